@@ -91,9 +91,20 @@ def test_a_knee_locks_in_an_engine_as_in_our_walk(engine):
     assert answer.end == pytest.approx(truth.samples.states[1], abs=2e-5)
 
 
-def test_our_law_in_an_engine_is_our_walk(engine):
+DRIVES = {
+    "nothing": (),
+    "a push-off": ("push_off.impulse_N_s=1",),
+    "all drives": (
+        "push_off.impulse_N_s=1", "push_off.duration_s=0.02", "walker.hip.spring_N_m_per_rad=2",
+        "walker.hip.damping_N_m_s_per_rad=0.05", "walker.hip.torque_N_m=0.3",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("drives", DRIVES)
+def test_our_law_in_an_engine_is_our_walk(engine, drives):
     """To the first touch and through it: of first order, by a factor that hangs on where in a step the touch falls."""
-    scene = compass()
+    scene = compass(*DRIVES[drives])
     until = 0.8
     truth = walked(scene, "radau5", 1e-10, 2, until).samples.states[1]
     errors = []

@@ -10,7 +10,9 @@ from walkerlab.benchmarks.engines.runs import pinned_model
 from walkerlab.errors import ConfigError
 from walkerlab.ground.friction import friction_coefficient
 from walkerlab.ground.walker import BENT, LOCKED
+from walkerlab.hybrid.contact_run import walk_contact
 from walkerlab.outcome import Outcome
+from walkerlab.solvers.registry import Tolerances
 
 
 @pytest.fixture(params=[(), ("contact.terrain=after-mid-swing",)], ids=["pads", "after-mid-swing"])
@@ -103,6 +105,36 @@ def test_a_knee_that_a_touch_releases_is_free_from_the_next_step_on():
     assert (before, after) == ((-1, -1), (-1, 4))
 
 
+def test_a_knee_that_a_push_holds_is_free_as_it_ends():
+    push = ("push_off.impulse_N_s=0.05", "push_off.duration_s=0.02")
+    for rule in ("touch", "compression"):
+        result, _, changes = knees_seen(kneed(*push, f"walker.knee={{release: {rule}}}"))
+        time_s, before, after = changes[1]
+        assert time_s - result.touch_time_s[0] == pytest.approx(0.02, abs=1.5e-4)
+        assert (before, after) == ((-1, -1), (-1, 4))
+
+
+DRIVEN = ("push_off.impulse_N_s=1", "walker.hip.spring_N_m_per_rad=2", "walker.hip.torque_N_m=0.3")
+
+
+def test_forces_of_drives_do_the_work_that_our_walk_gives():
+    """In the twentieth of a second after the first touch."""
+    scene = compass(*DRIVEN)
+    tight = Tolerances("radau5", 1e-9, 1e-11, 10**6)
+    result = walk_contact(scene.ours, scene.ground, False, scene.stance, scene.start, tight, 2, 1e-5)
+    samples = result.samples
+    rules = RuleFollower(scene, 2, *scene.from_base(scene.start), carries=False)
+    begin, end = (int(np.searchsorted(samples.time_s, result.touch_time_s[0] + late)) for late in (1e-4, 0.05))
+    rules.walk_state.feet[:2], rules.walk_state.times[0] = (0, 1), result.touch_time_s[0]
+    powers = []
+    for i in range(begin, end + 1):
+        q, v = scene.from_base(tuple(samples.states[i]))
+        powers.append(float(rules.forces(float(samples.time_s[i]), q, v) @ v))
+    elastic = 0.5 * scene.ours.whole.hip_stiffness * (samples.states[:, 3] - samples.states[:, 2]) ** 2
+    given = samples.driven_J[end].sum() - samples.driven_J[begin].sum() + elastic[begin] - elastic[end]
+    assert np.trapezoid(powers, samples.time_s[begin : end + 1]) == pytest.approx(given, rel=1e-5)
+
+
 def test_a_torso_and_a_stop_that_gives_are_refused_in_words():
     with pytest.raises(ConfigError, match="compliant stop"):
         kneed("walker.knee={lock: compliant}")
@@ -124,7 +156,7 @@ def test_forces_of_the_ground_do_the_work_that_the_feet_see(scene):
         q, v = scene.from_base(tuple(samples.states[i]))
         rules = RuleFollower(scene, 3, *scene.from_base(scene.start))
         rules.walk_state.has_ground[:] = samples.has_ground[i]
-        forces = rules.forces(q, v).copy()
+        forces = rules.forces(0.0, q, v).copy()
         law, friction = scene.ours.normal, scene.ours.friction
         power = 0.0
         for foot, (_, height, slip, vertical_velocity) in enumerate(rules.feet(q, v)):

@@ -1,4 +1,4 @@
-"""The ground's forces for a program that integrates the walker itself, in that program's own coordinates.
+"""The forces of ground and drives for a program that integrates the walker itself, in that program's own coordinates.
 
 Coordinates: where a point of the base body is, along the slope and over it (m), then one angle a link, each measured
 from the link that it is hinged to (rad); the base's from the slope's normal. Forces are generalised in the same order.
@@ -6,7 +6,9 @@ from the link that it is hinged to (rad); the base's from the slope's normal. Fo
 
 from typing import Any
 
+from walkerlab.ground.hip import add_hip_torque
 from walkerlab.ground.motion import ground_wrench
+from walkerlab.ground.pulse import add_pulse
 from walkerlab.ground.walker import OF_BODIES, OF_STATES, OnGround, foot_motion, sines_cosines
 from walkerlab.kernels import inlined, kernel, vector
 
@@ -25,11 +27,14 @@ def absolute_state(slope: float, chain: Any, q: Any, v: Any, y: Any) -> None:
 
 
 @kernel
-def feet_and_forces(system: OnGround, chain: Any, q: Any, v: Any, feet: Any, forces: Any) -> None:
-    """How both feet move into feet (2, 4) and, unless that is empty, the ground's forces into forces (2 + links).
+def feet_and_forces(system: OnGround, chain: Any, t: float, q: Any, v: Any, feet: Any, forces: Any) -> None:
+    """How both feet move into feet (2, 4) and, unless that is empty, the forces on the walker into forces (2 + links).
 
-    system  with all bodies, its feet's levers from the base's point
+    They are the ground's, of a torque between the legs, and of a push-off.
+
+    system  with all bodies, its levers of feet and hip from the base's point
     chain   (n, links) which joints lie between the base and each body; bodies that move as one share theirs
+    t       s
     q, v    (2 + links) coordinates and velocities of the other program
     feet    along (m), height (m), slip (m/s), velocity of the height (m/s)
     """
@@ -45,7 +50,8 @@ def feet_and_forces(system: OnGround, chain: Any, q: Any, v: Any, feet: Any, for
         return
     for k in range(chain.shape[0]):
         torques[k] = 0.0
-    forces[0], forces[1] = 0.0, 0.0
+    forces[0], forces[1] = add_pulse(system, t, s, c, torques)
+    add_hip_torque(system, y, torques)
     for foot in range(2):
         if system.has_ground[foot] != 0:
             push = ground_wrench(system, foot, s, c, y, torques)

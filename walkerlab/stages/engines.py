@@ -16,9 +16,8 @@ from walkerlab.benchmarks.engines.process import OwnProcess
 from walkerlab.benchmarks.engines.registry import ENGINES, EXTRA, Engine, installed
 from walkerlab.benchmarks.engines.rows import OURS, OWN_LAW, SAME_LAW, EngineRow, SwingRow, TuningRow
 from walkerlab.benchmarks.engines.scenes import EngineScene, scenes
-from walkerlab.config.drives import drives_of
 from walkerlab.config.reads import SceneConfig
-from walkerlab.errors import ConfigError, NoAnswer
+from walkerlab.errors import NoAnswer
 from walkerlab.labels import labels_of
 from walkerlab.pipeline.progress import Progress
 from walkerlab.stages.accuracy import environment, hinge_left_out, plain_power
@@ -48,8 +47,6 @@ class EngineFindings:
 
 def run(config: SceneConfig, inputs: Mapping[str, Content], progress: Progress, jobs: int = 1) -> Content:
     """Measure every engine that is installed on every scene, `jobs` of them at a time; raises NoAnswer if none is."""
-    if drives := drives_of(config):
-        raise ConfigError(f"engines walk passive walkers, and this one has {' and '.join(drives)}", "Leave them out.")
     engines = installed()
     found = EngineFindings(left_out=[*not_installed(), *hinge_left_out(config, "engines")])
     if not engines:

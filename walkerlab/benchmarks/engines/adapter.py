@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from walkerlab.benchmarks.engines.planar import PlanarModel
 
 Floats = NDArray[np.float64]
-Forces = Callable[[Floats, Floats], Floats]
-"""Generalised forces from coordinates and velocities; the result is overwritten by the next call."""
+Forces = Callable[[float, Floats, Floats], Floats]
+"""Generalised forces from time, coordinates and velocities; the result is overwritten by the next call."""
 
 
 @dataclass(frozen=True)
@@ -63,10 +63,6 @@ class OwnContact:
     settings: Mapping[str, float]
 
 
-Law = Forces | OwnContact | None
-"""Where the forces of the ground come from: a function, the engine's own contact, or no ground at all."""
-
-
 OnStep = Callable[[float, Floats, Floats], bool]
 """Told time (s), coordinates and velocities at the end of every step of an engine; whether to go on."""
 
@@ -88,16 +84,26 @@ class Stepping:
 class Simulation(ABC):
     """A model in its start state."""
 
-    def __init__(self, model: PlanarModel, stepping: Stepping, q: Floats, v: Floats, law: Law) -> None:
-        """The model at coordinates q (of the root's freedoms, then of the hinges; m, rad) with velocities v."""
-        self.stepping = stepping
-        self.own = law if isinstance(law, OwnContact) else None
-        self.forces = None if isinstance(law, OwnContact) else law
+    def __init__(
+        self,
+        model: PlanarModel,
+        stepping: Stepping,
+        q: Floats,
+        v: Floats,
+        forces: Forces | None = None,
+        own: OwnContact | None = None,
+    ) -> None:
+        """The model at coordinates q (of the root's freedoms, then of the hinges; m, rad) with velocities v.
+
+        forces  on the walker from outside the engine
+        own     the engine's own contact with the ground
+        """
+        self.stepping, self.forces, self.own = stepping, forces, own
         self.build(model, q, v)
 
     @abstractmethod
     def build(self, model: PlanarModel, q: Floats, v: Floats) -> None:
-        """Build the model in the engine, with its own contact or under the forces of our law."""
+        """Build the model in the engine, with its own contact if it has one, under the forces if there are any."""
 
     @abstractmethod
     def run(self, steps: int, until_s: float, on_step: OnStep) -> None:

@@ -234,7 +234,7 @@ def apply(builder: Any, plant: Any, forces: adapter.Forces, place: Any) -> None:
 
         def _calculate(self, context: Any, output: Any) -> None:
             state = self.get_input_port(0).Eval(context)
-            result[place] = forces(state[place], state[rates])
+            result[place] = forces(context.get_time(), state[place], state[rates])
             output.SetFromVector(result)
 
     ground = builder.AddSystem(Ground())

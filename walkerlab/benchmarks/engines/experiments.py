@@ -19,7 +19,7 @@ from walkerlab.benchmarks.engines.scenes import EngineScene
 from walkerlab.ground.energy import kinetic_energy, potential_energy
 from walkerlab.ground.friction import friction_coefficient
 from walkerlab.ground.resting import resting_foot
-from walkerlab.ground.walker import folded, on_ground, unfolded
+from walkerlab.ground.walker import changed_forms, folded, on_ground, unfolded
 from walkerlab.hybrid.contact_run import ContactWalkResult, knees_at_start, walk_contact
 from walkerlab.outcome import Outcome
 from walkerlab.solvers.registry import Tolerances
@@ -277,7 +277,7 @@ def adams_rows(scene: EngineScene, version: str) -> Iterator[EngineRow]:
 
 
 def swing_rows(engine: Engine, scene: EngineScene, process: OwnProcess) -> tuple[list[SwingRow], list[TaskLost]]:
-    """The hinged walker's swing over step sizes, by each of an engine's integrators."""
+    """The hinged walker's swing, without drives, over step sizes, by each of an engine's integrators."""
     model = runs.pinned_model(scene)
     n = len(model.chain)
     start = np.array((*scene.start[2 : 2 + n], *scene.start[4 + n :]))
@@ -306,8 +306,9 @@ def swing_truth(scene: EngineScene, start: Floats, until_s: float = SWING_S) -> 
     from scipy.integrate import solve_ivp
 
     knee = knees_at_start(scene.ours, scene.stance, scene.start)
-    system = on_ground(scene.ours, (False, False), knee, hinged=True)
-    whole = scene.ours.forms[1, 0]
+    passive = changed_forms(scene.ours, driven_hip=False, push_off=0.0, hip_stiffness=0.0)
+    system = on_ground(passive, (False, False), knee, hinged=True)
+    whole = passive.forms[1, 0]
 
     def rate(t: float, y: Floats) -> Any:
         f = np.zeros(y.size)

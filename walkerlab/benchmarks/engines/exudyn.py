@@ -131,9 +131,9 @@ def assembled(system: Any, model: PlanarModel, node: Any, forces: adapter.Forces
             inertias.append(link.inertia_kg_m2 * NO_ROTATION if last else 0.0 * NO_ROTATION)
         places.append(len(joints) - 1)
 
-    def ground(_system: Any, _time_s: float, _item: Any, q: Any, v: Any) -> Any:
+    def applied(_system: Any, time_s: float, _item: Any, q: Any, v: Any) -> Any:
         assert forces is not None, "it is only called with a law"
-        return forces(np.asarray(q), np.asarray(v)).tolist()
+        return forces(time_s, np.asarray(q), np.asarray(v)).tolist()
 
     tree = ObjectKinematicTree(
         nodeNumber=node,
@@ -145,7 +145,7 @@ def assembled(system: Any, model: PlanarModel, node: Any, forces: adapter.Forces
         linkCOMs=exu.Vector3DList(centres),
         linkMasses=masses,
         gravity=[model.gravity_along, -model.gravity_down, 0.0],
-        forceUserFunction=0 if forces is None else ground,
+        forceUserFunction=0 if forces is None else applied,
     )
     return system.AddObject(tree), places
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from walkerlab.benchmarks.engines.scenes import EngineScene
 from walkerlab.ground.external import feet_and_forces
 from walkerlab.ground.knees import FLEXED, lock
+from walkerlab.ground.pulse import pulse_left
 from walkerlab.ground.terrain import cell_at, cell_edges, has_ground_in_cell
 from walkerlab.ground.walker import BENT, LOCKED, RELEASED, FootMotion, locked_knees, on_ground
 from walkerlab.hybrid import contact_events, contact_rules
@@ -46,9 +47,13 @@ class RuleFollower:
     watches     whether knees are watched
     """
 
-    def __init__(self, scene: EngineScene, steps: int, q: Floats, v: Floats) -> None:
-        """At the start of a walk of at most `steps` steps, both feet on the ground."""
+    def __init__(self, scene: EngineScene, steps: int, q: Floats, v: Floats, *, carries: bool = True) -> None:
+        """At the start of a walk of at most `steps` steps, both feet on the ground.
+
+        carries  whether the ground's forces are ours; else the engine has its own, and only drives are
+        """
         self.walk_state = new_walk_state(scene.ours, scene.ground.terrain, scene.stance, steps, scene.start)
+        self._ground = self.walk_state.has_ground if carries else np.zeros(2, np.int8)
         self.time_s = self.grounded_s = 0.0
         self.outcome: Outcome | None = None
         self.turn: Turn | None = None
@@ -62,24 +67,25 @@ class RuleFollower:
 
     def _see(self, scene: EngineScene, q: Floats, v: Floats) -> None:
         """Look at a scene's model in a state, by the compiled function with what stays the same in its calls."""
-        size = scene.model.size
-        # the array of grounds is the walk state's own and changes with it
-        self.scene, self._fixed = scene, (on_ground(scene.walker, self.walk_state.has_ground), scene.chain)
+        size, state = scene.model.size, self.walk_state
+        # these arrays are the walk state's own and change with it
+        system = on_ground(scene.walker, self._ground, feet=state.feet, times=state.times)
+        self.scene, self._fixed = scene, (system, scene.chain)
         self._motion, self._forces, self._none = np.zeros((2, 4)), np.zeros(size), np.zeros(0)
         self._call = entry_point(
-            feet_and_forces, *self._fixed, np.zeros(size), np.zeros(size), self._motion, self._forces
+            feet_and_forces, *self._fixed, 0.0, np.zeros(size), np.zeros(size), self._motion, self._forces
         )
         self._feet, self._bends = self.feet(q, v), self._bends_in(q, v)
 
     def feet(self, q: Floats, v: Floats) -> Feet:
         """How the feet move; coordinates and velocities are contiguous arrays."""
-        self._call(*self._fixed, q, v, self._motion, self._none)
+        self._call(*self._fixed, 0.0, q, v, self._motion, self._none)
         first, second = self._motion.tolist()
         return FootMotion(*first), FootMotion(*second)
 
-    def forces(self, q: Floats, v: Floats) -> Floats:
-        """The generalised forces of the ground, in memory that the next call overwrites."""
-        self._call(*self._fixed, q, v, self._motion, self._forces)
+    def forces(self, time_s: float, q: Floats, v: Floats) -> Floats:
+        """The generalised forces on the walker, in memory that the next call overwrites."""
+        self._call(*self._fixed, time_s, q, v, self._motion, self._forces)
         return self._forces
 
     def _bends_in(self, q: Floats, v: Floats) -> list[tuple[float, float]]:
@@ -154,7 +160,13 @@ class RuleFollower:
         """The first knee to lock or to be released within a step of h (s), if there is one."""
         walk_state, found = self.walk_state, []
         stance = walk_state.feet[contact_events.STANCE]
-        if walk_state.releasing[0] and now[stance].vertical_velocity >= 0.0:
+        pushing_s = pulse_left(self._fixed[0], self.time_s)
+        if walk_state.releasing[0] == contact_rules.OWED:
+            if pushing_s <= h:
+                found.append(Turn(pushing_s / h, contact_events.PULSE_END))
+        elif walk_state.releasing[0] and now[stance].vertical_velocity >= 0.0 and pushing_s > h:
+            walk_state.releasing[0] = contact_rules.OWED
+        elif walk_state.releasing[0] and now[stance].vertical_velocity >= 0.0:
             sinking = max(0.0, -self._feet[stance].vertical_velocity)
             share = sinking / (sinking + now[stance].vertical_velocity) if sinking > 0.0 else 0.0
             found.append(Turn(share, int(stance) * contact_events.PER_FOOT + contact_events.VERTICAL_VELOCITY))
@@ -176,7 +188,7 @@ class RuleFollower:
         Returns coordinates and velocities of the walker from there on, with its knees as they are now.
         """
         walker, walk_state, y = self.scene.ours, self.walk_state, self.scene.about_centre(q, v)
-        if self.turn is not None and self.turn.event >= contact_events.EXTENSION:
+        if self.turn is not None and contact_events.EXTENSION <= self.turn.event < contact_events.PULSE_END:
             contact_rules.knee_stops(walker.stop, walk_state, self.turn.event, self.time_s)
             y = lock(walker.whole, walker.forms[0, locked_knees(walk_state.knee)], y).state
         elif self.turn is not None:

@@ -80,7 +80,7 @@ def applied(forces: adapter.Forces, data: Any) -> Any:
     q, v, passive_forces = data.qpos, data.qvel, data.qfrc_passive
 
     def passive(_model: Any, _data: Any) -> None:
-        passive_forces[:] = forces(q, v)
+        passive_forces[:] = forces(data.time, q, v)
 
     return passive
 

@@ -84,7 +84,7 @@ class EngineWalk:
         """At the start."""
         self.task, self.adapter = task, ENGINES[task.engine].adapter()
         self.q, self.v = task.scene.from_base(task.scene.start)
-        self.rules = RuleFollower(task.scene, task.touches, self.q, self.v)
+        self.rules = RuleFollower(task.scene, task.touches, self.q, self.v, carries=task.own is None)
         self.steps, self.time_s, self.wall_s = 0, 0.0, 0.0
 
     @property
@@ -112,9 +112,13 @@ class EngineWalk:
         stepping = task.stepping
         if not self.adapter.INTEGRATORS[stepping.integrator].adapts:
             stepping = replace(stepping, step_s=span / math.ceil((1.0 - ROUNDING) * span / stepping.step_s))
-        law = rules.forces if task.own is None else task.own
-        engine = self.adapter.EngineRun(rules.scene.model, stepping, self.q, self.v, law)
         since = self.time_s
+
+        def forces(time_s: float, q: Floats, v: Floats) -> Floats:
+            return rules.forces(since + time_s, q, v)
+
+        outside = forces if task.own is None or task.scene.is_driven else None
+        engine = self.adapter.EngineRun(rules.scene.model, stepping, self.q, self.v, outside, task.own)
 
         def hand_over_ground() -> None:
             for foot in range(2):
@@ -162,7 +166,7 @@ class SwingTask:
         chain = self.model.chain
         absolute = np.column_stack((self.start[: len(chain)] + self.slope, self.start[len(chain) :]))
         q, v = np.linalg.lstsq(chain, absolute, rcond=None)[0].T
-        engine = ENGINES[self.engine].adapter().EngineRun(self.model, self.stepping, q, v, None)
+        engine = ENGINES[self.engine].adapter().EngineRun(self.model, self.stepping, q, v)
         begun = time.process_time()
         motion = recorded(engine, self.most, self.until_s)
         wall = time.process_time() - begun
@@ -250,7 +254,7 @@ class Bench:
         model = planar.PlanarModel((link,), planar.UPRIGHT, (ball,), along * target.gravity, target.gravity, np.eye(1))
         name = adapter.CONTACTS[self.own.model]
         stepping = Stepping(name, h, ROUNDING if adapter.INTEGRATORS[name].adapts else None)
-        engine = adapter.EngineRun(model, stepping, np.array((0.0, -depth)), np.array(velocity), self.own)
+        engine = adapter.EngineRun(model, stepping, np.array((0.0, -depth)), np.array(velocity), own=self.own)
         engine.carry(0, True)
         return recorded(engine, MANY, max(2, round(time_s / h)) * h)
 

@@ -36,7 +36,7 @@ class EngineScene:
     base      the body that the engine's tree hangs from
     hip       its point that does
     ours      the walker as this project walks it
-    walker    the same with its feet's levers from the base's point
+    walker    the same with its levers of feet and hip from the base's point, which is the hip
     ground    terrain, and the measures that a walk is judged by
     stance    the first stance foot
     start     state of the free walker on the gait
@@ -60,6 +60,11 @@ class EngineScene:
         """What an engine builds."""
         base = self.base, self.hip
         return planar_model(self.assembly, base, FLOATING, self.gravity, self.ours.slope, self.locked)
+
+    @property
+    def is_driven(self) -> bool:
+        """Whether anything acts on the walker but gravity and the ground."""
+        return bool(self.ours.driven or self.ours.whole.driven_hip)
 
     @property
     def chain(self) -> Floats:
@@ -136,7 +141,7 @@ def scenes(config: ContactConfig, rigid_step_length_m: float | None, rigid_state
     d = np.zeros((2, MAX_BODIES, 2))
     for foot, part in enumerate(assembly.feet):
         d[foot, : len(assembly.bodies)] = levers(assembly, Anchor(base, hip), Anchor(part.body, part.centre_m))
-    walker = changed_forms(scene.walker, foot_x=d[..., 0], foot_y=d[..., 1])
+    walker = changed_forms(scene.walker, foot_x=d[..., 0], foot_y=d[..., 1], hip_x=0.0, hip_y=0.0)
     name, parts = "kneed" if assembly.knees else "compass", (assembly, base, hip, config.gravity_m_s2)
     free = EngineScene(name, *parts, scene.walker, walker, scene.ground, STANCE_FOOT, start)
     return (free.with_knees_locked(knees_at_start(scene.walker, STANCE_FOOT, start)),)
