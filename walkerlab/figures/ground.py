@@ -7,9 +7,10 @@ from matplotlib.artist import Artist
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
+from walkerlab.account import KNEE_STRIKES, LOSSES, SAMPLED
 from walkerlab.figures.canvas import add_legend, blank, entry
 from walkerlab.figures.illustration import Drawn, Illustration, Need, Results
-from walkerlab.figures.style import BLACK, BLUE, CONTACT, GREEN, GREY, LEGS, ORANGE, PURPLE
+from walkerlab.figures.style import BLACK, CONTACT, GREY, LEGS
 from walkerlab.figures.walks import (
     CONTACT_STAGE,
     NO_ENERGIES,
@@ -24,12 +25,8 @@ from walkerlab.figures.walks import (
 NORMAL, FRICTION = "normal_force_N", "friction_force_N"
 FORCES = Need(CONTACT_STAGE, TRAJECTORY, (NORMAL, FRICTION), "'forces' is not among the config's outputs")
 TOTAL: Final = "total_energy_J"
-LOST: Final = {
-    "dissipated_damping_J": ("damping of the ground", BLUE),
-    "dissipated_friction_J": ("friction", ORANGE),
-    "lost_at_edges_J": ("edges of pads", GREEN),
-}
-KNEES: Final = ("knees", PURPLE)
+LOST: Final = {loss.variable: (loss.cause, loss.colour) for loss in SAMPLED.values()}
+KNEES: Final = (LOSSES[KNEE_STRIKES].cause, LOSSES[KNEE_STRIKES].colour)
 ENERGY = Need(CONTACT_STAGE, TRAJECTORY, (*LOST, TOTAL), NO_ENERGIES)
 STRIDES, STEPS = 2, 40
 """That are shown: of forces, so that impacts are told apart, and of energies."""

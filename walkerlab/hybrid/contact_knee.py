@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from walkerlab.account import KNEE_STOP, KNEE_STRIKES
 from walkerlab.ground.knees import knee_energy, lock
 from walkerlab.ground.motion import motion_gradient
 from walkerlab.ground.walker import (
@@ -18,7 +19,7 @@ from walkerlab.ground.walker import (
     unfolded,
 )
 from walkerlab.hybrid.contact_events import EXTENSION, EXTENSION_RATE, HEIGHT, PER_FOOT, PULSE_END
-from walkerlab.hybrid.contact_observer import KNEE_STOP, KNEE_STRIKES, ContactObserver
+from walkerlab.hybrid.contact_observer import SO_FAR, ContactObserver
 from walkerlab.kernels import vector
 from walkerlab.mechanics.tree import projections
 from walkerlab.solvers.scipy_methods import right_hand_side
@@ -48,12 +49,12 @@ def change_form(
         before = before._replace(feet=1 - after.feet)
     if EXTENSION <= event < PULSE_END:
         new, lost, reset = lock(whole, after.form, x)
-        observer.dissipated[KNEE_STRIKES] += lost
+        observer.account[SO_FAR, KNEE_STRIKES] += lost
         if event >= EXTENSION_RATE:
             stopping = before.knee.copy()
             stopping[(event - EXTENSION) % 2] = STOPPING
             before = before._replace(knee=stopping)
-            observer.dissipated[KNEE_STOP] += knee_energy(before, y)
+            observer.account[SO_FAR, KNEE_STOP] += knee_energy(before, y)
     z = folded(after.form, new)
     Phi = observer.tangent.Phi
     if Phi.shape[1] > 0:

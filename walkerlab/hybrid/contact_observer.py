@@ -4,6 +4,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from walkerlab.account import DAMPING, EDGES, ENTRIES, FORWARD, FRICTION, HIP, KNEE_STOP, PUSH_OFF
 from walkerlab.ground.energy import dissipated_power, foot_elastic_energy, push_power, total_energy
 from walkerlab.ground.hip import hip_power
 from walkerlab.ground.knees import knee_power
@@ -15,19 +16,13 @@ from walkerlab.solvers.events import RISING, CrossingFinder, first_crossing
 from walkerlab.solvers.scipy_methods import ScipyMethod
 from walkerlab.solvers.stepping import T_OLD, T, interpolate
 
-# indices into `dissipated`
-DAMPING, FRICTION, EDGES, KNEE_STRIKES, KNEE_STOP, CHANNEL_COUNT = 0, 1, 2, 3, 4, 5
-# indices into `work`: rows, and what drives the walker; the last is what of the torque's work is positive
+# rows of `account`
 SO_FAR, AT_TOUCH = 0, 1
-PUSH_OFF, HIP, FORWARD = 0, 1, 2
 # indices into `extremes`
 MAX_PENETRATION, RESIDUAL, START_ENERGY, AT_HAND = 0, 1, 2, 3
 # the start of a step and the nodes of the Radau quadrature on it, with its weights: exact to the order of that method
 NODES = (0.0, 0.15505102572168219, 0.6449489742783178, 1.0)
 WEIGHTS = (0.0, 0.37640306270046725, 0.5124858261884216, 0.1111111111111111)
-
-
-Works = tuple[float, float, float, float, float, float]
 
 
 @by_reference
@@ -41,11 +36,9 @@ class ContactObserver(NamedTuple):
     stance: Any  # (samples,)
     knees: Any  # (samples, 2) what each knee is doing
     level: Any  # (samples, 2) m, height of the ground for each foot
-    sampled_dissipation: Any  # (samples, 5) J dissipated so far, by channel
-    sampled_work: Any  # (samples, 2) J given so far by push-off and hip
+    sampled_account: Any  # (samples, entries) J
     recorded: Any  # (1,)
-    dissipated: Any  # (5,) J dissipated so far
-    work: Any  # (2, 3) J that push-off and hip have given so far, and until the last step's touch
+    account: Any  # (2, entries) J so far, and until the last step's touch
     # (4,) deepest penetration m, largest residual of the energy balance J, energy at the start J: its potential from a
     # fixed origin, and from the slope below
     extremes: Any
@@ -59,7 +52,7 @@ def observe(
     """Take note of the last step, which stands and whose event functions are sampled."""
     record_samples(observer, method, system, walk_state)
     if observer.track_energy:
-        add_dissipation(observer, method, system)
+        balance(observer, method, system)
         for foot in range(2):
             if system.has_ground[foot] != 0:
                 note_depth(observer, method, system, finder, foot)
@@ -77,14 +70,9 @@ def record_samples(observer: ContactObserver, method: Any, system: OnGround, wal
         fraction = (observer.times[index] - t) / h
         interpolate(method, system, fraction, y)
         store_whole(system.form, y, observer.states[index])
-        damping, friction, stops, hip, _, push = work_until(method, system, fraction)
-        for channel in range(CHANNEL_COUNT):
-            observer.sampled_dissipation[index, channel] = observer.dissipated[channel]
-        observer.sampled_dissipation[index, DAMPING] += damping
-        observer.sampled_dissipation[index, FRICTION] += friction
-        observer.sampled_dissipation[index, KNEE_STOP] += stops
-        observer.sampled_work[index, PUSH_OFF] = observer.work[SO_FAR, PUSH_OFF] + push
-        observer.sampled_work[index, HIP] = observer.work[SO_FAR, HIP] + hip
+        for entry in range(ENTRIES):
+            observer.sampled_account[index, entry] = observer.account[SO_FAR, entry]
+        add_work_until(method, system, fraction, observer.sampled_account[index])
         for k in range(2):
             observer.knees[index, k] = walk_state.knee[k]
             observer.has_ground[index, k] = walk_state.has_ground[k]
@@ -95,19 +83,13 @@ def record_samples(observer: ContactObserver, method: Any, system: OnGround, wal
 
 
 @inlined
-def add_dissipation(observer: ContactObserver, method: Any, system: OnGround) -> None:
-    """What the last step dissipated, and how well the energy balances at its end."""
-    damping, friction, stops, hip, forward, push = work_until(method, system, 1.0)
-    work = observer.work[SO_FAR]
-    work[HIP] += hip
-    work[PUSH_OFF] += push
-    work[FORWARD] += forward
-    observer.dissipated[DAMPING] += damping
-    observer.dissipated[FRICTION] += friction
-    observer.dissipated[KNEE_STOP] += stops
-    lost = -work[PUSH_OFF] - work[HIP]
-    for channel in range(CHANNEL_COUNT):
-        lost += observer.dissipated[channel]
+def balance(observer: ContactObserver, method: Any, system: OnGround) -> None:
+    """What the last step took and gave, and how well the energy balances at its end."""
+    account = observer.account[SO_FAR]
+    add_work_until(method, system, 1.0, account)
+    lost = -account[PUSH_OFF] - account[HIP]
+    for entry in range(PUSH_OFF):
+        lost += account[entry]
     residual = end_energy(method, system) + lost - observer.extremes[START_ENERGY]
     observer.extremes[RESIDUAL] = max(observer.extremes[RESIDUAL], abs(residual))
 
@@ -115,8 +97,8 @@ def add_dissipation(observer: ContactObserver, method: Any, system: OnGround) ->
 @inlined
 def note_work(observer: ContactObserver) -> None:
     """A step has ended: what was given until now belongs to steps that were taken."""
-    for i in range(observer.work.shape[1]):
-        observer.work[AT_TOUCH, i] = observer.work[SO_FAR, i]
+    for entry in range(ENTRIES):
+        observer.account[AT_TOUCH, entry] = observer.account[SO_FAR, entry]
 
 
 @inlined
@@ -136,7 +118,7 @@ def note_depth(observer: ContactObserver, method: Any, system: OnGround, finder:
 def observe_edge(observer: ContactObserver, system: OnGround, foot: int, y: Any) -> None:
     """A foot left its pad: the spring under it is gone, and what it held with it."""
     if system.has_ground[foot] != 0 and observer.track_energy:
-        observer.dissipated[EDGES] += foot_elastic_energy(system, foot, y)
+        observer.account[SO_FAR, EDGES] += foot_elastic_energy(system, foot, y)
 
 
 @by_type_or_default
@@ -146,36 +128,31 @@ def end_energy(method: Any, system: OnGround) -> float:
 
 
 @by_type_or_default
-def work_until(method: Any, system: OnGround, fraction: float) -> Works:
-    """Work (J) lost to damping, to friction and in the knees' stops in the first part of the last step.
-
-    Then what the hip gave, what of its torque's was positive, and what the push-off gave.
-    """
+def add_work_until(method: Any, system: OnGround, fraction: float, account: Any) -> None:
+    """Add to an account (entries,) what the first part of the last step took and gave (J)."""
     states = matrix(OF_STATES)
     for i in range(len(NODES)):
         interpolate(method, system, fraction * NODES[i], states[i, : method.y.size])
-    return lost_work(system, states, method.clock[T_OLD], fraction * (method.clock[T] - method.clock[T_OLD]))
+    add_work(system, states, method.clock[T_OLD], fraction * (method.clock[T] - method.clock[T_OLD]), account)
 
 
 @inlined
-def lost_work(system: OnGround, states: Any, begin: float, span: float) -> Works:
-    """`work_until` of a time `span` (s) from `begin` on, with the states at its NODES."""
-    damping, friction, stops = 0.0, 0.0, 0.0
+def add_work(system: OnGround, states: Any, begin: float, span: float, account: Any) -> None:
+    """The same of a time `span` (s) from `begin` on, with the states at its NODES."""
     for foot in range(2):
         if system.has_ground[foot] != 0:
-            lost = foot_work(system, states, foot, span)
-            damping += lost[0]
-            friction += lost[1]
-    if system.knee[0] == STOPPING or system.knee[1] == STOPPING:
-        for i in range(1, len(NODES)):
-            stops += span * WEIGHTS[i] * knee_power(system, states[i])
-    hip, forward, push = 0.0, 0.0, 0.0
+            damping, friction = foot_work(system, states, foot, span)
+            account[DAMPING] += damping
+            account[FRICTION] += friction
+    stopping = system.knee[0] == STOPPING or system.knee[1] == STOPPING
     for i in range(1, len(NODES)):
-        power = hip_power(system, states[i])
-        hip += span * WEIGHTS[i] * power[0]
-        forward += span * WEIGHTS[i] * power[1]
-        push += span * WEIGHTS[i] * push_power(system, begin + NODES[i] * span, states[i])
-    return damping, friction, stops, hip, forward, push
+        weight = span * WEIGHTS[i]
+        if stopping:
+            account[KNEE_STOP] += weight * knee_power(system, states[i])
+        hip, forward = hip_power(system, states[i])
+        account[HIP] += weight * hip
+        account[FORWARD] += weight * forward
+        account[PUSH_OFF] += weight * push_power(system, begin + NODES[i] * span, states[i])
 
 
 @inlined
@@ -203,9 +180,9 @@ def energy_of(system: OnGround, y: Any) -> float:
 
 
 @kernel
-def lost_work_of(system: OnGround, states: Any, begin: float, span: float) -> Works:
-    """As `lost_work`."""
-    return lost_work(system, states, begin, span)
+def add_work_of(system: OnGround, states: Any, begin: float, span: float, account: Any) -> None:
+    """As `add_work`."""
+    add_work(system, states, begin, span, account)
 
 
 @end_energy.case(ScipyMethod)
@@ -214,11 +191,8 @@ def end_energy_in_python(method: ScipyMethod, system: OnGround) -> float:
     return energy_of(system, method.y)
 
 
-@work_until.case(ScipyMethod)
-def work_in_python(method: ScipyMethod, system: OnGround, fraction: float) -> Works:
+@add_work_until.case(ScipyMethod)
+def add_work_in_python(method: ScipyMethod, system: OnGround, fraction: float, account: Any) -> None:
     """Likewise."""
     states, begin = method.states_at(fraction * np.array(NODES)), method.clock[T_OLD]
-    damping, friction, stops, hip, forward, push = lost_work_of(
-        system, states, begin, fraction * (method.clock[T] - begin)
-    )
-    return damping, friction, stops, hip, forward, push
+    add_work_of(system, states, begin, fraction * (method.clock[T] - begin), account)

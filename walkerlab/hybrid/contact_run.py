@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from walkerlab.account import ENTRIES, GIVEN, KNEE_STRIKES, LOSSES, LOST, PUSH_OFF
 from walkerlab.ground.energy import kinetic_energy, potential_energy, total_energy
 from walkerlab.ground.knees import FLEXED, extension
 from walkerlab.ground.terrain import Terrain, cell_at, has_ground_in_cell, is_uneven, starts_with_ground
@@ -47,7 +48,6 @@ from walkerlab.hybrid.contact_knee import change_form
 from walkerlab.hybrid.contact_observer import (
     AT_HAND,
     AT_TOUCH,
-    CHANNEL_COUNT,
     MAX_PENETRATION,
     RESIDUAL,
     SO_FAR,
@@ -65,8 +65,6 @@ from walkerlab.solvers.stepping import ACCEPTED, JACOBIANS, REJECTED, RHS, T
 from walkerlab.solvers.system import State
 
 Floats = NDArray[np.float64]
-CHANNELS = ("damping", "friction", "edges", "knee_strikes", "knee_stop")
-OF_STRAIGHT_LEGS = 3  # channels
 
 ROUNDING = 1e-14  # of a start's coordinates and velocities
 USUAL_STEP = 3.0  # pendulum times that most steps are shorter than
@@ -129,7 +127,7 @@ class ContactSamples:
     stance: NDArray[np.int64]  # (samples,)
     knees: NDArray[np.int8]  # (samples, 2) what each knee is doing
     level: Floats  # (samples, 2) m, height over the slope of the ground for each foot
-    dissipated_J: Floats  # (samples, 5) by damping, by friction, at edges, at knees' strikes, in their stops
+    dissipated_J: Floats  # (samples, 5) in the order of account.LOSSES
     driven_J: Floats  # (samples, 2) given by push-off and hip
 
 
@@ -264,11 +262,9 @@ def new_observer(
         np.zeros(samples, np.int64),
         np.zeros((samples, 2), np.int8),
         np.zeros((samples, 2)),
-        np.zeros((samples, CHANNEL_COUNT)),
-        np.zeros((samples, 2)),
+        np.zeros((samples, ENTRIES)),
         np.zeros(1, np.int64),
-        np.zeros(CHANNEL_COUNT),
-        np.zeros((2, 3)),
+        np.zeros((2, ENTRIES)),
         extremes,
         new_tangent(walker.size, directions),
     )
@@ -390,8 +386,8 @@ def run_parts(
 
 def by_channel(walker: ContactWalker, dissipated: Floats) -> dict[str, float]:
     """What was dissipated (J), by name; the knees' channels only where there are knees."""
-    count = len(CHANNELS) if walker.kneed else OF_STRAIGHT_LEGS
-    return dict(zip(CHANNELS[:count], dissipated[:count].tolist(), strict=True))
+    pairs = zip(LOSSES, dissipated.tolist(), strict=True)
+    return {loss.key: joules for place, (loss, joules) in enumerate(pairs) if walker.kneed or place < KNEE_STRIKES}
 
 
 def release_hinge(walker: ContactWalker, walk_state: WalkState, y: State) -> None:
@@ -409,7 +405,7 @@ def explained_residual(observer: ContactObserver, tolerances: Tolerances) -> flo
     It is UNEXPLAINED times rtol times energy and work exchanged: the energy at the start, kinetic, elastic, and
     potential over the slope below, and all that has been dissipated since.
     """
-    exchanged = observer.extremes[AT_HAND] + np.abs(observer.dissipated).sum() + np.abs(observer.work[SO_FAR]).sum()
+    exchanged = observer.extremes[AT_HAND] + np.abs(observer.account[SO_FAR]).sum()
     return float(UNEXPLAINED * max(tolerances.rtol, FINEST) * exchanged)
 
 
@@ -425,7 +421,7 @@ def balanced(ended: int, observer: ContactObserver, tolerances: Tolerances) -> O
 def driven_work(walker: ContactWalker, along: float, up: float, observer: ContactObserver) -> DrivenWork:
     """What was given over the steps taken, which led so far along the slope and up (m)."""
     gravity = walker.mass * (walker.gravity_along * along - walker.gravity_down * up)
-    return DrivenWork(walker.mass * walker.gravity, gravity, *observer.work[AT_TOUCH].tolist())
+    return DrivenWork(walker.mass * walker.gravity, gravity, *observer.account[AT_TOUCH, PUSH_OFF:].tolist())
 
 
 def gather(
@@ -447,8 +443,8 @@ def gather(
             observer.stance[:seen],
             observer.knees[:seen],
             observer.level[:seen],
-            observer.sampled_dissipation[:seen],
-            observer.sampled_work[:seen],
+            observer.sampled_account[:seen, LOST],
+            observer.sampled_account[:seen, GIVEN],
         )
     strikes = walk_state.knee_strike[:done]
     along, up = (
@@ -469,7 +465,7 @@ def gather(
         max_penetration_m=float(observer.extremes[MAX_PENETRATION]),
         energy_balance_residual_J=float(observer.extremes[RESIDUAL]),
         explained_residual_J=explained_residual(observer, tolerances),
-        dissipated_J=observer.dissipated.copy(),
+        dissipated_J=observer.account[SO_FAR, LOST].copy(),
         driven=driven_work(walker, along, up, observer),
         samples=samples,
     )

@@ -21,6 +21,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from walkerlab.account import LOST
 from walkerlab.ground.knees import IdealLock
 from walkerlab.ground.terrain import (
     STANCE_FOOT,
@@ -34,7 +35,7 @@ from walkerlab.ground.walker import ContactWalker, OnGround, feet_motion, folded
 from walkerlab.hybrid.contact_events import HEIGHT as HEIGHT_OF_FOOT
 from walkerlab.hybrid.contact_events import PASSING, PER_FOOT, JudgedGround, WalkState, material_along
 from walkerlab.hybrid.contact_knee import rate_of
-from walkerlab.hybrid.contact_observer import ContactObserver
+from walkerlab.hybrid.contact_observer import SO_FAR, ContactObserver
 from walkerlab.hybrid.contact_run import Stopped, new_observer, new_walk_state, walk_on
 from walkerlab.mechanics.links import Counted, factor_linked, solve_linked
 from walkerlab.mechanics.tree import add_inertia
@@ -214,7 +215,7 @@ def step_from_section(
         float(walk_state.touch_time[0]),
         float(walk_state.slip[0] + slipped),
         float(walk_state.rolling[0] + rolled),
-        observer.dissipated.copy(),
+        observer.account[SO_FAR, LOST].copy(),
         float(lost),
         stopped.work,
         float(walk_state.touch_along[0] - foothold),

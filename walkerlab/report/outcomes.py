@@ -32,16 +32,6 @@ def tone(outcome: str) -> Tone:
     return "good" if outcome == WALKED else "bad"
 
 
-CHANNELS = {
-    "damping": "in the ground's damping",
-    "friction": "in friction",
-    "edges": "at pads' edges",
-    "knee_strikes": "in knee strikes",
-    "knee_stop": "in the knees' stops",
-}
-"""Where a contact walk dissipates energy, by the names under which it is stored."""
-
-
 USUAL = "a hundred times tighter tolerances"
 """What the second walk has, unless `by` says otherwise."""
 ERRORS = {

@@ -2,9 +2,10 @@
 
 from pathlib import Path
 
+from walkerlab.account import CHANNELS
 from walkerlab.prose import Prose, parts
 from walkerlab.report import numbers
-from walkerlab.report.outcomes import CHANNELS, ERRORS, USUAL, ends, off_by, walks
+from walkerlab.report.outcomes import ERRORS, USUAL, ends, off_by, walks
 from walkerlab.report.symbols import in_signs
 
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from walkerlab.account import SAMPLED
 from walkerlab.config.reads import ContactConfig, ContactSimConfig, GroundConfig
 from walkerlab.errors import NoAnswer
 from walkerlab.ground.compliant import hinge_of
@@ -236,9 +237,7 @@ def energy_variables(scene: ContactScene, samples: ContactSamples, foothold: Flo
         potential_J=potential - at_foothold,
         mechanical_J=total - at_foothold,
         total_energy_J=total,
-        dissipated_damping_J=lost[:, 0],
-        dissipated_friction_J=lost[:, 1],
-        lost_at_edges_J=lost[:, 2],
+        **{loss.variable: lost[:, place] for place, loss in SAMPLED.items()},
         **({"push_off_J": given[0], "hip_J": given[1]} if given.any() else {}),
         residual_J=total + lost.sum(axis=1) - given.sum(axis=0) - total[:1],
     )

@@ -11,6 +11,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from walkerlab.account import SAMPLED
 from walkerlab.config.reads import SceneConfig, SimulateConfig
 from walkerlab.errors import NoAnswer
 from walkerlab.hybrid.recorded_walk import as_state
@@ -63,9 +64,7 @@ OVER_TIME: Final = {
     "potential_J": Label("J", "potential energy, zero at the step's foothold"),
     "mechanical_J": Label("J", "kinetic, potential (zero at the step's foothold) and elastic energy"),
     "total_energy_J": Label("J", "kinetic, potential from a fixed origin, and elastic energy"),
-    "dissipated_damping_J": Label("J", "dissipated in normal direction so far"),
-    "dissipated_friction_J": Label("J", "dissipated in friction so far"),
-    "lost_at_edges_J": Label("J", "elastic energy lost at pads' edges so far"),
+    **{loss.variable: Label("J", loss.meaning) for loss in SAMPLED.values()},
     "push_off_J": Label("J", "given by the push-off so far"),
     "hip_J": Label("J", "given by torque and damper of the hip so far"),
     "residual_J": Label("J", "total energy plus what was lost less what was given, less the start's"),

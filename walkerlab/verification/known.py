@@ -14,6 +14,7 @@ from typing import Annotated, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from walkerlab.account import LOST
 from walkerlab.config.contact import Contact
 from walkerlab.ground.compliant import contact_walker
 from walkerlab.ground.friction import Coulomb
@@ -22,6 +23,7 @@ from walkerlab.ground.resting import resting_foot
 from walkerlab.ground.terrain import checkerboard
 from walkerlab.ground.walker import ContactWalker, one_foot_motion
 from walkerlab.hybrid.contact_events import LAST_TOUCH, Frame, JudgedGround
+from walkerlab.hybrid.contact_observer import SO_FAR
 from walkerlab.hybrid.contact_run import new_observer, new_walk_state, walk_on
 from walkerlab.hybrid.contact_walk import LONGEST_FLIGHT, LONGEST_STEP
 from walkerlab.labels import Label
@@ -94,7 +96,7 @@ def run_until(
         raise ArithmeticError(f"ended as {stopped.outcome.label} at {stopped.time_s:.4g} s of {duration_s:.4g} s")
     seen = int(observer.recorded[0])
     times, states = observer.times[:seen].copy(), observer.states[:seen].copy()
-    return ParticleRun(times, states, stopped.state, observer.dissipated.copy())
+    return ParticleRun(times, states, stopped.state, observer.account[SO_FAR, LOST].copy())
 
 
 @dataclass(frozen=True)

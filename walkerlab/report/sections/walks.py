@@ -4,9 +4,10 @@ from collections.abc import Mapping
 from itertools import zip_longest
 from typing import Any
 
+from walkerlab.account import CHANNELS
 from walkerlab.report.blocks import PageBlock, Paragraph, Section
 from walkerlab.report.numbers import NONE, decimals_left, fixed, length, number, power_of_ten, quantity, span, whole
-from walkerlab.report.outcomes import CHANNELS, CONTACT, MODELS, RIGID, tone
+from walkerlab.report.outcomes import CONTACT, MODELS, RIGID, tone
 from walkerlab.report.results import Results
 from walkerlab.report.tables import Cell, Column, table
 from walkerlab.report.words import words
