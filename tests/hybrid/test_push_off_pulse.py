@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from walkerlab.config.loader import load
-from walkerlab.ground.pulse import add_pulse, pulse_force
+from walkerlab.ground.motion import foot_wrench
+from walkerlab.ground.pulse import pulse_force
 from walkerlab.ground.walker import LOCKED, OF_BODIES, on_ground
 from walkerlab.orbits.contact_map import step_from_section
 from walkerlab.orbits.fixed_point import find_gaits
@@ -83,10 +84,10 @@ def test_the_force_acts_along_the_line_from_the_foot_to_the_hip_and_turns_nothin
     form, y = scene.walker.whole, np.array(start_state(scene, gait.state))
     n = int(form.bodies)
     s, c, r = np.sin(y[2 : 2 + n]), np.cos(y[2 : 2 + n]), np.zeros(len(OF_BODIES))
-    along, upward = add_pulse(system, 0.0025, s, c, r)
+    trailing = 0
+    along, upward = foot_wrench(system, 0.0025, trailing, s, c, y, r)
     hip_F = c * form.hip_x[:n] - s * form.hip_y[:n]
     hip_U = s * form.hip_x[:n] + c * form.hip_y[:n]
-    trailing = 0
     # moving the force to the hip changes the trailing leg's torque by nothing
     assert r[trailing] == pytest.approx(float(-along * hip_U[trailing] + upward * hip_F[trailing]), abs=1e-9)
     assert upward > 0.0

@@ -5,12 +5,13 @@ from typing import Any
 from walkerlab.ground.hip import hip_energy
 from walkerlab.ground.knees import knee_energy
 from walkerlab.ground.normal_force import elastic_energy
-from walkerlab.ground.pulse import pulse_power
+from walkerlab.ground.pulse import push_on
 from walkerlab.ground.walker import (
     OF_BODIES,
     Form,
     OnGround,
     foot_force,
+    foot_motion,
     half_size,
     one_foot_motion,
     over_ground,
@@ -67,9 +68,10 @@ def push_power(system: OnGround, t: float, y: Any) -> float:
     """Power (W) that the push-off gives."""
     if system.form.push_off == 0.0:
         return 0.0
-    s, c = vector(OF_BODIES), vector(OF_BODIES)
+    s, c, foot = vector(OF_BODIES), vector(OF_BODIES), 1 - system.feet[0]
     sines_cosines(system.form, y, s, c)
-    return pulse_power(system, t, s, c, one_foot_motion(system.form, 1 - system.feet[0], y))
+    push, motion = push_on(system, t, foot, s, c), foot_motion(system.form, foot, s, c, y)
+    return push.along * motion.slip + push.upward * motion.vertical_velocity
 
 
 @inlined

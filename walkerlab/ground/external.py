@@ -7,8 +7,7 @@ from the link that it is hinged to (rad); the base's from the slope's normal. Fo
 from typing import Any
 
 from walkerlab.ground.hip import add_hip_torque
-from walkerlab.ground.motion import ground_wrench
-from walkerlab.ground.pulse import add_pulse
+from walkerlab.ground.motion import foot_wrench
 from walkerlab.ground.walker import OF_BODIES, OF_STATES, OnGround, foot_motion, sines_cosines
 from walkerlab.kernels import inlined, kernel, vector
 
@@ -50,13 +49,12 @@ def feet_and_forces(system: OnGround, chain: Any, t: float, q: Any, v: Any, feet
         return
     for k in range(chain.shape[0]):
         torques[k] = 0.0
-    forces[0], forces[1] = add_pulse(system, t, s, c, torques)
-    add_hip_torque(system, y, torques)
+    forces[0], forces[1] = 0.0, 0.0
     for foot in range(2):
-        if system.has_ground[foot] != 0:
-            push = ground_wrench(system, foot, s, c, y, torques)
-            forces[0] += push[0]
-            forces[1] += push[1]
+        force = foot_wrench(system, t, foot, s, c, y, torques)
+        forces[0] += force[0]
+        forces[1] += force[1]
+    add_hip_torque(system, y, torques)
     for j in range(chain.shape[1]):
         total = 0.0
         for k in range(chain.shape[0]):

@@ -4,7 +4,7 @@ from typing import Any
 
 from walkerlab.ground.hip import add_hip_gradients, add_hip_torque
 from walkerlab.ground.knees import add_stop_gradients, add_stop_torques
-from walkerlab.ground.pulse import add_pulse, add_pulse_gradients
+from walkerlab.ground.pulse import push_gradient, push_on
 from walkerlab.ground.walker import (
     OF_BODIES,
     Form,
@@ -34,24 +34,30 @@ def coordinate_and_rate(system: OnGround) -> tuple[float, float]:
 
 
 @always_inline
-def ground_wrench(system: OnGround, foot: int, s: Any, c: Any, y: Any, r: Any) -> tuple[float, float]:
-    """Force along and normal to the slope (N) on a foot with ground; its torques (N m) are added to r (n,)."""
-    form = system.form
-    motion = over_ground(system, foot, foot_motion(form, foot, s, c, y))
-    if motion.height >= 0.0:
+def foot_wrench(system: OnGround, t: float, foot: int, s: Any, c: Any, y: Any, r: Any) -> tuple[float, float]:
+    """Force of ground and push-off on a foot, along and normal to the slope (N); adds its torques (N m) to r (n,)."""
+    form, push = system.form, push_on(system, t, foot, s, c)
+    along, normal = push.along, push.upward
+    if system.has_ground[foot] != 0:
+        motion = over_ground(system, foot, foot_motion(form, foot, s, c, y))
+        if motion.height < 0.0:
+            force = foot_force(system, motion)
+            along += force.along
+            normal += force.normal.force
+    if along == 0.0 and normal == 0.0:
         return 0.0, 0.0
-    force, F, U = foot_force(system, motion), vector(OF_BODIES), vector(OF_BODIES)
+    F, U = vector(OF_BODIES), vector(OF_BODIES)
     projections(form.foot_x[foot], form.foot_y[foot], form.bodies, s, c, F, U)
     for k in range(form.bodies):
-        r[k] += force.along * (form.rolling[foot, k] - U[k]) + force.normal.force * F[k]
-    return force.along, force.normal.force
+        r[k] += along * (form.rolling[foot, k] - U[k]) + normal * F[k]
+    return along, normal
 
 
 @always_inline
 def all_forces(system: OnGround, t: float, s: Any, c: Any, y: Any, M: Any, r: Any) -> tuple[float, float]:
     """Force of ground and push-off along and normal to the slope (N); M (n, n) and all torques (N m) into r (n,).
 
-    They are those of the ground, of the centrifugal terms, of the knees' stops, of the hip and, about a hinge, of
+    They are those of the feet, of the centrifugal terms, of the knees' stops, of the hip and, about a hinge, of
     gravity.
     """
     form = system.form
@@ -64,13 +70,9 @@ def all_forces(system: OnGround, t: float, s: Any, c: Any, y: Any, M: Any, r: An
         add_gravity(form, n, F, U, r)
     along, normal = 0.0, 0.0
     for foot in range(2):
-        if system.has_ground[foot] != 0:
-            push = ground_wrench(system, foot, s, c, y, r)
-            along += push[0]
-            normal += push[1]
-    pulse = add_pulse(system, t, s, c, r)
-    along += pulse[0]
-    normal += pulse[1]
+        force = foot_wrench(system, t, foot, s, c, y, r)
+        along += force[0]
+        normal += force[1]
     add_stop_torques(system, y, r)
     add_hip_torque(system, y, r)
     add_inertia(form, n, s, c, y[half + form.places : 2 * half], M, r)
@@ -117,27 +119,41 @@ def motion_gradient(form: Form, foot: int, F: Any, U: Any, y: Any, j: int) -> tu
 
 
 @inlined
-def add_ground_gradients(system: OnGround, foot: int, s: Any, c: Any, y: Any, J: Any) -> None:
+def add_foot_gradients(system: OnGround, t: float, foot: int, s: Any, c: Any, y: Any, J: Any) -> None:
     """Add the derivatives of a foot's force and torques to the acceleration rows of J, before masses divide them."""
-    form = system.form
+    form, push = system.form, push_on(system, t, foot, s, c)
     motion = over_ground(system, foot, foot_motion(form, foot, s, c, y))
-    if motion.height >= 0.0:
+    inside, pushed = system.has_ground[foot] != 0 and motion.height < 0.0, push.above != 0.0
+    if not inside and not pushed:
         return
-    force, F, U = foot_force(system, motion), vector(OF_BODIES), vector(OF_BODIES)
+    F, U, p, half = vector(OF_BODIES), vector(OF_BODIES), form.places, half_size(form)
     projections(form.foot_x[foot], form.foot_y[foot], form.bodies, s, c, F, U)
-    p, half = form.places, half_size(form)
+    along, normal = push.along, push.upward
+    if inside:
+        force = foot_force(system, motion)
+        along += force.along
+        normal += force.normal.force
+        for j in range(2 * half):
+            # how penetration, its rate and the slip change along coordinate or velocity j
+            deeper, deeper_rate, faster = motion_gradient(form, foot, F, U, y, j)
+            by_j = force.normal.by_penetration * deeper + force.normal.by_rate * deeper_rate
+            add_column(form, foot, j, force.coefficient * by_j + force.by_slip * faster, by_j, F, U, J)
     for k in range(form.bodies):
-        J[half + p + k, p + k] -= force.along * F[k] + force.normal.force * U[k]
-    for j in range(2 * half):
-        # how penetration, its rate and the slip change along coordinate or velocity j
-        deeper, deeper_rate, faster = motion_gradient(form, foot, F, U, y, j)
-        normal = force.normal.by_penetration * deeper + force.normal.by_rate * deeper_rate
-        along = force.coefficient * normal + force.by_slip * faster
-        if p > 0:
-            J[half, j] += along
-            J[half + 1, j] += normal
-        for k in range(form.bodies):
-            J[half + p + k, j] += along * (form.rolling[foot, k] - U[k]) + normal * F[k]
+        J[half + p + k, p + k] -= along * F[k] + normal * U[k]
+        if pushed:
+            by_angle = push_gradient(form, push, foot, s, c, k)
+            add_column(form, foot, p + k, by_angle[0], by_angle[1], F, U, J)
+
+
+@inlined
+def add_column(form: Form, foot: int, j: int, along: float, normal: float, F: Any, U: Any, J: Any) -> None:
+    """Add to column j of J what a force on a foot changes by, along and normal to the slope; and its torques."""
+    p, half = form.places, half_size(form)
+    if p > 0:
+        J[half, j] += along
+        J[half + 1, j] += normal
+    for k in range(form.bodies):
+        J[half + p + k, j] += along * (form.rolling[foot, k] - U[k]) + normal * F[k]
 
 
 @inlined
@@ -176,9 +192,7 @@ def on_ground_jacobian(system: OnGround, t: float, y: Any, J: Any) -> None:
         gathered(links, 0, by_torque[k])
         solve_linked(links, 0, M, by_torque[k])
     for foot in range(2):
-        if system.has_ground[foot] != 0:
-            add_ground_gradients(system, foot, s, c, y, J)
-    add_pulse_gradients(system, t, s, c, J)
+        add_foot_gradients(system, t, foot, s, c, y, J)
     add_torque_gradients(system, s, c, y, alpha, J[half + p :, p:half], J[half + p :, half + p :])
     for j in range(2 * half):
         for k in range(n):
