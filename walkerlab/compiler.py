@@ -53,10 +53,12 @@ IPythonCacheLocator = inner_part("numba.core.caching.IPythonCacheLocator", "from
 UserProvidedCacheLocator = inner_part(
     "numba.core.caching.UserProvidedCacheLocator", "from_function", "get_suitable_cache_subpath"
 )
+inner_part("numba.core.codegen.CPUCodegen", "_function_pass_manager")
 JITCodeLibrary = inner_part(
     "numba.core.codegen.JITCodeLibrary",
     "codegen",
     "get_pointer_to_function",
+    "_optimize_functions",
     "_ensure_finalized",
     "_optimize_final_module",
     "_finalize_final_module",
@@ -225,7 +227,7 @@ class QuickFlags(Flags):  # type: ignore[misc, valid-type]
 
 
 class KernelCompiler(Compiler):  # type: ignore[misc, valid-type]
-    """Numba's own compiler, with garbage collected seldom meanwhile."""
+    """Numba's own compiler, with garbage collected seldom meanwhile, and loops of few turns left as they are."""
 
     def __init__(self, *given: Any) -> None:
         """With what numba's own is given."""
@@ -238,8 +240,9 @@ class KernelCompiler(Compiler):  # type: ignore[misc, valid-type]
 
     def compile_extra(self, func: Any) -> Any:
         """The compiled function."""
-        usual = gc.get_threshold()
+        usual, vectorized = gc.get_threshold(), numba.config.LOOP_VECTORIZE
         gc.set_threshold(*SELDOM)
+        numba.config.LOOP_VECTORIZE = 0
         try:
             return super().compile_extra(func)
         except BaseException:  # whatever stops it goes on to the caller; the kernel's lock and name do not stay behind
@@ -249,6 +252,7 @@ class KernelCompiler(Compiler):  # type: ignore[misc, valid-type]
             raise
         finally:
             gc.set_threshold(*usual)
+            numba.config.LOOP_VECTORIZE = vectorized
 
 
 def with_what_is_needed(pipelines: list[Any]) -> list[Any]:
@@ -298,6 +302,13 @@ class _PartLibrary(JITCodeLibrary):  # type: ignore[misc, valid-type]
     def get_pointer_to_function(self, name: str) -> int:  # noqa: ARG002
         self._ensure_finalized()
         return 0
+
+    def _optimize_functions(self, module: Any) -> None:
+        """A first tidying is enough, since the kernel is optimised as a whole."""
+        module.data_layout = self._codegen._data_layout
+        manager, passes = self._codegen._function_pass_manager(opt=1)
+        for function in module.functions:
+            manager.run(function, passes)
 
     def _optimize_final_module(self) -> None:
         pass

@@ -30,13 +30,12 @@ from walkerlab.compiler import KernelCache, KernelCompiler, PartCompiler, absent
 FLAGS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"nsz"}, "_nrt": False}
 # parts of a kernel are never entered from outside
 PART_FLAGS: dict[str, Any] = {**FLAGS, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+if not absent:
+    PART_FLAGS["pipeline_class"] = PartCompiler
 # of what takes lanes: handing them on in memory costs as much as the work
 ALWAYS_INLINE_FLAGS: dict[str, Any] = {**PART_FLAGS, "forceinline": True}
 F = TypeVar("F", bound=Callable[..., Any])
 C = TypeVar("C", bound=type)
-
-if not absent:
-    PART_FLAGS["pipeline_class"] = PartCompiler
 
 
 def kernel(function: F) -> F:

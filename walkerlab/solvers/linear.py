@@ -2,7 +2,28 @@
 
 from typing import Any
 
-from walkerlab.kernels import inlined
+from numba import types
+
+from walkerlab.kernels import PART_FLAGS, compile_as, inlined
+
+
+def reciprocal(x: Any) -> Any:
+    """Of a real or complex number."""
+    return 1.0 / x
+
+
+def complex_reciprocal(x: Any) -> Any:
+    """The same to the last bit, by Smith's formulas as in Python; numba compiles a function for its division."""
+    if abs(x.real) >= abs(x.imag):
+        ratio = x.imag / x.real
+        whole = x.real + x.imag * ratio
+        return complex(1.0 / whole, -ratio / whole)
+    ratio = x.real / x.imag
+    whole = x.real * ratio + x.imag
+    return complex(ratio / whole, -1.0 / whole)
+
+
+compile_as(reciprocal, lambda x: (complex_reciprocal if isinstance(x, types.Complex) else reciprocal, PART_FLAGS))
 
 
 @inlined
@@ -28,7 +49,7 @@ def factor(A: Any, pivots: Any, n: int) -> bool:
         if best != k:
             for j in range(n):
                 A[k, j], A[best, j] = A[best, j], A[k, j]
-        A[k, k] = 1.0 / A[k, k]
+        A[k, k] = reciprocal(A[k, k])
         for i in range(k + 1, n):
             A[i, k] *= A[k, k]
             multiple = A[i, k]

@@ -64,7 +64,7 @@ def factor_matrices(method: Radau5, h: float) -> bool:
     left = int(method.control[UNKNOWNS])
     method.control[H_FACTORED] = h
     real = factor_shifted(method.J, left, GAMMA / h, method.real, method.pivots[0])
-    return real and factor_shifted(method.J, left, complex(ALPHA, -BETA) / h, method.pair, method.pivots[1])
+    return real and factor_shifted(method.J, left, complex(ALPHA / h, -BETA / h), method.pair, method.pivots[1])
 
 
 @inlined
@@ -77,7 +77,8 @@ def solve_real(method: Radau5, r: Any) -> None:
 @inlined
 def solve_pair(method: Radau5, r: Any) -> None:
     """Solve with the complex matrix of the step, overwriting r (n,)."""
-    s = complex(ALPHA, -BETA) / method.control[H_FACTORED]
+    h = method.control[H_FACTORED]
+    s = complex(ALPHA / h, -BETA / h)
     solve_shifted(method.J, int(method.control[UNKNOWNS]), s, method.pair, method.pivots[1], r)
 
 

@@ -10,7 +10,7 @@ Source: Hairer, Wanner, Solving Ordinary Differential Equations II, 2nd ed. (199
 from typing import Any
 
 from walkerlab.kernels import inlined
-from walkerlab.solvers.linear import factor, solve
+from walkerlab.solvers.linear import factor, reciprocal, solve
 
 
 @inlined
@@ -30,7 +30,7 @@ def unknowns(J: Any) -> int:
 @inlined
 def factor_shifted(J: Any, left: int, s: Any, factors: Any, pivots: Any) -> bool:
     """Factors (left, left) for the shift s, real or complex as `factors` is; False if the matrix is singular."""
-    n, wait = J.shape[0], 1.0 / s
+    n, wait = J.shape[0], reciprocal(s)
     for i in range(left):
         for j in range(left):
             factors[i, j] = -J[i, j] if left == n else -J[left + i, left + j] - wait * J[left + i, j]
@@ -44,7 +44,7 @@ def solve_shifted(J: Any, left: int, s: Any, factors: Any, pivots: Any, r: Any) 
     if left == J.shape[0]:
         solve(factors, pivots, r, 0, left)
         return
-    wait = 1.0 / s
+    wait = reciprocal(s)
     for i in range(left):
         r[i] *= wait
     for i in range(left):
