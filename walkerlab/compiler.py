@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numba
+from numba import types
 
 from walkerlab.kernel_cache import PACKAGE, cache_folder, lock_of, watchers
 
@@ -276,6 +277,26 @@ class _Refreshed:
         """Leave the context as the compiler of the kernel has refreshed it."""
 
 
+class _TypingOfNumbers(_Refreshed):
+    """A context that looks up only once what an operator or a function makes of numbers.
+
+    Numba tries all that an operator can do with arrays, sets and strings at every place where it stands.
+    """
+
+    found: dict[Any, Any] = {}  # noqa: RUF012 - one for all parts
+
+    def resolve_function_type(self, function: Any, given: tuple[Any, ...], named: dict[str, Any]) -> Any:
+        """The signature."""
+        if named or not all(isinstance(each, types.Number) for each in given):
+            return self._context.resolve_function_type(function, given, named)
+        if (function, given) not in self.found:
+            found = self._context.resolve_function_type(function, given, named)
+            if found is None:
+                return None
+            self.found[function, given] = found
+        return self.found[function, given]
+
+
 class _WithoutEnvironment:
     """A code generator that has no place for the environment of a function whose machine code nobody asks for."""
 
@@ -324,7 +345,7 @@ class PartCompiler(CompilerBase):  # type: ignore[misc, valid-type]
     def __init__(self, typing: Any, target: Any, *rest: Any) -> None:
         """In contexts that the kernel's own compiler has refreshed."""
         super().__init__(_Refreshed(typing), _Refreshed(target), *rest)
-        self.state.typingctx, self.state.flags = typing, QuickFlags(self.state.flags)
+        self.state.typingctx, self.state.flags = _TypingOfNumbers(typing), QuickFlags(self.state.flags)
 
     def define_pipelines(self) -> list[Any]:
         """The passes."""
