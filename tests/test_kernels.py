@@ -18,6 +18,7 @@ from walkerlab import compiler
 from walkerlab.compiler import compiling
 from walkerlab.kernel_cache import watched
 from walkerlab.kernels import (
+    always_inline,
     by_reference,
     by_type,
     by_type_or_default,
@@ -305,6 +306,17 @@ def test_without_numbas_inner_parts_kernels_are_compiled_as_numba_does_it_and_it
         assert stored  # in the folder of this state of the sources, from which the next process takes it
         run_without(part, tmp_path)
         assert {path: path.stat().st_mtime_ns for path in folder.rglob("*.nbc")} == stored
+
+
+@pytest.mark.parametrize("compiled", [kernel, inlined, always_inline])
+def test_a_function_inside_a_kernel_is_refused_by_name_where_it_stands(compiled):
+    def summed(x):
+        return (lambda y: y * y)(x)
+
+    with pytest.raises(
+        TypeError, match=r"test_kernels\.py:\d+: <lambda> inside summed: compiled functions hold no others"
+    ):
+        compiled(summed)
 
 
 NESTED = """

@@ -3,6 +3,7 @@
 import functools
 import hashlib
 from collections.abc import Callable
+from types import CodeType
 from typing import Any, TypeVar, cast
 
 import numba
@@ -38,8 +39,19 @@ F = TypeVar("F", bound=Callable[..., Any])
 C = TypeVar("C", bound=type)
 
 
+def refuse_nested(function: Any) -> None:
+    """Refuse a lambda, a comprehension or a function inside another: the passes that would compile it are left out."""
+    for inner in getattr(function, "py_func", function).__code__.co_consts:
+        if isinstance(inner, CodeType):
+            raise TypeError(
+                f"{inner.co_filename}:{inner.co_firstlineno}: {inner.co_name} inside {function.__name__}: compiled "
+                "functions hold no others and no comprehensions; write a loop, or a function beside it"
+            )
+
+
 def kernel(function: F) -> F:
     """Compile `function` on its first call and keep the machine code on disk for later processes."""
+    refuse_nested(function)
     if absent:
         return cast(F, cached_plainly(function, FLAGS))
     compiled = numba.njit(pipeline_class=KernelCompiler, **FLAGS)(function)
@@ -50,12 +62,14 @@ def kernel(function: F) -> F:
 
 def inlined(function: F) -> F:
     """Leave `function` as it is in Python, and compile it into the kernels that call it."""
+    refuse_nested(function)
     compile_as(function, lambda *_: (function, PART_FLAGS))
     return function
 
 
 def always_inline(function: F) -> F:
     """As `inlined`, and put into the code of its callers, however large."""
+    refuse_nested(function)
     compile_as(function, lambda *_: (function, ALWAYS_INLINE_FLAGS))
     return function
 
@@ -117,6 +131,7 @@ class ByType:
         """
 
         def register(body: F) -> F:
+            refuse_nested(body)
             self._bodies[chosen] = body
             if always_inline:
                 self._always_inline.add(chosen)
