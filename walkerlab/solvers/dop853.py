@@ -28,7 +28,6 @@ from walkerlab.solvers.stepping import (
     T,
     advance,
     begin,
-    dense_degree,
     interpolate,
     prepare_dense,
     rewind,
@@ -238,9 +237,3 @@ def interpolate_dop853(method: Dop853, system: Any, fraction: float, y: Any) -> 
         low = fused(w1 * s, d[2, i], fused(w1, d[1, i], fused(s, d[0, i], method.y_old[i])))
         high = fused(w3 * s * r, d[5, i], fused(w3 * s, d[4, i], fused(w3, d[3, i], low)))
         y[i] = fused(w3 * s * r * s, d[6, i], high)
-
-
-@dense_degree.case(Dop853)
-def dense_degree_dop853(method: Dop853) -> int:
-    """Seven."""
-    return 7
