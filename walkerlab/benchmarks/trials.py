@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from walkerlab.benchmarks.user_script import walk_as_a_script
 from walkerlab.hybrid.rigid_observer import unwatched
@@ -19,12 +18,12 @@ from walkerlab.outcome import Outcome
 from walkerlab.paper.appendix_a import RigidWalker
 from walkerlab.solvers.registry import METHODS, Tolerances, finder_for
 from walkerlab.solvers.stepping import ACCEPTED, H_NEXT, REJECTED, RHS, clear_counts
+from walkerlab.solvers.system import Floats
 
 if TYPE_CHECKING:
     from walkerlab.ground.walker import ContactWalker
     from walkerlab.hybrid.contact_events import JudgedGround
 
-Floats = NDArray[np.float64]
 USER_SCRIPT = "scipy-dop853-numpy"
 ATOL_PER_RTOL = 1e-2
 

@@ -29,9 +29,8 @@ from walkerlab.orbits.shooting import Shooting, section_of
 from walkerlab.orbits.shooting import on_section as state_on_section
 from walkerlab.outcome import Outcome
 from walkerlab.solvers.registry import Tolerances
+from walkerlab.solvers.system import Floats, Integers
 
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 RTOL, ATOL = 1e-6, 1e-8  # of the walks of a basin: errors of 1e-7 a step
 FOUND_RTOL, FOUND_ATOL = 1e-11, 1e-13  # of the walks that attractors are taken from
 COORDINATES = 3

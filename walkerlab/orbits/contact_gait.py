@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from walkerlab.ground.terrain import STANCE_FOOT
 from walkerlab.ground.walker import ContactWalker
@@ -22,9 +21,7 @@ from walkerlab.orbits.newton import Effort, NotConverged
 from walkerlab.orbits.step_map import Cycle, gait_near
 from walkerlab.outcome import Outcome
 from walkerlab.solvers.registry import Tolerances
-from walkerlab.solvers.system import State
-
-Floats = NDArray[np.float64]
+from walkerlab.solvers.system import Floats, State
 
 WARM_UP = (4, 2, 0)  # steps walked from the start before Newton's method takes over
 BUDGET_OF_A_STEP = 40_000  # right-hand sides

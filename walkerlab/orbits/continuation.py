@@ -14,8 +14,9 @@ from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
 
-from walkerlab.orbits.newton import MAX_EVALUATIONS, Equations, Evaluated, Floats, NotConverged, newton
+from walkerlab.orbits.newton import MAX_EVALUATIONS, Equations, Evaluated, NotConverged, newton
 from walkerlab.outcome import Outcome
+from walkerlab.solvers.system import Floats
 
 D = TypeVar("D")
 FEW_CORRECTIONS = 3

@@ -23,9 +23,10 @@ from walkerlab.orbits.bifurcations import (
     onto_doubled,
 )
 from walkerlab.orbits.continuation import Segment, Solved, StepControl, corrected, stepped
-from walkerlab.orbits.newton import Effort, Floats, NotConverged
+from walkerlab.orbits.newton import Effort, NotConverged
 from walkerlab.orbits.step_map import Cycle, Monitor, StepMap, gait_near
 from walkerlab.outcome import TOLD, Outcome
+from walkerlab.solvers.system import Floats
 
 SAME = 1e-6  # distance of states below which two gaits are one
 HALVINGS = 12  # of the amplitude on the way onto a branch

@@ -24,9 +24,9 @@ from walkerlab.orbits.attractors import (
 )
 from walkerlab.orbits.continuation import StepControl
 from walkerlab.orbits.families import BranchFollower, GaitBranch, Seed, ValueSpan
-from walkerlab.orbits.newton import Floats
 from walkerlab.orbits.plane import CONTROL, BifurcationCurve, MapAt, Regions, curve_through, regions_of
 from walkerlab.orbits.step_map import StepMap
+from walkerlab.solvers.system import Floats
 
 BEFORE_FLIP = 0.02  # of the span: how far before the first flip the attractor is looked at
 OTHERS_AT, OTHER_PERIODS, RETURNS = 12, (3, 5, 6), 4000  # values, steps of gaits looked for, steps walked for them

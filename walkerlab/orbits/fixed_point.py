@@ -16,13 +16,13 @@ from walkerlab.hybrid.recorded_walk import take_walk
 from walkerlab.hybrid.rigid_walk import LONGEST_SWING
 from walkerlab.mechanics.standing import STANCE, SWING, Standing, on_slope, swing_foot_motion
 from walkerlab.orbits.continuation import Follower, Strides, Way, interpolated
-from walkerlab.orbits.newton import Effort, Floats, NotConverged
+from walkerlab.orbits.newton import Effort, NotConverged
 from walkerlab.orbits.shooting import EXACT, NEW, RigidMap, Shooting, on_section, section_of
 from walkerlab.orbits.similarity import Units, unit_walker
 from walkerlab.orbits.small_slope import SmallSlopeSeed, seeds
 from walkerlab.orbits.step_map import Cycle, Stepper, gait_near
 from walkerlab.solvers.registry import Tolerances
-from walkerlab.solvers.system import State
+from walkerlab.solvers.system import Floats, State
 
 RANDOM_START = "random start"
 SMALLEST_ANGLE = 1e-5  # rad, half the angle between the legs; less on level ground or after a random start is standing

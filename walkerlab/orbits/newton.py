@@ -5,11 +5,10 @@ from dataclasses import dataclass
 from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from walkerlab.outcome import Outcome
+from walkerlab.solvers.system import Floats
 
-Floats = NDArray[np.float64]
 D = TypeVar("D")
 MAX_EVALUATIONS = 8
 ROUNDING = 100.0  # a residual at most this many tolerances large that a move does not halve is rounding

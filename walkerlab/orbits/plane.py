@@ -16,15 +16,15 @@ from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from walkerlab.orbits.attractors import settled
 from walkerlab.orbits.bifurcations import Bifurcation, GaitEquations, Kind, critical_value, eigenvector
 from walkerlab.orbits.continuation import Solved, StepControl, corrected, stepped
 from walkerlab.orbits.families import EVALUATIONS, BranchEnd, GaitBranch, ValueSpan, why_lost
-from walkerlab.orbits.newton import Effort, Equations, Evaluated, Floats, NotConverged
+from walkerlab.orbits.newton import Effort, Equations, Evaluated, NotConverged
 from walkerlab.orbits.step_map import Cycle, StepMap, gait_near
 from walkerlab.outcome import Outcome
+from walkerlab.solvers.system import Floats, Integers
 
 REACH = 1e-5  # of the differences of the test function, unknowns being of magnitude one
 CONTROL = StepControl(first=0.01, shortest=1e-6, longest=0.03, turn=0.97, tolerance=1e-11)
@@ -156,7 +156,7 @@ class Regions:
 
     first: Floats
     second: Floats
-    period: NDArray[np.int64]
+    period: Integers
 
 
 Row = list[Cycle | None]
@@ -229,7 +229,7 @@ def away_from(gait: Cycle) -> Floats:
     return gait.z + KICK * eigenvector(gait.DP, gait.multipliers[0].real)
 
 
-def settled_row(step_map: StepMap, values: Floats, gaits: Row, before: Points) -> tuple[NDArray[np.int64], Points]:
+def settled_row(step_map: StepMap, values: Floats, gaits: Row, before: Points) -> tuple[Integers, Points]:
     """The periods of a row's cells, and a point of the attractor in each.
 
     before  those of the row before

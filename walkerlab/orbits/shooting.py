@@ -15,7 +15,6 @@ from threading import local
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from walkerlab.hybrid.recorded_walk import take_walk
 from walkerlab.hybrid.rigid_observer import Observer, unwatched
@@ -30,10 +29,7 @@ from walkerlab.solvers.events import CrossingFinder
 from walkerlab.solvers.linear import factor, solve
 from walkerlab.solvers.registry import ENDLESS, Tolerances, finder_for
 from walkerlab.solvers.stepping import BUDGET, H_NEXT, clear_counts
-from walkerlab.solvers.system import State
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
+from walkerlab.solvers.system import Floats, Integers, State
 
 WALKED = int(Outcome.WALKED)
 SMALL = 2.0**-13

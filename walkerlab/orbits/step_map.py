@@ -18,8 +18,7 @@ from numpy.typing import NDArray
 from walkerlab.orbits.newton import Effort, Evaluated, NotConverged, newton
 from walkerlab.outcome import Outcome
 from walkerlab.solvers.registry import Tolerances
-
-Floats = NDArray[np.float64]
+from walkerlab.solvers.system import Floats
 
 SPREAD = 1e-3  # of the parameter, between the points of the difference formula
 REMEMBERED = 4096  # walkers built so far

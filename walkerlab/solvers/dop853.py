@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from walkerlab.kernels import by_reference, inlined, vector
 from walkerlab.solvers import dop853_tableau as tableau
@@ -32,7 +31,7 @@ from walkerlab.solvers.stepping import (
     prepare_dense,
     rewind,
 )
-from walkerlab.solvers.system import block, derivative
+from walkerlab.solvers.system import Floats, block, derivative
 
 # Hairer's code has 0.9: a fifth of a walk's steps was rejected, and the same error took 11 % more work.
 SAFETY, SHRINK_MOST, GROW_MOST = 0.8, 0.333, 6.0
@@ -41,7 +40,7 @@ STAGES, EXTRA_STAGES = 12, 3
 LAST, ALL = STAGES, STAGES + 1 + EXTRA_STAGES  # row of the derivative at the step's end; rows with dense output
 
 
-def rows(weights: Sequence[Sequence[float]], length: int) -> NDArray[np.float64]:
+def rows(weights: Sequence[Sequence[float]], length: int) -> Floats:
     """Weights as the rows of a matrix (rows, length), filled up with zeros."""
     return np.array([[*row, *[0.0] * (length - len(row))] for row in weights])
 

@@ -12,7 +12,6 @@ from functools import partial
 from typing import Annotated, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from walkerlab.account import LOST
 from walkerlab.config.contact import Contact
@@ -31,10 +30,9 @@ from walkerlab.mechanics.parts import Assembly, BallFoot, Body, Position, Revolu
 from walkerlab.outcome import Outcome
 from walkerlab.scene.contact import normal_law
 from walkerlab.solvers.registry import Tolerances
-from walkerlab.solvers.system import State
+from walkerlab.solvers.system import Floats, State
 from walkerlab.verification import references
 
-Array = NDArray[np.float64]
 ENDLESS = 1e7  # m, an area without edges, and a hip that cannot fall
 OUT_OF_REACH: Position = (0.0, 1e3)  # m, where a foot is that takes no part
 BUDGET = 2_000_000  # right-hand sides
@@ -50,10 +48,10 @@ PAPER_FRICTION: Final = Coulomb(0.9, 0.7, 0.1, 1.0)
 class ParticleRun:
     """What it did."""
 
-    times: Array  # (samples,) s
-    states: Array  # (samples, 8)
+    times: Floats  # (samples,) s
+    states: Floats  # (samples, 8)
     end: State
-    dissipated: Array  # (3,) J
+    dissipated: Floats  # (3,) J
 
 
 def rig(

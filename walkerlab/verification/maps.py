@@ -8,12 +8,12 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from walkerlab.config.contact import Contact
 from walkerlab.config.schema import Config
 from walkerlab.config.stability import Case
 from walkerlab.solvers.registry import Tolerances
+from walkerlab.solvers.system import Floats
 from walkerlab.verification.catalogue import config_of
 from walkerlab.verification.judge import TENFOLD
 from walkerlab.verification.ordinary import REFERENCE, STEPS, arrival_of, fixed, natural_units
@@ -34,7 +34,7 @@ VERDICTS: Final = ("fine", "wrong silently", "diverges", "gives up", "no referen
 Numbers = list[float]
 
 
-def along(ends: tuple[float, float], cells: int) -> NDArray[np.float64]:
+def along(ends: tuple[float, float], cells: int) -> Floats:
     """Evenly spaced powers."""
     return np.geomspace(*ends, cells)
 

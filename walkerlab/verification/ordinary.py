@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from walkerlab.benchmarks.user_script import walk_as_a_script
 from walkerlab.config.reads import RigidConfig, WalksConfig
@@ -28,11 +27,11 @@ from walkerlab.scene.rigid import compass_or_none
 from walkerlab.solvers.registry import Tolerances
 from walkerlab.solvers.scipy_methods import entry_point, right_hand_side
 from walkerlab.solvers.semi_implicit_euler import RUNAWAY, semi_implicit_euler
+from walkerlab.solvers.system import Floats
 from walkerlab.verification.scaling import pendulum_time
 from walkerlab.verification.starts import ContactStart, RigidStart, prepared
 from walkerlab.verification.verdict import finite
 
-Floats = NDArray[np.float64]
 CAP: Final = 20_000  # right-hand sides
 FINE: Final = 1e-2  # of a leg, of a radian, of their rates in pendulum times
 SCIPY_DEFAULT: Final = (1e-3, 1e-6)  # tolerances of solve_ivp

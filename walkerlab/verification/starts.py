@@ -5,7 +5,6 @@ from functools import cache
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from walkerlab.config.reads import WalksConfig
 from walkerlab.config.stability import Case
@@ -19,7 +18,7 @@ from walkerlab.scene.parts import assembly_of
 from walkerlab.scene.rigid import rigid_walker
 from walkerlab.solvers.registry import Tolerances
 from walkerlab.solvers.stepping import ACCEPTED, RHS
-from walkerlab.solvers.system import State
+from walkerlab.solvers.system import Floats, State
 from walkerlab.verification.masses import RigidMasses
 from walkerlab.verification.momentum import MEASURE, momentum_finding
 from walkerlab.verification.scaling import pendulum_time
@@ -41,12 +40,12 @@ class JudgedWalk:
     """
 
     outcome: Outcome
-    touches: NDArray[np.float64]
+    touches: Floats
     end: float | None
     residual_J: float  # noqa: N815
     rhs_evaluations: int
     accepted: int
-    numbers: NDArray[np.float64]
+    numbers: Floats
     record: Any
 
 

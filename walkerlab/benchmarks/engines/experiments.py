@@ -8,7 +8,6 @@ from statistics import median
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from walkerlab.benchmarks.engines import runs
 from walkerlab.benchmarks.engines.adapter import EngineContact, Integrator, OwnContact, Stepping
@@ -23,9 +22,7 @@ from walkerlab.ground.walker import changed_forms, folded, on_ground, unfolded
 from walkerlab.hybrid.contact_run import ContactWalkResult, knees_at_start, walk_contact
 from walkerlab.outcome import Outcome
 from walkerlab.solvers.registry import Tolerances
-from walkerlab.solvers.system import derivative
-
-Floats = NDArray[np.float64]
+from walkerlab.solvers.system import Floats, derivative
 
 SAME_LAW_STEPS = (4e-4, 2e-4, 1e-4, 5e-5, 2.5e-5, 1.25e-5, 6.25e-6, 3.125e-6)  # s
 OWN_LAW_STEPS = (2e-3, 1e-3, 5e-4, 2.5e-4, 1.25e-4, 6.25e-5)  # s

@@ -9,7 +9,6 @@ import sys
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from walkerlab.benchmarks.engines.scenes import EngineScene
 from walkerlab.ground.external import feet_and_forces
@@ -22,8 +21,8 @@ from walkerlab.hybrid.contact_run import new_walk_state
 from walkerlab.hybrid.contact_walk import LONGEST_FLIGHT, LONGEST_STEP
 from walkerlab.outcome import Outcome
 from walkerlab.solvers.scipy_methods import entry_point
+from walkerlab.solvers.system import Floats
 
-Floats = NDArray[np.float64]
 Feet = tuple[FootMotion, FootMotion]
 HALVINGS = 60
 FAR_AWAY = 1e4  # m: where only the feet of a run that has lost its numbers get to

@@ -6,12 +6,11 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from walkerlab.mechanics.assembly import masses, neighbours
 from walkerlab.mechanics.parts import Assembly, Knee, Position
+from walkerlab.solvers.system import Floats
 
-Floats = NDArray[np.float64]
 Freedom = Literal["along", "height", "turn"]
 FLOATING: tuple[Freedom, ...] = ("along", "height", "turn")
 HINGED: tuple[Freedom, ...] = ("turn",)

@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from walkerlab.benchmarks.engines import planar
 from walkerlab.benchmarks.engines.adapter import EngineContact, OwnContact, Simulation, Stepping
@@ -16,8 +15,8 @@ from walkerlab.benchmarks.engines.scenes import EngineScene
 from walkerlab.hybrid.contact_events import STEPS
 from walkerlab.hybrid.contact_rules import steps_with_lift
 from walkerlab.outcome import Outcome
+from walkerlab.solvers.system import Floats
 
-Floats = NDArray[np.float64]
 ROUNDING = 1e-9
 MANY = 10_000_000  # steps
 STEADY = 5  # so many times longer steps serve where only a steady end counts

@@ -23,9 +23,7 @@ from walkerlab.mechanics.standing import swing_foot
 from walkerlab.scene.contact import contact_scene, knee_rules, start_state
 from walkerlab.scene.parts import assembly_of
 from walkerlab.scene.rigid import rigid_walker
-from walkerlab.solvers.system import State
-
-Floats = NDArray[np.float64]
+from walkerlab.solvers.system import Floats, State
 
 
 @dataclass(frozen=True)
