@@ -26,7 +26,7 @@ from walkerlab.orbits.fixed_point import (
     over_slope,
 )
 from walkerlab.orbits.fixed_point import find_gaits as find_gaits_of_model
-from walkerlab.orbits.newton import Evaluated, NotConverged, newton
+from walkerlab.orbits.newton import Effort, Evaluated, NotConverged, newton
 from walkerlab.orbits.shooting import NEW, NOWHERE, Shooting, section_of
 from walkerlab.orbits.small_slope import LONG_PERIOD, SHORT_PERIOD, seeds
 from walkerlab.outcome import Outcome
@@ -79,7 +79,7 @@ def solve(shooting, walker, z, tolerance):
             return Evaluated(step.outcome, z, np.eye(z.size), step)
         return Evaluated(step.outcome, step.z[0] - z, step.DP[0] - np.eye(z.size), step)
 
-    return newton(returning, np.array(z), tolerance, 60, SHORTEST_MOVE)
+    return newton(returning, np.array(z), Effort(tolerance, 60, SHORTEST_MOVE))
 
 
 # from two other integrations of the same equations

@@ -14,7 +14,7 @@ from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
 
-from walkerlab.orbits.newton import MAX_EVALUATIONS, Equations, Evaluated, NotConverged, newton
+from walkerlab.orbits.newton import MAX_EVALUATIONS, Effort, Equations, Evaluated, NotConverged, newton
 from walkerlab.outcome import Outcome
 from walkerlab.solvers.system import Floats
 
@@ -116,7 +116,7 @@ def corrected(
         value = np.append(here.value, normal @ (x - guess))
         return here._replace(value=value, jacobian=np.vstack((here.jacobian, normal)))
 
-    found = newton(on_plane, guess, tolerance, most)
+    found = newton(on_plane, guess, Effort(tolerance, most))
     if isinstance(found, NotConverged):
         return found
     ahead = np.zeros(guess.size)

@@ -79,8 +79,13 @@ def section_of(walker: Standing) -> StrikeSection:
 
 def on_section(walker: Standing, z: Any) -> State:
     """The state (2 n) of section coordinates z (d,)."""
+    return tuple(states_on_section(walker, z).tolist())
+
+
+def states_on_section(walker: Standing, z: Any) -> Floats:
+    """States (n, 2 n) of section coordinates z (n, d), or that of one."""
     section = section_of(walker)
-    return tuple((section.start[: len(walker.zero_state)] + np.asarray(z) @ section.basis).tolist())
+    return np.asarray(section.start[: len(walker.zero_state)] + np.asarray(z) @ section.basis)
 
 
 def coordinates_of(walker: Standing, y: Any) -> Floats:

@@ -268,7 +268,7 @@ def with_parameter(step_map: StepMap, cycle: Cycle) -> Cycle:
 
 def gait_near(step_map: Stepper, z: Floats, p: float, effort: Effort, n: int = 1) -> Cycle | NotConverged:
     """The gait of n steps near z (d,) at p, by Newton's method."""
-    solved = newton(lambda z: walk_steps(step_map, z, p, n).returning(), z, *effort)
+    solved = newton(lambda z: walk_steps(step_map, z, p, n).returning(), z, effort)
     return solved if isinstance(solved, NotConverged) else solved.evaluated.data
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from walkerlab.mechanics.standing import Standing
 from walkerlab.orbits.shooting import RigidMap
 from walkerlab.scene.parameter import Parameter
-from walkerlab.scene.rigid import rigid_walker
+from walkerlab.scene.rigid import rigid_walker, walker_or_none
 from walkerlab.solvers.registry import Tolerances
 
 if TYPE_CHECKING:
@@ -22,12 +22,7 @@ CONTACT = Tolerances("radau5", 1e-10, 1e-12, 60_000)
 
 def rigid_walkers(config: ContactConfig, parameter: Parameter) -> Callable[[float], Standing | None]:
     """The rigid walker at a value of the parameter; None where the config refuses the value."""
-
-    def walker_at(value: float) -> Standing | None:
-        changed = parameter.config_at(config, value)
-        return None if changed is None else rigid_walker(changed, changed.equations)
-
-    return walker_at
+    return lambda value: walker_or_none(parameter.config_at(config, value))
 
 
 def rigid_map(config: ContactConfig, parameter: Parameter, scale: float) -> RigidMap:

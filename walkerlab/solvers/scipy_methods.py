@@ -28,7 +28,7 @@ from walkerlab.solvers.stepping import (
     prepare_dense,
     rewind,
 )
-from walkerlab.solvers.system import derivative, jacobian
+from walkerlab.solvers.system import Integers, derivative, jacobian
 
 DENSE_DEGREE = 7
 """High enough for the dense output of all of them."""
@@ -82,18 +82,17 @@ class ScipyMethod:
         return np.ascontiguousarray(self.dense(t_old + fractions * (t - t_old)).T)
 
 
-def counted(method: ScipyMethod, system: Any, n: int) -> Callable[[float, Any], Any]:
+def counted(counts: Integers, system: Any, n: int) -> Callable[[float, Any], Any]:
     """The compiled right-hand side as libraries call it, counting and keeping the budget."""
     probe = np.zeros(n)
     code = entry_point(right_hand_side, system, 0.0, probe, probe)
-    counts = method.counts
 
     def fun(t: float, y: Any) -> Any:
         if counts[RHS] >= counts[BUDGET]:
             raise OutOfBudgetError
         counts[RHS] += 1
         dy = np.empty(n)
-        code(system, t, y, dy)
+        code(system, float(t), np.ascontiguousarray(y), dy)
         return dy
 
     return fun
@@ -123,7 +122,7 @@ def begin_scipy(method: ScipyMethod, system: Any, t: float, y: Any, h: float) ->
         options["jac"] = counted_jacobian(method, system, n)
     method.dense = None
     try:
-        method.solver = method.new_solver(counted(method, system, n), t, method.y.copy(), np.inf, **options)
+        method.solver = method.new_solver(counted(method.counts, system, n), t, method.y.copy(), np.inf, **options)
     except OutOfBudgetError:
         method.solver = None
 
