@@ -146,10 +146,8 @@ def row_of(one: Ascent, run: MethodRun, reference: Reference) -> MethodRow:
     end, result = reference.for_method(one.method), run.result
     error = float(np.max(np.abs(result.state - end.state))) if result.state.size else None
     known = error is not None and error <= reference.agreement
-    asked, work = (
-        (one.trial.name, one.method, run.tolerance),
-        (result.rhs_evaluations, result.accepted, result.rejected),
-    )
+    asked = one.trial.name, one.method, run.tolerance
+    work = result.rhs_evaluations, result.accepted, result.rejected
     times = median(run.walls_s), min(run.walls_s), len(run.walls_s)
     return MethodRow(*asked, result.outcome, error, end.method, known, *times, *work)
 

@@ -221,11 +221,6 @@ def corrected_row(step_map: StepMap, values: Floats, before: Points) -> Row:
     return row
 
 
-def away_from(gait: Cycle) -> Floats:
-    """A start beside an unstable gait, towards what grows."""
-    return gait.z + KICK * eigenvector(gait.DP, gait.multipliers[0].real)
-
-
 def settled_row(step_map: StepMap, values: Floats, gaits: Row, before: Points) -> tuple[Integers, Points]:
     """The periods of a row's cells, and a point of the attractor in each.
 
@@ -237,9 +232,9 @@ def settled_row(step_map: StepMap, values: Floats, gaits: Row, before: Points) -
             periods[place] = 1
             points.append(gait.z)
             continue
-        point = None
-        # on the attractors of its neighbours, and beside its unstable gait
-        starts = (points[place - 1] if place else None, before[place], None if gait is None else away_from(gait))
+        # on the attractors of its neighbours, and beside its unstable gait, towards what grows
+        beside = None if gait is None else gait.z + KICK * eigenvector(gait.DP, gait.multipliers[0].real)
+        point, starts = None, (points[place - 1] if place else None, before[place], beside)
         for start in (one for one in starts if one is not None):
             here = settled(step_map, start, float(values[place]), TRANSIENT, KEPT)
             if not isinstance(here, Outcome):

@@ -141,17 +141,12 @@ def margins(
     """
     found = []
     for name, *way in DIRECTIONS:
-
-        def trial(change: float, way: Sequence[float] = way) -> StartTrial:
-            return starts.walk(around[0] * (1.0 + change * way[0]), around[1] * (1.0 + change * way[1]))
-
         sign = 1.0 if max(way) > 0.0 else -1.0
         limit = largest - 1.0 if sign > 0.0 else 1.0 - SMALLEST_FACTOR
-        good, bad, failure = 0.0, limit, None
-        halvings = 0
+        good, bad, failure, halvings = 0.0, limit, None, 0
         while good < limit and halvings <= HALVINGS:
             change = min(good + step, limit) if failure is None else 0.5 * (good + bad)
-            tried = trial(change)
+            tried = starts.walk(around[0] * (1.0 + change * way[0]), around[1] * (1.0 + change * way[1]))
             if tried.walks:
                 good = change
             else:
@@ -195,10 +190,8 @@ def smallest_change(
             grid = np.array(best) + spacing * OFFSETS
             distance = np.hypot(*(grid - 1.0).T)
             nearer = np.flatnonzero(distance < math.hypot(best[0] - 1.0, best[1] - 1.0) - 1e-12)
-            nearest_first = (
-                tuple(grid[index].tolist()) for index in nearer[np.argsort(distance[nearer], kind="stable")]
-            )
-            both = (point for point in nearest_first if quick.walk(*point).walks and starts.walk(*point).walks)
+            nearest_first = grid[nearer[np.argsort(distance[nearer], kind="stable")]].tolist()
+            both = ((a, b) for a, b in nearest_first if quick.walk(a, b).walks and starts.walk(a, b).walks)
             best = next(both, best)
         return Adjustment(*best, starts.walk(*best))
     return None

@@ -64,9 +64,8 @@ class ContactScene:
 
         heights  (footholds,) m over the slope, the start's first; even ground without
         """
-        ground = (
-            self.ground if heights is None else self.ground._replace(terrain=self.terrain._replace(heights=heights))
-        )
+        terrain = self.terrain if heights is None else self.terrain._replace(heights=heights)
+        ground = JudgedGround(terrain, self.frame)
         return walk_contact(self.walker, ground, self.pinned, STANCE_FOOT, start, tolerances, steps, sampling)
 
 

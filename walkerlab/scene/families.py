@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from walkerlab.mechanics.standing import Standing
@@ -30,28 +29,30 @@ def rigid_map(config: ContactConfig, parameter: Parameter, scale: float) -> Rigi
     return RigidMap(rigid_walkers(config, parameter), scale, rigid_walker(config, config.equations))
 
 
+def on_ground(config: ContactConfig, step_length_m: float) -> WalkerOnGround:
+    """The contact model of a config; steps are judged by a length (m)."""
+    from walkerlab.orbits.contact_map import WalkerOnGround
+    from walkerlab.scene.contact import contact_scene
+
+    scene = contact_scene(config, step_length_m, step_length_m)
+    return WalkerOnGround(scene.walker, scene.ground)
+
+
 def walkers_on_ground(
     config: ContactConfig, parameter: Parameter, step_length_m: float
 ) -> Callable[[float], WalkerOnGround | None]:
     """The contact model at a value of the parameter; None where the config refuses the value."""
-    from walkerlab.orbits.contact_map import WalkerOnGround
-    from walkerlab.scene.contact import contact_scene
 
     def walker_at(value: float) -> WalkerOnGround | None:
         changed = parameter.config_at(config, value)
-        if changed is None:
-            return None
-        scene = replace(contact_scene(changed, step_length_m, step_length_m), pinned=False)
-        return WalkerOnGround(scene.walker, scene.ground)
+        return None if changed is None else on_ground(changed, step_length_m)
 
     return walker_at
 
 
 def contact_map(config: ContactConfig, parameter: Parameter, scale: float, step_length_m: float) -> ContactMap:
     """The contact model's step map over the parameter; steps are judged by a length (m)."""
-    from walkerlab.orbits.contact_map import ContactMap, WalkerOnGround
-    from walkerlab.scene.contact import contact_scene
+    from walkerlab.orbits.contact_map import ContactMap
 
     walkers = walkers_on_ground(config, parameter, step_length_m)
-    like = contact_scene(config, step_length_m, step_length_m)
-    return ContactMap(walkers, scale, CONTACT, step_length_m, WalkerOnGround(like.walker, like.ground))
+    return ContactMap(walkers, scale, CONTACT, step_length_m, on_ground(config, step_length_m))

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from walkerlab.labels import in_words, unit_by_name
 from walkerlab.store.content import Variable
-from walkerlab.sweeps.chunk import Labels
 
 OWN: Final = {
     "outcome": "how it ended: the stage's own outcome, else whether it has an answer",
@@ -91,10 +90,6 @@ class Columns:
             column = self._columns[name]
             there = [k for k in there if isinstance(rows[k][name], str) == column.text]
             column.put(np.array([places[k] for k in there], int), [rows[k][name] for k in there])
-
-    def label(self, labels: Labels) -> None:
-        """Take units and meanings."""
-        self.labels.update(labels)
 
     @property
     def names(self) -> Collection[str]:

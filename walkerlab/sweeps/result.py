@@ -34,7 +34,7 @@ class Merge:
 
     def put(self, chunk: Chunk, places: Mapping[str, int]) -> None:
         """Take the rows of a chunk that have a place."""
-        self.columns.label(chunk.labels)
+        self.columns.labels.update(chunk.labels)
         wanted = [row for row in chunk.rows if row.key in places]
         at = [places[row.key] for row in wanted]
         rows = []

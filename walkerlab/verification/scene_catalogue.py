@@ -6,11 +6,10 @@ from pathlib import Path
 from typing import Any, Final, TypeVar
 
 from walkerlab.config.fields import Block
-from walkerlab.config.reader import read
 from walkerlab.config.schema import Config
 from walkerlab.config.stability import FATES, Case, Fate
-from walkerlab.config.tree import plain
 from walkerlab.config.walkers import Kneed, PartsWalker
+from walkerlab.verification.catalogue import listed
 
 CATALOGUE: Final = Path(__file__).with_suffix(".yaml")
 ENDS: tuple[Fate, ...] = tuple(fate for fate in FATES if fate not in ("budget-exhausted", "solver-failed", "rejected"))
@@ -27,11 +26,8 @@ def scene_cases(config: Config) -> list[tuple[Case, Config]]:
 
     config  with the start spelled out in numbers, and the pads' pitch if there are pads
     """
-    root = read(CATALOGUE.read_text(encoding="utf-8"), CATALOGUE.name)
-    assert root is not None, "a list of cases"
-    listed: Any = plain(root)
     there, found = features(config), []
-    for entry in listed:
+    for entry in listed(CATALOGUE):
         needs = {entry.get("model", "contact"), *entry.pop("needs", ())}
         changes: dict[str, Any] = {name: entry.pop(name) for name in CHANGES if name in entry}
         if entry.get("expected") == "stops":

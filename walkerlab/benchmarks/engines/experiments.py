@@ -71,13 +71,12 @@ def walked(scene: EngineScene, method: str, rtol: float, steps: int, until_s: fl
 
 def truth_of(scene: EngineScene) -> Truth | None:
     """The reference of a scene; None if the walk ends before states can be compared."""
-    (first, first_rtol), second = REFERENCES
-    walk = walked(scene, first, first_rtol, OWN_TOUCHES)
+    walk = walked(scene, *REFERENCES[0], OWN_TOUCHES)
     if walk.touch_time_s.size <= TOUCHES:
         return None
     last, following = walk.touch_time_s[TOUCHES - 1 : TOUCHES + 1]
     until = float(last + INTO_NEXT_STEP * (following - last))
-    one, other = (walked(scene, *reference, TOUCHES + 1, until) for reference in ((first, first_rtol), second))
+    one, other = (walked(scene, *reference, TOUCHES + 1, until) for reference in REFERENCES)
     end, other_end = end_of(one), end_of(other)
     assert end is not None, "the walk goes on beyond that time"
     assert other_end is not None, "so it does by the other method"
@@ -298,7 +297,7 @@ def swing_rows(engine: Engine, scene: EngineScene, process: OwnProcess) -> tuple
     return rows, lost
 
 
-def swing_truth(scene: EngineScene, start: Floats, until_s: float = SWING_S) -> tuple[Floats, Any]:
+def swing_truth(scene: EngineScene, start: Floats) -> tuple[Floats, Any]:
     """The end of the swing by our equations and SciPy's method, and the mechanical energy of a state."""
     from scipy.integrate import solve_ivp
 
@@ -316,7 +315,7 @@ def swing_truth(scene: EngineScene, start: Floats, until_s: float = SWING_S) -> 
         return float(kinetic_energy(whole, y) + potential_energy(whole, y))
 
     y = folded(system.form, start)
-    done = solve_ivp(rate, (0.0, until_s), y, method="DOP853", rtol=1e-13, atol=1e-14)
+    done = solve_ivp(rate, (0.0, SWING_S), y, method="DOP853", rtol=1e-13, atol=1e-14)
     return unfolded(system.form, done.y[:, -1], start.size), energy
 
 
