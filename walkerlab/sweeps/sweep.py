@@ -262,7 +262,7 @@ class SweepRun:
             store(self.folder, stage, digest, chunk, begun)
             merge.put(chunk, self.places)
             if any(row.status == "answered" for row in chunk.rows):
-                work.check(merge.columns.numbers)
+                work.check(merge.numbers)
             for bug in (row.bug for row in chunk.rows if row.bug):
                 place = bug.rpartition("\n  ")[0]  # without what it says there, which differs from point to point
                 if place not in bugs:
