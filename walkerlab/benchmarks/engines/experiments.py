@@ -297,7 +297,7 @@ def swing_rows(engine: Engine, scene: EngineScene, process: OwnProcess) -> tuple
     return rows, lost
 
 
-def swing_truth(scene: EngineScene, start: Floats) -> tuple[Floats, Any]:
+def swing_truth(scene: EngineScene, start: Floats, until_s: float = SWING_S) -> tuple[Floats, Any]:
     """The end of the swing by our equations and SciPy's method, and the mechanical energy of a state."""
     from scipy.integrate import solve_ivp
 
@@ -315,7 +315,7 @@ def swing_truth(scene: EngineScene, start: Floats) -> tuple[Floats, Any]:
         return float(kinetic_energy(whole, y) + potential_energy(whole, y))
 
     y = folded(system.form, start)
-    done = solve_ivp(rate, (0.0, SWING_S), y, method="DOP853", rtol=1e-13, atol=1e-14)
+    done = solve_ivp(rate, (0.0, until_s), y, method="DOP853", rtol=1e-13, atol=1e-14)
     return unfolded(system.form, done.y[:, -1], start.size), energy
 
 
