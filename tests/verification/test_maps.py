@@ -15,7 +15,7 @@ from walkerlab.verification.maps import (
     PAPER_STIFFNESS,
     VERDICTS,
     along,
-    on_ground,
+    case_on_ground,
     pieces_of,
     step_column,
     stiction_cell,
@@ -58,7 +58,7 @@ def test_the_paper_is_a_cell_that_walks():
 
 
 def test_the_papers_ground_is_the_papers():
-    contact = on_ground(PAPER_STIFFNESS, 0.1, 4, 1000)[1].contact.in_si()
+    contact = case_on_ground(PAPER_STIFFNESS, 0.1, 4, 1000)[1].contact.in_si()
     assert vars(contact) == pytest.approx(vars(load().config.contact.in_si()))
 
 

@@ -108,7 +108,7 @@ def gait_on(pads: OwnPads, z: Floats, rigidity: float = 0.0) -> Cycle | str:
     return found
 
 
-def with_contact(walker: ContactWalker, stiffness: float, damping: float, creep: float) -> ContactWalker:
+def with_scaled_laws(walker: ContactWalker, stiffness: float, damping: float, creep: float) -> ContactWalker:
     """The walker on ground whose stiffness, damping and velocities of friction are multiplied by these factors.
 
     The penetration at which damping is full shrinks with the static penetration, so that the ground damps alike.
@@ -125,7 +125,7 @@ def with_contact(walker: ContactWalker, stiffness: float, damping: float, creep:
 def with_rigidity(walker: ContactWalker, rigidity: float) -> ContactWalker:
     """The walker on ground that is the more rigid the larger `rigidity`: 0 as it is, 1 nearly rigid."""
     stiffer = STIFFER**rigidity
-    return with_contact(walker, stiffer, math.sqrt(stiffer), STICKIER**-rigidity)
+    return with_scaled_laws(walker, stiffer, math.sqrt(stiffer), STICKIER**-rigidity)
 
 
 def follow_from_rigid(walker: ContactWalker, ground: JudgedGround, tolerances: Tolerances, start: State) -> GaitAnswer:

@@ -24,7 +24,7 @@ from walkerlab.hybrid.comparison import (
 )
 from walkerlab.hybrid.contact_events import JudgedGround
 from walkerlab.hybrid.contact_run import ContactWalkResult, walk_contact
-from walkerlab.orbits.contact_gait import EFFORT, with_contact
+from walkerlab.orbits.contact_gait import EFFORT, with_scaled_laws
 from walkerlab.orbits.contact_map import OwnPads, step_of
 from walkerlab.orbits.step_map import Cycle, gait_near
 from walkerlab.solvers.registry import Tolerances
@@ -123,7 +123,7 @@ class Limit:
         """
         found: list[Distance] = []
         for setting in series_of(name, self.every):
-            changed = with_contact(walker, *setting[2:])
+            changed = with_scaled_laws(walker, *setting[2:])
             near = self.gait(changed, gait, GAIT_TOLERANCE)
             if near is None:
                 break

@@ -29,7 +29,7 @@ def rigid_map(config: ContactConfig, parameter: Parameter, scale: float) -> Rigi
     return RigidMap(rigid_walkers(config, parameter), scale, rigid_walker(config, config.equations))
 
 
-def on_ground(config: ContactConfig, step_length_m: float) -> WalkerOnGround:
+def walker_on_ground(config: ContactConfig, step_length_m: float) -> WalkerOnGround:
     """The contact model of a config; steps are judged by a length (m)."""
     from walkerlab.orbits.contact_map import WalkerOnGround
     from walkerlab.scene.contact import contact_scene
@@ -45,7 +45,7 @@ def walkers_on_ground(
 
     def walker_at(value: float) -> WalkerOnGround | None:
         changed = parameter.config_at(config, value)
-        return None if changed is None else on_ground(changed, step_length_m)
+        return None if changed is None else walker_on_ground(changed, step_length_m)
 
     return walker_at
 
@@ -55,4 +55,4 @@ def contact_map(config: ContactConfig, parameter: Parameter, scale: float, step_
     from walkerlab.orbits.contact_map import ContactMap
 
     walkers = walkers_on_ground(config, parameter, step_length_m)
-    return ContactMap(walkers, scale, CONTACT, step_length_m, on_ground(config, step_length_m))
+    return ContactMap(walkers, scale, CONTACT, step_length_m, walker_on_ground(config, step_length_m))

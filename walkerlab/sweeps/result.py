@@ -168,7 +168,7 @@ class Merge:
         """The largest numerical errors of the walks that were taken again, how many those are, and of how many.
 
         `ended_otherwise` counts those that came to another end, whose error is unknown.
-        Nothing for a stage that walks not.
+        Nothing for a stage that does not walk.
 
         inverse  which result each point has
         """

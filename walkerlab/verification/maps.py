@@ -16,7 +16,7 @@ from walkerlab.config.stability import Case
 from walkerlab.solvers.registry import Tolerances
 from walkerlab.solvers.system import Floats
 from walkerlab.verification.catalogue import config_of
-from walkerlab.verification.judge import TENFOLD
+from walkerlab.verification.judge import TIGHTER
 from walkerlab.verification.ordinary import REFERENCE, STEPS, arrival_of, fixed, natural_units
 from walkerlab.verification.starts import ContactStart, configured, prepared
 from walkerlab.verification.verdict import finite
@@ -28,7 +28,7 @@ NONE: Final = -1.0  # in the place of an error in what is kept, whose numbers ar
 PER_STICTION: Final = 10.0  # friction velocity over stiction velocity, as the paper has it
 STEP: Final = (1e-6, 1e-2)  # s
 WALK_STEPS: Final = 4
-BUDGET, SHARPER_BUDGET, REFERENCE_BUDGET = 600_000, 1_200_000, 20_000_000  # right-hand sides; of the last most take 7e6
+BUDGET, TIGHTER_BUDGET, REFERENCE_BUDGET = 600_000, 1_200_000, 20_000_000  # right-hand sides; of the last most take 7e6
 MAX_EVALUATIONS: Final = 5_000_000  # of a fixed step: more than any cell needs
 VERDICTS: Final = ("fine", "wrong silently", "diverges", "gives up", "no reference")
 
@@ -40,7 +40,7 @@ def along(ends: tuple[float, float], cells: int) -> Floats:
     return np.geomspace(*ends, cells)
 
 
-def on_ground(stiffness: float, stiction_velocity: float | None, steps: int, budget: int) -> tuple[Case, Config]:
+def case_on_ground(stiffness: float, stiction_velocity: float | None, steps: int, budget: int) -> tuple[Case, Config]:
     """The paper's walk on ground of another stiffness (N/m^e), and with another stiction velocity (m/s) if given."""
     contact: dict[str, object] = {"units": "si", "stiffness": stiffness}
     if stiction_velocity is not None:
@@ -61,15 +61,15 @@ def prepared_on_ground(config: Config, case: Case) -> ContactStart:
 def stiction_cell(stiffness: float, stiction_velocity: float) -> Numbers:
     """The paper's walk with one stiffness and stiction velocity, by the default method.
 
-    Returns outcome, steps, outcome at a tenfold tolerance, error between both in legs, radians and pendulum times
-    (`NONE` if they end unlike), right-hand sides.
+    Returns outcome, steps, outcome at a ten times tighter tolerance, error between both in legs, radians and pendulum
+    times (`NONE` if they end unlike), right-hand sides.
     """
-    case, config = on_ground(stiffness, stiction_velocity, WALK_STEPS, BUDGET)
+    case, config = case_on_ground(stiffness, stiction_velocity, WALK_STEPS, BUDGET)
     start = prepared_on_ground(config, case)
     walk = again = start.walk(case, configured(start, case))
     if walk.outcome.answered:
-        sharper = case.model_copy(update={"budget": SHARPER_BUDGET})
-        again = start.walk(case, configured(start, sharper, TENFOLD))
+        tighter = case.model_copy(update={"budget": TIGHTER_BUDGET})
+        again = start.walk(case, configured(start, tighter, TIGHTER))
     error = NONE
     if walk.outcome is again.outcome and walk.touches.size == again.touches.size:
         ends = np.abs(np.subtract(walk.record.end_state, again.record.end_state)) / natural_units(config)
@@ -79,11 +79,11 @@ def stiction_cell(stiffness: float, stiction_velocity: float) -> Numbers:
 
 
 def step_column(stiffness: float, steps_s: tuple[float, ...]) -> Numbers:
-    """Two steps of the paper's walk with one stiffness, sharply, then by semi-implicit Euler with each step.
+    """Two steps of the paper's walk with one stiffness: semi-implicit Euler with each step, against a tight tolerance.
 
     Returns verdict and error of each step.
     """
-    case, config = on_ground(stiffness, None, STEPS, REFERENCE_BUDGET)
+    case, config = case_on_ground(stiffness, None, STEPS, REFERENCE_BUDGET)
     start = prepared_on_ground(config, case)
     walk = start.walk(case, Tolerances(*REFERENCE, case.budget))
     if not walk.outcome.answered:
