@@ -109,7 +109,6 @@ class ContactTrial:
     walker: ContactWalker
     ground: JudgedGround
     start: tuple[float, ...]
-    stance: int
     steps: int
     name: str
 
@@ -120,9 +119,10 @@ class ContactTrial:
 
     def prepare(self, method: str, rtol: float, budget: int) -> Callable[[], TrialRun]:
         """A function that does the walk with a method, ready to be timed."""
+        from walkerlab.ground.terrain import STANCE_FOOT
         from walkerlab.hybrid.contact_run import walk_contact
 
-        scene = self.walker, self.ground, False, self.stance, self.start
+        scene = self.walker, self.ground, False, STANCE_FOOT, self.start
         tolerances = Tolerances(method, rtol, rtol * ATOL_PER_RTOL, budget, track_energy=False)
 
         def run() -> TrialRun:

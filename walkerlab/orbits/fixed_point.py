@@ -38,6 +38,7 @@ RETREATS = 5  # halvings of the seed's amplitude, whose error shrinks with the a
 # angle between the legs (rad), angular velocities (sqrt(g/L)) of swing and stance leg, and of a shank whose knee was
 # free at heel strike
 MIN_START, MAX_START = np.array([0.0, -1.0, -1.0, -1.0]), np.array([1.2, 1.0, 0.0, 1.0])
+DRAWN_FROM = f"legs up to {MAX_START[0]:g} rad apart, rates up to {MAX_START[1]:g} sqrt(g/L)"
 
 
 @dataclass(frozen=True)
@@ -169,11 +170,8 @@ class GaitSearch:
     @property
     def sought(self) -> str:
         """How gaits were looked for, in words; a very unstable one may be missed by all of it."""
-        return (
-            f"{self.followed}, and by Newton's method from {self.random_starts} random starts (legs up "
-            f"to {MAX_START[0]:g} rad apart, rates up to {MAX_START[1]:g} sqrt(g/L), steps of at most "
-            f"{LONGEST_SWING:g} sqrt(L/g))"
-        )
+        starts = f"{self.random_starts} random starts ({DRAWN_FROM}, steps of at most {LONGEST_SWING:g} sqrt(L/g))"
+        return f"{self.followed}, and by Newton's method from {starts}"
 
     @property
     def gait(self) -> RigidGait | None:
@@ -397,10 +395,8 @@ class Search:
         chosen, reason = choice(gaits)
         if not gaits:
             followed = f"{self.followed}, {'; '.join(self.lost)}" if self.lost else NONE_TO_FOLLOW[self.walker.passive]
-            reason = (
-                f"none found: {followed}; none of {self.drawn} random starting values (legs up to {MAX_START[0]:g} "
-                f"rad apart, rates up to {MAX_START[1]:g} sqrt(g/L)) led to a gait by Newton's method"
-            )
+            starts = f"none of {self.drawn} random starting values ({DRAWN_FROM})"
+            reason = f"none found: {followed}; {starts} led to a gait by Newton's method"
         return GaitSearch(gaits, chosen, reason, hits, self.drawn, tuple(self.lost), self.followed)
 
 

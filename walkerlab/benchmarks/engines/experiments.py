@@ -18,6 +18,7 @@ from walkerlab.benchmarks.engines.scenes import EngineScene
 from walkerlab.ground.energy import kinetic_energy, potential_energy
 from walkerlab.ground.friction import friction_coefficient
 from walkerlab.ground.resting import resting_foot
+from walkerlab.ground.terrain import STANCE_FOOT
 from walkerlab.ground.walker import changed_forms, folded, on_ground, unfolded
 from walkerlab.hybrid.contact_run import ContactWalkResult, knees_at_start, walk_contact
 from walkerlab.outcome import Outcome
@@ -66,7 +67,7 @@ class Truth:
 def walked(scene: EngineScene, method: str, rtol: float, steps: int, until_s: float | None = None) -> ContactWalkResult:
     """Our walk; with `until_s` also the state then."""
     tolerances = Tolerances(method, rtol, 1e-2 * rtol, ENDLESS, track_energy=False)
-    return walk_contact(scene.ours, scene.ground, False, scene.stance, scene.start, tolerances, steps, until_s)
+    return walk_contact(scene.ours, scene.ground, False, STANCE_FOOT, scene.start, tolerances, steps, until_s)
 
 
 def truth_of(scene: EngineScene) -> Truth | None:
@@ -301,7 +302,7 @@ def swing_truth(scene: EngineScene, start: Floats, until_s: float = SWING_S) -> 
     """The end of the swing by our equations and SciPy's method, and the mechanical energy of a state."""
     from scipy.integrate import solve_ivp
 
-    knee = knees_at_start(scene.ours, scene.stance, scene.start)
+    knee = knees_at_start(scene.ours, STANCE_FOOT, scene.start)
     passive = changed_forms(scene.ours, driven_hip=False, push_off=0.0, hip_stiffness=0.0)
     system = on_ground(passive, (False, False), knee, hinged=True)
     whole = passive.forms[1, 0]
