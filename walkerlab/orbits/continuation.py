@@ -119,10 +119,8 @@ def corrected(
     found = newton(on_plane, guess, Effort(tolerance, most))
     if isinstance(found, NotConverged):
         return found
-    ahead = np.zeros(guess.size)
-    ahead[-1] = 1.0
     try:
-        direction = np.linalg.solve(found.evaluated.jacobian, ahead)
+        direction = np.linalg.solve(found.evaluated.jacobian, np.eye(guess.size)[-1])
     except np.linalg.LinAlgError:
         return NotConverged(Outcome.WALKED, singular=True)
     return Solved(found.x, direction / np.linalg.norm(direction), found.evaluated, found.corrections)

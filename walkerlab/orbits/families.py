@@ -181,10 +181,8 @@ class BranchFollower:
 
     def solved_at(self, z: Floats, value: float, period: int) -> Solved[Cycle] | None:
         """The point of the curve of gaits near z at a value of the parameter; None if Newton's method finds none."""
-        fixed = np.append(np.zeros(z.size), 1.0)
-        found = corrected(
-            self.equations(period), np.append(z, value / self.span.size), fixed, self.control.tolerance, EVALUATIONS
-        )
+        x, tolerance = np.append(z, value / self.span.size), self.control.tolerance
+        found = corrected(self.equations(period), x, np.eye(x.size)[-1], tolerance, EVALUATIONS)
         return None if isinstance(found, NotConverged) else found
 
     def lies_on(self, branch: GaitBranch, gait: Cycle) -> bool:
@@ -287,7 +285,7 @@ class BranchFollower:
         share = (edge - equations.value(last.x)) / (value - equations.value(last.x))
         guess = last.x + share * (solved.x - last.x)
         guess[-1] = edge / self.span.size
-        at_edge = corrected(equations, guess, np.append(np.zeros(guess.size - 1), 1.0), self.control.tolerance)
+        at_edge = corrected(equations, guess, np.eye(guess.size)[-1], self.control.tolerance)
         if isinstance(at_edge, NotConverged):
             return BranchEnd(value, "end of the span"), solved
         along = at_edge.tangent if at_edge.tangent @ last.tangent > 0.0 else -at_edge.tangent

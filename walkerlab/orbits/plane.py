@@ -103,8 +103,7 @@ def curve_through(
     equations = critical_gaits(plane.map_at, bifurcation.kind, period, scales)
     x = np.append(bifurcation.point.x, plane.own / scales[1])
     x[-2] = bifurcation.value / scales[0]
-    at_second = np.append(np.zeros(x.size - 1), 1.0)
-    start = corrected(equations, x, at_second, control.tolerance)
+    start = corrected(equations, x, np.eye(x.size)[-1], control.tolerance)
     if isinstance(start, NotConverged):
         return None
     (behind, begin), (ahead, end) = (

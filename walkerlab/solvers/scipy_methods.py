@@ -92,7 +92,7 @@ def counted(counts: Integers, system: Any, n: int) -> Callable[[float, Any], Any
             raise OutOfBudgetError
         counts[RHS] += 1
         dy = np.empty(n)
-        code(system, float(t), np.ascontiguousarray(y), dy)
+        code(system, t, np.ascontiguousarray(y), dy)
         return dy
 
     return fun

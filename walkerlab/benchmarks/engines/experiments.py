@@ -165,12 +165,9 @@ def same_law_rows(
     for name, integrator in engine.adapter().INTEGRATORS.items():
         if integrator.for_contact_only:
             continue
-        for asked in steppings(name, integrator, SAME_LAW_STEPS):
-            steps = math.ceil(truth.until_s / asked.step_s)
-            if not integrator.adapts and steps > integrator.most_steps:
+        for stepping in steppings(name, integrator, SAME_LAW_STEPS):
+            if not integrator.adapts and math.ceil(truth.until_s / stepping.step_s) > integrator.most_steps:
                 continue
-            # a whole number of steps leads to the end
-            stepping = asked if integrator.adapts else Stepping(name, truth.until_s / steps)
             task = runs.WalkTask(engine.name, stepping, scene, OWN_TOUCHES, truth.until_s, None, integrator.most_steps)
             answer = process.do(task.run, PATIENCE_S)
             row = experiment.row(name, stepping, answer)
