@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -37,21 +37,6 @@ class TrialRun:
     rhs_evaluations: int
     accepted: int
     rejected: int
-
-
-class Trial(Protocol):
-    """A walk to measure by."""
-
-    @property
-    def name(self) -> str:
-        """Name of the scene."""
-
-    @property
-    def methods(self) -> tuple[str, ...]:
-        """The methods that can walk it."""
-
-    def prepare(self, method: str, rtol: float, budget: int) -> Callable[[], TrialRun]:
-        """A function that does the walk with a method, ready to be timed."""
 
 
 @dataclass(frozen=True)
@@ -130,6 +115,10 @@ class ContactTrial:
             return finished(result.outcome, np.array(result.end_state), result.work)
 
         return run
+
+
+Trial = RigidTrial | ContactTrial
+"""A walk to measure methods by."""
 
 
 def finished(outcome: Outcome, state: Floats, counts: Any) -> TrialRun:
