@@ -3,8 +3,6 @@
 All of it from seeds on a step map, whatever the model; how thoroughly it is done is what sets models apart.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
