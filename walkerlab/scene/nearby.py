@@ -31,6 +31,7 @@ STEEP, STEEPEST = 0.2, 0.35  # rad, up to which gaits are followed: at least, an
 QUICK = SearchSettings(random_starts=50, further_starts=100)
 POINTS = 60  # of a branch
 INSIDE = 0.1  # of a range, from its end
+OF_A_WALKER = frozenset(PHYSICAL) - {"contact"}  # keys whose numbers lead from one walker to another
 
 
 @dataclass(frozen=True)
@@ -137,12 +138,7 @@ def numbers_of(config: Config) -> dict[tuple[str, ...], float]:
         held: Any = config
         for name in path:
             held = getattr(held, name, None)
-        if (
-            path[0] in PHYSICAL
-            and path[0] != "contact"
-            and isinstance(held, float)
-            and "number" in kind(field.annotation)
-        ):
+        if path[0] in OF_A_WALKER and isinstance(held, float) and "number" in kind(field.annotation):
             found[path] = held
     return found
 

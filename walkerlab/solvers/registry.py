@@ -30,10 +30,10 @@ class Method:
     compiled: bool = False
 
 
-def of_scipy(class_name: str, told: bool = True) -> Callable[[int, float, float, int], ScipyMethod]:
-    """Builds methods with a class of scipy.integrate, which is loaded where one starts.
+def of_scipy(class_name: str, takes_jacobian: bool = True) -> Callable[[int, float, float, int], ScipyMethod]:
+    """What builds methods with a class of scipy.integrate, which is loaded where one starts.
 
-    told  whether they take the Jacobian
+    takes_jacobian  whether there is use for the Jacobian
     """
 
     def new_solver(*problem: Any, **options: Any) -> Any:
@@ -41,11 +41,11 @@ def of_scipy(class_name: str, told: bool = True) -> Callable[[int, float, float,
 
         return getattr(integrate, class_name)(*problem, **options)
 
-    return partial(ScipyMethod, new_solver, told)
+    return partial(ScipyMethod, new_solver, takes_jacobian)
 
 
 def of_cvode(family: str) -> Callable[[int, float, float, int], ScipyMethod]:
-    """Builds methods with one of CVODE's families of formulas."""
+    """What builds methods with one of CVODE's families of formulas."""
     return partial(ScipyMethod, partial(cvode.CvodeSolver, family), True)
 
 
@@ -54,8 +54,8 @@ OWN = (
     Method("radau5", new_radau5, stiff=True, orders=(5, 5), compiled=True),
 )
 SCIPY = (
-    Method("scipy-rk45", of_scipy("RK45", told=False), stiff=False, orders=(5, 5)),
-    Method("scipy-dop853", of_scipy("DOP853", told=False), stiff=False, orders=(8, 8)),
+    Method("scipy-rk45", of_scipy("RK45", takes_jacobian=False), stiff=False, orders=(5, 5)),
+    Method("scipy-dop853", of_scipy("DOP853", takes_jacobian=False), stiff=False, orders=(8, 8)),
     Method("scipy-lsoda", of_scipy("LSODA"), stiff=True, orders=(1, 12)),
     Method("scipy-radau", of_scipy("Radau"), stiff=True, orders=(5, 5)),
     Method("scipy-bdf", of_scipy("BDF"), stiff=True, orders=(1, 5)),

@@ -60,14 +60,14 @@ class ScipyMethod:
     """A library's integrator with the fields of a method."""
 
     def __init__(
-        self, new_solver: Callable[..., Any], told: bool, n: int, rtol: float, atol: float, budget: int
+        self, new_solver: Callable[..., Any], takes_jacobian: bool, n: int, rtol: float, atol: float, budget: int
     ) -> None:
         """Prepare for n equations; the solver itself is made by `begin`.
 
-        new_solver  makes it, called as the classes of scipy.integrate are
-        told        whether it takes the Jacobian
+        new_solver      makes it, called as the classes of scipy.integrate are
+        takes_jacobian  whether there is use for the Jacobian
         """
-        self.new_solver, self.told = new_solver, told
+        self.new_solver, self.takes_jacobian = new_solver, takes_jacobian
         self.rtol, self.atol = rtol, atol
         self.clock = np.zeros(3)
         self.y_old, self.y = np.zeros(n), np.zeros(n)
@@ -118,7 +118,7 @@ def begin_scipy(method: ScipyMethod, system: Any, t: float, y: Any, h: float) ->
     method.y[:] = y
     method.clock[T_OLD] = method.clock[T] = t
     options: dict[str, Any] = {"rtol": max(method.rtol, 2.3e-14), "atol": method.atol}
-    if method.told:
+    if method.takes_jacobian:
         options["jac"] = counted_jacobian(method, system, n)
     method.dense = None
     try:

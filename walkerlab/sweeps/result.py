@@ -86,12 +86,14 @@ def types_in(values: Sequence[Any]) -> set[type]:
 class Merge:
     """The rows of a sweep's results put together, as one variable for each thing that they say.
 
-    size  number of different results
+    config   the one that is varied
+    inverse  which result each point has
     """
 
-    def __init__(self, size: int) -> None:
+    def __init__(self, question: SweptStage, config: Config, inverse: Integers) -> None:
         """There are no rows yet."""
-        self.there = np.zeros(size, bool)
+        self.question, self.config, self.inverse = question, config, inverse
+        self.there = np.zeros(int(inverse.max()) + 1, bool)
         self.labels: dict[str, tuple[str, str]] = {}
         self.columns: dict[str, SweepVariable] = {}
 
@@ -122,18 +124,15 @@ class Merge:
         """Of the variables those that are one number for each result."""
         return [name for name, column in self.columns.items() if not column.text and column.values.ndim == 1]
 
-    def of(self, name: str, inverse: Integers) -> NDArray[Any] | None:
+    def of(self, name: str) -> NDArray[Any] | None:
         """What the points have under a name, nan or an empty text for a gap; None if none of them has it."""
-        return self.columns[name].values[inverse] if name in self.columns else None
+        return self.columns[name].values[self.inverse] if name in self.columns else None
 
-    def content(self, question: SweptStage, config: Config, inverse: Integers) -> InTurn:
-        """What is stored of the sweep; to be asked for once.
-
-        config   the one that is varied
-        inverse  which result each point has
-        """
-        parameters = dict(coordinates(question, config))
-        statuses = self.columns["status"].values[inverse]
+    def content(self) -> InTurn:
+        """What is stored of the sweep; to be asked for once."""
+        question = self.question
+        parameters = dict(coordinates(question, self.config))
+        statuses = self.columns["status"].values[self.inverse]
         summary = {
             "of": question.stage,
             "parameters": {name: list(axis.values) for name, axis in zip(question.names, question.axes, strict=True)},
@@ -141,21 +140,22 @@ class Merge:
             "points": len(question),
             "done": int(np.sum(statuses != "failed")),
             "failed": int(np.sum(statuses == "failed")),
-            "outcomes": counted(self.columns["outcome"].values[inverse]),
-            **self.numerical_error(inverse),
+            "outcomes": counted(self.columns["outcome"].values[self.inverse]),
+            **self.numerical_error(),
         }
-        ended = self.endings(question, config, inverse)
+        ended = self.endings()
         summary |= {"endings": ended} if ended else {}
         attrs = {"coordinates": " ".join(question.names)} if question.layout == "list" else {}
         scales = {name: one for name, one in parameters.items() if one.dims == (name,)}
         size = sum(one.values.nbytes * (TEXT_BYTES if one.text else 1) for one in self.columns.values())
-        return InTurn(summary, attrs, scales, self._variables(question, parameters, inverse), size)
+        return InTurn(summary, attrs, scales, self._variables(parameters), size)
 
-    def endings(self, question: SweptStage, config: Config, inverse: Integers) -> list[dict[str, Any]]:
+    def endings(self) -> list[dict[str, Any]]:
         """What ended the walks and what the ground has to do with it; nothing of a stage that does not walk."""
-        outcomes = self.columns["outcome"].values[inverse]
-        pads, pitch = None, self.of("pitch_m", inverse)
-        off, lengths = outcomes == "off-pad", self.of("step_lengths_m", inverse)
+        question, config = self.question, self.config
+        outcomes = self.columns["outcome"].values[self.inverse]
+        pads, pitch = None, self.of("pitch_m")
+        off, lengths = outcomes == "off-pad", self.of("step_lengths_m")
         if pitch is not None and off.any():
             last = np.zeros(0) if lengths is None else last_of_each(lengths[off])
             steps = last[np.isfinite(last)]
@@ -164,40 +164,31 @@ class Merge:
             pads = Pads(ends_of(pitch[off]), ends_of(steps) if steps.size else None, str(laid))
         return endings(counted(outcomes), config, question.stage == CONTACT, pads)
 
-    def numerical_error(self, inverse: Integers) -> dict[str, Any]:
+    def numerical_error(self) -> dict[str, Any]:
         """The largest numerical errors of the walks that were taken again, how many those are, and of how many.
 
         `ended_otherwise` counts those that came to another end, whose error is unknown.
         Nothing for a stage that does not walk.
-
-        inverse  which result each point has
         """
-        found = {key: self.of(f"numerical_error.{key}", inverse) for key in ("end_time_s", *OF_EACH_STEP)}
-        reasons, ends = self.of("numerical_error.reason", inverse), found["end_time_s"]
+        found = {key: self.of(f"numerical_error.{key}") for key in ("end_time_s", *OF_EACH_STEP)}
+        reasons, ends = self.of("numerical_error.reason"), found["end_time_s"]
         otherwise = 0 if reasons is None else int(np.sum(reasons != ""))
         known = 0 if ends is None else int(np.sum(np.isfinite(ends)))
         if otherwise + known == 0:
             return {}
         largest = {key: float(np.nanmax(values)) for key, values in found.items() if values is not None}
-        told = {"walked_again": known + otherwise, "of": len(inverse), "ended_otherwise": otherwise, **largest}
+        told = {"walked_again": known + otherwise, "of": len(self.inverse), "ended_otherwise": otherwise, **largest}
         return {"numerical_error": told}
 
-    def _variables(
-        self, question: SweptStage, parameters: Mapping[str, Variable], inverse: Integers
-    ) -> Iterator[tuple[str, Variable]]:
+    def _variables(self, parameters: Mapping[str, Variable]) -> Iterator[tuple[str, Variable]]:
         """Every variable by name; a number that is a parameter as well is its coordinate."""
-        shape, dims = question.shape, question.dims
         for name in sorted({*parameters, *self.columns}):
-            yield name, parameters[name] if name in parameters else self.variable(name, inverse, shape, dims)
+            yield name, parameters[name] if name in parameters else self.variable(name)
 
-    def variable(self, name: str, inverse: Integers, shape: tuple[int, ...], dims: tuple[str, ...]) -> Variable:
-        """A variable over the points; it is handed over, so that no two copies are held of all.
-
-        inverse      which result each point has
-        shape, dims  of the points
-        """
+    def variable(self, name: str) -> Variable:
+        """A variable over the points; it is handed over, so that no two copies are held of all."""
         column = self.columns.pop(name)
-        values = column.typed()[inverse]
+        values = column.typed()[self.inverse]
         extra = values.shape[1:]
         own = tuple(f"{name}_index{axis if len(extra) > 1 else ''}" for axis in range(len(extra)))
         last = name.rpartition(".")[2]
@@ -210,7 +201,7 @@ class Merge:
         else:
             unit, text = unit_by_name(last), in_words(name)
         gaps = values.dtype.kind == "f" and bool(np.isnan(values).any())
-        return Variable(values.reshape(shape + extra), dims + own, unit, text, missing=gaps)
+        return Variable(values.reshape(self.question.shape + extra), self.question.dims + own, unit, text, missing=gaps)
 
 
 def last_of_each(rows: NDArray[Any]) -> NDArray[Any]:
