@@ -39,7 +39,7 @@ from walkerlab.hybrid.rigid_lanes import Strikes, new_fates, new_lane_memory, tw
 from walkerlab.hybrid.rigid_walk import FALLEN_HIP
 from walkerlab.orbits.basin import ATOL, RTOL
 from walkerlab.orbits.families import ValueSpan
-from walkerlab.orbits.fixed_point import RigidGait, Search, SearchSettings, SlopeBranch, find_gaits, over_slope
+from walkerlab.orbits.fixed_point import LOOKING, RigidGait, Search, SlopeBranch, find_gaits, over_slope
 from walkerlab.orbits.newton import Effort
 from walkerlab.orbits.shooting import on_section
 from walkerlab.orbits.small_slope import seeds
@@ -224,9 +224,9 @@ def chosen_gait(config: Config) -> RigidGait:
 
 def newton_lines(watch: Stopwatch) -> Iterator[Line]:
     """From the small-slope seed to the fixed point at 1 degree."""
-    search = Search(rigid_walker(ONE_DEGREE, "corrected"), SearchSettings())
+    search = Search(rigid_walker(ONE_DEGREE, "corrected"))
     seed, slope = seeds(search.walker)[0], float(search.walker.slope)
-    looking = over_slope(search.walker, search.settings.looking)
+    looking = over_slope(search.walker, LOOKING)
 
     def solve() -> None:
         _, z = SlopeBranch(looking, seed).follow(slope)

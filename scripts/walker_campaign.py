@@ -229,7 +229,7 @@ def end_of(search: GaitSearch) -> str:
 
 def overlooks(walker: Standing) -> bool:
     """Whether another method finds a gait of a walker of which a search finds none."""
-    search = Search(walker, SETTINGS)
+    search = Search(walker)
     looking, still = search.looking, search.walker.slope + search.walker.lean
     section = section_of(search.walker)
     d = len(search.walker.section_indices)

@@ -8,6 +8,7 @@ from walkerlab.benchmarks.engines.adapter import Stepping
 from walkerlab.benchmarks.engines.planar import HINGED, planar_model
 from walkerlab.benchmarks.engines.registry import ENGINES
 from walkerlab.benchmarks.engines.runs import SwingTask
+from walkerlab.mechanics.assembly import Anchor
 from walkerlab.mechanics.rigid import standing
 from walkerlab.mechanics.standing import BENT, STANCE, Mode
 from walkerlab.mechanics.walkers import Arc, Limb, kneed_legs
@@ -43,7 +44,8 @@ def test_the_swing_with_a_free_knee_converges_to_the_rigid_models_with_the_order
     engine = ENGINES[name]
     pytest.importorskip(engine.module, reason=f"{name} is not installed: {engine.install_line}")
     foot = KNEED.feet[STANCE]
-    model = planar_model(KNEED, (foot.body, foot.centre_m), HINGED, GRAVITY, SLOPE, KNEED.knees[STANCE:])
+    gravity = float(GRAVITY * np.sin(SLOPE)), float(GRAVITY * np.cos(SLOPE))
+    model = planar_model(KNEED, Anchor(foot.body, foot.centre_m), HINGED, gravity, KNEED.knees[STANCE:])
     for integrator, entry in engine.adapter().INTEGRATORS.items():
         if entry.adapts:
             continue

@@ -9,6 +9,7 @@ from walkerlab.benchmarks.engines.follow import RuleFollower, crossing
 from walkerlab.benchmarks.engines.runs import pinned_model
 from walkerlab.errors import ConfigError
 from walkerlab.ground.friction import friction_coefficient
+from walkerlab.ground.terrain import STANCE_FOOT
 from walkerlab.ground.walker import BENT, LOCKED
 from walkerlab.hybrid.contact_run import walk_contact
 from walkerlab.outcome import Outcome
@@ -121,7 +122,7 @@ def test_forces_of_drives_do_the_work_that_our_walk_gives():
     """In the twentieth of a second after the first touch."""
     scene = compass(*DRIVEN)
     tight = Tolerances("radau5", 1e-9, 1e-11, 10**6)
-    result = walk_contact(scene.ours, scene.ground, False, scene.stance, scene.start, tight, 2, 1e-5)
+    result = walk_contact(scene.ours, scene.ground, False, STANCE_FOOT, scene.start, tight, 2, 1e-5)
     samples = result.samples
     rules = RuleFollower(scene, 2, *scene.from_base(scene.start), carries=False)
     begin, end = (int(np.searchsorted(samples.time_s, result.touch_time_s[0] + late)) for late in (1e-4, 0.05))
@@ -145,7 +146,7 @@ def test_a_torso_and_a_stop_that_gives_are_refused_in_words():
 def test_a_hinged_walker_hangs_from_its_stance_foot(scene):
     model = pinned_model(scene)
     assert model.freedoms == ("turn",)
-    assert model.links[0].point_m == scene.assembly.feet[scene.stance].centre_m
+    assert model.links[0].point_m == scene.assembly.feet[STANCE_FOOT].centre_m
     assert model.chain.tolist() == [[1.0, 1.0], [1.0, 0.0]]
 
 

@@ -6,9 +6,10 @@ import numpy as np
 from contact_walks import settings
 
 from walkerlab.config.contact import Contact
-from walkerlab.ground.compliant import KneeRules
+from walkerlab.ground.compliant import KneeRules, contact_walker
+from walkerlab.hybrid.contact_events import Frame
 from walkerlab.mechanics.walkers import Arc, Limb, kneed_legs
-from walkerlab.scene.contact import assembled_scene, start_state
+from walkerlab.scene.contact import TERRAINS, ContactScene, friction_law, normal_law, start_state
 
 THIGH, SHANK, HIP_MASS = Limb(0.5, 0.5, 0.325), Limb(0.5, 0.05, 0.125), 0.5
 MASS, PAPER_MASS, GRAVITY, SLOPE = 1.6, 20.0, 9.81, 0.0504
@@ -29,15 +30,10 @@ def scene_of(rules=None, radius=0.0, shank=SHANK, slope=SLOPE, scale=1.0, **cont
         "damping": 9e4 * MASS / PAPER_MASS / scale**0.5, "full_damping_penetration": 1e-4 * scale,
         "stiction_velocity": 0.1 * scale**0.5, "friction_velocity": 1.0 * scale**0.5, "terrain": "plane",
     }  # fmt: skip
-    return assembled_scene(
-        kneed_legs(*limbs, HIP_MASS, Arc(scale * radius)),
-        scale,
-        Contact(**(law | contact)),
-        GRAVITY,
-        slope,
-        scale * STEP,
-        rules,
-    )
+    ground, parts = Contact(**(law | contact)), kneed_legs(*limbs, HIP_MASS, Arc(scale * radius))
+    walker = contact_walker(parts, normal_law(ground), friction_law(ground), GRAVITY, slope, rules)
+    frame = Frame(scale, np.sqrt(scale / GRAVITY), locate_switching=True)
+    return ContactScene(walker, TERRAINS[ground.terrain](scale * STEP), frame, False, scale * STEP, parts)
 
 
 @functools.cache

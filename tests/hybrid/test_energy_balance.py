@@ -81,5 +81,5 @@ def test_searches_and_maps_do_not_go_by_such_walks(nothing_explained):
 def test_a_ladder_of_methods_is_measured_by_its_errors_alone(nothing_explained):
     scene = scene_of()
     ground, start = JudgedGround(scene.terrain, scene.frame), start_state(scene, FIXED_POINT)
-    trial = ContactTrial(scene.walker, ground, start, STANCE_FOOT, 1, "contact")
+    trial = ContactTrial(scene.walker, ground, start, 1, "contact")
     assert trial.prepare("radau5", 1e-3, 100_000)().outcome == "walked"

@@ -15,8 +15,8 @@ from walkerlab.orbits.basin import (
     edge_cells,
     find_attractors,
     inside_cell,
-    on_section,
 )
+from walkerlab.orbits.shooting import on_section
 from walkerlab.outcome import Outcome
 from walkerlab.paper.appendix_a import CORRECTED, RigidWalker, assembled
 from walkerlab.solvers.registry import Tolerances
@@ -45,7 +45,7 @@ def gentle():
 
 def walked(walker, z, steps):
     tolerances = Tolerances("dop853", 1e-12, 1e-14, 10**7)
-    return take_walk(walker.model, tolerances, tuple(on_section(walker, np.atleast_2d(z))[0].tolist()), steps)
+    return take_walk(walker.model, tolerances, on_section(walker.model, z), steps)
 
 
 def test_the_only_attractor_of_a_gentle_slope_is_its_gait(gentle):

@@ -24,7 +24,7 @@ from walkerlab.orbits.continuation import Segment, Solved, StepControl, correcte
 from walkerlab.orbits.families import BranchFollower, Seed, ValueSpan, apart
 from walkerlab.orbits.fixed_point import find_gaits
 from walkerlab.orbits.newton import Effort, Evaluated
-from walkerlab.orbits.plane import curve_through
+from walkerlab.orbits.plane import CONTROL, Plane, curve_through
 from walkerlab.orbits.shooting import RigidMap
 from walkerlab.orbits.similarity import unit_walker
 from walkerlab.orbits.step_map import Cycle, gait_near, multipliers_of, walk_steps
@@ -372,7 +372,9 @@ def test_curves_of_flips_pass_through_flips_located_for_other_masses():
 
     branch = next(b for b in compass_family() if b.period == 1 and b.stable_ranges)
     (flip,) = branch.bifurcations
-    curve = curve_through(flip, 1, map_at, (ValueSpan(1e-4, 0.1), ValueSpan(9.0, 12.0)), 10.0, 40)
+    curve = curve_through(
+        flip, 1, ValueSpan(1e-4, 0.1), Plane(map_at, ValueSpan(9.0, 12.0), 10.0), 40, lambda: None, CONTROL
+    )
     index = int(np.argmax(curve.second))
     heavy = curve.second[index]
     assert heavy == 12.0

@@ -15,18 +15,18 @@ from walkerlab.config.walkers import StraightLegs, Torso
 from walkerlab.hybrid.recorded_walk import take_walk
 from walkerlab.mechanics.rigid import standing
 from walkerlab.orbits.fixed_point import (
+    LOOKING,
     RANDOM_START,
     SHORTEST_MOVE,
     RigidGait,
     Search,
-    SearchSettings,
     SlopeBranch,
     branches,
     choice,
     over_slope,
 )
 from walkerlab.orbits.fixed_point import find_gaits as find_gaits_of_model
-from walkerlab.orbits.newton import Evaluated, NotConverged, newton
+from walkerlab.orbits.newton import Effort, Evaluated, NotConverged, newton
 from walkerlab.orbits.shooting import NEW, NOWHERE, Shooting, section_of
 from walkerlab.orbits.small_slope import LONG_PERIOD, SHORT_PERIOD, seeds
 from walkerlab.outcome import Outcome
@@ -79,7 +79,7 @@ def solve(shooting, walker, z, tolerance):
             return Evaluated(step.outcome, z, np.eye(z.size), step)
         return Evaluated(step.outcome, step.z[0] - z, step.DP[0] - np.eye(z.size), step)
 
-    return newton(returning, np.array(z), tolerance, 60, SHORTEST_MOVE)
+    return newton(returning, np.array(z), Effort(tolerance, 60, SHORTEST_MOVE))
 
 
 # from two other integrations of the same equations
@@ -160,10 +160,9 @@ def test_the_same_seed_draws_the_same_starts():
 
 
 def test_following_a_seed_costs_as_much_as_a_few_dozen_steps():
-    settings = SearchSettings()
-    walker = Search(assembled(PAPER), settings).walker
-    step_map = over_slope(walker, settings.looking)
-    counted = step_map._exact = Counted(walker, settings.looking)
+    walker = Search(assembled(PAPER)).walker
+    step_map = over_slope(walker, LOOKING)
+    counted = step_map._exact = Counted(walker, LOOKING)
     assert SlopeBranch(step_map, seeds(walker)[0]).follow(walker.slope)[1] is not None
     # one step of walking takes about 200 right-hand sides
     assert counted.steps <= 30
@@ -367,7 +366,7 @@ def test_newton_stops_when_only_rounding_is_left():
 
 def test_a_gait_is_the_same_whatever_slopes_were_asked_before():
     def starts_from_seeds(degrees):
-        search = Search(assembled(on_slope(degrees)), SearchSettings())
+        search = Search(assembled(on_slope(degrees)))
         search.follow_seeds()
         return [found.cycle.z.tolist() for found in search.found], search.lost
 
@@ -423,9 +422,9 @@ def test_a_start_that_does_not_walk_or_comes_to_stand_leads_nowhere():
 @pytest.mark.parametrize("degrees", [0.5445378151260504, 2.7453781512605043, 7.147058823529412])
 def test_what_is_known_of_two_gaits_hides_no_third_that_a_start_leads_to(degrees):
     walker = assembled(on_slope(degrees))
-    ignorant = Search(walker, SearchSettings())
+    ignorant = Search(walker)
     ignorant.draw(np.random.default_rng(0), 100)
-    search = Search(walker, SearchSettings())
+    search = Search(walker)
     search.follow_seeds()
     search.draw(np.random.default_rng(0), 100)
     periods = [sorted(round(found.gait.period, 6) for found in one.found) for one in (ignorant, search)]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from walkerlab.config.loader import load
-from walkerlab.orbits.contact_gait import with_contact
+from walkerlab.orbits.contact_gait import with_scaled_laws
 from walkerlab.orbits.rigid_limit import (
     ALL,
     STICTION,
@@ -52,12 +52,12 @@ def test_changes_below_the_numerical_error_do_not_spoil_the_limit():
 @pytest.mark.parametrize("name", [ALL, STICTION])
 def test_a_series_begins_at_the_configs_own_contact(name):
     walker = contact_scene(load().config, 0.37).walker
-    assert with_contact(walker, *series_of(name)[0][2:]) == walker
+    assert with_scaled_laws(walker, *series_of(name)[0][2:]) == walker
 
 
 def test_full_damping_stays_where_the_static_penetration_is():
     walker = contact_scene(load().config, 0.37).walker
-    changed = with_contact(walker, *series_of(ALL)[4][2:])
+    changed = with_scaled_laws(walker, *series_of(ALL)[4][2:])
     before, after = walker.normal, changed.normal
     static = [(196.2 / law.stiffness) ** (1.0 / law.exponent) for law in (before, after)]
     ratio = after.full_damping_penetration / before.full_damping_penetration

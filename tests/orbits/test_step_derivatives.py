@@ -138,7 +138,7 @@ def test_newton_converges_quadratically_on_the_contact_step_map(scene):
 
     def moves(tolerance):
         pads = OwnPads(lambda _: scene.walker, scene.ground, tolerances, PITCH)
-        found = newton(lambda z: walk_steps(pads, z, 0.0, 1).returning(), NEAR_THE_GAIT + ASIDE, tolerance)
+        found = newton(lambda z: walk_steps(pads, z, 0.0, 1).returning(), NEAR_THE_GAIT + ASIDE, Effort(tolerance))
         return found.corrections, found.evaluated.residual
 
     # a tolerance between two residuals shows each of them

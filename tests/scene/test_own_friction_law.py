@@ -15,7 +15,7 @@ from walkerlab.config.schema import Contact
 from walkerlab.errors import ConfigError
 from walkerlab.ground import friction
 from walkerlab.ground.friction import FRICTION_LAWS, Frictionless, friction_coefficient, steepest_change
-from walkerlab.orbits.contact_gait import why_there_is_none, with_contact, with_rigidity
+from walkerlab.orbits.contact_gait import why_there_is_none, with_rigidity, with_scaled_laws
 from walkerlab.orbits.rigid_limit import STICTION, series_of
 from walkerlab.scene.contact import contact_scene, friction_law, scene_measures, start_state
 from walkerlab.solvers.registry import Tolerances
@@ -128,7 +128,7 @@ def test_creep_of_any_law_is_led_towards_the_rigid_limit(own):
     stiff = with_rigidity(own.walker, 1.0).friction.v_0
     assert stiff < 0.1
     setting = series_of(STICTION)[-1]
-    assert with_contact(own.walker, *setting[2:]).friction.v_0 == pytest.approx(0.1 * setting.stiction)
+    assert with_scaled_laws(own.walker, *setting[2:]).friction.v_0 == pytest.approx(0.1 * setting.stiction)
     trial = near_rigid_trial(load().config, START, 0.3714, 2)
     assert trial.walker.friction.v_0 == pytest.approx(0.1 * SLOWER)
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from walkerlab.kernels import kernel
-from walkerlab.solvers.registry import METHODS, method_named
+from walkerlab.solvers.registry import METHODS, dense_degree, method_named
 from walkerlab.solvers.stepping import (
     ACCEPTED,
     OUT_OF_BUDGET,
@@ -17,7 +17,6 @@ from walkerlab.solvers.stepping import (
     T,
     advance,
     begin,
-    dense_degree,
     interpolate,
     prepare_dense,
     rewind,

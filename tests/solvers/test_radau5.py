@@ -29,6 +29,7 @@ from system_rates import rate_of
 
 from walkerlab.kernels import kernel
 from walkerlab.solvers.radau5 import new_radau5
+from walkerlab.solvers.registry import dense_degree
 from walkerlab.solvers.scipy_methods import jacobian_matrix, right_hand_side
 from walkerlab.solvers.stepping import (
     ACCEPTED,
@@ -42,7 +43,6 @@ from walkerlab.solvers.stepping import (
     T_OLD,
     T,
     advance,
-    dense_degree,
     interpolate,
     rewind,
 )

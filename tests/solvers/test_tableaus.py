@@ -6,7 +6,7 @@ from rooted_trees import defects, trees
 from scipy.integrate import DOP853, RK45
 from scipy.integrate._ivp import radau as scipy_radau
 
-from walkerlab.solvers import dop853_tableau, radau5_tableau
+from walkerlab.solvers import dop853_tableau, radau5
 from walkerlab.solvers.registry import METHODS
 
 
@@ -30,8 +30,8 @@ def own_dop853():
 
 
 def own_radau5():
-    T = np.array([radau5_tableau.T_1, radau5_tableau.T_2, (1.0, 1.0, 0.0)])
-    return collocation(T, radau5_tableau.GAMMA, radau5_tableau.ALPHA + 1j * radau5_tableau.BETA, radau5_tableau.C)
+    T = np.array([radau5.T_1, radau5.T_2, (1.0, 1.0, 0.0)])
+    return collocation(T, radau5.GAMMA, radau5.ALPHA + 1j * radau5.BETA, radau5.C)
 
 
 def of_scipys_radau():

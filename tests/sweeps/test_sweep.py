@@ -23,7 +23,7 @@ from walkerlab.store.content import untimed
 from walkerlab.store.files import refused
 from walkerlab.store.runfolder import RunFolder
 from walkerlab.sweeps import sweep as sweeps
-from walkerlab.sweeps.chunk import FOLDER, Chunk, PointResult, by_name, row_of, without_outputs
+from walkerlab.sweeps.chunk import FOLDER, Chunk, PointResult, SweepPoint, by_name, row_of, without_outputs
 from walkerlab.sweeps.drawing import said_of
 from walkerlab.sweeps.question import asked, axis_of_text
 from walkerlab.sweeps.result import Merge, as_csv, last_of_each
@@ -108,19 +108,20 @@ def test_of_few_points_all_are_walked_again_and_those_that_end_otherwise_counted
 
 def test_a_sweep_of_contact_walks_says_that_pads_ended_them_with_pitch_and_last_steps():
     question = asked("contact-sim", [axis_of_text("contact.stiffness=[1e5, 2e5, 3e5]")])
-    merge = Merge(3)
     rows = {
         "0": {"outcome": "off-pad", "pitch_m": 0.37, "step_lengths_m": [0.36, 0.35]},
         "1": {"outcome": "off-pad", "pitch_m": 0.3, "step_lengths_m": [0.4]},
         "2": {"outcome": "walked", "pitch_m": 0.5, "step_lengths_m": [0.5, 0.5, 0.5]},
     }
     found = [PointResult(key, "answered", "", json.dumps(row)) for key, row in rows.items()]
-    merge.put(Chunk(tuple(found), {}), {key: int(key) for key in rows})
-    (ended,) = merge.endings(question, load().config, np.arange(3))
+    over_pitch = asked("contact-sim", [axis_of_text("contact.pad_pitch=[0.3, 0.37, 0.5]")])
+    both = [Merge(one, load().config, np.arange(3)) for one in (question, over_pitch)]
+    for merge in both:
+        merge.put(Chunk(tuple(found), {}), {key: int(key) for key in rows})
+    (ended,), (of_pitches,) = (merge.endings() for merge in both)
     assert (ended["outcome"], ended["walks"], ended["of"]) == ("off-pad", 2, 3)
     assert "pitch is 0.3 to 0.37 m, the rigid gait's step length; their last steps were 0.35 to 0.4 m" in ended["said"]
-    over_pitch = asked("contact-sim", [axis_of_text("contact.pad_pitch=[0.3, 0.37, 0.5]")])
-    assert "the rigid gait's" not in merge.endings(over_pitch, load().config, np.arange(3))[0]["said"]
+    assert "the rigid gait's" not in of_pitches["said"]
 
 
 def test_a_stage_that_does_not_walk_has_no_numerical_error(toy):
@@ -308,7 +309,7 @@ def test_the_file_says_what_was_asked(toy):
 def test_a_walk_in_a_sweep_has_the_summary_of_the_walk_alone(stage):
     config = load(sets=("strides=1",)).config
     keys = Keys().of(config, stage)
-    row, _ = row_of(InMemory(), config, stage, keys)
+    row, _ = row_of(InMemory(), stage, SweepPoint(config, keys, True))
     alone = InMemory().answer(config, stage, keys).content
     assert "trajectory" in alone.groups
     assert json.loads(row.numbers) == by_name(untimed(alone.summary, alone.timed))

@@ -87,10 +87,10 @@ def test_a_start_is_lowered_by_metres_whatever_the_leg():
         assert there[HEIGHT] - on_ground[HEIGHT] == pytest.approx(0.01, rel=1e-12)
 
 
-def test_disagreement_with_a_sharper_tolerance_is_told():
+def test_disagreement_with_a_tighter_tolerance_is_told():
     case = Case(name="sharp", expected=("walked",), reason="to be inexact", steps=2, agreement=1e-15)
     result = judge(case, config_of(case))
-    assert any("tenfold tolerance" in failure for failure in result.failures)
+    assert any("ten times tighter" in failure for failure in result.failures)
     assert any("dop853" in failure for failure in result.failures)
 
 

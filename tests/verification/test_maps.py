@@ -14,11 +14,11 @@ from walkerlab.verification.maps import (
     NONE,
     PAPER_STIFFNESS,
     VERDICTS,
-    StepColumn,
-    StictionCell,
     along,
-    on_ground,
+    case_on_ground,
     pieces_of,
+    step_column,
+    stiction_cell,
 )
 
 CELLS = 2
@@ -52,18 +52,18 @@ def whole(tmp_path_factory):
 
 
 def test_the_paper_is_a_cell_that_walks():
-    outcome, steps, sharper, error, _ = StictionCell("x", PAPER_STIFFNESS, 0.1).run()
+    outcome, steps, sharper, error, _ = stiction_cell(PAPER_STIFFNESS, 0.1)
     assert (outcome, steps, sharper) == (Outcome.WALKED, 4, Outcome.WALKED)
     assert 0.0 < error < 1e-6
 
 
 def test_the_papers_ground_is_the_papers():
-    contact = on_ground(PAPER_STIFFNESS, 0.1, 4, 1000)[1].contact.in_si()
+    contact = case_on_ground(PAPER_STIFFNESS, 0.1, 4, 1000)[1].contact.in_si()
     assert vars(contact) == pytest.approx(vars(load().config.contact.in_si()))
 
 
 def test_a_fixed_step_is_fine_where_it_is_small_and_its_error_falls_with_it():
-    numbers = StepColumn("x", PAPER_STIFFNESS, (4e-6, 8e-6, 1e-3)).run()
+    numbers = step_column(PAPER_STIFFNESS, (4e-6, 8e-6, 1e-3))
     verdicts = [VERDICTS[int(number)] for number in numbers[::2]]
     assert verdicts == ["fine", "fine", "diverges"]
     assert 0.0 < numbers[1] < 0.7 * numbers[3]  # halving the step of a method of first order or better
@@ -88,9 +88,9 @@ def test_where_no_error_was_measured_the_map_has_a_gap():
 
 
 def test_every_cell_has_a_name_of_its_own():
-    pieces = pieces_of(3)
-    assert len({piece.name for piece in pieces}) == len(pieces)
-    assert sum(piece.cells for piece in pieces) == 2 * 3 * 3
+    pieces = list(pieces_of(3))
+    assert len({name for name, *_ in pieces}) == len(pieces)
+    assert sum(cells for _, cells, _ in pieces) == 2 * 3 * 3
 
 
 def test_both_maps_are_stored(whole):
@@ -105,7 +105,7 @@ def test_both_maps_are_stored(whole):
 
 @pytest.mark.parametrize("stiffer", [1.0, 1e2, 1e4])
 def test_on_oil_the_walker_slides_however_stiff_the_ground_below(stiffer):
-    assert StictionCell("x", stiffer * PAPER_STIFFNESS, 10.0).run()[::2][:2] == [Outcome.SLID] * 2
+    assert stiction_cell(stiffer * PAPER_STIFFNESS, 10.0)[::2][:2] == [Outcome.SLID] * 2
 
 
 def test_a_run_that_was_cut_off_goes_on_and_comes_to_the_same(whole, tmp_path):

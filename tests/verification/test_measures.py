@@ -6,13 +6,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from walkerlab.orbits.similarity import Units
 from walkerlab.paper.appendix_a import impact
 from walkerlab.scene.parts import assembly_of
 from walkerlab.scene.rigid import compass
 from walkerlab.verification.catalogue import config_of, shipped
 from walkerlab.verification.judge import time_difference
 from walkerlab.verification.masses import RigidMasses
-from walkerlab.verification.scaling import TwinScale, scaled, to_twin
+from walkerlab.verification.scaling import scaled, to_twin
 from walkerlab.verification.starts import configured, prepared
 from walkerlab.verification.verdict import Measure, finite
 
@@ -74,7 +75,7 @@ def test_what_is_no_number_fails():
 
 def test_a_twin_there_and_back_is_the_walker():
     by = to_twin(PAPER)
-    back = TwinScale(1.0 / by.length, 1.0 / by.mass, 1.0 / by.gravity)
+    back = Units(1.0 / by.length, 1.0 / by.mass, 1.0 / by.time)
     again = scaled(scaled(PAPER, by), back)
     assert again.walker.leg_length_m == pytest.approx(PAPER.walker.leg_length_m)
     assert again.gravity_m_s2 == pytest.approx(PAPER.gravity_m_s2)

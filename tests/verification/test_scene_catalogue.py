@@ -10,6 +10,7 @@ from walkerlab.config.reads import dotted_keys
 from walkerlab.config.schema import Config
 from walkerlab.mechanics.impact import heel_strike
 from walkerlab.mechanics.standing import STANCE, kinetic_energy
+from walkerlab.orbits.similarity import Units
 from walkerlab.pipeline.graph import PIPELINE
 from walkerlab.pipeline.identity import Identities
 from walkerlab.scene.parts import assembly_of
@@ -18,7 +19,7 @@ from walkerlab.stages.stability import spelled_out
 from walkerlab.store.content import Content
 from walkerlab.verification.judge import CaseCell
 from walkerlab.verification.masses import RigidMasses
-from walkerlab.verification.scaling import TwinScale, scaled, to_twin
+from walkerlab.verification.scaling import scaled, to_twin
 from walkerlab.verification.scene_catalogue import ENDS, STOPS, scene_cases
 
 OTHERS = ("kneed", "kneed-round-feet", "round-feet", "torso")
@@ -126,7 +127,7 @@ def test_a_twin_of_any_walker_there_and_back_is_the_walker(name, sets):
     by = to_twin(config)
     twin = scaled(config, by)
     assert twin.walker.total_mass_kg == pytest.approx(by.mass * config.walker.total_mass_kg)
-    again = scaled(twin, TwinScale(1.0 / by.length, 1.0 / by.mass, 1.0 / by.gravity))
+    again = scaled(twin, Units(1.0 / by.length, 1.0 / by.mass, 1.0 / by.time))
     assert numbers_of(again.walker.model_dump()) == pytest.approx(numbers_of(config.walker.model_dump()))
 
 

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 from walkerlab.benchmarks.trials import ContactTrial
 from walkerlab.config.reads import ContactConfig
-from walkerlab.ground.terrain import STANCE_FOOT
 from walkerlab.mechanics.standing import swing_foot
 from walkerlab.scene.contact import contact_scene, start_state
 from walkerlab.scene.rigid import rigid_walker
@@ -16,7 +15,7 @@ def contact_trial(config: ContactConfig, state: tuple[float, ...], length_m: flo
     """Steps with the config's own contact, on pads of the rigid step length, or of the start's own without a gait."""
     length = length_m or abs(swing_foot(rigid_walker(config, config.equations), state)[1])
     scene = contact_scene(config, length, own_pitch_m=length)
-    return ContactTrial(scene.walker, scene.ground, start_state(scene, state), STANCE_FOOT, steps, "contact")
+    return ContactTrial(scene.walker, scene.ground, start_state(scene, state), steps, "contact")
 
 
 def near_rigid_trial(

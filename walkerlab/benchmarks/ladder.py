@@ -91,22 +91,22 @@ def ascend(trial: Trial, method: str) -> Ascent:
 
 
 def finished(
-    trials: Sequence[Trial], climbs: Sequence[Ascent], jobs: int, long_runs: bool = True
+    trials: Sequence[Trial], ascents: Sequence[Ascent], jobs: int, long_runs: bool = True
 ) -> tuple[list[End | WalkEndsError], list[Ascent]]:
-    """The first ends of the references, or why there is none, and the climbs with the run that was put off.
+    """The first ends of the references, or why there is none, and the ascents with the run that was put off.
 
     long_runs  whether what was put off is run at all
     """
     # longest first: near the rigid limit ground is the stiffest for the explicit method that references are made with
     ends = [partial(end_or_reason, trial) for trial in reversed(trials)]
-    wanted = [one for one in climbs if one.unfinished and long_runs]
+    wanted = [one for one in ascents if one.unfinished and long_runs]
     put_off = [partial(long_run, one.trial, one.method, one.ladder[len(one.runs)]) for one in wanted]
     calls: list[Callable[[], Any]] = [*ends, *put_off]
     done = in_order(calls, jobs)
     firsts: list[End | WalkEndsError] = [next(done) for _ in trials][::-1]
     return firsts, [
         replace(one, runs=(*one.runs, next(done)), unfinished=False) if one.unfinished and long_runs else one
-        for one in climbs
+        for one in ascents
     ]
 
 
@@ -146,10 +146,8 @@ def row_of(one: Ascent, run: MethodRun, reference: Reference) -> MethodRow:
     end, result = reference.for_method(one.method), run.result
     error = float(np.max(np.abs(result.state - end.state))) if result.state.size else None
     known = error is not None and error <= reference.agreement
-    asked, work = (
-        (one.trial.name, one.method, run.tolerance),
-        (result.rhs_evaluations, result.accepted, result.rejected),
-    )
+    asked = one.trial.name, one.method, run.tolerance
+    work = result.rhs_evaluations, result.accepted, result.rejected
     times = median(run.walls_s), min(run.walls_s), len(run.walls_s)
     return MethodRow(*asked, result.outcome, error, end.method, known, *times, *work)
 

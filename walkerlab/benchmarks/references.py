@@ -3,14 +3,12 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from walkerlab.benchmarks import taylor_reference
 from walkerlab.benchmarks.trials import RigidTrial, Trial
 from walkerlab.outcome import Outcome
 from walkerlab.paper.appendix_a import RigidWalker
-
-Floats = NDArray[np.float64]
+from walkerlab.solvers.system import Floats
 
 BUDGET = 20_000_000  # right-hand sides: a million explicit steps, which stiff ground takes, and some to spare
 # on stiff ground an explicit step errs by rounding alone: asked for less, it shrinks without end and gains nothing

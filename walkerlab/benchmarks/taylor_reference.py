@@ -8,9 +8,9 @@ import importlib.util
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from walkerlab.paper.appendix_a import RigidWalker, impact
+from walkerlab.solvers.system import Floats
 
 NAME = "heyoka-taylor"
 
@@ -20,7 +20,7 @@ def is_installed() -> bool:
     return importlib.util.find_spec("heyoka") is not None
 
 
-def walk_by_taylor(walker: RigidWalker, start: tuple[float, ...], steps: int) -> NDArray[np.float64]:
+def walk_by_taylor(walker: RigidWalker, start: tuple[float, ...], steps: int) -> Floats:
     """State after the last of `steps` heel strikes; ValueError if one does not come."""
     limit = 10.0 * np.sqrt(walker.leg_length / walker.gravity)
     passing, striking = integrators(walker)

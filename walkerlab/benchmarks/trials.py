@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from walkerlab.benchmarks.user_script import walk_as_a_script
 from walkerlab.hybrid.rigid_observer import unwatched
@@ -19,12 +18,12 @@ from walkerlab.outcome import Outcome
 from walkerlab.paper.appendix_a import RigidWalker
 from walkerlab.solvers.registry import METHODS, Tolerances, finder_for
 from walkerlab.solvers.stepping import ACCEPTED, H_NEXT, REJECTED, RHS, clear_counts
+from walkerlab.solvers.system import Floats
 
 if TYPE_CHECKING:
     from walkerlab.ground.walker import ContactWalker
     from walkerlab.hybrid.contact_events import JudgedGround
 
-Floats = NDArray[np.float64]
 USER_SCRIPT = "scipy-dop853-numpy"
 ATOL_PER_RTOL = 1e-2
 
@@ -38,21 +37,6 @@ class TrialRun:
     rhs_evaluations: int
     accepted: int
     rejected: int
-
-
-class Trial(Protocol):
-    """A walk to measure by."""
-
-    @property
-    def name(self) -> str:
-        """Name of the scene."""
-
-    @property
-    def methods(self) -> tuple[str, ...]:
-        """The methods that can walk it."""
-
-    def prepare(self, method: str, rtol: float, budget: int) -> Callable[[], TrialRun]:
-        """A function that does the walk with a method, ready to be timed."""
 
 
 @dataclass(frozen=True)
@@ -110,7 +94,6 @@ class ContactTrial:
     walker: ContactWalker
     ground: JudgedGround
     start: tuple[float, ...]
-    stance: int
     steps: int
     name: str
 
@@ -121,9 +104,10 @@ class ContactTrial:
 
     def prepare(self, method: str, rtol: float, budget: int) -> Callable[[], TrialRun]:
         """A function that does the walk with a method, ready to be timed."""
+        from walkerlab.ground.terrain import STANCE_FOOT
         from walkerlab.hybrid.contact_run import walk_contact
 
-        scene = self.walker, self.ground, False, self.stance, self.start
+        scene = self.walker, self.ground, False, STANCE_FOOT, self.start
         tolerances = Tolerances(method, rtol, rtol * ATOL_PER_RTOL, budget, track_energy=False)
 
         def run() -> TrialRun:
@@ -131,6 +115,10 @@ class ContactTrial:
             return finished(result.outcome, np.array(result.end_state), result.work)
 
         return run
+
+
+Trial = RigidTrial | ContactTrial
+"""A walk to measure methods by."""
 
 
 def finished(outcome: Outcome, state: Floats, counts: Any) -> TrialRun:

@@ -6,11 +6,9 @@ A peer to measure by; nothing else uses it.
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from walkerlab.paper.appendix_a import RigidWalker, impact
-
-Floats = NDArray[np.float64]
+from walkerlab.solvers.system import Floats
 
 
 class ScriptBudgetError(Exception):

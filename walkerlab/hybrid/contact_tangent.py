@@ -13,7 +13,7 @@ import numpy as np
 from walkerlab.ground.walker import OF_STATES
 from walkerlab.kernels import by_reference, inlined, vector
 from walkerlab.solvers.linear import factor, solve
-from walkerlab.solvers.radau5_tableau import C
+from walkerlab.solvers.radau5 import C
 from walkerlab.solvers.stepping import T_OLD, T, interpolate
 from walkerlab.solvers.system import jacobian
 

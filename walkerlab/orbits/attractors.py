@@ -17,9 +17,9 @@ import numpy as np
 
 from walkerlab.orbits.bifurcations import eigenvector
 from walkerlab.orbits.families import Seed
-from walkerlab.orbits.newton import Floats
 from walkerlab.orbits.step_map import Cycle, StepMap
 from walkerlab.outcome import Outcome
+from walkerlab.solvers.system import Floats
 
 LONGEST_PERIOD = 48  # steps; a gait of more steps is told as aperiodic
 REPEATS = 1e-5  # distance of points that are called the same

@@ -25,13 +25,11 @@ from walkerlab.hybrid.rigid_lanes import (
 )
 from walkerlab.hybrid.rigid_walk import hip_above_fall
 from walkerlab.mechanics.standing import Standing
-from walkerlab.orbits.shooting import Shooting, section_of
-from walkerlab.orbits.shooting import on_section as state_on_section
+from walkerlab.orbits.shooting import Shooting, on_section, section_of, states_on_section
 from walkerlab.outcome import Outcome
 from walkerlab.solvers.registry import Tolerances
+from walkerlab.solvers.system import Floats, Integers
 
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 RTOL, ATOL = 1e-6, 1e-8  # of the walks of a basin: errors of 1e-7 a step
 FOUND_RTOL, FOUND_ATOL = 1e-11, 1e-13  # of the walks that attractors are taken from
 COORDINATES = 3
@@ -122,11 +120,6 @@ class Arrivals:
     last: Floats  # (n, 3) where they were last
 
 
-def on_section(walker: TwoLegs, z: Floats) -> Floats:
-    """States (n, 4) of section coordinates (n, 3)."""
-    return np.column_stack([-2.0 * (walker.slope + walker.model.lean) - z[:, 0], z])
-
-
 def arrivals(
     walker: Walker,
     attractors: Attractors,
@@ -141,7 +134,7 @@ def arrivals(
     if isinstance(walker, Standing):
         walk_one_by_one(walker, capture, z, fates, tolerances)
     else:
-        walk_lanes(walker, new_lane_memory(*tolerances), capture, on_section(walker, z), fates)
+        walk_lanes(walker, new_lane_memory(*tolerances), capture, states_on_section(walker.model, z), fates)
     return Arrivals(fates.outcome, fates.steps, capture.attractor, capture.last)
 
 
@@ -152,7 +145,7 @@ def walk_one_by_one(
     shooting, section = Shooting(walker, Tolerances("dop853", *tolerances, BUDGET)), section_of(walker)
     for number, start in enumerate(z):
         here, steps = start, 0
-        outcome = REJECTED if hip_above_fall(walker, state_on_section(walker, start)) < 0.0 else WALKED
+        outcome = REJECTED if hip_above_fall(walker, on_section(walker, start)) < 0.0 else WALKED
         while outcome == WALKED and steps < capture.most:
             part = shooting.walk(section, here, min(AT_ONCE, capture.most - steps), derived=False)
             outcome, points, taken = int(part.outcome), part.z, part.time.size

@@ -14,9 +14,10 @@ from typing import Literal
 import numpy as np
 
 from walkerlab.orbits.continuation import Segment, Solved, root_along
-from walkerlab.orbits.newton import Evaluated, Floats
+from walkerlab.orbits.newton import Evaluated
 from walkerlab.orbits.step_map import Cycle, StepMap, walk_steps, with_parameter
 from walkerlab.outcome import Outcome
+from walkerlab.solvers.system import Floats
 
 Kind = Literal["fold", "flip", "torus"]
 KINDS: tuple[Kind, ...] = ("fold", "flip", "torus")

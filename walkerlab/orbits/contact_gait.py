@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from walkerlab.ground.terrain import STANCE_FOOT
 from walkerlab.ground.walker import ContactWalker
@@ -22,9 +21,7 @@ from walkerlab.orbits.newton import Effort, NotConverged
 from walkerlab.orbits.step_map import Cycle, gait_near
 from walkerlab.outcome import Outcome
 from walkerlab.solvers.registry import Tolerances
-from walkerlab.solvers.system import State
-
-Floats = NDArray[np.float64]
+from walkerlab.solvers.system import Floats, State
 
 WARM_UP = (4, 2, 0)  # steps walked from the start before Newton's method takes over
 BUDGET_OF_A_STEP = 40_000  # right-hand sides
@@ -111,7 +108,7 @@ def gait_on(pads: OwnPads, z: Floats, rigidity: float = 0.0) -> Cycle | str:
     return found
 
 
-def with_contact(walker: ContactWalker, stiffness: float, damping: float, creep: float) -> ContactWalker:
+def with_scaled_laws(walker: ContactWalker, stiffness: float, damping: float, creep: float) -> ContactWalker:
     """The walker on ground whose stiffness, damping and velocities of friction are multiplied by these factors.
 
     The penetration at which damping is full shrinks with the static penetration, so that the ground damps alike.
@@ -128,7 +125,7 @@ def with_contact(walker: ContactWalker, stiffness: float, damping: float, creep:
 def with_rigidity(walker: ContactWalker, rigidity: float) -> ContactWalker:
     """The walker on ground that is the more rigid the larger `rigidity`: 0 as it is, 1 nearly rigid."""
     stiffer = STIFFER**rigidity
-    return with_contact(walker, stiffer, math.sqrt(stiffer), STICKIER**-rigidity)
+    return with_scaled_laws(walker, stiffer, math.sqrt(stiffer), STICKIER**-rigidity)
 
 
 def follow_from_rigid(walker: ContactWalker, ground: JudgedGround, tolerances: Tolerances, start: State) -> GaitAnswer:

@@ -14,8 +14,9 @@ from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
 
-from walkerlab.orbits.newton import MAX_EVALUATIONS, Equations, Evaluated, Floats, NotConverged, newton
+from walkerlab.orbits.newton import MAX_EVALUATIONS, Effort, Equations, Evaluated, NotConverged, newton
 from walkerlab.outcome import Outcome
+from walkerlab.solvers.system import Floats
 
 D = TypeVar("D")
 FEW_CORRECTIONS = 3
@@ -115,13 +116,11 @@ def corrected(
         value = np.append(here.value, normal @ (x - guess))
         return here._replace(value=value, jacobian=np.vstack((here.jacobian, normal)))
 
-    found = newton(on_plane, guess, tolerance, most)
+    found = newton(on_plane, guess, Effort(tolerance, most))
     if isinstance(found, NotConverged):
         return found
-    ahead = np.zeros(guess.size)
-    ahead[-1] = 1.0
     try:
-        direction = np.linalg.solve(found.evaluated.jacobian, ahead)
+        direction = np.linalg.solve(found.evaluated.jacobian, np.eye(guess.size)[-1])
     except np.linalg.LinAlgError:
         return NotConverged(Outcome.WALKED, singular=True)
     return Solved(found.x, direction / np.linalg.norm(direction), found.evaluated, found.corrections)

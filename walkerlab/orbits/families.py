@@ -23,9 +23,10 @@ from walkerlab.orbits.bifurcations import (
     onto_doubled,
 )
 from walkerlab.orbits.continuation import Segment, Solved, StepControl, corrected, stepped
-from walkerlab.orbits.newton import Effort, Floats, NotConverged
+from walkerlab.orbits.newton import Effort, NotConverged
 from walkerlab.orbits.step_map import Cycle, Monitor, StepMap, gait_near
 from walkerlab.outcome import TOLD, Outcome
+from walkerlab.solvers.system import Floats
 
 SAME = 1e-6  # distance of states below which two gaits are one
 HALVINGS = 12  # of the amplitude on the way onto a branch
@@ -105,6 +106,13 @@ class GaitBranch:
             found.append([*values, self.points[-1].value, self.ends[1].value])
         return tuple((min(stretch), max(stretch)) for stretch in found)
 
+    def closes_on(self, flip: Bifurcation) -> list[bool]:
+        """Of either end, whether it is this flip of another branch."""
+        reach = (2.0 * np.ptp(values) + 1e-12 for values in (self.values[:2], self.values[-2:]))
+        near = [bool(abs(end.value - flip.value) <= far) for end, far in zip(self.ends, reach, strict=True)]
+        closing = (flip.kind == "flip" and end.reason.startswith("closes") for end in self.ends)
+        return [one and other for one, other in zip(closing, near, strict=True)]
+
     @property
     def flipped_outside(self) -> bool:
         """Whether all of it lies beyond a flip that is not on it: an odd number of multipliers below -1 throughout."""
@@ -173,10 +181,8 @@ class BranchFollower:
 
     def solved_at(self, z: Floats, value: float, period: int) -> Solved[Cycle] | None:
         """The point of the curve of gaits near z at a value of the parameter; None if Newton's method finds none."""
-        fixed = np.append(np.zeros(z.size), 1.0)
-        found = corrected(
-            self.equations(period), np.append(z, value / self.span.size), fixed, self.control.tolerance, EVALUATIONS
-        )
+        x, tolerance = np.append(z, value / self.span.size), self.control.tolerance
+        found = corrected(self.equations(period), x, np.eye(x.size)[-1], tolerance, EVALUATIONS)
         return None if isinstance(found, NotConverged) else found
 
     def lies_on(self, branch: GaitBranch, gait: Cycle) -> bool:
@@ -197,7 +203,8 @@ class BranchFollower:
         """The branches of twice the period that begin at the flips of a branch."""
         found: list[GaitBranch] = []
         for flip in parent.bifurcations:
-            if flip.kind != "flip" or any(ends_at(branch, flip, 2 * parent.period) for branch in (*known, *found)):
+            like = [branch for branch in (*known, *found) if branch.period == 2 * parent.period]
+            if flip.kind != "flip" or any(any(branch.closes_on(flip)) for branch in like):
                 continue
             form = flip_form(self.equations(parent.period), flip)
             start = None if form is None else self.beyond(flip, form, parent.period)
@@ -278,7 +285,7 @@ class BranchFollower:
         share = (edge - equations.value(last.x)) / (value - equations.value(last.x))
         guess = last.x + share * (solved.x - last.x)
         guess[-1] = edge / self.span.size
-        at_edge = corrected(equations, guess, np.append(np.zeros(guess.size - 1), 1.0), self.control.tolerance)
+        at_edge = corrected(equations, guess, np.eye(guess.size)[-1], self.control.tolerance)
         if isinstance(at_edge, NotConverged):
             return BranchEnd(value, "end of the span"), solved
         along = at_edge.tangent if at_edge.tangent @ last.tangent > 0.0 else -at_edge.tangent
@@ -311,24 +318,10 @@ def closed_on(branch: GaitBranch, branches: Iterable[GaitBranch]) -> GaitBranch:
     """The branch with ends that close on another's flip put there."""
     flips = [one for parent in branches for one in parent.bifurcations if 2 * parent.period == branch.period]
     ends = []
-    for end, values in zip(branch.ends, (branch.values[:2], branch.values[-2:]), strict=True):
-        near = [flip.value for flip in flips if closes_on(flip, end, values)]
+    for place, end in enumerate(branch.ends):
+        near = [flip.value for flip in flips if branch.closes_on(flip)[place]]
         ends.append(replace(end, value=min(near, key=lambda value: abs(value - end.value))) if near else end)
     return branch if tuple(ends) == branch.ends else replace(branch, ends=(ends[0], ends[1]))
-
-
-def closes_on(flip: Bifurcation, end: BranchEnd, values: Floats) -> bool:
-    """Whether a branch's end is this flip; `values` are its last two."""
-    near = abs(end.value - flip.value) <= 2.0 * np.ptp(values) + 1e-12
-    return flip.kind == "flip" and end.reason.startswith("closes") and bool(near)
-
-
-def ends_at(branch: GaitBranch, flip: Bifurcation, period: int) -> bool:
-    """Whether a branch of this period closes on this flip, at either end."""
-    if branch.period != period:
-        return False
-    ends = zip(branch.ends, (branch.values[:2], branch.values[-2:]), strict=True)
-    return any(closes_on(flip, end, values) for end, values in ends)
 
 
 def why_lost(lost: NotConverged) -> str:

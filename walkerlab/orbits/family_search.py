@@ -3,12 +3,10 @@
 All of it from seeds on a step map, whatever the model; how thoroughly it is done is what sets models apart.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple, Protocol
+from typing import Protocol
 
 import numpy as np
 
@@ -24,9 +22,9 @@ from walkerlab.orbits.attractors import (
 )
 from walkerlab.orbits.continuation import StepControl
 from walkerlab.orbits.families import BranchFollower, GaitBranch, Seed, ValueSpan
-from walkerlab.orbits.newton import Floats
-from walkerlab.orbits.plane import CONTROL, BifurcationCurve, MapAt, Regions, curve_through, regions_of
+from walkerlab.orbits.plane import CONTROL, BifurcationCurve, Plane, Regions, curve_through, regions_of
 from walkerlab.orbits.step_map import StepMap
+from walkerlab.solvers.system import Floats
 
 BEFORE_FLIP = 0.02  # of the span: how far before the first flip the attractor is looked at
 OTHERS_AT, OTHER_PERIODS, RETURNS = 12, (3, 5, 6), 4000  # values, steps of gaits looked for, steps walked for them
@@ -101,14 +99,6 @@ class Family:
     regions: Regions | None = None
 
 
-class Plane(NamedTuple):
-    """A second parameter: step maps over the first by its values, those asked for, and the family's own."""
-
-    map_at: MapAt
-    span: ValueSpan
-    own: float
-
-
 @dataclass(frozen=True)
 class FamilySearch:
     """A search for all gaits of a model over a span, from seeds: of how many steps, and points a branch, at most."""
@@ -151,7 +141,7 @@ class FamilySearch:
             found = self.with_attractors(found)
         if self.how.others and found.attractors.found:
             found = self.with_others(found, generator)
-        return found if self.plane is None else self.over_plane(found, *self.plane)
+        return found if self.plane is None else self.over_plane(found, self.plane)
 
     def with_attractors(self, family: Family) -> Family:
         """The attractor beyond the first flip of a stable branch, and the exponents along it.
@@ -222,12 +212,12 @@ class FamilySearch:
         self.tell("branches of other gaits of {model}")
         return replace(family, branches=self.follower.family(seeds, self.periods, family.branches))
 
-    def over_plane(self, family: Family, map_at: MapAt, second: ValueSpan, own: float) -> Family:
+    def over_plane(self, family: Family, plane: Plane) -> Family:
         """The family with curves of its bifurcations, and perhaps regions, over the plane of both parameters."""
-        spans, advance = (self.span, second), self.listener.advance
+        span, advance = self.span, self.listener.advance
         self.tell("curves of bifurcations of {model}")
         found = [
-            curve_through(one, branch.period, map_at, spans, own, CURVE_POINTS, advance, self.how.over_plane)
+            curve_through(one, branch.period, span, plane, CURVE_POINTS, advance, self.how.over_plane)
             for branch in family.branches
             for one in branch.bifurcations
             if branch.period <= self.how.of_curves and one.kind != "torus"
@@ -235,7 +225,7 @@ class FamilySearch:
         regions = None
         if self.how.others:
             self.tell("regions of the plane of two parameters")
-            regions = regions_of(family.branches, map_at, spans, own, advance)
+            regions = regions_of(family.branches, span, plane, advance)
         return replace(family, curves=tuple(curve for curve in found if curve is not None), regions=regions)
 
 

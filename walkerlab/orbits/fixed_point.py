@@ -16,18 +16,19 @@ from walkerlab.hybrid.recorded_walk import take_walk
 from walkerlab.hybrid.rigid_walk import LONGEST_SWING
 from walkerlab.mechanics.standing import STANCE, SWING, Standing, on_slope, swing_foot_motion
 from walkerlab.orbits.continuation import Follower, Strides, Way, interpolated
-from walkerlab.orbits.newton import Effort, Floats, NotConverged
+from walkerlab.orbits.newton import Effort, NotConverged
 from walkerlab.orbits.shooting import EXACT, NEW, RigidMap, Shooting, on_section, section_of
 from walkerlab.orbits.similarity import Units, unit_walker
 from walkerlab.orbits.small_slope import SmallSlopeSeed, seeds
 from walkerlab.orbits.step_map import Cycle, Stepper, gait_near
 from walkerlab.solvers.registry import Tolerances
-from walkerlab.solvers.system import State
+from walkerlab.solvers.system import Floats, State
 
 RANDOM_START = "random start"
 SMALLEST_ANGLE = 1e-5  # rad, half the angle between the legs; less on level ground or after a random start is standing
 SAME = 1e-5  # relative distance of states below which two searches found one gait
-LOOKING = Tolerances("dop853", 1e-7, 1e-10, 20_000)
+LOOKING = Tolerances("dop853", 1e-7, 1e-10, 20_000)  # of steps while gaits are looked for; EXACT while they are solved
+SOLVED, ENOUGH = 1e-14, 1e-11  # residual wanted, and that of an acceptable gait, which may be rounding on a steep slope
 MAX_EVALUATIONS, SHORTEST_MOVE = 60, 2.0**-8  # of Newton's method
 # on the way from a vanishing slope
 STRIDES = Strides(math.log(2.0), math.log(1.001), 3)  # of the logarithm of the slope's cube root
@@ -38,6 +39,7 @@ RETREATS = 5  # halvings of the seed's amplitude, whose error shrinks with the a
 # angle between the legs (rad), angular velocities (sqrt(g/L)) of swing and stance leg, and of a shank whose knee was
 # free at heel strike
 MIN_START, MAX_START = np.array([0.0, -1.0, -1.0, -1.0]), np.array([1.2, 1.0, 0.0, 1.0])
+DRAWN_FROM = f"legs up to {MAX_START[0]:g} rad apart, rates up to {MAX_START[1]:g} sqrt(g/L)"
 
 
 @dataclass(frozen=True)
@@ -87,13 +89,13 @@ class RigidGait:
         return tuple(found)
 
 
-def measured(walker: Standing, units: Units, tolerances: Tolerances, gait: Cycle) -> RigidGait | None:
+def measured(walker: Standing, units: Units, gait: Cycle) -> RigidGait | None:
     """The gait after walking one step of it; None if that step does not end.
 
     walker  the unit walker, whose units are `units`
     """
     start = on_section(walker, gait.z)
-    step = take_walk(walker, tolerances, start, 1, sampled=True)
+    step = take_walk(walker, EXACT, start, 1, sampled=True)
     if step.steps == 0 or step.samples is None:
         return None
     swing = step.samples.state[step.samples.step == 0]
@@ -125,19 +127,12 @@ def measured(walker: Standing, units: Units, tolerances: Tolerances, gait: Cycle
 class SearchSettings:
     """How hard to look.
 
-    random_starts     starting values to draw
-    further_starts    to draw where nothing is found
-    looking, solving  how steps are walked while gaits are looked for, and while they are solved
-    solved_residual   down to which they are then solved
-    residual          of an acceptable gait, which may be rounding on a steep slope
+    random_starts   starting values to draw
+    further_starts  to draw where nothing is found
     """
 
     random_starts: int = 100
     further_starts: int = 1000
-    looking: Tolerances = LOOKING
-    solving: Tolerances = EXACT
-    solved_residual: float = 1e-14
-    residual: float = 1e-11
 
 
 FOLLOWED = "followed from a vanishing slope"
@@ -169,11 +164,8 @@ class GaitSearch:
     @property
     def sought(self) -> str:
         """How gaits were looked for, in words; a very unstable one may be missed by all of it."""
-        return (
-            f"{self.followed}, and by Newton's method from {self.random_starts} random starts (legs up "
-            f"to {MAX_START[0]:g} rad apart, rates up to {MAX_START[1]:g} sqrt(g/L), steps of at most "
-            f"{LONGEST_SWING:g} sqrt(L/g))"
-        )
+        starts = f"{self.random_starts} random starts ({DRAWN_FROM}, steps of at most {LONGEST_SWING:g} sqrt(L/g))"
+        return f"{self.followed}, and by Newton's method from {starts}"
 
     @property
     def gait(self) -> RigidGait | None:
@@ -188,12 +180,12 @@ def find_gaits(walker: Standing, seed: int = 0, settings: SearchSettings = Searc
     """
     if walker.slope <= 0.0 and walker.misprint == 0.0 and not walker.driven:
         return GaitSearch((), None, NO_DESCENT)
-    search = Search(walker, settings)
+    search = Search(walker)
     generator = np.random.default_rng(seed)
     search.follow_seeds()
     search.draw(generator, settings.random_starts)
     if not search.found and not search.walker.passive:
-        search.lead(generator)
+        search.lead(generator, settings.random_starts)
     if not search.found:
         search.draw(generator, settings.further_starts)
     return search.result()
@@ -273,9 +265,9 @@ def scaled(s: float, z: Floats, period: float) -> Floats:
 
 
 @lru_cache(maxsize=16)
-def branches(walker: Standing, settings: SearchSettings) -> tuple[SlopeBranch, ...]:
+def branches(walker: Standing) -> tuple[SlopeBranch, ...]:
     """The gaits of the small-slope theory, for all searches of one walker on whatever slope; `walker` on none."""
-    looking = over_slope(walker, settings.looking)
+    looking = over_slope(walker, LOOKING)
     return tuple(SlopeBranch(looking, seed) for seed in seeds(walker))
 
 
@@ -303,29 +295,28 @@ class FoundGait:
 class Search:
     """A search in progress."""
 
-    def __init__(self, walker: Standing, settings: SearchSettings) -> None:
+    def __init__(self, walker: Standing) -> None:
         """Nothing is found yet."""
         self.walker, self.units = unit_walker(walker)
-        self.settings = settings
         self.found: list[FoundGait] = []
         self.lost: list[str] = []
         self.drawn = 0
         self.followed = FOLLOWED if walker.passive else LED
-        self.looking = Shooting(self.walker, settings.looking)
-        self.step_map = over_slope(self.walker, settings.solving)
+        self.looking = Shooting(self.walker, LOOKING)
+        self.step_map = over_slope(self.walker, EXACT)
 
     def follow_seeds(self) -> None:
         """Follow the gaits of the small-slope theory, which is of passive walkers, to the walker's slope."""
         if self.walker.slope <= 0.0 or not self.walker.passive:
             return
-        for branch in branches(on_slope(self.walker, 0.0), self.settings):
+        for branch in branches(on_slope(self.walker, 0.0)):
             (slope, z), name = branch.follow(self.walker.slope), branch.seed.name
             if z is None:
                 self.lost.append(f"the gait from the {name} is lost at a slope of {slope:.3g} rad")
             elif not self.keep(z, name):
                 self.lost.append(f"the gait from the {name} cannot be solved to rounding")
 
-    def lead(self, generator: np.random.Generator) -> None:
+    def lead(self, generator: np.random.Generator, starts: int) -> None:
         """Follow gaits of the passive walker on slopes that it may walk down to this one, as what drives it grows."""
         # Imported here: gaits that are found otherwise do without.
         from walkerlab.orbits.families import BranchFollower, Seed, ValueSpan
@@ -333,9 +324,9 @@ class Search:
         goal = self.walker
         own = (goal.slope,) if goal.slope > 0.0 else ()
         for slope in (*own, *LED_FROM):
-            passive = Search(partly_driven(goal, slope, 0.0), self.settings)
+            passive = Search(partly_driven(goal, slope, 0.0))
             passive.follow_seeds()
-            passive.draw(generator, self.settings.random_starts)
+            passive.draw(generator, starts)
             family = RigidMap(partial(partly_driven, goal, slope), 1.0, goal)
             follower = BranchFollower(family, ValueSpan(0.0, 1.0), most=POINTS_OF_A_LEAD)
             for branch in follower.family([Seed(found.cycle.z, 0.0) for found in passive.found], 1):
@@ -367,16 +358,14 @@ class Search:
         """Solve for the gait near z to rounding and take it among those found; False if there is none."""
         if self.known(z, by):
             return True
-        settings = self.settings
-        least, enough = settings.solved_residual, settings.residual
-        effort = Effort(least, MAX_EVALUATIONS, SHORTEST_MOVE, rounding=enough / least)
+        effort = Effort(SOLVED, MAX_EVALUATIONS, SHORTEST_MOVE, rounding=ENOUGH / SOLVED)
         cycle = gait_near(self.step_map, z, float(self.walker.slope), effort)
         if isinstance(cycle, NotConverged) or (self.walker.slope == 0.0 and self.stands(cycle.z)):
             return False
         if self.known(cycle.z, by):
             return True
-        gait = measured(self.walker, self.units, settings.solving, cycle)
-        if gait is None or gait.residual > enough:
+        gait = measured(self.walker, self.units, cycle)
+        if gait is None or gait.residual > ENOUGH:
             return False
         self.found.append(FoundGait(cycle, gait, [by]))
         return True
@@ -397,10 +386,8 @@ class Search:
         chosen, reason = choice(gaits)
         if not gaits:
             followed = f"{self.followed}, {'; '.join(self.lost)}" if self.lost else NONE_TO_FOLLOW[self.walker.passive]
-            reason = (
-                f"none found: {followed}; none of {self.drawn} random starting values (legs up to {MAX_START[0]:g} "
-                f"rad apart, rates up to {MAX_START[1]:g} sqrt(g/L)) led to a gait by Newton's method"
-            )
+            starts = f"none of {self.drawn} random starting values ({DRAWN_FROM})"
+            reason = f"none found: {followed}; {starts} led to a gait by Newton's method"
         return GaitSearch(gaits, chosen, reason, hits, self.drawn, tuple(self.lost), self.followed)
 
 

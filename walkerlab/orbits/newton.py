@@ -5,11 +5,10 @@ from dataclasses import dataclass
 from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from walkerlab.outcome import Outcome
+from walkerlab.solvers.system import Floats
 
-Floats = NDArray[np.float64]
 D = TypeVar("D")
 MAX_EVALUATIONS = 8
 ROUNDING = 100.0  # a residual at most this many tolerances large that a move does not halve is rounding
@@ -61,7 +60,14 @@ class NotConverged:
 
 
 class Effort(NamedTuple):
-    """How closely something is solved, and how hard; see `newton`."""
+    """How closely something is solved, and how hard.
+
+    tolerance  on the residual
+    most       evaluations of the equations
+    shortest   share of a move that is not halved any more
+    growth     of the residual from which on a move is
+    rounding   tolerances that a residual may be large which a move does not halve
+    """
 
     tolerance: float
     most: int = MAX_EVALUATIONS
@@ -70,26 +76,12 @@ class Effort(NamedTuple):
     rounding: float = ROUNDING
 
 
-def newton(
-    equations: Equations[D],
-    guess: Floats,
-    tolerance: float,
-    most: int = MAX_EVALUATIONS,
-    shortest: float = 1.0,
-    growth: float = 1.0,
-    rounding: float = ROUNDING,
-) -> Solution[D] | NotConverged:
-    """Solve m equations in m unknowns.
-
-    guess      (m,)
-    tolerance  on the residual
-    most       evaluations of the equations
-    shortest   share of a move that is not halved any more
-    growth     of the residual from which on a move is
-    rounding   tolerances that a residual may be large which a move does not halve
+def newton(equations: Equations[D], guess: Floats, effort: Effort) -> Solution[D] | NotConverged:
+    """Solve m equations in m unknowns from a guess (m,).
 
     Returns the point, or with which outcome the equations could not be evaluated or did not converge.
     """
+    tolerance, most, shortest, growth, rounding = effort
     x, here, corrections, evaluations = guess, equations(guess), 0, 1
     residual = here.residual
     while tolerance < residual < np.inf:

@@ -14,17 +14,18 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from walkerlab.orbits.attractors import settled
 from walkerlab.orbits.bifurcations import Bifurcation, GaitEquations, Kind, critical_value, eigenvector
 from walkerlab.orbits.continuation import Solved, StepControl, corrected, stepped
 from walkerlab.orbits.families import EVALUATIONS, BranchEnd, GaitBranch, ValueSpan, why_lost
-from walkerlab.orbits.newton import Effort, Equations, Evaluated, Floats, NotConverged
+from walkerlab.orbits.newton import Effort, Equations, Evaluated, NotConverged
 from walkerlab.orbits.step_map import Cycle, StepMap, gait_near
 from walkerlab.outcome import Outcome
+from walkerlab.solvers.system import Floats, Integers
 
 REACH = 1e-5  # of the differences of the test function, unknowns being of magnitude one
 CONTROL = StepControl(first=0.01, shortest=1e-6, longest=0.03, turn=0.97, tolerance=1e-11)
@@ -38,6 +39,14 @@ KICK = 1e-3  # away from an unstable gait, coordinates being of magnitude one
 
 MapAt = Callable[[float], StepMap | None]
 """Step maps over the first parameter, by the value of the second; None where that makes no walker."""
+
+
+class Plane(NamedTuple):
+    """A second parameter: step maps over the first by its values, those asked for, and the family's own."""
+
+    map_at: MapAt
+    span: ValueSpan
+    own: float
 
 
 def critical_gaits(map_at: MapAt, kind: Kind, period: int, scales: tuple[float, float]) -> Equations[Cycle | None]:
@@ -81,34 +90,28 @@ class BifurcationCurve:
 
 
 def curve_through(
-    bifurcation: Bifurcation,
-    period: int,
-    map_at: MapAt,
-    spans: tuple[ValueSpan, ValueSpan],
-    second: float,
-    points: int,
-    advance: Callable[[], None] = lambda: None,
-    control: StepControl = CONTROL,
-) -> BifurcationCurve | None:
-    """The curve through a bifurcation that was located at a value of the second parameter; None if it is lost there.
+    bifurcation: Bifurcation, period: int, first: ValueSpan, plane: Plane, points: int,
+    advance: Callable[[], None], control: StepControl,
+) -> BifurcationCurve | None:  # fmt: skip
+    """The curve through a bifurcation that was located at the plane's own value; None if it is lost there.
 
-    spans   of both parameters: the curve is followed inside
+    first   values of the first parameter: the curve is followed inside these and the plane's
     points  at most, each way
     """
+    spans = (first, plane.span)
     scales = (spans[0].size, spans[1].size)
-    equations = critical_gaits(map_at, bifurcation.kind, period, scales)
-    x = np.append(bifurcation.point.x, second / scales[1])
+    equations = critical_gaits(plane.map_at, bifurcation.kind, period, scales)
+    x = np.append(bifurcation.point.x, plane.own / scales[1])
     x[-2] = bifurcation.value / scales[0]
-    at_second = np.append(np.zeros(x.size - 1), 1.0)
-    start = corrected(equations, x, at_second, control.tolerance)
+    start = corrected(equations, x, np.eye(x.size)[-1], control.tolerance)
     if isinstance(start, NotConverged):
         return None
-    (behind, first), (ahead, last) = (
+    (behind, begin), (ahead, end) = (
         traced(equations, replace(start, tangent=sign * start.tangent), spans, points, advance, control)
         for sign in (-1.0, 1.0)
     )
     along = np.vstack((behind[::-1], ahead[1:]))
-    return BifurcationCurve(bifurcation.kind, period, along[:, 0], along[:, 1], (first, last))
+    return BifurcationCurve(bifurcation.kind, period, along[:, 0], along[:, 1], (begin, end))
 
 
 def traced(
@@ -156,7 +159,7 @@ class Regions:
 
     first: Floats
     second: Floats
-    period: NDArray[np.int64]
+    period: Integers
 
 
 Row = list[Cycle | None]
@@ -164,25 +167,18 @@ Row = list[Cycle | None]
 Points = list[Floats | None]
 
 
-def regions_of(
-    branches: Sequence[GaitBranch],
-    map_at: MapAt,
-    spans: tuple[ValueSpan, ValueSpan],
-    own: float,
-    advance: Callable[[], None],
-) -> Regions:
-    """The regions of the plane around branches that were followed at the value `own` of the second parameter."""
-    first, second = (
-        span.least + span.size * (np.arange(cells) + 0.5) / cells for span, cells in zip(spans, CELLS, strict=True)
-    )
+def regions_of(branches: Sequence[GaitBranch], span: ValueSpan, plane: Plane, advance: Callable[[], None]) -> Regions:
+    """The regions of the plane around branches that were followed over a span of the first parameter."""
+    sides = zip((span, plane.span), CELLS, strict=True)
+    first, second = (side.least + side.size * (np.arange(cells) + 0.5) / cells for side, cells in sides)
     period = np.full(CELLS, NOTHING, np.int64)
-    begin = int(np.argmin(np.abs(second - own)))
+    begin = int(np.argmin(np.abs(second - plane.own)))
     known = known_gaits(branches, first)
     for order in (range(begin, CELLS[1]), range(begin - 1, -1, -1)):
         guesses = known
         points: Points = [None] * len(first)
         for row in order:
-            step_map = map_at(float(second[row]))
+            step_map = plane.map_at(float(second[row]))
             if step_map is not None:
                 gaits = corrected_row(step_map, first, guesses)
                 guesses = [None if gait is None else gait.z for gait in gaits]
@@ -224,12 +220,7 @@ def corrected_row(step_map: StepMap, values: Floats, before: Points) -> Row:
     return row
 
 
-def away_from(gait: Cycle) -> Floats:
-    """A start beside an unstable gait, towards what grows."""
-    return gait.z + KICK * eigenvector(gait.DP, gait.multipliers[0].real)
-
-
-def settled_row(step_map: StepMap, values: Floats, gaits: Row, before: Points) -> tuple[NDArray[np.int64], Points]:
+def settled_row(step_map: StepMap, values: Floats, gaits: Row, before: Points) -> tuple[Integers, Points]:
     """The periods of a row's cells, and a point of the attractor in each.
 
     before  those of the row before
@@ -240,9 +231,9 @@ def settled_row(step_map: StepMap, values: Floats, gaits: Row, before: Points) -
             periods[place] = 1
             points.append(gait.z)
             continue
-        point = None
-        # on the attractors of its neighbours, and beside its unstable gait
-        starts = (points[place - 1] if place else None, before[place], None if gait is None else away_from(gait))
+        # on the attractors of its neighbours, and beside its unstable gait, towards what grows
+        beside = None if gait is None else gait.z + KICK * eigenvector(gait.DP, gait.multipliers[0].real)
+        point, starts = None, (points[place - 1] if place else None, before[place], beside)
         for start in (one for one in starts if one is not None):
             here = settled(step_map, start, float(values[place]), TRANSIENT, KEPT)
             if not isinstance(here, Outcome):

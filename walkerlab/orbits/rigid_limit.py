@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from walkerlab.ground.terrain import STANCE_FOOT
 from walkerlab.ground.walker import ContactWalker
@@ -25,11 +24,11 @@ from walkerlab.hybrid.comparison import (
 )
 from walkerlab.hybrid.contact_events import JudgedGround
 from walkerlab.hybrid.contact_run import ContactWalkResult, walk_contact
-from walkerlab.orbits.contact_gait import EFFORT, with_contact
+from walkerlab.orbits.contact_gait import EFFORT, with_scaled_laws
 from walkerlab.orbits.contact_map import OwnPads, step_of
 from walkerlab.orbits.step_map import Cycle, gait_near
 from walkerlab.solvers.registry import Tolerances
-from walkerlab.solvers.system import State
+from walkerlab.solvers.system import Floats, State
 
 METHOD, BUDGET = "radau5", 50_000_000
 GAIT_TOLERANCE, CHECK_TOLERANCE = 1e-10, 1e-11
@@ -124,7 +123,7 @@ class Limit:
         """
         found: list[Distance] = []
         for setting in series_of(name, self.every):
-            changed = with_contact(walker, *setting[2:])
+            changed = with_scaled_laws(walker, *setting[2:])
             near = self.gait(changed, gait, GAIT_TOLERANCE)
             if near is None:
                 break
@@ -182,9 +181,7 @@ class Limit:
         )
 
 
-def motion_of_legs(
-    states: NDArray[np.float64], walker: ContactWalker
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def motion_of_legs(states: Floats, walker: ContactWalker) -> tuple[Floats, Floats]:
     """Angles and angular velocities, each (samples, leg), of the legs in states; of legs with knees the thighs'."""
     upper, half = walker.legs[:, 0], states.shape[1] // 2
     return states[:, 2 + upper], states[:, half + 2 + upper]

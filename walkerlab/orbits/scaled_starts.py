@@ -13,7 +13,6 @@ from itertools import product
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from walkerlab.ground.terrain import STANCE_FOOT
 from walkerlab.ground.walker import ContactWalker
@@ -24,9 +23,8 @@ from walkerlab.mechanics.standing import Standing
 from walkerlab.outcome import Outcome
 from walkerlab.solvers.registry import ENDLESS, Tolerances
 from walkerlab.solvers.stepping import RHS
-from walkerlab.solvers.system import State
+from walkerlab.solvers.system import Floats, Integers, State
 
-Integers = NDArray[np.int64]
 TOLERANCES = Tolerances("radau5", 1e-7, 1e-9, 10_000_000)
 RIGID = Tolerances("dop853", 1e-7, 1e-9, ENDLESS)
 SETTLED = 0.02  # of the gait's period and step length
@@ -143,17 +141,12 @@ def margins(
     """
     found = []
     for name, *way in DIRECTIONS:
-
-        def trial(change: float, way: Sequence[float] = way) -> StartTrial:
-            return starts.walk(around[0] * (1.0 + change * way[0]), around[1] * (1.0 + change * way[1]))
-
         sign = 1.0 if max(way) > 0.0 else -1.0
         limit = largest - 1.0 if sign > 0.0 else 1.0 - SMALLEST_FACTOR
-        good, bad, failure = 0.0, limit, None
-        halvings = 0
+        good, bad, failure, halvings = 0.0, limit, None, 0
         while good < limit and halvings <= HALVINGS:
             change = min(good + step, limit) if failure is None else 0.5 * (good + bad)
-            tried = trial(change)
+            tried = starts.walk(around[0] * (1.0 + change * way[0]), around[1] * (1.0 + change * way[1]))
             if tried.walks:
                 good = change
             else:
@@ -197,10 +190,8 @@ def smallest_change(
             grid = np.array(best) + spacing * OFFSETS
             distance = np.hypot(*(grid - 1.0).T)
             nearer = np.flatnonzero(distance < math.hypot(best[0] - 1.0, best[1] - 1.0) - 1e-12)
-            nearest_first = (
-                tuple(grid[index].tolist()) for index in nearer[np.argsort(distance[nearer], kind="stable")]
-            )
-            both = (point for point in nearest_first if quick.walk(*point).walks and starts.walk(*point).walks)
+            nearest_first = grid[nearer[np.argsort(distance[nearer], kind="stable")]].tolist()
+            both = ((a, b) for a, b in nearest_first if quick.walk(a, b).walks and starts.walk(a, b).walks)
             best = next(both, best)
         return Adjustment(*best, starts.walk(*best))
     return None
@@ -213,14 +204,14 @@ def smallest_change(
 class StartMap:
     """Cells over the factors of both velocities; rows are those of the stance leg."""
 
-    swing: NDArray[np.float64]  # (columns,) factors on the swing leg's velocity
-    stance: NDArray[np.float64]  # (rows,) factors on the stance leg's velocity
+    swing: Floats  # (columns,) factors on the swing leg's velocity
+    stance: Floats  # (rows,) factors on the stance leg's velocity
     outcome: Integers  # (rows, columns)
     steps: Integers  # (rows, columns)
     settled: Integers  # (rows, columns) 1 if the last step is the gait's
 
     @property
-    def walking(self) -> NDArray[np.float64]:
+    def walking(self) -> Floats:
         """(n, 2) factors of the cells that walk and settle."""
         rows, columns = np.nonzero((self.outcome == Outcome.WALKED) & (self.settled == 1))
         return np.column_stack((self.swing[columns], self.stance[rows]))
@@ -230,15 +221,13 @@ class StartMap:
         return float(self.walking.shape[0]) / self.outcome.size
 
 
-def contact_row(starts: ScaledStarts, swing: NDArray[np.float64], stance: float) -> Integers:
+def contact_row(starts: ScaledStarts, swing: Floats, stance: float) -> Integers:
     """(columns, 3) outcome, steps and whether settled of one row of cells."""
     trials = [starts.walk(float(factor), float(stance)) for factor in swing]
     return np.array([(trial.outcome, trial.steps, trial.settled) for trial in trials], np.int64)
 
 
-def rigid_map(
-    walker: Standing, state: State, swing: NDArray[np.float64], stance: NDArray[np.float64], steps: int
-) -> StartMap:
+def rigid_map(walker: Standing, state: State, swing: Floats, stance: Floats, steps: int) -> StartMap:
     """The same starts in the rigid model, whose ground may also pull: then the outcome is `lifted-off`."""
 
     def cell(factor_1: float, factor_2: float) -> tuple[int, int, bool]:
@@ -249,6 +238,6 @@ def rigid_map(
     return as_map(swing, stance, list(np.array(rows, np.int64)))
 
 
-def as_map(swing: NDArray[np.float64], stance: NDArray[np.float64], rows: Sequence[Integers]) -> StartMap:
+def as_map(swing: Floats, stance: Floats, rows: Sequence[Integers]) -> StartMap:
     """The map of its rows (columns, 3)."""
     return StartMap(swing, stance, *np.moveaxis(np.stack(rows), 2, 0))

@@ -15,7 +15,6 @@ from threading import local
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from walkerlab.hybrid.recorded_walk import take_walk
 from walkerlab.hybrid.rigid_observer import Observer, unwatched
@@ -30,10 +29,7 @@ from walkerlab.solvers.events import CrossingFinder
 from walkerlab.solvers.linear import factor, solve
 from walkerlab.solvers.registry import ENDLESS, Tolerances, finder_for
 from walkerlab.solvers.stepping import BUDGET, H_NEXT, clear_counts
-from walkerlab.solvers.system import State
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
+from walkerlab.solvers.system import Floats, Integers, State
 
 WALKED = int(Outcome.WALKED)
 SMALL = 2.0**-13
@@ -83,8 +79,13 @@ def section_of(walker: Standing) -> StrikeSection:
 
 def on_section(walker: Standing, z: Any) -> State:
     """The state (2 n) of section coordinates z (d,)."""
+    return tuple(states_on_section(walker, z).tolist())
+
+
+def states_on_section(walker: Standing, z: Any) -> Floats:
+    """States (n, 2 n) of section coordinates z (n, d), or that of one."""
     section = section_of(walker)
-    return tuple((section.start[: len(walker.zero_state)] + np.asarray(z) @ section.basis).tolist())
+    return np.asarray(section.start[: len(walker.zero_state)] + np.asarray(z) @ section.basis)
 
 
 def coordinates_of(walker: Standing, y: Any) -> Floats:

@@ -19,7 +19,6 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from walkerlab.mechanics.impact import heel_strike
 from walkerlab.mechanics.standing import (
@@ -31,9 +30,7 @@ from walkerlab.mechanics.standing import (
     on_slope,
     swing_foot,
 )
-from walkerlab.solvers.system import State
-
-Vector = NDArray[np.float64]
+from walkerlab.solvers.system import Floats, State
 
 LONG_PERIOD, SHORT_PERIOD = "long-period seed", "short-period seed"
 SCAN = 400  # samples over one period of the swinging leg, to bracket roots with
@@ -53,9 +50,9 @@ class SmallSlopeSeed(NamedTuple):
 
     name: str
     slope: float  # rad
-    z: Vector  # (3,) theta_2, dtheta_1, dtheta_2 after the heel strike
+    z: Floats  # (3,) theta_2, dtheta_1, dtheta_2 after the heel strike
     period: float  # s, in the limit
-    limit: Vector  # (3,) z / slope^(1/3) in the limit
+    limit: Floats  # (3,) z / slope^(1/3) in the limit
 
 
 class Modes(NamedTuple):
@@ -63,7 +60,7 @@ class Modes(NamedTuple):
 
     swing: float  # rad/s, of the oscillating mode
     fall: float  # 1/s, of the growing mode
-    V: Vector  # (2, 2), a mode a column, oscillating first
+    V: Floats  # (2, 2), a mode a column, oscillating first
 
 
 def linear_modes(walker: Standing) -> Modes | None:
@@ -84,7 +81,7 @@ def linear_modes(walker: Standing) -> Modes | None:
     return Modes(math.sqrt(-oscillating), math.sqrt(growing), V)
 
 
-def leg_columns(walker: Standing) -> Vector:
+def leg_columns(walker: Standing) -> Floats:
     """Angles (n, 2) of all bodies for a unit angle of the swing leg, and of the stance leg."""
     return np.array([linked(walker, STRAIGHT, unit) for unit in np.eye(len(walker.arm_x))[:2]]).T
 
@@ -120,7 +117,7 @@ def long_period_seed(walker: Standing, modes: Modes) -> SmallSlopeSeed | None:
     return cube_root_seed(LONG_PERIOD, walker, np.array([0.5, omega, omega]), 2.0 * half)
 
 
-def cube_root_seed(name: str, walker: Standing, per_angle: Vector, period: float) -> SmallSlopeSeed:
+def cube_root_seed(name: str, walker: Standing, per_angle: Floats, period: float) -> SmallSlopeSeed:
     """The gait at LONG_AMPLITUDE whose motion grows as the cube root of the slope.
 
     per_angle  (3,) theta_2 + phi, dtheta_1, dtheta_2 after the heel strike for a unit angle between the legs
@@ -133,7 +130,7 @@ def cube_root_seed(name: str, walker: Standing, per_angle: Vector, period: float
 
 
 @np.errstate(divide="raise", invalid="raise")
-def loss(walker: Standing, per_angle: Vector) -> float:
+def loss(walker: Standing, per_angle: Floats) -> float:
     """The slope that makes up for the heel strike's loss, over the cube of the angle between the legs.
 
     A gait of the limit comes down as it set out, with both legs at the same rates: what its heel strike takes is what
@@ -149,7 +146,7 @@ def loss(walker: Standing, per_angle: Vector) -> float:
 
 
 @np.errstate(divide="raise", invalid="raise")
-def after_strike(walker: Standing, state: State) -> Vector:
+def after_strike(walker: Standing, state: State) -> Floats:
     """The state (2 n,) after a heel strike."""
     after = np.zeros(len(state))
     heel_strike(walker, np.array(state), after)
@@ -166,7 +163,7 @@ def symmetric_half_period(modes: Modes) -> float | None:
     """The first time h > 0 after mid-swing, theta = 0, at which theta_1 + theta_2 = 0 and dtheta_1 = dtheta_2 (s)."""
     total, apart = modes.V[0] + modes.V[1], modes.V[0] - modes.V[1]
 
-    def mismatch(h: Vector) -> Vector:
+    def mismatch(h: Floats) -> Floats:
         """Determinant of the two conditions on the modes' weights, over h cosh(fall h)."""
         swinging = total[0] * np.sin(modes.swing * h) / modes.swing * apart[1]
         falling = total[1] * np.tanh(modes.fall * h) / modes.fall * apart[0] * np.cos(modes.swing * h)
@@ -195,7 +192,7 @@ def short_period_seed(walker: Standing, modes: Modes, longest: float) -> SmallSl
     return SmallSlopeSeed(SHORT_PERIOD, slope, slope * z, period, np.zeros(3))
 
 
-def step_conditions(walker: Standing, modes: Modes) -> Callable[[Vector], Vector]:
+def step_conditions(walker: Standing, modes: Modes) -> Callable[[Floats], Floats]:
     """One step of the linearised walker on a slope of one radian, for many durations at once.
 
     Returns a function of durations t (s) that gives matrices (..., 4, 4) on (z, 1): three rows say that t later z is
@@ -213,11 +210,11 @@ def step_conditions(walker: Standing, modes: Modes) -> Callable[[Vector], Vector
     rest = np.zeros((4, 4))
     rest[:2, 3] = np.linalg.solve(flat.gravity * legs.T @ np.diag(flat.arm_y) @ legs, pull)
 
-    def of_modes(oscillating: Vector, growing: Vector) -> Vector:
+    def of_modes(oscillating: Floats, growing: Floats) -> Floats:
         weights = np.stack((oscillating, growing), axis=-1)[..., None, :]
         return np.asarray(modes.V * weights @ inverse, np.float64)
 
-    def conditions(t: Vector) -> Vector:
+    def conditions(t: Floats) -> Floats:
         sine, cosine = np.sin(swing * t), np.cos(swing * t)
         growing, grown = np.sinh(fall * t), np.cosh(fall * t)
         flow = np.empty((*t.shape, 4, 4))  # takes a state to the one t later
@@ -234,7 +231,7 @@ def step_conditions(walker: Standing, modes: Modes) -> Callable[[Vector], Vector
     return conditions
 
 
-def first_root(f: Callable[[Vector], Vector], longest: float) -> float | None:
+def first_root(f: Callable[[Floats], Floats], longest: float) -> float | None:
     """The smallest root of f in (0, longest), bracketed by samples ever closer; None if f keeps its sign."""
     # the end itself is left out: there the short gait's conditions degenerate into the long one's
     samples = longest * np.arange(1, SCAN) / SCAN

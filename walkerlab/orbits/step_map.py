@@ -18,8 +18,7 @@ from numpy.typing import NDArray
 from walkerlab.orbits.newton import Effort, Evaluated, NotConverged, newton
 from walkerlab.outcome import Outcome
 from walkerlab.solvers.registry import Tolerances
-
-Floats = NDArray[np.float64]
+from walkerlab.solvers.system import Floats
 
 SPREAD = 1e-3  # of the parameter, between the points of the difference formula
 REMEMBERED = 4096  # walkers built so far
@@ -269,7 +268,7 @@ def with_parameter(step_map: StepMap, cycle: Cycle) -> Cycle:
 
 def gait_near(step_map: Stepper, z: Floats, p: float, effort: Effort, n: int = 1) -> Cycle | NotConverged:
     """The gait of n steps near z (d,) at p, by Newton's method."""
-    solved = newton(lambda z: walk_steps(step_map, z, p, n).returning(), z, *effort)
+    solved = newton(lambda z: walk_steps(step_map, z, p, n).returning(), z, effort)
     return solved if isinstance(solved, NotConverged) else solved.evaluated.data
 
 

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from walkerlab.pipeline.progress import Progress
 from walkerlab.store.parts import Numbers, Parts
 from walkerlab.workers import in_order
-
-if TYPE_CHECKING:
-    from walkerlab.verification.maps import MapPiece
 
 
 class Piece(NamedTuple):
@@ -27,7 +24,7 @@ class Piece(NamedTuple):
 
 
 def complete(
-    pieces: Sequence[Piece | MapPiece], parts: Parts, label: str, progress: Progress, jobs: int, shared_from: int = 0
+    pieces: Sequence[Piece], parts: Parts, label: str, progress: Progress, jobs: int, shared_from: int = 0
 ) -> int:
     """Compute the pieces that are not there yet, and keep each as soon as it is.
 

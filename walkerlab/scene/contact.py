@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from walkerlab.config.drives import Hip, drives_of
+from walkerlab.config.drives import drives_of
 from walkerlab.config.walkers import Kneed, PartsWalker
 from walkerlab.errors import ConfigError
 from walkerlab.ground.compliant import KneeRules, contact_walker
@@ -23,7 +23,7 @@ from walkerlab.hybrid.contact_run import ContactWalkResult, Floats, walk_contact
 from walkerlab.mechanics.parts import Assembly
 from walkerlab.mechanics.rigid import places_of
 from walkerlab.orbits.contact_gait import GaitAnswer, find_gait_from
-from walkerlab.scene.parts import AnyWalker, assembly_of
+from walkerlab.scene.parts import AnyWalker, assembly_of, drive_numbers
 from walkerlab.solvers.registry import Tolerances
 from walkerlab.solvers.system import State
 
@@ -64,9 +64,8 @@ class ContactScene:
 
         heights  (footholds,) m over the slope, the start's first; even ground without
         """
-        ground = (
-            self.ground if heights is None else self.ground._replace(terrain=self.terrain._replace(heights=heights))
-        )
+        terrain = self.terrain if heights is None else self.terrain._replace(heights=heights)
+        ground = JudgedGround(terrain, self.frame)
         return walk_contact(self.walker, ground, self.pinned, STANCE_FOOT, start, tolerances, steps, sampling)
 
 
@@ -78,32 +77,19 @@ def contact_scene(config: ContactConfig, rigid_step_length_m: float, own_pitch_m
     """
     contact = with_contact(config)
     pitch = pads_pitch(contact, rigid_step_length_m, own_pitch_m)
-    scene = assembled_scene(
-        assembly_of(config.walker),
-        config.walker.leg_length_m,
-        contact,
-        config.gravity_m_s2,
-        config.slope_rad,
-        pitch,
-        knee_rules(config.walker),
-    )
-    return replace(scene, walker=with_drives(scene.walker, config))
+    assembly, leg, gravity = assembly_of(config.walker), config.walker.leg_length_m, config.gravity_m_s2
+    laws, rules = (normal_law(contact), friction_law(contact)), knee_rules(config.walker)
+    walker = with_drives(contact_walker(assembly, *laws, gravity, config.slope_rad, rules), config)
+    frame = Frame(leg, math.sqrt(leg / gravity), locate_switching=True)
+    terrain = TERRAINS[contact.terrain](pitch)
+    return ContactScene(walker, terrain, frame, contact.stance == "pinned", pitch, assembly)
 
 
 def with_drives(walker: ContactWalker, config: ContactConfig) -> ContactWalker:
     """The walker with what drives it in a config."""
     if not drives_of(config):
         return walker
-    hip, push = config.walker.hip, config.push_off
-    return changed_forms(
-        walker,
-        driven_hip=hip != Hip(),
-        hip_stiffness=hip.spring_N_m_per_rad,
-        hip_damping=hip.damping_N_m_s_per_rad,
-        hip_torque=hip.torque_N_m,
-        push_off=push.impulse_N_s,
-        push_off_duration=push.duration_s,
-    )
+    return changed_forms(walker, **drive_numbers(config), push_off_duration=config.push_off.duration_s)
 
 
 def knee_rules(walker: AnyWalker) -> KneeRules:
@@ -116,28 +102,6 @@ def knee_rules(walker: AnyWalker) -> KneeRules:
         return KneeRules(release_at_touch=at_touch)
     # damped from the first hundredth of a milliradian on
     return KneeRules(NormalLaw(knee.stop_stiffness, 1.0, knee.stop_damping, FULL_STOP_DAMPING), at_touch)
-
-
-def assembled_scene(
-    assembly: Assembly,
-    leg_length_m: float,
-    contact: Contact,
-    gravity: float,
-    slope: float,
-    pitch_m: float,
-    knee_rules: KneeRules | None = None,
-) -> ContactScene:
-    """Any walker of the catalogue on the ground of a contact block.
-
-    gravity     m/s^2
-    slope       rad
-    pitch_m     what pads are laid for and steps are measured by
-    knee_rules  how knees lock and are released
-    """
-    walker = contact_walker(assembly, normal_law(contact), friction_law(contact), gravity, slope, knee_rules)
-    frame = Frame(leg_length_m, math.sqrt(leg_length_m / gravity), locate_switching=True)
-    terrain = TERRAINS[contact.terrain](pitch_m)
-    return ContactScene(walker, terrain, frame, contact.stance == "pinned", pitch_m, assembly)
 
 
 TERRAINS: dict[str, Callable[[float], Terrain]] = {

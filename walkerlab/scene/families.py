@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from walkerlab.mechanics.standing import Standing
 from walkerlab.orbits.shooting import RigidMap
 from walkerlab.scene.parameter import Parameter
-from walkerlab.scene.rigid import rigid_walker
+from walkerlab.scene.rigid import rigid_walker, walker_or_none
 from walkerlab.solvers.registry import Tolerances
 
 if TYPE_CHECKING:
@@ -22,12 +21,7 @@ CONTACT = Tolerances("radau5", 1e-10, 1e-12, 60_000)
 
 def rigid_walkers(config: ContactConfig, parameter: Parameter) -> Callable[[float], Standing | None]:
     """The rigid walker at a value of the parameter; None where the config refuses the value."""
-
-    def walker_at(value: float) -> Standing | None:
-        changed = parameter.config_at(config, value)
-        return None if changed is None else rigid_walker(changed, changed.equations)
-
-    return walker_at
+    return lambda value: walker_or_none(parameter.config_at(config, value))
 
 
 def rigid_map(config: ContactConfig, parameter: Parameter, scale: float) -> RigidMap:
@@ -35,28 +29,30 @@ def rigid_map(config: ContactConfig, parameter: Parameter, scale: float) -> Rigi
     return RigidMap(rigid_walkers(config, parameter), scale, rigid_walker(config, config.equations))
 
 
+def walker_on_ground(config: ContactConfig, step_length_m: float) -> WalkerOnGround:
+    """The contact model of a config; steps are judged by a length (m)."""
+    from walkerlab.orbits.contact_map import WalkerOnGround
+    from walkerlab.scene.contact import contact_scene
+
+    scene = contact_scene(config, step_length_m, step_length_m)
+    return WalkerOnGround(scene.walker, scene.ground)
+
+
 def walkers_on_ground(
     config: ContactConfig, parameter: Parameter, step_length_m: float
 ) -> Callable[[float], WalkerOnGround | None]:
     """The contact model at a value of the parameter; None where the config refuses the value."""
-    from walkerlab.orbits.contact_map import WalkerOnGround
-    from walkerlab.scene.contact import contact_scene
 
     def walker_at(value: float) -> WalkerOnGround | None:
         changed = parameter.config_at(config, value)
-        if changed is None:
-            return None
-        scene = replace(contact_scene(changed, step_length_m, step_length_m), pinned=False)
-        return WalkerOnGround(scene.walker, scene.ground)
+        return None if changed is None else walker_on_ground(changed, step_length_m)
 
     return walker_at
 
 
 def contact_map(config: ContactConfig, parameter: Parameter, scale: float, step_length_m: float) -> ContactMap:
     """The contact model's step map over the parameter; steps are judged by a length (m)."""
-    from walkerlab.orbits.contact_map import ContactMap, WalkerOnGround
-    from walkerlab.scene.contact import contact_scene
+    from walkerlab.orbits.contact_map import ContactMap
 
     walkers = walkers_on_ground(config, parameter, step_length_m)
-    like = contact_scene(config, step_length_m, step_length_m)
-    return ContactMap(walkers, scale, CONTACT, step_length_m, WalkerOnGround(like.walker, like.ground))
+    return ContactMap(walkers, scale, CONTACT, step_length_m, walker_on_ground(config, step_length_m))

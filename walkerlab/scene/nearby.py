@@ -21,8 +21,9 @@ from walkerlab.mechanics.standing import Standing
 from walkerlab.orbits.families import BranchFollower, GaitBranch, Seed, ValueSpan
 from walkerlab.orbits.fixed_point import SearchSettings, find_gaits
 from walkerlab.orbits.shooting import RigidMap
+from walkerlab.scene.families import rigid_walkers
 from walkerlab.scene.parameter import PHYSICAL, SLOPE_RAD, Parameter
-from walkerlab.scene.rigid import rigid_walker
+from walkerlab.scene.rigid import walker_or_none
 
 SLOPES = (0.7, 1.5, 2.3, 0.35, 0.1)  # of one's own, in the order in which they are looked at
 WALKED_ON = (0.03, 0.12)  # rad: slopes that most walkers with a gait have it on
@@ -30,6 +31,7 @@ STEEP, STEEPEST = 0.2, 0.35  # rad, up to which gaits are followed: at least, an
 QUICK = SearchSettings(random_starts=50, further_starts=100)
 POINTS = 60  # of a branch
 INSIDE = 0.1  # of a range, from its end
+OF_A_WALKER = frozenset(PHYSICAL) - {"contact"}  # keys whose numbers lead from one walker to another
 
 
 @dataclass(frozen=True)
@@ -50,15 +52,10 @@ def gaits_on_other_slopes(config: Config) -> Met | None:
     """The range of slopes (rad) nearest to the config's own on which it has a gait, stable ones before others."""
     own, slope = config.slope_rad, Parameter(SLOPE_RAD, "rad", (SLOPE_RAD,))
     span = ValueSpan(0.02 * own, min(STEEPEST, max(3.0 * own, STEEP)))
-
-    def walker_at(value: float) -> Standing | None:
-        changed = slope.config_at(config, value)
-        return None if changed is None else rigid_walker(changed, changed.equations)
-
     found: list[Met] = []
     for value in (*(factor * own for factor in SLOPES), *WALKED_ON):
         if value in span and not any(one.stable for one in found):
-            found += walkable(followed(walker_at, span, value))
+            found += walkable(followed(rigid_walkers(config, slope), span, value))
     return min(found, key=lambda one: (one.stable is None, distance(one.stable or one.whole, own)), default=None)
 
 
@@ -127,16 +124,11 @@ def way_from_built_in(config: Config) -> tuple[Config, Met] | None:
     own = numbers_of(config)
     others = [load(Path(name)).config for name in builtin_names()]
     like = [one for one in others if one.walker.type == config.walker.type and set(numbers_of(one)) == set(own)]
-    ways = sorted((unlikeness(own, numbers_of(one)), one.name, one) for one in like)
-    for *_, one in ways[:1]:
-
-        def walker_at(share: float, begin: Config = one) -> Standing | None:
-            changed = between(begin, config, share)
-            return None if changed is None else rigid_walker(changed, changed.equations)
-
-        for met in walkable(followed(walker_at, ValueSpan(0.0, 1.0), 0.0)):
-            return one, met
-    return None
+    if not like:
+        return None
+    begin = min(like, key=lambda one: (unlikeness(own, numbers_of(one)), one.name))
+    branches = followed(lambda share: walker_or_none(between(begin, config, share)), ValueSpan(0.0, 1.0), 0.0)
+    return next(((begin, met) for met in walkable(branches)), None)
 
 
 def numbers_of(config: Config) -> dict[tuple[str, ...], float]:
@@ -146,12 +138,7 @@ def numbers_of(config: Config) -> dict[tuple[str, ...], float]:
         held: Any = config
         for name in path:
             held = getattr(held, name, None)
-        if (
-            path[0] in PHYSICAL
-            and path[0] != "contact"
-            and isinstance(held, float)
-            and "number" in kind(field.annotation)
-        ):
+        if path[0] in OF_A_WALKER and isinstance(held, float) and "number" in kind(field.annotation):
             found[path] = held
     return found
 

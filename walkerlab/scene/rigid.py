@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
-from walkerlab.config.drives import Hip
 from walkerlab.config.ground import Footholds
 from walkerlab.config.walkers import CompassWalker, Walker, is_plain_compass
 from walkerlab.errors import ConfigError
@@ -16,7 +15,7 @@ from walkerlab.mechanics.rigid import knee_of, on_level_ground, places_of
 from walkerlab.mechanics.standing import Standing, on_slope
 from walkerlab.paper.appendix_a import AS_PRINTED, CORRECTED, RigidWalker, as_printed
 from walkerlab.scene.footholds import foothold_heights
-from walkerlab.scene.parts import SHOWN_IN, assembly_of, knee_locked_at_strike
+from walkerlab.scene.parts import SHOWN_IN, assembly_of, drive_numbers, knee_locked_at_strike
 from walkerlab.solvers.registry import ENDLESS, Tolerances
 from walkerlab.solvers.system import State
 
@@ -74,20 +73,14 @@ def rigid_scene_on(
 
 def rigid_walker(config: RigidConfig, equations: Equations) -> Standing:
     """The walker of a config with one of the two sets of equations; those as printed are a compass's."""
-    model = driven(on_slope(level_walker(config.walker, config.gravity_m_s2), config.slope_rad), config)
+    passive = on_slope(level_walker(config.walker, config.gravity_m_s2), config.slope_rad)
+    model = passive.changed(**drive_numbers(config))
     return as_printed(model) if equations == "as-printed" else model
 
 
-def driven(model: Standing, config: RigidConfig) -> Standing:
-    """The walker with what drives it in a config."""
-    hip = config.walker.hip
-    return model.changed(
-        driven_hip=hip != Hip(),
-        hip_stiffness=hip.spring_N_m_per_rad,
-        hip_damping=hip.damping_N_m_s_per_rad,
-        hip_torque=hip.torque_N_m,
-        push_off=config.push_off.impulse_N_s,
-    )
+def walker_or_none(config: RigidConfig | None) -> Standing | None:
+    """The walker of a config with its own equations; None where there is no config."""
+    return None if config is None else rigid_walker(config, config.equations)
 
 
 @lru_cache(REMEMBERED)

@@ -77,7 +77,6 @@ class LastStep:
     def __init__(self, of: CvodeSolver) -> None:
         """The last step of a solver."""
         self.of = of
-        self.t_max = of.t
 
     def __call__(self, times: Any) -> Any:
         """States (n,) at a time, or (n, times) at several."""

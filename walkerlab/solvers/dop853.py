@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from walkerlab.kernels import by_reference, inlined, vector
 from walkerlab.solvers import dop853_tableau as tableau
@@ -28,12 +27,11 @@ from walkerlab.solvers.stepping import (
     T,
     advance,
     begin,
-    dense_degree,
     interpolate,
     prepare_dense,
     rewind,
 )
-from walkerlab.solvers.system import block, derivative
+from walkerlab.solvers.system import Floats, block, derivative
 
 # Hairer's code has 0.9: a fifth of a walk's steps was rejected, and the same error took 11 % more work.
 SAFETY, SHRINK_MOST, GROW_MOST = 0.8, 0.333, 6.0
@@ -42,7 +40,7 @@ STAGES, EXTRA_STAGES = 12, 3
 LAST, ALL = STAGES, STAGES + 1 + EXTRA_STAGES  # row of the derivative at the step's end; rows with dense output
 
 
-def rows(weights: Sequence[Sequence[float]], length: int) -> NDArray[np.float64]:
+def rows(weights: Sequence[Sequence[float]], length: int) -> Floats:
     """Weights as the rows of a matrix (rows, length), filled up with zeros."""
     return np.array([[*row, *[0.0] * (length - len(row))] for row in weights])
 
@@ -238,9 +236,3 @@ def interpolate_dop853(method: Dop853, system: Any, fraction: float, y: Any) -> 
         low = fused(w1 * s, d[2, i], fused(w1, d[1, i], fused(s, d[0, i], method.y_old[i])))
         high = fused(w3 * s * r, d[5, i], fused(w3 * s, d[4, i], fused(w3, d[3, i], low)))
         y[i] = fused(w3 * s * r * s, d[6, i], high)
-
-
-@dense_degree.case(Dop853)
-def dense_degree_dop853(method: Dop853) -> int:
-    """Seven."""
-    return 7

@@ -4,30 +4,17 @@ Source: Hairer, Wanner, Solving Ordinary Differential Equations II, 2nd ed. (199
 """
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
-from walkerlab.kernels import inlined
+import numpy as np
+
+from walkerlab.kernels import by_reference, inlined
 from walkerlab.solvers.fused import fused
-from walkerlab.solvers.radau5_stages import (
-    ERROR_OLD,
-    FRESH,
-    H_FACTORED,
-    H_OLD,
-    NEWTON_MOST,
-    RATE,
-    SMOOTH,
-    UNKNOWNS,
-    Radau5,
-    factor_matrices,
-    new_radau5,
-    solve_real,
-    solve_stages,
-)
-from walkerlab.solvers.radau5_tableau import ERROR, P_1, P_2, P_3
-from walkerlab.solvers.shifted_system import unknowns
+from walkerlab.solvers.shifted_system import factor_shifted, solve_shifted, unknowns
 from walkerlab.solvers.stepping import (
     ACCEPTED,
     BUDGET,
+    COUNTS,
     H_NEXT,
     JACOBIANS,
     OUT_OF_BUDGET,
@@ -40,19 +27,171 @@ from walkerlab.solvers.stepping import (
     T,
     advance,
     begin,
-    dense_degree,
     interpolate,
     prepare_dense,
     rewind,
 )
 from walkerlab.solvers.system import derivative, jacobian
 
-__all__ = ["Radau5", "new_radau5"]
+ROOT6 = math.sqrt(6.0)
+C = ((4.0 - ROOT6) / 10.0, (4.0 + ROOT6) / 10.0, 1.0)
+# eigenvalues of A^-1: one real, one complex pair; A^-1 = T Lambda T^-1, (8.5) and (8.12)
+GAMMA = 3.0 + 3.0 ** (2.0 / 3.0) - 3.0 ** (1.0 / 3.0)
+ALPHA = 3.0 + 0.5 * (3.0 ** (1.0 / 3.0) - 3.0 ** (2.0 / 3.0))
+BETA = 0.5 * (3.0 ** (5.0 / 6.0) + 3.0 ** (7.0 / 6.0))
+T_1 = (0.09443876248897524, -0.14125529502095421, 0.03002919410514742)
+T_2 = (0.25021312296533332, 0.20412935229379994, -0.38294211275726192)  # the third row is (1, 1, 0)
+INV_1 = (4.17871859155190428, 0.32768282076106237, 0.52337644549944951)
+INV_2 = (-4.17871859155190428, -0.32768282076106237, 0.47662355450055044)
+INV_3 = (0.50287263494578682, -2.57192694985560522, 0.59603920482822492)
+# error estimate (8.19): h gamma_0 f(y_0) + sum e_i z_i, times gamma
+ERROR = ((-13.0 - 7.0 * ROOT6) / 3.0, (-13.0 + 7.0 * ROOT6) / 3.0, -1.0 / 3.0)
+# the collocation polynomial: z(s) = s (P_1 + s (P_2 + s P_3)), each a combination of z_1, z_2, z_3
+P_1 = (13.0 / 3.0 + 7.0 * ROOT6 / 3.0, 13.0 / 3.0 - 7.0 * ROOT6 / 3.0, 1.0 / 3.0)
+P_2 = (-23.0 / 3.0 - 22.0 * ROOT6 / 3.0, -23.0 / 3.0 + 22.0 * ROOT6 / 3.0, -8.0 / 3.0)
+P_3 = (10.0 / 3.0 + 5.0 * ROOT6, 10.0 / 3.0 - 5.0 * ROOT6, 10.0 / 3.0)
 
 SAFETY, SHRINK_MOST, GROW_MOST = 0.9, 0.125, 8.0
 KEEP_LOW, KEEP_HIGH = 1.0, 1.2  # step ratios within which the factored matrices are kept
 FRESH_RATE = 1e-3  # Newton convergence below which the Jacobian is kept
 FIRST_STEP = 1e-6
+NEWTON_MOST = 7
+
+# indices into `control`
+H_FACTORED, H_OLD, ERROR_OLD, RATE, SMOOTH, FRESH, UNKNOWNS = 0, 1, 2, 3, 4, 5, 6
+
+
+@by_reference
+class Radau5(NamedTuple):
+    """The method with its memory for n equations."""
+
+    rtol: float
+    atol: float
+    clock: Any
+    y_old: Any
+    y: Any
+    counts: Any
+    at: Any  # (n,) where a derivative is asked for
+    slope: Any  # (2, n) derivative at the start of the next step, and of the last
+    z: Any  # (3, n) stages less the step's start
+    w: Any  # (3, n) the same, transformed
+    f: Any  # (3, n) stage derivatives, transformed; Newton's right-hand sides
+    dense: Any  # (3, n) coefficients of the collocation polynomial
+    J: Any  # (n, n)
+    real: Any  # (n, n) factors of gamma/h I - J
+    pair: Any  # (n, n) complex factors of (alpha - i beta)/h I - J
+    pivots: Any  # (2, n)
+    move: Any  # (n,) Newton's move, real part of the transformed system
+    move_pair: Any  # (n,) complex, the pair's
+    control: Any  # (7,) see the indices above
+
+
+def new_radau5(n: int, rtol: float, atol: float, budget: int) -> Radau5:
+    """A Radau IIA method for n equations that may evaluate `budget` right-hand sides."""
+    counts = np.zeros(COUNTS, np.int64)
+    counts[BUDGET] = budget
+    three, square = (3, n), (n, n)
+    return Radau5(
+        rtol, atol, np.zeros(3), np.zeros(n), np.zeros(n), counts, np.zeros(n), np.zeros((2, n)),
+        np.zeros(three), np.zeros(three), np.zeros(three), np.zeros(three),
+        np.zeros(square), np.zeros(square), np.zeros(square, np.complex128), np.zeros((2, n), np.int64),
+        np.zeros(n), np.zeros(n, np.complex128), np.zeros(7),
+    )  # fmt: skip
+
+
+@inlined
+def factor_matrices(method: Radau5, h: float) -> bool:
+    """Factors of both matrices of the simplified Newton iteration for step h."""
+    left = int(method.control[UNKNOWNS])
+    method.control[H_FACTORED] = h
+    real = factor_shifted(method.J, left, GAMMA / h, method.real, method.pivots[0])
+    return real and factor_shifted(method.J, left, complex(ALPHA / h, -BETA / h), method.pair, method.pivots[1])
+
+
+@inlined
+def solve_real(method: Radau5, r: Any) -> None:
+    """Solve with the real matrix of the step, overwriting r (n,)."""
+    s = GAMMA / method.control[H_FACTORED]
+    solve_shifted(method.J, int(method.control[UNKNOWNS]), s, method.real, method.pivots[0], r)
+
+
+@inlined
+def solve_pair(method: Radau5, r: Any) -> None:
+    """Solve with the complex matrix of the step, overwriting r (n,)."""
+    h = method.control[H_FACTORED]
+    s = complex(ALPHA / h, -BETA / h)
+    solve_shifted(method.J, int(method.control[UNKNOWNS]), s, method.pair, method.pivots[1], r)
+
+
+@inlined
+def first_guess(method: Radau5, h: float) -> None:
+    """Stages from the collocation polynomial of the step before, or zero after a start."""
+    ratio = h / method.control[H_OLD] if method.control[SMOOTH] > 0.0 else 0.0
+    z, w, dense = method.z, method.w, method.dense
+    for i in range(method.y.size):
+        start = dense[0, i] + dense[1, i] + dense[2, i]
+        for stage in range(3):
+            s = 1.0 + C[stage] * ratio
+            z[stage, i] = s * (dense[0, i] + s * (dense[1, i] + s * dense[2, i])) - start if ratio > 0.0 else 0.0
+        w[0, i] = INV_1[0] * z[0, i] + INV_1[1] * z[1, i] + INV_1[2] * z[2, i]
+        w[1, i] = INV_2[0] * z[0, i] + INV_2[1] * z[1, i] + INV_2[2] * z[2, i]
+        w[2, i] = INV_3[0] * z[0, i] + INV_3[1] * z[1, i] + INV_3[2] * z[2, i]
+
+
+@inlined
+def newton_move(method: Radau5, system: Any, t: float, h: float) -> float:
+    """One simplified Newton iteration on the stages; returns the size of its move relative to the tolerance."""
+    y, z, w, f = method.y, method.z, method.w, method.f
+    n = y.size
+    for stage in range(3):
+        for i in range(n):
+            method.at[i] = y[i] + z[stage, i]
+        derivative(system, t + C[stage] * h, method.at, f[stage])
+    method.counts[RHS] += 3
+    real = method.move
+    for i in range(n):
+        f1, f2, f3 = f[0, i], f[1, i], f[2, i]
+        real[i] = INV_1[0] * f1 + INV_1[1] * f2 + INV_1[2] * f3 - GAMMA / h * w[0, i]
+        re = INV_2[0] * f1 + INV_2[1] * f2 + INV_2[2] * f3 - (ALPHA * w[1, i] + BETA * w[2, i]) / h
+        im = INV_3[0] * f1 + INV_3[1] * f2 + INV_3[2] * f3 - (ALPHA * w[2, i] - BETA * w[1, i]) / h
+        method.move_pair[i] = complex(re, im)
+    solve_real(method, real)
+    solve_pair(method, method.move_pair)
+    size = 0.0
+    for i in range(n):
+        d1, d2, d3 = real[i], method.move_pair[i].real, method.move_pair[i].imag
+        scale = 1.0 / (method.atol + method.rtol * abs(y[i]))
+        size += (d1 * scale) ** 2 + (d2 * scale) ** 2 + (d3 * scale) ** 2
+        w1, w2, w3 = w[0, i] + d1, w[1, i] + d2, w[2, i] + d3
+        w[0, i], w[1, i], w[2, i] = w1, w2, w3
+        z[0, i] = T_1[0] * w1 + T_1[1] * w2 + T_1[2] * w3
+        z[1, i] = T_2[0] * w1 + T_2[1] * w2 + T_2[2] * w3
+        z[2, i] = w1 + w2
+    return math.sqrt(size / (3 * n))
+
+
+@inlined
+def solve_stages(method: Radau5, system: Any, t: float, h: float) -> int:
+    """Iterate until the stages are accurate to a part of the tolerance; the iterations used, 0 if they diverge."""
+    tolerance = max(10.0 * 2.3e-16 / method.rtol, min(0.03, math.sqrt(method.rtol)))
+    first_guess(method, h)
+    size_old, rate = 0.0, method.control[RATE]
+    for iteration in range(1, NEWTON_MOST + 1):
+        size = newton_move(method, system, t, h)
+        if not size < 1e100:
+            return 0
+        if iteration > 1:
+            rate = size / size_old
+            if rate >= 0.99:
+                return 0
+            ahead = rate ** (NEWTON_MOST - iteration) / (1.0 - rate) * size
+            if ahead > 10.0 * tolerance:
+                return 0
+            method.control[RATE] = rate
+        if size == 0.0 or (iteration > 1 and rate / (1.0 - rate) * size <= tolerance):
+            return iteration
+        size_old = max(size, 1e-300)
+    return 0
 
 
 @begin.case(Radau5)
@@ -204,9 +343,3 @@ def interpolate_radau5(method: Radau5, system: Any, fraction: float, y: Any) -> 
     s, dense = fraction, method.dense
     for i in range(y.size):
         y[i] = fused(s * s * s, dense[2, i], fused(s * s, dense[1, i], fused(s, dense[0, i], method.y_old[i])))
-
-
-@dense_degree.case(Radau5)
-def dense_degree_radau5(method: Radau5) -> int:
-    """Three."""
-    return 3

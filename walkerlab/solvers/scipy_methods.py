@@ -4,14 +4,12 @@ They serve as peers and as a check. Walks with them run in Python: the same sour
 """
 
 from collections.abc import Callable
-from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import numba
 import numpy as np
 
 from walkerlab.kernels import kernel
-from walkerlab.solvers import cvode
 from walkerlab.solvers.stepping import (
     ACCEPTED,
     BUDGET,
@@ -26,54 +24,14 @@ from walkerlab.solvers.stepping import (
     T,
     advance,
     begin,
-    dense_degree,
     interpolate,
     prepare_dense,
     rewind,
 )
-from walkerlab.solvers.system import derivative, jacobian
+from walkerlab.solvers.system import Integers, derivative, jacobian
 
-
-class Entry(NamedTuple):
-    """A library's class of solvers, loaded only where it is used.
-
-    load    gives what makes a solver, called as the classes of scipy.integrate are
-    stiff   whether it is meant for stiff problems
-    orders  lowest and highest
-    told    whether it takes the Jacobian
-    """
-
-    load: Callable[[], Callable[..., Any]]
-    stiff: bool
-    orders: tuple[int, int]
-    told: bool
-
-
-def of_scipy(class_name: str) -> Callable[[], Callable[..., Any]]:
-    """Loads a class of scipy.integrate."""
-
-    def load() -> Callable[..., Any]:
-        from scipy import integrate
-
-        solver_class: Callable[..., Any] = getattr(integrate, class_name)
-        return solver_class
-
-    return load
-
-
-SCIPY = {
-    "scipy-rk45": Entry(of_scipy("RK45"), stiff=False, orders=(5, 5), told=False),
-    "scipy-dop853": Entry(of_scipy("DOP853"), stiff=False, orders=(8, 8), told=False),
-    "scipy-lsoda": Entry(of_scipy("LSODA"), stiff=True, orders=(1, 12), told=True),
-    "scipy-radau": Entry(of_scipy("Radau"), stiff=True, orders=(5, 5), told=True),
-    "scipy-bdf": Entry(of_scipy("BDF"), stiff=True, orders=(1, 5), told=True),
-}
-CVODE = {
-    "cvode-bdf": Entry(lambda: partial(cvode.CvodeSolver, "BDF"), stiff=True, orders=(1, 5), told=True),
-    "cvode-adams": Entry(lambda: partial(cvode.CvodeSolver, "Adams"), stiff=False, orders=(1, 12), told=True),
-}
-LIBRARIES = {**SCIPY, **(CVODE if cvode.is_installed() else {})}
 DENSE_DEGREE = 7
+"""High enough for the dense output of all of them."""
 
 
 class OutOfBudgetError(Exception):
@@ -101,9 +59,15 @@ def entry_point(function: Any, *arguments: Any) -> Callable[..., None]:
 class ScipyMethod:
     """A library's integrator with the fields of a method."""
 
-    def __init__(self, entry: Entry, n: int, rtol: float, atol: float, budget: int) -> None:
-        """Prepare for n equations; the solver itself is made by `begin`."""
-        self.entry = entry
+    def __init__(
+        self, new_solver: Callable[..., Any], takes_jacobian: bool, n: int, rtol: float, atol: float, budget: int
+    ) -> None:
+        """Prepare for n equations; the solver itself is made by `begin`.
+
+        new_solver      makes it, called as the classes of scipy.integrate are
+        takes_jacobian  whether there is use for the Jacobian
+        """
+        self.new_solver, self.takes_jacobian = new_solver, takes_jacobian
         self.rtol, self.atol = rtol, atol
         self.clock = np.zeros(3)
         self.y_old, self.y = np.zeros(n), np.zeros(n)
@@ -118,27 +82,17 @@ class ScipyMethod:
         return np.ascontiguousarray(self.dense(t_old + fractions * (t - t_old)).T)
 
 
-def new_scipy_method(entry: Entry) -> Callable[[int, float, float, int], ScipyMethod]:
-    """A builder of methods with such solvers."""
-
-    def build(n: int, rtol: float, atol: float, budget: int) -> ScipyMethod:
-        return ScipyMethod(entry, n, rtol, atol, budget)
-
-    return build
-
-
-def counted(method: ScipyMethod, system: Any, n: int) -> Callable[[float, Any], Any]:
+def counted(counts: Integers, system: Any, n: int) -> Callable[[float, Any], Any]:
     """The compiled right-hand side as libraries call it, counting and keeping the budget."""
     probe = np.zeros(n)
     code = entry_point(right_hand_side, system, 0.0, probe, probe)
-    counts = method.counts
 
     def fun(t: float, y: Any) -> Any:
         if counts[RHS] >= counts[BUDGET]:
             raise OutOfBudgetError
         counts[RHS] += 1
         dy = np.empty(n)
-        code(system, t, y, dy)
+        code(system, t, np.ascontiguousarray(y), dy)
         return dy
 
     return fun
@@ -164,12 +118,11 @@ def begin_scipy(method: ScipyMethod, system: Any, t: float, y: Any, h: float) ->
     method.y[:] = y
     method.clock[T_OLD] = method.clock[T] = t
     options: dict[str, Any] = {"rtol": max(method.rtol, 2.3e-14), "atol": method.atol}
-    if method.entry.told:
+    if method.takes_jacobian:
         options["jac"] = counted_jacobian(method, system, n)
     method.dense = None
     try:
-        new_solver = method.entry.load()
-        method.solver = new_solver(counted(method, system, n), t, method.y.copy(), np.inf, **options)
+        method.solver = method.new_solver(counted(method.counts, system, n), t, method.y.copy(), np.inf, **options)
     except OutOfBudgetError:
         method.solver = None
 
@@ -225,9 +178,3 @@ def interpolate_scipy(method: ScipyMethod, system: Any, fraction: float, y: Any)
     """The library's dense output."""
     t_old, t = method.clock[T_OLD], method.clock[T]
     y[:] = method.dense(t_old + fraction * (t - t_old))[: y.size]
-
-
-@dense_degree.case(ScipyMethod)
-def dense_degree_scipy(method: ScipyMethod) -> int:
-    """High enough for all of them."""
-    return DENSE_DEGREE

@@ -6,6 +6,7 @@ rtol, atol   tolerances on the error of a step
 clock        (3,) start of the last step, its end, and the next step to try, s
 y_old, y     (n,) states at start and end of the last step
 counts       (5,) see the indices below
+dense        (d, n) what `interpolate` evaluates a polynomial of degree d from; a library has its own
 """
 
 from typing import Any
@@ -45,11 +46,6 @@ def prepare_dense(method: Any, system: Any) -> None:
 @by_type
 def interpolate(method: Any, system: Any, fraction: float, y: Any) -> None:
     """Write the state at `fraction` (0 to 1) of the last step, or its first numbers, into y."""
-
-
-@by_type
-def dense_degree(method: Any) -> int:
-    """Degree of the polynomial that `interpolate` evaluates."""
 
 
 @inlined

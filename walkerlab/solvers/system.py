@@ -6,8 +6,13 @@ A system is a NamedTuple that registers a body for each of these; an integrator 
 
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from walkerlab.kernels import by_type
 
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
 State = tuple[float, ...]
 """A state outside compiled code: it is never written to."""
 

@@ -23,8 +23,6 @@ from walkerlab.orbits.basin import (
     NONE,
     RTOL,
     Attractors,
-    Floats,
-    Integers,
     Walker,
     Window,
     arrivals,
@@ -41,6 +39,7 @@ from walkerlab.pipeline.progress import Progress
 from walkerlab.scene.contact import ContactScene, contact_gait, start_state, with_contact
 from walkerlab.scene.endings import Pads, endings
 from walkerlab.scene.rigid import rigid_walker
+from walkerlab.solvers.system import Floats, Integers
 from walkerlab.stages.contact_sim import scene_on_pads, tolerances_of
 from walkerlab.stages.numerical_error import evenly_spread, tightened
 from walkerlab.stages.walk import OUTCOMES, counted

@@ -15,10 +15,11 @@ from walkerlab.config.walkers import without_contact
 from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.orbits.attractors import feigenbaum_ratios, may_part
 from walkerlab.orbits.bifurcations import Bifurcation
-from walkerlab.orbits.families import Crossing, GaitBranch, Seed, ValueSpan, ends_at, steps_word
-from walkerlab.orbits.family_search import CONTACT, RIGID, THOROUGHNESS, Family, FamilySearch, Plane
+from walkerlab.orbits.families import Crossing, GaitBranch, Seed, ValueSpan, steps_word
+from walkerlab.orbits.family_search import CONTACT, RIGID, THOROUGHNESS, Family, FamilySearch
 from walkerlab.orbits.fixed_point import find_gaits
 from walkerlab.orbits.newton import Effort
+from walkerlab.orbits.plane import Plane
 from walkerlab.orbits.step_map import Cycle, StepMap, gait_near
 from walkerlab.outcome import outcome_of
 from walkerlab.pipeline.progress import Progress
@@ -368,7 +369,7 @@ def is_born_in(child: GaitBranch, flip: Bifurcation, parent: GaitBranch) -> bool
     """Whether a branch begins at a flip of another one, at either of its ends."""
     if flip.kind != "flip" or child.period != 2 * parent.period:
         return False
-    return child.ends[0].value == flip.value or ends_at(child, flip, child.period)
+    return child.ends[0].value == flip.value or any(child.closes_on(flip))
 
 
 def attractor_summary(family: Family) -> dict[str, Any]:

@@ -16,7 +16,6 @@ from walkerlab.labels import Label
 from walkerlab.mechanics.rigid import knee_of
 from walkerlab.orbits.families import GaitBranch
 from walkerlab.orbits.family_search import RIGID, Family
-from walkerlab.orbits.newton import Floats
 from walkerlab.orbits.plane import BifurcationCurve, Regions
 from walkerlab.orbits.shooting import on_section
 from walkerlab.orbits.similarity import unit_walker
@@ -25,6 +24,7 @@ from walkerlab.scene.parameter import Parameter
 from walkerlab.scene.parts import assembly_of
 from walkerlab.scene.rigid import RigidScene, coordinates, rigid_walker
 from walkerlab.solvers.registry import ENDLESS, Tolerances
+from walkerlab.solvers.system import Floats
 from walkerlab.stages.numerical_error import evenly_spread
 from walkerlab.stages.simulate import trajectory_group
 from walkerlab.stages.walk import only_at

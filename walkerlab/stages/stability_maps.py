@@ -7,7 +7,7 @@ import numpy as np
 
 from walkerlab.config.reads import MapsConfig
 from walkerlab.outcome import Outcome
-from walkerlab.pipeline.pieces import complete
+from walkerlab.pipeline.pieces import Piece, complete
 from walkerlab.pipeline.progress import Progress
 from walkerlab.stages.walk import OUTCOMES, counted
 from walkerlab.store.content import Content, Group, Variable
@@ -34,7 +34,7 @@ def run(
     jobs   processes
     """
     cells = config.stability.map_cells
-    complete(maps.pieces_of(cells), parts, "stability maps", progress, jobs)
+    complete([Piece(*one) for one in maps.pieces_of(cells)], parts, "stability maps", progress, jobs)
     stiction, step = stiction_group(cells, parts.kept), step_group(cells, parts.kept)
     return Content({"stiction": stiction, "step": step}, summary_of(stiction, step))
 

@@ -18,6 +18,8 @@ NAME = re.compile(r"[A-Za-z][A-Za-z0-9_.+-]*")
 """Names of groups, variables, dimensions and attributes: what HDF5, netCDF and xarray all take unquoted."""
 
 
+STORED_AS: dict[str, type] = {"f": np.float64, "i": np.int64, "u": np.int64, "b": np.bool_}
+"""By the kinds of NumPy's numbers."""
 TIMING = re.compile(r"(.*_)?wall_s", re.DOTALL)
 """Keys of summaries that name measured run times."""
 
@@ -173,12 +175,8 @@ def canonical(values: ArrayLike) -> NDArray[Any]:
     array: NDArray[Any] = np.asarray(values)
     result: NDArray[Any]
     kind = array.dtype.kind
-    if kind == "f":
-        result = array.astype(np.float64, order="C", casting="safe")
-    elif kind in "iu":
-        result = array.astype(np.int64, order="C", casting="safe")
-    elif kind == "b":
-        result = array.astype(np.bool_, order="C")
+    if kind in STORED_AS:
+        result = array.astype(STORED_AS[kind], order="C", casting="safe")
     elif kind in "UTO" and all(isinstance(item, str) for item in array.ravel().tolist()):
         result = array.astype(object, order="C")
         check_text(*result.ravel().tolist())

@@ -49,22 +49,22 @@ def write_in_turn(
 
 
 class GroupOnDisk(Group):
-    """The group at a path in an intact file; each variable is read when it is asked for."""
+    """The variables at the root of an intact file; each is read when it is asked for."""
 
-    def __init__(self, file: Path, path: str = "/") -> None:
+    def __init__(self, file: Path) -> None:
         """Read nothing yet but the names."""
-        object.__setattr__(self, "variables", VariablesOnDisk(file, path))
+        object.__setattr__(self, "variables", VariablesOnDisk(file))
         object.__setattr__(self, "attrs", {})
 
 
 class VariablesOnDisk(Mapping[str, Variable]):
-    """Variables of a group in a file, by name."""
+    """Variables at the root of a file, by name."""
 
-    def __init__(self, file: Path, path: str) -> None:
+    def __init__(self, file: Path) -> None:
         """Read the names, and where in the file each is."""
-        self.file, self.path = file, path
+        self.file = file
         with h5py.File(file) as opened:
-            members = dict(opened[path])
+            members = dict(opened)
             self._by_address = names_of(members)
             self._names = [
                 name for name, one in members.items() if isinstance(one, h5py.Dataset) and not is_bare_dimension(one)
@@ -85,7 +85,7 @@ class VariablesOnDisk(Mapping[str, Variable]):
 
     def _read_anew(self, name: str) -> Variable:
         with h5py.File(self.file) as opened:
-            return read_variable(name, opened[self.path][name], self._by_address, Budget(self.file.stat().st_size))
+            return read_variable(name, opened[name], self._by_address, Budget(self.file.stat().st_size))
 
 
 def write_variables(target: Any, variables: Iterable[tuple[str, Variable]]) -> None:

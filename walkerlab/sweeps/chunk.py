@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Any, Final, Literal, NamedTuple
 
 from walkerlab.config.schema import Config
 from walkerlab.errors import WalkerlabError
@@ -49,31 +49,35 @@ class PointResult:
     """The traceback of the bug that stopped it; empty if none did."""
 
 
+class SweepPoint(NamedTuple):
+    """A point of a sweep.
+
+    keys   of its result and of the results it needs, by stage
+    again  whether its walk is taken a second time for its numerical error
+    """
+
+    config: Config
+    keys: dict[str, str]
+    again: bool
+
+
 @dataclass(frozen=True)
 class ChunkTask:
     """What a worker is sent.
 
-    graph    where the pipeline is, as module:NAME
-    target   the stage
-    configs  of the points
-    keys     of each point's result and of the results it needs, by stage
-    again    whether each point's walk is taken a second time for its numerical error
+    graph   where the pipeline is, as module:NAME
+    target  the stage
     """
 
     graph: str
     target: str
-    configs: tuple[Config, ...]
-    keys: tuple[dict[str, str], ...]
-    again: tuple[bool, ...]
+    points: tuple[SweepPoint, ...]
 
-    def split(self) -> tuple[ChunkTask, ChunkTask]:
+    def split(self) -> Iterator[ChunkTask]:
         """Both halves of a chunk of at least two points."""
-        middle = len(self.configs) // 2
-        halves = (slice(None, middle), slice(middle, None))
-        first, second = (
-            replace(self, configs=self.configs[half], keys=self.keys[half], again=self.again[half]) for half in halves
-        )
-        return first, second
+        middle = len(self.points) // 2
+        for half in (self.points[:middle], self.points[middle:]):
+            yield replace(self, points=half)
 
 
 @dataclass(frozen=True)
@@ -89,9 +93,9 @@ def compute(task: ChunkTask) -> Chunk:
     worker = worker_at(task.graph)
     labels: dict[str, tuple[str, str]] = {}
     rows = []
-    for config, keys, again in zip(task.configs, task.keys, task.again, strict=True):
+    for point in task.points:
         started = time.perf_counter()
-        row, content = row_of(worker, config, task.target, keys, again)
+        row, content = row_of(worker, task.target, point)
         rows.append(replace(row, wall_s=time.perf_counter() - started))
         labels.update(labels_in(content, labels))
     return Chunk(tuple(rows), labels)
@@ -106,19 +110,19 @@ def worker_at(where: str) -> Any:
     return InMemory(getattr(importlib.import_module(module), name))
 
 
-def row_of(
-    worker: Any, config: Config, target: str, keys: dict[str, str], again: bool = True
-) -> tuple[PointResult, Content]:
-    """One point's row, and the content it is from; `again` as in `ChunkTask`."""
+def row_of(worker: Any, target: str, point: SweepPoint) -> tuple[PointResult, Content]:
+    """One point's row, and the content it is from."""
+    key = point.keys[target]
     try:
-        answer = worker.answer(without_outputs(config, target, worker.graph), target, keys, again=again)
+        config = without_outputs(point.config, target, worker.graph)
+        answer = worker.answer(config, target, point.keys, again=point.again)
     except WalkerlabError as error:
-        return PointResult(keys[target], "failed", error.message), Content()
+        return PointResult(key, "failed", error.message), Content()
     except Exception as error:
         why = f"a bug: {type(error).__name__}: {error}"
-        return PointResult(keys[target], "failed", why, bug=traceback.format_exc()), Content()
+        return PointResult(key, "failed", why, bug=traceback.format_exc()), Content()
     why_not = None if answer.no_answer is None else answer.no_answer.message
-    return told(keys[target], answer.content, why_not), answer.content
+    return told(key, answer.content, why_not), answer.content
 
 
 def told(key: str, content: Content, no_answer: str | None) -> PointResult:

@@ -6,10 +6,10 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import dataclass
 from itertools import islice
-from typing import Any, Final
+from typing import Final
 
 from walkerlab.errors import NoAnswer
-from walkerlab.sweeps.chunk import Chunk, ChunkTask, PointResult, compute
+from walkerlab.sweeps.chunk import Chunk, ChunkTask, PointResult, SweepPoint, compute
 from walkerlab.sweeps.engines import Order, SweepEngine
 
 SCOUTS: Final = 2
@@ -43,13 +43,13 @@ class FanOut:
         engine: SweepEngine,
         order: Order,
         chunk_s: float,
-        todo: Iterator[tuple[Any, dict[str, str], bool]],
+        todo: Iterator[SweepPoint],
         count: int,
     ) -> None:
         """Begin nothing yet.
 
         chunk_s  how long a chunk is to take, s
-        todo     of each point, of `count`: its config, its keys, and whether its walk is taken again (`ChunkTask`)
+        todo     points, of which there are `count`
         """
         self.engine, self.order, self.chunk_s = engine, order, chunk_s
         self.todo, self.left = todo, count
@@ -84,8 +84,7 @@ class FanOut:
     def _next_task(self, workers: int) -> ChunkTask:
         size = min(self.left, self._chunk_size(workers))
         self.left -= size
-        configs, keys, again = zip(*islice(self.todo, size), strict=True)
-        return ChunkTask(self.graph, self.target, configs, keys, again)
+        return ChunkTask(self.graph, self.target, tuple(islice(self.todo, size)))
 
     def _chunk_size(self, workers: int) -> int:
         if self.point_s is None:
@@ -113,11 +112,11 @@ class FanOut:
                 f"no worker lives: {said}",
                 "What was computed is kept, and the same command goes on. Look at memory and limits of this machine.",
             )
-        if one.failures and len(one.task.configs) > 1:
+        if one.failures and len(one.task.points) > 1:
             self._again.extend(Try(half, 1) for half in one.task.split())
         elif one.failures < 3:
             self._again.append(Try(one.task, one.failures + 1))
         else:
             self.point_s = self.point_s or 1.0
-            key = one.task.keys[0][self.target]
+            key = one.task.points[0].keys[self.target]
             self.keep(Chunk((PointResult(key, "failed", f"its worker died: {said}"),), {}))

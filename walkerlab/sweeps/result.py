@@ -2,39 +2,104 @@
 
 import io
 import json
-from collections.abc import Iterable, Iterator, Mapping
-from typing import Any
+import sys
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from itertools import chain
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from walkerlab.config.schema import Config
+from walkerlab.labels import in_words, unit_by_name
 from walkerlab.report.headlines import LAST_OF, headlines
 from walkerlab.scene.endings import Pads, endings
+from walkerlab.solvers.system import Integers
 from walkerlab.stages.numerical_error import OF_EACH_STEP
 from walkerlab.store.artifact import InTurn
 from walkerlab.store.content import Content, Variable
 from walkerlab.sweeps.chunk import Chunk
-from walkerlab.sweeps.columns import Columns
 from walkerlab.sweeps.question import SweptStage, described
 
 CONTACT, PAD_PITCH = "contact-sim", "contact.pad_pitch"
 
 
-class Merge:
-    """The rows of a sweep's results put together.
+OWN: Final = {
+    "outcome": "how it ended: the stage's own outcome, else whether it has an answer",
+    "status": "answered, no-answer, or failed: not computed",
+    "reason": "why there is no answer",
+}
+"""What is told of every result, beside what its stage says."""
+STATES: Final = ("state", "start_state", "final_state")
+TEXT_BYTES: Final = 6
+"""What a text of some words takes in a file, in units of what it takes here."""
 
-    size  number of different results
+
+class SweepVariable:
+    """One variable: a number, a list of numbers, or a text, for each of `size` results."""
+
+    def __init__(self, size: int, shape: tuple[int, ...], text: bool) -> None:
+        """Nothing is known of any result; `shape` is that of one value."""
+        self.kinds: set[type] = set()
+        self.text = text
+        self.values: NDArray[Any] = np.full((size, *shape), "" if text else np.nan, object if text else float)
+
+    def put(self, places: Integers, values: Sequence[Any]) -> None:
+        """Take some results' values; those that have another shape than others make room for themselves."""
+        if self.text:
+            # of many equal texts one is kept
+            self.values[places] = [sys.intern(value) for value in values]
+            return
+        try:
+            array = np.array(values)
+        except ValueError:  # lists of different lengths
+            for k, value in enumerate(values):
+                self.put(places[k : k + 1], [value])
+            return
+        if array.ndim != self.values.ndim:
+            return  # a list where others have a number says something else
+        self.kinds.update(types_in(values) if array.dtype.kind == "i" else {array.dtype.type})
+        shape = tuple(max(old, new) for old, new in zip(self.values.shape[1:], array.shape[1:], strict=True))
+        if shape != self.values.shape[1:]:
+            old = self.values
+            self.values = np.full((len(old), *shape), np.nan)
+            self.values[tuple(slice(0, length) for length in old.shape)] = old
+        own: tuple[Any, ...] = (places, *(slice(0, length) for length in array.shape[1:]))
+        self.values[own] = array
+
+    def typed(self) -> NDArray[Any]:
+        """The values in the type that they had, where every result has one; else numbers with gaps."""
+        if self.text or np.isnan(self.values).any():
+            return self.values
+        if self.kinds == {np.bool_}:
+            return self.values.astype(bool)
+        return self.values.astype(np.int64) if self.kinds == {int} else self.values
+
+
+def types_in(values: Sequence[Any]) -> set[type]:
+    """The types of the numbers in a list, or in lists in it."""
+    inner = [item for value in values if isinstance(value, list) for item in value]
+    own = {type(value) for value in values if not isinstance(value, list)}
+    return own | types_in(inner) if inner else own
+
+
+class Merge:
+    """The rows of a sweep's results put together, as one variable for each thing that they say.
+
+    config   the one that is varied
+    inverse  which result each point has
     """
 
-    def __init__(self, size: int) -> None:
+    def __init__(self, question: SweptStage, config: Config, inverse: Integers) -> None:
         """There are no rows yet."""
-        self.columns = Columns(size)
-        self.there = np.zeros(size, bool)
+        self.question, self.config, self.inverse = question, config, inverse
+        self.there = np.zeros(int(inverse.max()) + 1, bool)
+        self.labels: dict[str, tuple[str, str]] = {}
+        self.columns: dict[str, SweepVariable] = {}
 
     def put(self, chunk: Chunk, places: Mapping[str, int]) -> None:
         """Take the rows of a chunk that have a place."""
-        self.columns.label(chunk.labels)
+        self.labels.update(chunk.labels)
         wanted = [row for row in chunk.rows if row.key in places]
         at = [places[row.key] for row in wanted]
         rows = []
@@ -44,22 +109,30 @@ class Merge:
             last = {name: numbers[whole][-1] for name, whole in LAST_OF.items() if whole in numbers}
             rows.append({**numbers, **last, **own})
         self.there[at] = True
-        self.columns.put(at, rows)
+        for name in dict.fromkeys(chain.from_iterable(rows)):
+            have = [k for k, row in enumerate(rows) if name in row]
+            first = rows[have[0]][name]
+            text = isinstance(first, str)
+            if name not in self.columns:
+                self.columns[name] = SweepVariable(self.there.size, () if text else np.shape(first), text)
+            column = self.columns[name]
+            have = [k for k in have if isinstance(rows[k][name], str) == column.text]
+            column.put(np.array([at[k] for k in have], int), [rows[k][name] for k in have])
 
-    def of(self, name: str, inverse: NDArray[np.int64]) -> NDArray[Any]:
-        """A text of every point: one of those that are told of every result."""
-        texts = self.columns.of(name)
-        assert texts is not None, "a sweep has results"
-        return texts[inverse]
+    @property
+    def numbers(self) -> Collection[str]:
+        """Of the variables those that are one number for each result."""
+        return [name for name, column in self.columns.items() if not column.text and column.values.ndim == 1]
 
-    def content(self, question: SweptStage, config: Config, inverse: NDArray[np.int64]) -> InTurn:
-        """What is stored of the sweep; to be asked for once.
+    def of(self, name: str) -> NDArray[Any] | None:
+        """What the points have under a name, nan or an empty text for a gap; None if none of them has it."""
+        return self.columns[name].values[self.inverse] if name in self.columns else None
 
-        config   the one that is varied
-        inverse  which result each point has
-        """
-        parameters = dict(coordinates(question, config))
-        statuses = self.of("status", inverse)
+    def content(self) -> InTurn:
+        """What is stored of the sweep; to be asked for once."""
+        question = self.question
+        parameters = dict(coordinates(question, self.config))
+        statuses = self.columns["status"].values[self.inverse]
         summary = {
             "of": question.stage,
             "parameters": {name: list(axis.values) for name, axis in zip(question.names, question.axes, strict=True)},
@@ -67,38 +140,68 @@ class Merge:
             "points": len(question),
             "done": int(np.sum(statuses != "failed")),
             "failed": int(np.sum(statuses == "failed")),
-            "outcomes": counted(self.of("outcome", inverse)),
-            **numerical_error(self.columns, inverse),
+            "outcomes": counted(self.columns["outcome"].values[self.inverse]),
+            **self.numerical_error(),
         }
-        ended = self.endings(question, config, inverse)
+        ended = self.endings()
         summary |= {"endings": ended} if ended else {}
         attrs = {"coordinates": " ".join(question.names)} if question.layout == "list" else {}
         scales = {name: one for name, one in parameters.items() if one.dims == (name,)}
-        return InTurn(summary, attrs, scales, self._variables(question, parameters, inverse), self.columns.size_bytes)
+        size = sum(one.values.nbytes * (TEXT_BYTES if one.text else 1) for one in self.columns.values())
+        return InTurn(summary, attrs, scales, self._variables(parameters), size)
 
-    def endings(self, question: SweptStage, config: Config, inverse: NDArray[np.int64]) -> list[dict[str, Any]]:
+    def endings(self) -> list[dict[str, Any]]:
         """What ended the walks and what the ground has to do with it; nothing of a stage that does not walk."""
-        outcomes = self.of("outcome", inverse)
-        pads, pitch = None, self.columns.of("pitch_m")
-        off, lengths = outcomes == "off-pad", self.columns.of("step_lengths_m")
+        question, config = self.question, self.config
+        outcomes = self.columns["outcome"].values[self.inverse]
+        pads, pitch = None, self.of("pitch_m")
+        off, lengths = outcomes == "off-pad", self.of("step_lengths_m")
         if pitch is not None and off.any():
-            last = np.zeros(0) if lengths is None else last_of_each(lengths[inverse][off])
+            last = np.zeros(0) if lengths is None else last_of_each(lengths[off])
             steps = last[np.isfinite(last)]
             varied = PAD_PITCH in (axis.key for axis in question.axes)
             laid = "" if config.contact is None or varied else config.contact.pad_pitch
-            pads = Pads(ends_of(pitch[inverse][off]), ends_of(steps) if steps.size else None, str(laid))
+            pads = Pads(ends_of(pitch[off]), ends_of(steps) if steps.size else None, str(laid))
         return endings(counted(outcomes), config, question.stage == CONTACT, pads)
 
-    def _variables(
-        self, question: SweptStage, parameters: Mapping[str, Variable], inverse: NDArray[np.int64]
-    ) -> Iterator[tuple[str, Variable]]:
+    def numerical_error(self) -> dict[str, Any]:
+        """The largest numerical errors of the walks that were taken again, how many those are, and of how many.
+
+        `ended_otherwise` counts those that came to another end, whose error is unknown.
+        Nothing for a stage that does not walk.
+        """
+        found = {key: self.of(f"numerical_error.{key}") for key in ("end_time_s", *OF_EACH_STEP)}
+        reasons, ends = self.of("numerical_error.reason"), found["end_time_s"]
+        otherwise = 0 if reasons is None else int(np.sum(reasons != ""))
+        known = 0 if ends is None else int(np.sum(np.isfinite(ends)))
+        if otherwise + known == 0:
+            return {}
+        largest = {key: float(np.nanmax(values)) for key, values in found.items() if values is not None}
+        told = {"walked_again": known + otherwise, "of": len(self.inverse), "ended_otherwise": otherwise, **largest}
+        return {"numerical_error": told}
+
+    def _variables(self, parameters: Mapping[str, Variable]) -> Iterator[tuple[str, Variable]]:
         """Every variable by name; a number that is a parameter as well is its coordinate."""
-        shape, dims = question.shape, question.dims
-        for name in sorted({*parameters, *self.columns.names}):
-            if name in parameters:
-                yield name, parameters[name]
-            else:
-                yield name, self.columns.variable(name, inverse, shape, dims)
+        for name in sorted({*parameters, *self.columns}):
+            yield name, parameters[name] if name in parameters else self.variable(name)
+
+    def variable(self, name: str) -> Variable:
+        """A variable over the points; it is handed over, so that no two copies are held of all."""
+        column = self.columns.pop(name)
+        values = column.typed()[self.inverse]
+        extra = values.shape[1:]
+        own = tuple(f"{name}_index{axis if len(extra) > 1 else ''}" for axis in range(len(extra)))
+        last = name.rpartition(".")[2]
+        if column.text:
+            unit, text = "", OWN.get(name, name)
+        elif last in STATES:
+            unit, text = "rad, rad/s", last.replace("_", " ")
+        elif last in self.labels:
+            unit, text = self.labels[last]
+        else:
+            unit, text = unit_by_name(last), in_words(name)
+        gaps = values.dtype.kind == "f" and bool(np.isnan(values).any())
+        return Variable(values.reshape(self.question.shape + extra), self.question.dims + own, unit, text, missing=gaps)
 
 
 def last_of_each(rows: NDArray[Any]) -> NDArray[Any]:
@@ -111,24 +214,6 @@ def last_of_each(rows: NDArray[Any]) -> NDArray[Any]:
 def ends_of(values: NDArray[Any]) -> tuple[float, float]:
     """The least and the largest."""
     return float(values.min()), float(values.max())
-
-
-def numerical_error(columns: Columns, inverse: NDArray[np.int64]) -> dict[str, Any]:
-    """The largest numerical errors of the walks that were taken again, how many those are, and of how many.
-
-    `ended_otherwise` counts those that came to another end, whose error is unknown. Nothing for a stage that walks not.
-
-    inverse  which result each point has
-    """
-    found = {key: columns.of(f"numerical_error.{key}") for key in ("end_time_s", *OF_EACH_STEP)}
-    reasons, ends = columns.of("numerical_error.reason"), found["end_time_s"]
-    otherwise = 0 if reasons is None else int(np.sum(reasons[inverse] != ""))
-    known = 0 if ends is None else int(np.sum(np.isfinite(ends[inverse])))
-    if otherwise + known == 0:
-        return {}
-    largest = {key: float(np.nanmax(values)) for key, values in found.items() if values is not None}
-    told = {"walked_again": known + otherwise, "of": len(inverse), "ended_otherwise": otherwise, **largest}
-    return {"numerical_error": told}
 
 
 def coordinates(question: SweptStage, config: Any) -> Iterable[tuple[str, Variable]]:

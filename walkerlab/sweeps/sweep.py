@@ -26,7 +26,7 @@ from walkerlab.store.files import make_folder
 from walkerlab.store.hdf5 import GroupOnDisk
 from walkerlab.store.key import Identity
 from walkerlab.store.runfolder import RunFolder
-from walkerlab.sweeps.chunk import Chunk, PointResult, store, stored_chunks
+from walkerlab.sweeps.chunk import Chunk, PointResult, SweepPoint, store, stored_chunks
 from walkerlab.sweeps.engines import ENGINES, Order, SweepEngine
 from walkerlab.sweeps.fan_out import FanOut
 from walkerlab.sweeps.question import SweptStage
@@ -214,7 +214,7 @@ class SweepRun:
         make_folder(self.folder.path)
         with self.folder.locked(work.wait, reporter.note):
             claim(self.folder, self.loaded.config)
-            merge = Merge(len(self.places))
+            merge = Merge(self.question, self.loaded.config, self.inverse)
             for chunk in () if work.force else self._stored(reporter.warn):
                 merge.put(chunk, self.places)
             reused = int(merge.there[self.inverse].sum())
@@ -232,7 +232,7 @@ class SweepRun:
                 raise
             finally:
                 progress.end("")
-            content = merge.content(self.question, self.loaded.config, self.inverse)
+            content = merge.content()
             identity = Identity("sweep", self.slice, {}, self.code_digest)
             complete = content.summary["failed"] == 0
             artifact.write_in_turn(self.path, content, identity, begun.until_now(), complete)
@@ -262,7 +262,7 @@ class SweepRun:
             store(self.folder, stage, digest, chunk, begun)
             merge.put(chunk, self.places)
             if any(row.status == "answered" for row in chunk.rows):
-                work.check(merge.columns.numbers)
+                work.check(merge.numbers)
             for bug in (row.bug for row in chunk.rows if row.bug):
                 place = bug.rpartition("\n  ")[0]  # without what it says there, which differs from point to point
                 if place not in bugs:
@@ -270,17 +270,17 @@ class SweepRun:
                     bugs[place] = bug
             progress.advance(len(chunk.rows))
 
-        todo = self._configs(missing.tolist())
+        todo = self._points(missing.tolist())
         chunk_s = work.chunk_s or work.engine.chunk_s
         FanOut(work.engine, work.order, chunk_s, todo, int(missing.size)).run(work.graph, stage, keep)
         return tuple(bugs.values())
 
-    def _configs(self, indices: list[int]) -> Iterator[tuple[Config, dict[str, str], bool]]:
-        """Of each point its config, its keys, and whether it is of the sample whose walks are taken again."""
+    def _points(self, indices: list[int]) -> Iterator[SweepPoint]:
+        """Points; of a sample of all walks are taken again."""
         sample = set(np.sort(self.first)[evenly_spread(self.first.size, SAMPLE)].tolist())
         for index in indices:
             config = self.config(index)
-            yield config, self.keys.of(config, self.question.stage), index in sample
+            yield SweepPoint(config, self.keys.of(config, self.question.stage), index in sample)
 
 
 def refuse_unknown_stage(name: str, graph: Graph) -> None:

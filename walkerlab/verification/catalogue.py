@@ -2,13 +2,13 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from walkerlab.config.overlay import over_paper
 from walkerlab.config.reader import read
 from walkerlab.config.schema import Config
 from walkerlab.config.stability import Case
-from walkerlab.config.tree import Mapping, plain
+from walkerlab.config.tree import plain
 from walkerlab.errors import ConfigError
 
 CATALOGUE: Final = Path(__file__).parent / "catalogue.yaml"
@@ -17,16 +17,15 @@ NAME_OF_ITS_OWN: Final = "Give yours a name of its own."
 
 def shipped() -> tuple[Case, ...]:
     """The cases that come with the package."""
-    root = read(CATALOGUE.read_text(encoding="utf-8"), CATALOGUE.name)
-    if not isinstance(root, Mapping):
-        raise ValueError(f"{CATALOGUE.name} is no block of families")
-    listed: list[Case] = []
-    for family, node in root.entries.items():
-        entries = plain(node)
-        if not isinstance(entries, list):
-            raise ValueError(f"family {family} is no list of cases")
-        listed += [Case.model_validate({"family": family, **entry}) for entry in entries if isinstance(entry, dict)]
-    return without_doubles(listed)
+    families = listed(CATALOGUE).items()
+    return without_doubles([Case.model_validate({"family": name, **one}) for name, cases in families for one in cases])
+
+
+def listed(path: Path) -> Any:
+    """What a catalogue says, in plain values."""
+    root = read(path.read_text(encoding="utf-8"), path.name)
+    assert root is not None, "a catalogue is not empty"
+    return plain(root)
 
 
 def judged(own: Sequence[Case], catalogue: Sequence[Case] | None = None) -> tuple[Case, ...]:

@@ -1,4 +1,4 @@
-"""Cases, each walked, again with a tenfold tolerance and by another method, and as its twin."""
+"""Cases, each walked, again at a ten times tighter tolerance and by another method, and as its twin."""
 
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -18,7 +18,7 @@ from walkerlab.verification.starts import ContactStart, JudgedWalk, Start, confi
 from walkerlab.verification.verdict import BUDGET_USED, CaseResult, Measure, NotMeasured, finite, promised
 from walkerlab.workers import in_order
 
-TENFOLD = 0.1
+TIGHTER = 0.1
 SAMPLED_STEPS = 100  # longer walks are not sampled
 LIBRARY: Final = ("scipy-bdf", "scipy-radau")
 """Asked where our other method gives up; multistep first, since its formulas are neither of ours."""
@@ -103,7 +103,7 @@ def judge(case: Case, config: Config) -> CaseResult:
 
 def walked_again(start: Start, config: Config, case: Case, second: Second) -> list[tuple[str, JudgedWalk]]:
     """The walks that must do the same, and what they are."""
-    again = [("tenfold tolerance", start.walk(case, configured(start, case, TENFOLD)))]
+    again = [("ten times tighter tolerance", start.walk(case, configured(start, case, TIGHTER)))]
     if second.walk is not None:
         again.append((second.method, second.walk))
     if case.twin:

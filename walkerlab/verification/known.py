@@ -12,9 +12,7 @@ from functools import partial
 from typing import Annotated, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from walkerlab.account import LOST
 from walkerlab.config.contact import Contact
 from walkerlab.ground.compliant import contact_walker
 from walkerlab.ground.friction import Coulomb
@@ -23,7 +21,6 @@ from walkerlab.ground.resting import resting_foot
 from walkerlab.ground.terrain import checkerboard
 from walkerlab.ground.walker import ContactWalker, one_foot_motion
 from walkerlab.hybrid.contact_events import LAST_TOUCH, Frame, JudgedGround
-from walkerlab.hybrid.contact_observer import SO_FAR
 from walkerlab.hybrid.contact_run import new_observer, new_walk_state, walk_on
 from walkerlab.hybrid.contact_walk import LONGEST_FLIGHT, LONGEST_STEP
 from walkerlab.labels import Label
@@ -31,10 +28,9 @@ from walkerlab.mechanics.parts import Assembly, BallFoot, Body, Position, Revolu
 from walkerlab.outcome import Outcome
 from walkerlab.scene.contact import normal_law
 from walkerlab.solvers.registry import Tolerances
-from walkerlab.solvers.system import State
+from walkerlab.solvers.system import Floats, State
 from walkerlab.verification import references
 
-Array = NDArray[np.float64]
 ENDLESS = 1e7  # m, an area without edges, and a hip that cannot fall
 OUT_OF_REACH: Position = (0.0, 1e3)  # m, where a foot is that takes no part
 BUDGET = 2_000_000  # right-hand sides
@@ -50,10 +46,9 @@ PAPER_FRICTION: Final = Coulomb(0.9, 0.7, 0.1, 1.0)
 class ParticleRun:
     """What it did."""
 
-    times: Array  # (samples,) s
-    states: Array  # (samples, 8)
+    times: Floats  # (samples,) s
+    states: Floats  # (samples, 8)
     end: State
-    dissipated: Array  # (3,) J
 
 
 def rig(
@@ -95,8 +90,7 @@ def run_until(
     if stopped.outcome is not Outcome.NO_HEEL_STRIKE:
         raise ArithmeticError(f"ended as {stopped.outcome.label} at {stopped.time_s:.4g} s of {duration_s:.4g} s")
     seen = int(observer.recorded[0])
-    times, states = observer.times[:seen].copy(), observer.states[:seen].copy()
-    return ParticleRun(times, states, stopped.state, observer.account[SO_FAR, LOST].copy())
+    return ParticleRun(observer.times[:seen].copy(), observer.states[:seen].copy(), stopped.state)
 
 
 @dataclass(frozen=True)

@@ -4,18 +4,19 @@ The paper's walk over stiffness and stiction velocity, and over stiffness and th
 is the paper's.
 """
 
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from functools import partial
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from walkerlab.config.contact import Contact
 from walkerlab.config.schema import Config
 from walkerlab.config.stability import Case
 from walkerlab.solvers.registry import Tolerances
+from walkerlab.solvers.system import Floats
 from walkerlab.verification.catalogue import config_of
-from walkerlab.verification.judge import TENFOLD
+from walkerlab.verification.judge import TIGHTER
 from walkerlab.verification.ordinary import REFERENCE, STEPS, arrival_of, fixed, natural_units
 from walkerlab.verification.starts import ContactStart, configured, prepared
 from walkerlab.verification.verdict import finite
@@ -27,19 +28,19 @@ NONE: Final = -1.0  # in the place of an error in what is kept, whose numbers ar
 PER_STICTION: Final = 10.0  # friction velocity over stiction velocity, as the paper has it
 STEP: Final = (1e-6, 1e-2)  # s
 WALK_STEPS: Final = 4
-BUDGET, SHARPER_BUDGET, REFERENCE_BUDGET = 600_000, 1_200_000, 20_000_000  # right-hand sides; of the last most take 7e6
+BUDGET, TIGHTER_BUDGET, REFERENCE_BUDGET = 600_000, 1_200_000, 20_000_000  # right-hand sides; of the last most take 7e6
 MAX_EVALUATIONS: Final = 5_000_000  # of a fixed step: more than any cell needs
 VERDICTS: Final = ("fine", "wrong silently", "diverges", "gives up", "no reference")
 
 Numbers = list[float]
 
 
-def along(ends: tuple[float, float], cells: int) -> NDArray[np.float64]:
+def along(ends: tuple[float, float], cells: int) -> Floats:
     """Evenly spaced powers."""
     return np.geomspace(*ends, cells)
 
 
-def on_ground(stiffness: float, stiction_velocity: float | None, steps: int, budget: int) -> tuple[Case, Config]:
+def case_on_ground(stiffness: float, stiction_velocity: float | None, steps: int, budget: int) -> tuple[Case, Config]:
     """The paper's walk on ground of another stiffness (N/m^e), and with another stiction velocity (m/s) if given."""
     contact: dict[str, object] = {"units": "si", "stiffness": stiffness}
     if stiction_velocity is not None:
@@ -57,78 +58,50 @@ def prepared_on_ground(config: Config, case: Case) -> ContactStart:
     return start
 
 
-@dataclass(frozen=True)
-class StictionCell:
+def stiction_cell(stiffness: float, stiction_velocity: float) -> Numbers:
     """The paper's walk with one stiffness and stiction velocity, by the default method.
 
-    run  outcome, steps, outcome at a tenfold tolerance, error between both in legs, radians and pendulum times (`NONE`
-         if they end unlike), right-hand sides
+    Returns outcome, steps, outcome at a ten times tighter tolerance, error between both in legs, radians and pendulum
+    times (`NONE` if they end unlike), right-hand sides.
     """
-
-    name: str
-    stiffness: float
-    stiction_velocity: float
-    cells: int = 1
-
-    def run(self) -> Numbers:
-        """Walk it twice."""
-        case, config = on_ground(self.stiffness, self.stiction_velocity, WALK_STEPS, BUDGET)
-        start = prepared_on_ground(config, case)
-        walk = again = start.walk(case, configured(start, case))
-        if walk.outcome.answered:
-            sharper = case.model_copy(update={"budget": SHARPER_BUDGET})
-            again = start.walk(case, configured(start, sharper, TENFOLD))
-        error = NONE
-        if walk.outcome is again.outcome and walk.touches.size == again.touches.size:
-            ends = np.abs(np.subtract(walk.record.end_state, again.record.end_state)) / natural_units(config)
-            error = finite(float(np.max(np.concatenate([np.abs(walk.touches - again.touches), ends]))))
-        numbers = walk.outcome, walk.touches.size, again.outcome, error, walk.rhs_evaluations
-        return [float(number) for number in numbers]
+    case, config = case_on_ground(stiffness, stiction_velocity, WALK_STEPS, BUDGET)
+    start = prepared_on_ground(config, case)
+    walk = again = start.walk(case, configured(start, case))
+    if walk.outcome.answered:
+        tighter = case.model_copy(update={"budget": TIGHTER_BUDGET})
+        again = start.walk(case, configured(start, tighter, TIGHTER))
+    error = NONE
+    if walk.outcome is again.outcome and walk.touches.size == again.touches.size:
+        ends = np.abs(np.subtract(walk.record.end_state, again.record.end_state)) / natural_units(config)
+        error = finite(float(np.max(np.concatenate([np.abs(walk.touches - again.touches), ends]))))
+    numbers = walk.outcome, walk.touches.size, again.outcome, error, walk.rhs_evaluations
+    return [float(number) for number in numbers]
 
 
-@dataclass(frozen=True)
-class StepColumn:
-    """Two steps of the paper's walk with one stiffness, by semi-implicit Euler with each step.
+def step_column(stiffness: float, steps_s: tuple[float, ...]) -> Numbers:
+    """Two steps of the paper's walk with one stiffness: semi-implicit Euler with each step, against a tight tolerance.
 
-    run  verdict and error of each step
+    Returns verdict and error of each step.
     """
-
-    name: str
-    stiffness: float
-    steps_s: tuple[float, ...]
-
-    @property
-    def cells(self) -> int:
-        """Of the map."""
-        return len(self.steps_s)
-
-    def run(self) -> Numbers:
-        """Walk it sharply, then with each step."""
-        case, config = on_ground(self.stiffness, None, STEPS, REFERENCE_BUDGET)
-        start = prepared_on_ground(config, case)
-        walk = start.walk(case, Tolerances(*REFERENCE, case.budget))
-        if not walk.outcome.answered:
-            return [float(VERDICTS.index("no reference")), NONE] * self.cells
-        arrival = arrival_of("map", walk.record, natural_units(config))
-        numbers: Numbers = []
-        for h in self.steps_s:
-            one = fixed(arrival, start, h, MAX_EVALUATIONS)
-            numbers += [float(VERDICTS.index(one.verdict)), NONE if one.error is None else one.error]
-        return numbers
+    case, config = case_on_ground(stiffness, None, STEPS, REFERENCE_BUDGET)
+    start = prepared_on_ground(config, case)
+    walk = start.walk(case, Tolerances(*REFERENCE, case.budget))
+    if not walk.outcome.answered:
+        return [float(VERDICTS.index("no reference")), NONE] * len(steps_s)
+    arrival = arrival_of("map", walk.record, natural_units(config))
+    numbers: Numbers = []
+    for h in steps_s:
+        one = fixed(arrival, start, h, MAX_EVALUATIONS)
+        numbers += [float(VERDICTS.index(one.verdict)), NONE if one.error is None else one.error]
+    return numbers
 
 
-MapPiece = StictionCell | StepColumn
-
-
-def pieces_of(cells: int) -> list[MapPiece]:
-    """Everything there is to compute for maps of `cells` cells along each axis."""
+def pieces_of(cells: int) -> Iterator[tuple[str, int, Callable[[], Numbers]]]:
+    """Everything there is to compute for maps of `cells` cells along each axis: of each piece name, cells and call."""
     stiffness = along(STIFFNESS, cells)
     steps = tuple(float(h) for h in along(STEP, cells))
-    return [
-        *(StepColumn(f"step {i}", float(k), steps) for i, k in enumerate(stiffness)),
-        *(
-            StictionCell(f"stiction {i} {j}", float(k), float(v))
-            for i, v in enumerate(along(STICTION_VELOCITY, cells))
-            for j, k in enumerate(stiffness)
-        ),
-    ]
+    for i, k in enumerate(stiffness):
+        yield f"step {i}", cells, partial(step_column, float(k), steps)
+    for i, v in enumerate(along(STICTION_VELOCITY, cells)):
+        for j, k in enumerate(stiffness):
+            yield f"stiction {i} {j}", 1, partial(stiction_cell, float(k), float(v))

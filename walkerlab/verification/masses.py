@@ -3,15 +3,13 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from walkerlab.mechanics.assembly import Anchor, levers, masses
 from walkerlab.mechanics.parts import Assembly
 from walkerlab.mechanics.rigid import hip_of, places_of
 from walkerlab.mechanics.standing import STANCE, SWING
+from walkerlab.solvers.system import Floats
 from walkerlab.verification.verdict import finite
-
-Array = NDArray[np.float64]
 
 
 class Masses:
@@ -32,14 +30,14 @@ class Masses:
             self.levers = self.levers - np.average(self.levers, axis=0, weights=self.mass)
         self.inertia = np.array([body.inertia_kg_m2 for body in assembly.bodies])
 
-    def moving(self, psi: Array, rate: Array) -> tuple[Array, Array]:
+    def moving(self, psi: Floats, rate: Floats) -> tuple[Floats, Floats]:
         """Places and velocities (..., masses, 2) against the point, at angles and rates (..., bodies)."""
         arms = turned(self.levers, psi[..., None, :])
         swept = np.stack([-arms[..., 1], arms[..., 0]], axis=-1) * rate[..., None, :, None]
         return arms.sum(axis=-2), swept.sum(axis=-2)
 
 
-def turned(d: Array, psi: Array) -> Array:
+def turned(d: Floats, psi: Floats) -> Floats:
     """Levers (..., bodies, 2) turned with their bodies."""
     s, c = np.sin(psi), np.cos(psi)
     return np.stack([c * d[..., 0] - s * d[..., 1], s * d[..., 0] + c * d[..., 1]], axis=-1)
@@ -58,20 +56,20 @@ class Moving:
     contact   (2,) m, of the swing foot the point that would touch
     """
 
-    mass: Array
-    place: Array
-    velocity: Array
-    inertia: Array
-    rate: Array
-    hip: Array
-    contact: Array
+    mass: Floats
+    place: Floats
+    velocity: Floats
+    inertia: Floats
+    rate: Floats
+    hip: Floats
+    contact: Floats
 
     @property
     def kinetic(self) -> float:
         """Kinetic energy (J)."""
         return float(0.5 * self.mass @ (self.velocity**2).sum(axis=1) + 0.5 * self.inertia @ self.rate**2)
 
-    def about(self, point: Array, on_masses: Array, on_bodies: Array) -> float:
+    def about(self, point: Floats, on_masses: Floats, on_bodies: Floats) -> float:
         """Angular momentum about a point (kg m^2/s), of masses and bodies by their share in what is meant."""
         arm = self.place - point
         orbital = self.mass * (arm[:, 0] * self.velocity[:, 1] - arm[:, 1] * self.velocity[:, 0])
@@ -92,7 +90,7 @@ class RigidMasses:
         self.to_hip = levers(assembly, root, Anchor(hip.parent, hip.parent_point_m))
         self.to_foot = levers(assembly, root, Anchor(other.body, other.centre_m))
 
-    def at(self, state: Array) -> Moving:
+    def at(self, state: Floats) -> Moving:
         """The masses in a state of the rigid model (2 n)."""
         n = self.members.shape[1]
         psi, rate = self.members @ state[:n] + self.slope, self.members @ state[n:]
@@ -102,7 +100,7 @@ class RigidMasses:
         mass, inertia = self.masses.mass, self.masses.inertia
         return Moving(mass, centre + place, rolling + velocity, inertia, rate, hip, contact)
 
-    def momenta(self, state: Array, new: bool) -> tuple[float, float]:
+    def momenta(self, state: Floats, new: bool) -> tuple[float, float]:
         """The angular momenta that a heel strike keeps (kg m^2/s).
 
         The whole walker's about the new foothold; that of the leg that lifts, and of what turns along with it in part,
@@ -120,13 +118,13 @@ class RigidMasses:
         whole = moving.about(foothold, np.ones(len(self.owner)), np.ones(share.size))
         return whole, moving.about(moving.hip, share[self.owner], share)
 
-    def moment_of(self, push_off: float, state: Array) -> float:
+    def moment_of(self, push_off: float, state: Floats) -> float:
         """Of a push-off (N s) about the new foothold (kg m^2/s): it acts from the contact behind towards the hip."""
         moving = self.at(state)
         along, up = push_off * moving.hip / np.hypot(*moving.hip)
         return float(moving.contact[1] * along - moving.contact[0] * up)
 
-    def momentum_change(self, before: Array, after: Array, push_off: float = 0.0) -> float:
+    def momentum_change(self, before: Floats, after: Floats, push_off: float = 0.0) -> float:
         """Largest change of these momenta in heel strikes, as a share of their size; states (strikes, 2 n).
 
         A push-off's moment (N s) is no change.
@@ -138,11 +136,11 @@ class RigidMasses:
             change, size = max(change, *np.abs(left - kept)), max(size, *np.abs(kept), *np.abs(left))
         return finite(change / size)
 
-    def energy_won(self, before: Array, after: Array) -> float:
+    def energy_won(self, before: Floats, after: Floats) -> float:
         """Largest gain of kinetic energy (J) in heel strikes; 0 if each loses some."""
         gains = [self.at(new).kinetic - self.at(old).kinetic for old, new in zip(before, after, strict=True)]
         return max(0.0, *gains)
 
-    def feet_off_the_slope(self, before: Array) -> float:
+    def feet_off_the_slope(self, before: Floats) -> float:
         """Largest distance of the foot that comes down from the slope (m)."""
         return float(max(abs(self.at(state).contact[1]) for state in before))

@@ -19,12 +19,11 @@ from walkerlab.scene.contact import ContactScene
 from walkerlab.scene.parts import assembly_of
 from walkerlab.solvers.registry import Tolerances
 from walkerlab.solvers.stepping import ACCEPTED
-from walkerlab.solvers.system import State
+from walkerlab.solvers.system import Floats, State
 from walkerlab.verification.masses import Masses
 from walkerlab.verification.scaling import pendulum_time
 from walkerlab.verification.verdict import MAGNIFIED, Measure, NotMeasured, finite, promised
 
-Array = NDArray[np.float64]
 MEASURE: Final = "momentum not given by ground and gravity, over the walker's"
 STEPS: Final = 2  # so that there is an impact, and what comes of it
 INTERVALS: Final = 256  # to begin with
@@ -103,33 +102,33 @@ def momentum_balance(config: WalksConfig, scene: ContactScene, start: State, cas
     return Balance(float(apart.max()), float(change.sum()), push / max(1, accepted) ** 0.5, accepted)
 
 
-def with_middles(grid: Array) -> Array:
+def with_middles(grid: Floats) -> Floats:
     """The ends and middles of intervals."""
     return np.sort(np.concatenate([grid, 0.5 * (grid[1:] + grid[:-1])]))
 
 
-def split(times: Array, wanting: NDArray[np.bool_]) -> Array:
+def split(times: Floats, wanting: NDArray[np.bool_]) -> Floats:
     """The ends of intervals, given with their middles, once those that want it are cut into four."""
     first, middle, last = times[:-1:2], times[1::2], times[2::2]
     halves = np.concatenate([middle, 0.5 * (first + middle), 0.5 * (middle + last)])
     return np.sort(np.concatenate([times[::2], halves[np.tile(wanting, 3)]]))
 
 
-def impulse(times: Array, rate: Array) -> Array:
+def impulse(times: Floats, rate: Floats) -> Floats:
     """Sums (times, components) of a rate up to each interval's end, by Simpson's rule on ends and middles."""
     widths = np.diff(times[::2])[:, None]
     pieces = widths / 6.0 * (rate[:-1:2] + 4.0 * rate[1::2] + rate[2::2])
     return np.concatenate([np.zeros((1, rate.shape[1])), np.cumsum(pieces, axis=0)])
 
 
-def unsettled(times: Array, rate: Array) -> Array:
+def unsettled(times: Floats, rate: Floats) -> Floats:
     """How much each interval's sum changes by looking at its middle, in the worst component."""
     widths = np.diff(times[::2])[:, None]
     change = widths / 6.0 * (rate[:-1:2] - 2.0 * rate[1::2] + rate[2::2])
     return np.asarray(np.abs(change).max(axis=1))
 
 
-def impulse_rate(samples: ContactSamples, scene: ContactScene, config: RigidConfig, touches: Array) -> Array:
+def impulse_rate(samples: ContactSamples, scene: ContactScene, config: RigidConfig, touches: Floats) -> Floats:
     """Force along and up from the slope (N), and torque about a point of the slope (N m).
 
     They are those of ground and gravity and, from the times of touches (steps,) on, of push-offs.
@@ -155,7 +154,7 @@ def impulse_rate(samples: ContactSamples, scene: ContactScene, config: RigidConf
     return given
 
 
-def momentum(samples: ContactSamples, config: RigidConfig) -> Array:
+def momentum(samples: ContactSamples, config: RigidConfig) -> Floats:
     """Momentum along and up from the slope (kg m/s) and about a point of the slope (kg m^2/s), at intervals' ends."""
     y = samples.states[::2]
     n, found = y.shape[1] // 2 - 2, Masses(assembly_of(config.walker))
@@ -165,6 +164,6 @@ def momentum(samples: ContactSamples, config: RigidConfig) -> Array:
     return np.column_stack([found.mass @ v, cross(r, v) @ found.mass + rate @ found.inertia])
 
 
-def cross(r: Array, v: Array) -> Array:
+def cross(r: Floats, v: Floats) -> Floats:
     """The turning parts of moments (..., 2) in the plane."""
     return np.asarray(r[..., 0] * v[..., 1] - r[..., 1] * v[..., 0])

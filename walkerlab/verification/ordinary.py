@@ -10,10 +10,9 @@ import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from walkerlab.benchmarks.user_script import walk_as_a_script
 from walkerlab.config.reads import RigidConfig, WalksConfig
@@ -26,13 +25,14 @@ from walkerlab.hybrid.recorded_walk import RigidWalkResult
 from walkerlab.paper.appendix_a import RigidWalker
 from walkerlab.scene.rigid import compass_or_none
 from walkerlab.solvers.registry import Tolerances
-from walkerlab.solvers.scipy_methods import entry_point, right_hand_side
+from walkerlab.solvers.scipy_methods import OutOfBudgetError, counted
 from walkerlab.solvers.semi_implicit_euler import RUNAWAY, semi_implicit_euler
+from walkerlab.solvers.stepping import BUDGET, COUNTS, RHS
+from walkerlab.solvers.system import Floats
 from walkerlab.verification.scaling import pendulum_time
 from walkerlab.verification.starts import ContactStart, RigidStart, prepared
 from walkerlab.verification.verdict import finite
 
-Floats = NDArray[np.float64]
 CAP: Final = 20_000  # right-hand sides
 FINE: Final = 1e-2  # of a leg, of a radian, of their rates in pendulum times
 SCIPY_DEFAULT: Final = (1e-3, 1e-6)  # tolerances of solve_ivp
@@ -59,10 +59,6 @@ class Choice:
     error: float | None
     rhs_evaluations: int
     wall_s: float
-
-
-class CapReachedError(Exception):
-    """The evaluations are used up."""
 
 
 def choices(case: Case, config: WalksConfig) -> tuple[Choice, ...]:
@@ -133,7 +129,7 @@ def in_silence() -> Iterator[None]:
     with (
         warnings.catch_warnings(),
         np.errstate(all="ignore"),
-        suppress(CapReachedError, ValueError, np.linalg.LinAlgError),
+        suppress(OutOfBudgetError, ValueError, np.linalg.LinAlgError),
     ):
         warnings.simplefilter("ignore")
         yield
@@ -154,25 +150,16 @@ def library(arrival: Arrival, ready: ContactStart, method: str) -> Choice:
 
     system = OnPads(on_ground(ready.scene.walker, (True, True)), ready.scene.terrain)
     start = np.array(ready.start)
-    code = entry_point(right_hand_side, system, 0.0, start, start)
-    count = 0
-
-    def fun(t: float, y: Any) -> Any:
-        nonlocal count
-        if count >= CAP:
-            raise CapReachedError
-        count += 1
-        rate = np.empty(y.size)
-        code(system, float(t), np.ascontiguousarray(y), rate)
-        return rate
-
+    counts = np.zeros(COUNTS, np.int64)
+    counts[BUDGET] = CAP
+    right_hand_side = counted(counts, system, start.size)
     began = time.perf_counter()
     y = None
     with in_silence():
-        solution = solve_ivp(fun, (0.0, arrival.time_s), start, method=method)
+        solution = solve_ivp(right_hand_side, (0.0, arrival.time_s), start, method=method)
         if solution.success:
             y = solution.y[:, -1]
-    return arrival.judged(f"SciPy {method}", y, count, time.perf_counter() - began)
+    return arrival.judged(f"SciPy {method}", y, int(counts[RHS]), time.perf_counter() - began)
 
 
 def fixed(arrival: Arrival, ready: ContactStart, h: float, cap: int = CAP) -> Choice:

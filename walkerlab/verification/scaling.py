@@ -1,40 +1,16 @@
 """Walkers of another size, mass and gravity that must do the same, in their own units (dimensional analysis)."""
 
 import math
-from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from walkerlab.config.fields import Block
 from walkerlab.config.reads import RigidConfig
 from walkerlab.config.schema import Config
+from walkerlab.orbits.similarity import Units
 
 B = TypeVar("B", bound=Block)
 # the twin's leg (m), mass (kg) and gravity (m/s^2): odd numbers, so that rounding falls differently
 TWIN_LEG, TWIN_MASS, TWIN_GRAVITY = 1.37, 11.3, 7.43
-
-
-@dataclass(frozen=True)
-class TwinScale:
-    """How many times larger the twin's measures are."""
-
-    length: float
-    mass: float
-    gravity: float
-
-    @property
-    def time(self) -> float:
-        """Of sqrt(L/g)."""
-        return math.sqrt(self.length / self.gravity)
-
-    @property
-    def speed(self) -> float:
-        """Of lengths in times."""
-        return self.length / self.time
-
-    @property
-    def force(self) -> float:
-        """Of weights."""
-        return self.mass * self.gravity
 
 
 def pendulum_time(config: RigidConfig) -> float:
@@ -42,26 +18,25 @@ def pendulum_time(config: RigidConfig) -> float:
     return math.sqrt(config.walker.leg_length_m / config.gravity_m_s2)
 
 
-def to_twin(config: RigidConfig) -> TwinScale:
-    """The scale that leads from a config's walker to its twin of ordinary size."""
+def to_twin(config: RigidConfig) -> Units:
+    """How many times larger the measures of a config's walker are in its twin of ordinary size."""
     length, mass = TWIN_LEG / config.walker.leg_length_m, TWIN_MASS / config.walker.total_mass_kg
-    return TwinScale(length, mass, TWIN_GRAVITY / config.gravity_m_s2)
+    return Units(length, mass, math.sqrt(length * config.gravity_m_s2 / TWIN_GRAVITY))
 
 
-def scaled_block(block: B, by: TwinScale) -> B:
+def scaled_block(block: B, by: Units) -> B:
     """A block of measures scaled, each by the unit that its key ends in; knees' stops are turned by torques."""
-    torque = by.force * by.length
     units = {
-        "_N_m_per_rad": torque,
-        "_N_m_s_per_rad": torque * by.time,
-        "_N_m": torque,
-        "_N_s": by.force * by.time,
+        "_N_m_per_rad": by.energy,
+        "_N_m_s_per_rad": by.energy * by.time,
+        "_N_m": by.energy,
+        "_N_s": by.impulse,
         "duration_s": by.time,
         "_kg_m2": by.mass * by.length**2,
         "_kg": by.mass,
         "_m": by.length,
-        "stop_stiffness": torque,
-        "stop_damping": torque * by.time,
+        "stop_stiffness": by.energy,
+        "stop_damping": by.energy * by.time,
     }
 
     def value(given: Any, unit: float) -> Any:
@@ -78,12 +53,12 @@ def scaled_block(block: B, by: TwinScale) -> B:
     return block.model_copy(update=changed)
 
 
-def scaled(config: Config, by: TwinScale) -> Config:
+def scaled(config: Config, by: Units) -> Config:
     """The config of the similar walker: every quantity with a unit scaled, angles and pure numbers as they are."""
     walker = scaled_block(config.walker, by)
     changes: dict[str, object] = {
         "walker": walker,
-        "gravity_m_s2": config.gravity_m_s2 * by.gravity,
+        "gravity_m_s2": config.gravity_m_s2 * by.length / by.time**2,
         "push_off": scaled_block(config.push_off, by),
     }
     if not isinstance(config.start, str):
@@ -94,10 +69,10 @@ def scaled(config: Config, by: TwinScale) -> Config:
         ground = {
             "units": "si",
             "stiffness": si.stiffness_N_per_m_e * by.force / by.length**si.exponent,
-            "damping": si.damping_N_s_m * by.force / by.speed,
+            "damping": si.damping_N_s_m * by.mass / by.time,
             "full_damping_penetration": si.full_damping_penetration_m * by.length,
-            "stiction_velocity": si.stiction_velocity_m_s * by.speed,
-            "friction_velocity": si.friction_velocity_m_s * by.speed,
+            "stiction_velocity": si.stiction_velocity_m_s * by.length / by.time,
+            "friction_velocity": si.friction_velocity_m_s * by.length / by.time,
             "pad_pitch": pitch if isinstance(pitch, str) else pitch * by.length,
         }
         changes["contact"] = config.contact.model_copy(update=ground)

@@ -5,7 +5,6 @@ from functools import cache
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from walkerlab.config.reads import WalksConfig
 from walkerlab.config.stability import Case
@@ -19,7 +18,7 @@ from walkerlab.scene.parts import assembly_of
 from walkerlab.scene.rigid import rigid_walker
 from walkerlab.solvers.registry import Tolerances
 from walkerlab.solvers.stepping import ACCEPTED, RHS
-from walkerlab.solvers.system import State
+from walkerlab.solvers.system import Floats, State
 from walkerlab.verification.masses import RigidMasses
 from walkerlab.verification.momentum import MEASURE, momentum_finding
 from walkerlab.verification.scaling import pendulum_time
@@ -41,28 +40,35 @@ class JudgedWalk:
     """
 
     outcome: Outcome
-    touches: NDArray[np.float64]
+    touches: Floats
     end: float | None
     residual_J: float  # noqa: N815
     rhs_evaluations: int
     accepted: int
-    numbers: NDArray[np.float64]
+    numbers: Floats
     record: Any
 
 
 @dataclass(frozen=True)
-class RigidStart:
-    """A walker of the rigid model and the state that it starts from.
+class CaseStart:
+    """A walker in the state that a case starts from.
 
-    energy  m g L and the kinetic energy of the start (J): what residuals are measured by
+    energy  m g L and the energy of the start (J): what residuals are measured by
     kept    what its residual is of, in words
     """
 
-    kept: ClassVar[str] = "energy drift within a swing"
+    kept: ClassVar[str]
     config: WalksConfig
-    walker: Standing
     start: State
     energy: float
+
+
+@dataclass(frozen=True)
+class RigidStart(CaseStart):
+    """A walker of the rigid model."""
+
+    kept: ClassVar[str] = "energy drift within a swing"
+    walker: Standing
 
     def again(self, case: Case) -> Case:
         """As far as a case is walked again: no further than times are compared."""
@@ -95,18 +101,11 @@ class RigidStart:
 
 
 @dataclass(frozen=True)
-class ContactStart:
-    """A walker on its ground, in the state that it starts from.
-
-    energy  m g L and the energy of the start (J): what residuals are measured by
-    kept    what its residual is of, in words
-    """
+class ContactStart(CaseStart):
+    """A walker on its ground."""
 
     kept: ClassVar[str] = "energy balance residual"
-    config: WalksConfig
     scene: ContactScene
-    start: State
-    energy: float
 
     def again(self, case: Case) -> Case:
         """As far as a case is walked again: all the way, since how it ends is compared too."""
@@ -167,7 +166,7 @@ def prepared(config: WalksConfig, case: Case) -> Start | None:
     if case.model == "rigid":
         speed = walker.leg_length * max(abs(rate) for rate in state[len(state) // 2 :])
         energy = float(walker.mass * (walker.gravity * walker.leg_length + 0.5 * speed**2))
-        return RigidStart(config, walker, state, energy)
+        return RigidStart(config, state, energy, walker)
     pitch = length
     if config.contact is not None and wants_own_pitch(config.contact):
         found = contact_gait(config, length, state).gait
@@ -181,4 +180,4 @@ def prepared(config: WalksConfig, case: Case) -> Start | None:
     speed = float(np.max(np.abs([*rates[:2], *(leg * rate for rate in rates[2:])])))
     stored = 2.0 * law.stiffness * max(0.0, case.lowered_m) ** (law.exponent + 1.0) / (law.exponent + 1.0)
     energy = scene.walker.mass * (config.gravity_m_s2 * leg + 0.5 * speed**2) + stored
-    return ContactStart(config, scene, y, energy)
+    return ContactStart(config, y, energy, scene)

@@ -15,12 +15,11 @@ MAGNIFIED: Final = 10.0  # by how much a walk may magnify the errors of its step
 
 @dataclass(frozen=True)
 class Measure:
-    """One independent measure of a run."""
+    """One independent measure of a run, a pure number."""
 
     measure: str
     value: float
     limit: float  # up to which the value is right
-    unit: str = "1"
 
     @property
     def ok(self) -> bool:
@@ -29,8 +28,7 @@ class Measure:
 
     def __str__(self) -> str:
         """In words."""
-        unit = "" if self.unit == "1" else f" {self.unit}"
-        return f"{self.measure} {self.value:.3g}{unit} above {self.limit:.3g}{unit}"
+        return f"{self.measure} {self.value:.3g} above {self.limit:.3g}"
 
 
 @dataclass(frozen=True)

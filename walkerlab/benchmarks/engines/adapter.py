@@ -5,12 +5,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
 from walkerlab.benchmarks.engines.planar import PlanarModel
+from walkerlab.solvers.system import Floats
 
-Floats = NDArray[np.float64]
 Forces = Callable[[float, Floats, Floats], Floats]
 """Generalised forces from time, coordinates and velocities; the result is overwritten by the next call."""
 

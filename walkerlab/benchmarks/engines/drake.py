@@ -16,6 +16,7 @@ import numpy as np
 
 from walkerlab.benchmarks.engines import adapter
 from walkerlab.benchmarks.engines.planar import Link, PlanarModel
+from walkerlab.solvers.system import Floats
 
 INTEGRATORS = {
     "semi_explicit_euler": adapter.Integrator(1, 25_000),
@@ -58,7 +59,7 @@ def tuned(model: str, target: adapter.EngineContact) -> adapter.OwnContact:
 class EngineRun(adapter.Simulation):
     """A diagram, its simulator and its context."""
 
-    def build(self, model: PlanarModel, q: adapter.Floats, v: adapter.Floats) -> None:
+    def build(self, model: PlanarModel, q: Floats, v: Floats) -> None:
         """Build the diagram and put it into its start state."""
         from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, DiscreteContactApproximation
         from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
@@ -126,7 +127,7 @@ class EngineRun(adapter.Simulation):
         self._simulator.set_monitor(monitor)
         self._simulator.AdvanceTo(until_s)
 
-    def _state(self) -> tuple[adapter.Floats, adapter.Floats]:
+    def _state(self) -> tuple[Floats, Floats]:
         """Coordinates and velocities."""
         x = self._plant.GetPositionsAndVelocities(self._at)
         return x[self._order], x[self._rates]

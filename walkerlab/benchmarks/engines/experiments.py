@@ -8,7 +8,6 @@ from statistics import median
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from walkerlab.benchmarks.engines import runs
 from walkerlab.benchmarks.engines.adapter import EngineContact, Integrator, OwnContact, Stepping
@@ -19,13 +18,12 @@ from walkerlab.benchmarks.engines.scenes import EngineScene
 from walkerlab.ground.energy import kinetic_energy, potential_energy
 from walkerlab.ground.friction import friction_coefficient
 from walkerlab.ground.resting import resting_foot
+from walkerlab.ground.terrain import STANCE_FOOT
 from walkerlab.ground.walker import changed_forms, folded, on_ground, unfolded
 from walkerlab.hybrid.contact_run import ContactWalkResult, knees_at_start, walk_contact
 from walkerlab.outcome import Outcome
 from walkerlab.solvers.registry import Tolerances
-from walkerlab.solvers.system import derivative
-
-Floats = NDArray[np.float64]
+from walkerlab.solvers.system import Floats, derivative
 
 SAME_LAW_STEPS = (4e-4, 2e-4, 1e-4, 5e-5, 2.5e-5, 1.25e-5, 6.25e-6, 3.125e-6)  # s
 OWN_LAW_STEPS = (2e-3, 1e-3, 5e-4, 2.5e-4, 1.25e-4, 6.25e-5)  # s
@@ -69,18 +67,17 @@ class Truth:
 def walked(scene: EngineScene, method: str, rtol: float, steps: int, until_s: float | None = None) -> ContactWalkResult:
     """Our walk; with `until_s` also the state then."""
     tolerances = Tolerances(method, rtol, 1e-2 * rtol, ENDLESS, track_energy=False)
-    return walk_contact(scene.ours, scene.ground, False, scene.stance, scene.start, tolerances, steps, until_s)
+    return walk_contact(scene.ours, scene.ground, False, STANCE_FOOT, scene.start, tolerances, steps, until_s)
 
 
 def truth_of(scene: EngineScene) -> Truth | None:
     """The reference of a scene; None if the walk ends before states can be compared."""
-    (first, first_rtol), second = REFERENCES
-    walk = walked(scene, first, first_rtol, OWN_TOUCHES)
+    walk = walked(scene, *REFERENCES[0], OWN_TOUCHES)
     if walk.touch_time_s.size <= TOUCHES:
         return None
     last, following = walk.touch_time_s[TOUCHES - 1 : TOUCHES + 1]
     until = float(last + INTO_NEXT_STEP * (following - last))
-    one, other = (walked(scene, *reference, TOUCHES + 1, until) for reference in ((first, first_rtol), second))
+    one, other = (walked(scene, *reference, TOUCHES + 1, until) for reference in REFERENCES)
     end, other_end = end_of(one), end_of(other)
     assert end is not None, "the walk goes on beyond that time"
     assert other_end is not None, "so it does by the other method"
@@ -168,12 +165,9 @@ def same_law_rows(
     for name, integrator in engine.adapter().INTEGRATORS.items():
         if integrator.for_contact_only:
             continue
-        for asked in steppings(name, integrator, SAME_LAW_STEPS):
-            steps = math.ceil(truth.until_s / asked.step_s)
-            if not integrator.adapts and steps > integrator.most_steps:
+        for stepping in steppings(name, integrator, SAME_LAW_STEPS):
+            if not integrator.adapts and math.ceil(truth.until_s / stepping.step_s) > integrator.most_steps:
                 continue
-            # a whole number of steps leads to the end
-            stepping = asked if integrator.adapts else Stepping(name, truth.until_s / steps)
             task = runs.WalkTask(engine.name, stepping, scene, OWN_TOUCHES, truth.until_s, None, integrator.most_steps)
             answer = process.do(task.run, PATIENCE_S)
             row = experiment.row(name, stepping, answer)
@@ -305,7 +299,7 @@ def swing_truth(scene: EngineScene, start: Floats, until_s: float = SWING_S) -> 
     """The end of the swing by our equations and SciPy's method, and the mechanical energy of a state."""
     from scipy.integrate import solve_ivp
 
-    knee = knees_at_start(scene.ours, scene.stance, scene.start)
+    knee = knees_at_start(scene.ours, STANCE_FOOT, scene.start)
     passive = changed_forms(scene.ours, driven_hip=False, push_off=0.0, hip_stiffness=0.0)
     system = on_ground(passive, (False, False), knee, hinged=True)
     whole = passive.forms[1, 0]

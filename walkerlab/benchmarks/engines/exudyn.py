@@ -14,6 +14,7 @@ import numpy as np
 
 from walkerlab.benchmarks.engines import adapter
 from walkerlab.benchmarks.engines.planar import PlanarModel
+from walkerlab.solvers.system import Floats
 
 INTEGRATORS = {
     "ExplicitEuler": adapter.Integrator(1, 45_000),
@@ -52,7 +53,7 @@ def tuned(model: str, target: adapter.EngineContact) -> adapter.OwnContact:
 class EngineRun(adapter.Simulation):
     """A system of one tree, and its contacts."""
 
-    def build(self, model: PlanarModel, q: adapter.Floats, v: adapter.Floats) -> None:
+    def build(self, model: PlanarModel, q: Floats, v: Floats) -> None:
         """Build the system in its start state."""
         import exudyn as exu
         from exudyn.itemInterface import NodeGenericODE2

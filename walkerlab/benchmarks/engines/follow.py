@@ -9,21 +9,20 @@ import sys
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from walkerlab.benchmarks.engines.scenes import EngineScene
 from walkerlab.ground.external import feet_and_forces
 from walkerlab.ground.knees import FLEXED, lock
 from walkerlab.ground.pulse import pulse_left
-from walkerlab.ground.terrain import cell_at, cell_edges, has_ground_in_cell
+from walkerlab.ground.terrain import STANCE_FOOT, cell_at, cell_edges, has_ground_in_cell
 from walkerlab.ground.walker import BENT, LOCKED, RELEASED, FootMotion, locked_knees, on_ground
 from walkerlab.hybrid import contact_events, contact_rules
 from walkerlab.hybrid.contact_run import new_walk_state
 from walkerlab.hybrid.contact_walk import LONGEST_FLIGHT, LONGEST_STEP
 from walkerlab.outcome import Outcome
 from walkerlab.solvers.scipy_methods import entry_point
+from walkerlab.solvers.system import Floats
 
-Floats = NDArray[np.float64]
 Feet = tuple[FootMotion, FootMotion]
 HALVINGS = 60
 FAR_AWAY = 1e4  # m: where only the feet of a run that has lost its numbers get to
@@ -52,7 +51,7 @@ class RuleFollower:
 
         carries  whether the ground's forces are ours; else the engine has its own, and only drives are
         """
-        self.walk_state = new_walk_state(scene.ours, scene.ground.terrain, scene.stance, steps, scene.start)
+        self.walk_state = new_walk_state(scene.ours, scene.ground.terrain, STANCE_FOOT, steps, scene.start)
         self._ground = self.walk_state.has_ground if carries else np.zeros(2, np.int8)
         self.time_s = self.grounded_s = 0.0
         self.outcome: Outcome | None = None

@@ -13,6 +13,7 @@ from typing import Any
 
 from walkerlab.benchmarks.engines import adapter
 from walkerlab.benchmarks.engines.planar import Ball, PlanarModel
+from walkerlab.solvers.system import Floats
 
 INTEGRATORS = {"Euler": adapter.Integrator(1, 120_000), "RK4": adapter.Integrator(4, 120_000)}
 CONTACTS = {"soft": "Euler", "soft-rk4": "RK4"}
@@ -47,7 +48,7 @@ def tuned(model: str, target: adapter.EngineContact) -> adapter.OwnContact:
 class EngineRun(adapter.Simulation):
     """A model and its data."""
 
-    def build(self, model: PlanarModel, q: adapter.Floats, v: adapter.Floats) -> None:
+    def build(self, model: PlanarModel, q: Floats, v: Floats) -> None:
         """Compile the model and put it into its start state."""
         import mujoco
 

@@ -1,17 +1,15 @@
 """What an engine is told of a walker: a tree of rigid bodies in a plane, hung from its base, under tilted gravity."""
 
-import math
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-from walkerlab.mechanics.assembly import masses, neighbours
+from walkerlab.mechanics.assembly import Anchor, masses, neighbours
 from walkerlab.mechanics.parts import Assembly, Knee, Position
+from walkerlab.solvers.system import Floats
 
-Floats = NDArray[np.float64]
 Freedom = Literal["along", "height", "turn"]
 FLOATING: tuple[Freedom, ...] = ("along", "height", "turn")
 HINGED: tuple[Freedom, ...] = ("turn",)
@@ -79,24 +77,21 @@ def moved(point: Position, shift: Position) -> Position:
 
 def planar_model(
     assembly: Assembly,
-    base: tuple[str, Position],
+    base: Anchor,
     freedoms: tuple[Freedom, ...],
-    gravity: float,
-    slope: float,
+    gravity: tuple[float, float],
     welds: Collection[Knee] = (),
 ) -> PlanarModel:
     """The assembly hung from a point of its base, from there outwards, depth first.
 
-    base     a body and a point of it
-    gravity  m/s^2
-    slope    rad
+    gravity  along the slope and towards it, m/s^2
     welds    knees whose shank and thigh are one link
     """
-    root, base_point = base
+    root = base.body
     one = [{knee.thigh, knee.shank} for knee in welds]
     # of each link: its bodies, and where their frames' origins are in its own; and how it hangs from its parent
     members: list[list[tuple[str, Position]]] = [[(root, (0.0, 0.0))]]
-    hinges: list[tuple[int, Position, Position]] = [(-1, (0.0, 0.0), base_point)]
+    hinges: list[tuple[int, Position, Position]] = [(-1, (0.0, 0.0), base.at_m)]
     placed: dict[str, tuple[int, Position]] = {root: (0, (0.0, 0.0))}
     rows = {root: np.eye(1, len(assembly.bodies))[0]}
 
@@ -123,7 +118,7 @@ def planar_model(
     for foot in assembly.feet:
         link, shift = placed[foot.body]
         balls.append(Ball(link, moved(foot.centre_m, shift), *ball_and_ground(foot.radius_m)))
-    return PlanarModel(links, freedoms, tuple(balls), gravity * math.sin(slope), gravity * math.cos(slope), chain)
+    return PlanarModel(links, freedoms, tuple(balls), *gravity, chain)
 
 
 def ball_and_ground(radius_m: float) -> tuple[float, float]:

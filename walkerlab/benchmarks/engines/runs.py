@@ -6,18 +6,19 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from walkerlab.benchmarks.engines import planar
 from walkerlab.benchmarks.engines.adapter import EngineContact, OwnContact, Simulation, Stepping
 from walkerlab.benchmarks.engines.follow import RuleFollower
 from walkerlab.benchmarks.engines.registry import ENGINES
 from walkerlab.benchmarks.engines.scenes import EngineScene
+from walkerlab.ground.terrain import STANCE_FOOT
 from walkerlab.hybrid.contact_events import STEPS
 from walkerlab.hybrid.contact_rules import steps_with_lift
+from walkerlab.mechanics.assembly import Anchor
 from walkerlab.outcome import Outcome
+from walkerlab.solvers.system import Floats
 
-Floats = NDArray[np.float64]
 ROUNDING = 1e-9
 MANY = 10_000_000  # steps
 STEADY = 5  # so many times longer steps serve where only a steady end counts
@@ -196,9 +197,9 @@ def recorded(engine: Simulation, steps: int, until_s: float) -> EngineMotion:
 
 def pinned_model(scene: EngineScene) -> planar.PlanarModel:
     """The scene's walker hinged at the centre of its stance foot."""
-    foot = scene.assembly.feet[scene.stance]
-    base = foot.body, foot.centre_m
-    return planar.planar_model(scene.assembly, base, planar.HINGED, scene.gravity, scene.ours.slope, scene.locked)
+    foot = scene.assembly.feet[STANCE_FOOT]
+    base = Anchor(foot.body, foot.centre_m)
+    return planar.planar_model(scene.assembly, base, planar.HINGED, scene.gravity, scene.locked)
 
 
 @dataclass(frozen=True)

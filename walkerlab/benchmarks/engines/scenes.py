@@ -18,14 +18,12 @@ from walkerlab.ground.walker import LOCKED, MAX_BODIES, ContactWalker, changed_f
 from walkerlab.hybrid.contact_events import JudgedGround
 from walkerlab.hybrid.contact_run import knees_at_start
 from walkerlab.mechanics.assembly import Anchor, levers, masses, total_mass
-from walkerlab.mechanics.parts import Assembly, Knee, Position
+from walkerlab.mechanics.parts import Assembly, Knee
 from walkerlab.mechanics.standing import swing_foot
 from walkerlab.scene.contact import contact_scene, knee_rules, start_state
 from walkerlab.scene.parts import assembly_of
 from walkerlab.scene.rigid import rigid_walker
-from walkerlab.solvers.system import State
-
-Floats = NDArray[np.float64]
+from walkerlab.solvers.system import Floats, State
 
 
 @dataclass(frozen=True)
@@ -33,33 +31,36 @@ class EngineScene:
     """A walker on its ground, as an engine and as the rules of a walk see it.
 
     assembly  the parts
-    base      the body that the engine's tree hangs from
-    hip       its point that does
+    base      the point that the engine's tree hangs from: the hip, on the first stance leg
     ours      the walker as this project walks it
-    walker    the same with its levers of feet and hip from the base's point, which is the hip
+    walker    the same with its levers of feet and hip from the base
     ground    terrain, and the measures that a walk is judged by
-    stance    the first stance foot
     start     state of the free walker on the gait
     locked    the knees that are: what an engine builds has no hinge there
     """
 
-    name: str
     assembly: Assembly
-    base: str
-    hip: Position
-    gravity: float
+    base: Anchor
     ours: ContactWalker
     walker: ContactWalker
     ground: JudgedGround
-    stance: int
     start: State
     locked: tuple[Knee, ...] = ()
 
     @cached_property
     def model(self) -> PlanarModel:
         """What an engine builds."""
-        base = self.base, self.hip
-        return planar_model(self.assembly, base, FLOATING, self.gravity, self.ours.slope, self.locked)
+        return planar_model(self.assembly, self.base, FLOATING, self.gravity, self.locked)
+
+    @property
+    def name(self) -> str:
+        """What results call it."""
+        return "kneed" if self.assembly.knees else "compass"
+
+    @property
+    def gravity(self) -> tuple[float, float]:
+        """Along the slope and towards it (m/s^2)."""
+        return self.ours.gravity_along, self.ours.gravity_down
 
     @property
     def is_driven(self) -> bool:
@@ -86,8 +87,7 @@ class EngineScene:
     @cached_property
     def centre_levers(self) -> Floats:
         """Levers (n, 2) in m from the base's point to the centre of mass."""
-        base = Anchor(self.base, self.hip)
-        every = [mass * levers(self.assembly, base, at) for mass, at in masses(self.assembly)]
+        every = [mass * levers(self.assembly, self.base, at) for mass, at in masses(self.assembly)]
         return np.asarray(sum(every) / total_mass(self.assembly))
 
     def from_base(self, y: State) -> tuple[Floats, Floats]:
@@ -136,12 +136,11 @@ def scenes(config: ContactConfig, rigid_step_length_m: float | None, rigid_state
     length = rigid_step_length_m or abs(swing_foot(rigid_walker(config, config.equations), rigid_state)[1])
     scene = replace(contact_scene(config, length, length), pinned=False)
     assembly, start = scene.assembly, start_state(scene, rigid_state)
-    base = assembly.legs[STANCE_FOOT][0]
-    hip = hinge_of(assembly, base, assembly.legs[1 - STANCE_FOOT][0])
+    upper = assembly.legs[STANCE_FOOT][0]
+    base = Anchor(upper, hinge_of(assembly, upper, assembly.legs[1 - STANCE_FOOT][0]))
     d = np.zeros((2, MAX_BODIES, 2))
     for foot, part in enumerate(assembly.feet):
-        d[foot, : len(assembly.bodies)] = levers(assembly, Anchor(base, hip), Anchor(part.body, part.centre_m))
+        d[foot, : len(assembly.bodies)] = levers(assembly, base, Anchor(part.body, part.centre_m))
     walker = changed_forms(scene.walker, foot_x=d[..., 0], foot_y=d[..., 1], hip_x=0.0, hip_y=0.0)
-    name, parts = "kneed" if assembly.knees else "compass", (assembly, base, hip, config.gravity_m_s2)
-    free = EngineScene(name, *parts, scene.walker, walker, scene.ground, STANCE_FOOT, start)
+    free = EngineScene(assembly, base, scene.walker, walker, scene.ground, start)
     return (free.with_knees_locked(knees_at_start(scene.walker, STANCE_FOOT, start)),)
