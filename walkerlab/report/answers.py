@@ -10,13 +10,13 @@ from functools import partial
 from typing import Any
 
 from walkerlab.account import CHANNELS
-from walkerlab.cli.text import described_summary, paragraph
 from walkerlab.labels import unit_by_name
 from walkerlab.report import gaits
 from walkerlab.report.numbers import count, decimals_left, fixed, length, listed, number, quantity
 from walkerlab.report.outcomes import MODELS, WALKED, off_by
 from walkerlab.report.outcomes import walks as comes
 from walkerlab.report.tables import Cell, Column, Table, in_lines, measured, side_by_side, table
+from walkerlab.report.text import described_summary, paragraph
 from walkerlab.report.words import words
 
 Summary = Mapping[str, Any]

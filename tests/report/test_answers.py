@@ -2,12 +2,12 @@
 
 import pytest
 
-from walkerlab.cli.answers import ANSWERS, answer, elided, verdict
-from walkerlab.cli.text import COLUMNS, described_summary
 from walkerlab.outcome import Outcome
+from walkerlab.report.answers import ANSWERS, answer, elided, verdict
 from walkerlab.report.gaits import gait_table
 from walkerlab.report.numbers import number
 from walkerlab.report.tables import Column, aligned, as_csv, as_tex, in_lines, measured, side_by_side, table, width
+from walkerlab.report.text import COLUMNS, described_summary
 
 GAIT = {
     "state": [-0.2042, 0.1694, -0.6058, -0.861],
