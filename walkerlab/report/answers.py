@@ -181,8 +181,8 @@ def last_steps(summary: Summary, errors: Mapping[str, Summary]) -> Table:
     """
     steps = []
     for name, step in summary["steps"].items():
-        known = {"period_s": "step_period_s", "length_m": "step_length_m"} if name in errors else {}
-        left = {key: Cell(fixed(step[key], decimals_left(errors[name].get(error)))) for key, error in known.items()}
+        known = {key: errors[name].get(f"step_{key}") for key in ("period_s", "length_m") if name in errors}
+        left = {key: Cell(fixed(step[key], decimals_left(error))) for key, error in known.items()}
         steps.append({"name": name, "outcome": summary["outcomes"].get(name), **step, **left})
     steps += [{"name": f"knee released at {name}", **walk} for name, walk in summary.get("releases", {}).items()]
     return table("", LAST_STEP, steps)

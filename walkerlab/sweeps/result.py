@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walkerlab.config.schema import Config
+from walkerlab.labels import ERROR_OF_EACH_STEP
 from walkerlab.report.headlines import LAST_OF, headlines
 from walkerlab.scene.endings import Pads, endings
-from walkerlab.stages.numerical_error import OF_EACH_STEP
 from walkerlab.store.artifact import InTurn
 from walkerlab.store.content import Content, Variable
 from walkerlab.sweeps.chunk import Chunk
@@ -120,7 +120,7 @@ def numerical_error(columns: Columns, inverse: NDArray[np.int64]) -> dict[str, A
 
     inverse  which result each point has
     """
-    found = {key: columns.of(f"numerical_error.{key}") for key in ("end_time_s", *OF_EACH_STEP)}
+    found = {key: columns.of(f"numerical_error.{key}") for key in ("end_time_s", *ERROR_OF_EACH_STEP.values())}
     reasons, ends = columns.of("numerical_error.reason"), found["end_time_s"]
     otherwise = 0 if reasons is None else int(np.sum(reasons[inverse] != ""))
     known = 0 if ends is None else int(np.sum(np.isfinite(ends[inverse])))
