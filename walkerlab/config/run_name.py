@@ -1,9 +1,9 @@
 """Run identity: a config changed by `--set` runs beside the unchanged one, in a folder named after the change."""
 
 import hashlib
-from collections.abc import Iterator
 from typing import Any, Final
 
+from walkerlab.config.canonical import leaves
 from walkerlab.config.fields import block_of
 from walkerlab.config.numbers import short
 from walkerlab.config.schema import Config
@@ -27,8 +27,8 @@ def run_name(base: Config, changed: Config, slope_deg: float | None = None, run:
         if block is not None and before[name] is None and after[name] is not None:
             before[name] = block().model_dump(mode="json")
             parts.append(f"{name}=added")
-    known = dict(_flat(before))
-    differing = {key: value for key, value in _flat(after) if key not in known or known[key] != value}
+    known = dict(leaves(before))
+    differing = {key: value for key, value in leaves(after) if key not in known or known[key] != value}
     renamed = differing.pop("name", None)
     whole, _, earlier = (renamed or run or base.name).partition("@")
     if slope_deg is not None and "slope_rad" in differing:
@@ -40,14 +40,6 @@ def run_name(base: Config, changed: Config, slope_deg: float | None = None, run:
         digest = hashlib.sha256(change.encode()).hexdigest()[:12]
         change = f"{change[:KEPT_OF_A_LONG_CHANGE].rstrip('.,_=-')}-{digest}"
     return f"{whole}@{change}" if change else whole
-
-
-def _flat(block: dict[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
-    for name, value in block.items():
-        if isinstance(value, dict):
-            yield from _flat(value, f"{prefix}{name}.")
-        else:
-            yield f"{prefix}{name}", value
 
 
 def _word(value: Any) -> str:

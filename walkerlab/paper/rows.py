@@ -7,7 +7,7 @@ from enum import StrEnum
 from typing import Literal
 
 from walkerlab.paper import printed
-from walkerlab.paper.arithmetic import MM, percent_of, speed_difference
+from walkerlab.paper.arithmetic import MM, speed_difference
 from walkerlab.paper.measured import CYCLES, Measured
 from walkerlab.paper.printed import Printed
 from walkerlab.paper.prose import prose
@@ -63,7 +63,7 @@ def paper_rows(measured: Measured, study: PaperStudy) -> Iterator[JudgedNumber]:
     yield judge.input(printed.DYNAMIC_FRICTION, contact.law.dynamic_friction, "contact")
     yield judge.lost_balance()
     for coordinate, entry in enumerate(printed.RAISED, 2):
-        agrees = bool(entry.agreement(percent_of(printed.TABLE_2[coordinate]).of_matlab))
+        agrees = bool(entry.agreement(printed.TABLE_2[coordinate].percent_of_matlab))
         text = prose("evidence.raised", contact, judge.raised[2:])
         yield judge.row(entry, {}, judge.raised[coordinate], agrees, REFUTED, "any", text)
     for coordinate, row in enumerate(printed.TABLE_2):
@@ -151,10 +151,10 @@ class Judge:
 
     def percent(self, row: printed.StartRow, coordinate: int) -> JudgedNumber:
         """A percentage of Table 2: arithmetic, whatever the config."""
-        entry, percent = row.percent, percent_of(row)
-        agrees = bool(entry.agreement(percent.of_matlab))
-        otherwise = EXPLAINED if entry.agreement(percent.of_adams) else REFUTED
-        text = prose("evidence.percent", percent, REPRODUCED if agrees else otherwise)
+        entry = row.percent
+        agrees = bool(entry.agreement(row.percent_of_matlab))
+        otherwise = EXPLAINED if entry.agreement(row.percent_of_adams) else REFUTED
+        text = prose("evidence.percent", row, REPRODUCED if agrees else otherwise)
         return self.row(entry, {}, self.raised[coordinate], agrees, otherwise, "any", text)
 
     def adams_start(self, entry: Printed, coordinate: int) -> JudgedNumber:
@@ -214,7 +214,7 @@ class Judge:
         agrees = bool(found) and max(found.values()) < entry.value
         return self.row(entry, found, None, agrees, REFUTED if sums >= entry.value else EXPLAINED, "any", text)
 
-    def table_3(self, row: printed.ResultRow) -> Iterator[JudgedNumber]:
+    def table_3(self, row: printed.PrintedRow) -> Iterator[JudgedNumber]:
         """A row of Table 3: MATLAB's number against the rigid model, and that of ADAMS against the contact model."""
         measured, study = self.measured, self.study
         found = {name: getattr(model.table_3, row.name) for name, model in measured.models.items()}

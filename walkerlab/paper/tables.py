@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 from walkerlab.paper import printed
-from walkerlab.paper.arithmetic import MM, percent_of
+from walkerlab.paper.arithmetic import MM
 from walkerlab.paper.measured import Measured
 from walkerlab.paper.study import PaperStudy
 
@@ -38,13 +38,12 @@ def table_2(measured: Measured) -> Table:
     """The initial values, and the percentages on both bases."""
     table, start = {}, measured.contact.start
     for place, (coordinate, row) in enumerate(zip(printed.COORDINATES, printed.TABLE_2, strict=True)):
-        percent = percent_of(row)
         states = {name: model.state[place] for name, model in measured.models.items()}
         table[coordinate] = {
             **beside(row, states, None if start is None else start[place]),
             "paper_percent": row.percent.value,
-            "percent_of_matlab": percent.of_matlab,
-            "percent_of_adams": percent.of_adams,
+            "percent_of_matlab": row.percent_of_matlab,
+            "percent_of_adams": row.percent_of_adams,
         }
     return table
 
@@ -58,9 +57,7 @@ def table_3(measured: Measured) -> Table:
     return table
 
 
-def beside(
-    row: printed.StartRow | printed.ResultRow, rigid: Mapping[str, float | None], contact: float | None
-) -> dict[str, Any]:
+def beside(row: printed.PrintedRow, rigid: Mapping[str, float | None], contact: float | None) -> dict[str, Any]:
     """Both printed numbers of a row beside those of the rigid model, by set of equations, and of the contact model."""
     return {
         "unit": row.matlab.unit,
