@@ -16,10 +16,9 @@ from walkerlab.errors import NoAnswer
 from walkerlab.kernel_cache import watched
 from walkerlab.pipeline import plan
 from walkerlab.pipeline.graph import PIPELINE, Graph, Stage
-from walkerlab.pipeline.precompiler import Precompiler
 from walkerlab.pipeline.progress import Reporter, Silent, StageReporter
 from walkerlab.pipeline.runs import claim, refuse_another_config
-from walkerlab.pipeline.task import StageAnswer, StageTask, nothing_compiled_yet, run_in_worker, task_of
+from walkerlab.pipeline.task import Precompiler, StageAnswer, StageTask, nothing_compiled_yet, run_in_worker, task_of
 from walkerlab.scene.left_out import LeftOut
 from walkerlab.store import artifact, provenance
 from walkerlab.store.elsewhere import take_over
