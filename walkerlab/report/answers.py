@@ -159,9 +159,7 @@ def compare(summary: Summary) -> list[str | Table]:
     if "verdicts" in summary:
         from walkerlab.report.sections.paper import numbers_table
 
-        verdicts = summary["verdicts"]
-        fared = listed(f"{many} {'is' if many == 1 else 'are'} {name}" for name, many in verdicts.items())
-        head = f"Of {sum(verdicts.values())} numbers that the paper prints, {fared}."
+        head = words("paper.finding", summary["verdicts"])
         return [head, numbers_table(summary["paper_numbers"]), *told]
     return [words("models.answer", summary["outcomes"]), last_steps(summary, errors), *told]
 
@@ -199,18 +197,9 @@ def accuracy(summary: Summary) -> list[str | Table]:
 
 def extreme_cases(summary: Summary) -> list[str | Table]:
     """How many cases ended as they should, and those that did not."""
-    from walkerlab.report.sections.stability import family_table
+    from walkerlab.report.sections.stability import failures, family_table, finding
 
-    total = summary["passed"] + summary["failed"]
-    head = f"{summary['passed']} of {total} extreme cases and known problems ended as expected."
-    failed = [case for case in summary["cases"] if not case["ok"]]
-    said = [f"not as expected: {case['name']} ended {case['outcome']}: {case['note']}" for case in failed]
-    said += [
-        f"not as expected: {known['name']}, off by {number(known['error'], 2)}"
-        for known in summary["known"]
-        if not known["ok"]
-    ]
-    return [head, family_table(summary["cases"]), *said]
+    return [finding(summary), family_table(summary["cases"]), *failures(summary)]
 
 
 def continuation(summary: Summary) -> list[str | Table]:
