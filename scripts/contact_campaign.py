@@ -243,9 +243,9 @@ def plain_scene(config: Config, pitch_m: float, heights_m: tuple[float, ...]) ->
     si = contact.in_si()
     smooth = contact.friction == "none"
     return plain_walk.Plain(
-        *plain_legs(walker), walker.leg_length_m, config.gravity_m_s2, config.slope_rad, si.stiffness_N_per_m_e,
-        si.exponent, si.damping_N_s_m, si.full_damping_penetration_m, 0.0 if smooth else si.static_friction,
-        0.0 if smooth else si.dynamic_friction, si.stiction_velocity_m_s, si.friction_velocity_m_s,
+        *plain_legs(walker), walker.leg_length_m, config.gravity_m_s2, config.slope_rad, si.stiffness,
+        si.exponent, si.damping, si.full_damping_penetration, 0.0 if smooth else si.static_friction,
+        0.0 if smooth else si.dynamic_friction, si.stiction_velocity, si.friction_velocity,
         TERRAINS[contact.terrain], pitch_m, at_touch(walker), np.array(tuple(dict(walker.hip).values())),
         config.push_off.impulse_N_s, config.push_off.duration_s, np.array(heights_m),
     )  # fmt: skip

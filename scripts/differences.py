@@ -61,7 +61,7 @@ class Difference:
     """Two values that are not the same, and how far apart they are in units of what is allowed."""
 
     name: str
-    share: float  # of what is allowed; inf for what is no number
+    share: float  # of what is allowed; inf for NaN
     words: str
 
 

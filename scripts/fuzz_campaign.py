@@ -1,4 +1,4 @@
-"""Fuzzed configs and damaged results: never a traceback, never a hang, never what is no number stored as a result.
+"""Fuzzed configs and damaged results: never a traceback, never a hang, never NaN stored as a result.
 
     python scripts/fuzz_campaign.py                          # 2,000 configs, 200 damaged results
     python scripts/fuzz_campaign.py --configs 50 --damaged 20

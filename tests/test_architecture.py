@@ -13,8 +13,8 @@ from walkerlab.kernel_cache import KERNEL_HOMES
 PACKAGE = Path(walkerlab.__file__).parent
 # each imports only those after it
 LAYERS = (
-    "api",
     "cli",
+    "api",
     "explorer",
     "sweeps",
     "stages",

@@ -9,7 +9,6 @@ from pathlib import Path
 from types import NoneType
 from typing import Any, TypedDict, Unpack, cast
 
-from walkerlab.cli.text import in_words
 from walkerlab.config.contact import Contact
 from walkerlab.config.fields import Block, kinds_of
 from walkerlab.config.files import DEFAULT, builtin, read_layers
@@ -26,6 +25,7 @@ from walkerlab.pipeline.in_memory import InMemory, Keys
 from walkerlab.pipeline.resolve import resolve
 from walkerlab.pipeline.runner import Options, execute
 from walkerlab.pipeline.runs import config_of, headline_values, result_in, run_named
+from walkerlab.report.text import in_words
 from walkerlab.store import artifact
 from walkerlab.store.artifact import Damaged
 from walkerlab.store.content import Content, Group
@@ -192,15 +192,13 @@ def run(
     >>> float(gait.dataset("corrected/gaits").period_s.max()) == gait.summary["period_s"]
     True
     """
-    from walkerlab.cli.stage import as_json
-
     refuse_unknown_stage(stage)
     asked = resolve(str(config), settings(set), strides, folder_of(runs), name)
     warn(asked.loaded.warnings)
     report = execute(asked.loaded.config, stage, asked.folder, Options(force=force, jobs=jobs))
     content = artifact.read(report.artifact) if report.artifact is not None else Content()
     said = None if report.no_answer is None else report.no_answer.message
-    return result_of(stage, as_json(report), content, said, report.artifact)
+    return result_of(stage, report.as_json(), content, said, report.artifact)
 
 
 def open_run(name: str | Path, runs: str | Path = RUNS) -> Run:

@@ -1,7 +1,7 @@
 """What can go wrong for a user, each with the exit code of the command line; everything else is a bug."""
 
 import re
-from typing import ClassVar, Final
+from typing import Any, ClassVar, Final
 
 ADVISED: Final = re.compile(r"`(walkerlab (?!schema|open|init)[a-z-]+(?: [A-Za-z0-9-]+)*)`")
 """A command in a text, unless it is about no run."""
@@ -29,6 +29,10 @@ class WalkerlabError(Exception):
         super().__init__(message)
         self.message = message
         self.advice = advice
+
+    def as_json(self) -> dict[str, Any]:
+        """What `--json` has of it."""
+        return {"message": self.message, "advice": self.advice, "exit_code": self.exit_code}
 
 
 class ConfigError(WalkerlabError):

@@ -11,6 +11,14 @@ UNITS: Final = {
     "N_m": "N m", "N_m_per_rad": "N m/rad", "N_m_s_per_rad": "N m s/rad",
 }  # fmt: skip
 """By what names of numbers end in."""
+ERROR_OF_EACH_STEP: Final = {
+    "step_periods_s": "step_period_s",
+    "step_lengths_m": "step_length_m",
+    "slips_m": "slip_m",
+    "rolling_m": "rolling_m",
+    "knee_strike_times_s": "knee_strike_time_s",
+}
+"""Numbers of each step in a walk's summary, and under which name in its `numerical_error` their largest change is."""
 
 
 @dataclass(frozen=True)

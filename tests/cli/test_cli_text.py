@@ -4,8 +4,8 @@ import pytest
 
 from walkerlab.cli import console
 from walkerlab.cli.console import Console, StageLine
-from walkerlab.cli.text import described_summary, table
 from walkerlab.report.tables import LONGEST_CELL
+from walkerlab.report.text import described_summary, table
 
 SENTENCES = "One gait cycle of the rigid model, to scale. " * 5
 

@@ -45,9 +45,9 @@ def test_the_wrong_units_are_the_papers_numbers_read_in_si() -> None:
     contact = load(Path("contact-si")).config.contact
     assert contact is not None
     law = contact.in_si()
-    assert (law.stiffness_N_per_m_e, law.exponent, law.damping_N_s_m) == (1e5, 1.0, 90.0)
-    assert (law.full_damping_penetration_m, law.static_friction, law.dynamic_friction) == (1e-4, 0.9, 0.7)
-    assert (law.stiction_velocity_m_s, law.friction_velocity_m_s) == (0.1, 1.0)
+    assert (law.stiffness, law.exponent, law.damping) == (1e5, 1.0, 90.0)
+    assert (law.full_damping_penetration, law.static_friction, law.dynamic_friction) == (1e-4, 0.9, 0.7)
+    assert (law.stiction_velocity, law.friction_velocity) == (0.1, 1.0)
 
 
 @pytest.mark.parametrize("name", builtin_names())

@@ -4,13 +4,23 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Iterator
 from typing import Protocol
 
 import pytest
 
+from walkerlab.config import reads, schema
+from walkerlab.config.basin import Basin
 from walkerlab.config.canonical import canonical_json, slice_of
+from walkerlab.config.continuation import Continuation
+from walkerlab.config.design import Design
+from walkerlab.config.drives import PushOff
+from walkerlab.config.ground import Footholds
 from walkerlab.config.reads import ContactConfig, SceneConfig, SimulateConfig, StartConfig, dotted_keys, only
+from walkerlab.config.robustness import Robustness
 from walkerlab.config.schema import Config, Contact
+from walkerlab.config.stability import Case
+from walkerlab.pipeline.graph import STAGES, Stage
 
 CONFIG = Config(contact=Contact())
 
@@ -43,6 +53,26 @@ class StartThenTolerance(ToleranceConfig, StartConfig, Protocol):
 class MisspeltConfig(Protocol):
     @property
     def slope_deg(self) -> float: ...
+
+
+@pytest.fixture
+def blocks_imported(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """As if `reads` imported the blocks of the config when it runs, and not for mypy alone."""
+    blocks = (Basin, Case, Contact, Continuation, Design, Footholds, PushOff, Robustness)
+    for block in blocks:
+        monkeypatch.setattr(reads, block.__name__, block, raising=False)
+    monkeypatch.setattr(reads, "schema", schema, raising=False)
+    reads.keys_of.cache_clear()
+    yield
+    reads.keys_of.cache_clear()
+
+
+KEYS = {stage.name: stage.reads for stage in STAGES}
+
+
+@pytest.mark.parametrize("stage", STAGES, ids=KEYS)
+def test_what_a_stage_takes_does_not_depend_on_what_is_imported(stage: Stage, blocks_imported: None) -> None:
+    assert stage.reads == KEYS[stage.name]
 
 
 def test_a_type_has_the_keys_of_its_bases() -> None:

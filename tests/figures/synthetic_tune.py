@@ -23,9 +23,10 @@ def starts():
     both = ("stance", "swing")
     outcome = np.resize([int(one) for one in Outcome], (FACTORS.size, FACTORS.size))
     cells = {"outcome": outcome, "steps": np.where(outcome == Outcome.WALKED, STEPS, 1)}
-    axes = {f"{name}_factor": Variable(FACTORS, (name,), "1", name) for name in both}
+    dims = tuple(f"{name}_factor" for name in both)
+    axes = {name: Variable(FACTORS, (name,), "1", name) for name in dims}
     cells |= {f"rigid_{name}": values for name, values in cells.items()}
-    maps = {name: Variable(values, both, "1", name) for name, values in cells.items()}
+    maps = {name: Variable(values, dims, "1", name) for name, values in cells.items()}
     marks = {f"{name}_{one}_factor": 1.1 for name in ("adjusted", "gait") for one in both}
     return Group(axes | maps, {**marks, "steps_wanted": STEPS})
 

@@ -123,8 +123,8 @@ def steps_of(step):
 def pads_group(steps):
     numbers = np.arange(-2, steps + 3)
     edges = {"left_m": (numbers - 0.5) * STEP_LENGTH, "right_m": (numbers + 0.5) * STEP_LENGTH}
-    lanes = {"leg": 2 - numbers % 2}
-    return Group({name: Variable(values, ("pad",), "1", name) for name, values in {**edges, **lanes}.items()})
+    lanes = {"leg": Variable(2 - numbers % 2, ("pad",), "1", "leg")}
+    return Group({**{name: Variable(values, ("pad",), "m", name) for name, values in edges.items()}, **lanes})
 
 
 def compared(steps=10, period=0.7, aligned=True):

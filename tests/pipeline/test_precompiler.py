@@ -9,7 +9,7 @@ import pytest
 from walkerlab.config.loader import load
 from walkerlab.pipeline import runner
 from walkerlab.pipeline.graph import PIPELINE, Graph
-from walkerlab.pipeline.precompiler import Precompiler
+from walkerlab.pipeline.task import Precompiler
 from walkerlab.store.artifact import read
 from walkerlab.workers import WorkerPool
 

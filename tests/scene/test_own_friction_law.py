@@ -32,7 +32,7 @@ class Regularised(NamedTuple):
 
     @classmethod
     def of(cls, contact):
-        return cls(contact.dynamic_friction, contact.stiction_velocity_m_s)
+        return cls(contact.dynamic_friction, contact.stiction_velocity)
 
     largest = property(lambda self: self.mu)
     rising_until = property(lambda self: 3.0 * self.v_0)

@@ -1,6 +1,7 @@
 """What holds for every method of the registry; a new one is covered as soon as it is listed."""
 
 import math
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -111,6 +112,31 @@ def driven(name, rtol, t_end, budget=PLENTY):
     return method, called(name, drive, method, ORBIT, START, t_end)
 
 
+@cache
+def growth(t):
+    """How much larger a change of the start has become by a time, at most: 3e3 after a tenth of the orbit."""
+    change = 1e-9
+    ends = [drive_to(t, START + sign * change * unit) for unit in np.eye(4) for sign in (1.0, -1.0)]
+    columns = [(up - down) / (2.0 * change) for up, down in zip(ends[::2], ends[1::2], strict=True)]
+    return np.abs(columns).sum(axis=0)
+
+
+def drive_to(t, y):
+    method = method_named("dop853").new(4, 1e-13, 1e-15, PLENTY)
+    drive(method, ORBIT, y, t)
+    return method.y.copy()
+
+
+def allowed(name, rtol, t):
+    """What the end may be off by, a number for each of the state.
+
+    A step may err by rtol times the state, which is of order one, and that grows. Most steps err less, and what errs
+    later grows less: a hundredth of it is left, of methods that vary their order, and take many more steps, a tenth.
+    """
+    lowest, highest = METHODS[name].orders
+    return (0.01 if lowest == highest else 0.1) * growth(t) * rtol
+
+
 # without a moon a circle around the earth, seen from the rotating frame: Kepler's third law gives its rate
 NO_MOON = Satellite(0.0)
 RADIUS = 0.64
@@ -141,10 +167,10 @@ every_method = pytest.mark.parametrize("name", METHODS)
 
 @every_method
 def test_arenstorfs_orbit_closes(name):
-    """Errors grow about 10^4 times along the orbit."""
+    """Along the orbit changes of the place grow about 10^4 times, those of the velocity 10^6 times."""
     method, status = driven(name, 1e-9, PERIOD)
     assert status == STEP_DONE
-    assert method.y[:2] == pytest.approx(START[:2], abs=2e-3)
+    assert np.all(np.abs(method.y - START) < allowed(name, 1e-9, PERIOD))
     assert method.clock[T] == PERIOD
 
 
@@ -152,7 +178,7 @@ def test_arenstorfs_orbit_closes(name):
 def test_error_falls_with_the_tolerance(name, early):
     errors = [np.abs(driven(name, rtol, 0.1 * PERIOD)[0].y - early).max() for rtol in (1e-4, 1e-6, 1e-8)]
     assert errors[0] > errors[1] > errors[2]
-    assert errors[2] < 1e-4
+    assert errors[2] < allowed(name, 1e-8, 0.1 * PERIOD).max()
 
 
 @every_method
@@ -193,17 +219,18 @@ def test_dense_output_agrees_with_a_run_that_ends_there(name):
     called(name, half_way, method, ORBIT, out)
     middle = 0.5 * (method.clock[T_OLD] + method.clock[T])
     exact = driven("dop853", 1e-13, middle)[0].y
-    assert out == pytest.approx(exact, abs=1e-4)
+    assert out == pytest.approx(exact, abs=allowed(name, rtol, middle).max())
 
 
 @every_method
 def test_a_step_taken_back_is_taken_again_up_to_an_event(name):
-    method, _ = driven(name, 1e-8, 0.05 * PERIOD)
+    rtol = 1e-8
+    method, _ = driven(name, rtol, 0.05 * PERIOD)
     event = 0.25 * method.clock[T_OLD] + 0.75 * method.clock[T]
     assert called(name, once_more, method, ORBIT, event) == STEP_DONE
     assert method.clock[T] == event
     exact = driven("dop853", 1e-13, event)[0].y
-    assert method.y == pytest.approx(exact, abs=1e-4)
+    assert method.y == pytest.approx(exact, abs=allowed(name, rtol, event).max())
 
 
 @every_method
@@ -224,7 +251,7 @@ def test_steps_that_a_deadline_cuts_short_leave_no_gap_and_do_not_overlap(name):
             t, y, steps = float(method.clock[T]), method.y.copy(), steps + 1
         assert t == deadline
     whole, _ = driven(name, rtol, t_end)
-    assert y == pytest.approx(whole.y, abs=1e-3)
+    assert y == pytest.approx(whole.y, abs=allowed(name, rtol, t_end).max())
     if not METHODS[name].compiled:
         # a library's solver goes its own way: cutting its steps short is no work for it
         assert method.counts[ACCEPTED] == whole.counts[ACCEPTED]

@@ -5,12 +5,12 @@ from pathlib import Path
 
 import pytest
 
-from walkerlab.cli.answers import answer
 from walkerlab.config.loader import load
 from walkerlab.config.reads import only
 from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.pipeline.graph import PIPELINE
 from walkerlab.pipeline.progress import Silent
+from walkerlab.report.answers import answer
 from walkerlab.stages import fixedpoint, robustness
 from walkerlab.store.parts import Parts
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from walkerlab.cli.console import Console
-from walkerlab.config.problems import nearest
+from walkerlab.config.problems import meant
 from walkerlab.config.schema import Config
 from walkerlab.errors import ConfigError, StaleError
 from walkerlab.labels import with_unit
@@ -155,8 +155,6 @@ def named_in(folder: RunFolder, name: str) -> Illustration | Table:
     for called in (hyphened(name), shortened(name)):
         if called in tables:
             return tables[called]
-    near = nearest(name, (*named, *TABLES, TRAJECTORY, *tables))
-    meant = f" Did you mean {near}?" if near else ""
     compared = stored["compare"].summary if "compare" in stored else {}
     there = [one.name for one in FIGURES if one.why_left_out(stored, {}) is None]
     there += [table for table, key in TABLES.items() if key in compared]
@@ -164,7 +162,8 @@ def named_in(folder: RunFolder, name: str) -> Illustration | Table:
     there += [TRAJECTORY] * any(TRAJECTORY in result.groups for result in stored.values())
     nothing = f"{folder.path} has nothing yet: {makes(folder, PIPELINE['report'])} makes it all."
     advice = f"{folder.path} has {listed(there)}." if there else nothing
-    raise ConfigError(f"nothing is called {name}.{meant}", advice)
+    near = meant(name, (*named, *TABLES, TRAJECTORY, *tables))
+    raise ConfigError(f"nothing is called {name}.{near}", advice)
 
 
 def planned(folder: RunFolder) -> Planner:

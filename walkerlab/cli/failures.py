@@ -38,7 +38,7 @@ def exit_on_failure(name: str, request: Request) -> Iterator[Request]:
         if request.as_json:
             run_dir = None if request.run_dir is None else str(request.run_dir)
             nothing: dict[str, Any] = {"artifact": None, "reused": False, "wall_s": 0.0, "left_out": []}
-            print_json({"stage": name, "run_dir": run_dir, **nothing, "error": described(error)})
+            print_json({"stage": name, "run_dir": run_dir, **nothing, "error": error.as_json()})
 
     try:
         yield request
@@ -75,11 +75,6 @@ def say(error: WalkerlabError, typed: str = "") -> None:
     print(f"error: {error.message}", file=sys.stderr)
     if error.advice:
         print(f"advice: {to_type_back(error.advice, typed)}", file=sys.stderr)
-
-
-def described(error: WalkerlabError) -> dict[str, Any]:
-    """A failure as JSON."""
-    return {"message": error.message, "advice": error.advice, "exit_code": error.exit_code}
 
 
 def print_json(value: dict[str, Any]) -> None:

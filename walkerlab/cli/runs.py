@@ -93,9 +93,9 @@ def lines(folders: tuple[RunFolder, RunFolder], found: RunDifference, figures: l
 
     every  all numbers that differ instead
     """
-    from walkerlab.cli.text import in_words
     from walkerlab.report.numbers import number
     from walkerlab.report.tables import aligned
+    from walkerlab.report.text import in_words
 
     def told(value: Any) -> str:
         return number(value, DIGITS) if isinstance(value, float) and not every else in_words(value)

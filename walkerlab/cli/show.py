@@ -5,11 +5,11 @@ from typing import Any
 
 from walkerlab.cli.failures import print_json
 from walkerlab.cli.request import Request
-from walkerlab.cli.text import described_summary
 from walkerlab.errors import ConfigError, StaleError
 from walkerlab.pipeline.graph import Graph
 from walkerlab.pipeline.plan import survey
 from walkerlab.report.tables import aligned
+from walkerlab.report.text import described_summary
 from walkerlab.store.artifact import NOT_THERE, Stored
 from walkerlab.store.content import Variable
 

@@ -3,14 +3,13 @@
 import itertools
 import os
 import shlex
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import typer
 
-from walkerlab.cli.answers import answer, verdict
-from walkerlab.cli.failures import described, print_json, say
+from walkerlab.cli.failures import print_json, say
 from walkerlab.cli.request import Request
 from walkerlab.config.files import builtin_names, extendable
 from walkerlab.config.layers import setting_of
@@ -19,6 +18,7 @@ from walkerlab.config.writer import extending
 from walkerlab.errors import NoAnswer
 from walkerlab.pipeline.graph import PIPELINE, Graph, Stage
 from walkerlab.pipeline.runner import Options, StageReport, execute, told_once
+from walkerlab.report.answers import answer, verdict
 from walkerlab.report.tables import aligned
 from walkerlab.store.files import storing
 
@@ -33,12 +33,12 @@ def run_stage(request: Request, stage: Stage, graph: Graph, full: bool) -> None:
     config, folder = request.resolved, request.folder
     if options.dry:
         report = execute(config, stage.name, folder, options, graph=graph)
-        show(request, as_json(report) | {"dry_run": True}, planned(report))
+        show(request, report.as_json() | {"dry_run": True}, planned(report))
         return
     report = with_nearby_gaits(execute(config, stage.name, folder, options, request.console, graph), request)
     if stage.designs and "best" in report.summary:
         report.summary["config"] = str(write_optimum(request, report))
-    show(request, as_json(report), printed(request, report))
+    show(request, report.as_json(), printed(request, report))
     if request.open_page and "html" in report.summary and not request.console.shown:
         request.console.show(report.run_dir / str(report.summary["html"]))
     if report.no_answer is not None:
@@ -85,21 +85,6 @@ def show(request: Request, value: dict[str, Any], text: str) -> None:
         print_json(value)
     else:
         print(text)
-
-
-def as_json(report: StageReport) -> dict[str, Any]:
-    """The one JSON object of a stage: the keys that all stages have, then those of its summary."""
-    common: dict[str, Any] = {
-        "stage": report.stage,
-        "run_dir": str(report.run_dir),
-        "artifact": None if report.artifact is None else str(report.artifact),
-        "reused": report.reused,
-        "wall_s": report.wall_s,
-        "left_out": [asdict(entry) for entry in report.left_out],
-    }
-    own = {key: value for key, value in report.summary.items() if key not in (*common, "no_answer")}
-    error = {} if report.no_answer is None else {"error": described(report.no_answer)}
-    return common | own | {"stages": [asdict(done) for done in report.steps]} | error
 
 
 def printed(request: Request, report: StageReport) -> str:

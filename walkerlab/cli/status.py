@@ -5,7 +5,7 @@ from typing import Any
 
 import typer
 
-from walkerlab.cli.failures import described, print_json, say
+from walkerlab.cli.failures import print_json, say
 from walkerlab.cli.request import Request
 from walkerlab.errors import StaleError
 from walkerlab.pipeline.graph import Graph
@@ -46,7 +46,7 @@ def print_status(request: Request, graph: Graph, check: bool, run: str | None) -
         status: dict[str, Any] = {"run_dir": str(folder.path), "current": error is None, "stages": rows}
         if listed is not None:
             status["runs"] = [vars(one) | {"run_dir": str(one.run_dir)} for one in listed]
-        print_json(status | ({"error": described(error)} if check and error is not None else {}))
+        print_json(status | ({"error": error.as_json()} if check and error is not None else {}))
     else:
         print(f"{folder.path}:")
         print("\n".join(aligned([["stage", "state", "why"], *([s.stage.name, state_of(s), why(s)] for s in steps)])))

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from walkerlab.cli.failures import described, exit_on_failure, print_json, say
+from walkerlab.cli.failures import exit_on_failure, print_json, say
 from walkerlab.cli.request import OF_A_RUN, OF_TALK, Request, command
-from walkerlab.cli.text import paragraph
 from walkerlab.pipeline.graph import PIPELINE, Graph
+from walkerlab.report.text import paragraph
 
 if TYPE_CHECKING:
     from collections.abc import Collection
@@ -200,7 +200,7 @@ def show_result(request: Request, swept: Swept, names: tuple[str, ...], as_csv: 
         value["csv"] = str(beside)
     error = swept.error() if swept.failed else None
     if request.as_json:
-        print_json(value | ({"error": described(error)} if error is not None else {}))
+        print_json(value | ({"error": error.as_json()} if error is not None else {}))
     elif as_csv:
         print(table, end="")
     else:

@@ -1,6 +1,7 @@
 """The part of a config that a type names, and one text for one content: what keys of results are made of."""
 
 import json
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from walkerlab.config.reads import keys_of
@@ -20,6 +21,16 @@ def slice_of(config: Config, takes: type | None) -> dict[str, Any]:
 
     found: dict[str, Any] = part(config.model_dump(mode="json"), takes)
     return found
+
+
+def leaves(block: Mapping[str, Any], lists: bool = False, prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Dotted names and values of nested objects; of lists, too, with the places among the names, or as values."""
+    for name, value in block.items():
+        inner = {str(place): item for place, item in enumerate(value)} if lists and isinstance(value, list) else value
+        if isinstance(inner, Mapping):
+            yield from leaves(inner, lists, f"{prefix}{name}.")
+        else:
+            yield f"{prefix}{name}", value
 
 
 def canonical_json(data: Any) -> str:

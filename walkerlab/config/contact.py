@@ -1,7 +1,7 @@
 """The contact block: numbers as ADAMS dialogs show them (N, mm, s) or in SI, and their conversion."""
 
-from dataclasses import dataclass
-from typing import Annotated, Any, Final, Literal
+from collections.abc import Mapping
+from typing import Annotated, Any, Final, Literal, Self
 
 from pydantic import Discriminator, Field, Tag, ValidationInfo, field_validator, model_validator
 
@@ -20,18 +20,14 @@ _FIG_4B = "section 4 and Fig. 4b, unit not given"
 _SECTION_4 = "section 4"
 
 
-@dataclass(frozen=True)
-class ContactSI:
-    """The force laws of the contact in SI units, whatever the units of the config."""
-
-    stiffness_N_per_m_e: float  # noqa: N815 (a unit's capital)
-    exponent: float
-    damping_N_s_m: float  # noqa: N815
-    full_damping_penetration_m: float
-    stiction_velocity_m_s: float
-    friction_velocity_m_s: float
-    static_friction: float
-    dynamic_friction: float
+def from_mm(numbers: Mapping[str, Any], exponent: float) -> dict[str, Any]:
+    """The units `si`, and in them the numbers whose unit has mm in it."""
+    return {
+        "units": "si",
+        "stiffness": numbers["stiffness"] * MM_PER_M**exponent,
+        "damping": numbers["damping"] * MM_PER_M,
+        **{name: numbers[name] / MM_PER_M for name in BOUNDS_SI},
+    }
 
 
 PadPitch = Annotated[
@@ -108,14 +104,8 @@ class Contact(Block):
             return data
         exponent = data.get("exponent", 2.2)
         power = float(exponent) if isinstance(exponent, int | float) and 1.0 <= exponent <= 3.0 else 2.2
-        factors = {
-            "stiffness": MM_PER_M**power,
-            "damping": MM_PER_M,
-            "full_damping_penetration": 1 / MM_PER_M,
-            "stiction_velocity": 1 / MM_PER_M,
-            "friction_velocity": 1 / MM_PER_M,
-        }
-        return {name: factor * cls.model_fields[name].default for name, factor in factors.items()} | data
+        defaults = {name: field.default for name, field in cls.model_fields.items()}
+        return from_mm(defaults, power) | data
 
     @field_validator("friction_velocity")
     @classmethod
@@ -153,16 +143,6 @@ class Contact(Block):
         """The unit of a key, of those that its text names for either units."""
         return either.split(" or ")[-1 if self.units == "si" else 0]
 
-    def in_si(self) -> ContactSI:
-        """The force laws in SI units."""
-        scale = MM_PER_M if self.units == "adams" else 1.0
-        return ContactSI(
-            stiffness_N_per_m_e=self.stiffness * scale**self.exponent,
-            exponent=self.exponent,
-            damping_N_s_m=self.damping * scale,
-            full_damping_penetration_m=self.full_damping_penetration / scale,
-            stiction_velocity_m_s=self.stiction_velocity / scale,
-            friction_velocity_m_s=self.friction_velocity / scale,
-            static_friction=self.static_friction,
-            dynamic_friction=self.dynamic_friction,
-        )
+    def in_si(self) -> Self:
+        """The same ground with its numbers in SI units."""
+        return self if self.units == "si" else self.model_copy(update=from_mm(vars(self), self.exponent))

@@ -59,6 +59,12 @@ def nearest(word: str, candidates: Iterable[str]) -> str:
     return spelled[found[0]] if found else ""
 
 
+def meant(word: str, candidates: Iterable[str]) -> str:
+    """What was perhaps meant, as a sentence after another one; empty if nothing is like the word."""
+    near = nearest(word, candidates)
+    return f" Did you mean {near}?" if near else ""
+
+
 def shown(text: str, length: int = SHOWN_LENGTH) -> str:
     """A text from outside, short and safe to print: control characters and lone surrogates are escaped."""
     cut = text if len(text) <= length else f"{text[: length - 1]}…"

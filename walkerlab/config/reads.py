@@ -35,7 +35,8 @@ def keys_of(takes: type) -> dict[str, type | None]:
 def _part(member: property) -> type | None:
     getter: Any = member.fget
     named = getter.__globals__.get(getter.__annotations__.get("return"))
-    return named if isinstance(named, type) else None
+    # a block of the config is taken whole, whether or not it is imported here
+    return named if Protocol in getattr(named, "__mro__", ()) else None
 
 
 def dotted_keys(takes: type) -> Iterator[str]:

@@ -12,7 +12,7 @@ from pydantic.fields import FieldInfo
 from walkerlab.config.fields import block_of, bounds_of, extra, kind, leaves, leaves_of_other_kinds
 from walkerlab.config.files import builtin_names
 from walkerlab.config.numbers import short
-from walkerlab.config.problems import nearest
+from walkerlab.config.problems import meant
 from walkerlab.config.schema import Config, SlopeInDegrees
 from walkerlab.errors import ConfigError
 
@@ -100,9 +100,8 @@ def asked_for(asked: str) -> list[KeyReference]:
     ]
     if not found:
         names = {".".join(name.split(".")[:depth]) for name in plain.values() for depth in (1, 2, 3)}
-        near = nearest(asked, names) or nearest(asked, {name.split(".")[-1] for name in names})
-        meant = f" Did you mean {near}?" if near else ""
-        raise ConfigError(f"the config has no key {asked}.{meant}", "`walkerlab schema` lists every key")
+        near = meant(asked, names) or meant(asked, {name.split(".")[-1] for name in names})
+        raise ConfigError(f"the config has no key {asked}.{near}", "`walkerlab schema` lists every key")
     return found
 
 

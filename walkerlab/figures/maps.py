@@ -200,7 +200,7 @@ def attractor_name(number: int, attractors: list[dict[str, Any]]) -> str:
 MAPS: Final = "stability-maps"
 STIFFNESS, VELOCITY, STEP = "stiffness", "stiction_velocity", "step_size"
 _LAW: Final = Contact().in_si()
-PAPER: Final = (_LAW.stiffness_N_per_m_e, _LAW.stiction_velocity_m_s)
+PAPER: Final = (_LAW.stiffness, _LAW.stiction_velocity)
 SHARP, ROUGH = (1e-10, 1.0), (1e-6, 1.0)  # errors told apart by colour
 VERDICT_COLOURS: Final = {
     "fine": SKY,

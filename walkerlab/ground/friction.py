@@ -19,7 +19,7 @@ class FrictionLaw(Protocol):
 
     @classmethod
     def of(cls, contact: Any) -> Self:
-        """The law with the parameters of a contact block, a `config.contact.ContactSI`."""
+        """The law with the parameters of a contact block in SI."""
 
     @property
     def largest(self) -> float:
@@ -66,12 +66,12 @@ class Coulomb(NamedTuple):
 
     @classmethod
     def of(cls, contact: Any) -> Coulomb:
-        """The law with the parameters of a contact block, a `config.contact.ContactSI`."""
+        """The law with the parameters of a contact block in SI."""
         return cls(
             contact.static_friction,
             contact.dynamic_friction,
-            contact.stiction_velocity_m_s,
-            contact.friction_velocity_m_s,
+            contact.stiction_velocity,
+            contact.friction_velocity,
         )
 
     @property
@@ -177,7 +177,7 @@ FRICTION_LAWS: Final[dict[str, type[FrictionLaw]]] = {"coulomb": Coulomb, "none"
 
 
 def law_named(word: str, contact: Any) -> FrictionLaw:
-    """The law of that word with the parameters of a contact block, a `config.contact.ContactSI`.
+    """The law of that word with the parameters of a contact block in SI.
 
     TypeError if the law's class is incomplete, saying what it lacks.
     """

@@ -1,27 +1,12 @@
 """Arithmetic on the paper's printed numbers alone: no model, no config."""
 
-from dataclasses import dataclass
 from typing import Final
 
 from walkerlab.ground.resting import RestingFoot, resting_foot
-from walkerlab.paper.printed import DAMPING, STEP_LENGTH, STIFFNESS, TABLE_1, StartRow
+from walkerlab.paper.printed import DAMPING, STEP_LENGTH, STIFFNESS, TABLE_1
 
 MM: Final = 1000.0  # mm in a m
 ADAMS_EXPONENT: Final = 2.2  # default of ADAMS/View, not given in the paper
-
-
-@dataclass(frozen=True)
-class PercentOf:
-    """The difference of the two columns of Table 2, in percent of either."""
-
-    of_matlab: float
-    of_adams: float
-
-
-def percent_of(row: StartRow) -> PercentOf:
-    """How much larger in magnitude the ADAMS value of a row of Table 2 is."""
-    matlab, adams = abs(row.matlab.value), abs(row.adams.value)
-    return PercentOf(100.0 * (adams - matlab) / matlab, 100.0 * (adams - matlab) / adams)
 
 
 def printed_speed(cycle: float) -> float:

@@ -68,11 +68,18 @@ TABLE_1: Final = (
 
 
 @dataclass(frozen=True)
-class StartRow:
-    """A row of Table 2."""
+class PrintedRow:
+    """A row of Table 3."""
 
+    name: str
     matlab: Printed
     adams: Printed
+
+
+@dataclass(frozen=True)
+class StartRow(PrintedRow):
+    """A row of Table 2."""
+
     percent: Printed
 
     @property
@@ -80,9 +87,23 @@ class StartRow:
         """The ADAMS value over the MATLAB one."""
         return self.adams.value / self.matlab.value
 
+    @property
+    def percent_of_matlab(self) -> float:
+        """How much larger in magnitude the ADAMS value is, in percent of the MATLAB one."""
+        return self._percent_of(self.matlab)
+
+    @property
+    def percent_of_adams(self) -> float:
+        """The same in percent of itself."""
+        return self._percent_of(self.adams)
+
+    def _percent_of(self, base: Printed) -> float:
+        return 100.0 * (abs(self.adams.value) - abs(self.matlab.value)) / abs(base.value)
+
 
 TABLE_2: Final = tuple(
     StartRow(
+        name,
         Printed("Table 2", f"{name}, MATLAB", unit, matlab),
         Printed("Table 2", f"{name}, MSC ADAMS", unit, adams),
         Printed("Table 2", f"{name}, difference rate", "%", percent),
@@ -96,30 +117,21 @@ TABLE_2: Final = tuple(
 )
 
 
-@dataclass(frozen=True)
-class ResultRow:
-    """A row of Table 3."""
-
-    name: str
-    matlab: Printed
-    adams: Printed
-
-
-def result_row(name: str, quantity: str, unit: str, matlab: str, adams: str) -> ResultRow:
-    """A row of Table 3 from its two texts."""
-    return ResultRow(
+TABLE_3: Final = tuple(
+    PrintedRow(
         name,
-        Printed("Table 3", f"{quantity}, MATLAB", unit, matlab),
-        Printed("Table 3", f"{quantity}, MSC ADAMS", unit, adams),
+        Printed("Table 3", f"{quantity}, {name}, MATLAB", unit, matlab),
+        Printed("Table 3", f"{quantity}, {name}, MSC ADAMS", unit, adams),
     )
-
-
-T_LEFT: Final = result_row("t_left", "left step period, t_left", "s", "0.60", "0.59")
-T_RIGHT: Final = result_row("t_right", "right step period, t_right", "s", "0.79", "0.77")
-T_CYCLE: Final = result_row("t_cycle", "one cycle period, t_cycle", "s", "1.39", "1.38")
-V_COM: Final = result_row("v_com", "average velocity, v_com", "m/s", "0.0246", "0.0248")
-E_AVG: Final = result_row("E_avg", "average mechanical energy (5 steps), E_avg", "J", "150.13", "150.14")
-TABLE_3: Final = (T_LEFT, T_RIGHT, T_CYCLE, V_COM, E_AVG)
+    for name, quantity, unit, matlab, adams in (
+        ("t_left", "left step period", "s", "0.60", "0.59"),
+        ("t_right", "right step period", "s", "0.79", "0.77"),
+        ("t_cycle", "one cycle period", "s", "1.39", "1.38"),
+        ("v_com", "average velocity", "m/s", "0.0246", "0.0248"),
+        ("E_avg", "average mechanical energy (5 steps)", "J", "150.13", "150.14"),
+    )
+)
+T_LEFT, T_RIGHT, T_CYCLE, V_COM, E_AVG = TABLE_3
 
 EIGENVALUES: Final = Printed("section 3.3", "largest eigenvalue of P of a stable gait", "1", "less than one")
 LEG_INERTIA: Final = Printed("section 4, Fig. 4a", "inertia of the links", "kg m^2", "zero")

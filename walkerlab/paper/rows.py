@@ -1,13 +1,13 @@
-"""The paper's numbers, each with its verdict: what it puts in and starts from, then what it gets out."""
+"""The paper's numbers, each with its verdict, in their order; then its three tables beside what was measured."""
 
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Literal
+from typing import Any, Literal
 
 from walkerlab.paper import printed
-from walkerlab.paper.arithmetic import MM, percent_of, speed_difference
+from walkerlab.paper.arithmetic import MM, speed_difference
 from walkerlab.paper.measured import CYCLES, Measured
 from walkerlab.paper.printed import Printed
 from walkerlab.paper.prose import prose
@@ -63,7 +63,7 @@ def paper_rows(measured: Measured, study: PaperStudy) -> Iterator[JudgedNumber]:
     yield judge.input(printed.DYNAMIC_FRICTION, contact.law.dynamic_friction, "contact")
     yield judge.lost_balance()
     for coordinate, entry in enumerate(printed.RAISED, 2):
-        agrees = bool(entry.agreement(percent_of(printed.TABLE_2[coordinate]).of_matlab))
+        agrees = bool(entry.agreement(printed.TABLE_2[coordinate].percent_of_matlab))
         text = prose("evidence.raised", contact, judge.raised[2:])
         yield judge.row(entry, {}, judge.raised[coordinate], agrees, REFUTED, "any", text)
     for coordinate, row in enumerate(printed.TABLE_2):
@@ -151,10 +151,10 @@ class Judge:
 
     def percent(self, row: printed.StartRow, coordinate: int) -> JudgedNumber:
         """A percentage of Table 2: arithmetic, whatever the config."""
-        entry, percent = row.percent, percent_of(row)
-        agrees = bool(entry.agreement(percent.of_matlab))
-        otherwise = EXPLAINED if entry.agreement(percent.of_adams) else REFUTED
-        text = prose("evidence.percent", percent, REPRODUCED if agrees else otherwise)
+        entry = row.percent
+        agrees = bool(entry.agreement(row.percent_of_matlab))
+        otherwise = EXPLAINED if entry.agreement(row.percent_of_adams) else REFUTED
+        text = prose("evidence.percent", row, REPRODUCED if agrees else otherwise)
         return self.row(entry, {}, self.raised[coordinate], agrees, otherwise, "any", text)
 
     def adams_start(self, entry: Printed, coordinate: int) -> JudgedNumber:
@@ -214,7 +214,7 @@ class Judge:
         agrees = bool(found) and max(found.values()) < entry.value
         return self.row(entry, found, None, agrees, REFUTED if sums >= entry.value else EXPLAINED, "any", text)
 
-    def table_3(self, row: printed.ResultRow) -> Iterator[JudgedNumber]:
+    def table_3(self, row: printed.PrintedRow) -> Iterator[JudgedNumber]:
         """A row of Table 3: MATLAB's number against the rigid model, and that of ADAMS against the contact model."""
         measured, study = self.measured, self.study
         found = {name: getattr(model.table_3, row.name) for name, model in measured.models.items()}
@@ -232,3 +232,64 @@ class Judge:
         otherwise = EXPLAINED if contact is None else REFUTED
         text = prose("evidence.adams", row, measured, names)
         yield self.row(row.adams, rigid, contact, bool(row.adams.agreement(contact)), otherwise, "contact", text)
+
+
+Table = dict[str, dict[str, Any]]
+"""Rows by name, each with its columns; None where a model has no such value."""
+
+MIDDLE = "section 2: 'in the middle of the legs'"
+
+
+def table_1(measured: Measured, study: PaperStudy) -> Table:
+    """The parameters: as printed (`paper`), where, and as used."""
+    walker, inertia, radius = measured.walker, printed.LEG_INERTIA, printed.FOOT_RADIUS
+    length, mass, hip, gravity = printed.TABLE_1
+    rows = (
+        ("L", "length of the legs", "m", length.value, walker.leg_length, length.where),
+        ("m", "mass of a leg", "kg", mass.value, walker.leg_mass, mass.where),
+        ("MH", "mass of the hip", "kg", hip.value, walker.hip_mass, hip.where),
+        ("g", "gravity", "m/s^2", gravity.value, walker.gravity, gravity.where),
+        ("a", "foot to mass of the leg", "m", 0.5 * length.value, walker.foot_to_mass, MIDDLE),
+        ("J", "inertia of a leg", "kg m^2", inertia.value, walker.leg_inertia, inertia.where),
+        ("r", "radius of the foot", "m", radius.value / MM, measured.contact.foot_radius, radius.where),
+        ("phi", "slope", "rad", study.slope, walker.slope, "not stated: from the angles of x_p"),
+    )
+    return {
+        symbol: {"quantity": quantity, "unit": unit, "paper": paper, "used": used, "where": where}
+        for symbol, quantity, unit, paper, used, where in rows
+    }
+
+
+def table_2(measured: Measured) -> Table:
+    """The initial values, and the percentages on both bases."""
+    table, start = {}, measured.contact.start
+    for place, (coordinate, row) in enumerate(zip(printed.COORDINATES, printed.TABLE_2, strict=True)):
+        states = {name: model.state[place] for name, model in measured.models.items()}
+        table[coordinate] = {
+            **beside(row, states, None if start is None else start[place]),
+            "paper_percent": row.percent.value,
+            "percent_of_matlab": row.percent_of_matlab,
+            "percent_of_adams": row.percent_of_adams,
+        }
+    return table
+
+
+def table_3(measured: Measured) -> Table:
+    """The characteristics of both models."""
+    table = {}
+    for row in printed.TABLE_3:
+        rigid = {name: getattr(model.table_3, row.name) for name, model in measured.models.items()}
+        table[row.name] = beside(row, rigid, getattr(measured.contact.table_3, row.name))
+    return table
+
+
+def beside(row: printed.PrintedRow, rigid: Mapping[str, float | None], contact: float | None) -> dict[str, Any]:
+    """Both printed numbers of a row beside those of the rigid model, by set of equations, and of the contact model."""
+    return {
+        "unit": row.matlab.unit,
+        "paper_matlab": row.matlab.value,
+        "paper_adams": row.adams.value,
+        "as_printed": rigid.get("as-printed"),
+        "corrected": rigid.get("corrected"),
+        "contact": contact,
+    }

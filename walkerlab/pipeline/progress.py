@@ -57,16 +57,7 @@ class Silent:
         """Say nothing of a stage either."""
         return self
 
-    def start(self, label: str, total: int | None = None) -> None:
+    def note(self, *_told: Any, **_named: Any) -> None:
         """Let it go untold."""
 
-    def advance(self, n: int = 1) -> None:
-        """Let it go untold."""
-
-    def note(self, text: str) -> None:
-        """Let it go untold."""
-
-    warn = compiling = end = note
-
-    def drawn(self, summary: Mapping[str, Any], folder: Path) -> None:
-        """Let it go untold."""
+    start = advance = warn = compiling = end = drawn = note

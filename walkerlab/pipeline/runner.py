@@ -5,7 +5,7 @@ import importlib
 import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from functools import partial
 from pathlib import Path
 from queue import SimpleQueue
@@ -16,10 +16,9 @@ from walkerlab.errors import NoAnswer
 from walkerlab.kernel_cache import watched
 from walkerlab.pipeline import plan
 from walkerlab.pipeline.graph import PIPELINE, Graph, Stage
-from walkerlab.pipeline.precompiler import Precompiler
 from walkerlab.pipeline.progress import Reporter, Silent, StageReporter
 from walkerlab.pipeline.runs import claim, refuse_another_config
-from walkerlab.pipeline.task import StageAnswer, StageTask, nothing_compiled_yet, run_in_worker, task_of
+from walkerlab.pipeline.task import Precompiler, StageAnswer, StageTask, nothing_compiled_yet, run_in_worker, task_of
 from walkerlab.scene.left_out import LeftOut
 from walkerlab.store import artifact, provenance
 from walkerlab.store.elsewhere import take_over
@@ -64,6 +63,20 @@ class StageReport:
     steps: tuple[StageDone, ...]
     no_answer: NoAnswer | None = None
     results: Mapping[str, dict[str, Any]] = field(default_factory=dict)
+
+    def as_json(self) -> dict[str, Any]:
+        """The one JSON object of a stage: the keys that all stages have, then those of its summary."""
+        common: dict[str, Any] = {
+            "stage": self.stage,
+            "run_dir": str(self.run_dir),
+            "artifact": None if self.artifact is None else str(self.artifact),
+            "reused": self.reused,
+            "wall_s": self.wall_s,
+            "left_out": [asdict(entry) for entry in self.left_out],
+        }
+        own = {key: value for key, value in self.summary.items() if key not in (*common, "no_answer")}
+        error = {} if self.no_answer is None else {"error": self.no_answer.as_json()}
+        return common | own | {"stages": [asdict(done) for done in self.steps]} | error
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from walkerlab.config.problems import nearest
+from walkerlab.config.canonical import leaves
+from walkerlab.config.problems import meant
 from walkerlab.config.reader import read as read_text
 from walkerlab.config.schema import Config
 from walkerlab.config.tree import Mapping as Tree
@@ -140,9 +141,8 @@ def run_named(text: str, runs_dir: Path) -> RunFolder:
     if found is not None:
         return found
     there = sorted(path.name for path in runs_dir.glob("*/"))
-    near = nearest(Path(text).name, there)
-    meant = f" Did you mean {near}?" if near else f" There are {', '.join(there)}." if there else ""
-    raise ConfigError(f"there is no run {text}.{meant}", "`walkerlab report` creates the run of the paper config.")
+    near = meant(Path(text).name, there) or (f" There are {', '.join(there)}." if there else "")
+    raise ConfigError(f"there is no run {text}.{near}", "`walkerlab report` creates the run of the paper config.")
 
 
 def claim(folder: RunFolder, config: Config) -> None:
@@ -229,16 +229,6 @@ def difference(
         tuple(name for name in first if name not in second),
         tuple(name for name in second if name not in first),
     )
-
-
-def leaves(block: Mapping[str, Any], lists: bool = False, prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """Dotted names and values of nested objects; of lists, too, with the places among the names, or as values."""
-    for name, value in block.items():
-        inner = {str(place): item for place, item in enumerate(value)} if lists and isinstance(value, list) else value
-        if isinstance(inner, Mapping):
-            yield from leaves(inner, lists, f"{prefix}{name}.")
-        else:
-            yield f"{prefix}{name}", value
 
 
 def pairs(first: Mapping[str, Any], second: Mapping[str, Any]) -> tuple[Pair, ...]:

@@ -154,7 +154,7 @@ def pads_pitch(contact: Contact, rigid_step_length_m: float, own_pitch_m: float 
 def normal_law(contact: Contact) -> NormalLaw:
     """The normal force in SI."""
     si = contact.in_si()
-    return NormalLaw(si.stiffness_N_per_m_e, si.exponent, si.damping_N_s_m, si.full_damping_penetration_m)
+    return NormalLaw(si.stiffness, si.exponent, si.damping, si.full_damping_penetration)
 
 
 def friction_law(contact: Contact) -> FrictionLaw:

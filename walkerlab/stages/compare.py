@@ -28,9 +28,8 @@ from walkerlab.paper.measured import (
     rigid_model,
 )
 from walkerlab.paper.printed import fixed_point_as_printed
-from walkerlab.paper.rows import NumberVerdict, paper_rows
+from walkerlab.paper.rows import NumberVerdict, paper_rows, table_1, table_2, table_3
 from walkerlab.paper.study import study_the_paper
-from walkerlab.paper.tables import table_1, table_2, table_3
 from walkerlab.pipeline.progress import Progress
 from walkerlab.scene.contact import GAIT, contact_scene, start_state, with_contact
 from walkerlab.scene.rigid import compass

@@ -56,19 +56,15 @@ def compare_releases(config: ContactConfig, state: State, pitch_m: float) -> dic
 def told(scene: ContactScene, walk: ContactWalkResult) -> dict[str, Any]:
     """How a walk ended, its last step, how long into it the knee locked, and what a step dissipates by channel."""
     steps = walk.steps
+    said = {"outcome": walk.outcome.label, "steps": steps, "of": STEPS}
     if steps == 0 or walk.knee_strike_time_s is None:
-        return {"outcome": walk.outcome.label, "steps": 0, "of": STEPS, **NO_STEP}
+        return said | dict.fromkeys(("period_s", "length_m", "knee_strike_s", "dissipated_J_per_step"))
     period, strike = float(walk.periods_s[-1]), float(walk.knee_strike_time_s[-1])
     lost = by_channel(scene.walker, walk.dissipated_J)
     return {
-        "outcome": walk.outcome.label,
-        "steps": steps,
-        "of": STEPS,
+        **said,
         "period_s": period,
         "length_m": float(walk.lengths_m[-1]),
         "knee_strike_s": strike - (float(walk.touch_time_s[-1]) - period) if not math.isnan(strike) else None,
         "dissipated_J_per_step": {name: joules / steps for name, joules in lost.items()},
     }
-
-
-NO_STEP = {"period_s": None, "length_m": None, "knee_strike_s": None, "dissipated_J_per_step": None}

@@ -69,6 +69,16 @@ class FamilyQuestion:
         parameter = parameter_of(block.over, self.config)
         return replace(self, parameter=parameter, span=ValueSpan(block.least, block.most))
 
+    def refuse_ends(self, block: str) -> None:
+        """Raise ConfigError, about keys of the block, for an end of the span that the config cannot have."""
+        key = self.parameter.key
+        for name, value in (("from", self.span.least), ("to", self.span.most)):
+            if self.parameter.config_at(self.config, value) is None:
+                raise ConfigError(
+                    f"continuation.{block}{name}: {key} cannot be {value:g} {self.parameter.unit}",
+                    f"`walkerlab schema {key}` says what the key allows.",
+                )
+
     def touches(self, model: str) -> bool:
         """Whether a model changes over the span."""
         walkers: Callable[..., Callable[[float], Any]] = (
@@ -126,19 +136,15 @@ def run(config: ContinuationConfig, _inputs: Mapping[str, Content], progress: Pr
 def models_of(asked: FamilyQuestion) -> tuple[str, ...]:
     """The models that are followed.
 
-    Raises ConfigError for one that the config has not, for a key that touches none or cannot have the ends of its span,
+    Raises ConfigError for one that the config has not, for keys that touch none or cannot have the ends of their spans,
     and for a second key that is the first, or whose range leaves out the config's own value.
     """
-    config, key, second = asked.config, asked.parameter.key, asked.second
+    config, second = asked.config, asked.second
     if asked.models != (RIGID,) and config.contact is None:
         raise without_contact("the contact model", config.walker, "Use --model rigid.")
-    for name, value in (("from", asked.span.least), ("to", asked.span.most)):
-        if asked.parameter.config_at(config, value) is None:
-            raise ConfigError(
-                f"continuation.{name}: {key} cannot be {value:g} {asked.parameter.unit}",
-                f"`walkerlab schema {key}` says what the key allows.",
-            )
+    asked.refuse_ends("")
     if second is not None:
+        second.refuse_ends("second.")
         own, span, name = second.parameter.value_in(config), second.span, second.parameter.key
         if second.parameter.path == asked.parameter.path:
             raise ConfigError(
@@ -401,13 +407,13 @@ def attractor_summary(family: Family) -> dict[str, Any]:
 def curve_rows(family: Family) -> Iterator[dict[str, Any]]:
     """Curves of bifurcations over the plane: where they begin and end, and why."""
     for curve in family.curves:
-        begins, *_, ends = zip(curve.first.tolist(), curve.second.tolist(), strict=True)
+        points = list(zip(curve.first.tolist(), curve.second.tolist(), strict=True))
         yield {
             "kind": curve.kind,
             "period": curve.period,
-            "points": int(curve.first.size),
-            "begins": list(begins),
-            "ends": list(ends),
+            "points": len(points),
+            "begins": list(points[0]),
+            "ends": list(points[-1]),
             "reasons": [end.reason for end in curve.ends],
         }
 

@@ -6,6 +6,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from walkerlab.labels import ERROR_OF_EACH_STEP
 from walkerlab.solvers.registry import ENDLESS, Tolerances
 
 LEAST_RTOL: Final = 1e-14  # that the schema allows
@@ -14,14 +15,6 @@ MORE_WORK: Final = 10  # that tighter tolerances may take
 SAMPLE: Final = 16  # of many walks, so many are taken again
 USUAL: Final = TIGHTER[100.0]
 ROUNDING: Final = 1e-6  # of a tolerance that was divided
-OF_EACH_STEP: Final = {
-    "step_period_s": "step_periods_s",
-    "step_length_m": "step_lengths_m",
-    "slip_m": "slips_m",
-    "rolling_m": "rolling_m",
-    "knee_strike_time_s": "knee_strike_times_s",
-}
-"""Largest change of a number of the steps: its key, and the key of that number in a walk's summary."""
 
 Summary = Mapping[str, Any]
 
@@ -29,12 +22,12 @@ Summary = Mapping[str, Any]
 def numerical_error(walked: Summary, tolerances: Tolerances, walk: Callable[[Tolerances], Summary]) -> dict[str, Any]:
     """How much a walk's numbers change when it is walked again, at a hundred times tighter tolerances if there are any.
 
-    walked      summary of the walk: its `outcome`, `steps`, `end_time_s`, and what its steps have of `OF_EACH_STEP`
+    walked      summary of the walk: its `outcome`, `steps`, `end_time_s`, and lists with a number for each step
     tolerances  that it was walked with
     walk        the same walk with others, as its summary
 
-    Returns the largest changes of what its steps have, by the keys of `OF_EACH_STEP`, and `end_time_s` (s); `by` tells
-    what was changed if it is not the usual. Only `reason` if the second walk ends otherwise.
+    Returns the largest changes of what its steps have, named as in `ERROR_OF_EACH_STEP`, and `end_time_s` (s); `by`
+    tells what was changed if it is not the usual. Only `reason` if the second walk ends otherwise.
     """
     tighter, by = tightened(tolerances)
     return change(walked, walk(tighter), by)
@@ -60,7 +53,7 @@ def change(walked: Summary, again: Summary, by: str = USUAL) -> dict[str, Any]:
         steps = f"{again['steps']} step{'' if again['steps'] == 1 else 's'}"
         return {"reason": f"with {by} the walk ends otherwise: {again['outcome']} after {steps}"}
     changes = {}
-    for name, key in OF_EACH_STEP.items():
+    for key, name in ERROR_OF_EACH_STEP.items():
         both = zip(walked.get(key) or (), again.get(key) or (), strict=False)  # a last foot may not have lifted in one
         apart = [abs(one - other) for one, other in both if one is not None and other is not None]
         if apart and any(walked[key]):  # points do not roll

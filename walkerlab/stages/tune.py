@@ -238,13 +238,12 @@ def table_2(found: TuneRun) -> dict[str, dict[str, Any]]:
     for k, (name, value) in enumerate(zip(found.names, found.rigid_state, strict=True)):
         row: dict[str, Any] = {"unit": "rad" if k < len(found.names) // 2 else "rad/s"}
         if found.paper is not None:
-            matlab, adams = TABLE_2[k].matlab.value, TABLE_2[k].adams.value
             row |= {
-                "paper_matlab": matlab,
-                "paper_adams": adams,
+                "paper_matlab": TABLE_2[k].matlab.value,
+                "paper_adams": TABLE_2[k].adams.value,
                 "paper_percent": TABLE_2[k].percent.value,
-                "paper_percent_of_matlab": percent(adams, matlab, matlab),
-                "paper_percent_of_adams": percent(adams, matlab, adams),
+                "paper_percent_of_matlab": TABLE_2[k].percent_of_matlab,
+                "paper_percent_of_adams": TABLE_2[k].percent_of_adams,
             }
         ours = None if adjusted is None else adjusted[k]
         rows[name] = {

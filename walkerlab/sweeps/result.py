@@ -11,11 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walkerlab.config.schema import Config
-from walkerlab.labels import in_words, unit_by_name
+from walkerlab.labels import ERROR_OF_EACH_STEP, in_words, unit_by_name
 from walkerlab.report.headlines import LAST_OF, headlines
 from walkerlab.scene.endings import Pads, endings
 from walkerlab.solvers.system import Integers
-from walkerlab.stages.numerical_error import OF_EACH_STEP
 from walkerlab.store.artifact import InTurn
 from walkerlab.store.content import Content, Variable
 from walkerlab.sweeps.chunk import Chunk
@@ -170,7 +169,7 @@ class Merge:
         `ended_otherwise` counts those that came to another end, whose error is unknown.
         Nothing for a stage that does not walk.
         """
-        found = {key: self.of(f"numerical_error.{key}") for key in ("end_time_s", *OF_EACH_STEP)}
+        found = {key: self.of(f"numerical_error.{key}") for key in ("end_time_s", *ERROR_OF_EACH_STEP.values())}
         reasons, ends = self.of("numerical_error.reason"), found["end_time_s"]
         otherwise = 0 if reasons is None else int(np.sum(reasons != ""))
         known = 0 if ends is None else int(np.sum(np.isfinite(ends)))

@@ -21,7 +21,7 @@ from walkerlab.verification.ordinary import REFERENCE, STEPS, arrival_of, fixed,
 from walkerlab.verification.starts import ContactStart, configured, prepared
 from walkerlab.verification.verdict import finite
 
-PAPER_STIFFNESS: Final = Contact().in_si().stiffness_N_per_m_e
+PAPER_STIFFNESS: Final = Contact().in_si().stiffness
 STIFFNESS: Final = (1e-6 * PAPER_STIFFNESS, 1e6 * PAPER_STIFFNESS)
 STICTION_VELOCITY: Final = (1e-7, 10.0)  # m/s
 NONE: Final = -1.0  # in the place of an error in what is kept, whose numbers are finite

@@ -68,11 +68,11 @@ def scaled(config: Config, by: Units) -> Config:
         si, pitch = config.contact.in_si(), config.contact.pad_pitch
         ground = {
             "units": "si",
-            "stiffness": si.stiffness_N_per_m_e * by.force / by.length**si.exponent,
-            "damping": si.damping_N_s_m * by.mass / by.time,
-            "full_damping_penetration": si.full_damping_penetration_m * by.length,
-            "stiction_velocity": si.stiction_velocity_m_s * by.length / by.time,
-            "friction_velocity": si.friction_velocity_m_s * by.length / by.time,
+            "stiffness": si.stiffness * by.force / by.length**si.exponent,
+            "damping": si.damping * by.mass / by.time,
+            "full_damping_penetration": si.full_damping_penetration * by.length,
+            "stiction_velocity": si.stiction_velocity * by.length / by.time,
+            "friction_velocity": si.friction_velocity * by.length / by.time,
             "pad_pitch": pitch if isinstance(pitch, str) else pitch * by.length,
         }
         changes["contact"] = config.contact.model_copy(update=ground)

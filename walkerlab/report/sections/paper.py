@@ -33,7 +33,7 @@ def numbers(results: Results) -> Section | None:
     if results.departures:
         blocks = (Paragraph(words("paper.departs", results.departures), "fair"), *blocks)
     verdicts = Counter(row["verdict"] for row in rows)
-    finding = words("paper.finding", len(rows), {name: verdicts[name] for name in TONES if verdicts[name]})
+    finding = words("paper.finding", {name: verdicts[name] for name in TONES})
     return Section("paper-numbers", "The paper’s numbers", blocks, finding, PAPER)
 
 

@@ -24,13 +24,11 @@ def section(results: Results) -> Section | None:
     if not summary:
         return None
     cases, known = summary["cases"], summary["known"]
-    failed = [words("stability.failed_case", one) for one in cases if not one["ok"]]
-    failed += [words("stability.failed_problem", one) for one in known if not one["ok"]]
     unanswered = [(row["second_tried"], row) for row in cases if row["second_tried"]]
     missed = [(f"{one['measure']}: {one['why']}", row) for row in cases for one in row["not_measured"]]
     note = words("stability.cases", by_reason(unanswered), by_reason(missed))
     blocks: list[PageBlock] = [
-        *(Paragraph(said, "bad") for said in failed),
+        *(Paragraph(said, "bad") for said in failures(summary)),
         Paragraph(words("stability.judgement")),
         table("Extreme cases", CASE_COLUMNS, grouped(cases, "family"), wordy=True, note=note),
         table("Problems with known answers, run through the contact code", KNOWN_COLUMNS, known, wordy=True),
@@ -40,9 +38,19 @@ def section(results: Results) -> Section | None:
     planes = results.summary("stability-maps")
     blocks.append(Paragraph(words("stability.maps", planes) if planes else words("stability.how_to_map")))
     blocks += [Gallery((picture,)) for picture in results.pictures if picture.name.startswith("stability")]
+    return Section("stability", "Stiff and extreme cases", tuple(blocks), finding(summary), CASES)
+
+
+def finding(summary: Row) -> str:
+    """How many came out right."""
     total = summary["passed"] + summary["failed"]
-    finding = f"{summary['passed']} of {count(total, 'extreme case')} and known problems came out right."
-    return Section("stability", "Stiff and extreme cases", tuple(blocks), finding, CASES)
+    return f"{summary['passed']} of {count(total, 'extreme case')} and known problems came out right."
+
+
+def failures(summary: Row) -> list[str]:
+    """What did not, a paragraph each."""
+    failed = [words("stability.failed_case", one) for one in summary["cases"] if not one["ok"]]
+    return failed + [words("stability.failed_problem", one) for one in summary["known"] if not one["ok"]]
 
 
 def worst_measure(row: Row) -> float | None:

@@ -5,6 +5,7 @@ from itertools import zip_longest
 from typing import Any
 
 from walkerlab.account import CHANNELS
+from walkerlab.labels import ERROR_OF_EACH_STEP
 from walkerlab.report.blocks import PageBlock, Paragraph, Section
 from walkerlab.report.numbers import NONE, decimals_left, fixed, length, number, power_of_ten, quantity, span, whole
 from walkerlab.report.outcomes import CONTACT, MODELS, RIGID, tone
@@ -131,14 +132,8 @@ def steps(results: Results) -> Section | None:
     return Section("steps", "Step by step", tuple(blocks), words("walks.periods", periods))
 
 
-NUMBERS_OF_STEPS = {
-    "step_periods_s": ("step_period_s", 1.0), "step_lengths_m": ("step_length_m", 1.0), "slips_m": ("slip_m", 1e3)
-}  # fmt: skip
-"""Numbers of each step: under which key of `numerical_error` their error is, and the factor that shows them in mm."""
-
-
 def of_step(value: float | None, key: str, summary: Mapping[str, Any]) -> str:
     """A number of a step with the decimals that its numerical error leaves; a slip in mm."""
-    name, factor = NUMBERS_OF_STEPS[key]
-    error = (summary.get("numerical_error") or {}).get(name)
+    factor = 1e3 if key == "slips_m" else 1.0
+    error = (summary.get("numerical_error") or {}).get(ERROR_OF_EACH_STEP[key])
     return fixed(value and factor * value, decimals_left(error and factor * error))

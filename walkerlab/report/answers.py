@@ -10,13 +10,13 @@ from functools import partial
 from typing import Any
 
 from walkerlab.account import CHANNELS
-from walkerlab.cli.text import described_summary, paragraph
 from walkerlab.labels import unit_by_name
 from walkerlab.report import gaits
 from walkerlab.report.numbers import count, decimals_left, fixed, length, listed, number, quantity
 from walkerlab.report.outcomes import MODELS, WALKED, off_by
 from walkerlab.report.outcomes import walks as comes
 from walkerlab.report.tables import Cell, Column, Table, in_lines, measured, side_by_side, table
+from walkerlab.report.text import described_summary, paragraph
 from walkerlab.report.words import words
 
 Summary = Mapping[str, Any]
@@ -159,9 +159,7 @@ def compare(summary: Summary) -> list[str | Table]:
     if "verdicts" in summary:
         from walkerlab.report.sections.paper import numbers_table
 
-        verdicts = summary["verdicts"]
-        fared = listed(f"{many} {'is' if many == 1 else 'are'} {name}" for name, many in verdicts.items())
-        head = f"Of {sum(verdicts.values())} numbers that the paper prints, {fared}."
+        head = words("paper.finding", summary["verdicts"])
         return [head, numbers_table(summary["paper_numbers"]), *told]
     return [words("models.answer", summary["outcomes"]), last_steps(summary, errors), *told]
 
@@ -181,8 +179,8 @@ def last_steps(summary: Summary, errors: Mapping[str, Summary]) -> Table:
     """
     steps = []
     for name, step in summary["steps"].items():
-        known = {"period_s": "step_period_s", "length_m": "step_length_m"} if name in errors else {}
-        left = {key: Cell(fixed(step[key], decimals_left(errors[name].get(error)))) for key, error in known.items()}
+        known = {key: errors[name].get(f"step_{key}") for key in ("period_s", "length_m") if name in errors}
+        left = {key: Cell(fixed(step[key], decimals_left(error))) for key, error in known.items()}
         steps.append({"name": name, "outcome": summary["outcomes"].get(name), **step, **left})
     steps += [{"name": f"knee released at {name}", **walk} for name, walk in summary.get("releases", {}).items()]
     return table("", LAST_STEP, steps)
@@ -199,18 +197,9 @@ def accuracy(summary: Summary) -> list[str | Table]:
 
 def extreme_cases(summary: Summary) -> list[str | Table]:
     """How many cases ended as they should, and those that did not."""
-    from walkerlab.report.sections.stability import family_table
+    from walkerlab.report.sections.stability import failures, family_table, finding
 
-    total = summary["passed"] + summary["failed"]
-    head = f"{summary['passed']} of {total} extreme cases and known problems ended as expected."
-    failed = [case for case in summary["cases"] if not case["ok"]]
-    said = [f"not as expected: {case['name']} ended {case['outcome']}: {case['note']}" for case in failed]
-    said += [
-        f"not as expected: {known['name']}, off by {number(known['error'], 2)}"
-        for known in summary["known"]
-        if not known["ok"]
-    ]
-    return [head, family_table(summary["cases"]), *said]
+    return [finding(summary), family_table(summary["cases"]), *failures(summary)]
 
 
 def continuation(summary: Summary) -> list[str | Table]:

@@ -2,12 +2,12 @@
 
 import pytest
 
-from walkerlab.cli.answers import ANSWERS, answer, elided, verdict
-from walkerlab.cli.text import COLUMNS, described_summary
 from walkerlab.outcome import Outcome
+from walkerlab.report.answers import ANSWERS, answer, elided, verdict
 from walkerlab.report.gaits import gait_table
 from walkerlab.report.numbers import number
 from walkerlab.report.tables import Column, aligned, as_csv, as_tex, in_lines, measured, side_by_side, table, width
+from walkerlab.report.text import COLUMNS, described_summary
 
 GAIT = {
     "state": [-0.2042, 0.1694, -0.6058, -0.861],
@@ -218,11 +218,11 @@ def test_columns_line_up_under_letters_with_dots():
 def test_the_verdict_of_a_run_is_three_paragraphs():
     numbers = {"verdicts": {"reproduced": 3, "explained": 1}, "paper_numbers": []}
     cases = {"passed": 5, "failed": 0, "cases": [], "known": []}
-    judged = "5 of 5 extreme cases and known problems ended as expected."
-    begun = ("On a slope of 0.0174", "The rigid model walks all 20000 steps.", "Of 4 numbers that the paper prints,")
+    judged = "5 of 5 extreme cases and known problems came out right."
+    begun = ("On a slope of 0.0174", "The rigid model walks all 20000 steps.", "Of 4 numbers that the paper prints:")
     said = verdict({"fixedpoint": GAIT, "simulate": WALK, "compare": numbers, "stability": cases})
     assert [head for line in said for head in begun if line.startswith(head)] == [*begun]
-    assert " ".join(said).endswith(f"1 is explained. {judged}")
+    assert " ".join(said).endswith(f"1 explained. {judged}")
     assert verdict({"compare": {"steps": {}, "outcomes": {}}, "stability": cases}) == [judged]
 
 
@@ -239,7 +239,9 @@ SAYS_MUCH = {
     "stability": {
         "passed": 0,
         "failed": 1,
-        "cases": [{"family": "start", "name": "slow", "outcome": "fell", "ok": False, "note": LONG}],
+        "cases": [
+            {"family": "start", "name": "slow", "outcome": "fell", "ok": False, "note": LONG, "reason": "it walks"}
+        ],
         "known": [],
     },
     "engines": {"rows": [], "versions": {"drake": "1.5"}, "conclusions": {"kneed": {"own-law": LONG}}},

@@ -1,0 +1,83 @@
+"""Results made by hand are laid out as small real runs of the stages store theirs: groups, variables, keys."""
+
+import re
+
+import pytest
+import synthetic_results
+import synthetic_tune
+import synthetic_walks
+from synthetic_families import families
+
+from walkerlab.config.loader import load
+from walkerlab.orbits import plane
+from walkerlab.pipeline.in_memory import InMemory, Keys
+
+SMALL = {
+    "fixedpoint": (),
+    "simulate": (),
+    "contact-sim": (),
+    "compare": (),
+    "tune": ("tune.cells=3", "tune.rigid_limit=false"),
+    "continuation": (
+        "continuation.over=slope_deg", "continuation.from=4.3", "continuation.to=5.05", "continuation.periods=2",
+        "continuation.points=10", "continuation.model=rigid",
+        "continuation.second={over: walker.hip_mass_kg, from: 9.5, to: 10.5}",
+    ),
+}  # fmt: skip
+MADE = {
+    "walks that the report gets": {
+        name: one() for name, one in synthetic_results.EVERYTHING.items() if name != "compare"
+    },
+    "walks that figures get": synthetic_walks.both_models(),
+    "a comparison with the paper": {"compare": synthetic_results.compare()},
+    "families": families(),
+    "families that move": {"continuation": synthetic_results.families_that_move(synthetic_results.simulate())},
+    "tune": {"tune": synthetic_tune.tuned()["tune"]},
+}
+CASES = [(title, stage) for title, results in MADE.items() for stage in results]
+NO_LIMIT = "limit"  # takes seconds: its columns are asked for by figures/costs.py
+
+
+@pytest.fixture(scope="module")
+def real():
+    """What stages store of small runs of the paper's walker, computed as they are asked for."""
+    memory, known = InMemory(), {}
+
+    def stored(stage):
+        if stage not in known:
+            config = load(None, ["strides=1", *SMALL[stage]]).config
+            with pytest.MonkeyPatch.context() as patch:
+                patch.setattr(plane, "CELLS", (3, 2))
+                known[stage] = memory.answer(config, stage, Keys().of(config, stage)).content
+        return known[stage]
+
+    return stored
+
+
+def kinds(groups):
+    """The variables of groups that differ in number only, as branch_0 and branch_1, with dimensions and unit."""
+    found = {}
+    for path, group in groups.items():
+        there = found.setdefault(re.sub(r"\d+", "N", path), {})
+        there.update({name: (one.dims, one.units) for name, one in group.variables.items()})
+    return found
+
+
+def keys(summary):
+    """The keys of a summary, those of blocks and of rows dotted."""
+    for key, value in summary.items():
+        rows = value if isinstance(value, list) else [value]
+        inner = {below for row in rows if isinstance(row, dict) for below in keys(row)}
+        yield from (key, *(f"{key}.{below}" for below in inner))
+
+
+@pytest.mark.parametrize(("title", "stage"), CASES)
+def test_what_is_made_by_hand_is_laid_out_as_it_is_stored(real, title, stage):
+    made, stored = MADE[title][stage], real(stage)
+    there = kinds(stored.groups)
+    for path, variables in kinds(made.groups).items():
+        if path.split("/")[0] == NO_LIMIT:
+            continue
+        for name, layout in variables.items():
+            assert there[path].get(name) == layout, f"{path} {name}"
+    assert set(keys(made.summary)) <= set(keys(stored.summary))

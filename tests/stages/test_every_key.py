@@ -1,0 +1,111 @@
+"""Every number of every built-in walker, in every stage that takes a key: it is followed, or refused in words."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from walkerlab.config.fields import kind, leaves
+from walkerlab.config.files import builtin_names
+from walkerlab.config.loader import load
+from walkerlab.config.reads import only
+from walkerlab.config.schema import Config
+from walkerlab.errors import ConfigError
+from walkerlab.orbits.families import ValueSpan
+from walkerlab.orbits.family_search import CONTACT, RIGID
+from walkerlab.pipeline.graph import PIPELINE
+from walkerlab.pipeline.in_memory import InMemory, Keys
+from walkerlab.pipeline.progress import Silent
+from walkerlab.scene.parameter import PHYSICAL, parameter_of
+from walkerlab.stages import robustness
+from walkerlab.stages.continuation import FamilyQuestion, models_of
+from walkerlab.sweeps.question import axis, described
+
+WALKERS = {
+    **dict.fromkeys(builtin_names(), ()),
+    "kneed with compliant stops": ("walker.knee.lock=compliant",),
+    "paper with a hip": ("walker.hip={spring_N_m_per_rad: 1, damping_N_m_s_per_rad: 0.1, torque_N_m: 0.01}",),
+}
+ONLY_CONTACT = ("contact.", "push_off.duration_s", "walker.knee.stop_")
+
+
+@pytest.fixture(scope="module", params=WALKERS)
+def config(request):
+    return load(Path(request.param.split(" ")[0]), WALKERS[request.param]).config
+
+
+@pytest.fixture(scope="module")
+def keys(config):
+    """The keys of a model that hold a number in the config."""
+    found = ["slope_deg"]
+    for path, field in leaves(Config, held=config):
+        held = config
+        for name in path:
+            held = getattr(held, name, None)
+        if path[0] in PHYSICAL and "number" in kind(field.annotation) and isinstance(held, int | float):
+            found.append(".".join(path))
+    return found
+
+
+def question(config, key, model):
+    """What `continuation` asks over a small span above a key's own value, or below where that is the largest."""
+    taken = only(config, PIPELINE["continuation"].takes)
+    taken.continuation = config.continuation.model_copy(update={"model": model})
+    parameter = parameter_of(key, taken)
+    value = parameter.value_in(taken)
+    ends = (value, 1.001 * value) if value else (0.0, 1e-15)
+    if value and parameter.config_at(taken, ends[1]) is None:
+        ends = (0.999 * value, value)
+    return FamilyQuestion(taken, parameter, ValueSpan(*ends), 1, 10)
+
+
+def followed(asked):
+    """The models that are followed, or why none is."""
+    try:
+        return models_of(asked), ""
+    except ConfigError as error:
+        return (), error.message
+
+
+def test_continuation_follows_every_number_in_the_models_that_have_it_or_says_why_not(config, keys):
+    every = (RIGID,) if config.contact is None else (RIGID, CONTACT)
+    for key in keys:
+        models, refused = followed(question(config, key, "rigid" if len(every) == 1 else "both"))
+        assert models in (every, (CONTACT,)) or f" {key} " in f" {refused} "
+        assert RIGID in models or refused or key.startswith((*ONLY_CONTACT, "walker.foot_radius_m"))
+
+
+def test_a_second_number_is_followed_or_refused_too(config, keys):
+    first = question(config, "gravity_m_s2", "rigid")
+    for key in keys:
+        span = question(config, key, "rigid").span
+        second = {"over": key, "from": span.least, "to": span.most}
+        block = Config.model_validate({"continuation": {"model": "rigid", "second": second}}).continuation
+        taken = only(config, PIPELINE["continuation"].takes)
+        taken.continuation = block
+        models, refused = followed(replace(first, config=taken))
+        assert models == (RIGID,) or refused.startswith("continuation.second")
+        assert models or f" {key} " in f" {refused} "
+
+
+def test_robustness_differentiates_the_gait_by_every_number(config, keys):
+    fixedpoint = InMemory().answer(config, "fixedpoint", Keys().of(config, "fixedpoint"))
+    taken = only(config, PIPELINE["robustness"].takes)
+    subject = next(robustness.subjects(taken, {"fixedpoint": fixedpoint.content}, Silent()))
+    assert set(robustness.numbers_read(subject)) <= set(keys)
+    for key in keys:
+        for name, gradient in robustness.gradients_of(subject, key).items():
+            assert gradient.value is not None or gradient.why, f"{name} by {key}"
+            assert gradient.value is None or np.isfinite(gradient.value), f"{name} by {key}"
+            if key.startswith(ONLY_CONTACT):
+                effect = gradient.value * parameter_of(key, config).value_in(config)
+                assert abs(effect) < 1e-6, f"the rigid model does not read {key}"
+
+
+def test_sweeps_take_every_number(config, keys):
+    for key in keys:
+        asked = question(config, key, "rigid")
+        ends = (asked.span.least, asked.span.most)
+        assert axis(key, f"{ends[0]!r}:{ends[1]!r}:2", f"--over {key}").values == pytest.approx(ends)
+        assert described(config, key)[1] != key, "its meaning is known"
