@@ -40,7 +40,7 @@ def test_a_step_loses_what_its_beginning_took_whatever_lies_between_two_samples(
 
 
 def test_what_drives_a_walker_is_no_loss_and_hides_none():
-    """A push-off gives back what a step loses: the walker's energy stays, and straight legs have no knees to lose it."""
+    """A push-off gives back what a step loses: the energy stays, and straight legs have no knees to lose it."""
     walk = contact()
     gone = walk["trajectory"]
     given = Variable(150.0 - gone["total_energy_J"], ("time",), "J", "given")

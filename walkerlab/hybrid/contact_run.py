@@ -418,10 +418,10 @@ def balanced(ended: int, observer: ContactObserver, tolerances: Tolerances) -> O
     return Outcome(ended) if closes else Outcome.SOLVER_FAILED
 
 
-def driven_work(walker: ContactWalker, along: float, up: float, observer: ContactObserver) -> DrivenWork:
-    """What was given over the steps taken, which led so far along the slope and up (m)."""
+def driven_work(walker: ContactWalker, along: float, up: float, account: Floats) -> DrivenWork:
+    """What was given on a way that led so far along the slope and up (m); account (entries,) J."""
     gravity = walker.mass * (walker.gravity_along * along - walker.gravity_down * up)
-    return DrivenWork(walker.mass * walker.gravity, gravity, *observer.account[AT_TOUCH, PUSH_OFF:].tolist())
+    return DrivenWork(walker.mass * walker.gravity, gravity, *account[PUSH_OFF:].tolist())
 
 
 def gather(
@@ -466,6 +466,6 @@ def gather(
         energy_balance_residual_J=float(observer.extremes[RESIDUAL]),
         explained_residual_J=explained_residual(observer, tolerances),
         dissipated_J=observer.account[SO_FAR, LOST].copy(),
-        driven=driven_work(walker, along, up, observer),
+        driven=driven_work(walker, along, up, observer.account[AT_TOUCH]),
         samples=samples,
     )
