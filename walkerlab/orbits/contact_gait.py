@@ -145,7 +145,7 @@ def follow_from_rigid(walker: ContactWalker, ground: JudgedGround, tolerances: T
         return GaitAnswer(
             None,
             "nearly rigid ground has no gait either",
-            f"{hint}Damp or stiffen the contact, choose a gentler slope, or, on pads, contact.terrain: after-mid-swing.",
+            f"{hint}Damp or stiffen the contact, try a gentler slope, or, on pads, contact.terrain: after-mid-swing.",
         )
     gaits = {0.0: last}
 
