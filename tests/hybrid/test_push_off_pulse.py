@@ -22,6 +22,12 @@ from walkerlab.solvers.system import jacobian
 WALK = Tolerances("radau5", 1e-8, 1e-10, 10**7)
 TIGHT = Tolerances("radau5", 1e-12, 1e-13, 10**7)
 
+ON_THE_LEVEL = ("slope_deg=0", "push_off.impulse_N_s=0.2", "walker.hip.torque_N_m=0.15")
+PUSHED = {
+    "level": (), "kneed-level": (), "parts": ON_THE_LEVEL, "kneed-round-feet": ON_THE_LEVEL,
+    "torso": ("slope_deg=0", "push_off.impulse_N_s=2"), "round-feet": ("slope_deg=0", "push_off.impulse_N_s=0.12"),
+}  # fmt: skip
+
 
 def scene_of(name, *changes):
     config = load(Path(name), changes).config
@@ -59,9 +65,9 @@ def test_a_pulse_has_the_impulse_of_the_push_off_and_is_smooth_at_its_ends():
     assert pulse_force(before_any_touch, 2.002) == 0.0
 
 
-@pytest.mark.parametrize("name", ["level", "kneed-level"])
+@pytest.mark.parametrize("name", PUSHED)
 def test_the_equations_derivatives_in_a_pulse_are_differences(name):
-    _, scene, gait = scene_of(name, "push_off.impulse_N_s=1")
+    _, scene, gait = scene_of(name, *PUSHED[name])
     system = on_ground(scene.walker, (False, False), feet=(1, 1), times=(0.0,))
     y = np.array(start_state(scene, gait.state))
     J, t = np.zeros((y.size, y.size)), 0.3 * scene.walker.whole.push_off_duration
@@ -94,9 +100,9 @@ def test_the_force_acts_along_the_line_from_the_foot_to_the_hip_and_turns_nothin
     assert upward > 0.0
 
 
-@pytest.mark.parametrize("name", ["level", "kneed-level"])
+@pytest.mark.parametrize("name", ["level", "kneed-level", "torso"])
 def test_the_step_maps_derivative_takes_along_when_the_pulse_begins(name):
-    config, _, gait = scene_of(name)
+    config, _, gait = scene_of(name, *PUSHED[name])
     found = gait_off_pads(config, gait.step_length, gait.state)
     assert found.gait is not None, found.reason
     scene = contact_scene(
@@ -118,11 +124,12 @@ def test_the_step_maps_derivative_takes_along_when_the_pulse_begins(name):
         np.testing.assert_allclose(DP[:, j], slope, rtol=1e-4, atol=2e-4)
 
 
-def test_the_energy_of_a_pushed_walk_balances():
-    for name in ("level", "kneed-level"):
-        walk, _ = walked(name, steps=4)
-        assert walk.energy_balance_residual_J < walk.explained_residual_J
-        assert walk.driven.push_off > 0.0
+@pytest.mark.parametrize("name", PUSHED)
+def test_the_energy_of_a_pushed_walk_balances(name):
+    walk, _ = walked(name, *PUSHED[name], steps=4)
+    assert walk.steps == 4
+    assert walk.energy_balance_residual_J < walk.explained_residual_J
+    assert walk.driven.push_off > 0.0
 
 
 def at(name, times, *changes, steps=2):
