@@ -27,7 +27,7 @@ ORIGIN = Provenance(
 
 
 def stored(stage, groups, summary):
-    walker = {"type": "compass", "leg_length_m": LEG_LENGTH, "foot_radius_m": 0.001}
+    walker = {"type": "compass", "leg_length_m": LEG_LENGTH, "foot_radius_m": 0.001, "hip": {}}
     asked = {"walker": walker, "slope_rad": SLOPE, "contact": LAW, "push_off": {"impulse_N_s": 0.0}}
     identity = Identity(stage, asked, {}, "c0de")
     return Stored(groups, summary, identity=identity, provenance=ORIGIN, complete=True, seal="5ea1")

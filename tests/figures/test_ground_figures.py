@@ -2,12 +2,13 @@
 
 import numpy as np
 import pytest
-from synthetic_walks import WEIGHT, both_models, contact, without
+from synthetic_walks import WEIGHT, both_models, contact, stored, without
 
 from walkerlab.figures.canvas import styled
 from walkerlab.figures.ground import FIGURES, losses
 from walkerlab.figures.style import CONTACT
 from walkerlab.figures.walks import walk_of
+from walkerlab.store.content import Group, Variable
 
 FORCES, LOST = FIGURES
 
@@ -36,6 +37,19 @@ def test_a_step_loses_what_its_beginning_took_whatever_lies_between_two_samples(
     np.testing.assert_allclose(friction, 0.1 * damping, atol=1e-12)
     said = LOST.caption(both_models())
     assert "1.1 J in the mean: 90.9 % to damping of the ground, 9.09 % to friction" in said
+
+
+def test_what_drives_a_walker_is_no_loss_and_hides_none():
+    """A push-off gives back what a step loses: the energy stays, and straight legs have no knees to lose it."""
+    walk = contact()
+    gone = walk["trajectory"]
+    given = Variable(150.0 - gone["total_energy_J"], ("time",), "J", "given")
+    level = Variable(np.full(given.values.size, 150.0), ("time",), "J", "energy")
+    driven = {**gone.variables, "push_off_J": given, "total_energy_J": level}
+    found = losses(walk_of(stored("contact-sim", {**walk.groups, "trajectory": Group(driven)}, walk.summary), CONTACT))
+    passive = losses(walk_of(walk, CONTACT))
+    assert [*found] == [*passive]
+    np.testing.assert_allclose([*found.values()], [*passive.values()], atol=1e-12)
 
 
 def test_bars_stand_on_one_another():

@@ -13,6 +13,7 @@ from test_foot_on_ground import differenced
 from walkerlab.config import loader
 from walkerlab.ground.walker import LOCKED, RELEASED, changed_forms, on_ground
 from walkerlab.mechanics.standing import STRAIGHT, Mode
+from walkerlab.orbits.fixed_point import find_gaits
 from walkerlab.scene.contact import contact_scene, start_state
 from walkerlab.scene.rigid import rigid_walker
 from walkerlab.solvers.registry import Tolerances
@@ -22,6 +23,7 @@ IN_THE_AIR = (False, False)
 RIGID_STEP = 0.3718088  # m
 HIP = {"driven_hip": True, "hip_stiffness": 10.0, "hip_damping": 0.4, "hip_torque": 1.5}
 SETTINGS = ("walker.hip.spring_N_m_per_rad=10", "walker.hip.damping_N_m_s_per_rad=0.4", "walker.hip.torque_N_m=1.5")
+TOLERANCES = Tolerances("radau5", 1e-9, 1e-11, 10**6)
 angles = st.tuples(*(st.floats(-0.6, 0.6),) * 2)
 rates = st.tuples(*(st.floats(-3.0, 3.0),) * 2)
 
@@ -62,11 +64,25 @@ def test_with_knees_they_act_on_the_thighs():
     assert (swing, stance) == (locked.form.thighs[0], locked.form.thighs[1])
 
 
+def test_a_springs_work_over_the_steps_taken_is_what_its_energy_fell_by():
+    """As in the rigid model; the energy balance counts what it stores."""
+    config = loader.load(Path("paper"), ["slope_deg=3", SETTINGS[0], "contact.terrain=after-mid-swing"]).config
+    gait = find_gaits(rigid_walker(config, "corrected")).gait
+    scene = contact_scene(config, gait.step_length)
+    start = start_state(scene, gait.state)
+    touch = scene.walk(start, 2, TOLERANCES).touch_time_s[-1]
+    walk = scene.walk(start, 2, TOLERANCES, np.array([0.0, touch]))
+    apart = walk.samples.states[:, 2] - walk.samples.states[:, 3]
+    assert walk.steps == 2
+    assert walk.driven.hip == pytest.approx(5.0 * (apart[0] ** 2 - apart[1] ** 2), rel=1e-5)
+    assert abs(walk.driven.hip) > 1e-3
+
+
 def test_the_energy_balance_of_a_driven_walk_closes():
     config = loader.load(Path("paper"), ["slope_deg=0.9", *SETTINGS, "contact.terrain=after-mid-swing"]).config
     scene = contact_scene(config, RIGID_STEP)
     start = start_state(scene, (-0.2044455, 0.169539, -0.6057394, -0.861714))
-    walk = scene.walk(start, 4, Tolerances("radau5", 1e-9, 1e-11, 10**6))
+    walk = scene.walk(start, 4, TOLERANCES)
     assert walk.steps == 4
     assert walk.driven.hip > 0.1
     assert walk.energy_balance_residual_J < 1e-6

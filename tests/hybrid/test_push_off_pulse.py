@@ -9,6 +9,7 @@ from walkerlab.config.loader import load
 from walkerlab.ground.motion import foot_wrench
 from walkerlab.ground.pulse import pulse_force
 from walkerlab.ground.walker import LOCKED, OF_BODIES, on_ground
+from walkerlab.hybrid.contact_run import sampled_feet
 from walkerlab.orbits.contact_map import step_from_section
 from walkerlab.orbits.fixed_point import find_gaits
 from walkerlab.outcome import Outcome
@@ -20,6 +21,12 @@ from walkerlab.solvers.system import jacobian
 
 WALK = Tolerances("radau5", 1e-8, 1e-10, 10**7)
 TIGHT = Tolerances("radau5", 1e-12, 1e-13, 10**7)
+
+ON_THE_LEVEL = ("slope_deg=0", "push_off.impulse_N_s=0.2", "walker.hip.torque_N_m=0.15")
+PUSHED = {
+    "level": (), "kneed-level": (), "parts": ON_THE_LEVEL, "kneed-round-feet": ON_THE_LEVEL,
+    "torso": ("slope_deg=0", "push_off.impulse_N_s=2"), "round-feet": ("slope_deg=0", "push_off.impulse_N_s=0.12"),
+}  # fmt: skip
 
 
 def scene_of(name, *changes):
@@ -58,9 +65,9 @@ def test_a_pulse_has_the_impulse_of_the_push_off_and_is_smooth_at_its_ends():
     assert pulse_force(before_any_touch, 2.002) == 0.0
 
 
-@pytest.mark.parametrize("name", ["level", "kneed-level"])
+@pytest.mark.parametrize("name", PUSHED)
 def test_the_equations_derivatives_in_a_pulse_are_differences(name):
-    _, scene, gait = scene_of(name, "push_off.impulse_N_s=1")
+    _, scene, gait = scene_of(name, *PUSHED[name])
     system = on_ground(scene.walker, (False, False), feet=(1, 1), times=(0.0,))
     y = np.array(start_state(scene, gait.state))
     J, t = np.zeros((y.size, y.size)), 0.3 * scene.walker.whole.push_off_duration
@@ -93,9 +100,9 @@ def test_the_force_acts_along_the_line_from_the_foot_to_the_hip_and_turns_nothin
     assert upward > 0.0
 
 
-@pytest.mark.parametrize("name", ["level", "kneed-level"])
+@pytest.mark.parametrize("name", ["level", "kneed-level", "torso"])
 def test_the_step_maps_derivative_takes_along_when_the_pulse_begins(name):
-    config, _, gait = scene_of(name)
+    config, _, gait = scene_of(name, *PUSHED[name])
     found = gait_off_pads(config, gait.step_length, gait.state)
     assert found.gait is not None, found.reason
     scene = contact_scene(
@@ -117,11 +124,12 @@ def test_the_step_maps_derivative_takes_along_when_the_pulse_begins(name):
         np.testing.assert_allclose(DP[:, j], slope, rtol=1e-4, atol=2e-4)
 
 
-def test_the_energy_of_a_pushed_walk_balances():
-    for name in ("level", "kneed-level"):
-        walk, _ = walked(name, steps=4)
-        assert walk.energy_balance_residual_J < walk.explained_residual_J
-        assert walk.driven.push_off > 0.0
+@pytest.mark.parametrize("name", PUSHED)
+def test_the_energy_of_a_pushed_walk_balances(name):
+    walk, _ = walked(name, *PUSHED[name], steps=4)
+    assert walk.steps == 4
+    assert walk.energy_balance_residual_J < walk.explained_residual_J
+    assert walk.driven.push_off > 0.0
 
 
 def at(name, times, *changes, steps=2):
@@ -183,6 +191,40 @@ def test_pulses_shorter_than_the_grounds_own_time_come_to_the_rigid_impulse_as_t
             off[factor, duration] = abs(walk.periods_s[1] - gait.period)
     assert off[100.0, 3e-5] < 0.1 * off[100.0, 1e-4] < 0.1 * off[100.0, 1e-3]
     assert off[100.0, 3e-5] < 1e-2 * off[1.0, 1e-6]
+
+
+def test_where_a_long_pulse_leaves_no_gait_the_advice_is_a_shorter_one_which_has_one():
+    config, _, gait = scene_of("level", "push_off.impulse_N_s=6")
+    lost = gait_off_pads(config, gait.step_length, gait.state)
+    assert lost.gait is None
+    assert "push_off.duration_s" in lost.advice
+    config, _, gait = scene_of("level", "push_off.impulse_N_s=6", "push_off.duration_s=0.001")
+    assert gait_off_pads(config, gait.step_length, gait.state).gait.stable
+
+
+def test_a_bounce_of_the_leading_foot_while_a_pulse_lasts_begins_none():
+    """Ground that hardly damps throws that foot up again; the pulse goes on as the first touch began it.
+
+    So it does under a trailing foot that has left the ground: its work is that of the stated force on its way.
+    """
+    bouncing = ("contact.damping=0.2", "contact.terrain=after-mid-swing", "push_off.duration_s=0.05")
+    _, scene, gait = scene_of("level", *bouncing, "push_off.impulse_N_s=1")
+    start = start_state(scene, gait.state)
+    touch = float(scene.walk(start, 1, WALK).touch_time_s[0])
+    seen = scene.walk(start, 2, WALK, touch + np.linspace(1e-9, 0.05, 4001)).samples
+    leading, trailing = 0, 1
+    feet = np.zeros((4001, 2, 5))
+    sampled_feet(scene.walker, seen.states, seen.has_ground, seen.level, feet)
+    heights, t = feet[:, :, 1], seen.time_s - touch
+    assert np.count_nonzero((heights[:-1, leading] > 0.0) & (heights[1:, leading] < 0.0)) >= 1
+    assert (heights[:, trailing] > 0.0).mean() > 0.5
+    theta, (leg, radius) = seen.states[:, 2 + trailing], (0.999, 0.001)
+    line = np.array([-leg * np.sin(theta), radius + leg * np.cos(theta)])
+    velocity = np.array([feet[:, trailing, 4], np.gradient(heights[:, trailing], t)])
+    u = t / 0.05
+    power = 30.0 * (u * (1.0 - u)) ** 2 / 0.05 * (line * velocity).sum(0) / np.linalg.norm(line, axis=0)
+    work = np.append(0.0, np.cumsum(0.5 * (power[1:] + power[:-1]) * np.diff(t)))
+    np.testing.assert_allclose(seen.driven_J[:, 0], work, atol=1e-3 * work[-1])
 
 
 def test_a_passive_walk_does_not_know_the_pulses_duration():

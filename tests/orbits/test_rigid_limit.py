@@ -1,22 +1,31 @@
 """Orders and limits of series that are known exactly, and what a setting changes."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from walkerlab.config.loader import load
 from walkerlab.orbits.contact_gait import with_scaled_laws
+from walkerlab.orbits.contact_map import OwnPads
+from walkerlab.orbits.fixed_point import find_gaits
 from walkerlab.orbits.rigid_limit import (
     ALL,
+    ALL_POINT,
+    SEARCH,
     STICTION,
     ContactFactors,
     Distance,
     extrapolated,
     observed_orders,
     series_of,
+    settings,
+    with_setting,
 )
-from walkerlab.scene.contact import contact_scene
+from walkerlab.orbits.step_map import Cycle, gait_near
+from walkerlab.scene.contact import contact_scene, gait_off_pads
+from walkerlab.scene.rigid import rigid_walker
 
 
 def distances(periods, ratio):
@@ -62,3 +71,32 @@ def test_full_damping_stays_where_the_static_penetration_is():
     static = [(196.2 / law.stiffness) ** (1.0 / law.exponent) for law in (before, after)]
     ratio = after.full_damping_penetration / before.full_damping_penetration
     assert ratio == pytest.approx(static[1] / static[0])
+
+
+def test_the_gait_of_a_walker_that_is_pushed_off_comes_to_the_rigid_one_in_first_order():
+    """As the ground stiffens and the pulse shortens; a pulse that stays as long leads elsewhere."""
+    config = load(Path("level"), ["contact.terrain=after-mid-swing", "walker.foot_radius_m=1e-6"]).config
+    rigid = find_gaits(rigid_walker(config, config.equations)).gait
+    scene, found = contact_scene(config, rigid.step_length), gait_off_pads(config, rigid.step_length, rigid.state)
+
+    def off(walker, gait):
+        pads = OwnPads(lambda _: walker, scene.ground, settings(1e-10), rigid.step_length)
+        near = gait_near(pads, gait.z, 0.0, SEARCH)
+        return near, abs(near.step.period_s - rigid.period) if isinstance(near, Cycle) else np.inf
+
+    gait, distances = found.gait, []
+    for setting in series_of(ALL_POINT)[1:5]:
+        gait, distance = off(with_setting(scene.walker, setting), gait)
+        distances.append(distance)
+    orders = np.log(np.divide(distances[:-1], distances[1:])) / np.log(np.sqrt(10.0))
+    assert orders == pytest.approx(1.0, abs=0.06)
+    assert distances[-1] < 2e-4
+    assert off(with_scaled_laws(scene.walker, *series_of(ALL_POINT)[4][2:]), gait)[1] > 100.0 * distances[-1]
+
+
+def test_only_the_way_to_the_limit_shortens_a_push_off_and_only_beyond_the_configs_contact():
+    walker = contact_scene(load(Path("level")).config, 0.4).walker
+    for name, shortened in ((ALL, True), (STICTION, False)):
+        durations = [with_setting(walker, one).whole.push_off_duration for one in series_of(name)]
+        assert durations[0] == 0.005
+        assert (np.diff(durations) < 0.0).all() == shortened

@@ -127,6 +127,20 @@ def test_the_page_opens_with_what_holds_what_fails_and_what_follows():
     )
 
 
+def test_of_a_driven_walker_title_lead_and_verdict_say_what_drives_it_and_at_what_cost():
+    driven = ("slope_deg=0", "push_off.impulse_N_s=4", "walker.hip.spring_N_m_per_rad=10")
+    by = "driven by a push-off of 4 N s and a hip spring of 10 N m/rad"
+    gait = stored("fixedpoint", {}, {**fixedpoint().summary, "cost_of_transport": 0.00998})
+    costly = {"fixedpoint": gait, "contact-sim": contact_sim(cost_of_transport=0.0195)}
+    found = sections(sets=driven, **costly)
+    cost = "its cost of transport is 0.00998 in the rigid gait and 0.0195 on compliant ground"
+    assert f"The walker is {by}; {cost}." in plain(found["verdict"].blocks[0].text)
+    assert "arrows are the forces of ground and push-off" in texts(found["motion"])
+    assert "Cost of transport" in texts(found["glossary"])
+    assert by in plain(lead(config(*driven), "level"))
+    assert "driven" not in plain(sections()["verdict"].blocks[0].text)
+
+
 def test_figures_of_the_paper_that_are_not_drawn_are_explained():
     figure = Picture("Figure 2. Sticks.", "As walked.", "Legs.")
     made = {name: make() for name, make in EVERYTHING.items()}

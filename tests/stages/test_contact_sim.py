@@ -33,6 +33,8 @@ FIXED_KEYS = {
     "rhs_evaluations",
     "static_penetration_m",
     "damping_ratio",
+    "work_per_step_J",
+    "cost_of_transport",
 }
 # a result of fixedpoint, as far as contact-sim reads it: the corrected gait of the paper's slope
 GAIT = Content({}, {"state": [-0.204200, 0.169400, -0.605819, -0.861041], "step_length_m": 0.3714303})

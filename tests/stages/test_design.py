@@ -11,10 +11,14 @@ from walkerlab.config.reads import only
 from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.orbits.design import Aim, Point, optima, searched
 from walkerlab.orbits.fixed_point import find_gaits
+from walkerlab.orbits.gradients import gait_numbers
 from walkerlab.pipeline.graph import PIPELINE
 from walkerlab.pipeline.progress import Silent
+from walkerlab.scene.contact import contact_scene, gait_off_pads, start_state
 from walkerlab.scene.rigid import rigid_walker
+from walkerlab.solvers.registry import Tolerances
 from walkerlab.stages import design, fixedpoint
+from walkerlab.stages.robustness import contact_subject
 
 # design contract, section 4
 FIXED_KEYS = {
@@ -109,3 +113,30 @@ def test_bounds_that_no_walker_keeps_are_no_answer():
     with pytest.raises(NoAnswer, match="keeps the other numbers"):
         run("slope-3deg", "design.minimise=period_s", "design.over={slope_deg: [2, 3]}",
             "design.keep={step_length_m: [2, 3]}", "design.starts=1")  # fmt: skip
+
+
+def contact_gait(name):
+    """Its step, and the cost of transport as design has it."""
+    config = load(Path(name), ["contact.terrain=after-mid-swing"]).config
+    walker = rigid_walker(config, config.equations)
+    gait = find_gaits(walker).gait
+    told = {"state": gait.state}
+    here = contact_subject(config, told, design.scales_of(walker), gait.step_length, Silent()).at()
+    found = gait_off_pads(config, gait.step_length, gait.state).gait
+    return config, gait, found.step, gait_numbers(here, ["cost_of_transport"])["cost_of_transport"]
+
+
+@pytest.mark.parametrize("name", ["slope-3deg", "level"])
+def test_a_contact_gaits_cost_of_transport_is_what_the_ground_takes_over_weight_and_distance(name):
+    _, _, step, cost = contact_gait(name)
+    assert cost == pytest.approx(step.dissipated_J.sum() / (20.0 * 9.81 * step.length_m), rel=1e-7)
+
+
+def test_a_settled_walk_with_knees_and_torque_costs_what_its_gait_does():
+    config, gait, _, cost = contact_gait("kneed-level")
+    scene, costs, ways = contact_scene(config, gait.step_length), [], []
+    for steps in (14, 15):
+        walk = scene.walk(start_state(scene, gait.state), steps, Tolerances("radau5", 1e-9, 1e-11, 10**8))
+        ways.append(walk.touch_along_m[-1])
+        costs.append(walk.driven.cost_of_transport(1.0))
+    assert np.subtract(*costs) / np.subtract(*ways) == pytest.approx(cost, rel=1e-5)

@@ -28,6 +28,8 @@ FIXED_KEYS = {
     "max_friction_ratio",
     "max_scuff_depth_m",
     "mean_energy_J",
+    "work_per_step_J",
+    "cost_of_transport",
 }
 GIVEN = (-0.2022, 0.1674, -0.60, -0.84)
 SLOW = (-0.2022, 0.1674, -0.4, -0.5)

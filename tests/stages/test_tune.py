@@ -51,6 +51,17 @@ def test_the_gait_is_the_one_that_the_walk_settles_on():
     assert sum(gait["lost_J"].values()) == pytest.approx(gait["height_lost_J"], rel=1e-7)
 
 
+def test_what_drives_a_gaits_step_is_what_the_ground_takes_of_it():
+    gait = small("level").summary["gait"]
+    given = gait["work_per_step_J"]
+    assert sum(gait["lost_J"].values()) == pytest.approx(sum(given.values()), rel=1e-7)
+    assert given["push_off"] == pytest.approx(sum(given.values()), rel=1e-9)
+    assert gait["cost_of_transport"] == pytest.approx(given["push_off"] / (20 * 9.81 * gait["step_length_m"]))
+    assert abs(gait["balance_J"]) < 1e-7
+    said = words("adjustment.explained", {"gait": gait}, False).replace("\xa0", " ")
+    assert "of the 1.694 J that drive a step, 1.556 J go into damping at touch-down" in said
+
+
 def test_the_papers_own_start_does_not_walk_and_says_why():
     start = small("paper").summary["paper_start"]
     assert start["outcome"] != "walked"

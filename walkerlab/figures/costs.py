@@ -241,7 +241,7 @@ LEAST = 1e-14
 def draw_limit(results: Results) -> Drawn:
     """Errors over run time, one setting a point, from the config's contact to the most rigid one.
 
-    Caption: what both amount to, with point feet besides, and the paper's claim.
+    Caption: what both amount to, with point feet besides, the paper's claim, and whether the walker pushes off.
     """
     figure, of_the_paper = blank(3.6), redoes_the_paper(results)
     # feet that roll in both models too are not made points as well
@@ -266,7 +266,8 @@ def draw_limit(results: Results) -> Drawn:
     add_legend(figure, [*key, entry("the config's contact", **CONFIGS)])
     first, *point_feet = [rows[ALIGNED] for rows, _ in found]
     claim = ANGLE_ERROR.text if of_the_paper else ""
-    return figure, (first[0], first[-1], point_feet[0][-1] if point_feet else None, claim)
+    pushes = results[TUNE_STAGE].identity.config_slice["push_off"]["impulse_N_s"] != 0.0
+    return figure, (first[0], first[-1], point_feet[0][-1] if point_feet else None, claim, pushes)
 
 
 SCENES = ("rigid", "contact", "contact-near-rigid")

@@ -362,7 +362,7 @@ def draw_energies(results: Results) -> Drawn:
     """A row for each energy.
 
     Caption: how much is shown, the means of the mechanical energy, whether Table 3 has it too, whether there are
-    impacts, and how the walks went.
+    impacts, whether anything drives the walker, and how the walks went.
     """
     walks, extent = shown(walks_with(results, ENERGIES))
     figure, axes = in_time(walks, 1.75, ENERGIES_IN_TIME)
@@ -378,7 +378,9 @@ def draw_energies(results: Results) -> Drawn:
         integral = np.sum(0.5 * (energy[1:] + energy[:-1]) * durations)
         means.append((walk.look.label, integral / durations.sum() if durations.any() else energy[0]))
     impacts = any(walk.look is CONTACT for walk in walks)
-    return figure, (extent, means, redoes_the_paper(results), impacts, sentence(walks))
+    asked = results[RIGID_STAGE].identity.config_slice
+    driven = any((asked["push_off"]["impulse_N_s"], *asked["walker"]["hip"].values()))
+    return figure, (extent, means, redoes_the_paper(results), impacts, driven, sentence(walks))
 
 
 FIGURES = (

@@ -6,7 +6,7 @@ import numpy as np
 
 from walkerlab.account import DAMPING, EDGES, ENTRIES, FORWARD, FRICTION, HIP, KNEE_STOP, PUSH_OFF
 from walkerlab.ground.energy import dissipated_power, foot_elastic_energy, push_power, total_energy
-from walkerlab.ground.hip import hip_power
+from walkerlab.ground.hip import hip_energy, hip_power
 from walkerlab.ground.knees import knee_power
 from walkerlab.ground.walker import OF_STATES, STOPPING, OnGround, one_foot_motion, over_ground, store_whole
 from walkerlab.hybrid.contact_events import HEIGHT, PER_FOOT, STANCE, VERTICAL_VELOCITY, WalkState
@@ -19,7 +19,7 @@ from walkerlab.solvers.stepping import T_OLD, T, interpolate
 # rows of `account`
 SO_FAR, AT_TOUCH = 0, 1
 # indices into `extremes`
-MAX_PENETRATION, RESIDUAL, START_ENERGY, AT_HAND = 0, 1, 2, 3
+MAX_PENETRATION, RESIDUAL, START_ENERGY, AT_HAND, START_SPRING = 0, 1, 2, 3, 4
 # the start of a step and the nodes of the Radau quadrature on it, with its weights: exact to the order of that method
 NODES = (0.0, 0.15505102572168219, 0.6449489742783178, 1.0)
 WEIGHTS = (0.0, 0.37640306270046725, 0.5124858261884216, 0.1111111111111111)
@@ -39,8 +39,8 @@ class ContactObserver(NamedTuple):
     sampled_account: Any  # (samples, entries) J
     recorded: Any  # (1,)
     account: Any  # (2, entries) J so far, and until the last step's touch
-    # (4,) deepest penetration m, largest residual of the energy balance J, energy at the start J: its potential from a
-    # fixed origin, and from the slope below
+    # (5,) deepest penetration m, largest residual of the energy balance J, energy at the start J: its potential from a
+    # fixed origin, and from the slope below; and the part of the hip's spring J
     extremes: Any
     tangent: Tangent  # derivative of the state with respect to where it started, if wanted
 
@@ -95,10 +95,11 @@ def balance(observer: ContactObserver, method: Any, system: OnGround) -> None:
 
 
 @inlined
-def note_work(observer: ContactObserver) -> None:
-    """A step has ended: what was given until now belongs to steps that were taken."""
+def note_work(observer: ContactObserver, system: OnGround, y: Any) -> None:
+    """A step has ended: what was given until now belongs to steps that were taken, and what the hip's spring gave."""
     for entry in range(ENTRIES):
         observer.account[AT_TOUCH, entry] = observer.account[SO_FAR, entry]
+    observer.account[AT_TOUCH, HIP] += observer.extremes[START_SPRING] - hip_energy(system, y)
 
 
 @inlined

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from walkerlab.account import ENTRIES, GIVEN, KNEE_STRIKES, LOSSES, LOST, PUSH_OFF
 from walkerlab.ground.energy import kinetic_energy, potential_energy, total_energy
+from walkerlab.ground.hip import hip_energy
 from walkerlab.ground.knees import FLEXED, extension
 from walkerlab.ground.terrain import Terrain, cell_at, has_ground_in_cell, is_uneven, starts_with_ground
 from walkerlab.ground.walker import (
@@ -52,6 +53,7 @@ from walkerlab.hybrid.contact_observer import (
     RESIDUAL,
     SO_FAR,
     START_ENERGY,
+    START_SPRING,
     ContactObserver,
 )
 from walkerlab.hybrid.contact_rules import GOES_ON, steps_with_lift
@@ -247,12 +249,12 @@ def new_observer(
     """
     times = np.zeros(0) if times is None else times
     samples = times.size
-    extremes = np.zeros(4)
+    extremes = np.zeros(5)
     if track_energy:
         here = on_ground(
             walker, walk_state.has_ground, feet=walk_state.feet, level=walk_state.level, times=walk_state.times
         )
-        extremes[START_ENERGY] = total_energy(here, y)
+        extremes[START_ENERGY], extremes[START_SPRING] = total_energy(here, y), hip_energy(here, y)
         extremes[AT_HAND] = extremes[START_ENERGY] + walker.mass * walker.gravity_along * y[0]
     return ContactObserver(
         track_energy,
@@ -418,10 +420,10 @@ def balanced(ended: int, observer: ContactObserver, tolerances: Tolerances) -> O
     return Outcome(ended) if closes else Outcome.SOLVER_FAILED
 
 
-def driven_work(walker: ContactWalker, along: float, up: float, observer: ContactObserver) -> DrivenWork:
-    """What was given over the steps taken, which led so far along the slope and up (m)."""
+def driven_work(walker: ContactWalker, along: float, up: float, account: Floats) -> DrivenWork:
+    """What was given on a way that led so far along the slope and up (m); account (entries,) J."""
     gravity = walker.mass * (walker.gravity_along * along - walker.gravity_down * up)
-    return DrivenWork(walker.mass * walker.gravity, gravity, *observer.account[AT_TOUCH, PUSH_OFF:].tolist())
+    return DrivenWork(walker.mass * walker.gravity, gravity, *account[PUSH_OFF:].tolist())
 
 
 def gather(
@@ -466,6 +468,6 @@ def gather(
         energy_balance_residual_J=float(observer.extremes[RESIDUAL]),
         explained_residual_J=explained_residual(observer, tolerances),
         dissipated_J=observer.account[SO_FAR, LOST].copy(),
-        driven=driven_work(walker, along, up, observer),
+        driven=driven_work(walker, along, up, observer.account[AT_TOUCH]),
         samples=samples,
     )

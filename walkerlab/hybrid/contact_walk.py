@@ -184,7 +184,7 @@ def walk_in_form(
                 return outcome, event
             stepped = walk_state.feet[STEPS] > steps
             if stepped:
-                note_work(observer)
+                note_work(observer, system, method.y)
             if (stepped and is_hinged(system)) or (event == PASSING and 0 <= until <= walk_state.feet[STEPS]):
                 return WALKED, event
             # where the motion jumps the tangent does, too: in another form, and where a hip's torque changes legs

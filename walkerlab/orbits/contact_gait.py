@@ -135,13 +135,14 @@ def follow_from_rigid(walker: ContactWalker, ground: JudgedGround, tolerances: T
         return gait_on(OwnPads(partial(with_rigidity, walker), ground, tolerances, pitch_m), z, rigidity)
 
     points = section_points(with_rigidity(walker, 1.0), ground, tolerances, start)
+    hint = "" if walker.whole.push_off == 0.0 else "Shorten the push-off (push_off.duration_s). "
     tried = (gait_at(1.0, z, ground.terrain.stride_measure) for _, z in points)
     last = next((found for found in tried if isinstance(found, Cycle)), None)
     if last is None:
         return GaitAnswer(
             None,
             "nearly rigid ground has no gait either",
-            "Damp or stiffen the contact, choose a gentler slope, or, on pads, contact.terrain: after-mid-swing.",
+            f"{hint}Damp or stiffen the contact, try a gentler slope, or, on pads, contact.terrain: after-mid-swing.",
         )
     gaits = {0.0: last}
 
@@ -161,7 +162,7 @@ def follow_from_rigid(walker: ContactWalker, ground: JudgedGround, tolerances: T
         None,
         f"followed from nearly rigid ground the gait is lost where that is {STIFFER**rigidity:.3g} times as stiff "
         f"and creep {STICKIER**rigidity:.3g} times as slow as wanted",
-        "Stiffen or damp the contact, lower its stiction velocity, or choose a gentler slope.",
+        f"{hint}Stiffen or damp the contact, lower its stiction velocity, or choose a gentler slope.",
     )
 
 

@@ -36,7 +36,8 @@ from walkerlab.hybrid.contact_events import HEIGHT as HEIGHT_OF_FOOT
 from walkerlab.hybrid.contact_events import PASSING, PER_FOOT, JudgedGround, WalkState, material_along
 from walkerlab.hybrid.contact_knee import rate_of
 from walkerlab.hybrid.contact_observer import SO_FAR, ContactObserver
-from walkerlab.hybrid.contact_run import Stopped, new_observer, new_walk_state, walk_on
+from walkerlab.hybrid.contact_run import Stopped, driven_work, new_observer, new_walk_state, walk_on
+from walkerlab.hybrid.walk_record import DrivenWork
 from walkerlab.mechanics.links import Counted, factor_linked, solve_linked
 from walkerlab.mechanics.tree import add_inertia
 from walkerlab.orbits.step_map import REMEMBERED, Cycle, DisturbedWalk, MappedStep, Monitor, StepMap, Stepper, no_step
@@ -58,7 +59,7 @@ class SectionStep(MappedStep):
     slip_m: float  # net, from touch to lift: of the foot that lands up to here, and of the other from here on
     rolling_m: float  # likewise
     dissipated_J: Floats  # (5,) dissipated by damping, by friction, at edges, at knees' strikes, in their stops
-    height_lost_J: float  # potential energy given up
+    driven: DrivenWork
     work: NDArray[np.int64]  # right-hand sides, accepted, rejected, Jacobians
     reach_m: float  # from where the stance foot is on the section to the touch
     advance_m: float  # of the foot that touched, from its touch to the section
@@ -199,8 +200,7 @@ def step_from_section(
         Phi = observer.tangent.Phi
         on_section = Phi - np.outer(rate, gradient @ Phi) / (gradient @ rate)
         DP = np.column_stack([coordinates_of(walker, column, landed) for column in on_section.T])
-    lost = walker.mass * (walker.gravity_along * (end[ALONG] - start[ALONG]))
-    lost -= walker.mass * walker.gravity_down * (end[HEIGHT] - start[HEIGHT])
+    way, rose = (float(end[place] - start[place]) for place in (ALONG, HEIGHT))
     spacing = float(walk_state.touch_along[0] - walk_state.foothold[stance] - walk_state.slip[0])
     half = min(1.0, max(-1.0, 0.5 * spacing / ground.frame.leg_length))
     foothold = feet_motion(walker.whole, start)[stance].along
@@ -210,13 +210,13 @@ def step_from_section(
         coordinates_of(walker, end, landed),
         DP,
         stopped.time_s,
-        float(end[ALONG] - start[ALONG]),
+        way,
         math.asin(half) - walker.slope,
         float(walk_state.touch_time[0]),
         float(walk_state.slip[0] + slipped),
         float(walk_state.rolling[0] + rolled),
         observer.account[SO_FAR, LOST].copy(),
-        float(lost),
+        driven_work(walker, way, rose, observer.account[SO_FAR]),
         stopped.work,
         float(walk_state.touch_along[0] - foothold),
         float(along - walk_state.foothold[landed]),
@@ -399,9 +399,10 @@ class ContactMap(StepMap):
             before = step
         return DisturbedWalk(before.outcome, np.array(durations), np.array(lengths), np.array(points))
 
-    def cost_of_transport(self, z: Floats, p: float) -> float | None:  # noqa: ARG002 (the rigid model's is known)
-        """Not known."""
-        return None
+    def cost_of_transport(self, z: Floats, p: float) -> float | None:
+        """Work given over weight and distance of a step from z (d,); None where it ends."""
+        step = self.step(z, p, derived=False)
+        return step.driven.cost_of_transport(step.length_m) if isinstance(step, SectionStep) else None
 
     def at(self, tolerances: Tolerances) -> ContactMap:
         """The same map, its steps integrated otherwise."""

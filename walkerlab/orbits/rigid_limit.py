@@ -1,7 +1,7 @@
 """What separates the contact model from the rigid one: its contact led towards the rigid limit, knob by knob.
 
 Stiffness k, damping c and stiction velocity v_s are the knobs. With k the penetration d_max of full damping shrinks as
-the static penetration does, and with v_s the friction velocity v_d.
+the static penetration does, and with v_s the friction velocity v_d. A push-off is shortened as all three are turned.
 """
 
 import math
@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from walkerlab.ground.terrain import STANCE_FOOT
-from walkerlab.ground.walker import ContactWalker
+from walkerlab.ground.walker import ContactWalker, changed_forms
 from walkerlab.hybrid.comparison import (
     PHASES,
     Motion,
@@ -36,6 +36,7 @@ WALK_TOLERANCE, WALK_CHECK = 1e-8, 1e-10  # of the walks that are timed, and of 
 ABSOLUTE = 0.01  # absolute tolerance in relative ones
 REPEATS = 3
 SEARCH = EFFORT._replace(most=30)
+BRIEF = 0.1  # of sqrt(d / g), d the static penetration: a push-off as short is over while the other foot still lands
 
 
 class ContactFactors(NamedTuple):
@@ -67,6 +68,19 @@ def series_of(name: str, every: int = 1) -> list[ContactFactors]:
     count, ratio, powers = SERIES[name]
     rigidities = [ratio**step for step in range(0, count, every)]
     return [ContactFactors(name, rigidity, *(rigidity**power for power in powers)) for rigidity in rigidities]
+
+
+def with_setting(walker: ContactWalker, setting: ContactFactors) -> ContactWalker:
+    """The walker on the ground of a setting, its push-off brief on the way to the limit.
+
+    A longer one lifts the leading foot off again, however rigid the ground is, and leads to another limit.
+    """
+    changed, law = with_scaled_laws(walker, *setting[2:]), walker.normal
+    if setting.series not in (ALL, ALL_POINT) or setting.rigidity == 1.0:
+        return changed
+    static = (walker.mass * walker.gravity / law.stiffness) ** (1.0 / law.exponent)
+    brief = BRIEF * math.sqrt(static / (walker.gravity * setting.stiffness))
+    return changed_forms(changed, push_off_duration=min(brief, float(walker.whole.push_off_duration)))
 
 
 @dataclass(frozen=True)
@@ -123,7 +137,7 @@ class Limit:
         """
         found: list[Distance] = []
         for setting in series_of(name, self.every):
-            changed = with_scaled_laws(walker, *setting[2:])
+            changed = with_setting(walker, setting)
             near = self.gait(changed, gait, GAIT_TOLERANCE)
             if near is None:
                 break

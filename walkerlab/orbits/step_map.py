@@ -123,7 +123,7 @@ class StepMap(Stepper, Protocol):
         """
 
     def cost_of_transport(self, z: Floats, p: float) -> float | None:
-        """Work given over weight and distance of a step from z (d,); None where it is not known."""
+        """Work given over weight and distance of a step from z (d,); None where it ends."""
 
     def at(self, tolerances: Tolerances) -> StepMap:
         """The same map, its steps integrated otherwise."""

@@ -55,12 +55,17 @@ GIVEN_BY = {"gravity": "gravity", "push_off": "the push-off", "hip": "the hip"}
 """What gives a step its work, by the names under which it is stored."""
 
 
+ROUNDING = 1e-12
+"""Part of the largest work that counts as none."""
+
+
 def works(words: str, written: Callable[[Any], str]) -> Iterator[Column]:
-    """The work that each gives a step, of those that give any."""
+    """The work that each gives a step, of those that give more than rounding."""
     for name, giver in GIVEN_BY.items():
 
         def given(record: Mapping[str, Any], name: str = name) -> float | None:
-            return (record.get("work_per_step_J") or {}).get(name) or None
+            work = record.get("work_per_step_J") or {}
+            return work[name] if work and abs(work[name]) > ROUNDING * max(map(abs, work.values())) else None
 
         yield Column(f"{words} {giver} a step (J)", given, written)
 

@@ -75,7 +75,7 @@ def pages_of(results: Results, run: str) -> tuple[Page, ...]:
         main.insert([section.anchor for section in main].index("glossary"), links)
     redone = "After" if results.departures else "Redoes"
     of_run = "" if run == DEFAULT else run
-    title, source = f"Passive walking: {run}", results.config.source
+    title, source = f"{'Driven' if drives_of(results.config) else 'Passive'} walking: {run}", results.config.source
     return (
         Page(title, tuple(main), (lead(results.config, run),), MAIN, source, redone, results.pending, of_run),
         *(Page(f"{closing.TITLES[file]} · {run}", found, file=file, run=of_run) for file, found in beside.items()),

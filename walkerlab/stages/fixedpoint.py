@@ -63,10 +63,14 @@ def advice(config: RigidConfig) -> str:
         f"to walk there all the same, give a start state (start: [{', '.join(coordinates(config))}]), and the "
         "contact model a pitch of its pads (contact.pad_pitch: a number)"
     )
-    if config.slope_rad <= 0.0:
-        driven = "drive the walker (push_off.impulse_N_s or walker.hip.torque_N_m)"
-        return f"Let the slope descend in walking direction (slope_deg above 0), or {driven}; {walk_anyway}."
-    return f"Gaits on other slopes are followed by `walkerlab continuation`; {walk_anyway}."
+    drives = "push_off.impulse_N_s or walker.hip.torque_N_m"
+    if config.push_off.impulse_N_s or config.walker.hip.torque_N_m:
+        tried = f"What drives the walker may be too strong or too weak for it there: try another {drives}"
+    elif config.slope_rad <= 0.0:
+        tried = f"Let the slope descend in walking direction (slope_deg above 0), or drive the walker ({drives})"
+    else:
+        tried = "Gaits on other slopes are followed by `walkerlab continuation`"
+    return f"{tried}; {walk_anyway}."
 
 
 def summary(config: RigidConfig, searches: Mapping[str, GaitSearch]) -> dict[str, Any]:

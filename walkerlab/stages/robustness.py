@@ -355,7 +355,7 @@ def sensitivities(
         parameter = parameter_of(key, subject.config)
         value = parameter.value_in(subject.config)
         for name, gradient in of_key.items():
-            if name in numbers and (name != "cost_of_transport" or drives_of(subject.config)):
+            if name in numbers:
                 told = {} if gradient.value is None else relative_effect(gradient, value, numbers[name])
                 unit = QUANTITIES[name] if parameter.unit == "1" else f"{QUANTITIES[name]} per {parameter.unit}"
                 rows.append(
@@ -374,10 +374,11 @@ def relative_effect(gradient: Gradient, parameter: float, quantity: float) -> di
 
 
 def gradients_of(subject: Subject, key: str) -> dict[str, Gradient]:
-    """Derivatives by one key."""
+    """Derivatives by one key; the cost of transport of a passive walker is its slope's sine."""
     parameter = parameter_of(key, subject.config)
     value = parameter.value_in(subject.config)
-    return gradients(subject.at(parameter), abs(value) or 1e-2)
+    known = () if drives_of(subject.config) else ("cost_of_transport",)
+    return gradients(subject.at(parameter), abs(value) or 1e-2, [name for name in QUANTITIES if name not in known])
 
 
 def numbers_read(subject: Subject) -> tuple[str, ...]:

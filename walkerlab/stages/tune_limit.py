@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from walkerlab.config.reads import ContactConfig
-from walkerlab.config.walkers import CompassWalker, is_plain_compass
+from walkerlab.config.walkers import CompassWalker
 from walkerlab.ground.compliant import contact_walker
 from walkerlab.ground.walker import ContactWalker
 from walkerlab.hybrid.comparison import Motion, sampled_at_strikes
@@ -99,6 +99,7 @@ def limit_findings(
     """
     if walk.samples is None or walk.steps == 0:
         return None
+    compass = isinstance(config.walker, CompassWalker) and config.walker.torso is None
     legs = leg_variables(walk.samples)
     angle, velocity = legs["angle"].values, legs["velocity"].values
     seen = Motion(walk.samples.time_s, angle, velocity, walk.touch_time_s, walk.knee_strikes_s)
@@ -110,10 +111,10 @@ def limit_findings(
         motion,
         walk.steps,
         scene.frame.pendulum_time / (FINER * SAMPLES_PER_PENDULUM_TIME),
-        1 if is_plain_compass(config) else OTHERS_EVERY,
+        1 if compass else OTHERS_EVERY,
     )
     walked = (ALL, ALL_POINT) if isinstance(config.walker, CompassWalker) else (ALL,)  # others roll in both models
-    gaits = COMPASS_GAITS if is_plain_compass(config) else GAITS
+    gaits = COMPASS_GAITS if compass else GAITS
     progress.start("tune: rigid limit", len(walked) + len(gaits))
 
     def start(walker: ContactWalker) -> State:

@@ -5,7 +5,7 @@ from functools import partial
 from typing import Any
 
 from walkerlab.report.blocks import COSTS, PageBlock, Paragraph, Section
-from walkerlab.report.gaits import symbol
+from walkerlab.report.gaits import symbol, works
 from walkerlab.report.numbers import NONE, fixed, length, listed, number, quantity
 from walkerlab.report.outcomes import tone
 from walkerlab.report.results import Results
@@ -44,7 +44,7 @@ def limit(results: Results) -> Section | None:
     reaches, orders = summary.get("reaches") or {}, summary.get("orders") or {}
     if not (reaches or orders):
         return None
-    note = words("adjustment.factors")
+    note = words("adjustment.factors", results.config.push_off.impulse_N_s != 0.0)
     titles = words.terms("adjustment.distances").items()
     columns = [measured(title, key, partial(number, digits=3)) for key, title in titles]
     blocks: list[PageBlock] = [
@@ -108,7 +108,7 @@ GAIT_LINES = (
         Column(f"energy lost {said}", partial(lost, channel), partial(quantity, unit="J"))
         for channel, (said, _) in LOST.items()
     ),
-    Column("height lost", "height_lost_J", partial(quantity, unit="J")),
+    *works("work of", number),
 )
 
 
@@ -117,7 +117,7 @@ def gait_table(summary: Summary, rigid: Summary) -> Table:
     gait = summary["gait"]
     note = f"Section of the contact gait: {gait['section']}."
     losses = {channel: Cell(said) for channel, (_, said) in LOST.items() if lost(channel, gait) is not None}
-    beside = {**rigid, "slip_m": Cell("none"), "lost_J": losses, "height_lost_J": Cell("the same as lost")}
+    beside = {**rigid, "slip_m": Cell("none"), "lost_J": losses}
     gaits = {"contact model": gait, "rigid model": beside}
     return side_by_side("The contact model's own gait", GAIT_LINES, gaits, note=note)
 

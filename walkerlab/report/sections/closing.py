@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 
+from walkerlab.config.drives import drives_of
 from walkerlab.report.blocks import CASES, COSTS, PAPER, Cards, PageBlock, Paragraph, Section, Terms
 from walkerlab.report.numbers import count, listed
 from walkerlab.report.results import Results
@@ -30,7 +31,7 @@ def further(results: Results, pages: Mapping[str, Sequence[Section]]) -> Section
 
 def glossary(results: Results) -> Section:
     """What the words mean."""
-    told = words.terms("closing.glossary", results.config.contact is not None)
+    told = words.terms("closing.glossary", results.config.contact is not None, drives_of(results.config))
     return Section("glossary", "Glossary", (Terms(told),), "The words of this report, in a line each.")
 
 

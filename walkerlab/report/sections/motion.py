@@ -40,7 +40,7 @@ def player(results: Results) -> Player | None:
     steps = {MODELS[stage].lower(): len(results.summary(stage)["step_periods_s"]) for stage in tracks}
     return Player(
         title="The walk.",
-        caption=words("motion.caption", max(steps.values()), MAX_STEPS),
+        caption=words("motion.caption", max(steps.values()), MAX_STEPS, config.push_off.impulse_N_s != 0.0),
         alt=words("motion.alt", steps, math.degrees(config.slope_rad)),
         walkers=tuple(walker(results, stage, track) for stage, track in tracks.items()),
         slope_rad=config.slope_rad,

@@ -7,6 +7,7 @@ from typing import Any
 from walkerlab.account import CHANNELS
 from walkerlab.labels import ERROR_OF_EACH_STEP
 from walkerlab.report.blocks import PageBlock, Paragraph, Section
+from walkerlab.report.gaits import GIVEN_BY
 from walkerlab.report.numbers import NONE, decimals_left, fixed, length, number, power_of_ten, quantity, span, whole
 from walkerlab.report.outcomes import CONTACT, MODELS, RIGID, tone
 from walkerlab.report.results import Results
@@ -31,6 +32,7 @@ def contact(results: Results) -> Section | None:
 def contact_rows(summary: Mapping[str, Any]) -> list[tuple[str, str | Cell, str]]:
     """The numbers of the contact walk that there are: name, value and meaning of each."""
     get, lost = summary.get, summary.get("dissipated_J") or {}
+    given = get("work_per_step_J") or {}
     values: dict[str, str | Cell] = {
         "outcome": Cell(summary["outcome"], tone(summary["outcome"])),
         "largest penetration": length(get("max_penetration_m")),
@@ -39,6 +41,7 @@ def contact_rows(summary: Mapping[str, Any]) -> list[tuple[str, str | Cell, str]
         "slip a step": length(get("slip_per_step_m")),
         "slip, step by step": span([1e3 * slip for slip in get("slips_m") or ()], "mm", 3),
         "rolling a step": length(get("rolling_per_step_m") or None),
+        **{f"work of {giver}": joules(given[name]) for name, giver in GIVEN_BY.items() if given.get(name)},
         "cost of transport": number(get("cost_of_transport"), 4),
         "energy balance residual": joules(summary["energy_balance_residual_J"]),
         **{f"energy lost {CHANNELS.get(key, key)}": joules(value) for key, value in lost.items()},
