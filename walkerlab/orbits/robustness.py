@@ -142,23 +142,23 @@ def response(at: Standpoint, disturbance: Disturbance, times: float = 1.0) -> tu
     return None if norm is None else (norm, D[0])
 
 
-def largest(stands: Callable[[float], bool], unit: float) -> tuple[float, bool]:
-    """The largest disturbance that is stood with every smaller one, and whether a larger one was looked for in vain.
+def largest(stands: Callable[[float], bool], unit: float) -> float:
+    """The largest disturbance that is stood with every smaller one.
 
     unit  of the disturbance: the grid is a part of it, and it is not sought beyond half of it
     """
     steps = round(MOST / GRID)
     low = next((k - 1 for k in range(1, steps + 1) if not stands(k * GRID * unit)), steps)
     if low == steps:
-        return MOST * unit, True
+        return MOST * unit
     below, above = low * GRID * unit, (low + 1) * GRID * unit
     while above - below > CLOSE * unit:
         middle = 0.5 * (below + above)
         below, above = (middle, above) if stands(middle) else (below, middle)
-    return below, False
+    return below
 
 
-def largest_disturbance(at: Standpoint, disturbance: Disturbance, sign: float, steps: int) -> tuple[float, bool]:
+def largest_disturbance(at: Standpoint, disturbance: Disturbance, sign: float, steps: int) -> float:
     """The largest drop (m) or push (N s) of one sign after which so many more steps are taken; see `largest`."""
 
     def stands(size: float) -> bool:

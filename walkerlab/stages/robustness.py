@@ -263,9 +263,8 @@ def single(subject: Subject, config: RobustnessConfig) -> Iterator[Piece]:
 
 
 def single_of(subject: Subject, disturbance: Any, sign: float, steps: int) -> list[float]:
-    """The largest disturbance of a sign, and whether none larger was looked for."""
-    size, beyond = largest_disturbance(subject.at(exact=False), disturbance, sign, steps)
-    return [size, float(beyond)]
+    """The largest disturbance of a sign."""
+    return [largest_disturbance(subject.at(exact=False), disturbance, sign, steps)]
 
 
 def rough(subject: Subject, config: RobustnessConfig) -> Iterator[Piece]:
