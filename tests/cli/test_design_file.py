@@ -5,6 +5,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from walkerlab.config.loader import load
 
 COMMAND = (
@@ -32,3 +34,10 @@ def test_the_optimum_is_a_config_that_extends_the_start_and_is_written_over_noth
     path.write_text("extends: paper\n", encoding="utf-8")
     assert Path(design(tmp_path)["config"]).name == "optimum-2.yaml"
     assert path.read_text(encoding="utf-8") == "extends: paper\n"
+
+
+@pytest.mark.parametrize("stage", ["robustness", "design", "continuation"])
+def test_the_model_that_is_asked_about_is_an_option_that_goes_by_itself(stage, tmp_path):
+    command = [sys.executable, "-m", "walkerlab", stage, "--model", "contact", "--dry-run", "--json"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
+    assert json.loads(done.stdout)["run_dir"].endswith(f"{stage}.model=contact")

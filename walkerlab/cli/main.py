@@ -93,7 +93,9 @@ Over = Annotated[
 ]
 From = Annotated[float | None, typer.Option("--from", metavar="A", help="Where the span begins, in the key's unit.")]
 To = Annotated[float | None, typer.Option("--to", metavar="B", help="Where the span ends.")]
-Model = Annotated[str | None, typer.Option("--model", metavar="rigid|contact|both", help="Whose gaits to follow.")]
+Model = Annotated[
+    str | None, typer.Option("--model", metavar="rigid|contact|both", help="Whose gaits are asked about.")
+]
 Periods = Annotated[int | None, typer.Option("--periods", metavar="N", help="Steps of the longest gaits wanted.")]
 Full = Annotated[
     bool, typer.Option("--full", help="Run the long campaign too; if interrupted, it resumes the next time.")
@@ -118,7 +120,7 @@ def add_stage(app: typer.Typer, stage: Stage, graph: Graph) -> None:
     if not (stage.walks or last):
         shared.remove("strides")
     unasked: list[str] = [] if stage.follows else ["over", "begin", "end", "periods"]
-    unasked += [] if stage.follows or stage.designs else ["model"]
+    unasked += [] if stage.of_a_model else ["model"]
     unasked += [] if stage.designs else ["least", "most", "within", "keep"]
     meaningless = [*unasked, *([] if graph.campaigns_of(stage.name) else ["full"])]
 
@@ -137,8 +139,9 @@ def add_stage(app: typer.Typer, stage: Stage, graph: Graph) -> None:
         keep: Keep = None,
     ) -> None:
         own = designing if stage.designs else following
-        given = (model, least, most, within, keep) if stage.designs else (over, begin, end, model, periods)
-        settings = [*(request.sets or ()), *own(*given)]
+        given = (least, most, within, keep) if stage.designs else (over, begin, end, periods)
+        whose = [] if model is None else [f"{stage.name}.model={model}"]
+        settings = [*(request.sets or ()), *whose, *own(*given)]
         with exit_on_failure(stage.name, replace(request, sets=settings)) as asked:
             # Imported here: help loads neither a config nor an array.
             from walkerlab.cli.stage import run_stage
@@ -146,13 +149,9 @@ def add_stage(app: typer.Typer, stage: Stage, graph: Graph) -> None:
             run_stage(asked, stage, graph, full)
 
 
-def designing(
-    model: str | None, least: str | None, most: str | None, within: list[str] | None, keep: list[str] | None
-) -> tuple[str, ...]:
+def designing(least: str | None, most: str | None, within: list[str] | None, keep: list[str] | None) -> tuple[str, ...]:
     """The options of a design as settings of the config; typer.BadParameter for bounds that are none."""
-    if least is None and most is None and not within and not keep:
-        return ()
-    given = {"model": model, "minimise": least, "maximise": most}
+    given = {"minimise": least, "maximise": most}
     said = tuple(f"design.{name}={value}" for name, value in given.items() if value is not None)
     return (
         *said,
@@ -168,11 +167,9 @@ def bounds(option: str, given: list[str]) -> str:
     return "{" + ", ".join(f"{one[1]}: [{one[2]}, {one[3]}]" for one in parts if one) + "}"
 
 
-def following(
-    over: str | None, begin: float | None, end: float | None, model: str | None, periods: int | None
-) -> tuple[str, ...]:
+def following(over: str | None, begin: float | None, end: float | None, periods: int | None) -> tuple[str, ...]:
     """The options of a stage that follows gaits as settings of the config; typer.BadParameter if some are missing."""
     if over is not None and (begin is None or end is None):
         raise typer.BadParameter("a span goes with a key: give --from and --to, in its unit", param_hint="--over")
-    given = {"over": over, "from": begin, "to": end, "model": model, "periods": periods}
+    given = {"over": over, "from": begin, "to": end, "periods": periods}
     return tuple(f"continuation.{name}={value}" for name, value in given.items() if value is not None)

@@ -120,7 +120,7 @@ def on_rough_ground(results: Results) -> Drawn:
     across = sticks.in_plane(sticks.landings)[:, 0]
     seen = np.concatenate((sticks.hip[:, None], sticks.top[:, None], sticks.feet), axis=1)
     left, bottom, right, top = surrounding(sticks.in_plane(seen).reshape(-1, 2), sticks.leg_length)
-    figure = blank(0.8 + 2.0 * BELOW)
+    figure = blank(1.6 + 2.0 * BELOW)
     tall = (figure.get_figwidth() - BESIDE) * (top - bottom) / (right - left)
     figure.set_figheight(figure.get_figheight() + tall)
     walk, heights, share = figure.subplots(3, 1, height_ratios=[tall, 0.7 * BELOW, 1.3 * BELOW])

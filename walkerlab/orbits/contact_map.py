@@ -28,15 +28,14 @@ from walkerlab.ground.terrain import (
     Terrain,
     after_mid_swing,
     checkerboard,
-    foothold_height,
     has_ground_in_air,
 )
 from walkerlab.ground.walker import ContactWalker, OnGround, feet_motion, folded, on_ground, sines_cosines, unfolded
-from walkerlab.hybrid.contact_events import HEIGHT as HEIGHT_OF_FOOT
-from walkerlab.hybrid.contact_events import PASSING, PER_FOOT, JudgedGround, WalkState, material_along
+from walkerlab.hybrid.contact_events import PASSING, STANCE, STEPS, JudgedGround, WalkState, material_along
 from walkerlab.hybrid.contact_knee import rate_of
-from walkerlab.hybrid.contact_observer import SO_FAR, ContactObserver
+from walkerlab.hybrid.contact_observer import SO_FAR
 from walkerlab.hybrid.contact_run import Stopped, driven_work, new_observer, new_walk_state, walk_on
+from walkerlab.hybrid.contact_walk import NEVER
 from walkerlab.hybrid.walk_record import DrivenWork
 from walkerlab.mechanics.links import Counted, factor_linked, solve_linked
 from walkerlab.mechanics.tree import add_inertia
@@ -61,8 +60,6 @@ class SectionStep(MappedStep):
     dissipated_J: Floats  # (5,) dissipated by damping, by friction, at edges, at knees' strikes, in their stops
     driven: DrivenWork
     work: NDArray[np.int64]  # right-hand sides, accepted, rejected, Jacobians
-    reach_m: float  # from where the stance foot is on the section to the touch
-    advance_m: float  # of the foot that touched, from its touch to the section
 
 
 def turning_bodies(walker: ContactWalker, stance: int) -> tuple[int, ...]:
@@ -154,32 +151,23 @@ def step_from_section(
     z: Floats,
     pitch_m: float,
     derived: bool = True,
-    rise: float = 0.0,
-    push: float = 0.0,
 ) -> SectionStep:
     """Walk from the section to the section.
 
     z        section coordinates, the height over the present foothold
     pitch_m  what the pads are laid for
     derived  whether the derivative is wanted
-    rise     m, of the next foothold over the present one
-    push     N s, an impulse at the hip along the slope as the foot touches; on the ground of one's own, not derived
     """
     stance, laid = STANCE_FOOT, ground
     start = state_on_section(walker, z, stance)
     if ground.terrain.has_pads:  # the standing foot in the middle of one
         foothold = feet_motion(walker.whole, start)[stance].along
         laid = JudgedGround(checkerboard(pitch_m, (foothold + pitch_m, foothold)), ground.frame)
-    if rise != 0.0:
-        laid = laid._replace(terrain=laid.terrain._replace(heights=np.array([0.0, rise])))
-    walk_state = new_walk_state(walker, laid.terrain, stance, 2, start)
-    stand_on_section(walk_state, walker, laid, start, stance)
+    walk_state = walk_state_on_section(walker, laid, start, 2)
     observer = new_observer(walker, walk_state, start, directions=z.size if derived else 0)
     if derived:
         observer.tangent.Phi[:, :] = directions(walker, start, stance)
-    stopped = Stopped(Outcome.STUBBED, 0.0, start, np.zeros(4, np.int64))
-    if rise == 0.0 or walk_state.has_ground[1 - stance] != 0 or laid.terrain.order_matters:
-        stopped = walk_pushed(walker, laid, tolerances, walk_state, observer, start, push)
+    stopped = walk_on(walker, laid, tolerances, walk_state, observer, start, 1)
     end, landed = np.array(stopped.state), 1 - stance
     along = feet_motion(walker.whole, stopped.state)[landed].along
     slipped = material_along(walker.whole, landed, along, stopped.state) - float(walk_state.touched[landed])
@@ -203,8 +191,6 @@ def step_from_section(
     way, rose = (float(end[place] - start[place]) for place in (ALONG, HEIGHT))
     spacing = float(walk_state.touch_along[0] - walk_state.foothold[stance] - walk_state.slip[0])
     half = min(1.0, max(-1.0, 0.5 * spacing / ground.frame.leg_length))
-    foothold = feet_motion(walker.whole, start)[stance].along
-    end[HEIGHT] -= rise
     return SectionStep(
         stopped.outcome,
         coordinates_of(walker, end, landed),
@@ -218,31 +204,43 @@ def step_from_section(
         observer.account[SO_FAR, LOST].copy(),
         driven_work(walker, way, rose, observer.account[SO_FAR]),
         stopped.work,
-        float(walk_state.touch_along[0] - foothold),
-        float(along - walk_state.foothold[landed]),
     )
 
 
-def walk_pushed(
-    walker: ContactWalker,
-    ground: JudgedGround,
-    tolerances: Tolerances,
-    walk_state: WalkState,
-    observer: ContactObserver,
-    start: State,
-    push: float,
-) -> Stopped:
-    """Walk from the section to the section, with an impulse (N s) at the hip along the slope at the touch between."""
-    if push == 0.0:
-        return walk_on(walker, ground, tolerances, walk_state, observer, start, 1)
-    until_touch = resized(walk_state, 1)
-    touched = walk_on(walker, ground, tolerances, until_touch, observer, start)
-    if touched.outcome is not Outcome.WALKED:
-        return touched
-    for before, after in zip(until_touch, walk_state, strict=True):
-        after[: len(before)] = before
-    pushed = pushed_at_hip(on_ground(walker, walk_state.has_ground, walk_state.knee), walker, touched.state, push)
-    return walk_on(walker, ground, tolerances, walk_state, new_observer(walker, walk_state, pushed), pushed, 1)
+def walk_from_section(
+    walker: ContactWalker, ground: JudgedGround, tolerances: Tolerances, z: Floats, heights: Floats, push: float
+) -> DisturbedWalk:
+    """Walk from the section to touches of footholds at some heights, with an impulse at the hip at the first of them.
+
+    heights  (steps + 1,) m, the first that of the foothold on which it stands, too
+    push     N s, along the slope
+    """
+    start, steps = state_on_section(walker, z, STANCE_FOOT), heights.size - 1
+    over = np.append(heights[0], heights) - heights[0]
+    laid = ground._replace(terrain=ground.terrain._replace(heights=over)) if over.any() else ground
+    walk_state = walk_state_on_section(walker, laid, start, steps + 1)
+
+    def go_on(walk_state: WalkState, state: State, until: int = NEVER) -> Stopped:
+        return walk_on(walker, laid, tolerances, walk_state, new_observer(walker, walk_state, state), state, until)
+
+    stopped = Stopped(Outcome.WALKED, 0.0, start, np.zeros(4, np.int64))
+    if push != 0.0:
+        until_touch = resized(walk_state, 1)
+        stopped = go_on(until_touch, start)
+        for before, after in zip(until_touch, walk_state, strict=True):
+            after[: len(before)] = before
+        pushed = pushed_at_hip(on_ground(walker, walk_state.has_ground, walk_state.knee), walker, stopped.state, push)
+        stopped = replace(stopped, state=pushed)
+    if stopped.outcome is Outcome.WALKED:
+        stopped = go_on(walk_state, stopped.state, steps)
+    if stopped.outcome is Outcome.WALKED:
+        stance = int(walk_state.feet[STANCE])
+        z = coordinates_of(walker, np.array(stopped.state), stance)
+        z[0] -= walk_state.level[stance]
+        stopped = go_on(walk_state, stopped.state)
+    touched = int(walk_state.feet[STEPS])
+    times, places = walk_state.touch_time[:touched], walk_state.touch_along[:touched]
+    return DisturbedWalk(stopped.outcome, np.diff(times), np.diff(places), z)
 
 
 def resized(walk_state: WalkState, steps: int) -> WalkState:
@@ -270,24 +268,20 @@ def pushed_at_hip(system: OnGround, walker: ContactWalker, state: State, impulse
     return tuple(unfolded(form, y, walker.size).tolist())
 
 
-def stand_on_section(
-    walk_state: WalkState, walker: ContactWalker, ground: JudgedGround, start: State, stance: int
-) -> None:
-    """Correct a walk state made for a start with both feet down: here one stands and the other swings past it."""
-    swing = 1 - stance
+def walk_state_on_section(walker: ContactWalker, ground: JudgedGround, start: State, steps: int) -> WalkState:
+    """The walk state of a walk of `steps` touches: one foot stands, and the other swings past it."""
+    stance, swing = STANCE_FOOT, 1 - STANCE_FOOT
+    walk_state = new_walk_state(walker, ground.terrain, stance, steps, start)
     feet = feet_motion(walker.whole, start)
     walk_state.at_zero[:] = 0
     walk_state.at_zero[PASSING] = 1
     walk_state.sides[PASSING] = 1 if swing == 1 else -1
-    walk_state.level[swing] = foothold_height(ground.terrain, 1)
-    above = feet[swing].height > walk_state.level[swing]
-    if walk_state.level[swing] != 0.0:
-        walk_state.sides[swing * PER_FOOT + HEIGHT_OF_FOOT] = 1 if above else -1
-    walk_state.has_ground[swing] = above and has_ground_in_air(
+    walk_state.has_ground[swing] = feet[swing].height > 0.0 and has_ground_in_air(
         ground.terrain, bool(walk_state.has_ground[swing]), False, True
     )
     walk_state.left_cells[swing] = walk_state.cells[swing] - 1
     walk_state.foothold[swing] = feet[stance].along - ground.frame.leg_length
+    return walk_state
 
 
 @dataclass(frozen=True)
@@ -309,6 +303,7 @@ class ContactMap(StepMap):
         Monitor("slip_m", "m", "largest net slip of a foot from touch to lift"),
         Monitor("tripped", "1", "whether pads of its own step length trip the swing foot", 0.5),
     )
+    probe = 1e-6  # stiff ground gives way to less than a hundredth of a millimetre
 
     def __init__(
         self,
@@ -339,20 +334,14 @@ class ContactMap(StepMap):
         """Coordinates of a point of the section in SI."""
         return np.asarray(z / self._units)
 
-    def _walk(
-        self,
-        here: WalkerOnGround,
-        z: Floats,
-        derived: bool,
-        terrain: Terrain | None = None,
-        rise: float = 0.0,
-        push: float = 0.0,
-    ) -> SectionStep:
-        own, frame = here.ground
-        terrain = terrain or (after_mid_swing(self._measure) if own.has_pads else own)
-        measure = terrain.stride_measure if terrain.has_pads else self._measure
-        ground = JudgedGround(terrain, frame)
-        return step_from_section(here.walker, ground, self.tolerances, z * self._units, measure, derived, rise, push)
+    def _terrain(self, here: WalkerOnGround) -> Terrain:
+        own = here.ground.terrain
+        return after_mid_swing(self._measure) if own.has_pads else own
+
+    def _walk(self, here: WalkerOnGround, z: Floats, derived: bool, terrain: Terrain | None = None) -> SectionStep:
+        terrain = terrain or self._terrain(here)
+        ground = here.ground._replace(terrain=terrain)
+        return step_from_section(here.walker, ground, self.tolerances, z * self._units, terrain.stride_measure, derived)
 
     def step(self, z: Floats, p: float, derived: bool = True) -> MappedStep:
         """One step, with its exact derivative along the section."""
@@ -379,25 +368,13 @@ class ContactMap(StepMap):
         return np.array([slip, tripped])
 
     def disturbed(self, z: Floats, p: float, heights_m: Floats, push_N_s: float = 0.0) -> DisturbedWalk:
-        """Walk over footholds (m); a push comes with a first touch that is not among the steps."""
+        """Walk over footholds (m) from the touch on that follows z, with which a push comes."""
         here = self._at(p)
         assert here is not None, "what is disturbed has a gait"
-        rises, before = np.diff(heights_m).tolist(), self._walk(here, z, False)
-        durations, lengths, points = list[float](), list[float](), list[Floats]()
-        if push_N_s != 0.0:
-            before = self._walk(here, z, False, push=push_N_s)
-            z = before.z / self._units
-        for rise in rises:
-            if before.outcome is not Outcome.WALKED:
-                break
-            step = self._walk(here, z, False, rise=rise)
-            if step.outcome is Outcome.WALKED:
-                durations.append(before.period_s - before.strike_s + step.strike_s)
-                lengths.append(before.advance_m + step.reach_m)
-                z = step.z / self._units
-                points.append(z)
-            before = step
-        return DisturbedWalk(before.outcome, np.array(durations), np.array(lengths), np.array(points))
+        ground = here.ground._replace(terrain=self._terrain(here))
+        endless = replace(self.tolerances, budget=self.tolerances.budget * heights_m.size)
+        walk = walk_from_section(here.walker, ground, endless, z * self._units, heights_m, push_N_s)
+        return replace(walk, z=walk.z / self._units)
 
     def cost_of_transport(self, z: Floats, p: float) -> float | None:
         """Work given over weight and distance of a step from z (d,); None where it ends."""

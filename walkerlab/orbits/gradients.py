@@ -2,7 +2,7 @@
 
 With z the section's coordinates and P the step map, dz/dp = (I - A)^-1 dP/dp; all that follows from the gait changes
 along (dz/dp, 1). The derivatives by p are difference quotients of exact steps at two step sizes, which tell their
-error; that of a multiplier comes from A's by its left and right eigenvectors.
+error, along the family as far as it is known; that of a multiplier comes from A's by its left and right eigenvectors.
 """
 
 from __future__ import annotations
@@ -10,14 +10,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
-from functools import partial
-from typing import Final
+from functools import cache, partial
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from walkerlab.orbits.robustness import Standpoint, quotient, sensitivity
-from walkerlab.orbits.step_map import multipliers_of
+from walkerlab.orbits.robustness import Standpoint, response, slope_of
+from walkerlab.orbits.step_map import MappedStep, multipliers_of
 from walkerlab.outcome import Outcome
 
 Floats = NDArray[np.float64]
@@ -34,6 +34,7 @@ QUANTITIES: Final[Mapping[str, str]] = {
 OWN = 3  # of them that a step itself has
 APART = 1e-6  # |l' r| of the largest multiplier's eigenvectors, below which multipliers meet
 STEP = 1.5  # of a difference quotient, in fifth roots of the relative tolerance
+APPROACH = (1e-4, 1e-2)  # of that: steps by which the direction of the family is found
 LOST = 0.1  # error, relative to a derivative, from which rounding has eaten it
 
 
@@ -55,21 +56,26 @@ def gait_numbers(at: Standpoint, wanted: Collection[str] = QUANTITIES) -> dict[s
     if step.outcome is not Outcome.WALKED:
         return None
     radius = float(np.abs(multipliers_of(step.DP)).max())
-    found = dict(zip(QUANTITIES, (step.period_s, step.length_m, step.length_m / step.period_s, radius), strict=False))
+    found = dict(zip(QUANTITIES, (*own_numbers(step), radius), strict=False))
     for name, of in OTHERS.items():
         value = of(at._replace(A=step.DP)) if name in wanted else None
         found |= {} if value is None else {name: value}
     return found
 
 
+def own_numbers(step: MappedStep) -> tuple[float, float, float]:
+    """What a step itself tells: period, length and speed."""
+    return step.period_s, step.length_m, step.length_m / step.period_s
+
+
 def norm_of(at: Standpoint) -> float | None:
     """The norm of the step period for a drop of the floor; None of an unstable gait."""
-    answer = sensitivity(at, "floor-drop")
-    return None if answer is None else float(answer.norm[0])
+    answer = response(at, "floor-drop")
+    return None if answer is None else float(answer[0][0])
 
 
 def cost_of(at: Standpoint) -> float | None:
-    """The cost of transport, where it is known."""
+    """The cost of transport."""
     return at.step_map.cost_of_transport(at.z, at.p)
 
 
@@ -85,40 +91,72 @@ def gradients(at: Standpoint, scale: float, wanted: Collection[str] = QUANTITIES
     scale   magnitude of changes of the parameter that matter
     wanted  the numbers, see `gait_numbers`
     """
-    d, unity = at.z.size, np.eye(at.z.size)
-    h = STEP * at.step_map.tolerances.rtol**0.2 * scale
+    h, along = STEP * at.step_map.tolerances.rtol**0.2 * scale, np.zeros(at.z.size)
+    for part in APPROACH:
+        closer = along_family(at, part * h, along)
+        if closer is None:
+            return {}
+        along = closer
+    fine, coarse = (changes(at, times * h, along, wanted) for times in (1.0, 2.0))
+    if fine is None or coarse is None:
+        return {}
+    found = {
+        name: told(value, abs(value - coarse.numbers[name]))
+        for name, value in fine.numbers.items()
+        if name in coarse.numbers
+    }
+    return found | {"spectral_radius": of_radius(at.A, fine.A, coarse.A - fine.A)}
+
+
+class Changes(NamedTuple):
+    """Of a gait's numbers and of A (d, d), by the parameter."""
+
+    numbers: dict[str, float]
+    A: Floats
+
+
+def along_family(at: Standpoint, h: float, guess: Floats) -> Floats | None:
+    """How the gait's z (d,) changes with the parameter, by steps from beside it, along a guess of that.
+
+    On compliant ground a step from z itself would be none of a walker of other measures: its foot would be in the air,
+    or deep in the ground.
+    """
 
     def led(off: float) -> Floats | None:
-        step = at.step_map.step(at.z, at.p + off, derived=False)
+        step = at.step_map.step(at.z + off * guess, at.p + off, derived=False)
         return step.z if step.outcome is Outcome.WALKED else None
 
-    beside = quotient(led, h)
-    if beside is None:
-        return {}
-    along = np.linalg.solve(unity - at.A, beside.value)
+    moved = slope_of(led, h)
+    return None if moved is None else np.asarray(np.linalg.solve(np.eye(guess.size) - at.A, moved - at.A @ guess))
 
-    def of_family(off: float) -> Floats | None:
+
+def changes(at: Standpoint, h: float, guess: Floats, wanted: Collection[str]) -> Changes | None:
+    """By difference quotients of a step h along the family; None where steps beside the gait end."""
+    along = along_family(at, h, guess)
+    if along is None:
+        return None
+
+    @cache
+    def beside(off: float) -> tuple[Standpoint, MappedStep]:
         step = at.step_map.step(at.z + off * along, at.p + off)
-        if step.outcome is not Outcome.WALKED:
-            return None
-        return np.concatenate(((step.period_s, step.length_m, step.length_m / step.period_s), step.DP.ravel()))
+        return at._replace(z=at.z + off * along, p=at.p + off, A=step.DP), step
+
+    def of_step(off: float) -> Floats | None:
+        _, step = beside(off)
+        return np.append(own_numbers(step), step.DP) if step.outcome is Outcome.WALKED else None
 
     def other(off: float, of: Callable[[Standpoint], float | None]) -> Floats | None:
-        z, p = at.z + off * along, at.p + off
-        step = at.step_map.step(z, p)
-        value = None if step.outcome is not Outcome.WALKED else of(at._replace(z=z, p=p, A=step.DP))
-        return None if value is None else np.array([value])
+        here, step = beside(off)
+        value = of(here) if step.outcome is Outcome.WALKED else None
+        return None if value is None else np.array(value)
 
-    changed = quotient(of_family, h)
+    changed = slope_of(of_step, h)
     if changed is None:
-        return {}
-    matrix, off = (part[OWN:].reshape(d, d) for part in changed)
-    own = (told(changed.value[k], changed.error[k]) for k in range(OWN))
-    found = dict(zip(QUANTITIES, (*own, of_radius(at.A, matrix, off)), strict=False))
-    for name, of in OTHERS.items():
-        one = quotient(partial(other, of=of), h) if name in wanted else None
-        found |= {} if one is None else {name: told(one.value[0], one.error[0])}
-    return found
+        return None
+    others = {name: slope_of(partial(other, of=of), h) for name, of in OTHERS.items() if name in wanted}
+    numbers = dict(zip(QUANTITIES, changed[:OWN].tolist(), strict=False))
+    numbers |= {name: float(value) for name, value in others.items() if value is not None}
+    return Changes(numbers, changed[OWN:].reshape(at.A.shape))
 
 
 def told(value: float, error: float) -> Gradient:

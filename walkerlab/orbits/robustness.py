@@ -28,8 +28,7 @@ Floats = NDArray[np.float64]
 Disturbance = Literal["floor-drop", "hip-push"]
 DISTURBANCES: tuple[Disturbance, ...] = ("floor-drop", "hip-push")
 INDICATORS = ("step_period", "step_length", "speed")
-DIRECT = 3  # steps whose change is a difference quotient
-QUOTIENT_STEP = 64.0  # of a difference quotient, in square roots of the steps' relative tolerance
+DIRECT = 2  # steps whose change is a difference quotient
 CENTRAL = ((-2, 1.0 / 12.0), (-1, -8.0 / 12.0), (1, 8.0 / 12.0), (2, -1.0 / 12.0))
 FORWARD = ((0, -25.0 / 12.0), (1, 4.0), (2, -3.0), (3, 4.0 / 3.0), (4, -0.25))
 FORMULAS = (CENTRAL, FORWARD, tuple((-offset, -weight) for offset, weight in FORWARD))
@@ -65,41 +64,13 @@ class Standpoint(NamedTuple):
     scales: Scales
 
 
-class Quotient(NamedTuple):
-    """A difference quotient of fourth order, and how far that of twice the step is off it."""
-
-    value: Floats
-    error: Floats
-
-
-def quotient(function: Callable[[float], Floats | None], step: float) -> Quotient | None:
-    """The derivative at 0 of a function, one-sided where it has no value on one side; None where it has none."""
-    seen: dict[int, Floats | None] = {}
+def slope_of(function: Callable[[float], Floats | None], step: float) -> Floats | None:
+    """The derivative at 0 of a function, to fourth order; one-sided where one side has no value, or else None."""
     for formula in FORMULAS:
-        both = [derivative(function, step, formula, every, seen) for every in (1, 2)]
-        if both[0] is not None and both[1] is not None:
-            return Quotient(both[0], np.abs(both[0] - both[1]))
+        values = [value for offset, _ in formula if (value := function(offset * step)) is not None]
+        if len(values) == len(formula):
+            return np.asarray(np.tensordot([weight / step for _, weight in formula], values, 1))
     return None
-
-
-def derivative(
-    function: Callable[[float], Floats | None],
-    step: float,
-    formula: tuple[tuple[int, float], ...],
-    every: int,
-    seen: dict[int, Floats | None],
-) -> Floats | None:
-    """A formula over so many steps at once; `seen` are the function's values by steps from 0."""
-    total: Floats | None = None
-    for offset, weight in formula:
-        if every * offset not in seen:
-            seen[every * offset] = function(every * offset * step)
-        value = seen[every * offset]
-        if value is None:
-            return None
-        part = weight / (every * step) * value
-        total = part if total is None else total + part
-    return total
 
 
 def sensitivity_norm(A: Floats, B: Floats, C: Floats, D: Floats) -> Floats | None:
@@ -132,9 +103,9 @@ class Sensitivity:
     error: Floats
 
 
-def indicators(durations: Floats, lengths: Floats) -> Floats:
+def indicators(walk: DisturbedWalk) -> Floats:
     """(steps, 3) period, length and speed."""
-    return np.column_stack((durations, lengths, lengths / durations))
+    return np.column_stack((walk.durations_s, walk.lengths_m, walk.lengths_m / walk.durations_s))
 
 
 def disturbed(at: Standpoint, disturbance: Disturbance, size: float, steps: int) -> DisturbedWalk:
@@ -146,52 +117,48 @@ def disturbed(at: Standpoint, disturbance: Disturbance, size: float, steps: int)
 
 def sensitivity(at: Standpoint, disturbance: Disturbance) -> Sensitivity | None:
     """Norms of a gait for a disturbance; None if it is unstable, or steps near it end."""
-    step_map, d = at.step_map, at.z.size
-    h = QUOTIENT_STEP * math.sqrt(step_map.tolerances.rtol)
+    fine, coarse = (response(at, disturbance, times) for times in (1.0, 2.0))
+    return None if fine is None or coarse is None else Sensitivity(*fine, np.abs(fine[0] - coarse[0]))
+
+
+def response(at: Standpoint, disturbance: Disturbance, times: float = 1.0) -> tuple[Floats, Floats] | None:
+    """Norms, and what of them is of the disturbed step itself, by difference quotients of `times` the usual step."""
+    d, h = at.z.size, times * at.step_map.probe
 
     def after(size: float) -> Floats | None:
         walk = disturbed(at, disturbance, size, DIRECT)
-        if walk.outcome is not Outcome.WALKED:
-            return None
-        return np.append(indicators(walk.durations_s, walk.lengths_m), walk.z[1])
+        return np.append(indicators(walk), walk.z) if walk.outcome is Outcome.WALKED else None
 
-    def second_step(move: Floats) -> Floats | None:
-        walk = step_map.disturbed(at.z + move, at.p, np.zeros(DIRECT))
-        return indicators(walk.durations_s, walk.lengths_m)[1] if walk.outcome is Outcome.WALKED else None
+    def next_step(move: Floats) -> Floats | None:
+        walk = at.step_map.disturbed(at.z + move, at.p, np.zeros(2))
+        return indicators(walk)[0] if walk.outcome is Outcome.WALKED else None
 
-    changed = quotient(after, h * at.scales.of_disturbance(disturbance))
-    columns = [quotient(lambda size, i=i: second_step(size * np.eye(d)[i]), h) for i in range(d)]  # type: ignore[misc]
+    changed = slope_of(after, h * at.scales.of_disturbance(disturbance))
+    columns = [slope_of(lambda size, way=way: next_step(size * way), h) for way in np.eye(d)]  # type: ignore[misc]
     if changed is None or any(column is None for column in columns):
         return None
-
-    def norm(off: float) -> Floats | None:
-        seen = changed.value + off * changed.error
-        C = np.column_stack([column.value + off * column.error for column in columns if column is not None])
-        return sensitivity_norm(at.A, seen[-d:], C, seen[:-d].reshape(DIRECT, len(INDICATORS)))
-
-    value, other = norm(0.0), norm(1.0)
-    if value is None or other is None:
-        return None
-    return Sensitivity(value, changed.value[: len(INDICATORS)], np.abs(other - value))
+    D = changed[:-d].reshape(DIRECT, len(INDICATORS))
+    norm = sensitivity_norm(at.A, changed[-d:], np.column_stack(columns), D)  # type: ignore[arg-type]
+    return None if norm is None else (norm, D[0])
 
 
-def largest(stands: Callable[[float], bool], unit: float) -> tuple[float, bool]:
-    """The largest disturbance that is stood with every smaller one, and whether a larger one was looked for in vain.
+def largest(stands: Callable[[float], bool], unit: float) -> float:
+    """The largest disturbance that is stood with every smaller one.
 
     unit  of the disturbance: the grid is a part of it, and it is not sought beyond half of it
     """
     steps = round(MOST / GRID)
     low = next((k - 1 for k in range(1, steps + 1) if not stands(k * GRID * unit)), steps)
     if low == steps:
-        return MOST * unit, True
+        return MOST * unit
     below, above = low * GRID * unit, (low + 1) * GRID * unit
     while above - below > CLOSE * unit:
         middle = 0.5 * (below + above)
         below, above = (middle, above) if stands(middle) else (below, middle)
-    return below, False
+    return below
 
 
-def largest_disturbance(at: Standpoint, disturbance: Disturbance, sign: float, steps: int) -> tuple[float, bool]:
+def largest_disturbance(at: Standpoint, disturbance: Disturbance, sign: float, steps: int) -> float:
     """The largest drop (m) or push (N s) of one sign after which so many more steps are taken; see `largest`."""
 
     def stands(size: float) -> bool:

@@ -250,6 +250,7 @@ class RigidMap(StepMap):
     )
 
     tolerances = WATCHED
+    probe = 2e-5
 
     def __init__(
         self, walker_at: Callable[[float], Standing | None], scale: float, like: Standing, exact: Tolerances = EXACT
@@ -316,7 +317,7 @@ class RigidMap(StepMap):
         before, after = (states[: len(walked.time)] for states in (walked.strikes.before, walked.strikes.after))
         lengths = step_lengths(walker, np.vstack((on_section(walker, z), after))[:-1], before)
         durations = np.diff(walked.time, prepend=0.0) * units.time
-        return DisturbedWalk(walked.outcome, durations, lengths * units.length, walked.z)
+        return DisturbedWalk(walked.outcome, durations, lengths * units.length, walked.z[-1] if walked.z.size else z)
 
     def cost_of_transport(self, z: Floats, p: float) -> float | None:
         """Of a step of the unit walker, which is that of the walker; None where it ends."""

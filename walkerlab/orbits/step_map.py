@@ -81,9 +81,9 @@ class DisturbedWalk:
     """A walk from the section over uneven ground, or pushed.
 
     outcome      WALKED if it took all its steps
-    durations_s  (steps,) between heel strikes, the first from the section on
+    durations_s  (steps,) between heel strikes
     lengths_m    (steps,)
-    z            (steps, d) where each led: a point of the section where the footholds before and after are level
+    z            (d,) where it came to the section last: the next step from there follows the last one
     """
 
     outcome: Outcome
@@ -106,12 +106,14 @@ class StepMap(Stepper, Protocol):
     monitors    what `watch` measures
     scale       magnitude of changes of the parameter that matter
     tolerances  of its steps
+    probe       disturbance, in units of the walker, that they answer in proportion
     """
 
     names: tuple[str, ...]
     monitors: tuple[Monitor, ...]
     scale: float
     tolerances: Tolerances
+    probe: float
 
     def watch(self, z: Floats, p: float, steps: int) -> Floats:
         """(monitors,) the worst of each over some steps."""

@@ -75,7 +75,8 @@ class Stage:
     keeps_parts    whether it keeps parts of its result, to go on where a run was cut off
     alone          whether it measures times, and so runs with nothing beside it
     early_with     the results with which it is worth drawing while others are still being computed
-    follows        whether it runs over a parameter: `--over`, `--from`, `--to`, `--model`, `--periods`
+    follows        whether it runs over a parameter: `--over`, `--from`, `--to`, `--periods`
+    of_a_model     whether it asks about gaits of a model that is to be named: `--model`
     designs        whether it has a question of its own: `--minimise`, `--maximise`, `--over`, `--keep`
     does_without   what is left out of its scene under a config: what, why, and what that saves
     """
@@ -97,6 +98,7 @@ class Stage:
     alone: bool = False
     early_with: tuple[str, ...] = ()
     follows: bool = False
+    of_a_model: bool = False
     designs: bool = False
     does_without: Lacks = nothing
     takes_of_scene: type | None = None
@@ -210,7 +212,7 @@ PIPELINE = Graph(
     Stage(
         "continuation", "walkerlab.stages.continuation",
         "Follow families of gaits over a parameter: branches, bifurcations, cascades, chaos.",
-        reads.ContinuationConfig, on_demand=True, follows=True,
+        reads.ContinuationConfig, on_demand=True, follows=True, of_a_model=True,
     ),
     Stage(
         "basin", "walkerlab.stages.basin",
@@ -221,11 +223,12 @@ PIPELINE = Graph(
         "robustness", "walkerlab.stages.robustness",
         "Ask what a gait stands: drops, pushes, rough ground, and which number of the walker moves it most.",
         reads.RobustnessConfig, results_of("fixedpoint"), has_cells=True, on_demand=True, keeps_parts=True,
+        of_a_model=True,
     ),
     Stage(
         "design", "walkerlab.stages.design",
         "Find the walker whose gait has the least or largest of a number, within bounds.",
-        reads.DesignConfig, results_of("fixedpoint"), on_demand=True, designs=True,
+        reads.DesignConfig, results_of("fixedpoint"), on_demand=True, designs=True, of_a_model=True,
     ),
     Stage(
         "plot", "walkerlab.stages.plot", "Draw the figures from the stored results.", reads.NamedConfig,

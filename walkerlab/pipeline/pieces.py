@@ -24,13 +24,20 @@ class Piece(NamedTuple):
 
 
 def complete(
-    pieces: Sequence[Piece], parts: Parts, label: str, progress: Progress, jobs: int, shared_from: int = 0
+    pieces: Sequence[Piece],
+    parts: Parts,
+    label: str,
+    progress: Progress,
+    jobs: int,
+    shared_from: int = 0,
+    first: Sequence[int] = (0,),
 ) -> int:
     """Compute the pieces that are not there yet, and keep each as soon as it is.
 
     parts        what an earlier run has left, and where new pieces are kept
     jobs         processes
     shared_from  cells that take longer than starting another process
+    first        places of pieces that are done here, before several processes would each compile the same
 
     Returns how many cells were computed.
     """
@@ -39,7 +46,7 @@ def complete(
     total = sum(piece.cells for piece in pieces)
     progress.start(label, total)
     progress.advance(total - cells)
-    found = in_order([piece.run for piece in waiting], jobs if cells >= shared_from else 1, (0,))
+    found = in_order([piece.run for piece in waiting], jobs if cells >= shared_from else 1, first)
     for piece, numbers in zip(waiting, found, strict=True):
         parts.keep(piece.name, numbers)
         progress.advance(piece.cells)

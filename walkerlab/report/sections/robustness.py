@@ -11,6 +11,8 @@ from walkerlab.report.words import words
 
 SHOWN = 12
 """Derivatives in the table."""
+BUILT = ("walker.", "push_off.")
+"""How the numbers begin that a builder can change."""
 MODEL = Column("model", "model")
 NORMS = (
     MODEL,
@@ -74,7 +76,16 @@ def section(results: Results) -> Section | None:
 
 def findings(summary: Mapping[str, Any]) -> list[str]:
     """What there is to say, sentence by sentence."""
-    return words.parts("robustness.findings", summary)
+    first: dict[str, Mapping[str, Any]] = {}
+    for row in summary["sensitivity"]:
+        if (
+            row["of"] == "gait_sensitivity_norm"
+            and row["to"].startswith(BUILT)
+            and "relative" in row
+            and not row.get("why")
+        ):
+            first.setdefault(row["model"], row)
+    return words.parts("robustness.findings", summary, [*first.values()])
 
 
 def tables(summary: Mapping[str, Any]) -> list[Table]:
