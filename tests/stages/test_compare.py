@@ -170,7 +170,7 @@ def test_another_walker_is_not_judged_by_the_paper(compared, change):
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ("contact.stiffness=2e5", "contact.stiffness 7.96214e+11 instead of 3.98107e+11"),
+        ("contact.stiffness=2e5", "contact.stiffness (SI) 7.96214e+11 instead of 3.98107e+11"),
         ("contact.terrain=after-mid-swing", "contact.terrain after-mid-swing instead of checkerboard"),
         ("slope_deg=3", "slope_rad 0.0523599 instead of 0.0174"),
     ],

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from walkerlab.config.design import Design
 from walkerlab.config.fields import kind, leaves
 from walkerlab.config.files import builtin_names
 from walkerlab.config.loader import load
@@ -20,6 +21,7 @@ from walkerlab.pipeline.progress import Silent
 from walkerlab.scene.parameter import PHYSICAL, parameter_of
 from walkerlab.stages import robustness
 from walkerlab.stages.continuation import FamilyQuestion, models_of
+from walkerlab.stages.design import Gaits
 from walkerlab.sweeps.question import axis, described
 
 WALKERS = {
@@ -89,10 +91,32 @@ def test_a_second_number_is_followed_or_refused_too(config, keys):
         assert models or f" {key} " in f" {refused} "
 
 
-def test_robustness_differentiates_the_gait_by_every_number(config, keys):
-    fixedpoint = InMemory().answer(config, "fixedpoint", Keys().of(config, "fixedpoint"))
+@pytest.fixture(scope="module")
+def fixedpoint(config):
+    return InMemory().answer(config, "fixedpoint", Keys().of(config, "fixedpoint")).content
+
+
+@pytest.fixture(scope="module")
+def subject(config, fixedpoint):
+    """The rigid model's gait, to be disturbed."""
     taken = only(config, PIPELINE["robustness"].takes)
-    subject = next(robustness.subjects(taken, {"fixedpoint": fixedpoint.content}, Silent()))
+    return next(robustness.subjects(taken, {"fixedpoint": fixedpoint}, Silent()))
+
+
+def test_design_knows_the_gait_and_its_gradient_over_every_number(config, keys, fixedpoint, subject):
+    taken = only(config, PIPELINE["design"].takes)
+    for key in keys:
+        parameter, asked = parameter_of(key, taken), Design(minimise="period_s", over={key: [0.0, 1.0]})
+        own = np.array([parameter.value_in(taken)])
+        found = Gaits(taken, asked, [parameter], fixedpoint.summary, Silent()).at(own)
+        if found is None:
+            assert not robustness.gradients_of(subject, key), "the walker has no other value of it"
+            continue
+        assert found.numbers["period_s"] == pytest.approx(fixedpoint.summary["period_s"], abs=1e-9)
+        assert np.all(np.isfinite(found.gradients["period_s"])), key
+
+
+def test_robustness_differentiates_the_gait_by_every_number(config, keys, subject):
     assert set(robustness.numbers_read(subject)) <= set(keys)
     for key in keys:
         for name, gradient in robustness.gradients_of(subject, key).items():

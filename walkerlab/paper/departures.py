@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Iterator
 from typing import Any, Final
 
-from walkerlab.config.contact import Contact
+from walkerlab.config.contact import BOUNDS_SI, Contact
 from walkerlab.config.drives import drives_of
 from walkerlab.config.numbers import same
 from walkerlab.config.reads import ContactConfig
@@ -13,8 +13,10 @@ from walkerlab.paper.measured import Departures
 from walkerlab.paper.printed import X_P, slope_of
 
 PHYSICAL_MODEL_ONLY: Final = ("foot_radius_m",)
-GROUND: Final = tuple(name for name in Contact.model_fields if name not in ("units", "stance"))
-"""Keys of the contact block, told in SI. A pinned first stance is the paper's too (section 4)."""
+IN_SI: Final = ("stiffness", "damping", *BOUNDS_SI)
+"""Keys of the contact block whose numbers are of either units."""
+PURE: Final = tuple(name for name in Contact.model_fields if name not in (*IN_SI, "units", "stance"))
+"""Its other keys; a pinned first stance is the paper's too (section 4)."""
 
 
 def departures(config: ContactConfig, start_moved: bool) -> Departures:
@@ -37,17 +39,18 @@ def departures(config: ContactConfig, start_moved: bool) -> Departures:
             rigid.append(said("slope_rad", config.slope_rad, slope))
         if contact is not None:
             of_contact += different(walker, paper, PHYSICAL_MODEL_ONLY)
-            of_contact += different(contact.in_si(), Contact().in_si(), GROUND, "contact.")
+            of_contact += different(contact.in_si(), Contact().in_si(), IN_SI, "contact.{} (SI)")
+            of_contact += different(contact, Contact(), PURE, "contact.{}")
     if start_moved:
         of_contact.append("the start is not the rigid model's fixed point")
     return Departures(tuple(rigid), (*rigid, *of_contact))
 
 
-def different(used: Any, paper: Any, names: Iterable[str], block: str = "") -> Iterator[str]:
-    """The names, of a block, by which the two have different values."""
+def different(used: Any, paper: Any, names: Iterable[str], called: str = "{}") -> Iterator[str]:
+    """The names by which the two have different values, with these, as they are called."""
     for name in names:
         if not same(getattr(used, name), getattr(paper, name)):
-            yield said(f"{block}{name}", getattr(used, name), getattr(paper, name))
+            yield said(called.format(name), getattr(used, name), getattr(paper, name))
 
 
 def said(name: str, *values: Any) -> str:

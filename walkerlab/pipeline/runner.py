@@ -1,6 +1,5 @@
 """Runs a stage and what it needs: reuses what is up to date, stores each result as soon as it is there."""
 
-import datetime
 import importlib
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -282,11 +281,7 @@ class Execution:
             folder=self.folder.path,
             left_out=self.planner.missing_inputs(stage),
         )
-        expected = None
-        if step.found is not None:
-            times = (step.found.provenance.started_utc, step.found.provenance.ended_utc)
-            begun, ended = (datetime.datetime.fromisoformat(time) for time in times)
-            expected = (ended - begun).total_seconds()
+        expected = None if step.found is None else step.found.provenance.took_s
         number = self.of - len(self.left) + 1 + len(self.running)
         of = max(self.of, number)
         place = [f"{number} of {of}"] if of > 1 else []

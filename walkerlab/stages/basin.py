@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -77,7 +77,8 @@ def run(
     progress.start("basin: attractors")
     question = question_of(config, inputs, window, rigid)
     begun, shared_from = time.perf_counter(), question.shared_from
-    pieces = cells_of(question, window)
+    every = range(window.size)
+    pieces = pieces_of("cells", every, question.cells_at_once, 1, partial(ends_of, question, window))
     walks = complete(pieces, parts, "basin", progress, jobs, shared_from)
     ends = [np.reshape(parts.kept[piece.name], (3, -1)) for piece in pieces]
     found = WalkEnds(*np.concatenate(ends, axis=1).astype(np.int64))
@@ -85,7 +86,9 @@ def run(
     edges = edge_cells(np.where(walked, found.attractor, FAILED).reshape(window.cells))
     walking = walked.astype(float)
     if config.basin.refine > 1 and edges.size:
-        pieces = edges_of(question, window, edges, config.basin.refine)
+        refine = config.basin.refine
+        walks_of_cell, shares = refine ** len(window.axes), partial(shares_of, question, window, refine)
+        pieces = pieces_of("edge", edges.tolist(), question.edges_at_once, walks_of_cell, shares)
         walks += complete(pieces, parts, "basin: edges", progress, jobs, shared_from)
         walking[edges] = np.concatenate([parts.kept[piece.name] for piece in pieces])
     rate = {"trajectories_per_s": walks / (time.perf_counter() - begun)} if walks else {}
@@ -312,33 +315,22 @@ class ContactQuestion:
 Question = RigidQuestion | ContactQuestion
 
 
-def cells_of(question: Question, window: Window) -> list[Piece]:
-    """Every cell, walked from its middle."""
-    pieces = []
-    for first in range(0, window.size, question.cells_at_once):
-        cells = range(first, min(first + question.cells_at_once, window.size))
-        pieces.append(Piece(f"cells {first}", len(cells), partial(ends_of, question, window, cells)))
-    return pieces
+def pieces_of(
+    name: str, cells: Sequence[int], at_once: int, walks: int, run: Callable[[Sequence[int]], list[float]]
+) -> list[Piece]:
+    """Cells as pieces of so many at once, each named by its first cell; a cell takes so many walks."""
+    pieces = (cells[first : first + at_once] for first in range(0, len(cells), at_once))
+    return [Piece(f"{name} {piece[0]}", walks * len(piece), partial(run, piece)) for piece in pieces]
 
 
-def ends_of(question: Question, window: Window, cells: range) -> list[float]:
-    """Outcomes, attractors and steps of the cells, one after the other."""
+def ends_of(question: Question, window: Window, cells: Sequence[int]) -> list[float]:
+    """Outcomes, attractors and steps of the cells, each walked from its middle, one after the other."""
     found = question.walked(window.starts(np.array(cells)))
     return [float(number) for number in (*found.outcome, *found.attractor, *found.steps)]
 
 
-def edges_of(question: Question, window: Window, edges: Integers, refine: int) -> list[Piece]:
-    """The cells at edges, walked from the middles of their parts."""
-    pieces, parts = [], int(refine ** len(window.axes))
-    for first in range(0, len(edges), question.edges_at_once):
-        cells = edges[first : first + question.edges_at_once]
-        run = partial(shares_of, question, window, cells, refine)
-        pieces.append(Piece(f"edge {edges[first]}", parts * len(cells), run))
-    return pieces
-
-
-def shares_of(question: Question, window: Window, cells: Integers, refine: int) -> list[float]:
-    """The share of each cell that walks."""
+def shares_of(question: Question, window: Window, refine: int, cells: Sequence[int]) -> list[float]:
+    """The share of each cell that walks, from the middles of its parts."""
     inside = inside_cell(refine, len(window.axes))
     found = question.walked(window.starts(np.repeat(cells, len(inside)), np.tile(inside, (len(cells), 1))))
     walking = (found.outcome == Outcome.WALKED).reshape(len(cells), -1)

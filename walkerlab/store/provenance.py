@@ -45,6 +45,12 @@ class Provenance:
     git_commit: str | None = None
     input_digests: Mapping[str, str] = field(default_factory=dict)
 
+    @property
+    def took_s(self) -> float:
+        """How long it took, s."""
+        begun, ended = map(datetime.datetime.fromisoformat, (self.started_utc, self.ended_utc))
+        return (ended - begun).total_seconds()
+
     def until_now(self) -> Provenance:
         """The same, ended now."""
         return replace(self, ended_utc=utc_now())

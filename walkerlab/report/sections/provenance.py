@@ -1,7 +1,5 @@
 """Where the numbers come from: config, software, machine, and what determines each result."""
 
-import datetime
-
 from walkerlab.config.writer import to_yaml
 from walkerlab.report.blocks import Code, PageBlock, Section
 from walkerlab.report.results import Results
@@ -34,7 +32,7 @@ RESULT_COLUMNS = (
     Column(
         "begun (UTC)", lambda result: result.provenance.started_utc.partition(".")[0].replace("T", " "), numeric=True
     ),
-    Column("took (s)", lambda result: f"{took_s(result):.2f}", numeric=True),
+    Column("took (s)", lambda result: f"{result.provenance.took_s:.2f}", numeric=True),
     Column("seed", lambda result: result.provenance.seed, numeric=True),
     Column("complete", lambda result: result.complete),
 )
@@ -43,14 +41,6 @@ DIGEST_COLUMNS = (
     Column("stage key (sha256)", lambda result: result.identity.key, wide=True),
     Column("digest of its content", lambda result: result.digest(), wide=True),
 )
-
-
-def took_s(result: Stored) -> float:
-    """How long a stage ran, s."""
-    begun, ended = (
-        datetime.datetime.fromisoformat(time) for time in (result.provenance.started_utc, result.provenance.ended_utc)
-    )
-    return (ended - begun).total_seconds()
 
 
 def software_table(results: Results) -> Table:
