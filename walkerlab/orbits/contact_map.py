@@ -157,7 +157,7 @@ def step_from_section(
     rise: float = 0.0,
     push: float = 0.0,
 ) -> SectionStep:
-    """Walk from the section to the section.
+    """Walk from the section to the section; REJECTED if a push-off is not over there, which begins without one.
 
     z        section coordinates, the height over the present foothold
     pitch_m  what the pads are laid for
@@ -205,8 +205,11 @@ def step_from_section(
     half = min(1.0, max(-1.0, 0.5 * spacing / ground.frame.leg_length))
     foothold = feet_motion(walker.whole, start)[stance].along
     end[HEIGHT] -= rise
+    cut_off = (
+        walker.whole.push_off != 0.0 and stopped.time_s - walk_state.touch_time[0] < walker.whole.push_off_duration
+    )
     return SectionStep(
-        stopped.outcome,
+        Outcome.REJECTED if cut_off and stopped.outcome is Outcome.WALKED else stopped.outcome,
         coordinates_of(walker, end, landed),
         DP,
         stopped.time_s,
