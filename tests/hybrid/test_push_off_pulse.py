@@ -202,6 +202,14 @@ def test_where_a_long_pulse_leaves_no_gait_the_advice_is_a_shorter_one_which_has
     assert gait_off_pads(config, gait.step_length, gait.state).gait.stable
 
 
+def test_a_pulse_that_is_not_over_when_the_feet_pass_has_no_gait_and_says_why():
+    config, _, gait = scene_of("slope-3deg", "push_off.impulse_N_s=0.5", "push_off.duration_s=0.5")
+    lost = gait_off_pads(config, gait.step_length, gait.state)
+    assert lost.gait is None
+    assert "its push-off lasts until the feet pass each other, or longer" in lost.reason
+    assert "push_off.duration_s" in lost.advice
+
+
 def test_a_bounce_of_the_leading_foot_while_a_pulse_lasts_begins_none():
     """Ground that hardly damps throws that foot up again; the pulse goes on as the first touch began it.
 

@@ -152,7 +152,7 @@ def step_from_section(
     pitch_m: float,
     derived: bool = True,
 ) -> SectionStep:
-    """Walk from the section to the section.
+    """Walk from the section to the section; REJECTED if a push-off is not over there, which begins without one.
 
     z        section coordinates, the height over the present foothold
     pitch_m  what the pads are laid for
@@ -191,8 +191,10 @@ def step_from_section(
     way, rose = (float(end[place] - start[place]) for place in (ALONG, HEIGHT))
     spacing = float(walk_state.touch_along[0] - walk_state.foothold[stance] - walk_state.slip[0])
     half = min(1.0, max(-1.0, 0.5 * spacing / ground.frame.leg_length))
+    pulse = walker.whole.push_off_duration if walker.whole.push_off != 0.0 else 0.0
+    cut_off = stopped.time_s - walk_state.touch_time[0] < pulse
     return SectionStep(
-        stopped.outcome,
+        Outcome.REJECTED if cut_off and stopped.outcome is Outcome.WALKED else stopped.outcome,
         coordinates_of(walker, end, landed),
         DP,
         stopped.time_s,
