@@ -128,6 +128,17 @@ def test_gaits_along_the_number_are_drawn_and_a_click_goes_there(page):
     )
 
 
+def test_gaits_along_a_number_of_the_ground_are_the_contact_models_over_decades(page):
+    typed(page, "contact.stiffness", "50000")
+    page.until("along.key === 'contact.stiffness' && along.found?.every(({ model }) => model === 'contact')")
+    page.until("along.series.length > 0")
+    assert page.evaluate("along.dot.getAttribute('visibility')") == "hidden"  # the rigid gait has no place there
+    marked = page.evaluate("along.value(along.fromX(Number(along.line.getAttribute('x1'))))")
+    assert marked == pytest.approx(50000)
+    labels = page.evaluate("[...along.curves.querySelectorAll('text.middle')].map((one) => one.textContent)")
+    assert "1e5" in labels
+
+
 def test_each_model_can_be_hidden(page):
     both = page.evaluate(WALK)
     page.evaluate("document.getElementById('contact').click()")

@@ -1,7 +1,10 @@
 """`walkerlab explore` as a process: its numbers are the command's, and what is refused is refused in words."""
 
 import json
+import shlex
 import signal
+import subprocess
+import sys
 import threading
 import time
 from pathlib import Path
@@ -56,6 +59,18 @@ def test_every_number_is_the_one_of_the_command(served, config, changes):
 def test_every_number_of_the_contact_walk_is_the_one_of_the_command(served, changes):
     said = same(served, "paper", changes, ["rigid", "contact"])
     assert said["tracks"].keys() == {"simulate", "contact-sim"}
+
+
+def test_the_copied_command_lines_print_what_the_page_shows(served):
+    changes = {"slope_deg": 2.345678901, "walker.hip_mass_kg": 12.5, "contact.terrain": "after-mid-swing"}
+    _, said = served.walk({**changes, "ground.heights_m": [0.0, 0.001]}, ["rigid", "contact"])
+    lines = said["command"].splitlines()
+    assert [line.split()[:2] for line in lines] == [["walkerlab", stage] for stage in ("fixedpoint", *STAGES.values())]
+    for line in lines:
+        _, stage, *options = shlex.split(line)
+        command = [sys.executable, "-m", "walkerlab", stage, *options, "--runs", "asked", "--json"]
+        printed = json.loads(subprocess.run(command, cwd=served.folder, capture_output=True, check=True).stdout)
+        assert {key: printed[key] for key in said[stage]} == said[stage]
 
 
 def test_a_slope_without_a_gait_is_an_answer(served):
@@ -214,6 +229,26 @@ def test_the_server_ends_when_told_and_leaves_nothing_behind(tmp_path, told):
         assert not workers_of(one.process.pid)
     finally:
         one.close()
+
+
+def test_a_report_that_is_being_made_ends_with_the_server(tmp_path):
+    one = Served(tmp_path)
+    try:
+        assert one.asked("/api/job", {"kind": "report"})[0] == 200
+        while not at_work_for(tmp_path):
+            time.sleep(0.05)
+        one.process.send_signal(signal.SIGTERM)
+        began = time.monotonic()
+        assert one.process.wait(10) == 130
+        assert time.monotonic() - began < 2
+        assert not at_work_for(tmp_path)
+    finally:
+        one.close()
+
+
+def at_work_for(folder):
+    """Commands that run for a folder of runs."""
+    return [file for file in Path("/proc").glob("[0-9]*/cmdline") if f"{folder / 'runs'}\0--json" in text_of(file)]
 
 
 def workers_of(process):

@@ -57,15 +57,20 @@ class Desk:
         if self.drops and self._turn.locked():
             self.worker.process.send_signal(GIVE_WAY)
         with self._turn:
-            if number != self._newest:
-                return SUPERSEDED
-            try:
-                return self.worker.do(call, self._heard)
-            except WorkerDiedError as error:
-                self.worker = self._hired()
-                return SUPERSEDED if number != self._newest else failed(500, error.message, error.advice)
-            except Exception as error:
-                return failed(500, f"this is a bug of walkerlab: {type(error).__name__}: {error}")
+            # again, if what was to end the question before has come late
+            while number == self._newest:
+                try:
+                    answer = self.worker.do(call, self._heard)
+                except WorkerDiedError as error:
+                    self.worker = self._hired()
+                    if error.exit_code_of_worker != -GIVE_WAY:  # not even begun, and so told
+                        return failed(500, error.message, error.advice)
+                except Exception as error:
+                    return failed(500, f"this is a bug of walkerlab: {type(error).__name__}: {error}")
+                else:
+                    if answer != SUPERSEDED:
+                        return answer
+            return SUPERSEDED
 
     def _heard(self, kernel: str) -> None:
         self.compiling = kernel

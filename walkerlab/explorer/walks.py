@@ -17,10 +17,10 @@ from walkerlab.config.writer import extending
 from walkerlab.errors import ConfigError, WalkerlabError
 from walkerlab.explorer.numbers import adjustable
 from walkerlab.pipeline.in_memory import InMemory, Keys
+from walkerlab.pipeline.progress import Silent
 from walkerlab.pipeline.resolve import resolve
 from walkerlab.report.results import Results
 from walkerlab.report.sections import motion
-from walkerlab.stopping import raise_on
 from walkerlab.store.content import Content, Group
 from walkerlab.workers import tell
 
@@ -34,6 +34,26 @@ GIVE_WAY = signal.SIGUSR1
 
 class SupersededError(BaseException):
     """A newer question waits; not to be taken for a failure of what it stops."""
+
+
+class GivingWay(Silent):
+    """The progress of what is dropped as soon as a newer question waits, between two gaits.
+
+    Nowhere else: what a signal interrupts where it arrives, such as an import, may stay half done.
+    """
+
+    def __init__(self) -> None:
+        """None waits yet."""
+        self._superseded = False
+        signal.signal(GIVE_WAY, self._give_way)
+
+    def _give_way(self, *_: object) -> None:
+        self._superseded = True
+
+    def advance(self, n: int = 1) -> None:  # noqa: ARG002
+        """Go on, if nobody waits."""
+        if self._superseded:
+            raise SupersededError
 
 
 @dataclass(frozen=True)
@@ -138,16 +158,13 @@ def along(question: ExploredConfig) -> Answered:
     The question's changes hold the block `continuation`: key, ends and points. Status 409 if a newer question came.
     """
     stages, keys = memory()
-    raise_on(GIVE_WAY, SupersededError)
     try:
         config = question.loaded.config
-        answer = stages.answer(config, "continuation", keys.of(config, "continuation"), again=False)
+        answer = stages.answer(config, "continuation", keys.of(config, "continuation"), GivingWay(), again=False)
     except ConfigError as error:
         return question.refused(error)
     except SupersededError:
         return SUPERSEDED
-    finally:
-        signal.signal(GIVE_WAY, signal.SIG_IGN)
     followed = [(path, group) for path, group in answer.content.groups.items() if "step_period" in group.variables]
     curves = [{"model": path.partition("/")[0], **curve(group)} for path, group in followed if walkable(group)]
     return 200, {"over": config.continuation.over, "curves": curves}

@@ -325,7 +325,8 @@ class Along extends Plot {
     return this.log ? 10 ** scaled : scaled;
   }
   label(value, horizontal) {
-    return horizontal && this.log ? digits(10 ** value, 2) : super.label(value);
+    if (!horizontal || !this.log) return super.label(value);
+    return Number.isInteger(value) ? (Math.abs(value) < 4 ? digits(10 ** value) : minus(`1e${value}`)) : "";
   }
   at(event) {
     const box = this.cursor.getBoundingClientRect();
@@ -355,13 +356,13 @@ class Along extends Plot {
       const block = Object.fromEntries(Object.entries(span).map(([name, value]) => [`continuation.${name}`, value]));
       const [status, answer] = await ask("/api/along", question({ set: { ...state.set, ...block } })).catch(() => [0]);
       if (this.asked !== asked) return;
-      if (status === 409) return (this.asked = null);
+      if (status === 409) return this.said("Another page has asked for other gaits."), (this.asked = null);
       if (status === 200) found[model] = answer.curves;
       else if (status === 422) refused = sentence(answer.error);
       this.found = Object.values(found).flat();
       if (this.found.length) this.plot();
       const more = place + 1 < finer.length ? ` Computing more of the ${finer[place + 1][0]} model.` : "";
-      this.said((this.found.length ? "Stable gaits are full lines; a click goes there." : refused || "No gaits are found along this number.") + more);
+      this.said((this.found.length ? "Stable gaits are full lines; a click goes there." : more ? "" : refused || "No gaits are found along this number.") + more);
     }
   }
   said(text) {
@@ -371,33 +372,43 @@ class Along extends Plot {
     if (!this.found?.length) return;
     this.place.classList.remove("old");
     const what = byId("what");
-    this.titles = [this.unit && this.unit !== "1" ? `${this.key} (${this.unit})` : this.key, what.selectedOptions[0].text];
+    this.titles = [this.unit && this.unit !== "1" ? `${this.key} (${this.unit})` : this.key, ""];
+    // Gaits far from those that can be walked would make these one flat line.
+    const near = [this.height, ...this.found.flatMap((curve) => curve[what.value].filter((_, index) => curve.stable[index]))].filter(Number.isFinite);
+    const [least, most] = near.length ? [Math.min(...near) / 1.5, Math.max(...near) * 1.5] : [0, Infinity];
     const series = this.found.flatMap((curve) => {
       const pieces = [];
       curve.value.forEach((x, index) => {
         const y = curve[what.value][index];
+        if (y < least || y > most) return pieces.push(null);
         const last = pieces.at(-1);
         if (last) last.x.push(this.scaled(x)), last.y.push(y);
         if (last?.stable !== curve.stable[index]) {
           pieces.push({ x: [this.scaled(x)], y: [y], stable: curve.stable[index], style: curve.model, dash: curve.stable[index] ? "" : "dashed" });
         }
       });
-      return pieces;
+      return pieces.filter((piece) => piece);
     });
+    if (!series.length) return;
     super.draw(series, `${what.selectedOptions[0].text} of gaits over ${this.key}`);
     this.dot = element("circle", { r: 4.5 });
     this.cursor.replaceChildren(this.line, this.dot);
     this.mark();
   }
+  // Of the gait that is shown; there is none beside the contact model's curves alone.
+  get height() {
+    const [gait, what] = [shown?.answer.fixedpoint ?? {}, byId("what").value];
+    if (!this.found?.some(({ model }) => model === "rigid")) return undefined;
+    return what === "speed_m_s" ? gait.step_length_m / gait.period_s : gait[what];
+  }
   mark() {
     if (!this.series || !shown) return;
     const value = state.set[this.key] ?? rows.get(this.key)?.number.value;
-    const gait = shown.answer.fixedpoint;
-    const height = byId("what").value === "speed_m_s" ? gait.step_length_m / gait.period_s : gait[byId("what").value];
-    const [x, y] = [this.toX(this.scaled(value)), this.toY(height)];
-    for (const name of ["x1", "x2"]) this.line.setAttribute(name, Number.isFinite(x) ? x : -9);
-    this.dot.setAttribute("cx", Number.isFinite(x) ? x : -9);
-    this.dot.setAttribute("cy", Number.isFinite(y) ? clamp(y, 0, Plot.HEIGHT) : -9);
+    const [x, y] = [this.toX(this.scaled(value)), this.toY(this.height)];
+    this.line.setAttribute("visibility", Number.isFinite(x) ? "visible" : "hidden");
+    this.dot.setAttribute("visibility", Number.isFinite(x + y) ? "visible" : "hidden");
+    if (Number.isFinite(x)) for (const name of ["x1", "x2"]) this.line.setAttribute(name, x);
+    if (Number.isFinite(x + y)) for (const [name, at] of [["cx", x], ["cy", clamp(y, 0, Plot.HEIGHT)]]) this.dot.setAttribute(name, at);
   }
 }
 

@@ -13,7 +13,9 @@ const clamp = (value, low, high) => Math.min(high, Math.max(low, value));
 class Track {
   constructor(meta, packed) {
     Object.assign(this, meta);
-    const bytes = Uint8Array.from(atob(packed), (letter) => letter.charCodeAt(0));
+    const letters = atob(packed);
+    const bytes = new Uint8Array(letters.length);
+    for (let i = 0; i < letters.length; i++) bytes[i] = letters.charCodeAt(i);
     const floats = new Float32Array(bytes.buffer);
     this.all = {};
     this.channels.forEach((name, index) => (this.all[name] = floats.subarray(index * this.samples, (index + 1) * this.samples)));
