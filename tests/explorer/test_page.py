@@ -1,5 +1,7 @@
 """The page of `walkerlab explore` in a real browser: dragged, typed, searched, gone back in, saved, and left alone."""
 
+import itertools
+
 import pytest
 from browser import Browser, executable
 from explored import Served
@@ -98,8 +100,8 @@ def test_a_picture_is_never_taken_for_that_of_other_numbers(page):
     typed(page, "walker.leg_mass_kg", "5")
     page.until(f"{STATE} === 'shown'")
     typed(page, "slope_deg", "30")
-    page.until(f"{SAID}.startsWith('No gait: no gait at a slope')")
-    assert page.evaluate("document.getElementById('place').hidden")
+    page.until(f"{SAID}.startsWith('No gait at a slope')")
+    assert page.evaluate("document.querySelector('.scenes').hidden")
     assert page.evaluate(f"{SHOWN} + {PERIOD}") == "Nothing walks: paper with slope_deg 30–"
 
 
@@ -124,6 +126,17 @@ def test_gaits_along_the_number_are_drawn_and_a_click_goes_there(page):
     page.until(
         f"{SHOWN}.startsWith('Shown: paper with slope_deg 2') || {SHOWN}.startsWith('Shown: paper with slope_deg 3')"
     )
+
+
+def test_gaits_along_a_number_of_the_ground_are_the_contact_models_over_decades(page):
+    typed(page, "contact.stiffness", "50000")
+    page.until("along.key === 'contact.stiffness' && along.found?.every(({ model }) => model === 'contact')")
+    page.until("along.series.length > 0")
+    assert page.evaluate("along.dot.getAttribute('visibility')") == "hidden"  # the rigid gait has no place there
+    marked = page.evaluate("along.value(along.fromX(Number(along.line.getAttribute('x1'))))")
+    assert marked == pytest.approx(50000)
+    labels = page.evaluate("[...along.curves.querySelectorAll('text.middle')].map((one) => one.textContent)")
+    assert "1e5" in labels
 
 
 def test_each_model_can_be_hidden(page):
@@ -153,7 +166,7 @@ def test_a_film_is_made_and_linked(page):
     kind = page.evaluate(
         "fetch(document.querySelector('#made a').href).then((answer) => answer.headers.get('Content-Type'))"
     )
-    assert link.endswith("simulate.gif")
+    assert link.partition("?")[0].endswith("simulate.gif")
     assert kind == "image/gif"
 
 
@@ -168,9 +181,54 @@ def test_nothing_is_wider_than_the_screen(browser, served, width, dark):
 
 def test_the_keyboard_alone_turns_a_number(page):
     page.evaluate("document.getElementById('turn-slope_deg').focus()")
+    before = page.evaluate("history.length")
     page.press("ArrowRight", 39)
     page.until(f"{SHOWN}.startsWith('Shown: paper with slope_deg 1.04')")
     assert page.evaluate("document.activeElement.id") == "turn-slope_deg"
+    for _ in range(5):
+        page.call("Input.dispatchKeyEvent", type="keyDown", key="ArrowRight", windowsVirtualKeyCode=39)
+    page.call("Input.dispatchKeyEvent", type="keyUp", key="ArrowRight", windowsVirtualKeyCode=39)
+    assert page.evaluate("history.length") == before + 2  # a key that is held is one place to come back to
+
+
+def test_what_the_page_was_started_from_is_what_it_shows(browser, tmp_path):
+    one = Served(tmp_path, "--set", "slope_deg=3")
+    try:
+        browser.open(Address("about:blank"))
+        browser.open(Address(one.url))
+        browser.until(f"{STATE} === 'shown'")
+        assert browser.evaluate(SHOWN) == "Shown: paper with slope_deg=3"
+        assert browser.evaluate("rows.get('slope_deg').text.value") == "3"
+        assert "--set slope_deg=3" in browser.evaluate("document.getElementById('command').textContent")
+        browser.evaluate(
+            "document.getElementById('config').value = 'paper';"
+            "document.getElementById('config').dispatchEvent(new Event('change'))"
+        )
+        browser.until(f"{SHOWN} === 'Shown: paper'")
+    finally:
+        one.close()
+
+
+def test_a_loop_of_a_steady_walk_goes_on_over_the_ground(page):
+    page.evaluate(
+        "window.said = []; const drawn = CanvasRenderingContext2D.prototype.fillText;"
+        "CanvasRenderingContext2D.prototype.fillText = function (text, x, y) {"
+        " const time = document.querySelector('.time').value;"
+        " if (this.canvas.className === 'walk') said.push([time, Number(text.replace('−', '-').split(' ')[0]), x]);"
+        " return drawn.call(this, text, x, y); };"
+        "document.querySelector('.speed').value = '2'"
+    )
+    page.until("said.some((one, place) => place && Number(one[0]) < Number(said[place - 1][0]))")
+    page.until("said.at(-1)[0] > 5")
+    width = page.evaluate("document.querySelector('.walk').clientWidth")
+    frames = {}
+    for time, metres, x in page.evaluate("said"):
+        frames.setdefault(time, []).append((metres, x))
+    # where the hip is, by the numbers on the ground: it is drawn in the middle
+    hips = [a + (width / 2 - x) * (b - a) / (y - x) for (a, x), (b, y), *_ in frames.values()]
+    steps = [after - before for before, after in itertools.pairwise(hips)]
+    assert min(steps) > -0.01
+    assert max(steps) < 0.3
 
 
 def test_a_server_that_is_gone_is_told(browser, tmp_path):

@@ -1,7 +1,10 @@
 """`walkerlab explore` as a process: its numbers are the command's, and what is refused is refused in words."""
 
 import json
+import shlex
 import signal
+import subprocess
+import sys
 import threading
 import time
 from pathlib import Path
@@ -58,6 +61,18 @@ def test_every_number_of_the_contact_walk_is_the_one_of_the_command(served, chan
     assert said["tracks"].keys() == {"simulate", "contact-sim"}
 
 
+def test_the_copied_command_lines_print_what_the_page_shows(served):
+    changes = {"slope_deg": 2.345678901, "walker.hip_mass_kg": 12.5, "contact.terrain": "after-mid-swing"}
+    _, said = served.walk({**changes, "ground.heights_m": [0.0, 0.001]}, ["rigid", "contact"])
+    lines = said["command"].splitlines()
+    assert [line.split()[:2] for line in lines] == [["walkerlab", stage] for stage in ("fixedpoint", *STAGES.values())]
+    for line in lines:
+        _, stage, *options = shlex.split(line)
+        command = [sys.executable, "-m", "walkerlab", stage, *options, "--runs", "asked", "--json"]
+        printed = json.loads(subprocess.run(command, cwd=served.folder, capture_output=True, check=True).stdout)
+        assert {key: printed[key] for key in said[stage]} == said[stage]
+
+
 def test_a_slope_without_a_gait_is_an_answer(served):
     status, said = served.walk({"slope_deg": 20})
     assert (status, said["fixedpoint"]["error"]["exit_code"]) == (200, 4)
@@ -106,6 +121,8 @@ def test_what_a_config_cannot_have_is_refused_with_the_commands_message(served, 
         (404, "/api/other", "{}", {}),
         (404, "/runs/../../../etc/passwd", None, {}),
         (404, "/runs/%2e%2e/%2e%2e/etc/passwd", None, {}),
+        (404, "/runs/a%00b", None, {}),
+        (404, "//[", None, {}),
     ],
 )
 def test_who_may_not_ask_and_what_is_no_question_is_refused_in_words(served, status, path, body, headers):
@@ -150,6 +167,11 @@ def test_a_config_is_saved_as_what_differs_and_over_no_file(served):
     assert served.asked("/api/save", asked)[0] == 409
     assert served.asked("/api/save", {**asked, "name": "../mine.yaml"})[0] == 400
     assert served.asked("/api/save", {"set": {"slope_deg": 99}, "name": "steep"})[0] == 422
+    assert "slope_deg: 3.0" in said["text"]  # as it was typed
+    status, said = served.asked("/api/save", {**asked, "name": "my walker"})
+    assert (status, list(served.folder.glob("my walker*"))) == (422, [])
+    assert "not safe as a name" in said["error"]["message"]
+    assert served.walk({}, config="mine.yaml")[1]["command"].startswith("walkerlab fixedpoint -c mine.yaml\n")
 
 
 def test_gaits_along_a_number_are_those_of_the_continuation(served):
@@ -173,7 +195,27 @@ def test_what_can_be_turned_is_what_the_walker_has(served):
     assert keys["walker.thigh.mass_kg"]["unit"] == "kg"
     assert "checkerboard" in keys["contact.terrain"]["words"]
     for number in keys.values():
-        assert "words" in number or number["from"] <= number["start"] <= number["to"]
+        assert "from" not in number or number["from"] <= number["start"] <= number["to"]
+
+
+def test_a_slider_leads_to_nothing_that_is_refused_and_to_all_that_matters(served):
+    for config in ("kneed", "paper"):
+        _, said = served.asked("/api/numbers", {"config": config})
+        keys = {number["key"]: number for number in said["numbers"]}
+        for key, number in keys.items():
+            for end in {"from", "to"} & number.keys():
+                status, answer = served.asked("/api/numbers", {"config": config, "set": {key: number[end]}})
+                assert status == 200, answer
+    assert keys["walker.foot_to_mass_m"]["to"] == pytest.approx(1.0, rel=0.01)  # the leg ends there
+    assert keys["walker.foot_radius_m"]["to"] == pytest.approx(0.3)  # from 1 mm to feet that roll
+    assert keys["push_off.impulse_N_s"]["to"] == pytest.approx(0.1 * 20 * (9.81 * 1) ** 0.5)
+    assert keys["walker.hip_mass_kg"]["log"]
+    assert not keys["slope_deg"]["log"]
+    assert "from" not in keys["ground.heights_m"]  # a list is typed
+    assert "seed" not in keys  # no walk depends on it
+    _, said = served.asked("/api/numbers", {"config": "level"})
+    [slope] = [number for number in said["numbers"] if number["key"] == "slope_deg"]
+    assert slope["from"] < 0 < slope["to"]  # what is driven walks uphill, too
 
 
 @pytest.mark.parametrize("told", [signal.SIGTERM, signal.SIGINT])
@@ -187,6 +229,26 @@ def test_the_server_ends_when_told_and_leaves_nothing_behind(tmp_path, told):
         assert not workers_of(one.process.pid)
     finally:
         one.close()
+
+
+def test_a_report_that_is_being_made_ends_with_the_server(tmp_path):
+    one = Served(tmp_path)
+    try:
+        assert one.asked("/api/job", {"kind": "report"})[0] == 200
+        while not at_work_for(tmp_path):
+            time.sleep(0.05)
+        one.process.send_signal(signal.SIGTERM)
+        began = time.monotonic()
+        assert one.process.wait(10) == 130
+        assert time.monotonic() - began < 2
+        assert not at_work_for(tmp_path)
+    finally:
+        one.close()
+
+
+def at_work_for(folder):
+    """Commands that run for a folder of runs."""
+    return [file for file in Path("/proc").glob("[0-9]*/cmdline") if f"{folder / 'runs'}\0--json" in text_of(file)]
 
 
 def workers_of(process):

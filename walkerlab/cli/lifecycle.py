@@ -1,5 +1,6 @@
 """Commands that begin, show and repeat runs: init, open, rerun, export, animate."""
 
+import signal
 from pathlib import Path
 from typing import Annotated
 
@@ -7,7 +8,9 @@ import typer
 
 from walkerlab.cli.failures import exit_on_failure
 from walkerlab.cli.request import OF_TALK, Request, command
+from walkerlab.errors import StoppedError
 from walkerlab.pipeline.graph import Graph
+from walkerlab.stopping import raise_on
 
 RunArgument = Annotated[
     str, typer.Argument(metavar="RUN", help="A run's folder, or its name in the folder of all runs.")
@@ -124,12 +127,19 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
             from walkerlab.explorer.walks import ExploredConfig
 
             assert request.resolved
-            server = Server(port, ExploredConfig(request.config, tuple(request.sets or ()), request.runs, {}))
+            if signal.getsignal(signal.SIGHUP) is signal.SIG_DFL:  # its terminal is closed
+                raise_on(signal.SIGHUP, KeyboardInterrupt)
+            try:
+                server = Server(port, ExploredConfig(request.config, tuple(request.sets or ()), request.runs, {}))
+            except OSError as error:
+                raise typer.BadParameter(f"{port} cannot be had: {error.strerror}", param_hint="--port") from None
             try:
                 print(server.url, flush=True)
                 if not no_browser:
                     request.console.show(server.url)
                 server.serve_forever()
+            except KeyboardInterrupt:  # how it is meant to end
+                raise typer.Exit(StoppedError.exit_code) from None
             finally:
                 server.close()
 

@@ -1,6 +1,7 @@
 """A config as YAML text that loads back to the same: bare, as artifacts carry it, or with a comment on each key."""
 
 import json
+import math
 import re
 import textwrap
 from collections.abc import Collection, Iterator
@@ -27,6 +28,10 @@ def extending(start: str, base: Config, changed: Config, name: str) -> str:
     """YAML text of a config that extends another one, `base` by the name `start`, and says only what differs."""
     different = _different(base.model_dump(mode="json"), changed.model_dump(mode="json"))
     blocks = {"extends": start, "name": name, **{key: value for key, value in different.items() if key != "name"}}
+    degrees = float(f"{math.degrees(changed.slope_rad):.12g}")
+    if "slope_rad" in blocks and math.radians(degrees) == changed.slope_rad:
+        blocks["slope_deg"] = degrees
+        del blocks["slope_rad"]
     return "".join(f"{line}\n" for line in _lines(blocks, ""))
 
 

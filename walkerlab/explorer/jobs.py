@@ -2,6 +2,8 @@
 
 import contextlib
 import json
+import os
+import signal
 import subprocess
 import sys
 import tempfile
@@ -12,6 +14,8 @@ from typing import Any
 from walkerlab.explorer.walks import Answered, ExploredConfig
 
 KINDS = ("report", "gif")
+PATIENCE_S = 1.0
+"""How long a command may take to keep what is finished, once the page ends."""
 
 
 class Job:
@@ -34,14 +38,18 @@ class Job:
         threading.Thread(target=self._make, args=(str(kind), question), daemon=True).start()
         return 200, dict(self._told)
 
-    def progress(self) -> Answered:
+    def progress(self) -> dict[str, Any]:
         """What was said last, and in the end where the file is."""
-        return 200, dict(self._told)
+        return dict(self._told)
 
     def close(self) -> None:
-        """End what runs."""
-        if self._process is not None:
-            self._process.terminate()
+        """End what runs, and what it has started."""
+        if (process := self._process) is not None:
+            process.terminate()
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                process.wait(PATIENCE_S)
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
 
     def _make(self, kind: str, question: ExploredConfig) -> None:
         runs = question.runs.resolve()
@@ -65,7 +73,9 @@ class Job:
         lines = []
         # Into a file: a pipe that nobody reads meanwhile would fill.
         with tempfile.TemporaryFile("w+") as output:
-            self._process = subprocess.Popen(command, stdout=output, stderr=subprocess.PIPE, text=True)
+            self._process = subprocess.Popen(
+                command, stdout=output, stderr=subprocess.PIPE, text=True, start_new_session=True
+            )
             assert self._process.stderr is not None
             for line in self._process.stderr:
                 lines.append(line.strip())

@@ -14,7 +14,26 @@ from walkerlab.report import page as report
 from walkerlab.report.blocks import Player
 
 TEMPLATES = Path(__file__).parent / "templates"
-SEEN = "Each leg is a line from hip to foot; leg 2 is hollow. The ground's forces are arrows."
+SEEN = (
+    "The broad walker is the rigid model, the narrow one the contact model. Each leg is a line from hip to foot;"
+    " leg 2 is hollow. The ground's forces are arrows; a red one is a push-off."
+)
+
+
+LONGEST_NAME = 60
+
+
+def started(base: ExploredConfig) -> str:
+    """What the page was started from, in words."""
+    name = base.config or DEFAULT
+    changed = f"{name} with {', '.join(base.sets)}"
+    return name if not base.sets else changed if len(changed) <= LONGEST_NAME else f"{name}, changed"
+
+
+def choices(base: ExploredConfig) -> list[str]:
+    """What else can be chosen: built-in configs, and the files in the folder that one works in."""
+    own = sorted(path.name for path in Path().glob("*.yaml"))
+    return [name for name in (*builtin_names(), *own) if name != started(base)]
 
 
 @dataclass(frozen=True)
@@ -32,9 +51,9 @@ def rendered(base: ExploredConfig) -> ServedPage:
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     environment = report.environment()
     environment.loader = FileSystemLoader([report.TEMPLATES, TEMPLATES])
-    named = base.config or DEFAULT
     html = environment.get_template("explore.html.j2").render(
-        configs=list(dict.fromkeys([named, *builtin_names()])),
+        started=started(base),
+        configs=choices(base),
         anchor="walk",
         # Whatever is asked for later is drawn in this one.
         block=Player("The walk.", SEEN, "The walker", (), 0.0, 1.0, 0.0, 0.0, 1.0, 1.0, (), (), (0, 0, 1, 1)),

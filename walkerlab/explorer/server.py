@@ -4,29 +4,26 @@ import contextlib
 import json
 import os
 import secrets
+import sys
 import threading
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
-from http.cookies import SimpleCookie
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from mimetypes import guess_type
 from pathlib import Path
 from typing import Any
 from urllib.parse import parse_qs, unquote, urlsplit
 
-from walkerlab.config.files import builtin_names
 from walkerlab.errors import ConfigError
 from walkerlab.explorer import walks
 from walkerlab.explorer.jobs import Job
-from walkerlab.explorer.page import rendered
-from walkerlab.explorer.walks import Answered, ExploredConfig
+from walkerlab.explorer.page import choices, rendered, started
+from walkerlab.explorer.walks import GIVE_WAY, SUPERSEDED, Answered, ExploredConfig
 from walkerlab.workers import Worker, WorkerDiedError
 
 LONGEST_BODY = 100_000
 NICE = 15
-SUPERSEDED = "a newer question was asked meanwhile"
-COOKIE = "walkerlab-explore"
 
 
 def failed(status: int, message: str, advice: str = "") -> Answered:
@@ -42,7 +39,7 @@ class Desk:
 
         drops  whether a newer question ends the work on an older one
         """
-        self.drops = drops
+        self.drops, self.compiling, self.compiled = drops, "", 0
         self.worker = self._hired()
         self._turn, self._count, self._newest = threading.Lock(), threading.Lock(), 0
 
@@ -58,19 +55,26 @@ class Desk:
             self._newest += 1
             number = self._newest
         if self.drops and self._turn.locked():
-            self.worker.process.kill()
+            self.worker.process.send_signal(GIVE_WAY)
         with self._turn:
-            if number != self._newest:
-                return failed(409, SUPERSEDED)
-            try:
-                return self.worker.do(call)
-            except WorkerDiedError as error:
-                self.worker = self._hired()
-                if self.drops and number != self._newest:
-                    return failed(409, SUPERSEDED)
-                return failed(500, error.message, error.advice)
-            except Exception as error:
-                return failed(500, f"this is a bug of walkerlab: {type(error).__name__}: {error}")
+            # again, if what was to end the question before has come late
+            while number == self._newest:
+                try:
+                    answer = self.worker.do(call, self._heard)
+                except WorkerDiedError as error:
+                    self.worker = self._hired()
+                    if error.exit_code_of_worker != -GIVE_WAY:  # not even begun, and so told
+                        return failed(500, error.message, error.advice)
+                except Exception as error:
+                    return failed(500, f"this is a bug of walkerlab: {type(error).__name__}: {error}")
+                else:
+                    if answer != SUPERSEDED:
+                        return answer
+            return SUPERSEDED
+
+    def _heard(self, kernel: str) -> None:
+        self.compiling = kernel
+        self.compiled += bool(kernel)
 
     def close(self) -> None:
         """End the worker at once, whatever it is at."""
@@ -87,6 +91,7 @@ class Server(ThreadingHTTPServer):
         """Listen; port 0 is any that is free."""
         super().__init__(("127.0.0.1", port), Handler)
         self.base, self.token, self.job = base, secrets.token_urlsafe(16), Job()
+        self.cookie = f"walkerlab-explore-{self.server_port}"
         # what is drawn in the background keeps nobody waiting who turns a number
         self.desk, self.background = Desk(), Desk(drops=True)
         self._beside: threading.Thread | None = None
@@ -105,6 +110,11 @@ class Server(ThreadingHTTPServer):
         """Serve beside what else this process does."""
         self._beside = threading.Thread(target=self.serve_forever, daemon=True)
         self._beside.start()
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """Say what went wrong, unless it is that the one who asked has left."""
+        if not isinstance(sys.exception(), OSError):
+            super().handle_error(request, client_address)
 
     def _repr_html_(self) -> str:
         """The page, in a notebook."""
@@ -125,9 +135,9 @@ class Server(ThreadingHTTPServer):
             raise TypeError
         question = replace(self.base, changes=changes, models=models)
         named = body.get("config")
-        if named is None or named == self.base.config:
+        if named is None or named == started(self.base):
             return question
-        if named not in builtin_names():
+        if named not in choices(self.base):
             raise TypeError
         return replace(question, config=named, sets=())
 
@@ -169,28 +179,30 @@ class Handler(BaseHTTPRequestHandler):
     """One request."""
 
     server: Server
+    timeout = 60
 
     def do_GET(self) -> None:
-        """The page, the progress of a job, and the files that a job made."""
-        address = urlsplit(self.path)
-        if not self.local():
-            return None
-        if address.path == "/":
+        """The page, the progress of what is computed, and the files that a job made."""
+        try:
+            address = urlsplit(self.path)
             given = parse_qs(address.query).get("token", [""])[0]
-            if not self.allowed(given):
+            if not self.local() or not self.allowed(given or self.cookie() or self.bearer()):
                 return None
-            page = rendered(self.server.base)
-            return self.send(200, page.html.encode(), "text/html; charset=utf-8", page.policy)
-        cookies = SimpleCookie(self.headers.get("Cookie", ""))
-        if not self.allowed(cookies[COOKIE].value if COOKIE in cookies else self.bearer()):
-            return None
-        if address.path == "/api/job":
-            return self.answer(*self.server.job.progress())
-        runs = self.server.base.runs.resolve()
-        file = (runs / unquote(address.path).removeprefix("/runs/")).resolve()
-        if not address.path.startswith("/runs/") or not file.is_relative_to(runs) or not file.is_file():
-            return self.answer(*failed(404, f"there is no {address.path}"))
-        return self.send(200, file.read_bytes(), guess_type(file.name)[0] or "application/octet-stream")
+            if address.path == "/":
+                page = rendered(self.server.base)
+                return self.send(200, page.html.encode(), "text/html; charset=utf-8", page.policy)
+            if address.path == "/api/job":
+                desk = self.server.desk
+                return self.answer(
+                    200, {**self.server.job.progress(), "compiling": desk.compiling, "compiled": desk.compiled}
+                )
+            runs = self.server.base.runs.resolve()
+            file = (runs / unquote(address.path).removeprefix("/runs/")).resolve()
+            if address.path.startswith("/runs/") and file.is_relative_to(runs) and file.is_file():
+                return self.send(200, file.read_bytes(), guess_type(file.name)[0] or "application/octet-stream")
+        except (ValueError, OSError):  # no address, or none that can be read
+            pass
+        return self.answer(*failed(404, f"there is no {self.path}"))
 
     def do_POST(self) -> None:
         """Answer a question."""
@@ -203,7 +215,7 @@ class Handler(BaseHTTPRequestHandler):
             self.answer(*self.server.answer(urlsplit(self.path).path, json.loads(self.rfile.read(length))))
         except (ValueError, AttributeError, TypeError, RecursionError):
             form = '{"set": {KEY: VALUE}, "models": ["rigid", "contact"]}'
-            self.answer(*failed(400, f"a question is JSON: {form}; its `config`, if any, is a built-in one's name"))
+            self.answer(*failed(400, f"a question is JSON: {form}; its `config`, if any, is one that the page offers"))
 
     def local(self) -> bool:
         """Whether it is this server's own page that asks; whoever else does is told so."""
@@ -212,6 +224,11 @@ class Handler(BaseHTTPRequestHandler):
             return True
         self.answer(*failed(403, "only pages of this server may ask"))
         return False
+
+    def cookie(self) -> str:
+        """The token in the cookie of this server: others on the same machine have their own."""
+        parts = dict(part.partition("=")[::2] for part in self.headers.get("Cookie", "").split("; "))
+        return parts.get(self.server.cookie, "")
 
     def bearer(self) -> str:
         """The token in the header."""
@@ -232,10 +249,11 @@ class Handler(BaseHTTPRequestHandler):
         """Send a file."""
         self.send_response(status)
         headers = {"Content-Type": kind, "Content-Length": str(len(body)), "Cache-Control": "no-store"}
+        if status == 200 and "text/html" in kind:
+            # The links of a report, to its other pages, carry no token.
+            headers["Set-Cookie"] = f"{self.server.cookie}={self.server.token}; HttpOnly; SameSite=Strict"
         if policy:
-            # The page's own links, to reports, carry no token.
-            cookie = f"{COOKIE}={self.server.token}; HttpOnly; SameSite=Strict"
-            headers |= {"Content-Security-Policy": policy, "Set-Cookie": cookie}
+            headers["Content-Security-Policy"] = policy
         for name, value in headers.items():
             self.send_header(name, value)
         with contextlib.suppress(ConnectionError):  # whoever asked has left the page

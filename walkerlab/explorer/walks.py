@@ -2,12 +2,14 @@
 
 import json
 import shlex
+import signal
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
+from walkerlab import kernel_cache
 from walkerlab.config.files import extendable
 from walkerlab.config.loader import LoadedConfig, load
 from walkerlab.config.schema import Config
@@ -15,14 +17,43 @@ from walkerlab.config.writer import extending
 from walkerlab.errors import ConfigError, WalkerlabError
 from walkerlab.explorer.numbers import adjustable
 from walkerlab.pipeline.in_memory import InMemory, Keys
+from walkerlab.pipeline.progress import Silent
 from walkerlab.pipeline.resolve import resolve
 from walkerlab.report.results import Results
 from walkerlab.report.sections import motion
 from walkerlab.store.content import Content, Group
+from walkerlab.workers import tell
 
 STAGES = {"rigid": "simulate", "contact": "contact-sim"}
 Answered = tuple[int, dict[str, Any]]
 """Status and object of an answer."""
+SUPERSEDED: Final[Answered] = 409, {"error": {"message": "a newer question was asked meanwhile", "advice": ""}}
+GIVE_WAY = signal.SIGUSR1
+"""What a worker is sent that is to drop the question that it is at."""
+
+
+class SupersededError(BaseException):
+    """A newer question waits; not to be taken for a failure of what it stops."""
+
+
+class GivingWay(Silent):
+    """The progress of what is dropped as soon as a newer question waits, between two gaits.
+
+    Nowhere else: what a signal interrupts where it arrives, such as an import, may stay half done.
+    """
+
+    def __init__(self) -> None:
+        """None waits yet."""
+        self._superseded = False
+        signal.signal(GIVE_WAY, self._give_way)
+
+    def _give_way(self, *_: object) -> None:
+        self._superseded = True
+
+    def advance(self, n: int = 1) -> None:  # noqa: ARG002
+        """Go on, if nobody waits."""
+        if self._superseded:
+            raise SupersededError
 
 
 @dataclass(frozen=True)
@@ -87,14 +118,15 @@ def walked(question: ExploredConfig) -> Answered:
         config = loaded.config
         wanted = [STAGES[model] for model in question.models if model == "rigid" or config.contact is not None]
         # The walks first: they leave the gait behind, and it is then there without being sought again.
-        answers = {
-            stage: stages.answer(config, stage, keys.of(config, stage), again=False, anew=False)
-            for stage in (*wanted, "fixedpoint")
-        }
+        with kernel_cache.watched(tell):
+            answers = {
+                stage: stages.answer(config, stage, keys.of(config, stage), again=False, anew=False)
+                for stage in (*wanted, "fixedpoint")
+            }
     except ConfigError as error:
         return question.refused(error)
-    found: dict[str, Any] = {"command": shlex.join(["walkerlab", "simulate", *question.options])}
-    found["warnings"] = list(loaded.warnings)
+    commands = [shlex.join(["walkerlab", stage, *question.options]) for stage in ("fixedpoint", *wanted)]
+    found: dict[str, Any] = {"command": "\n".join(commands), "warnings": list(loaded.warnings)}
     walks: dict[str, Content] = {}
     for stage in ("fixedpoint", *wanted):
         said = answers[stage].no_answer
@@ -123,14 +155,16 @@ def numbers(question: ExploredConfig) -> Answered:
 def along(question: ExploredConfig) -> Answered:
     """Gaits over one key: for each model the places, numbers and stability of its branches.
 
-    The question's changes hold the block `continuation`: key, ends and points.
+    The question's changes hold the block `continuation`: key, ends and points. Status 409 if a newer question came.
     """
     stages, keys = memory()
     try:
         config = question.loaded.config
-        answer = stages.answer(config, "continuation", keys.of(config, "continuation"), again=False)
+        answer = stages.answer(config, "continuation", keys.of(config, "continuation"), GivingWay(), again=False)
     except ConfigError as error:
         return question.refused(error)
+    except SupersededError:
+        return SUPERSEDED
     followed = [(path, group) for path, group in answer.content.groups.items() if "step_period" in group.variables]
     curves = [{"model": path.partition("/")[0], **curve(group)} for path, group in followed if walkable(group)]
     return 200, {"over": config.continuation.over, "curves": curves}
@@ -155,5 +189,5 @@ def curve(branch: Group) -> dict[str, list[Any]]:
 
 def as_file(question: ExploredConfig, name: str) -> str:
     """The config as a file that extends the one that was started from and says only what differs; ConfigError."""
-    start = extendable(question.config)
-    return extending(start, load(Path(start)).config, question.loaded.config, name)
+    start, named = extendable(question.config), replace(question, changes={**question.changes, "name": name})
+    return extending(start, load(Path(start)).config, named.loaded.config, name)

@@ -1,10 +1,9 @@
 const token = new URLSearchParams(location.search).get("token");
 const byId = (id) => document.getElementById(id);
 const MODELS = { rigid: "simulate", contact: "contact-sim" };
-const start = byId("config").value;
 
-// What is asked about: the config's name and what differs from it, as the address has it.
-let state = { config: start, set: {} };
+// What is asked about: the config's name, none for the one that was started from, and what differs from it.
+let state = { config: "", set: {} };
 let rows = new Map();
 let touched = "slope_deg";
 let shown = null;
@@ -17,28 +16,30 @@ async function ask(path, body) {
   return [answer.status, await answer.json()];
 }
 
-const question = (more = {}) => ({ config: state.config, set: state.set, ...more });
+const question = (more = {}) => ({ ...(state.config && { config: state.config }), set: state.set, ...more });
+const called = (config = "") => [...byId("config").options].find((option) => option.value === config).text;
 const models = () => Object.keys(MODELS).filter((model) => byId(model).checked);
-const changes = (set) => Object.entries(set).map(([key, value]) => `${key} ${typeof value === "number" ? digits(value, 6) : value}`).join(", ");
+const changes = (set) => Object.entries(set).map(([key, value]) => `${key} ${typeof value === "string" ? value : typeof value === "number" ? digits(value, 6) : JSON.stringify(value)}`).join(", ");
 
 // The address
 
 function fragment() {
   const said = Object.fromEntries(Object.entries(state.set).map(([key, value]) => [key, JSON.stringify(value)]));
-  return `#${new URLSearchParams({ ...(state.config === start ? {} : { config: state.config }), ...said })}`;
+  return `#${new URLSearchParams({ ...(state.config && { config: state.config }), ...said })}`;
+}
+
+function valueOf(text) {
+  try {
+    return JSON.parse(text);
+  } catch {
+    return Number.isFinite(Number(text)) && text.trim() ? Number(text) : text;
+  }
 }
 
 function fromFragment() {
-  const { config = start, ...set } = Object.fromEntries(new URLSearchParams(location.hash.slice(1)));
-  const value = (text) => {
-    try {
-      return JSON.parse(text);
-    } catch {
-      return text;
-    }
-  };
+  const { config = "", ...set } = Object.fromEntries(new URLSearchParams(location.hash.slice(1)));
   const known = [...byId("config").options].some((option) => option.value === config);
-  state = { config: known ? config : start, set: Object.fromEntries(Object.entries(set).map(([key, text]) => [key, value(text)])) };
+  state = { config: known ? config : "", set: Object.fromEntries(Object.entries(set).map(([key, text]) => [key, valueOf(text)])) };
   byId("config").value = state.config;
 }
 
@@ -61,16 +62,17 @@ async function walk() {
     document.body.dataset.state = "asking";
     const asked = structuredClone(question({ models: models() }));
     const began = performance.now();
-    const late = setInterval(() => {
-      const once = shown ? "" : " The kernels are loaded; where they have to be compiled first, that takes some twenty seconds, once.";
-      say(`Computing ${changes(asked.set) || asked.config}: ${Math.round((performance.now() - began) / 1000)} s.${once}`);
+    const late = setInterval(async () => {
+      const [, { compiling, compiled } = {}] = await ask("/api/job").catch(() => [0]);
+      if (!asking || document.body.dataset.state !== "asking") return;
+      const what = compiling ? `Compiling what walks, once for all: ${compiled} parts so far, now ${compiling}` : `Computing ${changes(asked.set) || called(asked.config)}`;
+      say(`${what} (${Math.round((performance.now() - began) / 1000)} s).`);
     }, 500);
     try {
-      const [status, answer] = await ask("/api/walk", asked);
-      clearInterval(late);
+      const [status, answer] = await ask("/api/walk", asked).finally(() => clearInterval(late));
+      if (status === 409) next = true;
       if (!next) show(status, answer, asked);
     } catch {
-      clearInterval(late);
       document.body.dataset.state = "failed";
       say("The server does not answer. Start `walkerlab explore` again; this page goes on asking.", "bad");
       await new Promise((resolve) => setTimeout(resolve, 1000));
@@ -80,45 +82,56 @@ async function walk() {
   asking = false;
 }
 
+// What is to be typed stands between backticks.
 function say(text, tone = "plain") {
-  byId("said").textContent = text;
+  byId("said").replaceChildren(...text.split("`").map((part, place) => (place % 2 ? Object.assign(document.createElement("code"), { textContent: part }) : part)));
   byId("said").className = `statement ${tone}`;
 }
 
-const sentence = ({ message, advice }) => `${message} ${advice ?? ""}`.trim();
+// Where a value stands in a command line is nothing to a page.
+const ended = (text = "") => text && text[0].toUpperCase() + text.slice(1) + (/[.:]$/.test(text) ? "" : ".");
+const sentence = ({ message, advice }) => [message.replace(/^--set .*?: /, ""), advice].map(ended).join(" ").trim();
 
 function show(status, answer, asked) {
   for (const row of rows.values()) row.place.classList.remove("wrong");
   const gait = answer.fixedpoint;
   if (status !== 200 || gait.error) {
     document.body.dataset.state = "failed";
-    say(status === 200 ? `No gait: ${sentence(gait.error)}` : sentence(answer.error), "bad");
+    say(sentence(gait?.error ?? answer.error), "bad");
     if (status === 422) rows.get(answer.error.key)?.place.classList.add("wrong");
     if (status !== 200) return;
   }
   shown = { answer, asked };
-  const named = [asked.config, changes(asked.set)].filter(Boolean).join(" with ");
+  document.body.dataset.shown = "";
+  const named = [called(asked.config), changes(asked.set)].filter(Boolean).join(" with ");
   byId("shown").textContent = `${answer.tracks ? "Shown" : "Nothing walks"}: ${named}`;
   byId("command").textContent = answer.command;
-  byId("place").hidden = !answer.tracks;
+  reveal(!!answer.tracks);
   fillTable(answer);
   drawCircle(gait.multipliers ?? []);
   along.mark();
   if (gait.error) return;
   document.body.dataset.state = "shown";
-  const stable = gait.stable ? "a stable gait" : "an unstable gait";
-  const ends = Object.entries(MODELS).filter(([, stage]) => answer[stage]).map(([model, stage]) => `${model}: ${outcome(answer[stage])}`);
-  say([stable, ...ends, ...answer.warnings].join("; "), ends.every((text) => text.includes("walked")) && gait.stable ? "good" : "fair");
+  const walks = Object.entries(MODELS).filter(([, stage]) => answer[stage]);
+  const ends = walks.map(([model, stage]) => `${model === "rigid" ? "Rigid" : "Contact"} model: ${outcome(answer[stage])}`);
+  const fine = gait.stable && walks.every(([, stage]) => answer[stage].outcome === "walked");
+  say([`${gait.stable ? "A stable" : "An unstable"} gait.`, ...ends, ...answer.warnings].join(" "), fine ? "good" : "fair");
   draw();
 }
 
-const outcome = (walk) => (walk.error ? sentence(walk.error) : `${walk.outcome} ${walk.outcome === "walked" ? `${walk.steps} steps` : `in step ${walk.steps + 1}. ${walk.advice}`}`);
+const ENDS = { walked: "walks", fell: "falls", slid: "slides" };
+const outcome = (walk) => (walk.error ? sentence(walk.error) : walk.outcome === "walked" ? `walks ${walk.steps} steps.` : `${ENDS[walk.outcome] ?? walk.outcome} in step ${walk.steps + 1}: ${walk.advice}`);
+
+// The circle and the table stay where nothing walks.
+function reveal(walks) {
+  for (const part of byId("place").querySelectorAll(".scenes, .controls, .views, .readout, .key, .player > figcaption")) part.hidden = !walks;
+}
 
 function draw() {
   const { answer } = shown;
   if (!answer.tracks) return;
   const stages = models().map((model) => MODELS[model]).filter((stage) => answer.tracks[stage]);
-  byId("place").hidden = stages.length === 0;
+  reveal(stages.length > 0);
   if (!stages.length) return;
   const tracks = stages.map((stage) => new Track(answer.tracks[stage].meta, answer.tracks[stage].floats));
   const scene = { ...answer.scene, repeats: stages.every((stage) => answer[stage].outcome === "walked") };
@@ -126,6 +139,7 @@ function draw() {
   byId("place").append(byId("player").content.cloneNode(true));
   const root = byId("place").firstElementChild;
   root.querySelector(".loop").checked = true;
+  root.querySelector(".views").before(byId("results").parentElement);
   player = play(root, scene, tracks);
   if (!matchMedia("(prefers-reduced-motion: reduce)").matches) player.start();
 }
@@ -182,18 +196,17 @@ class Row {
     this.place.className = "turn";
     const id = `turn-${number.key}`;
     const label = Object.assign(document.createElement("label"), { htmlFor: id, title: `${number.meaning}${number.bounds ? `; ${number.bounds}` : ""}` });
-    const name = Object.assign(document.createElement("span"), { textContent: number.key.replace(/^(walker|contact)\./, "") });
-    label.append(name, " ", Object.assign(document.createElement("small"), { textContent: number.unit === "1" ? "" : number.unit }));
-    const back = Object.assign(document.createElement("button"), { type: "button", textContent: "↺", title: `Back to ${number.start}`, ariaLabel: `Reset ${number.key}` });
+    const name = Object.assign(document.createElement("span"), { textContent: number.key.replace(/^(walker|contact)\./, "").replace(/[._]/g, "$&\u200b") });
+    label.append(name, " ", Object.assign(document.createElement("small"), { textContent: number.unit === "1" ? "" : number.unit.replaceAll("^2", "²") }));
+    const back = Object.assign(document.createElement("button"), { type: "button", textContent: "↺", title: `Back to ${JSON.stringify(number.start)}`, ariaLabel: `Reset ${number.key}` });
     back.addEventListener("click", () => turn(number.key, number.start, true));
-    const inputs = number.words ? [this.choice(id)] : [this.slider(id), this.typed(id)];
+    const inputs = number.words ? [this.choice(id)] : "from" in number ? [this.slider(id), this.typed()] : [this.typed(id)];
     this.place.append(label, ...inputs, back);
     this.put(number.value);
   }
   choice(id) {
     this.select = Object.assign(document.createElement("select"), { id });
     for (const word of this.number.words) this.select.append(new Option(word));
-    this.select.style.gridColumn = "2 / span 2";
     this.select.addEventListener("change", () => turn(this.number.key, this.number.words[this.select.selectedIndex], true));
     return this.select;
   }
@@ -201,21 +214,21 @@ class Row {
     this.range = Object.assign(document.createElement("input"), { type: "range", id, min: 0, max: 1000, step: "any" });
     this.range.addEventListener("input", () => turn(this.number.key, this.fromRange(), false));
     this.range.addEventListener("change", () => turn(this.number.key, this.fromRange(), true));
-    this.range.addEventListener("keydown", (event) => {
-      const way = { ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1 }[event.key];
+    const arrow = (event) => {
+      const way = { ArrowRight: 10, ArrowUp: 10, ArrowLeft: -10, ArrowDown: -10 }[event.key];
       if (!way) return;
       event.preventDefault();
-      this.range.value = Number(this.range.value) + 10 * way;
-      turn(this.number.key, this.fromRange(), true);
-    });
+      if (event.type === "keydown") this.range.value = Number(this.range.value) + way;
+      turn(this.number.key, this.fromRange(), event.type === "keyup");
+    };
+    for (const kind of ["keydown", "keyup"]) this.range.addEventListener(kind, arrow);
     return this.range;
   }
   typed(id) {
-    this.text = Object.assign(document.createElement("input"), { className: "typed", inputMode: "decimal", ariaLabel: `${this.number.key}, typed` });
-    this.text.addEventListener("change", () => {
-      const value = Number(this.text.value.replace("−", "-"));
-      turn(this.number.key, this.text.value.trim() && Number.isFinite(value) ? value : this.text.value, true);
-    });
+    this.text = Object.assign(document.createElement("input"), { className: "typed", spellcheck: false, autocomplete: "off" });
+    if (id) this.text.id = id;
+    else Object.assign(this.text, { inputMode: "decimal", ariaLabel: `${this.number.key}, typed` });
+    this.text.addEventListener("change", () => turn(this.number.key, valueOf(this.text.value.replace("−", "-")), true));
     return this.text;
   }
   fromRange() {
@@ -226,20 +239,21 @@ class Row {
   }
   put(value) {
     const { from, to, log, start: first } = this.number;
-    this.place.classList.toggle("changed", value !== first);
+    this.place.classList.toggle("changed", JSON.stringify(value) !== JSON.stringify(first));
     if (this.select) return (this.select.value = String(value));
-    if (typeof value === "number") this.range.value = 1000 * (log ? Math.log(value / from) / Math.log(to / from) : (value - from) / (to - from));
-    this.range.setAttribute("aria-valuetext", `${value} ${this.number.unit}`);
-    if (document.activeElement !== this.text || Number(this.text.value) !== value) this.text.value = typeof value === "number" ? String(Number(value.toPrecision(7))) : value;
+    if (this.range && typeof value === "number") this.range.value = 1000 * (log ? Math.log(value / from) / Math.log(to / from) : (value - from) / (to - from));
+    this.range?.setAttribute("aria-valuetext", `${value} ${this.number.unit}`);
+    const text = typeof value === "number" ? String(Number(value.toPrecision(7))) : typeof value === "string" ? value : JSON.stringify(value);
+    if (document.activeElement !== this.text || Number(this.text.value) !== value) this.text.value = text;
   }
 }
 
 function turn(key, value, settled) {
   const row = rows.get(key);
-  if (value === row.number.start) delete state.set[key];
+  if (JSON.stringify(value) === JSON.stringify(row.number.start)) delete state.set[key];
   else state.set[key] = value;
   row.put(value);
-  if (typeof value === "number") touched = key;
+  if ("from" in row.number) touched = key;
   walk();
   if (settled) remember(), settle();
   else along.mark();
@@ -267,6 +281,7 @@ function arrange(numbers) {
   }
   const seen = [...rows.values()].filter(({ number, wanted }) => number.rank !== null || wanted);
   seen.sort((one, other) => (one.number.rank ?? Infinity) - (other.number.rank ?? Infinity) || 0);
+  document.body.classList.toggle("rigid-only", !rows.has("contact.stiffness"));
   const places = seen.map((row) => row.place);
   const there = [...byId("sliders").children];
   if (places.length !== there.length || places.some((place, index) => place !== there[index])) {
@@ -284,7 +299,7 @@ function search() {
     button.addEventListener("click", () => {
       row.wanted = true;
       arrange([...rows.values()].map(({ number }) => number));
-      (row.range ?? row.select).focus();
+      (row.range ?? row.select ?? row.text).focus();
     });
     return button;
   }));
@@ -299,74 +314,101 @@ class Along extends Plot {
     this.curves_of = {};
     this.cursor.addEventListener("pointerup", (event) => {
       const [least, most] = [this.fromX(Plot.FRAME[0]), this.fromX(Plot.WIDTH - Plot.FRAME[2])];
-      if (this.series) turn(this.key, Number(clamp(this.at(event), least, most).toPrecision(4)), true);
+      if (this.series) turn(this.key, Number(this.value(clamp(this.at(event), least, most)).toPrecision(4)), true);
     });
+  }
+  // What spans decades is drawn over its logarithm.
+  scaled(value) {
+    return this.log ? Math.log10(value) : value;
+  }
+  value(scaled) {
+    return this.log ? 10 ** scaled : scaled;
+  }
+  label(value, horizontal) {
+    if (!horizontal || !this.log) return super.label(value);
+    return Number.isInteger(value) ? (Math.abs(value) < 4 ? digits(10 ** value) : minus(`1e${value}`)) : "";
   }
   at(event) {
     const box = this.cursor.getBoundingClientRect();
     return this.fromX(((event.clientX - box.left) / box.width) * Plot.WIDTH);
   }
   look(event) {
-    if (this.series) this.tip.textContent = `${digits(this.at(event), 4)} ${rows.get(this.key)?.number.unit ?? ""}`;
+    if (this.series) this.tip.textContent = `${digits(this.value(this.at(event)), 4)} ${rows.get(this.key)?.number.unit ?? ""}`;
   }
-  // Coarse at once, then finer and with both models.
+  // Coarse at once, then finer, while nothing else is asked.
   async draw() {
-    const row = rows.get(touched) ?? rows.get("slope_deg");
-    if (!row || row.number.words) return;
-    const { key, from, to, unit } = row.number;
+    const row = [rows.get(touched), rows.get("slope_deg")].find((one) => one && "from" in one.number);
+    if (!row) return;
+    const { key, from, to, log, unit } = row.number;
     const { [key]: here, ...others } = state.set;
-    const asked = JSON.stringify([state.config, others, key, models()]);
+    const wanted = models().filter((model) => model === "rigid" ? !key.startsWith("contact.") : rows.has("contact.stiffness"));
+    const asked = JSON.stringify([state.config, others, key, wanted]);
     byId("over").textContent = `Along ${key}`;
     if (asked === this.asked) return this.mark();
-    [this.asked, this.key] = [asked, key];
-    byId("along-said").textContent = "Computing …";
-    const both = byId("contact").checked && rows.has("contact.stiffness");
-    for (const [points, model] of [[12, "rigid"], [60, "rigid"], ...(both ? [[24, "both"]] : [])]) {
-      const span = { over: key, from: Math.max(from, 1e-9), to, points, model, periods: 1 };
+    [this.asked, this.key, this.unit, this.log] = [asked, key, unit, log && to > 50 * from];
+    this.place.classList.add("old");
+    this.said("Computing …");
+    const found = {};
+    let refused = "";
+    const finer = [["rigid", 12], ["rigid", 60], ["contact", 8], ["contact", 40]].filter(([model]) => wanted.includes(model));
+    for (const [place, [model, points]] of finer.entries()) {
+      const span = { over: key, from: from || 1e-9, to, points, model, periods: 1 };
       const block = Object.fromEntries(Object.entries(span).map(([name, value]) => [`continuation.${name}`, value]));
-      const set = { ...state.set, ...block };
-      const [status, answer] = await ask("/api/along", question({ set })).catch(() => [0]);
+      const [status, answer] = await ask("/api/along", question({ set: { ...state.set, ...block } })).catch(() => [0]);
       if (this.asked !== asked) return;
-      if (status === 409) return (this.asked = null);
-      if (status !== 200 || !answer.curves.length) {
-        byId("along-said").textContent = status === 422 ? sentence(answer.error) : "No gaits are followed along this number.";
-        if (status !== 200) return;
-      } else byId("along-said").textContent = "Stable gaits are full lines; a click goes there.";
-      [this.found, this.unit] = [answer.curves, unit];
-      this.plot();
+      if (status === 409) return this.said("Another page has asked for other gaits."), (this.asked = null);
+      if (status === 200) found[model] = answer.curves;
+      else if (status === 422) refused = sentence(answer.error);
+      this.found = Object.values(found).flat();
+      if (this.found.length) this.plot();
+      const more = place + 1 < finer.length ? ` Computing more of the ${finer[place + 1][0]} model.` : "";
+      this.said((this.found.length ? "Stable gaits are full lines; a click goes there." : more ? "" : refused || "No gaits are found along this number.") + more);
     }
+  }
+  said(text) {
+    byId("along-said").textContent = text;
   }
   plot() {
     if (!this.found?.length) return;
+    this.place.classList.remove("old");
     const what = byId("what");
-    this.titles = [this.unit && this.unit !== "1" ? `${this.key} (${this.unit})` : this.key, what.selectedOptions[0].text];
+    this.titles = [this.unit && this.unit !== "1" ? `${this.key} (${this.unit})` : this.key, ""];
+    // Gaits far from those that can be walked would make these one flat line.
+    const near = [this.height, ...this.found.flatMap((curve) => curve[what.value].filter((_, index) => curve.stable[index]))].filter(Number.isFinite);
+    const [least, most] = near.length ? [Math.min(...near) / 1.5, Math.max(...near) * 1.5] : [0, Infinity];
     const series = this.found.flatMap((curve) => {
       const pieces = [];
       curve.value.forEach((x, index) => {
         const y = curve[what.value][index];
+        if (y < least || y > most) return pieces.push(null);
         const last = pieces.at(-1);
-        if (last && last.stable === curve.stable[index]) last.x.push(x), last.y.push(y);
-        else {
-          if (last) last.x.push(x), last.y.push(y);
-          pieces.push({ x: [x], y: [y], stable: curve.stable[index], style: curve.model, dash: curve.stable[index] ? "" : "dashed" });
+        if (last) last.x.push(this.scaled(x)), last.y.push(y);
+        if (last?.stable !== curve.stable[index]) {
+          pieces.push({ x: [this.scaled(x)], y: [y], stable: curve.stable[index], style: curve.model, dash: curve.stable[index] ? "" : "dashed" });
         }
       });
-      return pieces;
+      return pieces.filter((piece) => piece);
     });
+    if (!series.length) return;
     super.draw(series, `${what.selectedOptions[0].text} of gaits over ${this.key}`);
     this.dot = element("circle", { r: 4.5 });
     this.cursor.replaceChildren(this.line, this.dot);
     this.mark();
   }
+  // Of the gait that is shown; there is none beside the contact model's curves alone.
+  get height() {
+    const [gait, what] = [shown?.answer.fixedpoint ?? {}, byId("what").value];
+    if (!this.found?.some(({ model }) => model === "rigid")) return undefined;
+    return what === "speed_m_s" ? gait.step_length_m / gait.period_s : gait[what];
+  }
   mark() {
     if (!this.series || !shown) return;
     const value = state.set[this.key] ?? rows.get(this.key)?.number.value;
-    const gait = shown.answer.fixedpoint;
-    const height = byId("what").value === "speed_m_s" ? gait.step_length_m / gait.period_s : gait[byId("what").value];
-    const [x, y] = [this.toX(value), this.toY(height)];
-    for (const name of ["x1", "x2"]) this.line.setAttribute(name, Number.isFinite(x) ? x : -9);
-    this.dot.setAttribute("cx", Number.isFinite(x) ? x : -9);
-    this.dot.setAttribute("cy", Number.isFinite(y) ? clamp(y, 0, Plot.HEIGHT) : -9);
+    const [x, y] = [this.toX(this.scaled(value)), this.toY(this.height)];
+    this.line.setAttribute("visibility", Number.isFinite(x) ? "visible" : "hidden");
+    this.dot.setAttribute("visibility", Number.isFinite(x + y) ? "visible" : "hidden");
+    if (Number.isFinite(x)) for (const name of ["x1", "x2"]) this.line.setAttribute(name, x);
+    if (Number.isFinite(x + y)) for (const [name, at] of [["cx", x], ["cy", clamp(y, 0, Plot.HEIGHT)]]) this.dot.setAttribute(name, at);
   }
 }
 
@@ -374,6 +416,18 @@ class Along extends Plot {
 
 function leave(name, address) {
   Object.assign(document.createElement("a"), { download: name, href: address }).click();
+}
+
+// The canvas has no ground of its own: the page shows through.
+function picture() {
+  if (!player) return;
+  const { canvas } = player.walk;
+  const copy = Object.assign(document.createElement("canvas"), { width: canvas.width, height: canvas.height });
+  const context = copy.getContext("2d");
+  context.fillStyle = getComputedStyle(document.body).backgroundColor;
+  context.fillRect(0, 0, copy.width, copy.height);
+  context.drawImage(canvas, 0, 0);
+  leave("walk.png", copy.toDataURL("image/png"));
 }
 
 function tell(text, url) {
@@ -384,6 +438,8 @@ function tell(text, url) {
 async function save() {
   const [status, answer] = await ask("/api/save", question({ name: byId("name").value })).catch(() => [0]);
   tell(status === 200 ? `Saved: ${answer.file}` : status ? sentence(answer.error) : "The server does not answer.");
+  const name = answer?.file?.split("/").at(-1);
+  if (name && ![...byId("config").options].some((option) => option.value === name)) byId("config").append(new Option(name));
 }
 
 async function make(kind) {
@@ -394,7 +450,7 @@ async function make(kind) {
     [status, answer] = await ask("/api/job").catch(() => [0]);
   }
   if (status !== 200) return tell(status ? sentence(answer.error) : "The server does not answer.");
-  tell(answer.error ? sentence(answer.error) : `The ${kind} is there.`, answer.url);
+  tell(answer.error ? sentence(answer.error) : `The ${kind} is there.`, answer.url && `${answer.url}?token=${token}`);
 }
 
 // The whole page
@@ -403,7 +459,7 @@ async function begin() {
   fromFragment();
   remember.last = fragment();
   let [status, answer] = await ask("/api/numbers", question()).catch(() => [0]);
-  if (status === 422) [status, answer] = await ask("/api/numbers", { config: state.config });
+  if (status === 422) [status, answer] = await ask("/api/numbers", { ...question(), set: {} });
   if (status === 200) arrange(answer.numbers);
   else say(status ? sentence(answer.error) : "The server does not answer.", "bad");
   await walk();
@@ -432,7 +488,7 @@ for (const model of Object.keys(MODELS)) {
 }
 byId("copy").addEventListener("click", () => navigator.clipboard.writeText(byId("command").textContent).then(() => tell("Copied.")));
 byId("save").addEventListener("click", save);
-byId("png").addEventListener("click", () => player && leave("walk.png", player.walk.canvas.toDataURL("image/png")));
+byId("png").addEventListener("click", picture);
 for (const kind of ["gif", "report"]) byId(kind).addEventListener("click", () => make(kind));
 addEventListener("popstate", begin);
 begin();

@@ -13,7 +13,9 @@ const clamp = (value, low, high) => Math.min(high, Math.max(low, value));
 class Track {
   constructor(meta, packed) {
     Object.assign(this, meta);
-    const bytes = Uint8Array.from(atob(packed), (letter) => letter.charCodeAt(0));
+    const letters = atob(packed);
+    const bytes = new Uint8Array(letters.length);
+    for (let i = 0; i < letters.length; i++) bytes[i] = letters.charCodeAt(i);
     const floats = new Float32Array(bytes.buffer);
     this.all = {};
     this.channels.forEach((name, index) => (this.all[name] = floats.subarray(index * this.samples, (index + 1) * this.samples)));
@@ -89,7 +91,8 @@ function force(c, scene, track, leg, x, y, unit, most) {
   arrow(c, x, y, along * scale, -normal * scale);
 }
 
-function drawWalk(picture, scene, tracks, colours) {
+// `back`: how far the walkers have been set back to where they had been, m.
+function drawWalk(picture, scene, tracks, colours, back = 0) {
   const { context: c, width, height } = picture;
   const scale = (0.66 * height) / (scene.leg_m + scene.torso_m);
   const [sin, cos] = [Math.sin(scene.slope_rad), Math.cos(scene.slope_rad)];
@@ -124,17 +127,19 @@ function drawWalk(picture, scene, tracks, colours) {
     c.lineTo(...place(to, height));
   });
   const tick = 0.5 * scene.leg_m;
-  for (let i = Math.ceil((hip - across) / tick); i * tick < hip + across; i++) {
-    c.moveTo(...place(i * tick, under));
-    c.lineTo(...place(i * tick, under - 0.03 * scene.leg_m));
+  const ticks = [];
+  for (let i = Math.ceil((hip + back - across) / tick); i * tick < hip + back + across; i++) ticks.push([i * tick, i * tick - back]);
+  for (const [, x] of ticks) {
+    c.moveTo(...place(x, under));
+    c.lineTo(...place(x, under - 0.03 * scene.leg_m));
   }
   c.stroke();
   c.fillStyle = colours.soft;
   c.font = "12px system-ui, sans-serif";
   c.textAlign = "center";
-  for (let i = Math.ceil((hip - across) / tick); i * tick < hip + across; i++) {
-    const [x, y] = place(i * tick, under - 0.1 * scene.leg_m);
-    const said = `${digits(i * tick)} m`;
+  for (const [far, along] of ticks) {
+    const [x, y] = place(along, under - 0.1 * scene.leg_m);
+    const said = `${digits(far)} m`;
     const room = 0.5 * c.measureText(said).width;
     if (x > room && x < width - room) c.fillText(said, x, y);
   }
@@ -345,13 +350,17 @@ class Plot {
       const at = horizontal ? this.toX(i * step) : this.toY(i * step);
       const ends = horizontal ? { x1: at, x2: at, y1: top, y2: Plot.HEIGHT - bottom } : { y1: at, y2: at, x1: left, x2: Plot.WIDTH - right };
       const label = horizontal ? { x: at, y: Plot.HEIGHT - bottom + 15, class: "middle" } : { x: left - 5, y: at + 4, class: "last" };
-      parts.push(element("line", { class: "grid", ...ends }), element("text", label, digits(Number((i * step).toPrecision(6)))));
+      parts.push(element("line", { class: "grid", ...ends }), element("text", label, this.label(i * step, horizontal)));
     }
     const title = horizontal
       ? { x: (left + Plot.WIDTH - right) / 2, y: Plot.HEIGHT - 4, class: "middle" }
       : { transform: `translate(11 ${(top + Plot.HEIGHT - bottom) / 2}) rotate(-90)`, class: "middle" };
     parts.push(element("text", title, this.titles[horizontal ? 0 : 1]));
     return parts;
+  }
+
+  label(value) {
+    return digits(Number(value.toPrecision(6)));
   }
 
   curve(one) {
@@ -412,7 +421,9 @@ function element(name, attributes, text) {
 // The player: one clock, and everything that follows it; returns what gives it other walks.
 function play(root, firstScene, firstTracks) {
   const find = (selector) => root.querySelector(selector);
-  let [scene, tracks, plots, end, round, strikes] = [{}, [], [], 0, 0, [0]];
+  let [scene, tracks, plots, end, strikes] = [{}, [], [], 0, [0]];
+  // Where a loop goes back from and to, and how far over the ground it has gone back.
+  let [round, again, back] = [0, 0, 0];
   const [walk, foot] = [
     new Picture(find(".walk"), (width) => (width < 500 ? 0.78 : 0.56)),
     new Picture(find(".foot"), (width) => (width < 420 ? 0.8 : 0.4)),
@@ -421,7 +432,7 @@ function play(root, firstScene, firstTracks) {
   let [time, playing, last, frame, colours, close, readout] = [0, false, 0, 0, {}];
 
   const seek = (next, still = true) => {
-    if (still) stop();
+    if (still) stop(), (back = 0);
     time = clamp(next, 0, end);
     for (const track of tracks) track.seek(time);
     show();
@@ -434,7 +445,9 @@ function play(root, firstScene, firstTracks) {
     tracks.forEach((track) => (track.alone = tracks.length === 1));
     end = Math.max(...tracks.map((track) => track.end));
     strikes = [0, ...close.strikes, end];
-    round = scene.repeats && close.strikes.length > 1 ? strikes[2 * Math.floor(close.strikes.length / 2)] : end;
+    // A steady walk goes on in its last two steps, where it has settled; another one is seen anew.
+    const steps = scene.repeats ? 2 * Math.floor(close.strikes.length / 2) : 0;
+    [round, again] = steps ? [strikes[steps], strikes[steps - 2]] : [end, 0];
     const to = Math.min(step, strikes.length - 2);
     slider.max = end;
     plots = makePlots(root, tracks, seek);
@@ -446,7 +459,7 @@ function play(root, firstScene, firstTracks) {
 
   const show = () => {
     const leg = find(".which").value === "-1" ? close.stance : Number(find(".which").value);
-    drawWalk(walk, scene, tracks, colours);
+    drawWalk(walk, scene, tracks, colours, back);
     drawFoot(foot, scene, close, leg, colours);
     for (const plot of plots) plot.show(time);
     slider.value = time;
@@ -457,6 +470,12 @@ function play(root, firstScene, firstTracks) {
     find(".foot-said").textContent = footSaid(close, leg);
     readout();
   };
+  const goBack = (next) => {
+    const hip = () => close.at("hx");
+    const [from, to] = [round, again].map((at) => (close.seek(at), hip()));
+    back = again ? back + from - to : 0;
+    seek(next - round + again, false);
+  };
   const stop = () => {
     playing = false;
     button.textContent = "Play";
@@ -465,7 +484,7 @@ function play(root, firstScene, firstTracks) {
     if (!playing) return;
     const next = time + (Math.min(now - last, 100) / 1000) * Number(find(".speed").value);
     last = now;
-    if (find(".loop").checked && next >= round) seek(next - round, false);
+    if (find(".loop").checked && next >= round) goBack(next);
     else if (next < end) seek(next, false);
     else return seek(end);
     requestAnimationFrame(tick);
