@@ -13,7 +13,7 @@ from walkerlab.ground.knees import IdealLock
 from walkerlab.ground.normal_force import NormalLaw
 from walkerlab.ground.terrain import STANCE_FOOT
 from walkerlab.ground.walker import FORM, MAX_BODIES, NO_FOOT, ContactWalker
-from walkerlab.mechanics.assembly import Anchor, Tree, levers, tree_about, tree_about_centre
+from walkerlab.mechanics.assembly import Anchor, Tree, followers, levers, tree_about, tree_about_centre
 from walkerlab.mechanics.parts import Assembly, Position
 
 Floats = NDArray[np.float64]
@@ -117,12 +117,8 @@ def hip_levers(assembly: Assembly, to_foot: Floats) -> Floats:
 
 def hinge_of(assembly: Assembly, body: str, other: str) -> Position:
     """Where a body is hinged to another, in its own frame; its origin if they are not hinged directly."""
-    for joint in assembly.joints:
-        if (joint.parent, joint.child) == (body, other):
-            return joint.parent_point_m
-        if (joint.parent, joint.child) == (other, body):
-            return joint.child_point_m
-    return (0.0, 0.0)
+    hinge = assembly.hinge(body, other)
+    return (0.0, 0.0) if hinge is None else hinge.parent_point_m
 
 
 def fill(form: Any, assembly: Assembly, root: Root, locked: list[int], merges: bool) -> None:
@@ -155,17 +151,6 @@ def fill(form: Any, assembly: Assembly, root: Root, locked: list[int], merges: b
     form["onto"][: len(onto)], form["first"][:n] = onto, kept
     if knees:
         form["thighs"], form["shanks"] = ([onto[body] for body in bodies] for bodies in zip(*knees, strict=True))
-
-
-def followers(assembly: Assembly) -> dict[int, Floats]:
-    """Weights (bodies,) by which the bodies of couplings follow others."""
-    rows = {}
-    for coupling in assembly.couplings:
-        row = np.zeros(len(assembly.bodies))
-        for other, weight in zip(coupling.of, coupling.weights, strict=True):
-            row[assembly.index(other)] = weight
-        rows[assembly.index(coupling.body)] = row
-    return rows
 
 
 def legs_of(assembly: Assembly) -> NDArray[np.int64]:

@@ -121,3 +121,14 @@ def tree_of(assembly: Assembly, mass_levers: list[tuple[float, Floats]]) -> Tree
         B = B + mass * d @ rotated.T
         c = c + mass * d
     return Tree(total_mass(assembly), A, B, c[:, 0], c[:, 1])
+
+
+def followers(assembly: Assembly) -> dict[int, Floats]:
+    """Weights (bodies,) by which the bodies of couplings follow others."""
+    rows = {}
+    for coupling in assembly.couplings:
+        row = np.zeros(len(assembly.bodies))
+        for other, weight in zip(coupling.of, coupling.weights, strict=True):
+            row[assembly.index(other)] += weight
+        rows[assembly.index(coupling.body)] = row
+    return rows

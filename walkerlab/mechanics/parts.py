@@ -108,3 +108,12 @@ class Assembly:
         if body not in names:
             raise KeyError(f"no body named {body!r}; bodies: {', '.join(names)}")
         return names.index(body)
+
+    def hinge(self, body: str, other: str) -> Revolute | None:
+        """The hinge between two bodies, the first one as its parent; None if they are not hinged directly."""
+        for joint in self.joints:
+            if (joint.parent, joint.child) == (body, other):
+                return joint
+            if (joint.child, joint.parent) == (body, other):
+                return Revolute(joint.name, body, joint.child_point_m, other, joint.parent_point_m)
+        return None

@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from walkerlab.mechanics.assembly import Anchor, levers, tree_about
+from walkerlab.mechanics.assembly import Anchor, followers, levers, tree_about
 from walkerlab.mechanics.parts import Assembly, Revolute
 from walkerlab.mechanics.standing import NO_SHANK, STANCE, SWING, Standing, new_standing, on_slope
 
@@ -109,13 +109,8 @@ def place_of(groups: list[tuple[str, ...]], name: str) -> int:
 
 def torso_rows(assembly: Assembly, places: BodyPlaces) -> dict[int, Floats]:
     """Weights by which coupled places follow others."""
-    rows = {}
-    for coupling in assembly.couplings:
-        weights = np.zeros(len(assembly.bodies))
-        for name, weight in zip(coupling.of, coupling.weights, strict=True):
-            weights[assembly.index(name)] += weight
-        rows[int(np.argmax(places.members[assembly.index(coupling.body)]))] = weights @ places.members
-    return rows
+    members = places.members
+    return {int(np.argmax(members[body])): row @ members for body, row in followers(assembly).items()}
 
 
 def knee_rows(places: BodyPlaces) -> dict[int, Floats]:
@@ -133,22 +128,17 @@ def reduction(rows: dict[int, Floats], n: int) -> Floats:
 
 def hip_of(assembly: Assembly) -> Revolute:
     """The hinge between the legs, with the stance leg as its parent."""
-    upper = tuple(leg[0] for leg in assembly.legs)
-    for joint in assembly.joints:
-        if (joint.parent, joint.child) == (upper[1], upper[0]):
-            return joint
-        if (joint.parent, joint.child) == upper:
-            return Revolute(joint.name, joint.child, joint.child_point_m, joint.parent, joint.parent_point_m)
-    raise ValueError(f"no hinge joins the legs {upper[0]!r} and {upper[1]!r} at a hip; add one between them")
+    first, second = (leg[0] for leg in assembly.legs)
+    hinge = assembly.hinge(second, first)
+    if hinge is None:
+        raise ValueError(f"no hinge joins the legs {first!r} and {second!r} at a hip; add one between them")
+    return hinge
 
 
 def knee_of(assembly: Assembly) -> tuple[float, float] | None:
     """Where a thigh's frame has its knee (m); None without knees."""
-    for knee in assembly.knees:
-        for joint in assembly.joints:
-            if (joint.parent, joint.child) == (knee.thigh, knee.shank):
-                return joint.parent_point_m
-    return None
+    hinges = (assembly.hinge(knee.thigh, knee.shank) for knee in assembly.knees)
+    return next((hinge.parent_point_m for hinge in hinges if hinge is not None), None)
 
 
 def refuse_unlike_legs(assembly: Assembly) -> None:
