@@ -30,6 +30,7 @@ from walkerlab.hybrid.rigid_observer import (
 from walkerlab.hybrid.rigid_walk import EVENTS, LONGEST_SWING, hip_above_fall, new_heel_strikes, walk
 from walkerlab.hybrid.walk_record import Array, DrivenWork, WalkRecord, WalkWork
 from walkerlab.kernels import uncompiled
+from walkerlab.mechanics.hinges import hinge_energy
 from walkerlab.mechanics.standing import (
     AT_STRIKE,
     BENT,
@@ -39,6 +40,7 @@ from walkerlab.mechanics.standing import (
     Standing,
     energies,
     energy_at_touch,
+    hip_law,
     linked,
     step_lengths,
 )
@@ -201,7 +203,7 @@ class Recorder:
         walker, push = self.walker, float(self.work[PUSH_OFF])
         starts = np.vstack((self.start, after[:-1])) if self.steps else before
         apart = [each[:, SWING] - each[:, STANCE] for each in (starts, before)]
-        given = [walker.hip_torque * each - 0.5 * walker.hip_stiffness * each * each for each in apart]
+        given = [walker.hip_torque * each - hinge_energy(hip_law(walker), each) for each in apart]
         hip = float((given[1] - given[0]).sum())
         unsprung = walker.changed(hip_stiffness=0.0)  # what the spring gives is among the works
         ends = [sum(energies(unsprung, y)) - energy_at_touch(unsprung, y[STANCE]) for y in (self.start, self.state)]

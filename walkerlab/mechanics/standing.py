@@ -27,6 +27,7 @@ from walkerlab.mechanics.hinges import (
     SpringDamper,
     add_hinge_gradients,
     add_hinge_torque,
+    hinge_energy,
     hinge_torque,
 )
 from walkerlab.mechanics.links import factor_linked, gathered, solve_linked, spread
@@ -195,10 +196,16 @@ def equations(model: Standing, y: Any, s: Any, c: Any, F: Any, U: Any, M: Any, r
 
 
 @always_inline
+def hip_law(model: Standing) -> SpringDamper:
+    """What acts between the legs."""
+    return SpringDamper(model.hip_stiffness, model.hip_damping, model.hip_torque)
+
+
+@always_inline
 def hip_torque(model: Standing, y: Any) -> HingeTorque:
     """The torque between the legs, by how far the swing leg is ahead."""
-    n, law = len(model.arm_x), SpringDamper(model.hip_stiffness, model.hip_damping, model.hip_torque)
-    return hinge_torque(law, y[SWING] - y[STANCE], y[n + SWING] - y[n + STANCE])
+    n = len(model.arm_x)
+    return hinge_torque(hip_law(model), y[SWING] - y[STANCE], y[n + SWING] - y[n + STANCE])
 
 
 @always_inline
@@ -341,8 +348,8 @@ def energies(model: Standing, y: Any) -> tuple[float, float]:
     equations(model, y, s, c, F, U, M, r)
     rolled = -model.radius * (y[STANCE] + model.slope)
     potential = tree.potential_energy(model, n, rolled, model.radius, F, U)
-    apart = y[SWING] - y[STANCE]
-    return tree.kinetic_energy(n, M, y[n : 2 * n]), potential + 0.5 * model.hip_stiffness * apart * apart
+    stored = hinge_energy(hip_law(model), y[SWING] - y[STANCE])
+    return tree.kinetic_energy(n, M, y[n : 2 * n]), potential + stored
 
 
 def energy_at_touch(model: Standing, touched: Any) -> Any:
