@@ -299,13 +299,13 @@ def contact(**keys: Any) -> Contact:
 def find_gait(walker: Any = None, slope_deg: float | None = None, **keys: Any) -> Gait:
     """The periodic gaits of a walker on a slope, in memory: the chosen one in `summary`, all of them in `dataset`.
 
-    What is left out here and below is as the built-in paper config has it.
+    What is left out is as in the built-in `paper` config, here and below.
 
     walker     from `compass`, `kneed` or `walker`
     slope_deg  positive downhill, deg
     keys       other keys of a config, such as gravity_m_s2, equations, seed
 
-    Raises ConfigError for what cannot be meant, as all functions here do.
+    Raises ConfigError for values that are not allowed, as all functions here do.
 
     >>> gait = find_gait(compass(hip_mass_kg=10), slope_deg=3)
     >>> gait.summary["stable"], round(gait.summary["period_s"], 4)
@@ -377,11 +377,11 @@ def basin(
 def robustness(
     walker: Any = None, slope_deg: float | None = None, to: Sequence[str] = (), walks: int | None = None, **keys: Any
 ) -> Result:
-    """What a gait stands and which number moves it, in memory: norms, largest steps, rough ground in `summary`.
+    """What a gait withstands and which number moves it, in memory: norms, largest steps, rough ground in `summary`.
 
     walker     from `compass`, `kneed` or `walker`
     slope_deg  positive downhill, deg
-    to         numbers of the config that the gait is differentiated by; every one that the model reads without
+    to         numbers of the config that the gait is differentiated by; by default all that the model reads
     walks      on each rough ground
     keys       other keys of a config, such as contact, seed
     """
@@ -418,7 +418,7 @@ BOUNDED = ("over", "keep")
 
 
 def design(walker: Any = None, over: Mapping[str, Any] | None = None, **keys: Any) -> Result:
-    """The walker whose gait has the least or largest of a number, in memory: `best`, `value` and more in `summary`.
+    """Find the walker that minimises or maximises a number of its gait, in memory: `best`, `value`, … in `summary`.
 
     walker  from `compass`, `kneed` or `walker`
     over    bounds (low, high) of numbers of the config, in the key's unit

@@ -102,8 +102,8 @@ TOLD = {
     ),
     Outcome.BUDGET_EXHAUSTED: OutcomeWords(
         "exhausts its evaluation budget",
-        "exhausted their budget of right-hand sides",
-        "a step takes more right-hand sides than it may",
+        "ran out of function evaluations",
+        "a step takes more function evaluations than it may",
         "#000000",
         "The run exhausted its evaluation budget; loosen solver.*.rtol, soften the contact, or ask for fewer strides.",
     ),

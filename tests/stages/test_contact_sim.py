@@ -283,7 +283,7 @@ def test_a_tolerance_that_leaves_friction_to_chance_is_told(atol, told):
     sets = ("contact.units=si", "contact.stiction_velocity=1e-7", "contact.friction_velocity=1e-6", "strides=1")
     config = load(None, (*sets, f"solver.contact.atol={atol}")).config
     contact_sim.run(only(config, PIPELINE["contact-sim"].takes), {"fixedpoint": GAIT}, Listener())
-    assert any("stiction_velocity" in note and "lower atol" in note for note in notes) is told
+    assert any("stiction_velocity" in note and "lower solver.contact.atol" in note for note in notes) is told
 
 
 def test_a_budget_that_ends_before_the_first_sample_is_no_answer_either(monkeypatch):

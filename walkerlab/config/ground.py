@@ -24,7 +24,7 @@ class Footholds(Block):
     @classmethod
     def _drawn_or_listed(cls, value: tuple[float, ...], info: ValidationInfo) -> tuple[float, ...]:
         if value and info.data.get("roughness_m"):
-            raise wrong("must not stand beside roughness_m: heights are either listed or drawn")
+            raise wrong("cannot be combined with roughness_m: heights are either listed or drawn")
         if any(abs(height) > 1e3 for height in value):
             raise wrong("must be numbers from -1e3 to 1e3")
         return value

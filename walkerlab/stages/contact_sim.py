@@ -85,8 +85,8 @@ def tell_unresolved_slip(atol: float, scene: ContactScene, progress: Progress) -
     rising = scene.walker.friction.rising_until
     if atol > RESOLVED * rising:
         progress.note(
-            f"contact-sim: solver.contact.atol, {atol:g} m/s, is not small against contact.stiction_velocity, up to "
-            f"which friction rises, {rising:g} m/s: friction, and how the walk ends, may be chance; lower atol"
+            f"contact-sim: lower solver.contact.atol ({atol:g} m/s): it is large beside contact.stiction_velocity, up "
+            f"to which friction rises ({rising:g} m/s), so friction and how the walk ends may be chance"
         )
 
 
