@@ -157,6 +157,18 @@ def test_what_was_found_is_saved(page, served):
     page.until("document.getElementById('made').textContent.includes('exists already')")
 
 
+def test_the_picture_is_what_is_seen_on_the_pages_own_ground(page):
+    page.evaluate("window.leave = (name, address) => (window.left = address); document.getElementById('png').click()")
+    page.evaluate("window.seen = new Image(); seen.src = left; seen.decode()")
+    corner, size = page.evaluate(
+        "(() => { const c = document.createElement('canvas'); [c.width, c.height] = [seen.width, seen.height];"
+        " const d = c.getContext('2d'); d.drawImage(seen, 0, 0);"
+        " return [[...d.getImageData(2, 2, 1, 1).data], [c.width, c.height]]; })()"
+    )
+    assert corner == [255, 255, 255, 255]
+    assert size == page.evaluate("(({ canvas }) => [canvas.width, canvas.height])(player.walk)")
+
+
 def test_a_film_is_made_and_linked(page):
     typed(page, "slope_deg", "2.5")
     page.evaluate("document.getElementById('contact').click()")

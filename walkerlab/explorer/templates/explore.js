@@ -90,7 +90,8 @@ function say(text, tone = "plain") {
 
 // Where a value stands in a command line is nothing to a page.
 const ended = (text = "") => text && text[0].toUpperCase() + text.slice(1) + (/[.:]$/.test(text) ? "" : ".");
-const sentence = ({ message, advice }) => [message.replace(/^--set .*?: /, ""), advice].map(ended).join(" ").trim();
+const placeless = (text) => text.replace(/^(--set .*?|\S.*?:\d+:\d+): /, "");
+const sentence = ({ message, advice }) => [placeless(message), advice].map(ended).join(" ").trim();
 
 function show(status, answer, asked) {
   for (const row of rows.values()) row.place.classList.remove("wrong");
@@ -115,7 +116,7 @@ function show(status, answer, asked) {
   const walks = Object.entries(MODELS).filter(([, stage]) => answer[stage]);
   const ends = walks.map(([model, stage]) => `${model === "rigid" ? "Rigid" : "Contact"} model: ${outcome(answer[stage])}`);
   const fine = gait.stable && walks.every(([, stage]) => answer[stage].outcome === "walked");
-  say([`${gait.stable ? "A stable" : "An unstable"} gait.`, ...ends, ...answer.warnings].join(" "), fine ? "good" : "fair");
+  say([`${gait.stable ? "A stable" : "An unstable"} gait.`, ...ends, ...answer.warnings.map((text) => sentence({ message: text }))].join(" "), fine ? "good" : "fair");
   draw();
 }
 
@@ -432,7 +433,7 @@ function picture() {
 
 function tell(text, url) {
   byId("made").textContent = `${text} `;
-  if (url) byId("made").append(Object.assign(document.createElement("a"), { href: url, textContent: "Open it", target: "_blank" }));
+  if (url) byId("made").append(Object.assign(document.createElement("a"), { href: `${url}?token=${token}`, textContent: "Open it", target: "_blank" }));
 }
 
 async function save() {
@@ -445,12 +446,12 @@ async function save() {
 async function make(kind) {
   let [status, answer] = await ask("/api/job", question({ kind, models: models() })).catch(() => [0]);
   while (status === 200 && answer.running) {
-    tell(`${kind}: ${answer.said || "begins"}`);
+    tell(`${kind}: ${answer.said || "begins"}`, answer.url);
     await new Promise((resolve) => setTimeout(resolve, 500));
     [status, answer] = await ask("/api/job").catch(() => [0]);
   }
   if (status !== 200) return tell(status ? sentence(answer.error) : "The server does not answer.");
-  tell(answer.error ? sentence(answer.error) : `The ${kind} is there.`, answer.url && `${answer.url}?token=${token}`);
+  tell(answer.error ? sentence(answer.error) : `The ${kind} is there.`, answer.url);
 }
 
 // The whole page
