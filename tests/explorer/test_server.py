@@ -75,6 +75,17 @@ def test_the_copied_command_lines_print_what_the_page_shows(served):
         assert {key: printed[key] for key in said[stage]} == said[stage]
 
 
+def test_a_gait_that_is_left_is_seen_to_limp(served):
+    """The lesson of docs/explore.md."""
+    changes = {"slope_deg": 4.7, "strides": 50, "contact.terrain": "after-mid-swing"}
+    _, said = served.walk(changes, ["rigid", "contact"])
+    for stage in STAGES.values():
+        touches = [0.0, *said["tracks"][stage]["meta"]["strikes"]]
+        assert len(touches) >= 100
+        assert abs(np.diff(touches)[-1] - np.diff(touches)[-2]) > 0.05
+    assert not said["fixedpoint"]["stable"]
+
+
 def test_two_servers_keep_their_tokens_apart(served, tmp_path):
     other = Served(tmp_path)
     try:

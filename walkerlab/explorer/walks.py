@@ -67,6 +67,7 @@ class ExploredConfig:
     runs     the folder of all runs
     changes  values by key, over the sets
     models   those that walk
+    called   as the page calls it; None is the config's name
     """
 
     config: str | None
@@ -74,6 +75,7 @@ class ExploredConfig:
     runs: Path
     changes: Mapping[str, Any]
     models: Sequence[str] = ()
+    called: str | None = None
 
     @property
     def options(self) -> list[str]:

@@ -128,6 +128,14 @@ function reveal(walks) {
   for (const part of byId("place").querySelectorAll(".scenes, .controls, .views, .readout, .key, .player > figcaption")) part.hidden = !walks;
 }
 
+// A steady walk goes on in its last two steps, where it has settled: their end, their beginning and their length.
+function lastLap(track) {
+  const strikes = [0, ...track.strikes];
+  const last = 2 * Math.floor(track.strikes.length / 2);
+  const hip = (time) => (track.seek(time), track.at("hx"));
+  return last ? [strikes[last], strikes[last - 2], hip(strikes[last]) - hip(strikes[last - 2])] : undefined;
+}
+
 function draw() {
   const { answer } = shown;
   if (!answer.tracks) return;
@@ -135,7 +143,7 @@ function draw() {
   reveal(stages.length > 0);
   if (!stages.length) return;
   const tracks = stages.map((stage) => new Track(answer.tracks[stage].meta, answer.tracks[stage].floats));
-  const scene = { ...answer.scene, repeats: stages.every((stage) => answer[stage].outcome === "walked") };
+  const scene = { ...answer.scene, loop: stages.every((stage) => answer[stage].outcome === "walked") ? lastLap(tracks.at(-1)) : undefined };
   if (player) return player.change(scene, tracks);
   byId("place").append(byId("player").content.cloneNode(true));
   const root = byId("place").firstElementChild;
