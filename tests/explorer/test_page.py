@@ -203,6 +203,26 @@ def test_the_keyboard_alone_turns_a_number(page):
     assert page.evaluate("history.length") == before + 2  # a key that is held is one place to come back to
 
 
+def test_who_skips_to_the_numbers_keeps_them(page):
+    typed(page, "slope_deg", "2")
+    page.until(f"{SHOWN} === 'Shown: paper with slope_deg 2'")
+    page.evaluate("document.querySelector('.skip').click()")
+    assert page.evaluate("[document.activeElement.id, location.hash]") == ["config", "#slope_deg=2"]
+    typed(page, "slope_deg", "")
+    page.until(f"{SHOWN} === 'Shown: paper'")
+
+
+def test_a_list_is_typed_and_comes_back_with_the_address(page):
+    page.evaluate("document.getElementById('search').value = 'heights'; search()")
+    page.evaluate("document.querySelector('#found button').click()")
+    typed(page, "ground.heights_m", "[0.002, -0.001]")
+    page.until(f"{SHOWN} === 'Shown: paper with ground.heights_m [0.002,-0.001]'")
+    page.evaluate("location.reload()")
+    page.until(f"typeof rows !== 'undefined' && {SHOWN}.endsWith('[0.002,-0.001]')")
+    assert page.evaluate("rows.get('ground.heights_m').text.value") == "[0.002,-0.001]"
+    assert page.evaluate("shown.answer.scene.ground.length") > 2  # the player draws the levels
+
+
 def test_what_the_page_was_started_from_is_what_it_shows(browser, tmp_path):
     one = Served(tmp_path, "--set", "slope_deg=3")
     try:

@@ -37,7 +37,8 @@ function valueOf(text) {
 }
 
 function fromFragment() {
-  const { config = "", ...set } = Object.fromEntries(new URLSearchParams(location.hash.slice(1)));
+  const said = [...new URLSearchParams(location.hash.slice(1))].filter(([, text]) => text);
+  const { config = "", ...set } = Object.fromEntries(said);
   const known = [...byId("config").options].some((option) => option.value === config);
   state = { config: known ? config : "", set: Object.fromEntries(Object.entries(set).map(([key, text]) => [key, valueOf(text)])) };
   byId("config").value = state.config;
@@ -237,7 +238,10 @@ class Row {
     this.text = Object.assign(document.createElement("input"), { className: "typed", spellcheck: false, autocomplete: "off" });
     if (id) this.text.id = id;
     else Object.assign(this.text, { inputMode: "decimal", ariaLabel: `${this.number.key}, typed` });
-    this.text.addEventListener("change", () => turn(this.number.key, valueOf(this.text.value.replace("−", "-")), true));
+    this.text.addEventListener("change", () => {
+      const text = this.text.value.trim().replace("−", "-");
+      turn(this.number.key, text ? valueOf(text) : this.number.start, true);
+    });
     return this.text;
   }
   fromRange() {
@@ -354,6 +358,10 @@ class Along extends Plot {
     const asked = JSON.stringify([state.config, others, key, wanted]);
     byId("over").textContent = `Along ${key}`;
     if (asked === this.asked) return this.mark();
+    if (key !== this.key) {
+      this.series = this.found = null;
+      for (const layer of [this.curves, this.cursor]) layer.replaceChildren();
+    }
     [this.asked, this.key, this.unit, this.log] = [asked, key, unit, log && to > 50 * from];
     this.place.classList.add("old");
     this.said("Computing …");
@@ -500,4 +508,9 @@ byId("save").addEventListener("click", save);
 byId("png").addEventListener("click", picture);
 for (const kind of ["gif", "report"]) byId(kind).addEventListener("click", () => make(kind));
 addEventListener("popstate", begin);
+// The fragment is taken: it holds the changes.
+document.querySelector(".skip").addEventListener("click", (event) => {
+  event.preventDefault();
+  byId("config").focus();
+});
 begin();
