@@ -1,4 +1,4 @@
-"""The picture of docs/explore.md: `walkerlab explore` in a headless Chromium, at three degrees.
+"""The picture of docs/explore.md: `walkerlab explore` in a headless Chromium, at 2.5 degrees.
 
 python scripts/picture_of_explore.py
 """
@@ -35,10 +35,10 @@ def main():
     try:
         browser.open(Address(page.url), 1360, 1120)
         browser.until("document.body.dataset.state === 'shown'")
-        for slope in (1.5, 2.0, 2.5, 3.0):
+        for slope in (1.5, 2.0, 2.5):
             browser.evaluate(f"turn('slope_deg', {slope}, true)")
             browser.until(f"shown.asked.set.slope_deg === {slope}")
-        browser.until("document.getElementById('along-said').textContent.startsWith('Stable')")
+        browser.until("along.found?.some(({ model }) => model === 'contact')")
         time.sleep(2.5)
         # a palette is a third of the size
         Image.open(io.BytesIO(browser.screenshot())).quantize(128).save(PICTURE, optimize=True)

@@ -409,7 +409,7 @@ def explore(
     from walkerlab.explorer.walks import ExploredConfig, sets_of
 
     config = config_of_scene(walker, {"slope_deg": slope_deg, "contact": contact}, keys)
-    server = Server(0, ExploredConfig(None, sets_of(config), folder_of(runs), {}))
+    server = Server(0, ExploredConfig(None, sets_of(config), folder_of(runs), {}, called="your walker"))
     server.begin()
     return server
 

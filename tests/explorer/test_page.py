@@ -157,6 +157,18 @@ def test_what_was_found_is_saved(page, served):
     page.until("document.getElementById('made').textContent.includes('exists already')")
 
 
+def test_the_picture_is_what_is_seen_on_the_pages_own_ground(page):
+    page.evaluate("window.leave = (name, address) => (window.left = address); document.getElementById('png').click()")
+    page.evaluate("window.seen = new Image(); seen.src = left; seen.decode()")
+    corner, size = page.evaluate(
+        "(() => { const c = document.createElement('canvas'); [c.width, c.height] = [seen.width, seen.height];"
+        " const d = c.getContext('2d'); d.drawImage(seen, 0, 0);"
+        " return [[...d.getImageData(2, 2, 1, 1).data], [c.width, c.height]]; })()"
+    )
+    assert corner == [255, 255, 255, 255]
+    assert size == page.evaluate("(({ canvas }) => [canvas.width, canvas.height])(player.walk)")
+
+
 def test_a_film_is_made_and_linked(page):
     typed(page, "slope_deg", "2.5")
     page.evaluate("document.getElementById('contact').click()")
@@ -189,6 +201,26 @@ def test_the_keyboard_alone_turns_a_number(page):
         page.call("Input.dispatchKeyEvent", type="keyDown", key="ArrowRight", windowsVirtualKeyCode=39)
     page.call("Input.dispatchKeyEvent", type="keyUp", key="ArrowRight", windowsVirtualKeyCode=39)
     assert page.evaluate("history.length") == before + 2  # a key that is held is one place to come back to
+
+
+def test_who_skips_to_the_numbers_keeps_them(page):
+    typed(page, "slope_deg", "2")
+    page.until(f"{SHOWN} === 'Shown: paper with slope_deg 2'")
+    page.evaluate("document.querySelector('.skip').click()")
+    assert page.evaluate("[document.activeElement.id, location.hash]") == ["config", "#slope_deg=2"]
+    typed(page, "slope_deg", "")
+    page.until(f"{SHOWN} === 'Shown: paper'")
+
+
+def test_a_list_is_typed_and_comes_back_with_the_address(page):
+    page.evaluate("document.getElementById('search').value = 'heights'; search()")
+    page.evaluate("document.querySelector('#found button').click()")
+    typed(page, "ground.heights_m", "[0.002, -0.001]")
+    page.until(f"{SHOWN} === 'Shown: paper with ground.heights_m [0.002,-0.001]'")
+    page.evaluate("location.reload()")
+    page.until(f"typeof rows !== 'undefined' && {SHOWN}.endsWith('[0.002,-0.001]')")
+    assert page.evaluate("rows.get('ground.heights_m').text.value") == "[0.002,-0.001]"
+    assert page.evaluate("shown.answer.scene.ground.length") > 2  # the player draws the levels
 
 
 def test_what_the_page_was_started_from_is_what_it_shows(browser, tmp_path):

@@ -1,6 +1,8 @@
 """`walkerlab explore` as a process: its numbers are the command's, and what is refused is refused in words."""
 
+import http.client
 import json
+import os
 import shlex
 import signal
 import subprocess
@@ -71,6 +73,40 @@ def test_the_copied_command_lines_print_what_the_page_shows(served):
         command = [sys.executable, "-m", "walkerlab", stage, *options, "--runs", "asked", "--json"]
         printed = json.loads(subprocess.run(command, cwd=served.folder, capture_output=True, check=True).stdout)
         assert {key: printed[key] for key in said[stage]} == said[stage]
+
+
+def test_a_gait_that_is_left_is_seen_to_limp(served):
+    """The lesson of docs/explore.md."""
+    changes = {"slope_deg": 4.7, "strides": 50, "contact.terrain": "after-mid-swing"}
+    _, said = served.walk(changes, ["rigid", "contact"])
+    for stage in STAGES.values():
+        touches = [0.0, *said["tracks"][stage]["meta"]["strikes"]]
+        assert len(touches) >= 100
+        assert abs(np.diff(touches)[-1] - np.diff(touches)[-2]) > 0.05
+    assert not said["fixedpoint"]["stable"]
+
+
+def test_two_servers_keep_their_tokens_apart(served, tmp_path):
+    other = Served(tmp_path)
+    try:
+        cookies = []
+        for one in (served, other):
+            connection = http.client.HTTPConnection("127.0.0.1", one.port)
+            connection.request("GET", f"/?token={one.token}")
+            cookies.append(connection.getresponse().headers["Set-Cookie"].partition(";")[0])
+        for one in (served, other):
+            assert one.asked("/runs/none", Cookie="; ".join(cookies))[0] == 404
+            assert one.asked("/runs/none", Cookie=cookies[one is served])[0] == 401
+    finally:
+        other.close()
+
+
+def test_a_port_that_is_taken_is_a_word(served, tmp_path):
+    command = [sys.executable, "-m", "walkerlab", "explore", "--no-browser", "--port", str(served.port)]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "cannot be had" in done.stderr
+    assert "Traceback" not in done.stderr
 
 
 def test_a_slope_without_a_gait_is_an_answer(served):
@@ -183,6 +219,25 @@ def test_gaits_along_a_number_are_those_of_the_continuation(served):
     [limit] = {branch["stable_range"][1] for branch in summary["branches"] if branch["stable_range"]}
     stable = [x for curve in said["curves"] for x, is_so in zip(curve["value"], curve["stable"], strict=True) if is_so]
     assert 0.9 * limit < max(stable) <= limit
+
+
+def test_gaits_that_nobody_waits_for_any_more_are_dropped_and_their_worker_kept(served):
+    span = {"over": "slope_deg", "from": 0.5, "to": 5.0, "points": 200, "periods": 1, "model": "contact"}
+    block = {f"continuation.{key}": value for key, value in span.items()}
+    answers = []
+
+    def ask(**more):
+        answers.append(served.asked("/api/along", {"set": {**block, **more}})[0])
+
+    ask(**{"continuation.model": "rigid"})
+    [worker] = [file for file in workers_of(served.process.pid) if os.getpriority(0, int(file.parts[2])) > 0]
+    first = threading.Thread(target=ask)
+    first.start()
+    time.sleep(1)
+    ask(**{"continuation.model": "rigid"})
+    first.join()
+    assert sorted(answers) == [200, 200, 409]
+    assert worker in workers_of(served.process.pid)
 
 
 def test_what_can_be_turned_is_what_the_walker_has(served):

@@ -3,6 +3,7 @@
 import contextlib
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -10,10 +11,13 @@ import tempfile
 import threading
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
 from walkerlab.explorer.walks import Answered, ExploredConfig
 
 KINDS = ("report", "gif")
+EARLY = re.compile(r"page: (.+) \(partial")
+"""How a command says that there is a page already."""
 PATIENCE_S = 1.0
 """How long a command may take to keep what is finished, once the page ends."""
 
@@ -24,6 +28,7 @@ class Job:
     def __init__(self) -> None:
         """Nothing is asked for yet."""
         self._process: subprocess.Popen[str] | None = None
+        self._runs = Path()
         self._lock, self._thread = threading.Lock(), None
         self._told: dict[str, Any] = {"running": False}
 
@@ -52,7 +57,7 @@ class Job:
                 os.killpg(process.pid, signal.SIGKILL)
 
     def _make(self, kind: str, question: ExploredConfig) -> None:
-        runs = question.runs.resolve()
+        self._runs = runs = question.runs.resolve()
         of_config = [*question.options, "--runs", str(runs), "--json"]
         try:
             if kind == "report":
@@ -63,9 +68,12 @@ class Job:
                 folder = Path(self._command(walk, *of_config)["run_dir"])
                 file = folder / f"{walk}.gif"
                 self._command("animate", str(folder), "--model", walk, "--to", "gif", "-o", str(file))
-            self._told = {"running": False, "kind": kind, "url": f"/runs/{file.resolve().relative_to(runs)}"}
+            self._told = {"running": False, "kind": kind, "url": self._url(file)}
         except (RuntimeError, OSError, KeyError, ValueError) as error:
             self._told = {"running": False, "kind": kind, "error": {"message": str(error), "advice": ""}}
+
+    def _url(self, file: Path) -> str:
+        return "/runs/" + quote(str(file.resolve().relative_to(self._runs)))
 
     def _command(self, *words: str) -> dict[str, Any]:
         """What a command prints as JSON; RuntimeError with what it said last if it fails."""
@@ -80,6 +88,8 @@ class Job:
             for line in self._process.stderr:
                 lines.append(line.strip())
                 self._told = {**self._told, "said": line.strip()}
+                if (early := EARLY.search(line)) is not None:
+                    self._told = {**self._told, "url": self._url(Path(early[1]))}
             status = self._process.wait()
             output.seek(0)
             printed = output.read()

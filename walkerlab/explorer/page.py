@@ -25,9 +25,9 @@ LONGEST_NAME = 60
 
 def started(base: ExploredConfig) -> str:
     """What the page was started from, in words."""
-    name = base.config or DEFAULT
+    name = base.called or base.config or DEFAULT
     changed = f"{name} with {', '.join(base.sets)}"
-    return name if not base.sets else changed if len(changed) <= LONGEST_NAME else f"{name}, changed"
+    return name if base.called or not base.sets else changed if len(changed) <= LONGEST_NAME else f"{name}, changed"
 
 
 def choices(base: ExploredConfig) -> list[str]:

@@ -28,6 +28,8 @@ STAGES = {"rigid": "simulate", "contact": "contact-sim"}
 Answered = tuple[int, dict[str, Any]]
 """Status and object of an answer."""
 SUPERSEDED: Final[Answered] = 409, {"error": {"message": "a newer question was asked meanwhile", "advice": ""}}
+MAX_STEPS = 100
+"""What is shown of a walk: enough for a gait that is left to come to another one."""
 GIVE_WAY = signal.SIGUSR1
 """What a worker is sent that is to drop the question that it is at."""
 
@@ -65,6 +67,7 @@ class ExploredConfig:
     runs     the folder of all runs
     changes  values by key, over the sets
     models   those that walk
+    called   as the page calls it; None is the config's name
     """
 
     config: str | None
@@ -72,6 +75,7 @@ class ExploredConfig:
     runs: Path
     changes: Mapping[str, Any]
     models: Sequence[str] = ()
+    called: str | None = None
 
     @property
     def options(self) -> list[str]:
@@ -137,7 +141,7 @@ def walked(question: ExploredConfig) -> Answered:
                 break
         elif stage != "fixedpoint":
             walks[stage] = answers[stage].content
-    if (player := motion.player(Results(config, walks))) is not None:
+    if (player := motion.player(Results(config, walks), MAX_STEPS)) is not None:
         found["scene"] = player.scene
         tracks = [{"meta": walker.meta, "floats": walker.track.packed()} for walker in player.walkers]
         found["tracks"] = dict(zip((stage for stage in STAGES.values() if stage in walks), tracks, strict=True))

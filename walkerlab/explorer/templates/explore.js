@@ -37,7 +37,8 @@ function valueOf(text) {
 }
 
 function fromFragment() {
-  const { config = "", ...set } = Object.fromEntries(new URLSearchParams(location.hash.slice(1)));
+  const said = [...new URLSearchParams(location.hash.slice(1))].filter(([, text]) => text);
+  const { config = "", ...set } = Object.fromEntries(said);
   const known = [...byId("config").options].some((option) => option.value === config);
   state = { config: known ? config : "", set: Object.fromEntries(Object.entries(set).map(([key, text]) => [key, valueOf(text)])) };
   byId("config").value = state.config;
@@ -90,7 +91,8 @@ function say(text, tone = "plain") {
 
 // Where a value stands in a command line is nothing to a page.
 const ended = (text = "") => text && text[0].toUpperCase() + text.slice(1) + (/[.:]$/.test(text) ? "" : ".");
-const sentence = ({ message, advice }) => [message.replace(/^--set .*?: /, ""), advice].map(ended).join(" ").trim();
+const placeless = (text) => text.replace(/^(--set .*?|\S.*?:\d+:\d+): /, "");
+const sentence = ({ message, advice }) => [placeless(message), advice].map(ended).join(" ").trim();
 
 function show(status, answer, asked) {
   for (const row of rows.values()) row.place.classList.remove("wrong");
@@ -115,7 +117,7 @@ function show(status, answer, asked) {
   const walks = Object.entries(MODELS).filter(([, stage]) => answer[stage]);
   const ends = walks.map(([model, stage]) => `${model === "rigid" ? "Rigid" : "Contact"} model: ${outcome(answer[stage])}`);
   const fine = gait.stable && walks.every(([, stage]) => answer[stage].outcome === "walked");
-  say([`${gait.stable ? "A stable" : "An unstable"} gait.`, ...ends, ...answer.warnings].join(" "), fine ? "good" : "fair");
+  say([`${gait.stable ? "A stable" : "An unstable"} gait.`, ...ends, ...answer.warnings.map((text) => sentence({ message: text }))].join(" "), fine ? "good" : "fair");
   draw();
 }
 
@@ -127,6 +129,14 @@ function reveal(walks) {
   for (const part of byId("place").querySelectorAll(".scenes, .controls, .views, .readout, .key, .player > figcaption")) part.hidden = !walks;
 }
 
+// A steady walk goes on in its last two steps, where it has settled: their end, their beginning and their length.
+function lastLap(track) {
+  const strikes = [0, ...track.strikes];
+  const last = 2 * Math.floor(track.strikes.length / 2);
+  const hip = (time) => (track.seek(time), track.at("hx"));
+  return last ? [strikes[last], strikes[last - 2], hip(strikes[last]) - hip(strikes[last - 2])] : undefined;
+}
+
 function draw() {
   const { answer } = shown;
   if (!answer.tracks) return;
@@ -134,7 +144,7 @@ function draw() {
   reveal(stages.length > 0);
   if (!stages.length) return;
   const tracks = stages.map((stage) => new Track(answer.tracks[stage].meta, answer.tracks[stage].floats));
-  const scene = { ...answer.scene, repeats: stages.every((stage) => answer[stage].outcome === "walked") };
+  const scene = { ...answer.scene, loop: stages.every((stage) => answer[stage].outcome === "walked") ? lastLap(tracks.at(-1)) : undefined };
   if (player) return player.change(scene, tracks);
   byId("place").append(byId("player").content.cloneNode(true));
   const root = byId("place").firstElementChild;
@@ -228,7 +238,10 @@ class Row {
     this.text = Object.assign(document.createElement("input"), { className: "typed", spellcheck: false, autocomplete: "off" });
     if (id) this.text.id = id;
     else Object.assign(this.text, { inputMode: "decimal", ariaLabel: `${this.number.key}, typed` });
-    this.text.addEventListener("change", () => turn(this.number.key, valueOf(this.text.value.replace("−", "-")), true));
+    this.text.addEventListener("change", () => {
+      const text = this.text.value.trim().replace("−", "-");
+      turn(this.number.key, text ? valueOf(text) : this.number.start, true);
+    });
     return this.text;
   }
   fromRange() {
@@ -345,6 +358,10 @@ class Along extends Plot {
     const asked = JSON.stringify([state.config, others, key, wanted]);
     byId("over").textContent = `Along ${key}`;
     if (asked === this.asked) return this.mark();
+    if (key !== this.key) {
+      this.series = this.found = null;
+      for (const layer of [this.curves, this.cursor]) layer.replaceChildren();
+    }
     [this.asked, this.key, this.unit, this.log] = [asked, key, unit, log && to > 50 * from];
     this.place.classList.add("old");
     this.said("Computing …");
@@ -432,7 +449,7 @@ function picture() {
 
 function tell(text, url) {
   byId("made").textContent = `${text} `;
-  if (url) byId("made").append(Object.assign(document.createElement("a"), { href: url, textContent: "Open it", target: "_blank" }));
+  if (url) byId("made").append(Object.assign(document.createElement("a"), { href: `${url}?token=${token}`, textContent: "Open it", target: "_blank" }));
 }
 
 async function save() {
@@ -445,12 +462,12 @@ async function save() {
 async function make(kind) {
   let [status, answer] = await ask("/api/job", question({ kind, models: models() })).catch(() => [0]);
   while (status === 200 && answer.running) {
-    tell(`${kind}: ${answer.said || "begins"}`);
+    tell(`${kind}: ${answer.said || "begins"}`, answer.url);
     await new Promise((resolve) => setTimeout(resolve, 500));
     [status, answer] = await ask("/api/job").catch(() => [0]);
   }
   if (status !== 200) return tell(status ? sentence(answer.error) : "The server does not answer.");
-  tell(answer.error ? sentence(answer.error) : `The ${kind} is there.`, answer.url && `${answer.url}?token=${token}`);
+  tell(answer.error ? sentence(answer.error) : `The ${kind} is there.`, answer.url);
 }
 
 // The whole page
@@ -491,4 +508,9 @@ byId("save").addEventListener("click", save);
 byId("png").addEventListener("click", picture);
 for (const kind of ["gif", "report"]) byId(kind).addEventListener("click", () => make(kind));
 addEventListener("popstate", begin);
+// The fragment is taken: it holds the changes.
+document.querySelector(".skip").addEventListener("click", (event) => {
+  event.preventDefault();
+  byId("config").focus();
+});
 begin();

@@ -26,11 +26,11 @@ def section(results: Results) -> Section | None:
     return None if shown is None else Section("motion", "The walk", (shown,))
 
 
-def player(results: Results) -> Player | None:
-    """The walks of both models, as far as they are there; None if no motion was stored."""
+def player(results: Results, most: int = MAX_STEPS) -> Player | None:
+    """The first steps of both models' walks, as far as they are there; None if no motion was stored."""
     touches = [results.summary(stage).get("touch_times_s", []) for stage in MODELS]
-    # the first steps are shown, of the model that takes longest over them
-    end = max((times[MAX_STEPS - 1] for times in touches if len(times) >= MAX_STEPS), default=math.inf)
+    # of the model that takes longest over them
+    end = max((times[most - 1] for times in touches if len(times) >= most), default=math.inf)
     found = {stage: track_in(results.group(stage, "trajectory")) for stage in MODELS}
     tracks = {stage: track.until(end) for stage, track in found.items() if track is not None}
     if not tracks:
@@ -40,7 +40,7 @@ def player(results: Results) -> Player | None:
     steps = {MODELS[stage].lower(): len(results.summary(stage)["step_periods_s"]) for stage in tracks}
     return Player(
         title="The walk.",
-        caption=words("motion.caption", max(steps.values()), MAX_STEPS, config.push_off.impulse_N_s != 0.0),
+        caption=words("motion.caption", max(steps.values()), most, config.push_off.impulse_N_s != 0.0),
         alt=words("motion.alt", steps, math.degrees(config.slope_rad)),
         walkers=tuple(walker(results, stage, track) for stage, track in tracks.items()),
         slope_rad=config.slope_rad,

@@ -91,7 +91,6 @@ function force(c, scene, track, leg, x, y, unit, most) {
   arrow(c, x, y, along * scale, -normal * scale);
 }
 
-// `back`: how far the walkers have been set back to where they had been, m.
 function drawWalk(picture, scene, tracks, colours, back = 0) {
   const { context: c, width, height } = picture;
   const scale = (0.66 * height) / (scene.leg_m + scene.torso_m);
@@ -128,17 +127,17 @@ function drawWalk(picture, scene, tracks, colours, back = 0) {
   });
   const tick = 0.5 * scene.leg_m;
   const ticks = [];
-  for (let i = Math.ceil((hip + back - across) / tick); i * tick < hip + back + across; i++) ticks.push([i * tick, i * tick - back]);
-  for (const [, x] of ticks) {
-    c.moveTo(...place(x, under));
-    c.lineTo(...place(x, under - 0.03 * scene.leg_m));
+  for (let i = Math.ceil((hip + back - across) / tick); i * tick < hip + back + across; i++) ticks.push(i * tick);
+  for (const far of ticks) {
+    c.moveTo(...place(far - back, under));
+    c.lineTo(...place(far - back, under - 0.03 * scene.leg_m));
   }
   c.stroke();
   c.fillStyle = colours.soft;
   c.font = "12px system-ui, sans-serif";
   c.textAlign = "center";
-  for (const [far, along] of ticks) {
-    const [x, y] = place(along, under - 0.1 * scene.leg_m);
+  for (const far of ticks) {
+    const [x, y] = place(far - back, under - 0.1 * scene.leg_m);
     const said = `${digits(far)} m`;
     const room = 0.5 * c.measureText(said).width;
     if (x > room && x < width - room) c.fillText(said, x, y);
@@ -422,8 +421,7 @@ function element(name, attributes, text) {
 function play(root, firstScene, firstTracks) {
   const find = (selector) => root.querySelector(selector);
   let [scene, tracks, plots, end, strikes] = [{}, [], [], 0, [0]];
-  // Where a loop goes back from and to, and how far over the ground it has gone back.
-  let [round, again, back] = [0, 0, 0];
+  let [round, again, lap, back] = [0, 0, 0, 0];
   const [walk, foot] = [
     new Picture(find(".walk"), (width) => (width < 500 ? 0.78 : 0.56)),
     new Picture(find(".foot"), (width) => (width < 420 ? 0.8 : 0.4)),
@@ -445,9 +443,9 @@ function play(root, firstScene, firstTracks) {
     tracks.forEach((track) => (track.alone = tracks.length === 1));
     end = Math.max(...tracks.map((track) => track.end));
     strikes = [0, ...close.strikes, end];
-    // A steady walk goes on in its last two steps, where it has settled; another one is seen anew.
-    const steps = scene.repeats ? 2 * Math.floor(close.strikes.length / 2) : 0;
-    [round, again] = steps ? [strikes[steps], strikes[steps - 2]] : [end, 0];
+    // A loop's end, beginning and length; `back` is how far it has gone back.
+    [round, again, lap] = scene.loop ?? [end, 0, 0];
+    if (!lap) back = 0;
     const to = Math.min(step, strikes.length - 2);
     slider.max = end;
     plots = makePlots(root, tracks, seek);
@@ -470,12 +468,6 @@ function play(root, firstScene, firstTracks) {
     find(".foot-said").textContent = footSaid(close, leg);
     readout();
   };
-  const goBack = (next) => {
-    const hip = () => close.at("hx");
-    const [from, to] = [round, again].map((at) => (close.seek(at), hip()));
-    back = again ? back + from - to : 0;
-    seek(next - round + again, false);
-  };
   const stop = () => {
     playing = false;
     button.textContent = "Play";
@@ -484,7 +476,7 @@ function play(root, firstScene, firstTracks) {
     if (!playing) return;
     const next = time + (Math.min(now - last, 100) / 1000) * Number(find(".speed").value);
     last = now;
-    if (find(".loop").checked && next >= round) goBack(next);
+    if (find(".loop").checked && next >= round) (back += lap), seek(next - round + again, false);
     else if (next < end) seek(next, false);
     else return seek(end);
     requestAnimationFrame(tick);
@@ -541,7 +533,7 @@ function play(root, firstScene, firstTracks) {
   root.classList.add("scripted");
   new ResizeObserver(fit).observe(root);
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", paint);
-  // Whoever asked for less motion starts at a quarter of the speed, and nothing ever moves by itself.
+  // Whoever asked for less motion starts at a quarter of the speed.
   if (matchMedia("(prefers-reduced-motion: reduce)").matches) find(".speed").value = "0.25";
   change(firstScene, firstTracks);
   fit();
