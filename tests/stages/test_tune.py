@@ -60,6 +60,8 @@ def test_what_drives_a_gaits_step_is_what_the_ground_takes_of_it():
     assert abs(gait["balance_J"]) < 1e-7
     said = words("adjustment.explained", {"gait": gait}, False).replace("\xa0", " ")
     assert "of the 1.694 J that drive a step, 1.556 J go into damping at touch-down" in said
+    told = words("adjustment.caused", {"total_s": 1e-3, "together_s": 1e-3}, True)
+    assert "what they and the push-off's length do together" in told
 
 
 def test_the_papers_own_start_does_not_walk_and_says_why():

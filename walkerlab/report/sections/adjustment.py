@@ -44,7 +44,8 @@ def limit(results: Results) -> Section | None:
     reaches, orders = summary.get("reaches") or {}, summary.get("orders") or {}
     if not (reaches or orders):
         return None
-    note = words("adjustment.factors", results.config.push_off.impulse_N_s != 0.0)
+    pushes = results.config.push_off.impulse_N_s != 0.0
+    note = words("adjustment.factors", pushes)
     titles = words.terms("adjustment.distances").items()
     columns = [measured(title, key, partial(number, digits=3)) for key, title in titles]
     blocks: list[PageBlock] = [
@@ -55,7 +56,9 @@ def limit(results: Results) -> Section | None:
     if orders:
         rows = [[name, ", ".join(fixed(order, 2) for order in values) or NONE] for name, values in orders.items()]
         blocks.append(table("How fast the period converges when one knob is turned", ORDER_COLUMNS, rows))
-    return Section("limit", "Towards the rigid limit", tuple(blocks), words("adjustment.reached", reaches), COSTS)
+    return Section(
+        "limit", "Towards the rigid limit", tuple(blocks), words("adjustment.reached", reaches, pushes), COSTS
+    )
 
 
 def starts_table(results: Results, summary: Summary) -> Table:
