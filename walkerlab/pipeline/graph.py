@@ -182,7 +182,7 @@ PIPELINE = Graph(
     ),
     Stage(
         "compare", "walkerlab.stages.compare",
-        "Compare both models with each other and with every number of the paper.", reads.ContactConfig,
+        "Compare both models with each other and with every number of the paper.", reads.CompareConfig,
         results_of(*WALKED), needs_contact=True,
     ),
     Stage(
