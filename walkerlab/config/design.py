@@ -43,7 +43,7 @@ class Design(Block):
     @classmethod
     def _one_of_both(cls, value: str | None, info: ValidationInfo) -> str | None:
         if value is not None and info.data.get("minimise") is not None:
-            raise wrong("must not stand beside minimise: leave one of them out")
+            raise wrong("must not stand beside minimise: leave one out")
         return value
 
     @field_validator("over", "keep")
