@@ -19,6 +19,7 @@ from walkerlab.scene.rigid import rigid_walker
 from walkerlab.solvers.registry import Tolerances
 from walkerlab.stages import design, fixedpoint
 from walkerlab.stages.robustness import contact_subject
+from walkerlab.store.parts import Parts
 
 # design contract, section 4
 FIXED_KEYS = {
@@ -26,10 +27,12 @@ FIXED_KEYS = {
 }  # fmt: skip
 
 
-def run(name, *changes):
+def run(name, *changes, parts=None):
     config = load(Path(name), changes).config
     gait = fixedpoint.run(only(config, PIPELINE["fixedpoint"].takes), {}, Silent())
-    return design.run(only(config, PIPELINE["design"].takes), {"fixedpoint": gait}, Silent()).summary
+    return design.run(
+        only(config, PIPELINE["design"].takes), {"fixedpoint": gait}, Silent(), parts=parts or Parts(None, "")
+    ).summary
 
 
 def gait_at(name, *changes):
@@ -51,6 +54,17 @@ def test_the_optimum_is_that_of_a_brute_grid():
     assert found["value"] == pytest.approx(
         gait_at("slope-3deg", f"walker.hip_mass_kg={found['best']['walker.hip_mass_kg']!r}").spectral_radius, rel=1e-8
     )
+
+
+def test_searches_that_were_cut_off_go_on_where_they_stopped(tmp_path):
+    asked = ("design.minimise=spectral_radius", "design.over={walker.hip_mass_kg: [5, 50]}", "design.starts=2")
+    whole = run("slope-3deg", *asked, parts=Parts(tmp_path / "parts", "key"))
+    kept = Parts(tmp_path / "parts", "key")
+    assert list(kept.kept) == ["search 0", "search 1"]
+    again = run("slope-3deg", *asked, parts=kept)
+    assert again["evaluations"] == 3 < whole["evaluations"]
+    assert again["best"] == pytest.approx(whole["best"], rel=1e-9)
+    assert again["value"] == pytest.approx(whole["value"], rel=1e-9)
 
 
 def test_other_numbers_are_kept_within_their_bounds_and_a_bound_that_is_reached_is_said():

@@ -153,6 +153,13 @@ class ContactSimConfig(WalkConfig, GroundConfig, Protocol):
     """What `contact-sim` takes."""
 
 
+class CompareConfig(ContactConfig, Protocol):
+    """What `compare` takes."""
+
+    @property
+    def ground(self) -> Footholds: ...
+
+
 class TuneConfig(GroundConfig, Protocol):
     """What `tune` takes."""
 

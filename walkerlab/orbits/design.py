@@ -132,10 +132,17 @@ def kept(question: Aim, point: Point) -> bool:
     )
 
 
-def searched(question: Aim, own: Floats, starts: int, seed: int) -> list[Descent]:
-    """Searches from the walker's own numbers and from drawn ones, the best first, those that keep bounds in front."""
+def searched(
+    question: Aim, own: Floats, starts: int, seed: int, search: Callable[[int, Floats], Descent] | None = None
+) -> list[Descent]:
+    """Searches from the walker's own numbers and from drawn ones, the best first, those that keep bounds in front.
+
+    search  does one, by its number and start (variables,); `sought` without
+    """
+    search = search or (lambda _, start: sought(question, start))
     drawn = np.random.default_rng(seed).uniform(question.lower, question.upper, (starts - 1, own.size))
-    found = [sought(question, start) for start in (np.clip(own, question.lower, question.upper), *drawn)]
+    begun = (np.clip(own, question.lower, question.upper), *drawn)
+    found = [search(number, start) for number, start in enumerate(begun)]
     ended = [one for one in found if one.point is not None]
 
     def rank(one: Descent) -> tuple[bool, float]:

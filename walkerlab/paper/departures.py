@@ -6,7 +6,7 @@ from typing import Any, Final
 from walkerlab.config.contact import BOUNDS_SI, Contact
 from walkerlab.config.drives import drives_of
 from walkerlab.config.numbers import same
-from walkerlab.config.reads import ContactConfig
+from walkerlab.config.reads import CompareConfig
 from walkerlab.config.schema import Config
 from walkerlab.config.walkers import CompassWalker
 from walkerlab.paper.measured import Departures
@@ -19,7 +19,7 @@ PURE: Final = tuple(name for name in Contact.model_fields if name not in (*IN_SI
 """Its other keys; a pinned first stance is the paper's too (section 4)."""
 
 
-def departures(config: ContactConfig, start_moved: bool) -> Departures:
+def departures(config: CompareConfig, start_moved: bool) -> Departures:
     """What differs from the paper's scene, in words; the slope is known to the digits of x_p.
 
     start_moved  the walk did not start from the rigid model's fixed point
@@ -29,6 +29,8 @@ def departures(config: ContactConfig, start_moved: bool) -> Departures:
     of_contact: list[str] = []
     if drives := drives_of(config):
         rigid.append(f"the walker is driven by {' and '.join(drives)}")
+    if not config.ground.even:
+        rigid.append("the ground is uneven")
     if not isinstance(walker, CompassWalker):
         rigid.append(said("walker.type", walker.type, paper.type))
     else:

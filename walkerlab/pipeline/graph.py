@@ -182,7 +182,7 @@ PIPELINE = Graph(
     ),
     Stage(
         "compare", "walkerlab.stages.compare",
-        "Compare both models with each other and with every number of the paper.", reads.ContactConfig,
+        "Compare both models with each other and with every number of the paper.", reads.CompareConfig,
         results_of(*WALKED), needs_contact=True,
     ),
     Stage(
@@ -228,7 +228,7 @@ PIPELINE = Graph(
     Stage(
         "design", "walkerlab.stages.design",
         "Find the walker whose gait has the least or largest of a number, within bounds.",
-        reads.DesignConfig, results_of("fixedpoint"), on_demand=True, designs=True, of_a_model=True,
+        reads.DesignConfig, results_of("fixedpoint"), on_demand=True, keeps_parts=True, designs=True, of_a_model=True,
     ),
     Stage(
         "plot", "walkerlab.stages.plot", "Draw the figures from the stored results.", reads.NamedConfig,

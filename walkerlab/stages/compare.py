@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from walkerlab.config.reads import ContactConfig
+from walkerlab.config.reads import CompareConfig
 from walkerlab.config.schema import Equations
 from walkerlab.config.walkers import is_the_papers
 from walkerlab.hybrid import comparison
@@ -41,7 +41,10 @@ from walkerlab.store.content import Content, Group, Variable
 STRIDE = 2  # steps
 MOVED = 1e-6  # rad and rad/s: a start this far from the fixed point is another one
 EQUATION_SETS: tuple[Equations, ...] = ("as-printed", "corrected")
-NOT_THE_PAPERS = {"what": "the paper's numbers, tables and errata", "why": "they are of the paper's own walker"}
+NOT_THE_PAPERS = {
+    "what": "the paper's numbers, tables and errata",
+    "why": "they are of the paper's own walker, on even ground",
+}
 WAYS = ("raw", "aligned", "between_impacts", "settled")
 PHASE, ROW = "phase", "row"
 MODELS = {
@@ -68,9 +71,9 @@ MEANINGS = {
 """Columns of the paper's numbers and tables."""
 
 
-def run(config: ContactConfig, inputs: Mapping[str, Content], progress: Progress) -> Content:
-    """Compare the walks of both models and, if the walker is the paper's, hold both against the paper."""
-    papers = is_the_papers(config)
+def run(config: CompareConfig, inputs: Mapping[str, Content], progress: Progress) -> Content:
+    """Compare the walks of both models and, if walker and ground are the paper's, hold both against the paper."""
+    papers = is_the_papers(config) and config.ground.even
     progress.start("compare", 3 if papers else 2)
     motion = compare_motion(motion_of(inputs["simulate"]), motion_of(inputs["contact-sim"]))
     walks = {"rigid": inputs["simulate"].summary, "contact": inputs["contact-sim"].summary}
@@ -87,7 +90,7 @@ def run(config: ContactConfig, inputs: Mapping[str, Content], progress: Progress
 
 
 def against_the_paper(
-    config: ContactConfig, inputs: Mapping[str, Content], motion: Comparison, progress: Progress
+    config: CompareConfig, inputs: Mapping[str, Content], motion: Comparison, progress: Progress
 ) -> tuple[dict[str, Group], dict[str, Any]]:
     """Groups and summary of both models against the paper's numbers, tables and errata."""
     study = study_the_paper()
@@ -108,7 +111,7 @@ def against_the_paper(
     }
 
 
-def models_compared(config: ContactConfig, inputs: Mapping[str, Content]) -> dict[str, Any]:
+def models_compared(config: CompareConfig, inputs: Mapping[str, Content]) -> dict[str, Any]:
     """Summary of the walks of both models alone, and of a walker with knees of both instants of their release."""
     gait, rigid, contact = (inputs[name].summary for name in ("fixedpoint", "simulate", "contact-sim"))
     releases = compare_releases(config, as_state(gait["state"]), float(contact["pitch_m"]))
@@ -242,7 +245,7 @@ def differences(way: str, found: comparison.WalkDifference, dims: tuple[str, ...
     }
 
 
-def measure(config: ContactConfig, inputs: Mapping[str, Content], motion: Comparison) -> Measured:
+def measure(config: CompareConfig, inputs: Mapping[str, Content], motion: Comparison) -> Measured:
     """Everything that the paper's numbers are held against."""
     sets = inputs["fixedpoint"].summary["equation_sets"]
     found = {name: sets[name] for name in EQUATION_SETS if "state" in sets.get(name, {})}
@@ -264,7 +267,7 @@ def measure(config: ContactConfig, inputs: Mapping[str, Content], motion: Compar
     )
 
 
-def contact_model(config: ContactConfig, walk: Content) -> ContactModel:
+def contact_model(config: CompareConfig, walk: Content) -> ContactModel:
     """What is held against the paper's ADAMS model."""
     summary, pitch = walk.summary, float(walk.summary["pitch_m"])
     periods, lengths = np.array(summary["step_periods_s"]), np.array(summary["step_lengths_m"])

@@ -15,7 +15,7 @@ from walkerlab.config.walkers import without_contact
 from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.labels import Label
 from walkerlab.mechanics.standing import Standing
-from walkerlab.orbits.design import ON_BOUND, Aim, Floats, Point, optima, searched
+from walkerlab.orbits.design import ON_BOUND, Aim, Descent, Floats, Point, optima, searched, sought
 from walkerlab.orbits.fixed_point import find_gaits
 from walkerlab.orbits.gradients import gait_numbers, gradients
 from walkerlab.orbits.newton import Effort, NotConverged
@@ -28,6 +28,7 @@ from walkerlab.scene.rigid import rigid_walker
 from walkerlab.stages.robustness import Subject, contact_subject, section_coordinates
 from walkerlab.store.columns import rows_group
 from walkerlab.store.content import Content
+from walkerlab.store.parts import Parts
 
 SOLVED: Final = Effort(1e-10)
 MEETING: Final = 1e-3  # between magnitudes of multipliers
@@ -39,8 +40,11 @@ LABELS: Final = {
 ADVICE: Final = "Widen the bounds (--over), or let other numbers go further (--keep)."
 
 
-def run(config: DesignConfig, inputs: Mapping[str, Content], progress: Progress) -> Content:
-    """Search; raises ConfigError for a question that cannot be meant, NoAnswer where no walker keeps the bounds."""
+def run(config: DesignConfig, inputs: Mapping[str, Content], progress: Progress, *, parts: Parts) -> Content:
+    """Search; raises ConfigError for a question that cannot be meant, NoAnswer where no walker keeps the bounds.
+
+    parts  ends of searches that an earlier run has left, and where new ones are kept
+    """
     asked = config.design or Design()
     quantity = asked.minimise or asked.maximise
     if quantity is None or not asked.over:
@@ -58,7 +62,19 @@ def run(config: DesignConfig, inputs: Mapping[str, Content], progress: Progress)
     own = np.array([parameter.value_in(config) for parameter in parameters])
     progress.start("design")
     begun = gaits.at(own)
-    searches = searched(question, own, asked.starts, config.seed)
+
+    def search(number: int, start: Floats) -> Descent:
+        progress.start(f"design: search {number + 1} of {asked.starts}")
+        name = f"search {number}"
+        if name in parts.kept:
+            *x, gradient_norm = parts.kept[name]
+            return Descent(np.array(x), gaits.at(np.array(x)), gradient_norm)
+        one = sought(question, start)
+        if one.point is not None:
+            parts.keep(name, [*one.x.tolist(), one.gradient_norm])
+        return one
+
+    searches = searched(question, own, asked.starts, config.seed, search)
     if not searches or searches[0].point is None:
         raise NoAnswer(f"no gait of the {asked.model} model within the bounds", ADVICE)
     best = searches[0]

@@ -18,7 +18,8 @@ NORMS = (
     MODEL,
     Column("disturbance", "disturbance"),
     Column("of the", lambda row: row["indicator"].replace("_", " ")),
-    Column("norm", lambda row: f"{number(row['value'], 6)} {row['unit']}", numeric=True),
+    Column("norm", "value", lambda value: number(value, 6), numeric=True),
+    Column("unit", "unit"),
     Column("direct", "direct", lambda value: number(value, 5), numeric=True),
     Column("scaled", "scaled", lambda value: number(value, 6), numeric=True),
 )
@@ -40,7 +41,8 @@ MOVES = (
     MODEL,
     Column("number of the config", "to"),
     Column("of the gait", "of"),
-    Column("derivative", lambda row: f"{number(row['value'], 5)} {row['unit']}", numeric=True),
+    Column("derivative", "value", number, numeric=True),
+    Column("unit", "unit"),
     Column("% per %", "relative", lambda value: number(value, 3), numeric=True),
 )
 
