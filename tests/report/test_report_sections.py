@@ -27,7 +27,7 @@ from synthetic_results import (
 
 from walkerlab.config.loader import load
 from walkerlab.report.blocks import PAPER, Code, Paragraph, Picture, Player, Section, Shares, Statements
-from walkerlab.report.gaits import SETS, coordinate
+from walkerlab.report.gaits import SETS, coordinate, works
 from walkerlab.report.registry import SECTIONS, lead, sections_of
 from walkerlab.report.results import Results
 from walkerlab.report.sections import motion
@@ -139,6 +139,12 @@ def test_of_a_driven_walker_title_lead_and_verdict_say_what_drives_it_and_at_wha
     assert "Cost of transport" in texts(found["glossary"])
     assert by in plain(lead(config(*driven), "level"))
     assert "driven" not in plain(sections()["verdict"].blocks[0].text)
+
+
+def test_work_that_is_rounding_is_not_told():
+    record = {"work_per_step_J": {"gravity": -2e-14, "push_off": 1.69, "hip": 0.0}}
+    told = [column.title for column in works("work of", str) if column.value(record) is not None]
+    assert told == ["work of the push-off a step (J)"]
 
 
 def test_figures_of_the_paper_that_are_not_drawn_are_explained():
