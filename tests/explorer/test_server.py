@@ -268,6 +268,8 @@ def test_a_slider_leads_to_nothing_that_is_refused_and_to_all_that_matters(serve
     assert not keys["slope_deg"]["log"]
     assert "from" not in keys["ground.heights_m"]  # a list is typed
     assert "seed" not in keys  # no walk depends on it
+    assert {key for key in keys if keys[key].get("gaits")} >= {"slope_deg", "contact.stiffness", "push_off.impulse_N_s"}
+    assert not keys["ground.roughness_m"]["gaits"]  # gaits are those of even ground
     _, said = served.asked("/api/numbers", {"config": "level"})
     [slope] = [number for number in said["numbers"] if number["key"] == "slope_deg"]
     assert slope["from"] < 0 < slope["to"]  # what is driven walks uphill, too

@@ -9,7 +9,7 @@ from pydantic.fields import FieldInfo
 from walkerlab.config.fields import bounds_of, kind, leaves, words_of
 from walkerlab.config.schema import Config
 from walkerlab.errors import ConfigError
-from walkerlab.scene.parameter import parameter_of
+from walkerlab.scene.parameter import Parameter, parameter_of
 from walkerlab.sweeps.question import described
 
 FIRST: Final = (
@@ -95,12 +95,13 @@ def reach(key: str, first: Any, unit: str, field: FieldInfo, start: Config) -> d
         most = max(most, ordinary) if logarithmic else most
     if unit != "deg":
         least, most = max(least, low), min(most, high)
-    ends = [last_allowed(key, start, first, end) for end in (least, most)]
+    parameter = gaits_by(key, start)
+    ends = [end if parameter is None else last_allowed(parameter, start, first, end) for end in (least, most)]
     if ends[0] == ends[1]:
         return {}
     if whole := isinstance(first, int):
         ends = [round(end) for end in ends]
-    return {"from": ends[0], "to": ends[1], "log": logarithmic, "whole": whole}
+    return {"from": ends[0], "to": ends[1], "log": logarithmic, "whole": whole, "gaits": parameter is not None}
 
 
 def ordinary_size(key: str, unit: str, start: Config) -> float:
@@ -116,12 +117,16 @@ def ordinary_size(key: str, unit: str, start: Config) -> float:
     }.get(unit, 0.0)  # fmt: skip
 
 
-def last_allowed(key: str, start: Config, first: float, end: float) -> float:
-    """The value nearest to a slider's end that is allowed beside the config's other values."""
+def gaits_by(key: str, start: Config) -> Parameter | None:
+    """A key as a number that gaits can be followed along; None if no model is made of it."""
     try:
-        parameter = parameter_of(key, start)
-    except ConfigError:  # none that a model is made of: its own bounds are all there is
-        return end
+        return parameter_of(key, start)
+    except ConfigError:
+        return None
+
+
+def last_allowed(parameter: Parameter, start: Config, first: float, end: float) -> float:
+    """The value nearest to a slider's end that is allowed beside the config's other values."""
     if parameter.config_at(start, end) is not None:
         return end
     good, bad = first, end

@@ -90,7 +90,7 @@ function say(text, tone = "plain") {
 }
 
 // Where a value stands in a command line is nothing to a page.
-const ended = (text = "") => text && text[0].toUpperCase() + text.slice(1) + (/[.:]$/.test(text) ? "" : ".");
+const ended = (text = "") => text && (/^[a-z]+[ :]/.test(text) ? text[0].toUpperCase() : text[0]) + text.slice(1) + (/[.:]$/.test(text) ? "" : ".");
 const placeless = (text) => text.replace(/^(--set .*?|\S.*?:\d+:\d+): /, "");
 const sentence = ({ message, advice }) => [placeless(message), advice].map(ended).join(" ").trim();
 
@@ -266,7 +266,7 @@ function turn(key, value, settled) {
   if (JSON.stringify(value) === JSON.stringify(row.number.start)) delete state.set[key];
   else state.set[key] = value;
   row.put(value);
-  if ("from" in row.number) touched = key;
+  if (row.number.gaits) touched = key;
   walk();
   if (settled) remember(), settle();
   else along.mark();
@@ -350,7 +350,7 @@ class Along extends Plot {
   }
   // Coarse at once, then finer, while nothing else is asked.
   async draw() {
-    const row = [rows.get(touched), rows.get("slope_deg")].find((one) => one && "from" in one.number);
+    const row = [rows.get(touched), rows.get("slope_deg")].find((one) => one?.number.gaits);
     if (!row) return;
     const { key, from, to, log, unit } = row.number;
     const { [key]: here, ...others } = state.set;
