@@ -56,6 +56,13 @@ def test_the_optimum_is_that_of_a_brute_grid():
     )
 
 
+def test_a_search_far_from_the_configs_own_numbers_is_on_the_gait_that_is_sought_there():
+    """From a hip of 10 kg Newton's method comes to an unstable gait of the walker of 50 kg, with multiplier 4.55."""
+    asked = ("design.minimise=spectral_radius", "design.over={walker.hip_mass_kg: [49.9, 50]}", "design.starts=1")
+    found = run("slope-3deg", *asked)
+    assert found["value"] == pytest.approx(gait_at("slope-3deg", "walker.hip_mass_kg=50").spectral_radius, rel=1e-3)
+
+
 def test_searches_that_were_cut_off_go_on_where_they_stopped(tmp_path):
     asked = ("design.minimise=spectral_radius", "design.over={walker.hip_mass_kg: [5, 50]}", "design.starts=2")
     whole = run("slope-3deg", *asked, parts=Parts(tmp_path / "parts", "key"))

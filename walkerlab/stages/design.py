@@ -67,11 +67,12 @@ def run(config: DesignConfig, inputs: Mapping[str, Content], progress: Progress,
         progress.start(f"design: search {number + 1} of {asked.starts}")
         name = f"search {number}"
         if name in parts.kept:
-            *x, gradient_norm = parts.kept[name]
-            return Descent(np.array(x), gaits.at(np.array(x)), gradient_norm)
+            x, (gradient_norm, *z) = np.array(parts.kept[name][: own.size]), parts.kept[name][own.size :]
+            gaits.z = np.array(z)
+            return Descent(x, gaits.at(x), gradient_norm)
         one = sought(question, start)
         if one.point is not None:
-            parts.keep(name, [*one.x.tolist(), one.gradient_norm])
+            parts.keep(name, [*one.x.tolist(), one.gradient_norm, *gaits.z.tolist()])
         return one
 
     searches = searched(question, own, asked.starts, config.seed, search)
@@ -161,9 +162,9 @@ class Gaits:
         subject = Subject(self.model, config, self.z, scales_of(walker), self.length)
         here = subject.at()
         found = self.near(here, self.z)
-        if found is None and self.model == "rigid":
+        if self.model == "rigid" and (found is None or found[1]["spectral_radius"] >= 1.0):  # a long way, perhaps
             gait = find_gaits(walker, config.seed).gait
-            found = None if gait is None else self.near(here, section_coordinates(walker, gait.state))
+            found = found if gait is None else self.near(here, section_coordinates(walker, gait.state)) or found
         if found is None:
             return None
         here, numbers = found
