@@ -2,10 +2,10 @@
 
 from typing import Final
 
+from walkerlab.config.contact import MM_PER_M
 from walkerlab.ground.resting import RestingFoot, resting_foot
 from walkerlab.paper.printed import DAMPING, STEP_LENGTH, STIFFNESS, TABLE_1
 
-MM: Final = 1000.0  # mm in a m
 ADAMS_EXPONENT: Final = 2.2  # default of ADAMS/View, not given in the paper
 
 
@@ -25,5 +25,7 @@ def readings_of_fig_4b() -> tuple[RestingFoot, RestingFoot]:
     _, leg, hip, gravity = (entry.value for entry in TABLE_1)
     mass = hip + 2.0 * leg
     stiffness, damping = STIFFNESS.value, DAMPING.value
-    in_adams = resting_foot(mass * gravity, mass, stiffness * MM**ADAMS_EXPONENT, ADAMS_EXPONENT, damping * MM)
+    in_adams = resting_foot(
+        mass * gravity, mass, stiffness * MM_PER_M**ADAMS_EXPONENT, ADAMS_EXPONENT, damping * MM_PER_M
+    )
     return in_adams, resting_foot(mass * gravity, mass, stiffness, 1.0, damping)
