@@ -1,12 +1,8 @@
-"""Arithmetic on the paper's printed numbers alone: no model, no config."""
+"""Arithmetic on the paper's printed numbers alone: no walk, no config of a run."""
 
-from typing import Final
-
+from walkerlab.config.contact import Contact
 from walkerlab.ground.resting import RestingFoot, resting_foot
 from walkerlab.paper.printed import DAMPING, STEP_LENGTH, STIFFNESS, TABLE_1
-
-MM: Final = 1000.0  # mm in a m
-ADAMS_EXPONENT: Final = 2.2  # default of ADAMS/View, not given in the paper
 
 
 def printed_speed(cycle: float) -> float:
@@ -23,7 +19,6 @@ def speed_difference(matlab_cycle: float, adams_cycle: float) -> float:
 def readings_of_fig_4b() -> tuple[RestingFoot, RestingFoot]:
     """How the paper's walker stands on its contact by its numbers without units: read in N, mm and s, and in SI."""
     _, leg, hip, gravity = (entry.value for entry in TABLE_1)
-    mass = hip + 2.0 * leg
-    stiffness, damping = STIFFNESS.value, DAMPING.value
-    in_adams = resting_foot(mass * gravity, mass, stiffness * MM**ADAMS_EXPONENT, ADAMS_EXPONENT, damping * MM)
-    return in_adams, resting_foot(mass * gravity, mass, stiffness, 1.0, damping)
+    mass, adams = hip + 2.0 * leg, Contact(stiffness=STIFFNESS.value, damping=DAMPING.value).in_si()
+    in_adams = resting_foot(mass * gravity, mass, adams.stiffness, adams.exponent, adams.damping)
+    return in_adams, resting_foot(mass * gravity, mass, STIFFNESS.value, 1.0, DAMPING.value)

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any, Literal
 
+from walkerlab.config.contact import MM_PER_M
 from walkerlab.paper import printed
-from walkerlab.paper.arithmetic import MM, speed_difference
+from walkerlab.paper.arithmetic import speed_difference
 from walkerlab.paper.measured import CYCLES, Measured
 from walkerlab.paper.printed import Printed
 from walkerlab.paper.prose import prose
@@ -55,7 +56,7 @@ def paper_rows(measured: Measured, study: PaperStudy) -> Iterator[JudgedNumber]:
         yield judge.fixed_point(entry, coordinate)
     yield judge.eigenvalue()
     yield judge.input(printed.LEG_INERTIA, walker.leg_inertia, "rigid")
-    yield judge.input(printed.FOOT_RADIUS, contact.foot_radius * MM, "contact")
+    yield judge.input(printed.FOOT_RADIUS, contact.foot_radius * MM_PER_M, "contact")
     for entry, value in ((printed.STIFFNESS, contact.law.stiffness), (printed.DAMPING, contact.law.damping)):
         # printed without a unit
         yield judge.row(entry, {}, value, False, EXPLAINED, "contact", prose("evidence.unitless", contact))
@@ -251,7 +252,7 @@ def table_1(measured: Measured, study: PaperStudy) -> Table:
         ("g", "gravity", "m/s^2", gravity.value, walker.gravity, gravity.where),
         ("a", "foot to mass of the leg", "m", 0.5 * length.value, walker.foot_to_mass, MIDDLE),
         ("J", "inertia of a leg", "kg m^2", inertia.value, walker.leg_inertia, inertia.where),
-        ("r", "radius of the foot", "m", radius.value / MM, measured.contact.foot_radius, radius.where),
+        ("r", "radius of the foot", "m", radius.value / MM_PER_M, measured.contact.foot_radius, radius.where),
         ("phi", "slope", "rad", study.slope, walker.slope, "not stated: from the angles of x_p"),
     )
     return {

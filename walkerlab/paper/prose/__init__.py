@@ -6,8 +6,9 @@ A package of its own: only results of modules that import it depend on its words
 import math
 from pathlib import Path
 
+from walkerlab.config.contact import MM_PER_M
 from walkerlab.paper import arithmetic, printed
 from walkerlab.prose import Prose, f
 
-KNOWN = vars(printed) | vars(arithmetic) | {"pi": math.pi}
+KNOWN = vars(printed) | vars(arithmetic) | {"pi": math.pi, "MM_PER_M": MM_PER_M}
 prose = Prose(Path(__file__).parent, (f,), {name: value for name, value in KNOWN.items() if not name.startswith("_")})
