@@ -217,8 +217,8 @@ def test_a_list_is_typed_and_comes_back_with_the_address(page):
     page.evaluate("document.querySelector('#found button').click()")
     typed(page, "ground.heights_m", "[0.002, -0.001]")
     page.until(f"{SHOWN} === 'Shown: paper with ground.heights_m [0.002,-0.001]'")
-    page.evaluate("location.reload()")
-    page.until(f"typeof rows !== 'undefined' && {SHOWN}.endsWith('[0.002,-0.001]')")
+    page.evaluate("window.old = true; location.reload()")
+    page.until(f"!window.old && typeof rows !== 'undefined' && {SHOWN}.endsWith('[0.002,-0.001]')")
     assert page.evaluate("rows.get('ground.heights_m').text.value") == "[0.002,-0.001]"
     assert page.evaluate("shown.answer.scene.ground.length") > 2  # the player draws the levels
 

@@ -61,18 +61,21 @@ async function walk() {
   while (next) {
     next = false;
     document.body.dataset.state = "asking";
-    const asked = structuredClone(question({ models: models() }));
+    // The rigid model walks while the contact model is still compiled.
+    const first = !shown;
+    const asked = structuredClone(question({ models: first ? ["rigid"] : models() }));
     const began = performance.now();
     const late = setInterval(async () => {
       const [, { compiling, compiled } = {}] = await ask("/api/job").catch(() => [0]);
       if (!asking || document.body.dataset.state !== "asking") return;
-      const what = compiling ? `Compiling what walks, once for all: ${compiled} parts so far, now ${compiling}` : `Computing ${changes(asked.set) || called(asked.config)}`;
+      const what = compiling ? `Compiling, which is done once: part ${compiled}, ${compiling}` : `Computing ${changes(asked.set) || called(asked.config)}`;
       say(`${what} (${Math.round((performance.now() - began) / 1000)} s).`);
     }, 500);
     try {
       const [status, answer] = await ask("/api/walk", asked).finally(() => clearInterval(late));
       if (status === 409) next = true;
       if (!next) show(status, answer, asked);
+      if (first && status === 200) next = true;
     } catch {
       document.body.dataset.state = "failed";
       say("The server does not answer. Start `walkerlab explore` again; this page goes on asking.", "bad");
