@@ -328,11 +328,15 @@ def text_of(file):
         return ""
 
 
-def test_in_a_notebook_it_is_a_frame(tmp_path):
+def test_in_a_notebook_it_is_a_frame(tmp_path, monkeypatch):
     page = walkerlab.explore(walkerlab.kneed(), slope_deg=3, runs=tmp_path)
     try:
         assert f'<iframe src="{page.url}"' in page._repr_html_()
         said = page.answer("/api/walk", {"models": ["rigid"]})[1]
         assert said["fixedpoint"]["period_s"] == walkerlab.find_gait(walkerlab.kneed(), slope_deg=3).summary["period_s"]
+        monkeypatch.chdir(tmp_path)
+        page.answer("/api/save", {"set": {"walker.hip_mass_kg": 0.7}, "name": "kneed-of-mine"})
+        saved = load(tmp_path / "kneed-of-mine.yaml").config
+        assert (saved.walker.type, saved.walker.hip_mass_kg) == ("kneed", 0.7)
     finally:
         page.close()
