@@ -13,7 +13,7 @@ from walkerlab import kernel_cache
 from walkerlab.config.files import extendable
 from walkerlab.config.loader import LoadedConfig, load
 from walkerlab.config.schema import Config
-from walkerlab.config.writer import extending
+from walkerlab.config.writer import extending, to_yaml
 from walkerlab.errors import ConfigError, WalkerlabError
 from walkerlab.explorer.numbers import adjustable
 from walkerlab.pipeline.in_memory import InMemory, Keys
@@ -192,6 +192,10 @@ def curve(branch: Group) -> dict[str, list[Any]]:
 
 
 def as_file(question: ExploredConfig, name: str) -> str:
-    """The config as a file that extends the one that was started from and says only what differs; ConfigError."""
+    """The config as a file that extends the one that was started from and says only what differs; ConfigError.
+
+    It says all where nothing can be extended: for a walker of another type than the paper's that no file holds.
+    """
     start, named = extendable(question.config), replace(question, changes={**question.changes, "name": name})
-    return extending(start, load(Path(start)).config, named.loaded.config, name)
+    base, changed = load(Path(start)).config, named.loaded.config
+    return extending(start, base, changed, name) if base.walker.type == changed.walker.type else to_yaml(changed)
