@@ -99,6 +99,7 @@ def tables(summary: Mapping[str, Any]) -> list[Table]:
         found.append(table("Steps on rough ground", ROUGH, summary["rough_ground"], note=words("robustness.rough")))
     moving = [row for row in summary["sensitivity"] if row.get("relative") is not None and not row.get("why")]
     if moving:
+        moving.sort(key=lambda row: -abs(row["relative"]))  # of both models
         left = len(summary["sensitivity"]) - len(moving[:SHOWN])
         found.append(table("What moves the gait", MOVES, moving[:SHOWN], note=words("robustness.moves", left)))
     return found
