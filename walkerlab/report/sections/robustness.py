@@ -35,6 +35,7 @@ ROUGH = (
     Column("standard error", lambda row: row.get("standard_error"), lambda value: number(value, 2), numeric=True),
     Column("walks", "walks", whole, numeric=True),
     Column("cut off", "capped", whole, numeric=True),
+    Column("at step", "cut_off_at", whole, numeric=True),
     Column("method", "method"),
 )
 MOVES = (
