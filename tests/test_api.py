@@ -234,3 +234,14 @@ def test_what_is_wrong_with_an_argument_is_told_in_words_and_without_a_place_in_
     monkeypatch.chdir(tmp_path)
     with pytest.raises(ConfigError, match=said):
         call()
+
+
+def test_robustness_and_design_are_asked_in_memory():
+    asked = {"model": "rigid", "steps": 5, "roughness_m": [0.002], "max_steps": 50}
+    found = walkerlab.robustness(walkerlab.compass(), 3, to=["slope_deg"], walks=4, **asked)
+    assert [(row["model"], row["steps"]) for row in found.summary["largest_step"]] == [("rigid", 5)]
+    assert found.summary["rough_ground"][0]["cut_off_at"] == 50
+    walker = walkerlab.design(
+        walkerlab.compass(), over={"slope_deg": (2, 3)}, maximise="speed_m_s", slope_deg=2.5, starts=1
+    )
+    assert walker.summary["best"] == {"slope_deg": 3.0}

@@ -383,9 +383,12 @@ def robustness(
     slope_deg  positive downhill, deg
     to         numbers of the config that the gait is differentiated by; by default all that the model reads
     walks      on each rough ground
-    keys       other keys of a config, such as contact, seed
+    keys       model, steps, roughness_m and max_steps of the block `robustness`; other keys of a config
     """
-    asked: dict[str, Any] = {} if walks is None else {"walks": plain(walks)}
+    asked: dict[str, Any] = {
+        name: keys.pop(name) for name in ("model", "steps", "roughness_m", "max_steps") if name in keys
+    }
+    asked |= {} if walks is None else {"walks": plain(walks)}
     asked |= {"to": list(to)} if to else {}
     return in_memory("robustness", config_of_scene(walker, {"slope_deg": slope_deg, "robustness": asked or None}, keys))
 

@@ -101,6 +101,14 @@ def test_what_to_change_is_a_number_of_the_walker_that_rounding_has_not_eaten(ri
     assert "What to change first" not in said_of({**rigid.summary, "sensitivity": others})
 
 
+def test_what_moves_the_gait_is_ranked_over_both_models(both):
+    lines = [line.split() for line in "\n".join(answer("robustness", both.summary)).splitlines() if " slope_" in line]
+    shares = [abs(float(line[-1].replace("\N{MINUS SIGN}", "-"))) for line in lines]
+    assert {line[0] for line in lines} == {"rigid", "contact"}
+    assert len(shares) > 4
+    assert shares == sorted(shares, reverse=True)
+
+
 def test_large_means_are_told_to_the_digits_that_mean_something(rigid):
     one = rigid.summary["rough_ground"][0] | {"mean_steps": 492652.3, "standard_error": 348357.1, "method": "censored"}
     assert "walks 490,000 steps on average, give or take 350,000." in said_of({**rigid.summary, "rough_ground": [one]})

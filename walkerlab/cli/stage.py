@@ -36,7 +36,7 @@ def run_stage(request: Request, stage: Stage, graph: Graph, full: bool) -> None:
         show(request, report.as_json() | {"dry_run": True}, planned(report))
         return
     report = with_nearby_gaits(execute(config, stage.name, folder, options, request.console, graph), request)
-    if stage.designs and "best" in report.summary:
+    if stage.designs and report.no_answer is None:
         report.summary["config"] = str(write_optimum(request, report))
     show(request, report.as_json(), printed(request, report))
     if request.open_page and "html" in report.summary and not request.console.shown:

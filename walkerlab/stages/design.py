@@ -82,7 +82,9 @@ def run(config: DesignConfig, inputs: Mapping[str, Content], progress: Progress,
     assert best.point is not None
     ends = optima(question, searches)
     start = {} if begun is None else {"start_value": begun.numbers[quantity], "start": dict(begun.numbers)}
-    found = dict(zip(asked.over, best.x.tolist(), strict=True))
+    found = {
+        key: float(f"{value:.12g}") for key, value in zip(asked.over, best.x, strict=True)
+    }  # a bound as it was given
     said = {
         "quantity": quantity,
         "sense": "least" if asked.minimise else "largest",

@@ -35,6 +35,7 @@ ROUGH = (
     Column("standard error", lambda row: row.get("standard_error"), lambda value: number(value, 2), numeric=True),
     Column("walks", "walks", whole, numeric=True),
     Column("cut off", "capped", whole, numeric=True),
+    Column("at step", "cut_off_at", whole, numeric=True),
     Column("method", "method"),
 )
 MOVES = (
@@ -99,6 +100,7 @@ def tables(summary: Mapping[str, Any]) -> list[Table]:
         found.append(table("Steps on rough ground", ROUGH, summary["rough_ground"], note=words("robustness.rough")))
     moving = [row for row in summary["sensitivity"] if row.get("relative") is not None and not row.get("why")]
     if moving:
+        moving.sort(key=lambda row: -abs(row["relative"]))  # of both models
         left = len(summary["sensitivity"]) - len(moving[:SHOWN])
         found.append(table("What moves the gait", MOVES, moving[:SHOWN], note=words("robustness.moves", left)))
     return found
