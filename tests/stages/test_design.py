@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from walkerlab.cli.answers import answer
 from walkerlab.config.loader import load
 from walkerlab.config.reads import only
 from walkerlab.errors import ConfigError, NoAnswer
@@ -15,6 +14,7 @@ from walkerlab.orbits.fixed_point import find_gaits
 from walkerlab.orbits.gradients import gait_numbers
 from walkerlab.pipeline.graph import PIPELINE
 from walkerlab.pipeline.progress import Silent
+from walkerlab.report.answers import answer
 from walkerlab.scene.contact import contact_scene, gait_off_pads, start_state
 from walkerlab.scene.rigid import rigid_walker
 from walkerlab.solvers.registry import Tolerances
