@@ -1,4 +1,4 @@
-"""Figures of what gaits stand: numbers of a sweep over one number, and of walks on rough ground."""
+"""Figures of what gaits withstand: numbers of a sweep over one number, and of walks on rough ground."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Figures of what gaits stand: 17 over one number of the config, from a sweep; 18 walks on rough ground."""
+"""Figures of what gaits withstand: 17 over one number of the config, from a sweep; 18 walks on rough ground."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ def actuations(group: Group, parameters: Sequence[str]) -> dict[str, NDArray[np.
 
 
 def push_off_or_hip(group: Group, driven: Mapping[str, NDArray[np.bool_]]) -> Drawing:
-    """What each way to drive a walker costs and stands over its speed, from a sweep of `robustness`."""
+    """What each way to drive a walker costs and withstands over its speed, from a sweep of `robustness`."""
     speed = group[SPEED].astype(float)
     with styled():
         figure = blank(0.6 + PANEL_HEIGHT * len(OF_ACTUATIONS))

@@ -1,6 +1,6 @@
 """The least or largest of a gait's numbers over some of a walker's, others kept within bounds.
 
-SciPy's SLSQP on numbers scaled to their bounds, with exact gradients, from several starts. Where there is no gait the
+SciPy's SLSQP on numbers scaled to their bounds, with gradients from exact steps, from several starts. Where there is no gait the
 function is continued by a slope back to the last point that had one, so that a search goes round such places.
 """
 

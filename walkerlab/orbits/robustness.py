@@ -1,4 +1,4 @@
-"""What a gait stands: its sensitivity to a drop of the floor and to a push, the largest of both, and rough ground.
+"""What a gait withstands: its sensitivity to a drop of the floor and to a push, the largest of both, and rough ground.
 
 Gait sensitivity norm: with z the section's coordinates after a step and e a measure of it, less the gait's,
 

@@ -221,7 +221,7 @@ PIPELINE = Graph(
     ),
     Stage(
         "robustness", "walkerlab.stages.robustness",
-        "Ask what a gait stands: drops, pushes, rough ground, and which number of the walker moves it most.",
+        "Ask what a gait withstands: drops, pushes, rough ground, and which number of the walker moves it most.",
         reads.RobustnessConfig, results_of("fixedpoint"), has_cells=True, on_demand=True, keeps_parts=True,
         of_a_model=True,
     ),

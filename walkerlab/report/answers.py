@@ -220,7 +220,7 @@ def starts(summary: Summary) -> list[str | Table]:
 
 
 def stood(summary: Summary) -> list[str | Table]:
-    """What the gait stands, and what moves it."""
+    """What the gait withstands, and what moves it."""
     from walkerlab.report.sections import robustness
 
     return [*robustness.findings(summary), *robustness.tables(summary)]

@@ -1,4 +1,4 @@
-"""What a gait stands, in both models, and which numbers of the config move it; walks are kept piece by piece."""
+"""What a gait withstands, in both models, and which numbers of the config move it; walks are kept piece by piece."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a gait stands, and which number of the walker moves it."""
+"""What a gait withstands, and which number of the walker moves it."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -74,7 +74,7 @@ def section(results: Results) -> Section | None:
         return None
     first, *others = findings(summary) or [""]
     blocks: list[PageBlock] = [Paragraph(" ".join(others))] if others else []
-    return Section("robustness", "What the gait stands", (*blocks, *tables(summary)), first)
+    return Section("robustness", "What the gait withstands", (*blocks, *tables(summary)), first)
 
 
 def findings(summary: Mapping[str, Any]) -> list[str]:
