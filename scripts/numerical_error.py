@@ -19,10 +19,11 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from contact_campaign import TIGHTER, Drawn, arguments, ours_at, scene_of, spread, tell_row, walks_of
 
-from walkerlab.stages.numerical_error import OF_EACH_STEP, change
+from walkerlab.labels import ERROR_OF_EACH_STEP
+from walkerlab.stages.numerical_error import change
 from walkerlab.stages.tune import walk_summary
 
-ERRORS = (*OF_EACH_STEP, "end_time_s")
+ERRORS = (*ERROR_OF_EACH_STEP.values(), "end_time_s")
 FACTORS = (1.5, 10.0)
 LEAST = 1e-11  # s or m: below it both are rounding, or the last digits of an event's time
 

@@ -3,6 +3,7 @@
 import http.client
 import json
 import re
+import signal
 import subprocess
 import sys
 
@@ -11,7 +12,10 @@ class Served:
     def __init__(self, folder, *options):
         command = [sys.executable, "-m", "walkerlab", "explore", "--no-browser", "--runs", "runs", *options]
         self.folder = folder
-        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=folder)
+        self.process = subprocess.Popen(  # as from a terminal: a script's background job ignores Ctrl-C
+            command, stdout=subprocess.PIPE, text=True, cwd=folder,
+            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+        )  # fmt: skip
         self.url = self.process.stdout.readline().strip()
         port, self.token = re.fullmatch(r"http://127\.0\.0\.1:(\d+)/\?token=(\S+)", self.url).groups()
         self.port = int(port)

@@ -105,7 +105,7 @@ def test_a_port_that_is_taken_is_a_word(served, tmp_path):
     command = [sys.executable, "-m", "walkerlab", "explore", "--no-browser", "--port", str(served.port)]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
     assert (done.returncode, done.stdout) == (2, "")
-    assert "cannot be had" in done.stderr
+    assert "is not available" in done.stderr
     assert "Traceback" not in done.stderr
 
 

@@ -7,7 +7,7 @@ from walkerlab.stages.stability_maps import step_group, stiction_group, summary_
 from walkerlab.verification.maps import NONE, VERDICTS
 
 CELLS = 3
-# outcome, outcome at a tenfold tolerance, error
+# outcome, outcome at a ten times tighter tolerance, error
 ENDS = (
     (Outcome.WALKED, Outcome.WALKED, 1e-9),
     (Outcome.OFF_PAD, Outcome.WALKED, NONE),

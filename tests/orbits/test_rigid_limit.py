@@ -74,7 +74,7 @@ def test_full_damping_stays_where_the_static_penetration_is():
 
 
 def test_the_gait_of_a_walker_that_is_pushed_off_comes_to_the_rigid_one_in_first_order():
-    """As the ground stiffens and the pulse shortens; a pulse that stays as long leads elsewhere."""
+    """As the ground stiffens and the pulse shortens; where it stays as long no gait is near."""
     config = load(Path("level"), ["contact.terrain=after-mid-swing", "walker.foot_radius_m=1e-6"]).config
     rigid = find_gaits(rigid_walker(config, config.equations)).gait
     scene, found = contact_scene(config, rigid.step_length), gait_off_pads(config, rigid.step_length, rigid.state)
@@ -91,7 +91,7 @@ def test_the_gait_of_a_walker_that_is_pushed_off_comes_to_the_rigid_one_in_first
     orders = np.log(np.divide(distances[:-1], distances[1:])) / np.log(np.sqrt(10.0))
     assert orders == pytest.approx(1.0, abs=0.06)
     assert distances[-1] < 2e-4
-    assert off(with_scaled_laws(scene.walker, *series_of(ALL_POINT)[4][2:]), gait)[1] > 100.0 * distances[-1]
+    assert not isinstance(off(with_scaled_laws(scene.walker, *series_of(ALL_POINT)[4][2:]), gait)[0], Cycle)
 
 
 def test_only_the_way_to_the_limit_shortens_a_push_off_and_only_beyond_the_configs_contact():

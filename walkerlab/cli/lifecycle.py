@@ -132,7 +132,9 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
             try:
                 server = Server(port, ExploredConfig(request.config, tuple(request.sets or ()), request.runs, {}))
             except OSError as error:
-                raise typer.BadParameter(f"{port} cannot be had: {error.strerror}", param_hint="--port") from None
+                raise typer.BadParameter(
+                    f"port {port} is not available: {error.strerror}", param_hint="--port"
+                ) from None
             try:
                 print(server.url, flush=True)
                 if not no_browser:

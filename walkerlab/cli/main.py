@@ -94,7 +94,7 @@ Over = Annotated[
 From = Annotated[float | None, typer.Option("--from", metavar="A", help="Where the span begins, in the key's unit.")]
 To = Annotated[float | None, typer.Option("--to", metavar="B", help="Where the span ends.")]
 Model = Annotated[
-    str | None, typer.Option("--model", metavar="rigid|contact|both", help="Whose gaits are asked about.")
+    str | None, typer.Option("--model", metavar="rigid|contact|both", help="Which model's gaits to ask about.")
 ]
 Periods = Annotated[int | None, typer.Option("--periods", metavar="N", help="Steps of the longest gaits wanted.")]
 Full = Annotated[

@@ -51,7 +51,7 @@ class Design(Block):
     def _upwards(cls, value: Bounds) -> Bounds:
         for name, bounds in value.items():
             if len(bounds) != 2 or bounds[0] >= bounds[1]:
-                raise wrong(f"has bounds of {name} that are not two numbers, the first below the second")
+                raise wrong(f"gives {name} bounds that are not two numbers, the first below the second")
         return value
 
     @field_validator("keep")
@@ -59,5 +59,5 @@ class Design(Block):
     def _numbers_of_a_gait(cls, value: Bounds) -> Bounds:
         for name in value:
             if name not in _NAMES.split(", "):
-                raise wrong(f"names {name}, which is no number of a gait; there are {_NAMES}")
+                raise wrong(f"names {name}, which is not a number of a gait; choose from {_NAMES}")
         return value

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from walkerlab.config.canonical import leaves
+from walkerlab.config.canonical import flattened
 from walkerlab.config.fields import block_of
 from walkerlab.config.files import DEFAULT, ConfigFile, builtin, find, read_layers, with_cases
 from walkerlab.config.layers import ConfigSetting, option_setting, setting_of, stacked, with_settings
@@ -155,8 +155,8 @@ def run_name(base: Config, changed: Config, slope_deg: float | None = None, run:
         if block is not None and before[name] is None and after[name] is not None:
             before[name] = block().model_dump(mode="json")
             parts.append(f"{name}=added")
-    known = dict(leaves(before))
-    differing = {key: value for key, value in leaves(after) if key not in known or known[key] != value}
+    known = dict(flattened(before))
+    differing = {key: value for key, value in flattened(after) if key not in known or known[key] != value}
     renamed = differing.pop("name", None)
     whole, _, earlier = (renamed or run or base.name).partition("@")
     if slope_deg is not None and "slope_rad" in differing:

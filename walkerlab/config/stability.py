@@ -40,7 +40,7 @@ class Case(Block):
     budget: int = key(400_000, "1", "right-hand sides it may evaluate", ge=1, le=100_000_000)
     balance: float = key(1e-6, "1", "largest residual of the energy balance, as a share of the walker's energy", gt=0.0)
     agreement: float = key(
-        1e-4, "1", "largest change of times under a tenfold tolerance, in pendulum times; for a twin too", gt=0.0
+        1e-4, "1", "largest change of times at a ten times tighter tolerance, in pendulum times; for a twin too", gt=0.0
     )
     compared_steps: int = key(20, "1", "steps of which the times are compared: fewer where small errors grow", ge=1)
     twin: bool = key(False, "", "whether a walker of another size must do the same", bounds="true or false")

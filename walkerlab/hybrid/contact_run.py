@@ -250,7 +250,7 @@ def new_observer(
     times = np.zeros(0) if times is None else times
     samples = times.size
     extremes = np.zeros(5)
-    if track_energy:
+    if track_energy or walker.whole.driven_hip:
         here = on_ground(
             walker, walk_state.has_ground, feet=walk_state.feet, level=walk_state.level, times=walk_state.times
         )

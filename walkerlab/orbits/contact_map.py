@@ -42,9 +42,8 @@ from walkerlab.mechanics.tree import add_inertia
 from walkerlab.orbits.step_map import REMEMBERED, Cycle, DisturbedWalk, MappedStep, Monitor, StepMap, Stepper, no_step
 from walkerlab.outcome import Outcome
 from walkerlab.solvers.registry import Tolerances
-from walkerlab.solvers.system import State
+from walkerlab.solvers.system import Floats, State
 
-Floats = NDArray[np.float64]
 # places in the state: along, height, the bodies' angles, and the velocities of these
 ALONG, HEIGHT, ANGLES = 0, 1, 2
 COORDINATES = 6  # of a walker with two straight legs

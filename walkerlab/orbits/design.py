@@ -1,7 +1,7 @@
 """The least or largest of a gait's numbers over some of a walker's, others kept within bounds.
 
-SciPy's SLSQP on numbers scaled to their bounds, with gradients from exact steps, from several starts. Where there is no gait the
-function is continued by a slope back to the last point that had one, so that a search goes round such places.
+SciPy's SLSQP on numbers scaled to their bounds, with gradients from exact steps, from several starts. Where there is
+no gait the function is continued by a slope back to the last point that had one, so that a search goes round it.
 """
 
 from __future__ import annotations
@@ -10,9 +10,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from walkerlab.solvers.system import Floats
+
 PRECISION = 1e-9  # of the quantity over its start's
 MAX_ITERATIONS = 60
 ON_BOUND = 1e-6  # of the range
@@ -54,9 +54,6 @@ class Descent:
     x: Floats
     point: Point | None
     gradient_norm: float = 0.0
-    evaluations: int = 0
-    without_gait: int = 0
-    said: str = ""
     seen: dict[bytes, Point | None] = field(default_factory=dict)
 
 
@@ -70,12 +67,9 @@ def sought(question: Aim, start: Floats) -> Descent:
     def at(u: Floats) -> Point | None:
         x = question.lower + np.clip(u, 0.0, 1.0) * span
         if x.tobytes() not in search.seen:
-            search.evaluations += 1
             search.seen[x.tobytes()] = question.at(x)
         point = search.seen[x.tobytes()]
-        if point is None:
-            search.without_gait += 1
-        else:
+        if point is not None:
             search.x, search.point = x, point
         return point
 
@@ -117,7 +111,6 @@ def sought(question: Aim, start: Floats) -> Descent:
         options={"ftol": PRECISION, "maxiter": MAX_ITERATIONS},
     )  # fmt: skip
     at(np.clip(ended.x, 0.0, 1.0))
-    search.said = str(ended.message)
     free = (ended.x > ON_BOUND) & (ended.x < 1.0 - ON_BOUND)
     search.gradient_norm = float(np.linalg.norm(objective(ended.x)[1][free]))
     return search

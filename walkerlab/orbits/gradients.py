@@ -14,13 +14,11 @@ from functools import cache, partial
 from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from walkerlab.orbits.robustness import Standpoint, response, slope_of
 from walkerlab.orbits.step_map import MappedStep, multipliers_of
 from walkerlab.outcome import Outcome
-
-Floats = NDArray[np.float64]
+from walkerlab.solvers.system import Floats
 
 QUANTITIES: Final[Mapping[str, str]] = {
     "period_s": "s",

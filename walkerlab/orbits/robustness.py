@@ -19,12 +19,11 @@ from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from walkerlab.orbits.step_map import DisturbedWalk, StepMap, multipliers_of
 from walkerlab.outcome import Outcome
+from walkerlab.solvers.system import Floats
 
-Floats = NDArray[np.float64]
 Disturbance = Literal["floor-drop", "hip-push"]
 DISTURBANCES: tuple[Disturbance, ...] = ("floor-drop", "hip-push")
 INDICATORS = ("step_period", "step_length", "speed")

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from walkerlab.config.canonical import leaves
+from walkerlab.config.canonical import flattened
 from walkerlab.config.problems import meant
 from walkerlab.config.reader import read as read_text
 from walkerlab.config.schema import Config
@@ -221,10 +221,10 @@ def difference(
 ) -> RunDifference:
     """How the results of two runs differ, and the configs of both; nothing is said of a config that is not known."""
     both = [name for name in first if name in second]
-    one, other = ({} if config is None else dict(leaves(config.model_dump(mode="json"))) for config in configs)
+    one, other = ({} if config is None else dict(flattened(config.model_dump(mode="json"))) for config in configs)
     return RunDifference(
         tuple((key, one.get(key), other.get(key)) for key in {**one, **other} if one.get(key) != other.get(key)),
-        {name: pairs(*(dict(leaves(run[name].summary, lists=True)) for run in (first, second))) for name in both},
+        {name: pairs(*(dict(flattened(run[name].summary, lists=True)) for run in (first, second))) for name in both},
         {name: pairs(*(headline_values(name, run[name].summary) for run in (first, second))) for name in both},
         tuple(name for name in first if name not in second),
         tuple(name for name in second if name not in first),
@@ -240,7 +240,7 @@ def pairs(first: Mapping[str, Any], second: Mapping[str, Any]) -> tuple[Pair, ..
 def headline_values(stage: str, summary: Mapping[str, Any]) -> dict[str, Any]:
     """The numbers of a stage's summary that say most, by name."""
     last = {name: summary[whole][-1] for name, whole in LAST_OF.items() if summary.get(whole)}
-    every = dict(leaves(summary, lists=True)) | last
+    every = dict(flattened(summary, lists=True)) | last
     return {name: every[name] for name in headlines(stage, every)}
 
 

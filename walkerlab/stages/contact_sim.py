@@ -6,7 +6,6 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from walkerlab.account import SAMPLED
 from walkerlab.config.reads import ContactConfig, ContactSimConfig, GroundConfig
@@ -31,7 +30,7 @@ from walkerlab.scene.contact import (
 from walkerlab.scene.footholds import foothold_heights
 from walkerlab.scene.left_out import of_contact_walk
 from walkerlab.solvers.registry import Tolerances
-from walkerlab.solvers.system import State
+from walkerlab.solvers.system import Floats, State
 from walkerlab.stages.walk import content_of_walk, legs, numbers_of, of_body, over_time, rigid_start, steps_of
 from walkerlab.store.columns import numbered
 from walkerlab.store.content import Content, Group, Variable
@@ -44,7 +43,6 @@ SCUFFED = (
     "A straight swing leg cannot pass the stance leg on a plane: its foot scuffs. Give it room with "
     "contact.terrain: after-mid-swing, or checkerboard."
 )
-Floats = NDArray[np.float64]
 
 
 def run(config: ContactSimConfig, inputs: Mapping[str, Content], progress: Progress, again: bool = True) -> Content:

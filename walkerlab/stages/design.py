@@ -15,7 +15,7 @@ from walkerlab.config.walkers import without_contact
 from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.labels import Label
 from walkerlab.mechanics.standing import Standing
-from walkerlab.orbits.design import ON_BOUND, Aim, Descent, Floats, Point, optima, searched, sought
+from walkerlab.orbits.design import ON_BOUND, Aim, Descent, Point, optima, searched, sought
 from walkerlab.orbits.fixed_point import find_gaits
 from walkerlab.orbits.gradients import gait_numbers, gradients
 from walkerlab.orbits.newton import Effort, NotConverged
@@ -25,6 +25,7 @@ from walkerlab.orbits.step_map import gait_near, multipliers_of
 from walkerlab.pipeline.progress import Progress
 from walkerlab.scene.parameter import Parameter, parameter_of
 from walkerlab.scene.rigid import rigid_walker
+from walkerlab.solvers.system import Floats
 from walkerlab.stages.robustness import Subject, contact_subject, section_coordinates
 from walkerlab.store.columns import rows_group
 from walkerlab.store.content import Content
@@ -61,18 +62,21 @@ def run(config: DesignConfig, inputs: Mapping[str, Content], progress: Progress,
     question = Aim(quantity, -1.0 if asked.maximise else 1.0, lower, upper, keep, gaits.at)
     own = np.array([parameter.value_in(config) for parameter in parameters])
     progress.start("design")
-    begun = gaits.at(own)
+    begun, own_z = gaits.at(own), gaits.z
 
     def search(number: int, start: Floats) -> Descent:
         progress.start(f"design: search {number + 1} of {asked.starts}")
-        name = f"search {number}"
+        name, before, gaits.z = f"search {number}", gaits.counts.copy(), own_z
         if name in parts.kept:
-            x, (gradient_norm, *z) = np.array(parts.kept[name][: own.size]), parts.kept[name][own.size :]
-            gaits.z = np.array(z)
-            return Descent(x, gaits.at(x), gradient_norm)
+            kept = np.array(parts.kept[name])
+            counts, gradient_norm, x, gaits.z = np.split(kept, (2, 3, 3 + own.size))
+            point = gaits.at(x)
+            gaits.counts = before + counts.astype(int)
+            return Descent(x, point, float(gradient_norm[0]))
         one = sought(question, start)
         if one.point is not None:
-            parts.keep(name, [*one.x.tolist(), one.gradient_norm, *gaits.z.tolist()])
+            z = gaits.found[one.x.tobytes()]
+            parts.keep(name, [*(gaits.counts - before).tolist(), one.gradient_norm, *one.x.tolist(), *z.tolist()])
         return one
 
     searches = searched(question, own, asked.starts, config.seed, search)
@@ -99,8 +103,8 @@ def run(config: DesignConfig, inputs: Mapping[str, Content], progress: Progress,
         ],
         "on_bound": on_bound(asked, best.x),
         "gradient_norm": best.gradient_norm,
-        "evaluations": gaits.evaluations,
-        "without_gait": gaits.without,
+        "evaluations": int(gaits.counts[0]),
+        "without_gait": int(gaits.counts[1]),
         "optima": ends,
         "starts": asked.starts,
         "multipliers_meet": best.point.apart < MEETING,
@@ -136,7 +140,8 @@ class Gaits:
         self.config, self.model, self.parameters, self.progress = config, asked.model, parameters, progress
         walker = rigid_walker(config, config.equations)
         self.wanted = {*filter(None, (asked.minimise, asked.maximise)), *asked.keep}
-        self.evaluations, self.without = 0, 0
+        self.counts = np.zeros(2, int)  # evaluations, and those without such a gait
+        self.found: dict[bytes, Floats] = {}  # section coordinates of gaits, by the numbers that were asked for
         self.length = float(gait["step_length_m"])
         if asked.model == "contact":
             self.z = contact_subject(config, gait, scales_of(walker), self.length, progress).z
@@ -145,7 +150,7 @@ class Gaits:
 
     def at(self, x: Floats) -> Point | None:
         """The gait; None where there is none, or the config refuses the numbers."""
-        self.evaluations += 1
+        self.counts[0] += 1
         self.progress.advance()
         changed: Config | None = None
         for parameter, value in zip(self.parameters, x.tolist(), strict=True):
@@ -155,7 +160,9 @@ class Gaits:
         assert changed is not None, "some number changes"
         found = self.gait_of(changed)
         if found is None:
-            self.without += 1
+            self.counts[1] += 1
+        else:
+            self.found[x.tobytes()] = self.z
         return found
 
     def gait_of(self, config: Config) -> Point | None:

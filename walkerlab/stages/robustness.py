@@ -8,7 +8,6 @@ from functools import partial
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from walkerlab.config.drives import drives_of
 from walkerlab.config.fields import leaves
@@ -41,13 +40,13 @@ from walkerlab.scene.families import contact_map, rigid_map
 from walkerlab.scene.parameter import SLOPE_RAD, Parameter, parameter_of, why_no_parameter
 from walkerlab.scene.rigid import rigid_scene_on, rigid_walker
 from walkerlab.solvers.registry import ENDLESS, Tolerances
+from walkerlab.solvers.system import Floats
 from walkerlab.stages.simulate import groups as groups_of_walk
 from walkerlab.store.columns import rows_group
 from walkerlab.store.content import Content, Group, Variable
 from walkerlab.store.parts import Parts
 from walkerlab.workers import in_order
 
-Floats = NDArray[np.float64]
 Rows = list[dict[str, Any]]
 
 RIGID: Final = "rigid"

@@ -18,7 +18,7 @@ from walkerlab.verification.ordinary import FINE, STEPS
 OF_STICTION = {
     "outcome": "how the walk ended, see attribute outcomes",
     "steps": "steps walked",
-    "sharper_outcome": "how it ended at a tenfold tolerance",
+    "sharper_outcome": "how it ended at a ten times tighter tolerance",
     "error": "between both runs, in legs, radians, pendulum times, where they are compared",
     "rhs_evaluations": "right-hand sides evaluated",
 }

@@ -13,6 +13,7 @@ from typing import Annotated, Final
 
 import numpy as np
 
+from walkerlab.account import LOST
 from walkerlab.config.contact import Contact
 from walkerlab.ground.compliant import contact_walker
 from walkerlab.ground.friction import Coulomb
@@ -21,6 +22,7 @@ from walkerlab.ground.resting import resting_foot
 from walkerlab.ground.terrain import checkerboard
 from walkerlab.ground.walker import ContactWalker, one_foot_motion
 from walkerlab.hybrid.contact_events import LAST_TOUCH, Frame, JudgedGround
+from walkerlab.hybrid.contact_observer import SO_FAR
 from walkerlab.hybrid.contact_run import new_observer, new_walk_state, walk_on
 from walkerlab.hybrid.contact_walk import LONGEST_FLIGHT, LONGEST_STEP
 from walkerlab.labels import Label
@@ -49,6 +51,7 @@ class ParticleRun:
     times: Floats  # (samples,) s
     states: Floats  # (samples, 8)
     end: State
+    dissipated: Floats  # (5,) J, in the order of account.LOSSES
 
 
 def rig(
@@ -90,7 +93,8 @@ def run_until(
     if stopped.outcome is not Outcome.NO_HEEL_STRIKE:
         raise ArithmeticError(f"ended as {stopped.outcome.label} at {stopped.time_s:.4g} s of {duration_s:.4g} s")
     seen = int(observer.recorded[0])
-    return ParticleRun(observer.times[:seen].copy(), observer.states[:seen].copy(), stopped.state)
+    times, states = observer.times[:seen].copy(), observer.states[:seen].copy()
+    return ParticleRun(times, states, stopped.state, observer.account[SO_FAR, LOST].copy())
 
 
 @dataclass(frozen=True)
