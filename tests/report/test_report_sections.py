@@ -135,7 +135,7 @@ def test_of_a_driven_walker_title_lead_and_verdict_say_what_drives_it_and_at_wha
     found = sections(sets=driven, **costly)
     cost = "its cost of transport is 0.00998 in the rigid gait and 0.0195 on compliant ground"
     assert f"The walker is {by}; {cost}." in plain(found["verdict"].blocks[0].text)
-    assert "arrows are the forces of ground and push-off" in texts(found["motion"])
+    assert "arrows are the forces of the ground and the push-off" in texts(found["motion"])
     assert "Cost of transport" in texts(found["glossary"])
     assert by in plain(lead(config(*driven), "level"))
     assert "driven" not in plain(sections()["verdict"].blocks[0].text)
