@@ -28,7 +28,7 @@ from walkerlab.orbits.plane import CONTROL, Plane, curve_through
 from walkerlab.orbits.shooting import RigidMap
 from walkerlab.orbits.similarity import unit_walker
 from walkerlab.orbits.step_map import Cycle, gait_near, multipliers_of, walk_steps
-from walkerlab.outcome import Outcome
+from walkerlab.outcome import TOLD, Outcome
 from walkerlab.paper.appendix_a import CORRECTED, RigidWalker, assembled
 
 A, L, M, M_H, G = 0.5, 1.0, 5.0, 10.0, 9.81
@@ -389,7 +389,8 @@ def test_a_branch_ends_where_no_walker_has_the_parameters_value():
 
     follower = BranchFollower(map_of(walker_at, 10.0), ValueSpan(8.0, 18.0))
     branch = follower.family(seeds_at(walker_at, 10.0), 1)[0]
-    assert branch.ends[1].reason == "no walker has the parameter's next value"
+    assert branch.ends[1].reason == TOLD[Outcome.REJECTED].why
+    assert branch.ends[1].reason.startswith("no walker has the parameter's next value")
     assert 12.5 < branch.ends[1].value < 13.0
 
 
