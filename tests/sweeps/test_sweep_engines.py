@@ -7,13 +7,14 @@ import subprocess
 import sys
 import threading
 import time
+from asyncio import CancelledError
 
 import numpy as np
 import pytest
 from process_table import THERE, is_alive, processes_below
 
 from walkerlab.errors import ConfigError, NoAnswer
-from walkerlab.sweeps.engines import ENGINES, ONE_THREAD, Order, SweepEngine, engine_named, one_thread_each
+from walkerlab.sweeps.engines import ENGINES, ONE_THREAD, JobExecutor, Order, SweepEngine, engine_named, one_thread_each
 from walkerlab.sweeps.fan_out import FanOut
 
 LOCAL = ENGINES["local"]
@@ -132,6 +133,23 @@ def test_dask_gives_the_same_and_outlives_its_workers(toy, monkeypatch):
         assert set(client.run(os.getpid).values()).isdisjoint(pids)
     assert set(seeds(swept).values()) == {"answered"}
     assert swept.content.digest() == toy.run("deadly", "seed=100:219:120", force=True).content.digest()
+
+
+def test_a_job_that_is_cancelled_or_fails_says_so_and_is_forgotten():
+    class Job:
+        def __init__(self, error):
+            self.error = error
+
+        def result(self):
+            raise self.error
+
+    executor = JobExecutor(Job)
+    for error in (CancelledError("its worker is gone"), ValueError("no result")):  # the first is no Exception
+        assert executor.submit(error).exception(timeout=10.0) is error
+    deadline = time.monotonic() + 10.0
+    while executor.jobs and time.monotonic() < deadline:
+        time.sleep(0.01)
+    assert not executor.jobs
 
 
 @pytest.mark.filterwarnings("ignore")  # of the library's own

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import importlib
 import os
 import threading
@@ -114,12 +115,13 @@ def dask(order: Order) -> Iterator[Pool]:
                 raise ConfigError(f"--engine dask: its processes did not start: {error}", GUARD) from error
             stack.enter_context(cluster)
             client = stack.enter_context(distributed.Client(cluster))
-        # A worker's death is dealt with chunk by chunk, here as in every engine.
-        executor = client.get_executor(retries=0, pure=False)
+        # A worker's death is dealt with chunk by chunk, here as in every engine. Dask's own executor mistakes a result
+        # whose worker dies before it is handed over for an error.
+        executor = JobExecutor(functools.partial(client.submit, retries=0, pure=False))
         try:
             yield Pool(executor, order.workers or max(1, len(client.scheduler_info()["workers"])))
         finally:
-            executor.shutdown(wait=False)
+            client.cancel(list(executor.jobs))
 
 
 @contextlib.contextmanager
@@ -137,38 +139,41 @@ def slurm(order: Order) -> Iterator[Pool]:
         made.update_parameters(**{"name": "walkerlab", "timeout_min": 60, "cpus_per_task": 1} | options)
     except (RuntimeError, TypeError, ValueError, NotImplementedError) as error:
         raise ConfigError(f"--engine slurm: {error}", "--engine-option cluster=local tries it out here.") from error
-    executor = JobExecutor(made)
+    executor = JobExecutor(made.submit)
     try:
         yield Pool(executor, order.workers or 16)
     finally:
-        for job in executor.jobs:
+        for job in list(executor.jobs):
             with contextlib.suppress(OSError):  # a job that has ended meanwhile
                 if not job.done():
                     job.cancel(check=False)
 
 
 class JobExecutor(Executor):
-    """Jobs of submitit as futures, each waited for by a thread."""
+    """A library's jobs as futures, each waited for by a thread."""
 
-    def __init__(self, made: Any) -> None:
+    def __init__(self, start: Callable[..., Any]) -> None:
         """Nothing is submitted yet.
 
-        made  a submitit executor
+        start  called with a function and its arguments, returns a job whose `result()` waits
         """
-        self._made = made
-        self.jobs: list[Any] = []
+        self._start = start
+        self.jobs: set[Any] = set()
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
         """Submit one job."""
         future: Future[Any] = Future()
-        job = self._made.submit(fn, *args, **kwargs)
-        self.jobs.append(job)
+        job = self._start(fn, *args, **kwargs)
+        self.jobs.add(job)
 
         def wait() -> None:
             try:
-                future.set_result(job.result())
-            except Exception as error:
+                result = job.result()
+            except BaseException as error:  # a cancelled job's is no Exception
                 future.set_exception(error)
+            else:
+                future.set_result(result)
+            self.jobs.discard(job)
 
         threading.Thread(target=wait, daemon=True).start()
         return future
