@@ -5,13 +5,14 @@ import os
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from types import NoneType
 from typing import Any, TypedDict, Unpack, cast
 
 from walkerlab.config.contact import Contact
 from walkerlab.config.fields import Block, kinds_of
-from walkerlab.config.files import DEFAULT, builtin, read_layers
+from walkerlab.config.files import DEFAULT, layers_of_paper
 from walkerlab.config.layers import stacked
 from walkerlab.config.loader import doubts
 from walkerlab.config.overlay import tree_of
@@ -454,9 +455,15 @@ def dataset(group: Group) -> Any:
 def in_memory(stage: str, config: Config) -> Result:
     """A stage's result, with what it needs, without files; ConfigError if the config has not what it needs."""
     refuse_unknown_stage(stage)
-    answer = InMemory().answer(config, stage, Keys().of(config, stage))
+    answer = InMemory().answer(config, stage, keys_here().of(config, stage))
     said = None if answer.no_answer is None else answer.no_answer.message
     return result_of(stage, answer.content.summary, answer.content, said)
+
+
+@cache
+def keys_here() -> Keys:
+    """The stage keys of the code that this process has loaded."""
+    return Keys()
 
 
 def config_of_scene(walker: Any, given: Mapping[str, Any], keys: Mapping[str, Any]) -> Config:
@@ -476,7 +483,7 @@ def config_of_scene(walker: Any, given: Mapping[str, Any], keys: Mapping[str, An
     lines = {key: plain(value) for key, value in {"name": "memory", **keys, **named}.items()}
     replaced = {"source", "contact", *({"walker"} & lines.keys())}
     upper = tree_of(lines, NOWHERE)
-    tree = stacked([*(layer.without(*replaced) for layer in read_layers(builtin(DEFAULT))), upper])
+    tree = stacked([*(layer.without(*replaced) for layer in layers_of_paper()), upper])
     config, moved = on_the_slope(typed(tree), tree)
     warn([*doubts(config, tree), *moved], inside=1)
     return config

@@ -3,6 +3,7 @@
 import contextlib
 import stat
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Final
 
@@ -90,6 +91,12 @@ def read_layers(file: ConfigFile) -> list[Mapping]:
             raise refused(asked, "extends: is not the name of a config", _what_there_is())
         named = extends.value in builtin_names()  # else a path from the file's folder
         file = builtin(extends.value) if named else file_at(file.path.parent / extends.value)
+
+
+@cache
+def layers_of_paper() -> tuple[Mapping, ...]:
+    """The layers of the built-in paper config, read once; they are changed in copies alone."""
+    return tuple(read_layers(builtin(DEFAULT)))
 
 
 def with_cases(layer: Mapping, folder: Path) -> Mapping:
