@@ -148,8 +148,8 @@ def tune(summary: Summary) -> list[str | Table]:
         if gait["found"]
         else f"No own gait: {gait['reason']}."
     )
-    margins = [adjustment.margins_table(summary)] if summary["adjustment"].get("margins") else []
-    return [*words.parts("adjustment.answer", summary), *words.parts("basin.grounds", summary["map"]), own, *margins]
+    told = (*words.parts("adjustment.answer", summary), *words.parts("basin.grounds", summary["map"]))
+    return [*told, own, adjustment.margins_table(summary)]
 
 
 def compare(summary: Summary) -> list[str | Table]:

@@ -16,7 +16,7 @@ SETS = {"as-printed": "as printed", "corrected": "corrected"}
 """The sets of equations, as they are stored and as they are called."""
 
 
-def gait_table(sets: Mapping[str, Mapping[str, Any]], names: Sequence[str]) -> Table:
+def gait_table(sets: Mapping[str, Mapping[str, Any]], names: Sequence[str], note: str = "") -> Table:
     """Fixed point and multipliers, the sets of equations side by side.
 
     names  of the coordinates of a state
@@ -48,7 +48,7 @@ def gait_table(sets: Mapping[str, Mapping[str, Any]], names: Sequence[str]) -> T
     # the corrected set is labelled only beside the printed one
     gaits = {"value" if list(sets) == ["corrected"] else SETS[name]: gait for name, gait in sets.items()}
     caption = f"Fixed point of the step map and its multipliers{', under both sets of equations' if both else ''}"
-    return side_by_side(caption, lines, gaits)
+    return side_by_side(caption, lines, gaits, note=note)
 
 
 GIVEN_BY = {"gravity": "gravity", "push_off": "the push-off", "hip": "the hip"}

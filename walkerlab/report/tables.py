@@ -132,6 +132,10 @@ class Table:
     note: str = ""
     by: str = ""
 
+    def __bool__(self) -> bool:
+        """Whether it has a row."""
+        return any(body.rows for body in self.bodies)
+
 
 def table(
     caption: str,

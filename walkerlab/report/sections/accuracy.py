@@ -27,12 +27,12 @@ def section(results: Results) -> Section | None:
         costs(summary),
         table("References", REFERENCE_COLUMNS, references, note=words("accuracy.references")),
         *(Gallery((picture,)) for picture in results.pictures if picture.name.startswith("accuracy")),
-        *not_run(summary),
+        not_run(summary),
     )
     fastest: dict[str, list[str]] = {}
     for scene, best in summary["best"].items():
         fastest.setdefault(listed(dict.fromkeys(best.values())), []).append(scene)
-    return Section("accuracy", "Error against run time", blocks, words("accuracy.fastest", fastest), COSTS)
+    return Section.of("accuracy", "Error against run time", blocks, words("accuracy.fastest", fastest), COSTS)
 
 
 def costs(summary: Row) -> Table:
@@ -89,10 +89,10 @@ NOT_RUN_COLUMNS = (
 )
 
 
-def not_run(summary: Row) -> tuple[Table, ...]:
+def not_run(summary: Row) -> Table:
     """The tolerances that were not tried, a row for each reason."""
     found: dict[tuple[str, ...], dict[str, Any]] = {}
     for entry in summary.get("not_run", []):
         key = (entry["scene"], entry["method"], entry["why"])
         found.setdefault(key, {**entry, "tolerances": []})["tolerances"].append(float(entry["tolerance"]))
-    return (table("Not run", NOT_RUN_COLUMNS, list(found.values()), wordy=True),) if found else ()
+    return table("Not run", NOT_RUN_COLUMNS, list(found.values()), wordy=True)

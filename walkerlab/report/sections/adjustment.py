@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any
 
-from walkerlab.report.blocks import COSTS, PageBlock, Paragraph, Section
+from walkerlab.report.blocks import COSTS, Paragraph, Section
 from walkerlab.report.gaits import symbol, works
 from walkerlab.report.numbers import NONE, fixed, length, listed, number, quantity
 from walkerlab.report.outcomes import tone
@@ -22,17 +22,14 @@ def section(results: Results) -> Section | None:
     if "adjustment" not in summary:
         return None
     changed = results.of_the_paper or summary["adjustment"]["needed"]
-    blocks: list[PageBlock] = [Paragraph(words("adjustment.explained", summary, results.of_the_paper))]
-    if changed:
-        blocks.append(starts_table(results, summary))
-    if summary["gait"]["found"]:
-        blocks.append(gait_table(summary, results.summary("fixedpoint")))
-    if summary["adjustment"].get("margins"):
-        blocks.append(margins_table(summary))
-    if changed:
-        blocks.append(walks_table(results, summary))
-    finding = words("adjustment.needed", summary)
-    return Section("adjustment", "The parameter adjustment", tuple(blocks), finding)
+    blocks = (
+        Paragraph(words("adjustment.explained", summary, results.of_the_paper)),
+        starts_table(results, summary) if changed else None,
+        gait_table(summary, results.summary("fixedpoint")) if summary["gait"]["found"] else None,
+        margins_table(summary),
+        walks_table(results, summary) if changed else None,
+    )
+    return Section.of("adjustment", "The parameter adjustment", blocks, words("adjustment.needed", summary))
 
 
 ORDER_COLUMNS = (Column("knob"), Column("observed orders, towards the limit", wide=True))
@@ -42,23 +39,17 @@ def limit(results: Results) -> Section | None:
     """What takes the contact model to the rigid one; None if nobody asked."""
     summary = results.summary("tune")
     reaches, orders = summary.get("reaches") or {}, summary.get("orders") or {}
-    if not (reaches or orders):
-        return None
     pushes = results.config.push_off.impulse_N_s != 0.0
     note = words("adjustment.factors", pushes)
     titles = words.terms("adjustment.distances").items()
     columns = [measured(title, key, partial(number, digits=3)) for key, title in titles]
-    blocks: list[PageBlock] = [
-        table(f"Towards the rigid limit: {name}", columns, found["settings"], note=note)
-        for name, found in reaches.items()
-        if found["settings"]
-    ]
-    if orders:
-        rows = [[name, ", ".join(fixed(order, 2) for order in values) or NONE] for name, values in orders.items()]
-        blocks.append(table("How fast the period converges when one knob is turned", ORDER_COLUMNS, rows))
-    return Section(
-        "limit", "Towards the rigid limit", tuple(blocks), words("adjustment.reached", reaches, pushes), COSTS
+    settings = {f"Towards the rigid limit: {name}": found["settings"] for name, found in reaches.items()}
+    rows = [[name, ", ".join(fixed(order, 2) for order in values) or NONE] for name, values in orders.items()]
+    blocks = (
+        *(table(caption, columns, found, note=note) for caption, found in settings.items()),
+        table("How fast the period converges when one knob is turned", ORDER_COLUMNS, rows),
     )
+    return Section.of("limit", "Towards the rigid limit", blocks, words("adjustment.reached", reaches, pushes), COSTS)
 
 
 def starts_table(results: Results, summary: Summary) -> Table:
@@ -135,7 +126,7 @@ MARGIN_COLUMNS = (
 
 def margins_table(summary: Summary) -> Table:
     """How far the start may be scaled."""
-    rows = [{"name": name, **margin} for name, margin in summary["adjustment"]["margins"].items()]
+    rows = [{"name": name, **margin} for name, margin in (summary["adjustment"].get("margins") or {}).items()]
     return table("How far the start's velocities may change", MARGIN_COLUMNS, rows)
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 
 from walkerlab.config.drives import drives_of
-from walkerlab.report.blocks import CASES, COSTS, PAPER, Cards, PageBlock, Paragraph, Section, Terms
+from walkerlab.report.blocks import CASES, COSTS, PAPER, Cards, Paragraph, Section, Terms
 from walkerlab.report.numbers import count, listed
 from walkerlab.report.results import Results
 from walkerlab.report.tables import Column, table
@@ -24,9 +24,9 @@ def further(results: Results, pages: Mapping[str, Sequence[Section]]) -> Section
     for file, found in pages.items():
         silent = file == PAPER and not results.of_the_paper
         items.append((file, TITLES[file], "" if silent else " ".join(filter(None, (one.finding for one in found)))))
-    blocks: list[PageBlock] = [Cards(tuple(items))] if items else []
-    blocks += [Paragraph(words("closing.pending", name), "waiting") for name in results.pending]
-    return Section("further", "Further pages" if items else "Still to come", tuple(blocks)) if blocks else None
+    waiting = (Paragraph(words("closing.pending", name), "waiting") for name in results.pending)
+    title = "Further pages" if items else "Still to come"
+    return Section.of("further", title, (Cards(tuple(items)) if items else None, *waiting))
 
 
 def glossary(results: Results) -> Section:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walkerlab.labels import in_words, with_unit
-from walkerlab.report.blocks import Diagram, GaitMark, PageBlock, Paragraph, Section, Walker
+from walkerlab.report.blocks import Diagram, GaitMark, Paragraph, Section, Walker
 from walkerlab.report.gaits import complex_number
 from walkerlab.report.numbers import number, whole
 from walkerlab.report.results import Results
@@ -25,13 +25,8 @@ def section(results: Results) -> Section | None:
     if not summary.get("branches"):
         return None
     first, *others = findings(summary) or [words("families.followed", summary["branches"])]
-    blocks: list[PageBlock] = [Paragraph(" ".join(others))] if others else []
-    diagram = gait_diagram(results)
-    if diagram is not None:
-        blocks.append(diagram)
-    if summary["bifurcations"]:
-        blocks.append(bifurcations(summary))
-    return Section("families", f"Families of gaits over {parameter(summary)}", tuple(blocks), first)
+    blocks = (Paragraph(" ".join(others)), gait_diagram(results), bifurcations(summary))
+    return Section.of("families", f"Families of gaits over {parameter(summary)}", blocks, first)
 
 
 def findings(summary: Mapping[str, Any]) -> list[str]:
@@ -167,10 +162,7 @@ def basin(results: Results) -> Section | None:
     if not summary:
         return None
     told = (words("basin.shares", summary), *words.parts("basin.grounds", summary))
-    blocks: list[PageBlock] = [Paragraph(said) for said in told]
-    if summary["attractors"]:
-        blocks.append(attractors(summary))
-    return Section("basin", "Basins of attraction", tuple(blocks))
+    return Section.of("basin", "Basins of attraction", (*map(Paragraph, told), attractors(summary)))
 
 
 def attractors(summary: Mapping[str, Any]) -> Table:

@@ -2,7 +2,7 @@
 
 from functools import partial
 
-from walkerlab.report.blocks import PageBlock, Section
+from walkerlab.report.blocks import Section
 from walkerlab.report.numbers import number
 from walkerlab.report.results import Results
 from walkerlab.report.tables import Column, measured, table
@@ -42,13 +42,14 @@ def section(results: Results) -> Section | None:
         return None
     rows = [(said, angle[key], velocity.get(key)) for key, said in words.terms("models.ways").items() if key in angle]
     note = words("models.differences", summary.get("orbit_distance"))
-    blocks: list[PageBlock] = [table("Largest differences of the legs’ motions", DIFFERENCE_COLUMNS, rows, note=note)]
-    if releases := summary.get("releases"):
-        walks = [{**walk, "released": RELEASED[name]} for name, walk in releases.items()]
+    walks = [{**walk, "released": RELEASED[name]} for name, walk in summary.get("releases", {}).items()]
+    if walks:
         walks.insert(0, {**summary["steps"]["gait"], "released": "rigid gait"})
-        note = words("models.releases")
-        blocks.append(table("What the instant of release decides", RELEASE_COLUMNS, walks, note=note))
-    return Section("models", "The models compared", tuple(blocks), words("models.finding", angle))
+    blocks = (
+        table("Largest differences of the legs’ motions", DIFFERENCE_COLUMNS, rows, note=note),
+        table("What the instant of release decides", RELEASE_COLUMNS, walks, note=words("models.releases")),
+    )
+    return Section.of("models", "The models compared", blocks, words("models.finding", angle))
 
 
 def departure(results: Results) -> str:

@@ -27,18 +27,17 @@ def section(results: Results) -> Section | None:
     unanswered = [(row["second_tried"], row) for row in cases if row["second_tried"]]
     missed = [(f"{one['measure']}: {one['why']}", row) for row in cases for one in row["not_measured"]]
     note = words("stability.cases", by_reason(unanswered), by_reason(missed))
-    blocks: list[PageBlock] = [
+    planes = results.summary("stability-maps")
+    blocks: tuple[PageBlock, ...] = (
         *(Paragraph(said, "bad") for said in failures(summary)),
         Paragraph(words("stability.judgement")),
         table("Extreme cases", CASE_COLUMNS, grouped(cases, "family"), wordy=True, note=note),
         table("Problems with known answers, run through the contact code", KNOWN_COLUMNS, known, wordy=True),
-    ]
-    if summary["ordinary"]:
-        blocks.append(ordinary_table(summary))
-    planes = results.summary("stability-maps")
-    blocks.append(Paragraph(words("stability.maps", planes) if planes else words("stability.how_to_map")))
-    blocks += [Gallery((picture,)) for picture in results.pictures if picture.name.startswith("stability")]
-    return Section("stability", "Stiff and extreme cases", tuple(blocks), finding(summary), CASES)
+        ordinary_table(summary),
+        Paragraph(words("stability.maps", planes) if planes else words("stability.how_to_map")),
+        *(Gallery((picture,)) for picture in results.pictures if picture.name.startswith("stability")),
+    )
+    return Section.of("stability", "Stiff and extreme cases", blocks, finding(summary), CASES)
 
 
 def finding(summary: Row) -> str:
