@@ -115,7 +115,8 @@ def row_of(worker: Any, target: str, point: SweepPoint) -> tuple[PointResult, Co
     key = point.keys[target]
     try:
         config = without_outputs(point.config, target, worker.graph)
-        answer = worker.answer(config, target, point.keys, again=point.again)
+        again = point.again or not worker.graph[target].walks
+        answer = worker.answer(config, target, point.keys, again=again)
     except WalkerlabError as error:
         return PointResult(key, "failed", error.message), Content()
     except Exception as error:
