@@ -15,8 +15,8 @@ from walkerlab.verification.maps import (
     PAPER_STIFFNESS,
     VERDICTS,
     along,
-    case_on_ground,
     pieces_of,
+    prepared_on_ground,
     step_column,
     stiction_cell,
 )
@@ -58,7 +58,7 @@ def test_the_paper_is_a_cell_that_walks():
 
 
 def test_the_papers_ground_is_the_papers():
-    contact = case_on_ground(PAPER_STIFFNESS, 0.1, 4, 1000)[1].contact.in_si()
+    contact = prepared_on_ground(PAPER_STIFFNESS, 0.1, 4, 1000)[1].contact.in_si()
     assert vars(contact) == pytest.approx(vars(load().config.contact.in_si()))
 
 

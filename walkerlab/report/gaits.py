@@ -33,7 +33,7 @@ def gait_table(sets: Mapping[str, Mapping[str, Any]], names: Sequence[str], note
         ),
         Column("spectral radius", "spectral_radius", partial(fixed, decimals=5)),
         Column("stable", "stable"),
-        *works("work of", partial(number, digits=4)),
+        *works(partial(number, digits=4)),
         measured("cost of transport", "cost_of_transport", partial(fixed, decimals=5)),
         measured("energy from the stance foot", "energy_J", partial(fixed, decimals=3)),
         measured("energy drift", "energy_drift_J", partial(number, digits=2)),
@@ -59,7 +59,7 @@ ROUNDING = 1e-12
 """Part of the largest work that counts as none."""
 
 
-def works(words: str, written: Callable[[Any], str]) -> Iterator[Column]:
+def works(written: Callable[[Any], str]) -> Iterator[Column]:
     """The work that each gives a step, of those that give more than rounding."""
     for name, giver in GIVEN_BY.items():
 
@@ -67,7 +67,7 @@ def works(words: str, written: Callable[[Any], str]) -> Iterator[Column]:
             work = record.get("work_per_step_J") or {}
             return work[name] if work and abs(work[name]) > ROUNDING * max(map(abs, work.values())) else None
 
-        yield Column(f"{words} {giver} a step (J)", given, written)
+        yield Column(f"work of {giver} a step (J)", given, written)
 
 
 def state_at(place: int, gait: Mapping[str, Any]) -> float:

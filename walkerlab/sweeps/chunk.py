@@ -65,13 +65,15 @@ class SweepPoint(NamedTuple):
 class ChunkTask:
     """What a worker is sent.
 
-    graph   where the pipeline is, as module:NAME
-    target  the stage
+    graph     where the pipeline is, as module:NAME
+    target    the stage
+    failures  failed attempts
     """
 
     graph: str
     target: str
     points: tuple[SweepPoint, ...]
+    failures: int = 0
 
     def split(self) -> Iterator[ChunkTask]:
         """Both halves of a chunk of at least two points."""

@@ -102,7 +102,7 @@ GAIT_LINES = (
         Column(f"energy lost {said}", partial(lost, channel), partial(quantity, unit="J"))
         for channel, (said, _) in LOST.items()
     ),
-    *works("work of", number),
+    *works(number),
 )
 
 
