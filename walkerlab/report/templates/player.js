@@ -111,11 +111,7 @@ function drawWalk(picture, scene, tracks, colours, back = 0) {
   c.clearRect(0, 0, width, height);
   const under = scene.pads.length ? -0.04 * scene.leg_m : 0;
   const levels = levelsOf(scene, hip - across, hip + across);
-  for (const [from, to, height] of levels) slab(from, to, height + under, -scene.leg_m, colours.ground);
-  if (under) { // no pads are known before the first and behind the last
-    slab(hip - across, Math.max(hip - across, Math.min(...scene.pads.map(([from]) => from))), 0, under, colours.ground);
-    slab(Math.min(hip + across, Math.max(...scene.pads.map(([, to]) => to))), hip + across, 0, under, colours.ground);
-  }
+  for (const [from, to, height] of levels) slab(from, to, height, -scene.leg_m, colours.ground);
   c.globalAlpha = 0.55;
   for (const [from, to, leg] of scene.pads) {
     if (to > hip - across && from < hip + across) slab(from, to, 0, under, colours[`leg-${leg + 1}`]);
