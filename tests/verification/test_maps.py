@@ -14,7 +14,6 @@ from walkerlab.verification.maps import (
     NONE,
     PAPER_STIFFNESS,
     VERDICTS,
-    along,
     pieces_of,
     prepared_on_ground,
     step_column,
@@ -96,7 +95,7 @@ def test_every_cell_has_a_name_of_its_own():
 def test_both_maps_are_stored(whole):
     stiction, step = whole.groups["stiction"], whole.groups["step"]
     assert stiction["outcome"].shape == step["verdict"].shape == (CELLS, CELLS)
-    np.testing.assert_array_equal(step["step_size"], along((1e-6, 1e-2), CELLS))
+    np.testing.assert_array_equal(step["step_size"], np.geomspace(1e-6, 1e-2, CELLS))
     assert stiction["outcome"][1, 0] == Outcome.SLID  # oil
     assert step["verdict"][1].tolist() == [VERDICTS.index("diverges")] * 2
     assert whole.summary["cells"] == 8

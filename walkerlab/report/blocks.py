@@ -205,13 +205,11 @@ class GaitMark:
     """A point of a diagram whose gait a player can show.
 
     x, y    where its mark is, in the diagram's own units
-    said    what it is
-    walker  how it moves
+    walker  how it moves; its name says what it is
     """
 
     x: float
     y: float
-    said: str
     stable: bool
     walker: Walker
     slope_rad: float

@@ -14,7 +14,6 @@ from walkerlab.config.contact import Contact
 from walkerlab.config.schema import Config
 from walkerlab.config.stability import Case
 from walkerlab.solvers.registry import Tolerances
-from walkerlab.solvers.system import Floats
 from walkerlab.verification.catalogue import config_of
 from walkerlab.verification.judge import TIGHTER
 from walkerlab.verification.ordinary import REFERENCE, STEPS, arrival_of, fixed, natural_units
@@ -33,11 +32,6 @@ MAX_EVALUATIONS: Final = 5_000_000  # of a fixed step: more than any cell needs
 VERDICTS: Final = ("fine", "wrong silently", "diverges", "gives up", "no reference")
 
 Numbers = list[float]
-
-
-def along(ends: tuple[float, float], cells: int) -> Floats:
-    """Evenly spaced powers."""
-    return np.geomspace(*ends, cells)
 
 
 def prepared_on_ground(
@@ -94,10 +88,10 @@ def step_column(stiffness: float, steps_s: tuple[float, ...]) -> Numbers:
 
 def pieces_of(cells: int) -> Iterator[tuple[str, int, Callable[[], Numbers]]]:
     """Everything there is to compute for maps of `cells` cells along each axis: of each piece name, cells and call."""
-    stiffness = along(STIFFNESS, cells)
-    steps = tuple(float(h) for h in along(STEP, cells))
+    stiffness = np.geomspace(*STIFFNESS, cells)
+    steps = tuple(float(h) for h in np.geomspace(*STEP, cells))
     for i, k in enumerate(stiffness):
         yield f"step {i}", cells, partial(step_column, float(k), steps)
-    for i, v in enumerate(along(STICTION_VELOCITY, cells)):
+    for i, v in enumerate(np.geomspace(*STICTION_VELOCITY, cells)):
         for j, k in enumerate(stiffness):
             yield f"stiction {i} {j}", 1, partial(stiction_cell, float(k), float(v))

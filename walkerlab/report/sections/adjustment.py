@@ -55,13 +55,12 @@ def limit(results: Results) -> Section | None:
 def starts_table(results: Results, summary: Summary) -> Table:
     """The start before and after; beside Table 2 if the paper is what is redone."""
     rows = [{"name": name, **row} for name, row in summary["table2"].items()]
+    caption, note, head = "The start before and after the adjustment", "", "coordinate"
     if results.of_the_paper:
-        caption = "Table 2 again: the start before and after the adjustment"
+        caption, head = "Table 2 again: the start before and after the adjustment", "row"
         note = "The paper's percentages are those of the ADAMS value, without saying so."
-        first = Column("row", lambda row: in_signs(f"{row['name']} ({row['unit']})"))
-    else:
-        caption, note = "The start before and after the adjustment", ""
-        first = Column("coordinate", lambda row: f"{symbol(row['name'])} ({row['unit']})")
+    named = in_signs if results.of_the_paper else symbol
+    first = Column(head, lambda row: f"{named(row['name'])} ({row['unit']})")
     beside = (
         Column(title, key, partial(number, digits=3 if "percent" in key else 6), numeric=True)
         for key, title in words.terms("adjustment.starts", results.of_the_paper).items()
@@ -134,12 +133,7 @@ WALK_COLUMNS = (
     Column("walk", "walk"),
     Column("outcome", "outcome", lambda outcome: Cell(outcome, tone(outcome))),
     Column("steps", "steps", numeric=True),
-    Column(
-        "numerical error of a period (s)",
-        lambda walk: walk.get("numerical_error", {}).get("step_period_s"),
-        partial(number, digits=1),
-        numeric=True,
-    ),
+    measured("numerical error of a period", "numerical_error/step_period_s", partial(number, digits=1)),
 )
 
 

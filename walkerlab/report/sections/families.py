@@ -114,7 +114,7 @@ def gait_diagram(results: Results) -> Diagram | None:
             name = words("families.mark", int(motion.attrs["steps"]), x, unit, stable)
             strikes = motion["time"][1:][np.diff(motion["step"]) > 0].round(6)
             walker = Walker(name, MODEL, track.thinned(gap), tuple(strikes.tolist()), (), pushes=pushes)
-            marks.append(GaitMark(across.place(x), up.place(y), name, stable, walker, float(motion.attrs["slope_rad"])))
+            marks.append(GaitMark(across.place(x), up.place(y), stable, walker, float(motion.attrs["slope_rad"])))
     over = parameter(summary)
     return Diagram(
         title=f"Gaits over {over}",

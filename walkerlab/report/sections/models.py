@@ -24,13 +24,8 @@ RELEASE_COLUMNS = (
     measured("period", "period_s"),
     measured("length", "length_m", partial(number, digits=4)),
     measured("knee locks after", "knee_strike_s", partial(number, digits=4)),
-    Column(
-        "knee strikes (J a step)",
-        lambda walk: (walk.get("dissipated_J_per_step") or {}).get("knee_strikes"),
-        partial(number, digits=3),
-        numeric=True,
-    ),
-    Column("rigid period (s)", lambda walk: (walk.get("rigid") or {}).get("period_s"), number, numeric=True),
+    Column("knee strikes (J a step)", "dissipated_J_per_step/knee_strikes", partial(number, digits=3), numeric=True),
+    measured("rigid period", "rigid/period_s"),
 )
 
 

@@ -28,7 +28,7 @@ ROUGH = (
     MODEL,
     Column("roughness", "roughness_m", length, numeric=True),
     Column("mean steps", lambda row: BOUND.get(row["method"], "") + number(row["mean_steps"], 4), numeric=True),
-    Column("standard error", lambda row: row.get("standard_error"), lambda value: number(value, 2), numeric=True),
+    Column("standard error", "standard_error", lambda value: number(value, 2), numeric=True),
     Column("walks", "walks", whole, numeric=True),
     Column("cut off", "capped", whole, numeric=True),
     Column("at step", "cut_off_at", whole, numeric=True),
