@@ -169,11 +169,11 @@ def table(
     return Table(caption, tuple(columns), tuple(bodies), wordy, note, by)
 
 
-def grouped(records: Iterable[Mapping[str, Any]], key: str) -> dict[str, list[Mapping[str, Any]]]:
-    """Records by what they have under a key, in the order in which that comes first."""
+def grouped(records: Iterable[Mapping[str, Any]], *keys: str) -> dict[str, list[Mapping[str, Any]]]:
+    """Records by what they have under some keys, in words, in the order in which that comes first."""
     found: dict[str, list[Mapping[str, Any]]] = {}
     for record in records:
-        found.setdefault(str(record[key]), []).append(record)
+        found.setdefault(" ".join(str(record[key]) for key in keys), []).append(record)
     return found
 
 

@@ -8,7 +8,7 @@ from walkerlab.report.blocks import COSTS, Paragraph, Section
 from walkerlab.report.gaits import symbol, works
 from walkerlab.report.numbers import NONE, fixed, length, listed, number, quantity
 from walkerlab.report.outcomes import tone
-from walkerlab.report.results import Results
+from walkerlab.report.results import Results, of_stage
 from walkerlab.report.symbols import in_signs
 from walkerlab.report.tables import Cell, Column, Table, measured, side_by_side, table
 from walkerlab.report.words import words
@@ -16,11 +16,9 @@ from walkerlab.report.words import words
 Summary = Mapping[str, Any]
 
 
-def section(results: Results) -> Section | None:
+@of_stage("tune", "adjustment")
+def section(results: Results, summary: Summary) -> Section | None:
     """The verdict on the adjustment, with the tables behind it."""
-    summary = results.summary("tune")
-    if "adjustment" not in summary:
-        return None
     changed = results.of_the_paper or summary["adjustment"]["needed"]
     blocks = (
         Paragraph(words("adjustment.explained", summary, results.of_the_paper)),

@@ -12,18 +12,16 @@ from walkerlab.labels import in_words, with_unit
 from walkerlab.report.blocks import Diagram, GaitMark, Paragraph, Section, Walker
 from walkerlab.report.gaits import complex_number
 from walkerlab.report.numbers import number, whole
-from walkerlab.report.results import Results
+from walkerlab.report.results import Results, of_stage
 from walkerlab.report.tables import Column, Table, table
 from walkerlab.report.tracks import sampling_gap, track_in
 from walkerlab.report.words import words
 from walkerlab.store.content import Group
 
 
-def section(results: Results) -> Section | None:
+@of_stage("continuation", "branches")
+def section(results: Results, summary: Mapping[str, Any]) -> Section | None:
     """Branches, their bifurcations and the chaos beyond; None if none were followed."""
-    summary = results.summary("continuation")
-    if not summary.get("branches"):
-        return None
     first, *others = findings(summary) or [words("families.followed", summary["branches"])]
     blocks = (Paragraph(" ".join(others)), gait_diagram(results), bifurcations(summary))
     return Section.of("families", f"Families of gaits over {parameter(summary)}", blocks, first)
@@ -156,11 +154,9 @@ ATTRACTOR_COLUMNS = (
 )
 
 
-def basin(results: Results) -> Section | None:
+@of_stage("basin")
+def basin(_results: Results, summary: Mapping[str, Any]) -> Section | None:
     """What the basin came to; None if it was not asked for."""
-    summary = results.summary("basin")
-    if not summary:
-        return None
     told = (words("basin.shares", summary), *words.parts("basin.grounds", summary))
     return Section.of("basin", "Basins of attraction", (*map(Paragraph, told), attractors(summary)))
 

@@ -7,16 +7,14 @@ from typing import Any
 from walkerlab.report.blocks import Paragraph, Section
 from walkerlab.report.gaits import SETS, STATE, gait_table, state_at, symbol
 from walkerlab.report.numbers import fixed
-from walkerlab.report.results import Results
+from walkerlab.report.results import Results, of_stage
 from walkerlab.report.tables import Column, Table, measured, table
 from walkerlab.report.words import words
 
 
-def section(results: Results) -> Section | None:
+@of_stage("fixedpoint")
+def section(results: Results, summary: Mapping[str, Any]) -> Section | None:
     """The gait of this walker on this slope."""
-    summary = results.summary("fixedpoint")
-    if not summary:
-        return None
     names = summary.get("state_names", STATE)
     shown = SETS if results.of_the_paper else (summary["equations"],)
     sets = summary.get("equation_sets", {summary.get("equations"): summary})

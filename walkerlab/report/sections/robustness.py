@@ -5,7 +5,7 @@ from typing import Any
 
 from walkerlab.report.blocks import PageBlock, Paragraph, Section
 from walkerlab.report.numbers import length, number, whole
-from walkerlab.report.results import Results
+from walkerlab.report.results import Results, of_stage
 from walkerlab.report.tables import Column, Table, table
 from walkerlab.report.words import words
 
@@ -63,11 +63,9 @@ def designed(summary: Mapping[str, Any]) -> list[str | Table]:
     return [*words.parts("design.findings", summary), table("Optimum", BEST, rows), kept]
 
 
-def section(results: Results) -> Section | None:
+@of_stage("robustness", "gaits")
+def section(_results: Results, summary: Mapping[str, Any]) -> Section | None:
     """The answer; None if it was not asked for."""
-    summary = results.summary("robustness")
-    if not summary.get("gaits"):
-        return None
     first, *others = findings(summary) or [""]
     blocks: tuple[PageBlock, ...] = (Paragraph(" ".join(others)), *tables(summary))
     return Section.of("robustness", "What the gait withstands", blocks, first)

@@ -10,18 +10,17 @@ from walkerlab.report.blocks import Paragraph, Section
 from walkerlab.report.gaits import GIVEN_BY
 from walkerlab.report.numbers import NONE, decimals_left, fixed, length, number, power_of_ten, quantity, span, whole
 from walkerlab.report.outcomes import CONTACT, MODELS, RIGID, tone
-from walkerlab.report.results import Results
+from walkerlab.report.results import Results, of_stage
 from walkerlab.report.tables import Cell, Column, table
 from walkerlab.report.words import words
 
 QUANTITY_COLUMNS = (Column("quantity"), Column("value", numeric=True), Column("meaning", wide=True))
 
 
-def contact(results: Results) -> Section | None:
+@of_stage(CONTACT)
+def contact(results: Results, summary: Mapping[str, Any]) -> Section | None:
     """The contact model on its ground: how it stands, walks, slips and loses energy."""
-    summary, ground = results.summary(CONTACT), results.config.contact
-    if not summary:
-        return None
+    ground = results.config.contact
     said = "" if ground is None else words("walks.ground", ground, ground.in_si(), summary)
     numbers = table("The contact model's walk", QUANTITY_COLUMNS, contact_rows(summary), wordy=True)
     residual = joules(summary["energy_balance_residual_J"])
