@@ -25,7 +25,7 @@ def engine(request):
 @cache
 def free_swing(walker):
     scene = walker()
-    n = len(scene.chain)
+    n = len(scene.model.chain)
     start = np.array((*scene.start[2 : 2 + n], *scene.start[4 + n :]))
     return scene, start, *swing_truth(scene, start, SWING_S)
 

@@ -65,9 +65,9 @@ def swept(count=5):
 
 
 def test_over_one_number_both_models_are_drawn_and_the_least_disturbed_gait_is_named():
-    drawing = robustness.over_one_number(swept(), "slope_deg")
-    assert "the rigid model's gaits the one at 2 is disturbed least, with a norm of 20 s/m" in drawing.caption
-    assert "the contact model's gaits the one at 2 is disturbed least, with a norm of 21 s/m" in drawing.caption
+    drawing = robustness.of_sweep(swept(), ("slope_deg",)).drawn({})
+    assert "the rigid model's gaits the one at 2 deg is disturbed least, with a norm of 20 s/m" in drawing.caption
+    assert "the contact model's gaits the one at 2 deg is disturbed least, with a norm of 21 s/m" in drawing.caption
     assert "speed (m/s)" in drawing.svg.decode()
 
 
@@ -92,7 +92,7 @@ def test_ways_to_drive_a_walker_are_told_apart_by_what_is_not_zero():
         "slope_deg": [True, True, False, False],
         "impulse_N_s": [False, False, True, True],
     }
-    drawing = robustness.push_off_or_hip(group, found)
+    drawing = robustness.of_sweep(group, names).drawn({})
     assert "With slope the least disturbed gait walks at 0.4 m/s, with a norm of 20 s/m" in drawing.caption
     assert "With push-off the least disturbed gait walks at 0.6 m/s" in drawing.caption
     assert robustness.actuations(driven([1.0, 2.0, 1.0, 0.0], [0.0, 0.0, 2.0, 4.0]), names) is None

@@ -143,7 +143,7 @@ def test_of_a_driven_walker_title_lead_and_verdict_say_what_drives_it_and_at_wha
 
 def test_work_that_is_rounding_is_not_told():
     record = {"work_per_step_J": {"gravity": -2e-14, "push_off": 1.69, "hip": 0.0}}
-    told = [column.title for column in works("work of", str) if column.value(record) is not None]
+    told = [column.title for column in works(str) if column.value(record) is not None]
     assert told == ["work of the push-off a step (J)"]
 
 

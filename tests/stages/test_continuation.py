@@ -19,6 +19,7 @@ from walkerlab.orbits.family_search import THOROUGHNESS
 from walkerlab.orbits.newton import Effort
 from walkerlab.orbits.step_map import gait_near
 from walkerlab.pipeline.graph import PIPELINE
+from walkerlab.pipeline.in_memory import InMemory, Keys
 from walkerlab.pipeline.progress import Silent
 from walkerlab.scene.families import rigid_map
 from walkerlab.scene.parameter import parameter_of
@@ -77,6 +78,14 @@ def test_a_sample_of_gaits_is_walked_again_and_how_many_is_told(in_degrees):
     assert 0.0 < error["step_period_s"] < 1e-11
     assert 0.0 < error["step_length_m"] < 1e-11
     assert error["by"] == "ten times tighter tolerances"
+
+
+def test_families_that_are_only_looked_at_are_the_same_without_a_numerical_error():
+    asked = config("over=slope_deg", "from=1", "to=1.5", "periods=1")
+    keys = Keys().of(asked, "continuation")
+    looked_at, whole = (InMemory().answer(asked, "continuation", keys, again=again).content for again in (False, True))
+    assert whole.summary["numerical_error"].keys() == {"rigid"}
+    assert looked_at.summary == {**whole.summary, "numerical_error": {}}
 
 
 def test_what_newtons_method_leaves_over_is_part_of_the_numerical_error():

@@ -14,9 +14,8 @@ from walkerlab.verification.maps import (
     NONE,
     PAPER_STIFFNESS,
     VERDICTS,
-    along,
-    case_on_ground,
     pieces_of,
+    prepared_on_ground,
     step_column,
     stiction_cell,
 )
@@ -58,7 +57,7 @@ def test_the_paper_is_a_cell_that_walks():
 
 
 def test_the_papers_ground_is_the_papers():
-    contact = case_on_ground(PAPER_STIFFNESS, 0.1, 4, 1000)[1].contact.in_si()
+    contact = prepared_on_ground(PAPER_STIFFNESS, 0.1, 4, 1000)[1].contact.in_si()
     assert vars(contact) == pytest.approx(vars(load().config.contact.in_si()))
 
 
@@ -96,7 +95,7 @@ def test_every_cell_has_a_name_of_its_own():
 def test_both_maps_are_stored(whole):
     stiction, step = whole.groups["stiction"], whole.groups["step"]
     assert stiction["outcome"].shape == step["verdict"].shape == (CELLS, CELLS)
-    np.testing.assert_array_equal(step["step_size"], along((1e-6, 1e-2), CELLS))
+    np.testing.assert_array_equal(step["step_size"], np.geomspace(1e-6, 1e-2, CELLS))
     assert stiction["outcome"][1, 0] == Outcome.SLID  # oil
     assert step["verdict"][1].tolist() == [VERDICTS.index("diverges")] * 2
     assert whole.summary["cells"] == 8

@@ -66,9 +66,8 @@ class RigidTrial:
 
             def as_a_script() -> TrialRun:
                 state, evaluations = walk_as_a_script(compass, self.start, self.steps, rtol, atol, budget)
-                if state is None:
-                    return TrialRun(Outcome.BUDGET_EXHAUSTED.label, np.zeros(0), evaluations, 0, 0)
-                return TrialRun(Outcome.WALKED.label, state, evaluations, 0, 0)
+                ended = Outcome.BUDGET_EXHAUSTED if state is None else Outcome.WALKED
+                return TrialRun(ended.label, np.zeros(0) if state is None else state, evaluations, 0, 0)
 
             return as_a_script
         n, entry = len(self.walker.zero_state), METHODS[method]

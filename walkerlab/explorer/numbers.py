@@ -10,7 +10,7 @@ from walkerlab.config.fields import bounds_of, kind, leaves, words_of
 from walkerlab.config.schema import Config
 from walkerlab.errors import ConfigError
 from walkerlab.scene.parameter import Parameter, parameter_of
-from walkerlab.sweeps.question import described
+from walkerlab.sweeps.question import described, held
 
 FIRST: Final = (
     "slope_deg", "walker.", "push_off.impulse_N_s", "contact.stiffness", "contact.damping", "contact.static_friction",
@@ -61,14 +61,6 @@ def rank(key: str, first: Any) -> int | None:
     return next(
         (place for place, name in enumerate(FIRST) if key == name or (name[-1] == "." and key.startswith(name))), None
     )
-
-
-def held(config: Config, path: tuple[str, ...]) -> Any:
-    """The value at a path; None if the config has no such block."""
-    found: Any = config
-    for name in path:
-        found = getattr(found, name, None)
-    return found
 
 
 def reach(key: str, first: Any, unit: str, field: FieldInfo, start: Config) -> dict[str, Any]:

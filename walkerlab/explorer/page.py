@@ -1,8 +1,5 @@
 """The page of `walkerlab explore`: the report's player and style, and a script that asks the server."""
 
-import base64
-import hashlib
-from dataclasses import dataclass
 from pathlib import Path
 
 from jinja2 import FileSystemLoader
@@ -36,19 +33,10 @@ def choices(base: ExploredConfig) -> list[str]:
     return [name for name in (*builtin_names(), *own) if name != started(base)]
 
 
-@dataclass(frozen=True)
-class ServedPage:
-    """A page, and what its header allows it to load and to run."""
-
-    html: str
-    policy: str
-
-
-def rendered(base: ExploredConfig) -> ServedPage:
-    """The page for a config."""
+def rendered(base: ExploredConfig) -> tuple[str, str]:
+    """The page for a config, and what its header allows it to load and to run."""
     own = (TEMPLATES / "explore.js").read_text(encoding="utf-8").strip()
     script = f'\n"use strict";\n{report.source("player.js")}\n{own}\n'
-    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     environment = report.environment()
     environment.loader = FileSystemLoader([report.TEMPLATES, TEMPLATES])
     html = environment.get_template("explore.html.j2").render(
@@ -62,4 +50,4 @@ def rendered(base: ExploredConfig) -> ServedPage:
         script=Markup(script),
     )
     allowed = "default-src 'none'; img-src data: blob:; connect-src 'self'; style-src 'unsafe-inline'"
-    return ServedPage(html, f"{allowed}; script-src 'sha256-{digest}'; base-uri 'none'; form-action 'none'")
+    return html, f"{allowed}; script-src 'sha256-{report.digest_of(script)}'; base-uri 'none'; form-action 'none'"

@@ -189,8 +189,8 @@ class Handler(BaseHTTPRequestHandler):
             if not self.local() or not self.allowed(given or self.cookie() or self.bearer()):
                 return None
             if address.path == "/":
-                page = rendered(self.server.base)
-                return self.send(200, page.html.encode(), "text/html; charset=utf-8", page.policy)
+                html, policy = rendered(self.server.base)
+                return self.send(200, html.encode(), "text/html; charset=utf-8", policy)
             if address.path == "/api/job":
                 desk = self.server.desk
                 return self.answer(

@@ -142,7 +142,6 @@ ENGINES_STAGE, ENGINE_RUNS = "engines", "rows"
 OF_A_SERIES = ("step_s", "error", "wall_s", "period_s", "outcome")
 ENGINE_VARIABLES = ("scene", "engine", "experiment", "integrator", "start", *OF_A_SERIES)
 COLOURS = {OURS: BLACK, "mujoco": VERMILLION, "drake": BLUE, "exudyn": GREEN}
-OTHER_ENGINES = (ORANGE, PURPLE, GREY)
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<")
 DASHES: tuple[LineStyleType, ...] = ("-", DASHED, DOTTED, (0.0, (5.0, 1.2, 1.0, 1.2)), (0.0, (2.0, 2.0)))
 
@@ -156,9 +155,8 @@ def engines_of(scene: str, experiment: str, results: Results) -> Iterator[Series
     for engine, name in dict.fromkeys(zip(engines[here].tolist(), names[here].tolist(), strict=True)):
         mine = here & (engines == engine) & (names == name) & (rows["start"] == 1.0)
         place = places[engine] = places.get(engine, -1) + 1
-        colour = COLOURS.get(engine, OTHER_ENGINES[len(engine) % len(OTHER_ENGINES)])
         style, marker = DASHES[place % len(DASHES)], MARKERS[place % len(MARKERS)]
-        look = Look(f"{engine} {name}", colour, style, 1.8 if engine == OURS else 1.1, marker)
+        look = Look(f"{engine} {name}", COLOURS[engine], style, 1.8 if engine == OURS else 1.1, marker)
         yield Series(look, {variable: rows[variable][mine] for variable in OF_A_SERIES}, place == 0, engine)
 
 

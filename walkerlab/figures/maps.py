@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from typing import Any, Final
 
@@ -11,7 +10,6 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.colors import BoundaryNorm, ListedColormap, LogNorm
-from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from matplotlib.ticker import LogLocator, NullLocator
 from numpy.typing import NDArray
@@ -43,7 +41,17 @@ def discrete(colours: Sequence[str]) -> dict[str, Any]:
 def draw_kinds(draw: Callable[..., Any], kinds: Sequence[Kind]) -> list[Artist]:
     """Each cell in the colour of its kind, by a function that draws numbers; returns the key."""
     draw(np.argmax(np.array([where for _, _, where in kinds]), axis=0), **discrete([colour for colour, *_ in kinds]))
-    return [Patch(facecolor=colour, edgecolor=GREY, linewidth=0.3, label=label) for colour, label, _ in kinds]
+    return patches((colour, label) for colour, label, _ in kinds)
+
+
+def patches(kinds: Iterable[tuple[str, str]]) -> list[Artist]:
+    """The key of colours and what they mean."""
+    return [Patch(facecolor=colour, edgecolor=GREY, linewidth=0.3, label=label) for colour, label in kinds]
+
+
+def ends_among(outcomes: Any) -> list[tuple[str, str]]:
+    """Colours and names of the outcomes that occur."""
+    return [(TOLD[one].colour, one.label) for one in map(Outcome, np.unique(outcomes).tolist())]
 
 
 def edges(centres: NDArray[Any]) -> NDArray[Any]:
@@ -104,10 +112,7 @@ def draw_starts(results: Results) -> Drawn:
             axes.contour(across, up, steps, levels, colors=BLACK, linewidths=0.4)
         axes.set(title=title, xlabel=f"factor on the velocity of {swing}")
     both[0].set_ylabel(f"factor on the velocity of {stance}")
-    key: list[Artist] = [
-        Patch(facecolor=TOLD[one].colour, edgecolor=GREY, linewidth=0.3, label=one.label)
-        for one in map(Outcome, np.unique([cells[f"{model}outcome"] for model, _ in MODELS]).tolist())
-    ]
+    key = patches(ends_among([cells[f"{model}outcome"] for model, _ in MODELS]))
     for label, marker, size, face, (x, y) in marks:
         mark: dict[str, Any] = {"linestyle": "", "marker": marker, "markersize": size, "color": BLACK}
         for axes in both:
@@ -211,39 +216,29 @@ VERDICT_COLOURS: Final = {
 }
 
 
-@dataclass(frozen=True)
 class OverStiffness:
     """Two panels over stiffness and another coordinate: what becomes of walks, and their errors."""
 
-    figure: Figure
-    left: Axes
-    right: Axes
-    edges: tuple[NDArray[Any], NDArray[Any]]
-
-    @classmethod
-    def of(cls, cells: Group, up: str, titles: tuple[str, str]) -> OverStiffness:
+    def __init__(self, cells: Group, up: str, titles: tuple[str, str]) -> None:
         """Both panels, still empty, the other coordinate upward."""
-        figure = blank(3.9)
-        left, right = figure.subplots(1, 2, sharex=True, sharey=True)
-        x, y = edges(cells[STIFFNESS]), edges(cells[up])
-        for axes, title in ((left, titles[0]), (right, titles[1])):
-            axes.set(xscale="log", yscale="log", xlabel=axis_of(cells, STIFFNESS), title=title)
-            axes.set(xlim=x[[0, -1]], ylim=y[[0, -1]])
+        self.cells, self.edges = cells, (edges(cells[STIFFNESS]), edges(cells[up]))
+        self.figure = blank(3.9)
+        self.left, self.right = self.figure.subplots(1, 2, sharex=True, sharey=True)
+        xlim, ylim = (ends[[0, -1]] for ends in self.edges)
+        for axes, title in ((self.left, titles[0]), (self.right, titles[1])):
+            axes.set(xscale="log", yscale="log", xlabel=axis_of(cells, STIFFNESS), title=title, xlim=xlim, ylim=ylim)
             axes.xaxis.set_major_locator(LogLocator())
             for axis in (axes.xaxis, axes.yaxis):
                 axis.set_minor_locator(NullLocator())
-        left.set_ylabel(axis_of(cells, up))
-        return cls(figure, left, right, (x, y))
+        self.left.set_ylabel(axis_of(cells, up))
 
     def draw(self, axes: Axes, values: NDArray[Any], **look: Any) -> Any:
         """Values of the cells."""
         return axes.pcolormesh(*self.edges, values, **look, rasterized=True)
 
-    def draw_errors(
-        self, cells: Group, there: NDArray[np.bool_], ends: tuple[float, float], others: Sequence[Kind]
-    ) -> None:
+    def draw_errors(self, there: NDArray[np.bool_], ends: tuple[float, float], others: Sequence[Kind]) -> None:
         """Errors by brightness, where there are any, with their scale; cells of other kinds in their colours."""
-        shown = np.ma.masked_where(~there, np.clip(cells["error"], *ends))
+        shown = np.ma.masked_where(~there, np.clip(self.cells["error"], *ends))
         mesh = self.draw(self.right, shown, cmap="cividis", norm=LogNorm(*ends))
         self.figure.colorbar(mesh, ax=self.right, label="error", extend="both")
         for colour, _, where in others:
@@ -255,19 +250,17 @@ class OverStiffness:
 def draw_stiction(results: Results) -> Drawn:
     """Outcome on the left, error on the right; caption: what is walked, and how many cells come out how."""
     cells = results[MAPS]["stiction"]
-    made = OverStiffness.of(cells, VELOCITY, ("(a) how the walk ends", "(b) against a tolerance ten times tighter"))
+    made = OverStiffness(cells, VELOCITY, ("(a) how the walk ends", "(b) against a tolerance ten times tighter"))
     outcomes, compared = cells["outcome"], cells["compared"] == 1
     made.draw(made.left, outcomes, **OUTCOMES)
     unanswered = np.isin(outcomes, [int(Outcome.BUDGET_EXHAUSTED), int(Outcome.SOLVER_FAILED)])
     otherwise = (VERMILLION, "(b) ends otherwise", ~compared & ~unanswered)
-    made.draw_errors(cells, compared, SHARP, [(BLACK, "", unanswered), otherwise])
-    seen = [(TOLD[one].colour, one.label) for one in map(Outcome, np.unique(outcomes).tolist())]
-    seen += [otherwise[:2]] if otherwise[2].any() else []
+    made.draw_errors(compared, SHARP, [(BLACK, "", unanswered), otherwise])
+    seen = [*ends_among(outcomes), *([otherwise[:2]] if otherwise[2].any() else [])]
     mark: dict[str, Any] = {"marker": "o", "color": BLACK, "markerfacecolor": WHITE}
     for axes in (made.left, made.right):
         axes.plot(*PAPER, **mark, markersize=5.0)
-    patches = [Patch(facecolor=colour, edgecolor=GREY, linewidth=0.3, label=label) for colour, label in seen]
-    add_legend(made.figure, [*patches, entry("paper", linestyle="none", **mark)])
+    add_legend(made.figure, [*patches(seen), entry("paper", linestyle="none", **mark)])
     return made.figure, (results[MAPS].summary, cells.attrs)
 
 
@@ -275,18 +268,18 @@ def draw_step(results: Results) -> Drawn:
     """Verdict on the left, error on the right; caption: what is walked, and how many cells come out how."""
     cells = results[MAPS]["step"]
     names = [one.partition(" ")[2] for one in str(cells.attrs["verdicts"]).split(", ")]
-    made = OverStiffness.of(cells, STEP, ("(a) what becomes of the walk", "(b) error of the state at the end"))
+    made = OverStiffness(cells, STEP, ("(a) what becomes of the walk", "(b) error of the state at the end"))
     verdict = np.array(names, dtype=object)[cells["verdict"]]
     made.draw(made.left, cells["verdict"], **discrete([VERDICT_COLOURS[name] for name in names]))
     errors = ("fine", "wrong silently")
     others = [(VERDICT_COLOURS[name], name, verdict == name) for name in VERDICT_COLOURS if name not in errors]
-    made.draw_errors(cells, np.isin(verdict, errors), ROUGH, others)
+    made.draw_errors(np.isin(verdict, errors), ROUGH, others)
     line: dict[str, Any] = {"color": GREY, "linewidth": 0.8}
     for axes in (made.left, made.right):
         axes.axvline(PAPER[0], **line)
     seen = [names[int(number)] for number in np.unique(cells["verdict"])]
-    patches = [Patch(facecolor=VERDICT_COLOURS[name], label=name) for name in seen]
-    add_legend(made.figure, [*patches, entry("the paper's stiffness", **line)])
+    shown = [Patch(facecolor=VERDICT_COLOURS[name], label=name) for name in seen]
+    add_legend(made.figure, [*shown, entry("the paper's stiffness", **line)])
     return made.figure, (results[MAPS].summary, cells.attrs)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from itertools import cycle
 from typing import Any, Final
 
@@ -10,9 +11,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-from walkerlab.figures.canvas import Drawing, add_legend, blank, entry, files_of, label_of, styled
+from walkerlab.figures.canvas import add_legend, blank, entry, label_of
 from walkerlab.figures.families import MODELS
-from walkerlab.figures.illustration import WORDS, Drawn, Need, Results, paper_figure
+from walkerlab.figures.illustration import Drawn, Illustration, Need, Results, paper_figure
 from walkerlab.figures.stick_diagram import FAINT, FULL, draw_postures, draw_slope, sticks_of, surrounding
 from walkerlab.figures.style import BLACK, BLUE, GREY, VERMILLION
 from walkerlab.labels import in_words
@@ -48,34 +49,39 @@ BELOW, BESIDE = 1.7, 0.4
 """Height of the panels under the walker, and what axes' labels take beside it at least, in."""
 
 
+def of_sweep(group: Group, parameters: Sequence[str]) -> Illustration | None:
+    """What a sweep of `robustness` is drawn as: over one number, or by ways to drive a walker; None if as any other."""
+    if can_be_drawn(group, parameters):
+        return Illustration("figure-17", (), partial(over_one_number, group, parameters[0]))
+    driven = actuations(group, parameters)
+    return None if driven is None else Illustration("push-off-or-hip", (), partial(push_off_or_hip, group, driven))
+
+
 def can_be_drawn(group: Group, parameters: Sequence[str]) -> bool:
     """Whether a sweep is of robustness over one number, and has gaits."""
     names = (name.format(0) for _, name, _ in PANELS)
     return len(parameters) == 1 and all(name in group.variables for name in names)
 
 
-def over_one_number(group: Group, parameter: str) -> Drawing:
-    """Figure 17 from a sweep of `robustness` over one number."""
-    x = group[parameter].astype(float)
+def over_one_number(group: Group, parameter: str, _results: Results) -> Drawn:
+    """Figure 17; caption: the number, its unit, and each model's least disturbed gait, with its norm (s/m)."""
+    x, said, unit = group[parameter].astype(float), in_words(parameter), group.variables[parameter].units
     models = {str(group[f"gaits.{k}.model"][0]): k for k in range(2) if f"gaits.{k}.model" in group.variables}
-    with styled():
-        figure = blank(0.6 + PANEL_HEIGHT * len(PANELS))
-        axes = figure.subplots(len(PANELS), 1, sharex=True)
-        for one, (said, name, shown) in zip(axes, PANELS, strict=True):
-            for model, k in models.items():
-                look: dict[str, Any] = {"color": MODELS[model], "markersize": 2.6, "linewidth": 1.3, **LINES[model]}
-                for place in (name, UP) if name.startswith("largest_step") else (name,):
-                    values = group[place.format(k)].astype(float)
-                    one.plot(x, shown(values) if place == name else 1e3 * values, **look)
-            one.set_ylabel(said)
-        axes[2].axhline(0.0, color=GREY, linewidth=0.7)
-        axes[-1].set_xlabel(label_of(in_words(parameter.rpartition(".")[2]), group.variables[parameter].units))
-        add_legend(figure, [entry(f"{model} model", color=MODELS[model], **LINES[model]) for model in models])
-        title = WORDS("figure-17.title")
-        svg, png = files_of(figure, "figure-17", title)
+    figure = blank(0.6 + PANEL_HEIGHT * len(PANELS))
+    axes = figure.subplots(len(PANELS), 1, sharex=True)
+    for one, (label, name, shown) in zip(axes, PANELS, strict=True):
+        for model, k in models.items():
+            look: dict[str, Any] = {"color": MODELS[model], "markersize": 2.6, "linewidth": 1.3, **LINES[model]}
+            for place in (name, UP) if name.startswith("largest_step") else (name,):
+                values = group[place.format(k)].astype(float)
+                one.plot(x, shown(values) if place == name else 1e3 * values, **look)
+        one.set_ylabel(label)
+    axes[2].axhline(0.0, color=GREY, linewidth=0.7)
+    axes[-1].set_xlabel(label_of(said, unit))
+    add_legend(figure, [entry(f"{model} model", color=MODELS[model], **LINES[model]) for model in models])
     norms = {model: group[PANELS[0][1].format(k)].astype(float) for model, k in models.items()}
     best = {model: (x[np.nanargmin(norm)], np.nanmin(norm)) for model, norm in norms.items() if np.isfinite(norm).any()}
-    return Drawing(svg, png, title, WORDS("figure-17.caption", in_words(parameter.rpartition(".")[2]), best))
+    return figure, (said, unit, best)
 
 
 def actuations(group: Group, parameters: Sequence[str]) -> dict[str, NDArray[np.bool_]] | None:
@@ -88,29 +94,26 @@ def actuations(group: Group, parameters: Sequence[str]) -> dict[str, NDArray[np.
     return driven if bool(np.all(np.sum([*driven.values()], axis=0) == 1)) else None
 
 
-def push_off_or_hip(group: Group, driven: Mapping[str, NDArray[np.bool_]]) -> Drawing:
-    """What each way to drive a walker costs and withstands over its speed, from a sweep of `robustness`."""
+def push_off_or_hip(group: Group, driven: Mapping[str, NDArray[np.bool_]], _results: Results) -> Drawn:
+    """What each way to drive a walker costs and withstands over its speed.
+
+    Caption: of each way speed (m/s), norm (s/m) and cost of transport of the least disturbed gait.
+    """
     speed = group[SPEED].astype(float)
-    with styled():
-        figure = blank(0.6 + PANEL_HEIGHT * len(OF_ACTUATIONS))
-        axes = figure.subplots(len(OF_ACTUATIONS), 1, sharex=True)
-        looks = {name: {"color": colour, "marker": marker} for name, (_, colour, marker) in ACTUATIONS.items()}
-        for one, (said, name, logarithmic) in zip(axes, OF_ACTUATIONS, strict=True):
-            for parameter, points in driven.items():
-                order = np.argsort(speed[points])
-                at, values = speed[points][order], group[name].astype(float)[points][order]
-                one.plot(at, values, **looks[parameter], markersize=3.0, linewidth=1.2)
-            one.set(ylabel=said, **({"yscale": "log"} if logarithmic else {}))
-        axes[-1].set_xlabel("speed (m/s)")
-        add_legend(figure, [entry(ACTUATIONS[name][0], **looks[name]) for name in driven])
-        title = WORDS("push-off-or-hip.title")
-        svg, png = files_of(figure, "push-off-or-hip", title)
+    figure = blank(0.6 + PANEL_HEIGHT * len(OF_ACTUATIONS))
+    axes = figure.subplots(len(OF_ACTUATIONS), 1, sharex=True)
+    looks = {name: {"color": colour, "marker": marker} for name, (_, colour, marker) in ACTUATIONS.items()}
+    for one, (said, name, logarithmic) in zip(axes, OF_ACTUATIONS, strict=True):
+        for parameter, points in driven.items():
+            order = np.argsort(speed[points])
+            at, values = speed[points][order], group[name].astype(float)[points][order]
+            one.plot(at, values, **looks[parameter], markersize=3.0, linewidth=1.2)
+        one.set(ylabel=said, yscale="log" if logarithmic else "linear")
+    axes[-1].set_xlabel("speed (m/s)")
+    add_legend(figure, [entry(ACTUATIONS[name][0], **looks[name]) for name in driven])
     cost, norm = (group[name].astype(float) for _, name, _ in OF_ACTUATIONS[:2])
-    told = {}
-    for parameter, points in driven.items():
-        least = np.flatnonzero(points)[np.nanargmin(norm[points])]
-        told[ACTUATIONS[parameter][0]] = (speed[least], norm[least], cost[least])
-    return Drawing(svg, png, title, WORDS("push-off-or-hip.caption", told))
+    least = {name: np.flatnonzero(points)[np.nanargmin(norm[points])] for name, points in driven.items()}
+    return figure, ({ACTUATIONS[name][0]: (speed[at], norm[at], cost[at]) for name, at in least.items()},)
 
 
 def on_rough_ground(results: Results) -> Drawn:

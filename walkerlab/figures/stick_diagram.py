@@ -333,17 +333,19 @@ def film_times(sticks: Sticks, steps: int, rate: int, slower: float) -> Array:
 
 def pictures(sticks: Sticks, at: Array, pads: Group | None = None) -> Iterator[NDArray[np.uint8]]:
     """A picture (height, width, 3) for each time, on pads if there are some."""
-    lines = [sticks.leg(leg) for leg in range(len(LEGS))]
+    lines: list[tuple[Array, dict[str, Any]]] = [
+        (sticks.leg(leg), {"color": look.colour, "linestyle": look.style}) for leg, look in enumerate(LEGS)
+    ]
     if sticks.has_soles:
-        lines += [sticks.sole(leg) for leg in range(len(LEGS))]
+        lines += [(sticks.sole(leg), {"color": look.colour}) for leg, look in enumerate(LEGS)]
     if sticks.head is not None:
-        lines.append(np.stack((sticks.hip, sticks.head), axis=1))
-    points = np.concatenate(lines, axis=1)
+        lines.append((np.stack((sticks.hip, sticks.head), axis=1), {"color": BLACK}))
+    points = np.concatenate([line for line, _ in lines], axis=1)
     flat = points.reshape(points.shape[0], -1)
     # between two samples, straight; both sides of a heel strike are samples, so none is cut across
     places = np.stack([np.interp(at, sticks.time, column) for column in flat.T], axis=1)
     shown = sticks.in_plane(places.reshape(at.size, *points.shape[1:]))
-    ends = np.cumsum([line.shape[1] for line in lines])[:-1]
+    ends = np.cumsum([line.shape[1] for line, _ in lines])[:-1]
     with styled():
         figure = Figure(figsize=FILM_SIZE, dpi=FILM_DPI, layout="constrained")
         canvas = FigureCanvasAgg(figure)
@@ -351,9 +353,7 @@ def pictures(sticks: Sticks, at: Array, pads: Group | None = None) -> Iterator[N
         left, bottom, right, top = surrounding(shown.reshape(-1, 2), sticks.leg_length)
         axes.set(xlim=(left, right), ylim=(bottom, top), **AXES)
         draw_ground(axes, sticks, pads)
-        looks: list[dict[str, Any]] = [{"color": look.colour, "linestyle": look.style} for look in LEGS]
-        looks += [{"color": look.colour} for look in LEGS] * sticks.has_soles + [{"color": BLACK}]
-        parts = [axes.plot([], [], **look, linewidth=2.2)[0] for look in looks[: len(lines)]]
+        parts = [axes.plot([], [], **look, linewidth=2.2)[0] for _, look in lines]
         (hip,) = axes.plot([], [], linestyle="none", marker="o", markersize=6.0, color=BLACK)
         (push,) = axes.plot([], [], color=PURPLE, linewidth=5.0, solid_capstyle="round", zorder=9)
         clock = axes.text(0.01, 0.97, "", transform=axes.transAxes, va="top")

@@ -75,7 +75,7 @@ class Stage:
     keeps_parts    whether it keeps parts of its result, to go on where a run was cut off
     alone          whether it measures times, and so runs with nothing beside it
     early_with     the results with which it is worth drawing while others are still being computed
-    follows        whether it runs over a parameter: `--over`, `--from`, `--to`, `--periods`
+    follows        whether it runs over a parameter: `--over`, `--from`, `--to`, `--periods`; `again` is for it, too
     of_a_model     whether it asks about gaits of a model that is to be named: `--model`
     designs        whether it has a question of its own: `--minimise`, `--maximise`, `--over`, `--keep`
     does_without   what is left out of its scene under a config: what, why, and what that saves

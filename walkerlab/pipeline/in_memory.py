@@ -73,7 +73,7 @@ class InMemory:
         progress = progress or Silent()
         results: dict[str, Content] = {}
         for stage in self.graph.needed_for(target, config):
-            key = (keys[stage.name], again and stage.walks)
+            key = (keys[stage.name], again and (stage.walks or stage.follows))
             if key not in self._inputs or (anew and stage.name == target):
                 inputs = {name: results[name] for name in stage.inputs(config)}
                 task = task_of(stage, config, inputs, jobs=1, parts=Parts(None, ""), again=again)

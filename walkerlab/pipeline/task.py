@@ -79,7 +79,7 @@ def task_of(stage: Stage, config: Config, inputs: Mapping[str, Content], **offer
     asked = {
         "jobs": stage.has_cells,
         "parts": stage.keeps_parts,
-        "again": stage.walks,
+        "again": stage.walks or stage.follows,
         "folder": stage.draws,
         "left_out": stage.draws,
     }

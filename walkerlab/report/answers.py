@@ -85,7 +85,7 @@ def energy_lost(dissipated: Mapping[str, float]) -> str:
 
 OF_EACH_STEP = {"step_periods_s": "period (s)", "step_lengths_m": "length (m)", "slips_m": "slip (mm)"}
 OF_THE_WALK = (
-    *gaits.works("work of", partial(number, digits=4)),
+    *gaits.works(partial(number, digits=4)),
     told("cost of transport", "cost_of_transport"),
     told("mean energy", "mean_energy_J", 7),
     told("energy drift", "energy_drift_J", 2),
@@ -148,8 +148,8 @@ def tune(summary: Summary) -> list[str | Table]:
         if gait["found"]
         else f"No own gait: {gait['reason']}."
     )
-    margins = [adjustment.margins_table(summary)] if summary["adjustment"].get("margins") else []
-    return [*words.parts("adjustment.answer", summary), *words.parts("basin.grounds", summary["map"]), own, *margins]
+    told = (*words.parts("adjustment.answer", summary), *words.parts("basin.grounds", summary["map"]))
+    return [*told, own, adjustment.margins_table(summary)]
 
 
 def compare(summary: Summary) -> list[str | Table]:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from typing import ClassVar, Literal, Protocol
 
 from markupsafe import Markup
@@ -29,6 +29,10 @@ class Paragraph:
     template: ClassVar[str] = "paragraph"
     text: str
     tone: Tone | Literal["waiting"] = "plain"
+
+    def __bool__(self) -> bool:
+        """Whether it says anything."""
+        return bool(self.text)
 
 
 @dataclass(frozen=True)
@@ -122,6 +126,10 @@ class Code:
     title: str
     text: str
 
+    def __bool__(self) -> bool:
+        """Whether there is any."""
+        return bool(self.text)
+
 
 Pad = tuple[float, float, int]
 """Where a pad begins and ends along the slope (m), and the leg in whose lane it lies."""
@@ -197,13 +205,11 @@ class GaitMark:
     """A point of a diagram whose gait a player can show.
 
     x, y    where its mark is, in the diagram's own units
-    said    what it is
-    walker  how it moves
+    walker  how it moves; its name says what it is
     """
 
     x: float
     y: float
-    said: str
     stable: bool
     walker: Walker
     slope_rad: float
@@ -243,6 +249,14 @@ class Section:
 
     anchor: str
     title: str
-    blocks: tuple[PageBlock, ...] = field(default=())
+    blocks: tuple[PageBlock, ...] = ()
     finding: str = ""
     page: str = MAIN
+
+    @classmethod
+    def of(
+        cls, anchor: str, title: str, blocks: Iterable[PageBlock | None], finding: str = "", page: str = MAIN
+    ) -> Section | None:
+        """A section of those blocks that there are and that say something; None if there are none."""
+        said = tuple(block for block in blocks if block)
+        return cls(anchor, title, said, finding, page) if said else None

@@ -16,7 +16,7 @@ SETS = {"as-printed": "as printed", "corrected": "corrected"}
 """The sets of equations, as they are stored and as they are called."""
 
 
-def gait_table(sets: Mapping[str, Mapping[str, Any]], names: Sequence[str]) -> Table:
+def gait_table(sets: Mapping[str, Mapping[str, Any]], names: Sequence[str], note: str = "") -> Table:
     """Fixed point and multipliers, the sets of equations side by side.
 
     names  of the coordinates of a state
@@ -33,7 +33,7 @@ def gait_table(sets: Mapping[str, Mapping[str, Any]], names: Sequence[str]) -> T
         ),
         Column("spectral radius", "spectral_radius", partial(fixed, decimals=5)),
         Column("stable", "stable"),
-        *works("work of", partial(number, digits=4)),
+        *works(partial(number, digits=4)),
         measured("cost of transport", "cost_of_transport", partial(fixed, decimals=5)),
         measured("energy from the stance foot", "energy_J", partial(fixed, decimals=3)),
         measured("energy drift", "energy_drift_J", partial(number, digits=2)),
@@ -48,7 +48,7 @@ def gait_table(sets: Mapping[str, Mapping[str, Any]], names: Sequence[str]) -> T
     # the corrected set is labelled only beside the printed one
     gaits = {"value" if list(sets) == ["corrected"] else SETS[name]: gait for name, gait in sets.items()}
     caption = f"Fixed point of the step map and its multipliers{', under both sets of equations' if both else ''}"
-    return side_by_side(caption, lines, gaits)
+    return side_by_side(caption, lines, gaits, note=note)
 
 
 GIVEN_BY = {"gravity": "gravity", "push_off": "the push-off", "hip": "the hip"}
@@ -59,7 +59,7 @@ ROUNDING = 1e-12
 """Part of the largest work that counts as none."""
 
 
-def works(words: str, written: Callable[[Any], str]) -> Iterator[Column]:
+def works(written: Callable[[Any], str]) -> Iterator[Column]:
     """The work that each gives a step, of those that give more than rounding."""
     for name, giver in GIVEN_BY.items():
 
@@ -67,7 +67,7 @@ def works(words: str, written: Callable[[Any], str]) -> Iterator[Column]:
             work = record.get("work_per_step_J") or {}
             return work[name] if work and abs(work[name]) > ROUNDING * max(map(abs, work.values())) else None
 
-        yield Column(f"{words} {giver} a step (J)", given, written)
+        yield Column(f"work of {giver} a step (J)", given, written)
 
 
 def state_at(place: int, gait: Mapping[str, Any]) -> float:

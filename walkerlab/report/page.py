@@ -51,18 +51,14 @@ def render(page: Page) -> str:
     if len(set(anchors)) != len(anchors):
         raise ValueError(f"two sections of the report have one anchor: {anchors}")
     script = f"\n{source('page.js')}\n{source('player.js')}\n"
-    return (
-        environment(page.run)
-        .get_template("page.html.j2")
-        .render(
-            page=page,
-            home=MAIN,
-            # The only texts that are markup already: files of this package.
-            style=Markup(source("style.css")),
-            script=Markup(script),
-            script_digest=base64.b64encode(hashlib.sha256(script.encode()).digest()).decode(),
-        )
-    )
+    # The only texts that are markup already: files of this package.
+    own = {"style": Markup(source("style.css")), "script": Markup(script), "script_digest": digest_of(script)}
+    return environment(page.run).get_template("page.html.j2").render(page=page, home=MAIN, **own)
+
+
+def digest_of(script: str) -> str:
+    """What a page's header knows the one script by that may run."""
+    return base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
 
 
 def environment(run: str = "") -> Environment:

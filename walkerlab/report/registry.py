@@ -5,7 +5,6 @@ needs with `Results.summary(stage)` and `Results.group(stage, path)`, which give
 """
 
 import math
-from collections.abc import Callable
 
 from walkerlab.config.drives import drives_of
 from walkerlab.config.files import DEFAULT
@@ -13,7 +12,7 @@ from walkerlab.config.schema import Config
 from walkerlab.config.walkers import is_plain_compass
 from walkerlab.report.blocks import MAIN, Section
 from walkerlab.report.page import Page
-from walkerlab.report.results import Results
+from walkerlab.report.results import Results, SectionMaker
 from walkerlab.report.sections import (
     accuracy,
     adjustment,
@@ -31,8 +30,6 @@ from walkerlab.report.sections import (
     walks,
 )
 from walkerlab.report.words import words
-
-SectionMaker = Callable[[Results], Section | None]
 
 SECTIONS: tuple[SectionMaker, ...] = (
     verdict.section,

@@ -1,11 +1,12 @@
 """What a section may draw on: the stored results of a run, the figures drawn from them, and what is missing."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import wraps
 from typing import Any
 
 from walkerlab.config.schema import Config
-from walkerlab.report.blocks import Picture
+from walkerlab.report.blocks import Picture, Section
 from walkerlab.scene.left_out import LeftOut
 from walkerlab.store.content import Content, Group
 
@@ -48,3 +49,23 @@ class Results:
         """A group of a stage's result; None if there is no such result or group."""
         result = self.stored.get(stage)
         return None if result is None else result.groups.get(path)
+
+
+SectionMaker = Callable[[Results], Section | None]
+
+
+def of_stage(stage: str, needed: str = "") -> Callable[[Callable[..., Section | None]], SectionMaker]:
+    """A section made of a stage's summary, which it is given, too; none without a result.
+
+    needed  a key of the summary without which there is nothing to say
+    """
+
+    def section_of(make: Callable[..., Section | None]) -> SectionMaker:
+        @wraps(make)
+        def section(results: Results) -> Section | None:
+            summary = results.summary(stage)
+            return make(results, summary) if (summary.get(needed) if needed else summary) else None
+
+        return section
+
+    return section_of

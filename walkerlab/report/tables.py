@@ -68,7 +68,8 @@ class Column:
     """What a table shows of each record: one of its columns or, where records stand side by side, one of its rows.
 
     title    its head, with the unit
-    of       key of a record's value, or a function of the record; without one a record is a row of cells
+    of       key of a record's value, `a/b` of one in a record within; or a function of the record; without one a record
+             is a row of cells
     written  a value as text, or as a cell with a tone; a cell in the place of a value stays as it is
     numeric  numbers, which stand under one another
     wide     sentences, for which a terminal has no room
@@ -84,7 +85,12 @@ class Column:
         """What a record has here; None if nothing."""
         if self.of is None:
             return record[place]
-        return record.get(self.of) if isinstance(self.of, str) else self.of(record)
+        if not isinstance(self.of, str):
+            return self.of(record)
+        *within, key = self.of.split("/")
+        for name in within:
+            record = record.get(name) or {}
+        return record.get(key)
 
     def cell(self, record: Any, place: int = 0) -> Cell:
         """A record's cell in the column at this place."""
@@ -132,6 +138,10 @@ class Table:
     note: str = ""
     by: str = ""
 
+    def __bool__(self) -> bool:
+        """Whether it has a row."""
+        return any(body.rows for body in self.bodies)
+
 
 def table(
     caption: str,
@@ -159,11 +169,11 @@ def table(
     return Table(caption, tuple(columns), tuple(bodies), wordy, note, by)
 
 
-def grouped(records: Iterable[Mapping[str, Any]], key: str) -> dict[str, list[Mapping[str, Any]]]:
-    """Records by what they have under a key, in the order in which that comes first."""
+def grouped(records: Iterable[Mapping[str, Any]], *keys: str) -> dict[str, list[Mapping[str, Any]]]:
+    """Records by what they have under some keys, in words, in the order in which that comes first."""
     found: dict[str, list[Mapping[str, Any]]] = {}
     for record in records:
-        found.setdefault(str(record[key]), []).append(record)
+        found.setdefault(" ".join(str(record[key]) for key in keys), []).append(record)
     return found
 
 

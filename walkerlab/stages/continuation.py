@@ -108,8 +108,10 @@ def numbers_in(value: Any) -> Iterator[Any]:
         yield value
 
 
-def run(config: ContinuationConfig, _inputs: Mapping[str, Content], progress: Progress) -> Content:
+def run(config: ContinuationConfig, _inputs: Mapping[str, Content], progress: Progress, again: bool = True) -> Content:
     """Follow the families that the config asks for.
+
+    again  whether some gaits are solved for a second time, for the numerical error
 
     Raises ConfigError for a key that is no number of the model, NoAnswer for a span without a gait.
     """
@@ -121,7 +123,7 @@ def run(config: ContinuationConfig, _inputs: Mapping[str, Content], progress: Pr
         search = search_of(model, asked, progress)
         family = Family(model, None) if search is None else search.family(np.random.default_rng(config.seed))
         found.append(family)
-    said, second = summary(found, asked), asked.second
+    said, second = summary(found, asked, again), asked.second
     content = Content(groups(found, said, config, parameter, None if second is None else second.parameter), said)
     if not any(family.branches for family in found):
         raise NoAnswer(
@@ -216,8 +218,8 @@ SEEDS: Final[Mapping[str, Callable[[FamilyQuestion, Progress], Begun | None]]] =
 }
 
 
-def summary(found: Sequence[Family], asked: FamilyQuestion) -> dict[str, Any]:
-    """What the command prints; values are in the unit of the key that was asked for."""
+def summary(found: Sequence[Family], asked: FamilyQuestion, again: bool) -> dict[str, Any]:
+    """What the command prints; values are in the unit of the key that was asked for. For `again` see `run`."""
     config, parameter = asked.config, asked.parameter
 
     def rows(of_model: Callable[[Family], Iterable[Mapping[str, Any]]]) -> list[dict[str, Any]]:
@@ -234,7 +236,7 @@ def summary(found: Sequence[Family], asked: FamilyQuestion) -> dict[str, Any]:
         "lyapunov": rows(lambda one: map(asdict, one.exponents)),
         "cascades": rows(cascade_rows),
         "limits": rows(limit_rows),
-        "numerical_error": {one.model: error for one in found if (error := sample_again(one)) is not None},
+        "numerical_error": {one.model: error for one in found if again and (error := sample_again(one)) is not None},
         "endings": rows(partial(ending_rows, parameter=parameter, config=config)),
         "attractors": rows(lambda one: [attractor_summary(one)] if one.attractors.found else []),
         "curves": rows(curve_rows),

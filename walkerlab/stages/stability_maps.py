@@ -75,7 +75,7 @@ def step_group(cells: int, kept: Mapping[str, maps.Numbers]) -> Group:
 
 def axis(name: str, ends: tuple[float, float], cells: int, unit: str, text: str) -> dict[str, Variable]:
     """The coordinate of an axis."""
-    return {name: Variable(maps.along(ends, cells), (name,), unit, text)}
+    return {name: Variable(np.geomspace(*ends, cells), (name,), unit, text)}
 
 
 def whole(values: Any, dims: tuple[str, ...], text: str) -> Variable:

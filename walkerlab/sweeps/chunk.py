@@ -65,13 +65,15 @@ class SweepPoint(NamedTuple):
 class ChunkTask:
     """What a worker is sent.
 
-    graph   where the pipeline is, as module:NAME
-    target  the stage
+    graph     where the pipeline is, as module:NAME
+    target    the stage
+    failures  failed attempts
     """
 
     graph: str
     target: str
     points: tuple[SweepPoint, ...]
+    failures: int = 0
 
     def split(self) -> Iterator[ChunkTask]:
         """Both halves of a chunk of at least two points."""
@@ -115,7 +117,8 @@ def row_of(worker: Any, target: str, point: SweepPoint) -> tuple[PointResult, Co
     key = point.keys[target]
     try:
         config = without_outputs(point.config, target, worker.graph)
-        answer = worker.answer(config, target, point.keys, again=point.again)
+        again = point.again or not worker.graph[target].walks
+        answer = worker.answer(config, target, point.keys, again=again)
     except WalkerlabError as error:
         return PointResult(key, "failed", error.message), Content()
     except Exception as error:

@@ -7,7 +7,6 @@ from typing import Any
 
 from walkerlab.errors import ConfigError
 from walkerlab.figures import robustness
-from walkerlab.figures.canvas import Drawing
 from walkerlab.figures.sweep import choose, is_number
 from walkerlab.figures.sweep import draw as drawn_figure
 from walkerlab.report.blocks import Gallery, Picture, Section
@@ -46,13 +45,10 @@ def draw(swept: Swept, folder: RunFolder, names: Sequence[str] = ()) -> Files:
     group, question = swept.group, swept.question
     refuse_unknown(group, question.dims, names)
     shown = list(names) or choose(group, question.dims, question.names)
-    figure: Drawing | None
-    if not names and robustness.can_be_drawn(group, question.names):
-        figure = robustness.over_one_number(group, question.names[0])
-    elif not names and (driven := robustness.actuations(group, question.names)) is not None:
-        figure = robustness.push_off_or_hip(group, driven)
-    else:
-        figure = drawn_figure(group, question.stage, question.names, question.dims, shown) if shown else None
+    own = None if names else robustness.of_sweep(group, question.names)
+    figure = None if own is None else own.drawn({})
+    if figure is None and shown:
+        figure = drawn_figure(group, question.stage, question.names, question.dims, shown)
     paths: list[Path] = []
     pictures: list[Picture] = []
     if figure is not None:

@@ -4,7 +4,7 @@ import math
 from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, wait
-from dataclasses import dataclass
+from dataclasses import replace
 from itertools import islice
 from typing import Final
 
@@ -22,17 +22,6 @@ BUGS: Final = (ArithmeticError, AssertionError, AttributeError, ImportError, Loo
 """Errors that mean a bug here, outside any point."""
 MAX_DEATHS: Final = 12
 """Deaths before any chunk has come back, after which it is the machine and not the points."""
-
-
-@dataclass(frozen=True)
-class Try:
-    """A chunk on its way.
-
-    failures  failed attempts
-    """
-
-    task: ChunkTask
-    failures: int = 0
 
 
 class FanOut:
@@ -54,8 +43,8 @@ class FanOut:
         self.engine, self.order, self.chunk_s = engine, order, chunk_s
         self.todo, self.left = todo, count
         self.point_s: float | None = None
-        self._again: deque[Try] = deque()
-        self._running: dict[Future[Chunk], Try] = {}
+        self._again: deque[ChunkTask] = deque()
+        self._running: dict[Future[Chunk], ChunkTask] = {}
         self._deaths = 0
         self._alive = False
 
@@ -70,8 +59,8 @@ class FanOut:
                 # as much as the pool can work on, and one chunk more for each worker that waits
                 most = 1 if self.point_s is None else pool.workers + 1
                 while len(self._running) < most and (self._again or self.left):
-                    one = self._again.popleft() if self._again else Try(self._next_task(pool.workers))
-                    self._running[pool.executor.submit(compute, one.task)] = one
+                    one = self._again.popleft() if self._again else self._next_task(pool.workers)
+                    self._running[pool.executor.submit(compute, one)] = one
                 ended, _ = wait(self._running, return_when=FIRST_COMPLETED)
                 for future in ended:
                     one = self._running.pop(future)
@@ -101,7 +90,7 @@ class FanOut:
         self.point_s = latest if self.point_s is None else 0.5 * (self.point_s + latest)
         self.keep(chunk)
 
-    def _failed(self, one: Try, error: BaseException) -> None:
+    def _failed(self, one: ChunkTask, error: BaseException) -> None:
         """Try a chunk again, then split it, then give its point up; a bug is raised."""
         if isinstance(error, BUGS):
             raise error
@@ -112,11 +101,11 @@ class FanOut:
                 f"no worker lives: {said}",
                 "What was computed is kept, and the same command goes on. Look at memory and limits of this machine.",
             )
-        if one.failures and len(one.task.points) > 1:
-            self._again.extend(Try(half, 1) for half in one.task.split())
+        if one.failures and len(one.points) > 1:
+            self._again.extend(replace(half, failures=1) for half in one.split())
         elif one.failures < 3:
-            self._again.append(Try(one.task, one.failures + 1))
+            self._again.append(replace(one, failures=one.failures + 1))
         else:
             self.point_s = self.point_s or 1.0
-            key = one.task.points[0].keys[self.target]
+            key = one.points[0].keys[self.target]
             self.keep(Chunk((PointResult(key, "failed", f"its worker died: {said}"),), {}))

@@ -249,12 +249,18 @@ def drawn(one: Axis, column: Any) -> Iterator[Value]:
             yield one.values[min(int(share * len(one.values)), len(one.values) - 1)]
 
 
+def held(config: Config, path: Sequence[str]) -> Any:
+    """The value at a path; None if the config has no such block."""
+    found: Any = config
+    for name in path:
+        found = getattr(found, name, None)
+    return found
+
+
 def described(config: Config, key: str) -> tuple[str, str]:
     """Unit and meaning of a config's key; a unit that depends on the block's is that of this config."""
     *above, last = key.split(".")
-    block: Any = config
-    for name in above:
-        block = getattr(block, name, None)
+    block = held(config, above)
     # the config's own blocks, which may be of a type that the schema only allows
     field = known_keys().get(key) or getattr(type(block), "model_fields", {}).get(last)
     if field is None:

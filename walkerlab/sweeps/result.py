@@ -1,9 +1,8 @@
 """A sweep's one file: parameters as coordinates, the stage's numbers as variables over them."""
 
-import io
 import json
 import sys
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from itertools import chain
 from typing import Any, Final
 
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 from walkerlab.config.schema import Config
 from walkerlab.labels import ERROR_OF_EACH_STEP, in_words, unit_by_name
 from walkerlab.report.headlines import LAST_OF, headlines
+from walkerlab.report.tables import csv_text
 from walkerlab.scene.endings import Pads, endings
 from walkerlab.solvers.system import Integers
 from walkerlab.store.artifact import InTurn
@@ -147,7 +147,10 @@ class Merge:
         attrs = {"coordinates": " ".join(question.names)} if question.layout == "list" else {}
         scales = {name: one for name, one in parameters.items() if one.dims == (name,)}
         size = sum(one.values.nbytes * (TEXT_BYTES if one.text else 1) for one in self.columns.values())
-        return InTurn(summary, attrs, scales, self._variables(parameters), size)
+        # a number that is a parameter as well is its coordinate
+        names = sorted({*parameters, *self.columns})
+        variables = ((name, parameters[name] if name in parameters else self.variable(name)) for name in names)
+        return InTurn(summary, attrs, scales, variables, size)
 
     def endings(self) -> list[dict[str, Any]]:
         """What ended the walks and what the ground has to do with it; nothing of a stage that does not walk."""
@@ -178,11 +181,6 @@ class Merge:
         largest = {key: float(np.nanmax(values)) for key, values in found.items() if values is not None}
         told = {"walked_again": known + otherwise, "of": len(self.inverse), "ended_otherwise": otherwise, **largest}
         return {"numerical_error": told}
-
-    def _variables(self, parameters: Mapping[str, Variable]) -> Iterator[tuple[str, Variable]]:
-        """Every variable by name; a number that is a parameter as well is its coordinate."""
-        for name in sorted({*parameters, *self.columns}):
-            yield name, parameters[name] if name in parameters else self.variable(name)
 
     def variable(self, name: str) -> Variable:
         """A variable over the points; it is handed over, so that no two copies are held of all."""
@@ -237,8 +235,6 @@ def as_csv(content: Content, question: SweptStage, every: bool = False) -> str:
 
     every  all numbers and texts instead; lists take columns
     """
-    import csv
-
     group, dimensions = content[""], len(question.shape)
     columns: dict[str, list[Any]] = {}
     for place, (name, axis) in enumerate(zip(question.names, question.axes, strict=True)):
@@ -250,11 +246,7 @@ def as_csv(content: Content, question: SweptStage, every: bool = False) -> str:
     for name, variable in variables.items():
         if name not in columns:
             columns.update(flat_columns(name, variable, dimensions))
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(columns)
-    writer.writerows(zip(*columns.values(), strict=True))
-    return text.getvalue()
+    return csv_text([*columns], zip(*columns.values(), strict=True)).decode()
 
 
 def flat_columns(name: str, variable: Variable, dimensions: int) -> Iterable[tuple[str, list[Any]]]:

@@ -14,7 +14,6 @@ from walkerlab.config.contact import Contact
 from walkerlab.config.schema import Config
 from walkerlab.config.stability import Case
 from walkerlab.solvers.registry import Tolerances
-from walkerlab.solvers.system import Floats
 from walkerlab.verification.catalogue import config_of
 from walkerlab.verification.judge import TIGHTER
 from walkerlab.verification.ordinary import REFERENCE, STEPS, arrival_of, fixed, natural_units
@@ -35,12 +34,9 @@ VERDICTS: Final = ("fine", "wrong silently", "diverges", "gives up", "no referen
 Numbers = list[float]
 
 
-def along(ends: tuple[float, float], cells: int) -> Floats:
-    """Evenly spaced powers."""
-    return np.geomspace(*ends, cells)
-
-
-def case_on_ground(stiffness: float, stiction_velocity: float | None, steps: int, budget: int) -> tuple[Case, Config]:
+def prepared_on_ground(
+    stiffness: float, stiction_velocity: float | None, steps: int, budget: int
+) -> tuple[Case, Config, ContactStart]:
     """The paper's walk on ground of another stiffness (N/m^e), and with another stiction velocity (m/s) if given."""
     contact: dict[str, object] = {"units": "si", "stiffness": stiffness}
     if stiction_velocity is not None:
@@ -48,14 +44,10 @@ def case_on_ground(stiffness: float, stiction_velocity: float | None, steps: int
     case = Case(
         name="map", expected=("walked",), reason="a cell", steps=steps, budget=budget, config={"contact": contact}
     )
-    return case, config_of(case)
-
-
-def prepared_on_ground(config: Config, case: Case) -> ContactStart:
-    """The start of a cell."""
+    config = config_of(case)
     start = prepared(config, case)
     assert isinstance(start, ContactStart), "the paper's slope has a gait"
-    return start
+    return case, config, start
 
 
 def stiction_cell(stiffness: float, stiction_velocity: float) -> Numbers:
@@ -64,8 +56,7 @@ def stiction_cell(stiffness: float, stiction_velocity: float) -> Numbers:
     Returns outcome, steps, outcome at a ten times tighter tolerance, error between both in legs, radians and pendulum
     times (`NONE` if they end unlike), right-hand sides.
     """
-    case, config = case_on_ground(stiffness, stiction_velocity, WALK_STEPS, BUDGET)
-    start = prepared_on_ground(config, case)
+    case, config, start = prepared_on_ground(stiffness, stiction_velocity, WALK_STEPS, BUDGET)
     walk = again = start.walk(case, configured(start, case))
     if walk.outcome.answered:
         tighter = case.model_copy(update={"budget": TIGHTER_BUDGET})
@@ -83,8 +74,7 @@ def step_column(stiffness: float, steps_s: tuple[float, ...]) -> Numbers:
 
     Returns verdict and error of each step.
     """
-    case, config = case_on_ground(stiffness, None, STEPS, REFERENCE_BUDGET)
-    start = prepared_on_ground(config, case)
+    case, config, start = prepared_on_ground(stiffness, None, STEPS, REFERENCE_BUDGET)
     walk = start.walk(case, Tolerances(*REFERENCE, case.budget))
     if not walk.outcome.answered:
         return [float(VERDICTS.index("no reference")), NONE] * len(steps_s)
@@ -98,10 +88,10 @@ def step_column(stiffness: float, steps_s: tuple[float, ...]) -> Numbers:
 
 def pieces_of(cells: int) -> Iterator[tuple[str, int, Callable[[], Numbers]]]:
     """Everything there is to compute for maps of `cells` cells along each axis: of each piece name, cells and call."""
-    stiffness = along(STIFFNESS, cells)
-    steps = tuple(float(h) for h in along(STEP, cells))
+    stiffness = np.geomspace(*STIFFNESS, cells)
+    steps = tuple(float(h) for h in np.geomspace(*STEP, cells))
     for i, k in enumerate(stiffness):
         yield f"step {i}", cells, partial(step_column, float(k), steps)
-    for i, v in enumerate(along(STICTION_VELOCITY, cells)):
+    for i, v in enumerate(np.geomspace(*STICTION_VELOCITY, cells)):
         for j, k in enumerate(stiffness):
             yield f"stiction {i} {j}", 1, partial(stiction_cell, float(k), float(v))

@@ -69,7 +69,7 @@ class RuleFollower:
         size, state = scene.model.size, self.walk_state
         # these arrays are the walk state's own and change with it
         system = on_ground(scene.walker, self._ground, feet=state.feet, times=state.times)
-        self.scene, self._fixed = scene, (system, scene.chain)
+        self.scene, self._fixed = scene, (system, scene.model.chain)
         self._motion, self._forces, self._none = np.zeros((2, 4)), np.zeros(size), np.zeros(0)
         self._call = entry_point(
             feet_and_forces, *self._fixed, 0.0, np.zeros(size), np.zeros(size), self._motion, self._forces

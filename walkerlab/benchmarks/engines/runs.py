@@ -118,7 +118,8 @@ class EngineWalk:
         def forces(time_s: float, q: Floats, v: Floats) -> Floats:
             return rules.forces(since + time_s, q, v)
 
-        outside = forces if task.own is None or task.scene.is_driven else None
+        driven = task.scene.ours.driven or task.scene.ours.whole.driven_hip
+        outside = forces if task.own is None or driven else None
         engine = self.adapter.EngineRun(rules.scene.model, stepping, self.q, self.v, outside, task.own)
 
         def hand_over_ground() -> None:

@@ -62,21 +62,11 @@ class EngineScene:
         """Along the slope and towards it (m/s^2)."""
         return self.ours.gravity_along, self.ours.gravity_down
 
-    @property
-    def is_driven(self) -> bool:
-        """Whether anything acts on the walker but gravity and the ground."""
-        return bool(self.ours.driven or self.ours.whole.driven_hip)
-
-    @property
-    def chain(self) -> Floats:
-        """Matrix (bodies, links): which relative angles add up to each absolute one."""
-        return self.model.chain
-
     @cached_property
     def knee_places(self) -> tuple[int, ...]:
         """Where each knee's angle is among an engine's coordinates; a locked one is at none, -1."""
         ends = [(self.assembly.index(knee.shank), self.assembly.index(knee.thigh)) for knee in self.assembly.knees]
-        bends = [self.chain[shank] - self.chain[thigh] for shank, thigh in ends]
+        bends = [self.model.chain[shank] - self.model.chain[thigh] for shank, thigh in ends]
         return tuple(2 + int(np.argmax(bend)) if bend.any() else -1 for bend in bends)
 
     def with_knees_locked(self, doing: NDArray[np.int8]) -> EngineScene:
@@ -92,16 +82,16 @@ class EngineScene:
 
     def from_base(self, y: State) -> tuple[Floats, Floats]:
         """Coordinates and velocities of the engine from the state of the free walker."""
-        n = len(self.chain)
+        n = len(self.model.chain)
         angles, rates = np.array(y[2 : 2 + n]) + self.ours.slope, np.array(y[4 + n :])
         shift, drift = self._centre(angles, rates)
         at, moving = np.array(y[:2]) - shift, np.array(y[2 + n : 4 + n]) - drift
-        relative, turning = np.linalg.lstsq(self.chain, np.column_stack((angles, rates)), rcond=None)[0].T
+        relative, turning = np.linalg.lstsq(self.model.chain, np.column_stack((angles, rates)), rcond=None)[0].T
         return np.concatenate((at, relative)), np.concatenate((moving, turning))
 
     def about_centre(self, q: Floats, v: Floats) -> Floats:
         """State of the free walker from an engine's coordinates and velocities."""
-        angles, rates = self.chain @ q[2:], self.chain @ v[2:]
+        angles, rates = self.model.chain @ q[2:], self.model.chain @ v[2:]
         shift, drift = self._centre(angles, rates)
         return np.concatenate((q[:2] + shift, angles - self.ours.slope, v[:2] + drift, rates))
 
@@ -114,7 +104,7 @@ class EngineScene:
 
     def started(self, factor: float) -> EngineScene:
         """The scene with the start's velocities times a factor; the stance foot stays at rest in the ground's eyes."""
-        n = len(self.chain)
+        n = len(self.model.chain)
         return replace(self, start=(*self.start[: 2 + n], *(factor * x for x in self.start[2 + n :])))
 
 

@@ -6,18 +6,16 @@ from typing import Any
 
 from walkerlab.report.blocks import COSTS, Gallery, PageBlock, Paragraph, Section, Statement, Statements
 from walkerlab.report.numbers import listed, number, power_of_ten, whole
-from walkerlab.report.results import Results
+from walkerlab.report.results import Results, of_stage
 from walkerlab.report.tables import Cell, Column, Table, grouped, table
 from walkerlab.report.words import words
 
 Row = Mapping[str, Any]
 
 
-def section(results: Results) -> Section | None:
+@of_stage("accuracy", "reference")
+def section(results: Results, summary: Row) -> Section | None:
     """The table of methods for each scene, with conclusions, references, and what was not run."""
-    summary = results.summary("accuracy")
-    if not summary.get("reference"):
-        return None
     told = {scene: summary["conclusions"][scene].removeprefix(f"{scene}: ") for scene in summary["reference"]}
     concluded = tuple(Statement(scene, text[:1].upper() + text[1:]) for scene, text in told.items())
     references = [{"scene": scene, **entry} for scene, entry in summary["reference"].items()]
@@ -27,12 +25,12 @@ def section(results: Results) -> Section | None:
         costs(summary),
         table("References", REFERENCE_COLUMNS, references, note=words("accuracy.references")),
         *(Gallery((picture,)) for picture in results.pictures if picture.name.startswith("accuracy")),
-        *not_run(summary),
+        not_run(summary),
     )
     fastest: dict[str, list[str]] = {}
     for scene, best in summary["best"].items():
         fastest.setdefault(listed(dict.fromkeys(best.values())), []).append(scene)
-    return Section("accuracy", "Error against run time", blocks, words("accuracy.fastest", fastest), COSTS)
+    return Section.of("accuracy", "Error against run time", blocks, words("accuracy.fastest", fastest), COSTS)
 
 
 def costs(summary: Row) -> Table:
@@ -89,10 +87,8 @@ NOT_RUN_COLUMNS = (
 )
 
 
-def not_run(summary: Row) -> tuple[Table, ...]:
+def not_run(summary: Row) -> Table:
     """The tolerances that were not tried, a row for each reason."""
-    found: dict[tuple[str, ...], dict[str, Any]] = {}
-    for entry in summary.get("not_run", []):
-        key = (entry["scene"], entry["method"], entry["why"])
-        found.setdefault(key, {**entry, "tolerances": []})["tolerances"].append(float(entry["tolerance"]))
-    return (table("Not run", NOT_RUN_COLUMNS, list(found.values()), wordy=True),) if found else ()
+    found = grouped(summary.get("not_run", []), "scene", "method", "why").values()
+    rows = [{**entries[0], "tolerances": [float(one["tolerance"]) for one in entries]} for entries in found]
+    return table("Not run", NOT_RUN_COLUMNS, rows, wordy=True)

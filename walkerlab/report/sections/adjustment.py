@@ -4,11 +4,11 @@ from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any
 
-from walkerlab.report.blocks import COSTS, PageBlock, Paragraph, Section
+from walkerlab.report.blocks import COSTS, Paragraph, Section
 from walkerlab.report.gaits import symbol, works
 from walkerlab.report.numbers import NONE, fixed, length, listed, number, quantity
 from walkerlab.report.outcomes import tone
-from walkerlab.report.results import Results
+from walkerlab.report.results import Results, of_stage
 from walkerlab.report.symbols import in_signs
 from walkerlab.report.tables import Cell, Column, Table, measured, side_by_side, table
 from walkerlab.report.words import words
@@ -16,23 +16,18 @@ from walkerlab.report.words import words
 Summary = Mapping[str, Any]
 
 
-def section(results: Results) -> Section | None:
+@of_stage("tune", "adjustment")
+def section(results: Results, summary: Summary) -> Section | None:
     """The verdict on the adjustment, with the tables behind it."""
-    summary = results.summary("tune")
-    if "adjustment" not in summary:
-        return None
     changed = results.of_the_paper or summary["adjustment"]["needed"]
-    blocks: list[PageBlock] = [Paragraph(words("adjustment.explained", summary, results.of_the_paper))]
-    if changed:
-        blocks.append(starts_table(results, summary))
-    if summary["gait"]["found"]:
-        blocks.append(gait_table(summary, results.summary("fixedpoint")))
-    if summary["adjustment"].get("margins"):
-        blocks.append(margins_table(summary))
-    if changed:
-        blocks.append(walks_table(results, summary))
-    finding = words("adjustment.needed", summary)
-    return Section("adjustment", "The parameter adjustment", tuple(blocks), finding)
+    blocks = (
+        Paragraph(words("adjustment.explained", summary, results.of_the_paper)),
+        starts_table(results, summary) if changed else None,
+        gait_table(summary, results.summary("fixedpoint")) if summary["gait"]["found"] else None,
+        margins_table(summary),
+        walks_table(results, summary) if changed else None,
+    )
+    return Section.of("adjustment", "The parameter adjustment", blocks, words("adjustment.needed", summary))
 
 
 ORDER_COLUMNS = (Column("knob"), Column("observed orders, towards the limit", wide=True))
@@ -42,35 +37,28 @@ def limit(results: Results) -> Section | None:
     """What takes the contact model to the rigid one; None if nobody asked."""
     summary = results.summary("tune")
     reaches, orders = summary.get("reaches") or {}, summary.get("orders") or {}
-    if not (reaches or orders):
-        return None
     pushes = results.config.push_off.impulse_N_s != 0.0
     note = words("adjustment.factors", pushes)
     titles = words.terms("adjustment.distances").items()
     columns = [measured(title, key, partial(number, digits=3)) for key, title in titles]
-    blocks: list[PageBlock] = [
-        table(f"Towards the rigid limit: {name}", columns, found["settings"], note=note)
-        for name, found in reaches.items()
-        if found["settings"]
-    ]
-    if orders:
-        rows = [[name, ", ".join(fixed(order, 2) for order in values) or NONE] for name, values in orders.items()]
-        blocks.append(table("How fast the period converges when one knob is turned", ORDER_COLUMNS, rows))
-    return Section(
-        "limit", "Towards the rigid limit", tuple(blocks), words("adjustment.reached", reaches, pushes), COSTS
+    settings = {f"Towards the rigid limit: {name}": found["settings"] for name, found in reaches.items()}
+    rows = [[name, ", ".join(fixed(order, 2) for order in values) or NONE] for name, values in orders.items()]
+    blocks = (
+        *(table(caption, columns, found, note=note) for caption, found in settings.items()),
+        table("How fast the period converges when one knob is turned", ORDER_COLUMNS, rows),
     )
+    return Section.of("limit", "Towards the rigid limit", blocks, words("adjustment.reached", reaches, pushes), COSTS)
 
 
 def starts_table(results: Results, summary: Summary) -> Table:
     """The start before and after; beside Table 2 if the paper is what is redone."""
     rows = [{"name": name, **row} for name, row in summary["table2"].items()]
+    caption, note, head = "The start before and after the adjustment", "", "coordinate"
     if results.of_the_paper:
-        caption = "Table 2 again: the start before and after the adjustment"
+        caption, head = "Table 2 again: the start before and after the adjustment", "row"
         note = "The paper's percentages are those of the ADAMS value, without saying so."
-        first = Column("row", lambda row: in_signs(f"{row['name']} ({row['unit']})"))
-    else:
-        caption, note = "The start before and after the adjustment", ""
-        first = Column("coordinate", lambda row: f"{symbol(row['name'])} ({row['unit']})")
+    named = in_signs if results.of_the_paper else symbol
+    first = Column(head, lambda row: f"{named(row['name'])} ({row['unit']})")
     beside = (
         Column(title, key, partial(number, digits=3 if "percent" in key else 6), numeric=True)
         for key, title in words.terms("adjustment.starts", results.of_the_paper).items()
@@ -111,7 +99,7 @@ GAIT_LINES = (
         Column(f"energy lost {said}", partial(lost, channel), partial(quantity, unit="J"))
         for channel, (said, _) in LOST.items()
     ),
-    *works("work of", number),
+    *works(number),
 )
 
 
@@ -135,7 +123,7 @@ MARGIN_COLUMNS = (
 
 def margins_table(summary: Summary) -> Table:
     """How far the start may be scaled."""
-    rows = [{"name": name, **margin} for name, margin in summary["adjustment"]["margins"].items()]
+    rows = [{"name": name, **margin} for name, margin in (summary["adjustment"].get("margins") or {}).items()]
     return table("How far the start's velocities may change", MARGIN_COLUMNS, rows)
 
 
@@ -143,12 +131,7 @@ WALK_COLUMNS = (
     Column("walk", "walk"),
     Column("outcome", "outcome", lambda outcome: Cell(outcome, tone(outcome))),
     Column("steps", "steps", numeric=True),
-    Column(
-        "numerical error of a period (s)",
-        lambda walk: walk.get("numerical_error", {}).get("step_period_s"),
-        partial(number, digits=1),
-        numeric=True,
-    ),
+    measured("numerical error of a period", "numerical_error/step_period_s", partial(number, digits=1)),
 )
 
 

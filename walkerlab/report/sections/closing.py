@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 
 from walkerlab.config.drives import drives_of
-from walkerlab.report.blocks import CASES, COSTS, PAPER, Cards, PageBlock, Paragraph, Section, Terms
+from walkerlab.report.blocks import CASES, COSTS, PAPER, Cards, Paragraph, Section, Terms
 from walkerlab.report.numbers import count, listed
 from walkerlab.report.results import Results
 from walkerlab.report.tables import Column, table
@@ -24,9 +24,9 @@ def further(results: Results, pages: Mapping[str, Sequence[Section]]) -> Section
     for file, found in pages.items():
         silent = file == PAPER and not results.of_the_paper
         items.append((file, TITLES[file], "" if silent else " ".join(filter(None, (one.finding for one in found)))))
-    blocks: list[PageBlock] = [Cards(tuple(items))] if items else []
-    blocks += [Paragraph(words("closing.pending", name), "waiting") for name in results.pending]
-    return Section("further", "Further pages" if items else "Still to come", tuple(blocks)) if blocks else None
+    waiting = (Paragraph(words("closing.pending", name), "waiting") for name in results.pending)
+    title = "Further pages" if items else "Still to come"
+    return Section.of("further", title, (Cards(tuple(items)) if items else None, *waiting))
 
 
 def glossary(results: Results) -> Section:
@@ -35,16 +35,15 @@ def glossary(results: Results) -> Section:
     return Section("glossary", "Glossary", (Terms(told),), "The words of this report, in a line each.")
 
 
-def left_out(results: Results) -> Section:
+def left_out(results: Results) -> Section | None:
     """Results that were not computed, and parts of results that were left out."""
     parts = [LeftOut(**one) for stored in results.stored.values() for one in stored.summary.get("left_out", [])]
     rows = list(rows_of(list(dict.fromkeys((*results.absent, *parts)))))
-    if not rows:
-        said = Paragraph("Nothing is left out: every result of the pipeline is there.")
-        return Section("left-out", "Left out", (said,), "Nothing.")
     columns = [Column("what"), Column("why", wide=True), Column("saves", wide=True)]
     missing = table("What was left out of this scene, why, and what that saves", columns, rows, wordy=True)
-    return Section("left-out", "Left out", (missing,), f"{count(len(rows), 'thing')}, each with its reason.")
+    nothing = Paragraph("" if rows else "Nothing is left out: every result of the pipeline is there.")
+    finding = f"{count(len(rows), 'thing')}, each with its reason." if rows else "Nothing."
+    return Section.of("left-out", "Left out", (missing, nothing), finding)
 
 
 def rows_of(missing: Sequence[LeftOut]) -> Iterator[tuple[str, str, str]]:
@@ -53,12 +52,9 @@ def rows_of(missing: Sequence[LeftOut]) -> Iterator[tuple[str, str, str]]:
     # the reason at the bottom of one such as 'it needs simulate: it needs fixedpoint: no gait'
     causes = {absent.why: min(filter(absent.why.endswith, reasons), key=len) for absent in missing}
     for why in dict.fromkeys(causes.values()):
-        first = listed(absent.what for absent in missing if absent.why == why)
-        yield (
-            first,
-            why,
-            "; ".join(dict.fromkeys(absent.saves for absent in missing if absent.why == why and absent.saves)),
-        )
+        alike = [absent for absent in missing if absent.why == why]
+        first = listed(absent.what for absent in alike)
+        yield first, why, "; ".join(dict.fromkeys(absent.saves for absent in alike if absent.saves))
         further = listed(absent.what for absent in missing if absent.why != why and causes[absent.why] == why)
         if further:
             yield further, f"needs {first}", ""

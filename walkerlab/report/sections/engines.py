@@ -6,9 +6,9 @@ from typing import Any
 
 from walkerlab.benchmarks.engines import rows as engines
 from walkerlab.benchmarks.engines.rows import OWN_LAW, SAME_LAW
-from walkerlab.report.blocks import PageBlock, Paragraph, Section, Statement, Statements
+from walkerlab.report.blocks import Paragraph, Section, Statement, Statements
 from walkerlab.report.numbers import NONE, fixed, number, power_of_ten
-from walkerlab.report.results import Results
+from walkerlab.report.results import Results, of_stage
 from walkerlab.report.tables import Column, Table, grouped, measured, table
 from walkerlab.report.words import words
 
@@ -16,11 +16,9 @@ ABOUT = {SAME_LAW: "same law", OWN_LAW: "own contact"}
 Row = Mapping[str, Any]
 
 
-def section(results: Results) -> Section | None:
+@of_stage("engines", "rows")
+def section(_results: Results, summary: Row) -> Section | None:
     """Conclusions in words, then a table for each experiment; None if the stage did not run."""
-    summary = results.summary("engines")
-    if not summary.get("rows"):
-        return None
     concluded = [
         Statement(f"{scene}, {ABOUT[experiment]}", text)
         for scene, told in summary["conclusions"].items()
@@ -37,19 +35,16 @@ def section(results: Results) -> Section | None:
             gait = {"period_s": reference["rigid_period_s"], "step_length_m": reference["rigid_step_length_m"]}
             own_law[scene].insert(0, {"engine": "rigid", "integrator": "gait", "start": 1.0, "slip_m": 0.0, **gait})
     limits = [[name, "; ".join(told) + "."] for name, told in summary["cannot_express"].items()]
-    blocks: list[PageBlock] = [
+    blocks = (
         Paragraph(words("engines.introduction", summary["versions"])),
         Statements(tuple(concluded)),
         table("ADAMS's law in each engine's integrators", SAME_LAW_COLUMNS, same_law, note=words("engines.same_law")),
         table("The walk on each engine's own contact", OWN_LAW_COLUMNS, own_law, note=words("engines.own_law")),
-    ]
-    if tuned := summary["tuning"]:
-        blocks.append(table("Tuning of the engines' own contact", TUNING_COLUMNS, tuned, note=words("engines.tuning")))
-    blocks += [
+        table("Tuning of the engines' own contact", TUNING_COLUMNS, summary["tuning"], note=words("engines.tuning")),
         swings(summary["swings"]),
         table("What the engines cannot express", LIMIT_COLUMNS, limits, wordy=True),
-    ]
-    return Section("engines", "In other engines", tuple(blocks))
+    )
+    return Section.of("engines", "In other engines", blocks)
 
 
 def engine_and_integrator(row: Row) -> str:
@@ -106,11 +101,8 @@ LIMIT_COLUMNS = (Column("engine"), Column("cannot express", wide=True))
 
 def swings(runs: Sequence[Row]) -> Table:
     """The hinged walker's swing: of each integrator the finest run, with the orders observed on the way to it."""
-    found: dict[tuple[str, ...], list[Row]] = {}
-    for run in runs:
-        found.setdefault((run["scene"], run["engine"], run["integrator"]), []).append(run)
     finest = []
-    for swung in found.values():
+    for swung in grouped(runs, "scene", "engine", "integrator").values():
         orders = ", ".join(number(run["order"], 3) for run in swung if run["order"] is not None)
         finest.append({**min(swung, key=lambda run: float(run["error"])), "orders": orders or "adapted"})
     return table("Without contact: a swing in each integrator", SWING_COLUMNS, finest, note=words("engines.swings"))

@@ -9,29 +9,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walkerlab.labels import in_words, with_unit
-from walkerlab.report.blocks import Diagram, GaitMark, PageBlock, Paragraph, Section, Walker
+from walkerlab.report.blocks import Diagram, GaitMark, Paragraph, Section, Walker
 from walkerlab.report.gaits import complex_number
 from walkerlab.report.numbers import number, whole
-from walkerlab.report.results import Results
+from walkerlab.report.results import Results, of_stage
 from walkerlab.report.tables import Column, Table, table
 from walkerlab.report.tracks import sampling_gap, track_in
 from walkerlab.report.words import words
 from walkerlab.store.content import Group
 
 
-def section(results: Results) -> Section | None:
+@of_stage("continuation", "branches")
+def section(results: Results, summary: Mapping[str, Any]) -> Section | None:
     """Branches, their bifurcations and the chaos beyond; None if none were followed."""
-    summary = results.summary("continuation")
-    if not summary.get("branches"):
-        return None
     first, *others = findings(summary) or [words("families.followed", summary["branches"])]
-    blocks: list[PageBlock] = [Paragraph(" ".join(others))] if others else []
-    diagram = gait_diagram(results)
-    if diagram is not None:
-        blocks.append(diagram)
-    if summary["bifurcations"]:
-        blocks.append(bifurcations(summary))
-    return Section("families", f"Families of gaits over {parameter(summary)}", tuple(blocks), first)
+    blocks = (Paragraph(" ".join(others)), gait_diagram(results), bifurcations(summary))
+    return Section.of("families", f"Families of gaits over {parameter(summary)}", blocks, first)
 
 
 def findings(summary: Mapping[str, Any]) -> list[str]:
@@ -119,7 +112,7 @@ def gait_diagram(results: Results) -> Diagram | None:
             name = words("families.mark", int(motion.attrs["steps"]), x, unit, stable)
             strikes = motion["time"][1:][np.diff(motion["step"]) > 0].round(6)
             walker = Walker(name, MODEL, track.thinned(gap), tuple(strikes.tolist()), (), pushes=pushes)
-            marks.append(GaitMark(across.place(x), up.place(y), name, stable, walker, float(motion.attrs["slope_rad"])))
+            marks.append(GaitMark(across.place(x), up.place(y), stable, walker, float(motion.attrs["slope_rad"])))
     over = parameter(summary)
     return Diagram(
         title=f"Gaits over {over}",
@@ -161,16 +154,11 @@ ATTRACTOR_COLUMNS = (
 )
 
 
-def basin(results: Results) -> Section | None:
+@of_stage("basin")
+def basin(_results: Results, summary: Mapping[str, Any]) -> Section | None:
     """What the basin came to; None if it was not asked for."""
-    summary = results.summary("basin")
-    if not summary:
-        return None
     told = (words("basin.shares", summary), *words.parts("basin.grounds", summary))
-    blocks: list[PageBlock] = [Paragraph(said) for said in told]
-    if summary["attractors"]:
-        blocks.append(attractors(summary))
-    return Section("basin", "Basins of attraction", tuple(blocks))
+    return Section.of("basin", "Basins of attraction", (*map(Paragraph, told), attractors(summary)))
 
 
 def attractors(summary: Mapping[str, Any]) -> Table:

@@ -1,35 +1,32 @@
 """The periodic gait: its fixed point and multipliers under both sets of equations, and all gaits that were found."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from walkerlab.report.blocks import PageBlock, Paragraph, Section
+from walkerlab.report.blocks import Paragraph, Section
 from walkerlab.report.gaits import SETS, STATE, gait_table, state_at, symbol
 from walkerlab.report.numbers import fixed
-from walkerlab.report.results import Results
+from walkerlab.report.results import Results, of_stage
 from walkerlab.report.tables import Column, Table, measured, table
 from walkerlab.report.words import words
 
 
-def section(results: Results) -> Section | None:
+@of_stage("fixedpoint")
+def section(results: Results, summary: Mapping[str, Any]) -> Section | None:
     """The gait of this walker on this slope."""
-    summary = results.summary("fixedpoint")
-    if not summary:
-        return None
     names = summary.get("state_names", STATE)
     shown = SETS if results.of_the_paper else (summary["equations"],)
     sets = summary.get("equation_sets", {summary.get("equations"): summary})
     found = {name: sets[name] for name in shown if name in sets}
-    blocks: list[PageBlock] = [Paragraph(words("gait.disturbances", summary))]
-    if gaits := {name: one for name, one in found.items() if one.get("state")}:
-        note = words("gait.equations") if len(gaits) > 1 else ""
-        blocks.append(replace(gait_table(gaits, names), note=note))
+    gaits = {name: one for name, one in found.items() if one.get("state")}
     every = {name: one["gaits"] for name, one in found.items() if one.get("gaits")}
-    if any(len(one) > 1 for one in every.values()):
-        blocks.append(every_gait(every, names))
-    return Section("gait", "The gait", tuple(blocks), words("gait.finding", summary))
+    blocks = (
+        Paragraph(words("gait.disturbances", summary)),
+        gait_table(gaits, names, note=words("gait.equations") if len(gaits) > 1 else "") if gaits else None,
+        every_gait(every, names) if any(len(one) > 1 for one in every.values()) else None,
+    )
+    return Section.of("gait", "The gait", blocks, words("gait.finding", summary))
 
 
 def every_gait(sets: Mapping[str, Sequence[Mapping[str, Any]]], names: Sequence[str]) -> Table:

@@ -2,7 +2,7 @@
 
 from functools import partial
 
-from walkerlab.report.blocks import PageBlock, Section
+from walkerlab.report.blocks import Section
 from walkerlab.report.numbers import number
 from walkerlab.report.results import Results
 from walkerlab.report.tables import Column, measured, table
@@ -24,13 +24,8 @@ RELEASE_COLUMNS = (
     measured("period", "period_s"),
     measured("length", "length_m", partial(number, digits=4)),
     measured("knee locks after", "knee_strike_s", partial(number, digits=4)),
-    Column(
-        "knee strikes (J a step)",
-        lambda walk: (walk.get("dissipated_J_per_step") or {}).get("knee_strikes"),
-        partial(number, digits=3),
-        numeric=True,
-    ),
-    Column("rigid period (s)", lambda walk: (walk.get("rigid") or {}).get("period_s"), number, numeric=True),
+    Column("knee strikes (J a step)", "dissipated_J_per_step/knee_strikes", partial(number, digits=3), numeric=True),
+    measured("rigid period", "rigid/period_s"),
 )
 
 
@@ -42,13 +37,14 @@ def section(results: Results) -> Section | None:
         return None
     rows = [(said, angle[key], velocity.get(key)) for key, said in words.terms("models.ways").items() if key in angle]
     note = words("models.differences", summary.get("orbit_distance"))
-    blocks: list[PageBlock] = [table("Largest differences of the legs’ motions", DIFFERENCE_COLUMNS, rows, note=note)]
-    if releases := summary.get("releases"):
-        walks = [{**walk, "released": RELEASED[name]} for name, walk in releases.items()]
+    walks = [{**walk, "released": RELEASED[name]} for name, walk in summary.get("releases", {}).items()]
+    if walks:
         walks.insert(0, {**summary["steps"]["gait"], "released": "rigid gait"})
-        note = words("models.releases")
-        blocks.append(table("What the instant of release decides", RELEASE_COLUMNS, walks, note=note))
-    return Section("models", "The models compared", tuple(blocks), words("models.finding", angle))
+    blocks = (
+        table("Largest differences of the legs’ motions", DIFFERENCE_COLUMNS, rows, note=note),
+        table("What the instant of release decides", RELEASE_COLUMNS, walks, note=words("models.releases")),
+    )
+    return Section.of("models", "The models compared", blocks, words("models.finding", angle))
 
 
 def departure(results: Results) -> str:

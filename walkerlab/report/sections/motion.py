@@ -22,8 +22,7 @@ STILL_VIEW_OF_RIGID = 4e-3
 
 def section(results: Results) -> Section | None:
     """The player; None if no motion was stored."""
-    shown = player(results)
-    return None if shown is None else Section("motion", "The walk", (shown,))
+    return Section.of("motion", "The walk", (player(results),))
 
 
 def player(results: Results, most: int = MAX_STEPS) -> Player | None:

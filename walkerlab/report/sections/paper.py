@@ -6,7 +6,7 @@ from functools import partial
 from typing import Any
 
 from walkerlab.labels import with_unit
-from walkerlab.report.blocks import PAPER, PageBlock, Paragraph, Section, Statement, Statements
+from walkerlab.report.blocks import PAPER, Paragraph, Section, Statement, Statements
 from walkerlab.report.numbers import count, number
 from walkerlab.report.results import Results
 from walkerlab.report.symbols import in_signs
@@ -29,12 +29,11 @@ def numbers(results: Results) -> Section | None:
         return None
     meanings = words.terms("paper.verdicts").items()
     told = tuple(Statement(f"{name.capitalize()}:", meaning, tone=TONES[name]) for name, meaning in meanings)
-    blocks: tuple[PageBlock, ...] = (Statements(told, "lines"), numbers_table(rows))
-    if results.departures:
-        blocks = (Paragraph(words("paper.departs", results.departures), "fair"), *blocks)
+    departs = words("paper.departs", results.departures) if results.departures else ""
+    blocks = (Paragraph(departs, "fair"), Statements(told, "lines"), numbers_table(rows))
     verdicts = Counter(row["verdict"] for row in rows)
     finding = words("paper.finding", {name: verdicts[name] for name in TONES})
-    return Section("paper-numbers", "The paper’s numbers", blocks, finding, PAPER)
+    return Section.of("paper-numbers", "The paper’s numbers", blocks, finding, PAPER)
 
 
 def numbers_table(rows: Sequence[Row]) -> Table:
@@ -65,12 +64,11 @@ def paper_numbers(results: Results) -> Sequence[Row]:
 def tables(results: Results) -> Section | None:
     """The tables that there are."""
     summary, notes = results.summary("compare"), words.terms("paper.notes")
-    shown: list[PageBlock] = [
-        paper_table(caption, summary[key], notes.get(key, ""))
+    shown = (
+        paper_table(caption, summary.get(key) or {}, notes.get(key, ""))
         for key, caption in words.terms("paper.tables").items()
-        if summary.get(key)
-    ]
-    return Section("tables", "The paper’s tables", tuple(shown), page=PAPER) if shown else None
+    )
+    return Section.of("tables", "The paper’s tables", shown, page=PAPER)
 
 
 def paper_table(caption: str, rows: Mapping[str, Row], note: str) -> Table:
@@ -98,11 +96,9 @@ ERRATUM_COLUMNS = [Column(head, name, in_signs, wide=name != "where") for name, 
 def errors(results: Results) -> Section | None:
     """The errata, each with what it was measured by."""
     rows = errata(results)
-    if not rows:
-        return None
     found = table("What is printed, and what is right", ERRATUM_COLUMNS, rows, wordy=True)
     finding = f"{count(len(rows), 'error')} and gaps of the paper, each with its evidence."
-    return Section("errata", "Errata of the paper", (found,), finding, PAPER)
+    return Section.of("errata", "Errata of the paper", (found,), finding, PAPER)
 
 
 def errata(results: Results) -> Sequence[Row]:

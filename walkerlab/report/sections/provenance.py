@@ -1,30 +1,28 @@
 """Where the numbers come from: config, software, machine, and what determines each result."""
 
+from collections.abc import Sequence
+
 from walkerlab.config.writer import to_yaml
-from walkerlab.report.blocks import Code, PageBlock, Section
+from walkerlab.report.blocks import Code, Section
 from walkerlab.report.results import Results
 from walkerlab.report.tables import Column, Table, side_by_side, table
 from walkerlab.report.words import words
 from walkerlab.store.artifact import Stored
 
 
-def section(results: Results) -> Section:
+def section(results: Results) -> Section | None:
     """Config, and provenance of each result."""
-    blocks: list[PageBlock] = [Code("The config of this run, defaults included", to_yaml(results.config).strip())]
-    made = files(results)
-    if made:
-        note = "A key is made of config, inputs and code; equal keys give equal digests. Timings are in neither."
-        digests = table("What determines each result, and what it holds", DIGEST_COLUMNS, made, note=note)
-        blocks += [table("When each result was made", RESULT_COLUMNS, made), software_table(results), digests]
-        commands = dict.fromkeys(result.provenance.command_line for result in made)
-        blocks.append(Code("Command lines", "\n".join(commands)))
+    made = [result for result in results.stored.values() if isinstance(result, Stored)]  # read from files
+    note = "A key is made of config, inputs and code; equal keys give equal digests. Timings are in neither."
+    blocks = (
+        Code("The config of this run, defaults included", to_yaml(results.config).strip()),
+        table("When each result was made", RESULT_COLUMNS, made),
+        software_table(made),
+        table("What determines each result, and what it holds", DIGEST_COLUMNS, made, note=note),
+        Code("Command lines", "\n".join(dict.fromkeys(result.provenance.command_line for result in made))),
+    )
     finding = words("closing.provenance", [result.provenance for result in made])
-    return Section("provenance", "Where this comes from", tuple(blocks), finding)
-
-
-def files(results: Results) -> list[Stored]:
-    """The results that were read from files."""
-    return [result for result in results.stored.values() if isinstance(result, Stored)]
+    return Section.of("provenance", "Where this comes from", blocks, finding)
 
 
 RESULT_COLUMNS = (
@@ -43,13 +41,13 @@ DIGEST_COLUMNS = (
 )
 
 
-def software_table(results: Results) -> Table:
+def software_table(made: Sequence[Stored]) -> Table:
     """Versions, and the machine; more than one column only if results differ."""
     used: dict[tuple[tuple[str, str], ...], list[str]] = {}
-    for result in files(results):
-        made = result.provenance
-        versions = {"walkerlab": made.package_version, "commit": made.git_commit or "unknown"}
-        versions |= {**dict(sorted(made.library_versions.items())), "platform": made.platform}
+    for result in made:
+        origin = result.provenance
+        versions = {"walkerlab": origin.package_version, "commit": origin.git_commit or "unknown"}
+        versions |= {**dict(sorted(origin.library_versions.items())), "platform": origin.platform}
         used.setdefault(tuple(versions.items()), []).append(result.identity.stage)
     columns = {", ".join(stages) if len(used) > 1 else "version": dict(versions) for versions, stages in used.items()}
     lines = [Column(name, name) for name in dict.fromkeys(name for versions in columns.values() for name in versions)]

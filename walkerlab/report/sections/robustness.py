@@ -5,7 +5,7 @@ from typing import Any
 
 from walkerlab.report.blocks import PageBlock, Paragraph, Section
 from walkerlab.report.numbers import length, number, whole
-from walkerlab.report.results import Results
+from walkerlab.report.results import Results, of_stage
 from walkerlab.report.tables import Column, Table, table
 from walkerlab.report.words import words
 
@@ -27,12 +27,8 @@ BOUND = {"lower-bound": "> "}
 ROUGH = (
     MODEL,
     Column("roughness", "roughness_m", length, numeric=True),
-    Column(
-        "mean steps",
-        lambda row: BOUND.get(row["method"], "") + number(row["mean_steps"], 4),
-        numeric=True,
-    ),
-    Column("standard error", lambda row: row.get("standard_error"), lambda value: number(value, 2), numeric=True),
+    Column("mean steps", lambda row: BOUND.get(row["method"], "") + number(row["mean_steps"], 4), numeric=True),
+    Column("standard error", "standard_error", lambda value: number(value, 2), numeric=True),
     Column("walks", "walks", whole, numeric=True),
     Column("cut off", "capped", whole, numeric=True),
     Column("at step", "cut_off_at", whole, numeric=True),
@@ -63,44 +59,35 @@ KEPT = (
 def designed(summary: Mapping[str, Any]) -> list[str | Table]:
     """Where the optimum of a design lies, and what of it."""
     rows = [{"to": key, "best": value} for key, value in summary["best"].items()]
-    found: list[str | Table] = [*words.parts("design.findings", summary), table("Optimum", BEST, rows)]
-    return [*found, table("Kept within bounds", KEPT, summary["constraints"])] if summary["constraints"] else found
+    kept = table("Kept within bounds", KEPT, summary["constraints"])
+    return [*words.parts("design.findings", summary), table("Optimum", BEST, rows), kept]
 
 
-def section(results: Results) -> Section | None:
+@of_stage("robustness", "gaits")
+def section(_results: Results, summary: Mapping[str, Any]) -> Section | None:
     """The answer; None if it was not asked for."""
-    summary = results.summary("robustness")
-    if not summary.get("gaits"):
-        return None
     first, *others = findings(summary) or [""]
-    blocks: list[PageBlock] = [Paragraph(" ".join(others))] if others else []
-    return Section("robustness", "What the gait withstands", (*blocks, *tables(summary)), first)
+    blocks: tuple[PageBlock, ...] = (Paragraph(" ".join(others)), *tables(summary))
+    return Section.of("robustness", "What the gait withstands", blocks, first)
 
 
 def findings(summary: Mapping[str, Any]) -> list[str]:
     """What there is to say, sentence by sentence."""
     first: dict[str, Mapping[str, Any]] = {}
     for row in summary["sensitivity"]:
-        if (
-            row["of"] == "gait_sensitivity_norm"
-            and row["to"].startswith(BUILT)
-            and "relative" in row
-            and not row.get("why")
-        ):
+        told = "relative" in row and not row.get("why")
+        if told and row["of"] == "gait_sensitivity_norm" and row["to"].startswith(BUILT):
             first.setdefault(row["model"], row)
     return words.parts("robustness.findings", summary, [*first.values()])
 
 
 def tables(summary: Mapping[str, Any]) -> list[Table]:
     """Norms, rough ground and what moves the gait."""
-    found = []
-    if norms := summary["gait_sensitivity_norm"]:
-        found.append(table("Gait sensitivity norms", NORMS, norms, note=words("robustness.norms")))
-    if summary["rough_ground"]:
-        found.append(table("Steps on rough ground", ROUGH, summary["rough_ground"], note=words("robustness.rough")))
     moving = [row for row in summary["sensitivity"] if row.get("relative") is not None and not row.get("why")]
-    if moving:
-        moving.sort(key=lambda row: -abs(row["relative"]))  # of both models
-        left = len(summary["sensitivity"]) - len(moving[:SHOWN])
-        found.append(table("What moves the gait", MOVES, moving[:SHOWN], note=words("robustness.moves", left)))
-    return found
+    shown = sorted(moving, key=lambda row: -abs(row["relative"]))[:SHOWN]  # of both models
+    left = len(summary["sensitivity"]) - len(shown)
+    return [
+        table("Gait sensitivity norms", NORMS, summary["gait_sensitivity_norm"], note=words("robustness.norms")),
+        table("Steps on rough ground", ROUGH, summary["rough_ground"], note=words("robustness.rough")),
+        table("What moves the gait", MOVES, shown, note=words("robustness.moves", left)),
+    ]

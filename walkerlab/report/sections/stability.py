@@ -7,7 +7,7 @@ from typing import Any
 
 from walkerlab.report.blocks import CASES, Gallery, PageBlock, Paragraph, Section
 from walkerlab.report.numbers import count, number, whole
-from walkerlab.report.results import Results
+from walkerlab.report.results import Results, of_stage
 from walkerlab.report.tables import Cell, Column, Table, Tone, grouped, measured, table
 from walkerlab.report.words import words
 from walkerlab.verification.verdict import BUDGET_USED
@@ -18,27 +18,24 @@ Row = Mapping[str, Any]
 Rows = Sequence[Row]
 
 
-def section(results: Results) -> Section | None:
+@of_stage("stability")
+def section(results: Results, summary: Row) -> Section | None:
     """The stability table; None if the stage did not run."""
-    summary = results.summary("stability")
-    if not summary:
-        return None
     cases, known = summary["cases"], summary["known"]
-    unanswered = [(row["second_tried"], row) for row in cases if row["second_tried"]]
-    missed = [(f"{one['measure']}: {one['why']}", row) for row in cases for one in row["not_measured"]]
+    unanswered = [{**row, "why": row["second_tried"]} for row in cases if row["second_tried"]]
+    missed = [{**row, "why": f"{one['measure']}: {one['why']}"} for row in cases for one in row["not_measured"]]
     note = words("stability.cases", by_reason(unanswered), by_reason(missed))
-    blocks: list[PageBlock] = [
+    planes = results.summary("stability-maps")
+    blocks: tuple[PageBlock, ...] = (
         *(Paragraph(said, "bad") for said in failures(summary)),
         Paragraph(words("stability.judgement")),
         table("Extreme cases", CASE_COLUMNS, grouped(cases, "family"), wordy=True, note=note),
         table("Problems with known answers, run through the contact code", KNOWN_COLUMNS, known, wordy=True),
-    ]
-    if summary["ordinary"]:
-        blocks.append(ordinary_table(summary))
-    planes = results.summary("stability-maps")
-    blocks.append(Paragraph(words("stability.maps", planes) if planes else words("stability.how_to_map")))
-    blocks += [Gallery((picture,)) for picture in results.pictures if picture.name.startswith("stability")]
-    return Section("stability", "Stiff and extreme cases", tuple(blocks), finding(summary), CASES)
+        ordinary_table(summary),
+        Paragraph(words("stability.maps", planes) if planes else words("stability.how_to_map")),
+        *(Gallery((picture,)) for picture in results.pictures if picture.name.startswith("stability")),
+    )
+    return Section.of("stability", "Stiff and extreme cases", blocks, finding(summary), CASES)
 
 
 def finding(summary: Row) -> str:
@@ -71,12 +68,9 @@ CASE_COLUMNS = (
 )
 
 
-def by_reason(reasons: Sequence[tuple[str, Row]]) -> str:
+def by_reason(cases: Rows) -> str:
     """Each reason once, with the cases that it holds for."""
-    names: dict[str, list[str]] = {}
-    for reason, row in reasons:
-        names.setdefault(reason, []).append(str(row["name"]))
-    return "; ".join(f"{reason} ({', '.join(cases)})" for reason, cases in names.items())
+    return "; ".join(f"{why} ({', '.join(row['name'] for row in rows)})" for why, rows in grouped(cases, "why").items())
 
 
 def family_table(cases: Rows) -> Table:

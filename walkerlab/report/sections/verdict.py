@@ -17,24 +17,23 @@ from walkerlab.report.tables import Tone
 from walkerlab.report.words import words
 
 
-def section(results: Results) -> Section:
+def section(results: Results) -> Section | None:
     """What a reader should know who reads no further."""
-    blocks: list[PageBlock] = [Paragraph(failure, "bad") for failure in failures(results)]
     rows = paper_numbers(results) if results.of_the_paper else ()
     walked = {model.lower(): summary for stage, model in MODELS.items() if (summary := results.summary(stage))}
-    if walked:  # what holds, what fails and what follows
-        verdicts = Counter(row["verdict"] for row in rows)
-        misprint = any(erratum["where"].startswith("A.5") for erratum in errata(results))
-        said = words(
-            "verdict.opening", walked, results.summary("fixedpoint"), verdicts, misprint, drives_of(results.config)
-        )
-        blocks.append(Paragraph(said))
-    fared = sorted(how_all_fared(results), key=lambda found: found.tone != "bad")
-    if fared:
-        blocks.append(Statements(tuple(fared), "cards"))
-    if departs := departure(results):
-        blocks.append(Paragraph(departs))
-    return Section("verdict", "Verdict", tuple(blocks) or (Paragraph("There are no results to judge."),))
+    verdicts = Counter(row["verdict"] for row in rows)
+    misprint = any(erratum["where"].startswith("A.5") for erratum in errata(results))
+    # what holds, what fails and what follows
+    found = results.summary("fixedpoint"), verdicts, misprint
+    said = words("verdict.opening", walked, *found, drives_of(results.config)) if walked else ""
+    fared = sorted(how_all_fared(results), key=lambda one: one.tone != "bad")
+    blocks = (
+        *(Paragraph(failure, "bad") for failure in failures(results)),
+        Paragraph(said),
+        Statements(tuple(fared), "cards") if fared else None,
+        Paragraph(departure(results)),
+    )
+    return Section.of("verdict", "Verdict", blocks if any(blocks) else (Paragraph("There are no results to judge."),))
 
 
 def printed(results: Results) -> Section | None:

@@ -6,22 +6,21 @@ from typing import Any
 
 from walkerlab.account import CHANNELS
 from walkerlab.labels import ERROR_OF_EACH_STEP
-from walkerlab.report.blocks import PageBlock, Paragraph, Section
+from walkerlab.report.blocks import Paragraph, Section
 from walkerlab.report.gaits import GIVEN_BY
 from walkerlab.report.numbers import NONE, decimals_left, fixed, length, number, power_of_ten, quantity, span, whole
 from walkerlab.report.outcomes import CONTACT, MODELS, RIGID, tone
-from walkerlab.report.results import Results
+from walkerlab.report.results import Results, of_stage
 from walkerlab.report.tables import Cell, Column, table
 from walkerlab.report.words import words
 
 QUANTITY_COLUMNS = (Column("quantity"), Column("value", numeric=True), Column("meaning", wide=True))
 
 
-def contact(results: Results) -> Section | None:
+@of_stage(CONTACT)
+def contact(results: Results, summary: Mapping[str, Any]) -> Section | None:
     """The contact model on its ground: how it stands, walks, slips and loses energy."""
-    summary, ground = results.summary(CONTACT), results.config.contact
-    if not summary:
-        return None
+    ground = results.config.contact
     said = "" if ground is None else words("walks.ground", ground, ground.in_si(), summary)
     numbers = table("The contact model's walk", QUANTITY_COLUMNS, contact_rows(summary), wordy=True)
     residual = joules(summary["energy_balance_residual_J"])
@@ -78,12 +77,10 @@ def assumptions(results: Results) -> Section | None:
         if summary.get(key) is not None and not (key == "energy_drift_J" and works):
             (assumption, _, measured), (value, verdict) = said.partition(": "), judgement(key, summary, results)
             judged.append({"assumption": assumption, "measured": measured, "value": value, "verdict": verdict})
-    if not judged:
-        return None
     where = " (sections 3.1 and 3.2)" if results.of_the_paper else ""
     caption = f"What the rigid model assumes{where}, and what its walk says"
     shown = table(caption, ASSUMPTION_COLUMNS, judged, wordy=True)
-    return Section("assumptions", "Assumptions, checked", (shown,), words("walks.assumptions", judged))
+    return Section.of("assumptions", "Assumptions, checked", (shown,), words("walks.assumptions", judged))
 
 
 def judgement(key: str, summary: Mapping[str, Any], results: Results) -> tuple[str, Cell]:
@@ -126,13 +123,14 @@ def steps(results: Results) -> Section | None:
     shown = taken if others <= 0 else [*taken[:FIRST], *taken[-LAST:]]
     columns = [Column("step", numeric=True), *(Column(SERIES[one], numeric=True) for one in found)]
     note = words("walks.steps", FIRST, others)
-    blocks: list[PageBlock] = [table("Periods and lengths of the steps", columns, shown, note=note)]
     models = {stage: model.lower() for stage, model in MODELS.items()}
     errors = {models[stage]: error for stage in models if (error := results.summary(stage).get("numerical_error"))}
-    if errors:
-        blocks.append(Paragraph(words("error.of_models", errors)))
+    blocks = (
+        table("Periods and lengths of the steps", columns, shown, note=note),
+        Paragraph(words("error.of_models", errors) if errors else ""),
+    )
     periods = {models[stage]: values for (stage, key), values in found.items() if key == "step_periods_s"}
-    return Section("steps", "Step by step", tuple(blocks), words("walks.periods", periods))
+    return Section.of("steps", "Step by step", blocks, words("walks.periods", periods))
 
 
 def of_step(value: float | None, key: str, summary: Mapping[str, Any]) -> str:

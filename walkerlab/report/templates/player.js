@@ -111,7 +111,7 @@ function drawWalk(picture, scene, tracks, colours, back = 0) {
   c.clearRect(0, 0, width, height);
   const under = scene.pads.length ? -0.04 * scene.leg_m : 0;
   const levels = levelsOf(scene, hip - across, hip + across);
-  for (const [from, to, height] of levels) slab(from, to, height + under, -scene.leg_m, colours.ground);
+  for (const [from, to, height] of levels) slab(from, to, height, -scene.leg_m, colours.ground);
   c.globalAlpha = 0.55;
   for (const [from, to, leg] of scene.pads) {
     if (to > hip - across && from < hip + across) slab(from, to, 0, under, colours[`leg-${leg + 1}`]);
