@@ -23,7 +23,6 @@ from walkerlab.orbits.gradients import QUANTITIES, Gradient, gait_numbers, gradi
 from walkerlab.orbits.robustness import (
     DISTURBANCES,
     INDICATORS,
-    Scales,
     Sensitivity,
     Standpoint,
     largest_disturbance,
@@ -161,14 +160,12 @@ class Subject:
 
     config    whose scene it walks in
     z         (d,) the gait on the section
-    scales    of the walker
     length_m  of its steps
     """
 
     model: str
     config: ContactConfig
     z: Floats
-    scales: Scales
     length_m: float
 
     def at(self, parameter: Parameter = SLOPE, exact: bool = True) -> Standpoint:
@@ -180,22 +177,18 @@ class Subject:
             else contact_map(self.config, parameter, 1.0, self.length_m)
         )
         step_map = step_map if exact else step_map.at(QUICK[self.model])
-        return Standpoint(step_map, p, self.z, step_map.step(self.z, p).DP, self.scales)
+        _, units = unit_walker(rigid_walker(self.config, self.config.equations))
+        return Standpoint(step_map, p, self.z, step_map.step(self.z, p).DP, units)
 
 
 def subjects(config: RobustnessConfig, inputs: Mapping[str, Content], progress: Progress) -> Iterator[Subject]:
     """The models that are asked for."""
     progress.start("robustness: gaits")
     gait = inputs["fixedpoint"].summary
-    walker: Standing = rigid_walker(config, config.equations)
-    _, units = unit_walker(walker)
-    z = section_coordinates(walker, gait["state"])
-    scales, length = Scales(units.length, units.time, units.impulse), float(gait["step_length_m"])
     asked = config.robustness.model or (RIGID if config.contact is None else "both")
-    if asked != CONTACT:
-        yield Subject(RIGID, config, z, scales, length)
-    if asked != RIGID:
-        yield contact_subject(config, gait, scales, length, progress)
+    for model in (RIGID, CONTACT):
+        if asked in (model, "both"):
+            yield subject_of(model, config, gait, progress)
 
 
 def section_coordinates(walker: Standing, state: Sequence[float]) -> Floats:
@@ -206,10 +199,17 @@ def section_coordinates(walker: Standing, state: Sequence[float]) -> Floats:
     return z
 
 
-def contact_subject(
-    config: RobustnessConfig | DesignConfig, gait: Mapping[str, Any], scales: Scales, length: float, progress: Progress
+def subject_of(
+    model: str, config: RobustnessConfig | DesignConfig, gait: Mapping[str, Any], progress: Progress
 ) -> Subject:
-    """The contact model, off its pads; raises NoAnswer if it has no gait."""
+    """A model with its gait, the contact model off its pads; raises NoAnswer if it has none.
+
+    gait  summary of `fixedpoint`
+    """
+    length = float(gait["step_length_m"])
+    if model == RIGID:
+        z = section_coordinates(rigid_walker(config, config.equations), gait["state"])
+        return Subject(RIGID, config, z, length)
     # Imported here: the rigid model alone does without.
     from walkerlab.scene.contact import gait_off_pads, with_contact
 
@@ -222,7 +222,7 @@ def contact_subject(
         progress.note("robustness: the contact model is disturbed on after-mid-swing: pads would end its walks")
     length = found.gait.step.length_m
     z = contact_map(config, SLOPE, 1.0, length).of_section(found.gait.z)
-    return Subject(CONTACT, config, z, scales, length)
+    return Subject(CONTACT, config, z, length)
 
 
 def norms(model: str, here: Standpoint) -> Rows:
@@ -231,13 +231,14 @@ def norms(model: str, here: Standpoint) -> Rows:
     for disturbance in DISTURBANCES:
         answer = sensitivity(here, disturbance)
         if answer is not None:
-            rows += norm_rows(model, disturbance, answer, here.scales)
+            rows += norm_rows(model, disturbance, answer, here)
     return rows
 
 
-def norm_rows(model: str, disturbance: Any, answer: Sensitivity, scales: Scales) -> Rows:
+def norm_rows(model: str, disturbance: Any, answer: Sensitivity, here: Standpoint) -> Rows:
     """A row for each indicator of a disturbance."""
-    to_pure = scales.of_disturbance(disturbance) / scales.of_indicators
+    units = here.units
+    to_pure = here.unit_of(disturbance) / np.array((units.time, units.length, units.length / units.time))
     return [
         {
             "model": model,
