@@ -93,7 +93,7 @@ def question(config, key, model):
     ends = (value, 1.001 * value) if value else (0.0, 1e-15)
     if value and parameter.config_at(taken, ends[1]) is None:
         ends = (0.999 * value, value)
-    return FamilyQuestion(taken, parameter, ValueSpan(*ends), 1, 10)
+    return FamilyQuestion(taken, parameter, ValueSpan(*ends))
 
 
 def followed(asked):

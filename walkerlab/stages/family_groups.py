@@ -20,7 +20,7 @@ from walkerlab.orbits.shooting import on_section
 from walkerlab.orbits.similarity import unit_walker
 from walkerlab.orbits.step_map import Cycle, Monitor
 from walkerlab.scene.parameter import Parameter
-from walkerlab.scene.rigid import rigid_scene_on
+from walkerlab.scene.rigid import rigid_scene
 from walkerlab.solvers.registry import ENDLESS, Tolerances
 from walkerlab.solvers.system import Floats
 from walkerlab.stages.numerical_error import evenly_spread
@@ -189,7 +189,7 @@ def motion(point: Cycle, period: int, config: ContactConfig, parameter: Paramete
     changed = parameter.config_at(config, point.value)
     if changed is None:
         return
-    scene = rigid_scene_on(changed, Footholds(), TOLERANCES, ALL_OUTPUTS)
+    scene = rigid_scene(changed, Footholds(), ALL_OUTPUTS)
     unit, units = unit_walker(scene.walker)
     section, n = on_section(unit, point.z), len(scene.walker.arm_x)
     start = (*section[:n], *(rate / units.time for rate in section[n:]))

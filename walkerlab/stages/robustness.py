@@ -37,7 +37,7 @@ from walkerlab.pipeline.pieces import Piece, complete
 from walkerlab.pipeline.progress import Progress
 from walkerlab.scene.families import contact_map, rigid_map
 from walkerlab.scene.parameter import SLOPE_RAD, Parameter, parameter_of, why_no_parameter
-from walkerlab.scene.rigid import rigid_scene_on, rigid_walker
+from walkerlab.scene.rigid import rigid_scene, rigid_walker
 from walkerlab.solvers.registry import ENDLESS, Tolerances
 from walkerlab.solvers.system import Floats
 from walkerlab.stages.simulate import groups as groups_of_walk
@@ -61,9 +61,9 @@ COMPILED: Final = ()
 SLOPE: Final = Parameter(SLOPE_RAD, "rad", (SLOPE_RAD,))
 UNITS: Final = {"floor-drop": "m", "hip-push": "N s"}
 OF: Final = dict(zip(INDICATORS, ("s", "m", "m/s"), strict=True))
+MODEL: Final = {"model": Label("", "which model walks")}
 LABELS: Final[dict[str, dict[str, Label]]] = {
     "gait_sensitivity_norm": {
-        "model": Label("", "which model walks"),
         "disturbance": Label("", "what the first step is disturbed by"),
         "indicator": Label("", "what of the steps is measured"),
         "value": Label("SI", "gait sensitivity norm, in the units of indicator and disturbance"),
@@ -71,17 +71,14 @@ LABELS: Final[dict[str, dict[str, Label]]] = {
         "error": Label("SI", "of the norm, from quotients over two step sizes"),
     },
     "largest_step": {
-        "model": Label("", "which model walks"),
         "down_m": Label("m", "largest step down after which the walk goes on"),
         "up_m": Label("m", "largest step up after which the walk goes on"),
     },
     "largest_push": {
-        "model": Label("", "which model walks"),
         "forward_N_s": Label("N s", "largest push forward at the hip after which the walk goes on"),
         "backward_N_s": Label("N s", "largest push backward"),
     },
     "rough_ground": {
-        "model": Label("", "which model walks"),
         "roughness_m": Label("m", "standard deviation of the footholds' heights"),
         "mean_steps": Label("1", "mean number of steps to failure, or a bound from below"),
         "walks": Label("1", "walks"),
@@ -89,13 +86,12 @@ LABELS: Final[dict[str, dict[str, Label]]] = {
         "method": Label("", "how the mean was found"),
     },
     "sensitivity": {
-        "model": Label("", "which model walks"),
         "of": Label("", "what changes"),
         "to": Label("", "number of the config"),
         "value": Label("SI", "derivative, in the units of both", absent=np.nan),
     },
 }
-"""What is stored, row by row, of each part of the answer."""
+"""What is stored, row by row, of each part of the answer, beside the model."""
 
 
 def run(
@@ -126,7 +122,7 @@ def run(
         for name, rows in walked(subject.model, config, parts).items():
             found[name] += rows
         steps[subject.model] = steps_walked(subject.model, config, parts)
-    groups = {name: rows_group(found[name], labels, "row", "row") for name, labels in LABELS.items() if found[name]}
+    groups = {name: rows_group(found[name], MODEL | labels) for name, labels in LABELS.items() if found[name]}
     if steps and config.robustness.roughness_m:
         groups |= rough_steps(config, steps) | rough_walk(config, inputs)
     content = Content(groups, {**found, "steps": config.robustness.steps})
@@ -322,7 +318,7 @@ def rough_walk(config: RobustnessConfig, inputs: Mapping[str, Content]) -> dict[
     """The beginning of the first walk on the roughest ground, as the rigid model takes it, to be drawn."""
     gait = as_state(inputs["fixedpoint"].summary["state"])
     heights = np.random.default_rng((config.seed, 0)).normal(0.0, max(config.robustness.roughness_m), STEPS_DRAWN)
-    scene = rigid_scene_on(config, Footholds(heights_m=tuple(heights.tolist())), EXACT, ("states",))
+    scene = rigid_scene(config, Footholds(heights_m=tuple(heights.tolist())), ("states",))
     walk = scene.walk(gait, STEPS_DRAWN, EXACT, sampled=True)
     return {f"rough_walk/{name}": group for name, group in groups_of_walk(scene, walk).items()}
 
