@@ -124,7 +124,7 @@ def run(
         steps[subject.model] = steps_walked(subject.model, config, parts)
     groups = {name: rows_group(found[name], MODEL | labels) for name, labels in LABELS.items() if found[name]}
     if steps and config.robustness.roughness_m:
-        groups |= rough_steps(config, steps) | rough_walk(config, inputs)
+        groups |= {"rough_steps": rough_steps(config, steps), **rough_walk(config, inputs)}
     content = Content(groups, {**found, "steps": config.robustness.steps})
     if unstable:
         why = f"the gait of the {' and the '.join(unstable)} model is unstable: it has no sensitivity norm"
@@ -292,26 +292,18 @@ def steps_walked(model: str, config: RobustnessConfig, parts: Parts) -> Floats:
     return np.array([np.concatenate(row) for row in rows])
 
 
-def rough_steps(config: RobustnessConfig, steps: Mapping[str, Floats]) -> dict[str, Group]:
+def rough_steps(config: RobustnessConfig, steps: Mapping[str, Floats]) -> Group:
     """The steps of every walk, as they are stored."""
+    roughness, caps = np.array(config.robustness.roughness_m), np.array([cap(model, config) for model in steps])
     about = "steps that a walk took; one that went on to the last step that was looked at has as many"
-    return {
-        "rough_steps": Group(
-            {
-                "model": Variable(np.array([*steps]), ("model",), "", "which model walks"),
-                "roughness_m": Variable(
-                    np.array(config.robustness.roughness_m), ("roughness",), "m", "standard deviation of the heights"
-                ),
-                "cut_off_at": Variable(
-                    np.array([cap(model, config) for model in steps]),
-                    ("model",),
-                    "1",
-                    "the last step that was looked at",
-                ),
-                "steps": Variable(np.array([*steps.values()]), ("model", "roughness", "walk"), "1", about),
-            }
-        )
-    }
+    return Group(
+        {
+            "model": Variable(np.array([*steps]), ("model",), "", "which model walks"),
+            "roughness_m": Variable(roughness, ("roughness",), "m", "standard deviation of the heights"),
+            "cut_off_at": Variable(caps, ("model",), "1", "the last step that was looked at"),
+            "steps": Variable(np.array([*steps.values()]), ("model", "roughness", "walk"), "1", about),
+        }
+    )
 
 
 def rough_walk(config: RobustnessConfig, inputs: Mapping[str, Content]) -> dict[str, Group]:
