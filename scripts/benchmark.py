@@ -238,10 +238,10 @@ def newton_lines(watch: Stopwatch) -> Iterator[Line]:
 
 def family_lines(watch: Stopwatch) -> Iterator[Line]:
     """Families of gaits over slope: the rigid model's to period 16, and the contact model's to its first flip."""
-    config = load().config
-    rigid = FamilyQuestion(config, parameter_of("slope_rad", config), ValueSpan(1e-4, 0.1), periods=16, points=400)
+    config, undoubled = load().config, load(None, ["continuation.periods=1"]).config
+    rigid = FamilyQuestion(config, parameter_of("slope_rad", config), ValueSpan(1e-4, 0.1))
     yield at_most("rigid branches to period 16", watch(lambda: branches_of("rigid", rigid)), "s", 5.0, 2.5)
-    contact = FamilyQuestion(config, parameter_of("slope_deg", config), ValueSpan(0.2, 4.2), periods=1, points=400)
+    contact = FamilyQuestion(undoubled, parameter_of("slope_deg", undoubled), ValueSpan(0.2, 4.2))
     seconds = watch(lambda: branches_of("contact", contact))
     yield at_most("contact branch from 0.2 deg to beyond its first flip", seconds, "s", 60.0, 30.0)
 

@@ -54,12 +54,12 @@ def config_of(ground: Ground, *more: str, of: str = "paper") -> Config:
         "dynamic_friction": own.dynamic_friction * ground.rubbed,
     }
     sets = [f"contact.{name}={value!r}" for name, value in changed.items()]
-    return load(Path(of), [*sets, f"walker.foot_radius_m={ground.radius!r}", *more]).config
+    return load(Path(of), [*sets, f"walker.foot_radius_m={ground.radius!r}", "continuation.periods=1", *more]).config
 
 
 def question(config: Config) -> FamilyQuestion:
     """Gaits of one step over the slope."""
-    return FamilyQuestion(config, parameter_of("slope_deg", config), SPAN, periods=1, points=400)
+    return FamilyQuestion(config, parameter_of("slope_deg", config), SPAN)
 
 
 def flip(ground: Ground) -> float:
@@ -107,7 +107,7 @@ def main() -> None:
     parser.add_argument("--damping", type=float, default=1.0, help="power of the stiffness that the damping goes with")
     parser.add_argument("--frictions", type=float, nargs="+", default=[0.5, 1.0, 2.0], help="of its coefficients")
     asked = parser.parse_args()
-    rigid = flip_of("rigid", load().config)
+    rigid = flip_of("rigid", load(None, ["continuation.periods=1"]).config)
     print(f"rigid model: {rigid:.7f} deg")
     velocity, ball, point = asked.velocities[-1], asked.radii[0], asked.radii[-1]
     stiffer = [Ground(velocity, point, factor, factor**asked.damping) for factor in asked.factors]

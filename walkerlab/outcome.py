@@ -118,7 +118,7 @@ TOLD = {
     Outcome.REJECTED: OutcomeWords(
         "starts in a state that is not allowed",
         "began in a state that is not allowed",
-        "no walker has the parameter's next value, or its push-off is not over when the feet pass each other",
+        "its push-off is not over when the feet pass each other",
         "#FFFFFF",
         "The start is not a state this walker can be in.",
     ),

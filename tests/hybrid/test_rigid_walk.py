@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from printed_compass import ground_reaction, kinetic_energy, potential_energy, swing_foot_height
 from scipy.integrate import solve_ivp
 
 from walkerlab.hybrid.recorded_walk import STEPS_AT_ONCE, as_state, far_from
@@ -10,18 +11,7 @@ from walkerlab.hybrid.rigid_measures import energies as energies_of_model
 from walkerlab.hybrid.rigid_measures import reactions as reactions_of_model
 from walkerlab.orbits.fixed_point import find_gaits as find_gaits_of_model
 from walkerlab.outcome import Outcome
-from walkerlab.paper.appendix_a import (
-    AS_PRINTED,
-    CORRECTED,
-    RigidWalker,
-    accelerations,
-    assembled,
-    ground_reaction,
-    impact,
-    kinetic_energy,
-    potential_energy,
-    swing_foot_height,
-)
+from walkerlab.paper.appendix_a import AS_PRINTED, CORRECTED, RigidWalker, accelerations, assembled, impact
 from walkerlab.solvers.registry import METHODS, Tolerances
 
 

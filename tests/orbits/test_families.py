@@ -21,14 +21,14 @@ from walkerlab.orbits.attractors import (
 )
 from walkerlab.orbits.bifurcations import GaitEquations, on_pairs
 from walkerlab.orbits.continuation import Segment, Solved, StepControl, corrected, root_along, stepped
-from walkerlab.orbits.families import BranchFollower, Seed, ValueSpan, apart
+from walkerlab.orbits.families import NO_WALKER, BranchFollower, Seed, ValueSpan, apart, why_lost
 from walkerlab.orbits.fixed_point import find_gaits
-from walkerlab.orbits.newton import Effort, Evaluated
+from walkerlab.orbits.newton import Effort, Evaluated, NotConverged
 from walkerlab.orbits.plane import CONTROL, Plane, curve_through
 from walkerlab.orbits.shooting import RigidMap
 from walkerlab.orbits.similarity import unit_walker
 from walkerlab.orbits.step_map import Cycle, gait_near, multipliers_of, walk_steps
-from walkerlab.outcome import TOLD, Outcome
+from walkerlab.outcome import Outcome
 from walkerlab.paper.appendix_a import CORRECTED, RigidWalker, assembled
 
 A, L, M, M_H, G = 0.5, 1.0, 5.0, 10.0, 9.81
@@ -263,7 +263,7 @@ def test_the_equations_of_a_gait_have_no_value_where_no_walker_has_the_parameter
     seed = seeds_at(paper_walker, 0.03)[0]
     step_map = map_of(lambda value: paper_walker(value) if value == 0.03 else None, 1.0)
     here = GaitEquations(step_map, 1, 1.0)(np.append(seed.z, 0.03))
-    assert here.outcome is Outcome.REJECTED
+    assert here.outcome is None
     assert here.jacobian.shape == (3, 4)
 
 
@@ -389,9 +389,13 @@ def test_a_branch_ends_where_no_walker_has_the_parameters_value():
 
     follower = BranchFollower(map_of(walker_at, 10.0), ValueSpan(8.0, 18.0))
     branch = follower.family(seeds_at(walker_at, 10.0), 1)[0]
-    assert branch.ends[1].reason == TOLD[Outcome.REJECTED].why
-    assert branch.ends[1].reason.startswith("no walker has the parameter's next value")
+    assert branch.ends[1].reason == NO_WALKER == "no walker has the parameter's next value"
     assert 12.5 < branch.ends[1].value < 13.0
+
+
+def test_a_branch_that_ends_in_a_push_off_that_lasts_too_long_says_so():
+    assert why_lost(NotConverged(Outcome.REJECTED)) == "its push-off is not over when the feet pass each other"
+    assert why_lost(NotConverged(Outcome.FELL)).startswith("fell: ")
 
 
 def test_a_branch_that_uses_up_its_points_says_so():

@@ -13,7 +13,6 @@ from walkerlab.orbits.fixed_point import find_gaits
 from walkerlab.orbits.gradients import QUANTITIES, gait_numbers, gradients
 from walkerlab.orbits.newton import Effort
 from walkerlab.orbits.robustness import (
-    Scales,
     Standpoint,
     disturbed,
     indicators,
@@ -43,7 +42,7 @@ def standpoint(name, key="slope_rad", tolerances=EXACT, changes=()):
     z[1:] *= units.time
     parameter = parameter_of(key, config)
     step_map, p = rigid_map(config, parameter, 1.0).at(tolerances), parameter.value_in(config)
-    return Standpoint(step_map, p, z, step_map.step(z, p).DP, Scales(units.length, units.time, units.impulse))
+    return Standpoint(step_map, p, z, step_map.step(z, p).DP, units)
 
 
 def on_compliant_ground(name, key="slope_rad", changes=()):
@@ -55,7 +54,7 @@ def on_compliant_ground(name, key="slope_rad", changes=()):
     parameter = parameter_of(key, config)
     step_map, p = contact_map(config, parameter, 1.0, gait.step.length_m), parameter.value_in(config)
     z = step_map.of_section(gait.z)
-    return Standpoint(step_map, p, z, step_map.step(z, p).DP, rigid.scales)
+    return Standpoint(step_map, p, z, step_map.step(z, p).DP, rigid.units)
 
 
 # ---- the norm ------------------------------------------------------------------------------------------------------
@@ -64,8 +63,8 @@ def on_compliant_ground(name, key="slope_rad", changes=()):
 def test_the_simplest_walkers_norm_is_that_of_two_other_codes():
     """Floor drop to step period, gamma .009, l = g = 1: direct part and norm."""
     answer = sensitivity(standpoint("simplest"), "floor-drop")
-    scales = standpoint("simplest").scales
-    to_pure = scales.length / scales.time
+    units = standpoint("simplest").units
+    to_pure = units.length / units.time
     assert answer.direct[0] * to_pure == pytest.approx(11.56992214, rel=1e-8)
     assert answer.norm[0] * to_pure == pytest.approx(680.1273, rel=1e-7)
 
@@ -75,7 +74,7 @@ def test_the_simplest_walkers_norm_is_that_of_two_other_codes():
 def test_the_norm_is_the_brute_sum_over_walks(name, disturbance):
     """Every step of a long walk from a gait that was disturbed a little either way, summed."""
     at = standpoint(name)
-    unit, steps = at.scales.of_disturbance(disturbance), 60
+    unit, steps = at.unit_of(disturbance), 60
     walks = {k: disturbed(at, disturbance, k * 1e-5 * unit, steps) for k in (-2, -1, 1, 2)}
     seen = {k: indicators(walk) for k, walk in walks.items()}
     changes = (8.0 * (seen[1] - seen[-1]) - (seen[2] - seen[-2])) / (12e-5 * unit)
@@ -90,7 +89,7 @@ def test_the_norm_is_the_brute_sum_over_walks(name, disturbance):
 def test_the_norm_on_compliant_ground_is_the_brute_sum_over_walks(name, disturbance):
     """Quotients that reach over more than the ground gives way to are 0.5 % off for a kneed walker."""
     at = on_compliant_ground(name)
-    size, steps = 2e-6 * at.scales.of_disturbance(disturbance), 40
+    size, steps = 2e-6 * at.unit_of(disturbance), 40
     either = [indicators(disturbed(at, disturbance, sign * size, steps)) for sign in (1.0, -1.0)]
     changes = (either[0] - either[1]) / (2.0 * size)
     answer = sensitivity(at, disturbance)

@@ -7,16 +7,9 @@ import pytest
 import sympy as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from printed_compass import ground_reaction, kinetic_energy, potential_energy
 
-from walkerlab.paper.appendix_a import (
-    AS_PRINTED,
-    CORRECTED,
-    RigidWalker,
-    accelerations,
-    ground_reaction,
-    kinetic_energy,
-    potential_energy,
-)
+from walkerlab.paper.appendix_a import AS_PRINTED, CORRECTED, RigidWalker, accelerations
 
 POINT_MASSES = {paper.J: 0}
 ORIGIN = sp.zeros(2, 1)

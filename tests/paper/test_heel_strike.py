@@ -6,17 +6,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from printed_compass import released_mass_matrix
+from printed_compass import feet_on_slope, kinetic_energy, released_mass_matrix, swing_foot_height
 
-from walkerlab.paper.appendix_a import (
-    CORRECTED,
-    RigidWalker,
-    feet_on_slope,
-    impact,
-    kinetic_energy,
-    step_length,
-    swing_foot_height,
-)
+from walkerlab.paper.appendix_a import CORRECTED, RigidWalker, impact, step_length
 
 walkers = st.builds(
     lambda L, fraction, m, M_H, g, slope: RigidWalker(L, fraction * L, m, M_H, 0.0, g, slope, CORRECTED),

@@ -188,8 +188,8 @@ def test_what_a_scene_is_said_to_save_is_what_it_saves():
     free, hinged = scene.walker.size, 2 * int(scene.walker.forms[1, 0].bodies)
     assert saved["floating base and stance contact in the first step"].startswith(f"{free - hinged} of {free} ")
     config = load(None, ("outputs=[]",)).config
-    rigid = left_out.of_rigid_walk(config)
-    assert rigid[0]["saves"].startswith(f"{free - len(rigid_scene(config).walker.zero_state)} of {free} ")
+    rigid, angles = left_out.of_rigid_walk(config), len(rigid_scene(config, config.ground, ()).walker.zero_state)
+    assert rigid[0]["saves"].startswith(f"{free - angles} of {free} ")
     assert all(entry["what"] and entry["why"] and entry["saves"] for entry in (*said, *rigid))
 
 

@@ -222,7 +222,7 @@ def test_a_key_touches_the_models_that_change_with_it(over, models):
     own = config()
     parameter = parameter_of(over, own)
     span = ValueSpan(*(factor * parameter.value_in(own) for factor in (1.0, 1.1)))
-    asked = FamilyQuestion(own, parameter, span, 1, 10)
+    asked = FamilyQuestion(own, parameter, span)
     assert {model for model in ("rigid", "contact") if asked.touches(model)} == models
 
 

@@ -19,7 +19,7 @@ from walkerlab.scene.contact import contact_scene, gait_off_pads, start_state
 from walkerlab.scene.rigid import rigid_walker
 from walkerlab.solvers.registry import Tolerances
 from walkerlab.stages import design, fixedpoint
-from walkerlab.stages.robustness import contact_subject
+from walkerlab.stages.robustness import subject_of
 from walkerlab.store.parts import Parts
 
 # design contract, section 4
@@ -147,8 +147,8 @@ def contact_gait(name):
     config = load(Path(name), ["contact.terrain=after-mid-swing"]).config
     walker = rigid_walker(config, config.equations)
     gait = find_gaits(walker).gait
-    told = {"state": gait.state}
-    here = contact_subject(config, told, design.scales_of(walker), gait.step_length, Silent()).at()
+    told = {"state": gait.state, "step_length_m": gait.step_length}
+    here = subject_of("contact", config, told, Silent()).at()
     found = gait_off_pads(config, gait.step_length, gait.state).gait
     return config, gait, found.step, gait_numbers(here, ["cost_of_transport"])["cost_of_transport"]
 

@@ -1,6 +1,7 @@
 """Every number of every built-in walker, in every stage that takes a key: it is followed, or refused in words."""
 
 from dataclasses import replace
+from fnmatch import fnmatch
 from pathlib import Path
 
 import numpy as np
@@ -30,11 +31,44 @@ WALKERS = {
     "paper with a hip": ("walker.hip={spring_N_m_per_rad: 1, damping_N_m_s_per_rad: 0.1, torque_N_m: 0.01}",),
 }
 ONLY_CONTACT = ("contact.", "push_off.duration_s", "walker.knee.stop_")
+PULSED = ("level", "kneed-level", "paper with a hip")
+RIGID_ONLY = ("kuo", "rigid-only", "simplest")
+IDEAL_KNEES = ("kneed", "kneed-level", "kneed-round-feet", "parts")
+REFUSED = (
+    ("continuation", sorted({*WALKERS} - {*PULSED}), "push_off.duration_s", "does not touch the rigid"),
+    ("continuation", RIGID_ONLY, "walker.foot_radius_m", "does not touch the rigid model"),
+    ("continuation", IDEAL_KNEES, "walker.knee.stop_*", "does not touch the rigid or the contact model"),
+    ("second", WALKERS, "contact.*", "does not touch the rigid model"),
+    ("second", WALKERS, "push_off.duration_s", "does not touch the rigid model"),
+    ("second", WALKERS, "walker.foot_radius_m", "does not touch the rigid model"),
+    ("second", WALKERS, "walker.knee.stop_*", "does not touch the rigid model"),
+    ("second", WALKERS, "gravity_m_s2", "is already the number that gaits are followed over"),
+    ("*", ("paper-as-printed",), "walker.hip.*", "cannot be 1e-15"),
+    ("*", ("paper-as-printed",), "push_off.impulse_N_s", "cannot be 1e-15"),
+    ("*", ("parts",), "walker.leg_length_m", "cannot be 0.999 m"),
+    ("gradients", ("kuo", "simplest"), "walker.leg_inertia_kg_m2", ""),
+    ("gradients", ("kuo",), "walker.hip.[dt]*", ""),
+    ("gradients", ("simplest",), "walker.hip.*", ""),
+)
+"""Whatever may be refused: by which question, of which walkers, which keys, and in which words, where there are any."""
+
+
+def may_be_refused(question, walker, key, said=""):
+    """Whether a refusal is one of those that are known."""
+    return any(
+        fnmatch(question, asked) and walker in walkers and fnmatch(key, keys) and (words in said or not said)
+        for asked, walkers, keys, words in REFUSED
+    )
 
 
 @pytest.fixture(scope="module", params=WALKERS)
-def config(request):
-    return load(Path(request.param.split(" ")[0]), WALKERS[request.param]).config
+def walker(request):
+    return request.param
+
+
+@pytest.fixture(scope="module")
+def config(walker):
+    return load(Path(walker.split(" ")[0]), WALKERS[walker]).config
 
 
 @pytest.fixture(scope="module")
@@ -59,7 +93,7 @@ def question(config, key, model):
     ends = (value, 1.001 * value) if value else (0.0, 1e-15)
     if value and parameter.config_at(taken, ends[1]) is None:
         ends = (0.999 * value, value)
-    return FamilyQuestion(taken, parameter, ValueSpan(*ends), 1, 10)
+    return FamilyQuestion(taken, parameter, ValueSpan(*ends))
 
 
 def followed(asked):
@@ -70,15 +104,16 @@ def followed(asked):
         return (), error.message
 
 
-def test_continuation_follows_every_number_in_the_models_that_have_it_or_says_why_not(config, keys):
+def test_continuation_follows_every_number_in_the_models_that_have_it_or_says_why_not(walker, config, keys):
     every = (RIGID,) if config.contact is None else (RIGID, CONTACT)
     for key in keys:
         models, refused = followed(question(config, key, "rigid" if len(every) == 1 else "both"))
         assert models in (every, (CONTACT,)) or f" {key} " in f" {refused} "
+        assert models or may_be_refused("continuation", walker, key, refused), f"{key}: {refused}"
         assert RIGID in models or refused or key.startswith((*ONLY_CONTACT, "walker.foot_radius_m"))
 
 
-def test_a_second_number_is_followed_or_refused_too(config, keys):
+def test_a_second_number_is_followed_or_refused_too(walker, config, keys):
     first = question(config, "gravity_m_s2", "rigid")
     for key in keys:
         span = question(config, key, "rigid").span
@@ -89,6 +124,7 @@ def test_a_second_number_is_followed_or_refused_too(config, keys):
         models, refused = followed(replace(first, config=taken))
         assert models == (RIGID,) or refused.startswith("continuation.second")
         assert models or f" {key} " in f" {refused} "
+        assert models or may_be_refused("second", walker, key, refused), f"{key}: {refused}"
 
 
 @pytest.fixture(scope="module")
@@ -103,7 +139,7 @@ def subject(config, fixedpoint):
     return next(robustness.subjects(taken, {"fixedpoint": fixedpoint}, Silent()))
 
 
-def test_design_knows_the_gait_and_its_gradient_over_every_number(config, keys, fixedpoint, subject):
+def test_design_knows_the_gait_and_its_gradient_over_every_number(walker, config, keys, fixedpoint, subject):
     taken = only(config, PIPELINE["design"].takes)
     for key in keys:
         parameter, asked = parameter_of(key, taken), Design(minimise="period_s", over={key: [0.0, 1.0]})
@@ -111,18 +147,22 @@ def test_design_knows_the_gait_and_its_gradient_over_every_number(config, keys, 
         found = Gaits(taken, asked, [parameter], fixedpoint.summary, Silent()).at(own)
         if found is None:
             assert not robustness.gradients_of(subject, key), "the walker has no other value of it"
+            assert may_be_refused("gradients", walker, key), key
             continue
         assert found.numbers["period_s"] == pytest.approx(fixedpoint.summary["period_s"], abs=1e-9)
         assert np.all(np.isfinite(found.gradients["period_s"])), key
 
 
-def test_robustness_differentiates_the_gait_by_every_number(config, keys, subject):
+def test_robustness_differentiates_the_gait_by_every_number(walker, config, keys, subject):
     assert set(robustness.numbers_read(subject)) <= set(keys)
     for key in keys:
-        for name, gradient in robustness.gradients_of(subject, key).items():
+        gradients = robustness.gradients_of(subject, key)
+        assert gradients or may_be_refused("gradients", walker, key), key
+        for name, gradient in gradients.items():
             assert gradient.value is not None or gradient.why, f"{name} by {key}"
             assert gradient.value is None or np.isfinite(gradient.value), f"{name} by {key}"
             if key.startswith(ONLY_CONTACT):
+                assert gradient.value is not None, f"{name} by {key}: {gradient.why}"
                 effect = gradient.value * parameter_of(key, config).value_in(config)
                 assert abs(effect) < 1e-6, f"the rigid model does not read {key}"
 

@@ -1,6 +1,6 @@
 """The design block: which number of the gait is made least or largest, over which numbers of the config."""
 
-from typing import Final, Literal
+from typing import Final, Literal, get_args
 
 from pydantic import ValidationInfo, field_validator
 
@@ -9,7 +9,7 @@ from walkerlab.config.fields import Block, key, wrong
 Quantity = Literal[
     "period_s", "step_length_m", "speed_m_s", "spectral_radius", "gait_sensitivity_norm", "cost_of_transport"
 ]
-_NAMES: Final = "period_s, step_length_m, speed_m_s, spectral_radius, gait_sensitivity_norm, cost_of_transport"
+_NAMES: Final = ", ".join(get_args(Quantity))
 Bounds = dict[str, list[float]]
 
 
@@ -58,6 +58,6 @@ class Design(Block):
     @classmethod
     def _numbers_of_a_gait(cls, value: Bounds) -> Bounds:
         for name in value:
-            if name not in _NAMES.split(", "):
+            if name not in get_args(Quantity):
                 raise wrong(f"names {name}, which is not a number of a gait; choose from {_NAMES}")
         return value

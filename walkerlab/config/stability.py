@@ -1,24 +1,17 @@
 """The stability block: cases of one's own, beside the catalogue that comes with the package."""
 
-from typing import Any, Final, Literal, get_args
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 from pydantic import field_validator
 
 from walkerlab.config.fields import Block, key, wrong
+from walkerlab.outcome import Outcome
 
-Fate = Literal[
-    "walked",
-    "fell",
-    "off-pad",
-    "lifted-off",
-    "slid",
-    "no-heel-strike",
-    "bent-knee",
-    "budget-exhausted",
-    "solver-failed",
-    "rejected",
-]
-FATES: Final[tuple[Fate, ...]] = get_args(Fate)
+FATES: Final = tuple(outcome.label for outcome in Outcome)
+if TYPE_CHECKING:
+    Fate = str
+else:
+    Fate = Literal[FATES]
 NAME: Final = r"^[A-Za-z0-9][A-Za-z0-9._+-]{0,63}$"
 
 

@@ -104,6 +104,11 @@ class _Legged(Block):
         """Angle of the line from hip to foot centre in an upright leg; of parts a start is taken as given."""
         return 0.0
 
+    @property
+    def total_mass_kg(self: Any) -> float:
+        """Two legs, the hip and a torso, kg."""
+        return float(2 * self.leg_mass_kg + self.hip_mass_kg + torso_mass(self.torso))
+
     @field_validator("hip", check_fields=False)
     @classmethod
     def _legs_can_follow(cls, value: Hip, info: ValidationInfo) -> Hip:
@@ -161,11 +166,6 @@ class CompassWalker(_Legged):
         """b = L - a, m."""
         return self.leg_length_m - self.foot_to_mass_m
 
-    @property
-    def total_mass_kg(self) -> float:
-        """Two legs, the hip and a torso, kg."""
-        return 2 * self.leg_mass_kg + self.hip_mass_kg + torso_mass(self.torso)
-
 
 class StraightLegs(_Legged):
     """Two straight legs of any distribution of mass, whose feet are arcs that roll in both models."""
@@ -188,11 +188,6 @@ class StraightLegs(_Legged):
     _inertia = turns(
         "leg_inertia_kg_m2", "the leg's mass at the hip: the swing leg", "leg_mass_below_hip_m", "leg_mass_ahead_m"
     )
-
-    @property
-    def total_mass_kg(self) -> float:
-        """Two legs, the hip and a torso, kg."""
-        return 2 * self.leg_mass_kg + self.hip_mass_kg + torso_mass(self.torso)
 
     @property
     def lean_rad(self) -> float:
@@ -263,9 +258,9 @@ class Kneed(_Legged):
         return self.thigh.length_m + self.shank.length_m
 
     @property
-    def total_mass_kg(self) -> float:
-        """Two legs, the hip and a torso, kg."""
-        return 2 * (self.thigh.mass_kg + self.shank.mass_kg) + self.hip_mass_kg + torso_mass(self.torso)
+    def leg_mass_kg(self) -> float:
+        """Thigh and shank, kg."""
+        return self.thigh.mass_kg + self.shank.mass_kg
 
 
 class PartBody(Block):

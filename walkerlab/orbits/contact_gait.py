@@ -101,10 +101,11 @@ def gait_on(pads: OwnPads, z: Floats, rigidity: float = 0.0) -> Cycle | str:
     if isinstance(found, NotConverged):
         if found.singular:
             return "its matrix is singular, since a multiplier is 1"
-        walked = found.outcome is Outcome.WALKED
+        if found.outcome is None or found.outcome is Outcome.WALKED:
+            return "it did not converge"
         if found.outcome is Outcome.REJECTED:
             return "its push-off lasts until the feet pass each other, or longer"
-        return "it did not converge" if walked else f"a step ended as {found.outcome.label}"
+        return f"a step ended as {found.outcome.label}"
     if found.step.length_m <= 0.0:
         return f"it led to a walk that does not advance, with steps of {found.step.length_m:.3g} m"
     return found

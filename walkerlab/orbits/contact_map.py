@@ -348,7 +348,7 @@ class ContactMap(StepMap):
         """One step, with its exact derivative along the section."""
         here = self._at(p)
         if here is None:
-            return no_step(Outcome.REJECTED, z.size)
+            return no_step(None, z.size)
         step = self._walk(here, z, derived)
         if step.outcome is not Outcome.WALKED:
             return no_step(step.outcome, z.size)

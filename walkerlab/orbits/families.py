@@ -33,6 +33,7 @@ HALVINGS = 12  # of the amplitude on the way onto a branch
 TURN_OF_MULTIPLIERS = 0.6  # by how much a multiplier may change between neighbours, near the unit circle
 NEAR_CIRCLE = 1.6  # magnitude of multipliers that this is asked of
 EVALUATIONS = 20  # of Newton's method from a seed
+NO_WALKER = "no walker has the parameter's next value"
 POINTS, GROWTH = 400, 1e4  # of one branch; of a disturbance over a cycle, beyond which no gait is resolved
 
 
@@ -328,5 +329,7 @@ def why_lost(lost: NotConverged) -> str:
     """Why a branch goes no further, in words."""
     if lost.outcome is Outcome.WALKED:
         return "Newton's method finds no further gait"
+    if lost.outcome is None:
+        return NO_WALKER
     aside = "" if lost.outcome is Outcome.REJECTED else f"{lost.outcome.label}: "
     return f"{aside}{TOLD[lost.outcome].why}"

@@ -23,7 +23,7 @@ class Evaluated(NamedTuple, Generic[D]):
     data      what the caller wants to keep of it
     """
 
-    outcome: Outcome
+    outcome: Outcome | None
     value: Floats
     jacobian: Floats
     data: D
@@ -51,11 +51,11 @@ class Solution(Generic[D]):
 class NotConverged:
     """Why Newton's method found nothing.
 
-    outcome   WALKED if the equations could be evaluated
+    outcome   WALKED if the equations could be evaluated; None where the parameter makes no walker
     singular  whether the matrix of a move was: a multiplier is 1
     """
 
-    outcome: Outcome
+    outcome: Outcome | None
     singular: bool = False
 
 

@@ -20,6 +20,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
+from walkerlab.orbits.similarity import Units
 from walkerlab.orbits.step_map import DisturbedWalk, StepMap, multipliers_of
 from walkerlab.outcome import Outcome
 from walkerlab.solvers.system import Floats
@@ -36,31 +37,18 @@ GRID, CLOSE = 1.0 / 5000.0, 1e-6  # in units of the disturbance: its search, and
 MOST = 0.5  # of a disturbance, in its unit
 
 
-class Scales(NamedTuple):
-    """Units of what is disturbed and measured, SI: those of the walker's leg, mass and gravity."""
-
-    length: float
-    time: float
-    impulse: float
-
-    def of_disturbance(self, disturbance: Disturbance) -> float:
-        """Of a drop (m) or of a push (N s)."""
-        return self.length if disturbance == "floor-drop" else self.impulse
-
-    @property
-    def of_indicators(self) -> Floats:
-        """(3,) of period, length and speed."""
-        return np.array((self.time, self.length, self.length / self.time))
-
-
 class Standpoint(NamedTuple):
-    """A gait of one step: its step map at a value, its section coordinates and the derivative there."""
+    """A gait of one step: its step map at a value, its section coordinates and the derivative there, its units."""
 
     step_map: StepMap
     p: float
     z: Floats  # (d,)
     A: Floats  # (d, d)
-    scales: Scales
+    units: Units
+
+    def unit_of(self, disturbance: Disturbance) -> float:
+        """Of a drop (m) or of a push (N s)."""
+        return self.units.length if disturbance == "floor-drop" else self.units.impulse
 
 
 def slope_of(function: Callable[[float], Floats | None], step: float) -> Floats | None:
@@ -132,7 +120,7 @@ def response(at: Standpoint, disturbance: Disturbance, times: float = 1.0) -> tu
         walk = at.step_map.disturbed(at.z + move, at.p, np.zeros(2))
         return indicators(walk)[0] if walk.outcome is Outcome.WALKED else None
 
-    changed = slope_of(after, h * at.scales.of_disturbance(disturbance))
+    changed = slope_of(after, h * at.unit_of(disturbance))
     columns = [slope_of(lambda size, way=way: next_step(size * way), h) for way in np.eye(d)]  # type: ignore[misc]
     if changed is None or any(column is None for column in columns):
         return None
@@ -163,7 +151,7 @@ def largest_disturbance(at: Standpoint, disturbance: Disturbance, sign: float, s
     def stands(size: float) -> bool:
         return disturbed(at, disturbance, sign * size, steps + 1).outcome is Outcome.WALKED
 
-    return largest(stands, at.scales.of_disturbance(disturbance))
+    return largest(stands, at.unit_of(disturbance))
 
 
 def steps_on_rough_ground(at: Standpoint, roughness_m: float, seed: tuple[int, ...], most: int) -> int:

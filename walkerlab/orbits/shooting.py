@@ -286,7 +286,7 @@ class RigidMap(StepMap):
         """One step, with its exact derivative along the section."""
         unit = self._unit_at(p)
         if unit is None:
-            return no_step(Outcome.REJECTED, z.size)
+            return no_step(None, z.size)
         step = self._exact.walk(unit.section, z, derived=derived)
         if step.outcome is not Outcome.WALKED or step.time[0] < SHORTEST_STEP:
             standing = step.outcome is Outcome.WALKED

@@ -50,7 +50,7 @@ class MappedStep:
     strike_s  when that is, from the section on
     """
 
-    outcome: Outcome
+    outcome: Outcome | None
     z: Floats
     DP: Floats
     period_s: float
@@ -96,7 +96,7 @@ class Stepper(Protocol):
     """A walker's step from section to section, over one parameter: all that a gait is solved on."""
 
     def step(self, z: Floats, p: float, derived: bool = True) -> MappedStep:
-        """One step from z (d,) at the parameter's value p, with its derivative; REJECTED where p makes no walker."""
+        """One step from z (d,) at the parameter's value p, with its derivative; no outcome where p makes no walker."""
 
 
 class StepMap(Stepper, Protocol):
@@ -135,7 +135,7 @@ class StepMap(Stepper, Protocol):
         taken, lengths, outcome = list[MappedStep](), list[float](), Outcome.WALKED
         for _ in range(steps):
             step = self.step(z, p, tangent is not None)
-            outcome = step.outcome
+            outcome = Outcome.REJECTED if step.outcome is None else step.outcome
             if outcome is not Outcome.WALKED:
                 break
             z = step.z
@@ -154,7 +154,7 @@ class StepMap(Stepper, Protocol):
         )
 
 
-def along_parameter(step_map: StepMap, z: Floats, p: float) -> tuple[Outcome, Floats]:
+def along_parameter(step_map: StepMap, z: Floats, p: float) -> tuple[Outcome | None, Floats]:
     """How a step from z (d,) ends near p, and the derivative (d,) of where it leads with respect to the parameter.
 
     A difference of exact steps of second order, central, one-sided where the parameter ends: it only steers predictors
@@ -164,14 +164,14 @@ def along_parameter(step_map: StepMap, z: Floats, p: float) -> tuple[Outcome, Fl
     for formula in (CENTRAL, FORWARD, tuple((-offset, -weight) for offset, weight in FORWARD)):
         steps = [step_map.step(z, p + offset * h, derived=False) for offset, _ in formula]
         outcomes = [step.outcome for step in steps]
-        if Outcome.REJECTED in outcomes:
+        if None in outcomes or Outcome.REJECTED in outcomes:
             continue
         ended = next((outcome for outcome in outcomes if outcome is not Outcome.WALKED), Outcome.WALKED)
         return ended, sum((weight / h * step.z for step, (_, weight) in zip(steps, formula, strict=True)), 0.0 * z)
-    return Outcome.REJECTED, 0.0 * z
+    return None, 0.0 * z
 
 
-def no_step(outcome: Outcome, d: int) -> MappedStep:
+def no_step(outcome: Outcome | None, d: int) -> MappedStep:
     """A step that did not come to its end."""
     return MappedStep(outcome, np.zeros(d), np.eye(d), 0.0, 0.0, 0.0, 0.0)
 
@@ -188,7 +188,7 @@ class Cycle:
     monitors  the worst of each over the steps, where they are on a branch
     """
 
-    outcome: Outcome
+    outcome: Outcome | None
     value: float
     z: Floats
     steps: tuple[MappedStep, ...]

@@ -1,7 +1,7 @@
 """Appendix A of the paper: the compass walker's equations as they are printed there, and with C_21 corrected.
 
-The rigid model is assembled from parts (mechanics/); these equations are what it is checked against, and `as-printed`
-walks by them.
+The rigid model is assembled from parts (mechanics/); these equations are what it is checked against (energies, forces
+and the foot's height stand in the tests), and `as-printed` walks by the sign of theirs.
 
 State (theta_1 swing, theta_2 stance, dtheta_1, dtheta_2): absolute angles from the vertical, counter-clockwise
 positive, rad and rad/s. The walker walks in +x, downhill for a positive slope.
@@ -69,57 +69,9 @@ def accelerations(
     return fused(c.d22, r1, -d12 * r2) * scale, fused(c.d11, r2, -d12 * r1) * scale
 
 
-def kinetic_energy(walker: RigidWalker, theta_1: float, theta_2: float, omega_1: float, omega_2: float) -> float:
-    """Kinetic energy (J): half of dq' D dq."""
-    c = swing_constants(walker)
-    d12 = -c.mLb * math.cos(theta_2 - theta_1)
-    return 0.5 * (c.d11 * omega_1 * omega_1 + c.d22 * omega_2 * omega_2) + d12 * omega_1 * omega_2
-
-
-def potential_energy(walker: RigidWalker, theta_1: float, theta_2: float) -> float:
-    """Potential energy (J) from the current stance foot."""
-    c = swing_constants(walker)
-    return walker.gravity * (c.K * math.cos(theta_2) - c.mb * math.cos(theta_1))
-
-
-def ground_reaction(
-    walker: RigidWalker, theta_1: float, theta_2: float, omega_1: float, omega_2: float
-) -> tuple[float, float]:
-    """Force of the ground on the stance foot (N): along the slope (positive in walking direction) and normal to it.
-
-    Rows 3 and 4 of (6) with the foot held still: (A.11) to (A.16), (A.33) to (A.38).
-    """
-    c = swing_constants(walker)
-    s1, c1 = sine_cosine(theta_1)
-    s2, c2 = sine_cosine(theta_2)
-    alpha_1, alpha_2 = accelerations(walker, theta_1, theta_2, omega_1, omega_2)
-    w1, w2 = omega_1 * omega_1, omega_2 * omega_2
-    x = c.mb * (c1 * alpha_1 - s1 * w1) - c.K * (c2 * alpha_2 - s2 * w2)
-    y = c.mb * (s1 * alpha_1 + c1 * w1) - c.K * (s2 * alpha_2 + c2 * w2) + walker.gravity * c.mass
-    s_phi, c_phi = math.sin(walker.slope), math.cos(walker.slope)
-    return c_phi * x - s_phi * y, s_phi * x + c_phi * y
-
-
-def swing_foot_height(walker: RigidWalker, theta_1: float, theta_2: float) -> float:
-    """Height of the swing foot above the slope (m), negative while it scuffs.
-
-    L (cos(theta_2 + phi) - cos(theta_1 + phi)) as a product, which keeps its digits near zero.
-    """
-    half_sum = 0.5 * (theta_1 + theta_2) + walker.slope
-    return 2.0 * walker.leg_length * math.sin(half_sum) * math.sin(0.5 * (theta_1 - theta_2))
-
-
 def step_length(walker: RigidWalker, theta_1: float, theta_2: float) -> float:
     """Distance between the feet along the slope (m) with both on it: 2 L sin((theta_2 - theta_1)/2)."""
     return 2.0 * walker.leg_length * math.sin(0.5 * (theta_2 - theta_1))
-
-
-def feet_on_slope(walker: RigidWalker, theta_1: float, theta_2: float) -> float:
-    """theta_1 + theta_2 + 2 phi (rad): zero with both feet on the slope, falling through zero at heel strike.
-
-    (9-2) prints theta_1 = -theta_2, which holds only for angles measured from the slope's normal.
-    """
-    return theta_1 + theta_2 + 2.0 * walker.slope
 
 
 def impact_matrices(walker: RigidWalker, cos_d: float) -> tuple[float, float, float, float, float, float]:

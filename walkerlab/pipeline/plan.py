@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Literal
 
 from walkerlab.config.schema import Config
@@ -11,7 +12,7 @@ from walkerlab.pipeline.identity import Identities
 from walkerlab.scene.left_out import LeftOut
 from walkerlab.store import artifact
 from walkerlab.store.artifact import Stored, Verdict
-from walkerlab.store.elsewhere import Elsewhere, find_elsewhere
+from walkerlab.store.elsewhere import find_elsewhere
 from walkerlab.store.index import broken_file
 from walkerlab.store.key import Identity, changed_parts
 from walkerlab.store.runfolder import RunFolder
@@ -51,7 +52,7 @@ class Step:
     identity  what its result is determined by; None if it is left out
     found     what is stored now, if it is intact: the result to reuse, or an outdated one
     damaged   a file is stored that is not to be trusted
-    origin    where the result to reuse lies, if that is another run's folder
+    origin    its file, if that lies in another run's folder
     """
 
     stage: Stage
@@ -60,7 +61,7 @@ class Step:
     identity: Identity | None = None
     found: Stored | None = None
     damaged: bool = False
-    origin: Elsewhere | None = None
+    origin: Path | None = None
 
 
 class Planner:
@@ -157,18 +158,19 @@ class Planner:
         if reason is None and verdict.artifact is not None:
             kept = UP_TO_DATE if verdict.artifact.complete else f"no answer: {no_answer(verdict.artifact)}"
             return Step(stage, "reuse", kept, identity, verdict.artifact)
-        origin = None if force else self._elsewhere(stage, identity)
-        if origin is not None:
-            reason = f"the same as in {origin.path.parent}"
-            return Step(stage, "reuse", reason, identity, origin.result, verdict.damaged, origin)
+        elsewhere = None if force else self._elsewhere(stage, identity)
+        if elsewhere is not None:
+            origin, result = elsewhere
+            reason = f"the same as in {origin.parent}"
+            return Step(stage, "reuse", reason, identity, result, verdict.damaged, origin)
         return Step(stage, "run", reason or "--force", identity, verdict.artifact, verdict.damaged)
 
-    def _elsewhere(self, stage: Stage, identity: Identity) -> Elsewhere | None:
+    def _elsewhere(self, stage: Stage, identity: Identity) -> tuple[Path, Stored] | None:
         """The result of a stage in another run folder; drawings stand beside their artifact and are made anew."""
         if not self.elsewhere or stage.draws:
             return None
         found = find_elsewhere(self.folder, stage.name, identity.key)
-        return found if found is not None and self._made_anew(stage, found.result) is None else None
+        return found if found is not None and self._made_anew(stage, found[1]) is None else None
 
     def _why_absent(self, name: str) -> str:
         command = self._command_of(name)

@@ -19,7 +19,7 @@ from walkerlab.pipeline.plan import survey
 from walkerlab.report.headlines import LAST_OF, headlines
 from walkerlab.report.numbers import listed
 from walkerlab.store import artifact
-from walkerlab.store.artifact import Damaged, OtherLayout, Stored
+from walkerlab.store.artifact import Stored
 from walkerlab.store.key import differences
 from walkerlab.store.runfolder import Record, RunFolder
 
@@ -93,14 +93,11 @@ def read_all(folder: RunFolder, stages: Iterable[str]) -> tuple[dict[str, Stored
     bad: dict[str, str] = {}
     for stage in stages:
         path = folder.artifact(stage)
-        try:
-            intact[stage] = artifact.read(path)
-        except (FileNotFoundError, NotADirectoryError):
-            continue
-        except OtherLayout as error:
-            bad[stage] = f"{path} cannot be read: {error}"
-        except Damaged as error:
-            bad[stage] = f"{path} is damaged: {error}"
+        found = artifact.check(path)
+        if found.artifact is not None:
+            intact[stage] = found.artifact
+        elif found.reason != artifact.NOT_THERE:
+            bad[stage] = f"{path} {'is' if found.damaged else 'cannot be read:'} {found.reason}"
     return intact, bad
 
 

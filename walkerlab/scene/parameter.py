@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import reduce
 from typing import Any
 
 from pydantic import ValidationError
@@ -33,9 +34,7 @@ class Parameter:
 
     def value_in(self, config: ContactConfig) -> float:
         """What the config has there."""
-        found: Any = config
-        for name in self.path:
-            found = getattr(found, name)
+        found: Any = reduce(getattr, self.path, config)
         return math.degrees(found) if self.key == SLOPE_DEG else float(found)
 
     def config_at(self, config: ContactConfig, value: float) -> Config | None:

@@ -16,11 +16,11 @@ from walkerlab.mechanics.standing import Standing, on_slope
 from walkerlab.paper.appendix_a import AS_PRINTED, CORRECTED, RigidWalker, as_printed
 from walkerlab.scene.footholds import foothold_heights
 from walkerlab.scene.parts import SHOWN_IN, assembly_of, drive_numbers, knee_locked_at_strike
-from walkerlab.solvers.registry import ENDLESS, Tolerances
+from walkerlab.solvers.registry import Tolerances
 from walkerlab.solvers.system import State
 
 if TYPE_CHECKING:
-    from walkerlab.config.reads import RigidConfig, SimulateConfig
+    from walkerlab.config.reads import RigidConfig
     from walkerlab.config.schema import Equations, Output
 
 REMEMBERED = 16  # walkers: over a slope the same one is asked for again and again
@@ -31,7 +31,6 @@ class RigidScene:
     """A walker on its slope, ready to walk."""
 
     walker: Standing
-    tolerances: Tolerances
     names: tuple[str, ...]  # of the state's numbers
     knee_m: tuple[float, float] | None  # the knee in its thigh's frame
     outputs: tuple[Output, ...]  # what in time is wanted
@@ -50,20 +49,10 @@ class RigidScene:
         return take_walk(self.walker, tolerances, start, steps, sampled and bool(self.outputs), advance, heights)
 
 
-def rigid_scene(config: SimulateConfig) -> RigidScene:
-    """The scene of a config: its equations, its method, its ground, and of the outputs those that it asks for."""
-    settings = config.solver.rigid
-    tolerances = Tolerances(settings.method, settings.rtol, settings.atol, ENDLESS)
-    return rigid_scene_on(config, config.ground, tolerances, config.outputs)
-
-
-def rigid_scene_on(
-    config: RigidConfig, ground: Footholds, tolerances: Tolerances, outputs: tuple[Output, ...]
-) -> RigidScene:
-    """The walker of a config on a ground."""
+def rigid_scene(config: RigidConfig, ground: Footholds, outputs: tuple[Output, ...]) -> RigidScene:
+    """The walker of a config on a ground, with what in time is wanted."""
     return RigidScene(
         walker=rigid_walker(config, config.equations),
-        tolerances=tolerances,
         names=coordinates(config),
         knee_m=knee_of(assembly_of(config.walker, rigid=True)),
         outputs=outputs,

@@ -34,7 +34,7 @@ from walkerlab.pipeline.progress import Progress
 from walkerlab.scene.contact import GAIT, contact_scene, start_state, with_contact
 from walkerlab.scene.rigid import compass
 from walkerlab.stages.compared_releases import LEFT_OUT, compare_releases
-from walkerlab.stages.walk import LEG, STEP, TIME, legs, over_time
+from walkerlab.stages.walk import LEG, STEP, TIME, last_step, legs, over_time
 from walkerlab.store.columns import numbered, rows_group
 from walkerlab.store.content import Content, Group, Variable
 
@@ -131,16 +131,6 @@ def models_compared(config: CompareConfig, inputs: Mapping[str, Content]) -> dic
         **({} if releases is None else {"releases": releases}),
         "left_out": [NOT_THE_PAPERS, *(() if releases is None else LEFT_OUT)],
     }
-
-
-def last_step(walk: Mapping[str, Any]) -> dict[str, Any]:
-    """Period (s) and length (m) of a walk's last step and how long into it a knee locked (s); None if it took none."""
-    periods, lengths, strikes = walk["step_periods_s"], walk["step_lengths_m"], walk.get("knee_strike_times_s")
-    step = {"period_s": periods[-1] if periods else None, "length_m": lengths[-1] if lengths else None}
-    if not strikes:
-        return step
-    begun = walk["touch_times_s"][-2] if len(strikes) > 1 else 0.0
-    return {**step, "knee_strike_s": None if strikes[-1] is None else strikes[-1] - begun}
 
 
 def recorded(walk: Content, group: str, name: str) -> comparison.Array | None:

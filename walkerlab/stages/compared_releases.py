@@ -4,7 +4,6 @@ Beside each the rigid model with the rule that it stands for: released in the co
 the impact, released at first touch it is free.
 """
 
-import math
 from dataclasses import replace
 from typing import Any
 
@@ -17,6 +16,7 @@ from walkerlab.scene.contact import ContactScene, contact_scene, start_state
 from walkerlab.scene.parts import assembly_of, drive_numbers
 from walkerlab.solvers.registry import Tolerances
 from walkerlab.solvers.system import State
+from walkerlab.stages.walk import last_step, numbers_of
 
 RELEASES = {"compression": False, "touch": True}
 """Instants of release, as the config names them, and whether that is the leading foot's first touch."""
@@ -55,16 +55,12 @@ def compare_releases(config: ContactConfig, state: State, pitch_m: float) -> dic
 
 def told(scene: ContactScene, walk: ContactWalkResult) -> dict[str, Any]:
     """How a walk ended, its last step, how long into it the knee locked, and what a step dissipates by channel."""
-    steps = walk.steps
-    said = {"outcome": walk.outcome.label, "steps": steps, "of": STEPS}
-    if steps == 0 or walk.knee_strike_time_s is None:
-        return said | dict.fromkeys(("period_s", "length_m", "knee_strike_s", "dissipated_J_per_step"))
-    period, strike = float(walk.periods_s[-1]), float(walk.knee_strike_time_s[-1])
-    lost = by_channel(scene.walker, walk.dissipated_J)
+    steps, lost = walk.steps, by_channel(scene.walker, walk.dissipated_J)
     return {
-        **said,
-        "period_s": period,
-        "length_m": float(walk.lengths_m[-1]),
-        "knee_strike_s": strike - (float(walk.touch_time_s[-1]) - period) if not math.isnan(strike) else None,
-        "dissipated_J_per_step": {name: joules / steps for name, joules in lost.items()},
+        "outcome": walk.outcome.label,
+        "steps": steps,
+        "of": STEPS,
+        "knee_strike_s": None,
+        **last_step(numbers_of(walk)),
+        "dissipated_J_per_step": {name: joules / steps for name, joules in lost.items()} if steps else None,
     }

@@ -45,8 +45,6 @@ class FamilyQuestion:
     config: ContinuationConfig
     parameter: Parameter
     span: ValueSpan
-    periods: int
-    points: int
 
     def looked_at(self) -> list[float]:
         """Values of the span at which gaits are sought: the config's own first."""
@@ -117,7 +115,7 @@ def run(config: ContinuationConfig, _inputs: Mapping[str, Content], progress: Pr
     """
     block = config.continuation
     parameter = parameter_of(block.over, config)
-    asked = FamilyQuestion(config, parameter, ValueSpan(block.least, block.most), block.periods, block.points)
+    asked = FamilyQuestion(config, parameter, ValueSpan(block.least, block.most))
     found = []
     for model in models_of(asked):
         search = search_of(model, asked, progress)
@@ -163,7 +161,7 @@ def models_of(asked: FamilyQuestion) -> tuple[str, ...]:
 
 def search_of(model: str, asked: FamilyQuestion, progress: Progress) -> FamilySearch | None:
     """The search of a model, also over the plane of a second key that touches it; None without a gait to begin from."""
-    begun, second = SEEDS[model](asked, progress), asked.second
+    begun, second, block = SEEDS[model](asked, progress), asked.second, asked.config.continuation
     if begun is None:
         return None
     seeds, map_of = begun
@@ -176,8 +174,8 @@ def search_of(model: str, asked: FamilyQuestion, progress: Progress) -> FamilySe
             return None if changed is None else map_of(changed)
 
         plane = Plane(map_at, second.span, parameter.value_in(asked.config))
-    periods = min(asked.periods, THOROUGHNESS[model].periods)
-    return FamilySearch(model, map_of(asked.config), asked.span, seeds, periods, asked.points, progress, plane)
+    periods = min(block.periods, THOROUGHNESS[model].periods)
+    return FamilySearch(model, map_of(asked.config), asked.span, seeds, periods, block.points, progress, plane)
 
 
 def rigid_seeds(asked: FamilyQuestion, progress: Progress) -> Begun:
@@ -436,7 +434,7 @@ def left_out(found: Sequence[Family], asked: FamilyQuestion) -> list[dict[str, s
             entries.append((f"the {model} model's gaits", f"{asked.parameter.key} does not touch that model"))
         elif not followed[model].branches:
             entries.append((f"the {model} model's gaits", "no gait was found in the span to begin from"))
-        elif model == CONTACT and asked.periods > THOROUGHNESS[CONTACT].periods:
+        elif model == CONTACT and asked.config.continuation.periods > THOROUGHNESS[CONTACT].periods:
             what = f"the contact model's gaits of more than {THOROUGHNESS[CONTACT].periods} steps"
             entries.append((what, "its flips are located too coarsely, to about 1e-7, to follow them further"))
     entries += [

@@ -14,19 +14,17 @@ from walkerlab.config.schema import Config
 from walkerlab.config.walkers import without_contact
 from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.labels import Label
-from walkerlab.mechanics.standing import Standing
 from walkerlab.orbits.design import ON_BOUND, Aim, Descent, Point, optima, searched, sought
 from walkerlab.orbits.fixed_point import find_gaits
 from walkerlab.orbits.gradients import gait_numbers, gradients
 from walkerlab.orbits.newton import Effort, NotConverged
-from walkerlab.orbits.robustness import Scales, Standpoint
-from walkerlab.orbits.similarity import unit_walker
+from walkerlab.orbits.robustness import Standpoint
 from walkerlab.orbits.step_map import gait_near, multipliers_of
 from walkerlab.pipeline.progress import Progress
 from walkerlab.scene.parameter import Parameter, parameter_of
 from walkerlab.scene.rigid import rigid_walker
 from walkerlab.solvers.system import Floats
-from walkerlab.stages.robustness import Subject, contact_subject, section_coordinates
+from walkerlab.stages.robustness import Subject, section_coordinates, subject_of
 from walkerlab.store.columns import rows_group
 from walkerlab.store.content import Content
 from walkerlab.store.parts import Parts
@@ -138,15 +136,11 @@ class Gaits:
     ) -> None:
         """Begin at the gait of the config."""
         self.config, self.model, self.parameters, self.progress = config, asked.model, parameters, progress
-        walker = rigid_walker(config, config.equations)
         self.wanted = {*filter(None, (asked.minimise, asked.maximise)), *asked.keep}
         self.counts = np.zeros(2, int)  # evaluations, and those without such a gait
         self.found: dict[bytes, Floats] = {}  # section coordinates of gaits, by the numbers that were asked for
         self.length = float(gait["step_length_m"])
-        if asked.model == "contact":
-            self.z = contact_subject(config, gait, scales_of(walker), self.length, progress).z
-        else:
-            self.z = section_coordinates(walker, gait["state"])
+        self.z = subject_of(asked.model, config, gait, progress).z
 
     def at(self, x: Floats) -> Point | None:
         """The gait; None where there is none, or the config refuses the numbers."""
@@ -167,11 +161,11 @@ class Gaits:
 
     def gait_of(self, config: Config) -> Point | None:
         """The gait of a config: near the last one, or where a search finds it."""
-        walker = rigid_walker(config, config.equations)
-        subject = Subject(self.model, config, self.z, scales_of(walker), self.length)
+        subject = Subject(self.model, config, self.z, self.length)
         here = subject.at()
         found = self.near(here, self.z)
         if self.model == "rigid" and (found is None or found[1]["spectral_radius"] >= 1.0):  # a long way, perhaps
+            walker = rigid_walker(config, config.equations)
             gait = find_gaits(walker, config.seed).gait
             found = found if gait is None else self.near(here, section_coordinates(walker, gait.state)) or found
         if found is None:
@@ -195,9 +189,3 @@ class Gaits:
         here = at._replace(z=cycle.z, A=cycle.DP)
         numbers = gait_numbers(here, self.wanted)
         return None if numbers is None or any(name not in numbers for name in self.wanted) else (here, numbers)
-
-
-def scales_of(walker: Standing) -> Scales:
-    """Units of a walker."""
-    _, units = unit_walker(walker)
-    return Scales(units.length, units.time, units.impulse)

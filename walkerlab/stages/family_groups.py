@@ -13,7 +13,6 @@ from walkerlab.config.ground import Footholds
 from walkerlab.config.reads import ContactConfig
 from walkerlab.config.schema import Output
 from walkerlab.labels import Label
-from walkerlab.mechanics.rigid import knee_of
 from walkerlab.orbits.families import GaitBranch
 from walkerlab.orbits.family_search import RIGID, Family
 from walkerlab.orbits.plane import BifurcationCurve, Regions
@@ -21,8 +20,7 @@ from walkerlab.orbits.shooting import on_section
 from walkerlab.orbits.similarity import unit_walker
 from walkerlab.orbits.step_map import Cycle, Monitor
 from walkerlab.scene.parameter import Parameter
-from walkerlab.scene.parts import assembly_of
-from walkerlab.scene.rigid import RigidScene, coordinates, rigid_walker
+from walkerlab.scene.rigid import rigid_scene
 from walkerlab.solvers.registry import ENDLESS, Tolerances
 from walkerlab.solvers.system import Floats
 from walkerlab.stages.numerical_error import evenly_spread
@@ -191,13 +189,11 @@ def motion(point: Cycle, period: int, config: ContactConfig, parameter: Paramete
     changed = parameter.config_at(config, point.value)
     if changed is None:
         return
-    walker = rigid_walker(changed, changed.equations)
-    unit, units = unit_walker(walker)
-    section, n = on_section(unit, point.z), len(walker.arm_x)
+    scene = rigid_scene(changed, Footholds(), ALL_OUTPUTS)
+    unit, units = unit_walker(scene.walker)
+    section, n = on_section(unit, point.z), len(scene.walker.arm_x)
     start = (*section[:n], *(rate / units.time for rate in section[n:]))
     steps = max(period, STRIDE)
-    knee = knee_of(assembly_of(changed.walker, rigid=True))
-    scene = RigidScene(walker, TOLERANCES, coordinates(changed), knee, ALL_OUTPUTS, Footholds())
     walk = scene.walk(start, steps, TOLERANCES, sampled=True)
     if walk.steps < steps or walk.samples is None:
         return

@@ -23,7 +23,6 @@ from walkerlab.orbits.gradients import QUANTITIES, Gradient, gait_numbers, gradi
 from walkerlab.orbits.robustness import (
     DISTURBANCES,
     INDICATORS,
-    Scales,
     Sensitivity,
     Standpoint,
     largest_disturbance,
@@ -38,7 +37,7 @@ from walkerlab.pipeline.pieces import Piece, complete
 from walkerlab.pipeline.progress import Progress
 from walkerlab.scene.families import contact_map, rigid_map
 from walkerlab.scene.parameter import SLOPE_RAD, Parameter, parameter_of, why_no_parameter
-from walkerlab.scene.rigid import rigid_scene_on, rigid_walker
+from walkerlab.scene.rigid import rigid_scene, rigid_walker
 from walkerlab.solvers.registry import ENDLESS, Tolerances
 from walkerlab.solvers.system import Floats
 from walkerlab.stages.simulate import groups as groups_of_walk
@@ -62,9 +61,9 @@ COMPILED: Final = ()
 SLOPE: Final = Parameter(SLOPE_RAD, "rad", (SLOPE_RAD,))
 UNITS: Final = {"floor-drop": "m", "hip-push": "N s"}
 OF: Final = dict(zip(INDICATORS, ("s", "m", "m/s"), strict=True))
+MODEL: Final = {"model": Label("", "which model walks")}
 LABELS: Final[dict[str, dict[str, Label]]] = {
     "gait_sensitivity_norm": {
-        "model": Label("", "which model walks"),
         "disturbance": Label("", "what the first step is disturbed by"),
         "indicator": Label("", "what of the steps is measured"),
         "value": Label("SI", "gait sensitivity norm, in the units of indicator and disturbance"),
@@ -72,17 +71,14 @@ LABELS: Final[dict[str, dict[str, Label]]] = {
         "error": Label("SI", "of the norm, from quotients over two step sizes"),
     },
     "largest_step": {
-        "model": Label("", "which model walks"),
         "down_m": Label("m", "largest step down after which the walk goes on"),
         "up_m": Label("m", "largest step up after which the walk goes on"),
     },
     "largest_push": {
-        "model": Label("", "which model walks"),
         "forward_N_s": Label("N s", "largest push forward at the hip after which the walk goes on"),
         "backward_N_s": Label("N s", "largest push backward"),
     },
     "rough_ground": {
-        "model": Label("", "which model walks"),
         "roughness_m": Label("m", "standard deviation of the footholds' heights"),
         "mean_steps": Label("1", "mean number of steps to failure, or a bound from below"),
         "walks": Label("1", "walks"),
@@ -90,13 +86,12 @@ LABELS: Final[dict[str, dict[str, Label]]] = {
         "method": Label("", "how the mean was found"),
     },
     "sensitivity": {
-        "model": Label("", "which model walks"),
         "of": Label("", "what changes"),
         "to": Label("", "number of the config"),
         "value": Label("SI", "derivative, in the units of both", absent=np.nan),
     },
 }
-"""What is stored, row by row, of each part of the answer."""
+"""What is stored, row by row, of each part of the answer, beside the model."""
 
 
 def run(
@@ -127,9 +122,9 @@ def run(
         for name, rows in walked(subject.model, config, parts).items():
             found[name] += rows
         steps[subject.model] = steps_walked(subject.model, config, parts)
-    groups = {name: rows_group(found[name], labels, "row", "row") for name, labels in LABELS.items() if found[name]}
+    groups = {name: rows_group(found[name], MODEL | labels) for name, labels in LABELS.items() if found[name]}
     if steps and config.robustness.roughness_m:
-        groups |= rough_steps(config, steps) | rough_walk(config, inputs)
+        groups |= {"rough_steps": rough_steps(config, steps), **rough_walk(config, inputs)}
     content = Content(groups, {**found, "steps": config.robustness.steps})
     if unstable:
         why = f"the gait of the {' and the '.join(unstable)} model is unstable: it has no sensitivity norm"
@@ -161,14 +156,12 @@ class Subject:
 
     config    whose scene it walks in
     z         (d,) the gait on the section
-    scales    of the walker
     length_m  of its steps
     """
 
     model: str
     config: ContactConfig
     z: Floats
-    scales: Scales
     length_m: float
 
     def at(self, parameter: Parameter = SLOPE, exact: bool = True) -> Standpoint:
@@ -180,22 +173,18 @@ class Subject:
             else contact_map(self.config, parameter, 1.0, self.length_m)
         )
         step_map = step_map if exact else step_map.at(QUICK[self.model])
-        return Standpoint(step_map, p, self.z, step_map.step(self.z, p).DP, self.scales)
+        _, units = unit_walker(rigid_walker(self.config, self.config.equations))
+        return Standpoint(step_map, p, self.z, step_map.step(self.z, p).DP, units)
 
 
 def subjects(config: RobustnessConfig, inputs: Mapping[str, Content], progress: Progress) -> Iterator[Subject]:
     """The models that are asked for."""
     progress.start("robustness: gaits")
     gait = inputs["fixedpoint"].summary
-    walker: Standing = rigid_walker(config, config.equations)
-    _, units = unit_walker(walker)
-    z = section_coordinates(walker, gait["state"])
-    scales, length = Scales(units.length, units.time, units.impulse), float(gait["step_length_m"])
     asked = config.robustness.model or (RIGID if config.contact is None else "both")
-    if asked != CONTACT:
-        yield Subject(RIGID, config, z, scales, length)
-    if asked != RIGID:
-        yield contact_subject(config, gait, scales, length, progress)
+    for model in (RIGID, CONTACT):
+        if asked in (model, "both"):
+            yield subject_of(model, config, gait, progress)
 
 
 def section_coordinates(walker: Standing, state: Sequence[float]) -> Floats:
@@ -206,10 +195,17 @@ def section_coordinates(walker: Standing, state: Sequence[float]) -> Floats:
     return z
 
 
-def contact_subject(
-    config: RobustnessConfig | DesignConfig, gait: Mapping[str, Any], scales: Scales, length: float, progress: Progress
+def subject_of(
+    model: str, config: RobustnessConfig | DesignConfig, gait: Mapping[str, Any], progress: Progress
 ) -> Subject:
-    """The contact model, off its pads; raises NoAnswer if it has no gait."""
+    """A model with its gait, the contact model off its pads; raises NoAnswer if it has none.
+
+    gait  summary of `fixedpoint`
+    """
+    length = float(gait["step_length_m"])
+    if model == RIGID:
+        z = section_coordinates(rigid_walker(config, config.equations), gait["state"])
+        return Subject(RIGID, config, z, length)
     # Imported here: the rigid model alone does without.
     from walkerlab.scene.contact import gait_off_pads, with_contact
 
@@ -222,7 +218,7 @@ def contact_subject(
         progress.note("robustness: the contact model is disturbed on after-mid-swing: pads would end its walks")
     length = found.gait.step.length_m
     z = contact_map(config, SLOPE, 1.0, length).of_section(found.gait.z)
-    return Subject(CONTACT, config, z, scales, length)
+    return Subject(CONTACT, config, z, length)
 
 
 def norms(model: str, here: Standpoint) -> Rows:
@@ -231,13 +227,14 @@ def norms(model: str, here: Standpoint) -> Rows:
     for disturbance in DISTURBANCES:
         answer = sensitivity(here, disturbance)
         if answer is not None:
-            rows += norm_rows(model, disturbance, answer, here.scales)
+            rows += norm_rows(model, disturbance, answer, here)
     return rows
 
 
-def norm_rows(model: str, disturbance: Any, answer: Sensitivity, scales: Scales) -> Rows:
+def norm_rows(model: str, disturbance: Any, answer: Sensitivity, here: Standpoint) -> Rows:
     """A row for each indicator of a disturbance."""
-    to_pure = scales.of_disturbance(disturbance) / scales.of_indicators
+    units = here.units
+    to_pure = here.unit_of(disturbance) / np.array((units.time, units.length, units.length / units.time))
     return [
         {
             "model": model,
@@ -295,33 +292,25 @@ def steps_walked(model: str, config: RobustnessConfig, parts: Parts) -> Floats:
     return np.array([np.concatenate(row) for row in rows])
 
 
-def rough_steps(config: RobustnessConfig, steps: Mapping[str, Floats]) -> dict[str, Group]:
+def rough_steps(config: RobustnessConfig, steps: Mapping[str, Floats]) -> Group:
     """The steps of every walk, as they are stored."""
+    roughness, caps = np.array(config.robustness.roughness_m), np.array([cap(model, config) for model in steps])
     about = "steps that a walk took; one that went on to the last step that was looked at has as many"
-    return {
-        "rough_steps": Group(
-            {
-                "model": Variable(np.array([*steps]), ("model",), "", "which model walks"),
-                "roughness_m": Variable(
-                    np.array(config.robustness.roughness_m), ("roughness",), "m", "standard deviation of the heights"
-                ),
-                "cut_off_at": Variable(
-                    np.array([cap(model, config) for model in steps]),
-                    ("model",),
-                    "1",
-                    "the last step that was looked at",
-                ),
-                "steps": Variable(np.array([*steps.values()]), ("model", "roughness", "walk"), "1", about),
-            }
-        )
-    }
+    return Group(
+        {
+            "model": Variable(np.array([*steps]), ("model",), "", "which model walks"),
+            "roughness_m": Variable(roughness, ("roughness",), "m", "standard deviation of the heights"),
+            "cut_off_at": Variable(caps, ("model",), "1", "the last step that was looked at"),
+            "steps": Variable(np.array([*steps.values()]), ("model", "roughness", "walk"), "1", about),
+        }
+    )
 
 
 def rough_walk(config: RobustnessConfig, inputs: Mapping[str, Content]) -> dict[str, Group]:
     """The beginning of the first walk on the roughest ground, as the rigid model takes it, to be drawn."""
     gait = as_state(inputs["fixedpoint"].summary["state"])
     heights = np.random.default_rng((config.seed, 0)).normal(0.0, max(config.robustness.roughness_m), STEPS_DRAWN)
-    scene = rigid_scene_on(config, Footholds(heights_m=tuple(heights.tolist())), EXACT, ("states",))
+    scene = rigid_scene(config, Footholds(heights_m=tuple(heights.tolist())), ("states",))
     walk = scene.walk(gait, STEPS_DRAWN, EXACT, sampled=True)
     return {f"rough_walk/{name}": group for name, group in groups_of_walk(scene, walk).items()}
 

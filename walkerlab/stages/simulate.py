@@ -13,7 +13,7 @@ from walkerlab.mechanics.standing import STANCE, energy_at_touch
 from walkerlab.pipeline.progress import Progress
 from walkerlab.scene.left_out import of_rigid_walk
 from walkerlab.scene.rigid import RigidScene, rigid_scene
-from walkerlab.solvers.registry import Tolerances
+from walkerlab.solvers.registry import ENDLESS, Tolerances
 from walkerlab.stages.walk import (
     COORDINATE,
     content_of_walk,
@@ -32,15 +32,16 @@ def run(config: SimulateConfig, inputs: Mapping[str, Content], progress: Progres
 
     again  whether the second walk, which takes about as long as two, is wanted
     """
-    scene, steps = rigid_scene(config), 2 * config.strides
-    _, start = rigid_start(config, inputs)
+    scene, settings = rigid_scene(config, config.ground, config.outputs), config.solver.rigid
+    tolerances = Tolerances(settings.method, settings.rtol, settings.atol, ENDLESS)
+    (_, start), steps = rigid_start(config, inputs), 2 * config.strides
 
     def walk(tolerances: Tolerances, sampled: bool) -> RigidWalkResult:
         progress.start("simulate" if sampled else "simulate: numerical error", steps)
         return scene.walk(start, steps, tolerances, sampled, progress.advance)
 
     of_scene, of_config = partial(groups, scene), partial(summary, config)
-    return content_of_walk("simulate", walk, scene.tolerances, of_scene, of_config, progress, again)
+    return content_of_walk("simulate", walk, tolerances, of_scene, of_config, progress, again)
 
 
 def summary(config: SimulateConfig, walk: RigidWalkResult) -> dict[str, Any]:

@@ -198,27 +198,11 @@ def summary(found: TuneRun) -> dict[str, Any]:
     """What the command prints."""
     paper, pitch, ends = found.paper, found.scene.pitch_m, counted(found.contact_map.outcome)
     pads = Pads((pitch, pitch), laid=str(with_contact(found.config).pad_pitch))
-    papers_start = (
-        {}
-        if paper is None
-        else {
-            "outcome": paper.walk.outcome.label,
-            "reason": paper.reason,
-            "steps": paper.walk.steps,
-            "state": list(paper.rigid.state),
-            "energy_J": paper.rigid.energy,
-            "weight_N": paper.rigid.weight,
-            "normal_force_N": paper.rigid.normal_force,
-            "pull_from_s": paper.rigid.pull_from,
-            "airborne_from_s": paper.airborne_from,
-            "end_time_s": paper.walk.end_time_s,
-        }
-    )
     return {
         "table2": table_2(found),
         "gait": gait_summary(found),
         "adjustment": adjustment_summary(found),
-        **({"paper_start": papers_start} if papers_start else {}),
+        **({} if paper is None else {"paper_start": papers_start(paper)}),
         "procedure": {**found.printed, "adjusted": found.printed.get("adjusted")},
         "map": {
             "cells": int(found.contact_map.outcome.size),
@@ -229,6 +213,22 @@ def summary(found: TuneRun) -> dict[str, Any]:
         },
         "slope_rad": found.scene.walker.slope,
         "pitch_m": pitch,
+    }
+
+
+def papers_start(paper: AdamsWalk) -> dict[str, Any]:
+    """How the walk from the paper's own start went, and what the rigid model says of that start."""
+    return {
+        "outcome": paper.walk.outcome.label,
+        "reason": paper.reason,
+        "steps": paper.walk.steps,
+        "state": list(paper.rigid.state),
+        "energy_J": paper.rigid.energy,
+        "weight_N": paper.rigid.weight,
+        "normal_force_N": paper.rigid.normal_force,
+        "pull_from_s": paper.rigid.pull_from,
+        "airborne_from_s": paper.airborne_from,
+        "end_time_s": paper.walk.end_time_s,
     }
 
 

@@ -224,3 +224,16 @@ def numbers_of(walk: WalkRecord) -> dict[str, Any]:
         "accepted_steps": walk.work.accepted,
         "rejected_steps": walk.work.rejected,
     }
+
+
+def last_step(walk: Mapping[str, Any]) -> dict[str, Any]:
+    """Period (s) and length (m) of a walk's last step and how long into it a knee locked (s); None if it took none.
+
+    walk  its numbers, as `numbers_of`
+    """
+    periods, lengths, strikes = walk["step_periods_s"], walk["step_lengths_m"], walk.get("knee_strike_times_s")
+    step = {"period_s": periods[-1] if periods else None, "length_m": lengths[-1] if lengths else None}
+    if not strikes:
+        return step
+    begun = walk["touch_times_s"][-2] if len(strikes) > 1 else 0.0
+    return {**step, "knee_strike_s": None if strikes[-1] is None else strikes[-1] - begun}

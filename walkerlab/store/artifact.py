@@ -159,8 +159,8 @@ def read(path: Path) -> Stored:
         raise Damaged(f"it is not an artifact: {error or type(error).__name__}") from error
 
 
-def check(path: Path, key: str) -> Verdict:
-    """Whether the file at `path` is intact and is the artifact for `key`; never raises for what the file may be."""
+def check(path: Path, key: str | None = None) -> Verdict:
+    """Whether the file at `path` is intact, and the artifact for `key` if one is given; never raises for what it is."""
     try:
         artifact = read(path)
     except (FileNotFoundError, NotADirectoryError):
@@ -169,7 +169,7 @@ def check(path: Path, key: str) -> Verdict:
         return Verdict(False, str(error))
     except Damaged as error:
         return Verdict(False, f"damaged: {error}", damaged=True)
-    if artifact.identity.key != key:
+    if key not in (None, artifact.identity.key):
         return Verdict(False, "made for another key", artifact)
     return Verdict(True, "", artifact)
 

@@ -3,7 +3,6 @@
 import mmap
 import os
 import shutil
-from dataclasses import dataclass
 from pathlib import Path
 
 from walkerlab.store import artifact
@@ -12,16 +11,8 @@ from walkerlab.store.files import replacing
 from walkerlab.store.runfolder import RunFolder
 
 
-@dataclass(frozen=True)
-class Elsewhere:
-    """An intact result in another run folder."""
-
-    path: Path
-    result: Stored
-
-
-def find_elsewhere(folder: RunFolder, stage: str, key: str) -> Elsewhere | None:
-    """The result for a key in another run folder beside this one, or None; never raises for what files may be."""
+def find_elsewhere(folder: RunFolder, stage: str, key: str) -> tuple[Path, Stored] | None:
+    """File and result for a key in another run folder beside this one, or None; never raises for what files may be."""
     try:
         names = sorted(entry.name for entry in os.scandir(folder.runs_dir) if entry.is_dir())
     except OSError:
@@ -30,7 +21,7 @@ def find_elsewhere(folder: RunFolder, stage: str, key: str) -> Elsewhere | None:
         if mentions(path, key):
             verdict = artifact.check(path, key)
             if verdict.accepted and verdict.artifact is not None:
-                return Elsewhere(path, verdict.artifact)
+                return path, verdict.artifact
     return None
 
 
@@ -43,14 +34,14 @@ def mentions(path: Path, key: str) -> bool:
         return False
 
 
-def take_over(found: Elsewhere, target: Path) -> None:
-    """Put a result from elsewhere in place under `target` too: a hard link, or a copy where the system has none.
+def take_over(found: Path, target: Path) -> None:
+    """Put a result's file in place under `target` too: a hard link, or a copy where the system has none.
 
     Artifacts are only ever replaced, so that a shared file is as safe as one's own. Raises StorageError if the system
     refuses.
     """
     with replacing(target) as temporary:
         try:
-            os.link(found.path, temporary)
+            os.link(found, temporary)
         except OSError:
-            shutil.copyfile(found.path, temporary)
+            shutil.copyfile(found, temporary)
