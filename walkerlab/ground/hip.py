@@ -6,19 +6,12 @@ from walkerlab.ground.walker import OnGround, half_size
 from walkerlab.kernels import inlined
 from walkerlab.mechanics.hinges import (
     HingeTorque,
-    SpringDamper,
     add_hinge_gradients,
     add_hinge_torque,
     hinge_energy,
     hinge_torque,
+    hip_law,
 )
-
-
-@inlined
-def hip_law(system: OnGround) -> SpringDamper:
-    """What acts between the legs."""
-    form = system.form
-    return SpringDamper(form.hip_stiffness, form.hip_damping, form.hip_torque)
 
 
 @inlined
@@ -38,7 +31,7 @@ def legs_apart(system: OnGround, y: Any, first: int) -> float:
 @inlined
 def torque_now(system: OnGround, y: Any) -> HingeTorque:
     """The torque between the legs in a state."""
-    return hinge_torque(hip_law(system), legs_apart(system, y, 0), legs_apart(system, y, half_size(system.form)))
+    return hinge_torque(hip_law(system.form), legs_apart(system, y, 0), legs_apart(system, y, half_size(system.form)))
 
 
 @inlined
@@ -60,7 +53,7 @@ def add_hip_gradients(system: OnGround, y: Any, by_angle: Any, by_rate: Any) -> 
 @inlined
 def hip_energy(system: OnGround, y: Any) -> float:
     """Elastic energy (J) of the spring."""
-    return hinge_energy(hip_law(system), legs_apart(system, y, 0)) if system.form.driven_hip else 0.0
+    return hinge_energy(hip_law(system.form), legs_apart(system, y, 0)) if system.form.driven_hip else 0.0
 
 
 @inlined
@@ -69,4 +62,4 @@ def hip_power(system: OnGround, y: Any) -> tuple[float, float]:
     if not system.form.driven_hip:
         return 0.0, 0.0
     now, rate = torque_now(system, y), legs_apart(system, y, half_size(system.form))
-    return (now.elastic - now.torque) * rate, max(0.0, system.form.hip_torque * rate)
+    return (now.elastic - now.torque) * rate, max(0.0, hip_law(system.form).torque * rate)

@@ -16,7 +16,7 @@ from walkerlab.ground.walker import (
     sines_cosines,
 )
 from walkerlab.kernels import always_inline, inlined, matrix, vector
-from walkerlab.mechanics.links import Counted, factor_linked, gathered, solve_linked
+from walkerlab.mechanics.links import Counted, factor_linked, solve_linked
 from walkerlab.mechanics.tree import (
     add_gravity,
     add_gravity_gradient,
@@ -88,7 +88,7 @@ def on_ground_derivative(system: OnGround, t: float, y: Any, f: Any) -> None:
     sines_cosines(form, y, s, c)
     along, normal = all_forces(system, t, s, c, y, M, r)
     links = Counted(form.E, form.arm_x[:n])
-    factor_linked(links, 0, M, r)
+    factor_linked(links, 0, M)
     solve_linked(links, 0, M, r)
     for i in range(half):
         f[i] = y[half + i]
@@ -184,12 +184,11 @@ def on_ground_jacobian(system: OnGround, t: float, y: Any, J: Any) -> None:
     sines_cosines(form, y, s, c)
     all_forces(system, t, s, c, y, M, alpha)
     links = Counted(form.E, form.arm_x[:n])
-    factor_linked(links, 0, M, alpha)
+    factor_linked(links, 0, M)
     solve_linked(links, 0, M, alpha)
     for k in range(n):  # row k: the angular accelerations by a torque on body k
         for l in range(n):
             by_torque[k, l] = 1.0 if k == l else 0.0
-        gathered(links, 0, by_torque[k])
         solve_linked(links, 0, M, by_torque[k])
     for foot in range(2):
         add_foot_gradients(system, t, foot, s, c, y, J)

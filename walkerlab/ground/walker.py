@@ -18,6 +18,7 @@ from walkerlab.ground.friction import friction_coefficient
 from walkerlab.ground.normal_force import NormalForce, NormalLaw, impact_normal_force
 from walkerlab.kernels import by_reference, inlined, vector
 from walkerlab.mechanics import tree
+from walkerlab.mechanics.hinges import HIP_NUMBERS, hip_law
 from walkerlab.mechanics.tree import lever_motion
 from walkerlab.solvers.system import State
 
@@ -57,9 +58,7 @@ class Form(np.record):  # type: ignore[misc]  # NumPy's stubs call one of its ba
     shanks: Integers
     uppers: Integers  # (2,) bodies of either leg at the hip
     driven_hip: bool  # whether anything acts between the legs: see ground/hip.py
-    hip_stiffness: float  # N m/rad
-    hip_damping: float  # N m s/rad
-    hip_torque: float  # N m, on the swing leg
+    hip: Floats  # numbers of that: see `hinges.hip_law`
     push_off: float  # N s, along the trailing leg from a step's touch on
     push_off_duration: float  # s
     onto: Integers  # (all bodies,) which of these bodies each is
@@ -87,6 +86,7 @@ SHAPES: dict[str, tuple[int, ...]] = {
     "E": (1, MAX_BODIES, MAX_BODIES),
     **dict.fromkeys(("arm_x", "arm_y", "hip_x", "hip_y", "onto", "first"), (MAX_BODIES,)),
     **dict.fromkeys(("foot_x", "foot_y", "rolling"), (2, MAX_BODIES)),
+    "hip": (HIP_NUMBERS,),
     **dict.fromkeys(("radius", "thighs", "shanks", "uppers"), (2,)),
 }
 KINDS = {Integers: np.int64, int: np.int64, bool: np.bool_}
@@ -138,7 +138,7 @@ class ContactWalker(NamedTuple):
     @property
     def driven(self) -> bool:
         """Whether anything but gravity gives it energy."""
-        return bool(self.whole.push_off != 0.0 or self.whole.hip_torque != 0.0)
+        return bool(self.whole.push_off != 0.0 or hip_law(self.whole).torque != 0.0)
 
     @property
     def gravity(self) -> float:

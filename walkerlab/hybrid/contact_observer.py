@@ -2,8 +2,6 @@
 
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from walkerlab.account import DAMPING, EDGES, ENTRIES, FORWARD, FRICTION, HIP, KNEE_STOP, PUSH_OFF
 from walkerlab.ground.energy import dissipated_power, foot_elastic_energy, push_power, total_energy
 from walkerlab.ground.hip import hip_energy, hip_power
@@ -11,10 +9,9 @@ from walkerlab.ground.knees import knee_power
 from walkerlab.ground.walker import OF_STATES, STOPPING, OnGround, one_foot_motion, over_ground, store_whole
 from walkerlab.hybrid.contact_events import HEIGHT, PER_FOOT, STANCE, VERTICAL_VELOCITY, WalkState
 from walkerlab.hybrid.contact_tangent import Tangent, carry_tangent
-from walkerlab.kernels import by_reference, by_type_or_default, inlined, kernel, matrix, vector
+from walkerlab.kernels import by_reference, entered, inlined, matrix, vector
 from walkerlab.solvers.events import RISING, CrossingFinder, first_crossing
-from walkerlab.solvers.scipy_methods import ScipyMethod
-from walkerlab.solvers.stepping import T_OLD, T, interpolate
+from walkerlab.solvers.stepping import T_OLD, T, interpolate, sample
 
 # rows of `account`
 SO_FAR, AT_TOUCH = 0, 1
@@ -90,7 +87,7 @@ def balance(observer: ContactObserver, method: Any, system: OnGround) -> None:
     lost = -account[PUSH_OFF] - account[HIP]
     for entry in range(PUSH_OFF):
         lost += account[entry]
-    residual = end_energy(method, system) + lost - observer.extremes[START_ENERGY]
+    residual = end_energy(system, method.y) + lost - observer.extremes[START_ENERGY]
     observer.extremes[RESIDUAL] = max(observer.extremes[RESIDUAL], abs(residual))
 
 
@@ -122,22 +119,23 @@ def observe_edge(observer: ContactObserver, system: OnGround, foot: int, y: Any)
         observer.account[SO_FAR, EDGES] += foot_elastic_energy(system, foot, y)
 
 
-@by_type_or_default
-def end_energy(method: Any, system: OnGround) -> float:
+@entered
+def end_energy(system: OnGround, y: Any) -> float:
     """Mechanical energy (J) at the end of the last step."""
-    return total_energy(system, method.y)
-
-
-@by_type_or_default
-def add_work_until(method: Any, system: OnGround, fraction: float, account: Any) -> None:
-    """Add to an account (entries,) what the first part of the last step took and gave (J)."""
-    states = matrix(OF_STATES)
-    for i in range(len(NODES)):
-        interpolate(method, system, fraction * NODES[i], states[i, : method.y.size])
-    add_work(system, states, method.clock[T_OLD], fraction * (method.clock[T] - method.clock[T_OLD]), account)
+    return total_energy(system, y)
 
 
 @inlined
+def add_work_until(method: Any, system: OnGround, fraction: float, account: Any) -> None:
+    """Add to an account (entries,) what the first part of the last step took and gave (J)."""
+    fractions, states = vector(NODES), matrix(OF_STATES)
+    for i in range(len(NODES)):
+        fractions[i] = fraction * NODES[i]
+    sample(method, system, fractions, states)
+    add_work(system, states, method.clock[T_OLD], fraction * (method.clock[T] - method.clock[T_OLD]), account)
+
+
+@entered
 def add_work(system: OnGround, states: Any, begin: float, span: float, account: Any) -> None:
     """The same of a time `span` (s) from `begin` on, with the states at its NODES."""
     for foot in range(2):
@@ -172,28 +170,3 @@ def foot_work(system: OnGround, states: Any, foot: int, span: float) -> tuple[fl
     if let_go:
         damping = foot_elastic_energy(system, foot, states[0]) - foot_elastic_energy(system, foot, states[last])
     return damping, friction
-
-
-@kernel
-def energy_of(system: OnGround, y: Any) -> float:
-    """Mechanical energy (J) of a state."""
-    return total_energy(system, y)
-
-
-@kernel
-def add_work_of(system: OnGround, states: Any, begin: float, span: float, account: Any) -> None:
-    """As `add_work`."""
-    add_work(system, states, begin, span, account)
-
-
-@end_energy.case(ScipyMethod)
-def end_energy_in_python(method: ScipyMethod, system: OnGround) -> float:
-    """A walk in Python hands its states to compiled code at once."""
-    return energy_of(system, method.y)
-
-
-@add_work_until.case(ScipyMethod)
-def add_work_in_python(method: ScipyMethod, system: OnGround, fraction: float, account: Any) -> None:
-    """Likewise."""
-    states, begin = method.states_at(fraction * np.array(NODES)), method.clock[T_OLD]
-    add_work_of(system, states, begin, fraction * (method.clock[T] - begin), account)

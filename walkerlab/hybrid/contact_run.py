@@ -302,7 +302,7 @@ def walk_on(
         tangent[: y.size] = folded(system.form, tangent)
     lead = tolerances.new(y.size)
     lead.clock[T] = walk_state.times[NOW]
-    by_size, finder = {y.size: lead}, finder_for(lead, EVENT_FUNCTIONS)
+    by_size, finder = {y.size: lead}, finder_for(lead, EVENT_FUNCTIONS, walker.size)
     while True:
         if y.size not in by_size:
             by_size[y.size] = sharing(tolerances.new(y.size), lead.clock, lead.counts)

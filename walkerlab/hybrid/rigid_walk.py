@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from walkerlab.hybrid.rigid_observer import Observer, observe, observe_start, observe_strike
-from walkerlab.kernels import by_type_or_default, inlined, kernel, vector
+from walkerlab.kernels import entered, inlined, kernel, vector
 from walkerlab.mechanics.impact import strike
 from walkerlab.mechanics.standing import (
     AT_STRIKE,
@@ -28,7 +28,6 @@ from walkerlab.mechanics.standing import (
 )
 from walkerlab.outcome import Outcome
 from walkerlab.solvers.events import FALLING, NO_CROSSING, RISING, CrossingFinder, first_crossing, value_at
-from walkerlab.solvers.scipy_methods import ScipyMethod
 from walkerlab.solvers.stepping import (
     H_NEXT,
     OUT_OF_BUDGET,
@@ -37,9 +36,9 @@ from walkerlab.solvers.stepping import (
     T,
     advance,
     begin,
-    interpolate,
     prepare_dense,
     rewind,
+    sample,
 )
 from walkerlab.solvers.system import derivative
 
@@ -108,7 +107,7 @@ def foot_function(system: Mode, y: Any) -> tuple[float, float, float, float]:
         height, ahead, upward, apart = swing_foot_motion(model, y, y[n : 2 * n])
         return height - system.rise, ahead, upward, apart
     swing, stance = y[n + SWING], y[n + STANCE]
-    return feet_on_slope(model, y), y[SWING] - y[STANCE], swing + stance, swing - stance
+    return feet_on_slope(model, y[SWING], y[STANCE]), y[SWING] - y[STANCE], swing + stance, swing - stance
 
 
 @inlined
@@ -135,9 +134,11 @@ def sample_events(system: Mode, y: Any, node: int, finder: CrossingFinder) -> No
         finder.values[KNEE, node] = knee_angle(system.model, y, 0)
 
 
-@inlined
+@entered
 def events_in_step(system: Mode, finder: CrossingFinder, at_start: bool) -> tuple[float, float, float]:
     """Fractions of a sampled step at which the swing foot comes down ahead, the walker falls, and the knee strikes."""
+    for node in range(finder.nodes.size):
+        sample_events(system, finder.states[node], node, finder)
     on_ground = at_start and system.behind == system.rise
     strike = first_crossing(finder, HEEL_STRIKE, FALLING, 0.0, on_ground)
     while strike <= 1.0 and value_at(finder, AHEAD, strike) <= 0.0:
@@ -145,31 +146,6 @@ def events_in_step(system: Mode, finder: CrossingFinder, at_start: bool) -> tupl
     fall, struck = first_crossing(finder, FALL, FALLING, 0.0, False), NO_CROSSING
     if is_bent(system):
         struck = first_crossing(finder, KNEE, RISING, RELEASED if at_start else 0.0, at_start)
-    return strike, fall, struck
-
-
-@by_type_or_default
-def scan_swing(method: Any, system: Mode, finder: CrossingFinder, at_start: bool) -> tuple[float, float, float]:
-    """`events_in_step` of the last step of a method; its dense output is ready."""
-    y = vector(system.model.zero_state)
-    for node in range(finder.nodes.size):
-        interpolate(method, system, finder.nodes[node], y)
-        sample_events(system, y, node, finder)
-    return events_in_step(system, finder, at_start)
-
-
-@kernel
-def scan_states(system: Mode, states: Any, finder: CrossingFinder, at_start: bool) -> tuple[float, float, float]:
-    """`events_in_step` of a step whose states at the nodes are the rows of `states`."""
-    for node in range(finder.nodes.size):
-        sample_events(system, states[node], node, finder)
-    return events_in_step(system, finder, at_start)
-
-
-@scan_swing.case(ScipyMethod)
-def scan_scipy(method: ScipyMethod, system: Mode, finder: CrossingFinder, at_start: bool) -> tuple[float, float, float]:
-    """A walk in Python hands the step's states to compiled code at once."""
-    strike, fall, struck = scan_states(system, method.states_at(finder.nodes), finder, at_start)
     return strike, fall, struck
 
 
@@ -225,7 +201,8 @@ def swing_phase(
             prepare_dense(method, system)
         strike, fall, struck = NO_CROSSING, NO_CROSSING, NO_CROSSING
         if near:
-            strike, fall, struck = scan_swing(method, system, finder, at_start)
+            sample(method, system, finder.nodes, finder.states)
+            strike, fall, struck = events_in_step(system, finder, at_start)
         if observer.watching:
             observe(observer, method, system, min(1.0, strike, fall, struck), step)
         if fall < min(strike, struck):
@@ -254,7 +231,7 @@ def event_value(system: Mode, y: Any, turn: Any) -> tuple[float, float]:
     if system.rise != 0.0:
         height, _, upward, _ = swing_foot_motion(model, y, turn)
         return height - system.rise, upward
-    return feet_on_slope(model, y), turn[SWING] + turn[STANCE]
+    return feet_on_slope(model, y[SWING], y[STANCE]), turn[SWING] + turn[STANCE]
 
 
 @inlined

@@ -23,14 +23,15 @@ from numpy.typing import NDArray
 from walkerlab.kernels import always_inline, inlined, matrix, vector, zeros
 from walkerlab.mechanics import tree
 from walkerlab.mechanics.hinges import (
+    HIP_NUMBERS,
     HingeTorque,
-    SpringDamper,
     add_hinge_gradients,
     add_hinge_torque,
     hinge_energy,
     hinge_torque,
+    hip_law,
 )
-from walkerlab.mechanics.links import factor_linked, gathered, solve_linked, spread
+from walkerlab.mechanics.links import factor_linked, solve_linked, spread
 from walkerlab.mechanics.tree import (
     add_gravity,
     add_gravity_gradient,
@@ -67,9 +68,7 @@ class Standing(np.record):  # type: ignore[misc]  # NumPy's stubs call one of it
     thigh: int  # places of the swing knee's bodies among them; NO_SHANK for legs without knees
     shank: int
     driven_hip: bool  # whether anything acts between the legs
-    hip_stiffness: float  # N m/rad, of what acts between the legs: a SpringDamper
-    hip_damping: float  # N m s/rad
-    hip_torque: float  # N m, on the swing leg
+    hip: Floats  # numbers of that: see `hinges.hip_law`
     push_off: float  # N s, along the trailing leg in the heel strike
     misprint: float  # kg m^2, of a torque on the stance leg that no hinge gives: see `add_misprint`
     mass: float  # kg
@@ -97,7 +96,7 @@ class Standing(np.record):  # type: ignore[misc]  # NumPy's stubs call one of it
     @property
     def driven(self) -> bool:
         """Whether anything but gravity gives it energy."""
-        return bool(self.push_off != 0.0 or self.hip_torque != 0.0)
+        return bool(self.push_off != 0.0 or hip_law(self).torque != 0.0)
 
     @property
     def passive(self) -> bool:
@@ -135,6 +134,7 @@ def new_standing(n: int, **fields: Any) -> Standing:
         **dict.fromkeys(("A", "B"), square),
         **dict.fromkeys(("arm_x", "arm_y", "foot_x", "foot_y"), each),
         "E": (3, n, n),
+        "hip": (HIP_NUMBERS,),
         "zero_state": (2 * n,),
     }
     whole = {"roles": each, "section": (n + 1,), "coordinates": (), "thigh": (), "shank": (), "driven_hip": ()}
@@ -196,12 +196,6 @@ def equations(model: Standing, y: Any, s: Any, c: Any, F: Any, U: Any, M: Any, r
 
 
 @always_inline
-def hip_law(model: Standing) -> SpringDamper:
-    """What acts between the legs."""
-    return SpringDamper(model.hip_stiffness, model.hip_damping, model.hip_torque)
-
-
-@always_inline
 def hip_torque(model: Standing, y: Any) -> HingeTorque:
     """The torque between the legs, by how far the swing leg is ahead."""
     n = len(model.arm_x)
@@ -237,7 +231,7 @@ def mode_derivative(system: Mode, t: float, y: Any, f: Any) -> None:
     n = len(like)
     s, c, F, U, alpha, M = vector(like), vector(like), vector(like), vector(like), vector(like), matrix(like)
     equations(model, y, s, c, F, U, M, alpha)
-    factor_linked(model, phase, M, alpha)
+    factor_linked(model, phase, M)
     solve_linked(model, phase, M, alpha)
     for k in range(n):
         f[k], f[n + k] = y[n + k], alpha[k]
@@ -251,7 +245,6 @@ def mode_derivative(system: Mode, t: float, y: Any, f: Any) -> None:
                 for l in range(n):
                     total += by_angle[k, l] * y[at + l] + by_rate[k, l] * y[at + n + l]
                 alpha[k] = total
-            gathered(model, phase, alpha)
             solve_linked(model, phase, M, alpha)
             for k in range(n):
                 f[at + k], f[at + n + k] = y[at + n + k], alpha[k]
@@ -287,14 +280,13 @@ def mode_jacobian(system: Mode, t: float, y: Any, J: Any) -> None:
     s, c, F, U, alpha, M = vector(like), vector(like), vector(like), vector(like), vector(like), matrix(like)
     by_angle, by_rate = matrix(like), matrix(like)
     equations(model, y, s, c, F, U, M, alpha)
-    factor_linked(model, phase, M, alpha)
+    factor_linked(model, phase, M)
     solve_linked(model, phase, M, alpha)
     torque_gradients(model, y, s, c, alpha, by_angle, by_rate)
     for j in range(2 * n):
         for k in range(n):
             J[k, j] = 1.0 if j == n + k else 0.0
             alpha[k] = by_angle[k, j] if j < n else by_rate[k, j - n]
-        gathered(model, phase, alpha)
         solve_linked(model, phase, M, alpha)
         for k in range(n):
             J[n + k, j] = alpha[k]
@@ -385,12 +377,14 @@ def hip_height(model: Standing, y: Any) -> float:
 
 
 @inlined
-def feet_on_slope(model: Standing, y: Any) -> float:
+def feet_on_slope(model: Any, swing: Any, stance: Any) -> Any:
     """Sum (rad) of the straight legs' angles from the slope's normal: zero with both feet on even ground.
 
     It falls through zero at heel strike. (9-2) prints theta_1 = -theta_2, which holds only for angles from the normal.
+
+    swing, stance  rad, angles from the vertical: numbers, arrays or lanes
     """
-    return y[SWING] + y[STANCE] + 2.0 * (model.slope + model.lean)
+    return swing + stance + 2.0 * (model.slope + model.lean)
 
 
 def step_lengths(model: Standing, starts: Any, ends: Any) -> Floats:

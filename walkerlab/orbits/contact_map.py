@@ -262,7 +262,7 @@ def pushed_at_hip(system: OnGround, walker: ContactWalker, state: State, impulse
     add_inertia(form, n, s, c, y[half + 2 :], M, r)
     r[:] = -impulse * (s * form.hip_x[:n] + c * form.hip_y[:n])
     links = Counted(form.E, form.arm_x[:n])
-    factor_linked(links, 0, M, r)
+    factor_linked(links, 0, M)
     solve_linked(links, 0, M, r)
     y[half] += impulse / form.mass
     y[half + 2 :] += r
