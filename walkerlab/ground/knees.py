@@ -7,14 +7,13 @@ a lock is a plastic impact: Z'MZ z = Z'M omega.
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from walkerlab.ground.normal_force import NormalLaw, elastic_energy, impact_normal_force
 from walkerlab.ground.walker import STOPPING, Form, OnGround, half_size
 from walkerlab.kernels import inlined
 from walkerlab.mechanics.hinges import HingeTorque, add_hinge_gradients, add_hinge_torque, hinge_energy, hinge_torque
+from walkerlab.solvers.system import Floats
 
-Floats = NDArray[np.float64]
 FLEXED = 0.01  # rad of flexion from which on a knee that straightens is caught
 
 

@@ -12,7 +12,6 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from walkerlab.ground.friction import friction_coefficient
 from walkerlab.ground.normal_force import NormalForce, NormalLaw, impact_normal_force
@@ -20,10 +19,8 @@ from walkerlab.kernels import by_reference, inlined, vector
 from walkerlab.mechanics import tree
 from walkerlab.mechanics.hinges import HIP_NUMBERS, hip_law
 from walkerlab.mechanics.tree import lever_motion
-from walkerlab.solvers.system import State
+from walkerlab.solvers.system import Floats, Integers, State
 
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 MAX_BODIES = 8
 OF_BODIES = (0.0,) * MAX_BODIES  # scratch is made like these
 OF_STATES = (0.0,) * (4 + 2 * MAX_BODIES)
@@ -89,10 +86,7 @@ SHAPES: dict[str, tuple[int, ...]] = {
     "hip": (HIP_NUMBERS,),
     **dict.fromkeys(("radius", "thighs", "shanks", "uppers"), (2,)),
 }
-KINDS = {Integers: np.int64, int: np.int64, bool: np.bool_}
-FORM = np.dtype(
-    (Form, [(name, KINDS.get(of, np.float64), SHAPES.get(name, ())) for name, of in Form.__annotations__.items()])
-)
+FORM = tree.record_type(Form, SHAPES)
 
 
 class ContactWalker(NamedTuple):

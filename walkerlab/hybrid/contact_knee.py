@@ -3,7 +3,6 @@
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from walkerlab.account import KNEE_STOP, KNEE_STRIKES
 from walkerlab.ground.knees import knee_energy, lock
@@ -24,8 +23,7 @@ from walkerlab.kernels import vector
 from walkerlab.mechanics.tree import projections
 from walkerlab.solvers.scipy_methods import right_hand_side
 from walkerlab.solvers.stepping import T
-
-Floats = NDArray[np.float64]
+from walkerlab.solvers.system import Floats
 
 
 def change_form(

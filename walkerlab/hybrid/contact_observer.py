@@ -2,7 +2,7 @@
 
 from typing import Any, NamedTuple
 
-from walkerlab.account import DAMPING, EDGES, ENTRIES, FORWARD, FRICTION, HIP, KNEE_STOP, PUSH_OFF
+from walkerlab.account import DAMPING, EDGES, ENTRIES, FORWARD, FRICTION, GIVEN, HIP, KNEE_STOP, LOST, PUSH_OFF
 from walkerlab.ground.energy import dissipated_power, foot_elastic_energy, push_power, total_energy
 from walkerlab.ground.hip import hip_energy, hip_power
 from walkerlab.ground.knees import knee_power
@@ -23,18 +23,35 @@ WEIGHTS = (0.0, 0.37640306270046725, 0.5124858261884216, 0.1111111111111111)
 
 
 @by_reference
-class ContactObserver(NamedTuple):
-    """Samples, energy balance and tangent of a walk; what is not wanted has no room and costs a look."""
+class ContactSamples(NamedTuple):
+    """A walk at rising times."""
 
-    track_energy: bool  # whether to keep the energy balance
-    times: Any  # (samples,) s, rising
+    time_s: Any  # (samples,)
     states: Any  # (samples, 4 + 2 n) of the whole walker
     has_ground: Any  # (samples, 2)
     stance: Any  # (samples,)
     knees: Any  # (samples, 2) what each knee is doing
-    level: Any  # (samples, 2) m, height of the ground for each foot
-    sampled_account: Any  # (samples, entries) J
-    recorded: Any  # (1,)
+    level: Any  # (samples, 2) m, height over the slope of the ground for each foot
+    account: Any  # (samples, entries) J
+
+    @property
+    def dissipated_J(self) -> Any:
+        """(samples, 5) in the order of account.LOSSES."""
+        return self.account[:, LOST]
+
+    @property
+    def driven_J(self) -> Any:
+        """(samples, 2) given by push-off and hip."""
+        return self.account[:, GIVEN]
+
+
+@by_reference
+class ContactObserver(NamedTuple):
+    """Samples, energy balance and tangent of a walk; what is not wanted has no room and costs a look."""
+
+    track_energy: bool  # whether to keep the energy balance
+    samples: ContactSamples
+    recorded: Any  # (1,) how many of them
     account: Any  # (2, entries) J so far, and until the last step's touch
     # (5,) deepest penetration m, largest residual of the energy balance J, energy at the start J: its potential from a
     # fixed origin, and from the slope below; and the part of the hip's spring J
@@ -61,20 +78,20 @@ def observe(
 def record_samples(observer: ContactObserver, method: Any, system: OnGround, walk_state: WalkState) -> None:
     """The samples that fall into the last step."""
     t, h = method.clock[T_OLD], method.clock[T] - method.clock[T_OLD]
-    index = observer.recorded[0]
+    samples, index = observer.samples, observer.recorded[0]
     y = vector(OF_STATES)[: method.y.size]
-    while index < observer.times.size and observer.times[index] <= method.clock[T]:
-        fraction = (observer.times[index] - t) / h
+    while index < samples.time_s.size and samples.time_s[index] <= method.clock[T]:
+        fraction = (samples.time_s[index] - t) / h
         interpolate(method, system, fraction, y)
-        store_whole(system.form, y, observer.states[index])
+        store_whole(system.form, y, samples.states[index])
         for entry in range(ENTRIES):
-            observer.sampled_account[index, entry] = observer.account[SO_FAR, entry]
-        add_work_until(method, system, fraction, observer.sampled_account[index])
+            samples.account[index, entry] = observer.account[SO_FAR, entry]
+        add_work_until(method, system, fraction, samples.account[index])
         for k in range(2):
-            observer.knees[index, k] = walk_state.knee[k]
-            observer.has_ground[index, k] = walk_state.has_ground[k]
-            observer.level[index, k] = walk_state.level[k]
-        observer.stance[index] = walk_state.feet[STANCE]
+            samples.knees[index, k] = walk_state.knee[k]
+            samples.has_ground[index, k] = walk_state.has_ground[k]
+            samples.level[index, k] = walk_state.level[k]
+        samples.stance[index] = walk_state.feet[STANCE]
         index += 1
     observer.recorded[0] = index
 

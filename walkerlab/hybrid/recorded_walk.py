@@ -6,7 +6,7 @@ Long walks are taken a few dozen steps at a time, so that memory is needed for r
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,8 +54,7 @@ SAMPLES_PER_UNIT_TIME = 64  # in sqrt(L/g)
 CLOSEST_SAMPLES = 1e-2  # of the time between samples; one nearer to a heel strike is dropped
 
 
-@dataclass(frozen=True, eq=False)
-class Samples:
+class Samples(NamedTuple):
     """A walk in time: a regular grid, and both sides of every heel strike."""
 
     time_s: Array  # (samples,) strictly rising; the state before a heel strike is one rounding earlier than after
@@ -307,7 +306,4 @@ def far_from(times: Array, events: Array, distance: float) -> NDArray[np.bool_]:
 
 def joined(pieces: list[Samples]) -> Samples:
     """One record of several that follow each other."""
-    time = np.concatenate([piece.time_s for piece in pieces])
-    state = np.concatenate([piece.state for piece in pieces])
-    step, bent = np.concatenate([piece.step for piece in pieces]), np.concatenate([piece.bent for piece in pieces])
-    return Samples(time, state, step, bent)
+    return Samples(*map(np.concatenate, zip(*pieces, strict=True)))

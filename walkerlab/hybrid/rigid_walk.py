@@ -89,24 +89,24 @@ def may_end(system: Mode, method: Any, at_start: bool) -> bool:
         start_rate, end_rate = h * knee_angle(model, old, n), h * knee_angle(model, y, n)
         if hull(start, start_rate, end, end_rate, at_start)[1] >= 0.0:
             return True
-    before, now = foot_function(system, old), foot_function(system, y)
+    before, now = foot_function(system, old, old[n : 2 * n]), foot_function(system, y, y[n : 2 * n])
     ahead = hull(before[1], h * before[3], now[1], h * now[3])
     return ahead[1] > 0.0 and hull(before[0], h * before[2], now[0], h * now[2])[0] <= 0.0
 
 
 @inlined
-def foot_function(system: Mode, y: Any) -> tuple[float, float, float, float]:
-    """What falls through zero as the swing foot comes down, what is positive with it ahead, and their rates.
+def foot_function(system: Mode, y: Any, turn: Any) -> tuple[float, float, float, float]:
+    """What falls through zero as the swing foot comes down, what is positive with it ahead, and how both change.
 
     Of a straight leg over even ground both are linear in the angles, and scuffing near mid-swing is no zero; otherwise
     they are the foot's height over its next foothold, and its place.
+
+    turn  (n,) and more: angular velocities, or a column
     """
-    model = system.model
-    n = len(model.arm_x)
+    model, swing, stance = system.model, turn[SWING], turn[STANCE]
     if is_bent(system) or system.rise != 0.0:
-        height, ahead, upward, apart = swing_foot_motion(model, y, y[n : 2 * n])
+        height, ahead, upward, apart = swing_foot_motion(model, y, turn)
         return height - system.rise, ahead, upward, apart
-    swing, stance = y[n + SWING], y[n + STANCE]
     return feet_on_slope(model, y[SWING], y[STANCE]), y[SWING] - y[STANCE], swing + stance, swing - stance
 
 
@@ -127,7 +127,7 @@ def hull(start: float, start_rate: float, end: float, end_rate: float, zero_at_s
 @inlined
 def sample_events(system: Mode, y: Any, node: int, finder: CrossingFinder) -> None:
     """Values of the event functions at one node of a step, where the state is y."""
-    foot = foot_function(system, y)
+    foot = foot_function(system, y, y[len(system.model.arm_x) :])
     finder.values[HEEL_STRIKE, node], finder.values[AHEAD, node] = foot[0], foot[1]
     finder.values[FALL, node] = hip_above_fall(system.model, y)
     if is_bent(system):
@@ -221,17 +221,11 @@ def swing_phase(
 
 @inlined
 def event_value(system: Mode, y: Any, turn: Any) -> tuple[float, float]:
-    """The event function of the strike that ends a phase, and how it changes as the bodies turn.
-
-    turn  (n,) and more: angular velocities, or a column
-    """
-    model = system.model
+    """The event function of the strike that ends a phase, and how it changes; `turn` as in `foot_function`."""
     if is_bent(system):
-        return knee_angle(model, y, 0), knee_angle(model, turn, 0)
-    if system.rise != 0.0:
-        height, _, upward, _ = swing_foot_motion(model, y, turn)
-        return height - system.rise, upward
-    return feet_on_slope(model, y[SWING], y[STANCE]), turn[SWING] + turn[STANCE]
+        return knee_angle(system.model, y, 0), knee_angle(system.model, turn, 0)
+    value, _, change, _ = foot_function(system, y, turn)
+    return value, change
 
 
 @inlined

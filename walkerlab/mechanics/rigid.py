@@ -5,13 +5,12 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from walkerlab.mechanics.assembly import Anchor, followers, levers, tree_about
 from walkerlab.mechanics.parts import Assembly, Revolute
 from walkerlab.mechanics.standing import NO_SHANK, STANCE, SWING, Standing, new_standing, on_slope
+from walkerlab.solvers.system import Floats
 
-Floats = NDArray[np.float64]
 ALIKE = 1e-12  # relative difference up to which two legs are alike
 
 

@@ -14,11 +14,9 @@ belongs to both legs.
 """
 
 import math
-from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from walkerlab.kernels import always_inline, inlined, matrix, vector, zeros
 from walkerlab.mechanics import tree
@@ -42,10 +40,8 @@ from walkerlab.mechanics.tree import (
     sines_cosines,
 )
 from walkerlab.mechanics.trigonometry import sine_cosine
-from walkerlab.solvers.system import block, derivative, jacobian
+from walkerlab.solvers.system import Floats, Integers, block, derivative, jacobian
 
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 SWING, STANCE, SHANK = 0, 1, 2
 # rows of E: while the swing knee is free, with the swing leg straight, and in the heel strike
 BENT, STRAIGHT, AT_STRIKE = 0, 1, 2
@@ -112,37 +108,29 @@ class Standing(np.record):  # type: ignore[misc]  # NumPy's stubs call one of it
         return hash(self.tobytes())
 
     def changed(self, **fields: Any) -> "Standing":
-        """The same with other values of some fields."""
-        return frozen(self, fields)
-
-
-def frozen(model: Any, fields: Mapping[str, Any]) -> Standing:
-    """A copy with these fields that nobody can write to."""
-    memory: Any = np.empty((), model.dtype)
-    memory[()] = model
-    for name, value in fields.items():
-        memory[name] = value
-    memory.flags.writeable = False
-    read_only: Standing = memory[()]
-    return read_only
+        """A copy with other values of some fields, that nobody can write to."""
+        memory: Any = np.empty((), self.dtype)
+        memory[()] = self
+        for name, value in fields.items():
+            memory[name] = value
+        memory.flags.writeable = False
+        read_only: Standing = memory[()]
+        return read_only
 
 
 def new_standing(n: int, **fields: Any) -> Standing:
     """The rigid model of n bodies with these fields; the others are zero."""
-    square, each = (n, n), (n,)
     shapes = {
-        **dict.fromkeys(("A", "B"), square),
-        **dict.fromkeys(("arm_x", "arm_y", "foot_x", "foot_y"), each),
+        **dict.fromkeys(("A", "B"), (n, n)),
+        **dict.fromkeys(("arm_x", "arm_y", "foot_x", "foot_y", "roles"), (n,)),
+        "section": (n + 1,),
         "E": (3, n, n),
         "hip": (HIP_NUMBERS,),
         "zero_state": (2 * n,),
     }
-    whole = {"roles": each, "section": (n + 1,), "coordinates": (), "thigh": (), "shank": (), "driven_hip": ()}
-    layout = [
-        (name, np.int64, whole[name]) if name in whole else (name, np.float64, shapes.get(name, ()))
-        for name in Standing.__annotations__
-    ]
-    return frozen(np.zeros((), np.dtype((Standing, layout))), fields)
+    blank: Any = np.zeros((), tree.record_type(Standing, shapes))
+    model: Standing = blank[()]
+    return model.changed(**fields)
 
 
 def on_slope(model: Standing, slope: float) -> Standing:
