@@ -2,8 +2,7 @@
 
 from typing import Any
 
-from walkerlab.ground.hip import add_hip_gradients, add_hip_torque
-from walkerlab.ground.knees import add_stop_gradients, add_stop_torques
+from walkerlab.ground.hinges import add_gradients, add_torques
 from walkerlab.ground.pulse import push_gradient, push_on
 from walkerlab.ground.walker import (
     OF_BODIES,
@@ -73,8 +72,7 @@ def all_forces(system: OnGround, t: float, s: Any, c: Any, y: Any, M: Any, r: An
         force = foot_wrench(system, t, foot, s, c, y, r)
         along += force[0]
         normal += force[1]
-    add_stop_torques(system, y, r)
-    add_hip_torque(system, y, r)
+    add_torques(system, y, r)
     add_inertia(form, n, s, c, y[half + form.places : 2 * half], M, r)
     return along, normal
 
@@ -165,8 +163,7 @@ def add_torque_gradients(system: OnGround, s: Any, c: Any, y: Any, alpha: Any, b
         F, U = vector(OF_BODIES), vector(OF_BODIES)
         projections(form.arm_x, form.arm_y, n, s, c, F, U)
         add_gravity_gradient(form, n, F, U, by_angle)
-    add_stop_gradients(system, y, by_angle, by_rate)
-    add_hip_gradients(system, y, by_angle, by_rate)
+    add_gradients(system, y, by_angle, by_rate)
     add_inertia_gradients(form, n, s, c, y[half + p : 2 * half], alpha, by_angle, by_rate)
 
 

@@ -54,7 +54,7 @@ class Form(np.record):  # type: ignore[misc]  # NumPy's stubs call one of its ba
     thighs: Integers  # (2,) bodies of either leg; thigh and shank are the same one while they move as one
     shanks: Integers
     uppers: Integers  # (2,) bodies of either leg at the hip
-    driven_hip: bool  # whether anything acts between the legs: see ground/hip.py
+    driven_hip: bool  # whether anything acts between the legs: see ground/hinges.py
     hip: Floats  # numbers of that: see `hinges.hip_law`
     push_off: float  # N s, along the trailing leg from a step's touch on
     push_off_duration: float  # s

@@ -5,7 +5,8 @@ from typing import Any
 import numpy as np
 
 from walkerlab.account import KNEE_STOP, KNEE_STRIKES
-from walkerlab.ground.knees import knee_energy, lock
+from walkerlab.ground.hinges import knee_energy
+from walkerlab.ground.knees import lock
 from walkerlab.ground.motion import motion_gradient
 from walkerlab.ground.walker import (
     OF_BODIES,

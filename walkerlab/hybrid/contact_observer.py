@@ -4,8 +4,7 @@ from typing import Any, NamedTuple
 
 from walkerlab.account import DAMPING, EDGES, ENTRIES, FORWARD, FRICTION, GIVEN, HIP, KNEE_STOP, LOST, PUSH_OFF
 from walkerlab.ground.energy import dissipated_power, foot_elastic_energy, push_power, total_energy
-from walkerlab.ground.hip import hip_energy, hip_power
-from walkerlab.ground.knees import knee_power
+from walkerlab.ground.hinges import hip_energy, hip_power, knee_power
 from walkerlab.ground.walker import OF_STATES, STOPPING, OnGround, one_foot_motion, over_ground, store_whole
 from walkerlab.hybrid.contact_events import HEIGHT, PER_FOOT, STANCE, VERTICAL_VELOCITY, WalkState
 from walkerlab.hybrid.contact_tangent import Tangent, carry_tangent

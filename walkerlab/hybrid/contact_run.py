@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from walkerlab.account import ENTRIES, KNEE_STRIKES, LOSSES, LOST, PUSH_OFF
 from walkerlab.ground.energy import kinetic_energy, potential_energy, total_energy
-from walkerlab.ground.hip import hip_energy
+from walkerlab.ground.hinges import hip_energy
 from walkerlab.ground.knees import FLEXED, extension
 from walkerlab.ground.terrain import Terrain, cell_at, has_ground_in_cell, is_uneven, starts_with_ground
 from walkerlab.ground.walker import (

@@ -72,26 +72,16 @@ def two_legs(model: Standing) -> TwoLegs | None:
     x, y = model.hip_x, model.hip_y
     lowest = (FALLEN_HIP * model.leg_length - model.radius) / math.hypot(x, y)
 
-    def numbers(values: Any) -> tuple[float, ...]:
-        return tuple(values.ravel().tolist())
-
+    held: dict[str, Any] = {name: tuple(model[name].ravel().tolist()) for name in ("A", "B", "arm_x", "arm_y")}
+    for name in ("misprint", "mass", "radius", "gravity_along", "gravity_down", "slope", "lean"):
+        held[name] = float(model[name])
     return TwoLegs(
         model,
-        numbers(model.A),
-        numbers(model.B),
-        numbers(model.arm_x),
-        numbers(model.arm_y),
-        SpringDamper(*model.hip.tolist()),
-        float(model.misprint),
-        float(model.mass),
-        float(model.radius),
-        float(model.gravity_along),
-        float(model.gravity_down),
-        float(model.slope),
-        float(model.lean),
-        math.atan2(x, y),
-        math.acos(max(-1.0, lowest)),
-        math.sqrt(model.leg_length / model.gravity),
+        **held,
+        hip=SpringDamper(*model.hip.tolist()),
+        upright=math.atan2(x, y),
+        fallen=math.acos(max(-1.0, lowest)),
+        pendulum_time=math.sqrt(model.leg_length / model.gravity),
     )
 
 

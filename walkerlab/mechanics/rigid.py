@@ -22,7 +22,6 @@ class BodyPlaces:
     members: Floats  # (bodies, n) 1 where a body belongs to a place
     roles: tuple[int, ...]  # which place each is taken from at heel strike
     knees: tuple[tuple[int, int], ...]  # (shank, thigh) of the swing leg
-    shared: tuple[int, ...]  # places of bodies that belong to both legs
 
 
 def standing(assembly: Assembly, gravity: float, slope: float, knee_locked_at_strike: bool = True) -> Standing:
@@ -97,7 +96,6 @@ def places_of(assembly: Assembly) -> BodyPlaces:
         members=members,
         roles=(STANCE, SWING, *((STANCE,) * more), *range(2 + more, len(groups))),
         knees=tuple((2 + k, place_of(groups, knee_of[name])) for k, name in enumerate(swinging[1:])),
-        shared=tuple(range(2 + more, len(groups))),
     )
 
 
