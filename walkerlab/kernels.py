@@ -67,6 +67,18 @@ def inlined(function: F) -> F:
     return function
 
 
+def entered(function: F) -> F:
+    """As `inlined`, and a kernel for Python: what a walk in Python hands over to compiled code at once."""
+    whole = kernel(function)
+
+    @functools.wraps(function)
+    def enter(*given: Any) -> Any:
+        return whole(*given)
+
+    compile_as(enter, lambda *_: (function, PART_FLAGS))
+    return cast(F, enter)
+
+
 def always_inline(function: F) -> F:
     """As `inlined`, and put into the code of its callers, however large."""
     refuse_nested(function)

@@ -30,7 +30,7 @@ from walkerlab.solvers.system import jacobian
 
 hips = st.builds(
     lambda stiffness, damping, torque: {
-        "driven_hip": True, "hip_stiffness": stiffness, "hip_damping": damping, "hip_torque": torque
+        "driven_hip": True, "hip": (stiffness, damping, torque)
     },
     st.floats(0.0, 20.0), st.floats(0.0, 2.0), st.floats(-5.0, 5.0),
 )  # fmt: skip
@@ -66,12 +66,12 @@ def test_a_swing_gains_what_the_torque_gives_and_the_damper_takes(assembly, mode
     y, n = state_of(model, BENT, free), len(model.arm_x)
 
     def with_work(_, x):
-        rate = apart(model, x)[1]
-        return (*x[n : 2 * n], *rates(model, BENT, tuple(x[:-1])), (model.hip_torque - model.hip_damping * rate) * rate)
+        rate, (_, damping, torque) = apart(model, x)[1], model.hip
+        return (*x[n : 2 * n], *rates(model, BENT, tuple(x[:-1])), (torque - damping * rate) * rate)
 
     swing = solve_ivp(with_work, (0.0, 0.1), (*y, 0.0), "DOP853", rtol=1e-11, atol=1e-12)
-    spring = [0.5 * model.hip_stiffness * apart(model, x)[0] ** 2 for x in swing.y.T]
-    without = model.changed(hip_stiffness=0.0)
+    spring = [0.5 * model.hip[0] * apart(model, x)[0] ** 2 for x in swing.y.T]
+    without = model.changed(hip=(0.0, *model.hip[1:]))
     balance = [total_energy(without, tuple(x[:-1])) + e - x[-1] for x, e in zip(swing.y.T, spring, strict=True)]
     assert np.ptp(balance) < 1e-7 * (1.0 + np.abs(balance).max())
     assert total_energy(model, y) == pytest.approx(total_energy(without, y) + spring[0], abs=1e-9)
@@ -92,7 +92,7 @@ def test_torques_at_the_hip_turn_both_legs_and_nothing_else(assembly, model, fre
         ]
         rate_of.append((spins[0] - spins[1]) / (2.0 * h))
     assert rate_of[0] == pytest.approx(rate_of[1], rel=1e-6, abs=1e-5)
-    with_torque = model.changed(hip_stiffness=0.0, hip_damping=0.0, hip_torque=1.0)
+    with_torque = model.changed(hip=(0.0, 0.0, 1.0))
     change = np.subtract(rates(with_torque, BENT, y), rates(passive, BENT, y))
     assert change[SWING] - change[STANCE] > 0.0
 

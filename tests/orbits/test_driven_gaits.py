@@ -51,7 +51,7 @@ def test_kuos_gaits(name):
     (push, spring, slope), (angle, rate, period), multipliers = KUO[name]
     simplest = walker_of("simplest", push_off=push)
     foot_mass = float(simplest.A[SWING, SWING])
-    walker = on_slope(simplest.changed(driven_hip=spring != 0.0, hip_stiffness=spring * foot_mass), slope)
+    walker = on_slope(simplest.changed(driven_hip=spring != 0.0, hip=(spring * foot_mass, 0.0, 0.0)), slope)
     gait = min(find_gaits(walker).gaits, key=lambda each: abs(each.period - period))
     assert gait.state[STANCE] + slope == pytest.approx(angle, abs=1e-9)
     assert gait.state[2 + STANCE] == pytest.approx(rate, abs=1e-9)
@@ -64,7 +64,7 @@ LEVEL = (-0.1931536892, 0.1931536892, -0.8881910818, -1.0417279402)
 
 def test_the_papers_compass_on_the_level():
     """Pushed by 4 N s, legs joined by a spring of 10 N m/rad: as an independent prototype has it."""
-    walker = on_slope(walker_of("paper", push_off=4.0, driven_hip=True, hip_stiffness=10.0), 0.0)
+    walker = on_slope(walker_of("paper", push_off=4.0, driven_hip=True, hip=(10.0, 0.0, 0.0)), 0.0)
     gait = find_gaits(walker).gait
     assert gait.stable
     assert gait.state == pytest.approx(LEVEL, abs=1e-9)
@@ -72,10 +72,10 @@ def test_the_papers_compass_on_the_level():
 
 
 DRIVEN = {
-    "torso": {"push_off": 4.0, "driven_hip": True, "hip_damping": 0.005},
-    "round-feet": {"push_off": 0.12, "driven_hip": True, "hip_stiffness": 0.3},
-    "kneed": {"push_off": 0.2, "driven_hip": True, "hip_torque": 0.15, "hip_damping": 0.005},
-    "kneed-round-feet": {"push_off": 0.2, "driven_hip": True, "hip_torque": 0.15},
+    "torso": {"push_off": 4.0, "driven_hip": True, "hip": (0.0, 0.005, 0.0)},
+    "round-feet": {"push_off": 0.12, "driven_hip": True, "hip": (0.3, 0.0, 0.0)},
+    "kneed": {"push_off": 0.2, "driven_hip": True, "hip": (0.0, 0.005, 0.15)},
+    "kneed-round-feet": {"push_off": 0.2, "driven_hip": True, "hip": (0.0, 0.0, 0.15)},
 }
 
 
@@ -134,7 +134,7 @@ def test_a_passive_gaits_cost_of_transport_is_the_slopes_sine(name):
     assert gait.work["gravity"] > gait.work["push_off"] == gait.work["hip"] == 0.0
 
 
-DRIVES = {**DRIVEN, "paper": {"push_off": 4.0, "driven_hip": True, "hip_stiffness": 10.0, "hip_torque": 0.3}}
+DRIVES = {**DRIVEN, "paper": {"push_off": 4.0, "driven_hip": True, "hip": (10.0, 0.0, 0.3)}}
 
 
 @pytest.mark.parametrize("name", DRIVES)
@@ -151,7 +151,7 @@ def test_the_energies_of_a_driven_walk_balance(name):
 
 
 def test_a_hips_damper_takes_the_integral_of_its_power():
-    walker = on_slope(walker_of("paper", push_off=4.0, driven_hip=True, hip_stiffness=10.0, hip_damping=0.1), 0.0)
+    walker = on_slope(walker_of("paper", push_off=4.0, driven_hip=True, hip=(10.0, 0.1, 0.0)), 0.0)
     walk = take_walk(walker, EXACT, LEVEL, 1, sampled=True)
     y, t = walk.samples.state[:-1], walk.samples.time_s[:-1]
     spring = 5.0 * float(np.diff((y[[-1, 0], 0] - y[[-1, 0], 1]) ** 2)[0])
@@ -161,7 +161,7 @@ def test_a_hips_damper_takes_the_integral_of_its_power():
 
 def test_of_a_hip_torques_work_that_is_spent_which_is_positive():
     """Against an integral of the sampled power; late in the swing the legs turn back."""
-    walker = on_slope(walker_of("paper", push_off=4.0, driven_hip=True, hip_stiffness=10.0, hip_torque=0.3), 0.0)
+    walker = on_slope(walker_of("paper", push_off=4.0, driven_hip=True, hip=(10.0, 0.0, 0.3)), 0.0)
     walk = take_walk(walker, EXACT, find_gaits(walker).gait.state, 1, sampled=True)
     y, t = walk.samples.state[:-1], walk.samples.time_s[:-1]
     power = 0.3 * (y[:, 2] - y[:, 3])

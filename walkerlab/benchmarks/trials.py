@@ -72,7 +72,7 @@ class RigidTrial:
             return as_a_script
         n, entry = len(self.walker.zero_state), METHODS[method]
         solver = entry.new(n, rtol, atol, budget)
-        finder = finder_for(solver, RIGID_EVENTS)
+        finder = finder_for(solver, RIGID_EVENTS, n)
         walker, observer = np.asarray(self.walker), unwatched()
         strikes = new_heel_strikes(self.steps, n, self.walker.kneed)
         stride = walk if entry.compiled else uncompiled(walk)

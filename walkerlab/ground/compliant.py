@@ -15,8 +15,7 @@ from walkerlab.ground.terrain import STANCE_FOOT
 from walkerlab.ground.walker import FORM, MAX_BODIES, NO_FOOT, ContactWalker
 from walkerlab.mechanics.assembly import Anchor, Tree, followers, levers, tree_about, tree_about_centre
 from walkerlab.mechanics.parts import Assembly, Position
-
-Floats = NDArray[np.float64]
+from walkerlab.solvers.system import Floats
 
 
 @dataclass(frozen=True)

@@ -2,8 +2,7 @@
 
 from typing import Any
 
-from walkerlab.ground.hip import hip_energy
-from walkerlab.ground.knees import knee_energy
+from walkerlab.ground.hinges import hip_energy, knee_energy
 from walkerlab.ground.normal_force import elastic_energy
 from walkerlab.ground.pulse import push_on
 from walkerlab.ground.walker import (

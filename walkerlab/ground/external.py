@@ -6,7 +6,7 @@ from the link that it is hinged to (rad); the base's from the slope's normal. Fo
 
 from typing import Any
 
-from walkerlab.ground.hip import add_hip_torque
+from walkerlab.ground.hinges import add_torques
 from walkerlab.ground.motion import foot_wrench
 from walkerlab.ground.walker import OF_BODIES, OF_STATES, OnGround, foot_motion, sines_cosines
 from walkerlab.kernels import inlined, kernel, vector
@@ -29,7 +29,7 @@ def absolute_state(slope: float, chain: Any, q: Any, v: Any, y: Any) -> None:
 def feet_and_forces(system: OnGround, chain: Any, t: float, q: Any, v: Any, feet: Any, forces: Any) -> None:
     """How both feet move into feet (2, 4) and, unless that is empty, the forces on the walker into forces (2 + links).
 
-    They are the ground's, of a torque between the legs, and of a push-off.
+    They are the ground's, those at hinges, and of a push-off.
 
     system  with all bodies, its levers of feet and hip from the base's point
     chain   (n, links) which joints lie between the base and each body; bodies that move as one share theirs
@@ -54,7 +54,7 @@ def feet_and_forces(system: OnGround, chain: Any, t: float, q: Any, v: Any, feet
         force = foot_wrench(system, t, foot, s, c, y, torques)
         forces[0] += force[0]
         forces[1] += force[1]
-    add_hip_torque(system, y, torques)
+    add_torques(system, y, torques)
     for j in range(chain.shape[1]):
         total = 0.0
         for k in range(chain.shape[0]):

@@ -7,14 +7,13 @@ a lock is a plastic impact: Z'MZ z = Z'M omega.
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from walkerlab.ground.normal_force import NormalLaw, elastic_energy, impact_normal_force
-from walkerlab.ground.walker import STOPPING, Form, OnGround, half_size
+from walkerlab.ground.walker import Form, half_size
 from walkerlab.kernels import inlined
-from walkerlab.mechanics.hinges import HingeTorque, add_hinge_gradients, add_hinge_torque, hinge_energy, hinge_torque
+from walkerlab.mechanics.hinges import HingeTorque, hinge_energy, hinge_torque
+from walkerlab.solvers.system import Floats
 
-Floats = NDArray[np.float64]
 FLEXED = 0.01  # rad of flexion from which on a knee that straightens is caught
 
 
@@ -48,51 +47,6 @@ def stop_torque(law: NormalLaw, angle: float, rate: float) -> HingeTorque:
 def stop_energy(law: NormalLaw, angle: float) -> float:
     """Elastic energy (J) of a stop."""
     return elastic_energy(angle, law)
-
-
-@inlined
-def torque_now(system: OnGround, knee: int, y: Any) -> HingeTorque:
-    """The torque of a knee's stop in a state."""
-    return hinge_torque(system.stop, extension(system.form, knee, y), extension_rate(system.form, knee, y))
-
-
-@inlined
-def add_stop_torques(system: OnGround, y: Any, r: Any) -> None:
-    """Add the torques (N m) of the stops to r (n,): each pushes the shank back and the thigh forward."""
-    for knee in range(2):
-        if system.knee[knee] == STOPPING:
-            add_hinge_torque(torque_now(system, knee, y), system.form.shanks[knee], system.form.thighs[knee], r)
-
-
-@inlined
-def add_stop_gradients(system: OnGround, y: Any, by_angle: Any, by_rate: Any) -> None:
-    """Add the derivatives of those torques by the angles and their velocities to by_angle and by_rate (n, n)."""
-    form = system.form
-    for knee in range(2):
-        if system.knee[knee] == STOPPING:
-            now = torque_now(system, knee, y)
-            add_hinge_gradients(now, form.shanks[knee], form.thighs[knee], by_angle, by_rate)
-
-
-@inlined
-def knee_energy(system: OnGround, y: Any) -> float:
-    """Elastic energy (J) in the stops."""
-    total = 0.0
-    for knee in range(2):
-        if system.knee[knee] == STOPPING:
-            total += hinge_energy(system.stop, extension(system.form, knee, y))
-    return total
-
-
-@inlined
-def knee_power(system: OnGround, y: Any) -> float:
-    """Power (W) that the stops dissipate."""
-    total = 0.0
-    for knee in range(2):
-        if system.knee[knee] == STOPPING:
-            now = torque_now(system, knee, y)
-            total += (now.torque - now.elastic) * extension_rate(system.form, knee, y)
-    return total
 
 
 class Lock(NamedTuple):

@@ -2,8 +2,7 @@
 
 from typing import Any
 
-from walkerlab.ground.hip import add_hip_gradients, add_hip_torque
-from walkerlab.ground.knees import add_stop_gradients, add_stop_torques
+from walkerlab.ground.hinges import add_gradients, add_torques
 from walkerlab.ground.pulse import push_gradient, push_on
 from walkerlab.ground.walker import (
     OF_BODIES,
@@ -16,7 +15,7 @@ from walkerlab.ground.walker import (
     sines_cosines,
 )
 from walkerlab.kernels import always_inline, inlined, matrix, vector
-from walkerlab.mechanics.links import Counted, factor_linked, gathered, solve_linked
+from walkerlab.mechanics.links import Counted, factor_linked, solve_linked
 from walkerlab.mechanics.tree import (
     add_gravity,
     add_gravity_gradient,
@@ -73,8 +72,7 @@ def all_forces(system: OnGround, t: float, s: Any, c: Any, y: Any, M: Any, r: An
         force = foot_wrench(system, t, foot, s, c, y, r)
         along += force[0]
         normal += force[1]
-    add_stop_torques(system, y, r)
-    add_hip_torque(system, y, r)
+    add_torques(system, y, r)
     add_inertia(form, n, s, c, y[half + form.places : 2 * half], M, r)
     return along, normal
 
@@ -88,7 +86,7 @@ def on_ground_derivative(system: OnGround, t: float, y: Any, f: Any) -> None:
     sines_cosines(form, y, s, c)
     along, normal = all_forces(system, t, s, c, y, M, r)
     links = Counted(form.E, form.arm_x[:n])
-    factor_linked(links, 0, M, r)
+    factor_linked(links, 0, M)
     solve_linked(links, 0, M, r)
     for i in range(half):
         f[i] = y[half + i]
@@ -165,8 +163,7 @@ def add_torque_gradients(system: OnGround, s: Any, c: Any, y: Any, alpha: Any, b
         F, U = vector(OF_BODIES), vector(OF_BODIES)
         projections(form.arm_x, form.arm_y, n, s, c, F, U)
         add_gravity_gradient(form, n, F, U, by_angle)
-    add_stop_gradients(system, y, by_angle, by_rate)
-    add_hip_gradients(system, y, by_angle, by_rate)
+    add_gradients(system, y, by_angle, by_rate)
     add_inertia_gradients(form, n, s, c, y[half + p : 2 * half], alpha, by_angle, by_rate)
 
 
@@ -184,12 +181,11 @@ def on_ground_jacobian(system: OnGround, t: float, y: Any, J: Any) -> None:
     sines_cosines(form, y, s, c)
     all_forces(system, t, s, c, y, M, alpha)
     links = Counted(form.E, form.arm_x[:n])
-    factor_linked(links, 0, M, alpha)
+    factor_linked(links, 0, M)
     solve_linked(links, 0, M, alpha)
     for k in range(n):  # row k: the angular accelerations by a torque on body k
         for l in range(n):
             by_torque[k, l] = 1.0 if k == l else 0.0
-        gathered(links, 0, by_torque[k])
         solve_linked(links, 0, M, by_torque[k])
     for foot in range(2):
         add_foot_gradients(system, t, foot, s, c, y, J)

@@ -12,17 +12,15 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from walkerlab.ground.friction import friction_coefficient
 from walkerlab.ground.normal_force import NormalForce, NormalLaw, impact_normal_force
 from walkerlab.kernels import by_reference, inlined, vector
 from walkerlab.mechanics import tree
+from walkerlab.mechanics.hinges import HIP_NUMBERS, hip_law
 from walkerlab.mechanics.tree import lever_motion
-from walkerlab.solvers.system import State
+from walkerlab.solvers.system import Floats, Integers, State
 
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 MAX_BODIES = 8
 OF_BODIES = (0.0,) * MAX_BODIES  # scratch is made like these
 OF_STATES = (0.0,) * (4 + 2 * MAX_BODIES)
@@ -56,10 +54,8 @@ class Form(np.record):  # type: ignore[misc]  # NumPy's stubs call one of its ba
     thighs: Integers  # (2,) bodies of either leg; thigh and shank are the same one while they move as one
     shanks: Integers
     uppers: Integers  # (2,) bodies of either leg at the hip
-    driven_hip: bool  # whether anything acts between the legs: see ground/hip.py
-    hip_stiffness: float  # N m/rad
-    hip_damping: float  # N m s/rad
-    hip_torque: float  # N m, on the swing leg
+    driven_hip: bool  # whether anything acts between the legs: see ground/hinges.py
+    hip: Floats  # numbers of that: see `hinges.hip_law`
     push_off: float  # N s, along the trailing leg from a step's touch on
     push_off_duration: float  # s
     onto: Integers  # (all bodies,) which of these bodies each is
@@ -87,12 +83,10 @@ SHAPES: dict[str, tuple[int, ...]] = {
     "E": (1, MAX_BODIES, MAX_BODIES),
     **dict.fromkeys(("arm_x", "arm_y", "hip_x", "hip_y", "onto", "first"), (MAX_BODIES,)),
     **dict.fromkeys(("foot_x", "foot_y", "rolling"), (2, MAX_BODIES)),
+    "hip": (HIP_NUMBERS,),
     **dict.fromkeys(("radius", "thighs", "shanks", "uppers"), (2,)),
 }
-KINDS = {Integers: np.int64, int: np.int64, bool: np.bool_}
-FORM = np.dtype(
-    (Form, [(name, KINDS.get(of, np.float64), SHAPES.get(name, ())) for name, of in Form.__annotations__.items()])
-)
+FORM = tree.record_type(Form, SHAPES)
 
 
 class ContactWalker(NamedTuple):
@@ -138,7 +132,7 @@ class ContactWalker(NamedTuple):
     @property
     def driven(self) -> bool:
         """Whether anything but gravity gives it energy."""
-        return bool(self.whole.push_off != 0.0 or self.whole.hip_torque != 0.0)
+        return bool(self.whole.push_off != 0.0 or hip_law(self.whole).torque != 0.0)
 
     @property
     def gravity(self) -> float:

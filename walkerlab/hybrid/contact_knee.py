@@ -3,10 +3,10 @@
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from walkerlab.account import KNEE_STOP, KNEE_STRIKES
-from walkerlab.ground.knees import knee_energy, lock
+from walkerlab.ground.hinges import knee_energy
+from walkerlab.ground.knees import lock
 from walkerlab.ground.motion import motion_gradient
 from walkerlab.ground.walker import (
     OF_BODIES,
@@ -24,8 +24,7 @@ from walkerlab.kernels import vector
 from walkerlab.mechanics.tree import projections
 from walkerlab.solvers.scipy_methods import right_hand_side
 from walkerlab.solvers.stepping import T
-
-Floats = NDArray[np.float64]
+from walkerlab.solvers.system import Floats
 
 
 def change_form(

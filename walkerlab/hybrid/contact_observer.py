@@ -2,19 +2,15 @@
 
 from typing import Any, NamedTuple
 
-import numpy as np
-
-from walkerlab.account import DAMPING, EDGES, ENTRIES, FORWARD, FRICTION, HIP, KNEE_STOP, PUSH_OFF
+from walkerlab.account import DAMPING, EDGES, ENTRIES, FORWARD, FRICTION, GIVEN, HIP, KNEE_STOP, LOST, PUSH_OFF
 from walkerlab.ground.energy import dissipated_power, foot_elastic_energy, push_power, total_energy
-from walkerlab.ground.hip import hip_energy, hip_power
-from walkerlab.ground.knees import knee_power
+from walkerlab.ground.hinges import hip_energy, hip_power, knee_power
 from walkerlab.ground.walker import OF_STATES, STOPPING, OnGround, one_foot_motion, over_ground, store_whole
 from walkerlab.hybrid.contact_events import HEIGHT, PER_FOOT, STANCE, VERTICAL_VELOCITY, WalkState
 from walkerlab.hybrid.contact_tangent import Tangent, carry_tangent
-from walkerlab.kernels import by_reference, by_type_or_default, inlined, kernel, matrix, vector
+from walkerlab.kernels import by_reference, entered, inlined, matrix, vector
 from walkerlab.solvers.events import RISING, CrossingFinder, first_crossing
-from walkerlab.solvers.scipy_methods import ScipyMethod
-from walkerlab.solvers.stepping import T_OLD, T, interpolate
+from walkerlab.solvers.stepping import T_OLD, T, interpolate, sample
 
 # rows of `account`
 SO_FAR, AT_TOUCH = 0, 1
@@ -26,18 +22,35 @@ WEIGHTS = (0.0, 0.37640306270046725, 0.5124858261884216, 0.1111111111111111)
 
 
 @by_reference
-class ContactObserver(NamedTuple):
-    """Samples, energy balance and tangent of a walk; what is not wanted has no room and costs a look."""
+class ContactSamples(NamedTuple):
+    """A walk at rising times."""
 
-    track_energy: bool  # whether to keep the energy balance
-    times: Any  # (samples,) s, rising
+    time_s: Any  # (samples,)
     states: Any  # (samples, 4 + 2 n) of the whole walker
     has_ground: Any  # (samples, 2)
     stance: Any  # (samples,)
     knees: Any  # (samples, 2) what each knee is doing
-    level: Any  # (samples, 2) m, height of the ground for each foot
-    sampled_account: Any  # (samples, entries) J
-    recorded: Any  # (1,)
+    level: Any  # (samples, 2) m, height over the slope of the ground for each foot
+    account: Any  # (samples, entries) J
+
+    @property
+    def dissipated_J(self) -> Any:
+        """(samples, 5) in the order of account.LOSSES."""
+        return self.account[:, LOST]
+
+    @property
+    def driven_J(self) -> Any:
+        """(samples, 2) given by push-off and hip."""
+        return self.account[:, GIVEN]
+
+
+@by_reference
+class ContactObserver(NamedTuple):
+    """Samples, energy balance and tangent of a walk; what is not wanted has no room and costs a look."""
+
+    track_energy: bool  # whether to keep the energy balance
+    samples: ContactSamples
+    recorded: Any  # (1,) how many of them
     account: Any  # (2, entries) J so far, and until the last step's touch
     # (5,) deepest penetration m, largest residual of the energy balance J, energy at the start J: its potential from a
     # fixed origin, and from the slope below; and the part of the hip's spring J
@@ -64,20 +77,20 @@ def observe(
 def record_samples(observer: ContactObserver, method: Any, system: OnGround, walk_state: WalkState) -> None:
     """The samples that fall into the last step."""
     t, h = method.clock[T_OLD], method.clock[T] - method.clock[T_OLD]
-    index = observer.recorded[0]
+    samples, index = observer.samples, observer.recorded[0]
     y = vector(OF_STATES)[: method.y.size]
-    while index < observer.times.size and observer.times[index] <= method.clock[T]:
-        fraction = (observer.times[index] - t) / h
+    while index < samples.time_s.size and samples.time_s[index] <= method.clock[T]:
+        fraction = (samples.time_s[index] - t) / h
         interpolate(method, system, fraction, y)
-        store_whole(system.form, y, observer.states[index])
+        store_whole(system.form, y, samples.states[index])
         for entry in range(ENTRIES):
-            observer.sampled_account[index, entry] = observer.account[SO_FAR, entry]
-        add_work_until(method, system, fraction, observer.sampled_account[index])
+            samples.account[index, entry] = observer.account[SO_FAR, entry]
+        add_work_until(method, system, fraction, samples.account[index])
         for k in range(2):
-            observer.knees[index, k] = walk_state.knee[k]
-            observer.has_ground[index, k] = walk_state.has_ground[k]
-            observer.level[index, k] = walk_state.level[k]
-        observer.stance[index] = walk_state.feet[STANCE]
+            samples.knees[index, k] = walk_state.knee[k]
+            samples.has_ground[index, k] = walk_state.has_ground[k]
+            samples.level[index, k] = walk_state.level[k]
+        samples.stance[index] = walk_state.feet[STANCE]
         index += 1
     observer.recorded[0] = index
 
@@ -90,7 +103,7 @@ def balance(observer: ContactObserver, method: Any, system: OnGround) -> None:
     lost = -account[PUSH_OFF] - account[HIP]
     for entry in range(PUSH_OFF):
         lost += account[entry]
-    residual = end_energy(method, system) + lost - observer.extremes[START_ENERGY]
+    residual = end_energy(system, method.y) + lost - observer.extremes[START_ENERGY]
     observer.extremes[RESIDUAL] = max(observer.extremes[RESIDUAL], abs(residual))
 
 
@@ -122,22 +135,23 @@ def observe_edge(observer: ContactObserver, system: OnGround, foot: int, y: Any)
         observer.account[SO_FAR, EDGES] += foot_elastic_energy(system, foot, y)
 
 
-@by_type_or_default
-def end_energy(method: Any, system: OnGround) -> float:
+@entered
+def end_energy(system: OnGround, y: Any) -> float:
     """Mechanical energy (J) at the end of the last step."""
-    return total_energy(system, method.y)
-
-
-@by_type_or_default
-def add_work_until(method: Any, system: OnGround, fraction: float, account: Any) -> None:
-    """Add to an account (entries,) what the first part of the last step took and gave (J)."""
-    states = matrix(OF_STATES)
-    for i in range(len(NODES)):
-        interpolate(method, system, fraction * NODES[i], states[i, : method.y.size])
-    add_work(system, states, method.clock[T_OLD], fraction * (method.clock[T] - method.clock[T_OLD]), account)
+    return total_energy(system, y)
 
 
 @inlined
+def add_work_until(method: Any, system: OnGround, fraction: float, account: Any) -> None:
+    """Add to an account (entries,) what the first part of the last step took and gave (J)."""
+    fractions, states = vector(NODES), matrix(OF_STATES)
+    for i in range(len(NODES)):
+        fractions[i] = fraction * NODES[i]
+    sample(method, system, fractions, states)
+    add_work(system, states, method.clock[T_OLD], fraction * (method.clock[T] - method.clock[T_OLD]), account)
+
+
+@entered
 def add_work(system: OnGround, states: Any, begin: float, span: float, account: Any) -> None:
     """The same of a time `span` (s) from `begin` on, with the states at its NODES."""
     for foot in range(2):
@@ -172,28 +186,3 @@ def foot_work(system: OnGround, states: Any, foot: int, span: float) -> tuple[fl
     if let_go:
         damping = foot_elastic_energy(system, foot, states[0]) - foot_elastic_energy(system, foot, states[last])
     return damping, friction
-
-
-@kernel
-def energy_of(system: OnGround, y: Any) -> float:
-    """Mechanical energy (J) of a state."""
-    return total_energy(system, y)
-
-
-@kernel
-def add_work_of(system: OnGround, states: Any, begin: float, span: float, account: Any) -> None:
-    """As `add_work`."""
-    add_work(system, states, begin, span, account)
-
-
-@end_energy.case(ScipyMethod)
-def end_energy_in_python(method: ScipyMethod, system: OnGround) -> float:
-    """A walk in Python hands its states to compiled code at once."""
-    return energy_of(system, method.y)
-
-
-@add_work_until.case(ScipyMethod)
-def add_work_in_python(method: ScipyMethod, system: OnGround, fraction: float, account: Any) -> None:
-    """Likewise."""
-    states, begin = method.states_at(fraction * np.array(NODES)), method.clock[T_OLD]
-    add_work_of(system, states, begin, fraction * (method.clock[T] - begin), account)

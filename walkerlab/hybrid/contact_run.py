@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from walkerlab.account import ENTRIES, GIVEN, KNEE_STRIKES, LOSSES, LOST, PUSH_OFF
+from walkerlab.account import ENTRIES, KNEE_STRIKES, LOSSES, LOST, PUSH_OFF
 from walkerlab.ground.energy import kinetic_energy, potential_energy, total_energy
-from walkerlab.ground.hip import hip_energy
+from walkerlab.ground.hinges import hip_energy
 from walkerlab.ground.knees import FLEXED, extension
 from walkerlab.ground.terrain import Terrain, cell_at, has_ground_in_cell, is_uneven, starts_with_ground
 from walkerlab.ground.walker import (
@@ -55,6 +55,7 @@ from walkerlab.hybrid.contact_observer import (
     START_ENERGY,
     START_SPRING,
     ContactObserver,
+    ContactSamples,
 )
 from walkerlab.hybrid.contact_rules import GOES_ON, steps_with_lift
 from walkerlab.hybrid.contact_tangent import new_tangent
@@ -64,9 +65,7 @@ from walkerlab.kernels import kernel, uncompiled, vector
 from walkerlab.outcome import Outcome
 from walkerlab.solvers.registry import Tolerances, finder_for, sharing
 from walkerlab.solvers.stepping import ACCEPTED, JACOBIANS, REJECTED, RHS, T
-from walkerlab.solvers.system import State
-
-Floats = NDArray[np.float64]
+from walkerlab.solvers.system import Floats, State
 
 ROUNDING = 1e-14  # of a start's coordinates and velocities
 USUAL_STEP = 3.0  # pendulum times that most steps are shorter than
@@ -117,20 +116,6 @@ def sampled_feet(walker: ContactWalker, states: Any, has_ground: Any, level: Any
             if has_ground[i, foot] != 0 and height < 0.0:
                 force = foot_force(walker, FootMotion(along, height, slip, vertical_velocity))
                 feet[i, foot, 2], feet[i, foot, 3] = force.normal.force, force.along
-
-
-@dataclass(frozen=True)
-class ContactSamples:
-    """A walk at evenly spaced times."""
-
-    time_s: Floats  # (samples,)
-    states: Floats  # (samples, 4 + 2 n)
-    has_ground: NDArray[np.int8]  # (samples, 2)
-    stance: NDArray[np.int64]  # (samples,)
-    knees: NDArray[np.int8]  # (samples, 2) what each knee is doing
-    level: Floats  # (samples, 2) m, height over the slope of the ground for each foot
-    dissipated_J: Floats  # (samples, 5) in the order of account.LOSSES
-    driven_J: Floats  # (samples, 2) given by push-off and hip
 
 
 @dataclass(frozen=True, eq=False)
@@ -256,8 +241,7 @@ def new_observer(
         )
         extremes[START_ENERGY], extremes[START_SPRING] = total_energy(here, y), hip_energy(here, y)
         extremes[AT_HAND] = extremes[START_ENERGY] + walker.mass * walker.gravity_along * y[0]
-    return ContactObserver(
-        track_energy,
+    room = ContactSamples(
         times,
         np.zeros((samples, walker.size)),
         np.zeros((samples, 2), np.int8),
@@ -265,11 +249,15 @@ def new_observer(
         np.zeros((samples, 2), np.int8),
         np.zeros((samples, 2)),
         np.zeros((samples, ENTRIES)),
-        np.zeros(1, np.int64),
-        np.zeros((2, ENTRIES)),
-        extremes,
-        new_tangent(walker.size, directions),
     )
+    seen, account, tangent = np.zeros(1, np.int64), np.zeros((2, ENTRIES)), new_tangent(walker.size, directions)
+    return ContactObserver(track_energy, room, seen, account, extremes, tangent)
+
+
+def in_walk(walker: ContactWalker, walk_state: WalkState, hinged: bool = False) -> OnGround:
+    """The walker in the form that a walk has it in, which changes what it remembers."""
+    at = walk_state
+    return on_ground(walker, at.has_ground, at.knee, hinged, at.feet, at.level, at.times)
 
 
 def walk_on(
@@ -291,10 +279,7 @@ def walk_on(
     Returns where it stopped, and how: `SOLVER_FAILED`, too, where the energy balance does not close.
     """
     walk = walk_in_form if tolerances.compiled else uncompiled(walk_in_form)
-    memory = (
-        walk_state.has_ground, walk_state.knee, hinged, walk_state.feet, walk_state.level, walk_state.times
-    )  # fmt: skip
-    system = on_ground(walker, *memory)
+    system = in_walk(walker, walk_state, hinged)
     tangent = observer.tangent.Phi
     half, root = len(start) // 2, 2 if hinged else 0
     y = folded(system.form, (*start[root:half], *start[half + root :]))
@@ -302,7 +287,7 @@ def walk_on(
         tangent[: y.size] = folded(system.form, tangent)
     lead = tolerances.new(y.size)
     lead.clock[T] = walk_state.times[NOW]
-    by_size, finder = {y.size: lead}, finder_for(lead, EVENT_FUNCTIONS)
+    by_size, finder = {y.size: lead}, finder_for(lead, EVENT_FUNCTIONS, walker.size)
     while True:
         if y.size not in by_size:
             by_size[y.size] = sharing(tolerances.new(y.size), lead.clock, lead.counts)
@@ -311,7 +296,7 @@ def walk_on(
         ended, event = walk(system, ground, method, finder, observer, walk_state, until)
         if ended != GOES_ON:
             break
-        before, system = system, on_ground(walker, *memory)
+        before, system = system, in_walk(walker, walk_state, hinged)
         y = change_form(walker, before, system, event, observer, method)
     if tangent.shape[1] > 0:
         tangent[:] = unfolded(system.form, tangent[: method.y.size], walker.size)
@@ -436,18 +421,7 @@ def gather(
 ) -> ContactWalkResult:
     """The result of a walk from what was written on the way."""
     done, lifted, seen = int(walk_state.feet[STEPS]), steps_with_lift(walk_state), int(observer.recorded[0])
-    samples = None
-    if observer.times.size:
-        samples = ContactSamples(
-            observer.times[:seen],
-            observer.states[:seen],
-            observer.has_ground[:seen],
-            observer.stance[:seen],
-            observer.knees[:seen],
-            observer.level[:seen],
-            observer.sampled_account[:seen, LOST],
-            observer.sampled_account[:seen, GIVEN],
-        )
+    samples = ContactSamples(*(each[:seen] for each in observer.samples)) if observer.samples.time_s.size else None
     strikes = walk_state.knee_strike[:done]
     along, up = (
         (float(walk_state.touch_along[done - 1]), float(walk_state.touch_height[done - 1])) if done else (0.0, 0.0)

@@ -7,7 +7,7 @@ from typing import Any
 
 from walkerlab.ground.pulse import pulse_left
 from walkerlab.ground.terrain import is_uneven
-from walkerlab.ground.walker import OF_STATES, OnGround, locked_knees
+from walkerlab.ground.walker import OnGround, locked_knees
 from walkerlab.hybrid.contact_events import (
     AIRBORNE_SINCE,
     LAST_TOUCH,
@@ -25,10 +25,10 @@ from walkerlab.hybrid.contact_events import (
 )
 from walkerlab.hybrid.contact_observer import ContactObserver, note_work, observe
 from walkerlab.hybrid.contact_rules import GOES_ON, OWED, apply_event, is_above, is_to_lift, note_flexion, release
-from walkerlab.kernels import by_type_or_default, inlined, kernel, vector
+from walkerlab.kernels import entered, inlined, kernel
+from walkerlab.mechanics.hinges import hip_law
 from walkerlab.outcome import Outcome
 from walkerlab.solvers.events import CrossingFinder
-from walkerlab.solvers.scipy_methods import ScipyMethod
 from walkerlab.solvers.stepping import (
     H_NEXT,
     OUT_OF_BUDGET,
@@ -37,9 +37,9 @@ from walkerlab.solvers.stepping import (
     T,
     advance,
     begin,
-    interpolate,
     prepare_dense,
     rewind,
+    sample,
 )
 
 NEVER = -1
@@ -55,54 +55,17 @@ WALKED, LIFTED_OFF, NO_HEEL_STRIKE = int(Outcome.WALKED), int(Outcome.LIFTED_OFF
 BUDGET_EXHAUSTED, SOLVER_FAILED = int(Outcome.BUDGET_EXHAUSTED), int(Outcome.SOLVER_FAILED)
 
 
-@by_type_or_default
+@entered
 def scan(
-    method: Any,
-    system: OnGround,
-    ground: JudgedGround,
-    walk_state: WalkState,
-    watch_order: bool,
-    finder: CrossingFinder,
+    system: OnGround, ground: JudgedGround, walk_state: WalkState, watch_order: bool, finder: CrossingFinder
 ) -> tuple[float, int]:
-    """Fraction of a method's last step at which the first event lies, and which it is; its dense output is ready.
+    """Fraction of a step, sampled at the nodes, at which the first event lies, and which it is.
 
     The event functions stay in `finder.values`. The fraction is NO_CROSSING if there is no event.
     """
-    y = vector(OF_STATES)[: method.y.size]
     for node in range(finder.nodes.size):
-        interpolate(method, system, finder.nodes[node], y)
-        sample_event_functions(system, ground, walk_state, y, node, finder)
+        sample_event_functions(system, ground, walk_state, finder.states[node], node, finder)
     return earliest_crossing(system, ground, walk_state, watch_order, finder)
-
-
-@kernel
-def scan_states(
-    states: Any,
-    system: OnGround,
-    ground: JudgedGround,
-    walk_state: WalkState,
-    watch_order: bool,
-    finder: CrossingFinder,
-) -> tuple[float, int]:
-    """The same for a step whose states at the nodes are the rows of `states`."""
-    for node in range(finder.nodes.size):
-        sample_event_functions(system, ground, walk_state, states[node], node, finder)
-    return earliest_crossing(system, ground, walk_state, watch_order, finder)
-
-
-@scan.case(ScipyMethod)
-def scan_in_python(
-    method: ScipyMethod,
-    system: OnGround,
-    ground: JudgedGround,
-    walk_state: WalkState,
-    watch_order: bool,
-    finder: CrossingFinder,
-) -> tuple[float, int]:
-    """A walk in Python hands the step's states to compiled code at once."""
-    states = method.states_at(finder.nodes)
-    fraction, event = scan_states(states, system, ground, walk_state, watch_order, finder)
-    return fraction, event
 
 
 @kernel
@@ -133,7 +96,8 @@ def walk_in_form(
         if status != STEP_DONE:
             return (BUDGET_EXHAUSTED if status == OUT_OF_BUDGET else SOLVER_FAILED), event
         prepare_dense(method, system)
-        fraction, found = scan(method, system, ground, walk_state, watch_order, finder)
+        sample(method, system, finder.nodes, finder.states)
+        fraction, found = scan(system, ground, walk_state, watch_order, finder)
         happens = fraction <= 1.0
         if happens:
             if not arriving:
@@ -208,7 +172,7 @@ def is_hinged(system: OnGround) -> bool:
 @inlined
 def jumps_at_touch(system: OnGround) -> bool:
     """Whether a step's touch changes what acts on the walker at once: torque changes legs, a push-off begins."""
-    return system.form.hip_torque != 0.0 or system.form.push_off != 0.0
+    return hip_law(system.form).torque != 0.0 or system.form.push_off != 0.0
 
 
 @inlined

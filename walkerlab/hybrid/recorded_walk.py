@@ -6,7 +6,7 @@ Long walks are taken a few dozen steps at a time, so that memory is needed for r
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +30,7 @@ from walkerlab.hybrid.rigid_observer import (
 from walkerlab.hybrid.rigid_walk import EVENTS, LONGEST_SWING, hip_above_fall, new_heel_strikes, walk
 from walkerlab.hybrid.walk_record import Array, DrivenWork, WalkRecord, WalkWork
 from walkerlab.kernels import uncompiled
-from walkerlab.mechanics.hinges import hinge_energy
+from walkerlab.mechanics.hinges import hinge_energy, hinge_torque, hip_law
 from walkerlab.mechanics.standing import (
     AT_STRIKE,
     BENT,
@@ -40,7 +40,6 @@ from walkerlab.mechanics.standing import (
     Standing,
     energies,
     energy_at_touch,
-    hip_law,
     linked,
     step_lengths,
 )
@@ -55,8 +54,7 @@ SAMPLES_PER_UNIT_TIME = 64  # in sqrt(L/g)
 CLOSEST_SAMPLES = 1e-2  # of the time between samples; one nearer to a heel strike is dropped
 
 
-@dataclass(frozen=True, eq=False)
-class Samples:
+class Samples(NamedTuple):
     """A walk in time: a regular grid, and both sides of every heel strike."""
 
     time_s: Array  # (samples,) strictly rising; the state before a heel strike is one rounding earlier than after
@@ -132,13 +130,13 @@ class Recorder:
     def __init__(self, walker: Standing, tolerances: Tolerances, start: State, sampled: bool) -> None:
         """Stand at `start`, at time 0."""
         self.walker, self.wanted, self.budget = walker, sampled, tolerances.budget
-        self.sampled = sampled or walker.hip_torque != 0.0
+        self.sampled = sampled or hip_law(walker).torque != 0.0
         self.method = method = tolerances.new(len(walker.zero_state))
         self.start = self.state = start
         self.heights: Array | None = None
         self.time, self.steps, self.grid_index = 0.0, 0, 0
         self.interval = math.sqrt(walker.leg_length / walker.gravity) / SAMPLES_PER_UNIT_TIME
-        self.finder = finder_for(method, EVENTS)
+        self.finder = finder_for(method, EVENTS, len(walker.zero_state))
         # a library's method is integrated with in Python
         self.walk: Callable[..., tuple[int, int]] = walk if tolerances.compiled else uncompiled(walk)
         self.numbers, self.kneed = len(walker.zero_state), walker.kneed
@@ -200,21 +198,21 @@ class Recorder:
 
         The balance gives the damper's work, which the states before and after strikes do not tell.
         """
-        walker, push = self.walker, float(self.work[PUSH_OFF])
+        walker, law, push = self.walker, hip_law(self.walker), float(self.work[PUSH_OFF])
         starts = np.vstack((self.start, after[:-1])) if self.steps else before
         apart = [each[:, SWING] - each[:, STANCE] for each in (starts, before)]
-        given = [walker.hip_torque * each - hinge_energy(hip_law(walker), each) for each in apart]
+        given = [law.torque * each - hinge_energy(law, each) for each in apart]
         hip = float((given[1] - given[0]).sum())
-        unsprung = walker.changed(hip_stiffness=0.0)  # what the spring gives is among the works
+        unsprung = walker.changed(hip=0.0)  # what the spring gives is among the works
         ends = [sum(energies(unsprung, y)) - energy_at_touch(unsprung, y[STANCE]) for y in (self.start, self.state)]
         left = float(ends[1] - ends[0] - gravity - push - hip + self.work[STRIKES])
-        hip, left = (hip + left, 0.0) if walker.hip_damping else (hip, left)
-        forward = self._forward_work() if walker.hip_torque and self.steps else 0.0
+        hip, left = (hip + left, 0.0) if hinge_torque(law, 0.0, 0.0).by_rate else (hip, left)
+        forward = self._forward_work() if law.torque and self.steps else 0.0
         return DrivenWork(float(walker.mass * walker.gravity), gravity, push, hip, forward), abs(left)
 
     def _forward_work(self) -> float:
         """What of the torque's work is positive (J) in the steps taken."""
-        samples, n, torque = joined(self.pieces), self.numbers // 2, float(self.walker.hip_torque)
+        samples, n, torque = joined(self.pieces), self.numbers // 2, float(hip_law(self.walker).torque)
         apart, rate = (samples.state[:, first + SWING] - samples.state[:, first + STANCE] for first in (0, n))
         within = (samples.step[1:] == samples.step[:-1]) & (samples.step[1:] < self.steps)
         turned = turning_values(np.diff(samples.time_s), apart, rate)
@@ -308,7 +306,4 @@ def far_from(times: Array, events: Array, distance: float) -> NDArray[np.bool_]:
 
 def joined(pieces: list[Samples]) -> Samples:
     """One record of several that follow each other."""
-    time = np.concatenate([piece.time_s for piece in pieces])
-    state = np.concatenate([piece.state for piece in pieces])
-    step, bent = np.concatenate([piece.step for piece in pieces]), np.concatenate([piece.bent for piece in pieces])
-    return Samples(time, state, step, bent)
+    return Samples(*map(np.concatenate, zip(*pieces, strict=True)))

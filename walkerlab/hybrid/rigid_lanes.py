@@ -14,7 +14,7 @@ from walkerlab.hybrid.rigid_walk import FALLEN_HIP, LONGEST_SWING, hip_above_fal
 from walkerlab.kernels import by_type, inlined, kernel, vector
 from walkerlab.mechanics.hinges import SpringDamper, hinge_torque
 from walkerlab.mechanics.impact import heel_strike
-from walkerlab.mechanics.standing import Standing
+from walkerlab.mechanics.standing import Standing, feet_on_slope
 from walkerlab.mechanics.trigonometry import sine_cosine
 from walkerlab.outcome import Outcome
 from walkerlab.solvers.dop853 import GROW_MOST, SAFETY, SHRINK_MOST
@@ -72,26 +72,16 @@ def two_legs(model: Standing) -> TwoLegs | None:
     x, y = model.hip_x, model.hip_y
     lowest = (FALLEN_HIP * model.leg_length - model.radius) / math.hypot(x, y)
 
-    def numbers(values: Any) -> tuple[float, ...]:
-        return tuple(values.ravel().tolist())
-
+    held: dict[str, Any] = {name: tuple(model[name].ravel().tolist()) for name in ("A", "B", "arm_x", "arm_y")}
+    for name in ("misprint", "mass", "radius", "gravity_along", "gravity_down", "slope", "lean"):
+        held[name] = float(model[name])
     return TwoLegs(
         model,
-        numbers(model.A),
-        numbers(model.B),
-        numbers(model.arm_x),
-        numbers(model.arm_y),
-        SpringDamper(float(model.hip_stiffness), float(model.hip_damping), float(model.hip_torque)),
-        float(model.misprint),
-        float(model.mass),
-        float(model.radius),
-        float(model.gravity_along),
-        float(model.gravity_down),
-        float(model.slope),
-        float(model.lean),
-        math.atan2(x, y),
-        math.acos(max(-1.0, lowest)),
-        math.sqrt(model.leg_length / model.gravity),
+        **held,
+        hip=SpringDamper(*model.hip.tolist()),
+        upright=math.atan2(x, y),
+        fallen=math.acos(max(-1.0, lowest)),
+        pendulum_time=math.sqrt(model.leg_length / model.gravity),
     )
 
 
@@ -282,12 +272,6 @@ def try_steps(walker: TwoLegs, memory: LaneMemory) -> bool:
 
 
 @inlined
-def feet_on_slope(walker: TwoLegs, theta_1: Any, theta_2: Any) -> Any:
-    """See `standing.feet_on_slope`."""
-    return theta_1 + theta_2 + 2.0 * (walker.slope + walker.lean)
-
-
-@inlined
 def may_end(walker: TwoLegs, y: Any, end: Any, h: Lanes) -> Lanes:
     """Positive where a step from y to `end` may hold a heel strike or a fall; see `rigid_walk.may_end`."""
     ahead = hull(y[0] - y[1], h * (y[2] - y[3]), end[0] - end[1], h * (end[2] - end[3]))
@@ -386,7 +370,7 @@ def in_step(memory: LaneMemory, lane: int, swing: float, stance: float, constant
 @inlined
 def strike_in_step(walker: TwoLegs, memory: LaneMemory, lane: int) -> float:
     """Fraction of a lane's step at which the swing foot strikes with its leg ahead; NO_CROSSING if it does not."""
-    guard = in_step(memory, lane, 1.0, 1.0, 2.0 * (walker.slope + walker.lean))
+    guard = in_step(memory, lane, 1.0, 1.0, feet_on_slope(walker, 0.0, 0.0))
     at_start = memory.rows[FIRST, lane] > 0.0
     strike = first_fall(memory.finder, guard, at_start, 0.0)
     if strike > 1.0:

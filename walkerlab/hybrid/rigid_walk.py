@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from walkerlab.hybrid.rigid_observer import Observer, observe, observe_start, observe_strike
-from walkerlab.kernels import by_type_or_default, inlined, kernel, vector
+from walkerlab.kernels import entered, inlined, kernel, vector
 from walkerlab.mechanics.impact import strike
 from walkerlab.mechanics.standing import (
     AT_STRIKE,
@@ -28,7 +28,6 @@ from walkerlab.mechanics.standing import (
 )
 from walkerlab.outcome import Outcome
 from walkerlab.solvers.events import FALLING, NO_CROSSING, RISING, CrossingFinder, first_crossing, value_at
-from walkerlab.solvers.scipy_methods import ScipyMethod
 from walkerlab.solvers.stepping import (
     H_NEXT,
     OUT_OF_BUDGET,
@@ -37,9 +36,9 @@ from walkerlab.solvers.stepping import (
     T,
     advance,
     begin,
-    interpolate,
     prepare_dense,
     rewind,
+    sample,
 )
 from walkerlab.solvers.system import derivative
 
@@ -90,25 +89,25 @@ def may_end(system: Mode, method: Any, at_start: bool) -> bool:
         start_rate, end_rate = h * knee_angle(model, old, n), h * knee_angle(model, y, n)
         if hull(start, start_rate, end, end_rate, at_start)[1] >= 0.0:
             return True
-    before, now = foot_function(system, old), foot_function(system, y)
+    before, now = foot_function(system, old, old[n : 2 * n]), foot_function(system, y, y[n : 2 * n])
     ahead = hull(before[1], h * before[3], now[1], h * now[3])
     return ahead[1] > 0.0 and hull(before[0], h * before[2], now[0], h * now[2])[0] <= 0.0
 
 
 @inlined
-def foot_function(system: Mode, y: Any) -> tuple[float, float, float, float]:
-    """What falls through zero as the swing foot comes down, what is positive with it ahead, and their rates.
+def foot_function(system: Mode, y: Any, turn: Any) -> tuple[float, float, float, float]:
+    """What falls through zero as the swing foot comes down, what is positive with it ahead, and how both change.
 
     Of a straight leg over even ground both are linear in the angles, and scuffing near mid-swing is no zero; otherwise
     they are the foot's height over its next foothold, and its place.
+
+    turn  (n,) and more: angular velocities, or a column
     """
-    model = system.model
-    n = len(model.arm_x)
+    model, swing, stance = system.model, turn[SWING], turn[STANCE]
     if is_bent(system) or system.rise != 0.0:
-        height, ahead, upward, apart = swing_foot_motion(model, y, y[n : 2 * n])
+        height, ahead, upward, apart = swing_foot_motion(model, y, turn)
         return height - system.rise, ahead, upward, apart
-    swing, stance = y[n + SWING], y[n + STANCE]
-    return feet_on_slope(model, y), y[SWING] - y[STANCE], swing + stance, swing - stance
+    return feet_on_slope(model, y[SWING], y[STANCE]), y[SWING] - y[STANCE], swing + stance, swing - stance
 
 
 @inlined
@@ -128,16 +127,18 @@ def hull(start: float, start_rate: float, end: float, end_rate: float, zero_at_s
 @inlined
 def sample_events(system: Mode, y: Any, node: int, finder: CrossingFinder) -> None:
     """Values of the event functions at one node of a step, where the state is y."""
-    foot = foot_function(system, y)
+    foot = foot_function(system, y, y[len(system.model.arm_x) :])
     finder.values[HEEL_STRIKE, node], finder.values[AHEAD, node] = foot[0], foot[1]
     finder.values[FALL, node] = hip_above_fall(system.model, y)
     if is_bent(system):
         finder.values[KNEE, node] = knee_angle(system.model, y, 0)
 
 
-@inlined
+@entered
 def events_in_step(system: Mode, finder: CrossingFinder, at_start: bool) -> tuple[float, float, float]:
     """Fractions of a sampled step at which the swing foot comes down ahead, the walker falls, and the knee strikes."""
+    for node in range(finder.nodes.size):
+        sample_events(system, finder.states[node], node, finder)
     on_ground = at_start and system.behind == system.rise
     strike = first_crossing(finder, HEEL_STRIKE, FALLING, 0.0, on_ground)
     while strike <= 1.0 and value_at(finder, AHEAD, strike) <= 0.0:
@@ -145,31 +146,6 @@ def events_in_step(system: Mode, finder: CrossingFinder, at_start: bool) -> tupl
     fall, struck = first_crossing(finder, FALL, FALLING, 0.0, False), NO_CROSSING
     if is_bent(system):
         struck = first_crossing(finder, KNEE, RISING, RELEASED if at_start else 0.0, at_start)
-    return strike, fall, struck
-
-
-@by_type_or_default
-def scan_swing(method: Any, system: Mode, finder: CrossingFinder, at_start: bool) -> tuple[float, float, float]:
-    """`events_in_step` of the last step of a method; its dense output is ready."""
-    y = vector(system.model.zero_state)
-    for node in range(finder.nodes.size):
-        interpolate(method, system, finder.nodes[node], y)
-        sample_events(system, y, node, finder)
-    return events_in_step(system, finder, at_start)
-
-
-@kernel
-def scan_states(system: Mode, states: Any, finder: CrossingFinder, at_start: bool) -> tuple[float, float, float]:
-    """`events_in_step` of a step whose states at the nodes are the rows of `states`."""
-    for node in range(finder.nodes.size):
-        sample_events(system, states[node], node, finder)
-    return events_in_step(system, finder, at_start)
-
-
-@scan_swing.case(ScipyMethod)
-def scan_scipy(method: ScipyMethod, system: Mode, finder: CrossingFinder, at_start: bool) -> tuple[float, float, float]:
-    """A walk in Python hands the step's states to compiled code at once."""
-    strike, fall, struck = scan_states(system, method.states_at(finder.nodes), finder, at_start)
     return strike, fall, struck
 
 
@@ -225,7 +201,8 @@ def swing_phase(
             prepare_dense(method, system)
         strike, fall, struck = NO_CROSSING, NO_CROSSING, NO_CROSSING
         if near:
-            strike, fall, struck = scan_swing(method, system, finder, at_start)
+            sample(method, system, finder.nodes, finder.states)
+            strike, fall, struck = events_in_step(system, finder, at_start)
         if observer.watching:
             observe(observer, method, system, min(1.0, strike, fall, struck), step)
         if fall < min(strike, struck):
@@ -244,17 +221,11 @@ def swing_phase(
 
 @inlined
 def event_value(system: Mode, y: Any, turn: Any) -> tuple[float, float]:
-    """The event function of the strike that ends a phase, and how it changes as the bodies turn.
-
-    turn  (n,) and more: angular velocities, or a column
-    """
-    model = system.model
+    """The event function of the strike that ends a phase, and how it changes; `turn` as in `foot_function`."""
     if is_bent(system):
-        return knee_angle(model, y, 0), knee_angle(model, turn, 0)
-    if system.rise != 0.0:
-        height, _, upward, _ = swing_foot_motion(model, y, turn)
-        return height - system.rise, upward
-    return feet_on_slope(model, y), turn[SWING] + turn[STANCE]
+        return knee_angle(system.model, y, 0), knee_angle(system.model, turn, 0)
+    value, _, change, _ = foot_function(system, y, turn)
+    return value, change
 
 
 @inlined

@@ -17,11 +17,9 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from walkerlab.mechanics.parts import Assembly, Position
-
-Floats = NDArray[np.float64]
+from walkerlab.solvers.system import Floats
 
 
 class Tree(NamedTuple):

@@ -1,7 +1,9 @@
 """Torques at hinges, for both models: what acts between two bodies by the angle between them and its rate.
 
 A law is a type with a body in `hinge_torque` and in `hinge_energy`. Its torque turns the first body back and the second
-one forward; what it loses is (torque - elastic part) times the rate.
+one forward; what it loses is (torque - elastic part) times the rate. That between the legs, `hip_law`, has numbers that
+the config's block `walker.hip` gives and both models hold; outside this file only their units matter, and its constant
+`torque`, which drives.
 """
 
 from typing import Any, NamedTuple
@@ -49,6 +51,15 @@ def spring_damper_torque(law: SpringDamper, angle: float, rate: float) -> HingeT
 def spring_energy(law: SpringDamper, angle: float) -> float:
     """That of the spring."""
     return 0.5 * law.stiffness * angle * angle
+
+
+HIP_NUMBERS = len(SpringDamper._fields)
+
+
+@always_inline
+def hip_law(model: Any) -> SpringDamper:
+    """What acts between the legs of a model, with its numbers in the order in which the config has them."""
+    return SpringDamper(model.hip[0], model.hip[1], model.hip[2])
 
 
 @always_inline

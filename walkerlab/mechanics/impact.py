@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walkerlab.kernels import always_inline, inlined, matrix, vector
-from walkerlab.mechanics.links import factor_linked, gathered, solve_linked
+from walkerlab.mechanics.links import factor_linked, solve_linked
 from walkerlab.mechanics.standing import AT_STRIKE, STANCE, STRAIGHT, SWING, Standing, equations, hip_height
 from walkerlab.mechanics.tree import projections, sines_cosines
 from walkerlab.mechanics.trigonometry import sine_cosine
@@ -62,12 +62,11 @@ def strike(model: Standing, phase: int, other_foot: bool, y: Any, new: Any) -> N
     for k in range(n):
         for l in range(n):
             factors[k, l] = M[k, l]
-    factor_linked(model, phase, factors, p)
+    factor_linked(model, phase, factors)
     momenta(model, M, F, U, new[n : 2 * n], along, upward, p)
     pushed = other_foot and model.push_off != 0.0
     if pushed:
         p[STANCE] += push_off(model, new).angular
-    gathered(model, phase, p)
     solve_linked(model, phase, factors, p)
     jump, turned = vector(like), vector(like)
     for k in range(n):
@@ -90,7 +89,6 @@ def strike(model: Standing, phase: int, other_foot: bool, y: Any, new: Any) -> N
         if pushed:
             push = push_off(model, new)
             p[STANCE] += push.by_trailing * new[at + SWING] + push.by_leading * new[at + STANCE]
-        gathered(model, phase, p)
         solve_linked(model, phase, factors, p)
         for k in range(n):
             new[at + n + k] = p[k]
@@ -134,7 +132,7 @@ def pushed_at_hip(model: Standing, y: Any, impulse: float) -> NDArray[np.float64
     equations(model, new, s, c, F, U, M, p)
     p[:] = 0.0
     p[STANCE] = -impulse * hip_height(model, new)
-    factor_linked(model, AT_STRIKE, M, p)
+    factor_linked(model, AT_STRIKE, M)
     solve_linked(model, AT_STRIKE, M, p)
     new[n:] += p
     return new

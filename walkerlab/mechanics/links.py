@@ -22,17 +22,6 @@ class Counted(NamedTuple):
 
 
 @always_inline
-def gathered(model: Any, phase: int, r: Any) -> None:
-    """E' r in place of r (n,), zero for the followers: what acts on a follower acts on those it follows."""
-    n = len(model.arm_x)
-    for c in range(n):
-        if model.E[phase, c, c] == 0.0:
-            for p in range(n):
-                r[p] += model.E[phase, c, p] * r[c]
-            r[c] = 0.0
-
-
-@always_inline
 def spread(model: Any, phase: int, z: Any) -> None:
     """E z in place of z (n,): a follower moves with those it follows."""
     n = len(model.arm_x)
@@ -45,8 +34,8 @@ def spread(model: Any, phase: int, z: Any) -> None:
 
 
 @always_inline
-def factor_linked(model: Any, phase: int, M: Any, r: Any) -> None:
-    """E' r in place of r (n,), and L D L' = E' M E in place of M (n, n): 1/D on the diagonal, L' above it."""
+def factor_linked(model: Any, phase: int, M: Any) -> None:
+    """L D L' = E' M E in place of M (n, n): 1/D on the diagonal, L' above it."""
     n = len(model.arm_x)
     for c in range(n):
         if model.E[phase, c, c] == 0.0:
@@ -59,7 +48,6 @@ def factor_linked(model: Any, phase: int, M: Any, r: Any) -> None:
             for l in range(n):
                 M[c, l], M[l, c] = 0.0, 0.0
             M[c, c] = 1.0
-    gathered(model, phase, r)
     for k in range(n):
         M[k, k] = 1.0 / M[k, k]
         for i in range(k + 1, n):
@@ -70,8 +58,16 @@ def factor_linked(model: Any, phase: int, M: Any, r: Any) -> None:
 
 @always_inline
 def solve_linked(model: Any, phase: int, factors: Any, b: Any) -> None:
-    """E dz in place of b (n,) = E' r, of a matrix that `factor_linked` has taken apart."""
+    """E dz in place of b (n,) = r, of a matrix that `factor_linked` has taken apart.
+
+    What acts on a follower acts on those it follows.
+    """
     n = len(model.arm_x)
+    for c in range(n):
+        if model.E[phase, c, c] == 0.0:
+            for p in range(n):
+                b[p] += model.E[phase, c, p] * b[c]
+            b[c] = 0.0
     for k in range(n):
         for i in range(k + 1, n):
             b[i] -= factors[k, i] * b[k]

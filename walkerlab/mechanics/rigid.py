@@ -5,13 +5,12 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from walkerlab.mechanics.assembly import Anchor, followers, levers, tree_about
 from walkerlab.mechanics.parts import Assembly, Revolute
 from walkerlab.mechanics.standing import NO_SHANK, STANCE, SWING, Standing, new_standing, on_slope
+from walkerlab.solvers.system import Floats
 
-Floats = NDArray[np.float64]
 ALIKE = 1e-12  # relative difference up to which two legs are alike
 
 
@@ -23,7 +22,6 @@ class BodyPlaces:
     members: Floats  # (bodies, n) 1 where a body belongs to a place
     roles: tuple[int, ...]  # which place each is taken from at heel strike
     knees: tuple[tuple[int, int], ...]  # (shank, thigh) of the swing leg
-    shared: tuple[int, ...]  # places of bodies that belong to both legs
 
 
 def standing(assembly: Assembly, gravity: float, slope: float, knee_locked_at_strike: bool = True) -> Standing:
@@ -98,7 +96,6 @@ def places_of(assembly: Assembly) -> BodyPlaces:
         members=members,
         roles=(STANCE, SWING, *((STANCE,) * more), *range(2 + more, len(groups))),
         knees=tuple((2 + k, place_of(groups, knee_of[name])) for k, name in enumerate(swinging[1:])),
-        shared=tuple(range(2 + more, len(groups))),
     )
 
 

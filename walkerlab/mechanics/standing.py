@@ -14,23 +14,22 @@ belongs to both legs.
 """
 
 import math
-from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from walkerlab.kernels import always_inline, inlined, matrix, vector, zeros
 from walkerlab.mechanics import tree
 from walkerlab.mechanics.hinges import (
+    HIP_NUMBERS,
     HingeTorque,
-    SpringDamper,
     add_hinge_gradients,
     add_hinge_torque,
     hinge_energy,
     hinge_torque,
+    hip_law,
 )
-from walkerlab.mechanics.links import factor_linked, gathered, solve_linked, spread
+from walkerlab.mechanics.links import factor_linked, solve_linked, spread
 from walkerlab.mechanics.tree import (
     add_gravity,
     add_gravity_gradient,
@@ -41,10 +40,8 @@ from walkerlab.mechanics.tree import (
     sines_cosines,
 )
 from walkerlab.mechanics.trigonometry import sine_cosine
-from walkerlab.solvers.system import block, derivative, jacobian
+from walkerlab.solvers.system import Floats, Integers, block, derivative, jacobian
 
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 SWING, STANCE, SHANK = 0, 1, 2
 # rows of E: while the swing knee is free, with the swing leg straight, and in the heel strike
 BENT, STRAIGHT, AT_STRIKE = 0, 1, 2
@@ -67,9 +64,7 @@ class Standing(np.record):  # type: ignore[misc]  # NumPy's stubs call one of it
     thigh: int  # places of the swing knee's bodies among them; NO_SHANK for legs without knees
     shank: int
     driven_hip: bool  # whether anything acts between the legs
-    hip_stiffness: float  # N m/rad, of what acts between the legs: a SpringDamper
-    hip_damping: float  # N m s/rad
-    hip_torque: float  # N m, on the swing leg
+    hip: Floats  # numbers of that: see `hinges.hip_law`
     push_off: float  # N s, along the trailing leg in the heel strike
     misprint: float  # kg m^2, of a torque on the stance leg that no hinge gives: see `add_misprint`
     mass: float  # kg
@@ -97,7 +92,7 @@ class Standing(np.record):  # type: ignore[misc]  # NumPy's stubs call one of it
     @property
     def driven(self) -> bool:
         """Whether anything but gravity gives it energy."""
-        return bool(self.push_off != 0.0 or self.hip_torque != 0.0)
+        return bool(self.push_off != 0.0 or hip_law(self).torque != 0.0)
 
     @property
     def passive(self) -> bool:
@@ -113,36 +108,29 @@ class Standing(np.record):  # type: ignore[misc]  # NumPy's stubs call one of it
         return hash(self.tobytes())
 
     def changed(self, **fields: Any) -> "Standing":
-        """The same with other values of some fields."""
-        return frozen(self, fields)
-
-
-def frozen(model: Any, fields: Mapping[str, Any]) -> Standing:
-    """A copy with these fields that nobody can write to."""
-    memory: Any = np.empty((), model.dtype)
-    memory[()] = model
-    for name, value in fields.items():
-        memory[name] = value
-    memory.flags.writeable = False
-    read_only: Standing = memory[()]
-    return read_only
+        """A copy with other values of some fields, that nobody can write to."""
+        memory: Any = np.empty((), self.dtype)
+        memory[()] = self
+        for name, value in fields.items():
+            memory[name] = value
+        memory.flags.writeable = False
+        read_only: Standing = memory[()]
+        return read_only
 
 
 def new_standing(n: int, **fields: Any) -> Standing:
     """The rigid model of n bodies with these fields; the others are zero."""
-    square, each = (n, n), (n,)
     shapes = {
-        **dict.fromkeys(("A", "B"), square),
-        **dict.fromkeys(("arm_x", "arm_y", "foot_x", "foot_y"), each),
+        **dict.fromkeys(("A", "B"), (n, n)),
+        **dict.fromkeys(("arm_x", "arm_y", "foot_x", "foot_y", "roles"), (n,)),
+        "section": (n + 1,),
         "E": (3, n, n),
+        "hip": (HIP_NUMBERS,),
         "zero_state": (2 * n,),
     }
-    whole = {"roles": each, "section": (n + 1,), "coordinates": (), "thigh": (), "shank": (), "driven_hip": ()}
-    layout = [
-        (name, np.int64, whole[name]) if name in whole else (name, np.float64, shapes.get(name, ()))
-        for name in Standing.__annotations__
-    ]
-    return frozen(np.zeros((), np.dtype((Standing, layout))), fields)
+    blank: Any = np.zeros((), tree.record_type(Standing, shapes))
+    model: Standing = blank[()]
+    return model.changed(**fields)
 
 
 def on_slope(model: Standing, slope: float) -> Standing:
@@ -196,12 +184,6 @@ def equations(model: Standing, y: Any, s: Any, c: Any, F: Any, U: Any, M: Any, r
 
 
 @always_inline
-def hip_law(model: Standing) -> SpringDamper:
-    """What acts between the legs."""
-    return SpringDamper(model.hip_stiffness, model.hip_damping, model.hip_torque)
-
-
-@always_inline
 def hip_torque(model: Standing, y: Any) -> HingeTorque:
     """The torque between the legs, by how far the swing leg is ahead."""
     n = len(model.arm_x)
@@ -237,7 +219,7 @@ def mode_derivative(system: Mode, t: float, y: Any, f: Any) -> None:
     n = len(like)
     s, c, F, U, alpha, M = vector(like), vector(like), vector(like), vector(like), vector(like), matrix(like)
     equations(model, y, s, c, F, U, M, alpha)
-    factor_linked(model, phase, M, alpha)
+    factor_linked(model, phase, M)
     solve_linked(model, phase, M, alpha)
     for k in range(n):
         f[k], f[n + k] = y[n + k], alpha[k]
@@ -251,7 +233,6 @@ def mode_derivative(system: Mode, t: float, y: Any, f: Any) -> None:
                 for l in range(n):
                     total += by_angle[k, l] * y[at + l] + by_rate[k, l] * y[at + n + l]
                 alpha[k] = total
-            gathered(model, phase, alpha)
             solve_linked(model, phase, M, alpha)
             for k in range(n):
                 f[at + k], f[at + n + k] = y[at + n + k], alpha[k]
@@ -287,14 +268,13 @@ def mode_jacobian(system: Mode, t: float, y: Any, J: Any) -> None:
     s, c, F, U, alpha, M = vector(like), vector(like), vector(like), vector(like), vector(like), matrix(like)
     by_angle, by_rate = matrix(like), matrix(like)
     equations(model, y, s, c, F, U, M, alpha)
-    factor_linked(model, phase, M, alpha)
+    factor_linked(model, phase, M)
     solve_linked(model, phase, M, alpha)
     torque_gradients(model, y, s, c, alpha, by_angle, by_rate)
     for j in range(2 * n):
         for k in range(n):
             J[k, j] = 1.0 if j == n + k else 0.0
             alpha[k] = by_angle[k, j] if j < n else by_rate[k, j - n]
-        gathered(model, phase, alpha)
         solve_linked(model, phase, M, alpha)
         for k in range(n):
             J[n + k, j] = alpha[k]
@@ -385,12 +365,14 @@ def hip_height(model: Standing, y: Any) -> float:
 
 
 @inlined
-def feet_on_slope(model: Standing, y: Any) -> float:
+def feet_on_slope(model: Any, swing: Any, stance: Any) -> Any:
     """Sum (rad) of the straight legs' angles from the slope's normal: zero with both feet on even ground.
 
     It falls through zero at heel strike. (9-2) prints theta_1 = -theta_2, which holds only for angles from the normal.
+
+    swing, stance  rad, angles from the vertical: numbers, arrays or lanes
     """
-    return y[SWING] + y[STANCE] + 2.0 * (model.slope + model.lean)
+    return swing + stance + 2.0 * (model.slope + model.lean)
 
 
 def step_lengths(model: Standing, starts: Any, ends: Any) -> Floats:

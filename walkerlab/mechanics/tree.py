@@ -13,10 +13,23 @@ standing.py, Newton's law for the centre of mass in ground/motion.py.
 where the tree's type tells.
 """
 
+from collections.abc import Mapping
 from typing import Any
+
+import numpy as np
 
 from walkerlab.kernels import always_inline
 from walkerlab.mechanics.trigonometry import sine_cosine
+from walkerlab.solvers.system import Integers
+
+
+def record_type(kind: type, shapes: Mapping[str, tuple[int, ...]]) -> Any:
+    """NumPy's type of a structured scalar with the fields of a class, whose numbers have eight bytes each."""
+    fields = [
+        (name, np.int64 if of in (Integers, int, bool) else np.float64, shapes.get(name, ()))
+        for name, of in kind.__annotations__.items()
+    ]
+    return np.dtype((kind, fields))
 
 
 @always_inline

@@ -34,7 +34,7 @@ from walkerlab.ground.walker import ContactWalker, OnGround, feet_motion, folded
 from walkerlab.hybrid.contact_events import PASSING, STANCE, STEPS, JudgedGround, WalkState, material_along
 from walkerlab.hybrid.contact_knee import rate_of
 from walkerlab.hybrid.contact_observer import SO_FAR
-from walkerlab.hybrid.contact_run import Stopped, driven_work, new_observer, new_walk_state, walk_on
+from walkerlab.hybrid.contact_run import Stopped, driven_work, in_walk, new_observer, new_walk_state, walk_on
 from walkerlab.hybrid.contact_walk import NEVER
 from walkerlab.hybrid.walk_record import DrivenWork
 from walkerlab.mechanics.links import Counted, factor_linked, solve_linked
@@ -173,14 +173,7 @@ def step_from_section(
     rolled = along - float(walk_state.foothold[landed]) - slipped
     DP = np.zeros((z.size, 0))
     if derived:  # the flow's, less how it shifts the moment at which the feet pass
-        system = on_ground(
-            walker,
-            walk_state.has_ground,
-            walk_state.knee,
-            feet=walk_state.feet,
-            level=walk_state.level,
-            times=walk_state.times,
-        )
+        system = in_walk(walker, walk_state)
         rate = rate_of(system, folded(system.form, end), end.size, stopped.time_s)
         gradient, n = np.zeros(end.size), int(walker.whole.bodies)
         gradient[ANGLES : ANGLES + n] = feet_apart(walker, end[ANGLES : ANGLES + n])[1]
@@ -262,7 +255,7 @@ def pushed_at_hip(system: OnGround, walker: ContactWalker, state: State, impulse
     add_inertia(form, n, s, c, y[half + 2 :], M, r)
     r[:] = -impulse * (s * form.hip_x[:n] + c * form.hip_y[:n])
     links = Counted(form.E, form.arm_x[:n])
-    factor_linked(links, 0, M, r)
+    factor_linked(links, 0, M)
     solve_linked(links, 0, M, r)
     y[half] += impulse / form.mass
     y[half + 2 :] += r

@@ -14,7 +14,7 @@ import numpy as np
 
 from walkerlab.hybrid.recorded_walk import take_walk
 from walkerlab.hybrid.rigid_walk import LONGEST_SWING
-from walkerlab.mechanics.standing import STANCE, SWING, Standing, on_slope, swing_foot_motion
+from walkerlab.mechanics.standing import STANCE, SWING, Standing, feet_on_slope, on_slope, swing_foot_motion
 from walkerlab.orbits.continuation import Follower, Strides, Way, interpolated
 from walkerlab.orbits.newton import Effort, NotConverged
 from walkerlab.orbits.shooting import EXACT, NEW, RigidMap, Shooting, on_section, section_of
@@ -278,7 +278,7 @@ def over_slope(walker: Standing, tolerances: Tolerances) -> RigidMap:
 
 def partly_driven(walker: Standing, slope: float, share: float) -> Standing:
     """The walker with a share of what drives it, on a slope (rad) as much nearer to its own; passive at 0."""
-    parts = {name: share * walker[name] for name in ("hip_stiffness", "hip_damping", "hip_torque", "push_off")}
+    parts = {name: share * walker[name] for name in ("hip", "push_off")}
     driven_hip = walker.driven_hip and share > 0.0
     return on_slope(walker.changed(**parts, driven_hip=driven_hip), slope + share * (walker.slope - slope))
 
@@ -341,7 +341,7 @@ class Search:
         d = int(self.walker.coordinates)
         self.drawn += count
         starts = generator.uniform(MIN_START[:d], MAX_START[:d], (count, d))
-        starts[:, 0] = 0.5 * starts[:, 0] - self.walker.slope - self.walker.lean
+        starts[:, 0] = 0.5 * (starts[:, 0] - feet_on_slope(self.walker, 0.0, 0.0))
         known = [(found.cycle.z, found.cycle.DP) for found in self.found]
         led = self.looking.lead(section_of(self.walker), known, starts)
         for z, gait in zip(starts, led, strict=True):
@@ -352,7 +352,7 @@ class Search:
 
     def stands(self, z: Floats) -> bool:
         """Whether the legs are together."""
-        return abs(float(z[0]) + self.walker.slope + self.walker.lean) < SMALLEST_ANGLE
+        return bool(abs(feet_on_slope(self.walker, z[0], z[0])) < 2.0 * SMALLEST_ANGLE)
 
     def keep(self, z: Floats, by: str) -> bool:
         """Solve for the gait near z to rounding and take it among those found; False if there is none."""

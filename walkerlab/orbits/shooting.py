@@ -21,7 +21,7 @@ from walkerlab.hybrid.rigid_observer import Observer, unwatched
 from walkerlab.hybrid.rigid_walk import EVENTS, HeelStrikes, new_heel_strikes, take_step, walk
 from walkerlab.kernels import inlined, kernel, matrix, vector
 from walkerlab.mechanics.impact import pushed_at_hip
-from walkerlab.mechanics.standing import AT_STRIKE, STANCE, STRAIGHT, SWING, Standing, step_lengths
+from walkerlab.mechanics.standing import AT_STRIKE, STANCE, STRAIGHT, SWING, Standing, feet_on_slope, step_lengths
 from walkerlab.orbits.similarity import Units, unit_walker
 from walkerlab.orbits.step_map import REMEMBERED, DisturbedWalk, Iterates, MappedStep, Monitor, StepMap, no_step
 from walkerlab.outcome import Outcome
@@ -65,7 +65,7 @@ def section_of(walker: Standing) -> StrikeSection:
     straight, at_strike, d = walker.E[STRAIGHT], walker.E[AT_STRIKE], int(walker.coordinates)
     n, places = len(straight), walker.section[:d]
     origin, basis = np.zeros(2 * n), np.zeros((d, 2 * n))
-    origin[:n] = -2.0 * (walker.slope + walker.lean) * straight[:, SWING]
+    origin[:n] = -feet_on_slope(walker, 0.0, 0.0) * straight[:, SWING]
     basis[0, :n] = straight[:, STANCE] - straight[:, SWING]
     basis[1:, n:] = at_strike[:, places[1:] - n].T
     every = np.add.outer(places, 2 * n * np.arange(1, d + 1))
@@ -128,7 +128,7 @@ class Shooting(local):
         """Steps at these tolerances."""
         size, d = len(like.zero_state), int(like.coordinates)
         self.plain, varied = tolerances.new(size), tolerances.new(size * (1 + d))
-        finder = finder_for(self.plain, EVENTS)
+        finder = finder_for(self.plain, EVENTS, size)
         self.memory = Memory(
             varied, finder, unwatched(), np.zeros(size * (1 + d)), new_heel_strikes(1, 0), np.zeros(d, np.int64)
         )

@@ -6,6 +6,9 @@ Gaits are sought for the unit walker, so that starting ranges, tolerances and th
 import math
 from typing import NamedTuple
 
+import numpy as np
+
+from walkerlab.mechanics.hinges import SpringDamper
 from walkerlab.mechanics.standing import Standing, on_slope
 
 
@@ -42,8 +45,7 @@ def unit_walker(walker: Standing) -> tuple[Standing, Units]:
     scales = {
         **dict.fromkeys(("A", "B", "misprint"), inertia),
         **dict.fromkeys(("arm_x", "arm_y"), moment),
-        **dict.fromkeys(("hip_stiffness", "hip_torque"), 1.0 / units.energy),
-        "hip_damping": 1.0 / (units.energy * units.time),
+        "hip": np.array(SpringDamper(1.0 / units.energy, 1.0 / (units.energy * units.time), 1.0 / units.energy)),
         "push_off": 1.0 / units.impulse,
         **dict.fromkeys(("radius", "foot_x", "foot_y", "hip_x", "hip_y"), 1.0 / length),
     }

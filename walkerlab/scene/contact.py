@@ -19,13 +19,13 @@ from walkerlab.ground.resting import RestingFoot, resting_foot
 from walkerlab.ground.terrain import STANCE_FOOT, Terrain, after_mid_swing, checkerboard, plane
 from walkerlab.ground.walker import ContactWalker, changed_forms, floating_state
 from walkerlab.hybrid.contact_events import Frame, JudgedGround
-from walkerlab.hybrid.contact_run import ContactWalkResult, Floats, walk_contact
+from walkerlab.hybrid.contact_run import ContactWalkResult, walk_contact
 from walkerlab.mechanics.parts import Assembly
 from walkerlab.mechanics.rigid import places_of
 from walkerlab.orbits.contact_gait import GaitAnswer, find_gait_from
 from walkerlab.scene.parts import AnyWalker, assembly_of, drive_numbers
 from walkerlab.solvers.registry import Tolerances
-from walkerlab.solvers.system import State
+from walkerlab.solvers.system import Floats, State
 
 if TYPE_CHECKING:
     from walkerlab.config.contact import Contact

@@ -1,5 +1,7 @@
 """From the walker of a config to the parts that both models are made of."""
 
+from typing import Any
+
 from walkerlab.config.drives import Hip
 from walkerlab.config.reads import RigidConfig
 from walkerlab.config.walkers import CompassWalker, Kneed, PartsWalker, StraightLegs
@@ -52,16 +54,11 @@ def own_parts(walker: PartsWalker) -> Assembly:
         raise ConfigError(f"walker: {error.args[0]}", SHOWN_IN) from None
 
 
-def drive_numbers(config: RigidConfig) -> dict[str, float]:
+def drive_numbers(config: RigidConfig) -> dict[str, Any]:
     """What drives the walker of a config, by the names that both models have for it."""
     hip = config.walker.hip
-    return {
-        "driven_hip": hip != Hip(),
-        "hip_stiffness": hip.spring_N_m_per_rad,
-        "hip_damping": hip.damping_N_m_s_per_rad,
-        "hip_torque": hip.torque_N_m,
-        "push_off": config.push_off.impulse_N_s,
-    }
+    numbers = tuple(dict(hip).values())
+    return {"driven_hip": hip != Hip(), "hip": numbers, "push_off": config.push_off.impulse_N_s}
 
 
 def knee_locked_at_strike(walker: AnyWalker) -> bool:

@@ -32,18 +32,21 @@ class CrossingFinder(NamedTuple):
 
     nodes: Any  # (degree + 1,)
     to_bernstein: Any  # (degree + 1, degree + 1), from values at the nodes to Bernstein coefficients
+    states: Any  # (degree + 1, numbers) at the nodes, and
     values: Any  # (event functions, degree + 1), filled by the caller
     stack: Any  # (DEPTH, degree + 1) coefficients of the pieces still to search
     ends: Any  # (DEPTH, 2) where those pieces begin and end
 
 
-def new_crossing_finder(degree: int, event_functions: int = 1) -> CrossingFinder:
-    """A finder for `event_functions` event functions on steps whose dense output has degree `degree`."""
+def new_crossing_finder(degree: int, event_functions: int = 1, numbers: int = 0) -> CrossingFinder:
+    """A finder for `event_functions` event functions on steps whose dense output has degree `degree`.
+
+    numbers  of a state that event functions are of
+    """
     nodes, to_bernstein = sampling(degree)
     size = degree + 1
-    return CrossingFinder(
-        nodes, to_bernstein, np.zeros((event_functions, size)), np.zeros((DEPTH, size)), np.zeros((DEPTH, 2))
-    )
+    rooms = ((size, numbers), (event_functions, size), (DEPTH, size), (DEPTH, 2))
+    return CrossingFinder(nodes, to_bernstein, *map(np.zeros, rooms))
 
 
 @lru_cache

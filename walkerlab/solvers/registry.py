@@ -119,6 +119,6 @@ def dense_degree(method: Any) -> int:
     return DENSE_DEGREE if isinstance(method, ScipyMethod) else len(method.dense)
 
 
-def finder_for(method: Any, event_functions: int) -> CrossingFinder:
-    """A crossing finder that fits a method's dense output."""
-    return new_crossing_finder(dense_degree(method), event_functions)
+def finder_for(method: Any, event_functions: int, numbers: int) -> CrossingFinder:
+    """A crossing finder that fits a method's dense output, for event functions of a state of some numbers."""
+    return new_crossing_finder(dense_degree(method), event_functions, numbers)

@@ -27,6 +27,7 @@ from walkerlab.solvers.stepping import (
     interpolate,
     prepare_dense,
     rewind,
+    sample,
 )
 from walkerlab.solvers.system import Integers, derivative, jacobian
 
@@ -75,11 +76,6 @@ class ScipyMethod:
         self.counts[BUDGET] = budget
         self.solver: Any = None
         self.dense: Any = None
-
-    def states_at(self, fractions: Any) -> Any:
-        """States (fractions, n) at fractions of the last step."""
-        t_old, t = self.clock[T_OLD], self.clock[T]
-        return np.ascontiguousarray(self.dense(t_old + fractions * (t - t_old)).T)
 
 
 def counted(counts: Integers, system: Any, n: int) -> Callable[[float, Any], Any]:
@@ -178,3 +174,11 @@ def interpolate_scipy(method: ScipyMethod, system: Any, fraction: float, y: Any)
     """The library's dense output."""
     t_old, t = method.clock[T_OLD], method.clock[T]
     y[:] = method.dense(t_old + fraction * (t - t_old))[: y.size]
+
+
+@sample.case(ScipyMethod)
+def sample_scipy(method: ScipyMethod, system: Any, fractions: Any, states: Any) -> None:
+    """All at once."""
+    t_old, t = method.clock[T_OLD], method.clock[T]
+    found = method.dense(t_old + fractions * (t - t_old))[: states.shape[1]]
+    states[: len(fractions), : len(found)] = found.T

@@ -11,7 +11,7 @@ dense        (d, n) what `interpolate` evaluates a polynomial of degree d from; 
 
 from typing import Any
 
-from walkerlab.kernels import by_type, inlined
+from walkerlab.kernels import by_type, by_type_or_default, inlined
 
 # indices into `clock`
 T_OLD, T, H_NEXT = 0, 1, 2
@@ -46,6 +46,13 @@ def prepare_dense(method: Any, system: Any) -> None:
 @by_type
 def interpolate(method: Any, system: Any, fraction: float, y: Any) -> None:
     """Write the state at `fraction` (0 to 1) of the last step, or its first numbers, into y."""
+
+
+@by_type_or_default
+def sample(method: Any, system: Any, fractions: Any, states: Any) -> None:
+    """Write the states at fractions (m,) of the last step, or their first numbers, into the rows of states (m, ...)."""
+    for k in range(len(fractions)):
+        interpolate(method, system, fractions[k], states[k, : method.y.size])
 
 
 @inlined

@@ -93,7 +93,7 @@ def run_until(
     if stopped.outcome is not Outcome.NO_HEEL_STRIKE:
         raise ArithmeticError(f"ended as {stopped.outcome.label} at {stopped.time_s:.4g} s of {duration_s:.4g} s")
     seen = int(observer.recorded[0])
-    times, states = observer.times[:seen].copy(), observer.states[:seen].copy()
+    times, states = observer.samples.time_s[:seen].copy(), observer.samples.states[:seen].copy()
     return ParticleRun(times, states, stopped.state, observer.account[SO_FAR, LOST].copy())
 
 
