@@ -132,6 +132,8 @@ def cubic(x, x0, h0, x1, h1):
 def turned(walker, levers, y, k):
     """One body's part of the way from the hip."""
     a, (ahead, up) = y[2 + k] + walker.slope, levers[k]
+    if ahead == 0.0 and up == 0.0:
+        return 0.0, 0.0  # most masses hang on few of the bodies
     return np.cos(a) * ahead - np.sin(a) * up, np.sin(a) * ahead + np.cos(a) * up
 
 

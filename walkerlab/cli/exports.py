@@ -150,11 +150,11 @@ def named_in(folder: RunFolder, name: str) -> Illustration | Table:
     named = {one.name: one for one in FIGURES}
     if name in named:
         return named[name]
-    stored, _ = read_all(folder, (stage.name for stage in PIPELINE.stages))
     tables = page_tables(folder)
     for called in (hyphened(name), shortened(name)):
         if called in tables:
             return tables[called]
+    stored, _ = read_all(folder, (stage.name for stage in PIPELINE.stages))
     compared = stored["compare"].summary if "compare" in stored else {}
     there = [one.name for one in FIGURES if one.why_left_out(stored, {}) is None]
     there += [table for table, key in TABLES.items() if key in compared]
