@@ -11,7 +11,7 @@ settings.load_profile("walkerlab")
 LONGEST_FIRST = (
     "test_campaigns", "test_tune", "test_same_bits", "test_kneed_contact_walk", "test_whole_report", "test_plain_walks",
     "test_scene_catalogue", "test_rigid_walk", "test_catalogue", "test_continuation", "test_api", "test_sweep_engines",
-    "test_hinged_walks", "test_lean_scenes",
+    "test_hinged_walks", "test_lean_scenes", "test_exports", "test_engine_adapters", "test_page", "test_server",
 )  # fmt: skip
 
 

@@ -2,11 +2,13 @@
 
 import functools
 import math
+import pickle
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from numba import typeof
 
 from walkerlab.config.loader import load
 from walkerlab.ground.friction import Coulomb, Frictionless
@@ -15,6 +17,7 @@ from walkerlab.ground.walker import feet_motion
 from walkerlab.hybrid.contact_events import hip_height
 from walkerlab.scene.contact import contact_scene, resting, start_state
 from walkerlab.scene.left_out import of_contact_walk
+from walkerlab.scene.rigid import rigid_walker
 
 STEP = 0.3714
 
@@ -97,3 +100,21 @@ def test_a_hinged_first_step_is_a_system_of_two_angles():
     hinged = scene.walker.forms[1, 0]
     assert scene.pinned
     assert (hinged.places, hinged.bodies) == (0, 2)
+
+
+@pytest.mark.parametrize("terrain", ["checkerboard", "after-mid-swing", "plane"])
+@pytest.mark.parametrize("heights", ["[]", "[0.001]"])
+def test_a_scene_sent_to_another_process_runs_the_code_that_is_compiled_here(terrain, heights):
+    scene = scene_of(f"contact.terrain={terrain}", f"ground.heights_m={heights}")
+    sent = pickle.loads(pickle.dumps(scene))
+    assert typeof(sent.ground) == typeof(scene.ground)
+    assert typeof(sent.walker) == typeof(scene.walker)
+
+
+def test_a_rigid_walker_sent_to_another_process_runs_the_code_that_is_compiled_here():
+    config = load(None).config
+    walker = rigid_walker(config, config.equations)
+    sent = pickle.loads(pickle.dumps(walker))
+    assert typeof(np.asarray(sent)) == typeof(np.asarray(walker))
+    assert sent == walker
+    assert not np.asarray(sent).flags.writeable

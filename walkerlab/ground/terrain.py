@@ -14,8 +14,7 @@ from walkerlab.kernels import inlined
 
 FAR = 1e9  # m, an edge out of reach
 STANCE_FOOT = 1  # which carries the first step
-EVEN = np.zeros(1)
-EVEN.flags.writeable = False
+EVEN = np.zeros(1)  # not read-only: pickled, it would come back as another type, for which kernels are compiled anew
 
 
 class Terrain(NamedTuple):

@@ -107,6 +107,10 @@ class Standing(np.record):  # type: ignore[misc]  # NumPy's stubs call one of it
         """Of all numbers."""
         return hash(self.tobytes())
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Its copy in another process, read-only too: kernels are compiled anew for what can be written to."""
+        return Standing.changed, (np.asarray(self),)
+
     def changed(self, **fields: Any) -> "Standing":
         """A copy with other values of some fields, that nobody can write to."""
         memory: Any = np.empty((), self.dtype)
