@@ -12,7 +12,7 @@ from typing import Any, TypedDict, Unpack, cast
 
 from walkerlab.config.contact import Contact
 from walkerlab.config.fields import Block, kinds_of
-from walkerlab.config.files import DEFAULT, layers_of_paper
+from walkerlab.config.files import DEFAULT, builtin, read_layers
 from walkerlab.config.layers import stacked
 from walkerlab.config.loader import doubts
 from walkerlab.config.overlay import tree_of
@@ -483,7 +483,7 @@ def config_of_scene(walker: Any, given: Mapping[str, Any], keys: Mapping[str, An
     lines = {key: plain(value) for key, value in {"name": "memory", **keys, **named}.items()}
     replaced = {"source", "contact", *({"walker"} & lines.keys())}
     upper = tree_of(lines, NOWHERE)
-    tree = stacked([*(layer.without(*replaced) for layer in layers_of_paper()), upper])
+    tree = stacked([*(layer.without(*replaced) for layer in read_layers(builtin(DEFAULT))), upper])
     config, moved = on_the_slope(typed(tree), tree)
     warn([*doubts(config, tree), *moved], inside=1)
     return config

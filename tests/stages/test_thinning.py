@@ -1,18 +1,10 @@
 """What is stored of a long walk: less of its middle, and every heel strike."""
 
-from dataclasses import dataclass
-
 import numpy as np
-from numpy.typing import NDArray
 
+from walkerlab.hybrid.recorded_walk import Samples
 from walkerlab.pipeline.progress import Silent
 from walkerlab.stages.walk import FIRST_STEPS, LAST_STEPS, MAX_BETWEEN, thinned
-
-
-@dataclass(frozen=True)
-class Samples:
-    time_s: NDArray[np.float64]
-    height: NDArray[np.float64]
 
 
 def walk(steps, per_step=50):
@@ -20,7 +12,8 @@ def walk(steps, per_step=50):
     ends = np.arange(1.0, steps + 1.0)
     grid = np.arange(steps * per_step) / per_step
     time = np.unique(np.concatenate((grid, ends, np.nextafter(ends, 0.0))))
-    return Samples(time, np.sin(time)), ends
+    state, step = np.sin(time)[:, None], np.searchsorted(ends, time, side="right")
+    return Samples(time, state, step, np.zeros(time.size, bool)), ends
 
 
 def test_an_ordinary_walk_is_stored_whole():
@@ -33,7 +26,7 @@ def test_of_a_long_walk_both_sides_of_every_heel_strike_are_stored():
     kept = thinned(samples, ends, Silent())
     assert np.isin(ends[:-1], kept.time_s).all()
     assert np.isin(np.nextafter(ends, 0.0), kept.time_s).all()
-    assert kept.height.tolist() == np.sin(kept.time_s).tolist()
+    assert kept.state[:, 0].tolist() == np.sin(kept.time_s).tolist()
 
 
 def test_beginning_and_end_are_whole_and_the_middle_is_bounded():

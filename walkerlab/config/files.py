@@ -3,7 +3,7 @@
 import contextlib
 import stat
 from dataclasses import dataclass
-from functools import cache
+from functools import lru_cache
 from pathlib import Path
 from typing import Final
 
@@ -18,6 +18,7 @@ DEFAULT: Final = "paper"
 SUFFIXES: Final = (".yaml", ".yml")
 MAX_EXTENDS: Final = 16
 SHOWN_PATH: Final = 240
+parsed = lru_cache(maxsize=32)(read)  # trees of texts that were read already: they are changed in copies alone
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +72,7 @@ def read_layers(file: ConfigFile) -> list[Mapping]:
     seen: list[str] = []
     asked: Position | None = None  # where the file's name stands
     while True:
-        root = read(_text_of(file, asked), file.label)
+        root = parsed(_text_of(file, asked), file.label)
         if str(file.path.resolve()) in seen:
             raise refused(asked, f"extends: {file.label} extends itself")
         if len(seen) == MAX_EXTENDS:
@@ -91,12 +92,6 @@ def read_layers(file: ConfigFile) -> list[Mapping]:
             raise refused(asked, "extends: is not the name of a config", _what_there_is())
         named = extends.value in builtin_names()  # else a path from the file's folder
         file = builtin(extends.value) if named else file_at(file.path.parent / extends.value)
-
-
-@cache
-def layers_of_paper() -> tuple[Mapping, ...]:
-    """The layers of the built-in paper config, read once; they are changed in copies alone."""
-    return tuple(read_layers(builtin(DEFAULT)))
 
 
 def with_cases(layer: Mapping, folder: Path) -> Mapping:

@@ -3,7 +3,7 @@
 from collections.abc import Mapping as Keys
 from typing import Any
 
-from walkerlab.config.files import DEFAULT, layers_of_paper
+from walkerlab.config.files import DEFAULT, builtin, read_layers
 from walkerlab.config.layers import stacked
 from walkerlab.config.problems import refused
 from walkerlab.config.schema import Config
@@ -28,11 +28,11 @@ def block_over_paper(upper: Mapping) -> Config:
 
     What a contact block in SI leaves out has the paper's physical value, not its number in N, mm, s.
     """
-    layers = layers_of_paper()
+    layers = read_layers(builtin(DEFAULT))
     contact = upper.entries.get("contact")
     units = contact.entries.get("units") if isinstance(contact, Mapping) else None
     if isinstance(units, Scalar) and units.value == "si":
-        layers = tuple(layer.without("contact") for layer in layers)
+        layers = [layer.without("contact") for layer in layers]
     tree = stacked([*layers, upper])
     tree.put("name", Scalar(upper.position, DEFAULT, DEFAULT), upper.position)
     return on_the_slope(typed(tree), tree)[0]

@@ -5,7 +5,7 @@ absent. Of a long walk's samples all of its beginning and end are stored, and be
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import fields, replace
+from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
@@ -124,7 +124,7 @@ def content_of_walk(
 def thinned(samples: Any, ends: NDArray[np.float64], progress: Progress) -> Any:
     """The samples that are stored; those of an ordinary walk themselves.
 
-    samples  a dataclass of arrays whose first axis is time, `time_s` among them
+    samples  a NamedTuple of arrays whose first axis is time, `time_s` among them
     ends     (steps,) s, times at which steps ended
     """
     if ends.size <= FIRST_STEPS + LAST_STEPS:
@@ -145,7 +145,7 @@ def thinned(samples: Any, ends: NDArray[np.float64], progress: Progress) -> Any:
 
 def only_at(samples: Any, kept: NDArray[Any]) -> Any:
     """Samples of a walk at some of their times."""
-    return replace(samples, **{field.name: getattr(samples, field.name)[kept] for field in fields(samples)})
+    return type(samples)(*(each[kept] for each in samples))
 
 
 def over_time(**values: ArrayLike) -> dict[str, Variable]:
