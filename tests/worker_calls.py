@@ -64,8 +64,8 @@ def count_to(number):
 
 
 def clean_up_at_the_end(path):
-    path.with_suffix(".begun").touch()
     try:
+        path.with_suffix(".begun").touch()
         time.sleep(600.0)
     finally:
         path.touch()
