@@ -43,6 +43,11 @@ def test_one_job_is_done_here_and_so_is_what_comes_first():
     assert os.getpid() not in (ids[0], ids[2])
 
 
+def test_calls_of_least_rank_begin_first():
+    begun = list(in_order([calls.begun_at] * 3, jobs=2, rank=lambda place: -place))
+    assert begun[0] == max(begun)
+
+
 LOADS_SLOWLY = """
 import pathlib, time
 

@@ -225,11 +225,14 @@ class WorkerPool(Executor):
         self.shutdown(wait=False, cancel_futures=True)
 
 
-def in_order(calls: Sequence[Callable[[], R]], jobs: int, first: Sequence[int] = ()) -> Iterator[R]:
+def in_order(
+    calls: Sequence[Callable[[], R]], jobs: int, first: Sequence[int] = (), rank: Callable[[int], float] = float
+) -> Iterator[R]:
     """What independent calls return, in their order, whoever did them.
 
     jobs   processes
     first  places of calls that are done here, before several processes would each compile the same
+    rank   by place: calls of least rank begin first, so that no process is left alone with a long one at the end
     """
     if jobs <= 1 or len(calls) <= 1:
         for call in calls:
@@ -237,7 +240,7 @@ def in_order(calls: Sequence[Callable[[], R]], jobs: int, first: Sequence[int] =
         return
     ready = {place: calls[place]() for place in first}
     with WorkerPool(min(jobs, len(calls))) as pool:
-        others = {place: pool.start(call) for place, call in enumerate(calls) if place not in ready}
+        others = {place: pool.start(calls[place]) for place in sorted({*range(len(calls))} - {*first}, key=rank)}
         for place in range(len(calls)):
             yield ready[place] if place in ready else others[place].result()
 

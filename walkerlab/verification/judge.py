@@ -56,10 +56,10 @@ class CaseCell:
 
 
 def run_cells(cells: Sequence[CaseCell], jobs: int) -> Iterator[tuple[CaseResult | Choice, ...]]:
-    """The cases' results in their order, whoever ran them; the first of each model is run first."""
+    """Results in the order of the cases, whoever ran them: one of each model first, then by what they may take."""
     models = [cell.case.model for cell in cells]
     first = [models.index(model) for model in ("contact", "rigid") if model in models]
-    return in_order([cell.run for cell in cells], jobs, first)
+    return in_order([cell.run for cell in cells], jobs, first, lambda place: -cells[place].case.budget)
 
 
 def judge(case: Case, config: Config) -> CaseResult:
