@@ -156,7 +156,7 @@ def engines_of(scene: str, experiment: str, results: Results) -> Iterator[Series
         mine = here & (engines == engine) & (names == name) & (rows["start"] == 1.0)
         place = places[engine] = places.get(engine, -1) + 1
         style, marker = DASHES[place % len(DASHES)], MARKERS[place % len(MARKERS)]
-        look = Look(f"{engine} {name}", COLOURS[engine], style, 1.8 if engine == OURS else 1.1, marker)
+        look = Look(f"{engine} {name}", COLOURS.get(engine, GREY), style, 1.8 if engine == OURS else 1.1, marker)
         yield Series(look, {variable: rows[variable][mine] for variable in OF_A_SERIES}, place == 0, engine)
 
 
