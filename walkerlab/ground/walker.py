@@ -29,6 +29,7 @@ NO_FOOT = -1
 RELEASED, BENT, STOPPING, LOCKED = 0, 1, 2, 3
 
 
+@tree.read_at_once
 class Form(np.record):  # type: ignore[misc]  # NumPy's stubs call one of its bases final
     """The walker as it moves while its knees are as they are, hinged or free, SI: a structured scalar.
 
@@ -66,16 +67,6 @@ class Form(np.record):  # type: ignore[misc]  # NumPy's stubs call one of its ba
     gravity_along: float  # m/s^2
     gravity_down: float  # m/s^2, towards the slope
     slope: float  # rad
-
-    # NumPy's own look-up of a record's field takes half as long again, and starts of walks are computed in Python
-    __getattribute__ = object.__getattribute__
-
-    def __getattr__(self, name: str) -> Any:
-        """The field of that name."""
-        try:
-            return self[name]
-        except ValueError:
-            raise AttributeError(name) from None
 
 
 SHAPES: dict[str, tuple[int, ...]] = {

@@ -22,6 +22,7 @@ from walkerlab.hybrid.contact_events import EXTENSION, EXTENSION_RATE, HEIGHT, P
 from walkerlab.hybrid.contact_observer import SO_FAR, ContactObserver
 from walkerlab.kernels import vector
 from walkerlab.mechanics.tree import projections
+from walkerlab.solvers.events import shift_column
 from walkerlab.solvers.scipy_methods import right_hand_side
 from walkerlab.solvers.stepping import T
 from walkerlab.solvers.system import Floats
@@ -58,14 +59,18 @@ def change_form(
     Phi = observer.tangent.Phi
     if Phi.shape[1] > 0:
         rate, rate_after = rate_of(before, y, size, t), rate_of(after, z, size, t)
-        column = unfolded(before.form, Phi[: y.size], size)
-        later = np.zeros(Phi.shape[1])
+        columns = unfolded(before.form, Phi[: y.size], size)
+        waits = np.zeros(Phi.shape[1])
         if event != PULSE_END:
             gradient = event_gradient(whole, event, x)
-            later = (gradient @ column) / (gradient @ rate)
+            waits = -(gradient @ columns) / (gradient @ rate)
         if event < EXTENSION and before.form.push_off != 0.0 and event % PER_FOOT == HEIGHT:
             rate_after = np.zeros(size)
-        Phi[: z.size] = folded(after.form, reset @ column + np.outer(rate_after - reset @ rate, later))
+        for column, wait in zip(columns.T, waits, strict=True):
+            shift_column(column, 0, rate, wait)
+            column[:] = reset @ column
+            shift_column(column, 0, rate_after, -wait)
+        Phi[: z.size] = folded(after.form, columns)
     return z
 
 

@@ -27,7 +27,15 @@ from walkerlab.mechanics.standing import (
     swing_foot_motion,
 )
 from walkerlab.outcome import Outcome
-from walkerlab.solvers.events import FALLING, NO_CROSSING, RISING, CrossingFinder, first_crossing, value_at
+from walkerlab.solvers.events import (
+    FALLING,
+    NO_CROSSING,
+    RISING,
+    CrossingFinder,
+    first_crossing,
+    shift_column,
+    value_at,
+)
 from walkerlab.solvers.stepping import (
     H_NEXT,
     OUT_OF_BUDGET,
@@ -257,16 +265,14 @@ def pass_event(method: Any, system: Mode, new: Any) -> float:
             at = 2 * n * column
             _, change = event_value(system, y, y[at : at + n])
             waits[column] = -change / rate
-            for i in range(2 * n):
-                y[at + i] += waits[column] * f[i]
+            shift_column(y, at, f, waits[column])
     strike(model, STRAIGHT if knee else AT_STRIKE, not knee, y, new)
     if knee and len(y) > 2 * n:
         for i in range(2 * n):
             before[i] = new[i]
         derivative(Mode(model, STRAIGHT, system.behind, system.rise), t, before, f)
         for column in range(1, len(y) // (2 * n)):
-            for i in range(2 * n):
-                new[2 * n * column + i] -= waits[column] * f[i]
+            shift_column(new, 2 * n * column, f, -waits[column])
     return t
 
 

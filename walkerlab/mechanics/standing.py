@@ -48,6 +48,7 @@ BENT, STRAIGHT, AT_STRIKE = 0, 1, 2
 NO_SHANK = -1
 
 
+@tree.read_at_once
 class Standing(np.record):  # type: ignore[misc]  # NumPy's stubs call one of its bases final
     """Everything that stays the same while the rigid model walks, SI: a structured scalar, of n bodies by its type."""
 

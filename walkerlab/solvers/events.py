@@ -220,3 +220,17 @@ def evaluate(stack: Any, piece: int, size: int, x: float) -> float:
         binomial = binomial * (degree - i + 1) / i
         total = (total + power * binomial * stack[piece, i]) * u
     return total + power * x * stack[piece, degree]
+
+
+@inlined
+def shift_column(columns: Any, at: int, rate: Any, wait: float) -> None:
+    """Take a column of a state's derivative from equal times to the event itself: Phi + f wait (saltation).
+
+    Before the event by the wait for it; after a jump, where time goes on as before, back by the same wait.
+
+    columns  numbers of which those from `at` on are the column; written
+    rate     (n,) f, the state's own derivative in time
+    wait     derivative of the event's time by what the column is for
+    """
+    for i in range(len(rate)):
+        columns[at + i] += rate[i] * wait
