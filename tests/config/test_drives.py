@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from walkerlab.config.drives import drives_of
+from walkerlab.config.drives import Hip, drives_of
 from walkerlab.config.loader import load
 from walkerlab.errors import ConfigError
 
@@ -35,3 +35,8 @@ def test_walkers_of_every_type_are_driven(name):
     assert drives_of(load(Path(name), sets).config) == (
         "a push-off of 0.1 N s", "a hip spring of 0.01 N m/rad", "a hip damper of 0.02 N m s/rad"
     )  # fmt: skip
+
+
+@pytest.mark.parametrize("number", Hip.model_fields)
+def test_every_number_of_the_hip_is_told_in_words(number):
+    assert len(drives_of(load(Path("paper"), (f"walker.hip.{number}=0.01",)).config)) == 1

@@ -2,14 +2,17 @@
 
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from walkerlab.orbits.similarity import Units
+from walkerlab.config.drives import Hip
+from walkerlab.config.loader import load
+from walkerlab.orbits.similarity import Units, unit_walker
 from walkerlab.paper.appendix_a import impact
 from walkerlab.scene.parts import assembly_of
-from walkerlab.scene.rigid import compass
+from walkerlab.scene.rigid import compass, rigid_walker
 from walkerlab.verification.catalogue import config_of, shipped
 from walkerlab.verification.judge import time_difference
 from walkerlab.verification.masses import RigidMasses
@@ -81,3 +84,12 @@ def test_a_twin_there_and_back_is_the_walker():
     assert again.gravity_m_s2 == pytest.approx(PAPER.gravity_m_s2)
     one, other = again.contact.in_si(), PAPER.contact.in_si()
     assert vars(one) == pytest.approx(vars(other))
+
+
+@pytest.mark.parametrize("name", ["paper", "round-feet", "kneed", "torso"])
+def test_a_driven_walker_and_its_twin_are_one_walker_of_unit_size(name):
+    sets = (*(f"walker.hip.{number}=0.01" for number in Hip.model_fields), "push_off.impulse_N_s=0.1")
+    config = load(Path(name), sets).config
+    own, twins = (unit_walker(rigid_walker(each, "corrected"))[0] for each in (config, scaled(config, to_twin(config))))
+    for field in own.dtype.names:
+        np.testing.assert_allclose(twins[field], own[field], rtol=1e-12, atol=1e-15, err_msg=field)

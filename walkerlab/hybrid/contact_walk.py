@@ -26,7 +26,6 @@ from walkerlab.hybrid.contact_events import (
 from walkerlab.hybrid.contact_observer import ContactObserver, note_work, observe
 from walkerlab.hybrid.contact_rules import GOES_ON, OWED, apply_event, is_above, is_to_lift, note_flexion, release
 from walkerlab.kernels import entered, inlined, kernel
-from walkerlab.mechanics.hinges import hip_law
 from walkerlab.outcome import Outcome
 from walkerlab.solvers.events import CrossingFinder
 from walkerlab.solvers.stepping import (
@@ -151,7 +150,7 @@ def walk_in_form(
                 note_work(observer, system, method.y)
             if (stepped and is_hinged(system)) or (event == PASSING and 0 <= until <= walk_state.feet[STEPS]):
                 return WALKED, event
-            # where the motion jumps the tangent does, too: in another form, and where a hip's torque changes legs
+            # where the motion jumps the tangent does, too: in another form, and where a hip's legs change
             if locked_knees(walk_state.knee) != locked or (stepped and jumps_at_touch(system)):
                 return GOES_ON, event
             if not is_switching(event):
@@ -171,8 +170,8 @@ def is_hinged(system: OnGround) -> bool:
 
 @inlined
 def jumps_at_touch(system: OnGround) -> bool:
-    """Whether a step's touch changes what acts on the walker at once: torque changes legs, a push-off begins."""
-    return hip_law(system.form).torque != 0.0 or system.form.push_off != 0.0
+    """Whether a step's touch may change what acts on the walker at once: the hip's legs change, a push-off begins."""
+    return system.form.driven_hip or system.form.push_off != 0.0
 
 
 @inlined

@@ -38,6 +38,14 @@ class DrivenWork(NamedTuple):
         return (self.gravity + self.push_off + self.forward) / (self.weight * distance)
 
 
+def rough_heights(roughness_m: float, seed: int | tuple[int, ...], steps: int) -> Array:
+    """Heights (steps + 1,) in m of the footholds of rough ground, independent and normal, the start's first and zero.
+
+    How many are drawn does not change the first.
+    """
+    return np.append(0.0, np.random.default_rng(seed).normal(0.0, roughness_m, steps))
+
+
 @dataclass(frozen=True, eq=False)
 class WalkRecord:
     """How a walk went: its steps, its fate and its cost, SI units. A step ends as the swing foot touches the ground."""

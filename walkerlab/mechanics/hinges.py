@@ -2,7 +2,7 @@
 
 A law is a type with a body in `hinge_torque` and in `hinge_energy`. Its torque turns the first body back and the second
 one forward; what it loses is (torque - elastic part) times the rate. That between the legs, `hip_law`, has numbers that
-the config's block `walker.hip` gives and both models hold; outside this file only their units matter, and its constant
+the config's block `walker.hip` gives and both models hold; of these others need the units alone, and the constant
 `torque`, which drives.
 """
 

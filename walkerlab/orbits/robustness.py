@@ -20,6 +20,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
+from walkerlab.hybrid.walk_record import rough_heights
 from walkerlab.orbits.similarity import Units
 from walkerlab.orbits.step_map import DisturbedWalk, StepMap, multipliers_of
 from walkerlab.outcome import Outcome
@@ -156,8 +157,7 @@ def largest_disturbance(at: Standpoint, disturbance: Disturbance, sign: float, s
 
 def steps_on_rough_ground(at: Standpoint, roughness_m: float, seed: tuple[int, ...], most: int) -> int:
     """Steps of a walk from the gait over footholds of normal heights, `most` if it goes on."""
-    heights = np.append(0.0, np.random.default_rng(seed).normal(0.0, roughness_m, most))
-    return int(at.step_map.disturbed(at.z, at.p, heights).durations_s.size)
+    return int(at.step_map.disturbed(at.z, at.p, rough_heights(roughness_m, seed, most)).durations_s.size)
 
 
 @dataclass(frozen=True)

@@ -34,6 +34,13 @@ class Units(NamedTuple):
         """Unit of impulse, N s."""
         return self.mass * self.length / self.time
 
+    def of(self, unit: str) -> float:
+        """By its name in the config; of a pure number 1. KeyError for one that no key of a walker has."""
+        inertia, damping = self.mass * self.length**2, self.energy * self.time
+        basic = {"": 1.0, "1": 1.0, "m": self.length, "kg": self.mass, "s": self.time}
+        derived = {"kg m^2": inertia, "N s": self.impulse, "N m": self.energy}
+        return (basic | derived | {"N m/rad": self.energy, "N m s/rad": damping})[unit]
+
 
 def unit_walker(walker: Standing) -> tuple[Standing, Units]:
     """The walker similar to `walker` with L = g = 1 and a total mass of 1, and its units."""

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from walkerlab.config.drives import drives_of
 from walkerlab.config.walkers import Kneed, PartsWalker
 from walkerlab.errors import ConfigError
 from walkerlab.ground.compliant import KneeRules, contact_walker
@@ -87,8 +86,6 @@ def contact_scene(config: ContactConfig, rigid_step_length_m: float, own_pitch_m
 
 def with_drives(walker: ContactWalker, config: ContactConfig) -> ContactWalker:
     """The walker with what drives it in a config."""
-    if not drives_of(config):
-        return walker
     return changed_forms(walker, **drive_numbers(config), push_off_duration=config.push_off.duration_s)
 
 

@@ -17,6 +17,7 @@ from walkerlab.config.schema import Config
 from walkerlab.config.walkers import without_contact
 from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.hybrid.recorded_walk import as_state
+from walkerlab.hybrid.walk_record import rough_heights
 from walkerlab.labels import Label
 from walkerlab.mechanics.standing import Standing
 from walkerlab.orbits.gradients import QUANTITIES, Gradient, gait_numbers, gradients, relative
@@ -309,8 +310,8 @@ def rough_steps(config: RobustnessConfig, steps: Mapping[str, Floats]) -> Group:
 def rough_walk(config: RobustnessConfig, inputs: Mapping[str, Content]) -> dict[str, Group]:
     """The beginning of the first walk on the roughest ground, as the rigid model takes it, to be drawn."""
     gait = as_state(inputs["fixedpoint"].summary["state"])
-    heights = np.random.default_rng((config.seed, 0)).normal(0.0, max(config.robustness.roughness_m), STEPS_DRAWN)
-    scene = rigid_scene(config, Footholds(heights_m=tuple(heights.tolist())), ("states",))
+    _, *heights = rough_heights(max(config.robustness.roughness_m), (config.seed, 0), STEPS_DRAWN).tolist()
+    scene = rigid_scene(config, Footholds(heights_m=tuple(heights)), ("states",))
     walk = scene.walk(gait, STEPS_DRAWN, EXACT, sampled=True)
     return {f"rough_walk/{name}": group for name, group in groups_of_walk(scene, walk).items()}
 

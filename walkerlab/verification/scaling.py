@@ -3,7 +3,7 @@
 import math
 from typing import Any, TypeVar
 
-from walkerlab.config.fields import Block
+from walkerlab.config.fields import Block, extra
 from walkerlab.config.reads import RigidConfig
 from walkerlab.config.schema import Config
 from walkerlab.orbits.similarity import Units
@@ -25,19 +25,7 @@ def to_twin(config: RigidConfig) -> Units:
 
 
 def scaled_block(block: B, by: Units) -> B:
-    """A block of measures scaled, each by the unit that its key ends in; knees' stops are turned by torques."""
-    units = {
-        "_N_m_per_rad": by.energy,
-        "_N_m_s_per_rad": by.energy * by.time,
-        "_N_m": by.energy,
-        "_N_s": by.impulse,
-        "duration_s": by.time,
-        "_kg_m2": by.mass * by.length**2,
-        "_kg": by.mass,
-        "_m": by.length,
-        "stop_stiffness": by.energy,
-        "stop_damping": by.energy * by.time,
-    }
+    """A block of measures scaled, each by its key's unit."""
 
     def value(given: Any, unit: float) -> Any:
         if isinstance(given, Block):
@@ -47,9 +35,8 @@ def scaled_block(block: B, by: Units) -> B:
         return given * unit if isinstance(given, float) and unit != 1.0 else given
 
     changed: dict[str, Any] = {}
-    for name in type(block).model_fields:
-        unit = next((unit for ending, unit in units.items() if name.endswith(ending)), 1.0)
-        changed[name] = value(getattr(block, name), unit)
+    for name, field in type(block).model_fields.items():
+        changed[name] = value(getattr(block, name), by.of(extra(field, "unit")))
     return block.model_copy(update=changed)
 
 
