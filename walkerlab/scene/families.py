@@ -29,23 +29,15 @@ def rigid_map(config: ContactConfig, parameter: Parameter, scale: float) -> Rigi
     return RigidMap(rigid_walkers(config, parameter), scale, rigid_walker(config, config.equations))
 
 
-def walker_on_ground(config: ContactConfig, step_length_m: float) -> WalkerOnGround:
-    """The contact model of a config; steps are judged by a length (m)."""
-    from walkerlab.orbits.contact_map import WalkerOnGround
-    from walkerlab.scene.contact import contact_scene
-
-    scene = contact_scene(config, step_length_m, step_length_m)
-    return WalkerOnGround(scene.walker, scene.ground)
-
-
 def walkers_on_ground(
     config: ContactConfig, parameter: Parameter, step_length_m: float
 ) -> Callable[[float], WalkerOnGround | None]:
-    """The contact model at a value of the parameter; None where the config refuses the value."""
+    """The contact model at a value of the parameter, steps judged by a length; None where the config refuses it."""
+    from walkerlab.scene.contact import contact_scene
 
     def walker_at(value: float) -> WalkerOnGround | None:
         changed = parameter.config_at(config, value)
-        return None if changed is None else walker_on_ground(changed, step_length_m)
+        return None if changed is None else contact_scene(changed, step_length_m, step_length_m)
 
     return walker_at
 
@@ -53,6 +45,10 @@ def walkers_on_ground(
 def contact_map(config: ContactConfig, parameter: Parameter, scale: float, step_length_m: float) -> ContactMap:
     """The contact model's step map over the parameter; steps are judged by a length (m)."""
     from walkerlab.orbits.contact_map import ContactMap
+    from walkerlab.scene.contact import contact_scene
 
-    walkers = walkers_on_ground(config, parameter, step_length_m)
-    return ContactMap(walkers, scale, CONTACT, step_length_m, walker_on_ground(config, step_length_m))
+    walkers, like = (
+        walkers_on_ground(config, parameter, step_length_m),
+        contact_scene(config, step_length_m, step_length_m),
+    )
+    return ContactMap(walkers, scale, CONTACT, step_length_m, like)

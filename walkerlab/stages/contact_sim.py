@@ -55,7 +55,7 @@ def run(config: ContactSimConfig, inputs: Mapping[str, Content], progress: Progr
     scene = scene_on_pads(config, rigid_step, rigid_state)
     start, steps = start_state(scene, rigid_state), 2 * config.strides
     tolerances = tolerances_of(config, steps)
-    interval = scene.frame.pendulum_time / SAMPLES_PER_PENDULUM_TIME if config.outputs else None
+    interval = scene.ground.frame.pendulum_time / SAMPLES_PER_PENDULUM_TIME if config.outputs else None
     heights = foothold_heights(config.ground, steps + 1)
     tell_unresolved_slip(tolerances.atol, scene, progress)
 
@@ -75,7 +75,7 @@ def compile_kernels(config: ContactSimConfig) -> None:
     places = places_of(scene.assembly).names
     angles = [HALF_ANGLE if name == "2" else -HALF_ANGLE if name.startswith("1") else 0.0 for name in places]
     standing = start_state(scene, (*angles, *(0.0 for _ in places)))
-    interval = scene.frame.pendulum_time if config.outputs else None
+    interval = scene.ground.frame.pendulum_time if config.outputs else None
     groups(config, scene, scene.walk(standing, 1, replace(tolerances_of(config, 1), budget=1), interval))
 
 
@@ -146,8 +146,8 @@ def groups(config: ContactSimConfig, scene: ContactScene, walk: ContactWalkResul
     stored: dict[str, Group] = {}
     if walk.steps:
         stored["steps"] = Group(steps_of(walk, slip_m=walk.slip_m, rolling_m=walk.rolling_m))
-    if scene.terrain.has_pads:
-        stored["terrain"] = pads_group(scene.terrain.stride_measure, walk.end_state[0])
+    if scene.ground.terrain.has_pads:
+        stored["terrain"] = pads_group(scene.ground.terrain.stride_measure, walk.end_state[0])
     if walk.samples is not None:
         stored["trajectory"] = trajectory_group(config, scene, walk, walk.samples)
     return stored

@@ -175,7 +175,7 @@ class TuneRun:
     def walk(self, state: State, pinned: bool = False, tolerances: Tolerances | None = None) -> ContactWalkResult:
         """Walk the contact model from a rigid state, as contact-sim does, with samples; at the config's tolerances."""
         scene = replace(self.scene, pinned=pinned)
-        interval = scene.frame.pendulum_time / SAMPLES_PER_PENDULUM_TIME
+        interval = scene.ground.frame.pendulum_time / SAMPLES_PER_PENDULUM_TIME
         return scene.walk(start_state(scene, state), self.steps, tolerances or self.tolerances, interval)
 
     def take(self, name: str, state: State) -> None:
