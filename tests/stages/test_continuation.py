@@ -234,6 +234,10 @@ def test_a_key_touches_the_models_that_change_with_it(over, models):
         (["over=strides"], "touches no model"),
         (["over=slope_dge"], "did you mean slope_deg?"),
         (["over=contact.stiffness", "from=1e5", "to=2e5"], "does not touch the rigid model"),
+        (
+            ["over=push_off.duration_s", "from=0.001", "to=0.01", "model=contact", "walker.hip.torque_N_m=1"],
+            "does not touch the contact model",
+        ),
         (["over=walker.hip_mass_kg", "from=-1", "to=2"], "cannot be -1 kg"),
         (["contact=null", "model=contact"], "needs a contact block"),
         (["contact=null", "over=contact.stiffness"], "the config has no contact"),

@@ -79,9 +79,8 @@ def run(
     begun, shared_from = time.perf_counter(), question.shared_from
     every = range(window.size)
     pieces = pieces_of("cells", every, question.cells_at_once, 1, partial(ends_of, question, window))
-    walks = complete(pieces, parts, "basin", progress, jobs, shared_from)
-    ends = [np.reshape(parts.kept[piece.name], (3, -1)) for piece in pieces]
-    found = WalkEnds(*np.concatenate(ends, axis=1).astype(np.int64))
+    ends, walks = complete(pieces, parts, "basin", progress, jobs, shared_from)
+    found = WalkEnds(*np.concatenate([np.reshape(part, (3, -1)) for part in ends], axis=1).astype(np.int64))
     walked = found.outcome == Outcome.WALKED
     edges = edge_cells(np.where(walked, found.attractor, FAILED).reshape(window.cells))
     walking = walked.astype(float)
@@ -89,8 +88,8 @@ def run(
         refine = config.basin.refine
         walks_of_cell, shares = refine ** len(window.axes), partial(shares_of, question, window, refine)
         pieces = pieces_of("edge", edges.tolist(), question.edges_at_once, walks_of_cell, shares)
-        walks += complete(pieces, parts, "basin: edges", progress, jobs, shared_from)
-        walking[edges] = np.concatenate([parts.kept[piece.name] for piece in pieces])
+        of_edges, more = complete(pieces, parts, "basin: edges", progress, jobs, shared_from)
+        walking[edges], walks = np.concatenate(of_edges), walks + more
     rate = {"trajectories_per_s": walks / (time.perf_counter() - begun)} if walks else {}
     aperiodic = isinstance(question, RigidQuestion) and question.attractors.aperiodic
     reached = attractors_of(question, rigid)
