@@ -24,7 +24,9 @@ class Case(Block):
     config: dict[str, Any] = key(dict, "", "keys of a config, over the paper's", bounds="a block of keys")
     steps: int = key(4, "1", "steps to walk", ge=1, le=2_000_000)
     lowered_m: float = key(0.0, "m", "how far the start is sunk into the ground; negative lifts it", ge=-1e3, le=1e3)
-    expected: tuple[Fate, ...] = key(..., "", "outcomes that are right", bounds=f"a list of {', '.join(FATES)}")
+    expected: tuple[Fate, ...] = key(
+        ..., "", "outcomes that are right", bounds=f"a list of {', '.join(FATES)}", sequence=True
+    )
     reason: str = key(..., "", "why that is to be expected", bounds="a sentence")
     budget: int = key(400_000, "1", "right-hand sides it may evaluate", ge=1, le=100_000_000)
     balance: float = key(1e-6, "1", "largest residual of the energy balance, as a share of the walker's energy", gt=0.0)
