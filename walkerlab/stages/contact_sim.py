@@ -12,7 +12,6 @@ from walkerlab.config.reads import ContactConfig, ContactSimConfig, GroundConfig
 from walkerlab.errors import NoAnswer
 from walkerlab.ground.compliant import hinge_of
 from walkerlab.ground.terrain import STANCE_FOOT
-from walkerlab.ground.walker import on_ground
 from walkerlab.hybrid.contact_observer import ContactSamples
 from walkerlab.hybrid.contact_run import ContactWalkResult, by_channel, sampled_energies, sampled_feet
 from walkerlab.mechanics.rigid import places_of
@@ -171,8 +170,7 @@ def trajectory_group(
 ) -> Group:
     """Samples of the walk: what `outputs` asks for."""
     variables = {**over_time(time=samples.time_s, stance_leg=samples.stance + 1), **legs()}
-    feet = np.zeros((samples.time_s.size, 2, 5))
-    sampled_feet(scene.walker, samples.states, samples.has_ground, samples.level, feet)
+    feet = sampled_feet(scene.walker, samples)
     if "states" in config.outputs:
         variables |= state_variables(scene, samples.states)
         variables |= over_time(foot_along_m=feet[:, :, 0], foot_height_m=feet[:, :, 1] + samples.level)
@@ -224,10 +222,7 @@ def energy_variables(scene: ContactScene, samples: ContactSamples, foothold: Flo
 
     foothold, up  (samples,) m, where along the slope the stance foot touched, and over it
     """
-    energies = np.zeros((samples.time_s.size, 3))
-    system = on_ground(scene.walker, (False, False))
-    sampled_energies(system, samples.states, samples.has_ground, samples.knees, samples.level, energies)
-    kinetic, potential, total = energies.T
+    kinetic, potential, total = sampled_energies(scene.walker, samples).T
     given = samples.driven_J.T
     lost, walker = samples.dissipated_J, scene.walker
     at_foothold = walker.mass * (walker.gravity_down * up - walker.gravity_along * foothold)
