@@ -4,7 +4,7 @@ from collections import OrderedDict
 
 from walkerlab.config.schema import Config
 from walkerlab.errors import ConfigError, NoAnswer
-from walkerlab.pipeline.graph import PIPELINE, Graph, Stage
+from walkerlab.pipeline.graph import PIPELINE, Graph
 from walkerlab.pipeline.identity import Identities
 from walkerlab.pipeline.plan import refuse_unsuited
 from walkerlab.pipeline.progress import Progress, Silent
@@ -14,12 +14,6 @@ from walkerlab.store.parts import Parts
 
 REMEMBERED = 256
 """Results of needed stages that are kept: those of neighbouring points are often the same."""
-
-
-def refuse_files(stage: Stage) -> None:
-    """Raise ConfigError for a stage that has no result but files of its run."""
-    if stage.draws:
-        raise ConfigError(f"{stage.name} draws the files of its run; it has no result without them.")
 
 
 class Keys:
@@ -35,10 +29,14 @@ class Keys:
         return self._identities.code_digest(self.graph[target])
 
     def of(self, config: Config, target: str) -> dict[str, str]:
-        """The key of a stage and of each that it needs, by name; ConfigError if the config has not what it needs."""
+        """The key of a stage and of each that it needs, by name.
+
+        Raises ConfigError if the config has not what it needs, and for a stage that has no result but files of its run.
+        """
         keys: dict[str, str] = {}
         for stage in self.graph.needed_for(target, config):
-            refuse_files(stage)
+            if stage.draws:
+                raise ConfigError(f"{stage.name} draws the files of its run; it has no result without them.")
             refuse_unsuited(target, stage, config)
             given = {name: keys[name] for name in stage.inputs(config)}
             keys[stage.name] = self._identities.of(stage, config, given).key

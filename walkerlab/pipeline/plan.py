@@ -1,7 +1,7 @@
 """What would happen, and why: for each stage whether its result is reused, made, or left out."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
@@ -64,31 +64,25 @@ class Step:
     origin: Path | None = None
 
 
+@dataclass
 class Planner:
-    """Decides on stages one after another, knowing what became of those before."""
+    """Decides on stages one after another, knowing what became of those before.
 
-    def __init__(
-        self,
-        config: Config,
-        folder: RunFolder,
-        graph: Graph = PIPELINE,
-        force: bool = False,
-        elsewhere: bool = True,
-    ) -> None:
-        """Begin with nothing decided.
+    force      every stage runs that is not left out
+    elsewhere  results in other run folders are reused too
+    left_out   the stages that are left out so far, and why
+    results    those that are there, by stage
+    """
 
-        force      every stage runs that is not left out
-        elsewhere  results in other run folders are reused too
-        """
-        self.config = config
-        self.folder = folder
-        self.graph = graph
-        self.force = force
-        self.elsewhere = elsewhere
-        self.left_out: dict[str, str] = {}
-        self.results: dict[str, Stored] = {}
-        self._keys: dict[str, str] = {}
-        self._identities = Identities()
+    config: Config
+    folder: RunFolder
+    graph: Graph = PIPELINE
+    force: bool = False
+    elsewhere: bool = True
+    left_out: dict[str, str] = field(default_factory=dict, init=False)
+    results: dict[str, Stored] = field(default_factory=dict, init=False)
+    _keys: dict[str, str] = field(default_factory=dict, init=False)
+    _identities: Identities = field(default_factory=Identities, init=False)
 
     def plan(self, stages: Sequence[Stage]) -> tuple[Step, ...]:
         """Decide on stages in the order in which they run, taking it that each goes as decided."""

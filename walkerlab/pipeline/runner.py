@@ -301,8 +301,7 @@ class Execution:
         except BaseException:
             begun.reporter.end("")
             raise
-        if stage.keeps_parts:
-            Parts(self.folder.parts(stage.name), identity.key).forget()
+        Parts(self.folder.parts(stage.name), identity.key).forget()
         self.planner.settle(stage, result)
         reason = begun.step.reason if result.complete else f"no answer: {plan.no_answer(result)}"
         done = StageDone(stage.name, "run", reason, time.perf_counter() - begun.started)
