@@ -20,7 +20,7 @@ from walkerlab.config.schema import Config
 from walkerlab.config.sweep import Sweep as SweepBlock
 from walkerlab.config.tree import NOWHERE
 from walkerlab.config.validation import on_the_slope, typed
-from walkerlab.errors import ConfigError, StaleError
+from walkerlab.errors import ConfigError, NoAnswer, StaleError
 from walkerlab.pipeline.graph import PIPELINE
 from walkerlab.pipeline.in_memory import InMemory, Keys
 from walkerlab.pipeline.resolve import resolve
@@ -148,9 +148,9 @@ class Run:
         """The stored result of a stage, whether or not it is up to date; StaleError if there is none to be read."""
         refuse_unknown_stage(stage)
         found = result_in(self.folder, stage)
-        no_answer = found.summary.get("no_answer")
-        said = None if no_answer is None else str(no_answer["message"])
-        return result_of(stage, found.summary, found, said, self.folder.artifact(stage))
+        said = found.summary.get("no_answer")
+        no_answer = None if said is None else NoAnswer(said["message"], said["advice"])
+        return result_of(stage, found.summary, found, no_answer, self.folder.artifact(stage))
 
     def sweep(self, name: str = "") -> Any:
         """A sweep as one xarray Dataset; without a name the only one there is. StaleError if it cannot be read."""
@@ -198,8 +198,7 @@ def run(
     warn(asked.loaded.warnings)
     report = execute(asked.loaded.config, stage, asked.folder, Options(force=force, jobs=jobs))
     content = artifact.read(report.artifact) if report.artifact is not None else Content()
-    said = None if report.no_answer is None else report.no_answer.message
-    return result_of(stage, report.as_json(), content, said, report.artifact)
+    return result_of(stage, report.as_json(), content, report.no_answer, report.artifact)
 
 
 def open_run(name: str | Path, runs: str | Path = RUNS) -> Run:
@@ -449,8 +448,7 @@ def in_memory(stage: str, config: Config) -> Result:
     """A stage's result, with what it needs, without files; ConfigError if the config has not what it needs."""
     refuse_unknown_stage(stage)
     answer = InMemory().answer(config, stage, keys_here().of(config, stage))
-    said = None if answer.no_answer is None else answer.no_answer.message
-    return result_of(stage, answer.content.summary, answer.content, said)
+    return result_of(stage, answer.content.summary, answer.content, answer.no_answer)
 
 
 @cache
@@ -538,7 +536,8 @@ def refuse_unknown_stage(stage: str) -> None:
 
 
 def result_of(
-    stage: str, summary: Mapping[str, Any], content: Content, no_answer: str | None, path: Path | None = None
+    stage: str, summary: Mapping[str, Any], content: Content, no_answer: NoAnswer | None, path: Path | None = None
 ) -> Result:
     """A result, of the type that the stage has."""
-    return RESULTS.get(stage, Result)(stage, summary, content, no_answer, path)
+    said = None if no_answer is None else no_answer.message
+    return RESULTS.get(stage, Result)(stage, summary, content, said, path)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from walkerlab.mechanics.standing import Standing
 from walkerlab.orbits.shooting import RigidMap
 from walkerlab.scene.parameter import Parameter
-from walkerlab.scene.rigid import rigid_walker, walker_or_none
+from walkerlab.scene.rigid import rigid_walker
 from walkerlab.solvers.registry import Tolerances
 
 if TYPE_CHECKING:
@@ -21,12 +21,12 @@ CONTACT = Tolerances("radau5", 1e-10, 1e-12, 60_000)
 
 def rigid_walkers(config: ContactConfig, parameter: Parameter) -> Callable[[float], Standing | None]:
     """The rigid walker at a value of the parameter; None where the config refuses the value."""
-    return lambda value: walker_or_none(parameter.config_at(config, value))
+    return parameter.over(config, rigid_walker)
 
 
 def rigid_map(config: ContactConfig, parameter: Parameter, scale: float) -> RigidMap:
     """The rigid model's step map over the parameter."""
-    return RigidMap(rigid_walkers(config, parameter), scale, rigid_walker(config, config.equations))
+    return RigidMap(rigid_walkers(config, parameter), scale, rigid_walker(config))
 
 
 def walkers_on_ground(
@@ -35,11 +35,7 @@ def walkers_on_ground(
     """The contact model at a value of the parameter, steps judged by a length; None where the config refuses it."""
     from walkerlab.scene.contact import contact_scene
 
-    def walker_at(value: float) -> WalkerOnGround | None:
-        changed = parameter.config_at(config, value)
-        return None if changed is None else contact_scene(changed, step_length_m, step_length_m)
-
-    return walker_at
+    return parameter.over(config, lambda changed: contact_scene(changed, step_length_m, step_length_m))
 
 
 def contact_map(config: ContactConfig, parameter: Parameter, scale: float, step_length_m: float) -> ContactMap:
@@ -47,8 +43,6 @@ def contact_map(config: ContactConfig, parameter: Parameter, scale: float, step_
     from walkerlab.orbits.contact_map import ContactMap
     from walkerlab.scene.contact import contact_scene
 
-    walkers, like = (
-        walkers_on_ground(config, parameter, step_length_m),
-        contact_scene(config, step_length_m, step_length_m),
-    )
+    walkers = walkers_on_ground(config, parameter, step_length_m)
+    like = contact_scene(config, step_length_m, step_length_m)
     return ContactMap(walkers, scale, CONTACT, step_length_m, like)

@@ -1,9 +1,9 @@
 """A number of the config as the parameter of a family of walkers: its key, its unit, and the config at a value."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 from pydantic import ValidationError
 from pydantic.fields import FieldInfo
@@ -14,6 +14,7 @@ from walkerlab.config.reads import ContactConfig, keys_of
 from walkerlab.config.schema import Config
 from walkerlab.errors import ConfigError
 
+R = TypeVar("R")
 SLOPE_DEG, SLOPE_RAD = "slope_deg", "slope_rad"
 PHYSICAL = tuple(keys_of(ContactConfig))
 """The keys that a model is made of."""
@@ -47,6 +48,15 @@ class Parameter:
             return Config.model_validate(data)
         except ValidationError:
             return None
+
+    def over(self, config: ContactConfig, make: Callable[[Config], R]) -> Callable[[float], R | None]:
+        """What is made of the config, at a value of the parameter; None where the schema refuses the value."""
+
+        def at(value: float) -> R | None:
+            changed = self.config_at(config, value)
+            return None if changed is None else make(changed)
+
+        return at
 
 
 SLOPE = Parameter(SLOPE_RAD, "rad", (SLOPE_RAD,))

@@ -97,7 +97,7 @@ def without(trial: Trial, why: WalkEndsError) -> dict[str, Any]:
 def scenes(config: SceneConfig, inputs: Mapping[str, Content]) -> Iterator[Trial]:
     """The walks to measure by: rigid, with a contact block on its ground, and a compass also near the rigid limit."""
     length, state = rigid_start(config, inputs)
-    walker = rigid_walker(config, config.equations)
+    walker = rigid_walker(config)
     start = with_scaled_rates(walker, state, OFF_THE_GAIT, OFF_THE_GAIT)
     yield RigidTrial(walker, start, RIGID_STEPS, compass_or_none(config, config.equations))
     if config.contact is None:

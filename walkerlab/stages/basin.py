@@ -66,7 +66,7 @@ def run(
     Raises ConfigError for the contact model without a contact block, NoAnswer if its pads are to fit a gait that
     there is not.
     """
-    gait, rigid = inputs["fixedpoint"].summary, rigid_walker(config, config.equations)
+    gait, rigid = inputs["fixedpoint"].summary, rigid_walker(config)
     if len(rigid.section_indices) != len(COORDINATES):
         raise ConfigError(
             f"basin takes walkers with {len(COORDINATES)} coordinates just after heel strike; this one has "

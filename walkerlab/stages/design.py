@@ -165,7 +165,7 @@ class Gaits:
         here = subject.at()
         found = self.near(here, self.z)
         if self.model == "rigid" and (found is None or found[1]["spectral_radius"] >= 1.0):  # a long way, perhaps
-            walker = rigid_walker(config, config.equations)
+            walker = rigid_walker(config)
             gait = find_gaits(walker, config.seed).gait
             found = found if gait is None else self.near(here, section_coordinates(walker, gait.state)) or found
         if found is None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import partial
 from typing import Any, Final
 
@@ -175,7 +175,7 @@ class Subject:
             else contact_map(self.config, parameter, 1.0, self.length_m)
         )
         step_map = step_map if exact else step_map.at(QUICK[self.model])
-        _, units = unit_walker(rigid_walker(self.config, self.config.equations))
+        _, units = unit_walker(rigid_walker(self.config))
         return Standpoint(step_map, p, self.z, step_map.step(self.z, p).DP, units)
 
     def gradients(self, parameter: Parameter, wanted: Collection[str]) -> dict[str, Gradient]:
@@ -210,7 +210,7 @@ def subject_of(
     """
     length = float(gait["step_length_m"])
     if model == RIGID:
-        z = section_coordinates(rigid_walker(config, config.equations), gait["state"])
+        z = section_coordinates(rigid_walker(config), gait["state"])
         return Subject(RIGID, config, z, length)
     # Imported here: the rigid model alone does without.
     from walkerlab.scene.contact import gait_off_pads, with_contact
@@ -308,9 +308,8 @@ def rough_rows(model: str, config: RobustnessConfig, steps: Floats) -> Rows:
     """How long walks last, of so many steps (roughness, walk), on each rough ground."""
     most, rows = cap(model, config), []
     for roughness, taken in zip(config.robustness.roughness_m, steps, strict=True):
-        seen = rough_walks(taken, most)
-        error = {} if seen.standard_error is None else {"standard_error": seen.standard_error}
-        told = {"mean_steps": seen.mean, **error, "walks": seen.walks, "capped": seen.capped, "method": seen.method}
+        seen = asdict(rough_walks(taken, most))
+        told = {name: value for name, value in seen.items() if value is not None}
         rows.append({"model": model, "roughness_m": roughness, **told, "cut_off_at": most})
     return rows
 

@@ -155,7 +155,7 @@ def gait_of(walker: Standing, seed: int) -> RigidGait | None:
 
 def prepared(config: WalksConfig, case: Case) -> Start | None:
     """The start of a case; None if it starts from a gait that there is not, or its pads are laid for one."""
-    walker = rigid_walker(config, config.equations)
+    walker = rigid_walker(config)
     if isinstance(config.start, str):
         gait = gait_of(walker, config.seed)
         if gait is None:
