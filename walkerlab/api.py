@@ -22,7 +22,8 @@ from walkerlab.config.tree import NOWHERE
 from walkerlab.config.validation import on_the_slope, typed
 from walkerlab.errors import ConfigError, NoAnswer, StaleError
 from walkerlab.pipeline.graph import PIPELINE
-from walkerlab.pipeline.in_memory import InMemory, Keys
+from walkerlab.pipeline.identity import Keys
+from walkerlab.pipeline.in_memory import InMemory
 from walkerlab.pipeline.resolve import resolve
 from walkerlab.pipeline.runner import Options, execute
 from walkerlab.pipeline.runs import config_of, headline_values, result_in, run_named

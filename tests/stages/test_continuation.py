@@ -19,7 +19,8 @@ from walkerlab.orbits.family_search import THOROUGHNESS
 from walkerlab.orbits.newton import Effort
 from walkerlab.orbits.step_map import gait_near
 from walkerlab.pipeline.graph import PIPELINE
-from walkerlab.pipeline.in_memory import InMemory, Keys
+from walkerlab.pipeline.identity import Keys
+from walkerlab.pipeline.in_memory import InMemory
 from walkerlab.pipeline.progress import Silent
 from walkerlab.scene.families import rigid_map
 from walkerlab.scene.parameter import parameter_of

@@ -14,6 +14,7 @@ from walkerlab.scene.left_out import of_adjustment, of_contact_walk, of_rigid_wa
 if TYPE_CHECKING:
     from walkerlab.config.schema import Config
 
+NO_CONTACT = "the config has no contact block"
 Inputs = Callable[["Config"], tuple[str, ...]]
 Lacks = Callable[["Config"], tuple[dict[str, str], ...]]
 
@@ -117,6 +118,17 @@ class Stage:
     def results(self, config: Config) -> tuple[str, ...]:
         """The stages whose results it gets: those that it needs, and those that it takes if they are current."""
         return (*self.inputs(config), *self.if_current)
+
+    def why_unsuited(self, config: Config) -> str | None:
+        """Why it means nothing under a config; None if it does."""
+        return NO_CONTACT if self.needs_contact and config.contact is None else None
+
+    def refuse_unsuited(self, asked: str, config: Config) -> None:
+        """Raise ConfigError if it means nothing under a config, being what is asked for or what this needs."""
+        from walkerlab.config.walkers import without_contact  # not for the help of the command line
+
+        if self.why_unsuited(config) is not None:
+            raise without_contact(asked, config.walker, "Add one to the config; `walkerlab schema` lists its keys.")
 
     @property
     def command(self) -> str:

@@ -23,6 +23,7 @@ from walkerlab.orbits.basin import (
     NONE,
     RTOL,
     Attractors,
+    WalkEnds,
     Walker,
     Window,
     arrivals,
@@ -39,7 +40,7 @@ from walkerlab.pipeline.progress import Progress
 from walkerlab.scene.contact import ContactScene, contact_gait, start_state, with_contact
 from walkerlab.scene.endings import Pads, endings
 from walkerlab.scene.rigid import rigid_walker
-from walkerlab.solvers.system import Floats, Integers
+from walkerlab.solvers.system import Floats
 from walkerlab.stages.contact_sim import scene_on_pads, tolerances_of
 from walkerlab.stages.numerical_error import evenly_spread, tightened
 from walkerlab.stages.walk import OUTCOMES, counted
@@ -245,15 +246,6 @@ def margin_of(config: RigidConfig, window: Window, found: WalkEnds, gait: Mappin
     return {"margin": float(np.sqrt((away**2).sum(axis=1)).min())}
 
 
-@dataclass(frozen=True)
-class WalkEnds:
-    """How walks ended: (n,) each; `attractor` is NONE where none was reached, else `steps` says after how many."""
-
-    outcome: Integers
-    attractor: Integers
-    steps: Integers
-
-
 @dataclass(frozen=True, eq=False)
 class RigidQuestion:
     """Starts of the rigid model.
@@ -274,8 +266,7 @@ class RigidQuestion:
     def walked(self, z: Floats) -> WalkEnds:
         """Walk from section coordinates z (n, 3), SI."""
         scaled = z * np.array(self.scale)
-        found = arrivals(self.walker, self.attractors, scaled, self.steps, tolerances=self.tolerances)
-        return WalkEnds(found.outcome, found.attractor, found.steps)
+        return arrivals(self.walker, self.attractors, scaled, self.steps, tolerances=self.tolerances)
 
     def tightened(self) -> RigidQuestion:
         """The same at a hundred times tighter tolerances."""

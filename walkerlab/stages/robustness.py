@@ -19,6 +19,7 @@ from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.hybrid.recorded_walk import as_state
 from walkerlab.labels import Label
 from walkerlab.mechanics.standing import Standing
+from walkerlab.orbits.family_search import CONTACT, RIGID
 from walkerlab.orbits.gradients import QUANTITIES, Gradient, gait_numbers, gradients, relative
 from walkerlab.orbits.robustness import (
     DISTURBANCES,
@@ -47,8 +48,6 @@ from walkerlab.workers import in_order
 
 Rows = list[dict[str, Any]]
 
-RIGID: Final = "rigid"
-CONTACT: Final = "contact"
 QUICK: Final = {RIGID: Tolerances("dop853", 1e-7, 1e-9, ENDLESS), CONTACT: Tolerances("radau5", 1e-6, 1e-8, 1_000_000)}
 """Of walks that are counted; the budget is a step's."""
 WALKS_AT_ONCE: Final = 25
@@ -170,7 +169,7 @@ class Subject:
         """The gait on the step map over a parameter."""
         p = parameter.value_in(self.config)
         step_map: StepMap = (
-            rigid_map(self.config, parameter, 1.0).at(EXACT)
+            rigid_map(self.config, parameter, 1.0)
             if self.model == RIGID
             else contact_map(self.config, parameter, 1.0, self.length_m)
         )

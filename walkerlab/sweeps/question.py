@@ -87,11 +87,9 @@ class SweptStage:
         """Which value of each parameter a point has; the last parameter changes fastest."""
         if self.layout == "list":
             return (index,) * len(self.axes)
-        places = []
-        for length in reversed(self.shape):
-            index, place = divmod(index, length)
-            places.append(place)
-        return tuple(reversed(places))
+        import numpy as np
+
+        return tuple(int(place) for place in np.unravel_index(index, self.shape))
 
     def settings(self, index: int) -> list[ConfigSetting]:
         """The `--set` options of one point."""
