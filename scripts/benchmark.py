@@ -35,9 +35,9 @@ from walkerlab.config.basin import COORDINATES
 from walkerlab.config.loader import load
 from walkerlab.config.schema import Config
 from walkerlab.hybrid.recorded_walk import with_scaled_rates
-from walkerlab.hybrid.rigid_lanes import Strikes, new_fates, new_lane_memory, two_legs, walk_lanes
+from walkerlab.hybrid.rigid_lanes import new_fates, new_lane_memory, two_legs, walk_lanes
 from walkerlab.hybrid.rigid_walk import FALLEN_HIP
-from walkerlab.orbits.basin import ATOL, RTOL
+from walkerlab.orbits.basin import ATOL, RTOL, Attractors
 from walkerlab.orbits.families import ValueSpan
 from walkerlab.orbits.fixed_point import LOOKING, RigidGait, Search, SlopeBranch, find_gaits, over_slope
 from walkerlab.orbits.newton import Effort
@@ -267,10 +267,10 @@ def batch_lines(watch: Stopwatch) -> Iterator[Line]:
     trial = printed_trial()
     reference = reference_for(trial)
     many = 2_000
-    strikes, fates = Strikes(np.zeros((many, STEPS)), np.zeros((many, STEPS, 4))), new_fates(many)
+    seen, fates = Attractors().capture(many, STEPS), new_fates(many)
     memory, legs = new_lane_memory(RTOL, ATOL), two_legs(trial.walker)
-    seconds = watch(lambda: walk_lanes(legs, memory, strikes, np.array([trial.start] * many), fates))
-    error = float(np.max(np.abs(strikes.after[:, -1] - reference.state)))
+    seconds = watch(lambda: walk_lanes(legs, memory, seen, np.array([trial.start] * many), fates))
+    error = float(np.max(np.abs(seen.last - reference.state[1:])))
     alone = cheapest(trial, reference, "dop853", 1e-6, watch, LADDER)
     script = cheapest(trial, reference, USER_SCRIPT, 1e-6, watch, LADDER)
     rate = many * STEPS / seconds

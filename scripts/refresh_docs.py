@@ -25,12 +25,15 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import astuple, fields
 from functools import cache
 from pathlib import Path
 from typing import Any
 
+from walkerlab.config.fields import block_of
 from walkerlab.config.loader import load
-from walkerlab.config.reference import as_text
+from walkerlab.config.reference import KeyReference, keys
+from walkerlab.config.schema import Config
 from walkerlab.pipeline.graph import PIPELINE
 from walkerlab.pipeline.runner import execute
 from walkerlab.store.runfolder import RunFolder
@@ -85,8 +88,14 @@ def stages(_results: Results) -> str:
 
 
 def config_keys(_results: Results) -> str:
-    """What `walkerlab schema` prints."""
-    return as_text().rstrip("\n") + "\n"
+    """Every key of a config, as a table that reads well in a terminal too."""
+    rows = [tuple(field.name for field in fields(KeyReference)), *(astuple(row) for row in keys())]
+    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
+    rows.insert(1, tuple("-" * width for width in widths))
+    lines = (" | ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)) for row in rows)
+    optional = [name for name, field in Config.model_fields.items() if block_of(field) and field.default is None]
+    notes = [f"The block `{name}` may be left out; what needs it is then left out too." for name in optional]
+    return "\n".join([*(f"| {line} |" for line in lines), "", *notes, ""])
 
 
 def gaits(results: Results) -> str:

@@ -11,7 +11,7 @@ from types import NoneType
 from typing import Any, TypedDict, Unpack, cast
 
 from walkerlab.config.contact import Contact
-from walkerlab.config.fields import Block, kinds_of
+from walkerlab.config.fields import Block, block_of, kinds_of
 from walkerlab.config.files import DEFAULT, builtin, read_layers
 from walkerlab.config.layers import stacked
 from walkerlab.config.loader import doubts
@@ -20,9 +20,10 @@ from walkerlab.config.schema import Config
 from walkerlab.config.sweep import Sweep as SweepBlock
 from walkerlab.config.tree import NOWHERE
 from walkerlab.config.validation import on_the_slope, typed
-from walkerlab.errors import ConfigError, StaleError
+from walkerlab.errors import ConfigError, NoAnswer, StaleError
 from walkerlab.pipeline.graph import PIPELINE
-from walkerlab.pipeline.in_memory import InMemory, Keys
+from walkerlab.pipeline.identity import Keys
+from walkerlab.pipeline.in_memory import InMemory
 from walkerlab.pipeline.resolve import resolve
 from walkerlab.pipeline.runner import Options, execute
 from walkerlab.pipeline.runs import config_of, headline_values, result_in, run_named
@@ -148,9 +149,9 @@ class Run:
         """The stored result of a stage, whether or not it is up to date; StaleError if there is none to be read."""
         refuse_unknown_stage(stage)
         found = result_in(self.folder, stage)
-        no_answer = found.summary.get("no_answer")
-        said = None if no_answer is None else str(no_answer["message"])
-        return result_of(stage, found.summary, found, said, self.folder.artifact(stage))
+        said = found.summary.get("no_answer")
+        no_answer = None if said is None else NoAnswer(said["message"], said["advice"])
+        return result_of(stage, found.summary, found, no_answer, self.folder.artifact(stage))
 
     def sweep(self, name: str = "") -> Any:
         """A sweep as one xarray Dataset; without a name the only one there is. StaleError if it cannot be read."""
@@ -198,8 +199,7 @@ def run(
     warn(asked.loaded.warnings)
     report = execute(asked.loaded.config, stage, asked.folder, Options(force=force, jobs=jobs))
     content = artifact.read(report.artifact) if report.artifact is not None else Content()
-    said = None if report.no_answer is None else report.no_answer.message
-    return result_of(stage, report.as_json(), content, said, report.artifact)
+    return result_of(stage, report.as_json(), content, report.no_answer, report.artifact)
 
 
 def open_run(name: str | Path, runs: str | Path = RUNS) -> Run:
@@ -352,12 +352,10 @@ def continue_gait(
     walker     from `compass`, `kneed` or `walker`
     over       the key that changes, and `span` from where to where, in its unit
     slope_deg  positive downhill, deg, where `over` is another key
-    keys       other keys of a config, such as contact, seed
+    keys       others of the block `continuation`, such as model; other keys of a config, such as contact, seed
     """
-    asked = {} if over is None else {"over": over}
-    if span is not None:
-        asked |= dict(zip(("from", "to"), two_numbers("span", plain(span)), strict=True))
-    given = {"slope_deg": slope_deg, "continuation": asked or None}
+    ends = {} if span is None else dict(zip(("from", "to"), two_numbers("span", plain(span)), strict=True))
+    given = {"slope_deg": slope_deg, **question("continuation", keys, over=over, **ends)}
     return in_memory("continuation", config_of_scene(walker, given, keys))
 
 
@@ -369,10 +367,10 @@ def basin(
     walker     from `compass`, `kneed` or `walker`
     slope_deg  positive downhill, deg
     cells      along either axis of the window
-    keys       other keys of a config, such as seed
+    keys       others of the block `basin`, such as model; other keys of a config, such as seed
     """
-    asked = None if cells is None else {"cells": plain(cells)}
-    return in_memory("basin", config_of_scene(walker, {"slope_deg": slope_deg, "basin": asked}, keys))
+    given = {"slope_deg": slope_deg, **question("basin", keys, cells=cells)}
+    return in_memory("basin", config_of_scene(walker, given, keys))
 
 
 def robustness(
@@ -386,12 +384,8 @@ def robustness(
     walks      on each rough ground
     keys       model, steps, roughness_m and max_steps of the block `robustness`; other keys of a config
     """
-    asked: dict[str, Any] = {
-        name: keys.pop(name) for name in ("model", "steps", "roughness_m", "max_steps") if name in keys
-    }
-    asked |= {} if walks is None else {"walks": plain(walks)}
-    asked |= {"to": list(to)} if to else {}
-    return in_memory("robustness", config_of_scene(walker, {"slope_deg": slope_deg, "robustness": asked or None}, keys))
+    given = {"slope_deg": slope_deg, **question("robustness", keys, to=list(to) or None, walks=walks)}
+    return in_memory("robustness", config_of_scene(walker, given, keys))
 
 
 def explore(
@@ -418,9 +412,6 @@ def explore(
     return server
 
 
-BOUNDED = ("over", "keep")
-
-
 def design(walker: Any = None, over: Mapping[str, Any] | None = None, **keys: Any) -> Result:
     """Find the walker that minimises or maximises a number of its gait, in memory: `best`, `value`, … in `summary`.
 
@@ -428,14 +419,16 @@ def design(walker: Any = None, over: Mapping[str, Any] | None = None, **keys: An
     over    bounds (low, high) of numbers of the config, in the key's unit
     keys    minimise or maximise, keep (bounds of other numbers of the gait), model, starts; other keys of a config
     """
-    own: dict[str, Any] = {
-        name: keys.pop(name) for name in ("minimise", "maximise", "keep", "model", "starts") if name in keys
-    }
-    asked: dict[str, Any] = {"over": over or {}, **own}
-    for name in BOUNDED:
-        if name in asked:
-            asked[name] = {key: list(pair) for key, pair in asked[name].items()}
-    return in_memory("design", config_of_scene(walker, {"design": asked}, keys))
+    return in_memory("design", config_of_scene(walker, question("design", keys, over=over or {}), keys))
+
+
+def question(stage: str, keys: dict[str, Any], **given: Any) -> dict[str, Any]:
+    """What is asked of a stage, as its block of the config: the block's own keys, out of `keys`, and those given."""
+    block = block_of(Config.model_fields[stage])
+    assert block is not None, "a stage that is asked something has a block"
+    own = {name: keys.pop(name) for name in block.model_fields if name in keys}
+    asked = {name: value for name, value in {**own, **given}.items() if value is not None}
+    return {stage: asked or None}
 
 
 def dataset(group: Group) -> Any:
@@ -456,8 +449,7 @@ def in_memory(stage: str, config: Config) -> Result:
     """A stage's result, with what it needs, without files; ConfigError if the config has not what it needs."""
     refuse_unknown_stage(stage)
     answer = InMemory().answer(config, stage, keys_here().of(config, stage))
-    said = None if answer.no_answer is None else answer.no_answer.message
-    return result_of(stage, answer.content.summary, answer.content, said)
+    return result_of(stage, answer.content.summary, answer.content, answer.no_answer)
 
 
 @cache
@@ -499,6 +491,8 @@ def plain(value: Any) -> Any:
     """A block, or NumPy's numbers, as plain values."""
     if isinstance(value, Block):
         return value.model_dump(mode="json")
+    if isinstance(value, Mapping):
+        return {key: plain(inner) for key, inner in value.items()}
     return value.tolist() if hasattr(value, "tolist") else value
 
 
@@ -543,7 +537,8 @@ def refuse_unknown_stage(stage: str) -> None:
 
 
 def result_of(
-    stage: str, summary: Mapping[str, Any], content: Content, no_answer: str | None, path: Path | None = None
+    stage: str, summary: Mapping[str, Any], content: Content, no_answer: NoAnswer | None, path: Path | None = None
 ) -> Result:
     """A result, of the type that the stage has."""
-    return RESULTS.get(stage, Result)(stage, summary, content, no_answer, path)
+    said = None if no_answer is None else no_answer.message
+    return RESULTS.get(stage, Result)(stage, summary, content, said, path)

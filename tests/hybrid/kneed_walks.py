@@ -7,7 +7,7 @@ from contact_walks import settings
 
 from walkerlab.config.contact import Contact
 from walkerlab.ground.compliant import KneeRules, contact_walker
-from walkerlab.hybrid.contact_events import Frame
+from walkerlab.hybrid.contact_events import Frame, JudgedGround
 from walkerlab.mechanics.walkers import Arc, Limb, kneed_legs
 from walkerlab.scene.contact import TERRAINS, ContactScene, friction_law, normal_law, start_state
 
@@ -33,7 +33,8 @@ def scene_of(rules=None, radius=0.0, shank=SHANK, slope=SLOPE, scale=1.0, **cont
     ground, parts = Contact(**(law | contact)), kneed_legs(*limbs, HIP_MASS, Arc(scale * radius))
     walker = contact_walker(parts, normal_law(ground), friction_law(ground), GRAVITY, slope, rules)
     frame = Frame(scale, np.sqrt(scale / GRAVITY), locate_switching=True)
-    return ContactScene(walker, TERRAINS[ground.terrain](scale * STEP), frame, False, scale * STEP, parts)
+    laid = JudgedGround(TERRAINS[ground.terrain](scale * STEP), frame)
+    return ContactScene(walker, laid, False, scale * STEP, parts)
 
 
 @functools.cache

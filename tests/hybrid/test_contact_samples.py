@@ -17,8 +17,7 @@ def test_samples_do_not_change_the_walk():
 def test_samples_show_the_touches_where_they_were_found():
     walk, scene = walked(interval=0.001, steps=4), scene_of()
     samples = walk.samples
-    feet = np.zeros((samples.time_s.size, 2, 5))
-    sampled_feet(scene.walker, samples.states, samples.has_ground, samples.level, feet)
+    feet = sampled_feet(scene.walker, samples)
     for step, (time, along) in enumerate(zip(walk.touch_time_s, walk.touch_along_m, strict=True)):
         foot = step % 2  # leg 1 (foot 0) swings first
         before, after = np.searchsorted(samples.time_s, time) - 1, np.searchsorted(samples.time_s, time)
@@ -33,7 +32,6 @@ def test_samples_show_the_touches_where_they_were_found():
 
 def test_deepest_penetration_is_what_the_samples_show():
     walk, scene = walked(interval=0.001, steps=4), scene_of()
-    feet = np.zeros((walk.samples.time_s.size, 2, 5))
-    sampled_feet(scene.walker, walk.samples.states, walk.samples.has_ground, walk.samples.level, feet)
+    feet = sampled_feet(scene.walker, walk.samples)
     depth = np.where(walk.samples.has_ground > 0, -feet[:, :, 1], 0.0).max()
     assert 0.8 * walk.max_penetration_m < depth <= walk.max_penetration_m * (1.0 + 1e-9)

@@ -110,7 +110,7 @@ def slid_foot(tolerance, start):
     end = feet_motion(scene.walker.whole, walk.end_state)[STANCE_FOOT]
     # the ball has also rolled, by its radius times the change of the leg's angle
     turned = walk.end_state[2 + STANCE_FOOT] - start[STANCE_FOOT]
-    return abs(end.along - begin.along + RADIUS * turned), end.height, farthest_slide(scene.terrain)
+    return abs(end.along - begin.along + RADIUS * turned), end.height, farthest_slide(scene.ground.terrain)
 
 
 @pytest.mark.parametrize("tolerance", [1e-5, 1e-8])

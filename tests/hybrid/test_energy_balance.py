@@ -9,7 +9,6 @@ from walkerlab.benchmarks.trials import ContactTrial
 from walkerlab.errors import NoAnswer
 from walkerlab.ground.terrain import STANCE_FOOT
 from walkerlab.hybrid import contact_run
-from walkerlab.hybrid.contact_events import JudgedGround
 from walkerlab.hybrid.contact_run import walk_contact
 from walkerlab.orbits.contact_gait import find_gait_from
 from walkerlab.orbits.contact_map import step_from_section
@@ -36,7 +35,7 @@ def test_a_walk_by_equations_of_another_walker_is_refused_with_its_residual_in_w
     forms[1] = heavier.walker.forms[1]
     taken = walk_contact(
         scene.walker._replace(forms=forms),
-        JudgedGround(scene.terrain, scene.frame),
+        scene.ground,
         True,
         STANCE_FOOT,
         start_state(scene, FIXED_POINT),
@@ -69,7 +68,7 @@ def test_a_command_gives_no_answer_and_says_by_how_much_the_balance_is_off(nothi
 
 def test_searches_and_maps_do_not_go_by_such_walks(nothing_explained):
     scene = scene_of()
-    ground, start = JudgedGround(scene.terrain, scene.frame), start_state(scene, FIXED_POINT)
+    ground, start = scene.ground, start_state(scene, FIXED_POINT)
     starts = scaled_starts(scene.walker, ground, lambda *_: start, 2, None)
     assert starts.walk(1.0, 1.0).outcome == Outcome.SOLVER_FAILED
     assert (
@@ -80,6 +79,6 @@ def test_searches_and_maps_do_not_go_by_such_walks(nothing_explained):
 
 def test_a_ladder_of_methods_is_measured_by_its_errors_alone(nothing_explained):
     scene = scene_of()
-    ground, start = JudgedGround(scene.terrain, scene.frame), start_state(scene, FIXED_POINT)
+    ground, start = scene.ground, start_state(scene, FIXED_POINT)
     trial = ContactTrial(scene.walker, ground, start, 1, "contact")
     assert trial.prepare("radau5", 1e-3, 100_000)().outcome == "walked"

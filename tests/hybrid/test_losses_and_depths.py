@@ -29,8 +29,7 @@ def test_dampings_share_of_a_bounce_is_the_height_that_it_costs(rtol):
 
 def test_the_deepest_penetration_is_found_inside_a_step():
     walk, scene = walked(interval=2e-5, steps=2), scene_of()
-    feet = np.zeros((walk.samples.time_s.size, 2, 5))
-    sampled_feet(scene.walker, walk.samples.states, walk.samples.has_ground, walk.samples.level, feet)
+    feet = sampled_feet(scene.walker, walk.samples)
     seen = np.where(walk.samples.has_ground > 0, -feet[:, :, 1], 0.0).max()
     assert seen <= walk.max_penetration_m * (1.0 + 1e-12)
     # a parabola between samples 20 us apart at a touch of a millisecond

@@ -16,8 +16,7 @@ ROUND = ("walker.foot_radius_m=0.3", "contact.terrain=after-mid-swing")
 
 def test_slip_is_the_integral_of_the_material_points_velocity():
     walk, scene = walked(interval=5e-6, steps=2, tolerance=1e-9), scene_of()
-    feet = np.zeros((walk.samples.time_s.size, 2, 5))
-    sampled_feet(scene.walker, walk.samples.states, walk.samples.has_ground, walk.samples.level, feet)
+    feet = sampled_feet(scene.walker, walk.samples)
     stood = (feet[:, 1, 1] <= 0.0) & (walk.samples.time_s < walk.touch_time_s[0] + 0.05)
     last = int(np.flatnonzero(stood)[-1])
     slip = np.trapezoid(feet[: last + 1, 1, 4], walk.samples.time_s[: last + 1])

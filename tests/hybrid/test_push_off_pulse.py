@@ -221,8 +221,7 @@ def test_a_bounce_of_the_leading_foot_while_a_pulse_lasts_begins_none():
     touch = float(scene.walk(start, 1, WALK).touch_time_s[0])
     seen = scene.walk(start, 2, WALK, touch + np.linspace(1e-9, 0.05, 4001)).samples
     leading, trailing = 0, 1
-    feet = np.zeros((4001, 2, 5))
-    sampled_feet(scene.walker, seen.states, seen.has_ground, seen.level, feet)
+    feet = sampled_feet(scene.walker, seen)
     heights, t = feet[:, :, 1], seen.time_s - touch
     assert np.count_nonzero((heights[:-1, leading] > 0.0) & (heights[1:, leading] < 0.0)) >= 1
     assert (heights[:, trailing] > 0.0).mean() > 0.5

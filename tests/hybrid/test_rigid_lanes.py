@@ -1,10 +1,12 @@
 """Walks in lanes: the same fates, steps and heel strikes as one by one at a tight tolerance, falls among them."""
 
+from typing import Any, NamedTuple
+
 import numpy as np
 import pytest
 
 from walkerlab.hybrid.recorded_walk import take_walk
-from walkerlab.hybrid.rigid_lanes import Strikes, new_fates, new_lane_memory, two_legs, walk_lanes
+from walkerlab.hybrid.rigid_lanes import GOES_ON, WALKED, new_fates, new_lane_memory, struck, two_legs, walk_lanes
 from walkerlab.outcome import Outcome
 from walkerlab.paper.appendix_a import CORRECTED, RigidWalker, assembled
 from walkerlab.solvers.registry import Tolerances
@@ -19,6 +21,21 @@ START, TENTH_STATE = (
     (-0.204388204282412, 0.169481619242526, -0.606147299375954, -0.861660164829674),
 )
 TENTH_TIME = 7.025036761059791
+
+
+class Strikes(NamedTuple):
+    """An observer that keeps every heel strike; a walk is over when there is no more room."""
+
+    times: Any  # (n, steps) s
+    after: Any  # (n, steps, 4) states just after them
+
+
+@struck.case(Strikes)
+def keep_strike(observer, walk, step, t, y):
+    observer.times[walk, step] = t
+    for i in range(4):
+        observer.after[walk, step, i] = y[i]
+    return WALKED if step + 1 == observer.times.shape[1] else GOES_ON
 
 
 def on_slope(walker, z):

@@ -7,6 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from walkerlab.config.schema import Contact
+from walkerlab.hybrid.comparison import WalkDifference
 from walkerlab.mechanics.standing import BENT, Mode
 from walkerlab.paper.appendix_a import CORRECTED, assembled
 from walkerlab.paper.measured import (
@@ -14,7 +15,6 @@ from walkerlab.paper.measured import (
     ContactModel,
     Departures,
     EnergyRecord,
-    LegErrors,
     Measured,
     characteristics,
     over_last_steps,
@@ -222,7 +222,11 @@ def test_percentages_are_refuted_unless_one_of_the_bases_gives_them(rows):
 
 
 def test_an_error_as_small_as_the_printed_one_is_no_refutation(rows):
-    small, large = LegErrors((9e-5, 1e-4), (1e-4, 1e-4)), LegErrors((0.1, 0.1), (1.0, 1.0))
+
+    def differing(angle, velocity):
+        return WalkDifference(np.array([angle]), np.array([velocity]))
+
+    small, large = differing((9e-5, 1e-4), (1e-4, 1e-4)), differing((0.1, 0.1), (1.0, 1.0))
     assert rows(errors={"raw": large, "aligned": large})[ANGLE_ERROR].verdict == NumberVerdict.REFUTED
     assert rows(errors={"raw": large, "aligned": small})[ANGLE_ERROR].verdict == NumberVerdict.EXPLAINED
     assert rows(errors={"raw": small, "aligned": small})[ANGLE_ERROR].verdict == NumberVerdict.REPRODUCED

@@ -15,7 +15,7 @@ from walkerlab.config.loader import load
 from walkerlab.config.reads import CompassCasesConfig, SceneCasesConfig, dotted_keys, only
 from walkerlab.config.schema import Config
 from walkerlab.pipeline.graph import PIPELINE, STAGES, Graph, Stage, results_of
-from walkerlab.pipeline.identity import Identities
+from walkerlab.pipeline.identity import Keys
 from walkerlab.store.key import differences
 
 NAMES = [stage.name for stage in STAGES]
@@ -67,11 +67,11 @@ def shown(given):
 @pytest.mark.parametrize("stage", ["stability", "stability-maps"])
 def test_a_change_of_the_paper_config_changes_the_keys_of_the_cases_that_stand_on_it(tmp_path, monkeypatch, stage):
     config = load(Path("rigid-only")).config
-    before = Identities().of(PIPELINE[stage], config, {}).config_slice
+    before = Keys().identity(PIPELINE[stage], config, {}).config_slice
     text = (BUILTIN_FOLDER / "paper.yaml").read_text()
     (tmp_path / "paper.yaml").write_text(text.replace("hip_mass_kg: 10", "hip_mass_kg: 11"))
     monkeypatch.setattr(files, "BUILTIN_FOLDER", tmp_path)
-    after = Identities().of(PIPELINE[stage], config, {}).config_slice
+    after = Keys().identity(PIPELINE[stage], config, {}).config_slice
     assert list(differences("", before, after)) == ["paper.walker.hip_mass_kg 10.0 -> 11.0"]
 
 

@@ -10,7 +10,8 @@ from synthetic_families import families
 
 from walkerlab.config.loader import load
 from walkerlab.orbits import plane
-from walkerlab.pipeline.in_memory import InMemory, Keys
+from walkerlab.pipeline.identity import Keys
+from walkerlab.pipeline.in_memory import InMemory
 
 SMALL = {
     "fixedpoint": (),

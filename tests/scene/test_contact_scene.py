@@ -85,13 +85,13 @@ def test_a_scene_without_friction_has_another_law_not_a_zero():
 
 def test_pads_are_laid_by_the_step_that_the_config_asks_for():
     config = load(None, ()).config
-    assert contact_scene(config, STEP).terrain == checkerboard(STEP, (-STEP, 0.0))
+    assert contact_scene(config, STEP).ground.terrain == checkerboard(STEP, (-STEP, 0.0))
     assert scene_of("contact.pad_pitch=0.36").pitch_m == 0.36
     own = load(None, ("contact.pad_pitch=own",)).config
     assert contact_scene(own, STEP, 0.3608).pitch_m == 0.3608
     with pytest.raises(ValueError, match="own"):
         contact_scene(own, STEP)
-    assert scene_of("contact.terrain=after-mid-swing").terrain == after_mid_swing(STEP)
+    assert scene_of("contact.terrain=after-mid-swing").ground.terrain == after_mid_swing(STEP)
 
 
 def test_a_hinged_first_step_is_a_system_of_two_angles():

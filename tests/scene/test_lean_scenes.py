@@ -125,8 +125,8 @@ def test_a_walk_on_frictionless_ground_is_that_with_coefficients_of_zero():
     ends = []
     for law in (NO_FRICTION, Frictionless()):
         scene = contact_scene(load(None, ()).config, 0.3714)
-        frame = scene.frame._replace(locate_switching=False)
-        scene = replace(scene, walker=scene.walker._replace(friction=law), frame=frame)
+        ground = scene.ground._replace(frame=scene.ground.frame._replace(locate_switching=False))
+        scene = replace(scene, walker=scene.walker._replace(friction=law), ground=ground)
         walk = scene.walk(start_state(scene, START), 2, Tolerances("radau5", 1e-7, 1e-9, 10**6), 0.01)
         ends.append((walk.outcome, walk.end_time_s, walk.end_state, walk.samples.states.tolist(), walk.work))
     assert ends[0] == ends[1]

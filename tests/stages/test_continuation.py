@@ -19,7 +19,8 @@ from walkerlab.orbits.family_search import THOROUGHNESS
 from walkerlab.orbits.newton import Effort
 from walkerlab.orbits.step_map import gait_near
 from walkerlab.pipeline.graph import PIPELINE
-from walkerlab.pipeline.in_memory import InMemory, Keys
+from walkerlab.pipeline.identity import Keys
+from walkerlab.pipeline.in_memory import InMemory
 from walkerlab.pipeline.progress import Silent
 from walkerlab.scene.families import rigid_map
 from walkerlab.scene.parameter import parameter_of
@@ -234,6 +235,10 @@ def test_a_key_touches_the_models_that_change_with_it(over, models):
         (["over=strides"], "touches no model"),
         (["over=slope_dge"], "did you mean slope_deg?"),
         (["over=contact.stiffness", "from=1e5", "to=2e5"], "does not touch the rigid model"),
+        (
+            ["over=push_off.duration_s", "from=0.001", "to=0.01", "model=contact", "walker.hip.torque_N_m=1"],
+            "does not touch the contact model",
+        ),
         (["over=walker.hip_mass_kg", "from=-1", "to=2"], "cannot be -1 kg"),
         (["contact=null", "model=contact"], "needs a contact block"),
         (["contact=null", "over=contact.stiffness"], "the config has no contact"),

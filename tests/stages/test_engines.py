@@ -13,7 +13,7 @@ from walkerlab.benchmarks.engines.scenes import scenes
 from walkerlab.config.loader import load
 from walkerlab.errors import NoAnswer
 from walkerlab.pipeline.graph import PIPELINE
-from walkerlab.pipeline.identity import Identities
+from walkerlab.pipeline.identity import Keys
 from walkerlab.pipeline.progress import Silent
 from walkerlab.stages import engines
 from walkerlab.stages.engines import closest, ratios, three_digits
@@ -40,9 +40,9 @@ def test_another_version_of_an_engine_makes_another_key(monkeypatch):
     config = load().config
     monkeypatch.setattr(registry, "installed", lambda: (ABSENT,))
     monkeypatch.setattr(Engine, "version", "1.0")
-    before = Identities().of(PIPELINE["engines"], config, {}).config_slice
+    before = Keys().identity(PIPELINE["engines"], config, {}).config_slice
     monkeypatch.setattr(Engine, "version", "1.1")
-    after = Identities().of(PIPELINE["engines"], config, {}).config_slice
+    after = Keys().identity(PIPELINE["engines"], config, {}).config_slice
     assert list(differences("", before, after)) == ["programs.absent 1.0 -> 1.1"]
 
 

@@ -17,7 +17,8 @@ from walkerlab.errors import ConfigError
 from walkerlab.orbits.families import ValueSpan
 from walkerlab.orbits.family_search import CONTACT, RIGID
 from walkerlab.pipeline.graph import PIPELINE
-from walkerlab.pipeline.in_memory import InMemory, Keys
+from walkerlab.pipeline.identity import Keys
+from walkerlab.pipeline.in_memory import InMemory
 from walkerlab.pipeline.progress import Silent
 from walkerlab.scene.parameter import PHYSICAL, parameter_of
 from walkerlab.stages import robustness

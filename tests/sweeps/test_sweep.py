@@ -14,7 +14,8 @@ from walkerlab.benchmarks.engines import registry
 from walkerlab.config.loader import load
 from walkerlab.errors import ConfigError
 from walkerlab.pipeline.graph import PIPELINE
-from walkerlab.pipeline.in_memory import InMemory, Keys
+from walkerlab.pipeline.identity import Keys
+from walkerlab.pipeline.in_memory import InMemory
 from walkerlab.pipeline.plan import Planner
 from walkerlab.pipeline.runner import execute
 from walkerlab.stages.numerical_error import SAMPLE

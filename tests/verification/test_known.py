@@ -9,9 +9,9 @@ from walkerlab.verification import references
 from walkerlab.verification.known import PROBLEMS
 
 
-@pytest.mark.parametrize("problem", PROBLEMS, ids=lambda problem: problem.name)
+@pytest.mark.parametrize("problem", PROBLEMS, ids=lambda problem: problem.args[0])
 def test_contact_code_gives_the_known_answer(problem):
-    answer = problem.answered()
+    answer = problem()
     assert answer.error <= answer.limit
 
 

@@ -12,7 +12,7 @@ from walkerlab.mechanics.impact import heel_strike
 from walkerlab.mechanics.standing import STANCE, kinetic_energy
 from walkerlab.orbits.similarity import Units
 from walkerlab.pipeline.graph import PIPELINE
-from walkerlab.pipeline.identity import Identities
+from walkerlab.pipeline.identity import Keys
 from walkerlab.scene.parts import assembly_of
 from walkerlab.scene.rigid import rigid_walker
 from walkerlab.stages.stability import spelled_out
@@ -139,13 +139,13 @@ def numbers_of(block):
 
 def test_known_problems_are_answered_once_for_all_scenes():
     stage = PIPELINE["known-problems"]
-    slices = [Identities().of(stage, config_of(name), {}).config_slice for name in ("kneed", "paper")]
+    slices = [Keys().identity(stage, config_of(name), {}).config_slice for name in ("kneed", "paper")]
     assert slices == [{}, {}]
 
 
 def test_only_other_walkers_read_their_scene():
     stage = PIPELINE["stability"]
-    steep, paper = (Identities().of(stage, config_of(name), {}).config_slice for name in ("slope-3deg", "paper"))
+    steep, paper = (Keys().identity(stage, config_of(name), {}).config_slice for name in ("slope-3deg", "paper"))
     assert steep == paper
     assert {"walker", "contact", "solver", "stability.cases"} <= set(dotted_keys(stage.takes_under(config_of("kneed"))))
     assert stage.inputs(config_of("slope-3deg")) == ("known-problems",)

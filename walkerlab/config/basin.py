@@ -26,22 +26,12 @@ class Basin(Block):
         "coordinates of the grid: two for a plane through the gait, or all three; theta_1 follows from the slope",
         "stance angle and its rate, as in Schwab and Wisse 2001",
         bounds=f"two or three of {', '.join(COORDINATES)}, each once",
-        sequence=True,
     )
     cells: tuple[Annotated[int, Field(ge=2, le=4000)], ...] = key(
-        (400, 400),
-        "1",
-        "cells along each of them",
-        bounds="a number from 2 to 4000 for each coordinate",
-        sequence=True,
+        (400, 400), "1", "cells along each of them", bounds="a number from 2 to 4000 for each coordinate"
     )
     lower: _Bounds = key(
-        (),
-        _UNIT,
-        "where the window begins",
-        bounds="a number for each",
-        default_in_words=f"below {_WIDTH}",
-        sequence=True,
+        (), _UNIT, "where the window begins", bounds="a number for each", default_in_words=f"below {_WIDTH}"
     )
     upper: _Bounds = key(
         (),
@@ -49,7 +39,6 @@ class Basin(Block):
         "where the window ends",
         bounds="a number for each, above `lower`",
         default_in_words=f"above {_WIDTH}",
-        sequence=True,
     )
     refine: int = key(
         4, "1", "parts along each axis that cells at edges of basins are divided into; 1: none", ge=1, le=32

@@ -16,26 +16,15 @@ Bounds = dict[str, list[float]]
 class Design(Block):
     """What `walkerlab design` looks for."""
 
-    minimise: Quantity | None = key(
-        None, "", "number of the gait that is made least", bounds=_NAMES, default_in_words="none"
-    )
-    maximise: Quantity | None = key(
-        None, "", "number of the gait that is made largest", bounds=_NAMES, default_in_words="none"
-    )
+    minimise: Quantity | None = key(None, "", "number of the gait that is made least")
+    maximise: Quantity | None = key(None, "", "number of the gait that is made largest")
     over: Bounds = key(
         dict,
         "",
         "numbers of the config that may change, with their bounds, in the key's unit",
         bounds="[A, B] for each key, A below B",
-        default_in_words="none",
     )
-    keep: Bounds = key(
-        dict,
-        "",
-        "numbers of the gait that stay within bounds",
-        bounds=f"[A, B] for each of {_NAMES}",
-        default_in_words="none",
-    )
+    keep: Bounds = key(dict, "", "numbers of the gait that stay within bounds", bounds=f"[A, B] for each of {_NAMES}")
     model: Literal["rigid", "contact"] = key("rigid", "", "whose gait is designed")
     starts: int = key(5, "1", "starts of the search: the config's own numbers, and drawn ones", ge=1, le=1000)
 

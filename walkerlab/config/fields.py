@@ -1,7 +1,8 @@
 """Annotations of config keys: every key carries unit, bounds, meaning and source, and says in words what it allows."""
 
 import types
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from functools import reduce
 from itertools import chain
 from typing import Annotated, Any, Final, Literal, Union, get_args, get_origin
 
@@ -38,12 +39,12 @@ def key(
     source            where the default comes from
     bounds            what is allowed in words, where `limits` cannot say it
     default_in_words  where it follows from another key
-    sequence          a YAML list is accepted for a tuple
+    sequence          a YAML list is accepted for a tuple, as always where the default is one
     limits            gt, ge, lt, le, pattern and so on, as pydantic has them
     """
     words = {"unit": unit, "source": source, "bounds": bounds, "default_in_words": default_in_words}
     settings: dict[str, Any] = {"default_factory" if callable(default) else "default": default, **limits}
-    settings |= {"strict": False} if sequence else {}
+    settings |= {"strict": False} if sequence or isinstance(default, tuple) else {}
     return Field(
         description=meaning, json_schema_extra={name: text for name, text in words.items() if text}, **settings
     )
@@ -94,6 +95,11 @@ def leaves_of_other_kinds(block: type[Block]) -> Iterator[tuple[tuple[str, ...],
             yield from leaves(kind, (f"{name}({tag})",))
 
 
+def held(config: Any, path: Iterable[str]) -> Any:
+    """The value at a path of keys; None if the config has no such block."""
+    return reduce(lambda block, name: getattr(block, name, None), path, config)
+
+
 def extra(field: FieldInfo, name: str) -> str:
     """`unit`, `source`, `bounds` or `default_in_words` of a key as `key` was given it; empty if it was not."""
     held = field.json_schema_extra
@@ -130,11 +136,11 @@ def words_of(annotation: Any) -> tuple[str, ...]:
 
 def bounds_of(field: FieldInfo) -> str:
     """What a key allows, in words and without its unit, e.g. `from 0.001 to 1000`; empty if there are no bounds."""
-    spoken = extra(field, "bounds")
+    spoken, what = extra(field, "bounds"), kind(field.annotation)
     if spoken:
         return spoken
-    if get_origin(field.annotation) is Literal:
-        return ", ".join(words_of(field.annotation))
+    if what in ("word", _KINDS[bool]):
+        return ", ".join(words_of(field.annotation)) or what
     limits = {sign: getattr(item, sign) for item in field.metadata for sign, _ in _SIGNS if hasattr(item, sign)}
     if limits.keys() == {"ge", "le"}:
         return f"from {short(limits['ge'])} to {short(limits['le'])}"

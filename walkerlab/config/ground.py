@@ -17,7 +17,6 @@ class Footholds(Block):
         "m",
         "heights of footholds 1, 2, … over the slope, along its normal; those beyond lie at the last",
         bounds="a list of numbers from -1e3 to 1e3, in place of roughness_m",
-        sequence=True,
     )
 
     @field_validator("heights_m")

@@ -5,6 +5,7 @@ ruamel.yaml splits the text; what plain scalars mean is the core schema of YAML 
 are refused, so that no text can cost more than its own length.
 """
 
+import math
 import re
 from collections.abc import Iterator
 from itertools import takewhile
@@ -18,30 +19,27 @@ MAX_DEPTH: Final = 12
 MAX_DIGITS: Final = 300
 
 _NOT_YAML = re.compile("[^\t\n\r\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
-_NULL = re.compile(r"null|Null|NULL|~|")
-_TRUE = re.compile(r"true|True|TRUE")
-_FALSE = re.compile(r"false|False|FALSE")
+_SPELLED: Final = {"null": None, "true": True, "false": False, ".inf": math.inf, "+.inf": math.inf, "-.inf": -math.inf}
+_WORDS: Final = {
+    **{text: value for word, value in _SPELLED.items() for text in (word, word.title(), word.upper())},
+    **dict.fromkeys(("", "~"), None),
+    **dict.fromkeys((".nan", ".NaN", ".NAN"), math.nan),
+}
 _INTEGER = re.compile(r"[-+]?[0-9]+")
 _OTHER_BASE = re.compile(r"0o[0-7]+|0x[0-9a-fA-F]+")
 _FLOAT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
-_INFINITE = re.compile(r"[-+]?(\.inf|\.Inf|\.INF)")
-_NAN = re.compile(r"\.nan|\.NaN|\.NAN")
 
 
 def value_of(text: str) -> str | int | float | bool | None:
     """What a plain scalar means in YAML 1.2."""
-    if _NULL.fullmatch(text):
-        return None
-    if _TRUE.fullmatch(text) or _FALSE.fullmatch(text):
-        return text[0] in "tT"
+    if text in _WORDS:
+        return _WORDS[text]
     if _INTEGER.fullmatch(text) and len(text) <= MAX_DIGITS:
         return int(text)
     if _OTHER_BASE.fullmatch(text) and len(text) <= MAX_DIGITS:
         return int(text, 0)
     if _FLOAT.fullmatch(text):
         return float(text) + 0.0  # no negative zero: one number, one text, one key
-    if _INFINITE.fullmatch(text) or _NAN.fullmatch(text):
-        return float(text.lower().replace(".", ""))
     return text
 
 

@@ -4,12 +4,13 @@ import json
 import re
 import textwrap
 from collections.abc import Iterator
-from dataclasses import astuple, dataclass, fields
+from dataclasses import dataclass
 from typing import Any, Final
 
 from pydantic.fields import FieldInfo
+from pydantic_core import PydanticUndefined
 
-from walkerlab.config.fields import block_of, bounds_of, extra, kind, leaves, leaves_of_other_kinds
+from walkerlab.config.fields import bounds_of, extra, kind, leaves, leaves_of_other_kinds
 from walkerlab.config.files import builtin_names
 from walkerlab.config.numbers import short
 from walkerlab.config.problems import meant
@@ -49,33 +50,26 @@ def keys() -> Iterator[KeyReference]:
 
 
 def _reference(path: tuple[str, ...], field: FieldInfo) -> KeyReference:
-    default = extra(field, "default_in_words") or ("none" if field.is_required() else _spelled(field.default))
+    default = extra(field, "default_in_words") or _spelled(
+        field.get_default(call_default_factory=True, validated_data={})
+    )
     return KeyReference(
         key=".".join(path),
         type=kind(field.annotation),
         unit=extra(field, "unit"),
         bounds=bounds_of(field),
-        default=default,
+        default=extra(field, "default_in_words") or _spelled(default),
         meaning=field.description or "",
         source=extra(field, "source"),
     )
 
 
 def _spelled(value: Any) -> str:
+    if value in (None, {}, PydanticUndefined):
+        return "none"
     if isinstance(value, tuple):
         return f"[{', '.join(_spelled(item) for item in value)}]"
     return short(value) if isinstance(value, int | float) else str(value)
-
-
-def as_text() -> str:
-    """Markdown table of every key, aligned so that it reads well in a terminal too."""
-    rows = [tuple(field.name for field in fields(KeyReference)), *(astuple(row) for row in keys())]
-    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
-    lines = [_line(row, widths) for row in rows]
-    lines.insert(1, _line(["-" * width for width in widths], widths))
-    optional = [name for name, field in Config.model_fields.items() if block_of(field) and field.default is None]
-    notes = [f"The block `{name}` may be left out; what needs it is then left out too." for name in optional]
-    return "\n".join([*lines, "", *notes, ""])
 
 
 def as_paragraphs(asked: str = "") -> str:
@@ -103,10 +97,6 @@ def asked_for(asked: str) -> list[KeyReference]:
         near = meant(asked, names) or meant(asked, {name.split(".")[-1] for name in names})
         raise ConfigError(f"the config has no key {asked}.{near}", "`walkerlab schema` lists every key")
     return found
-
-
-def _line(cells: tuple[str, ...] | list[str], widths: list[int]) -> str:
-    return f"| {' | '.join(cell.ljust(width) for cell, width in zip(cells, widths, strict=True))} |"
 
 
 def as_json_schema(asked: str = "") -> dict[str, Any]:

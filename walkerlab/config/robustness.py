@@ -14,11 +14,7 @@ class Robustness(Block):
     """What `walkerlab robustness` asks of a gait."""
 
     model: Literal["rigid", "contact", "both"] | None = key(
-        None,
-        "",
-        "which model walks",
-        bounds="rigid, contact, both",
-        default_in_words="both, rigid where there is no contact block",
+        None, "", "which model walks", default_in_words="both, rigid where there is no contact block"
     )
     to: tuple[str, ...] = key(
         (),
@@ -26,7 +22,6 @@ class Robustness(Block):
         "numbers of the config that the gait is differentiated by",
         bounds="a list of keys, dotted",
         default_in_words="every number that the model reads",
-        sequence=True,
     )
     steps: int = key(50, "1", "steps that a walk must take after a single disturbance", ge=1, le=10_000)
     roughness_m: tuple[Roughness, ...] = key(
@@ -34,7 +29,6 @@ class Robustness(Block):
         "m",
         "standard deviations of the footholds' heights; none leaves rough ground out",
         bounds="a list of numbers above 0",
-        sequence=True,
     )
     walks: int = key(400, "1", "walks on each rough ground", ge=2, le=1_000_000)
     max_steps: int = key(20_000, "1", "steps after which a walk on rough ground is cut off", ge=1, le=10_000_000)

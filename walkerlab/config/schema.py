@@ -137,7 +137,7 @@ class Solvers(Block):
 def factors(least: float, most: float, velocity: str) -> Any:
     """A range of factors on a velocity."""
     bounds = "two numbers from -10 to 10, the first below the second"
-    return key((least, most), "1", f"least and largest factor on the {velocity}", bounds=bounds, sequence=True)
+    return key((least, most), "1", f"least and largest factor on the {velocity}", bounds=bounds)
 
 
 class Tune(Block):
@@ -153,12 +153,7 @@ class Tune(Block):
     )
     swing_factors: Factors = factors(0.0, 2.0, "swing leg's initial angular velocity dtheta_1")
     stance_factors: Factors = factors(0.85, 1.3, "stance leg's initial angular velocity dtheta_2")
-    rigid_limit: bool = key(
-        True,
-        "",
-        "whether the contact is also led towards the rigid limit, to see what 1e-4 takes",
-        bounds="true or false",
-    )
+    rigid_limit: bool = key(True, "", "whether the contact is also led towards the rigid limit, to see what 1e-4 takes")
 
     @field_validator("swing_factors", "stance_factors")
     @classmethod
@@ -232,9 +227,7 @@ class Config(Block):
     robustness: Robustness = Robustness()
     design: Design | None = None
     sweep: Sweep | None = None
-    outputs: tuple[Output, ...] = key(
-        OUTPUTS, "", "what is stored", bounds="a list of states, energies, forces", sequence=True
-    )
+    outputs: tuple[Output, ...] = key(OUTPUTS, "", "what is stored", bounds="a list of states, energies, forces")
     seed: int = key(0, "1", "seed of everything that is drawn at random", ge=0, le=2**32 - 1)
 
     @field_validator("start")

@@ -21,9 +21,7 @@ class Case(Block):
     name: str = key(..., "", "name of the case", bounds="up to 64 letters, digits, '.', '_', '+' or '-'", pattern=NAME)
     family: str = key("own", "", "what it belongs to, for tables", bounds="as a name", pattern=NAME)
     model: Literal["contact", "rigid"] = key("contact", "", "which model walks")
-    config: dict[str, Any] = key(
-        dict, "", "keys of a config, over the paper's", bounds="a block of keys", default_in_words="none"
-    )
+    config: dict[str, Any] = key(dict, "", "keys of a config, over the paper's", bounds="a block of keys")
     steps: int = key(4, "1", "steps to walk", ge=1, le=2_000_000)
     lowered_m: float = key(0.0, "m", "how far the start is sunk into the ground; negative lifts it", ge=-1e3, le=1e3)
     expected: tuple[Fate, ...] = key(
@@ -36,7 +34,7 @@ class Case(Block):
         1e-4, "1", "largest change of times at a ten times tighter tolerance, in pendulum times; for a twin too", gt=0.0
     )
     compared_steps: int = key(20, "1", "steps of which the times are compared: fewer where small errors grow", ge=1)
-    twin: bool = key(False, "", "whether a walker of another size must do the same", bounds="true or false")
+    twin: bool = key(False, "", "whether a walker of another size must do the same")
 
     @field_validator("expected")
     @classmethod
@@ -50,10 +48,6 @@ class Stability(Block):
     """What `walkerlab stability` judges besides the catalogue."""
 
     cases: tuple[Case, ...] = key(
-        (),
-        "",
-        "cases of your own; a file that holds such a list may stand for it",
-        bounds="a list of cases, or a file",
-        sequence=True,
+        (), "", "cases of your own; a file that holds such a list may stand for it", bounds="a list of cases, or a file"
     )
     map_cells: int = key(25, "1", "cells along each axis of the maps that --full makes", ge=2, le=201)

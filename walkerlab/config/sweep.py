@@ -14,11 +14,8 @@ class Sweep(Block):
         "",
         "keys of a config with their values, in the key's unit; the last key changes fastest",
         bounds="FROM:TO:N, FROM:TO:N:log or a list, for each key",
-        default_in_words="none",
     )
-    zip: bool = key(
-        False, "", "the n-th values of all keys make the n-th point, not each with each", bounds="true or false"
-    )
+    zip: bool = key(False, "", "the n-th values of all keys make the n-th point, not each with each")
     sample: str = key(
         "",
         "",

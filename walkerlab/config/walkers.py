@@ -280,7 +280,7 @@ class PartHinge(Block):
     parent_point_m: Point = point("the hinge in its frame")
     child: str = named("the other body")
     child_point_m: Point = point("the hinge in its frame")
-    locks: bool = key(False, "", "whether it is a knee, parent the thigh and child the shank", bounds="true or false")
+    locks: bool = key(False, "", "whether it is a knee, parent the thigh and child the shank")
 
 
 class PartParticle(Block):

@@ -6,11 +6,11 @@ from typing import Any, Final
 
 from pydantic.fields import FieldInfo
 
-from walkerlab.config.fields import bounds_of, kind, leaves, words_of
+from walkerlab.config.fields import bounds_of, held, kind, leaves, words_of
 from walkerlab.config.schema import Config
 from walkerlab.errors import ConfigError
 from walkerlab.scene.parameter import Parameter, parameter_of
-from walkerlab.sweeps.question import described, held
+from walkerlab.sweeps.question import described
 
 FIRST: Final = (
     "slope_deg", "walker.", "push_off.impulse_N_s", "contact.stiffness", "contact.damping", "contact.static_friction",

@@ -16,7 +16,8 @@ from walkerlab.config.schema import Config
 from walkerlab.config.writer import extending, to_yaml
 from walkerlab.errors import ConfigError, WalkerlabError
 from walkerlab.explorer.numbers import adjustable
-from walkerlab.pipeline.in_memory import InMemory, Keys
+from walkerlab.pipeline.identity import Keys
+from walkerlab.pipeline.in_memory import InMemory
 from walkerlab.pipeline.progress import Silent
 from walkerlab.pipeline.resolve import resolve
 from walkerlab.report.results import Results

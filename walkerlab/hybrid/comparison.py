@@ -9,12 +9,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 
 Array = NDArray[np.float64]
+Quantity = Literal["angle", "velocity"]
 
 LEGS = 2
 JUMP = 1e-9  # of a walk's duration: samples closer than that are the two sides of a strike
@@ -156,15 +158,10 @@ class WalkDifference:
     angle: Array
     velocity: Array
 
-    @property
-    def largest_angle(self) -> Array:
-        """(leg,) largest difference of each angle (rad)."""
-        return np.asarray(np.abs(self.angle).reshape(-1, LEGS).max(axis=0))
-
-    @property
-    def largest_velocity(self) -> Array:
-        """(leg,) largest difference of each velocity (rad/s)."""
-        return np.asarray(np.abs(self.velocity).reshape(-1, LEGS).max(axis=0))
+    def largest(self, of: Quantity) -> list[float]:
+        """(leg,) largest difference of each leg's angle (rad) or velocity (rad/s)."""
+        found: list[float] = np.abs(getattr(self, of)).reshape(-1, LEGS).max(axis=0).tolist()
+        return found
 
 
 def difference_in_time(walk: Motion, reference: Motion) -> tuple[Array, WalkDifference]:

@@ -86,34 +86,42 @@ class Stopped:
     work: NDArray[np.int64]
 
 
-@kernel
-def sampled_energies(system: OnGround, states: Any, has_ground: Any, knees: Any, level: Any, energies: Any) -> None:
-    """Kinetic, potential and total energy (J) of every sampled state into energies (samples, 3).
+def sampled_energies(walker: ContactWalker, samples: ContactSamples) -> Floats:
+    """Kinetic, potential and total energy (J) of every sample, (samples, 3)."""
+    energies = np.zeros((samples.time_s.size, 3))
+    fill_energies(on_ground(walker, (False, False)), samples, energies)
+    return energies
 
-    system  with all bodies, free; its ground and its knees are set to those of each sample
-    """
-    for i in range(states.shape[0]):
+
+def sampled_feet(walker: ContactWalker, samples: ContactSamples) -> Floats:
+    """Position along and height over the ground (m), normal force and friction (N), slip (m/s), (samples, foot, 5)."""
+    feet = np.zeros((samples.time_s.size, 2, 5))
+    fill_feet(walker, samples, feet)
+    return feet
+
+
+@kernel
+def fill_energies(system: OnGround, samples: ContactSamples, energies: Any) -> None:
+    """`sampled_energies` of a walker with all bodies, free, whose ground and knees are set to those of each sample."""
+    for i in range(samples.states.shape[0]):
         for k in range(2):
-            system.has_ground[k], system.knee[k], system.level[k] = has_ground[i, k], knees[i, k], level[i, k]
-        energies[i, 0] = kinetic_energy(system.form, states[i])
-        energies[i, 1] = potential_energy(system.form, states[i])
-        energies[i, 2] = total_energy(system, states[i])
+            system.has_ground[k], system.knee[k] = samples.has_ground[i, k], samples.knees[i, k]
+            system.level[k] = samples.level[i, k]
+        energies[i, 0] = kinetic_energy(system.form, samples.states[i])
+        energies[i, 1] = potential_energy(system.form, samples.states[i])
+        energies[i, 2] = total_energy(system, samples.states[i])
 
 
 @kernel
-def sampled_feet(walker: ContactWalker, states: Any, has_ground: Any, level: Any, feet: Any) -> None:
-    """Position along and height over the ground (m), forces (N) and slip (m/s) of both feet into feet (samples, 2, 5).
-
-    Of the forces the normal one comes first, then friction.
-    """
-    for i in range(states.shape[0]):
-        motions = feet_motion(walker.forms[0, 0], states[i])
+def fill_feet(walker: ContactWalker, samples: ContactSamples, feet: Any) -> None:
+    """`sampled_feet` into an array of zeros."""
+    for i in range(samples.states.shape[0]):
+        motions = feet_motion(walker.forms[0, 0], samples.states[i])
         for foot in range(2):
             along, height, slip, vertical_velocity = motions[foot]
-            height -= level[i, foot]
+            height -= samples.level[i, foot]
             feet[i, foot, 0], feet[i, foot, 1], feet[i, foot, 4] = along, height, slip
-            feet[i, foot, 2], feet[i, foot, 3] = 0.0, 0.0
-            if has_ground[i, foot] != 0 and height < 0.0:
+            if samples.has_ground[i, foot] != 0 and height < 0.0:
                 force = foot_force(walker, FootMotion(along, height, slip, vertical_velocity))
                 feet[i, foot, 2], feet[i, foot, 3] = force.normal.force, force.along
 

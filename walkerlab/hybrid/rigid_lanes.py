@@ -142,13 +142,6 @@ def new_fates(n: int) -> Fates:
     return Fates(np.zeros(n, np.int64), np.zeros(n, np.int64))
 
 
-class Strikes(NamedTuple):
-    """An observer that keeps every heel strike; a walk is over when there is no more room."""
-
-    times: Any  # (n, steps) s
-    after: Any  # (n, steps, 4) states just after them
-
-
 @by_type
 def struck(observer: Any, walk: int, step: int, t: float, y: Any) -> int:
     """Take note of a heel strike at time t (s) with state y after it; returns GOES_ON or the outcome's number.
@@ -156,15 +149,6 @@ def struck(observer: Any, walk: int, step: int, t: float, y: Any) -> int:
     walk  number of the start
     step  from 0
     """
-
-
-@struck.case(Strikes)
-def keep_strike(observer: Strikes, walk: int, step: int, t: float, y: Any) -> int:
-    """Keep it."""
-    observer.times[walk, step] = t
-    for i in range(4):
-        observer.after[walk, step, i] = y[i]
-    return WALKED if step + 1 == observer.times.shape[1] else GOES_ON
 
 
 @kernel

@@ -111,12 +111,18 @@ class Attractors:
 
 
 @dataclass(frozen=True, eq=False)
-class Arrivals:
-    """How walks from many starts ended: (n,) each."""
+class WalkEnds:
+    """How walks from many starts ended: (n,) each; `attractor` is NONE where none was reached, else after `steps`."""
 
     outcome: Integers
+    attractor: Integers
     steps: Integers
-    attractor: Integers  # number of a cycle; NONE
+
+
+@dataclass(frozen=True, eq=False)
+class Arrivals(WalkEnds):
+    """How and where walks on the section ended."""
+
     last: Floats  # (n, 3) where they were last
 
 
@@ -135,7 +141,7 @@ def arrivals(
         walk_one_by_one(walker, capture, z, fates, tolerances)
     else:
         walk_lanes(walker, new_lane_memory(*tolerances), capture, states_on_section(walker.model, z), fates)
-    return Arrivals(fates.outcome, fates.steps, capture.attractor, capture.last)
+    return Arrivals(fates.outcome, capture.attractor, fates.steps, capture.last)
 
 
 def walk_one_by_one(

@@ -280,7 +280,7 @@ def walk_state_on_section(walker: ContactWalker, ground: JudgedGround, start: St
 
 @dataclass(frozen=True)
 class WalkerOnGround:
-    """A walker at one value of the parameter, and the ground it walks on."""
+    """A walker, and the ground it walks on and is judged by."""
 
     walker: ContactWalker
     ground: JudgedGround

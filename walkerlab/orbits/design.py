@@ -7,7 +7,7 @@ no gait the function is continued by a slope back to the last point that had one
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -49,12 +49,11 @@ class Aim:
 
 @dataclass
 class Descent:
-    """One search: where it ended, and what it met."""
+    """One search: where it ended."""
 
     x: Floats
     point: Point | None
     gradient_norm: float = 0.0
-    seen: dict[bytes, Point | None] = field(default_factory=dict)
 
 
 def sought(question: Aim, start: Floats) -> Descent:
@@ -62,13 +61,13 @@ def sought(question: Aim, start: Floats) -> Descent:
     from scipy.optimize import minimize  # a tenth of a second that nothing else needs
 
     span = question.upper - question.lower
-    search = Descent(start, None)
+    search, seen = Descent(start, None), dict[bytes, Point | None]()
 
     def at(u: Floats) -> Point | None:
         x = question.lower + np.clip(u, 0.0, 1.0) * span
-        if x.tobytes() not in search.seen:
-            search.seen[x.tobytes()] = question.at(x)
-        point = search.seen[x.tobytes()]
+        if x.tobytes() not in seen:
+            seen[x.tobytes()] = question.at(x)
+        point = seen[x.tobytes()]
         if point is not None:
             search.x, search.point = x, point
         return point

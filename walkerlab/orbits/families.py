@@ -129,19 +129,19 @@ class Seed(NamedTuple):
     steps: int = 1
 
 
+@dataclass(frozen=True)
 class BranchFollower:
-    """Follows branches of one model over one span."""
+    """Follows branches of one model over one span.
 
-    def __init__(
-        self,
-        step_map: StepMap,
-        span: ValueSpan,
-        control: StepControl = CONTROL,
-        most: int = POINTS,
-        advance: Callable[[], None] = lambda: None,
-    ) -> None:
-        """Nothing is followed yet; no branch gets more than `most` points, and `advance` is told of each."""
-        self.step_map, self.span, self.control, self.most, self.advance = step_map, span, control, most, advance
+    most     points of a branch
+    advance  told of each point
+    """
+
+    step_map: StepMap
+    span: ValueSpan
+    control: StepControl = CONTROL
+    most: int = POINTS
+    advance: Callable[[], None] = lambda: None
 
     def family(self, seeds: Iterable[Seed], periods: int, known: tuple[GaitBranch, ...] = ()) -> tuple[GaitBranch, ...]:
         """Every branch that the seeds lie on, and the cascades beyond their flips, after those that are known.

@@ -72,14 +72,9 @@ def norm_of(at: Standpoint) -> float | None:
     return None if answer is None else float(answer[0][0])
 
 
-def cost_of(at: Standpoint) -> float | None:
-    """The cost of transport."""
-    return at.step_map.cost_of_transport(at.z, at.p)
-
-
 OTHERS: Final[Mapping[str, Callable[[Standpoint], float | None]]] = {
     "gait_sensitivity_norm": norm_of,
-    "cost_of_transport": cost_of,
+    "cost_of_transport": lambda at: at.step_map.cost_of_transport(at.z, at.p),
 }
 
 

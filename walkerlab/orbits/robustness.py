@@ -164,12 +164,12 @@ def steps_on_rough_ground(at: Standpoint, roughness_m: float, seed: tuple[int, .
 class RoughWalks:
     """How long walks on rough ground last.
 
-    mean, standard_error  steps, as far as they can be told
-    capped                walks that went on to the last step that was looked at
-    method                all-failed: the mean of all; censored: steps over failures; lower-bound: none failed
+    mean_steps, standard_error  as far as they can be told
+    capped                      walks that went on to the last step that was looked at
+    method                      all-failed: the mean of all; censored: steps over failures; lower-bound: none failed
     """
 
-    mean: float
+    mean_steps: float
     standard_error: float | None
     walks: int
     capped: int

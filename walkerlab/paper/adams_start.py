@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from walkerlab.ground.walker import ContactWalker, on_ground
+from walkerlab.ground.walker import ContactWalker
 from walkerlab.hybrid.comparison import Array
 from walkerlab.hybrid.contact_run import ContactWalkResult, sampled_energies, sampled_feet
 from walkerlab.hybrid.recorded_walk import take_walk
@@ -101,7 +101,8 @@ def adams_walk(walker: Standing, walk: Callable[[State], ContactWalkResult], con
     _, theta_2, omega_1, omega_2 = adams_start_as_printed()
     rigid = adams_start(walker, (-2.0 * walker.slope - theta_2, theta_2, omega_1, omega_2))
     result = walk(rigid.state)
-    time, normal, mechanical = forces_of(result, contact)
+    assert result.samples is not None
+    time, normal = result.samples.time_s, sampled_feet(contact, result.samples)[:, :, 2]
     total = normal.sum(axis=1)
     airborne = time[(total <= 0.0) & (time > 0.0)]
     later = np.zeros(0) if rigid.pull_from is None else total[time >= rigid.pull_from]
@@ -111,7 +112,7 @@ def adams_walk(walker: Standing, walk: Callable[[State], ContactWalkResult], con
         airborne_from=float(airborne[0]) if airborne.size else None,
         later_normal_force=float(later.max()) if later.size else None,
         normal=normal,
-        mechanical=mechanical,
+        mechanical=sampled_energies(contact, result.samples)[:, :2].sum(axis=1),
     )
 
 
@@ -122,17 +123,3 @@ def first_below_zero(time: Array, values: Array) -> float | None:
         return None
     around = [int(below[0]), max(int(below[0]) - 1, 0)]
     return float(np.interp(0.0, values[around], time[around]))
-
-
-def forces_of(
-    walk: ContactWalkResult, walker: ContactWalker
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Times, normal forces (samples, leg) and mechanical energy of a sampled walk."""
-    samples = walk.samples
-    if samples is None:
-        raise ValueError("the walk was not sampled")
-    feet, dissipated = np.zeros((samples.time_s.size, 2, 5)), np.zeros((samples.time_s.size, 3))
-    sampled_feet(walker, samples.states, samples.has_ground, samples.level, feet)
-    system = on_ground(walker, (False, False))
-    sampled_energies(system, samples.states, samples.has_ground, samples.knees, samples.level, dissipated)
-    return samples.time_s, feet[:, :, 2], dissipated[:, 0] + dissipated[:, 1]

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from walkerlab.config.contact import Contact
-from walkerlab.hybrid.comparison import Array
+from walkerlab.hybrid.comparison import Array, WalkDifference
 from walkerlab.hybrid.recorded_walk import take_walk
 from walkerlab.hybrid.rigid_measures import energies
 from walkerlab.paper.appendix_a import RigidWalker, assembled, step_length
@@ -142,16 +142,8 @@ class ContactModel:
         return str(self.summary["outcome"])
 
 
-@dataclass(frozen=True)
-class LegErrors:
-    """Largest difference of each leg's angle (rad) and angular velocity (rad/s)."""
-
-    angle: tuple[float, ...]
-    velocity: tuple[float, ...]
-
-
-Errors = Mapping[str, LegErrors]
-"""Largest differences between the contact model and the rigid one, in each way in which there is something to compare:
+Errors = Mapping[str, WalkDifference]
+"""Differences between the contact model and the rigid one, in each way in which there is something to compare:
 
 raw              at the same time
 aligned          at the same phase of each step

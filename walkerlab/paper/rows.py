@@ -7,6 +7,7 @@ from enum import StrEnum
 from typing import Any, Literal
 
 from walkerlab.config.contact import MM_PER_M
+from walkerlab.hybrid.comparison import Quantity
 from walkerlab.paper import printed
 from walkerlab.paper.arithmetic import speed_difference
 from walkerlab.paper.measured import CYCLES, Measured
@@ -177,12 +178,12 @@ class Judge:
         text = prose("evidence.strides", contact, done, went_on and not all_done)
         return self.row(entry, rigid, float(done), all_done, EXPLAINED if went_on else REFUTED, "contact", text)
 
-    def error(self, entry: Printed, which: str, late: float, off: float) -> JudgedNumber:
+    def error(self, entry: Printed, which: Quantity, late: float, off: float) -> JudgedNumber:
         """The largest error of Fig. 8; that it cannot be so small follows from Table 3 alone, whatever the config.
 
         late, off  by how much Table 3's periods differ (s), and the error that this makes alone
         """
-        errors: dict[str, tuple[float, ...]] = {way: getattr(legs, which) for way, legs in self.measured.errors.items()}
+        errors = {way: difference.largest(which) for way, difference in self.measured.errors.items()}
         text = prose("evidence.error", entry, late, off, self.measured.equations, errors)
         raw, aligned = (max(errors[way]) if way in errors else None for way in ("raw", "aligned"))
         limit = AROUND * entry.value

@@ -14,6 +14,7 @@ from walkerlab.scene.left_out import of_adjustment, of_contact_walk, of_rigid_wa
 if TYPE_CHECKING:
     from walkerlab.config.schema import Config
 
+NO_CONTACT = "the config has no contact block"
 Inputs = Callable[["Config"], tuple[str, ...]]
 Lacks = Callable[["Config"], tuple[dict[str, str], ...]]
 
@@ -68,11 +69,9 @@ class Stage:
     draws          whether it writes files beside its artifact, from whatever results there are
     walks          whether `--strides` means something to it; its `run` walks a second time for the numerical error,
                    unless told not to: `again`
-    has_cells      whether it has independent cells for `--jobs`
     compiles_long  whether its kernels are worth compiling beside an earlier stage: its module has `compile_kernels`
     campaign_of    the stage whose `--full` runs it too; it is the user's choice, so nothing is stale without it
     on_demand      whether only its own command runs it; nothing is stale without it
-    keeps_parts    whether it keeps parts of its result, to go on where a run was cut off
     alone          whether it measures times, and so runs with nothing beside it
     early_with     the results with which it is worth drawing while others are still being computed
     follows        whether it runs over a parameter: `--over`, `--from`, `--to`, `--periods`; `again` is for it, too
@@ -90,11 +89,9 @@ class Stage:
     needs_contact: bool = False
     draws: bool = False
     walks: bool = False
-    has_cells: bool = False
     compiles_long: bool = False
     campaign_of: str = ""
     on_demand: bool = False
-    keeps_parts: bool = False
     alone: bool = False
     early_with: tuple[str, ...] = ()
     follows: bool = False
@@ -121,6 +118,17 @@ class Stage:
     def results(self, config: Config) -> tuple[str, ...]:
         """The stages whose results it gets: those that it needs, and those that it takes if they are current."""
         return (*self.inputs(config), *self.if_current)
+
+    def why_unsuited(self, config: Config) -> str | None:
+        """Why it means nothing under a config; None if it does."""
+        return NO_CONTACT if self.needs_contact and config.contact is None else None
+
+    def refuse_unsuited(self, asked: str, config: Config) -> None:
+        """Raise ConfigError if it means nothing under a config, being what is asked for or what this needs."""
+        from walkerlab.config.walkers import without_contact  # not for the help of the command line
+
+        if self.why_unsuited(config) is not None:
+            raise without_contact(asked, config.walker, "Add one to the config; `walkerlab schema` lists its keys.")
 
     @property
     def command(self) -> str:
@@ -178,7 +186,7 @@ PIPELINE = Graph(
     Stage(
         "tune", "walkerlab.stages.tune",
         "Adjust the initial velocities until the contact model walks; say whether, how much, and why.",
-        reads.TuneConfig, results_of("fixedpoint"), needs_contact=True, has_cells=True, does_without=of_adjustment,
+        reads.TuneConfig, results_of("fixedpoint"), needs_contact=True, does_without=of_adjustment,
     ),
     Stage(
         "compare", "walkerlab.stages.compare",
@@ -187,12 +195,12 @@ PIPELINE = Graph(
     ),
     Stage(
         "accuracy", "walkerlab.stages.accuracy", "Measure error against run time, method by method.",
-        reads.SceneConfig, gait_for_start_or_pads, has_cells=True, alone=True,
+        reads.SceneConfig, gait_for_start_or_pads, alone=True,
     ),
     Stage(
         "engines", "walkerlab.stages.engines",
         "Walk in other engines (MuJoCo, Drake, Exudyn): our contact law in their integrators, then their own contact.",
-        reads.SceneConfig, gait_for_start_or_pads, needs_contact=True, has_cells=True, on_demand=True,
+        reads.SceneConfig, gait_for_start_or_pads, needs_contact=True, on_demand=True,
         programs=engines_installed,
     ),
     Stage(
@@ -201,13 +209,13 @@ PIPELINE = Graph(
     ),
     Stage(
         "stability", "walkerlab.stages.stability", "Verify extreme cases and problems with known answers.",
-        reads.CompassCasesConfig, known_and_start, has_cells=True, does_without=of_verification,
+        reads.CompassCasesConfig, known_and_start, does_without=of_verification,
         takes_of_scene=reads.SceneCasesConfig, takes_of_paper=reads.WalksConfig,
     ),
     Stage(
         "stability-maps", "walkerlab.stages.stability_maps",
         "Map stability over stiffness, stiction velocity and step size; resumes where it was interrupted.",
-        reads.MapsConfig, has_cells=True, campaign_of="stability", keeps_parts=True, takes_of_paper=reads.WalksConfig,
+        reads.MapsConfig, campaign_of="stability", takes_of_paper=reads.WalksConfig,
     ),
     Stage(
         "continuation", "walkerlab.stages.continuation",
@@ -217,18 +225,17 @@ PIPELINE = Graph(
     Stage(
         "basin", "walkerlab.stages.basin",
         "Map which starts reach which attractor, and which fall; resumes where it was interrupted.",
-        reads.BasinConfig, results_of("fixedpoint"), has_cells=True, on_demand=True, keeps_parts=True,
+        reads.BasinConfig, results_of("fixedpoint"), on_demand=True,
     ),
     Stage(
         "robustness", "walkerlab.stages.robustness",
         "Ask what a gait withstands: drops, pushes, rough ground, and which number of the walker moves it most.",
-        reads.RobustnessConfig, results_of("fixedpoint"), has_cells=True, on_demand=True, keeps_parts=True,
-        of_a_model=True,
+        reads.RobustnessConfig, results_of("fixedpoint"), on_demand=True, of_a_model=True,
     ),
     Stage(
         "design", "walkerlab.stages.design",
         "Find the walker whose gait has the least or largest of a number, within bounds.",
-        reads.DesignConfig, results_of("fixedpoint"), on_demand=True, keeps_parts=True, designs=True, of_a_model=True,
+        reads.DesignConfig, results_of("fixedpoint"), on_demand=True, designs=True, of_a_model=True,
     ),
     Stage(
         "plot", "walkerlab.stages.plot", "Draw the figures from the stored results.", reads.NamedConfig,

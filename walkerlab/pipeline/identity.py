@@ -6,21 +6,37 @@ from typing import Any
 from walkerlab.config.canonical import slice_of
 from walkerlab.config.overlay import over_paper
 from walkerlab.config.schema import Config
-from walkerlab.pipeline.graph import Stage
+from walkerlab.errors import ConfigError
+from walkerlab.pipeline.graph import PIPELINE, Graph, Stage
 from walkerlab.sources import Sources
 from walkerlab.store.key import Identity
 
 
-class Identities:
-    """Identities of results; what does not depend on the config is looked up once for each stage."""
+class Keys:
+    """Identities of results, without looking at a file; what no config changes is looked up once for each stage."""
 
-    def __init__(self) -> None:
+    def __init__(self, graph: Graph = PIPELINE) -> None:
         """Read no code yet."""
+        self.graph = graph
         self._sources = Sources()
         self._digests: dict[str, str] = {}
         self._fixed: dict[str, dict[str, Any]] = {}
 
-    def of(self, stage: Stage, config: Config, input_keys: Mapping[str, str]) -> Identity:
+    def of(self, config: Config, target: str) -> dict[str, str]:
+        """The key of a stage and of each that it needs, by name.
+
+        Raises ConfigError if the config has not what it needs, and for a stage that has no result but files of its run.
+        """
+        keys: dict[str, str] = {}
+        for stage in self.graph.needed_for(target, config):
+            if stage.draws:
+                raise ConfigError(f"{stage.name} draws the files of its run; it has no result without them.")
+            stage.refuse_unsuited(target, config)
+            given = {name: keys[name] for name in stage.inputs(config)}
+            keys[stage.name] = self.identity(stage, config, given).key
+        return keys
+
+    def identity(self, stage: Stage, config: Config, input_keys: Mapping[str, str]) -> Identity:
         """The identity of a stage's result under a config.
 
         input_keys  keys of the results that it takes, by stage
@@ -33,10 +49,10 @@ class Identities:
             if stage.programs is not None:
                 fixed["programs"] = dict(stage.programs())
         own = slice_of(config, stage.takes_under(config))
-        return Identity(stage.name, {**own, **self._fixed[stage.name]}, input_keys, self.code_digest(stage))
+        return Identity(stage.name, {**own, **self._fixed[stage.name]}, input_keys, self.code_digest(stage.name))
 
-    def code_digest(self, stage: Stage) -> str:
+    def code_digest(self, target: str) -> str:
         """The digest of a stage's code, as it was when it was first asked for."""
-        if stage.name not in self._digests:
-            self._digests[stage.name] = self._sources.code_digest(stage.module)
-        return self._digests[stage.name]
+        if target not in self._digests:
+            self._digests[target] = self._sources.code_digest(self.graph[target].module)
+        return self._digests[target]

@@ -3,10 +3,8 @@
 from collections import OrderedDict
 
 from walkerlab.config.schema import Config
-from walkerlab.errors import ConfigError, NoAnswer
-from walkerlab.pipeline.graph import PIPELINE, Graph, Stage
-from walkerlab.pipeline.identity import Identities
-from walkerlab.pipeline.plan import refuse_unsuited
+from walkerlab.errors import NoAnswer
+from walkerlab.pipeline.graph import PIPELINE, Graph
 from walkerlab.pipeline.progress import Progress, Silent
 from walkerlab.pipeline.task import StageAnswer, task_of
 from walkerlab.store.content import Content
@@ -14,35 +12,6 @@ from walkerlab.store.parts import Parts
 
 REMEMBERED = 256
 """Results of needed stages that are kept: those of neighbouring points are often the same."""
-
-
-def refuse_files(stage: Stage) -> None:
-    """Raise ConfigError for a stage that has no result but files of its run."""
-    if stage.draws:
-        raise ConfigError(f"{stage.name} draws the files of its run; it has no result without them.")
-
-
-class Keys:
-    """The stage keys that results would be stored under, without looking at a file."""
-
-    def __init__(self, graph: Graph = PIPELINE) -> None:
-        """Read no code yet."""
-        self.graph = graph
-        self._identities = Identities()
-
-    def code_digest(self, target: str) -> str:
-        """The digest of a stage's code, as it was when it was first asked for."""
-        return self._identities.code_digest(self.graph[target])
-
-    def of(self, config: Config, target: str) -> dict[str, str]:
-        """The key of a stage and of each that it needs, by name; ConfigError if the config has not what it needs."""
-        keys: dict[str, str] = {}
-        for stage in self.graph.needed_for(target, config):
-            refuse_files(stage)
-            refuse_unsuited(target, stage, config)
-            given = {name: keys[name] for name in stage.inputs(config)}
-            keys[stage.name] = self._identities.of(stage, config, given).key
-        return keys
 
 
 class InMemory:

@@ -31,7 +31,7 @@ def complete(
     jobs: int,
     shared_from: int = 0,
     first: Sequence[int] = (0,),
-) -> int:
+) -> tuple[list[Numbers], int]:
     """Compute the pieces that are not there yet, and keep each as soon as it is.
 
     parts        what an earlier run has left, and where new pieces are kept
@@ -39,7 +39,7 @@ def complete(
     shared_from  cells that take longer than starting another process
     first        places of pieces that are done here, before several processes would each compile the same
 
-    Returns how many cells were computed.
+    Returns the numbers of each piece, and how many cells were computed.
     """
     waiting = [piece for piece in pieces if piece.name not in parts.kept]
     cells = sum(piece.cells for piece in waiting)
@@ -50,4 +50,4 @@ def complete(
     for piece, numbers in zip(waiting, found, strict=True):
         parts.keep(piece.name, numbers)
         progress.advance(piece.cells)
-    return cells
+    return [parts.kept[piece.name] for piece in pieces], cells

@@ -1,14 +1,13 @@
 """What would happen, and why: for each stage whether its result is reused, made, or left out."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
 from walkerlab.config.schema import Config
-from walkerlab.config.walkers import without_contact
-from walkerlab.pipeline.graph import PIPELINE, Graph, Stage
-from walkerlab.pipeline.identity import Identities
+from walkerlab.pipeline.graph import NO_CONTACT, PIPELINE, Graph, Stage
+from walkerlab.pipeline.identity import Keys
 from walkerlab.scene.left_out import LeftOut
 from walkerlab.store import artifact
 from walkerlab.store.artifact import Stored, Verdict
@@ -20,23 +19,9 @@ from walkerlab.store.runfolder import RunFolder
 Action = Literal["reuse", "run", "leave out"]
 
 
-NO_CONTACT = "the config has no contact block"
 UP_TO_DATE = "up to date"
 STILL_COMPUTED = "still being computed"
 """Why a drawing made early has to do without a result."""
-
-
-def why_unsuited(stage: Stage, config: Config) -> str | None:
-    """Why a stage means nothing under a config; None if it does."""
-    if stage.needs_contact and config.contact is None:
-        return NO_CONTACT
-    return None
-
-
-def refuse_unsuited(asked: str, stage: Stage, config: Config) -> None:
-    """Raise ConfigError if a stage that is asked for, or that this needs, means nothing under a config."""
-    if why_unsuited(stage, config) is not None:
-        raise without_contact(asked, config.walker, "Add one to the config; `walkerlab schema` lists its keys.")
 
 
 def left_out(stage: str, why: str) -> LeftOut:
@@ -64,31 +49,28 @@ class Step:
     origin: Path | None = None
 
 
+@dataclass
 class Planner:
-    """Decides on stages one after another, knowing what became of those before."""
+    """Decides on stages one after another, knowing what became of those before.
 
-    def __init__(
-        self,
-        config: Config,
-        folder: RunFolder,
-        graph: Graph = PIPELINE,
-        force: bool = False,
-        elsewhere: bool = True,
-    ) -> None:
-        """Begin with nothing decided.
+    force      every stage runs that is not left out
+    elsewhere  results in other run folders are reused too
+    left_out   the stages that are left out so far, and why
+    results    those that are there, by stage
+    """
 
-        force      every stage runs that is not left out
-        elsewhere  results in other run folders are reused too
-        """
-        self.config = config
-        self.folder = folder
-        self.graph = graph
-        self.force = force
-        self.elsewhere = elsewhere
-        self.left_out: dict[str, str] = {}
-        self.results: dict[str, Stored] = {}
-        self._keys: dict[str, str] = {}
-        self._identities = Identities()
+    config: Config
+    folder: RunFolder
+    graph: Graph = PIPELINE
+    force: bool = False
+    elsewhere: bool = True
+    left_out: dict[str, str] = field(default_factory=dict, init=False)
+    results: dict[str, Stored] = field(default_factory=dict, init=False)
+    _keys: dict[str, str] = field(default_factory=dict, init=False)
+
+    def __post_init__(self) -> None:
+        """Read no code yet."""
+        self._identities = Keys(self.graph)
 
     def plan(self, stages: Sequence[Stage]) -> tuple[Step, ...]:
         """Decide on stages in the order in which they run, taking it that each goes as decided."""
@@ -143,7 +125,7 @@ class Planner:
         return tuple(left_out(name, self._why_absent(name)) for name in missing)
 
     def _judge(self, stage: Stage, force: bool) -> Step:
-        why = why_unsuited(stage, self.config)
+        why = stage.why_unsuited(self.config)
         for name in () if stage.draws else stage.inputs(self.config):
             if why is None and name in self.left_out:
                 why = f"it needs {name}: {self.left_out[name]}"
@@ -152,7 +134,7 @@ class Planner:
         keys = {name: self._keys[name] for name in stage.results(self.config) if name in self._keys}
         # what a drawing says about results left out depends on why they are
         keys |= {absent.what: f"left out: {absent.why}" for absent in self.missing_inputs(stage)}
-        identity = self._identities.of(stage, self.config, keys)
+        identity = self._identities.identity(stage, self.config, keys)
         verdict = artifact.check(self.folder.artifact(stage.name), identity.key)
         reason = "--force" if force else self._why_run(stage, identity, verdict)
         if reason is None and verdict.artifact is not None:
@@ -176,7 +158,7 @@ class Planner:
         command = self._command_of(name)
         if self.graph[name].optional:
             return self.left_out.get(name, f"it was not asked for; {command} computes it")
-        none_yet = why_unsuited(self.graph[name], self.config) or f"no current result; {command} computes one"
+        none_yet = self.graph[name].why_unsuited(self.config) or f"no current result; {command} computes one"
         return self.left_out.get(name, none_yet)
 
     def _command_of(self, name: str) -> str:

@@ -114,7 +114,7 @@ def execute(
     No answer is no exception here: see `StageReport.no_answer`.
     """
     started = time.perf_counter()
-    plan.refuse_unsuited(target, graph[target], config)
+    graph[target].refuse_unsuited(target, config)
     stages = graph.needed_for(target, config) + (graph.campaigns_of(target) if options.full else ())
     planner = plan.Planner(config, folder, graph, options.force)
     steps = planner.plan(stages)
@@ -301,8 +301,7 @@ class Execution:
         except BaseException:
             begun.reporter.end("")
             raise
-        if stage.keeps_parts:
-            Parts(self.folder.parts(stage.name), identity.key).forget()
+        Parts(self.folder.parts(stage.name), identity.key).forget()
         self.planner.settle(stage, result)
         reason = begun.step.reason if result.complete else f"no answer: {plan.no_answer(result)}"
         done = StageDone(stage.name, "run", reason, time.perf_counter() - begun.started)
@@ -318,7 +317,7 @@ class Execution:
         for stage in self.waiting:
             inputs = self.planner.inputs(stage)
             wanted = unsettled.intersection(stage.inputs(config))
-            pending = {name for name in wanted if plan.why_unsuited(graph[name], config) is None}
+            pending = {name for name in wanted if graph[name].why_unsuited(config) is None}
             others = [name for name in pending if not graph[name].draws]
             if not stage.early_with or not others or not inputs or unsettled & set(stage.early_with):
                 continue

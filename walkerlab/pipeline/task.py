@@ -7,6 +7,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, replace
 from functools import partial
+from inspect import signature
 from typing import Any
 
 from walkerlab import kernel_cache
@@ -40,25 +41,31 @@ class StageAnswer:
 class StageTask:
     """A stage with all that it is given.
 
-    config  what it takes of the config
-    inputs  the results that it gets
-    given   what else it asks for, by the names of its parameters
+    config   what it takes of the config
+    inputs   the results that it gets
+    offered  what else it may ask for, by the names of parameters of its `run`:
+             jobs      processes for independent cells
+             parts     of its result, kept from a run that was cut off
+             again     whether walks are taken a second time for their numerical error
+             folder    of its run, which it draws into
+             left_out  the results that it has to do without as it draws
     """
 
     name: str
     module: str
     config: Any
     inputs: Mapping[str, Content]
-    given: Mapping[str, Any]
+    offered: Mapping[str, Any]
 
     def run(self, progress: Progress) -> StageAnswer:
         """Call the stage's `run` with what it declared and nothing else."""
         # Imported now and not before: a stage brings its libraries and compiled code along.
         run = importlib.import_module(self.module).run
-        folder = self.given.get("folder")
+        given = {name: self.offered[name] for name in self.offered.keys() & signature(run).parameters.keys()}
+        folder = given.get("folder")
         try:
             with contextlib.nullcontext() if folder is None else drawing_into(folder):
-                content = run(self.config, self.inputs, progress, **self.given)
+                content = run(self.config, self.inputs, progress, **given)
         except NoAnswer as error:
             partial = error.partial if isinstance(error.partial, Content) else Content()
             return StageAnswer(partial, NoAnswer(error.message, error.advice))
@@ -68,23 +75,8 @@ class StageTask:
 
 
 def task_of(stage: Stage, config: Config, inputs: Mapping[str, Content], **offered: Any) -> StageTask:
-    """The task of a stage; of what is offered it is given what it asks for.
-
-    jobs      processes for independent cells
-    parts     of its result, kept from a run that was cut off
-    again     whether walks are taken a second time for their numerical error
-    folder    of its run, which it draws into
-    left_out  the results that it has to do without as it draws
-    """
-    asked = {
-        "jobs": stage.has_cells,
-        "parts": stage.keeps_parts,
-        "again": stage.walks or stage.follows,
-        "folder": stage.draws,
-        "left_out": stage.draws,
-    }
-    given = {name: value for name, value in offered.items() if asked[name]}
-    return StageTask(stage.name, stage.module, only(config, stage.takes_under(config)), inputs, given)
+    """The task of a stage under a config; see `StageTask` for what may be offered."""
+    return StageTask(stage.name, stage.module, only(config, stage.takes_under(config)), inputs, offered)
 
 
 class PipeReporter:

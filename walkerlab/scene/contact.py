@@ -22,6 +22,7 @@ from walkerlab.hybrid.contact_run import ContactWalkResult, walk_contact
 from walkerlab.mechanics.parts import Assembly
 from walkerlab.mechanics.rigid import places_of
 from walkerlab.orbits.contact_gait import GaitAnswer, find_gait_from
+from walkerlab.orbits.contact_map import WalkerOnGround
 from walkerlab.scene.parts import AnyWalker, assembly_of, drive_numbers
 from walkerlab.solvers.registry import Tolerances
 from walkerlab.solvers.system import Floats, State
@@ -36,20 +37,12 @@ FULL_STOP_DAMPING = 1e-5  # rad into a compliant knee stop from which on its dam
 
 
 @dataclass(frozen=True)
-class ContactScene:
+class ContactScene(WalkerOnGround):
     """A walker on the ground, ready to walk."""
 
-    walker: ContactWalker
-    terrain: Terrain
-    frame: Frame
     pinned: bool  # whether the stance foot of the first step is hinged
     pitch_m: float
     assembly: Assembly
-
-    @property
-    def ground(self) -> JudgedGround:
-        """What a walk happens on and is judged by."""
-        return JudgedGround(self.terrain, self.frame)
 
     def walk(
         self,
@@ -63,8 +56,8 @@ class ContactScene:
 
         heights  (footholds,) m over the slope, the start's first; even ground without
         """
-        terrain = self.terrain if heights is None else self.terrain._replace(heights=heights)
-        ground = JudgedGround(terrain, self.frame)
+        even = self.ground.terrain
+        ground = self.ground if heights is None else self.ground._replace(terrain=even._replace(heights=heights))
         return walk_contact(self.walker, ground, self.pinned, STANCE_FOOT, start, tolerances, steps, sampling)
 
 
@@ -80,13 +73,14 @@ def contact_scene(config: ContactConfig, rigid_step_length_m: float, own_pitch_m
     laws, rules = (normal_law(contact), friction_law(contact)), knee_rules(config.walker)
     walker = with_drives(contact_walker(assembly, *laws, gravity, config.slope_rad, rules), config)
     frame = Frame(leg, math.sqrt(leg / gravity), locate_switching=True)
-    terrain = TERRAINS[contact.terrain](pitch)
-    return ContactScene(walker, terrain, frame, contact.stance == "pinned", pitch, assembly)
+    ground = JudgedGround(TERRAINS[contact.terrain](pitch), frame)
+    return ContactScene(walker, ground, contact.stance == "pinned", pitch, assembly)
 
 
 def with_drives(walker: ContactWalker, config: ContactConfig) -> ContactWalker:
     """The walker with what drives it in a config."""
-    return changed_forms(walker, **drive_numbers(config), push_off_duration=config.push_off.duration_s)
+    pulse = {"push_off_duration": config.push_off.duration_s} if config.push_off.impulse_N_s != 0.0 else {}
+    return changed_forms(walker, **drive_numbers(config), **pulse)
 
 
 def knee_rules(walker: AnyWalker) -> KneeRules:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from walkerlab.mechanics.standing import Standing
 from walkerlab.orbits.shooting import RigidMap
 from walkerlab.scene.parameter import Parameter
-from walkerlab.scene.rigid import rigid_walker, walker_or_none
+from walkerlab.scene.rigid import rigid_walker
 from walkerlab.solvers.registry import Tolerances
 
 if TYPE_CHECKING:
@@ -21,38 +21,28 @@ CONTACT = Tolerances("radau5", 1e-10, 1e-12, 60_000)
 
 def rigid_walkers(config: ContactConfig, parameter: Parameter) -> Callable[[float], Standing | None]:
     """The rigid walker at a value of the parameter; None where the config refuses the value."""
-    return lambda value: walker_or_none(parameter.config_at(config, value))
+    return parameter.over(config, rigid_walker)
 
 
 def rigid_map(config: ContactConfig, parameter: Parameter, scale: float) -> RigidMap:
     """The rigid model's step map over the parameter."""
-    return RigidMap(rigid_walkers(config, parameter), scale, rigid_walker(config, config.equations))
-
-
-def walker_on_ground(config: ContactConfig, step_length_m: float) -> WalkerOnGround:
-    """The contact model of a config; steps are judged by a length (m)."""
-    from walkerlab.orbits.contact_map import WalkerOnGround
-    from walkerlab.scene.contact import contact_scene
-
-    scene = contact_scene(config, step_length_m, step_length_m)
-    return WalkerOnGround(scene.walker, scene.ground)
+    return RigidMap(rigid_walkers(config, parameter), scale, rigid_walker(config))
 
 
 def walkers_on_ground(
     config: ContactConfig, parameter: Parameter, step_length_m: float
 ) -> Callable[[float], WalkerOnGround | None]:
-    """The contact model at a value of the parameter; None where the config refuses the value."""
+    """The contact model at a value of the parameter, steps judged by a length; None where the config refuses it."""
+    from walkerlab.scene.contact import contact_scene
 
-    def walker_at(value: float) -> WalkerOnGround | None:
-        changed = parameter.config_at(config, value)
-        return None if changed is None else walker_on_ground(changed, step_length_m)
-
-    return walker_at
+    return parameter.over(config, lambda changed: contact_scene(changed, step_length_m, step_length_m))
 
 
 def contact_map(config: ContactConfig, parameter: Parameter, scale: float, step_length_m: float) -> ContactMap:
     """The contact model's step map over the parameter; steps are judged by a length (m)."""
     from walkerlab.orbits.contact_map import ContactMap
+    from walkerlab.scene.contact import contact_scene
 
     walkers = walkers_on_ground(config, parameter, step_length_m)
-    return ContactMap(walkers, scale, CONTACT, step_length_m, walker_on_ground(config, step_length_m))
+    like = contact_scene(config, step_length_m, step_length_m)
+    return ContactMap(walkers, scale, CONTACT, step_length_m, like)

@@ -9,11 +9,10 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from walkerlab.config.fields import kind, leaves
+from walkerlab.config.fields import held, kind, leaves
 from walkerlab.config.files import builtin_names
 from walkerlab.config.loader import load
 from walkerlab.config.schema import Config
@@ -22,7 +21,7 @@ from walkerlab.orbits.families import BranchFollower, GaitBranch, Seed, ValueSpa
 from walkerlab.orbits.fixed_point import SearchSettings, find_gaits
 from walkerlab.orbits.shooting import RigidMap
 from walkerlab.scene.families import rigid_walkers
-from walkerlab.scene.parameter import PHYSICAL, SLOPE_RAD, Parameter
+from walkerlab.scene.parameter import PHYSICAL, SLOPE, Parameter
 from walkerlab.scene.rigid import walker_or_none
 
 SLOPES = (0.7, 1.5, 2.3, 0.35, 0.1)  # of one's own, in the order in which they are looked at
@@ -50,12 +49,12 @@ class Met:
 
 def gaits_on_other_slopes(config: Config) -> Met | None:
     """The range of slopes (rad) nearest to the config's own on which it has a gait, stable ones before others."""
-    own, slope = config.slope_rad, Parameter(SLOPE_RAD, "rad", (SLOPE_RAD,))
+    own = config.slope_rad
     span = ValueSpan(0.02 * own, min(STEEPEST, max(3.0 * own, STEEP)))
     found: list[Met] = []
     for value in (*(factor * own for factor in SLOPES), *WALKED_ON):
         if value in span and not any(one.stable for one in found):
-            found += walkable(followed(rigid_walkers(config, slope), span, value))
+            found += walkable(followed(rigid_walkers(config, SLOPE), span, value))
     return min(found, key=lambda one: (one.stable is None, distance(one.stable or one.whole, own)), default=None)
 
 
@@ -133,14 +132,9 @@ def way_from_built_in(config: Config) -> tuple[Config, Met] | None:
 
 def numbers_of(config: Config) -> dict[tuple[str, ...], float]:
     """The numbers of walker, slope and gravity, by their paths."""
-    found = {}
-    for path, field in leaves(Config, held=config):
-        held: Any = config
-        for name in path:
-            held = getattr(held, name, None)
-        if path[0] in OF_A_WALKER and isinstance(held, float) and "number" in kind(field.annotation):
-            found[path] = held
-    return found
+    own = (path for path, field in leaves(Config, held=config) if "number" in kind(field.annotation))
+    values = {path: held(config, path) for path in own if path[0] in OF_A_WALKER}
+    return {path: value for path, value in values.items() if isinstance(value, float)}
 
 
 def unlikeness(one: dict[tuple[str, ...], float], other: dict[tuple[str, ...], float]) -> float:

@@ -1,20 +1,20 @@
 """A number of the config as the parameter of a family of walkers: its key, its unit, and the config at a value."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import reduce
-from typing import Any
+from typing import Any, TypeVar
 
 from pydantic import ValidationError
 from pydantic.fields import FieldInfo
 
-from walkerlab.config.fields import Block, block_of, extra, kind, leaves, leaves_of_other_kinds
+from walkerlab.config.fields import Block, block_of, extra, held, kind, leaves, leaves_of_other_kinds
 from walkerlab.config.problems import nearest, shown
 from walkerlab.config.reads import ContactConfig, keys_of
 from walkerlab.config.schema import Config
 from walkerlab.errors import ConfigError
 
+R = TypeVar("R")
 SLOPE_DEG, SLOPE_RAD = "slope_deg", "slope_rad"
 PHYSICAL = tuple(keys_of(ContactConfig))
 """The keys that a model is made of."""
@@ -34,7 +34,7 @@ class Parameter:
 
     def value_in(self, config: ContactConfig) -> float:
         """What the config has there."""
-        found: Any = reduce(getattr, self.path, config)
+        found = held(config, self.path)
         return math.degrees(found) if self.key == SLOPE_DEG else float(found)
 
     def config_at(self, config: ContactConfig, value: float) -> Config | None:
@@ -48,6 +48,18 @@ class Parameter:
             return Config.model_validate(data)
         except ValidationError:
             return None
+
+    def over(self, config: ContactConfig, make: Callable[[Config], R]) -> Callable[[float], R | None]:
+        """What is made of the config, at a value of the parameter; None where the schema refuses the value."""
+
+        def at(value: float) -> R | None:
+            changed = self.config_at(config, value)
+            return None if changed is None else make(changed)
+
+        return at
+
+
+SLOPE = Parameter(SLOPE_RAD, "rad", (SLOPE_RAD,))
 
 
 def _as_given(value: Any) -> Any:
@@ -90,14 +102,13 @@ def why_no_parameter(key: str, config: ContactConfig, own: Mapping[str, FieldInf
         return "touches no model"
     if "number" not in kind(own[key].annotation):
         return "is not a number"
-    held: Any = config
-    for depth, name in enumerate(path, 1):
-        held = getattr(held, name)
-        if held is None:
-            return f"is not there: the config has no {'.'.join(path[:depth])}; give it one first"
-        if isinstance(held, tuple):
-            return f"is a number of each of the {'.'.join(path[:depth])}, not one number"
-    return "" if isinstance(held, int | float) else f"is {held!r} in the config, not a number"
+    for depth in range(1, len(path) + 1):
+        found, block = held(config, path[:depth]), ".".join(path[:depth])
+        if found is None:
+            return f"is not there: the config has no {block}; give it one first"
+        if isinstance(found, tuple):
+            return f"is a number of each of the {block}, not one number"
+    return "" if isinstance(found, int | float) else f"is {found!r} in the config, not a number"
 
 
 def likely(key: str, own: Mapping[str, FieldInfo]) -> str:

@@ -52,7 +52,7 @@ class RigidScene:
 def rigid_scene(config: RigidConfig, ground: Footholds, outputs: tuple[Output, ...]) -> RigidScene:
     """The walker of a config on a ground, with what in time is wanted."""
     return RigidScene(
-        walker=rigid_walker(config, config.equations),
+        walker=rigid_walker(config),
         names=coordinates(config),
         knee_m=knee_of(assembly_of(config.walker, rigid=True)),
         outputs=outputs,
@@ -60,16 +60,16 @@ def rigid_scene(config: RigidConfig, ground: Footholds, outputs: tuple[Output, .
     )
 
 
-def rigid_walker(config: RigidConfig, equations: Equations) -> Standing:
-    """The walker of a config with one of the two sets of equations; those as printed are a compass's."""
+def rigid_walker(config: RigidConfig, equations: Equations | None = None) -> Standing:
+    """The walker of a config, with its own set of equations or one of both; those as printed are a compass's."""
     passive = on_slope(level_walker(config.walker, config.gravity_m_s2), config.slope_rad)
     model = passive.changed(**drive_numbers(config))
-    return as_printed(model) if equations == "as-printed" else model
+    return as_printed(model) if (equations or config.equations) == "as-printed" else model
 
 
 def walker_or_none(config: RigidConfig | None) -> Standing | None:
-    """The walker of a config with its own equations; None where there is no config."""
-    return None if config is None else rigid_walker(config, config.equations)
+    """The walker of a config; None where there is no config."""
+    return None if config is None else rigid_walker(config)
 
 
 @lru_cache(REMEMBERED)

@@ -11,10 +11,11 @@ from walkerlab.benchmarks.references import End, Reference, WalkEndsError, secon
 from walkerlab.benchmarks.trials import RigidTrial, Trial
 from walkerlab.config.reads import ContactConfig, SceneConfig
 from walkerlab.config.walkers import is_plain_compass
-from walkerlab.hybrid.recorded_walk import as_state, with_scaled_rates
+from walkerlab.hybrid.recorded_walk import with_scaled_rates
 from walkerlab.labels import labels_of
 from walkerlab.pipeline.progress import Progress
 from walkerlab.scene.rigid import compass_or_none, rigid_walker
+from walkerlab.stages.walk import rigid_start
 from walkerlab.stages.words import words
 from walkerlab.store.columns import rows_group
 from walkerlab.store.content import Content
@@ -95,22 +96,20 @@ def without(trial: Trial, why: WalkEndsError) -> dict[str, Any]:
 
 def scenes(config: SceneConfig, inputs: Mapping[str, Content]) -> Iterator[Trial]:
     """The walks to measure by: rigid, with a contact block on its ground, and a compass also near the rigid limit."""
-    state = inputs["fixedpoint"].summary["state"] if config.start == "fixed-point" else config.start
-    walker = rigid_walker(config, config.equations)
-    start = with_scaled_rates(walker, as_state(state), OFF_THE_GAIT, OFF_THE_GAIT)
+    length, state = rigid_start(config, inputs)
+    walker = rigid_walker(config)
+    start = with_scaled_rates(walker, state, OFF_THE_GAIT, OFF_THE_GAIT)
     yield RigidTrial(walker, start, RIGID_STEPS, compass_or_none(config, config.equations))
     if config.contact is None:
         return
     # contact code is loaded only for scenes that have contact
     from walkerlab.benchmarks.contact_trials import contact_trial, near_rigid_trial
 
-    length = float(inputs["fixedpoint"].summary["step_length_m"]) if "fixedpoint" in inputs else None
-    given = tuple(float(x) for x in state)
     if not is_plain_compass(config):
-        yield contact_trial(config, given, length, OTHERS_CONTACT_STEPS)
+        yield contact_trial(config, state, length, OTHERS_CONTACT_STEPS)
         return
-    yield contact_trial(config, given, length, CONTACT_STEPS)
-    yield near_rigid_trial(config, given, length, NEAR_RIGID_STEPS)
+    yield contact_trial(config, state, length, CONTACT_STEPS)
+    yield near_rigid_trial(config, state, length, NEAR_RIGID_STEPS)
 
 
 def summary_of(

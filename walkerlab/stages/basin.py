@@ -23,6 +23,7 @@ from walkerlab.orbits.basin import (
     NONE,
     RTOL,
     Attractors,
+    WalkEnds,
     Walker,
     Window,
     arrivals,
@@ -39,7 +40,7 @@ from walkerlab.pipeline.progress import Progress
 from walkerlab.scene.contact import ContactScene, contact_gait, start_state, with_contact
 from walkerlab.scene.endings import Pads, endings
 from walkerlab.scene.rigid import rigid_walker
-from walkerlab.solvers.system import Floats, Integers
+from walkerlab.solvers.system import Floats
 from walkerlab.stages.contact_sim import scene_on_pads, tolerances_of
 from walkerlab.stages.numerical_error import evenly_spread, tightened
 from walkerlab.stages.walk import OUTCOMES, counted
@@ -66,7 +67,7 @@ def run(
     Raises ConfigError for the contact model without a contact block, NoAnswer if its pads are to fit a gait that
     there is not.
     """
-    gait, rigid = inputs["fixedpoint"].summary, rigid_walker(config, config.equations)
+    gait, rigid = inputs["fixedpoint"].summary, rigid_walker(config)
     if len(rigid.section_indices) != len(COORDINATES):
         raise ConfigError(
             f"basin takes walkers with {len(COORDINATES)} coordinates just after heel strike; this one has "
@@ -79,9 +80,8 @@ def run(
     begun, shared_from = time.perf_counter(), question.shared_from
     every = range(window.size)
     pieces = pieces_of("cells", every, question.cells_at_once, 1, partial(ends_of, question, window))
-    walks = complete(pieces, parts, "basin", progress, jobs, shared_from)
-    ends = [np.reshape(parts.kept[piece.name], (3, -1)) for piece in pieces]
-    found = WalkEnds(*np.concatenate(ends, axis=1).astype(np.int64))
+    ends, walks = complete(pieces, parts, "basin", progress, jobs, shared_from)
+    found = WalkEnds(*np.concatenate([np.reshape(part, (3, -1)) for part in ends], axis=1).astype(np.int64))
     walked = found.outcome == Outcome.WALKED
     edges = edge_cells(np.where(walked, found.attractor, FAILED).reshape(window.cells))
     walking = walked.astype(float)
@@ -89,8 +89,8 @@ def run(
         refine = config.basin.refine
         walks_of_cell, shares = refine ** len(window.axes), partial(shares_of, question, window, refine)
         pieces = pieces_of("edge", edges.tolist(), question.edges_at_once, walks_of_cell, shares)
-        walks += complete(pieces, parts, "basin: edges", progress, jobs, shared_from)
-        walking[edges] = np.concatenate([parts.kept[piece.name] for piece in pieces])
+        of_edges, more = complete(pieces, parts, "basin: edges", progress, jobs, shared_from)
+        walking[edges], walks = np.concatenate(of_edges), walks + more
     rate = {"trajectories_per_s": walks / (time.perf_counter() - begun)} if walks else {}
     aperiodic = isinstance(question, RigidQuestion) and question.attractors.aperiodic
     reached = attractors_of(question, rigid)
@@ -246,15 +246,6 @@ def margin_of(config: RigidConfig, window: Window, found: WalkEnds, gait: Mappin
     return {"margin": float(np.sqrt((away**2).sum(axis=1)).min())}
 
 
-@dataclass(frozen=True)
-class WalkEnds:
-    """How walks ended: (n,) each; `attractor` is NONE where none was reached, else `steps` says after how many."""
-
-    outcome: Integers
-    attractor: Integers
-    steps: Integers
-
-
 @dataclass(frozen=True, eq=False)
 class RigidQuestion:
     """Starts of the rigid model.
@@ -275,8 +266,7 @@ class RigidQuestion:
     def walked(self, z: Floats) -> WalkEnds:
         """Walk from section coordinates z (n, 3), SI."""
         scaled = z * np.array(self.scale)
-        found = arrivals(self.walker, self.attractors, scaled, self.steps, tolerances=self.tolerances)
-        return WalkEnds(found.outcome, found.attractor, found.steps)
+        return arrivals(self.walker, self.attractors, scaled, self.steps, tolerances=self.tolerances)
 
     def tightened(self) -> RigidQuestion:
         """The same at a hundred times tighter tolerances."""

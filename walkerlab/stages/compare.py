@@ -20,7 +20,6 @@ from walkerlab.paper.measured import (
     CYCLES,
     ContactModel,
     Errors,
-    LegErrors,
     Measured,
     RigidModel,
     characteristics,
@@ -46,6 +45,7 @@ NOT_THE_PAPERS = {
     "why": "they are of the paper's own walker, on even ground",
 }
 WAYS = ("raw", "aligned", "between_impacts", "settled")
+LARGEST: dict[str, comparison.Quantity] = {"max_angle_error_rad": "angle", "max_velocity_error_rad_s": "velocity"}
 PHASE, ROW = "phase", "row"
 MODELS = {
     "as_printed": "rigid model, equations as printed",
@@ -175,8 +175,8 @@ class Comparison:
     def summary(self) -> dict[str, Any]:
         """What the command prints: the larger leg's error and both legs' in every way, None where there is none."""
         said: dict[str, Any] = {}
-        for name, quantity in (("max_angle_error_rad", "angle"), ("max_velocity_error_rad_s", "velocity")):
-            per_leg = {way: list(getattr(self.errors[way], quantity)) if way in self.errors else None for way in WAYS}
+        for name, quantity in LARGEST.items():
+            per_leg = {way: self.errors[way].largest(quantity) if way in self.errors else None for way in WAYS}
             said[name] = {way: max(both) if both else None for way, both in per_leg.items()} | {"per_leg": per_leg}
         orbit = None if self.orbit is None else max(self.orbit)
         return {**said, "orbit_distance": orbit, "orbit_distance_per_leg": self.orbit}
@@ -212,13 +212,9 @@ def compare_motion(rigid: comparison.Motion | None, contact: comparison.Motion |
             text = "Hausdorff distance of the last stride's orbits, angle and velocity in units of the rigid orbit's "
             groups["orbit"] = Group({**legs(), "orbit_distance": Variable(distances, (LEG,), "1", f"{text}ranges")})
             orbit = distances.tolist()
-    errors = {
-        way: LegErrors(tuple(one.largest_angle.tolist()), tuple(one.largest_velocity.tolist()))
-        for way, one in found.items()
-    }
     what, needed = missing
     lacking = {"what": what, "why": f"no {needed} was completed by both models"}
-    return Comparison(errors, orbit, groups, () if steps >= STRIDE else (lacking,))
+    return Comparison(found, orbit, groups, () if steps >= STRIDE else (lacking,))
 
 
 def part(difference: comparison.WalkDifference, where: Any) -> comparison.WalkDifference:

@@ -12,7 +12,6 @@ from walkerlab.config.reads import ContactConfig, ContactSimConfig, GroundConfig
 from walkerlab.errors import NoAnswer
 from walkerlab.ground.compliant import hinge_of
 from walkerlab.ground.terrain import STANCE_FOOT
-from walkerlab.ground.walker import on_ground
 from walkerlab.hybrid.contact_observer import ContactSamples
 from walkerlab.hybrid.contact_run import ContactWalkResult, by_channel, sampled_energies, sampled_feet
 from walkerlab.mechanics.rigid import places_of
@@ -55,7 +54,7 @@ def run(config: ContactSimConfig, inputs: Mapping[str, Content], progress: Progr
     scene = scene_on_pads(config, rigid_step, rigid_state)
     start, steps = start_state(scene, rigid_state), 2 * config.strides
     tolerances = tolerances_of(config, steps)
-    interval = scene.frame.pendulum_time / SAMPLES_PER_PENDULUM_TIME if config.outputs else None
+    interval = scene.ground.frame.pendulum_time / SAMPLES_PER_PENDULUM_TIME if config.outputs else None
     heights = foothold_heights(config.ground, steps + 1)
     tell_unresolved_slip(tolerances.atol, scene, progress)
 
@@ -75,7 +74,7 @@ def compile_kernels(config: ContactSimConfig) -> None:
     places = places_of(scene.assembly).names
     angles = [HALF_ANGLE if name == "2" else -HALF_ANGLE if name.startswith("1") else 0.0 for name in places]
     standing = start_state(scene, (*angles, *(0.0 for _ in places)))
-    interval = scene.frame.pendulum_time if config.outputs else None
+    interval = scene.ground.frame.pendulum_time if config.outputs else None
     groups(config, scene, scene.walk(standing, 1, replace(tolerances_of(config, 1), budget=1), interval))
 
 
@@ -146,8 +145,8 @@ def groups(config: ContactSimConfig, scene: ContactScene, walk: ContactWalkResul
     stored: dict[str, Group] = {}
     if walk.steps:
         stored["steps"] = Group(steps_of(walk, slip_m=walk.slip_m, rolling_m=walk.rolling_m))
-    if scene.terrain.has_pads:
-        stored["terrain"] = pads_group(scene.terrain.stride_measure, walk.end_state[0])
+    if scene.ground.terrain.has_pads:
+        stored["terrain"] = pads_group(scene.ground.terrain.stride_measure, walk.end_state[0])
     if walk.samples is not None:
         stored["trajectory"] = trajectory_group(config, scene, walk, walk.samples)
     return stored
@@ -171,8 +170,7 @@ def trajectory_group(
 ) -> Group:
     """Samples of the walk: what `outputs` asks for."""
     variables = {**over_time(time=samples.time_s, stance_leg=samples.stance + 1), **legs()}
-    feet = np.zeros((samples.time_s.size, 2, 5))
-    sampled_feet(scene.walker, samples.states, samples.has_ground, samples.level, feet)
+    feet = sampled_feet(scene.walker, samples)
     if "states" in config.outputs:
         variables |= state_variables(scene, samples.states)
         variables |= over_time(foot_along_m=feet[:, :, 0], foot_height_m=feet[:, :, 1] + samples.level)
@@ -224,10 +222,7 @@ def energy_variables(scene: ContactScene, samples: ContactSamples, foothold: Flo
 
     foothold, up  (samples,) m, where along the slope the stance foot touched, and over it
     """
-    energies = np.zeros((samples.time_s.size, 3))
-    system = on_ground(scene.walker, (False, False))
-    sampled_energies(system, samples.states, samples.has_ground, samples.knees, samples.level, energies)
-    kinetic, potential, total = energies.T
+    kinetic, potential, total = sampled_energies(scene.walker, samples).T
     given = samples.driven_J.T
     lost, walker = samples.dissipated_J, scene.walker
     at_foothold = walker.mass * (walker.gravity_down * up - walker.gravity_along * foothold)

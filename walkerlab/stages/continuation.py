@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, is_dataclass, replace
+from dataclasses import asdict, dataclass, is_dataclass
 from functools import partial
 from typing import Any, Final
 
 import numpy as np
 
+from walkerlab.config.continuation import Span
 from walkerlab.config.reads import ContactConfig, ContinuationConfig
 from walkerlab.config.walkers import without_contact
 from walkerlab.errors import ConfigError, NoAnswer
@@ -62,10 +63,7 @@ class FamilyQuestion:
     def second(self) -> FamilyQuestion | None:
         """The same over the second key, if there is one."""
         block = self.config.continuation.second
-        if block is None:
-            return None
-        parameter = parameter_of(block.over, self.config)
-        return replace(self, parameter=parameter, span=ValueSpan(block.least, block.most))
+        return None if block is None else question_over(block, self.config)
 
     def refuse_ends(self, block: str) -> None:
         """Raise ConfigError, about keys of the block, for an end of the span that the config cannot have."""
@@ -97,6 +95,11 @@ class FamilyQuestion:
         return touched
 
 
+def question_over(block: Span, config: ContinuationConfig) -> FamilyQuestion:
+    """What a block of the config asks."""
+    return FamilyQuestion(config, parameter_of(block.over, config), ValueSpan(block.least, block.most))
+
+
 def numbers_in(value: Any) -> Iterator[Any]:
     """All that a record and the records in it are made of."""
     if isinstance(value, tuple) or is_dataclass(value):
@@ -113,10 +116,9 @@ def run(config: ContinuationConfig, _inputs: Mapping[str, Content], progress: Pr
 
     Raises ConfigError for a key that is no number of the model, NoAnswer for a span without a gait.
     """
-    block = config.continuation
-    parameter = parameter_of(block.over, config)
-    asked = FamilyQuestion(config, parameter, ValueSpan(block.least, block.most))
-    found = []
+    block, found = config.continuation, []
+    asked = question_over(block, config)
+    parameter = asked.parameter
     for model in models_of(asked):
         search = search_of(model, asked, progress)
         family = Family(model, None) if search is None else search.family(np.random.default_rng(config.seed))
@@ -167,13 +169,8 @@ def search_of(model: str, asked: FamilyQuestion, progress: Progress) -> FamilySe
     seeds, map_of = begun
     plane = None
     if second is not None and second.touches(model):
-        parameter = second.parameter
-
-        def map_at(value: float) -> StepMap | None:
-            changed = parameter.config_at(asked.config, value)
-            return None if changed is None else map_of(changed)
-
-        plane = Plane(map_at, second.span, parameter.value_in(asked.config))
+        parameter, config = second.parameter, asked.config
+        plane = Plane(parameter.over(config, map_of), second.span, parameter.value_in(config))
     periods = min(block.periods, THOROUGHNESS[model].periods)
     return FamilySearch(model, map_of(asked.config), asked.span, seeds, periods, block.points, progress, plane)
 
@@ -196,8 +193,10 @@ def contact_seeds(asked: FamilyQuestion, progress: Progress) -> Begun | None:
     progress.start("continuation: a gait of the contact model")
     for value in asked.looked_at():
         changed = asked.parameter.config_at(asked.config, value)
-        rigid = None if changed is None else find_gaits(rigid_walker(changed, changed.equations), changed.seed).gait
-        if changed is None or changed.contact is None or rigid is None:
+        if changed is None or changed.contact is None:
+            continue
+        rigid = find_gaits(rigid_walker(changed), changed.seed).gait
+        if rigid is None:
             continue
         found = gait_off_pads(changed, rigid.step_length, rigid.state)
         if found.gait is None:

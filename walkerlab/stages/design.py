@@ -16,7 +16,7 @@ from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.labels import Label
 from walkerlab.orbits.design import ON_BOUND, Aim, Descent, Point, optima, searched, sought
 from walkerlab.orbits.fixed_point import find_gaits
-from walkerlab.orbits.gradients import gait_numbers, gradients
+from walkerlab.orbits.gradients import gait_numbers
 from walkerlab.orbits.newton import Effort, NotConverged
 from walkerlab.orbits.robustness import Standpoint
 from walkerlab.orbits.step_map import gait_near, multipliers_of
@@ -165,7 +165,7 @@ class Gaits:
         here = subject.at()
         found = self.near(here, self.z)
         if self.model == "rigid" and (found is None or found[1]["spectral_radius"] >= 1.0):  # a long way, perhaps
-            walker = rigid_walker(config, config.equations)
+            walker = rigid_walker(config)
             gait = find_gaits(walker, config.seed).gait
             found = found if gait is None else self.near(here, section_coordinates(walker, gait.state)) or found
         if found is None:
@@ -173,7 +173,7 @@ class Gaits:
         here, numbers = found
         self.z, subject, by_key = here.z, replace(subject, z=here.z), []
         for parameter in self.parameters:
-            of_key = gradients(subject.at(parameter), abs(parameter.value_in(config)) or 1e-2, self.wanted)
+            of_key = subject.gradients(parameter, self.wanted)
             if any(name not in of_key for name in self.wanted):
                 return None
             by_key.append({name: of_key[name].value or 0.0 for name in self.wanted})

@@ -21,6 +21,7 @@ from walkerlab.errors import NoAnswer
 from walkerlab.labels import labels_of
 from walkerlab.pipeline.progress import Progress
 from walkerlab.stages.accuracy import environment, hinge_left_out, plain_power
+from walkerlab.stages.walk import rigid_start
 from walkerlab.stages.words import words
 from walkerlab.store.columns import rows_group
 from walkerlab.store.content import Content
@@ -52,10 +53,7 @@ def run(config: SceneConfig, inputs: Mapping[str, Content], progress: Progress, 
     if not engines:
         raise NoAnswer("engines: none of the engines is installed", f"Install them: {EXTRA}")
     rigid = inputs["fixedpoint"].summary if "fixedpoint" in inputs else None
-    start = rigid["state"] if rigid is not None and config.start == "fixed-point" else config.start
-    length = None if rigid is None else float(rigid["step_length_m"])
-    walks = scenes(config, length, tuple(float(x) for x in start))
-    for scene in walks:
+    for scene in scenes(config, *rigid_start(config, inputs)):
         truth = experiments.truth_of(scene)
         if truth is None:
             why = "the walk under ADAMS's law ends before there is anything to compare"

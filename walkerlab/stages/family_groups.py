@@ -53,6 +53,7 @@ ATTRACTORS = {
     "periods_s": Label("s", "durations of steps on it", ("visit",), name="step_period"),
     "angles": replace(STANCE, dims=("visit",)),
 }
+SETTLED: Final = "steps after which walks repeat themselves; 0: never, -1: none goes on"
 MARKS = {
     "after": Label("1", "point before a bifurcation; -1: none", name="mark_after"),
     "kind": replace(KIND, name="mark_kind"),
@@ -72,6 +73,12 @@ def groups(
     """
     value = {"value": Label(parameter.unit, parameter.key)}
     stored: dict[str, Group] = {}
+
+    def over(plane: BifurcationCurve | Regions, *dims: str) -> dict[str, Variable]:
+        """Values of both parameters."""
+        axes = zip(("value", "second"), (plane.first, plane.second), (parameter, second), dims, strict=True)
+        return {name: labelled(values, Label(one.unit, one.key), dim) for name, values, one, dim in axes if one}
+
     if said["branches"]:
         ends = {"from": Label(parameter.unit, "where it begins"), "to": Label(parameter.unit, "where it ends")}
         overview = columns(said["branches"], {"model": MODEL, "period": PERIOD, **ends}, "branch")
@@ -82,11 +89,11 @@ def groups(
         if one.step_map is None:
             continue
         own: dict[str, Group] = {}
-        if second is not None:
-            labels = Label(parameter.unit, parameter.key), Label(second.unit, second.key)
-            own |= {f"curve_{number}": curve_group(curve, *labels) for number, curve in enumerate(one.curves)}
-            if one.regions is not None:
-                own["regions"] = regions_group(one.regions, *labels)
+        for number, curve in enumerate(one.curves):
+            own[f"curve_{number}"] = Group(over(curve, "point", "point"), {"kind": curve.kind, "period": curve.period})
+        if one.regions is not None:
+            periods = Variable(one.regions.period, ("first", "second"), "1", SETTLED)
+            own["regions"] = Group({**over(one.regions, "first", "second"), "period": periods})
         for number, branch in enumerate(one.branches):
             marks = [*birth_of(branch, one.branches), *marks_on(branch)]
             own[f"branch_{number}"] = branch_group(branch, marks, one.step_map.monitors, value)
@@ -103,19 +110,6 @@ def groups(
             own |= motions(one.branches, config, parameter)
         stored |= {f"{one.model}/{name}": group for name, group in own.items()}
     return stored
-
-
-def curve_group(curve: BifurcationCurve, first: Label, second: Label) -> Group:
-    """A curve over the plane of both parameters."""
-    over = {"value": labelled(curve.first, first, "point"), "second": labelled(curve.second, second, "point")}
-    return Group(over, {"kind": curve.kind, "period": curve.period})
-
-
-def regions_group(regions: Regions, first: Label, second: Label) -> Group:
-    """What walks settle on over the plane of both parameters."""
-    periods = "steps after which walks repeat themselves; 0: never, -1: none goes on"
-    axes = {"value": labelled(regions.first, first, "first"), "second": labelled(regions.second, second, "second")}
-    return Group({**axes, "period": Variable(regions.period, ("first", "second"), "1", periods)})
 
 
 class Mark(NamedTuple):

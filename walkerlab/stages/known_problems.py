@@ -15,7 +15,7 @@ def run(_config: object, _inputs: Mapping[str, Content], progress: Progress) -> 
     progress.start("known problems", len(PROBLEMS))
     rows = []
     for problem in PROBLEMS:
-        known = problem.answered()
+        known = problem()
         rows.append({**asdict(known), "error": known.error, "ok": known.ok})
         progress.advance()
     right = sum(row["ok"] for row in rows)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from walkerlab.config.schema import Config
 from walkerlab.pipeline.graph import PIPELINE
-from walkerlab.pipeline.plan import STILL_COMPUTED, why_unsuited
+from walkerlab.pipeline.plan import STILL_COMPUTED
 from walkerlab.pipeline.progress import Progress
 from walkerlab.report.blocks import MAIN
 from walkerlab.report.page import Page, render
@@ -83,6 +83,6 @@ def write_pages(
 
 def has_failed(config: Config, name: str, left_out: set[str]) -> bool:
     """Whether a stage without a result was tried itself, and not given up for want of another: it has no answer."""
-    if name not in PIPELINE["report"].inputs(config) or why_unsuited(PIPELINE[name], config) is not None:
+    if name not in PIPELINE["report"].inputs(config) or PIPELINE[name].why_unsuited(config) is not None:
         return False
     return left_out.isdisjoint(PIPELINE[name].inputs(config))

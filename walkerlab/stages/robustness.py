@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
 from functools import partial
 from typing import Any, Final
 
@@ -20,11 +20,11 @@ from walkerlab.hybrid.recorded_walk import as_state
 from walkerlab.hybrid.walk_record import rough_heights
 from walkerlab.labels import Label
 from walkerlab.mechanics.standing import Standing
+from walkerlab.orbits.family_search import CONTACT, RIGID
 from walkerlab.orbits.gradients import QUANTITIES, Gradient, gait_numbers, gradients, relative
 from walkerlab.orbits.robustness import (
     DISTURBANCES,
     INDICATORS,
-    Sensitivity,
     Standpoint,
     largest_disturbance,
     rough_walks,
@@ -37,7 +37,7 @@ from walkerlab.orbits.step_map import StepMap
 from walkerlab.pipeline.pieces import Piece, complete
 from walkerlab.pipeline.progress import Progress
 from walkerlab.scene.families import contact_map, rigid_map
-from walkerlab.scene.parameter import SLOPE_RAD, Parameter, parameter_of, why_no_parameter
+from walkerlab.scene.parameter import SLOPE, Parameter, parameter_of, why_no_parameter
 from walkerlab.scene.rigid import rigid_scene, rigid_walker
 from walkerlab.solvers.registry import ENDLESS, Tolerances
 from walkerlab.solvers.system import Floats
@@ -49,8 +49,6 @@ from walkerlab.workers import in_order
 
 Rows = list[dict[str, Any]]
 
-RIGID: Final = "rigid"
-CONTACT: Final = "contact"
 QUICK: Final = {RIGID: Tolerances("dop853", 1e-7, 1e-9, ENDLESS), CONTACT: Tolerances("radau5", 1e-6, 1e-8, 1_000_000)}
 """Of walks that are counted; the budget is a step's."""
 WALKS_AT_ONCE: Final = 25
@@ -59,7 +57,6 @@ MAX_STEPS: Final = {RIGID: 2_000_000, CONTACT: 40_000}
 """On one rough ground, all walks together."""
 COMPILED: Final = ()
 """No piece comes first: with the gait's own numbers all kernels are there."""
-SLOPE: Final = Parameter(SLOPE_RAD, "rad", (SLOPE_RAD,))
 UNITS: Final = {"floor-drop": "m", "hip-push": "N s"}
 OF: Final = dict(zip(INDICATORS, ("s", "m", "m/s"), strict=True))
 MODEL: Final = {"model": Label("", "which model walks")}
@@ -119,10 +116,14 @@ def run(
             continue
         found["gait_sensitivity_norm"] += norms(subject.model, here)
         pieces = [*single(subject, config), *rough(subject, config)]
-        complete(pieces, parts, f"robustness: {subject.model} model", progress, jobs, first=COMPILED)
-        for name, rows in walked(subject.model, config, parts).items():
-            found[name] += rows
-        steps[subject.model] = steps_walked(subject.model, config, parts)
+        done, _ = complete(pieces, parts, f"robustness: {subject.model} model", progress, jobs, first=COMPILED)
+        (down,), (up,), (forward,), (backward,), *walks = done
+        of, wanted = {"model": subject.model}, {"steps": config.robustness.steps}
+        found["largest_step"].append({**of, "down_m": down, "up_m": up, **wanted})
+        found["largest_push"].append({**of, "forward_N_s": forward, "backward_N_s": backward, **wanted})
+        every = np.array([taken for some in walks for taken in some])
+        steps[subject.model] = every.reshape(-1, config.robustness.walks)
+        found["rough_ground"] += rough_rows(subject.model, config, steps[subject.model])
     groups = {name: rows_group(found[name], MODEL | labels) for name, labels in LABELS.items() if found[name]}
     if steps and config.robustness.roughness_m:
         groups |= {"rough_steps": rough_steps(config, steps), **rough_walk(config, inputs)}
@@ -169,13 +170,17 @@ class Subject:
         """The gait on the step map over a parameter."""
         p = parameter.value_in(self.config)
         step_map: StepMap = (
-            rigid_map(self.config, parameter, 1.0).at(EXACT)
+            rigid_map(self.config, parameter, 1.0)
             if self.model == RIGID
             else contact_map(self.config, parameter, 1.0, self.length_m)
         )
         step_map = step_map if exact else step_map.at(QUICK[self.model])
-        _, units = unit_walker(rigid_walker(self.config, self.config.equations))
+        _, units = unit_walker(rigid_walker(self.config))
         return Standpoint(step_map, p, self.z, step_map.step(self.z, p).DP, units)
+
+    def gradients(self, parameter: Parameter, wanted: Collection[str]) -> dict[str, Gradient]:
+        """Derivatives of the gait's numbers by a parameter."""
+        return gradients(self.at(parameter), abs(parameter.value_in(self.config)) or 1e-2, wanted)
 
 
 def subjects(config: RobustnessConfig, inputs: Mapping[str, Content], progress: Progress) -> Iterator[Subject]:
@@ -205,7 +210,7 @@ def subject_of(
     """
     length = float(gait["step_length_m"])
     if model == RIGID:
-        z = section_coordinates(rigid_walker(config, config.equations), gait["state"])
+        z = section_coordinates(rigid_walker(config), gait["state"])
         return Subject(RIGID, config, z, length)
     # Imported here: the rigid model alone does without.
     from walkerlab.scene.contact import gait_off_pads, with_contact
@@ -222,33 +227,24 @@ def subject_of(
     return Subject(CONTACT, config, z, length)
 
 
-def norms(model: str, here: Standpoint) -> Rows:
-    """Rows of sensitivity norms."""
-    rows: Rows = []
+def norms(model: str, here: Standpoint) -> Iterator[dict[str, Any]]:
+    """Rows of sensitivity norms, one for each indicator of a disturbance."""
     for disturbance in DISTURBANCES:
-        answer = sensitivity(here, disturbance)
-        if answer is not None:
-            rows += norm_rows(model, disturbance, answer, here)
-    return rows
-
-
-def norm_rows(model: str, disturbance: Any, answer: Sensitivity, here: Standpoint) -> Rows:
-    """A row for each indicator of a disturbance."""
-    units = here.units
-    to_pure = here.unit_of(disturbance) / np.array((units.time, units.length, units.length / units.time))
-    return [
-        {
-            "model": model,
-            "disturbance": disturbance,
-            "indicator": indicator,
-            "value": float(answer.norm[k]),
-            "direct": float(answer.direct[k]),
-            "unit": f"{unit}/({UNITS[disturbance]})" if " " in UNITS[disturbance] else f"{unit}/{UNITS[disturbance]}",
-            "scaled": float(answer.norm[k] * to_pure[k]),
-            "error": float(answer.error[k]),
-        }
-        for k, (indicator, unit) in enumerate(OF.items())
-    ]
+        answer, units, of = sensitivity(here, disturbance), here.units, UNITS[disturbance]
+        if answer is None:
+            continue
+        to_pure = here.unit_of(disturbance) / np.array((units.time, units.length, units.length / units.time))
+        for k, (indicator, unit) in enumerate(OF.items()):
+            yield {
+                "model": model,
+                "disturbance": disturbance,
+                "indicator": indicator,
+                "value": float(answer.norm[k]),
+                "direct": float(answer.direct[k]),
+                "unit": f"{unit}/({of})" if " " in of else f"{unit}/{of}",
+                "scaled": float(answer.norm[k] * to_pure[k]),
+                "error": float(answer.error[k]),
+            }
 
 
 def single(subject: Subject, config: RobustnessConfig) -> Iterator[Piece]:
@@ -285,14 +281,6 @@ def rough_of(subject: Subject, roughness: float, seed: int, walks: range, most: 
     return [float(steps_on_rough_ground(here, roughness, (seed, walk), most)) for walk in walks]
 
 
-def steps_walked(model: str, config: RobustnessConfig, parts: Parts) -> Floats:
-    """Steps (roughness, walk) of a model's walks on rough ground."""
-    asked = config.robustness
-    places = range(0, asked.walks, WALKS_AT_ONCE)
-    rows = [[parts.kept[f"{model} rough {roughness:g} {first}"] for first in places] for roughness in asked.roughness_m]
-    return np.array([np.concatenate(row) for row in rows])
-
-
 def rough_steps(config: RobustnessConfig, steps: Mapping[str, Floats]) -> Group:
     """The steps of every walk, as they are stored."""
     roughness, caps = np.array(config.robustness.roughness_m), np.array([cap(model, config) for model in steps])
@@ -316,23 +304,14 @@ def rough_walk(config: RobustnessConfig, inputs: Mapping[str, Content]) -> dict[
     return {f"rough_walk/{name}": group for name, group in groups_of_walk(scene, walk).items()}
 
 
-def walked(model: str, config: RobustnessConfig, parts: Parts) -> dict[str, Rows]:
-    """What the pieces of a model came to."""
-    asked, kept = config.robustness, parts.kept
-    (down, up), (forward, backward) = (
-        tuple(kept[f"{model} {disturbance} {sign:g}"][0] for sign in (1.0, -1.0)) for disturbance in DISTURBANCES
-    )
-    most, grounds = cap(model, config), []
-    for roughness, steps in zip(asked.roughness_m, steps_walked(model, config, parts), strict=True):
-        seen = rough_walks(steps, most)
-        error = {} if seen.standard_error is None else {"standard_error": seen.standard_error}
-        told = {"mean_steps": seen.mean, **error, "walks": seen.walks, "capped": seen.capped, "method": seen.method}
-        grounds.append({"model": model, "roughness_m": roughness, **told, "cut_off_at": most})
-    return {
-        "largest_step": [{"model": model, "down_m": down, "up_m": up, "steps": asked.steps}],
-        "largest_push": [{"model": model, "forward_N_s": forward, "backward_N_s": backward, "steps": asked.steps}],
-        "rough_ground": grounds,
-    }
+def rough_rows(model: str, config: RobustnessConfig, steps: Floats) -> Rows:
+    """How long walks last, of so many steps (roughness, walk), on each rough ground."""
+    most, rows = cap(model, config), []
+    for roughness, taken in zip(config.robustness.roughness_m, steps, strict=True):
+        seen = asdict(rough_walks(taken, most))
+        told = {name: value for name, value in seen.items() if value is not None}
+        rows.append({"model": model, "roughness_m": roughness, **told, "cut_off_at": most})
+    return rows
 
 
 def sensitivities(
@@ -348,7 +327,9 @@ def sensitivities(
         value = parameter.value_in(subject.config)
         for name, gradient in of_key.items():
             if name in numbers:
-                told = {} if gradient.value is None else relative_effect(gradient, value, numbers[name])
+                share = None if gradient.value is None else relative(gradient.value, value, numbers[name])
+                told = {} if gradient.value is None else {"error": float(gradient.error or 0.0)}
+                told |= {} if share is None else {"relative": share}
                 unit = QUANTITIES[name] if parameter.unit == "1" else f"{QUANTITIES[name]} per {parameter.unit}"
                 rows.append(
                     {"model": subject.model, "of": name, "to": key, "value": gradient.value, "unit": unit, **told}
@@ -358,19 +339,11 @@ def sensitivities(
     return sorted(rows, key=lambda row: (row["value"] is None, "relative" not in row, -abs(row.get("relative", 0.0))))
 
 
-def relative_effect(gradient: Gradient, parameter: float, quantity: float) -> dict[str, float]:
-    """Error of a derivative, and its relative effect where the parameter is not 0."""
-    assert gradient.value is not None
-    share = relative(gradient.value, parameter, quantity)
-    return {"error": float(gradient.error or 0.0)} | ({} if share is None else {"relative": share})
-
-
 def gradients_of(subject: Subject, key: str) -> dict[str, Gradient]:
     """Derivatives by one key; the cost of transport of a passive walker is its slope's sine."""
-    parameter = parameter_of(key, subject.config)
-    value = parameter.value_in(subject.config)
     known = () if drives_of(subject.config) else ("cost_of_transport",)
-    return gradients(subject.at(parameter), abs(value) or 1e-2, [name for name in QUANTITIES if name not in known])
+    wanted = [name for name in QUANTITIES if name not in known]
+    return subject.gradients(parameter_of(key, subject.config), wanted)
 
 
 def numbers_read(subject: Subject) -> tuple[str, ...]:

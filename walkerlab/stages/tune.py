@@ -11,7 +11,7 @@ from walkerlab.config.reads import TuneConfig
 from walkerlab.config.walkers import is_plain_compass, is_the_papers
 from walkerlab.ground.terrain import STANCE_FOOT
 from walkerlab.ground.walker import ContactWalker
-from walkerlab.hybrid.contact_run import ContactWalkResult, by_channel
+from walkerlab.hybrid.contact_run import ContactWalkResult, by_channel, sampled_feet
 from walkerlab.hybrid.recorded_walk import as_state, take_walk, with_scaled_rates
 from walkerlab.labels import Label
 from walkerlab.mechanics.standing import STANCE, SWING, Standing
@@ -21,7 +21,7 @@ from walkerlab.orbits.contact_map import angled_bodies, step_of, turning_bodies
 from walkerlab.orbits.rigid_limit import motion_of_legs
 from walkerlab.orbits.step_map import Cycle
 from walkerlab.outcome import Outcome
-from walkerlab.paper.adams_start import AdamsWalk, adams_walk, forces_of
+from walkerlab.paper.adams_start import AdamsWalk, adams_walk
 from walkerlab.paper.printed import TABLE_2
 from walkerlab.pipeline.progress import Progress
 from walkerlab.scene.contact import ContactScene, contact_gait, start_state, with_contact
@@ -103,7 +103,7 @@ class TuneRun:
         self.config, self.scene, self.rigid_state, self.gait = config, scene, rigid_state, gait
         self.names, self.steps = coordinates(config), 2 * config.strides
         self.tolerances = tolerances_of(config, self.steps)
-        self.rigid: Standing = rigid_walker(config, config.equations)
+        self.rigid: Standing = rigid_walker(config)
         self.hinge = is_plain_compass(config)
         self.starts = starts_of(scene, self.rigid, rigid_state, self.steps, gait, self.tolerances)
         self.walks: dict[str, ContactWalkResult] = {}
@@ -163,7 +163,7 @@ class TuneRun:
         first = self.rigid_state[n + SWING], self.rigid_state[n + STANCE]
         if walk is None or walk.steps < 2 or walk.samples is None or 0.0 in first:
             return None
-        time, normal, _ = forces_of(walk, self.scene.walker)
+        time, normal = walk.samples.time_s, sampled_feet(self.scene.walker, walk.samples)[:, :, 2]
         landed = walk.steps % 2  # leg 0 lands first
         swing = 1 - landed
         lifted = np.flatnonzero((time > walk.touch_time_s[-2]) & (normal[:, swing] <= 0.0) & (normal[:, landed] > 0.0))
@@ -175,7 +175,7 @@ class TuneRun:
     def walk(self, state: State, pinned: bool = False, tolerances: Tolerances | None = None) -> ContactWalkResult:
         """Walk the contact model from a rigid state, as contact-sim does, with samples; at the config's tolerances."""
         scene = replace(self.scene, pinned=pinned)
-        interval = scene.frame.pendulum_time / SAMPLES_PER_PENDULUM_TIME
+        interval = scene.ground.frame.pendulum_time / SAMPLES_PER_PENDULUM_TIME
         return scene.walk(start_state(scene, state), self.steps, tolerances or self.tolerances, interval)
 
     def take(self, name: str, state: State) -> None:

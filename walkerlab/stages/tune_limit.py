@@ -110,7 +110,7 @@ def limit_findings(
         float(rigid_gait["step_length_m"]),
         motion,
         walk.steps,
-        scene.frame.pendulum_time / (FINER * SAMPLES_PER_PENDULUM_TIME),
+        scene.ground.frame.pendulum_time / (FINER * SAMPLES_PER_PENDULUM_TIME),
         1 if compass else OTHERS_EVERY,
     )
     walked = (ALL, ALL_POINT) if isinstance(config.walker, CompassWalker) else (ALL,)  # others roll in both models

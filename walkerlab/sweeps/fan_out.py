@@ -4,7 +4,7 @@ import math
 from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, wait
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from itertools import islice
 from typing import Final
 
@@ -24,29 +24,25 @@ MAX_DEATHS: Final = 12
 """Deaths before any chunk has come back, after which it is the machine and not the points."""
 
 
+@dataclass
 class FanOut:
-    """One sweep's work on an engine."""
+    """One sweep's work on an engine.
 
-    def __init__(
-        self,
-        engine: SweepEngine,
-        order: Order,
-        chunk_s: float,
-        todo: Iterator[SweepPoint],
-        count: int,
-    ) -> None:
-        """Begin nothing yet.
+    chunk_s  how long a chunk is to take, s
+    todo     points, of which so many are `left`
+    point_s  how long a point takes, s, once that is known
+    """
 
-        chunk_s  how long a chunk is to take, s
-        todo     points, of which there are `count`
-        """
-        self.engine, self.order, self.chunk_s = engine, order, chunk_s
-        self.todo, self.left = todo, count
-        self.point_s: float | None = None
-        self._again: deque[ChunkTask] = deque()
-        self._running: dict[Future[Chunk], ChunkTask] = {}
-        self._deaths = 0
-        self._alive = False
+    engine: SweepEngine
+    order: Order
+    chunk_s: float
+    todo: Iterator[SweepPoint]
+    left: int
+    point_s: float | None = None
+    _again: deque[ChunkTask] = field(default_factory=deque)
+    _running: dict[Future[Chunk], ChunkTask] = field(default_factory=dict)
+    _deaths: int = 0
+    _alive: bool = False
 
     def run(self, graph: str, target: str, keep: Callable[[Chunk], None]) -> None:
         """Compute all points and hand each chunk to `keep`; points that could not be computed come as failed rows.

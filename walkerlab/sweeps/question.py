@@ -9,7 +9,7 @@ from typing import Any, Final, Literal
 from pydantic.fields import FieldInfo
 
 from walkerlab.config.contact import Contact
-from walkerlab.config.fields import extra, leaves
+from walkerlab.config.fields import extra, held, leaves
 from walkerlab.config.layers import ConfigSetting
 from walkerlab.config.problems import nearest, refused
 from walkerlab.config.reader import read
@@ -87,11 +87,9 @@ class SweptStage:
         """Which value of each parameter a point has; the last parameter changes fastest."""
         if self.layout == "list":
             return (index,) * len(self.axes)
-        places = []
-        for length in reversed(self.shape):
-            index, place = divmod(index, length)
-            places.append(place)
-        return tuple(reversed(places))
+        import numpy as np
+
+        return tuple(int(place) for place in np.unravel_index(index, self.shape))
 
     def settings(self, index: int) -> list[ConfigSetting]:
         """The `--set` options of one point."""
@@ -247,14 +245,6 @@ def drawn(one: Axis, column: Any) -> Iterator[Value]:
             yield from as_the_key_has_it(one.key, [one.ends[0] + share * (one.ends[1] - one.ends[0])])
         else:
             yield one.values[min(int(share * len(one.values)), len(one.values) - 1)]
-
-
-def held(config: Config, path: Sequence[str]) -> Any:
-    """The value at a path; None if the config has no such block."""
-    found: Any = config
-    for name in path:
-        found = getattr(found, name, None)
-    return found
 
 
 def described(config: Config, key: str) -> tuple[str, str]:

@@ -16,7 +16,7 @@ from walkerlab.config.problems import SHOWN_PROBLEMS
 from walkerlab.config.schema import Config
 from walkerlab.errors import ConfigError, NoAnswer, WalkerlabError
 from walkerlab.pipeline.graph import PIPELINE, Graph
-from walkerlab.pipeline.in_memory import Keys
+from walkerlab.pipeline.identity import Keys
 from walkerlab.pipeline.progress import Progress, Reporter, Silent
 from walkerlab.pipeline.runs import claim, refuse_another_config
 from walkerlab.stages.numerical_error import SAMPLE, evenly_spread

@@ -125,28 +125,21 @@ class Known:
         return bool(math.isfinite(self.error) and self.error <= self.limit)
 
 
-@dataclass(frozen=True)
-class KnownProblem:
-    """One known problem: `value` runs it through the contact code, `reference` answers it otherwise."""
+def answered(
+    name: str, quantity: str, run: Callable[[], float], other: Callable[[], float], source: str, limit: float, why: str
+) -> Known:
+    """Both numbers of a problem; a run that gives none has an error that fails.
 
-    name: str
-    quantity: str
-    value: Callable[[], float]
-    reference: Callable[[], float]
-    source: str
-    limit: float
-    why: str
-
-    def answered(self) -> Known:
-        """Both numbers; a run that gives none has an error that fails."""
-        started = time.perf_counter()
-        reference = self.reference()
-        try:
-            value = self.value()
-        except ArithmeticError:
-            value = math.copysign(1e300, reference)
-        wall_s = time.perf_counter() - started
-        return Known(self.name, self.quantity, value, reference, self.source, self.limit, self.why, wall_s)
+    run    through the contact code
+    other  answers it otherwise; see `Known` for the rest
+    """
+    started = time.perf_counter()
+    reference = other()
+    try:
+        value = run()
+    except ArithmeticError:
+        value = math.copysign(1e300, reference)
+    return Known(name, quantity, value, reference, source, limit, why, time.perf_counter() - started)
 
 
 SPRING: Final = NormalLaw(1.0e6, 1.0, 0.0, 1.0e-4)
@@ -233,40 +226,42 @@ def painleve_growth_rate() -> float:
 
 
 PROBLEMS: Final = (
-    KnownProblem(
-        "bouncing ball", "time from landing to landing, s", bouncing_ball_period,
+    partial(
+        answered, "bouncing ball", "time from landing to landing, s", bouncing_ball_period,
         partial(references.linear_bounce_period, 1.0, SPRING.stiffness, DROP, GRAVITY),
         "closed form: free flight and half a turn of the spring", 1e-7, "the tolerance asked for, over five bounces",
     ),
-    KnownProblem(
-        "ball dropped on the IMPACT law", "restitution at 0.5 m/s, a hundredth of the paper's damping",
+    partial(
+        answered, "ball dropped on the IMPACT law", "restitution at 0.5 m/s, a hundredth of the paper's damping",
         partial(restitution, LIGHT_LAW, 0.5),
         partial(references.restitution, BLOCK_MASS, 0.5, LIGHT_LAW, GRAVITY),
         "SciPy DOP853 on the law as its manual writes it", 1e-6, "the tolerance asked for, a thousandfold",
     ),
-    KnownProblem(
-        "ball dropped on thicker ground", "restitution at 0.5 m/s, a tenth of the paper's damping",
+    partial(
+        answered, "ball dropped on thicker ground", "restitution at 0.5 m/s, a tenth of the paper's damping",
         partial(restitution, THICK_LAW, 0.5),
         partial(references.restitution, BLOCK_MASS, 0.5, THICK_LAW, GRAVITY),
         "SciPy DOP853 on the law as its manual writes it", 1e-6, "the tolerance asked for, a thousandfold",
     ),
-    KnownProblem(
-        "block on an incline that holds it", "creep speed at 0.2 rad, m/s", partial(block_speed, 0.2, 0.0),
+    partial(
+        answered, "block on an incline that holds it", "creep speed at 0.2 rad, m/s", partial(block_speed, 0.2, 0.0),
         partial(references.creep_speed, 0.2, PAPER_FRICTION.static, PAPER_FRICTION.stiction_velocity),
         "root of the friction law's cubic, SciPy brentq", 1e-7, "the tolerance asked for",
     ),
-    KnownProblem(
-        "block on an incline too steep", "speed at 0.8 rad a second after 2 m/s, m/s", partial(block_speed, 0.8, 2.0),
+    partial(
+        answered, "block on an incline too steep", "speed at 0.8 rad a second after 2 m/s, m/s",
+        partial(block_speed, 0.8, 2.0),
         lambda: 2.0 + references.sliding_acceleration(0.8, PAPER_FRICTION.dynamic, GRAVITY),
         "closed form: g (sin - mu cos)", 1e-7, "the tolerance asked for",
     ),
-    KnownProblem(
-        "rimless wheel of eight spokes", "steady speed with a spoke upright at 0.08 rad, rad/s", rimless_wheel_speed,
+    partial(
+        answered, "rimless wheel of eight spokes", "steady speed with a spoke upright at 0.08 rad, rad/s",
+        rimless_wheel_speed,
         partial(references.wheel_upright_speed, SPOKES, WHEEL_SLOPE, GRAVITY, HUB_INERTIA),
         "McGeer 1990: closed form for rigid spokes", 1e-3, "the spokes' ground gives way and creeps a little",
     ),
-    KnownProblem(
-        "Painleve's rod", "rate at which its end digs itself in at friction 4, 1/s", painleve_growth_rate,
+    partial(
+        answered, "Painleve's rod", "rate at which its end digs itself in at friction 4, 1/s", painleve_growth_rate,
         partial(references.painleve_growth_rate, ROD_ANGLE, ROD_FRICTION, 1.0, ROD_STIFFNESS),
         "closed form, linearised", 1e-3, "the rod turns a little while it digs",
     ),

@@ -134,9 +134,7 @@ def impulse_rate(samples: ContactSamples, scene: ContactScene, config: RigidConf
 
     They are those of ground and gravity and, from the times of touches (steps,) on, of push-offs.
     """
-    feet = np.zeros((samples.time_s.size, 2, 5))
-    sampled_feet(scene.walker, samples.states, samples.has_ground, samples.level, feet)
-    along, height, normal, friction = np.moveaxis(feet[:, :, :4], 2, 0)
+    along, height, normal, friction, _ = np.moveaxis(sampled_feet(scene.walker, samples), 2, 0)
     slope = config.slope_rad
     weight = config.walker.total_mass_kg * config.gravity_m_s2 * np.array([np.sin(slope), -np.cos(slope)])
     torque = (along * normal - height * friction).sum(axis=1) + cross(samples.states[:, :2], weight)

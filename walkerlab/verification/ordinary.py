@@ -79,7 +79,7 @@ def choices(case: Case, config: WalksConfig) -> tuple[Choice, ...]:
         units = np.array([1.0, 1.0, *[1.0 / pendulum_time(config)] * 2])
         arrival = Arrival(case.name, float(walk.touch_time_s[-1]), np.array(walk.final_state), units)
         return tuple(script(arrival, compass, walk, name) for name in LIBRARY)
-    if not isinstance(start, ContactStart) or start.scene.pinned or start.scene.terrain.order_matters:
+    if not isinstance(start, ContactStart) or start.scene.pinned or start.scene.ground.terrain.order_matters:
         return ()
     walk = start.walk(short, Tolerances(*REFERENCE, short.budget)).record
     arrival = arrival_of(case.name, walk, natural_units(config))
@@ -148,7 +148,7 @@ def library(arrival: Arrival, ready: ContactStart, method: str) -> Choice:
     """A method of SciPy's solve_ivp with nothing but its name given."""
     from scipy.integrate import solve_ivp
 
-    system = OnPads(on_ground(ready.scene.walker, (True, True)), ready.scene.terrain)
+    system = OnPads(on_ground(ready.scene.walker, (True, True)), ready.scene.ground.terrain)
     start = np.array(ready.start)
     counts = np.zeros(COUNTS, np.int64)
     counts[BUDGET] = CAP
@@ -164,7 +164,7 @@ def library(arrival: Arrival, ready: ContactStart, method: str) -> Choice:
 
 def fixed(arrival: Arrival, ready: ContactStart, h: float, cap: int = CAP) -> Choice:
     """Semi-implicit Euler with a fixed step, at most `cap` of them."""
-    system = OnPads(on_ground(ready.scene.walker, (True, True)), ready.scene.terrain)
+    system = OnPads(on_ground(ready.scene.walker, (True, True)), ready.scene.ground.terrain)
     y = np.array(ready.start)
     began = time.perf_counter()
     taken = int(semi_implicit_euler(system, y, np.empty_like(y), arrival.time_s, h, cap))

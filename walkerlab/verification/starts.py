@@ -114,7 +114,7 @@ class ContactStart(CaseStart):
     def walk(self, case: Case, tolerances: Tolerances, sampled: bool = False) -> JudgedWalk:
         """Walk a case by a method."""
         scene, unit = self.scene, pendulum_time(self.config)
-        interval = scene.frame.pendulum_time / SAMPLES_PER_PENDULUM_TIME if sampled else None
+        interval = scene.ground.frame.pendulum_time / SAMPLES_PER_PENDULUM_TIME if sampled else None
         walk = scene.walk(self.start, case.steps, tolerances, interval)
         numbers = np.concatenate([walk.end_state, walk.touch_time_s, walk.touch_along_m, walk.dissipated_J])
         touches, end = walk.touch_time_s / unit, walk.end_time_s / unit
@@ -155,7 +155,7 @@ def gait_of(walker: Standing, seed: int) -> RigidGait | None:
 
 def prepared(config: WalksConfig, case: Case) -> Start | None:
     """The start of a case; None if it starts from a gait that there is not, or its pads are laid for one."""
-    walker = rigid_walker(config, config.equations)
+    walker = rigid_walker(config)
     if isinstance(config.start, str):
         gait = gait_of(walker, config.seed)
         if gait is None:

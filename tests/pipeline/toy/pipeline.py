@@ -17,8 +17,8 @@ GRAPH = Graph(
     Stage("drop", "toy.drop", "Drop a stone.", keys("gravity_m_s2", "slope_rad")),
     Stage("roll", "toy.roll", "Roll on.", ROLLS, drop_unless_start_is_given, walks=True),
     Stage("bounce", "toy.bounce", "Bounce.", keys("contact"), results_of("drop"), needs_contact=True),
-    Stage("survey", "toy.survey", "Time it.", keys("seed"), has_cells=True),
-    Stage("census", "toy.census", "Count the stones.", keys("seed"), campaign_of="survey", keeps_parts=True),
+    Stage("survey", "toy.survey", "Time it.", keys("seed")),
+    Stage("census", "toy.census", "Count the stones.", keys("seed"), campaign_of="survey"),
     Stage(
         "picture",
         "toy.picture",

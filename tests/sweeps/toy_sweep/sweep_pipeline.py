@@ -12,6 +12,6 @@ GRAPH = Graph(
     Stage("drop", "toy_sweep.falling_stone", "Drop a stone.", keys("gravity_m_s2", "slope_rad", "walker")),
     Stage("roll", "toy_sweep.rolling_stone", "Roll on.", keys("strides"), results_of("drop"), walks=True),
     Stage("deadly", "toy_sweep.deadly", "End the worker.", keys("seed")),
-    Stage("count", "toy_sweep.counting", "Count in parts.", keys("seed"), has_cells=True, keeps_parts=True),
+    Stage("count", "toy_sweep.counting", "Count in parts.", keys("seed")),
     Stage("picture", "toy_sweep.falling_stone", "Draw it.", keys("name"), draws=True),
 )

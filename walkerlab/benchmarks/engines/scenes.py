@@ -19,10 +19,8 @@ from walkerlab.hybrid.contact_events import JudgedGround
 from walkerlab.hybrid.contact_run import knees_at_start
 from walkerlab.mechanics.assembly import Anchor, levers, masses, total_mass
 from walkerlab.mechanics.parts import Assembly, Knee
-from walkerlab.mechanics.standing import swing_foot
 from walkerlab.scene.contact import contact_scene, knee_rules, start_state
 from walkerlab.scene.parts import assembly_of
-from walkerlab.scene.rigid import rigid_walker
 from walkerlab.solvers.system import Floats, State
 
 
@@ -108,7 +106,7 @@ class EngineScene:
         return replace(self, start=(*self.start[: 2 + n], *(factor * x for x in self.start[2 + n :])))
 
 
-def scenes(config: ContactConfig, rigid_step_length_m: float | None, rigid_state: State) -> tuple[EngineScene, ...]:
+def scenes(config: ContactConfig, rigid_step_length_m: float, rigid_state: State) -> tuple[EngineScene, ...]:
     """The walks of a config: its walker on its own ground, free from its start.
 
     Raises ConfigError for a walker that other engines cannot be told of.
@@ -123,8 +121,7 @@ def scenes(config: ContactConfig, rigid_step_length_m: float | None, rigid_state
         raise ConfigError(
             "engines: the compliant stop of a knee is not taken to other engines.", "Choose walker.knee.lock: ideal."
         )
-    length = rigid_step_length_m or abs(swing_foot(rigid_walker(config, config.equations), rigid_state)[1])
-    scene = replace(contact_scene(config, length, length), pinned=False)
+    scene = replace(contact_scene(config, rigid_step_length_m, rigid_step_length_m), pinned=False)
     assembly, start = scene.assembly, start_state(scene, rigid_state)
     upper = assembly.legs[STANCE_FOOT][0]
     base = Anchor(upper, hinge_of(assembly, upper, assembly.legs[1 - STANCE_FOOT][0]))
