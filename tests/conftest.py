@@ -1,8 +1,10 @@
 """What all tests share: property tests draw the same examples everywhere, and a slow machine is no failure.
 
 Files that compile or compute longest come first: no worker is left alone with one of them while the others are done.
+One worker more than there are processors computes while others wait for programs, browsers and servers.
 """
 
+import pytest
 from hypothesis import settings
 
 settings.register_profile("walkerlab", deadline=None, derandomize=True, database=None)
@@ -10,9 +12,17 @@ settings.load_profile("walkerlab")
 
 LONGEST_FIRST = (
     "test_campaigns", "test_tune", "test_same_bits", "test_kneed_contact_walk", "test_whole_report", "test_plain_walks",
-    "test_scene_catalogue", "test_rigid_walk", "test_catalogue", "test_continuation", "test_api", "test_sweep_engines",
-    "test_hinged_walks", "test_lean_scenes", "test_exports", "test_engine_adapters", "test_page", "test_server",
+    "test_docs", "test_scene_catalogue", "test_rigid_walk", "test_catalogue", "test_continuation", "test_api",
+    "test_sweep_engines", "test_hinged_walks", "test_lean_scenes", "test_exports", "test_engine_adapters",
+    "test_figure_style", "test_page", "test_server", "test_every_key", "test_figures", "test_robustness_stage",
+    "test_robustness", "test_fresh_code", "test_sources",
 )  # fmt: skip
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_xdist_auto_num_workers():
+    """How many workers there are, but for `--maxprocesses`."""
+    return (yield) + 1
 
 
 def pytest_collection_modifyitems(items):

@@ -18,6 +18,7 @@ from walkerlab.cli.films import Film, walk_in, write_film
 from walkerlab.config.loader import load
 from walkerlab.config.reads import only
 from walkerlab.config.schema import Config
+from walkerlab.config.writer import to_yaml
 from walkerlab.errors import ConfigError, StaleError
 from walkerlab.figures import illustration
 from walkerlab.figures.style import WIDTH
@@ -28,7 +29,7 @@ from walkerlab.stages import plot
 from walkerlab.store.artifact import write
 from walkerlab.store.content import Content
 from walkerlab.store.provenance import begin
-from walkerlab.store.runfolder import RunFolder
+from walkerlab.store.runfolder import Record, RunFolder
 
 QUIET = Console(quiet=True)
 
@@ -42,7 +43,9 @@ def run(tmp_path, monkeypatch):
         extra = {"table3": {"t_left": {"unit": "s", "corrected": 0.7}}} if name == "compare" else {}
         content = Content(result.groups, {**result.summary, **extra})
         write(folder / f"{name}.h5", content, result.identity, begin(load().config, {}))
-    return RunFolder.at(folder)
+    made = RunFolder.at(folder)
+    made.write_record(Record("paper", "", to_yaml(load().config)))  # without, all results are read to know the config
+    return made
 
 
 @pytest.mark.parametrize(

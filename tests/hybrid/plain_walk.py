@@ -13,6 +13,7 @@ import numba
 import numpy as np
 
 njit = partial(numba.njit, cache=True)  # all in one file, by whose time and size numba knows what is stale
+inner = partial(njit, no_cpython_wrapper=True, no_cfunc_wrapper=True)  # called by compiled code alone
 
 CHECKERBOARD, AFTER_MID_SWING, PLANE = 0, 1, 2
 WALKED, FELL, OFF_PAD, LIFTED_OFF, SLID, NO_HEEL_STRIKE, BENT_KNEE, STUBBED = 0, 1, 2, 3, 4, 5, 9, 10
@@ -121,7 +122,7 @@ def kneed_legs(thigh, thigh_mass_at, thigh_mass, shank, shank_mass_at, shank_mas
     return masses, levers, np.zeros(4), feet, np.array([2, 3]), radius, np.array([[0, 2], [1, 3]])
 
 
-@njit
+@inner
 def cubic(x, x0, h0, x1, h1):
     """ADAMS's STEP."""
     s = min(max((x - x0) / (x1 - x0), 0.0), 1.0)
@@ -129,9 +130,9 @@ def cubic(x, x0, h0, x1, h1):
 
 
 @njit
-def turned(walker, levers, y, k):
-    """One body's part of the way from the hip."""
-    a, (ahead, up) = y[2 + k] + walker.slope, levers[k]
+def turned(slope, levers, i, y, k):
+    """One body's part of the way from the hip to a mass or foot."""
+    a, ahead, up = y[2 + k] + slope, levers[i, k, 0], levers[i, k, 1]
     if ahead == 0.0 and up == 0.0:
         return 0.0, 0.0  # most masses hang on few of the bodies
     return np.cos(a) * ahead - np.sin(a) * up, np.sin(a) * ahead + np.cos(a) * up
@@ -143,17 +144,20 @@ def foot_at(walker, foot, y):
     n = walker.inertias.size
     x, h, v, w = y[0], y[1] - walker.radius, y[2 + n], y[3 + n]
     for k in range(n):
-        rx, rh = turned(walker, walker.foot_levers[foot], y, k)
+        rx, rh = turned(walker.slope, walker.foot_levers, foot, y, k)
         x, h, v, w = x + rx, h + rh, v - y[4 + n + k] * rh, w + y[4 + n + k] * rx
     return x, h, v + walker.radius * y[4 + n + walker.foot_bodies[foot]], w, v
 
 
-@njit
+@inner
 def solve(A, b):
     """Gauss with pivots, in place."""
     size = b.size
     for k in range(size):
-        pivot = k + np.argmax(np.abs(A[k:, k]))
+        pivot = k
+        for i in range(k + 1, size):
+            if abs(A[i, k]) > abs(A[pivot, k]):
+                pivot = i
         if pivot != k:
             for j in range(size):
                 A[k, j], A[pivot, j] = A[pivot, j], A[k, j]
@@ -171,7 +175,7 @@ def solve(A, b):
     return b
 
 
-@njit
+@inner
 def matrices(walker, now, y):
     """Mass matrix with the rows of what is held, and the forces of weight and turning; room for multipliers."""
     n, knees = walker.inertias.size, walker.knees.shape[0]
@@ -184,19 +188,19 @@ def matrices(walker, now, y):
     for i in range(walker.masses.size):
         m, bx, bh = walker.masses[i], 0.0, 0.0
         for k in range(n):
-            rx, rh = turned(walker, walker.levers[i], y, k)
+            rx, rh = turned(walker.slope, walker.levers, i, y, k)
             J[0, 2 + k], J[1, 2 + k] = -rh, rx
             bx, bh = bx - y[4 + n + k] ** 2 * rx, bh - y[4 + n + k] ** 2 * rh
         for p in range(2 + n):
             b[p] += m * (J[0, p] * (weight_x - bx) + J[1, p] * (weight_h - bh))
-            for q in range(2 + n):
+            for q in range(p + 1):
                 A[p, q] += m * (J[0, p] * J[0, q] + J[1, p] * J[1, q])
     for k in range(n):
         A[2 + k, 2 + k] += walker.inertias[k]
     row = 2 + n
     if hinged >= 0:
         for k in range(n):
-            rx, rh = turned(walker, walker.foot_levers[hinged], y, k)
+            rx, rh = turned(walker.slope, walker.foot_levers, hinged, y, k)
             A[row, 2 + k], A[row + 1, 2 + k] = -rh, rx
             b[row] += y[4 + n + k] ** 2 * rx
             b[row + 1] += y[4 + n + k] ** 2 * rh
@@ -206,24 +210,24 @@ def matrices(walker, now, y):
         if locked[knee]:
             A[row, 2 + walker.knees[knee, 1]], A[row, 2 + walker.knees[knee, 0]] = 1.0, -1.0
             row += 1
-    for i in range(2 + n, size):
-        for j in range(2 + n):
+    for i in range(size):
+        for j in range(i):
             A[j, i] = A[i, j]
     return A, b
 
 
-@njit
+@inner
 def push(walker, foot, y, b, along, upward):
     """Let a force (N) at a foot's contact point act."""
     b[0] += along
     b[1] += upward
     for k in range(walker.inertias.size):
-        rx, rh = turned(walker, walker.foot_levers[foot], y, k)
+        rx, rh = turned(walker.slope, walker.foot_levers, foot, y, k)
         b[2 + k] += rx * upward - rh * along
     b[2 + walker.foot_bodies[foot]] += walker.radius * along
 
 
-@njit
+@inner
 def push_off(walker, now, t, y, b):
     """The trailing leg's pulse, along the line from where its foot touches to the hip."""
     u, foot = (t - now.pushed_at) / walker.push_off_duration, 1 - now.stance
@@ -235,7 +239,7 @@ def push_off(walker, now, t, y, b):
     push(walker, foot, y, b, force * (y[0] - x), force * (y[1] - h))
 
 
-@njit
+@inner
 def rate(walker, now, t, y):
     """dy/dt."""
     n = walker.inertias.size
@@ -266,7 +270,7 @@ def rate(walker, now, t, y):
     return dy
 
 
-@njit
+@inner
 def reaction(walker, now, y):
     """How fast (1/s) the ground reacts to a foot's velocity, and a foot crosses the depth where damping sets in."""
     n, fastest = walker.inertias.size, 0.0
@@ -281,7 +285,7 @@ def reaction(walker, now, y):
                 J[:] = 0.0
                 J[axis] = 1.0
                 for k in range(n):
-                    rx, rh = turned(walker, walker.foot_levers[foot], y, k)
+                    rx, rh = turned(walker.slope, walker.foot_levers, foot, y, k)
                     J[2 + k] = rx if axis == 1 else -rh
                 if axis == 0:
                     J[2 + walker.foot_bodies[foot]] += walker.radius
@@ -291,7 +295,7 @@ def reaction(walker, now, y):
     return fastest
 
 
-@njit
+@inner
 def runge_kutta(walker, now, t, y, h):
     """One step of the classical method."""
     k1 = rate(walker, now, t, y)
@@ -301,7 +305,7 @@ def runge_kutta(walker, now, t, y, h):
     return y + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
 
 
-@njit
+@inner
 def struck(walker, now, y):
     """The state after a plastic impact: nothing but the hinge and what is locked takes an impulse."""
     n = walker.inertias.size
@@ -313,7 +317,7 @@ def struck(walker, now, y):
     return after
 
 
-@njit
+@inner
 def stored(walker, foot, level, y):
     """Energy (J) in the ground under a foot, whose surface is at a level (m)."""
     depth = max(0.0, level - foot_at(walker, foot, y)[1])
@@ -328,7 +332,7 @@ def energy(walker, has_ground, levels, y):
     for i in range(walker.masses.size):
         x, h, v, w = y[0], y[1], y[2 + n], y[3 + n]
         for k in range(n):
-            rx, rh = turned(walker, walker.levers[i], y, k)
+            rx, rh = turned(walker.slope, walker.levers, i, y, k)
             x, h, v, w = x + rx, h + rh, v - y[4 + n + k] * rh, w + y[4 + n + k] * rx
         height = np.cos(walker.slope) * h - np.sin(walker.slope) * x
         total += walker.masses[i] * (0.5 * (v * v + w * w) + walker.gravity * height)
@@ -340,19 +344,19 @@ def energy(walker, has_ground, levels, y):
     return total + 0.5 * walker.hip[0] * (y[2] - y[3]) ** 2
 
 
-@njit
+@inner
 def material(walker, foot, y):
     """Where a foot would be had it not rolled."""
     return foot_at(walker, foot, y)[0] + walker.radius * y[2 + walker.foot_bodies[foot]]
 
 
-@njit
+@inner
 def lane(walker, foot):
     """Where pad number 0 of a foot is centred: the swing foot starts a pitch behind the stance foot."""
     return 0.0 if foot == 1 else -walker.pitch
 
 
-@njit
+@inner
 def event_values(walker, now, y, cells, touched):
     """Every event function."""
     g = np.ones(EVENTS)
@@ -374,7 +378,7 @@ def event_values(walker, now, y, cells, touched):
     return g
 
 
-@njit
+@inner
 def set_level(walker, levels, side, foot, level, y):
     """The ground for a foot lies elsewhere now: the foot may find itself in it; returns what its spring held (J)."""
     held = stored(walker, foot, levels[foot], y) if side[3 * foot] < 0.0 else 0.0
@@ -615,9 +619,9 @@ def of_centre(walker, y):
     """The state of a walker of whose hip's place and velocity those of its centre of mass are given."""
     n, mass = walker.inertias.size, walker.masses.sum()
     moved = np.append(y, [0.0, 0.0])
-    for m, levers in zip(walker.masses, walker.levers, strict=True):
+    for i, m in enumerate(walker.masses):
         for k in range(n):
-            rx, rh = turned(walker, levers, y, k)
+            rx, rh = turned(walker.slope, walker.levers, i, y, k)
             moved[:2] -= m / mass * np.array([rx, rh])
             moved[2 + n : 4 + n] -= m / mass * y[4 + n + k] * np.array([-rh, rx])
     return moved

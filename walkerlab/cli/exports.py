@@ -191,9 +191,9 @@ def figure(
         advice = f"{listed(made)} {'makes' if len(made) == 1 else 'make'} what it needs." if made else ""
         raise StaleError(f"{illustration.name} cannot be drawn: {why}.", advice)
     planner, plot = planned(folder), PIPELINE["plot"]
-    taken, outdated = planner.inputs(plot), read_all(folder, plot.results(planner.config))[0]
-    for name in (*taken, *planner.left_out):
-        outdated.pop(name, None)
+    taken = planner.inputs(plot)
+    known = taken.keys() | planner.left_out.keys()
+    outdated, _ = read_all(folder, (name for name in plot.results(planner.config) if name not in known))
     left_out = stored.keys() <= taken.keys()
     if not left_out:
         taken |= stored | {name: result for name, result in outdated.items() if result.complete}
