@@ -53,6 +53,13 @@ def test_without_walks_on_rough_ground_it_is_said_that_none_were_asked_for():
     assert "rough ground" in why
 
 
+def test_a_walk_that_falls_in_its_first_step_has_no_figure(rough):
+    result = rough["robustness"]
+    groups = {name: group for name, group in result.groups.items() if name != "rough_walk/steps"}
+    why = robustness.FIGURE_18.why_left_out({"robustness": stored("robustness", groups, {})}, {})
+    assert "no step" in why
+
+
 def swept(count=5):
     x = np.linspace(1.0, 3.0, count)
     numbers = {"gaits.{}.gait_sensitivity_norm": 20.0 + (x - 2.0) ** 2, "gaits.{}.spectral_radius": 0.2 * x}

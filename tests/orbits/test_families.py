@@ -1,12 +1,14 @@
 """Families of gaits: flips by another route, cascades, folds, and what is said where a branch ends."""
 
 from functools import cache
+from itertools import pairwise
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from walkerlab.mechanics.standing import on_slope
 from walkerlab.orbits.attractors import (
     Lyapunov,
     close_returns,
@@ -25,7 +27,7 @@ from walkerlab.orbits.families import NO_WALKER, BranchFollower, Seed, ValueSpan
 from walkerlab.orbits.fixed_point import find_gaits
 from walkerlab.orbits.newton import Effort, Evaluated, NotConverged
 from walkerlab.orbits.plane import CONTROL, Plane, curve_through
-from walkerlab.orbits.shooting import RigidMap
+from walkerlab.orbits.shooting import RigidMap, coordinates_of
 from walkerlab.orbits.similarity import unit_walker
 from walkerlab.orbits.step_map import Cycle, gait_near, multipliers_of, walk_steps
 from walkerlab.outcome import Outcome
@@ -402,6 +404,26 @@ def test_a_branch_that_uses_up_its_points_says_so():
     follower = BranchFollower(map_of(paper_walker, 0.1), ValueSpan(1e-4, 0.1), most=5)
     branch = follower.family(seeds_at(paper_walker, 0.05), 1)[0]
     assert all(end.reason == "5 points are used up" for end in branch.ends)
+
+
+def test_a_closed_branch_is_gone_round_once_wherever_it_is_begun():
+    """The compass pushed uphill has gaits between two impulses alone, on one closed curve."""
+    uphill = on_slope(assembled(paper_walker(0.0)), np.radians(-0.25))
+    pushed = RigidMap(lambda impulse: uphill.changed(push_off=impulse), 7.0, uphill)
+    _, units = unit_walker(uphill)
+    seeds = [
+        Seed(coordinates_of(uphill, gait.state) * [1.0, units.time, units.time], 4.0)
+        for gait in find_gaits(uphill.changed(push_off=4.0)).gaits
+    ]
+    assert len(seeds) > 1
+    for seed in seeds:
+        (branch,) = BranchFollower(pushed, ValueSpan(1.0, 8.0)).family([seed, *seeds], 1)
+        assert [end.reason for end in branch.ends] == ["comes round to where it began"] * 2
+        assert branch.points[0] is branch.points[-1]
+        folds = sorted(one.value for one in branch.bifurcations if one.kind == "fold")
+        assert folds == pytest.approx([2.6594772, 2.8432054, 4.7852377, 6.0665538], abs=1e-6)
+        assert len(branch.stable_ranges) == 2
+        assert sum(one.stable != other.stable for one, other in pairwise(branch.points)) == 4
 
 
 class Circle:

@@ -124,6 +124,7 @@ def test_searches_go_round_places_without_a_gait_and_tell_how_many_optima_there_
         (("design.minimise=period_s", "design.over={walker.thigh.mass_kg: [1, 2]}"), "walker.thigh.mass_kg"),
         (("design.minimise=period_s", "design.over={slope_deg: [3, 1]}"), "first below the second"),
         (("design.minimise=period_s", "design.maximise=speed_m_s"), "remove one of them"),
+        (("design.minimise=period_s", "design.over={push_off.duration_s: [0.001, 0.01]}"), "does not touch the rigid"),
         (("design.minimise=height",), "design.minimise"),
         (("design.minimise=period_s", "design.over={slope_deg: [1, 3]}", "design.keep={w: [0, 1]}"), "not a number of"),
     ],

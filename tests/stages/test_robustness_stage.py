@@ -140,11 +140,18 @@ def test_an_unstable_gait_has_no_norm_and_says_so_with_what_there_is():
         (("robustness.roughness_m=[0.7]",), "more than half a leg"),
         (("robustness.to=[walker.thigh.mass_kg]",), "walker.thigh.mass_kg"),
         (("robustness.to=[strides]",), "touches no model"),
+        (("robustness.to=[contact.stiffness]", "robustness.model=rigid"), "does not touch the rigid model"),
+        (("robustness.to=[push_off.duration_s]",), "does not touch the rigid or the contact model"),
     ],
 )
 def test_bad_questions_end_in_words(changes, said):
     with pytest.raises(ConfigError, match=said):
         run("slope-3deg", *changes)
+
+
+def test_a_number_that_one_of_both_models_reads_is_answered_for_that_one():
+    found = run("kneed", "robustness.roughness_m=[]", "robustness.steps=1", "robustness.to=[contact.stiffness]")
+    assert {row["model"] for row in found.summary["sensitivity"]} == {"contact"}
 
 
 def test_contact_is_not_asked_for_without_its_block():

@@ -165,6 +165,7 @@ FIGURE_18 = paper_figure(
     18,
     (
         Need(STAGE, "rough_walk/trajectory", ("hip_along_m", "foot_along_m"), "no walk on rough ground was asked for"),
+        Need(STAGE, "rough_walk/steps", ("touch_along_m",), "the walk on rough ground takes no step"),
         Need(STAGE, "rough_steps", ("steps",), "no walks on rough ground were asked for"),
     ),
     on_rough_ground,

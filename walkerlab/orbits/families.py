@@ -33,6 +33,7 @@ HALVINGS = 12  # of the amplitude on the way onto a branch
 TURN_OF_MULTIPLIERS = 0.6  # by how much a multiplier may change between neighbours, near the unit circle
 NEAR_CIRCLE = 1.6  # magnitude of multipliers that this is asked of
 EVALUATIONS = 20  # of Newton's method from a seed
+ROUND = "comes round to where it began"
 NO_WALKER = "no walker has the parameter's next value"
 POINTS, GROWTH = 400, 1e4  # of one branch; of a disturbance over a cycle, beyond which no gait is resolved
 
@@ -82,6 +83,11 @@ class GaitBranch:
     ends: tuple[BranchEnd, BranchEnd]
     bifurcations: tuple[Bifurcation, ...]
     crossings: tuple[Crossing, ...]
+
+    @property
+    def closed(self) -> bool:
+        """Whether it comes round to where it begins."""
+        return self.ends[1].reason == ROUND
 
     @cached_property
     def values(self) -> Floats:
@@ -159,15 +165,16 @@ class BranchFollower:
             if sooner or any(self.lies_on(branch, gait) for branch in like):
                 continue
             rising = start if start.tangent[-1] > 0.0 else replace(start, tangent=-start.tangent)
-            behind = self.trace(replace(rising, tangent=-rising.tangent), seed.steps)
-            ahead = self.trace(rising, seed.steps)
-            found = GaitBranch(
-                seed.steps,
-                (*reversed(behind.points[1:]), *ahead.points),
-                (behind.ends[1], ahead.ends[1]),
-                (*reversed(behind.bifurcations), *ahead.bifurcations),
-                (*reversed(behind.crossings), *ahead.crossings),
-            )
+            found = self.trace(rising, seed.steps)
+            if not found.closed:
+                behind = self.trace(replace(rising, tangent=-rising.tangent), seed.steps)
+                found = GaitBranch(
+                    seed.steps,
+                    (*reversed(behind.points[1:]), *found.points),
+                    (behind.ends[1], found.ends[1]),
+                    (*reversed(behind.bifurcations), *found.bifurcations),
+                    (*reversed(behind.crossings), *found.crossings),
+                )
             # between a flip and the first gait beyond it a branch that is known has no points
             if not any(self.lies_on(found, branch.points[0]) for branch in like):
                 branches.append(found)
@@ -247,6 +254,8 @@ class BranchFollower:
                 break
             solved, step = following
             end, solved = self.within(equations, last, solved)
+            if passes(Segment(equations, last, solved, self.control.tolerance), start, self.control.turn):
+                end, solved = BranchEnd(points[0].value, ROUND), start
             if period % 2 == 0 and halves_meet(last.evaluated.data, solved.evaluated.data):
                 end = BranchEnd(points[-1].value, f"closes on the gait of {period // 2} {steps_word(period // 2)}")
                 break
@@ -262,7 +271,11 @@ class BranchFollower:
             if end is None and abs(points[-1].multipliers[0]) > GROWTH:
                 end = BranchEnd(points[-1].value, f"a disturbance grows more than {GROWTH:g}-fold a cycle")
             before, last = last, solved
-        first = BranchEnd(points[0].value, "start")
+        if end.reason == ROUND:  # told from an unstable gait on, so that no stable stretch is cut in two
+            begin = min(range(len(points) - 1), key=lambda k: (points[k].stable, points[k].value))
+            points = [*points[begin:-1], *points[: begin + 1]]
+            end = replace(end, value=points[0].value)
+        first = BranchEnd(points[0].value, end.reason if end.reason == ROUND else "start")
         return GaitBranch(period, tuple(points), (first, end), tuple(bifurcations), tuple(crossings))
 
     def near_enough(self, last: Solved[Cycle]) -> Callable[[Solved[Cycle]], bool]:
@@ -297,6 +310,19 @@ class BranchFollower:
         self.advance()
         gait = solved.evaluated.data
         return replace(gait, monitors=self.step_map.watch(gait.z, gait.value, len(gait.steps)))
+
+
+def passes(segment: Segment[Cycle], gait: Solved[Cycle], turn: float) -> bool:
+    """Whether a gait lies between two neighbours on a curve, which runs there as the gait's tangent does.
+
+    turn  cosine of the largest angle between the tangents
+    """
+    first = segment.first
+    along = float(first.tangent @ (gait.x - first.x))
+    if not 0.0 < along <= segment.length or gait.tangent @ first.tangent < turn:
+        return False
+    near = segment.at(along)
+    return isinstance(near, Solved) and bool(np.abs(near.x - gait.x).max() < SAME)
 
 
 def steps_word(n: int) -> str:

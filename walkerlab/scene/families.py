@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import is_dataclass
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from walkerlab.errors import ConfigError
 from walkerlab.mechanics.standing import Standing
 from walkerlab.orbits.shooting import RigidMap
-from walkerlab.scene.parameter import Parameter
+from walkerlab.scene.parameter import Parameter, parameter_of
 from walkerlab.scene.rigid import rigid_walker
 from walkerlab.solvers.registry import Tolerances
 
@@ -17,6 +22,7 @@ if TYPE_CHECKING:
 
 CONTACT = Tolerances("radau5", 1e-10, 1e-12, 60_000)
 """Of one step of the contact model."""
+NEARBY = 1e-3  # of a number: another value at which a model that reads it is another one
 
 
 def rigid_walkers(config: ContactConfig, parameter: Parameter) -> Callable[[float], Standing | None]:
@@ -46,3 +52,38 @@ def contact_map(config: ContactConfig, parameter: Parameter, scale: float, step_
     walkers = walkers_on_ground(config, parameter, step_length_m)
     like = contact_scene(config, step_length_m, step_length_m)
     return ContactMap(walkers, scale, CONTACT, step_length_m, like)
+
+
+def differs(model: str, config: ContactConfig, parameter: Parameter, values: tuple[float, float]) -> bool:
+    """Whether a model, rigid or contact, is another one at another value of the parameter."""
+    walkers: Callable[..., Callable[[float], Any]] = (
+        rigid_walkers if model == "rigid" else partial(walkers_on_ground, step_length_m=1.0)
+    )
+    first, last = ([*numbers_in(walkers(config, parameter)(value))] for value in values)
+    return len(first) != len(last) or not all(map(np.array_equal, first, last))
+
+
+def numbers_in(value: Any) -> Iterator[Any]:
+    """All that a record and the records in it are made of."""
+    if isinstance(value, tuple) or is_dataclass(value):
+        for one in value if isinstance(value, tuple) else vars(value).values():
+            yield from numbers_in(one)
+    else:
+        yield value
+
+
+def reads(model: str, config: ContactConfig, key: str) -> bool:
+    """Whether a number of the config makes a difference to a model, as far as the config allows another value."""
+    parameter = parameter_of(key, config)
+    value = parameter.value_in(config)
+    beside = (value + sign * NEARBY * (abs(value) or 1.0) for sign in (1.0, -1.0))
+    allowed = [one for one in beside if parameter.config_at(config, one) is not None]
+    return not allowed or any(differs(model, config, parameter, (value, one)) for one in allowed)
+
+
+def not_read(where: str, key: str, models: Sequence[str]) -> ConfigError:
+    """The error of a question, asked by some key of the config, about a number that none of the models reads."""
+    return ConfigError(
+        f"{where}: {key} does not touch the {' or the '.join(models)} model",
+        "Choose a key that the model is made of, or another model (--model).",
+    )

@@ -21,6 +21,7 @@ from walkerlab.orbits.newton import Effort, NotConverged
 from walkerlab.orbits.robustness import Standpoint
 from walkerlab.orbits.step_map import gait_near, multipliers_of
 from walkerlab.pipeline.progress import Progress
+from walkerlab.scene.families import not_read, reads
 from walkerlab.scene.parameter import Parameter, parameter_of
 from walkerlab.scene.rigid import rigid_walker
 from walkerlab.solvers.system import Floats
@@ -54,6 +55,9 @@ def run(config: DesignConfig, inputs: Mapping[str, Content], progress: Progress,
     if asked.model == "contact" and config.contact is None:
         raise without_contact("design.model: contact", config.walker, "Add one.")
     parameters = [parameter_of(key, config) for key in asked.over]
+    for key in asked.over:
+        if not reads(asked.model, config, key):
+            raise not_read("design.over", key, (asked.model,))
     gaits = Gaits(config, asked, parameters, inputs["fixedpoint"].summary, progress)
     lower, upper = np.array(list(asked.over.values()), float).T
     keep = {name: (bounds[0], bounds[1]) for name, bounds in asked.keep.items()}

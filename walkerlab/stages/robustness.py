@@ -36,7 +36,7 @@ from walkerlab.orbits.similarity import unit_walker
 from walkerlab.orbits.step_map import StepMap
 from walkerlab.pipeline.pieces import Piece, complete
 from walkerlab.pipeline.progress import Progress
-from walkerlab.scene.families import contact_map, rigid_map
+from walkerlab.scene.families import contact_map, not_read, reads, rigid_map
 from walkerlab.scene.parameter import SLOPE, Parameter, parameter_of, why_no_parameter
 from walkerlab.scene.rigid import rigid_scene, rigid_walker
 from walkerlab.solvers.registry import ENDLESS, Tolerances
@@ -143,6 +143,8 @@ def refuse(config: RobustnessConfig) -> None:
         raise without_contact(f"robustness.model: {asked.model}", config.walker, "Add one, or ask for rigid.")
     for key in asked.to:
         parameter_of(key, config)
+        if not any(reads(model, config, key) for model in models_of(config)):
+            raise not_read("robustness.to", key, models_of(config))
     half = 0.5 * config.walker.leg_length_m
     for roughness in asked.roughness_m:
         if roughness > half:
@@ -184,13 +186,17 @@ class Subject:
 
 
 def subjects(config: RobustnessConfig, inputs: Mapping[str, Content], progress: Progress) -> Iterator[Subject]:
-    """The models that are asked for."""
+    """The models that are asked for, with their gaits."""
     progress.start("robustness: gaits")
     gait = inputs["fixedpoint"].summary
+    for model in models_of(config):
+        yield subject_of(model, config, gait, progress)
+
+
+def models_of(config: RobustnessConfig) -> tuple[str, ...]:
+    """The models that are asked for."""
     asked = config.robustness.model or (RIGID if config.contact is None else "both")
-    for model in (RIGID, CONTACT):
-        if asked in (model, "both"):
-            yield subject_of(model, config, gait, progress)
+    return (RIGID, CONTACT) if asked == "both" else (asked,)
 
 
 def section_coordinates(walker: Standing, state: Sequence[float]) -> Floats:
@@ -318,7 +324,7 @@ def sensitivities(
     subject: Subject, wanted: tuple[str, ...], numbers: Mapping[str, float], progress: Progress, jobs: int
 ) -> Rows:
     """Rows of derivatives, the largest relative effect first, numbers that are 0 behind those that are not."""
-    keys = wanted or numbers_read(subject)
+    keys = numbers_read(subject, wanted)
     progress.start(f"robustness: gradients of the {subject.model} model", len(keys))
     rows: Rows = []
     found = in_order([partial(gradients_of, subject, key) for key in keys], jobs, COMPILED)
@@ -346,10 +352,8 @@ def gradients_of(subject: Subject, key: str) -> dict[str, Gradient]:
     return subject.gradients(parameter_of(key, subject.config), wanted)
 
 
-def numbers_read(subject: Subject) -> tuple[str, ...]:
-    """Every number that the model reads, dotted."""
+def numbers_read(subject: Subject, wanted: tuple[str, ...] = ()) -> tuple[str, ...]:
+    """Those of some numbers of the config, or of all, that the model reads, dotted."""
     own = {".".join(path): field for path, field in leaves(Config, held=subject.config)}
     every = (key for key in own if not why_no_parameter(key, subject.config, own))
-    return tuple(
-        key for key in every if subject.model != RIGID or not key.startswith(("contact.", "push_off.duration"))
-    )
+    return tuple(key for key in wanted or every if reads(subject.model, subject.config, key))
