@@ -99,7 +99,9 @@ def test_rerun_says_whether_a_result_comes_out_again(toy):
     done = toy("rerun", artifact, "--json")
     assert done.returncode == 5
     assert "the code has changed since" in done.stderr
-    assert json.JSONDecoder().raw_decode(done.stdout)[0]["same"] is False
+    printed = json.loads(done.stdout)
+    assert printed["same"] is False
+    assert "is not reproduced" in printed["error"]["message"]
 
 
 def test_open_without_a_page_says_what_writes_it(toy):

@@ -5,7 +5,7 @@ import inspect
 import os
 import re
 import shlex
-from collections.abc import Callable, Collection
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -15,6 +15,7 @@ import typer
 from typer.core import TyperCommand
 
 from walkerlab.cli.console import Console
+from walkerlab.cli.failures import exit_on_failure
 
 # Help loads neither a config nor an array.
 if TYPE_CHECKING:
@@ -54,8 +55,41 @@ def configs_and_files(incomplete: str) -> list[str]:
 
 @dataclass(frozen=True)
 class Request:
-    """The options that commands share; what a command has no option for is as if it had not been given."""
+    """What a command is asked: those of these options that it has; the others are as if they had not been given."""
 
+    over: Annotated[
+        str | None,
+        typer.Option(
+            "--over", metavar="KEY", help="Key to follow gaits over, e.g. slope_deg.", autocompletion=keys_to_vary
+        ),
+    ] = None
+    begin: Annotated[
+        float | None, typer.Option("--from", metavar="A", help="Where the span begins, in the key's unit.")
+    ] = None
+    end: Annotated[float | None, typer.Option("--to", metavar="B", help="Where the span ends.")] = None
+    model: Annotated[
+        str | None, typer.Option("--model", metavar="rigid|contact|both", help="Which model's gaits to ask about.")
+    ] = None
+    periods: Annotated[
+        int | None, typer.Option("--periods", metavar="N", help="Steps of the longest gaits wanted.")
+    ] = None
+    full: Annotated[
+        bool, typer.Option("--full", help="Run the long campaign too; if interrupted, it resumes the next time.")
+    ] = False
+    least: Annotated[
+        str | None, typer.Option("--minimise", metavar="QUANTITY", help="Number of the gait to make least.")
+    ] = None
+    most: Annotated[
+        str | None, typer.Option("--maximise", metavar="QUANTITY", help="Number of the gait to make largest.")
+    ] = None
+    within: Annotated[
+        list[str] | None,
+        typer.Option("--over", metavar="KEY=A:B", help="Number of the config that may change, and its bounds."),
+    ] = None
+    keep: Annotated[
+        list[str] | None,
+        typer.Option("--keep", metavar="QUANTITY=A:B", help="Number of the gait to keep within bounds."),
+    ] = None
     config: Annotated[
         str | None,
         typer.Option(
@@ -101,6 +135,7 @@ class Request:
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")] = False
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No messages but warnings and errors.")] = False
     verbose: Annotated[bool, typer.Option("--verbose", "-v", help="More messages.")] = False
+    command: str = ""  # as it is typed
 
     @cached_property
     def console(self) -> Console:
@@ -108,10 +143,28 @@ class Request:
         return Console(self.quiet, self.verbose, self.open_page)
 
     @property
+    def settings(self) -> tuple[str, ...]:
+        """Every change of the config, as `--set` has it; typer.BadParameter for a span or bounds that are none."""
+        if self.over is not None and (self.begin is None or self.end is None):
+            raise typer.BadParameter("a span goes with a key: give --from and --to, in its unit", param_hint="--over")
+        given = {
+            f"{self.command}.model": self.model,
+            "continuation.over": self.over,
+            "continuation.from": self.begin,
+            "continuation.to": self.end,
+            "continuation.periods": self.periods,
+            "design.minimise": self.least,
+            "design.maximise": self.most,
+            "design.over": bounds("over", self.within),
+            "design.keep": bounds("keep", self.keep),
+        }
+        return (*(self.sets or ()), *(f"{key}={value}" for key, value in given.items() if value is not None))
+
+    @property
     def typed(self) -> str:
         """The options that say which run is meant, each with a blank before it; none for the paper config's own."""
         words = [] if self.config is None else ["-c", self.config]
-        for setting in self.sets or ():
+        for setting in self.settings:
             words += ["--set", setting]
         words += [] if self.strides is None else ["--set", f"strides={self.strides}"]
         words += [] if self.name is None else ["--name", self.name]
@@ -130,7 +183,7 @@ class Request:
         """The config and its run folder, its warnings said; ConfigError if it is not usable."""
         from walkerlab.pipeline.resolve import resolve
 
-        found = resolve(self.config, self.sets or (), self.strides, self.runs, self.name)
+        found = resolve(self.config, self.settings, self.strides, self.runs, self.name)
         loaded = found.loaded
         if loaded.config.stability.cases:
             from walkerlab.verification.catalogue import judged
@@ -162,7 +215,15 @@ class Request:
         return self.asked.folder
 
 
-SHARED = inspect.signature(Request).parameters
+def bounds(option: str, given: list[str] | None) -> str | None:
+    """Bounds KEY=A:B as a block in YAML; None if there are none."""
+    parts = [re.fullmatch(r"([^=]+)=([^:]+):([^:]+)", one) for one in given or ()]
+    if None in parts:
+        raise typer.BadParameter("give a name and its bounds, NAME=A:B", param_hint=f"--{option}")
+    return "{" + ", ".join(f"{one[1]}: [{one[2]}, {one[3]}]" for one in parts if one) + "}" if parts else None
+
+
+OPTIONS = inspect.signature(Request).parameters
 OF_A_RUN = ("config", "sets", "strides", "name", "runs")
 """The options that say which run is meant."""
 OF_TALK = ("as_json", "quiet", "verbose")
@@ -187,27 +248,29 @@ class KeysAreNoOptions(TyperCommand):
             raise
 
 
-def command(
-    app: typer.Typer, *shared: str, name: str | None = None, purpose: str | None = None, without: Collection[str] = ()
-) -> Callable[[F], F]:
+def command(app: typer.Typer, *shared: str, name: str | None = None, purpose: str | None = None) -> Callable[[F], F]:
     """Add the decorated function to a program: it takes a `Request`, then the options that are its own.
 
     shared   fields of `Request` that are options of the command; the others keep their defaults
     name     as it is typed; default: the function's
     purpose  what help says; default: the function's docstring
-    without  parameters of the function that are no options of this command
+
+    What it raises ends the command as `exit_on_failure` says.
     """
 
     def register(function: F) -> F:
+        typed = name or function.__name__
+
         def run(**given: Any) -> None:
-            request = Request(**{field: given.pop(field) for field in shared})
-            function(request, **given)
+            request = Request(**{field: given.pop(field) for field in shared}, command=typed)
+            with exit_on_failure(request):
+                function(request, **given)
 
         _, *own = inspect.signature(function, eval_str=True).parameters.values()
-        options = [one for one in own if one.name not in without] + [SHARED[field] for field in shared]
+        options = [*own, *(option for field, option in OPTIONS.items() if field in shared)]
         by_name = [one.replace(kind=inspect.Parameter.KEYWORD_ONLY) for one in options]
         run.__signature__ = inspect.Signature(by_name)  # type: ignore[attr-defined]
-        app.command(name or function.__name__, cls=KeysAreNoOptions, help=purpose or inspect.getdoc(function))(run)
+        app.command(typed, cls=KeysAreNoOptions, help=purpose or inspect.getdoc(function))(run)
         return function
 
     return register

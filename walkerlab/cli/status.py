@@ -3,9 +3,7 @@
 from collections import Counter
 from typing import Any
 
-import typer
-
-from walkerlab.cli.failures import print_json, say
+from walkerlab.cli.failures import tell
 from walkerlab.cli.request import Request
 from walkerlab.errors import StaleError
 from walkerlab.pipeline.graph import Graph
@@ -29,33 +27,28 @@ def print_status(request: Request, graph: Graph, check: bool, run: str | None) -
     config = request.resolved if run is None else config_of(folder)
     if config is None:
         raise StaleError(f"{folder.path} has no result that tells its config.", "`walkerlab status` lists all runs.")
-    asked = run is not None or request.config is not None or request.sets or request.strides is not None
+    asked = run is not None or request.config is not None or request.settings or request.strides is not None
     listed = None if asked else list(runs_in(request.runs, graph))
     steps = survey(config, folder, graph)
     error = failing(steps, graph.stages[-1].name)
-    if request.as_json:
-        rows = [
-            {
-                "stage": step.stage.name,
-                "state": state_of(step),
-                "why": step.reason,
-                "artifact": str(folder.artifact(step.stage.name)) if step.found is not None else None,
-            }
-            for step in steps
-        ]
-        status: dict[str, Any] = {"run_dir": str(folder.path), "current": error is None, "stages": rows}
-        if listed is not None:
-            status["runs"] = [vars(one) | {"run_dir": str(one.run_dir)} for one in listed]
-        print_json(status | ({"error": error.as_json()} if check and error is not None else {}))
-    else:
-        print(f"{folder.path}:")
-        print("\n".join(aligned([["stage", "state", "why"], *([s.stage.name, state_of(s), why(s)] for s in steps)])))
-        if listed:
-            head = ["run", "results", "up to date", "sweeps", "size", "last written"]
-            print("\n".join([f"\nall runs in {request.runs}:", *aligned([head, *map(row_of, listed)])]))
-    if check and error is not None:
-        say(error, request.typed)
-        raise typer.Exit(error.exit_code)
+    rows = [
+        {
+            "stage": step.stage.name,
+            "state": state_of(step),
+            "why": step.reason,
+            "artifact": str(folder.artifact(step.stage.name)) if step.found is not None else None,
+        }
+        for step in steps
+    ]
+    status: dict[str, Any] = {"run_dir": str(folder.path), "current": error is None, "stages": rows}
+    table = aligned([["stage", "state", "why"], *([s.stage.name, state_of(s), why(s)] for s in steps)])
+    lines = [f"{folder.path}:", *table]
+    if listed is not None:
+        status["runs"] = [vars(one) | {"run_dir": str(one.run_dir)} for one in listed]
+    if listed:
+        head = ["run", "results", "up to date", "sweeps", "size", "last written"]
+        lines += ["", f"all runs in {request.runs}:", *aligned([head, *map(row_of, listed)])]
+    tell(request, status, lines, error if check else None)
 
 
 def row_of(run: RunSummary) -> list[str]:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from walkerlab.cli.failures import exit_on_failure, print_json, say
+from walkerlab.cli.failures import tell
 from walkerlab.cli.request import OF_A_RUN, OF_TALK, Request, command
 from walkerlab.pipeline.graph import PIPELINE, Graph
 from walkerlab.report.text import paragraph
@@ -78,50 +78,49 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
         as_csv: AsCsv = False,
     ) -> None:
         """Run a stage over many values of parameters; results that exist are reused."""
-        with exit_on_failure("sweep", request):
-            from walkerlab.config.sweep import Sweep
-            from walkerlab.sweeps.engines import Order, engine_named
-            from walkerlab.sweeps.question import asked, axis_of_text
-            from walkerlab.sweeps.sweep import SweepRun, SweepWork, modules_of
+        from walkerlab.config.sweep import Sweep
+        from walkerlab.sweeps.engines import Order, engine_named
+        from walkerlab.sweeps.question import asked, axis_of_text
+        from walkerlab.sweeps.sweep import SweepRun, SweepWork, modules_of
 
-            options = dict(text.split("=", 1) for text in engine_option or () if "=" in text)
-            if bad := [text for text in engine_option or () if "=" not in text]:
-                raise typer.BadParameter(f"{bad[0]!r} is not NAME=VALUE", param_hint="--engine-option")
-            chosen, address = engine_named(engine)
-            loaded = request.loaded
-            given = loaded.config.sweep or Sweep()  # what the options leave open
-            own = [(key, values, f"sweep.over.{key}") for key, values in given.over.items()]
-            question = asked(
-                stage or given.stage,
-                [axis_of_text(text) for text in over or ()] or own,
-                zipped or (given.zip and not over),
-                sample if sample is not None else "" if over else given.sample,
-                given.seed if seed is None else seed,
-            )
-            order = Order(
-                workers=jobs,
-                address=address,
-                modules=modules_of(question.stage, loaded.config, graph),
-                folder=request.folder.path,
-                options=options,
-            )
-            if request.dry_run:
-                foreseen = SweepRun(question, loaded, request.folder, graph)
-                show_plan(request, foreseen.foresee(jobs or os.cpu_count() or 1, SHOWN))
-                return
-            with chosen.begun(order) as begun:
-                run = SweepRun(question, loaded, request.folder, graph)
-                # What is needed at the end is loaded while others compute.
-                threading.Thread(target=importlib.import_module, args=("walkerlab.sweeps.drawing",)).start()
+        options = dict(text.split("=", 1) for text in engine_option or () if "=" in text)
+        if bad := [text for text in engine_option or () if "=" not in text]:
+            raise typer.BadParameter(f"{bad[0]!r} is not NAME=VALUE", param_hint="--engine-option")
+        chosen, address = engine_named(engine)
+        loaded = request.loaded
+        given = loaded.config.sweep or Sweep()  # what the options leave open
+        own = [(key, values, f"sweep.over.{key}") for key, values in given.over.items()]
+        question = asked(
+            stage or given.stage,
+            [axis_of_text(text) for text in over or ()] or own,
+            zipped or (given.zip and not over),
+            sample if sample is not None else "" if over else given.sample,
+            given.seed if seed is None else seed,
+        )
+        order = Order(
+            workers=jobs,
+            address=address,
+            modules=modules_of(question.stage, loaded.config, graph),
+            folder=request.folder.path,
+            options=options,
+        )
+        if request.dry_run:
+            foreseen = SweepRun(question, loaded, request.folder, graph)
+            show_plan(request, foreseen.foresee(jobs or os.cpu_count() or 1, SHOWN))
+            return
+        with chosen.begun(order) as begun:
+            run = SweepRun(question, loaded, request.folder, graph)
+            # What is needed at the end is loaded while others compute.
+            threading.Thread(target=importlib.import_module, args=("walkerlab.sweeps.drawing",)).start()
 
-                def check(there: Collection[str]) -> None:
-                    from walkerlab.sweeps.drawing import refuse_unheard
+            def check(there: Collection[str]) -> None:
+                from walkerlab.sweeps.drawing import refuse_unheard
 
-                    refuse_unheard(question.stage, show or (), there)
+                refuse_unheard(question.stage, show or (), there)
 
-                work = SweepWork(begun, order, chunk_seconds, not request.no_wait, request.force, where(graph), check)
-                swept = run.run(work, request.console)
-            show_result(request, swept, tuple(show or ()), as_csv)
+            work = SweepWork(begun, order, chunk_seconds, not request.no_wait, request.force, where(graph), check)
+            swept = run.run(work, request.console)
+        show_result(request, swept, tuple(show or ()), as_csv)
 
 
 def where(graph: Graph) -> str:
@@ -138,25 +137,21 @@ def where(graph: Graph) -> str:
 def show_plan(request: Request, foreseen: Foreseen) -> None:
     """Say what would be done."""
     missing = foreseen.count - foreseen.there
-    if request.as_json:
-        print_json(
-            {
-                **common(request, foreseen.path, 0.0),
-                "dry_run": True,
-                "points": foreseen.count,
-                "reused": foreseen.there,
-                "to_compute": missing,
-                "estimate_s": foreseen.estimate_s,
-                "first_points": list(foreseen.points),
-            }
-        )
-        return
+    value = {
+        **common(request, foreseen.path, 0.0),
+        "dry_run": True,
+        "points": foreseen.count,
+        "reused": foreseen.there,
+        "to_compute": missing,
+        "estimate_s": foreseen.estimate_s,
+        "first_points": list(foreseen.points),
+    }
     more = foreseen.count - len(foreseen.points)
     lines = [f"  {point}" for point in foreseen.points] + ([f"  and {more} more"] if more else [])
     known = foreseen.estimate_s
     time = "no such point has been timed yet" if known is None else f"about {in_time(known)}"
     counts = f"{foreseen.count} points, {foreseen.there} computed already, {missing} to compute: {time}"
-    print("\n".join([f"in {foreseen.path}:", *lines, counts]))
+    tell(request, value, [f"in {foreseen.path}:", *lines, counts])
 
 
 def in_time(seconds: float) -> str:
@@ -193,21 +188,13 @@ def show_result(request: Request, swept: Swept, names: tuple[str, ...], as_csv: 
         "figures": [str(path) for path in drawn.figures],
         "html": str(drawn.page),
     }
+    lines = printed(swept, drawn.page)
     if as_csv:
         table = table_of(swept.content, swept.question, request.every)
         beside = swept.path.with_suffix(".csv")
         write_atomically(beside, table.encode())
-        value["csv"] = str(beside)
-    error = swept.error() if swept.failed else None
-    if request.as_json:
-        print_json(value | ({"error": error.as_json()} if error is not None else {}))
-    elif as_csv:
-        print(table, end="")
-    else:
-        print("\n".join(printed(swept, drawn.page)))
-    if error is not None:
-        say(error)
-        raise typer.Exit(error.exit_code)
+        value["csv"], lines = str(beside), [table.removesuffix("\n")]
+    tell(request, value, lines, swept.error() if swept.failed else None)
 
 
 def printed(swept: Swept, page: Path) -> list[str]:
