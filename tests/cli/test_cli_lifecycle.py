@@ -170,7 +170,7 @@ def test_a_film_needs_no_name(walker):
 def test_advice_can_be_typed_back(toy):
     done = toy("show", "roll", "--strides", "3", "--set", "slope_deg=2")
     assert "advice: `walkerlab roll --set slope_deg=2 --set strides=3` creates it." in done.stderr
-    typed = Request(sets=["start=[0, 1, 2, 3]"]).typed
+    typed = Request("simulate", sets=["start=[0, 1, 2, 3]"]).typed
     assert to_type_back("`walkerlab status` or `walkerlab schema`", typed) == (
         "`walkerlab status --set 'start=[0, 1, 2, 3]'` or `walkerlab schema`"
     )

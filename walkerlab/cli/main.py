@@ -2,7 +2,9 @@
 
 import atexit
 import gc
+import re
 import warnings
+from dataclasses import dataclass
 from typing import Annotated, Any
 
 import typer
@@ -11,7 +13,7 @@ from typer.core import TyperGroup
 from walkerlab import __version__
 from walkerlab.cli import housekeeping, lifecycle, sweep
 from walkerlab.cli import runs as whole_runs
-from walkerlab.cli.request import OF_A_RUN, OF_TALK, Request, command
+from walkerlab.cli.request import OF_A_RUN, OF_TALK, Request, command, keys_to_vary, option
 from walkerlab.pipeline.graph import PIPELINE, Graph, Stage
 
 
@@ -82,6 +84,54 @@ def options_of_the_program(
     """Nothing but `--version`, which is answered on sight."""
 
 
+@dataclass(frozen=True)
+class StageRequest(Request):
+    """What a stage's command is asked, with its question where it has one."""
+
+    over: str | None = option(
+        "--over", metavar="KEY", help="Key to follow gaits over, e.g. slope_deg.", autocompletion=keys_to_vary
+    )
+    begin: float | None = option("--from", metavar="A", help="Where the span begins, in the key's unit.")
+    end: float | None = option("--to", metavar="B", help="Where the span ends.")
+    model: str | None = option("--model", metavar="rigid|contact|both", help="Which model's gaits to ask about.")
+    periods: int | None = option("--periods", metavar="N", help="Steps of the longest gaits wanted.")
+    full: bool = option(
+        "--full", default=False, help="Run the long campaign too; if interrupted, it resumes the next time."
+    )
+    least: str | None = option("--minimise", metavar="QUANTITY", help="Number of the gait to make least.")
+    most: str | None = option("--maximise", metavar="QUANTITY", help="Number of the gait to make largest.")
+    within: list[str] | None = option(
+        "--over", metavar="KEY=A:B", help="Number of the config that may change, and its bounds."
+    )
+    keep: list[str] | None = option("--keep", metavar="QUANTITY=A:B", help="Number of the gait to keep within bounds.")
+
+    @property
+    def settings(self) -> tuple[str, ...]:
+        """The options as settings of the config, too; typer.BadParameter for a span or bounds that are none."""
+        if self.over is not None and (self.begin is None or self.end is None):
+            raise typer.BadParameter("a span goes with a key: give --from and --to, in its unit", param_hint="--over")
+        given = {
+            f"{self.command}.model": self.model,
+            "continuation.over": self.over,
+            "continuation.from": self.begin,
+            "continuation.to": self.end,
+            "continuation.periods": self.periods,
+            "design.minimise": self.least,
+            "design.maximise": self.most,
+            "design.over": bounds("over", self.within),
+            "design.keep": bounds("keep", self.keep),
+        }
+        return (*super().settings, *(f"{key}={value}" for key, value in given.items() if value is not None))
+
+
+def bounds(option: str, given: list[str] | None) -> str | None:
+    """Bounds KEY=A:B as a block in YAML; None if there are none."""
+    parts = [re.fullmatch(r"([^=]+)=([^:]+):([^:]+)", one) for one in given or ()]
+    if None in parts:
+        raise typer.BadParameter("give a name and its bounds, NAME=A:B", param_hint=f"--{option}")
+    return "{" + ", ".join(f"{one[1]}: [{one[2]}, {one[3]}]" for one in parts if one) + "}" if parts else None
+
+
 def add_stage(app: typer.Typer, stage: Stage, graph: Graph) -> None:
     """Add the command of one stage to a program, with the options that mean something to it."""
     shared = [*OF_A_RUN, "jobs", "force", "dry_run", "no_wait", *OF_TALK]
@@ -94,9 +144,9 @@ def add_stage(app: typer.Typer, stage: Stage, graph: Graph) -> None:
     shared += ["least", "most", "within", "keep"] if stage.designs else []
     shared += ["full"] if graph.campaigns_of(stage.name) else []
 
-    @command(app, *shared, name=stage.name, purpose=stage.purpose)
-    def run(request: Request) -> None:
+    @command(app, *shared, name=stage.name, purpose=stage.purpose, asks=StageRequest)
+    def run(request: StageRequest) -> None:
         # Imported here: help loads neither a config nor an array.
         from walkerlab.cli.stage import run_stage
 
-        run_stage(request, stage, graph)
+        run_stage(request, stage, graph, request.full)

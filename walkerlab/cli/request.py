@@ -6,10 +6,10 @@ import os
 import re
 import shlex
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import Field, dataclass, field, fields
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from typer.core import TyperCommand
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from walkerlab.pipeline.resolve import ResolvedRun
     from walkerlab.store.runfolder import RunFolder
 
-F = TypeVar("F", bound=Callable[..., None])
 RUNS = Path("runs")
 OF_KIND = re.compile(r"\([^)]*\)")
 """The kind of a block that has several: `walker(kneed)`."""
@@ -53,89 +52,50 @@ def configs_and_files(incomplete: str) -> list[str]:
     return [*(name for name in builtin_names() if name.startswith(incomplete)), *files]
 
 
+def option(*flags: str, default: Any = None, **about: Any) -> Any:
+    """A field of a request that commands may have as an option: its flags, and what typer is told of it."""
+    return field(default=default, metadata={"option": typer.Option(*flags, **about)})
+
+
+def as_parameter(one: Field[Any]) -> inspect.Parameter:
+    """Such a field as a parameter of a function whose signature typer reads."""
+    kind, told = inspect.Parameter.KEYWORD_ONLY, one.metadata["option"]
+    return inspect.Parameter(one.name, kind, default=one.default, annotation=Annotated[one.type, told])
+
+
 @dataclass(frozen=True)
 class Request:
-    """What a command is asked: those of these options that it has; the others are as if they had not been given."""
+    """What a command is asked: those of these options that it has; the others are as if they had not been given.
 
-    over: Annotated[
-        str | None,
-        typer.Option(
-            "--over", metavar="KEY", help="Key to follow gaits over, e.g. slope_deg.", autocompletion=keys_to_vary
-        ),
-    ] = None
-    begin: Annotated[
-        float | None, typer.Option("--from", metavar="A", help="Where the span begins, in the key's unit.")
-    ] = None
-    end: Annotated[float | None, typer.Option("--to", metavar="B", help="Where the span ends.")] = None
-    model: Annotated[
-        str | None, typer.Option("--model", metavar="rigid|contact|both", help="Which model's gaits to ask about.")
-    ] = None
-    periods: Annotated[
-        int | None, typer.Option("--periods", metavar="N", help="Steps of the longest gaits wanted.")
-    ] = None
-    full: Annotated[
-        bool, typer.Option("--full", help="Run the long campaign too; if interrupted, it resumes the next time.")
-    ] = False
-    least: Annotated[
-        str | None, typer.Option("--minimise", metavar="QUANTITY", help="Number of the gait to make least.")
-    ] = None
-    most: Annotated[
-        str | None, typer.Option("--maximise", metavar="QUANTITY", help="Number of the gait to make largest.")
-    ] = None
-    within: Annotated[
-        list[str] | None,
-        typer.Option("--over", metavar="KEY=A:B", help="Number of the config that may change, and its bounds."),
-    ] = None
-    keep: Annotated[
-        list[str] | None,
-        typer.Option("--keep", metavar="QUANTITY=A:B", help="Number of the gait to keep within bounds."),
-    ] = None
-    config: Annotated[
-        str | None,
-        typer.Option(
-            "--config",
-            "-c",
-            metavar="FILE",
-            help="Config file, built-in config, or run by its name or folder; default: paper.",
-            autocompletion=configs_and_files,
-        ),
-    ] = None
-    sets: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--set",
-            metavar="KEY=VALUE",
-            help="Change one key of the config; may be repeated.",
-            autocompletion=keys_to_set,
-        ),
-    ] = None
-    strides: Annotated[
-        int | None, typer.Option("--strides", metavar="N", help="Strides to walk; one stride is two steps.")
-    ] = None
-    name: Annotated[
-        str | None,
-        typer.Option("--name", metavar="NAME", help="Name of the run's folder; default: after config and changes."),
-    ] = None
-    runs: Annotated[Path, typer.Option("--runs", metavar="DIR", help="Folder of all runs.")] = RUNS
-    jobs: Annotated[
-        int | None,
-        typer.Option(
-            "--jobs", metavar="N", min=1, help="Processes for independent stages and cells; default: all cores."
-        ),
-    ] = None
-    force: Annotated[bool, typer.Option("--force", help="Run the stage and all it needs, up to date or not.")] = False
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what would be done and why; change nothing.")] = False
-    no_wait: Annotated[
-        bool, typer.Option("--no-wait", help="Give up (exit 6) if another process works in the run folder.")
-    ] = False
-    open_page: Annotated[bool, typer.Option("--open", help="Show the page in the browser as soon as it is there.")] = (
-        False
+    command  as it is typed
+    """
+
+    command: str
+    config: str | None = option(
+        "--config", "-c", metavar="FILE", autocompletion=configs_and_files,
+        help="Config file, built-in config, or run by its name or folder; default: paper.",
+    )  # fmt: skip
+    sets: list[str] | None = option(
+        "--set", metavar="KEY=VALUE", help="Change one key of the config; may be repeated.", autocompletion=keys_to_set
     )
-    every: Annotated[bool, typer.Option("--all", help="Every number, not the headline numbers alone.")] = False
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")] = False
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No messages but warnings and errors.")] = False
-    verbose: Annotated[bool, typer.Option("--verbose", "-v", help="More messages.")] = False
-    command: str = ""  # as it is typed
+    strides: int | None = option("--strides", metavar="N", help="Strides to walk; one stride is two steps.")
+    name: str | None = option(
+        "--name", metavar="NAME", help="Name of the run's folder; default: after config and changes."
+    )
+    runs: Path = option("--runs", default=RUNS, metavar="DIR", help="Folder of all runs.")
+    jobs: int | None = option(
+        "--jobs", metavar="N", min=1, help="Processes for independent stages and cells; default: all cores."
+    )
+    force: bool = option("--force", default=False, help="Run the stage and all it needs, up to date or not.")
+    dry_run: bool = option("--dry-run", default=False, help="Say what would be done and why; change nothing.")
+    no_wait: bool = option(
+        "--no-wait", default=False, help="Give up (exit 6) if another process works in the run folder."
+    )
+    open_page: bool = option("--open", default=False, help="Show the page in the browser as soon as it is there.")
+    every: bool = option("--all", default=False, help="Every number, not the headline numbers alone.")
+    as_json: bool = option("--json", default=False, help="Print one JSON object on stdout.")
+    quiet: bool = option("--quiet", "-q", default=False, help="No messages but warnings and errors.")
+    verbose: bool = option("--verbose", "-v", default=False, help="More messages.")
 
     @cached_property
     def console(self) -> Console:
@@ -144,21 +104,8 @@ class Request:
 
     @property
     def settings(self) -> tuple[str, ...]:
-        """Every change of the config, as `--set` has it; typer.BadParameter for a span or bounds that are none."""
-        if self.over is not None and (self.begin is None or self.end is None):
-            raise typer.BadParameter("a span goes with a key: give --from and --to, in its unit", param_hint="--over")
-        given = {
-            f"{self.command}.model": self.model,
-            "continuation.over": self.over,
-            "continuation.from": self.begin,
-            "continuation.to": self.end,
-            "continuation.periods": self.periods,
-            "design.minimise": self.least,
-            "design.maximise": self.most,
-            "design.over": bounds("over", self.within),
-            "design.keep": bounds("keep", self.keep),
-        }
-        return (*(self.sets or ()), *(f"{key}={value}" for key, value in given.items() if value is not None))
+        """Every change of the config, as `--set` has it."""
+        return tuple(self.sets or ())
 
     @property
     def typed(self) -> str:
@@ -215,15 +162,6 @@ class Request:
         return self.asked.folder
 
 
-def bounds(option: str, given: list[str] | None) -> str | None:
-    """Bounds KEY=A:B as a block in YAML; None if there are none."""
-    parts = [re.fullmatch(r"([^=]+)=([^:]+):([^:]+)", one) for one in given or ()]
-    if None in parts:
-        raise typer.BadParameter("give a name and its bounds, NAME=A:B", param_hint=f"--{option}")
-    return "{" + ", ".join(f"{one[1]}: [{one[2]}, {one[3]}]" for one in parts if one) + "}" if parts else None
-
-
-OPTIONS = inspect.signature(Request).parameters
 OF_A_RUN = ("config", "sets", "strides", "name", "runs")
 """The options that say which run is meant."""
 OF_TALK = ("as_json", "quiet", "verbose")
@@ -248,27 +186,30 @@ class KeysAreNoOptions(TyperCommand):
             raise
 
 
-def command(app: typer.Typer, *shared: str, name: str | None = None, purpose: str | None = None) -> Callable[[F], F]:
-    """Add the decorated function to a program: it takes a `Request`, then the options that are its own.
+def command(
+    app: typer.Typer, *shared: str, name: str | None = None, purpose: str | None = None, asks: type[Request] = Request
+) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Add the decorated function to a program: it takes a request, then the options that are its own.
 
-    shared   fields of `Request` that are options of the command; the others keep their defaults
+    shared   fields of the request that are options of the command; the others keep their defaults
     name     as it is typed; default: the function's
     purpose  what help says; default: the function's docstring
+    asks     the request's type, whose own fields help has before those of `Request`
 
-    What it raises ends the command as `exit_on_failure` says.
+    What the function raises ends the command as `exit_on_failure` says.
     """
 
-    def register(function: F) -> F:
+    def register(function: Callable[..., None]) -> Callable[..., None]:
         typed = name or function.__name__
 
         def run(**given: Any) -> None:
-            request = Request(**{field: given.pop(field) for field in shared}, command=typed)
+            request = asks(typed, **{field: given.pop(field) for field in shared})
             with exit_on_failure(request):
                 function(request, **given)
 
         _, *own = inspect.signature(function, eval_str=True).parameters.values()
-        options = [*own, *(option for field, option in OPTIONS.items() if field in shared)]
-        by_name = [one.replace(kind=inspect.Parameter.KEYWORD_ONLY) for one in options]
+        options = sorted((one for one in fields(asks) if one.name in shared), key=fields(Request).__contains__)
+        by_name = [one.replace(kind=inspect.Parameter.KEYWORD_ONLY) for one in (*own, *map(as_parameter, options))]
         run.__signature__ = inspect.Signature(by_name)  # type: ignore[attr-defined]
         app.command(typed, cls=KeysAreNoOptions, help=purpose or inspect.getdoc(function))(run)
         return function

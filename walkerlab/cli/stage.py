@@ -24,9 +24,9 @@ SEARCHING = ("fixedpoint", "report")
 DRAWN_AT_ONCE = {stage.name for stage in PIPELINE.stages if stage.on_demand}
 
 
-def run_stage(request: Request, stage: Stage, graph: Graph) -> None:
+def run_stage(request: Request, stage: Stage, graph: Graph, full: bool) -> None:
     """Do what the command asks and print it; typer.Exit(4) if there is no answer, else as `execute` raises."""
-    options = Options(request.force, not request.no_wait, request.processes, request.full, request.dry_run)
+    options = Options(request.force, not request.no_wait, request.processes, full, request.dry_run)
     config, folder = request.resolved, request.folder
     if options.dry:
         report = execute(config, stage.name, folder, options, graph=graph)
