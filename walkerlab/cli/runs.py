@@ -59,7 +59,7 @@ def told_apart(folders: tuple[RunFolder, RunFolder]) -> tuple[str, str]:
 
 def draw(folders: tuple[RunFolder, RunFolder], results: list[dict[str, Any]]) -> list[Path]:
     """The figure of both walks, in the first run's folder of figures."""
-    from walkerlab.figures.overlay import overlaid
+    from walkerlab.figures.walks import overlaid
     from walkerlab.store.files import make_folder, write_atomically
 
     drawn = overlaid(results[0], results[1], told_apart(folders))
