@@ -109,17 +109,6 @@ def touch_times(steps: Group) -> Array:
     return steps[TOUCHES] if TOUCHES in steps.variables else np.zeros(0)
 
 
-def sentence(walks: list[Walk]) -> str:
-    """How the walks went: 'The rigid model walked 10 steps, the contact model took 1 step (fell).'."""
-    said = []
-    for walk in walks:
-        count = f"{walk.steps} step" + ("" if walk.steps == 1 else "s")
-        went = f"walked {count}" if walk.outcome == "walked" else f"took {count} ({walk.outcome})"
-        said.append(f"the {walk.look.label} {went}")
-    text = ", ".join(said)
-    return text[:1].upper() + text[1:] + "."
-
-
 def shown(walks: list[Walk], strides: int = PAPER_STRIDES) -> tuple[list[Walk], str]:
     """The walks' first strides, and a phrase on how much that is: '' if it is all, ' (the first 5 strides)' if not."""
     cut = [walk.first(strides) for walk in walks]
@@ -226,7 +215,7 @@ def draw_states(results: Results) -> Drawn:
             one.axvspan(first.time[begin], first.time[end - 1], color=PALE, linewidth=0.0, zorder=0.5)
     stance = f"stance of the leg, {first.look.label.split()[0]}"
     legend(figure, walks, Patch(facecolor=PALE, edgecolor="none", label=stance))
-    return figure, (extent, sentence(walks))
+    return figure, (extent, walks)
 
 
 AT_SAME_TIME: Final = Look("difference at the same time", VERMILLION, (0.0, (3.2, 1.4)), 1.2, "", order=3)
@@ -311,7 +300,7 @@ def draw_cycles(results: Results) -> Drawn:
             mark: dict[str, Any] = {"marker": look.marker, "markersize": 4.5, "color": look.colour, "mfc": face}
             key.append(entry(f"{whose} heel strike, {look.label.split()[0]}", linestyle="none", **mark))
     add_legend(figure, key)
-    return figure, (extent, sentence(walks))
+    return figure, (extent, walks)
 
 
 def draw_cycles_of(axes: Axes, walk: Walk, leg: int) -> None:
@@ -380,7 +369,7 @@ def draw_energies(results: Results) -> Drawn:
     impacts = any(walk.look is CONTACT for walk in walks)
     asked = results[RIGID_STAGE].identity.config_slice
     driven = any((asked["push_off"]["impulse_N_s"], *asked["walker"]["hip"].values()))
-    return figure, (extent, means, redoes_the_paper(results), impacts, driven, sentence(walks))
+    return figure, (extent, means, redoes_the_paper(results), impacts, driven, walks)
 
 
 OVERLAY_ROWS: Final[tuple[tuple[str, Any, str], ...]] = (
