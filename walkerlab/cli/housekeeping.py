@@ -21,7 +21,7 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
         check: Annotated[bool, typer.Option("--check", help="Exit with 5 if a result is stale or missing.")] = False,
     ) -> None:
         """Show whether each stage's result is up to date, and if not, why; and list all runs."""
-        from walkerlab.cli.status import print_status
+        from walkerlab.cli.stored import print_status
 
         print_status(request, graph, check, run)
 
@@ -45,7 +45,7 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
             raise typer.BadParameter("one run at a time", param_hint="RUN")
         asked = replace(request, command=stage, config=runs[0] if runs else request.config)
         with exit_on_failure(asked):
-            from walkerlab.cli.show import print_stored
+            from walkerlab.cli.stored import print_stored
             from walkerlab.pipeline.runs import run_named
 
             of_run = replace(asked, config=run_named(runs[0], asked.runs).given) if runs else asked

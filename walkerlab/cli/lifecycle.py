@@ -89,8 +89,7 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
         model: Annotated[str | None, typer.Option(metavar="STAGE", help=f"Whose trajectory; {FIRST_WALK}.")] = None,
     ) -> None:
         """Write a figure, a table or a trajectory of a run for use elsewhere."""
-        from walkerlab.cli.exports import COLUMNS, Target, export_from
-        from walkerlab.cli.films import walk_in
+        from walkerlab.cli.exports import COLUMNS, Target, export_from, walk_in
         from walkerlab.pipeline.runs import run_named
 
         folder, points = run_named(run, request.runs), width or COLUMNS[columns]
@@ -151,8 +150,7 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
         slower: Annotated[float, typer.Option(min=0.01, help="Slow motion: 2 is half speed.")] = 1.0,
     ) -> None:
         """Animate a run's walk."""
-        from walkerlab.cli.exports import Target
-        from walkerlab.cli.films import Film, walk_in, write_film
+        from walkerlab.cli.exports import Film, Target, walk_in, write_film
         from walkerlab.pipeline.runs import run_named
 
         folder = run_named(run, request.runs)

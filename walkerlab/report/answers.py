@@ -53,9 +53,15 @@ def laid_out(blocks: Iterable[str | Table]) -> list[str]:
 
 def fixedpoint(summary: Summary) -> list[str | Table]:
     """The gait, under both sets of equations side by side where the digits that are shown tell their gaits apart."""
-    slope_deg = math.degrees(summary["slope_rad"])
+    slope = f"{number(summary['slope_rad'])} rad ({number(math.degrees(summary['slope_rad']), 3)}°)"
     if "state" not in summary:
-        return [words("gait.no_gait", summary, slope_deg)]
+        return [f"No gait on a slope of {slope}: {summary['reason']}."]
+    driven = f", driven by {listed(summary['driven_by'])}," if summary.get("driven_by") else ""
+    head = (
+        f"On a slope of {slope}{driven} there is {'a stable' if summary['stable'] else 'an unstable'} gait: steps of "
+        f"{fixed(summary['step_length_m'], 4)} m in {fixed(summary['period_s'], 4)} s; "
+        f"the largest multiplier is {fixed(summary['spectral_radius'], 3)}."
+    )
     shown = [fixed(value, 6) for value in summary["state"]]
     others = {
         name: one
@@ -63,7 +69,8 @@ def fixedpoint(summary: Summary) -> list[str | Table]:
         if "state" in one and [fixed(value, 6) for value in one["state"]] != shown
     }
     found = gaits.gait_table({summary["equations"]: summary, **others}, summary.get("state_names", gaits.STATE))
-    return [words("gait.answer", summary, slope_deg), found, words("gait.sought", summary)]
+    many, sought = f"{count(summary['gaits_found'], 'gait')} of one step found.", summary.get("sought")
+    return [head, found, f"{many} Sought: {sought}; very unstable ones may be missed." if sought else many]
 
 
 def told(title: str, key: str, digits: int = 4) -> Column:
