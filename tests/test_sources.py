@@ -116,7 +116,7 @@ ROOT = Path(walkerlab.__file__).parent.parent
 WRITTEN = [stage.module for stage in STAGES if (ROOT / stage.module.replace(".", "/")).with_suffix(".py").exists()]
 
 
-@pytest.mark.parametrize("name", ["walkerlab.pipeline.runner", "walkerlab.cli.show", "walkerlab.kernels", *WRITTEN])
+@pytest.mark.parametrize("name", ["walkerlab.pipeline.runner", "walkerlab.cli.stored", "walkerlab.kernels", *WRITTEN])
 def test_what_python_imports_is_in_the_closure(name):
     """The scanner reads text; the interpreter is the independent witness."""
     done = subprocess.run([sys.executable, "-c", IMPORTED, name], cwd=ROOT, capture_output=True, text=True)

@@ -33,7 +33,7 @@ def added(x):
     return x + 1.0
 
 try:
-    with exit_on_failure("trial", Request()):
+    with exit_on_failure(Request("trial")):
         added(1.0)
         time.sleep(60.0)
 except typer.Exit as end:

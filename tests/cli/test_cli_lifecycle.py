@@ -99,7 +99,9 @@ def test_rerun_says_whether_a_result_comes_out_again(toy):
     done = toy("rerun", artifact, "--json")
     assert done.returncode == 5
     assert "the code has changed since" in done.stderr
-    assert json.JSONDecoder().raw_decode(done.stdout)[0]["same"] is False
+    printed = json.loads(done.stdout)
+    assert printed["same"] is False
+    assert "is not reproduced" in printed["error"]["message"]
 
 
 def test_open_without_a_page_says_what_writes_it(toy):
@@ -168,7 +170,7 @@ def test_a_film_needs_no_name(walker):
 def test_advice_can_be_typed_back(toy):
     done = toy("show", "roll", "--strides", "3", "--set", "slope_deg=2")
     assert "advice: `walkerlab roll --set slope_deg=2 --set strides=3` creates it." in done.stderr
-    typed = Request(sets=["start=[0, 1, 2, 3]"]).typed
+    typed = Request("simulate", sets=["start=[0, 1, 2, 3]"]).typed
     assert to_type_back("`walkerlab status` or `walkerlab schema`", typed) == (
         "`walkerlab status --set 'start=[0, 1, 2, 3]'` or `walkerlab schema`"
     )

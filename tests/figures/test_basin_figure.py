@@ -63,7 +63,7 @@ def test_without_a_basin_it_says_how_to_make_one():
 def test_the_report_has_its_shares_and_attractors():
     made = section(Results(CONFIG, basin([0, 0, 1, NONE]), (), ()))
     assert "75 % of the window walk" in made.blocks[0].text
-    assert [row[1].text for row in made.blocks[1].bodies[0].rows] == ["6", "3"]
+    assert [row[1].text for row in next(iter(made.blocks[1].groups.values()))] == ["6", "3"]
     assert section(Results(CONFIG, {}, (), ())) is None
 
 

@@ -13,8 +13,7 @@ from synthetic_walks import both_models
 
 from walkerlab.api import open_run
 from walkerlab.cli.console import Console
-from walkerlab.cli.exports import Target, export_from
-from walkerlab.cli.films import Film, walk_in, write_film
+from walkerlab.cli.exports import Film, Target, export_from, walk_in, write_film
 from walkerlab.config.loader import load
 from walkerlab.config.reads import only
 from walkerlab.config.schema import Config

@@ -15,7 +15,7 @@ from matplotlib.colors import to_hex
 from synthetic_methods import everything
 from synthetic_walks import both_models, compared, contact, rigid, rigid_alone, stored, without
 
-from walkerlab.figures import overlay, stick_diagram
+from walkerlab.figures import stick_diagram, walks
 from walkerlab.figures.canvas import styled
 from walkerlab.figures.illustration import WORDS, Illustration
 from walkerlab.figures.registry import FIGURES as ALL_FIGURES
@@ -117,7 +117,7 @@ def test_a_figure_that_the_paper_has_not_is_called_by_its_name():
 
 def test_every_figure_has_its_words_and_every_word_a_figure():
     assert [figure.name for figure in ALL_FIGURES if not figure.title or figure.title.endswith(".")] == []
-    shared = {"cycle", "counted", "figure-17", "push-off-or-hip"}  # and the words of a sweep
+    shared = {"cycle", "counted", "figure-17", "push-off-or-hip", "sweep", "went"}  # and the words of a sweep
     files = {path.stem for path in WORDS.folder.glob("*.j2")}
     assert files - shared == {figure.words or figure.name for figure in ALL_FIGURES}
 
@@ -311,7 +311,7 @@ def test_two_runs_over_one_another_have_an_axis_for_each_leg():
     first, second = both_models(), both_models(simulate=rigid(6))
     trajectories = [run["simulate"]["trajectory"] for run in (first, second)]
     with styled():
-        figure = overlay.drawn([("simulate", trajectories)], ("one", "other"))
+        figure = walks.draw_overlay([("simulate", trajectories)], ("one", "other"))
     for leg, axes in enumerate(figure.axes[:2]):
         assert len({line.get_color() for line in axes.lines}) == len(axes.lines) == 2
         for line, trajectory in zip(axes.lines, trajectories, strict=True):

@@ -6,7 +6,7 @@ import pytest
 from walkerlab.errors import ConfigError
 from walkerlab.figures.canvas import styled
 from walkerlab.figures.maps import is_logarithmic
-from walkerlab.figures.sweep import choose, draw, lines, maps
+from walkerlab.figures.sweep import choose, illustration, lines, maps
 from walkerlab.store.content import Group, Variable
 from walkerlab.sweeps.drawing import refuse_unheard
 
@@ -64,8 +64,9 @@ def test_the_caption_tells_how_gaps_look():
         (3, "Marks at the bottom: no answer there."),
         (8, "Where there is no answer the map is grey."),
     ):
-        made = draw(swept(9, masses, answered=False), "fixedpoint", PARAMETERS, PARAMETERS, ["spectral_radius"])
-        assert said in made.caption
+        group = swept(9, masses, answered=False)
+        made = illustration(group, "fixedpoint", PARAMETERS, PARAMETERS, ["spectral_radius"])
+        assert said in made.drawn({}).caption
         assert made.svg.startswith(b"<?xml")
 
 

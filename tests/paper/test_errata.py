@@ -8,7 +8,6 @@ import pytest
 from numpy.testing import assert_allclose
 
 from walkerlab.paper.appendix_a import AS_PRINTED, CORRECTED, impact
-from walkerlab.paper.arithmetic import speed_difference
 from walkerlab.paper.errata import errata
 from walkerlab.paper.misprints import (
     MISPRINTED,
@@ -22,7 +21,7 @@ from walkerlab.paper.misprints import (
     swing_foot_gradient,
     velocities_after_impact,
 )
-from walkerlab.paper.printed import TABLE_2, X_P, walker_of_the_paper
+from walkerlab.paper.printed import TABLE_2, X_P, speed_difference, walker_of_the_paper
 from walkerlab.paper.study import study_the_paper
 
 SLOPE = 0.0174

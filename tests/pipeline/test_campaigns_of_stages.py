@@ -2,7 +2,7 @@
 
 import pytest
 
-from walkerlab.cli.status import state_of
+from walkerlab.cli.stored import state_of
 from walkerlab.pipeline.plan import survey
 from walkerlab.store.artifact import read
 

@@ -259,7 +259,7 @@ def test_a_gait_is_one_table_on_page_and_terminal():
     gaits = {"as-printed": {**GAIT, "equations": "as-printed"}, "corrected": GAIT}
     shown = gait_table(gaits, ["theta_1", "theta_2", "dtheta_1", "dtheta_2"])
     lines = in_lines(shown)
-    for cells in (row for body in shown.bodies for row in body.rows):
+    for cells in (row for rows in shown.groups.values() for row in rows):
         assert " ".join(row(lines, cells[0].text)) == " ".join(cell.text for cell in cells[1:])
     assert cells_of_head(lines) == " ".join(column.title for column in shown.columns)
 
@@ -283,7 +283,7 @@ def test_a_terminal_has_no_room_for_sentences_and_a_column_for_the_titles_of_gro
 def test_records_side_by_side_have_a_row_for_what_one_of_them_has():
     lines = [measured("period", "period_s"), measured("slip", "slip_m", prefix="m"), measured("torque", "torque_N")]
     shown = side_by_side("", lines, {"rigid": {"period_s": 0.7}, "contact": {"period_s": 0.71, "slip_m": 5e-4}})
-    assert [[cell.text for cell in row] for row in shown.bodies[0].rows] == [
+    assert [[cell.text for cell in row] for row in next(iter(shown.groups.values()))] == [
         ["period (s)", "0.7", "0.71"],
         ["slip (mm)", "", "0.5"],
     ]

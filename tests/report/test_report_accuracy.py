@@ -55,9 +55,9 @@ def made():
 def tables(made):
     return {
         block.caption: {
-            (body.title, line[0].text): [cell.text.replace("\u00a0", " ") for cell in line[1:]]
-            for body in block.bodies
-            for line in body.rows
+            (title, line[0].text): [cell.text.replace("\u00a0", " ") for cell in line[1:]]
+            for title, lines in block.groups.items()
+            for line in lines
         }
         for block in made.blocks
         if isinstance(block, Table)
@@ -86,8 +86,11 @@ def test_a_run_that_ended_otherwise_is_told_with_its_outcome(made):
 
 
 def test_the_fastest_methods_are_marked(made):
-    body = next(block for block in made.blocks if isinstance(block, Table)).bodies[0]
-    assert {line[0].text: line[0].tone for line in body.rows} == {"dop853": "good", "scipy-bdf": None}
+    made_of = next(block for block in made.blocks if isinstance(block, Table)).groups
+    assert {line[0].text: line[0].tone for line in next(iter(made_of.values()))} == {
+        "dop853": "good",
+        "scipy-bdf": None,
+    }
 
 
 def test_conclusions_stand_beside_their_scenes(made):

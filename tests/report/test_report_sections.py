@@ -68,8 +68,8 @@ def blocks(section, kind):
 def rows(section, index=0):
     return {
         row[0].text: [plain(cell.text) for cell in row[1:]]
-        for body in blocks(section, Table)[index].bodies
-        for row in body.rows
+        for rows in blocks(section, Table)[index].groups.values()
+        for row in rows
     }
 
 
@@ -252,7 +252,7 @@ def test_the_papers_tables_stand_beside_ours_without_empty_columns():
     first, third = blocks(sections()["tables"], Table)
     assert [column.title for column in first.columns] == ["row", "quantity", "paper", "used here", "where"]
     assert [column.title for column in third.columns] == ["row", "paper, MATLAB", "corrected"]
-    assert third.bodies[0].rows[0][0].text == "left step period, t_left (s)"
+    assert next(iter(third.groups.values()))[0][0].text == "left step period, t_left (s)"
 
 
 def test_the_difference_of_the_models_is_given_in_every_way_it_was_taken():
@@ -264,7 +264,11 @@ def test_the_difference_of_the_models_is_given_in_every_way_it_was_taken():
 
 def test_every_number_of_the_paper_is_listed_under_where_it_stands():
     (table,) = blocks(sections()["paper-numbers"], Table)
-    assert [(body.title, len(body.rows)) for body in table.bodies] == [("eq. 11", 1), ("Table 3", 2), ("Table 2", 1)]
+    assert [(title, len(rows)) for title, rows in table.groups.items()] == [
+        ("eq. 11", 1),
+        ("Table 3", 2),
+        ("Table 2", 1),
+    ]
 
 
 def test_a_model_without_any_number_has_no_column():
@@ -448,11 +452,13 @@ def test_gaits_have_no_heading_where_there_is_one_set_of_equations():
     gait = gait_summary() | {"chosen": True, "objection": ""}
     every = {name: [gait, gait | {"chosen": False, "objection": "it scuffs"}] for name in SETS}
     heads = [
-        [one.title for one in every_gait({name: every[name] for name in sets}, COORDINATES).bodies]
-        for sets in (["corrected"], [*SETS])
+        [*every_gait({name: every[name] for name in sets}, COORDINATES).groups] for sets in (["corrected"], [*SETS])
     ]
     assert heads == [[""], ["as printed", "corrected"]]
-    assert [row[-1].text for row in every_gait(every, COORDINATES).bodies[0].rows] == ["chosen", "it scuffs"]
+    assert [row[-1].text for row in next(iter(every_gait(every, COORDINATES).groups.values()))] == [
+        "chosen",
+        "it scuffs",
+    ]
 
 
 def test_where_no_ground_is_described_the_friction_it_takes_is_told_once():

@@ -6,7 +6,7 @@ import pytest
 from synthetic_engines import ROWS, SWINGS, TUNING, content, row, truth
 
 from walkerlab.benchmarks.engines import registry
-from walkerlab.benchmarks.engines.experiments import TOLERANCES, same_law_rows
+from walkerlab.benchmarks.engines.experiments import TOLERANCES, EngineOnScene
 from walkerlab.benchmarks.engines.process import TaskLost
 from walkerlab.benchmarks.engines.registry import ENGINES, Engine
 from walkerlab.benchmarks.engines.scenes import scenes
@@ -67,8 +67,8 @@ class LosesEverything:
 def test_a_run_that_is_lost_is_a_row_and_what_takes_for_ever_is_not_refined(lost, outcome, rungs):
     (scene,) = scenes(load().config, 0.37, (-0.2042, 0.1694, -0.6058, -0.861))
     engine = replace(ABSENT, name="exudyn")
-    process = LosesEverything(lost)
-    rows = [one for one in same_law_rows(engine, "1.0", scene, truth(), process) if one.integrator == "DOPRI5 adaptive"]
+    runs = EngineOnScene(engine, scene, truth(), LosesEverything(lost)).same_law()
+    rows = [one for one in runs if one.integrator == "DOPRI5 adaptive"]
     assert len(rows) == min(rungs, len(TOLERANCES))
     assert {(one.outcome, one.why, one.error) for one in rows} == {(outcome, lost.why, None)}
 

@@ -205,9 +205,9 @@ def test_the_page_names_what_swings_beside_the_legs_and_no_joint_that_was_not_th
         "table2": kneed().summary["table2"] | {"dtheta_torso": row},
     }
     tables = tables_of(changed)
-    names = [row[0].text for row in tables["The start before and after the adjustment"].bodies[0].rows]
+    names = [row[0].text for row in next(iter(tables["The start before and after the adjustment"].groups.values()))]
     assert (names[2], names[-1]) == ("θ₁, shank (rad)", "θ̇, torso (rad/s)")
-    walks = [row[0].text for row in tables["The procedure, walk by walk"].bodies[0].rows]
+    walks = [row[0].text for row in next(iter(tables["The procedure, walk by walk"].groups.values()))]
     assert walks == ["from the rigid state", "from the adjusted start"]
 
 

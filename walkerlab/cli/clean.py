@@ -6,7 +6,7 @@ from pathlib import Path
 
 import typer
 
-from walkerlab.cli.failures import print_json
+from walkerlab.cli.failures import tell
 from walkerlab.cli.request import Request
 from walkerlab.store.clean import CHUNKS, FIGURES, files_of, remove, remove_if_empty
 from walkerlab.store.runfolder import RunFolder
@@ -39,11 +39,9 @@ def clean_folders(request: Request, every: bool, stages: Sequence[str], yes: boo
                 with folder.locked(not request.no_wait, request.console.note):
                     remove(folder, paths)
                 remove_if_empty(folder)
-    if request.as_json:
-        print_json({"run_dir": str(where), "removed": [str(path) for path in files], "dry_run": request.dry_run})
-    else:
-        said = "would be removed" if request.dry_run else "removed"
-        print("\n".join([f"{said}: {one}" for one in listed(files, sizes)] or [f"{where}: nothing {said}"]))
+    said = "would be removed" if request.dry_run else "removed"
+    lines = [f"{said}: {one}" for one in listed(files, sizes)] or [f"{where}: nothing {said}"]
+    tell(request, {"run_dir": str(where), "removed": [*map(str, files)], "dry_run": request.dry_run}, lines)
 
 
 def listed(files: Sequence[Path], sizes: Mapping[Path, int]) -> list[str]:

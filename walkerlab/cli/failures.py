@@ -8,7 +8,7 @@ import json
 import os
 import signal
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING, Any
 
 import typer
@@ -23,11 +23,10 @@ FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 
 
 @contextlib.contextmanager
-def exit_on_failure(name: str, request: Request) -> Iterator[Request]:
+def exit_on_failure(request: Request) -> Iterator[None]:
     """Turn what a user can act on into words on stderr and an exit code, and with `--json` into an object too.
 
-    name     of the command
-    request  what it is asked; advice has the options that say which run that is about
+    request  what a command is asked; advice has the options that say which run that is about
     """
     raise_on(signal.SIGTERM, KeyboardInterrupt)
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # a script's background job is to ignore it
@@ -38,10 +37,10 @@ def exit_on_failure(name: str, request: Request) -> Iterator[Request]:
         if request.as_json:
             run_dir = None if request.run_dir is None else str(request.run_dir)
             nothing: dict[str, Any] = {"artifact": None, "reused": False, "wall_s": 0.0, "left_out": []}
-            print_json({"stage": name, "run_dir": run_dir, **nothing, "error": error.as_json()})
+            print_json({"stage": request.command, "run_dir": run_dir, **nothing, "error": error.as_json()})
 
     try:
-        yield request
+        yield
         sys.stdout.flush()
     except WalkerlabError as error:
         print_failed(error)
@@ -68,6 +67,21 @@ def nobody_listens() -> None:
     nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, sys.stdout.fileno())
     os.close(nowhere)
+
+
+def tell(request: Request, value: dict[str, Any], lines: Iterable[str], error: WalkerlabError | None = None) -> None:
+    """Print a result in the way that was asked for; if there is an error in it, say that and raise typer.Exit.
+
+    value  what `--json` prints
+    lines  for people
+    """
+    if request.as_json:
+        print_json(value if error is None else value | {"error": error.as_json()})
+    else:
+        sys.stdout.writelines(f"{line}\n" for line in lines)
+    if error is not None:
+        say(error, request.typed)
+        raise typer.Exit(error.exit_code)
 
 
 def say(error: WalkerlabError, typed: str = "") -> None:

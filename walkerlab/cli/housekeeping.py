@@ -21,10 +21,9 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
         check: Annotated[bool, typer.Option("--check", help="Exit with 5 if a result is stale or missing.")] = False,
     ) -> None:
         """Show whether each stage's result is up to date, and if not, why; and list all runs."""
-        with exit_on_failure("status", request):
-            from walkerlab.cli.status import print_status
+        from walkerlab.cli.stored import print_status
 
-            print_status(request, graph, check, run)
+        print_status(request, graph, check, run)
 
     @command(app, *OF_A_RUN, *OF_TALK)
     def show(
@@ -44,8 +43,9 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
             raise typer.BadParameter(f"there is no stage {stage!r}; there are {', '.join(names)}", param_hint="STAGE")
         if len(runs) > 1 or (runs and request.config is not None):
             raise typer.BadParameter("one run at a time", param_hint="RUN")
-        with exit_on_failure(stage, replace(request, config=runs[0]) if runs else request) as asked:
-            from walkerlab.cli.show import print_stored
+        asked = replace(request, command=stage, config=runs[0] if runs else request.config)
+        with exit_on_failure(asked):
+            from walkerlab.cli.stored import print_stored
             from walkerlab.pipeline.runs import run_named
 
             of_run = replace(asked, config=run_named(runs[0], asked.runs).given) if runs else asked
@@ -57,13 +57,12 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
         key: Annotated[str, typer.Argument(metavar="[KEY]", help="A key or a block of keys; default: all.")] = "",
     ) -> None:
         """Print the keys of a config: type, unit, bounds, default, meaning, source."""
-        with exit_on_failure("schema", request):
-            from walkerlab.config.reference import as_json_schema, as_paragraphs
+        from walkerlab.config.reference import as_json_schema, as_paragraphs
 
-            if request.as_json:
-                print_json(as_json_schema(key))
-            else:
-                print(as_paragraphs(key))
+        if request.as_json:
+            print_json(as_json_schema(key))
+        else:
+            print(as_paragraphs(key))
 
     @command(app, *OF_A_RUN, "dry_run", "no_wait", *OF_TALK)
     def clean(
@@ -72,7 +71,6 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
         yes: Annotated[bool, typer.Option("--yes", "-y", help="Do not ask.")] = False,
     ) -> None:
         """Remove the results of a run and what killed runs left behind; other files stay."""
-        with exit_on_failure("clean", request):
-            from walkerlab.cli.clean import clean_folders
+        from walkerlab.cli.clean import clean_folders
 
-            clean_folders(request, all_runs, names, yes)
+        clean_folders(request, all_runs, names, yes)

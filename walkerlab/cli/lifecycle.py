@@ -6,7 +6,6 @@ from typing import Annotated
 
 import typer
 
-from walkerlab.cli.failures import exit_on_failure
 from walkerlab.cli.request import OF_TALK, Request, command
 from walkerlab.errors import StoppedError
 from walkerlab.pipeline.graph import Graph
@@ -43,27 +42,25 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
         ] = "compass",
     ) -> None:
         """Write a commented config to begin with, and a schema that editors check it against."""
-        with exit_on_failure("init", request):
-            from walkerlab.cli.init import write_config
+        from walkerlab.cli.init import write_config
 
-            said = write_config(file or Path(f"my-{walker}.yaml"), walker)
-            if not request.quiet:
-                print(said)
+        said = write_config(file or Path(f"my-{walker}.yaml"), walker)
+        if not request.quiet:
+            print(said)
 
     @command(app, "runs", "quiet", "verbose", name="open")
     def open_run(request: Request, run: RunArgument = "paper") -> None:
         """Show a run's page in the browser."""
-        with exit_on_failure("open", request):
-            from walkerlab.errors import StaleError
-            from walkerlab.pipeline.runs import run_named
+        from walkerlab.errors import StaleError
+        from walkerlab.pipeline.runs import run_named
 
-            folder = run_named(run, request.runs)
-            page = (folder.path / "report.html").resolve()
-            if not page.is_file():
-                advice = f"`walkerlab report -c {folder.typed}` writes it."
-                raise StaleError(f"{folder.path} has no page yet.", advice)
-            request.console.show(page)
-            print(page)
+        folder = run_named(run, request.runs)
+        page = (folder.path / "report.html").resolve()
+        if not page.is_file():
+            advice = f"`walkerlab report -c {folder.typed}` writes it."
+            raise StaleError(f"{folder.path} has no page yet.", advice)
+        request.console.show(page)
+        print(page)
 
     @command(app, *OF_TALK)
     def rerun(
@@ -71,10 +68,9 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
         artifact: Annotated[Path, typer.Argument(metavar="ARTIFACT", help="A stage's result, such as simulate.h5.")],
     ) -> None:
         """Recompute a stored result from scratch, and say whether it is the same."""
-        with exit_on_failure("rerun", request):
-            from walkerlab.cli.rerun import rerun_artifact
+        from walkerlab.cli.rerun import rerun_artifact
 
-            rerun_artifact(artifact, graph, request)
+        rerun_artifact(artifact, graph, request)
 
     @command(app, "runs")
     def export(
@@ -93,14 +89,12 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
         model: Annotated[str | None, typer.Option(metavar="STAGE", help=f"Whose trajectory; {FIRST_WALK}.")] = None,
     ) -> None:
         """Write a figure, a table or a trajectory of a run for use elsewhere."""
-        with exit_on_failure("export", request):
-            from walkerlab.cli.exports import COLUMNS, Target, export_from
-            from walkerlab.cli.films import walk_in
-            from walkerlab.pipeline.runs import run_named
+        from walkerlab.cli.exports import COLUMNS, Target, export_from, walk_in
+        from walkerlab.pipeline.runs import run_named
 
-            folder, points = run_named(run, request.runs), width or COLUMNS[columns]
-            whose = walk_in(folder, model)
-            print(export_from(folder, what, Target(to, output), points, whose, request.console, dpi))
+        folder, points = run_named(run, request.runs), width or COLUMNS[columns]
+        whose = walk_in(folder, model)
+        print(export_from(folder, what, Target(to, output), points, whose, request.console, dpi))
 
     @command(app)
     def draw(
@@ -110,10 +104,9 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
         output: Output = None,
     ) -> None:
         """Draw a config's walker to scale, with its measures named as the config names them."""
-        with exit_on_failure("draw", request):
-            from walkerlab.cli.exports import Target, draw_walker
+        from walkerlab.cli.exports import Target, draw_walker
 
-            print(draw_walker(file, Target(to, output), request.console))
+        print(draw_walker(file, Target(to, output), request.console))
 
     @command(app, "config", "sets", "runs")
     def explore(
@@ -122,28 +115,25 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
         no_browser: Annotated[bool, typer.Option("--no-browser", help="Open no browser.")] = False,
     ) -> None:
         """Serve a page on which every number is a slider and the walker walks with it, until Ctrl-C."""
-        with exit_on_failure("explore", request):
-            from walkerlab.explorer.server import Server
-            from walkerlab.explorer.walks import ExploredConfig
+        from walkerlab.explorer.server import Server
+        from walkerlab.explorer.walks import ExploredConfig
 
-            assert request.resolved
-            if signal.getsignal(signal.SIGHUP) is signal.SIG_DFL:  # its terminal is closed
-                raise_on(signal.SIGHUP, KeyboardInterrupt)
-            try:
-                server = Server(port, ExploredConfig(request.config, tuple(request.sets or ()), request.runs, {}))
-            except OSError as error:
-                raise typer.BadParameter(
-                    f"port {port} is not available: {error.strerror}", param_hint="--port"
-                ) from None
-            try:
-                print(server.url, flush=True)
-                if not no_browser:
-                    request.console.show(server.url)
-                server.serve_forever()
-            except KeyboardInterrupt:  # how it is meant to end
-                raise typer.Exit(StoppedError.exit_code) from None
-            finally:
-                server.close()
+        assert request.resolved
+        if signal.getsignal(signal.SIGHUP) is signal.SIG_DFL:  # its terminal is closed
+            raise_on(signal.SIGHUP, KeyboardInterrupt)
+        try:
+            server = Server(port, ExploredConfig(request.config, tuple(request.sets or ()), request.runs, {}))
+        except OSError as error:
+            raise typer.BadParameter(f"port {port} is not available: {error.strerror}", param_hint="--port") from None
+        try:
+            print(server.url, flush=True)
+            if not no_browser:
+                request.console.show(server.url)
+            server.serve_forever()
+        except KeyboardInterrupt:  # how it is meant to end
+            raise typer.Exit(StoppedError.exit_code) from None
+        finally:
+            server.close()
 
     @command(app, "runs", "quiet")
     def animate(
@@ -160,11 +150,9 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
         slower: Annotated[float, typer.Option(min=0.01, help="Slow motion: 2 is half speed.")] = 1.0,
     ) -> None:
         """Animate a run's walk."""
-        with exit_on_failure("animate", request):
-            from walkerlab.cli.exports import Target
-            from walkerlab.cli.films import Film, walk_in, write_film
-            from walkerlab.pipeline.runs import run_named
+        from walkerlab.cli.exports import Film, Target, walk_in, write_film
+        from walkerlab.pipeline.runs import run_named
 
-            folder = run_named(run, request.runs)
-            film = Film(walk_in(folder, model), steps, rate, slower)
-            print(write_film(folder, Target(to, output), film, request.console))
+        folder = run_named(run, request.runs)
+        film = Film(walk_in(folder, model), steps, rate, slower)
+        print(write_film(folder, Target(to, output), film, request.console))

@@ -4,7 +4,7 @@ import atexit
 import gc
 import re
 import warnings
-from dataclasses import replace
+from dataclasses import dataclass
 from typing import Annotated, Any
 
 import typer
@@ -13,8 +13,7 @@ from typer.core import TyperGroup
 from walkerlab import __version__
 from walkerlab.cli import housekeeping, lifecycle, sweep
 from walkerlab.cli import runs as whole_runs
-from walkerlab.cli.failures import exit_on_failure
-from walkerlab.cli.request import OF_A_RUN, OF_TALK, Request, command, keys_to_vary
+from walkerlab.cli.request import OF_A_RUN, OF_TALK, Request, command, keys_to_vary, option
 from walkerlab.pipeline.graph import PIPELINE, Graph, Stage
 
 
@@ -85,91 +84,69 @@ def options_of_the_program(
     """Nothing but `--version`, which is answered on sight."""
 
 
-Over = Annotated[
-    str | None,
-    typer.Option(
+@dataclass(frozen=True)
+class StageRequest(Request):
+    """What a stage's command is asked, with its question where it has one."""
+
+    over: str | None = option(
         "--over", metavar="KEY", help="Key to follow gaits over, e.g. slope_deg.", autocompletion=keys_to_vary
-    ),
-]
-From = Annotated[float | None, typer.Option("--from", metavar="A", help="Where the span begins, in the key's unit.")]
-To = Annotated[float | None, typer.Option("--to", metavar="B", help="Where the span ends.")]
-Model = Annotated[
-    str | None, typer.Option("--model", metavar="rigid|contact|both", help="Which model's gaits to ask about.")
-]
-Periods = Annotated[int | None, typer.Option("--periods", metavar="N", help="Steps of the longest gaits wanted.")]
-Full = Annotated[
-    bool, typer.Option("--full", help="Run the long campaign too; if interrupted, it resumes the next time.")
-]
+    )
+    begin: float | None = option("--from", metavar="A", help="Where the span begins, in the key's unit.")
+    end: float | None = option("--to", metavar="B", help="Where the span ends.")
+    model: str | None = option("--model", metavar="rigid|contact|both", help="Which model's gaits to ask about.")
+    periods: int | None = option("--periods", metavar="N", help="Steps of the longest gaits wanted.")
+    full: bool = option(
+        "--full", default=False, help="Run the long campaign too; if interrupted, it resumes the next time."
+    )
+    least: str | None = option("--minimise", metavar="QUANTITY", help="Number of the gait to make least.")
+    most: str | None = option("--maximise", metavar="QUANTITY", help="Number of the gait to make largest.")
+    within: list[str] | None = option(
+        "--over", metavar="KEY=A:B", help="Number of the config that may change, and its bounds."
+    )
+    keep: list[str] | None = option("--keep", metavar="QUANTITY=A:B", help="Number of the gait to keep within bounds.")
+
+    @property
+    def settings(self) -> tuple[str, ...]:
+        """The options as settings of the config, too; typer.BadParameter for a span or bounds that are none."""
+        if self.over is not None and (self.begin is None or self.end is None):
+            raise typer.BadParameter("a span goes with a key: give --from and --to, in its unit", param_hint="--over")
+        given = {
+            f"{self.command}.model": self.model,
+            "continuation.over": self.over,
+            "continuation.from": self.begin,
+            "continuation.to": self.end,
+            "continuation.periods": self.periods,
+            "design.minimise": self.least,
+            "design.maximise": self.most,
+            "design.over": bounds("over", self.within),
+            "design.keep": bounds("keep", self.keep),
+        }
+        return (*super().settings, *(f"{key}={value}" for key, value in given.items() if value is not None))
 
 
-Least = Annotated[str | None, typer.Option("--minimise", metavar="QUANTITY", help="Number of the gait to make least.")]
-Most = Annotated[str | None, typer.Option("--maximise", metavar="QUANTITY", help="Number of the gait to make largest.")]
-Within = Annotated[
-    list[str] | None,
-    typer.Option("--over", metavar="KEY=A:B", help="Number of the config that may change, and its bounds."),
-]
-Keep = Annotated[
-    list[str] | None, typer.Option("--keep", metavar="QUANTITY=A:B", help="Number of the gait to keep within bounds.")
-]
+def bounds(option: str, given: list[str] | None) -> str | None:
+    """Bounds KEY=A:B as a block in YAML; None if there are none."""
+    parts = [re.fullmatch(r"([^=]+)=([^:]+):([^:]+)", one) for one in given or ()]
+    if None in parts:
+        raise typer.BadParameter("give a name and its bounds, NAME=A:B", param_hint=f"--{option}")
+    return "{" + ", ".join(f"{one[1]}: [{one[2]}, {one[3]}]" for one in parts if one) + "}" if parts else None
 
 
 def add_stage(app: typer.Typer, stage: Stage, graph: Graph) -> None:
     """Add the command of one stage to a program, with the options that mean something to it."""
+    shared = [*OF_A_RUN, "jobs", "force", "dry_run", "no_wait", *OF_TALK]
     last = stage is graph.stages[-1]
-    shared = [*OF_A_RUN, "jobs", "force", "dry_run", "no_wait", *(["open_page"] if last else []), *OF_TALK]
     if not (stage.walks or last):
         shared.remove("strides")
-    unasked: list[str] = [] if stage.follows else ["over", "begin", "end", "periods"]
-    unasked += [] if stage.of_a_model else ["model"]
-    unasked += [] if stage.designs else ["least", "most", "within", "keep"]
-    meaningless = [*unasked, *([] if graph.campaigns_of(stage.name) else ["full"])]
+    shared += ["open_page"] if last else []
+    shared += ["over", "begin", "end", "periods"] if stage.follows else []
+    shared += ["model"] if stage.of_a_model else []
+    shared += ["least", "most", "within", "keep"] if stage.designs else []
+    shared += ["full"] if graph.campaigns_of(stage.name) else []
 
-    @command(app, *shared, name=stage.name, purpose=stage.purpose, without=meaningless)
-    def run(
-        request: Request,
-        over: Over = None,
-        begin: From = None,
-        end: To = None,
-        model: Model = None,
-        periods: Periods = None,
-        full: Full = False,
-        least: Least = None,
-        most: Most = None,
-        within: Within = None,
-        keep: Keep = None,
-    ) -> None:
-        own = designing if stage.designs else following
-        given = (least, most, within, keep) if stage.designs else (over, begin, end, periods)
-        whose = [] if model is None else [f"{stage.name}.model={model}"]
-        settings = [*(request.sets or ()), *whose, *own(*given)]
-        with exit_on_failure(stage.name, replace(request, sets=settings)) as asked:
-            # Imported here: help loads neither a config nor an array.
-            from walkerlab.cli.stage import run_stage
+    @command(app, *shared, name=stage.name, purpose=stage.purpose, asks=StageRequest)
+    def run(request: StageRequest) -> None:
+        # Imported here: help loads neither a config nor an array.
+        from walkerlab.cli.stage import run_stage
 
-            run_stage(asked, stage, graph, full)
-
-
-def designing(least: str | None, most: str | None, within: list[str] | None, keep: list[str] | None) -> tuple[str, ...]:
-    """The options of a design as settings of the config; typer.BadParameter for bounds that are none."""
-    given = {"minimise": least, "maximise": most}
-    said = tuple(f"design.{name}={value}" for name, value in given.items() if value is not None)
-    return (
-        *said,
-        *(f"design.{name}={bounds(name, each)}" for name, each in (("over", within), ("keep", keep)) if each),
-    )
-
-
-def bounds(option: str, given: list[str]) -> str:
-    """Bounds KEY=A:B as a block in YAML."""
-    parts = [re.fullmatch(r"([^=]+)=([^:]+):([^:]+)", one) for one in given]
-    if None in parts:
-        raise typer.BadParameter("give a name and its bounds, NAME=A:B", param_hint=f"--{option}")
-    return "{" + ", ".join(f"{one[1]}: [{one[2]}, {one[3]}]" for one in parts if one) + "}"
-
-
-def following(over: str | None, begin: float | None, end: float | None, periods: int | None) -> tuple[str, ...]:
-    """The options of a stage that follows gaits as settings of the config; typer.BadParameter if some are missing."""
-    if over is not None and (begin is None or end is None):
-        raise typer.BadParameter("a span goes with a key: give --from and --to, in its unit", param_hint="--over")
-    given = {"over": over, "from": begin, "to": end, "periods": periods}
-    return tuple(f"continuation.{name}={value}" for name, value in given.items() if value is not None)
+        run_stage(request, stage, graph, request.full)

@@ -5,16 +5,17 @@ import inspect
 import os
 import re
 import shlex
-from collections.abc import Callable, Collection
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import Field, dataclass, field, fields
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from typer.core import TyperCommand
 
 from walkerlab.cli.console import Console
+from walkerlab.cli.failures import exit_on_failure
 
 # Help loads neither a config nor an array.
 if TYPE_CHECKING:
@@ -23,7 +24,6 @@ if TYPE_CHECKING:
     from walkerlab.pipeline.resolve import ResolvedRun
     from walkerlab.store.runfolder import RunFolder
 
-F = TypeVar("F", bound=Callable[..., None])
 RUNS = Path("runs")
 OF_KIND = re.compile(r"\([^)]*\)")
 """The kind of a block that has several: `walker(kneed)`."""
@@ -52,55 +52,50 @@ def configs_and_files(incomplete: str) -> list[str]:
     return [*(name for name in builtin_names() if name.startswith(incomplete)), *files]
 
 
+def option(*flags: str, default: Any = None, **about: Any) -> Any:
+    """A field of a request that commands may have as an option: its flags, and what typer is told of it."""
+    return field(default=default, metadata={"option": typer.Option(*flags, **about)})
+
+
+def as_parameter(one: Field[Any]) -> inspect.Parameter:
+    """Such a field as a parameter of a function whose signature typer reads."""
+    kind, told = inspect.Parameter.KEYWORD_ONLY, one.metadata["option"]
+    return inspect.Parameter(one.name, kind, default=one.default, annotation=Annotated[one.type, told])
+
+
 @dataclass(frozen=True)
 class Request:
-    """The options that commands share; what a command has no option for is as if it had not been given."""
+    """What a command is asked: those of these options that it has; the others are as if they had not been given.
 
-    config: Annotated[
-        str | None,
-        typer.Option(
-            "--config",
-            "-c",
-            metavar="FILE",
-            help="Config file, built-in config, or run by its name or folder; default: paper.",
-            autocompletion=configs_and_files,
-        ),
-    ] = None
-    sets: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--set",
-            metavar="KEY=VALUE",
-            help="Change one key of the config; may be repeated.",
-            autocompletion=keys_to_set,
-        ),
-    ] = None
-    strides: Annotated[
-        int | None, typer.Option("--strides", metavar="N", help="Strides to walk; one stride is two steps.")
-    ] = None
-    name: Annotated[
-        str | None,
-        typer.Option("--name", metavar="NAME", help="Name of the run's folder; default: after config and changes."),
-    ] = None
-    runs: Annotated[Path, typer.Option("--runs", metavar="DIR", help="Folder of all runs.")] = RUNS
-    jobs: Annotated[
-        int | None,
-        typer.Option(
-            "--jobs", metavar="N", min=1, help="Processes for independent stages and cells; default: all cores."
-        ),
-    ] = None
-    force: Annotated[bool, typer.Option("--force", help="Run the stage and all it needs, up to date or not.")] = False
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what would be done and why; change nothing.")] = False
-    no_wait: Annotated[
-        bool, typer.Option("--no-wait", help="Give up (exit 6) if another process works in the run folder.")
-    ] = False
-    open_page: Annotated[bool, typer.Option("--open", help="Show the page in the browser as soon as it is there.")] = (
-        False
+    command  as it is typed
+    """
+
+    command: str
+    config: str | None = option(
+        "--config", "-c", metavar="FILE", autocompletion=configs_and_files,
+        help="Config file, built-in config, or run by its name or folder; default: paper.",
+    )  # fmt: skip
+    sets: list[str] | None = option(
+        "--set", metavar="KEY=VALUE", help="Change one key of the config; may be repeated.", autocompletion=keys_to_set
     )
-    every: Annotated[bool, typer.Option("--all", help="Every number, not the headline numbers alone.")] = False
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")] = False
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No messages but warnings and errors.")] = False
-    verbose: Annotated[bool, typer.Option("--verbose", "-v", help="More messages.")] = False
+    strides: int | None = option("--strides", metavar="N", help="Strides to walk; one stride is two steps.")
+    name: str | None = option(
+        "--name", metavar="NAME", help="Name of the run's folder; default: after config and changes."
+    )
+    runs: Path = option("--runs", default=RUNS, metavar="DIR", help="Folder of all runs.")
+    jobs: int | None = option(
+        "--jobs", metavar="N", min=1, help="Processes for independent stages and cells; default: all cores."
+    )
+    force: bool = option("--force", default=False, help="Run the stage and all it needs, up to date or not.")
+    dry_run: bool = option("--dry-run", default=False, help="Say what would be done and why; change nothing.")
+    no_wait: bool = option(
+        "--no-wait", default=False, help="Give up (exit 6) if another process works in the run folder."
+    )
+    open_page: bool = option("--open", default=False, help="Show the page in the browser as soon as it is there.")
+    every: bool = option("--all", default=False, help="Every number, not the headline numbers alone.")
+    as_json: bool = option("--json", default=False, help="Print one JSON object on stdout.")
+    quiet: bool = option("--quiet", "-q", default=False, help="No messages but warnings and errors.")
+    verbose: bool = option("--verbose", "-v", default=False, help="More messages.")
 
     @cached_property
     def console(self) -> Console:
@@ -108,10 +103,15 @@ class Request:
         return Console(self.quiet, self.verbose, self.open_page)
 
     @property
+    def settings(self) -> tuple[str, ...]:
+        """Every change of the config, as `--set` has it."""
+        return tuple(self.sets or ())
+
+    @property
     def typed(self) -> str:
         """The options that say which run is meant, each with a blank before it; none for the paper config's own."""
         words = [] if self.config is None else ["-c", self.config]
-        for setting in self.sets or ():
+        for setting in self.settings:
             words += ["--set", setting]
         words += [] if self.strides is None else ["--set", f"strides={self.strides}"]
         words += [] if self.name is None else ["--name", self.name]
@@ -130,7 +130,7 @@ class Request:
         """The config and its run folder, its warnings said; ConfigError if it is not usable."""
         from walkerlab.pipeline.resolve import resolve
 
-        found = resolve(self.config, self.sets or (), self.strides, self.runs, self.name)
+        found = resolve(self.config, self.settings, self.strides, self.runs, self.name)
         loaded = found.loaded
         if loaded.config.stability.cases:
             from walkerlab.verification.catalogue import judged
@@ -162,7 +162,6 @@ class Request:
         return self.asked.folder
 
 
-SHARED = inspect.signature(Request).parameters
 OF_A_RUN = ("config", "sets", "strides", "name", "runs")
 """The options that say which run is meant."""
 OF_TALK = ("as_json", "quiet", "verbose")
@@ -188,26 +187,31 @@ class KeysAreNoOptions(TyperCommand):
 
 
 def command(
-    app: typer.Typer, *shared: str, name: str | None = None, purpose: str | None = None, without: Collection[str] = ()
-) -> Callable[[F], F]:
-    """Add the decorated function to a program: it takes a `Request`, then the options that are its own.
+    app: typer.Typer, *shared: str, name: str | None = None, purpose: str | None = None, asks: type[Request] = Request
+) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Add the decorated function to a program: it takes a request, then the options that are its own.
 
-    shared   fields of `Request` that are options of the command; the others keep their defaults
+    shared   fields of the request that are options of the command; the others keep their defaults
     name     as it is typed; default: the function's
     purpose  what help says; default: the function's docstring
-    without  parameters of the function that are no options of this command
+    asks     the request's type, whose own fields help has before those of `Request`
+
+    What the function raises ends the command as `exit_on_failure` says.
     """
 
-    def register(function: F) -> F:
+    def register(function: Callable[..., None]) -> Callable[..., None]:
+        typed = name or function.__name__
+
         def run(**given: Any) -> None:
-            request = Request(**{field: given.pop(field) for field in shared})
-            function(request, **given)
+            request = asks(typed, **{field: given.pop(field) for field in shared})
+            with exit_on_failure(request):
+                function(request, **given)
 
         _, *own = inspect.signature(function, eval_str=True).parameters.values()
-        options = [one for one in own if one.name not in without] + [SHARED[field] for field in shared]
-        by_name = [one.replace(kind=inspect.Parameter.KEYWORD_ONLY) for one in options]
+        options = sorted((one for one in fields(asks) if one.name in shared), key=fields(Request).__contains__)
+        by_name = [one.replace(kind=inspect.Parameter.KEYWORD_ONLY) for one in (*own, *map(as_parameter, options))]
         run.__signature__ = inspect.Signature(by_name)  # type: ignore[attr-defined]
-        app.command(name or function.__name__, cls=KeysAreNoOptions, help=purpose or inspect.getdoc(function))(run)
+        app.command(typed, cls=KeysAreNoOptions, help=purpose or inspect.getdoc(function))(run)
         return function
 
     return register

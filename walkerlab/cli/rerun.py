@@ -3,7 +3,7 @@
 import tempfile
 from pathlib import Path
 
-from walkerlab.cli.failures import print_json
+from walkerlab.cli.failures import tell
 from walkerlab.cli.request import Request
 from walkerlab.config.files import ConfigFile
 from walkerlab.config.loader import load
@@ -36,22 +36,20 @@ def rerun_artifact(path: Path, graph: Graph, request: Request) -> None:
         again = None if report.artifact is None else read(report.artifact)
     before, after = stored.digest(), None if again is None else again.digest()
     same_code = again is not None and again.identity.key == stored.identity.key
-    if request.as_json:
-        print_json(
-            {
-                "stage": stage,
-                "artifact": str(path),
-                "same": before == after,
-                "digest": before,
-                "digest_again": after,
-                "same_code": same_code,
-            }
-        )
-    if before != after:
-        why = "the code is the same" if same_code else "the code has changed since"
-        raise StaleError(
-            f"{path} is not reproduced: {before[:SHORT]} then, {(after or 'no result')[:SHORT]} now; {why}.",
-            "Results are the same to the last bit on one platform with the same versions; `walkerlab show` lists them.",
-        )
-    if not request.as_json:
-        print(f"{path} is reproduced to the last bit: content {before[:SHORT]}.")
+    value = {
+        "stage": stage,
+        "artifact": str(path),
+        "same": before == after,
+        "digest": before,
+        "digest_again": after,
+        "same_code": same_code,
+    }
+    if before == after:
+        tell(request, value, [f"{path} is reproduced to the last bit: content {before[:SHORT]}."])
+        return
+    why = "the code is the same" if same_code else "the code has changed since"
+    another = StaleError(
+        f"{path} is not reproduced: {before[:SHORT]} then, {(after or 'no result')[:SHORT]} now; {why}.",
+        "Results are the same to the last bit on one platform with the same versions; `walkerlab show` lists them.",
+    )
+    tell(request, value, [], another)

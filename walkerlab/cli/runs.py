@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from walkerlab.cli.failures import exit_on_failure, print_json
+from walkerlab.cli.failures import tell
 from walkerlab.cli.request import Request, command
 from walkerlab.pipeline.graph import Graph
 
@@ -36,22 +36,19 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
         second: Annotated[str, typer.Argument(metavar="RUN_B", help="Another one.")],
     ) -> None:
         """Say how two runs differ: configs, headline numbers with relative change, walks over one another."""
-        with exit_on_failure("diff", request):
-            from walkerlab.errors import StaleError
-            from walkerlab.pipeline.runs import config_of, difference, results_in, run_named
+        from walkerlab.errors import StaleError
+        from walkerlab.pipeline.runs import config_of, difference, results_in, run_named
 
-            folders = (run_named(first, request.runs), run_named(second, request.runs))
-            names = [stage.name for stage in graph.stages]
-            results = [results_in(folder, names, graph) for folder in folders]
-            for folder, found in zip(folders, results, strict=True):
-                if not found:
-                    raise StaleError(f"{folder.path} has no results.", "Run a stage first.")
-            found_difference = difference(results[0], results[1], [config_of(folder) for folder in folders])
-            figures = draw(folders, results)
-            if request.as_json:
-                print_json(as_object(folders, found_difference, figures))
-            else:
-                print("\n".join(lines(folders, found_difference, figures, request.every)))
+        folders = (run_named(first, request.runs), run_named(second, request.runs))
+        names = [stage.name for stage in graph.stages]
+        results = [results_in(folder, names, graph) for folder in folders]
+        for folder, found in zip(folders, results, strict=True):
+            if not found:
+                raise StaleError(f"{folder.path} has no results.", "Run a stage first.")
+        found_difference = difference(results[0], results[1], [config_of(folder) for folder in folders])
+        figures = draw(folders, results)
+        shown = lines(folders, found_difference, figures, request.every)
+        tell(request, as_object(folders, found_difference, figures), shown)
 
 
 def told_apart(folders: tuple[RunFolder, RunFolder]) -> tuple[str, str]:
@@ -62,7 +59,7 @@ def told_apart(folders: tuple[RunFolder, RunFolder]) -> tuple[str, str]:
 
 def draw(folders: tuple[RunFolder, RunFolder], results: list[dict[str, Any]]) -> list[Path]:
     """The figure of both walks, in the first run's folder of figures."""
-    from walkerlab.figures.overlay import overlaid
+    from walkerlab.figures.walks import overlaid
     from walkerlab.store.files import make_folder, write_atomically
 
     drawn = overlaid(results[0], results[1], told_apart(folders))

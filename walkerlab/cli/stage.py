@@ -5,11 +5,8 @@ import os
 import shlex
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
-import typer
-
-from walkerlab.cli.failures import print_json, say
+from walkerlab.cli.failures import tell
 from walkerlab.cli.request import Request
 from walkerlab.config.files import builtin_names, extendable
 from walkerlab.config.layers import setting_of
@@ -33,17 +30,15 @@ def run_stage(request: Request, stage: Stage, graph: Graph, full: bool) -> None:
     config, folder = request.resolved, request.folder
     if options.dry:
         report = execute(config, stage.name, folder, options, graph=graph)
-        show(request, report.as_json() | {"dry_run": True}, planned(report))
+        tell(request, report.as_json() | {"dry_run": True}, planned(report))
         return
     report = with_nearby_gaits(execute(config, stage.name, folder, options, request.console, graph), request)
     if stage.designs and report.no_answer is None:
         report.summary["config"] = str(write_optimum(request, report))
-    show(request, report.as_json(), printed(request, report))
+    lines = printed(request, report)
     if request.open_page and "html" in report.summary and not request.console.shown:
         request.console.show(report.run_dir / str(report.summary["html"]))
-    if report.no_answer is not None:
-        say(report.no_answer, request.typed)
-        raise typer.Exit(report.no_answer.exit_code)
+    tell(request, report.as_json(), lines, report.no_answer)
 
 
 def with_nearby_gaits(report: StageReport, request: Request) -> StageReport:
@@ -79,18 +74,10 @@ def write_optimum(request: Request, report: StageReport) -> Path:
     raise AssertionError("there is always another name")
 
 
-def show(request: Request, value: dict[str, Any], text: str) -> None:
-    """Print a result in the way that was asked for."""
-    if request.as_json:
-        print_json(value)
-    else:
-        print(text)
-
-
-def printed(request: Request, report: StageReport) -> str:
+def printed(request: Request, report: StageReport) -> list[str]:
     """The result for people: what was found, where it is, and what to do next."""
     if report.artifact is None:
-        return "\n".join([f"{report.stage}: no result", *left_out_lines(request, report)])
+        return [f"{report.stage}: no result", *left_out_lines(request, report)]
     # why there is no answer, and what to try, is told once: as the error
     told_apart = ("no_answer",) if report.no_answer is None else ("no_answer", "advice")
     own = {key: value for key, value in report.summary.items() if key not in told_apart}
@@ -109,13 +96,13 @@ def printed(request: Request, report: StageReport) -> str:
 
         drawn = draw_at_once(report.stage, report.run_dir, anew=not report.reused)
         lines += [f"figure: {path}" for path in drawn]
-    return "\n".join([*lines, *left_out_lines(request, report)])
+    return [*lines, *left_out_lines(request, report)]
 
 
-def planned(report: StageReport) -> str:
+def planned(report: StageReport) -> list[str]:
     """What would happen, for people."""
     rows = [[done.stage, done.action, done.reason] for done in report.steps]
-    return "\n".join([f"in {report.run_dir}:", *aligned(rows), *each_left_out(report)])
+    return [f"in {report.run_dir}:", *aligned(rows), *each_left_out(report)]
 
 
 def left_out_lines(request: Request, report: StageReport) -> list[str]:

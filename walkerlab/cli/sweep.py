@@ -1,24 +1,22 @@
 """`walkerlab sweep`: one question over many configs."""
 
-from __future__ import annotations
-
 import importlib
 import os
 import sys
 import threading
+from collections.abc import Collection
+from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
-from walkerlab.cli.failures import exit_on_failure, print_json, say
-from walkerlab.cli.request import OF_A_RUN, OF_TALK, Request, command
+from walkerlab.cli.failures import tell
+from walkerlab.cli.request import OF_A_RUN, OF_TALK, Request, command, option
 from walkerlab.pipeline.graph import PIPELINE, Graph
 from walkerlab.report.text import paragraph
 
 if TYPE_CHECKING:
-    from collections.abc import Collection
-
     from walkerlab.sweeps.sweep import Foreseen, Swept
 
 TOLD = ("of", "parameters", "points", "done", "failed", "outcomes", "endings", "numerical_error")
@@ -26,102 +24,91 @@ TOLD = ("of", "parameters", "points", "done", "failed", "outcomes", "endings", "
 SHOWN = 20
 """Points that a dry run lists."""
 
-Over = Annotated[
-    list[str] | None,
-    typer.Option(
+
+@dataclass(frozen=True)
+class SweepRequest(Request):
+    """What a sweep is asked."""
+
+    over: list[str] | None = option(
         "--over", metavar="KEY=VALUES", help="A parameter: FROM:TO:N, FROM:TO:N:log or [a, b, ...]; may be repeated."
-    ),
-]
-Of = Annotated[str | None, typer.Option("--stage", metavar="NAME", help="The stage to run.")]
-Zip = Annotated[
-    bool, typer.Option("--zip", help="Combine the n-th values into the n-th point, instead of each with each.")
-]
-Sample = Annotated[
-    str | None, typer.Option("--sample", metavar="SAMPLER:N", help="Draw points: latin-hypercube:500, sobol:512.")
-]
-Seed = Annotated[int | None, typer.Option("--seed", metavar="N", min=0, help="Seed of the drawn points; default 1.")]
-EngineName = Annotated[
-    str, typer.Option("--engine", metavar="NAME", help="Where to compute: local, dask[=ADDRESS] or slurm.")
-]
-EngineOptions = Annotated[
-    list[str] | None,
-    typer.Option("--engine-option", metavar="NAME=VALUE", help="For Slurm: slurm_partition, timeout_min, cluster, ..."),
-]
-Jobs = Annotated[
-    int, typer.Option("--jobs", metavar="N", min=0, help="Chunks computed at once; 0: all cores, on Slurm 16.")
-]
-ChunkSeconds = Annotated[
-    float | None, typer.Option("--chunk-seconds", metavar="S", help="Target duration of a chunk; default by engine.")
-]
-Show = Annotated[list[str] | None, typer.Option("--show", metavar="NAME", help="Quantity to plot; may be repeated.")]
-AsCsv = Annotated[
-    bool, typer.Option("--csv", help="Print the points with the headline numbers as a table, kept beside the result.")
-]
+    )
+    stage: str | None = option("--stage", metavar="NAME", help="The stage to run.")
+    zipped: bool = option(
+        "--zip", default=False, help="Combine the n-th values into the n-th point, instead of each with each."
+    )
+    sample: str | None = option("--sample", metavar="SAMPLER:N", help="Draw points: latin-hypercube:500, sobol:512.")
+    seed: int | None = option("--seed", metavar="N", min=0, help="Seed of the drawn points; default 1.")
+    engine: str = option(
+        "--engine", default="local", metavar="NAME", help="Where to compute: local, dask[=ADDRESS] or slurm."
+    )
+    engine_option: list[str] | None = option(
+        "--engine-option", metavar="NAME=VALUE", help="For Slurm: slurm_partition, timeout_min, cluster, ..."
+    )
+    at_once: int = option(
+        "--jobs", default=0, metavar="N", min=0, help="Chunks computed at once; 0: all cores, on Slurm 16."
+    )
+    chunk_seconds: float | None = option(
+        "--chunk-seconds", metavar="S", help="Target duration of a chunk; default by engine."
+    )
+    show: list[str] | None = option("--show", metavar="NAME", help="Quantity to plot; may be repeated.")
+    as_csv: bool = option(
+        "--csv", default=False, help="Print the points with the headline numbers as a table, kept beside the result."
+    )
+
+
+OWN = [one.name for one in fields(SweepRequest) if one not in fields(Request)]
 
 
 def add_to(app: typer.Typer, graph: Graph) -> None:
     """Add the command to a program for a pipeline."""
 
-    @command(app, *OF_A_RUN, "force", "dry_run", "no_wait", "every", *OF_TALK)
-    def sweep(
-        request: Request,
-        over: Over = None,
-        stage: Of = None,
-        zipped: Zip = False,
-        sample: Sample = None,
-        seed: Seed = None,
-        engine: EngineName = "local",
-        engine_option: EngineOptions = None,
-        jobs: Jobs = 0,
-        chunk_seconds: ChunkSeconds = None,
-        show: Show = None,
-        as_csv: AsCsv = False,
-    ) -> None:
+    @command(app, *OWN, *OF_A_RUN, "force", "dry_run", "no_wait", "every", *OF_TALK, asks=SweepRequest)
+    def sweep(request: SweepRequest) -> None:
         """Run a stage over many values of parameters; results that exist are reused."""
-        with exit_on_failure("sweep", request):
-            from walkerlab.config.sweep import Sweep
-            from walkerlab.sweeps.engines import Order, engine_named
-            from walkerlab.sweeps.question import asked, axis_of_text
-            from walkerlab.sweeps.sweep import SweepRun, SweepWork, modules_of
+        from walkerlab.config.sweep import Sweep
+        from walkerlab.sweeps.engines import Order, engine_named
+        from walkerlab.sweeps.question import asked, axis_of_text
+        from walkerlab.sweeps.sweep import SweepRun, SweepWork, modules_of
 
-            options = dict(text.split("=", 1) for text in engine_option or () if "=" in text)
-            if bad := [text for text in engine_option or () if "=" not in text]:
-                raise typer.BadParameter(f"{bad[0]!r} is not NAME=VALUE", param_hint="--engine-option")
-            chosen, address = engine_named(engine)
-            loaded = request.loaded
-            given = loaded.config.sweep or Sweep()  # what the options leave open
-            own = [(key, values, f"sweep.over.{key}") for key, values in given.over.items()]
-            question = asked(
-                stage or given.stage,
-                [axis_of_text(text) for text in over or ()] or own,
-                zipped or (given.zip and not over),
-                sample if sample is not None else "" if over else given.sample,
-                given.seed if seed is None else seed,
-            )
-            order = Order(
-                workers=jobs,
-                address=address,
-                modules=modules_of(question.stage, loaded.config, graph),
-                folder=request.folder.path,
-                options=options,
-            )
-            if request.dry_run:
-                foreseen = SweepRun(question, loaded, request.folder, graph)
-                show_plan(request, foreseen.foresee(jobs or os.cpu_count() or 1, SHOWN))
-                return
-            with chosen.begun(order) as begun:
-                run = SweepRun(question, loaded, request.folder, graph)
-                # What is needed at the end is loaded while others compute.
-                threading.Thread(target=importlib.import_module, args=("walkerlab.sweeps.drawing",)).start()
+        options = dict(text.split("=", 1) for text in request.engine_option or () if "=" in text)
+        if bad := [text for text in request.engine_option or () if "=" not in text]:
+            raise typer.BadParameter(f"{bad[0]!r} is not NAME=VALUE", param_hint="--engine-option")
+        chosen, address = engine_named(request.engine)
+        loaded, over = request.loaded, request.over or ()
+        given = loaded.config.sweep or Sweep()  # what the options leave open
+        own = [(key, values, f"sweep.over.{key}") for key, values in given.over.items()]
+        question = asked(
+            request.stage or given.stage,
+            [axis_of_text(text) for text in over] or own,
+            request.zipped or (given.zip and not over),
+            request.sample if request.sample is not None else "" if over else given.sample,
+            given.seed if request.seed is None else request.seed,
+        )
+        order = Order(
+            workers=request.at_once,
+            address=address,
+            modules=modules_of(question.stage, loaded.config, graph),
+            folder=request.folder.path,
+            options=options,
+        )
+        if request.dry_run:
+            foreseen = SweepRun(question, loaded, request.folder, graph)
+            show_plan(request, foreseen.foresee(request.at_once or os.cpu_count() or 1, SHOWN))
+            return
+        with chosen.begun(order) as begun:
+            run = SweepRun(question, loaded, request.folder, graph)
+            # What is needed at the end is loaded while others compute.
+            threading.Thread(target=importlib.import_module, args=("walkerlab.sweeps.drawing",)).start()
 
-                def check(there: Collection[str]) -> None:
-                    from walkerlab.sweeps.drawing import refuse_unheard
+            def check(there: Collection[str]) -> None:
+                from walkerlab.sweeps.drawing import refuse_unheard
 
-                    refuse_unheard(question.stage, show or (), there)
+                refuse_unheard(question.stage, request.show or (), there)
 
-                work = SweepWork(begun, order, chunk_seconds, not request.no_wait, request.force, where(graph), check)
-                swept = run.run(work, request.console)
-            show_result(request, swept, tuple(show or ()), as_csv)
+            seconds, waits = request.chunk_seconds, not request.no_wait
+            work = SweepWork(begun, order, seconds, waits, request.force, where(graph), check)
+            swept = run.run(work, request.console)
+        show_result(request, swept)
 
 
 def where(graph: Graph) -> str:
@@ -135,28 +122,24 @@ def where(graph: Graph) -> str:
     return next(f"{name}:{key}" for name, module in own for key, value in vars(module).items() if value is graph)
 
 
-def show_plan(request: Request, foreseen: Foreseen) -> None:
+def show_plan(request: Request, foreseen: "Foreseen") -> None:
     """Say what would be done."""
     missing = foreseen.count - foreseen.there
-    if request.as_json:
-        print_json(
-            {
-                **common(request, foreseen.path, 0.0),
-                "dry_run": True,
-                "points": foreseen.count,
-                "reused": foreseen.there,
-                "to_compute": missing,
-                "estimate_s": foreseen.estimate_s,
-                "first_points": list(foreseen.points),
-            }
-        )
-        return
+    value = {
+        **common(request, foreseen.path, 0.0),
+        "dry_run": True,
+        "points": foreseen.count,
+        "reused": foreseen.there,
+        "to_compute": missing,
+        "estimate_s": foreseen.estimate_s,
+        "first_points": list(foreseen.points),
+    }
     more = foreseen.count - len(foreseen.points)
     lines = [f"  {point}" for point in foreseen.points] + ([f"  and {more} more"] if more else [])
     known = foreseen.estimate_s
     time = "no such point has been timed yet" if known is None else f"about {in_time(known)}"
     counts = f"{foreseen.count} points, {foreseen.there} computed already, {missing} to compute: {time}"
-    print("\n".join([f"in {foreseen.path}:", *lines, counts]))
+    tell(request, value, [f"in {foreseen.path}:", *lines, counts])
 
 
 def in_time(seconds: float) -> str:
@@ -178,13 +161,13 @@ def common(request: Request, path: Path, wall_s: float) -> dict[str, Any]:
     }
 
 
-def show_result(request: Request, swept: Swept, names: tuple[str, ...], as_csv: bool) -> None:
+def show_result(request: SweepRequest, swept: "Swept") -> None:
     """Draw and print a sweep; typer.Exit if points were not computed."""
     from walkerlab.store.files import write_atomically
     from walkerlab.sweeps.drawing import draw
     from walkerlab.sweeps.result import as_csv as table_of
 
-    drawn = draw(swept, request.folder, names)
+    drawn = draw(swept, request.folder, tuple(request.show or ()))
     summary = swept.summary
     value = {
         **common(request, swept.path, swept.wall_s),
@@ -193,24 +176,16 @@ def show_result(request: Request, swept: Swept, names: tuple[str, ...], as_csv: 
         "figures": [str(path) for path in drawn.figures],
         "html": str(drawn.page),
     }
-    if as_csv:
+    lines = printed(swept, drawn.page)
+    if request.as_csv:
         table = table_of(swept.content, swept.question, request.every)
         beside = swept.path.with_suffix(".csv")
         write_atomically(beside, table.encode())
-        value["csv"] = str(beside)
-    error = swept.error() if swept.failed else None
-    if request.as_json:
-        print_json(value | ({"error": error.as_json()} if error is not None else {}))
-    elif as_csv:
-        print(table, end="")
-    else:
-        print("\n".join(printed(swept, drawn.page)))
-    if error is not None:
-        say(error)
-        raise typer.Exit(error.exit_code)
+        value["csv"], lines = str(beside), [table.removesuffix("\n")]
+    tell(request, value, lines, swept.error() if swept.failed else None)
 
 
-def printed(swept: Swept, page: Path) -> list[str]:
+def printed(swept: "Swept", page: Path) -> list[str]:
     """The result for people."""
     from walkerlab.sweeps.drawing import said_of
 

@@ -1,6 +1,7 @@
 """Figures of a sweep: lines over one parameter, maps over two, points over each of more."""
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any, Final
 
 import matplotlib
@@ -11,7 +12,8 @@ from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
-from walkerlab.figures.canvas import Drawing, add_legend, blank, entry, files_of, label_of, styled
+from walkerlab.figures.canvas import add_legend, blank, entry, label_of
+from walkerlab.figures.illustration import Drawn, Illustration, Results
 from walkerlab.figures.maps import WHITE, edges, is_logarithmic
 from walkerlab.figures.style import BLUE, GREY, VERMILLION
 from walkerlab.labels import in_words
@@ -52,37 +54,32 @@ def is_number(group: Group, name: str, dims: tuple[str, ...]) -> bool:
     return name in group.variables and group.variables[name].dims == dims and group[name].dtype.kind in "fib"
 
 
-def draw(group: Group, stage: str, parameters: Sequence[str], dims: tuple[str, ...], names: Sequence[str]) -> Drawing:
+def illustration(
+    group: Group, stage: str, parameters: Sequence[str], dims: tuple[str, ...], names: Sequence[str]
+) -> Illustration:
     """The figure of some numbers over the parameters.
 
     parameters  names of the coordinates
     dims        of the points
     names       what to draw, at least one
     """
-    title = f"{stage} over {', '.join(parameters)}"
-    with styled():
-        if len(dims) != 2:
-            figure = panels(group, parameters, dims, names)
-        else:
-            figure = (lines if in_lines(group, dims) else maps)(group, parameters, names)
-        svg, png = files_of(figure, f"sweep-{stage}", title)
-    return Drawing(svg, png, title, caption(group, dims, parameters, names))
+    drawing = partial(draw, group, parameters, dims, names)
+    return Illustration(f"sweep-{stage}", (), drawing, words="sweep", scene=f"{stage} over {', '.join(parameters)}")
 
 
-def caption(group: Group, dims: tuple[str, ...], parameters: Sequence[str], names: Sequence[str]) -> str:
-    """What is seen, in a sentence or two."""
-    outcomes, counts = np.unique(group["outcome"].astype(str), return_counts=True)
-    said = ", ".join(f"{count} {name}" for name, count in zip(outcomes, counts, strict=True))
-    what = ", ".join(group.variables[name].long_name.replace("_", " ") for name in names)
-    gaps = bool(np.any(group["status"] != "answered"))
+def draw(
+    group: Group, parameters: Sequence[str], dims: tuple[str, ...], names: Sequence[str], _results: Results
+) -> Drawn:
+    """Caption: what is drawn over what, how points came out, how gaps are seen, and whether there is a line of one."""
     a_map = len(dims) == 2 and not in_lines(group, dims)
-    end = " Where there is no answer the map is grey." if gaps and a_map else ""
-    if gaps and not a_map and len(dims) < 3:
-        end = " Marks at the bottom: no answer there."
-    if a_map:
-        end += " The map ends where the outermost values were sampled; small ticks are at the others."
-    one = " The line is a largest multiplier of one: beyond it the gait is unstable." if RADIUS in names else ""
-    return f"{what[:1].upper()}{what[1:]} over {', '.join(parameters)}: {said}.{end}{one}"
+    if len(dims) != 2:
+        figure = panels(group, parameters, dims, names)
+    else:
+        figure = (maps if a_map else lines)(group, parameters, names)
+    outcomes = zip(*np.unique(group["outcome"].astype(str), return_counts=True), strict=True)
+    gaps = "" if np.all(group["status"] == "answered") else "map" if a_map else "marks" if len(dims) < 3 else ""
+    what = [group.variables[name].long_name.replace("_", " ") for name in names]
+    return figure, (what, parameters, list(outcomes), gaps, a_map, RADIUS in names)
 
 
 def label(group: Group, name: str) -> str:

@@ -1,8 +1,8 @@
-"""The walks of both models: 5, 7 and 10 in time, 8 their difference, 9 their limit cycles."""
+"""The walks of both models: 5, 7 and 10 in time, 8 their difference, 9 their limit cycles; and two runs overlaid."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from operator import is_
 from typing import Any, Final
@@ -14,9 +14,9 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from walkerlab.figures.canvas import add_legend, blank, entry, label_of
+from walkerlab.figures.canvas import add_legend, blank, entry, files_of, label_of, styled
 from walkerlab.figures.illustration import Drawn, Need, Results, paper_figure
-from walkerlab.figures.style import BLACK, CONTACT, GREY, PALE, RIGID, VERMILLION, Look
+from walkerlab.figures.style import BLACK, BLUE, CONTACT, GREY, ORANGE, PALE, RIGID, VERMILLION, Look
 from walkerlab.paper.printed import ANGLE_ERROR, VELOCITY_ERROR
 from walkerlab.store.content import Content, Group
 
@@ -107,17 +107,6 @@ def walk_of(result: Content, look: Look) -> Walk:
 def touch_times(steps: Group) -> Array:
     """Times of the heel strikes (s); none if no step was completed."""
     return steps[TOUCHES] if TOUCHES in steps.variables else np.zeros(0)
-
-
-def sentence(walks: list[Walk]) -> str:
-    """How the walks went: 'The rigid model walked 10 steps, the contact model took 1 step (fell).'."""
-    said = []
-    for walk in walks:
-        count = f"{walk.steps} step" + ("" if walk.steps == 1 else "s")
-        went = f"walked {count}" if walk.outcome == "walked" else f"took {count} ({walk.outcome})"
-        said.append(f"the {walk.look.label} {went}")
-    text = ", ".join(said)
-    return text[:1].upper() + text[1:] + "."
 
 
 def shown(walks: list[Walk], strides: int = PAPER_STRIDES) -> tuple[list[Walk], str]:
@@ -226,7 +215,7 @@ def draw_states(results: Results) -> Drawn:
             one.axvspan(first.time[begin], first.time[end - 1], color=PALE, linewidth=0.0, zorder=0.5)
     stance = f"stance of the leg, {first.look.label.split()[0]}"
     legend(figure, walks, Patch(facecolor=PALE, edgecolor="none", label=stance))
-    return figure, (extent, sentence(walks))
+    return figure, (extent, walks)
 
 
 AT_SAME_TIME: Final = Look("difference at the same time", VERMILLION, (0.0, (3.2, 1.4)), 1.2, "", order=3)
@@ -311,7 +300,7 @@ def draw_cycles(results: Results) -> Drawn:
             mark: dict[str, Any] = {"marker": look.marker, "markersize": 4.5, "color": look.colour, "mfc": face}
             key.append(entry(f"{whose} heel strike, {look.label.split()[0]}", linestyle="none", **mark))
     add_legend(figure, key)
-    return figure, (extent, sentence(walks))
+    return figure, (extent, walks)
 
 
 def draw_cycles_of(axes: Axes, walk: Walk, leg: int) -> None:
@@ -380,7 +369,51 @@ def draw_energies(results: Results) -> Drawn:
     impacts = any(walk.look is CONTACT for walk in walks)
     asked = results[RIGID_STAGE].identity.config_slice
     driven = any((asked["push_off"]["impulse_N_s"], *asked["walker"]["hip"].values()))
-    return figure, (extent, means, redoes_the_paper(results), impacts, driven, sentence(walks))
+    return figure, (extent, means, redoes_the_paper(results), impacts, driven, walks)
+
+
+OVERLAY_ROWS: Final[tuple[tuple[str, Any, str], ...]] = (
+    ("angle", 0, "angle of leg 1 (rad)"),
+    ("angle", 1, "angle of leg 2 (rad)"),
+    ("mechanical_J", slice(None), "energy (J)"),
+)
+RUN_LOOKS: Final[tuple[dict[str, Any], ...]] = (
+    {"color": BLUE, "linewidth": 1.3},
+    {"color": ORANGE, "linewidth": 1.2, "linestyle": (0.0, (3.2, 1.4))},
+)
+
+
+def overlaid(first: Mapping[str, Content], second: Mapping[str, Content], names: tuple[str, str]) -> list[bytes] | None:
+    """SVG and PNG of two runs' walks over one another; None if they have no walk in common that was sampled.
+
+    names  of the runs
+    """
+    both = [
+        (stage, [run[stage].groups["trajectory"] for run in (first, second)])
+        for stage in (RIGID_STAGE, CONTACT_STAGE)
+        if all(stage in run and run[stage].groups.get("trajectory") for run in (first, second))
+    ]
+    if not both:
+        return None
+    with styled():
+        return files_of(draw_overlay(both, names), "diff", f"{names[0]} and {names[1]}")
+
+
+def draw_overlay(both: list[tuple[str, list[Group]]], names: tuple[str, str]) -> Figure:
+    """A column for each stage, with both runs' trajectories; a row for each leg's angle and one for the energy."""
+    figure = blank(0.5 + 1.9 * len(OVERLAY_ROWS))
+    axes = figure.subplots(len(OVERLAY_ROWS), len(both), sharex="col", sharey="row", squeeze=False)
+    for row, (variable, leg, label) in zip(axes, OVERLAY_ROWS, strict=True):
+        row[0].set_ylabel(label)
+        for one, (_, groups) in zip(row, both, strict=True):
+            for group, look in zip(groups, RUN_LOOKS, strict=True):
+                if variable in group.variables:
+                    one.plot(group["time"], group[variable][..., leg], **look)
+    for top, bottom, (stage, _) in zip(axes[0], axes[-1], both, strict=True):
+        top.set_title(stage)
+        bottom.set_xlabel("time (s)")
+    add_legend(figure, [entry(name, **look) for name, look in zip(names, RUN_LOOKS, strict=True)])
+    return figure
 
 
 FIGURES = (

@@ -4,6 +4,8 @@ from dataclasses import dataclass
 from decimal import ROUND_DOWN, ROUND_HALF_UP, Decimal
 from typing import Final
 
+from walkerlab.config.contact import Contact
+from walkerlab.ground.resting import RestingFoot, resting_foot
 from walkerlab.paper.appendix_a import RigidWalker
 
 COORDINATES: Final = ("theta_1", "theta_2", "dtheta_1", "dtheta_2")
@@ -179,3 +181,22 @@ def walker_of_the_paper(c21_sign: float) -> RigidWalker:
     """
     length, mass, hip, gravity = (entry.value for entry in TABLE_1)
     return RigidWalker(length, 0.5 * length, mass, hip, LEG_INERTIA.value, gravity, slope_of(*X_P[:2])[0], c21_sign)
+
+
+def printed_speed(cycle: float) -> float:
+    """The printed step length over a cycle's time (s), as section 5 has it (m/s)."""
+    return STEP_LENGTH.value / cycle
+
+
+def speed_difference(matlab_cycle: float, adams_cycle: float) -> float:
+    """Difference of the two speeds (%) that follow from cycles of these times (s)."""
+    matlab, adams = printed_speed(matlab_cycle), printed_speed(adams_cycle)
+    return 100.0 * abs(adams - matlab) / matlab
+
+
+def readings_of_fig_4b() -> tuple[RestingFoot, RestingFoot]:
+    """How the paper's walker stands on its contact by its numbers without units: read in N, mm and s, and in SI."""
+    _, leg, hip, gravity = (entry.value for entry in TABLE_1)
+    mass, adams = hip + 2.0 * leg, Contact(stiffness=STIFFNESS.value, damping=DAMPING.value).in_si()
+    in_adams = resting_foot(mass * gravity, mass, adams.stiffness, adams.exponent, adams.damping)
+    return in_adams, resting_foot(mass * gravity, mass, STIFFNESS.value, 1.0, DAMPING.value)

@@ -9,9 +9,8 @@ from typing import Any, Literal
 from walkerlab.config.contact import MM_PER_M
 from walkerlab.hybrid.comparison import Quantity
 from walkerlab.paper import printed
-from walkerlab.paper.arithmetic import speed_difference
 from walkerlab.paper.measured import CYCLES, Measured
-from walkerlab.paper.printed import Printed
+from walkerlab.paper.printed import Printed, speed_difference
 from walkerlab.paper.prose import prose
 from walkerlab.paper.study import PaperStudy
 

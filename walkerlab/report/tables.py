@@ -6,6 +6,7 @@ import re
 import unicodedata
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from typing import Any, ClassVar, Final, Literal
 
 from walkerlab.labels import labels_of, unit_by_name, with_unit
@@ -114,17 +115,10 @@ def measured(
 
 
 @dataclass(frozen=True)
-class RowGroup:
-    """Rows under a common head of their own, which may be empty."""
-
-    title: str
-    rows: tuple[tuple[Cell, ...], ...]
-
-
-@dataclass(frozen=True)
 class Table:
     """A table; the first cell of a row is its head.
 
+    groups rows by the head that they have in common, which may be empty
     wordy  it has cells with sentences in them: on a narrow screen each row becomes a card of its own
     note   what to know when reading it, below it
     by     what the titles of its groups of rows are, where that is a column
@@ -133,14 +127,14 @@ class Table:
     template: ClassVar[str] = "table"
     caption: str
     columns: tuple[Column, ...]
-    bodies: tuple[RowGroup, ...]
+    groups: Mapping[str, Sequence[Sequence[Cell]]]
     wordy: bool = False
     note: str = ""
     by: str = ""
 
     def __bool__(self) -> bool:
         """Whether it has a row."""
-        return any(body.rows for body in self.bodies)
+        return any(self.groups.values())
 
 
 def table(
@@ -159,14 +153,14 @@ def table(
     Raises ValueError for a record that is a row of cells and has not one for each column.
     """
     groups = records if isinstance(records, Mapping) else {"": records}
-    bodies = []
-    for title, found in groups.items():
-        for record in found:
-            if isinstance(record, list | tuple) and len(record) != len(columns):
-                raise ValueError(f"{record!r} has not {len(columns)} cells")
-        rows = (tuple(column.cell(record, place) for place, column in enumerate(columns)) for record in found)
-        bodies.append(RowGroup(title, tuple(rows)))
-    return Table(caption, tuple(columns), tuple(bodies), wordy, note, by)
+    for record in chain.from_iterable(groups.values()):
+        if isinstance(record, list | tuple) and len(record) != len(columns):
+            raise ValueError(f"{record!r} has not {len(columns)} cells")
+    rows = {
+        title: [[column.cell(record, place) for place, column in enumerate(columns)] for record in found]
+        for title, found in groups.items()
+    }
+    return Table(caption, tuple(columns), rows, wordy, note, by)
 
 
 def grouped(records: Iterable[Mapping[str, Any]], *keys: str) -> dict[str, list[Mapping[str, Any]]]:
@@ -211,12 +205,12 @@ def flat(shown: Table, wide: bool = False) -> tuple[list[str], list[list[Cell]]]
     wide  whether columns of sentences are among them
     """
     kept = [place for place, column in enumerate(shown.columns) if wide or not column.wide]
-    titled = any(body.title for body in shown.bodies)
+    titled = any(shown.groups)
     heads = [*([shown.by] if titled else []), *(shown.columns[place].title for place in kept)]
     rows = [
-        [*([Cell(body.title, value=body.title)] if titled else []), *(row[place] for place in kept)]
-        for body in shown.bodies
-        for row in body.rows
+        [*([Cell(title, value=title)] if titled else []), *(row[place] for place in kept)]
+        for title, found in shown.groups.items()
+        for row in found
     ]
     return heads, rows
 

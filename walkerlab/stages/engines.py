@@ -5,17 +5,17 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, field
-from functools import partial
 from typing import Any
 
 import numpy as np
 
 from walkerlab import __version__
 from walkerlab.benchmarks.engines import experiments
-from walkerlab.benchmarks.engines.process import OwnProcess
-from walkerlab.benchmarks.engines.registry import ENGINES, EXTRA, Engine, installed
+from walkerlab.benchmarks.engines.experiments import EngineOnScene
+from walkerlab.benchmarks.engines.process import OwnProcess, TaskLost
+from walkerlab.benchmarks.engines.registry import ENGINES, EXTRA, installed
 from walkerlab.benchmarks.engines.rows import OURS, OWN_LAW, SAME_LAW, EngineRow, SwingRow, TuningRow
-from walkerlab.benchmarks.engines.scenes import EngineScene, scenes
+from walkerlab.benchmarks.engines.scenes import scenes
 from walkerlab.config.reads import SceneConfig
 from walkerlab.errors import NoAnswer
 from walkerlab.labels import labels_of
@@ -61,9 +61,10 @@ def run(config: SceneConfig, inputs: Mapping[str, Content], progress: Progress, 
             continue
         found.truths[scene.name] = truth
         progress.start(f"engines: {scene.name}", len(engines) + 1)
-        found.rows += [*experiments.our_rows(scene, truth, __version__), *experiments.adams_rows(scene, __version__)]
+        found.rows += experiments.our_rows(scene, truth, __version__)
         progress.advance()
-        for measured in side_by_side(engines, scene, truth, jobs):
+        each = [EngineOnScene(engine, scene, truth, OwnProcess()) for engine in engines]
+        for measured in side_by_side(each, jobs):
             found.add(measured)
             progress.advance()
     if not found.truths:
@@ -71,17 +72,14 @@ def run(config: SceneConfig, inputs: Mapping[str, Content], progress: Progress, 
     return content(found, rigid)
 
 
-def side_by_side(
-    engines: Sequence[Engine], scene: EngineScene, truth: experiments.Truth, jobs: int
-) -> Iterator[EngineFindings]:
+def side_by_side(each: Sequence[EngineOnScene], jobs: int) -> Iterator[EngineFindings]:
     """What is found of each engine, `jobs` of them at a time; who stops waiting ends those that run."""
-    processes = [OwnProcess() for _ in engines]
     with ThreadPoolExecutor(max(1, jobs)) as pool:
         try:
-            yield from pool.map(partial(measure, scene=scene, truth=truth), engines, processes)
+            yield from pool.map(measure, each)
         except BaseException:
-            for process in processes:
-                process.abandon()
+            for one in each:
+                one.process.abandon()
             raise
 
 
@@ -94,25 +92,25 @@ def not_installed() -> list[dict[str, str]]:
     ]
 
 
-def measure(engine: Engine, process: OwnProcess, scene: EngineScene, truth: experiments.Truth) -> EngineFindings:
-    """All experiments of one engine on one scene, in a process of its own."""
-    found = EngineFindings()
-    version, target = engine.version, experiments.target_of(scene)
-    with process:
-        found.swings, lost = experiments.swing_rows(engine, scene, process)
-        found.left_out += [{"what": f"a swing in {engine.name}", "why": one.why} for one in lost]
-        found.rows += experiments.same_law_rows(engine, version, scene, truth, process)
+def measure(one: EngineOnScene) -> EngineFindings:
+    """All experiments of one engine on one scene."""
+    found, name = EngineFindings(), one.engine.name
+    target = experiments.target_of(one.scene)
+    with one.process:
+        found.swings, lost = one.swings()
+        found.left_out += [{"what": f"a swing in {name}", "why": other.why} for other in lost]
+        found.rows += one.same_law()
         if target is None:
-            found.left_out.append({"what": f"own contact of {engine.name}", "why": "the ground has no friction"})
+            found.left_out.append({"what": f"own contact of {name}", "why": "the ground has no friction"})
             return found
-        for contact in engine.adapter().CONTACTS:
-            own, rows, failed = experiments.tuned(engine, contact, scene, target, process)
-            if own is None:
-                why = failed.why if failed is not None else "it could not be tuned"
-                found.left_out.append({"what": f"contact {contact} of {engine.name}", "why": why})
+        for contact in one.engine.adapter().CONTACTS:
+            tuned = one.tuned(contact, target)
+            if isinstance(tuned, TaskLost):
+                found.left_out.append({"what": f"contact {contact} of {name}", "why": tuned.why})
                 continue
+            own, rows = tuned
             found.tuning += rows
-            found.rows += experiments.own_law_rows(engine, version, contact, own, scene, truth, process)
+            found.rows += one.own_law(contact, own)
     return found
 
 

@@ -14,10 +14,9 @@ from walkerlab.stages.contact_sim import scene_on_pads
 from walkerlab.stages.walk import rigid_start
 from walkerlab.store.columns import rows_group
 from walkerlab.store.content import Content
-from walkerlab.verification.catalogue import judged
+from walkerlab.verification.catalogue import judged, scene_cases
 from walkerlab.verification.judge import CaseCell, run_cells
 from walkerlab.verification.ordinary import CAP, FINE, Choice
-from walkerlab.verification.scene_catalogue import scene_cases
 from walkerlab.verification.verdict import CaseResult
 
 

@@ -7,8 +7,7 @@ from typing import Any
 
 from walkerlab.errors import ConfigError
 from walkerlab.figures import robustness
-from walkerlab.figures.sweep import choose, is_number
-from walkerlab.figures.sweep import draw as drawn_figure
+from walkerlab.figures.sweep import choose, illustration, is_number
 from walkerlab.report.blocks import Gallery, Picture, Section
 from walkerlab.report.headlines import HEADLINES
 from walkerlab.report.numbers import number
@@ -46,12 +45,12 @@ def draw(swept: Swept, folder: RunFolder, names: Sequence[str] = ()) -> Files:
     refuse_unknown(group, question.dims, names)
     shown = list(names) or choose(group, question.dims, question.names)
     own = None if names else robustness.of_sweep(group, question.names)
-    figure = None if own is None else own.drawn({})
-    if figure is None and shown:
-        figure = drawn_figure(group, question.stage, question.names, question.dims, shown)
+    if own is None and shown:
+        own = illustration(group, question.stage, question.names, question.dims, shown)
     paths: list[Path] = []
     pictures: list[Picture] = []
-    if figure is not None:
+    if own is not None:
+        figure = own.drawn({})
         make_folder(folder.figures)
         paths = [folder.figures / f"{swept.path.stem}.{kind}" for kind in ("svg", "png")]
         for path, data in zip(paths, (figure.svg, figure.png), strict=True):

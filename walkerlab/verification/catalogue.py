@@ -1,18 +1,32 @@
-"""The catalogue of cases: read, typed by the schema, and turned into configs."""
+"""Two catalogues of cases, read, typed by the schema and turned into configs: of the paper's compass, and of any scene.
 
-from collections.abc import Sequence
+A scene's own extremes are its walker on harder and softer ground, on other slopes, from other starts.
+"""
+
+from collections.abc import Mapping, Sequence
+from operator import attrgetter
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
+from walkerlab.config.fields import Block
 from walkerlab.config.overlay import over_paper
 from walkerlab.config.reader import read
 from walkerlab.config.schema import Config
-from walkerlab.config.stability import Case
+from walkerlab.config.stability import FATES, Case, Fate
 from walkerlab.config.tree import plain
+from walkerlab.config.walkers import Kneed, PartsWalker
 from walkerlab.errors import ConfigError
 
 CATALOGUE: Final = Path(__file__).parent / "catalogue.yaml"
 NAME_OF_ITS_OWN: Final = "Give yours a name of its own."
+SCENE_CATALOGUE: Final = Path(__file__).with_name("scene_catalogue.yaml")
+ENDS: tuple[Fate, ...] = tuple(fate for fate in FATES if fate not in ("budget-exhausted", "solver-failed", "rejected"))
+"""The ends that physics may have: where nobody knows which, a case passes by its measures alone."""
+STOPS: tuple[Fate, ...] = tuple(fate for fate in ENDS if fate != "walked")
+CHANGES: Final = ("start", "slope", "times", "over", "set")
+USUAL: Final = {"steps": 4, "budget": 1_000_000, "expected": ENDS}
+
+B = TypeVar("B", bound=Block)
 
 
 def shipped() -> tuple[Case, ...]:
@@ -49,3 +63,52 @@ def without_doubles(cases: Sequence[Case]) -> tuple[Case, ...]:
 def config_of(case: Case) -> Config:
     """The paper's config with the case's lines over it; ConfigError if they are no config."""
     return over_paper(case.config, f"case {case.name}")
+
+
+def scene_cases(config: Config) -> list[tuple[Case, Config]]:
+    """The cases of a scene, each with its config: of the rigid model, and of the contact model where there is ground.
+
+    config  with the start spelled out in numbers, and the pads' pitch if there are pads
+    """
+    there, found = features(config), []
+    for entry in listed(SCENE_CATALOGUE):
+        needs = {entry.get("model", "contact"), *entry.pop("needs", ())}
+        changes: dict[str, Any] = {name: entry.pop(name) for name in CHANGES if name in entry}
+        if entry.get("expected") == "stops":
+            entry["expected"] = STOPS
+        if needs <= there:
+            case = Case.model_validate({**USUAL, **entry, "name": f"scene-{entry['name']}"})
+            found.append((case, changed(config, changes)))
+    return found
+
+
+def features(config: Config) -> set[str]:
+    """What a scene has of that which cases need."""
+    walker, found = config.walker, {"rigid"}
+    if config.contact is not None:
+        found |= {"contact", "friction"} if config.contact.has_friction else {"contact"}
+    if isinstance(walker, Kneed) or (isinstance(walker, PartsWalker) and any(one.locks for one in walker.hinges)):
+        found |= {f"release at {walker.knee.release}", f"{walker.knee.lock} lock"}
+    return found
+
+
+def changed(config: Config, changes: Mapping[str, Any]) -> Config:
+    """A scene with what a case of the catalogue changes in it; on another slope both feet stand on that."""
+    start, slope = changes.get("start", 1.0), changes.get("slope", 1.0) * config.slope_rad
+    values = dict(changes.get("set", {}))
+    values |= {path: factor * attrgetter(path)(config) for path, factor in changes.get("times", {}).items()}
+    values |= {path: attrgetter(path)(config) / factor for path, factor in changes.get("over", {}).items()}
+    if "start" in changes or "slope" in changes:
+        held, turned = config.start, config.slope_rad - slope
+        assert not isinstance(held, str), "the start is spelled out"
+        n = len(held) // 2
+        values |= {"slope_rad": slope, "start": (*(x + turned for x in held[:n]), *(start * x for x in held[n:]))}
+    for path, value in values.items():
+        config = with_key(config, path, value)
+    return config
+
+
+def with_key(block: B, path: str, value: Any) -> B:
+    """A block with a key of it, or of a block inside it, set anew, by its dotted path."""
+    name, _, rest = path.partition(".")
+    return block.model_copy(update={name: with_key(getattr(block, name), rest, value) if rest else value})

@@ -117,13 +117,11 @@ class Adapter(Protocol):
     INTEGRATORS     by name
     CONTACTS        its contact models, each with the integrator that it runs with
     CANNOT_EXPRESS  what it cannot, in words
-    EngineRun       a model in it
     """
 
     INTEGRATORS: Mapping[str, Integrator]
     CONTACTS: Mapping[str, str]
     CANNOT_EXPRESS: tuple[str, ...]
-    EngineRun: type[Simulation]
 
     def tuned(self, model: str, target: EngineContact) -> OwnContact:
         """The settings by which a contact model does what the target says, as far as it can."""

@@ -56,7 +56,7 @@ def tuned(model: str, target: adapter.EngineContact) -> adapter.OwnContact:
     return adapter.OwnContact(model, settings)
 
 
-class EngineRun(adapter.Simulation):
+class DrakeRun(adapter.Simulation):
     """A diagram, its simulator and its context."""
 
     def build(self, model: PlanarModel, q: Floats, v: Floats) -> None:

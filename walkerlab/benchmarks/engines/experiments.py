@@ -41,6 +41,7 @@ CREEP_LOAD = 0.1  # tangential over normal force, about the mean of a walk
 PATIENCE_S = 120.0  # with a run, before its process is ended
 OUR_METHOD = "radau5"
 OUR_LADDER = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
+ADAMS_RTOL = 1e-7  # of the walk that engines' own contact is held against
 REFERENCES = (("radau5", 1e-11), ("dop853", 1e-12))
 ENDLESS = 100_000_000  # right-hand sides
 ENDLESS_S = 1e9
@@ -90,13 +91,6 @@ def end_of(result: ContactWalkResult) -> Floats | None:
     return np.asarray(result.samples.states[1]) if result.samples is not None and there else None
 
 
-def answered(result: ContactWalkResult, wall_s: float, touches: int) -> runs.WalkAnswer:
-    """Our own walk as an engine would have answered, of so many touches."""
-    times, along, slips = result.touch_time_s[:touches], result.touch_along_m[:touches], result.slip_m[:touches]
-    steps, time_s = int(result.work[1]), float(result.end_time_s)
-    return runs.WalkAnswer(result.outcome.label, end_of(result), times, along, slips, steps, time_s, wall_s)
-
-
 @dataclass(frozen=True)
 class EngineExperiment:
     """One engine, or this project beside it, in one experiment on one scene."""
@@ -144,37 +138,31 @@ class EngineExperiment:
         return EngineRow(*head, step_s, tolerance, *numbers, touches.size, answer.outcome)
 
 
+def our_walk(
+    scene: EngineScene, rtol: float, touches: int, until_s: float | None = None, repeats: int = 1
+) -> runs.WalkAnswer:
+    """Our own walk of so many touches, or until a time within the next step, as an engine would have answered."""
+    walls = []
+    for _ in range(repeats):
+        begun = time.process_time()
+        result = walked(scene, OUR_METHOD, rtol, touches + (until_s is not None), until_s)
+        walls.append(time.process_time() - begun)
+    times, along, slips = result.touch_time_s[:touches], result.touch_along_m[:touches], result.slip_m[:touches]
+    steps, time_s = int(result.work[1]), float(result.end_time_s)
+    return runs.WalkAnswer(result.outcome.label, end_of(result), times, along, slips, steps, time_s, median(walls))
+
+
 def our_rows(scene: EngineScene, truth: Truth, version: str) -> Iterator[EngineRow]:
-    """Our own method over its ladder of tolerances, on the same walk."""
-    experiment = EngineExperiment(scene, OURS, version, SAME_LAW, truth)
-    walked(scene, OUR_METHOD, OUR_LADDER[0], TOUCHES + 1, truth.until_s)
+    """Our own method over its ladder of tolerances on the same walk, then ADAMS's law on the starts of own contact."""
+    same_law = EngineExperiment(scene, OURS, version, SAME_LAW, truth)
+    our_walk(scene, OUR_LADDER[0], TOUCHES, truth.until_s)
     for rtol in OUR_LADDER:
-        walls = []
-        for _ in range(REPEATS):
-            begun = time.process_time()
-            result = walked(scene, OUR_METHOD, rtol, TOUCHES + 1, truth.until_s)
-            walls.append(time.process_time() - begun)
-        yield experiment.row(OUR_METHOD, Stepping(OUR_METHOD, 0.0, rtol), answered(result, median(walls), TOUCHES))
-
-
-def same_law_rows(
-    engine: Engine, version: str, scene: EngineScene, truth: Truth, process: OwnProcess
-) -> Iterator[EngineRow]:
-    """An engine's integrators on our law, each over its ladder of step sizes or tolerances."""
-    experiment = EngineExperiment(scene, engine.name, version, SAME_LAW, truth)
-    for name, integrator in engine.adapter().INTEGRATORS.items():
-        if integrator.for_contact_only:
-            continue
-        for stepping in steppings(name, integrator, SAME_LAW_STEPS):
-            if not integrator.adapts and math.ceil(truth.until_s / stepping.step_s) > integrator.most_steps:
-                continue
-            task = runs.WalkTask(engine.name, stepping, scene, OWN_TOUCHES, truth.until_s, None, integrator.most_steps)
-            answer = process.do(task.run, PATIENCE_S)
-            row = experiment.row(name, stepping, answer)
-            yield row
-            late = isinstance(answer, TaskLost) and answer.timed_out
-            if late or (row.error is not None and row.error < EXACT_ENOUGH):
-                break
+        answer = our_walk(scene, rtol, TOUCHES, truth.until_s, REPEATS)
+        yield same_law.row(OUR_METHOD, Stepping(OUR_METHOD, 0.0, rtol), answer)
+    own_law = EngineExperiment(scene, OURS, version, OWN_LAW)
+    for factor in (1.0, *STARTS):
+        answer = our_walk(scene.started(factor), ADAMS_RTOL, OWN_TOUCHES)
+        yield own_law.row("impact", Stepping(OUR_METHOD, 0.0, ADAMS_RTOL), answer, factor)
 
 
 def steppings(name: str, integrator: Integrator, steps_s: Sequence[float]) -> list[Stepping]:
@@ -199,58 +187,108 @@ def target_of(scene: EngineScene) -> EngineContact | None:
     return EngineContact(mass, g, foot.depth, law.exponent, foot.damping_ratio, sliding, CREEP_LOAD, creep)
 
 
-def tuned(
-    engine: Engine, contact: str, scene: EngineScene, target: EngineContact, process: OwnProcess
-) -> tuple[OwnContact | None, list[TuningRow], TaskLost | None]:
-    """An engine's contact model tuned to the scene's, and how far a ball and a block are from it."""
-    task = runs.TuningTask(engine.name, contact, target, TUNING_STEP_S, 1.5 * scene.ours.friction.sliding_from)
-    answer: runs.TuningAnswer | TaskLost = process.do(task.run, PATIENCE_S)
-    if isinstance(answer, TaskLost):
-        return None, [], answer
-    settings = dict(answer.own.settings)
-    measured = (
-        ("penetration at rest", "m", target.penetration, answer.penetration),
-        ("damping ratio", "1", target.damping_ratio, answer.damping_ratio),
-        ("sliding friction", "1", target.friction, answer.friction),
-        ("creep velocity", "m/s", target.creep_velocity, answer.creep_velocity),
-    )
-    return answer.own, [TuningRow(scene.name, engine.name, contact, settings, *numbers) for numbers in measured], None
+@dataclass(frozen=True)
+class EngineOnScene:
+    """One engine on one scene, in a process of its own, beside our own walk."""
 
+    engine: Engine
+    scene: EngineScene
+    truth: Truth
+    process: OwnProcess
 
-def own_law_rows(
-    engine: Engine, version: str, contact: str, own: OwnContact, scene: EngineScene, truth: Truth, process: OwnProcess
-) -> Iterator[EngineRow]:
-    """An engine's own contact over step sizes from the gait, then from other starts at the finest but one.
+    def walk(
+        self, called: str, stepping: Stepping, most: int, own: OwnContact | None = None, start: float = 1.0
+    ) -> tuple[EngineRow, runs.WalkAnswer | TaskLost]:
+        """A walk on our law, or on the engine's own contact, with its row.
 
-    Where steps are adapted, all walks from the gait share the steps that the integrator is given; another walk that
-    would take more is not begun.
-    """
-    experiment = EngineExperiment(scene, engine.name, version, OWN_LAW, truth)
-    name = engine.adapter().CONTACTS[contact]
-    integrator = engine.adapter().INTEGRATORS[name]
-    most = integrator.most_steps if integrator.adapts else LONGER * integrator.most_steps
+        called  the integrator, or the contact that is its own
+        most    steps
+        start   velocities over those of the gait
+        """
+        law, until_s = (SAME_LAW, self.truth.until_s) if own is None else (OWN_LAW, ENDLESS_S)
+        scene = self.scene.started(start)
+        task = runs.WalkTask(self.engine.name, stepping, scene, OWN_TOUCHES, until_s, own, most)
+        answer = self.process.do(task.run, PATIENCE_S)
+        experiment = EngineExperiment(self.scene, self.engine.name, self.engine.version, law, self.truth)
+        return experiment.row(called, stepping, answer, start), answer
 
-    def walk(stepping: Stepping, factor: float) -> tuple[EngineRow, int]:
-        task = runs.WalkTask(engine.name, stepping, scene.started(factor), OWN_TOUCHES, ENDLESS_S, own, most)
-        answer = process.do(task.run, PATIENCE_S)
-        row = experiment.row(contact, stepping, answer, factor)
+    def same_law(self) -> Iterator[EngineRow]:
+        """Its integrators on our law, each over its ladder of step sizes or tolerances."""
+        for name, integrator in self.engine.adapter().INTEGRATORS.items():
+            if integrator.for_contact_only:
+                continue
+            for stepping in steppings(name, integrator, SAME_LAW_STEPS):
+                if not integrator.adapts and math.ceil(self.truth.until_s / stepping.step_s) > integrator.most_steps:
+                    continue
+                row, answer = self.walk(name, stepping, integrator.most_steps)
+                yield row
+                late = isinstance(answer, TaskLost) and answer.timed_out
+                if late or (row.error is not None and row.error < EXACT_ENOUGH):
+                    break
+
+    def tuned(self, contact: str, target: EngineContact) -> tuple[OwnContact, list[TuningRow]] | TaskLost:
+        """A contact model tuned to the scene's, and how far a ball and a block are from it."""
+        name, sliding = self.engine.name, 1.5 * self.scene.ours.friction.sliding_from
+        answer = self.process.do(runs.TuningTask(name, contact, target, TUNING_STEP_S, sliding).run, PATIENCE_S)
         if isinstance(answer, TaskLost):
-            return row, most if answer.timed_out else 0
-        return row, answer.steps
+            return answer
+        measured = (
+            ("penetration at rest", "m", target.penetration, answer.penetration),
+            ("damping ratio", "1", target.damping_ratio, answer.damping_ratio),
+            ("sliding friction", "1", target.friction, answer.friction),
+            ("creep velocity", "m/s", target.creep_velocity, answer.creep_velocity),
+        )
+        about = self.scene.name, name, contact, dict(answer.own.settings)
+        return answer.own, [TuningRow(*about, *numbers) for numbers in measured]
 
-    before, done, spent = None, [], 0
-    usual_s = float(truth.walk.touch_time_s[-1])
-    for stepping in steppings(name, integrator, [h for h in OWN_LAW_STEPS if usual_s / h <= integrator.most_steps]):
-        row, steps = walk(stepping, 1.0)
-        yield row
-        done.append(stepping)
-        spent += steps
-        if steps >= most or (integrator.adapts and spent + steps > most):
-            return
-        if before is not None and has_settled(before, row):
-            break
-        before = row
-    yield from (walk(stepping, factor)[0] for stepping in done[-2:][:1] for factor in STARTS)
+    def own_law(self, contact: str, own: OwnContact) -> Iterator[EngineRow]:
+        """Its own contact over step sizes from the gait, then from other starts at the finest but one.
+
+        Where steps are adapted, all walks from the gait share the steps that the integrator is given; another walk that
+        would take more is not begun.
+        """
+        name = self.engine.adapter().CONTACTS[contact]
+        integrator = self.engine.adapter().INTEGRATORS[name]
+        most = integrator.most_steps if integrator.adapts else LONGER * integrator.most_steps
+        before, done, spent = None, [], 0
+        usual_s = float(self.truth.walk.touch_time_s[-1])
+        for stepping in steppings(name, integrator, [h for h in OWN_LAW_STEPS if usual_s / h <= integrator.most_steps]):
+            row, answer = self.walk(contact, stepping, most, own)
+            yield row
+            done.append(stepping)
+            steps = answer.steps if not isinstance(answer, TaskLost) else most if answer.timed_out else 0
+            spent += steps
+            if steps >= most or (integrator.adapts and spent + steps > most):
+                return
+            if before is not None and has_settled(before, row):
+                break
+            before = row
+        for stepping in done[-2:][:1]:
+            yield from (self.walk(contact, stepping, most, own, factor)[0] for factor in STARTS)
+
+    def swings(self) -> tuple[list[SwingRow], list[TaskLost]]:
+        """The hinged walker's swing, without drives, over step sizes, by each of its integrators."""
+        scene, engine, model = self.scene, self.engine, runs.pinned_model(self.scene)
+        n = len(model.chain)
+        start = np.array((*scene.start[2 : 2 + n], *scene.start[4 + n :]))
+        truth, energy = swing_truth(scene, start)
+        rows: list[SwingRow] = []
+        lost: list[TaskLost] = []
+        for integrator, entry in engine.adapter().INTEGRATORS.items():
+            before: float | None = None
+            for stepping in steppings(integrator, entry, SWING_STEPS):
+                swing = model, scene.ours.slope, start, SWING_S, entry.most_steps
+                answer = self.process.do(runs.SwingTask(engine.name, stepping, *swing).run, PATIENCE_S)
+                if isinstance(answer, TaskLost):
+                    lost.append(answer)
+                    break
+                error = float(np.max(np.abs(answer.end - truth)))
+                drift = abs(energy(answer.end) - energy(start))
+                order = math.log2(before / error) if before and error and not entry.adapts else None
+                who, how = (scene.name, engine.name, integrator, entry.order), (stepping.step_s, stepping.tolerance)
+                rows.append(SwingRow(*who, *how, error, drift, order, answer.wall_s))
+                before = error
+        return rows, lost
 
 
 def has_settled(coarse: EngineRow, fine: EngineRow) -> bool:
@@ -258,41 +296,6 @@ def has_settled(coarse: EngineRow, fine: EngineRow) -> bool:
     if coarse.error is None or fine.error is None or coarse.period_s is None or fine.period_s is None:
         return False
     return abs(fine.period_s / coarse.period_s - 1.0) <= SETTLED
-
-
-def adams_rows(scene: EngineScene, version: str) -> Iterator[EngineRow]:
-    """ADAMS's law on the same starts, by our own walk."""
-    experiment, tolerance = EngineExperiment(scene, OURS, version, OWN_LAW), 1e-7
-    for factor in (1.0, *STARTS):
-        begun = time.process_time()
-        result = walked(scene.started(factor), OUR_METHOD, tolerance, OWN_TOUCHES)
-        answer = answered(result, time.process_time() - begun, OWN_TOUCHES)
-        yield experiment.row("impact", Stepping(OUR_METHOD, 0.0, tolerance), answer, factor)
-
-
-def swing_rows(engine: Engine, scene: EngineScene, process: OwnProcess) -> tuple[list[SwingRow], list[TaskLost]]:
-    """The hinged walker's swing, without drives, over step sizes, by each of an engine's integrators."""
-    model = runs.pinned_model(scene)
-    n = len(model.chain)
-    start = np.array((*scene.start[2 : 2 + n], *scene.start[4 + n :]))
-    truth, energy = swing_truth(scene, start)
-    rows: list[SwingRow] = []
-    lost: list[TaskLost] = []
-    for integrator, entry in engine.adapter().INTEGRATORS.items():
-        before = None
-        for stepping in steppings(integrator, entry, SWING_STEPS):
-            swing = model, scene.ours.slope, start, SWING_S, entry.most_steps
-            answer = process.do(runs.SwingTask(engine.name, stepping, *swing).run, PATIENCE_S)
-            if isinstance(answer, TaskLost):
-                lost.append(answer)
-                break
-            error = float(np.max(np.abs(answer.end - truth)))
-            drift = abs(energy(answer.end) - energy(start))
-            order: float | None = None if before is None or error == 0.0 or entry.adapts else math.log2(before / error)
-            who, how = (scene.name, engine.name, integrator, entry.order), (stepping.step_s, stepping.tolerance)
-            rows.append(SwingRow(*who, *how, error, drift, order, answer.wall_s))
-            before = error
-    return rows, lost
 
 
 def swing_truth(scene: EngineScene, start: Floats, until_s: float = SWING_S) -> tuple[Floats, Any]:

@@ -50,7 +50,7 @@ def tuned(model: str, target: adapter.EngineContact) -> adapter.OwnContact:
     return adapter.OwnContact(model, settings)
 
 
-class EngineRun(adapter.Simulation):
+class ExudynRun(adapter.Simulation):
     """A system of one tree, and its contacts."""
 
     def build(self, model: PlanarModel, q: Floats, v: Floats) -> None:

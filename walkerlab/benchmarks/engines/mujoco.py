@@ -45,7 +45,7 @@ def tuned(model: str, target: adapter.EngineContact) -> adapter.OwnContact:
     return adapter.OwnContact(model, settings)
 
 
-class EngineRun(adapter.Simulation):
+class MujocoRun(adapter.Simulation):
     """A model and its data."""
 
     def build(self, model: PlanarModel, q: Floats, v: Floats) -> None:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, cast
 
 if TYPE_CHECKING:
-    from walkerlab.benchmarks.engines.adapter import Adapter
+    from walkerlab.benchmarks.engines.adapter import Adapter, Simulation
 
 EXTRA = "pip install 'walkerlab[engines]'"
 
@@ -48,6 +48,11 @@ class Engine:
     def adapter(self) -> Adapter:
         """The module that drives it."""
         return cast("Adapter", importlib.import_module(f"walkerlab.benchmarks.engines.{self.name}"))
+
+    @property
+    def simulation(self) -> type[Simulation]:
+        """A model in it."""
+        return cast("type[Simulation]", getattr(self.adapter(), f"{self.name.capitalize()}Run"))
 
 
 ENGINES = {

@@ -83,7 +83,7 @@ class EngineWalk:
 
     def __init__(self, task: WalkTask) -> None:
         """At the start."""
-        self.task, self.adapter = task, ENGINES[task.engine].adapter()
+        self.task, self.engine = task, ENGINES[task.engine]
         self.q, self.v = task.scene.from_base(task.scene.start)
         self.rules = RuleFollower(task.scene, task.touches, self.q, self.v, carries=task.own is None)
         self.steps, self.time_s, self.wall_s = 0, 0.0, 0.0
@@ -111,7 +111,7 @@ class EngineWalk:
         """Let the engine go on from the present state, by a whole number of steps."""
         task, rules, span = self.task, self.rules, until_s - self.time_s
         stepping = task.stepping
-        if not self.adapter.INTEGRATORS[stepping.integrator].adapts:
+        if not self.engine.adapter().INTEGRATORS[stepping.integrator].adapts:
             stepping = replace(stepping, step_s=span / math.ceil((1.0 - ROUNDING) * span / stepping.step_s))
         since = self.time_s
 
@@ -120,7 +120,7 @@ class EngineWalk:
 
         driven = task.scene.ours.driven or task.scene.ours.whole.driven_hip
         outside = forces if task.own is None or driven else None
-        engine = self.adapter.EngineRun(rules.scene.model, stepping, self.q, self.v, outside, task.own)
+        engine = self.engine.simulation(rules.scene.model, stepping, self.q, self.v, outside, task.own)
 
         def hand_over_ground() -> None:
             for foot in range(2):
@@ -168,7 +168,7 @@ class SwingTask:
         chain = self.model.chain
         absolute = np.column_stack((self.start[: len(chain)] + self.slope, self.start[len(chain) :]))
         q, v = np.linalg.lstsq(chain, absolute, rcond=None)[0].T
-        engine = ENGINES[self.engine].adapter().EngineRun(self.model, self.stepping, q, v)
+        engine = ENGINES[self.engine].simulation(self.model, self.stepping, q, v)
         begun = time.process_time()
         motion = recorded(engine, self.most, self.until_s)
         wall = time.process_time() - begun
@@ -256,7 +256,9 @@ class Bench:
         model = planar.PlanarModel((link,), planar.UPRIGHT, (ball,), along * target.gravity, target.gravity, np.eye(1))
         name = adapter.CONTACTS[self.own.model]
         stepping = Stepping(name, h, ROUNDING if adapter.INTEGRATORS[name].adapts else None)
-        engine = adapter.EngineRun(model, stepping, np.array((0.0, -depth)), np.array(velocity), own=self.own)
+        engine = ENGINES[self.task.engine].simulation(
+            model, stepping, np.array((0.0, -depth)), np.array(velocity), own=self.own
+        )
         engine.carry(0, True)
         return recorded(engine, MANY, max(2, round(time_s / h)) * h)
 

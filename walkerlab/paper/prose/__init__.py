@@ -7,8 +7,8 @@ import math
 from pathlib import Path
 
 from walkerlab.config.contact import MM_PER_M
-from walkerlab.paper import arithmetic, printed
+from walkerlab.paper import printed
 from walkerlab.prose import Prose, f
 
-KNOWN = vars(printed) | vars(arithmetic) | {"pi": math.pi, "MM_PER_M": MM_PER_M}
+KNOWN = vars(printed) | {"pi": math.pi, "MM_PER_M": MM_PER_M}
 prose = Prose(Path(__file__).parent, (f,), {name: value for name, value in KNOWN.items() if not name.startswith("_")})
