@@ -123,6 +123,14 @@ def test_walks_are_the_same_for_any_number_of_processes_and_after_an_interruptio
     assert run("slope-3deg", "robustness.model=rigid", *FEW, parts=again).summary == rigid.summary
 
 
+def test_gradients_are_the_same_for_any_number_of_processes(rigid):
+    asked = only(load(Path("slope-3deg"), ("robustness.model=rigid",)).config, PIPELINE["robustness"].takes)
+    gait = fixedpoint.run(asked, {}, Silent())
+    subject, numbers = next(robustness.subjects(asked, {"fixedpoint": gait}, Silent())), rigid.summary["gaits"][0]
+    keys = ("slope_deg", "walker.hip_mass_kg")
+    assert robustness.sensitivities(subject, keys, numbers, Silent(), jobs=2) == rigid.summary["sensitivity"]
+
+
 def test_an_unstable_gait_has_no_norm_and_says_so_with_what_there_is():
     with pytest.raises(NoAnswer, match="the gait of the rigid model is unstable") as raised:
         run("rigid-only", "slope_deg=4.6", *FEW)

@@ -107,16 +107,19 @@ def run(
     unstable, steps = [], {}
     for subject in subjects(config, inputs, progress):
         here = subject.at()
+        # the rigid model's gradients and largest disturbances take less time than starting another process
+        jobs_but_for_walks = jobs if subject.model == CONTACT else 1
         numbers = gait_numbers(here)
         assert numbers is not None, "a gait that was found walks"
         found["gaits"].append({"model": subject.model, **numbers})
-        found["sensitivity"] += sensitivities(subject, config.robustness.to, numbers, progress, jobs)
+        found["sensitivity"] += sensitivities(subject, config.robustness.to, numbers, progress, jobs_but_for_walks)
         if numbers["spectral_radius"] >= 1.0:
             unstable.append(subject.model)
             continue
         found["gait_sensitivity_norm"] += norms(subject.model, here)
-        pieces = [*single(subject, config), *rough(subject, config)]
-        done, _ = complete(pieces, parts, f"robustness: {subject.model} model", progress, jobs, first=COMPILED)
+        rough_walks, label = [*rough(subject, config)], f"robustness: {subject.model} model"
+        pieces = [*single(subject, config), *rough_walks]
+        done, _ = complete(pieces, parts, label, progress, jobs if rough_walks else jobs_but_for_walks, first=COMPILED)
         (down,), (up,), (forward,), (backward,), *walks = done
         of, wanted = {"model": subject.model}, {"steps": config.robustness.steps}
         found["largest_step"].append({**of, "down_m": down, "up_m": up, **wanted})
