@@ -136,6 +136,11 @@ def test_a_key_typed_as_an_option_is_told_with_how_it_is_set(typed):
     assert "--set" in done.output
 
 
+def test_of_keys_of_one_name_that_of_the_commands_own_block_is_told():
+    done = CliRunner().invoke(program(), ["basin", "--model", "contact"])
+    assert "--set basin.model=VALUE" in done.output
+
+
 def test_an_option_that_is_no_key_is_told_as_any_other():
     done = CliRunner().invoke(program(), ["fixedpoint", "--colour", "3"])
     assert done.exit_code == 2

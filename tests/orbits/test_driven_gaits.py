@@ -180,3 +180,8 @@ def test_the_contact_step_maps_derivative_has_the_torques_change_of_legs():
     slope = slope_of(lambda z: stepped(scene, z, 1e-12).z, NEAR_THE_GAIT, STEPS)
     found = stepped(scene, NEAR_THE_GAIT, 1e-12).DP
     np.testing.assert_allclose(found, slope, rtol=0.0, atol=AGREEMENT)
+
+
+def test_a_drive_far_too_strong_for_the_gaits_that_there_are_without_it_is_not_said_to_be_for_want_of_one():
+    walker = walker_of("paper", driven_hip=True, hip=(0.0, 0.0, 1e8))
+    assert "the passive gait at 0.0174 rad is lost at 0% of the way" in find_gaits(walker).reason

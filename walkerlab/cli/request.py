@@ -179,6 +179,7 @@ class KeysAreNoOptions(TyperCommand):
             typed = str(getattr(error, "option_name", ""))
             name = typed.lstrip("-").replace("-", "_")
             keys = keys_to_vary("") if name and any(option.name == "sets" for option in self.params) else []
+            keys.sort(key=lambda key: not key.startswith(f"{self.name}."))  # its own block is meant first
             key = next((key for key in keys if name in (key, key.rpartition(".")[2])), None)
             if key is not None:
                 said = f"There is no option {typed}, but a key of the config: --set {key}=VALUE"

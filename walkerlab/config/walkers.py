@@ -115,10 +115,11 @@ class _Legged(Block):
         with suppress(AttributeError):  # what is wrong with the keys above is told
             inertia = leg_inertia(SimpleNamespace(**info.data))
             if value.too_quick_for(inertia):
-                reason = (
-                    f"whose torques would swing the legs faster than {QUICKEST:g} rad/s: their inertia about the hip is"
+                most = f"at most {QUICKEST**2 * inertia:.3g} (torque, spring) and {QUICKEST * inertia:.3g} (damper)"
+                raise wrong(
+                    f"whose torques would swing the legs faster than {QUICKEST:g} rad/s: with their inertia about the "
+                    f"hip, {inertia:.3g} kg m^2, it may have {most}"
                 )
-                raise wrong(f"{reason} {inertia:.3g} kg m^2, so a torque, spring or damper must be as small")
         return value
 
 

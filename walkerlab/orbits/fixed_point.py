@@ -329,10 +329,14 @@ class Search:
             passive.draw(generator, starts)
             family = RigidMap(partial(partly_driven, goal, slope), 1.0, goal)
             follower = BranchFollower(family, ValueSpan(0.0, 1.0), most=POINTS_OF_A_LEAD)
-            for branch in follower.family([Seed(found.cycle.z, 0.0) for found in passive.found], 1):
-                end, name = max(branch.points, key=lambda point: point.value), f"passive gait at {slope:.3g} rad"
+            name, lost = f"passive gait at {slope:.3g} rad", "is lost at {:.0%} of the way to this slope and drive"
+            led = follower.family([Seed(found.cycle.z, 0.0) for found in passive.found], 1)
+            for branch in led:
+                end = max(branch.points, key=lambda point: point.value)
                 if end.value < 1.0 - SAME or not self.keep(end.z, name):
-                    self.lost.append(f"the {name} is lost at {end.value:.0%} of the way to this slope and drive")
+                    self.lost.append(f"the {name} {lost.format(end.value)}")
+            if passive.found and not led:
+                self.lost.append(f"the {name} {lost.format(0.0)}")
             if self.found:
                 return
 
