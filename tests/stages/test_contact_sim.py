@@ -226,6 +226,15 @@ def test_straight_legs_that_scuff_on_a_plane_are_told_what_to_do():
     assert "contact.terrain: after-mid-swing" in content.summary["advice"]
 
 
+def test_legs_of_point_masses_pass_each_other_with_a_hip_of_no_mass_as_with_one_of_next_to_none():
+    """At the instant at which the feet pass, an event of this terrain, no mass resists a motion of the hip alone."""
+    asked = "start=[-0.126905, 0.092105, -1.065008, -1.176315]", "contact.terrain=after-mid-swing", "strides=1"
+    none, little = (run(f"walker.hip_mass_kg={mass}", *asked, "outputs=[]", inputs=()) for mass in (0, 1e-5))
+    assert none.summary["outcome"] == little.summary["outcome"] == "walked"
+    np.testing.assert_allclose(none.summary["step_periods_s"], little.summary["step_periods_s"], atol=1e-5)
+    np.testing.assert_allclose(none.summary["step_lengths_m"], little.summary["step_lengths_m"], atol=1e-5)
+
+
 def test_a_start_of_ones_own_needs_no_gait_where_the_pads_do_not():
     """The step that pads and steps are measured by is then that of the start itself."""
     content = run("start=[-0.2042, 0.1694, -0.6, -0.86]", "contact.pad_pitch=0.3714", "outputs=[]", inputs=())

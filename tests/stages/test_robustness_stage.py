@@ -3,6 +3,7 @@
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from walkerlab.config.loader import load
@@ -12,6 +13,7 @@ from walkerlab.pipeline.graph import PIPELINE
 from walkerlab.pipeline.progress import Silent
 from walkerlab.report.answers import answer
 from walkerlab.stages import fixedpoint, robustness
+from walkerlab.store.columns import rows_group
 from walkerlab.store.parts import Parts
 
 # design contract, section 4
@@ -140,6 +142,16 @@ def test_an_unstable_gait_has_no_norm_and_says_so_with_what_there_is():
     assert "What moves the gait" not in "".join(answer("robustness", {**summary, "sensitivity": []}))
     assert any("spectral_radius" in line for line in answer("robustness", summary))
     assert {row["of"] for row in summary["sensitivity"]} >= {"period_s", "spectral_radius"}
+
+
+def test_a_derivative_that_does_not_exist_is_a_gap():
+    """Where multipliers meet the spectral radius has none."""
+    rows = [
+        {"of": "period_s", "to": "slope_rad", "value": 0.1},
+        {"of": "spectral_radius", "to": "slope_rad", "value": None},
+    ]
+    stored = rows_group(rows, robustness.LABELS["sensitivity"])["value"]
+    np.testing.assert_array_equal(stored, [0.1, np.nan])
 
 
 @pytest.mark.parametrize(

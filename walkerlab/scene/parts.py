@@ -4,7 +4,7 @@ from typing import Any
 
 from walkerlab.config.drives import Hip
 from walkerlab.config.reads import RigidConfig
-from walkerlab.config.walkers import CompassWalker, Kneed, PartsWalker, StraightLegs
+from walkerlab.config.walkers import LIGHTEST_CONTACT, CompassWalker, Kneed, PartsWalker, StraightLegs, torso_mass
 from walkerlab.errors import ConfigError
 from walkerlab.mechanics.parts import Assembly, BallFoot, Body, Coupling, Knee, Particle, Revolute
 from walkerlab.mechanics.walkers import Arc, Limb, kneed_legs, straight_legs, with_torso
@@ -22,11 +22,11 @@ def assembly_of(walker: AnyWalker, rigid: bool = False) -> Assembly:
     """
     if isinstance(walker, CompassWalker):
         leg = Limb(walker.leg_length_m, walker.leg_mass_kg, walker.mass_to_hip_m, 0.0, walker.leg_inertia_kg_m2)
-        parts = straight_legs(leg, walker.hip_mass_kg, Arc(0.0 if rigid else walker.foot_radius_m))
+        parts = straight_legs(leg, hip_mass(walker, rigid), Arc(0.0 if rigid else walker.foot_radius_m))
     elif isinstance(walker, StraightLegs):
         centre = walker.leg_mass_below_hip_m, walker.leg_mass_ahead_m
         leg = Limb(walker.leg_length_m, walker.leg_mass_kg, *centre, walker.leg_inertia_kg_m2)
-        parts = straight_legs(leg, walker.hip_mass_kg, Arc(walker.foot_radius_m, walker.foot_centre_ahead_m))
+        parts = straight_legs(leg, hip_mass(walker, rigid), Arc(walker.foot_radius_m, walker.foot_centre_ahead_m))
     elif isinstance(walker, Kneed):
         upper, lower = walker.thigh, walker.shank
         thigh = Limb(upper.length_m, upper.mass_kg, upper.mass_below_hip_m, upper.mass_ahead_m, upper.inertia_kg_m2)
@@ -36,6 +36,18 @@ def assembly_of(walker: AnyWalker, rigid: bool = False) -> Assembly:
         parts = own_parts(walker)
     torso = walker.torso
     return parts if torso is None else with_torso(parts, torso.mass_kg, torso.above_hip_m, torso.inertia_kg_m2)
+
+
+def hip_mass(walker: CompassWalker | StraightLegs, rigid: bool) -> float:
+    """The mass at the hip of straight legs (kg).
+
+    On compliant ground legs that are point masses need some there: side by side they turn about their masses and take a
+    hip without mass along at no cost, so that no acceleration follows from the forces as they pass each other.
+    """
+    if rigid:
+        return walker.hip_mass_kg
+    there = torso_mass(walker.torso) + walker.leg_inertia_kg_m2 / walker.leg_length_m**2
+    return max(walker.hip_mass_kg, LIGHTEST_CONTACT * walker.total_mass_kg - there)
 
 
 def own_parts(walker: PartsWalker) -> Assembly:

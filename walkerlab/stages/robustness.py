@@ -86,7 +86,7 @@ LABELS: Final[dict[str, dict[str, Label]]] = {
     "sensitivity": {
         "of": Label("", "what changes"),
         "to": Label("", "number of the config"),
-        "value": Label("SI", "derivative, in the units of both", absent=np.nan),
+        "value": Label("SI", "derivative, in the units of both"),
     },
 }
 """What is stored, row by row, of each part of the answer, beside the model."""

@@ -124,8 +124,9 @@ def limit_findings(
     for name in walked:
         walker = scene.walker
         if name != ALL:  # points for feet, as the rigid model has them
-            parts, rules = assembly_of(config.walker, rigid=True), knee_rules(config.walker)
-            walker = contact_walker(parts, walker.normal, walker.friction, config.gravity_m_s2, config.slope_rad, rules)
+            points, rules = config.walker.model_copy(update={"foot_radius_m": 0.0}), knee_rules(config.walker)
+            laws = walker.normal, walker.friction
+            walker = contact_walker(assembly_of(points), *laws, config.gravity_m_s2, config.slope_rad, rules)
             walker = with_drives(walker, config)
         found[name] = limit.series(name, walker, gait, start)
         progress.advance()
