@@ -32,7 +32,7 @@ WALKERS = {
     "paper with a hip": ("walker.hip={spring_N_m_per_rad: 1, damping_N_m_s_per_rad: 0.1, torque_N_m: 0.01}",),
 }
 ONLY_CONTACT = ("contact.", "push_off.duration_s", "walker.knee.stop_")
-PULSED = ("level", "kneed-level", "paper with a hip")
+PULSED = ("level", "kneed-level")
 RIGID_ONLY = ("kuo", "rigid-only", "simplest")
 IDEAL_KNEES = ("kneed", "kneed-level", "kneed-round-feet", "parts")
 REFUSED = (
