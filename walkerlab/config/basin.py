@@ -1,10 +1,11 @@
 """The basin block: which starts are led to an attractor or a fall."""
 
+import operator
 from typing import Annotated, Final, Literal, get_args
 
 from pydantic import Field, ValidationInfo, field_validator
 
-from walkerlab.config.fields import Block, key, wrong
+from walkerlab.config.fields import Block, against, key, wrong
 
 Coordinate = Literal["theta_2", "dtheta_1", "dtheta_2"]
 COORDINATES: Final[tuple[Coordinate, ...]] = get_args(Coordinate)
@@ -61,9 +62,6 @@ class Basin(Block):
             raise wrong(f"must have {len(plane)} numbers, one for each of plane")
         return value
 
-    @field_validator("upper")
-    @classmethod
-    def _above_lower(cls, value: tuple[float, ...], info: ValidationInfo) -> tuple[float, ...]:
-        if any(b <= a for a, b in zip(info.data.get("lower", ()), value, strict=False)):
-            raise wrong("must be above lower")
-        return value
+    _above = against(
+        "upper", "lower", lambda upper, lower: "must be above lower" if any(map(operator.le, upper, lower)) else ""
+    )

@@ -5,7 +5,7 @@ from typing import Annotated, Any, Final, Literal, Self
 
 from pydantic import Discriminator, Field, Tag, ValidationInfo, field_validator, model_validator
 
-from walkerlab.config.fields import Block, key, wrong
+from walkerlab.config.fields import Block, against, key, wrong
 
 MM_PER_M: Final = 1000.0
 
@@ -107,13 +107,16 @@ class Contact(Block):
         defaults = {name: field.default for name, field in cls.model_fields.items()}
         return from_mm(defaults, power) | data
 
-    @field_validator("friction_velocity")
-    @classmethod
-    def _friction_velocity_above_stiction(cls, value: float, info: ValidationInfo) -> float:
-        stiction = info.data.get("stiction_velocity")
-        if stiction is not None and value <= stiction:
-            raise wrong(f"must exceed stiction_velocity, {stiction:g}")
-        return value
+    _above = against(
+        "friction_velocity",
+        "stiction_velocity",
+        lambda value, least: "" if value > least else f"must exceed stiction_velocity, {least:g}",
+    )
+    _below = against(
+        "dynamic_friction",
+        "static_friction",
+        lambda value, most: "" if value <= most else f"must not exceed static_friction, {most:g}",
+    )
 
     @field_validator(*BOUNDS_SI)
     @classmethod
@@ -125,14 +128,6 @@ class Contact(Block):
         if least * scale <= value <= most * scale:
             return value
         raise wrong(f"must be from {least * scale:g} to {most * scale:g} {prefix}{unit}, as `units: {units}` has it")
-
-    @field_validator("dynamic_friction")
-    @classmethod
-    def _dynamic_not_above_static(cls, value: float, info: ValidationInfo) -> float:
-        static = info.data.get("static_friction")
-        if static is not None and value > static:
-            raise wrong(f"must not exceed static_friction, {static:g}")
-        return value
 
     @property
     def has_friction(self) -> bool:

@@ -4,19 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Final, Literal
 
-from pydantic import ValidationInfo, create_model, field_validator
+from pydantic import create_model
 
-from walkerlab.config.fields import Block, key, wrong
+from walkerlab.config.fields import Block, against, key
 
 FollowedModel = Literal["rigid", "contact", "both"]
 _UNIT: Final = "that of the key"
-
-
-def _above_from(cls: type[Block], value: float, info: ValidationInfo) -> float:  # noqa: ARG001 - pydantic passes it
-    least = info.data.get("from")
-    if least is not None and value <= least:
-        raise wrong(f"must be above `from`, {least:g}")
-    return value
 
 
 if TYPE_CHECKING:
@@ -29,7 +22,9 @@ else:
     _Span = create_model(
         "_Span",
         __base__=Block,
-        __validators__={"above_from": field_validator("to")(classmethod(_above_from))},
+        __validators__={
+            "above": against("to", "from", lambda to, least: "" if to > least else f"must be above `from`, {least:g}")
+        },
         **{
             "from": (float, key(1.0e-4, _UNIT, "where the span begins", bounds="a number below `to`")),
             "to": (float, key(0.1, _UNIT, "where the span ends", bounds="a number above `from`")),

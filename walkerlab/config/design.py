@@ -2,9 +2,9 @@
 
 from typing import Final, Literal, get_args
 
-from pydantic import ValidationInfo, field_validator
+from pydantic import field_validator
 
-from walkerlab.config.fields import Block, key, wrong
+from walkerlab.config.fields import Block, against, key, wrong
 
 Quantity = Literal[
     "period_s", "step_length_m", "speed_m_s", "spectral_radius", "gait_sensitivity_norm", "cost_of_transport"
@@ -28,12 +28,9 @@ class Design(Block):
     model: Literal["rigid", "contact"] = key("rigid", "", "whose gait is designed")
     starts: int = key(5, "1", "starts of the search: the config's own numbers, and drawn ones", ge=1, le=1000)
 
-    @field_validator("maximise")
-    @classmethod
-    def _one_of_both(cls, value: str | None, info: ValidationInfo) -> str | None:
-        if value is not None and info.data.get("minimise") is not None:
-            raise wrong("cannot be combined with minimise: remove one of them")
-        return value
+    _one = against(
+        "maximise", "minimise", lambda value, _: "cannot be combined with minimise: remove one of them" if value else ""
+    )
 
     @field_validator("over", "keep")
     @classmethod

@@ -1,12 +1,12 @@
 """Annotations of config keys: every key carries unit, bounds, meaning and source, and says in words what it allows."""
 
 import types
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from functools import reduce
 from itertools import chain
 from typing import Annotated, Any, Final, Literal, Union, get_args, get_origin
 
-from pydantic import BaseModel, ConfigDict, Field, Tag
+from pydantic import BaseModel, ConfigDict, Field, Tag, ValidationInfo, field_validator
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticCustomError
 
@@ -53,6 +53,19 @@ def key(
 def wrong(reason: str) -> PydanticCustomError:
     """What a validator raises, with the reason, for what cannot be meant."""
     return PydanticCustomError("meaning", reason)
+
+
+def against(name: str, other: str, why: Callable[[Any, Any], str]) -> Any:
+    """A check of a key against one above it: `why` its value is not allowed beside the other's, empty if it is."""
+
+    def check(value: Any, info: ValidationInfo) -> Any:
+        beside = info.data.get(other)  # None where that is wrong itself, which is told
+        reason = "" if beside is None else why(value, beside)
+        if reason:
+            raise wrong(reason)
+        return value
+
+    return field_validator(name)(check)
 
 
 def block_of(field: FieldInfo) -> type[Block] | None:

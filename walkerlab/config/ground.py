@@ -1,8 +1,8 @@
 """The ground block: heights of footholds over the slope."""
 
-from pydantic import ValidationInfo, field_validator
+from pydantic import field_validator
 
-from walkerlab.config.fields import Block, key, wrong
+from walkerlab.config.fields import Block, against, key, wrong
 
 
 class Footholds(Block):
@@ -19,11 +19,17 @@ class Footholds(Block):
         bounds="a list of numbers from -1e3 to 1e3, in place of roughness_m",
     )
 
+    _listed = against(
+        "heights_m",
+        "roughness_m",
+        lambda heights, roughness: (
+            "cannot be combined with roughness_m: heights are either listed or drawn" if heights and roughness else ""
+        ),
+    )
+
     @field_validator("heights_m")
     @classmethod
-    def _drawn_or_listed(cls, value: tuple[float, ...], info: ValidationInfo) -> tuple[float, ...]:
-        if value and info.data.get("roughness_m"):
-            raise wrong("cannot be combined with roughness_m: heights are either listed or drawn")
+    def _near_the_slope(cls, value: tuple[float, ...]) -> tuple[float, ...]:
         if any(abs(height) > 1e3 for height in value):
             raise wrong("must be numbers from -1e3 to 1e3")
         return value

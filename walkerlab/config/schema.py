@@ -12,7 +12,7 @@ from walkerlab.config.contact import Contact
 from walkerlab.config.continuation import Continuation
 from walkerlab.config.design import Design
 from walkerlab.config.drives import PushOff, drives_of
-from walkerlab.config.fields import Block, key, wrong
+from walkerlab.config.fields import Block, against, key, wrong
 from walkerlab.config.ground import Footholds
 from walkerlab.config.robustness import Robustness
 from walkerlab.config.stability import Stability
@@ -21,9 +21,9 @@ from walkerlab.config.walkers import (
     CompassWalker,
     Walker,
     is_plain_compass,
-    rigid_bodies,
-    too_light_for_contact,
+    why_no_contact,
     why_no_push_off,
+    why_no_state,
 )
 
 Equations = Literal["corrected", "as-printed"]
@@ -230,16 +230,9 @@ class Config(Block):
     outputs: tuple[Output, ...] = key(OUTPUTS, "", "what is stored", bounds="a list of states, energies, forces")
     seed: int = key(0, "1", "seed of everything that is drawn at random", ge=0, le=2**32 - 1)
 
-    @field_validator("start")
-    @classmethod
-    def _start_fits_the_walker(cls, value: Any, info: ValidationInfo) -> Any:
-        walker = info.data.get("walker")
-        if isinstance(value, str) or walker is None:
-            return value
-        numbers = 2 * rigid_bodies(walker)
-        if len(value) != numbers:
-            raise wrong(f"has {len(value)} numbers, and this walker's state has {numbers}")
-        return value
+    _fits = against("start", "walker", why_no_state)
+    _pushes = against("push_off", "walker", lambda value, walker: why_no_push_off(walker) if value.impulse_N_s else "")
+    _stands = against("contact", "walker", lambda value, walker: why_no_contact(walker) if value else "")
 
     @field_validator("equations")
     @classmethod
@@ -250,24 +243,6 @@ class Config(Block):
                 raise wrong(f"is for a passive compass, and this walker has {', '.join(drives)}")
             if not is_plain_compass(given):
                 raise wrong("is for a compass; this walker is another")
-        return value
-
-    @field_validator("push_off")
-    @classmethod
-    def _something_takes_it(cls, value: PushOff, info: ValidationInfo) -> PushOff:
-        walker = info.data.get("walker")
-        why = "" if value.impulse_N_s == 0.0 or walker is None else why_no_push_off(walker)
-        if why:
-            raise wrong(why)
-        return value
-
-    @field_validator("contact")
-    @classmethod
-    def _feet_have_mass(cls, value: Contact | None, info: ValidationInfo) -> Contact | None:
-        walker = info.data.get("walker")
-        why = "" if value is None or walker is None else too_light_for_contact(walker)
-        if why:
-            raise wrong(f"{why}; leave the contact block out, or give the legs mass")
         return value
 
     @field_validator("outputs")

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Final, Literal
 from pydantic import Discriminator, Field, Tag, ValidationInfo, field_validator
 
 from walkerlab.config.drives import QUICKEST, Hip, drives_of
-from walkerlab.config.fields import Block, key, wrong
+from walkerlab.config.fields import Block, against, key, wrong
 from walkerlab.config.numbers import same
 from walkerlab.errors import ConfigError
 
@@ -62,16 +62,11 @@ def parts(of: type[Block], meaning: str, default: Any = ..., number: str = "") -
     return key(default, "", meaning, bounds=bounds, sequence=True)
 
 
-def below(name: str, limit: Callable[[dict[str, Any]], float]) -> Any:
-    """A check that a foot's arc is smaller than what it belongs to, which the keys above it say."""
-
-    def arc(value: float, info: ValidationInfo) -> float:
-        with suppress(KeyError):  # what is wrong with the key above is told
-            if value >= (longest := limit(info.data)):
-                raise wrong(f"must be below {name}, {longest:g}")
-        return value
-
-    return field_validator("foot_radius_m")(arc)
+def below(name: str, of: str, limit: Callable[[Any], float] = float) -> Any:
+    """A check that a foot's arc is smaller than what it belongs to, called `name`, which the key `of` says."""
+    return against(
+        "foot_radius_m", of, lambda arc, owner: "" if arc < limit(owner) else f"must be below {name}, {limit(owner):g}"
+    )
 
 
 def turns(inertia: str, why: str, *places: str) -> Any:
@@ -151,16 +146,9 @@ class CompassWalker(_Legged):
     torso: Torso | None = None
     hip: Hip = Hip()
 
-    _arc = below("half of leg_length_m", lambda data: data["leg_length_m"] / 2)
+    _arc = below("half of leg_length_m", "leg_length_m", lambda length: length / 2)
 
-    @field_validator("foot_to_mass_m")
-    @classmethod
-    def _mass_lies_on_the_leg(cls, value: float, info: ValidationInfo) -> float:
-        length = info.data.get("leg_length_m")
-        if length is None or value < length:
-            return value
-        massless = "equals leg_length_m, so b = 0: the leg's mass sits at the hip and the swing leg is massless; "
-        raise wrong(f"{massless if value == length else ''}must be below leg_length_m, {length:g}")
+    _mass = against("foot_to_mass_m", "leg_length_m", lambda mass, length: why_off_the_leg(mass, length))
 
     @property
     def mass_to_hip_m(self) -> float:
@@ -185,7 +173,7 @@ class StraightLegs(_Legged):
     torso: Torso | None = None
     hip: Hip = Hip()
 
-    _arc = below("leg_length_m", lambda data: data["leg_length_m"])
+    _arc = below("leg_length_m", "leg_length_m")
     _inertia = turns(
         "leg_inertia_kg_m2", "the leg's mass at the hip: the swing leg", "leg_mass_below_hip_m", "leg_mass_ahead_m"
     )
@@ -251,7 +239,7 @@ class Kneed(_Legged):
     torso: Torso | None = None
     hip: Hip = Hip()
 
-    _arc = below("shank.length_m", lambda data: data["shank"].length_m)
+    _arc = below("shank.length_m", "shank", lambda shank: shank.length_m)
 
     @property
     def leg_length_m(self) -> float:
@@ -371,6 +359,14 @@ def hip_to_sole(
     return None
 
 
+def why_off_the_leg(mass_m: float, length_m: float) -> str:
+    """Why a mass so far from the foot is on no leg of a length; empty if it is."""
+    if mass_m < length_m:
+        return ""
+    massless = "equals leg_length_m, so b = 0: the leg's mass sits at the hip and the swing leg is massless; "
+    return f"{massless if mass_m == length_m else ''}must be below leg_length_m, {length_m:g}"
+
+
 def torso_mass(torso: Torso | None) -> float:
     """Mass of a torso, if there is one (kg)."""
     return 0.0 if torso is None else torso.mass_kg
@@ -455,6 +451,19 @@ def too_light_for_contact(walker: Any) -> str:
         f"the walker's feet have next to no mass ({share:.1g} of the whole): on compliant ground they would have to be "
         "infinitely fast"
     )
+
+
+def why_no_contact(walker: Any) -> str:
+    """Why a walker cannot have a contact block, with what to do; empty if it can."""
+    why = too_light_for_contact(walker)
+    return f"{why}; leave the contact block out, or give the legs mass" if why else ""
+
+
+def why_no_state(start: Any, walker: Any) -> str:
+    """Why a start is no state of a walker; empty if it is, or the fixed point."""
+    numbers = 2 * rigid_bodies(walker)
+    fits = isinstance(start, str) or len(start) == numbers
+    return "" if fits else f"has {len(start)} numbers, and this walker's state has {numbers}"
 
 
 def without_contact(asked: str, walker: Any, instead: str) -> ConfigError:

@@ -58,7 +58,7 @@ class Descent:
 
 def sought(question: Aim, start: Floats) -> Descent:
     """The optimum that a search from `start` (variables,) comes to."""
-    from scipy.optimize import minimize  # a tenth of a second that nothing else needs
+    from scipy.optimize import NonlinearConstraint, minimize  # a tenth of a second that nothing else needs
 
     span = question.upper - question.lower
     search, seen = Descent(start, None), dict[bytes, Point | None]()
@@ -92,18 +92,9 @@ def sought(question: Aim, start: Floats) -> Descent:
         return found
 
     objective = value_of(question.quantity, question.sign / size)
-    bounds = [
-        (name, limit, sign, value_of(name, 1.0))
-        for name, limits in question.keep.items()
-        for limit, sign in zip(limits, (1.0, -1.0), strict=True)
-    ]
     constraints = [
-        {
-            "type": "ineq",
-            "fun": lambda u, limit=limit, sign=sign, of=of: sign * (of(u)[0] - limit),
-            "jac": lambda u, sign=sign, of=of: sign * of(u)[1],
-        }
-        for _, limit, sign, of in bounds
+        NonlinearConstraint(lambda u, of=of: of(u)[0], *bounds, lambda u, of=of: of(u)[1])
+        for bounds, of in ((bounds, value_of(name, 1.0)) for name, bounds in question.keep.items())
     ]
     ended = minimize(
         objective, good[0][0], jac=True, method="SLSQP", bounds=[(0.0, 1.0)] * span.size, constraints=constraints,

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVar
+
+R = TypeVar("R")
 
 
 class Progress(Protocol):
@@ -18,6 +20,14 @@ class Progress(Protocol):
 
     def note(self, text: str) -> None:
         """Say one line about the work."""
+
+
+def each_told(progress: Progress, label: str, total: int, done: Iterable[R], n: int = 1) -> Iterator[R]:
+    """What is done, a piece of work of `total` parts, each worth `n` of them once the next is asked for."""
+    progress.start(label, total)
+    for one in done:
+        yield one
+        progress.advance(n)
 
 
 class StageReporter(Progress, Protocol):

@@ -6,7 +6,7 @@ import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import partial, reduce
 from typing import Any
 
 import numpy as np
@@ -225,11 +225,8 @@ def summary(
 
 def gaussian(window: Window) -> Floats:
     """Weights of the cells, their sum 1: a normal distribution in the middle of the window, SIGMAS to its sides."""
-    weights = np.ones(window.cells)
-    for place, cells in enumerate(window.cells):
-        sigma = 0.5 * cells / SIGMAS
-        along = np.exp(-0.5 * ((np.arange(cells) + 0.5 - 0.5 * cells) / sigma) ** 2)
-        weights = weights * along.reshape([-1 if one == place else 1 for one in range(len(window.cells))])
+    off = ((np.arange(cells) + 0.5 - 0.5 * cells) / (0.5 * cells / SIGMAS) for cells in window.cells)
+    weights = reduce(np.multiply.outer, (np.exp(-0.5 * sigmas**2) for sigmas in off))
     return np.asarray(weights / weights.sum())
 
 

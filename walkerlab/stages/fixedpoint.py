@@ -10,7 +10,7 @@ from walkerlab.config.reads import FixedPointConfig, RigidConfig
 from walkerlab.errors import NoAnswer
 from walkerlab.labels import Label
 from walkerlab.orbits.fixed_point import GaitSearch, RigidGait, find_gaits
-from walkerlab.pipeline.progress import Progress
+from walkerlab.pipeline.progress import Progress, each_told
 from walkerlab.scene.rigid import coordinates, equation_sets, rigid_walker
 from walkerlab.store.columns import printed, real_and_imaginary, rows_group
 from walkerlab.store.content import Content, Group, Variable
@@ -41,11 +41,10 @@ STATE = Label("rad, rad/s", "state just after heel strike", ("coordinate",))
 def run(config: FixedPointConfig, _inputs: Mapping[str, Content], progress: Progress) -> Content:
     """Find the gaits of both sets of equations; raises NoAnswer if those of the config have none to walk."""
     sets = equation_sets(config)
-    progress.start("fixedpoint", len(sets))
-    searches: dict[str, GaitSearch] = {}
-    for equations in sets:
-        searches[equations] = find_gaits(rigid_walker(config, equations), config.seed)
-        progress.advance()
+    searches: dict[str, GaitSearch] = {
+        equations: find_gaits(rigid_walker(config, equations), config.seed)
+        for equations in each_told(progress, "fixedpoint", len(sets), sets)
+    }
     chosen = searches[config.equations]
     content = Content(
         {f"{name}/gaits": gaits_group(search, config) for name, search in searches.items() if search.gaits},

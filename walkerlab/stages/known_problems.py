@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import asdict
 
 from walkerlab.labels import labels_of
-from walkerlab.pipeline.progress import Progress
+from walkerlab.pipeline.progress import Progress, each_told
 from walkerlab.store.columns import rows_group
 from walkerlab.store.content import Content
 from walkerlab.verification.known import PROBLEMS, Known
@@ -12,12 +12,10 @@ from walkerlab.verification.known import PROBLEMS, Known
 
 def run(_config: object, _inputs: Mapping[str, Content], progress: Progress) -> Content:
     """Answer every problem; an answer that is wrong is kept, and `stability` tells."""
-    progress.start("known problems", len(PROBLEMS))
     rows = []
-    for problem in PROBLEMS:
+    for problem in each_told(progress, "known problems", len(PROBLEMS), PROBLEMS):
         known = problem()
         rows.append({**asdict(known), "error": known.error, "ok": known.ok})
-        progress.advance()
     right = sum(row["ok"] for row in rows)
     group = rows_group(rows, labels_of(Known), "problem", "number of the row")
     return Content({"known": group}, {"known": rows, "passed": right, "failed": len(rows) - right})

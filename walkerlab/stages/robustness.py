@@ -35,7 +35,7 @@ from walkerlab.orbits.shooting import EXACT, coordinates_of
 from walkerlab.orbits.similarity import unit_walker
 from walkerlab.orbits.step_map import StepMap
 from walkerlab.pipeline.pieces import Piece, complete
-from walkerlab.pipeline.progress import Progress
+from walkerlab.pipeline.progress import Progress, each_told
 from walkerlab.scene.families import contact_map, not_read, reads, rigid_map
 from walkerlab.scene.parameter import SLOPE, Parameter, parameter_of, why_no_parameter
 from walkerlab.scene.rigid import rigid_scene, rigid_walker
@@ -328,10 +328,9 @@ def sensitivities(
 ) -> Rows:
     """Rows of derivatives, the largest relative effect first, numbers that are 0 behind those that are not."""
     keys = numbers_read(subject, wanted)
-    progress.start(f"robustness: gradients of the {subject.model} model", len(keys))
-    rows: Rows = []
+    label, rows = f"robustness: gradients of the {subject.model} model", list[dict[str, Any]]()
     found = in_order([partial(gradients_of, subject, key) for key in keys], jobs, COMPILED)
-    for key, of_key in zip(keys, found, strict=True):
+    for key, of_key in each_told(progress, label, len(keys), zip(keys, found, strict=True)):
         parameter = parameter_of(key, subject.config)
         value = parameter.value_in(subject.config)
         for name, gradient in of_key.items():
@@ -344,7 +343,6 @@ def sensitivities(
                     {"model": subject.model, "of": name, "to": key, "value": gradient.value, "unit": unit, **told}
                     | ({"why": gradient.why} if gradient.why else {})
                 )
-        progress.advance()
     return sorted(rows, key=lambda row: (row["value"] is None, "relative" not in row, -abs(row.get("relative", 0.0))))
 
 

@@ -8,7 +8,7 @@ from walkerlab.config.reads import CompassCasesConfig, SceneCasesConfig, WalksCo
 from walkerlab.config.schema import Config
 from walkerlab.config.walkers import is_the_papers
 from walkerlab.labels import labels_of
-from walkerlab.pipeline.progress import Progress
+from walkerlab.pipeline.progress import Progress, each_told
 from walkerlab.scene.left_out import of_verification
 from walkerlab.stages.contact_sim import scene_on_pads
 from walkerlab.stages.walk import rigid_start
@@ -37,11 +37,8 @@ def run(
         cells = [*(CaseCell(*case) for case in own), *map(CaseCell, config.stability.cases)]
     else:
         cells = [*map(CaseCell, judged(config.stability.cases))]
-    progress.start("stability", len(cells))
-    found: list[CaseResult | Choice] = []
-    for results in run_cells(cells, jobs):
-        found += results
-        progress.advance()
+    every = each_told(progress, "stability", len(cells), run_cells(cells, jobs))
+    found: list[CaseResult | Choice] = [result for results in every for result in results]
     cases = [item for item in found if isinstance(item, CaseResult)]
     known = inputs["known-problems"]
     said = summary_of(cases, known.summary["known"], [item for item in found if isinstance(item, Choice)])

@@ -23,7 +23,7 @@ from walkerlab.orbits.step_map import Cycle
 from walkerlab.outcome import Outcome
 from walkerlab.paper.adams_start import AdamsWalk, adams_walk
 from walkerlab.paper.printed import TABLE_2
-from walkerlab.pipeline.progress import Progress
+from walkerlab.pipeline.progress import Progress, each_told
 from walkerlab.scene.contact import ContactScene, contact_gait, start_state, with_contact
 from walkerlab.scene.endings import Pads, endings
 from walkerlab.scene.left_out import of_adjustment
@@ -123,15 +123,10 @@ class TuneRun:
             self.take("hinged", self.rigid_state)
         self.take("released", self.rigid_state)
         self.as_it_stands = self.starts.walk(*AS_IT_STANDS)
-        progress.start("tune: map", swing.size * stance.size)
         quick = for_a_map(self.starts, self.as_it_stands.evaluations)
-        rows = []
-        for row in in_order(
-            [partial(scaled_starts.contact_row, quick, swing, float(factor)) for factor in stance], jobs
-        ):
-            rows.append(row)
-            progress.advance(swing.size)
-        self.contact_map = scaled_starts.as_map(swing, stance, rows)
+        rows = in_order([partial(scaled_starts.contact_row, quick, swing, float(factor)) for factor in stance], jobs)
+        every = [*each_told(progress, "tune: map", swing.size * stance.size, rows, swing.size)]
+        self.contact_map = scaled_starts.as_map(swing, stance, every)
         progress.start("tune: rigid map and margins")
         self.rigid_map = scaled_starts.rigid_map(self.rigid, self.rigid_state, swing, stance, self.steps)
         self.adjustment = self.adjusted(quick)
