@@ -65,8 +65,8 @@ def test_the_caption_tells_how_gaps_look():
         (8, "Where there is no answer the map is grey."),
     ):
         group = swept(9, masses, answered=False)
-        made = illustration(group, "fixedpoint", PARAMETERS, PARAMETERS, ["spectral_radius"])
-        assert said in made.drawn({}).caption
+        made = illustration(group, "fixedpoint", PARAMETERS, PARAMETERS, ["spectral_radius"]).drawn({})
+        assert said in made.caption
         assert made.svg.startswith(b"<?xml")
 
 

@@ -52,6 +52,12 @@ def blank(height: float) -> Figure:
     return figure
 
 
+def panels(height: float, rows: int = 1, columns: int = 1, **how: Any) -> tuple[Figure, Any]:
+    """A blank figure with axes in rows and columns, made as matplotlib's `subplots` makes them."""
+    figure = blank(height)
+    return figure, figure.subplots(rows, columns, **how)
+
+
 def label_of(words: str, unit: str) -> str:
     """An axis in words, with its unit."""
     return with_unit(words, re.sub(r"\^([\w.]+)", r"$^{\1}$", unit))

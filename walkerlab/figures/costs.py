@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from walkerlab.benchmarks.engines.rows import OURS, OWN_LAW, SAME_LAW
-from walkerlab.figures.canvas import add_legend, blank, entry, label_ticks
+from walkerlab.figures.canvas import add_legend, blank, entry, label_ticks, panels
 from walkerlab.figures.illustration import Drawn, Illustration, Need, Results, paper_figure
 from walkerlab.figures.style import BLACK, BLUE, CONTACT, GREEN, GREY, ORANGE, PALE, PURPLE, VERMILLION, Look
 from walkerlab.figures.walks import TUNE_STAGE, Array, redoes_the_paper
@@ -104,10 +104,9 @@ def draw_methods(scene: str, results: Results) -> Drawn:
     floor = max(float(reference["agreement"]), SMALLEST)
     errors = [float(np.max(one.runs["error"], where=one.runs["reached"] != 0, initial=floor)) for one in every]
     failed = FAILED * max(errors)
-    figure = blank(3.9)
-    left, right = figure.subplots(1, 2, sharey=True)
-    panels = ((left, "wall_s", "run time (s)"), (right, "rhs_evaluations", "right-hand sides"))
-    for axes, name, label in panels:
+    figure, (left, right) = panels(3.9, 1, 2, sharey=True)
+    costs_of = ((left, "wall_s", "run time (s)"), (right, "rhs_evaluations", "right-hand sides"))
+    for axes, name, label in costs_of:
         axes.set_xlabel(label)
         axes.axhspan(SMALLEST, floor, color=PALE, zorder=0)
         for one in every:
@@ -165,12 +164,12 @@ def draw_errors(scene: str, results: Results) -> Drawn:
 
     Caption: the reference, and the conclusion on the same law.
     """
-    figure = blank(4.6)
-    panels = (
+    figure, both = panels(4.6, 1, 2)
+    experiments = (
         (SAME_LAW, "upper", "(a) ADAMS's law in each integrator", "error of the end state (SI)"),
         (OWN_LAW, "lower", "(b) each engine's own contact", "difference of the step period (s)"),
     )
-    for axes, (experiment, edge, title, label) in zip(figure.subplots(1, 2), panels, strict=True):
+    for axes, (experiment, edge, title, label) in zip(both, experiments, strict=True):
         every = list(engines_of(scene, experiment, results))
         for one in every:
             draw_engine(axes, one, "wall_s", one.runs["error"])
@@ -204,8 +203,7 @@ def draw_periods(scene: str, results: Results) -> Drawn:
 
     Caption: the conclusion, and the steps of what did not walk to the end.
     """
-    figure = blank(4.2)
-    axes = figure.subplots()
+    figure, axes = panels(4.2)
     every, summary = list(engines_of(scene, OWN_LAW, results)), results[ENGINES_STAGE].summary
     engines, reference = [one for one in every if one.engine != OURS], summary["reference"][scene]
     for one in engines:

@@ -14,7 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Circle
 from numpy.typing import NDArray
 
-from walkerlab.figures.canvas import add_legend, blank, entry, label_of
+from walkerlab.figures.canvas import add_legend, entry, label_of, panels
 from walkerlab.figures.illustration import Drawn, Need, Results, paper_figure
 from walkerlab.figures.maps import Kind, draw_kinds
 from walkerlab.figures.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, VERMILLION
@@ -155,12 +155,12 @@ def draw_branches(results: Results) -> Drawn:
 
     Caption: where the models' gaits of one step change, where cascades accumulate, and the unit of both.
     """
-    figure, summary = blank(5.6), results[STAGE].summary
+    summary = results[STAGE].summary
     branches, settled, close = list(branches_of(results)), list(clouds(results)), close_of(results)
     parts = {"(a) all of it": None} | ({"(b) where gaits change": close} if close else {})
-    panels = figure.subplots(2, len(parts), squeeze=False)
+    figure, both = panels(5.6, 2, len(parts), squeeze=False)
     kinds: set[str] = set()
-    for row, (name, words) in zip(panels, QUANTITIES.items(), strict=True):
+    for row, (name, words) in zip(both, QUANTITIES.items(), strict=True):
         for axes, shown in zip(row, parts.values(), strict=True):
             for model, cloud in settled:
                 values = np.broadcast_to(cloud["value"][:, None], cloud[name].shape)
@@ -171,7 +171,7 @@ def draw_branches(results: Results) -> Drawn:
             if shown is not None:
                 axes.set_xlim(*shown)
             axes.set_ylim(*bounds(results, name, shown))
-    for axes, title in zip(panels[0], parts, strict=True):
+    for axes, title in zip(both[0], parts, strict=True):
         axes.set_title(title if close else "")
     models = {branch.model: MODELS[branch.model] for branch in branches}
     key: list[Artist] = [entry(f"{model} model", color=colour, linewidth=1.5) for model, colour in models.items()]
@@ -260,8 +260,7 @@ def draw_multipliers(results: Results) -> Drawn:
 
     Caption: where gaits of one step bifurcate, by model and kind, and the largest magnitude if it is beyond the axes.
     """
-    figure, largest = blank(3.6), 0.0
-    left, right = figure.subplots(1, 2)
+    (figure, (left, right)), largest = panels(3.6, 1, 2), 0.0
     drawn = [branch for branch in branches_of(results) if branch.period == 1]
     looks = {model: cycle(looks) for model, looks in GAITS.items()}
     key = []
@@ -305,8 +304,7 @@ def draw_plane(results: Results) -> Drawn:
 
     Caption: what the curves divide, and how much of the plane settles on what.
     """
-    figure = blank(4.4)
-    axes = figure.subplots()
+    figure, axes = panels(4.4)
     regions = results[STAGE].groups.get("rigid/regions")
     key: list[Artist] = []
     shares = []

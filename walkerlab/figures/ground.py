@@ -8,7 +8,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
 from walkerlab.account import KNEE_STRIKES, LOSSES, SAMPLED
-from walkerlab.figures.canvas import add_legend, blank, entry
+from walkerlab.figures.canvas import add_legend, blank, entry, panels
 from walkerlab.figures.illustration import Drawn, Illustration, Need, Results
 from walkerlab.figures.style import BLACK, CONTACT, GREY, LEGS
 from walkerlab.figures.walks import (
@@ -49,8 +49,8 @@ def draw_forces(results: Results) -> Drawn:
     # the normal force (N) up to which it is shown
     top = 1.1 * float(np.quantile(loads[loads > 0.0], OF_SAMPLES)) if (loads > 0.0).any() else 1.0
     figure = blank(4.4)
-    panels = figure.subplot_mosaic([["normal", "cone"], ["friction", "cone"]])
-    normal, friction, cone = panels["normal"], panels["friction"], panels["cone"]
+    parts = figure.subplot_mosaic([["normal", "cone"], ["friction", "cone"]])
+    normal, friction, cone = parts["normal"], parts["friction"], parts["cone"]
     key: list[Artist] = [entry(look.label, **look.line) for look in LEGS]
     steepest = 0.0
     # no cone where no foot feels any friction
@@ -99,8 +99,7 @@ def losses(walk: Walk) -> dict[tuple[str, str], Array]:
 def draw_losses(results: Results) -> Drawn:
     """A bar for each step, its causes on one another; caption: how much a step loses (J), and to what."""
     found = losses(walk_of(results[CONTACT_STAGE], CONTACT))
-    figure = blank(2.9)
-    axes = figure.subplots()
+    figure, axes = panels(2.9)
     steps = np.arange(1, 1 + min(STEPS, next(iter(found.values())).size))
     below = np.zeros(steps.size)
     for (_, colour), lost in found.items():

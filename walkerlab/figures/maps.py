@@ -15,7 +15,7 @@ from matplotlib.ticker import LogLocator, NullLocator
 from numpy.typing import NDArray
 
 from walkerlab.config.contact import Contact
-from walkerlab.figures.canvas import add_legend, blank, entry, label_of, label_ticks
+from walkerlab.figures.canvas import add_legend, entry, label_of, label_ticks, panels
 from walkerlab.figures.illustration import Drawn, Illustration, Need, Results, paper_figure
 from walkerlab.figures.style import BLACK, BLUE, GREEN, GREY, ORANGE, PALE, PURPLE, VERMILLION
 from walkerlab.figures.walks import TUNE_STAGE, redoes_the_paper, redoes_the_procedure
@@ -101,8 +101,7 @@ def draw_starts(results: Results) -> Drawn:
         place = cells.attrs.get(f"{name}_{SWING}"), cells.attrs.get(f"{name}_{STANCE}")
         if None not in place:
             marks.append(("contact gait" if name == "gait" else "adjusted start", marker, size, face, place))
-    figure = blank(3.9)
-    both = figure.subplots(1, 2, sharex=True, sharey=True)
+    figure, both = panels(3.9, 1, 2, sharex=True, sharey=True)
     swing, stance = ("link 1", "link 2") if redoes_the_procedure(results) else ("the swing leg", "the stance leg")
     for axes, (model, title) in zip(both, MODELS, strict=True):
         steps = cells[f"{model}steps"]
@@ -147,8 +146,7 @@ def draw_basins(results: Results) -> Drawn:
         extent = (*xlim, *ylim)
         return axes.imshow(values.T, extent=extent, origin="lower", aspect="auto", interpolation="nearest", **how)
 
-    figure = blank(3.9)
-    left, right = figure.subplots(1, 2, sharex=True, sharey=True)
+    figure, (left, right) = panels(3.9, 1, 2, sharex=True, sharey=True)
     key = draw_kinds(partial(draw, left), fates(shown["outcome"], shown["attractor"], summary))
     left.set_title("(a) where walks end")
     # on a scale of powers what has settled from its first step on has the colour of one step
@@ -222,8 +220,7 @@ class OverStiffness:
     def __init__(self, cells: Group, up: str, titles: tuple[str, str]) -> None:
         """Both panels, still empty, the other coordinate upward."""
         self.cells, self.edges = cells, (edges(cells[STIFFNESS]), edges(cells[up]))
-        self.figure = blank(3.9)
-        self.left, self.right = self.figure.subplots(1, 2, sharex=True, sharey=True)
+        self.figure, (self.left, self.right) = panels(3.9, 1, 2, sharex=True, sharey=True)
         xlim, ylim = (ends[[0, -1]] for ends in self.edges)
         for axes, title in ((self.left, titles[0]), (self.right, titles[1])):
             axes.set(xscale="log", yscale="log", xlabel=axis_of(cells, STIFFNESS), title=title, xlim=xlim, ylim=ylim)

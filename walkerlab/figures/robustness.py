@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-from walkerlab.figures.canvas import add_legend, blank, entry, label_of
+from walkerlab.figures.canvas import add_legend, blank, entry, label_of, panels
 from walkerlab.figures.families import MODELS
 from walkerlab.figures.illustration import Drawn, Illustration, Need, Results, paper_figure
 from walkerlab.figures.stick_diagram import FAINT, FULL, draw_postures, draw_slope, sticks_of, surrounding
@@ -67,8 +67,7 @@ def over_one_number(group: Group, parameter: str, _results: Results) -> Drawn:
     """Figure 17; caption: the number, its unit, and each model's least disturbed gait, with its norm (s/m)."""
     x, said, unit = group[parameter].astype(float), in_words(parameter), group.variables[parameter].units
     models = {str(group[f"gaits.{k}.model"][0]): k for k in range(2) if f"gaits.{k}.model" in group.variables}
-    figure = blank(0.6 + PANEL_HEIGHT * len(PANELS))
-    axes = figure.subplots(len(PANELS), 1, sharex=True)
+    figure, axes = panels(0.6 + PANEL_HEIGHT * len(PANELS), len(PANELS), sharex=True)
     for one, (label, name, shown) in zip(axes, PANELS, strict=True):
         for model, k in models.items():
             look: dict[str, Any] = {"color": MODELS[model], "markersize": 2.6, "linewidth": 1.3, **LINES[model]}
@@ -100,8 +99,7 @@ def push_off_or_hip(group: Group, driven: Mapping[str, NDArray[np.bool_]], _resu
     Caption: of each way speed (m/s), norm (s/m) and cost of transport of the least disturbed gait.
     """
     speed = group[SPEED].astype(float)
-    figure = blank(0.6 + PANEL_HEIGHT * len(OF_ACTUATIONS))
-    axes = figure.subplots(len(OF_ACTUATIONS), 1, sharex=True)
+    figure, axes = panels(0.6 + PANEL_HEIGHT * len(OF_ACTUATIONS), len(OF_ACTUATIONS), sharex=True)
     looks = {name: {"color": colour, "marker": marker} for name, (_, colour, marker) in ACTUATIONS.items()}
     for one, (said, name, logarithmic) in zip(axes, OF_ACTUATIONS, strict=True):
         for parameter, points in driven.items():

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
-from walkerlab.figures.canvas import add_legend, blank, entry, label_of
+from walkerlab.figures.canvas import add_legend, entry, label_of, panels
 from walkerlab.figures.illustration import Drawn, Illustration, Results
 from walkerlab.figures.maps import WHITE, edges, is_logarithmic
 from walkerlab.figures.style import BLUE, GREY, VERMILLION
@@ -73,7 +73,7 @@ def draw(
     """Caption: what is drawn over what, how points came out, how gaps are seen, and whether there is a line of one."""
     a_map = len(dims) == 2 and not in_lines(group, dims)
     if len(dims) != 2:
-        figure = panels(group, parameters, dims, names)
+        figure = scattered(group, parameters, dims, names)
     else:
         figure = (maps if a_map else lines)(group, parameters, names)
     outcomes = zip(*np.unique(group["outcome"].astype(str), return_counts=True), strict=True)
@@ -87,11 +87,11 @@ def label(group: Group, name: str) -> str:
     return label_of(LABELS.get(name, in_words(name.rpartition(".")[2])), group.variables[name].units)
 
 
-def panels(group: Group, parameters: Sequence[str], dims: tuple[str, ...], names: Sequence[str]) -> Figure:
+def scattered(group: Group, parameters: Sequence[str], dims: tuple[str, ...], names: Sequence[str]) -> Figure:
     """A row for each number, a column for each parameter; lines where the parameter orders the points."""
     shown = list(parameters)[:MAX_PANELS]
-    figure = blank(0.5 + PANEL_HEIGHT * len(names))
-    axes = figure.subplots(len(names), len(shown), sharex="col", sharey="row", squeeze=False)
+    rows, columns = len(names), len(shown)
+    figure, axes = panels(0.5 + PANEL_HEIGHT * rows, rows, columns, sharex="col", sharey="row", squeeze=False)
     for column, parameter in enumerate(shown):
         x = spread(group, parameter, dims)
         few = np.unique(np.linspace(0, x.size - 1, min(x.size, MAX_SCATTERED)).astype(int))
@@ -151,16 +151,15 @@ def lines(group: Group, parameters: Sequence[str], names: Sequence[str]) -> Figu
     x, values = numbers(group, across), group[few].tolist()
     looks = [{"color": matplotlib.colormaps["viridis"](0.85 * shade), "linestyle": DASHES[place % len(DASHES)]}
              for place, shade in enumerate(np.linspace(0.0, 1.0, len(values)))]  # fmt: skip
-    figure = blank(0.8 + PANEL_HEIGHT * len(names))
-    axes = figure.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0]
-    for one, name in zip(axes, names, strict=True):
+    figure, axes = panels(0.8 + PANEL_HEIGHT * len(names), len(names), sharex=True, squeeze=False)
+    for one, name in zip(axes[:, 0], names, strict=True):
         found = group[name].astype(float)
         rows = found if parameters[0] == few else found.T
         for row, look in zip(rows, looks, strict=True):
             one.plot(x, row, **look, linewidth=1.3, marker="o", markersize=2.4)
         finish_panel(one, group, across, name, x[np.isnan(rows).any(axis=0)])
         one.set_ylabel(label(group, name))
-    axes[-1].set_xlabel(label(group, across))
+    axes[-1, 0].set_xlabel(label(group, across))
     unit = group.variables[few].units
     key = []
     for value, look in zip(values, looks, strict=True):
@@ -181,8 +180,7 @@ def maps(group: Group, parameters: Sequence[str], names: Sequence[str]) -> Figur
     """A map for each number, two in a row; the second parameter runs upward."""
     columns = min(2, len(names))
     rows = -(-len(names) // columns)
-    figure = blank(0.4 + MAP_HEIGHT * rows)
-    axes = figure.subplots(rows, columns, squeeze=False)
+    figure, axes = panels(0.4 + MAP_HEIGHT * rows, rows, columns, squeeze=False)
     across, up = (numbers(group, parameter) for parameter in parameters)
     for place, name in enumerate(names):
         one = axes[place // columns][place % columns]

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from walkerlab.figures.canvas import add_legend, blank, entry, files_of, label_of, styled
+from walkerlab.figures.canvas import add_legend, entry, files_of, label_of, panels, styled
 from walkerlab.figures.illustration import Drawn, Need, Results, paper_figure
 from walkerlab.figures.style import BLACK, BLUE, CONTACT, GREY, ORANGE, PALE, RIGID, VERMILLION, Look
 from walkerlab.paper.printed import ANGLE_ERROR, VELOCITY_ERROR
@@ -117,8 +117,8 @@ def shown(walks: list[Walk], strides: int = PAPER_STRIDES) -> tuple[list[Walk], 
 
 def time_axes(rows: int, row_height: float, walks: list[Walk]) -> tuple[Figure, list[Axes]]:
     """A figure of axes that share the time axis, with the walks' heel strikes across all of them."""
-    figure = blank(0.85 + rows * row_height)
-    axes = list(figure.subplots(rows, 1, sharex=True, squeeze=False)[:, 0])
+    figure, column = panels(0.85 + rows * row_height, rows, sharex=True, squeeze=False)
+    axes = list(column[:, 0])
     for one in axes:
         for walk in walks:
             look, across = walk.look, one.get_xaxis_transform()
@@ -284,8 +284,7 @@ ARROW_LENGTH = 0.06
 def draw_cycles(results: Results) -> Drawn:
     """A phase plane for each leg, both on the same scales; caption: how much is shown, and how the walks went."""
     walks, extent = shown(walks_with(results, STATES), CYCLES)
-    figure = blank(4.2)
-    axes = list(figure.subplots(1, 2, sharex=True, sharey=True))
+    figure, axes = panels(4.2, 1, 2, sharex=True, sharey=True)
     for leg, one in enumerate(axes):
         for walk in walks:
             draw_cycles_of(one, walk, leg)
@@ -401,8 +400,8 @@ def overlaid(first: Mapping[str, Content], second: Mapping[str, Content], names:
 
 def draw_overlay(both: list[tuple[str, list[Group]]], names: tuple[str, str]) -> Figure:
     """A column for each stage, with both runs' trajectories; a row for each leg's angle and one for the energy."""
-    figure = blank(0.5 + 1.9 * len(OVERLAY_ROWS))
-    axes = figure.subplots(len(OVERLAY_ROWS), len(both), sharex="col", sharey="row", squeeze=False)
+    rows, columns = len(OVERLAY_ROWS), len(both)
+    figure, axes = panels(0.5 + 1.9 * rows, rows, columns, sharex="col", sharey="row", squeeze=False)
     for row, (variable, leg, label) in zip(axes, OVERLAY_ROWS, strict=True):
         row[0].set_ylabel(label)
         for one, (_, groups) in zip(row, both, strict=True):
