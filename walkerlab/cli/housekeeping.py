@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from walkerlab.cli.failures import exit_on_failure, print_json
+from walkerlab.cli.failures import exit_on_failure, tell
 from walkerlab.cli.request import OF_A_RUN, OF_TALK, Request, command
 from walkerlab.pipeline.graph import Graph
 
@@ -59,10 +59,7 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
         """Print the keys of a config: type, unit, bounds, default, meaning, source."""
         from walkerlab.config.reference import as_json_schema, as_paragraphs
 
-        if request.as_json:
-            print_json(as_json_schema(key))
-        else:
-            print(as_paragraphs(key))
+        tell(request, as_json_schema(key), [as_paragraphs(key)])
 
     @command(app, *OF_A_RUN, "dry_run", "no_wait", *OF_TALK)
     def clean(

@@ -4,7 +4,7 @@ from collections import Counter
 from dataclasses import asdict
 from typing import Any
 
-from walkerlab.cli.failures import print_json, tell
+from walkerlab.cli.failures import tell
 from walkerlab.cli.request import Request
 from walkerlab.errors import ConfigError, StaleError
 from walkerlab.pipeline.graph import Graph
@@ -101,13 +101,8 @@ def print_stored(request: Request, graph: Graph, stage: str) -> None:
         raise StaleError(f"{path} cannot be shown: {why}.", f"`walkerlab {stage}` computes it.")
     if step.action != "reuse":
         request.console.warn(f"{path} is out of date: {step.reason}")
-    if request.as_json:
-        print_json(
-            {"stage": stage, "artifact": str(path), "current": step.action == "reuse", "why": step.reason}
-            | as_json(step.found)
-        )
-    else:
-        print("\n".join([f"{stage}: {path}", *lines(step.found)]))
+    about = {"stage": stage, "artifact": str(path), "current": step.action == "reuse", "why": step.reason}
+    tell(request, about | as_json(step.found), [f"{stage}: {path}", *lines(step.found)])
 
 
 def as_json(stored: Stored) -> dict[str, Any]:
