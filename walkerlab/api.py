@@ -390,7 +390,7 @@ def robustness(
         name: keys.pop(name) for name in ("model", "steps", "roughness_m", "max_steps") if name in keys
     }
     asked |= {} if walks is None else {"walks": plain(walks)}
-    asked |= {"to": list(to)} if to else {}
+    asked |= {"to": to} if to else {}
     return in_memory("robustness", config_of_scene(walker, {"slope_deg": slope_deg, "robustness": asked or None}, keys))
 
 
@@ -418,9 +418,6 @@ def explore(
     return server
 
 
-BOUNDED = ("over", "keep")
-
-
 def design(walker: Any = None, over: Mapping[str, Any] | None = None, **keys: Any) -> Result:
     """Find the walker that minimises or maximises a number of its gait, in memory: `best`, `value`, … in `summary`.
 
@@ -432,9 +429,6 @@ def design(walker: Any = None, over: Mapping[str, Any] | None = None, **keys: An
         name: keys.pop(name) for name in ("minimise", "maximise", "keep", "model", "starts") if name in keys
     }
     asked: dict[str, Any] = {"over": over or {}, **own}
-    for name in BOUNDED:
-        if name in asked:
-            asked[name] = {key: list(pair) for key, pair in asked[name].items()}
     return in_memory("design", config_of_scene(walker, {"design": asked}, keys))
 
 
