@@ -226,6 +226,13 @@ def test_multipliers_are_complex_numbers():
             lambda: walkerlab.find_gait(slope_deg=1, slope_rad=1),
             r"^slope_\w+: the slope is given already, as slope_\w+;",
         ),
+        (
+            lambda: walkerlab.design(over={"slope_deg": 3}, minimise="period_s"),
+            r"^design.over: 3 is not a list; allowed",
+        ),
+        (lambda: walkerlab.design(over=3, minimise="period_s"), r"^design.over: 3 is not a block of keys; allowed"),
+        (lambda: walkerlab.design(over={"slope_deg": (1, 3)}, keep=[1]), r"^design.keep: \[1\] is not a block"),
+        (lambda: walkerlab.robustness(to="slope_deg"), r"^robustness.to: 'slope_deg' is not a list"),
     ],
 )
 def test_what_is_wrong_with_an_argument_is_told_in_words_and_without_a_place_in_a_text(
@@ -242,6 +249,6 @@ def test_robustness_and_design_are_asked_in_memory():
     assert [(row["model"], row["steps"]) for row in found.summary["largest_step"]] == [("rigid", 5)]
     assert found.summary["rough_ground"][0]["cut_off_at"] == 50
     walker = walkerlab.design(
-        walkerlab.compass(), over={"slope_deg": (2, 3)}, maximise="speed_m_s", slope_deg=2.5, starts=1
+        walkerlab.compass(), over={"slope_deg": np.array([2, 3])}, maximise="speed_m_s", slope_deg=2.5, starts=1
     )
     assert walker.summary["best"] == {"slope_deg": 3.0}

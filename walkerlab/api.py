@@ -384,7 +384,7 @@ def robustness(
     walks      on each rough ground
     keys       model, steps, roughness_m and max_steps of the block `robustness`; other keys of a config
     """
-    given = {"slope_deg": slope_deg, **question("robustness", keys, to=list(to) or None, walks=walks)}
+    given = {"slope_deg": slope_deg, **question("robustness", keys, to=to or None, walks=walks)}
     return in_memory("robustness", config_of_scene(walker, given, keys))
 
 

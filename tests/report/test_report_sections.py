@@ -120,6 +120,8 @@ def test_the_page_opens_with_what_holds_what_fails_and_what_follows():
     other = stored("compare", {}, {"departures": ["hip_mass_kg 12 instead of 10"]})
     said = opening(compare=other, **{"contact-sim": contact_sim(**slower)})
     assert "takes 1 % more time than in the rigid gait" in said
+    uneven = opening(sets=("ground.roughness_m=0.001",), compare=other, **{"contact-sim": contact_sim(**slower)})
+    assert uneven == "Both models walk all 4 steps, and the gait is stable."  # no two of its steps are alike
     fallen = opening(compare=other, **{"contact-sim": contact_sim("fell", 3)})
     assert fallen == (
         "The rigid model walks all 4 steps, the contact model walks 3 steps and then falls, and the gait is stable. "

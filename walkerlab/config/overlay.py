@@ -77,13 +77,15 @@ def refuse_without_ground(case: Case, config: Config, lines: Mapping) -> None:
 
 
 def tree_of(block: Keys[str, Any], position: Position) -> Mapping:
-    """Plain values by key as a tree, all of it at one position."""
+    """Plain values, or NumPy's, by key as a tree, all of it at one position."""
 
     def node(value: Any) -> Node:
         if isinstance(value, Keys):
             return tree_of(value, position)
         if isinstance(value, list | tuple):
             return Sequence(position, [node(item) for item in value])
+        if hasattr(value, "tolist"):  # NumPy's
+            return node(value.tolist())
         return Scalar(position, value, str(value))
 
     tree = Mapping(position)

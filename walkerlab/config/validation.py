@@ -26,6 +26,8 @@ _REASONS: Final = {
     "int_type": "is not an integer",
     "string_type": "is not a text",
     "tuple_type": "is not a list",
+    "list_type": "is not a list",
+    "dict_type": "is not a block of keys",
     "model_type": "is not a block of keys",
     "finite_number": "is not finite",
     "literal_error": "is not allowed",

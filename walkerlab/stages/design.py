@@ -63,6 +63,14 @@ def run(config: DesignConfig, inputs: Mapping[str, Content], progress: Progress,
     keep = {name: (bounds[0], bounds[1]) for name, bounds in asked.keep.items()}
     question = Aim(quantity, -1.0 if asked.maximise else 1.0, lower, upper, keep, gaits.at)
     own = np.array([parameter.value_in(config) for parameter in parameters])
+    for place, parameter in enumerate(parameters):
+        for bound in (lower[place], upper[place]):
+            beside = (np.where(np.arange(own.size) == place, bound, others) for others in (own, lower, upper))
+            if all(gaits.config_at(x) is None for x in beside):
+                raise ConfigError(
+                    f"design.over: {parameter.key} cannot be {bound:g} {parameter.unit}",
+                    f"`walkerlab schema {parameter.key}` says what the key allows.",
+                )
     progress.start("design")
     begun, own_z = gaits.at(own), gaits.z
 
@@ -150,18 +158,22 @@ class Gaits:
         """The gait; None where there is none, or the config refuses the numbers."""
         self.counts[0] += 1
         self.progress.advance()
-        changed: Config | None = None
-        for parameter, value in zip(self.parameters, x.tolist(), strict=True):
-            changed = parameter.config_at(self.config if changed is None else changed, value)
-            if changed is None:
-                return None
-        assert changed is not None, "some number changes"
-        found = self.gait_of(changed)
+        changed = self.config_at(x)
+        found = None if changed is None else self.gait_of(changed)
         if found is None:
             self.counts[1] += 1
         else:
             self.found[x.tobytes()] = self.z
         return found
+
+    def config_at(self, x: Floats) -> Config | None:
+        """The config with these numbers; None if it refuses them."""
+        changed: Config | None = None
+        for parameter, value in zip(self.parameters, x.tolist(), strict=True):
+            changed = parameter.config_at(self.config if changed is None else changed, value)
+            if changed is None:
+                break
+        return changed
 
     def gait_of(self, config: Config) -> Point | None:
         """The gait of a config: near the last one, or where a search finds it."""

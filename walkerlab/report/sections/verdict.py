@@ -24,8 +24,8 @@ def section(results: Results) -> Section | None:
     verdicts = Counter(row["verdict"] for row in rows)
     misprint = any(erratum["where"].startswith("A.5") for erratum in errata(results))
     # what holds, what fails and what follows
-    found = results.summary("fixedpoint"), verdicts, misprint
-    said = words("verdict.opening", walked, *found, drives_of(results.config)) if walked else ""
+    found, config = (results.summary("fixedpoint"), verdicts, misprint), results.config
+    said = words("verdict.opening", walked, *found, drives_of(config), config.ground.even) if walked else ""
     fared = sorted(how_all_fared(results), key=lambda one: one.tone != "bad")
     blocks = (
         *(Paragraph(failure, "bad") for failure in failures(results)),
