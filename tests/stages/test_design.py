@@ -133,6 +133,13 @@ def test_bad_questions_end_in_words(changes, said):
         run("rigid-only", *changes)
 
 
+@pytest.mark.parametrize("key", ["contact.damping", "push_off.duration_s"])
+def test_a_number_that_the_model_does_not_read_is_refused_in_words(key):
+    """Every value of it is as good as any other."""
+    with pytest.raises(ConfigError, match=f"{key} does not touch the rigid model"):
+        run("paper", "design.minimise=period_s", f"design.over={{{key}: [1, 2]}}")
+
+
 def test_bounds_that_no_walker_keeps_are_no_answer():
     with pytest.raises(NoAnswer, match="keeps the other numbers") as raised:
         run("slope-3deg", "design.minimise=period_s", "design.over={slope_deg: [2, 3]}",

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Iterator
+from dataclasses import is_dataclass
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from walkerlab.mechanics.standing import Standing
+from walkerlab.orbits.family_search import RIGID
 from walkerlab.orbits.shooting import RigidMap
 from walkerlab.scene.parameter import Parameter
 from walkerlab.scene.rigid import rigid_walker, walker_or_none
@@ -56,3 +61,22 @@ def contact_map(config: ContactConfig, parameter: Parameter, scale: float, step_
 
     walkers = walkers_on_ground(config, parameter, step_length_m)
     return ContactMap(walkers, scale, CONTACT, step_length_m, walker_on_ground(config, step_length_m))
+
+
+def touches(model: str, config: ContactConfig, parameter: Parameter, least: float, most: float) -> bool:
+    """Whether a model changes between two values of the parameter."""
+    walkers: Callable[..., Callable[[float], Any]] = (
+        rigid_walkers if model == RIGID else partial(walkers_on_ground, step_length_m=1.0)
+    )
+    walker_at = walkers(config, parameter)
+    first, last = ([*numbers_in(walker_at(value))] for value in (least, most))
+    return len(first) != len(last) or not all(map(np.array_equal, first, last))
+
+
+def numbers_in(value: Any) -> Iterator[Any]:
+    """All that a record and the records in it are made of."""
+    if isinstance(value, tuple) or is_dataclass(value):
+        for one in value if isinstance(value, tuple) else vars(value).values():
+            yield from numbers_in(one)
+    else:
+        yield value

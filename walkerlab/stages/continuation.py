@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, is_dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from typing import Any, Final
 
@@ -24,7 +24,7 @@ from walkerlab.orbits.step_map import Cycle, StepMap, gait_near
 from walkerlab.outcome import outcome_of
 from walkerlab.pipeline.progress import Progress
 from walkerlab.scene.endings import causes, without_pads
-from walkerlab.scene.families import contact_map, rigid_map, rigid_walkers, walkers_on_ground
+from walkerlab.scene.families import contact_map, rigid_map, rigid_walkers, touches
 from walkerlab.scene.parameter import Parameter, parameter_of
 from walkerlab.scene.rigid import rigid_walker
 from walkerlab.stages.family_groups import groups
@@ -79,12 +79,7 @@ class FamilyQuestion:
 
     def touches(self, model: str) -> bool:
         """Whether a model changes over the span."""
-        walkers: Callable[..., Callable[[float], Any]] = (
-            rigid_walkers if model == RIGID else partial(walkers_on_ground, step_length_m=1.0)
-        )
-        walker_at = walkers(self.config, self.parameter)
-        first, last = ([*numbers_in(walker_at(value))] for value in (self.span.least, self.span.most))
-        return len(first) != len(last) or not all(map(np.array_equal, first, last))
+        return touches(model, self.config, self.parameter, self.span.least, self.span.most)
 
     def touched(self, key: str) -> tuple[str, ...]:
         """The models asked for that change over the span; ConfigError, about the block's key, if none does."""
@@ -95,15 +90,6 @@ class FamilyQuestion:
                 "Choose a key that the model is made of, or another model (--model).",
             )
         return touched
-
-
-def numbers_in(value: Any) -> Iterator[Any]:
-    """All that a record and the records in it are made of."""
-    if isinstance(value, tuple) or is_dataclass(value):
-        for one in value if isinstance(value, tuple) else vars(value).values():
-            yield from numbers_in(one)
-    else:
-        yield value
 
 
 def run(config: ContinuationConfig, _inputs: Mapping[str, Content], progress: Progress, again: bool = True) -> Content:

@@ -21,6 +21,7 @@ from walkerlab.orbits.newton import Effort, NotConverged
 from walkerlab.orbits.robustness import Standpoint
 from walkerlab.orbits.step_map import gait_near, multipliers_of
 from walkerlab.pipeline.progress import Progress
+from walkerlab.scene.families import touches
 from walkerlab.scene.parameter import Parameter, parameter_of
 from walkerlab.scene.rigid import rigid_walker
 from walkerlab.solvers.system import Floats
@@ -54,6 +55,12 @@ def run(config: DesignConfig, inputs: Mapping[str, Content], progress: Progress,
     if asked.model == "contact" and config.contact is None:
         raise without_contact("design.model: contact", config.walker, "Add one.")
     parameters = [parameter_of(key, config) for key in asked.over]
+    for parameter, bounds in zip(parameters, asked.over.values(), strict=True):
+        if not touches(asked.model, config, parameter, *bounds) and parameter.config_at(config, bounds[0]):
+            raise ConfigError(
+                f"design.over: {parameter.key} does not touch the {asked.model} model",
+                "Choose a key that the model is made of, or another model (--model).",
+            )
     gaits = Gaits(config, asked, parameters, inputs["fixedpoint"].summary, progress)
     lower, upper = np.array(list(asked.over.values()), float).T
     keep = {name: (bounds[0], bounds[1]) for name, bounds in asked.keep.items()}
