@@ -58,6 +58,12 @@ def test_bars_stand_on_one_another():
     assert max(tops) == pytest.approx(1.1)
 
 
+@pytest.mark.parametrize("steps", [1, 2, 10])
+def test_steps_are_counted_in_whole_numbers(steps):
+    (axes,) = plotted(LOST, both_models(**{"contact-sim": contact(steps)})).axes
+    assert all(float(tick).is_integer() for tick in axes.get_xticks())
+
+
 def test_what_was_not_stored_is_not_drawn():
     results = both_models(**{"contact-sim": without(contact(), "trajectory", "normal_force_N", "total_energy_J")})
     assert FORCES.why_left_out(results, {}) == "contact-sim: 'forces' is not among the config's outputs"

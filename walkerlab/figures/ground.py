@@ -105,7 +105,7 @@ def draw_losses(results: Results) -> Drawn:
     for (_, colour), lost in found.items():
         axes.bar(steps, lost[: steps.size], 0.7, below, color=colour)
         below += lost[: steps.size]
-    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
     axes.set(xlabel="step", ylabel="energy lost (J)")
     add_legend(figure, [Patch(facecolor=colour, label=label) for label, colour in found])
     later = {label: float(lost[min(1, lost.size - 1) :].mean()) for (label, _), lost in found.items()}
