@@ -491,8 +491,6 @@ def plain(value: Any) -> Any:
     """A block, or NumPy's numbers, as plain values."""
     if isinstance(value, Block):
         return value.model_dump(mode="json")
-    if isinstance(value, Mapping):
-        return {key: plain(inner) for key, inner in value.items()}
     return value.tolist() if hasattr(value, "tolist") else value
 
 
