@@ -16,7 +16,7 @@ from walkerlab.benchmarks.ladder import (
     measure,
     row_of,
 )
-from walkerlab.benchmarks.references import End, Reference, WalkEndsError, first_end, second_end
+from walkerlab.benchmarks.references import End, Reference, WalkEndsError, reference_for
 from walkerlab.benchmarks.trials import USER_SCRIPT, RigidTrial, TrialRun
 from walkerlab.config.loader import load
 from walkerlab.labels import labels_of
@@ -30,11 +30,6 @@ START = (-0.20420, 0.16940, 0.98 * -0.605819, 0.98 * -0.861041)
 FEW = ("dop853", "radau5", "scipy-dop853", USER_SCRIPT)
 TRIAL = RigidTrial(rigid_walker(CONFIG, CONFIG.equations), START, 3, compass(CONFIG, CONFIG.equations))
 LADDER = (1e-4, 1e-7, 1e-10)
-
-
-def reference_for(trial):
-    by_second = second_end(trial)
-    return Reference(first_end(trial), by_second)
 
 
 @pytest.fixture(scope="module")

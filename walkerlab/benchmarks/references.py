@@ -60,6 +60,12 @@ class WalkEndsError(Exception):
     """The walk does not reach its last step, or not at a bearable cost, so that there is no end state to compare."""
 
 
+def reference_for(trial: Trial) -> Reference:
+    """The reference of a trial; WalkEndsError if the walk does not reach its end."""
+    by_second = second_end(trial)
+    return Reference(first_end(trial), by_second)
+
+
 def first_end(trial: Trial) -> End:
     """The end that all methods but one are measured by: Taylor series where they are installed and the scene is rigid.
 
