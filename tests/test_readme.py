@@ -24,9 +24,12 @@ def test_the_second_block_is_installation_and_tests():
 
 
 def test_the_check_runs_the_first_command_with_the_report_in_an_empty_folder():
-    parts = re.findall(r'^ +part \d+ "README: [^"]+" (.*)$', CHECK, re.MULTILINE)
-    assert " && ".join(parts[-2:]) == BLOCKS[0].strip()
-    between = CHECK[CHECK.index(parts[-2]) : CHECK.index(parts[-1])]
+    parts = dict(re.findall(r'^ +part \d+ "README: ([^"]+)" (.*)$', CHECK, re.MULTILINE))
+    assert f"{parts['install']} && {parts['walkerlab report']}" == BLOCKS[0].strip()
+    installing = CHECK[: CHECK.index('"README: install"')].splitlines()
+    assert installing[-2].strip() == 'enter_new_environment "$1" "$scratch/for-report"'
+    before = CHECK[: CHECK.index('"README: walkerlab report"')]
+    between = before[before.rindex('. "$scratch/for-report/bin/activate"') :]
     assert 'mkdir "$scratch/empty"' in between
     assert 'cd "$scratch/empty"' in between
 
