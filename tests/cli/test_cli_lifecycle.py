@@ -69,6 +69,14 @@ def test_a_longer_leg_whose_mass_stays_is_told():
     assert load(sets=["walker.leg_length_m=1.2", "walker.foot_to_mass_m=0.6"]).warnings == ()
 
 
+def test_a_mass_that_is_moved_along_a_leg_that_stays_is_what_was_asked_for(tmp_path):
+    assert load(sets=["walker.foot_to_mass_m=0.3"]).warnings == ()
+    path = tmp_path / "mine.yaml"
+    path.write_text("extends: paper\nwalker: {foot_to_mass_m: 0.3}\n")
+    assert load(path).warnings == ()
+    assert "walker.foot_to_mass_m stays 0.3 m" in load(path, ["walker.leg_length_m=1.2"]).warnings[0]
+
+
 def test_a_run_is_a_config_and_runs_again_in_its_own_folder(toy):
     toy("roll", "--strides", "3")
     folder = "runs/paper@strides=3"

@@ -110,7 +110,8 @@ def doubts(config: Config, tree: Mapping) -> Iterator[str]:
     length = short(walker.leg_length_m)
     if isinstance(walker, CompassWalker) and {"leg_length_m", "foot_to_mass_m"} <= places.keys():
         leg, mass, stays = places["leg_length_m"], places["foot_to_mass_m"].source, walker.foot_to_mass_m
-        if leg.source != mass and stays != walker.leg_length_m / 2:
+        moved = leg.source.startswith("built-in") or mass.startswith("--")  # the mass itself, over a leg that was there
+        if leg.source != mass and not moved and stays != walker.leg_length_m / 2:
             yield (
                 f"{leg}: walker.leg_length_m is {length} m, and walker.foot_to_mass_m stays {short(stays)} m, "
                 f"as {mass} has it: the mass is not in the middle of the leg"
