@@ -448,6 +448,7 @@ def dataset(group: Group) -> Any:
 def in_memory(stage: str, config: Config) -> Result:
     """A stage's result, with what it needs, without files; ConfigError if the config has not what it needs."""
     refuse_unknown_stage(stage)
+    PIPELINE[stage].refuse_question(config)
     answer = InMemory().answer(config, stage, keys_here().of(config, stage))
     return result_of(stage, answer.content.summary, answer.content, answer.no_answer)
 

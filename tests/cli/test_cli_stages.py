@@ -224,9 +224,21 @@ def test_a_key_to_follow_gaits_over_goes_with_its_span(walker):
     done = walker("continuation", "--over", "slope_deg")
     assert done.returncode == 2
     assert "--from and --to" in done.stderr
-    wrong = walker("continuation", "--over", "strides", "--from", "1", "--to", "2", "--json")
-    assert wrong.returncode == 3
-    assert "touches no model" in json.loads(wrong.stdout)["error"]["message"]
+
+
+@pytest.mark.parametrize(
+    ("asked", "refused"),
+    {
+        "continuation --over strides --from 1 --to 2": "strides touches no model",
+        "robustness --set robustness.to=[strides]": "strides touches no model",
+        "design --minimise period_s --over contact.damping=1:2": "does not touch the rigid model",
+    }.items(),
+)
+def test_a_question_that_cannot_be_meant_stops_before_anything_runs(walker, asked, refused):
+    done = walker(*asked.split(), "--json")
+    assert done.returncode == 3
+    assert refused in json.loads(done.stdout)["error"]["message"]
+    assert not list(walker.folder.iterdir())
 
 
 def test_what_was_left_out_is_told_to_those_who_ask(toy):

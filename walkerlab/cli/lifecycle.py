@@ -83,7 +83,8 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
         output: Output = None,
         columns: Annotated[int, typer.Option(min=1, max=2, help="Columns of a journal that a figure fills.")] = 1,
         width: Annotated[
-            float | None, typer.Option(min=72.0, metavar="PT", help="Width of a figure in points; a column has 252.")
+            float | None,
+            typer.Option(min=72.0, max=7200.0, metavar="PT", help="Width of a figure in points; a column has 252."),
         ] = None,
         dpi: Annotated[int, typer.Option(min=30, max=2400, help="Pixels an inch, of PNG and TIFF.")] = 300,
         model: Annotated[str | None, typer.Option(metavar="STAGE", help=f"Whose trajectory; {FIRST_WALK}.")] = None,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -129,6 +130,12 @@ class Stage:
 
         if self.why_unsuited(config) is not None:
             raise without_contact(asked, config.walker, "Add one to the config; `walkerlab schema` lists its keys.")
+
+    def refuse_question(self, config: Config) -> None:
+        """Raise ConfigError, before anything runs, for what `refuse` of its module refuses: of stages on demand."""
+        refuse = getattr(importlib.import_module(self.module), "refuse", None) if self.on_demand else None
+        if refuse is not None:
+            refuse(reads.only(config, self.takes_under(config)))
 
     @property
     def command(self) -> str:

@@ -118,6 +118,11 @@ def run(config: ContinuationConfig, _inputs: Mapping[str, Content], progress: Pr
     return content
 
 
+def refuse(config: ContinuationConfig) -> None:
+    """Raise ConfigError for a question that cannot be meant."""
+    models_of(question_over(config.continuation, config))
+
+
 def models_of(asked: FamilyQuestion) -> tuple[str, ...]:
     """The models that are followed.
 

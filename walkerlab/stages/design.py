@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Final
 
@@ -45,32 +45,16 @@ def run(config: DesignConfig, inputs: Mapping[str, Content], progress: Progress,
 
     parts  ends of searches that an earlier run has left, and where new ones are kept
     """
+    refuse(config)
     asked = config.design or Design()
     quantity = asked.minimise or asked.maximise
-    if quantity is None or not asked.over:
-        raise ConfigError(
-            "design has no question: it needs a number of the gait and the numbers of the config that may change.",
-            "For example --minimise gait_sensitivity_norm --over walker.hip_mass_kg=5:15.",
-        )
-    if asked.model == "contact" and config.contact is None:
-        raise without_contact("design.model: contact", config.walker, "Add one.")
+    assert quantity is not None, "a design without a question is refused"
     parameters = [parameter_of(key, config) for key in asked.over]
-    for key in asked.over:
-        if not reads(asked.model, config, key):
-            raise not_read("design.over", key, (asked.model,))
     gaits = Gaits(config, asked, parameters, inputs["fixedpoint"].summary, progress)
     lower, upper = np.array(list(asked.over.values()), float).T
     keep = {name: (bounds[0], bounds[1]) for name, bounds in asked.keep.items()}
     question = Aim(quantity, -1.0 if asked.maximise else 1.0, lower, upper, keep, gaits.at)
     own = np.array([parameter.value_in(config) for parameter in parameters])
-    for place, parameter in enumerate(parameters):
-        for bound in (lower[place], upper[place]):
-            beside = (np.where(np.arange(own.size) == place, bound, others) for others in (own, lower, upper))
-            if all(gaits.config_at(x) is None for x in beside):
-                raise ConfigError(
-                    f"design.over: {parameter.key} cannot be {bound:g} {parameter.unit}",
-                    f"`walkerlab schema {parameter.key}` says what the key allows.",
-                )
     progress.start("design")
     begun, own_z = gaits.at(own), gaits.z
 
@@ -129,6 +113,42 @@ def run(config: DesignConfig, inputs: Mapping[str, Content], progress: Progress,
     return content
 
 
+def refuse(config: DesignConfig) -> None:
+    """Raise ConfigError for a question that cannot be meant."""
+    asked = config.design or Design()
+    if (asked.minimise or asked.maximise) is None or not asked.over:
+        raise ConfigError(
+            "design has no question: it needs a number of the gait and the numbers of the config that may change.",
+            "For example --minimise gait_sensitivity_norm --over walker.hip_mass_kg=5:15.",
+        )
+    if asked.model == "contact" and config.contact is None:
+        raise without_contact("design.model: contact", config.walker, "Add one.")
+    parameters = [parameter_of(key, config) for key in asked.over]
+    for key in asked.over:
+        if not reads(asked.model, config, key):
+            raise not_read("design.over", key, (asked.model,))
+    own, bounds = [parameter.value_in(config) for parameter in parameters], list(asked.over.values())
+    corners = np.column_stack((own, bounds)).T
+    for place, parameter in enumerate(parameters):
+        for bound in bounds[place]:
+            beside = (np.where(np.arange(len(parameters)) == place, bound, others) for others in corners)
+            if all(config_with(config, parameters, x) is None for x in beside):
+                raise ConfigError(
+                    f"design.over: {parameter.key} cannot be {bound:g} {parameter.unit}",
+                    f"`walkerlab schema {parameter.key}` says what the key allows.",
+                )
+
+
+def config_with(config: DesignConfig, parameters: Sequence[Parameter], x: Floats) -> Config | None:
+    """The config with other numbers (parameters,); None if it refuses them."""
+    changed: Config | None = None
+    for parameter, value in zip(parameters, x.tolist(), strict=True):
+        changed = parameter.config_at(config if changed is None else changed, value)
+        if changed is None:
+            break
+    return changed
+
+
 def on_bound(asked: Design, x: Floats) -> list[str]:
     """The keys of which the optimum lies on a bound."""
     pairs = zip(asked.over.items(), x.tolist(), strict=True)
@@ -158,22 +178,13 @@ class Gaits:
         """The gait; None where there is none, or the config refuses the numbers."""
         self.counts[0] += 1
         self.progress.advance()
-        changed = self.config_at(x)
+        changed = config_with(self.config, self.parameters, x)
         found = None if changed is None else self.gait_of(changed)
         if found is None:
             self.counts[1] += 1
         else:
             self.found[x.tobytes()] = self.z
         return found
-
-    def config_at(self, x: Floats) -> Config | None:
-        """The config with these numbers; None if it refuses them."""
-        changed: Config | None = None
-        for parameter, value in zip(self.parameters, x.tolist(), strict=True):
-            changed = parameter.config_at(self.config if changed is None else changed, value)
-            if changed is None:
-                break
-        return changed
 
     def gait_of(self, config: Config) -> Point | None:
         """The gait of a config: near the last one, or where a search finds it."""
