@@ -125,6 +125,14 @@ def test_walks_are_the_same_for_any_number_of_processes_and_after_an_interruptio
     assert run("slope-3deg", "robustness.model=rigid", *FEW, parts=again).summary == rigid.summary
 
 
+def test_a_number_that_no_walker_beside_has_is_told_with_the_reason():
+    """Legs of next to no mass follow no torque of the usual step."""
+    found = run("kuo", "robustness.to=[walker.hip.torque_N_m]", "robustness.roughness_m=[]", "robustness.steps=1")
+    rows = found.summary["sensitivity"]
+    assert {row["of"] for row in rows} >= {"period_s", "spectral_radius"}
+    assert all(row["value"] is None and row["why"] == robustness.NONE_BESIDE.why for row in rows)
+
+
 def test_gradients_are_the_same_for_any_number_of_processes(rigid):
     asked = only(load(Path("slope-3deg"), ("robustness.model=rigid",)).config, PIPELINE["robustness"].takes)
     gait = fixedpoint.run(asked, {}, Silent())

@@ -60,6 +60,7 @@ COMPILED: Final = ()
 UNITS: Final = {"floor-drop": "m", "hip-push": "N s"}
 OF: Final = dict(zip(INDICATORS, ("s", "m", "m/s"), strict=True))
 MODEL: Final = {"model": Label("", "which model walks")}
+NONE_BESIDE: Final = Gradient(None, None, "walks beside the gait end, or the config refuses them")
 LABELS: Final[dict[str, dict[str, Label]]] = {
     "gait_sensitivity_norm": {
         "disturbance": Label("", "what the first step is disturbed by"),
@@ -333,7 +334,7 @@ def sensitivities(
     for key, of_key in each_told(progress, label, len(keys), zip(keys, found, strict=True)):
         parameter = parameter_of(key, subject.config)
         value = parameter.value_in(subject.config)
-        for name, gradient in of_key.items():
+        for name, gradient in (of_key or dict.fromkeys(numbers, NONE_BESIDE)).items():
             if name in numbers:
                 share = None if gradient.value is None else relative(gradient.value, value, numbers[name])
                 told = {} if gradient.value is None else {"error": float(gradient.error or 0.0)}
