@@ -15,7 +15,6 @@ from walkerlab.hybrid.rigid_observer import (
     DURATION,
     ENERGY_DRIFT,
     INTEGRAL,
-    LATEST,
     MAX_FRICTION_RATIO,
     MAX_IMPULSE_RATIO,
     MAX_SCUFF_DEPTH,
@@ -140,10 +139,8 @@ class Recorder:
         # a library's method is integrated with in Python
         self.walk: Callable[..., tuple[int, int]] = walk if tolerances.compiled else uncompiled(walk)
         self.numbers, self.kneed = len(walker.zero_state), walker.kneed
-        first = new_observer(np.zeros(0), self.numbers)
-        observe_start(first, Mode(walker, BENT), start)
-        self.energy_at_start = float(first.energy[LATEST])
-        self.extremes, self.work = first.extremes, np.zeros_like(first.work)
+        self.seen = new_observer(np.zeros(0), self.numbers)
+        self.extremes, self.work = self.seen.extremes, self.seen.work
         self.energy_integral, self.duration = 0.0, 0.0
         self.counts = np.zeros_like(method.counts)
         no_states = np.zeros((0, self.numbers))
@@ -189,7 +186,7 @@ class Recorder:
         """Time mean of the energy (J), in each step from the contact point at its touch."""
         zeros = energy_at_touch(self.walker, np.append(self.start[STANCE], after[:, STANCE]))
         if self.duration == 0.0:
-            return float(self.energy_at_start - zeros[0])
+            return float(sum(energies(self.walker, self.start)) - zeros[0])
         durations = np.diff(strikes, prepend=0.0, append=max(self.duration, self.time))
         return float((self.energy_integral - zeros @ durations) / self.duration)
 
@@ -203,7 +200,8 @@ class Recorder:
         apart = [each[:, SWING] - each[:, STANCE] for each in (starts, before)]
         given = [law.torque * each - hinge_energy(law, each) for each in apart]
         hip = float((given[1] - given[0]).sum())
-        unsprung = walker.changed(hip=0.0)  # what the spring gives is among the works
+        # what the spring gives is among the works
+        unsprung = walker.changed(hip=0.0) if walker.driven_hip else walker
         ends = [sum(energies(unsprung, y)) - energy_at_touch(unsprung, y[STANCE]) for y in (self.start, self.state)]
         left = float(ends[1] - ends[0] - gravity - push - hip + self.work[STRIKES])
         hip, left = (hip + left, 0.0) if hinge_torque(law, 0.0, 0.0).by_rate else (hip, left)
@@ -238,6 +236,8 @@ class Recorder:
 
     def finished(self, outcome: Outcome) -> RigidWalkResult:
         """All that was seen."""
+        if self.duration == 0.0:  # a swing that begins observes its own start
+            observe_start(self.seen, Mode(self.walker, BENT), self.start)
         end_time = self.time if outcome == Outcome.WALKED else self.duration
         if outcome == Outcome.WALKED and self.extremes[MIN_NORMAL_FORCE] < 0.0:
             outcome = Outcome.LIFTED_OFF

@@ -115,7 +115,8 @@ def execute(
     """
     started = time.perf_counter()
     graph[target].refuse_unsuited(target, config)
-    graph[target].refuse_question(config)
+    if not options.dry:
+        graph[target].refuse_question(config)
     stages = graph.needed_for(target, config) + (graph.campaigns_of(target) if options.full else ())
     planner = plan.Planner(config, folder, graph, options.force)
     steps = planner.plan(stages)
