@@ -13,7 +13,7 @@ from walkerlab.labels import labels_of, unit_by_name, with_unit
 from walkerlab.report.numbers import NONE, number
 from walkerlab.report.symbols import DOT, LETTERS, SUBSCRIPTS, SUPERSCRIPTS
 
-Tone = Literal["plain", "good", "fair", "bad"]
+Tone = Literal["plain", "good", "fair", "bad", "given"]
 PREFIXES: Final = {"": 1.0, "m": 1e3, "µ": 1e6}
 LONGEST_CELL: Final = 100
 """Letters; a column of records with longer cells holds sentences."""

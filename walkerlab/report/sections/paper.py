@@ -1,7 +1,7 @@
 """The page of the paper: every number that it prints beside what is computed here, its tables, and its errata."""
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -15,8 +15,14 @@ from walkerlab.report.words import words
 
 Row = Mapping[str, Any]
 
-TONES: dict[str, Tone] = {"reproduced": "good", "explained": "fair", "refuted": "bad"}
-"""The verdicts, and how each is set."""
+TONES: dict[str, Tone] = {
+    "input": "given",
+    "reproduced": "good",
+    "explained": "fair",
+    "contradicted": "bad",
+    "not-reproduced": "plain",
+}
+"""The verdicts on printed values, each of which counts once, and how they are set."""
 
 BESIDE = {"as_printed": "as printed", "corrected": "corrected", "contact": "contact model"}
 """What a number of the paper is compared with."""
@@ -28,11 +34,10 @@ def numbers(results: Results) -> Section | None:
     if not rows:
         return None
     meanings = words.terms("paper.verdicts").items()
-    told = tuple(Statement(f"{name.capitalize()}:", meaning, tone=TONES[name]) for name, meaning in meanings)
+    told = tuple(Statement(f"{spelled(name).capitalize()}:", meaning, tone=TONES[name]) for name, meaning in meanings)
     departs = words("paper.departs", results.departures) if results.departures else ""
     blocks = (Paragraph(departs, "fair"), Statements(told, "lines"), numbers_table(rows))
-    verdicts = Counter(row["verdict"] for row in rows)
-    finding = words("paper.finding", {name: verdicts[name] for name in TONES})
+    finding = words("paper.finding", by_verdict(row["verdict"] for row in rows))
     return Section.of("paper-numbers", "The paper’s numbers", blocks, finding, PAPER)
 
 
@@ -43,11 +48,22 @@ def numbers_table(rows: Sequence[Row]) -> Table:
         Column("quantity", lambda row: named(row["quantity"], row.get("unit"))),
         Column("printed", "printed", in_signs, numeric=True),
         *(Column(BESIDE[key], key, number, numeric=True) for key in models),
-        Column("verdict", "verdict", lambda verdict: Cell(verdict, TONES.get(verdict, "plain"))),
+        Column("verdict", "verdict", lambda verdict: Cell(spelled(verdict), TONES.get(verdict, "plain"))),
         Column("evidence", "evidence", in_signs, wide=True),
     )
     caption = "What the paper prints, and what its equations give"
     return table(caption, columns, grouped(rows, "where"), wordy=True, by="where")
+
+
+def by_verdict(verdicts: Iterable[str]) -> dict[str, int]:
+    """How many values of the paper have each verdict."""
+    counts = Counter(verdicts)
+    return {name: counts[name] for name in TONES}
+
+
+def spelled(verdict: str) -> str:
+    """A verdict as it is written in a sentence."""
+    return verdict.replace("-", " ")
 
 
 def named(name: str, unit: str | None) -> str:
