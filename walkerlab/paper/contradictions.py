@@ -50,7 +50,7 @@ def percentages() -> Iterator[tuple[Printed, str]]:
         smallest = 0.0 if low <= 0.0 <= high else min(abs(low), abs(high))
         if apart((smallest, max(abs(low), abs(high))), row.percent.rounding):
             change = f"{row.matlab.text} to {row.adams.text} {row.matlab.unit} is {row.percent_of_matlab:+.3g}%"
-            yield row.percent, f"{change} of the MATLAB value; rounding leaves {low:+.2f} to {high:+.2f}% open"
+            yield row.percent, f"{change} of the MATLAB value, with rounding {low:+.2f} to {high:+.2f}%"
 
 
 def percent_left_open(row: StartRow) -> Interval:

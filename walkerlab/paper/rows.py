@@ -155,7 +155,8 @@ class Judge:
         """A percentage of Table 2: arithmetic, whatever the config."""
         entry = row.percent
         verdict = REPRODUCED if entry.agreement(row.percent_of_matlab) else EXPLAINED
-        text = prose("evidence.percent", row, percent_left_open(row), self.measured.contact, self.raised[2:])
+        left_open = None if entry in contradictions() else percent_left_open(row)
+        text = prose("evidence.percent", row, left_open, self.measured.contact, self.raised[2:])
         return self.row(entry, {}, self.raised[coordinate], verdict, "any", text)
 
     def adams_start(self, entry: Printed, coordinate: int) -> JudgedNumber:
