@@ -142,7 +142,7 @@ TABLE_3: Final = tuple(
 )
 T_LEFT, T_RIGHT, T_CYCLE, V_COM, E_AVG = TABLE_3
 
-EIGENVALUES: Final = Printed("section 3.3", "largest eigenvalue of P, as the gait is stable", "1", "less than one")
+EIGENVALUES: Final = Printed("section 3.3", "largest eigenvalue of P of a stable gait", "1", "less than one")
 LEG_INERTIA: Final = Printed("section 4, Fig. 4a", "inertia of the links", "kg m^2", "zero")
 FOOT_RADIUS: Final = Printed("section 4, Fig. 3", "radius of the foot points", "mm", "1")
 STIFFNESS: Final = Printed("section 4, Fig. 4b", "stiffness of the contact", "not given", "10^5")
