@@ -7,7 +7,8 @@ from walkerlab.outcome import Outcome
 from walkerlab.report.answers import ANSWERS, answer, elided, verdict
 from walkerlab.report.gaits import gait_table
 from walkerlab.report.numbers import number
-from walkerlab.report.tables import Column, aligned, as_csv, as_tex, in_lines, measured, side_by_side, table, width
+from walkerlab.report.tables import Column, aligned, as_csv, in_lines, measured, side_by_side, table, width
+from walkerlab.report.tex import as_tex
 from walkerlab.report.text import COLUMNS, described_summary
 
 GAIT = {
@@ -296,4 +297,4 @@ def test_what_is_written_for_people_and_for_programs_comes_from_one_cell():
     shown = table("", [measured("period", "period_s", lambda value: number(value, 2))], [{"period_s": 0.7036}])
     assert in_lines(shown) == ["period (s)", "0.7"]
     assert as_csv(shown) == b"period (s)\n0.7036\n"
-    assert rb"$0.7036$ \\" in as_tex(shown)
+    assert rb"0.70360 \\" in as_tex(shown)

@@ -253,8 +253,8 @@ def test_a_scene_that_is_not_the_papers_has_its_own_results_first_and_the_paper_
 
 def test_the_papers_tables_stand_beside_ours_without_empty_columns():
     first, third = blocks(sections()["tables"], Table)
-    assert [column.title for column in first.columns] == ["row", "quantity", "paper", "used here", "where"]
-    assert [column.title for column in third.columns] == ["row", "paper, MATLAB", "corrected"]
+    assert [column.title for column in first.columns] == ["symbol", "quantity", "paper", "used here", "where"]
+    assert [column.title for column in third.columns] == ["quantity", "paper, MATLAB", "corrected"]
     assert next(iter(third.groups.values()))[0][0].text == "left step period, t_left (s)"
 
 

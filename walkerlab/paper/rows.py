@@ -275,6 +275,7 @@ def table_2(measured: Measured) -> Table:
         table[coordinate] = {
             **beside(row, states, None if start is None else start[place]),
             "paper_percent": row.percent.value,
+            "paper_percent_text": row.percent.text,
             "percent_of_matlab": row.percent_of_matlab,
             "percent_of_adams": row.percent_of_adams,
         }
@@ -295,7 +296,9 @@ def beside(row: printed.PrintedRow, rigid: Mapping[str, float | None], contact: 
     return {
         "unit": row.matlab.unit,
         "paper_matlab": row.matlab.value,
+        "paper_matlab_text": row.matlab.text,
         "paper_adams": row.adams.value,
+        "paper_adams_text": row.adams.text,
         "as_printed": rigid.get("as-printed"),
         "corrected": rigid.get("corrected"),
         "contact": contact,
