@@ -175,8 +175,8 @@ def paper_row(where, quantity, printed, verdict, evidence, **values):
 
 PAPER_ROWS = [
     paper_row("eq. 11", "x_p, theta_1", "-0.2022", "reproduced", "To the printed digits.", as_printed=-0.202216),
-    paper_row("Table 3", "t_left", "0.60", "refuted", "A gait of period one has equal steps.", corrected=0.7036),
-    paper_row("Table 3", "t_right", "0.79", "refuted", "A gait of period one has equal steps.", corrected=0.7036),
+    paper_row("Table 3", "t_left", "0.60", "contradicted", "A gait of period one has equal steps.", corrected=0.7036),
+    paper_row("Table 3", "t_right", "0.79", "contradicted", "A gait of period one has equal steps.", corrected=0.7036),
     paper_row("Table 2", "dtheta_2", "+74%", "explained", "Relative to the wrong one of both.", corrected=281.0),
 ]
 

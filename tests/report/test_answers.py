@@ -1,12 +1,14 @@
 """What people read on stdout: a headline in words, symbols and units, digits that count, long rows cut short."""
 
 import pytest
+from synthetic_results import paper_row
 
 from walkerlab.outcome import Outcome
 from walkerlab.report.answers import ANSWERS, answer, elided, verdict
 from walkerlab.report.gaits import gait_table
 from walkerlab.report.numbers import number
-from walkerlab.report.tables import Column, aligned, as_csv, as_tex, in_lines, measured, side_by_side, table, width
+from walkerlab.report.tables import Column, aligned, as_csv, in_lines, measured, side_by_side, table, width
+from walkerlab.report.tex import as_tex
 from walkerlab.report.text import COLUMNS, described_summary
 
 GAIT = {
@@ -216,13 +218,15 @@ def test_columns_line_up_under_letters_with_dots():
 
 
 def test_the_verdict_of_a_run_is_three_paragraphs():
-    numbers = {"verdicts": {"reproduced": 3, "explained": 1}, "paper_numbers": []}
+    rows = [paper_row("Table 1", "m", "5", verdict, "") for verdict in ("input", *("reproduced",) * 3)]
+    numbers = {"verdicts": {}, "paper_numbers": rows}
     cases = {"passed": 5, "failed": 0, "cases": [], "known": []}
-    judged = "5 of 5 extreme cases and known problems came out right."
-    begun = ("On a slope of 0.0174", "The rigid model walks all 20000 steps.", "Of 4 numbers that the paper prints:")
+    judged = "5 of 5 extreme cases and known problems came out as expected."
+    of_the_paper = "Of 4 values that the paper prints 1 is an input, 3 are reproduced,"
+    begun = ("On a slope of 0.0174", "The rigid model walks all 20000 steps.", of_the_paper)
     said = verdict({"fixedpoint": GAIT, "simulate": WALK, "compare": numbers, "stability": cases})
     assert [head for line in said for head in begun if line.startswith(head)] == [*begun]
-    assert " ".join(said).endswith(f"1 explained. {judged}")
+    assert " ".join(said).endswith(f"0 not reproduced. {judged}")
     assert verdict({"compare": {"steps": {}, "outcomes": {}}, "stability": cases}) == [judged]
 
 
@@ -293,4 +297,4 @@ def test_what_is_written_for_people_and_for_programs_comes_from_one_cell():
     shown = table("", [measured("period", "period_s", lambda value: number(value, 2))], [{"period_s": 0.7036}])
     assert in_lines(shown) == ["period (s)", "0.7"]
     assert as_csv(shown) == b"period (s)\n0.7036\n"
-    assert rb"$0.7036$ \\" in as_tex(shown)
+    assert rb"0.70360 \\" in as_tex(shown)

@@ -38,6 +38,7 @@ from walkerlab.report.tracks import Track, slip_since_touch
 from walkerlab.report.words import words
 from walkerlab.scene.left_out import LeftOut
 
+SHARES = "0 are inputs, 1 is reproduced, 1 explained, 2 contradicted by its own other values and 0 not reproduced"
 NO_GAIT = "no gait at a slope of 0.2 rad: nothing repeats itself"
 WITHOUT_GAIT = (
     LeftOut("fixedpoint", NO_GAIT),
@@ -113,8 +114,8 @@ def test_the_page_opens_with_what_holds_what_fails_and_what_follows():
         return plain(sections(**changed)["verdict"].blocks[0].text)
 
     assert opening() == (
-        "Both models walk all 4 steps, and the gait is stable; 1 of the 4 numbers that the paper prints come out and 2 "
-        "are refuted, and as its equations have a sign error (A.5), the corrected ones are to be used."
+        f"Both models walk all 4 steps, and the gait is stable; of the 4 values that the paper prints {SHARES}, and as "
+        "its equations have a sign error (A.5), the corrected ones are to be used."
     )
     slower = {"step_periods_s": [0.7, 0.7, 0.7, 0.707]}
     other = stored("compare", {}, {"departures": ["hip_mass_kg 12 instead of 10"]})
@@ -218,15 +219,15 @@ def test_every_end_of_a_walk_is_told_with_its_numbers(outcome, changed, said):
 def test_the_papers_numbers_are_counted_by_verdict():
     printed = sections()["printed"]
     (shares,) = blocks(printed, Shares)
-    assert printed.finding == "Of 4 numbers, 1 reproduced, 2 refuted and 1 explained."
-    assert shares.parts == (("reproduced", 1, "good"), ("explained", 1, "fair"), ("refuted", 2, "bad"))
+    assert printed.finding == f"Of 4 values that the paper prints {SHARES}."
+    assert shares.parts == (("reproduced", 1, "good"), ("explained", 1, "fair"), ("contradicted", 2, "bad"))
     assert sum(count for _, count, _ in shares.parts) == len(PAPER_ROWS)
 
 
 def test_the_verdict_says_which_numbers_fared_how():
     said = {finding.about: finding.text for finding in blocks(sections()["printed"], Statements)[0].items}
-    assert list(said) == ["Reproduced:", "Explained:", "Refuted:"]
-    assert said["Refuted:"] == "Table 3 (all 2)."
+    assert list(said) == ["Reproduced:", "Explained:", "Contradicted:"]
+    assert said["Contradicted:"] == "Table 3 (all 2)."
 
 
 def test_the_verdict_names_the_gravest_errors_with_what_was_measured():
@@ -252,8 +253,8 @@ def test_a_scene_that_is_not_the_papers_has_its_own_results_first_and_the_paper_
 
 def test_the_papers_tables_stand_beside_ours_without_empty_columns():
     first, third = blocks(sections()["tables"], Table)
-    assert [column.title for column in first.columns] == ["row", "quantity", "paper", "used here", "where"]
-    assert [column.title for column in third.columns] == ["row", "paper, MATLAB", "corrected"]
+    assert [column.title for column in first.columns] == ["symbol", "quantity", "paper", "used here", "where"]
+    assert [column.title for column in third.columns] == ["quantity", "paper, MATLAB", "corrected"]
     assert next(iter(third.groups.values()))[0][0].text == "left step period, t_left (s)"
 
 

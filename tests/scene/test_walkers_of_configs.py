@@ -51,6 +51,12 @@ def test_appendix_a_is_a_plain_compass_only():
     assert equation_sets(load(Path("torso")).config) == ("corrected",)
 
 
+def test_equations_as_printed_are_beside_the_corrected_ones_for_the_papers_walker_only():
+    assert equation_sets(load(None, ("slope_deg=3",)).config) == ("corrected", "as-printed")
+    assert equation_sets(load(None, ("walker.hip_mass_kg=12",)).config) == ("corrected",)
+    assert equation_sets(load(None, ("walker.hip_mass_kg=12", "equations=as-printed")).config) == ("as-printed",)
+
+
 @pytest.mark.parametrize(
     ("config", "setting", "said"),
     [

@@ -21,7 +21,8 @@ from walkerlab.pipeline.plan import Planner
 from walkerlab.pipeline.runs import config_of, makes, read_all, result_in, results_in
 from walkerlab.report.numbers import listed
 from walkerlab.report.outcomes import MODELS
-from walkerlab.report.tables import Table, as_csv, as_tex, csv_text, of_records
+from walkerlab.report.tables import Table, as_csv, csv_text, of_records
+from walkerlab.report.tex import as_tex
 from walkerlab.store.artifact import Stored
 from walkerlab.store.files import write_atomically
 from walkerlab.store.runfolder import RunFolder
@@ -99,7 +100,9 @@ def export_from(
     kinds: Sequence[str]
     if what == TRAJECTORY:
         stem, kinds, make = f"{model}-{what}", TRAJECTORY_KINDS, lambda kind: trajectory(result_in(folder, model), kind)
-    elif isinstance(found := table(folder, what) if what in TABLES else named_in(folder, what), Table):
+    elif what in TABLES:
+        stem, kinds, make = what, tuple(WRITERS), lambda kind: WRITERS[kind](table(folder, what, kind))
+    elif isinstance(found := named_in(folder, what), Table):
         stem, kinds, make = hyphened(what), tuple(WRITERS), lambda kind: WRITERS[kind](found)
     else:
         stem, kinds, make = what, FIGURE_KINDS, lambda kind: figure(folder, found, kind, (width, dpi), console)
@@ -210,8 +213,11 @@ def figure(
     return illustration.as_file(taken, kind, *size)
 
 
-def table(folder: RunFolder, name: str) -> Table:
-    """A table of the paper's numbers; ConfigError if the walker is another than the paper's."""
+def table(folder: RunFolder, name: str, kind: str) -> Table:
+    """A table of the paper's numbers; ConfigError if the walker is another than the paper's.
+
+    kind  csv, for programs: records by their keys; tex, for readers: as the page has it
+    """
     summary = result_in(folder, "compare").summary
     if TABLES[name] not in summary:
         raise ConfigError(
@@ -219,6 +225,11 @@ def table(folder: RunFolder, name: str) -> Table:
             f"Its page has {listed(page_tables(folder))}.",
         )
     rows = summary[TABLES[name]]
+    if kind == "tex":
+        # Imported here: CSV needs no page.
+        from walkerlab.report.sections.paper import table_of
+
+        return table_of(TABLES[name], rows)
     if isinstance(rows, Mapping):
         rows = [{"quantity": quantity, **row} for quantity, row in rows.items()]
     return of_records(rows)

@@ -153,13 +153,13 @@ def tune(summary: Summary) -> list[str | Table]:
 
 
 def compare(summary: Summary) -> list[str | Table]:
-    """What of the paper's numbers comes out, as printed beside corrected; of another walker, how the models differ."""
+    """How the values that the paper prints fare; of another walker, how the models differ."""
     errors = summary.get("numerical_error", {})
     told = [f"numerical error of the {model} walk: {off_by(error)}." for model, error in errors.items()]
     if "verdicts" in summary:
-        from walkerlab.report.sections.paper import numbers_table
+        from walkerlab.report.sections.paper import by_verdict, numbers_table
 
-        head = words("paper.finding", summary["verdicts"])
+        head = words("paper.finding", by_verdict(row["verdict"] for row in summary["paper_numbers"]))
         return [head, numbers_table(summary["paper_numbers"]), *told]
     return [words("models.answer", summary["outcomes"]), last_steps(summary, errors), *told]
 

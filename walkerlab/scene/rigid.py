@@ -8,7 +8,7 @@ from functools import lru_cache
 from typing import TYPE_CHECKING
 
 from walkerlab.config.ground import Footholds
-from walkerlab.config.walkers import CompassWalker, Walker, is_plain_compass
+from walkerlab.config.walkers import CompassWalker, Walker, is_plain_compass, is_the_papers
 from walkerlab.errors import ConfigError
 from walkerlab.hybrid.recorded_walk import RigidWalkResult, take_walk
 from walkerlab.mechanics.rigid import knee_of, on_level_ground, places_of
@@ -110,5 +110,5 @@ def coordinates(config: RigidConfig) -> tuple[str, ...]:
 
 
 def equation_sets(config: RigidConfig) -> tuple[Equations, ...]:
-    """The sets of equations that a config's walker has: Appendix A is a compass's."""
-    return ("corrected", "as-printed") if is_plain_compass(config) else ("corrected",)
+    """The sets of equations that gaits are sought with: the config's own, and both for the paper's walker."""
+    return ("corrected", "as-printed") if is_the_papers(config) else (config.equations,)

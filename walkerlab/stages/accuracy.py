@@ -116,7 +116,7 @@ def summary_of(
     rows: Sequence[MethodRow], not_run: list[dict[str, Any]], references: Mapping[str, Reference], jobs: int
 ) -> dict[str, Any]:
     """What the command prints."""
-    parts = ("method", "second_method", "agreement", "state")
+    parts = ("method", "second_method", "agreement", "state", "from_outside", "tolerance", "rhs_evaluations")
     return {
         "rows": [asdict(row) for row in rows],
         "repeats": REPEATS,

@@ -136,7 +136,8 @@ class TuneRun:
             self.adjusted_state = with_scaled_rates(self.rigid, self.rigid_state, *factors)
             self.take("adjusted", self.adjusted_state)
         if is_the_papers(self.config):
-            self.paper = adams_walk(self.rigid, self.walk, self.scene.walker)
+            terrain = with_contact(self.config).terrain
+            self.paper = adams_walk(self.rigid, self.walk, self.scene.walker, terrain)
 
     def adjusted(self, quick: scaled_starts.ScaledStarts) -> scaled_starts.Adjustment | None:
         """The smallest change of the velocities that walks; None if none does."""
