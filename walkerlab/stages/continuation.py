@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from typing import Any, Final
 
@@ -99,14 +99,16 @@ def run(config: ContinuationConfig, _inputs: Mapping[str, Content], progress: Pr
 
     Raises ConfigError for a key that is no number of the model, NoAnswer for a span without a gait.
     """
-    block, found = config.continuation, []
+    block, found, alone = config.continuation, [], []
     asked = question_over(block, config)
     parameter = asked.parameter
     for model in models_of(asked):
         search = search_of(model, asked, progress)
         family = Family(model, None) if search is None else search.family(np.random.default_rng(config.seed))
-        found.append(family)
+        alone += [alone_at(branch, model, parameter) for branch in family.branches if len(branch.points) == 1]
+        found.append(replace(family, branches=tuple(one for one in family.branches if len(one.points) > 1)))
     said, second = summary(found, asked, again), asked.second
+    said["left_out"] += alone
     content = Content(groups(found, said, config, parameter, None if second is None else second.parameter), said)
     if not any(family.branches for family in found):
         raise NoAnswer(
@@ -411,6 +413,13 @@ def region_rows(family: Family) -> Iterator[dict[str, Any]]:
         periods, counts = np.unique(family.regions.period, return_counts=True)
         for period, cells in zip(periods.tolist(), counts.tolist(), strict=True):
             yield {"period": period, "share": cells / family.regions.period.size}
+
+
+def alone_at(branch: GaitBranch, model: str, parameter: Parameter) -> dict[str, str]:
+    """The entry of a gait that goes on neither way: one from which the step map jumps is no branch."""
+    (gait,) = branch.points
+    what = f"a gait of the {model} model at {gait.value:.5g} {parameter.unit} ({gait.period_s:.4g} s)"
+    return {"what": what, "why": f"it goes on neither way: {branch.ends[1].reason}", "saves": ""}
 
 
 def left_out(found: Sequence[Family], asked: FamilyQuestion) -> list[dict[str, str]]:
