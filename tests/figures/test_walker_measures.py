@@ -19,7 +19,13 @@ from walkerlab.figures.measures import drawn, of_parts, of_type, upright
 ROOT = Path(__file__).parents[2]
 SCRIPT = runpy.run_path(str(ROOT / "scripts" / "draw_walkers.py"))
 WORDS = re.compile(r"<text[^>]*>(.*?)</text>", re.DOTALL)
-KNEED = Kneed(type="kneed", foot_radius_m=0.1, foot_centre_ahead_m=0.04, shank={"mass_ahead_m": 0.03}, thigh={"mass_ahead_m": 0.02})
+KNEED = Kneed(
+    type="kneed",
+    foot_radius_m=0.1,
+    foot_centre_ahead_m=0.04,
+    shank={"mass_ahead_m": 0.03},
+    thigh={"mass_ahead_m": 0.02},
+)
 
 
 def words(picture):

@@ -5,13 +5,14 @@ from collections.abc import Callable
 from contextlib import suppress
 from itertools import pairwise
 from types import SimpleNamespace
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Any, Final, Literal, TypeGuard
 
 from pydantic import Discriminator, Field, Tag, ValidationInfo, field_validator
 
+from walkerlab.config.contact import Contact
 from walkerlab.config.drives import QUICKEST, Hip, drives_of
 from walkerlab.config.fields import Block, against, key, wrong
-from walkerlab.config.numbers import same
+from walkerlab.config.numbers import same, short
 from walkerlab.errors import ConfigError
 
 WISSE: Final = "Wisse, Schwab, Int. J. Robotics Research 24 (2005): arc feet"
@@ -464,6 +465,24 @@ def why_no_state(start: Any, walker: Any) -> str:
     numbers = 2 * rigid_bodies(walker)
     fits = isinstance(start, str) or len(start) == numbers
     return "" if fits else f"has {len(start)} numbers, and this walker's state has {numbers}"
+
+
+def contact_to_add(walker: Any) -> str:
+    """A contact block for a walker, in YAML: the paper's numbers by mass, and ground that its legs can walk on."""
+    share, paper = walker.total_mass_kg / CompassWalker().total_mass_kg, Contact()
+    stiffness, damping = (short(float(f"{share * one:.3g}")) for one in (paper.stiffness, paper.damping))
+    numbers = f"stiffness: {stiffness}, damping: {damping}"
+    return f"contact: {{{numbers}, terrain: {'plane' if has_knees(walker) else 'after-mid-swing'}}}"
+
+
+def has_knees(walker: Any) -> TypeGuard["Kneed | PartsWalker"]:
+    """Whether a walker's swing leg shortens, so that it clears plain ground."""
+    return isinstance(walker, Kneed) or (isinstance(walker, PartsWalker) and any(one.locks for one in walker.hinges))
+
+
+def why_rigid_alone(walker: Any) -> str:
+    """Why the contact model is not asked about a walker without a contact block, as a sentence."""
+    return f"The contact model was not asked: {too_light_for_contact(walker) or 'the config has no contact block'}."
 
 
 def without_contact(asked: str, walker: Any, instead: str) -> ConfigError:

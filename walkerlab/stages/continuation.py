@@ -63,17 +63,13 @@ class FamilyQuestion:
     def second(self) -> FamilyQuestion | None:
         """The same over the second key, if there is one."""
         block = self.config.continuation.second
-        return None if block is None else question_over(block, self.config)
+        return None if block is None else question_over(block, self.config, "continuation", "second")
 
-    def refuse_ends(self, block: str) -> None:
+    def refuse_ends(self, *block: str) -> None:
         """Raise ConfigError, about keys of the block, for an end of the span that the config cannot have."""
-        key = self.parameter.key
         for name, value in (("from", self.span.least), ("to", self.span.most)):
             if self.parameter.config_at(self.config, value) is None:
-                raise ConfigError(
-                    f"continuation.{block}{name}: {key} cannot be {value:g} {self.parameter.unit}",
-                    f"`walkerlab schema {key}` says what the key allows.",
-                )
+                raise self.parameter.refusal(self.config, value, (*block, name))
 
     def touches(self, model: str) -> bool:
         """Whether a model changes over the span."""
@@ -87,9 +83,10 @@ class FamilyQuestion:
         return touched
 
 
-def question_over(block: Span, config: ContinuationConfig) -> FamilyQuestion:
-    """What a block of the config asks."""
-    return FamilyQuestion(config, parameter_of(block.over, config), ValueSpan(block.least, block.most))
+def question_over(block: Span, config: ContinuationConfig, *path: str) -> FamilyQuestion:
+    """What a block of the config asks, which is at a path of keys."""
+    parameter = parameter_of(block.over, config, (*path, "over"))
+    return FamilyQuestion(config, parameter, ValueSpan(block.least, block.most))
 
 
 def run(config: ContinuationConfig, _inputs: Mapping[str, Content], progress: Progress, again: bool = True) -> Content:
@@ -100,7 +97,7 @@ def run(config: ContinuationConfig, _inputs: Mapping[str, Content], progress: Pr
     Raises ConfigError for a key that is no number of the model, NoAnswer for a span without a gait.
     """
     block, found, alone = config.continuation, [], []
-    asked = question_over(block, config)
+    asked = question_over(block, config, "continuation")
     parameter = asked.parameter
     for model in models_of(asked):
         search = search_of(model, asked, progress)
@@ -122,7 +119,7 @@ def run(config: ContinuationConfig, _inputs: Mapping[str, Content], progress: Pr
 
 def refuse(config: ContinuationConfig) -> None:
     """Raise ConfigError for a question that cannot be meant."""
-    models_of(question_over(config.continuation, config))
+    models_of(question_over(config.continuation, config, "continuation"))
 
 
 def models_of(asked: FamilyQuestion) -> tuple[str, ...]:
@@ -134,9 +131,9 @@ def models_of(asked: FamilyQuestion) -> tuple[str, ...]:
     config, second = asked.config, asked.second
     if asked.models != (RIGID,) and config.contact is None:
         raise without_contact("the contact model", config.walker, "Use --model rigid.")
-    asked.refuse_ends("")
+    asked.refuse_ends("continuation")
     if second is not None:
-        second.refuse_ends("second.")
+        second.refuse_ends("continuation", "second")
         own, span, name = second.parameter.value_in(config), second.span, second.parameter.key
         if second.parameter.path == asked.parameter.path:
             raise ConfigError(
