@@ -35,6 +35,13 @@ def test_init_knows_the_types_of_walkers(walker):
     assert "Did you mean compass?" in done.stderr
 
 
+def test_init_says_what_walkerlab_is_not_for(walker):
+    done = walker("init", "x.yaml", "--type", "runner")
+    assert done.returncode == 3
+    assert "no running: its walkers always have a foot on the ground" in done.stderr
+    assert "mean" not in done.stderr
+
+
 @pytest.mark.parametrize(
     ("walker_type", "config"), [("torso", "torso"), ("parts", "parts"), ("straight-legs", "round-feet")]
 )

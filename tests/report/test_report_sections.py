@@ -87,12 +87,17 @@ def test_each_result_brings_its_sections():
     assert {"paper-numbers", "errata"} <= sections(["compare"]).keys()
 
 
-def test_without_contact_nothing_is_said_of_contact():
+def test_without_contact_the_lead_alone_says_that_it_was_not_asked():
     found = sections(["fixedpoint", "simulate"], sets=("contact=null",))
     assert not {"contact", "paper-numbers", "errata"} & found.keys()
     spoken = " ".join(texts(found[name]) for name in found if name != "provenance").lower()
     assert "contact" not in spoken
-    assert "contact" not in lead(config("contact=null"), "rigid-only").lower()
+    said = lead(config("contact=null"), "rigid-only")
+    assert said.endswith("alone. The contact model was not asked: the config has no contact block.")
+    assert said.lower().count("contact") == 2
+    assert lead(config(), "paper").endswith("as a rigid model and as one with contact.")
+    simplest = load(Path("simplest")).config
+    assert "not asked: the walker's feet have next to no mass" in lead(simplest, "simplest")
 
 
 def test_a_slope_without_a_gait_is_said_in_words_first():

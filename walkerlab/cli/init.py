@@ -6,7 +6,7 @@ from pathlib import Path
 
 from walkerlab.config.files import DEFAULT, builtin_names
 from walkerlab.config.loader import load, safe_name
-from walkerlab.config.problems import meant
+from walkerlab.config.problems import beyond_scope, meant
 from walkerlab.config.reference import as_json_schema
 from walkerlab.config.schema import Config
 from walkerlab.config.writer import commented
@@ -47,7 +47,7 @@ def template(walker: str) -> str:
         types.setdefault(load(Path(name)).config.walker.type, name)
     named = types | {name: name for name in builtin_names()}
     if walker not in named:
-        raise ConfigError(
-            f"there is no type of walker {walker!r}.{meant(walker, named)}", f"There are {', '.join(named)}."
-        )
+        beyond = beyond_scope(walker)
+        said = f"; {beyond}." if beyond else f".{meant(walker, named)}"
+        raise ConfigError(f"there is no type of walker {walker!r}{said}", f"There are {', '.join(named)}.")
     return named[walker]

@@ -37,7 +37,8 @@ class Design(Block):
     def _upwards(cls, value: Bounds) -> Bounds:
         for name, bounds in value.items():
             if len(bounds) != 2 or bounds[0] >= bounds[1]:
-                raise wrong(f"gives {name} bounds that are not two numbers, the first below the second")
+                text = ", ".join(f"{bound:g}" for bound in bounds)
+                raise wrong(f"has bounds for {name}, [{text}], that are not two numbers, the first below the second")
         return value
 
     @field_validator("keep")

@@ -7,7 +7,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Final
 
-from walkerlab.config.problems import KEYS_ARE_LISTED, nearest, refused, shown
+from walkerlab.config.problems import KEYS_ARE_LISTED, beyond_scope, nearest, refused, shown
 from walkerlab.config.reader import MAX_CHARACTERS, read
 from walkerlab.config.tree import Mapping, Position, Scalar, Sequence
 
@@ -138,7 +138,9 @@ def _text_of(file: ConfigFile, asked: Position | None, wanted: str = "") -> str:
     except FileNotFoundError:
         there_is = wanted or _what_there_is() if asked else f"a run, {_what_there_is()}"
         advice = KEYS_ARE_LISTED if wanted else "`walkerlab init` writes a config to begin with"
-        raise refused(asked, f"there is no {kind} {file.label}", there_is, _near(file), advice) from None
+        beyond = "" if wanted or file.path.suffix else beyond_scope(file.path.name)
+        text = f"there is no {kind} {file.label}{f'; {beyond}' if beyond else ''}"
+        raise refused(asked, text, there_is, "" if beyond else _near(file), advice) from None
     except (OSError, ValueError, RuntimeError) as error:  # ValueError: a null byte in the name; RuntimeError: a loop
         reason = (error.strerror if isinstance(error, OSError) else None) or str(error)
         raise refused(asked, f"{kind} {file.label} cannot be read: {reason.lower()}") from None

@@ -21,13 +21,16 @@ from walkerlab.config.overlay import refuse_bad_cases
 from walkerlab.config.problems import Problem
 from walkerlab.config.schema import Config
 from walkerlab.config.tree import Mapping, Position, Scalar
-from walkerlab.config.validation import Location, key_at, on_the_slope, typed
+from walkerlab.config.validation import Location, key_at, node_at, on_the_slope, typed
 from walkerlab.config.walkers import CompassWalker
+from walkerlab.errors import ConfigError
 
 STEEP_RAD: Final = 0.5
 """No passive walker is known to walk on a slope as steep; a number above it is perhaps in degrees."""
 LONG_M: Final = 20.0
 """Nobody builds longer legs; a number above it is perhaps in millimetres."""
+STRONG_M_S2: Final = 30.0
+"""No planet of the solar system pulls as strongly; a number above it is perhaps in cm/s^2."""
 HEAVY_KG_M3: Final = 1000.0
 """A mass above that of a cube of water as wide as the legs are long is perhaps in grams."""
 
@@ -48,6 +51,11 @@ class LoadedConfig:
     warnings: tuple[str, ...]
     source: str
     tree: Mapping
+
+    def placed(self, error: ConfigError) -> ConfigError:
+        """The error with the place of the key that it is about, where the config's text has one."""
+        where = node_at(self.tree, error.key)[1] if error.key and self.tree.entries.get(str(error.key[0])) else None
+        return ConfigError(f"{where}: {error.message}", error.advice) if where else error
 
     def variant(self, settings: Sequence[ConfigSetting]) -> Config:
         """The config with some keys set, checked by the schema; ConfigError with the places of what is wrong."""
@@ -104,7 +112,7 @@ def safe_name(text: str) -> str:
 
 
 def doubts(config: Config, tree: Mapping) -> Iterator[str]:
-    """What is perhaps meant otherwise: a leg whose mass is left behind, lengths in mm, degrees, masses in grams."""
+    """What is perhaps meant otherwise: a mass left behind, lengths in mm, degrees, masses in grams, gravity in cm."""
     walker, block = config.walker, tree.entries.get("walker")
     places = block.keys if isinstance(block, Mapping) else {}
     length = short(walker.leg_length_m)
@@ -120,6 +128,10 @@ def doubts(config: Config, tree: Mapping) -> Iterator[str]:
     if slope is not None and abs(config.slope_rad) > STEEP_RAD:
         degrees = short(round(math.degrees(config.slope_rad), 1))
         yield str(Problem(slope, f"slope_rad is in radians, so this is {degrees} degrees; slope_deg takes degrees"))
+    gravity = tree.keys.get("gravity_m_s2")
+    if gravity is not None and config.gravity_m_s2 > STRONG_M_S2:
+        text = f"gravity_m_s2 is {short(config.gravity_m_s2)}; it is in m/s^2 (9.81 on earth), not in cm/s^2"
+        yield str(Problem(gravity, text))
     for path, value in numbers(("walker",), walker.model_dump(mode="json")):
         key, text = str(path[-1]), f"{'.'.join(map(str, path))} is {short(value)}"
         if key.endswith("length_m") and value > LONG_M:

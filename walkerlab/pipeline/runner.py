@@ -125,6 +125,7 @@ def execute(
     if changes and options.dry:
         refuse_another_config(folder, config)
     if changes and not options.dry:
+        refuse_incomplete_law(config, steps)
         reused = "" if options.force else ", and its results will be reused"
         with folder.locked(options.wait, lambda held: run.reporter.note(held + reused)):
             claim(folder, config)
@@ -135,6 +136,15 @@ def execute(
         for step in steps:
             run.skip(step)
     return run.report(graph[target], time.perf_counter() - started)
+
+
+def refuse_incomplete_law(config: Config, steps: Sequence[plan.Step]) -> None:
+    """Raise ConfigError, before anything is compiled, for a friction law of the user's own that lacks something."""
+    if config.contact is not None and any(step.stage.needs_contact for step in steps if step.action == "run"):
+        # Imported here: it loads the compiler, as what runs will.
+        from walkerlab.scene.contact import friction_law
+
+        friction_law(config.contact)
 
 
 @dataclass(frozen=True)

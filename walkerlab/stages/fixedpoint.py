@@ -33,7 +33,7 @@ NUMBERS = {
     "max_impulse_ratio": Label("1", "largest ratio of tangential to normal impulse in a strike"),
     "max_scuff_depth": Label("m", "depth of the swing foot below the slope", name="max_scuff_depth_m"),
 }
-"""What is stored and printed of a gait, each a field of `Gait`."""
+"""What is stored and printed of a gait, each a field of `RigidGait`."""
 OF_KNEES = {"knee_strike": Label("s", "time of the knee strike after the heel strike", name="knee_strike_s")}
 STATE = Label("rad, rad/s", "state just after heel strike", ("coordinate",))
 

@@ -145,8 +145,8 @@ def refuse(config: RobustnessConfig) -> None:
     asked = config.robustness
     if asked.model in (CONTACT, "both") and config.contact is None:
         raise without_contact(f"robustness.model: {asked.model}", config.walker, "Add one, or ask for rigid.")
-    for key in asked.to:
-        parameter_of(key, config)
+    for place, key in enumerate(asked.to):
+        parameter_of(key, config, ("robustness", "to", place))
         if not any(reads(model, config, key) for model in models_of(config)):
             raise not_read("robustness.to", key, models_of(config))
     half = 0.5 * config.walker.leg_length_m
