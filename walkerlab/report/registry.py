@@ -6,7 +6,7 @@ needs with `Results.summary(stage)` and `Results.group(stage, path)`, which give
 
 import math
 
-from walkerlab.config.drives import drives_of
+from walkerlab.config.drives import drives_of, springs_of
 from walkerlab.config.files import DEFAULT
 from walkerlab.config.schema import Config
 from walkerlab.config.walkers import is_plain_compass
@@ -83,7 +83,8 @@ def lead(config: Config, run: str) -> str:
     """What was run: the walker, its slope and what it was to do."""
     equations = config.equations if is_plain_compass(config) else ""
     change = run.partition("@")[2].replace(",", ", ")
-    return words("lead.scene", config, change, math.degrees(config.slope_rad), equations, drives_of(config))
+    acting = drives_of(config), springs_of(config)
+    return words("lead.scene", config, change, math.degrees(config.slope_rad), equations, *acting)
 
 
 def sections_of(results: Results, makers: tuple[SectionMaker, ...] = SECTIONS) -> tuple[Section, ...]:
