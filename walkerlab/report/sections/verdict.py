@@ -25,8 +25,9 @@ def section(results: Results) -> Section | None:
     misprint = any(erratum["where"].startswith("A.5") for erratum in errata(results))
     # what holds, what fails and what follows
     found, config = (results.summary("fixedpoint"), verdicts, misprint), results.config
-    acting = drives_of(config), springs_of(config)
-    said = words("verdict.opening", walked, *found, *acting, config.ground.even) if walked else ""
+    said = ""
+    if walked:
+        said = words("verdict.opening", walked, *found, drives_of(config), springs_of(config), config.ground.even)
     fared = sorted(how_all_fared(results), key=lambda one: one.tone != "bad")
     blocks = (
         *(Paragraph(failure, "bad") for failure in failures(results)),
