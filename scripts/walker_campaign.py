@@ -10,13 +10,15 @@ these walks within 1e-3 of the gait they go on, and the trace of what k steps di
 multipliers' k-th powers. Every gait's heel strike needs the impulse that the masses' momentum, summed one by one,
 says; one that would have to pull is objected to. `light-hips` are the compasses whose gaits are hardest to follow
 from a vanishing slope: without any start drawn at random both ordinary gaits must be found by name, and each repeat
-itself in one step of SciPy's DOP853.
+itself in one step of SciPy's DOP853. `kneed-torque` have a constant torque and a spring at the hip: each gait's cost of
+transport is held against SciPy's integral of the positive power.
 Prints a table in Markdown, then what went wrong; exits 1 if anything did.
 """
 
 from __future__ import annotations
 
 import argparse
+import math
 import sys
 import time
 from collections import Counter
@@ -31,7 +33,7 @@ from scipy.optimize import root
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 
-from rigid_physics import momentum_of_masses
+from rigid_physics import momentum_of_masses, torque_work_of_a_step
 
 from walkerlab.config.walkers import CompassWalker, Kneed, KneeJoint, PartsWalker, Shank, StraightLegs, Thigh, Torso
 from walkerlab.hybrid.recorded_walk import take_walk
@@ -51,6 +53,7 @@ ASIDE = 1e-6  # of starts from the gait, in units of leg length and gravity
 STILL_LINEAR = 1e-3  # distance from the gait up to which its derivative tells where a walk goes
 AGREES = 1e-4  # of traces, in parts of the derivative's size: rounding by ASIDE, and what is left of curvature
 IMPULSES = 1e-8  # N s, of a walker of some kilograms
+COSTS = 1e-7  # relative, of an integral whose power has a kink at each turn of the legs
 RTOL, ATOL, BUDGET = 1e-12, 1e-15, 1_000_000
 LONGEST_SEARCH_S = 60.0  # processor time; one that takes longer hangs to a user
 SETTINGS = SearchSettings(random_starts=30)
@@ -174,11 +177,17 @@ def light_hips(draw: Draw) -> CompassWalker:
     )
 
 
+def torque_and_spring(draw: Draw) -> dict[str, Any]:
+    """A constant torque and a spring at the hip, by fields of the rigid model."""
+    return {"driven_hip": True, "hip": (draw.uniform(0.0, 3.0), 0.0, draw.uniform(0.02, 0.4))}
+
+
 TYPES: dict[str, Callable[[Draw], AnyWalker]] = {
     "light-hips": light_hips,
     "straight-legs": straight_legs,
     "kneed": kneed,
     "kneed-free": kneed_free,
+    "kneed-torque": kneed,
     "kneed-torso": kneed_with_torso,
     "torso": torso,
     "parts": parts,
@@ -204,6 +213,8 @@ def tally(name: str, walkers: int, seed: int) -> Tally:
         described, slope = TYPES[name](draw), float(10.0 ** draw.uniform(*((-3.5, -1.3) if light else (-2.3, -1.0))))
         assembly = assembly_of(described, rigid=True)
         walker = standing(assembly, 9.81, slope, knee_locked_at_strike(described))
+        if name == "kneed-torque":
+            walker = walker.changed(**torque_and_spring(draw))
         start = time.process_time()
         search = find_gaits(walker, settings=FOLLOWED_ONLY if light else SETTINGS)
         # the first of a type compiles
@@ -211,7 +222,7 @@ def tally(name: str, walkers: int, seed: int) -> Tally:
         found.slowest_s = max(found.slowest_s, spent)
         faults, steps = (ordinary_faults(walker, search), 0) if light else judged(walker, search)
         found.steps_seen += steps
-        faults += impulse_faults(assembly, walker, search)
+        faults += impulse_faults(assembly, walker, search) + cost_faults(walker, search)
         if spent > LONGEST_SEARCH_S:
             faults.append(f"the search took {spent:.0f} s")
         found.ends[end_of(search)] += 1
@@ -276,6 +287,18 @@ def impulse_faults(assembly: Assembly, walker: Standing, search: GaitSearch) -> 
         off = told - (after - before)
         if off > IMPULSES or (off < -IMPULSES and gait.knee_strike is None) or said != (told < 0.0):
             faults.append(f"a heel strike's impulse is {after - before:.6g} N s, told is {told:.6g}")
+    return faults
+
+
+def cost_faults(walker: Standing, search: GaitSearch) -> list[str]:
+    """Gaits whose cost of transport is not that of gravity's work and the torque's positive work integrated plainly."""
+    faults = []
+    for gait in search.gaits if walker.hip[2] != 0.0 else ():
+        step = take_walk(walker, Tolerances("dop853", RTOL, ATOL, BUDGET), gait.state, 1)
+        _, positive = torque_work_of_a_step(walker, gait.state, step)
+        cost = math.sin(walker.slope) + positive / (walker.mass * walker.gravity * step.lengths_m[0])
+        if abs(gait.cost_of_transport - cost) > COSTS * cost:
+            faults.append(f"the gait of {gait.period:.4g} s costs {cost:.10g}, told is {gait.cost_of_transport:.10g}")
     return faults
 
 

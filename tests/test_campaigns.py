@@ -70,7 +70,7 @@ def test_random_walkers_with_light_hips_have_both_their_ordinary_gaits():
     assert script("walker_campaign").tally("light-hips", 25, seed=1).wrong == []
 
 
-@pytest.mark.parametrize("name", ["straight-legs", "parts", "torso", "kneed-torso"])
+@pytest.mark.parametrize("name", ["straight-legs", "parts", "torso", "kneed-torso", "kneed-torque"])
 def test_gaits_of_random_walkers_forget_starts_aside_as_their_multipliers_say(name):
     found = script("walker_campaign").tally(name, 6, seed=2)
     assert found.wrong == []

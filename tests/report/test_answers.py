@@ -55,6 +55,15 @@ def test_multipliers_are_written_as_complex_numbers():
     assert row(lines, "λ₃") == ["0.2160"]
 
 
+def test_an_answer_says_what_drives_a_walker_and_a_spring_does_not():
+    spring = {"driven_by": [], "springs": ["a hip spring of 10 N m/rad"]}
+    head = said(answer("fixedpoint", {**GAIT, **spring}))
+    assert ", with a hip spring of 10 N m/rad, there is a stable gait" in head
+    assert "driven" not in head
+    head = said(answer("fixedpoint", {**GAIT, **spring, "driven_by": ["a push-off of 4 N s"]}))
+    assert ", driven by a push-off of 4 N s, with a hip spring of 10 N m/rad, there is" in head
+
+
 def test_what_is_right_is_named_only_beside_what_is_misprinted():
     assert ["quantity", "value"] in cells(answer("fixedpoint", {**GAIT, "equation_sets": {"corrected": GAIT}}))
     printed = {**GAIT, "equations": "as-printed"}

@@ -137,7 +137,7 @@ def test_the_page_opens_with_what_holds_what_fails_and_what_follows():
 
 def test_of_a_driven_walker_title_lead_and_verdict_say_what_drives_it_and_at_what_cost():
     driven = ("slope_deg=0", "push_off.impulse_N_s=4", "walker.hip.spring_N_m_per_rad=10")
-    by = "driven by a push-off of 4 N s and a hip spring of 10 N m/rad"
+    by = "driven by a push-off of 4 N s, with a hip spring of 10 N m/rad"
     gait = stored("fixedpoint", {}, {**fixedpoint().summary, "cost_of_transport": 0.00998})
     costly = {"fixedpoint": gait, "contact-sim": contact_sim(cost_of_transport=0.0195)}
     found = sections(sets=driven, **costly)
@@ -147,6 +147,14 @@ def test_of_a_driven_walker_title_lead_and_verdict_say_what_drives_it_and_at_wha
     assert "Cost of transport" in texts(found["glossary"])
     assert by in plain(lead(config(*driven), "level"))
     assert "driven" not in plain(sections()["verdict"].blocks[0].text)
+
+
+def test_a_spring_alone_does_not_drive_a_walker():
+    sprung = ("walker.hip.spring_N_m_per_rad=10",)
+    said = plain(lead(config(*sprung), "paper"))
+    assert "with a hip spring of 10 N m/rad" in said
+    assert "driven" not in said
+    assert "driven" not in plain(sections(sets=sprung)["verdict"].blocks[0].text)
 
 
 def test_work_that_is_rounding_is_not_told():

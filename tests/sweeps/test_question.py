@@ -5,7 +5,7 @@ import pytest
 
 from walkerlab.config.loader import load
 from walkerlab.errors import ConfigError
-from walkerlab.sweeps.question import asked, axis_of_text, described, distinct_ends
+from walkerlab.sweeps.question import asked, axis_of_text, described, distinct_ends, refuse_unrecorded
 
 
 def question(*over, **options):
@@ -32,6 +32,15 @@ def test_a_range_of_whole_numbers_is_of_integers_where_the_key_is_one():
     assert question("strides=2:4:3").axes[0].values == (2, 3, 4)
     assert all(isinstance(value, int) for value in question("strides=2:4:3").axes[0].values)
     assert question("slope_deg=2:4:3").axes[0].values == (2.0, 3.0, 4.0)
+
+
+@pytest.mark.parametrize("option", ["--show", "--against"])
+def test_a_quantity_that_a_stage_never_has_is_refused_before_anything_is_computed(option):
+    slopes = question("slope_deg=1:3:3")
+    for name in ("froude", "slope_deg", "work_per_step_J.hip_torque", "gaits.1.period_s"):
+        refuse_unrecorded(slopes, {f"{option} {name}": name})
+    with pytest.raises(ConfigError, match=rf"{option} froud: fixedpoint has no such quantity.*mean froude"):
+        refuse_unrecorded(slopes, {f"{option} froud": "froud"})
 
 
 def test_zip_pairs_values():

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Final, Literal, TypeGuard
 from pydantic import Discriminator, Field, Tag, ValidationInfo, field_validator
 
 from walkerlab.config.contact import Contact
-from walkerlab.config.drives import QUICKEST, Hip, drives_of
+from walkerlab.config.drives import QUICKEST, Hip, acting_on
 from walkerlab.config.fields import Block, against, key, wrong
 from walkerlab.config.numbers import same, short
 from walkerlab.errors import ConfigError
@@ -396,7 +396,7 @@ def followers(walker: Any) -> dict[int, tuple[str, dict[int, float]]]:
 
 def is_plain_compass(config: Any) -> bool:
     """Whether this is the walker of Appendix A."""
-    return bool(config.walker.type == "compass" and config.walker.torso is None and not drives_of(config))
+    return bool(config.walker.type == "compass" and config.walker.torso is None and not acting_on(config))
 
 
 def is_the_papers(config: Any) -> bool:

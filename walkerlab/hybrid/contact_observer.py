@@ -2,13 +2,15 @@
 
 from typing import Any, NamedTuple
 
-from walkerlab.account import DAMPING, EDGES, ENTRIES, FORWARD, FRICTION, GIVEN, HIP, KNEE_STOP, LOST, PUSH_OFF
+from walkerlab.account import DAMPING, EDGES, ENTRIES, FORWARD, FRICTION, GIVEN, HIP, KNEE_STOP, LOST, PUSH_OFF, TORQUE
 from walkerlab.ground.energy import dissipated_power, foot_elastic_energy, push_power, total_energy
 from walkerlab.ground.hinges import hip_energy, hip_power, knee_power
 from walkerlab.ground.walker import OF_STATES, STOPPING, OnGround, one_foot_motion, over_ground, store_whole
-from walkerlab.hybrid.contact_events import HEIGHT, PER_FOOT, STANCE, VERTICAL_VELOCITY, WalkState
+from walkerlab.hybrid.contact_events import HEIGHT, LEGS_TURN, PER_FOOT, STANCE, VERTICAL_VELOCITY, WalkState
 from walkerlab.hybrid.contact_tangent import Tangent, carry_tangent
+from walkerlab.hybrid.hip_torque import torque_work
 from walkerlab.kernels import by_reference, entered, inlined, matrix, vector
+from walkerlab.mechanics.hinges import hip_law
 from walkerlab.solvers.events import RISING, CrossingFinder, first_crossing
 from walkerlab.solvers.stepping import T_OLD, T, interpolate, sample
 
@@ -66,6 +68,7 @@ def observe(
     record_samples(observer, method, system, walk_state)
     if observer.track_energy:
         balance(observer, method, system)
+        note_torque(observer, method, system, finder)
         for foot in range(2):
             if system.has_ground[foot] != 0:
                 note_depth(observer, method, system, finder, foot)
@@ -105,6 +108,16 @@ def balance(observer: ContactObserver, method: Any, system: OnGround) -> None:
         lost += account[entry]
     residual = end_energy(system, method.y) + lost - observer.extremes[START_ENERGY]
     observer.extremes[RESIDUAL] = max(observer.extremes[RESIDUAL], abs(residual))
+
+
+@inlined
+def note_torque(observer: ContactObserver, method: Any, system: OnGround, finder: CrossingFinder) -> None:
+    """Work of the hip's constant torque in the last step."""
+    torque = hip_law(system.form).torque
+    if torque != 0.0:
+        given = torque_work(torque, method, system, finder, LEGS_TURN, 1.0)
+        observer.account[SO_FAR, TORQUE] += given.net
+        observer.account[SO_FAR, FORWARD] += given.positive
 
 
 @inlined
@@ -164,9 +177,7 @@ def add_work(system: OnGround, states: Any, begin: float, span: float, account: 
         weight = span * WEIGHTS[i]
         if stopping:
             account[KNEE_STOP] += weight * knee_power(system, states[i])
-        hip, forward = hip_power(system, states[i])
-        account[HIP] += weight * hip
-        account[FORWARD] += weight * forward
+        account[HIP] += weight * hip_power(system, states[i])
         account[PUSH_OFF] += weight * push_power(system, begin + NODES[i] * span, states[i])
 
 

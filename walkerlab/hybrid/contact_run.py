@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from walkerlab.account import ENTRIES, KNEE_STRIKES, LOSSES, LOST, PUSH_OFF
+from walkerlab.account import ENTRIES, KNEE_STRIKES, LOSSES, LOST, PUSH_OFF, TORQUE
 from walkerlab.ground.energy import kinetic_energy, potential_energy, total_energy
 from walkerlab.ground.hinges import hip_energy
 from walkerlab.ground.knees import FLEXED, extension
@@ -38,6 +38,7 @@ from walkerlab.hybrid.contact_events import (
     PASSING,
     PER_FOOT,
     RIGHT_EDGE,
+    ROWS,
     SLIDE,
     STEPS,
     JudgedGround,
@@ -295,7 +296,7 @@ def walk_on(
         tangent[: y.size] = folded(system.form, tangent)
     lead = tolerances.new(y.size)
     lead.clock[T] = walk_state.times[NOW]
-    by_size, finder = {y.size: lead}, finder_for(lead, EVENT_FUNCTIONS, walker.size)
+    by_size, finder = {y.size: lead}, finder_for(lead, ROWS, walker.size)
     while True:
         if y.size not in by_size:
             by_size[y.size] = sharing(tolerances.new(y.size), lead.clock, lead.counts)
@@ -400,7 +401,7 @@ def explained_residual(observer: ContactObserver, tolerances: Tolerances) -> flo
     It is UNEXPLAINED times rtol times energy and work exchanged: the energy at the start, kinetic, elastic, and
     potential over the slope below, and all that has been dissipated since.
     """
-    exchanged = observer.extremes[AT_HAND] + np.abs(observer.account[SO_FAR]).sum()
+    exchanged = observer.extremes[AT_HAND] + np.abs(observer.account[SO_FAR, :TORQUE]).sum()
     return float(UNEXPLAINED * max(tolerances.rtol, FINEST) * exchanged)
 
 

@@ -14,14 +14,15 @@ from numpy.typing import NDArray
 from walkerlab.hybrid.rigid_observer import (
     DURATION,
     ENERGY_DRIFT,
+    FORWARD,
     INTEGRAL,
     MAX_FRICTION_RATIO,
     MAX_IMPULSE_RATIO,
     MAX_SCUFF_DEPTH,
     MIN_IMPULSE,
     MIN_NORMAL_FORCE,
-    PUSH_OFF,
     STRIKES,
+    TAKEN,
     Observer,
     new_observer,
     observe_start,
@@ -30,6 +31,7 @@ from walkerlab.hybrid.rigid_walk import EVENTS, LONGEST_SWING, hip_above_fall, n
 from walkerlab.hybrid.walk_record import Array, DrivenWork, WalkRecord, WalkWork
 from walkerlab.kernels import uncompiled
 from walkerlab.mechanics.hinges import hinge_energy, hinge_torque, hip_law
+from walkerlab.mechanics.impact import push_off_work
 from walkerlab.mechanics.standing import (
     AT_STRIKE,
     BENT,
@@ -128,8 +130,7 @@ class Recorder:
 
     def __init__(self, walker: Standing, tolerances: Tolerances, start: State, sampled: bool) -> None:
         """Stand at `start`, at time 0."""
-        self.walker, self.wanted, self.budget = walker, sampled, tolerances.budget
-        self.sampled = sampled or hip_law(walker).torque != 0.0
+        self.walker, self.sampled, self.budget = walker, sampled, tolerances.budget
         self.method = method = tolerances.new(len(walker.zero_state))
         self.start = self.state = start
         self.heights: Array | None = None
@@ -193,29 +194,22 @@ class Recorder:
     def _driven_work(self, before: Array, after: Array, gravity: float) -> tuple[DrivenWork, float]:
         """What was given over the steps taken, by gravity that much (J); and what does not balance (J).
 
-        The balance gives the damper's work, which the states before and after strikes do not tell.
+        A push-off works before its strike, which loses what that leaves. The balance gives the damper's work, which
+        the states before and after strikes do not tell.
         """
-        walker, law, push = self.walker, hip_law(self.walker), float(self.work[PUSH_OFF])
+        walker, law = self.walker, hip_law(self.walker)
         starts = np.vstack((self.start, after[:-1])) if self.steps else before
         apart = [each[:, SWING] - each[:, STANCE] for each in (starts, before)]
-        given = [law.torque * each - hinge_energy(law, each) for each in apart]
-        hip = float((given[1] - given[0]).sum())
+        torque = float(law.torque * (apart[1] - apart[0]).sum())
+        hip = torque - float(np.sum(hinge_energy(law, apart[1]) - hinge_energy(law, apart[0])))
         # what the spring gives is among the works
         unsprung = walker.changed(hip=0.0) if walker.driven_hip else walker
         ends = [sum(energies(unsprung, y)) - energy_at_touch(unsprung, y[STANCE]) for y in (self.start, self.state)]
-        left = float(ends[1] - ends[0] - gravity - push - hip + self.work[STRIKES])
+        left = float(ends[1] - ends[0] - gravity - hip + self.work[TAKEN, STRIKES])
         hip, left = (hip + left, 0.0) if hinge_torque(law, 0.0, 0.0).by_rate else (hip, left)
-        forward = self._forward_work() if law.torque and self.steps else 0.0
-        return DrivenWork(float(walker.mass * walker.gravity), gravity, push, hip, forward), abs(left)
-
-    def _forward_work(self) -> float:
-        """What of the torque's work is positive (J) in the steps taken."""
-        samples, n, torque = joined(self.pieces), self.numbers // 2, float(hip_law(self.walker).torque)
-        apart, rate = (samples.state[:, first + SWING] - samples.state[:, first + STANCE] for first in (0, n))
-        within = (samples.step[1:] == samples.step[:-1]) & (samples.step[1:] < self.steps)
-        turned = turning_values(np.diff(samples.time_s), apart, rate)
-        ways = turned - apart[:-1], apart[1:] - turned
-        return float(sum(np.maximum(torque * way[within], 0.0).sum() for way in ways))
+        push = float(push_off_work(walker, before).sum()) if walker.push_off else 0.0
+        weight, forward = float(walker.mass * walker.gravity), float(self.work[TAKEN, FORWARD])
+        return DrivenWork(weight, gravity, push, hip, torque, forward), abs(left)
 
     def _samples(self, observer: Observer, strikes: Array, before: Array, after: Array, knees: Array) -> Samples:
         """The grid's samples with both sides of the heel strikes put between them."""
@@ -258,7 +252,7 @@ class Recorder:
             foothold_height_m=None if self.heights is None else self.heights[1 : self.steps + 1],
             driven=driven,
             energy_balance_residual=residual,
-            lost_in_strikes=float(self.work[STRIKES]),
+            lost_in_strikes=float(self.work[TAKEN, STRIKES]) + driven.push_off,
             start=self.start,
             before=before,
             after=after,
@@ -269,7 +263,7 @@ class Recorder:
             max_impulse_ratio=float(self.extremes[MAX_IMPULSE_RATIO]),
             energy_drift=float(self.extremes[ENERGY_DRIFT]),
             mean_energy=self._mean_energy(strikes, after),
-            samples=joined(self.pieces) if self.pieces and self.wanted else None,
+            samples=joined(self.pieces) if self.pieces else None,
         )
 
 
@@ -278,21 +272,6 @@ def with_scaled_rates(walker: Standing, state: State, swing: float, stance: floa
     n = len(state) // 2
     rates = [(stance if place == STANCE else swing) * rate for place, rate in enumerate(state[n:])]
     return (*state[:n], *linked(walker, AT_STRIKE, rates).tolist())
-
-
-def turning_values(h: Array, value: Array, rate: Array) -> Array:
-    """Where something turns back between samples (n,) h apart, by Hermite's cubic; its value before where it does not.
-
-    Returns (n - 1,) values.
-    """
-    begin, end, change = h * rate[:-1], h * rate[1:], np.diff(value)
-    square, cube = 3.0 * change - 2.0 * begin - end, begin + end - 2.0 * change
-    turns = begin * end < 0.0
-    root = np.sqrt(np.where(turns, square * square - 3.0 * cube * begin, 0.0))
-    # where the slope, begin + 2 square u + 3 cube u^2, falls or rises through zero between 0 and 1
-    under = square - np.sign(begin) * root
-    u = np.divide(-begin, under, out=np.zeros_like(h), where=turns & (under != 0.0))
-    return np.asarray(value[:-1] + u * (begin + u * (square + u * cube)))
 
 
 def far_from(times: Array, events: Array, distance: float) -> NDArray[np.bool_]:

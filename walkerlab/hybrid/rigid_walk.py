@@ -56,7 +56,8 @@ FALLEN_HIP = 0.5  # hip height over the slope in leg lengths
 RELEASED = 1e-6  # of the first step; a knee in line and at its thigh's rate crosses by rounding within 1e-9 of it
 # event functions, rows of the finder
 HEEL_STRIKE, FALL, AHEAD, KNEE = range(4)
-EVENTS = 4
+LEGS_TURN = 4  # no event: the rate between the legs
+EVENTS = 5
 KNEE_STRUCK = -1  # how a phase of a swing ends beside the outcomes
 WALKED, FELL, BENT_KNEE = int(Outcome.WALKED), int(Outcome.FELL), int(Outcome.BENT_KNEE)
 NO_HEEL_STRIKE, REJECTED = int(Outcome.NO_HEEL_STRIKE), int(Outcome.REJECTED)
@@ -212,7 +213,7 @@ def swing_phase(
             sample(method, system, finder.nodes, finder.states)
             strike, fall, struck = events_in_step(system, finder, at_start)
         if observer.watching:
-            observe(observer, method, system, min(1.0, strike, fall, struck), step)
+            observe(observer, method, system, finder, LEGS_TURN, min(1.0, strike, fall, struck), step)
         if fall < min(strike, struck):
             return FELL
         if is_bent(system) and strike < struck:

@@ -57,6 +57,7 @@ def fixedpoint(summary: Summary) -> list[str | Table]:
     if "state" not in summary:
         return [f"No gait on a slope of {slope}: {summary['reason']}."]
     driven = f", driven by {listed(summary['driven_by'])}," if summary.get("driven_by") else ""
+    driven += f"{'' if driven else ','} with {listed(summary['springs'])}," if summary.get("springs") else ""
     head = (
         f"On a slope of {slope}{driven} there is {'a stable' if summary['stable'] else 'an unstable'} gait: steps of "
         f"{fixed(summary['step_length_m'], 4)} m in {fixed(summary['period_s'], 4)} s; "
@@ -86,6 +87,8 @@ def energy_lost(dissipated: Mapping[str, float]) -> str:
 OF_EACH_STEP = {"step_periods_s": "period (s)", "step_lengths_m": "length (m)", "slips_m": "slip (mm)"}
 OF_THE_WALK = (
     *gaits.works(partial(number, digits=4)),
+    told("speed", "speed_m_s"),
+    told("Froude number", "froude"),
     told("cost of transport", "cost_of_transport"),
     told("mean energy", "mean_energy_J", 7),
     told("energy drift", "energy_drift_J", 2),

@@ -6,7 +6,7 @@ needs with `Results.summary(stage)` and `Results.group(stage, path)`, which give
 
 import math
 
-from walkerlab.config.drives import drives_of
+from walkerlab.config.drives import drives_of, springs_of
 from walkerlab.config.files import DEFAULT
 from walkerlab.config.schema import Config
 from walkerlab.config.walkers import is_plain_compass, why_rigid_alone
@@ -84,7 +84,8 @@ def lead(config: Config, run: str) -> str:
     equations = config.equations if is_plain_compass(config) else ""
     change = run.partition("@")[2].replace(",", ", ")
     degrees, alone = math.degrees(config.slope_rad), why_rigid_alone(config.walker)
-    return words("lead.scene", config, change, degrees, equations, drives_of(config), alone)
+    acting = drives_of(config), springs_of(config)
+    return words("lead.scene", config, change, degrees, equations, *acting, alone)
 
 
 def sections_of(results: Results, makers: tuple[SectionMaker, ...] = SECTIONS) -> tuple[Section, ...]:

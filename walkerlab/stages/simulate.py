@@ -21,6 +21,7 @@ from walkerlab.stages.walk import (
     numbers_of,
     of_body,
     over_time,
+    pace_of,
     rigid_start,
     steps_of,
 )
@@ -48,6 +49,7 @@ def summary(config: SimulateConfig, walk: RigidWalkResult) -> dict[str, Any]:
     """What the command prints."""
     return {
         **numbers_of(walk),
+        **pace_of(config, walk),
         "start_state": list(walk.start),
         "final_state": list(walk.final_state),
         "energy_drift_J": walk.energy_drift,

@@ -1,7 +1,7 @@
 """What a sweep asks: a stage, parameters with their values, and how they are combined."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import Any, Final, Literal
@@ -17,6 +17,7 @@ from walkerlab.config.schema import Config, SlopeInDegrees
 from walkerlab.config.tree import Position, Scalar, plain
 from walkerlab.config.tree import Sequence as Listed
 from walkerlab.errors import ConfigError
+from walkerlab.report.headlines import QUANTITIES, has_quantity
 
 Value = float | int | str | bool
 Layout = Literal["grid", "list"]
@@ -257,3 +258,17 @@ def described(config: Config, key: str) -> tuple[str, str]:
         return "1", key
     unit = extra(field, "unit")
     return (config.contact or Contact()).unit_of(unit), field.description or key
+
+
+def refuse_unrecorded(question: SweptStage, names: Mapping[str, str]) -> None:
+    """Raise ConfigError for a name that the stage never has, before anything is computed.
+
+    names  by the option that asks for each, as it was typed
+    """
+    for asked, name in names.items():
+        if name not in question.names and not has_quantity(question.stage, name):
+            known = QUANTITIES[question.stage]
+            near = nearest(name, (*known, *question.names))
+            listed = ", ".join(one + "…" if one.endswith(".") else one for one in known if one != "outcome")
+            meant = f" Did you mean {near}?" if near else ""
+            raise ConfigError(f"{asked}: {question.stage} has no such quantity.{meant}", f"There are {listed}.")

@@ -5,7 +5,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from walkerlab.config.drives import drives_of
+from walkerlab.config.drives import drives_of, springs_of
 from walkerlab.report.blocks import PageBlock, Paragraph, Section, Shares, Statement, Statements
 from walkerlab.report.numbers import count
 from walkerlab.report.outcomes import MODELS, tone
@@ -25,7 +25,9 @@ def section(results: Results) -> Section | None:
     misprint = any(erratum["where"].startswith("A.5") for erratum in errata(results))
     # what holds, what fails and what follows
     found, config = (results.summary("fixedpoint"), verdicts, misprint), results.config
-    said = words("verdict.opening", walked, *found, drives_of(config), config.ground.even) if walked else ""
+    said = ""
+    if walked:
+        said = words("verdict.opening", walked, *found, drives_of(config), springs_of(config), config.ground.even)
     fared = sorted(how_all_fared(results), key=lambda one: one.tone != "bad")
     blocks = (
         *(Paragraph(failure, "bad") for failure in failures(results)),
