@@ -4,13 +4,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
+from plain_rigid_walk import foot_of, plain_walk
 
 from walkerlab.config.ground import Footholds
 from walkerlab.config.loader import load
 from walkerlab.hybrid.recorded_walk import take_walk
-from walkerlab.mechanics import impact
-from walkerlab.mechanics.standing import BENT, NO_SHANK, STANCE, STRAIGHT, SWING, Mode
+from walkerlab.mechanics.standing import STANCE, SWING
 from walkerlab.orbits.fixed_point import find_gaits
 from walkerlab.orbits.shooting import EXACT, SMALL, Shooting, coordinates_of, section_of
 from walkerlab.outcome import Outcome
@@ -18,7 +17,6 @@ from walkerlab.scene.contact import contact_scene, start_state
 from walkerlab.scene.footholds import foothold_heights
 from walkerlab.scene.rigid import rigid_walker
 from walkerlab.solvers.registry import Tolerances
-from walkerlab.solvers.system import derivative
 
 TIGHT = Tolerances("dop853", 1e-12, 1e-13, 10**7)
 ON_GROUND = Tolerances("radau5", 1e-8, 1e-10, 10**7)
@@ -38,62 +36,65 @@ def heights_of(walker, seed, steps, share=2e-4):
 # ---- rigid model ---------------------------------------------------------------------------------------------------
 
 
-def foot_of(walker, y):
-    """Ahead of and over the present contact point (m), by the levers' definition."""
-    psi = np.array(y[: len(walker.arm_x)]) + walker.slope
-    return (
-        float(np.cos(psi) @ walker.foot_x - np.sin(psi) @ walker.foot_y),
-        float(np.sin(psi) @ walker.foot_x + np.cos(psi) @ walker.foot_y),
-    )
-
-
-def plain_walk(walker, y, heights):
-    """Times and states after heel strikes, each swing by a library's method with one event for each of its ends."""
-    n, t, seen = len(walker.arm_x), 0.0, []
-    for rise in np.diff(heights):
-        phases = (BENT, STRAIGHT) if walker.shank != NO_SHANK else (STRAIGHT,)
-        for phase in phases:
-            system = Mode(walker, phase)
-
-            def rate(_t, y, system=system):
-                f = np.zeros(2 * n)
-                derivative(system, 0.0, y, f)
-                return f
-
-            def strike(_t, y, rise=rise):
-                ahead, height = foot_of(walker, y)
-                return height - rise if ahead > 0.0 else 1.0
-
-            def knee(_t, y):
-                return y[walker.shank] - y[walker.thigh]
-
-            event = knee if phase == BENT else strike
-            event.terminal, event.direction = True, 1 if phase == BENT else -1
-            # a knee has just been released, a foot stands beside the other's contact: none is the next event
-            begun = (
-                solve_ivp(rate, (0.0, 1e-3), y, "DOP853", rtol=1e-12, atol=1e-13).y[:, -1] if phase == phases[0] else y
-            )
-            late = 1e-3 if phase == phases[0] else 0.0
-            swing = solve_ivp(rate, (late, 10.0), begun, "DOP853", events=event, rtol=1e-12, atol=1e-13)
-            assert swing.t_events[0].size, "neither knee nor heel strikes"
-            y, t = swing.y[:, -1], t + swing.t[-1]
-            new = np.zeros(2 * n)
-            (impact.knee_strike if phase == BENT else impact.heel_strike)(walker, y, new)
-            y = new
-        seen.append((t, *y))
-    return np.array(seen)
-
-
 @pytest.mark.parametrize("name", WALKERS)
 def test_rigid_walk_over_random_heights_is_that_of_a_library(name):
     _, walker, gait = gait_of(name)
     heights = heights_of(walker, 5, 5)
     walk = take_walk(walker, TIGHT, gait.state, 5, heights=heights)
     assert walk.outcome is Outcome.WALKED
-    plain = plain_walk(walker, np.array(gait.state), heights)
+    plain, outcome, _ = plain_walk(walker, np.array(gait.state), heights)
+    assert outcome is Outcome.WALKED
     np.testing.assert_allclose(walk.touch_time_s, plain[:, 0], rtol=0.0, atol=1e-8)
     np.testing.assert_allclose(walk.after, plain[:, 1:], rtol=0.0, atol=1e-7)
     assert walk.energy_balance_residual < 1e-8 * walker.mass * walker.gravity * walker.leg_length
+
+
+ROUND_FEET_UPHILL = (
+    "gravity_m_s2=10.366",
+    "slope_deg=-0.36498",
+    "push_off.impulse_N_s=1.0814",
+    "walker={type: straight-legs, leg_length_m: 0.97194, leg_mass_kg: 5.2396, leg_mass_below_hip_m: 0.36637, "
+    "leg_mass_ahead_m: -0.0012931, leg_inertia_kg_m2: 0.023407, hip_mass_kg: 0.0, foot_radius_m: 0.17015, "
+    "torso: {mass_kg: 4.9067, above_hip_m: 0.29383}, hip: {spring_N_m_per_rad: 6.8532, torque_N_m: 1.332}}",
+)
+FEET_TOGETHER = (
+    -0.12694069585151044,
+    0.13968090125936825,
+    0.006370102703928905,
+    -0.47726602005185587,
+    -0.3848651668375102,
+    -0.43106559344468304,
+)
+
+
+def test_a_backward_landing_ends_the_walk_as_fell_and_is_no_step():
+    """The foot comes down 2 mm ahead of the other, which has rolled back by 8 mm."""
+    walker = rigid_walker(load(Path("rigid-only"), ROUND_FEET_UPHILL).config)
+    heights = np.array([0.0, 0.403e-3, 0.907e-3])
+    plain, _, ahead = plain_walk(walker, np.array(FEET_TOGETHER), heights[:2])
+    rolled_back = walker.radius * (plain[0, 1] - FEET_TOGETHER[STANCE])
+    assert 0.0 < ahead[0] < 3e-3 < rolled_back
+    walk = take_walk(walker, TIGHT, FEET_TOGETHER, 2, heights=heights)
+    assert (walk.outcome, walk.steps) == (Outcome.FELL, 0)
+    assert walk.end_time_s == pytest.approx(plain[0, 0], abs=1e-8)
+
+
+@pytest.mark.parametrize(("name", "share", "seed"), [("level", 1e-3, 8), ("level", 1e-3, 47), ("slope-3deg", 8e-3, 14)])
+def test_a_foot_that_lands_less_than_a_quarter_of_the_gaits_step_ahead_is_no_step(name, share, seed):
+    _, walker, gait = gait_of(name)
+    heights, nearest = heights_of(walker, seed, 5, share), 0.25 * gait.step_length
+    plain, outcome, ahead = plain_walk(walker, np.array(gait.state), heights, nearest)
+    assert outcome is Outcome.FELL
+    assert 0.0 < ahead[-1] < nearest < min(ahead[:-1])
+    walk = take_walk(walker, TIGHT, gait.state, 5, heights=heights, step_length=gait.step_length)
+    assert walk.outcome is Outcome.FELL
+    np.testing.assert_allclose(walk.touch_time_s, plain[:, 0], rtol=0.0, atol=1e-7)
+
+
+def test_a_walk_on_even_ground_has_no_shortest_landing():
+    _, walker, gait = gait_of("slope-3deg")
+    even, judged = (take_walk(walker, TIGHT, gait.state, 3, step_length=length) for length in (None, 1e3))
+    np.testing.assert_array_equal(even.after, judged.after)
 
 
 @pytest.mark.parametrize("name", ["slope-3deg", "kneed", "round-feet"])

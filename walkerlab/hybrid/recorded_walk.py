@@ -27,7 +27,14 @@ from walkerlab.hybrid.rigid_observer import (
     new_observer,
     observe_start,
 )
-from walkerlab.hybrid.rigid_walk import EVENTS, LONGEST_SWING, hip_above_fall, new_heel_strikes, walk
+from walkerlab.hybrid.rigid_walk import (
+    EVENTS,
+    LONGEST_SWING,
+    SHORTEST_LANDING,
+    hip_above_fall,
+    new_heel_strikes,
+    walk,
+)
 from walkerlab.hybrid.walk_record import Array, DrivenWork, WalkRecord, WalkWork
 from walkerlab.kernels import uncompiled
 from walkerlab.mechanics.hinges import hinge_energy, hinge_torque, hip_law
@@ -43,6 +50,7 @@ from walkerlab.mechanics.standing import (
     energy_at_touch,
     linked,
     step_lengths,
+    swing_foot,
 )
 from walkerlab.outcome import Outcome
 from walkerlab.solvers.registry import Tolerances, finder_for
@@ -101,19 +109,25 @@ def take_walk(
     sampled: bool = False,
     advance: Callable[[int], None] | None = None,
     heights: Array | None = None,
+    step_length: float | None = None,
 ) -> RigidWalkResult:
     """Walk `steps` steps from `start`, or until the walk ends.
 
-    tolerances  how to integrate; no step is given more right-hand sides than any step needs
-    sampled     whether states in time are wanted
-    advance     told how many more steps were taken
-    heights     (steps + 1,) m, of the footholds over the slope, the start's first; even ground without
+    tolerances   how to integrate; no step is given more right-hand sides than any step needs
+    sampled      whether states in time are wanted
+    advance      told how many more steps were taken
+    heights      (steps + 1,) m, of the footholds over the slope, the start's first; even ground without
+    step_length  m, of the gait; the start's foot distance without. On uneven ground a foot that lands less than a
+                 quarter of it ahead of the other ends the walk as a fall
 
     A negative normal force does not stop the walk, since the model assumes it away, but the outcome says so.
     """
     recorder = Recorder(walker, tolerances, start, sampled)
     recorder.heights = heights
     rises = np.zeros(steps + 1) if heights is None else np.diff(heights, prepend=heights[0])
+    if rises.any():
+        judged_by = abs(swing_foot(walker, start)[1]) if step_length is None else step_length
+        recorder.nearest = SHORTEST_LANDING * judged_by
     if hip_above_fall(walker, start) < 0.0:
         return recorder.finished(Outcome.REJECTED)
     status = Outcome.WALKED
@@ -134,6 +148,7 @@ class Recorder:
         self.method = method = tolerances.new(len(walker.zero_state))
         self.start = self.state = start
         self.heights: Array | None = None
+        self.nearest = 0.0
         self.time, self.steps, self.grid_index = 0.0, 0, 0
         self.interval = math.sqrt(walker.leg_length / walker.gravity) / SAMPLES_PER_UNIT_TIME
         self.finder = finder_for(method, EVENTS, len(walker.zero_state))
@@ -151,7 +166,7 @@ class Recorder:
     def walk_on(self, rises: Array) -> Outcome:
         """Take up to so many more steps as footholds rise (m) over the present one, whose own rise is the first."""
         steps = rises.size - 1
-        seen, times = new_heel_strikes(steps, self.numbers, self.kneed, rises), np.zeros(0)
+        seen, times = new_heel_strikes(steps, self.numbers, self.kneed, rises, self.nearest), np.zeros(0)
         if self.sampled:  # as many as the steps may reach, from the start of the first of them
             most = math.ceil(steps * LONGEST_SWING * SAMPLES_PER_UNIT_TIME) + 1
             times = self.interval * np.arange(self.grid_index, self.grid_index + most, dtype=np.float64) - self.time

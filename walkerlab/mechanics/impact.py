@@ -17,6 +17,7 @@ from walkerlab.kernels import always_inline, inlined, matrix, vector
 from walkerlab.mechanics.links import factor_linked, solve_linked
 from walkerlab.mechanics.standing import (
     AT_STRIKE,
+    BENT,
     NO_SHANK,
     STANCE,
     STRAIGHT,
@@ -165,16 +166,16 @@ def push_off_work(model: Standing, before: Floats) -> Floats:
 def pushed_at_hip(model: Standing, y: Any, impulse: float) -> NDArray[np.float64]:
     """The state (2 n) just after a heel strike y, changed by an impulse (N s) at the hip along the slope.
 
-    The new stance foot stays where it is, and the constraints are those of the heel strike.
+    The new stance foot stays where it is. It comes after the release of the trailing knee, which is free.
     """
-    n, new = len(model.arm_x), np.array(y, float)
+    n, new, phase = len(model.arm_x), np.array(y, float), BENT if model.kneed else STRAIGHT
     s, c, F, U, p = np.zeros((5, n))
     M = np.zeros((n, n))
     equations(model, new, s, c, F, U, M, p)
     p[:] = 0.0
     p[STANCE] = -impulse * hip_height(model, new)
-    factor_linked(model, AT_STRIKE, M)
-    solve_linked(model, AT_STRIKE, M, p)
+    factor_linked(model, phase, M)
+    solve_linked(model, phase, M, p)
     new[n:] += p
     return new
 

@@ -1,8 +1,9 @@
 """How a gait's numbers answer a number of the walker: by the implicit function theorem.
 
 With z the section's coordinates and P the step map, dz/dp = (I - A)^-1 dP/dp; all that follows from the gait changes
-along (dz/dp, 1). The derivatives by p are difference quotients of exact steps at two step sizes, which tell their
-error, along the family as far as it is known; that of a multiplier comes from A's by its left and right eigenvectors.
+along (dz/dp, 1). The derivatives by p are difference quotients of exact steps along the family as far as it is known;
+that of a multiplier comes from A's by its left and right eigenvectors. The difference between two step sizes is the
+error, and the steps are halved as long as that makes errors smaller which are no small part of their derivatives.
 """
 
 from __future__ import annotations
@@ -33,6 +34,8 @@ OWN = 3  # of them that a step itself has
 APART = 1e-6  # |l' r| of the largest multiplier's eigenvectors, below which multipliers meet
 STEP = 1.5  # of a difference quotient, in fifth roots of the relative tolerance
 APPROACH = (1e-4, 1e-2)  # of that: steps by which the direction of the family is found
+SIZES = (2.0, 1.0, 0.5, 0.25, 0.125)  # of the steps of difference quotients, one after the other
+SMALL = 1e-3  # error, relative to a derivative, that needs no smaller step
 LOST = 0.1  # error, relative to a derivative, from which rounding has eaten it
 
 
@@ -43,6 +46,15 @@ class Gradient:
     value: float | None
     error: float | None
     why: str = ""
+
+    @property
+    def small(self) -> bool:
+        """Whether no smaller step is needed, or would help."""
+        return self.value is None or self.error is None or self.error <= SMALL * abs(self.value)
+
+    def halves(self, other: Gradient | None) -> bool:
+        """Whether its error is less than half of another one's."""
+        return other is None or (self.error is not None and self.error < 0.5 * (other.error or 0.0))
 
 
 def gait_numbers(at: Standpoint, wanted: Collection[str] = QUANTITIES) -> dict[str, float] | None:
@@ -90,15 +102,26 @@ def gradients(at: Standpoint, scale: float, wanted: Collection[str] = QUANTITIES
         if closer is None:
             return {}
         along = closer
-    fine, coarse = (changes(at, times * h, along, wanted) for times in (1.0, 2.0))
-    if fine is None or coarse is None:
-        return {}
+    found, coarse = dict[str, Gradient](), None
+    for size in SIZES:
+        fine = changes(at, size * h, along, wanted)
+        if fine is not None and coarse is not None:
+            closer = {name: one for name, one in pair(at.A, fine, coarse).items() if one.halves(found.get(name))}
+            found |= closer
+            if not closer or all(one.small for one in found.values()):
+                break
+        coarse = fine
+    return found
+
+
+def pair(A: Floats, fine: Changes, coarse: Changes) -> dict[str, Gradient]:
+    """The derivatives by the finer of two steps, with the errors that the coarser one shows."""
     found = {
         name: told(value, abs(value - coarse.numbers[name]))
         for name, value in fine.numbers.items()
         if name in coarse.numbers
     }
-    return found | {"spectral_radius": of_radius(at.A, fine.A, coarse.A - fine.A)}
+    return found | {"spectral_radius": of_radius(A, fine.A, coarse.A - fine.A)}
 
 
 class Changes(NamedTuple):

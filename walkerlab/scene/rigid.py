@@ -43,10 +43,11 @@ class RigidScene:
         tolerances: Tolerances,
         sampled: bool = False,
         advance: Callable[[int], None] | None = None,
+        step_length: float | None = None,
     ) -> RigidWalkResult:
         """Walk up to `steps` steps from a state (2 n); `sampled` if anything in time is wanted. See `take_walk`."""
-        heights = foothold_heights(self.ground, steps)
-        return take_walk(self.walker, tolerances, start, steps, sampled and bool(self.outputs), advance, heights)
+        heights, sampled = foothold_heights(self.ground, steps), sampled and bool(self.outputs)
+        return take_walk(self.walker, tolerances, start, steps, sampled, advance, heights, step_length)
 
 
 def rigid_scene(config: RigidConfig, ground: Footholds, outputs: tuple[Output, ...]) -> RigidScene:

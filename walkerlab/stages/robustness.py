@@ -307,10 +307,12 @@ def rough_steps(config: RobustnessConfig, steps: Mapping[str, Floats]) -> Group:
 
 def rough_walk(config: RobustnessConfig, inputs: Mapping[str, Content]) -> dict[str, Group]:
     """The beginning of the first walk on the roughest ground, as the rigid model takes it, to be drawn."""
-    gait = as_state(inputs["fixedpoint"].summary["state"])
+    gait = inputs["fixedpoint"].summary
     _, *heights = rough_heights(max(config.robustness.roughness_m), (config.seed, 0), STEPS_DRAWN).tolist()
     scene = rigid_scene(config, Footholds(heights_m=tuple(heights)), ("states",))
-    walk = scene.walk(gait, STEPS_DRAWN, EXACT, sampled=True)
+    walk = scene.walk(
+        as_state(gait["state"]), STEPS_DRAWN, EXACT, sampled=True, step_length=float(gait["step_length_m"])
+    )
     return {f"rough_walk/{name}": group for name, group in groups_of_walk(scene, walk).items()}
 
 

@@ -35,11 +35,12 @@ def run(config: SimulateConfig, inputs: Mapping[str, Content], progress: Progres
     """
     scene, settings = rigid_scene(config, config.ground, config.outputs), config.solver.rigid
     tolerances = Tolerances(settings.method, settings.rtol, settings.atol, ENDLESS)
-    (_, start), steps = rigid_start(config, inputs), 2 * config.strides
+    (length, start), steps = rigid_start(config, inputs), 2 * config.strides
+    of_gait = length if "fixedpoint" in inputs else None
 
     def walk(tolerances: Tolerances, sampled: bool) -> RigidWalkResult:
         progress.start("simulate" if sampled else "simulate: numerical error", steps)
-        return scene.walk(start, steps, tolerances, sampled, progress.advance)
+        return scene.walk(start, steps, tolerances, sampled, progress.advance, of_gait)
 
     of_scene, of_config = partial(groups, scene), partial(summary, config)
     return content_of_walk("simulate", walk, tolerances, of_scene, of_config, progress, again)
