@@ -66,6 +66,7 @@ def test_a_spring_is_followed_from_none_on_and_a_gait_that_goes_on_neither_way_i
         assert [end["reason"] for end in branch["ends"]] == ["end of the span"] * 2
     (alone,) = [one for one in summary["left_out"] if "goes on neither way" in one["why"]]
     assert alone["what"].startswith("a gait of the rigid model at 20 N m/rad")
+    assert alone["why"].endswith("Newton's method finds no further gait")  # not that there is no walker
 
 
 def test_the_summary_has_its_keys_and_the_artifact_a_group_for_each_branch(in_degrees):

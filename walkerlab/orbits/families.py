@@ -301,15 +301,15 @@ class BranchFollower:
         A step that leads out of the span goes to the span's end: beyond it there may be no walker. Returns the end
         alone where there is no further point.
         """
-        ahead = last.x + step * last.tangent
+        ahead, acceptable = last.x + step * last.tangent, self.near_enough(last)
         edge = self.span.nearest(equations.value(ahead))
         if edge != equations.value(ahead):
             if abs(edge - equations.value(last.x)) <= AT_AN_END * self.span.size:
                 return BranchEnd(edge, END_OF_SPAN)
             at_edge = self.at_edge(equations, last, ahead)
-            if at_edge is not None and at_edge.tangent @ last.tangent > self.control.turn:
+            if at_edge is not None and at_edge.tangent @ last.tangent > self.control.turn and acceptable(at_edge):
                 return at_edge, step, BranchEnd(edge, END_OF_SPAN)
-        following = stepped(equations, last, step, self.control, self.near_enough(last), before)
+        following = stepped(equations, last, step, self.control, acceptable, before)
         if isinstance(following, NotConverged):
             return BranchEnd(equations.value(last.x), why_lost(following))
         solved, step = following
