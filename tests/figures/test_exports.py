@@ -23,7 +23,7 @@ from walkerlab.figures import illustration
 from walkerlab.figures.style import WIDTH
 from walkerlab.pipeline.graph import PIPELINE
 from walkerlab.pipeline.progress import Silent
-from walkerlab.report.tables import in_tex
+from walkerlab.report.tex import in_tex
 from walkerlab.stages import plot
 from walkerlab.store.artifact import write
 from walkerlab.store.content import Content
@@ -138,11 +138,10 @@ def test_a_trajectory_as_netcdf_opens_without_a_group(run):
 
 def test_a_table_for_latex_guards_its_letters(run):
     text = export_from(run, "table-3", Target("tex", None), 516.0, "", QUIET).read_text()
-    assert r"$t_\mathrm{left}$ & s & $0.7$ \\" in text
+    assert r"left step period, $t_\mathrm{left}$ (s) & 0.70000 \\" in text
     assert in_tex("x_p, dtheta_1") == r"$x_p$, $\dot{\theta}_1$"
     assert in_tex("θ̇₁ (rad/s)") == r"$\dot{\theta}_{1}$ (rad/s)"
     assert in_tex("end_time_s") == r"end\_time\_s"
-    assert in_tex(1.5e-9) == r"$1.5 \times 10^{-9}$"
     assert in_tex("50 %") == r"50 \%"
     assert in_tex("m/s^2, 10^-4") == "m/s$^{2}$, 10$^{-4}$"
 

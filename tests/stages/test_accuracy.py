@@ -185,10 +185,18 @@ def test_the_conclusion_compares_with_the_best_library():
 def test_the_factor_over_a_library_is_told_as_work_of_the_method_times_cost_of_a_right_hand_side():
     said = conclusion(MADE, "rigid")
     # 1600 against 800 right-hand sides, 8 s against 2 s: twice as many, each twice as costly
-    assert "2 by fewer right-hand sides and 2 by what one costs with all around it, 2.5e+03 µs against 5e+03 µs" in said
-    assert "where the library's steps are taken in Python" in said
+    assert (
+        "2 times by fewer right-hand sides, 2 times by what one costs with all around it: 2500 µs against 5000 µs"
+        in said
+    )
+    assert "where the library’s steps are taken in Python" in said
     more = [made("dop853", 1e-10, 2.0), replace(made("scipy-bdf", 1e-10, 8.0), rhs_evaluations=400)]
-    assert "0.5 by more right-hand sides and 8 by what one costs" in conclusion(more, "rigid")
+    assert "0.5 times by more right-hand sides, 8 times by what one costs" in conclusion(more, "rigid")
+
+
+def test_a_script_with_a_right_hand_side_of_its_own_is_not_the_library_of_the_factor():
+    script = [made("dop853", 1e-4, 1.0), made(USER_SCRIPT, 1e-4, 5.0), made("scipy-bdf", 1e-4, 8.0)]
+    assert "8 times faster than scipy-bdf" in conclusion(script, "rigid")
 
 
 def test_a_reference_says_by_whom_it_is_and_what_it_took(reference):
