@@ -217,8 +217,9 @@ def test_a_costs_derivative_across_a_knee_strike_is_the_slope_of_independent_cos
         return (push_off_work(walker, step.before)[0] + positive) / (walker.mass * walker.gravity * step.lengths_m[0])
 
     step_map = RigidMap(driven, 1.0, driven(2.0))
-    gait = gait_near(step_map, find_gaits(driven(2.0)).gait.z, 2.0, Effort(1e-13))
-    found = gradients(Standpoint(step_map, gait.z, 2.0, gait.DP), 2.0, ["cost_of_transport"])["cost_of_transport"]
+    gait = gait_near(step_map, np.array(find_gaits(driven(2.0)).gait.z), 2.0, Effort(1e-13))
+    at = Standpoint(step_map, 2.0, gait.z, gait.DP, unit_walker(driven(2.0))[1])
+    found = gradients(at, 2.0, ["cost_of_transport"])["cost_of_transport"]
     slope = (cost(2.02) - cost(1.98)) / 0.04
     assert found.value == pytest.approx(slope, rel=1e-3)
     assert found.error < 1e-3 * abs(found.value)
