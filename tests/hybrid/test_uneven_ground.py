@@ -116,6 +116,18 @@ def test_columns_change_over_steps_up_and_down_as_differences_say(name):
         np.testing.assert_allclose(columns[:, j], slope, rtol=1e-6, atol=1e-6)
 
 
+def test_gravitys_work_on_uneven_ground_includes_the_change_of_height():
+    """And so does the cost of transport: what the walker descends is spent."""
+    _, walker, gait = gait_of("paper")
+    weight = walker.mass * walker.gravity
+    for height in (-5e-4, 5e-4):
+        walk = take_walk(walker, TIGHT, gait.state, 3, heights=np.array([0.0, 0.0, 0.0, height]))
+        along = walk.touch_along_m[-1]
+        descended = along * np.sin(walker.slope) - height * np.cos(walker.slope)
+        assert walk.driven.gravity == pytest.approx(weight * descended, rel=1e-12)
+        assert walk.driven.cost_of_transport(along) == pytest.approx(descended / along, rel=1e-12)
+
+
 def test_feet_land_at_the_heights_of_their_footholds():
     _, walker, gait = gait_of("slope-3deg")
     heights = np.array([0.0, -4e-3, 1e-3, -2e-3, -2e-3])

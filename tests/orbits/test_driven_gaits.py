@@ -11,10 +11,15 @@ from test_step_derivatives import AGREEMENT, NEAR_THE_GAIT, RIGID_STEP, STEPS, s
 
 from walkerlab.config import loader
 from walkerlab.hybrid.recorded_walk import take_walk, with_scaled_rates
+from walkerlab.mechanics.impact import push_off_work
 from walkerlab.mechanics.standing import STANCE, STRAIGHT, SWING, kinetic_energy, on_slope
 from walkerlab.orbits.fixed_point import find_gaits
-from walkerlab.orbits.shooting import EXACT, Shooting, coordinates_of, section_of
+from walkerlab.orbits.gradients import gradients
+from walkerlab.orbits.newton import Effort
+from walkerlab.orbits.robustness import Standpoint
+from walkerlab.orbits.shooting import EXACT, RigidMap, Shooting, coordinates_of, section_of
 from walkerlab.orbits.similarity import unit_walker
+from walkerlab.orbits.step_map import gait_near
 from walkerlab.scene.contact import contact_scene
 from walkerlab.scene.rigid import rigid_walker
 
@@ -196,6 +201,28 @@ def test_a_hip_torques_positive_work_is_the_integral_of_its_positive_power(name)
         assert driven.hip_torque / steps == pytest.approx(net, rel=1e-8)
         assert driven.hip_torque_positive / steps == pytest.approx(positive, rel=1e-7)
     assert driven.hip_torque == pytest.approx(driven.hip, rel=1e-9)
+
+
+def test_a_costs_derivative_across_a_knee_strike_is_the_slope_of_independent_costs():
+    """By the hip's spring, of a walker whose knee strike reverses the rate between its thighs."""
+
+    def driven(spring):
+        return on_slope(walker_of("kneed", push_off=0.2, driven_hip=True, hip=(spring, 0.0, 0.3)), 0.0)
+
+    def cost(spring):
+        walker = driven(spring)
+        start = find_gaits(walker).gait.state
+        step = take_walk(walker, EXACT, start, 1)
+        _, positive = torque_work_of_a_step(walker, start, step)
+        return (push_off_work(walker, step.before)[0] + positive) / (walker.mass * walker.gravity * step.lengths_m[0])
+
+    step_map = RigidMap(driven, 1.0, driven(2.0))
+    gait = gait_near(step_map, np.array(find_gaits(driven(2.0)).gait.z), 2.0, Effort(1e-13))
+    at = Standpoint(step_map, 2.0, gait.z, gait.DP, unit_walker(driven(2.0))[1])
+    found = gradients(at, 2.0, ["cost_of_transport"])["cost_of_transport"]
+    slope = (cost(2.02) - cost(1.98)) / 0.04
+    assert found.value == pytest.approx(slope, rel=1e-3)
+    assert found.error < 1e-3 * abs(found.value)
 
 
 HIP = ("walker.hip.spring_N_m_per_rad=10", "walker.hip.damping_N_m_s_per_rad=0.4", "walker.hip.torque_N_m=1.5")

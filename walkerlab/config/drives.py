@@ -33,7 +33,7 @@ class Hip(Block):
 
 
 class PushOff(Block):
-    """An impulse along the trailing leg, from foot to hip, as the other foot lands."""
+    """An impulse along the trailing leg, from foot to hip, just before the other foot lands."""
 
     impulse_N_s: float = key(0.0, "N s", "impulse at the trailing foot, 0 for none", KUO, ge=0.0, le=STRONGEST)
     duration_s: float = key(
