@@ -267,3 +267,36 @@ def test_a_damaged_result_is_called_so_once(toy):
     (toy.folder / "runs" / "paper" / "drop.h5").write_bytes(b"half a file")
     (line,) = (line for line in toy("status", "paper").stdout.splitlines() if line.startswith("drop"))
     assert line.count("damaged") == 1
+
+
+LONG = ("--set", "gravity_m_s2=1.62", "--set", "walker.leg_mass_kg=6.25")
+LONG_AS_LISTED = ["walker.leg_mass_kg=6.25", "gravity_m_s2=1.62"]
+
+
+def test_status_lists_what_was_changed_where_a_name_is_too_short_for_it(toy):
+    folder = run_dir(toy("drop", *LONG, "--json"))
+    assert re.fullmatch(r"runs/paper@walker\.leg_mass_kg-[0-9a-f]{8}", folder)
+    toy("drop")
+    found = json.loads(toy("status", "--json").stdout)["runs"]
+    assert {run["name"]: run["changes"] for run in found} == {"paper": [], folder.removeprefix("runs/"): LONG_AS_LISTED}
+    assert "changed: walker.leg_mass_kg=6.25, gravity_m_s2=1.62" in toy("status", folder).stdout
+    of_all = toy("status").stdout
+    assert "walker.leg_mass_kg=6.25, gravity_m_s2=1.62" in of_all
+    further = run_dir(toy("drop", "-c", folder, "--set", "strides=9", "--json"))
+    assert json.loads(toy("status", further, "--json").stdout)["changes"] == [*LONG_AS_LISTED, "strides=9"]
+    named = run_dir(toy("drop", *LONG, "--name", "moon", "--json"))
+    assert json.loads(toy("status", named, "--json").stdout)["changes"] == LONG_AS_LISTED
+
+
+def test_a_run_under_a_long_name_of_an_older_version_goes_on_under_it(toy):
+    old = "paper@walker.leg_mass_kg=6.25,gravity_m_s2=1.62,strides=9-cd9cca311320"
+    made = run_dir(toy("drop", *LONG, "--json"))
+    (toy.folder / made).rename(toy.folder / "runs" / old)
+    record = toy.folder / "runs" / old / ".run.json"
+    written = {**json.loads(record.read_text()), "run": old}
+    del written["changes"]
+    record.write_text(json.dumps(written))
+    done = json.loads(toy("drop", "-c", old, "--json").stdout)
+    assert (done["run_dir"], done["reused"]) == (f"runs/{old}", True)
+    assert json.loads(toy("roll", "-c", old, "--json").stdout)["run_dir"] == f"runs/{old}"
+    assert "walker.leg_mass_kg=6.25" in toy("status", old).stdout

@@ -8,13 +8,11 @@ from walkerlab.config.files import DEFAULT, builtin_names
 from walkerlab.config.loader import load, safe_name
 from walkerlab.config.problems import meant
 from walkerlab.config.reference import as_json_schema
-from walkerlab.config.schema import Config
+from walkerlab.config.schema import QUESTIONS, Config
 from walkerlab.config.writer import commented
 from walkerlab.errors import ConfigError, StorageError
 
 SCHEMA = ".walkerlab-schema.json"
-QUESTIONS = ("stability", "tune", "continuation", "basin", "robustness", "design", "sweep")
-"""Blocks that are written only where they are not at their defaults."""
 
 
 def write_config(file: Path, walker: str) -> str:

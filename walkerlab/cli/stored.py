@@ -45,13 +45,19 @@ def print_status(request: Request, graph: Graph, check: bool, run: str | None) -
         }
         for step in steps
     ]
-    status: dict[str, Any] = {"run_dir": str(folder.path), "current": error is None, "stages": rows}
+    status: dict[str, Any] = {
+        "run_dir": str(folder.path),
+        "changes": list(folder.changes),
+        "current": error is None,
+        "stages": rows,
+    }
     table = aligned([["stage", "state", "why"], *([s.stage.name, state_of(s), why(s)] for s in steps)])
-    lines = [f"{folder.path}:", *table]
+    changed = [f"changed: {', '.join(folder.changes)}"] if folder.changes else []
+    lines = [f"{folder.path}:", *changed, *table]
     if listed is not None:
         status["runs"] = [vars(one) | {"run_dir": str(one.run_dir)} for one in listed]
     if listed:
-        head = ["run", "results", "up to date", "sweeps", "size", "last written"]
+        head = ["run", "results", "up to date", "sweeps", "size", "last written", "changed"]
         lines += ["", f"all runs in {request.runs}:", *aligned([head, *map(row_of, listed)])]
     tell(request, status, lines, error if check else None)
 
@@ -60,7 +66,8 @@ def row_of(run: RunSummary) -> list[str]:
     """One run as a table's row."""
     unknown = "unknown config" if run.stages else "0"
     current = unknown if run.current is None else str(len([s for s in run.stages if s in run.current]))
-    return [run.name, str(len(run.stages)), current, str(len(run.sweeps)), f"{run.bytes / 1e6:.1f} MB", run.changed_utc]
+    counts = [str(len(run.stages)), current, str(len(run.sweeps))]
+    return [run.name, *counts, f"{run.bytes / 1e6:.1f} MB", run.changed_utc, ", ".join(run.changes)]
 
 
 def state_of(step: Step) -> str:

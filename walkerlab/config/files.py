@@ -25,14 +25,16 @@ parsed = lru_cache(maxsize=32)(read)  # trees of texts that were read already: t
 class ConfigFile:
     """One config file.
 
-    path   of the file
-    label  as messages name it
-    text   of the config, if it is not the file's own
+    path     of the file; of a run its folder's name
+    label    as messages name it
+    text     of the config that a run or an artifact holds; None if it is the file's own
+    changes  KEY=VALUE that made the run's config from its file
     """
 
     path: Path
     label: str
     text: str | None = None
+    changes: tuple[str, ...] = ()
 
 
 def builtin_names() -> tuple[str, ...]:

@@ -31,6 +31,7 @@ SHOWN_CHANGES = 3
 class RunSummary:
     """One run folder.
 
+    changes   KEY=VALUE of each key in which its config differs from the file that it is from
     stages    names of those with a stored result
     current   of these, the ones that are up to date; None if the run's config is not known any more
     sweeps    files of sweeps
@@ -40,6 +41,7 @@ class RunSummary:
 
     name: str
     run_dir: Path
+    changes: tuple[str, ...]
     stages: tuple[str, ...]
     current: tuple[str, ...] | None
     sweeps: tuple[str, ...]
@@ -50,7 +52,7 @@ class RunSummary:
 def runs_in(runs_dir: Path, graph: Graph = PIPELINE) -> Iterator[RunSummary]:
     """Every run in a folder, by name; folders without results are none."""
     for path in sorted(runs_dir.glob("*/")):
-        folder = RunFolder(runs_dir, path.name)
+        folder = RunFolder.at(path)
         stages = tuple(stage.name for stage in graph.stages if folder.artifact(stage.name).is_file())
         sweeps = tuple(sorted(file.name for file in path.glob("sweep-*.h5")))
         if not stages and not sweeps:
@@ -61,7 +63,7 @@ def runs_in(runs_dir: Path, graph: Graph = PIPELINE) -> Iterator[RunSummary]:
         stats = [file.stat() for file in path.rglob("*") if file.is_file()]
         when = datetime.datetime.fromtimestamp(max(stat.st_mtime for stat in stats), datetime.UTC)
         size, changed = sum(stat.st_size for stat in stats), when.isoformat(timespec="seconds")
-        yield RunSummary(folder.name, folder.path, stages, current, sweeps, size, changed)
+        yield RunSummary(folder.name, folder.path, folder.changes, stages, current, sweeps, size, changed)
 
 
 def config_text(folder: RunFolder) -> str | None:
@@ -149,7 +151,7 @@ def claim(folder: RunFolder, config: Config) -> None:
     """
     refuse_another_config(folder, config)
     record = folder.record()
-    asked = Record(folder.name, folder.source, to_yaml(config))
+    asked = Record(folder.name, folder.source, to_yaml(config), folder.changes)
     if record is None or (comes_from(record, folder) and record != asked):
         folder.write_record(asked)
 
