@@ -233,7 +233,11 @@ def trajectory(stored: Stored, kind: str) -> bytes:
         # Imported here: CSV needs no HDF5.
         from walkerlab.store import hdf5
 
-        about = {"title": f"walkerlab {stored.identity.stage}", "content_digest": stored.digest()}
+        about = {
+            "title": f"walkerlab {stored.identity.stage}",
+            "Conventions": hdf5.CONVENTIONS,
+            "content_digest": stored.digest(),
+        }
         return hdf5.image({"/": replace(group, attrs={**group.attrs, **about})}, {})
     columns = {}
     for name, variable in sorted(group.variables.items(), key=lambda named: (named[0] != "time", named[0])):

@@ -70,15 +70,19 @@ def program(graph: Graph = PIPELINE) -> typer.Typer:
 
 
 def print_version(asked: bool) -> None:
-    """Print the version and exit, if asked."""
+    """Print the version with the commit that the code is from, if that is known, and exit, if asked."""
     if asked:
-        typer.echo(f"walkerlab {__version__}")
+        # Imported here: nothing else that is answered on sight asks git.
+        from walkerlab.store.provenance import git_commit
+
+        commit = git_commit()
+        typer.echo(f"walkerlab {__version__}" + (f" (commit {commit})" if commit else ""))
         raise typer.Exit
 
 
 def options_of_the_program(
     version: Annotated[
-        bool, typer.Option("--version", is_eager=True, callback=print_version, help="Print the version.")
+        bool, typer.Option("--version", is_eager=True, callback=print_version, help="Print the version and the commit.")
     ] = False,
 ) -> None:
     """Nothing but `--version`, which is answered on sight."""

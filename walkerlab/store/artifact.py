@@ -30,7 +30,7 @@ SEAL_BYTES = 83
 NESTED = ("config_slice", "input_keys", "library_versions", "input_digests")
 """What of an identity and a provenance is a mapping, which an attribute holds as JSON."""
 ROOT_ATTRIBUTES = frozenset(one.name for one in (*fields(Identity), *fields(Provenance))) | {
-    "stage_key", "summary_json", "summary_timed", "content_digest", "complete"
+    "title", "Conventions", "stage_key", "summary_json", "summary_timed", "content_digest", "complete"
 }  # fmt: skip
 """What every artifact says of itself; a content with arrays at the root may say more there."""
 
@@ -180,6 +180,8 @@ def root_attributes(
     """What stands at the root of the file: all but the arrays."""
     facts = {name: value for name, value in {**vars(identity), **vars(provenance)}.items() if value is not None}
     return {
+        "title": f"walkerlab {identity.stage}",
+        "Conventions": hdf5.CONVENTIONS,
         **{name: canonical_json(dict(value)) if name in NESTED else value for name, value in facts.items()},
         "stage_key": identity.key,
         "summary_json": json.dumps(content.summary, ensure_ascii=False, allow_nan=False),
