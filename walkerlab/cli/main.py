@@ -2,7 +2,9 @@
 
 import atexit
 import gc
+import os
 import re
+import sys
 import warnings
 from dataclasses import dataclass
 from typing import Annotated, Any
@@ -33,7 +35,16 @@ def main() -> None:
         return f"warning: {message}\n" if own else as_python_has_it(message, category, filename, lineno, line)
 
     warnings.formatwarning = worded
+    print_whatever_there_is_to_print()
     program()()
+
+
+def print_whatever_there_is_to_print() -> None:
+    """Have output go nowhere where it is closed, and escape what its encoding lacks, such as names that are no text."""
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:
+            setattr(sys, name, os.fdopen(os.open(os.devnull, os.O_WRONLY), "w", encoding="utf-8"))
+        getattr(sys, name).reconfigure(errors="backslashreplace")
 
 
 class Commands(TyperGroup):

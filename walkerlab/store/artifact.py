@@ -159,8 +159,8 @@ def read(path: Path) -> Stored:
         raise Damaged(f"it is not an artifact: {error or type(error).__name__}") from error
 
 
-def check(path: Path, key: str | None = None) -> Verdict:
-    """Whether the file at `path` is intact, and the artifact for `key` if one is given; never raises for what it is."""
+def check(path: Path, key: str | None = None, stage: str | None = None) -> Verdict:
+    """Whether the file at `path` is intact, of `stage` and made for `key`, if these are given; never raises."""
     try:
         artifact = read(path)
     except (FileNotFoundError, NotADirectoryError):
@@ -169,6 +169,8 @@ def check(path: Path, key: str | None = None) -> Verdict:
         return Verdict(False, str(error))
     except Damaged as error:
         return Verdict(False, f"damaged: {error}", damaged=True)
+    if stage not in (None, artifact.identity.stage):
+        return Verdict(False, f"damaged: it is a result of {artifact.identity.stage}, not of {stage}", damaged=True)
     if key not in (None, artifact.identity.key):
         return Verdict(False, "made for another key", artifact)
     return Verdict(True, "", artifact)

@@ -13,7 +13,7 @@ from pathlib import Path
 from walkerlab.errors import LockedError
 from walkerlab.store.files import make_folder, read_bounded, remove_leftovers, storing, write_atomically
 
-RECORD = ".run.json"
+RECORD, LOCK = ".run.json", ".lock"
 RECORD_BYTES = 1 << 20
 """No record is larger."""
 
@@ -116,8 +116,8 @@ class RunFolder:
         from filelock import FileLock, Timeout
 
         make_folder(self.path)
-        lock = FileLock(self.path / ".lock")
-        with storing(self.path / ".lock"):
+        lock = FileLock(self.path / LOCK)
+        with storing(self.path / LOCK):
             try:
                 lock.acquire(timeout=0)
             except Timeout:
