@@ -117,3 +117,18 @@ def test_a_parameter_has_the_unit_of_its_key_and_of_the_blocks_units():
     assert described(load().config, "contact.stiffness")[0] == "N/mm^e"
     in_si = load(sets=["contact={units: si}"]).config
     assert described(in_si, "contact.stiffness")[0] == "N/m^e"
+
+
+@pytest.mark.parametrize(
+    ("over", "options"),
+    [
+        (["slope_deg=0.5:3:1000000000"], {}),
+        (["slope_deg=0.5:3:1000000000"], {"zip": True}),
+        (["slope_deg=0.5:3:1000000000"], {"sample": "random:10"}),
+        (["slope_deg=0.5:3:5000", "strides=1:5000:5000"], {}),
+        (["slope_deg=0.5:3"], {"sample": "sobol:1000000000"}),
+    ],
+)
+def test_every_way_to_ask_for_too_many_points_is_refused_before_they_are_made(over, options):
+    with pytest.raises(ConfigError, match=r"0 points; allowed: up to 10000000 in one sweep"):
+        question(*over, **options)

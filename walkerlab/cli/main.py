@@ -2,7 +2,9 @@
 
 import atexit
 import gc
+import os
 import re
+import sys
 import warnings
 from dataclasses import dataclass
 from typing import Annotated, Any
@@ -33,7 +35,16 @@ def main() -> None:
         return f"warning: {message}\n" if own else as_python_has_it(message, category, filename, lineno, line)
 
     warnings.formatwarning = worded
+    print_whatever_there_is_to_print()
     program()()
+
+
+def print_whatever_there_is_to_print() -> None:
+    """Have output go nowhere where it is closed, and escape what its encoding lacks, such as names that are no text."""
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:
+            setattr(sys, name, os.fdopen(os.open(os.devnull, os.O_WRONLY), "w", encoding="utf-8"))
+        getattr(sys, name).reconfigure(errors="backslashreplace")
 
 
 class Commands(TyperGroup):
@@ -70,15 +81,19 @@ def program(graph: Graph = PIPELINE) -> typer.Typer:
 
 
 def print_version(asked: bool) -> None:
-    """Print the version and exit, if asked."""
+    """Print the version with the commit that the code is from, if that is known, and exit, if asked."""
     if asked:
-        typer.echo(f"walkerlab {__version__}")
+        # Imported here: nothing else that is answered on sight asks git.
+        from walkerlab.store.provenance import git_commit
+
+        commit = git_commit()
+        typer.echo(f"walkerlab {__version__}" + (f" (commit {commit})" if commit else ""))
         raise typer.Exit
 
 
 def options_of_the_program(
     version: Annotated[
-        bool, typer.Option("--version", is_eager=True, callback=print_version, help="Print the version.")
+        bool, typer.Option("--version", is_eager=True, callback=print_version, help="Print the version and the commit.")
     ] = False,
 ) -> None:
     """Nothing but `--version`, which is answered on sight."""

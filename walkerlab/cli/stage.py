@@ -99,7 +99,8 @@ def printed(request: Request, report: StageReport) -> list[str]:
         lines = [*verdict(report.results), *answer(report.stage, own), *rigid_alone, *where]
     else:
         found = answer(report.stage, own)
-        lines = [*found, *([""] if found else []), f"stored in {report.artifact}"]
+        # that there is no answer is kept, too, but nobody would look there for a result
+        lines = [*found, *([""] if found else []), *([f"stored in {report.artifact}"] if own else [])]
     if report.stage in DRAWN_AT_ONCE:
         # Imported here: most stages draw nothing.
         from walkerlab.stages.plot import draw_at_once

@@ -163,6 +163,10 @@ class Tune(Block):
         return value
 
 
+QUESTIONS: Final = ("stability", "tune", "continuation", "basin", "robustness", "design", "sweep")
+"""Blocks that say what a stage or a sweep is asked, not what walks."""
+
+
 class Source(Block):
     """The study that a config redoes, as the report names it."""
 

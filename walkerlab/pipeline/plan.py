@@ -135,7 +135,7 @@ class Planner:
         # what a drawing says about results left out depends on why they are
         keys |= {absent.what: f"left out: {absent.why}" for absent in self.missing_inputs(stage)}
         identity = self._identities.identity(stage, self.config, keys)
-        verdict = artifact.check(self.folder.artifact(stage.name), identity.key)
+        verdict = artifact.check(self.folder.artifact(stage.name), identity.key, stage.name)
         reason = "--force" if force else self._why_run(stage, identity, verdict)
         if reason is None and verdict.artifact is not None:
             kept = UP_TO_DATE if verdict.artifact.complete else f"no answer: {no_answer(verdict.artifact)}"
