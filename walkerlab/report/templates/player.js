@@ -95,7 +95,9 @@ function drawWalk(picture, scene, tracks, colours, back = 0) {
   const { context: c, width, height } = picture;
   const scale = (0.66 * height) / (scene.leg_m + scene.torso_m);
   const [sin, cos] = [Math.sin(scene.slope_rad), Math.cos(scene.slope_rad)];
-  const hip = tracks.reduce((sum, track) => sum + track.at("hx"), 0) / tracks.length;
+  // The camera follows what still walks: it leaves a walker that has ended within half a second.
+  const shares = tracks.map((track) => clamp(1 - (track.time - track.end) / 0.5, 0, 1));
+  const hip = tracks.reduce((sum, track, index) => sum + shares[index] * track.at("hx"), 0) / shares.reduce((sum, share) => sum + share, 0);
   const place = picture.place = (x, y) => [
     width / 2 + scale * (cos * (x - hip) + sin * y),
     0.83 * height + scale * (sin * (x - hip) - cos * y),
