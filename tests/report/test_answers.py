@@ -296,8 +296,8 @@ def test_a_terminal_has_no_room_for_sentences_and_a_column_for_the_titles_of_gro
 @pytest.mark.parametrize(
     ("value", "cell"),
     [
-        ("=cmd|' /C calc'!A0", "'=cmd|' /C calc'!A0"), ("@SUM(A1)", "'@SUM(A1)"), ("+x", "'+x"), ("-b ahead", "'-b ahead"),
-        ("-2.5e-3", "-2.5e-3"), (-2.5, "-2.5"), ("fell", "fell"), (None, ""),
+        ("=cmd|' /C calc'!A0", "'=cmd|' /C calc'!A0"), ("@SUM(A1)", "'@SUM(A1)"), ("+x", "'+x"),
+        ("-b ahead", "'-b ahead"), ("-2.5e-3", "-2.5e-3"), (-2.5, "-2.5"), ("fell", "fell"), (None, ""),
     ],
 )  # fmt: skip
 def test_a_text_that_a_spreadsheet_would_compute_begins_with_an_apostrophe_and_a_value_does_not(value, cell):

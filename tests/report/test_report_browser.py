@@ -1,11 +1,21 @@
 """The report in a real browser: it asks for nothing, its player plays, every view follows, and no table overflows."""
 
 import html
+import itertools
 from dataclasses import replace
 
 import pytest
 from browser import Browser, executable
-from synthetic_results import EVERYTHING, config, contact_sim, families_that_move, simulate, stored, with_motion
+from synthetic_results import (
+    EVERYTHING,
+    config,
+    contact_sim,
+    families_that_move,
+    plotted,
+    simulate,
+    stored,
+    with_motion,
+)
 
 from walkerlab.config.schema import Source
 from walkerlab.stages.report import write_pages
@@ -185,6 +195,55 @@ def test_the_values_under_the_pointer_are_told(page):
 )
 def test_rounding_is_no_length(page, value, said):
     assert page.evaluate(f"metres({value})") == said
+
+
+LETTERS = """[...document.querySelectorAll('.picture text, .diagram text, .sheet text')]
+    .flatMap((text) => (text.querySelector('tspan') ? [...text.querySelectorAll('tspan')] : [text]))
+    .filter((text) => text.textContent.trim())
+    .map((text) => [parseFloat(getComputedStyle(text).fontSize), text.getScreenCTM()])
+    .map(([size, { a, b }]) => size * Math.hypot(a, b))"""
+
+
+@pytest.fixture(scope="module")
+def folder_with_figures(tmp_path_factory):
+    """The same report with figures as they are drawn."""
+    folder = tmp_path_factory.mktemp("drawn")
+    made = {name: make() for name, make in EVERYTHING.items()}
+    made |= {"simulate": with_motion(simulate()), "contact-sim": with_motion(contact_sim())}
+    made["continuation"] = families_that_move(made["simulate"])
+    made["plot"] = plotted(folder)
+    write_pages(config(), made, folder)
+    return folder
+
+
+@pytest.mark.parametrize("width", [400, 768, 1280])
+def test_letters_of_figures_have_nine_pixels_before_a_click(browser, folder_with_figures, width):
+    seen = 0
+    for file in sorted(folder_with_figures.glob("report*.html")):
+        browser.open(file, width)
+        browser.evaluate("document.querySelectorAll('details').forEach((one) => (one.open = true))")
+        sizes = browser.evaluate(LETTERS)
+        seen += len(sizes)
+        assert min(sizes, default=9.0) >= 9.0
+        assert browser.evaluate("document.documentElement.scrollWidth") <= width
+    assert seen > 200
+
+
+def test_figures_fill_their_frames_and_stand_close_together(browser, folder_with_figures):
+    for name in ("report.html", "report-accuracy.html"):
+        browser.open(folder_with_figures / name, 1280)
+        shares = browser.evaluate(
+            "[...document.querySelectorAll('.frame')].map((frame) =>"
+            " frame.querySelector('svg, img').getBoundingClientRect().width / frame.clientWidth)"
+        )
+        assert min(shares, default=1.0) > 0.95
+    browser.open(folder_with_figures / "report.html", 1280)
+    boxes = browser.evaluate(
+        "[...document.querySelectorAll('.picture')].map((one) => one.getBoundingClientRect())"
+        ".map(({ left, top, bottom }) => [left, top, bottom])"
+    )
+    for (left, _, bottom), (next_left, top, _) in itertools.pairwise(boxes):
+        assert left != next_left or top - bottom < 40
 
 
 def test_a_figure_grows_on_a_click_and_escape_closes_it(page):
