@@ -1,5 +1,7 @@
 """What people read on stdout: a headline in words, symbols and units, digits that count, long rows cut short."""
 
+import csv
+
 import pytest
 from synthetic_results import paper_row
 
@@ -7,7 +9,7 @@ from walkerlab.outcome import Outcome
 from walkerlab.report.answers import ANSWERS, answer, elided, verdict
 from walkerlab.report.gaits import gait_table
 from walkerlab.report.numbers import number
-from walkerlab.report.tables import Column, aligned, as_csv, in_lines, measured, side_by_side, table, width
+from walkerlab.report.tables import Column, aligned, as_csv, csv_text, in_lines, measured, side_by_side, table, width
 from walkerlab.report.tex import as_tex
 from walkerlab.report.text import COLUMNS, described_summary
 
@@ -291,6 +293,19 @@ def test_a_terminal_has_no_room_for_sentences_and_a_column_for_the_titles_of_gro
         ["ground", "slow", "0.5"],
     ]
     assert as_csv(shown).decode().splitlines()[:2] == ["family,case,error,why", f"start,slow,0.5,{LONG}"]
+
+
+@pytest.mark.parametrize(
+    ("value", "cell"),
+    [
+        ("=cmd|' /C calc'!A0", "'=cmd|' /C calc'!A0"), ("@SUM(A1)", "'@SUM(A1)"), ("+x", "'+x"),
+        ("-b ahead", "'-b ahead"), ("-2.5e-3", "-2.5e-3"), (-2.5, "-2.5"), ("fell", "fell"), (None, ""),
+    ],
+)  # fmt: skip
+def test_a_text_that_a_spreadsheet_would_compute_begins_with_an_apostrophe_and_a_value_does_not(value, cell):
+    lines = list(csv.reader(csv_text(["case", str(value)], [["a", value]]).decode().splitlines()))
+    assert lines[1] == ["a", cell]
+    assert lines[0] == ["case", cell or "None"]
 
 
 def test_records_side_by_side_have_a_row_for_what_one_of_them_has():

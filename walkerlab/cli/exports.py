@@ -292,13 +292,13 @@ class Film:
     """What is shown.
 
     model   the stage whose walk it is
-    steps   how many of its steps
+    steps   how many of its first steps; None for those that `film_times` chooses
     rate    pictures a second
     slower  so many times slower than life
     """
 
     model: str
-    steps: int
+    steps: int | None
     rate: int
     slower: float
 

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from walkerlab.figures.canvas import add_legend, entry, files_of, label_of, panels, styled
+from walkerlab.figures.canvas import add_legend, entry, files_of, label_of, panels, power_of_ten, styled
 from walkerlab.figures.illustration import Drawn, Need, Results, paper_figure
 from walkerlab.figures.style import BLACK, BLUE, CONTACT, GREY, ORANGE, PALE, RIGID, VERMILLION, Look
 from walkerlab.paper.printed import LARGEST_ERROR
@@ -261,6 +261,7 @@ def draw_differences(results: Results) -> Drawn:
             one.axhline(LARGEST_ERROR.value, **PAPER.line)
             bottom, top = min(LARGEST_ERROR.value / ROOM, bottom), max(ROOM * LARGEST_ERROR.value, top)
         one.set_yscale("log", subs=[])
+        one.yaxis.set_major_formatter(power_of_ten)
         one.set(ylim=(bottom, top), ylabel=label_of("error", raw.variables[f"raw_{name}"].units))
         one.set_title(f"({letter}{leg + 1}) {words} of leg {leg + 1}")
     looks = [AT_SAME_TIME, IN_PHASE, *([PAPER] if of_the_paper else [])]

@@ -21,6 +21,9 @@ LONGEST_CELL: Final = 100
 """Letters; a column of records with longer cells holds sentences."""
 BARE = re.compile(r"[-−+\d.e ×⁰¹²³⁴⁵⁶⁷⁸⁹⁻\xa0\u2009\u202f]+|-?(inf|nan)")
 """A number without unit or words."""
+FORMULA = re.compile(r"[=+\-@\t\r]")
+"""How texts begin that spreadsheets compute."""
+NUMERAL = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 
 
 @dataclass(frozen=True)
@@ -237,6 +240,13 @@ def csv_text(heads: Sequence[str], rows: Iterable[Sequence[Any]]) -> bytes:
     """Values as CSV under their heads; nothing where one is missing."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(heads)
-    writer.writerows(["" if value is None else value for value in row] for row in rows)
+    writer.writerow(map(csv_cell, heads))
+    writer.writerows(map(csv_cell, row) for row in rows)
     return text.getvalue().encode()
+
+
+def csv_cell(value: Any) -> Any:
+    """A value of a CSV file; a text that a spreadsheet would compute as a formula begins with an apostrophe."""
+    if isinstance(value, str) and FORMULA.match(value) and not NUMERAL.fullmatch(value):
+        return f"'{value}"
+    return "" if value is None else value
