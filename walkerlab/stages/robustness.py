@@ -138,7 +138,7 @@ def run(
         found["largest_push"].append({**of, "forward_N_s": forward, "backward_N_s": backward, **wanted})
         pushes = found["largest_push"][-1]
         for way, given in (("forward", ahead), ("backward", behind)):
-            pushes |= dict(zip((f"{way}_{name}" for name in GIVEN), given, strict=False))
+            pushes |= zip((f"{way}_{name}" for name in GIVEN), given or (None, None), strict=True)
         every = np.array([taken for some in walks for taken in some])
         steps[subject.model] = every.reshape(-1, config.robustness.walks)
         found["rough_ground"] += rough_rows(subject.model, config, steps[subject.model])
