@@ -8,7 +8,9 @@ Every search has to end in a gait or in words. Where it finds none, SciPy's `roo
 to either side of it along every coordinate of the step map (unit leg length and gravity): as long as theory keeps
 these walks within 1e-3 of the gait they go on, and the trace of what k steps did to the starts is the sum of the
 multipliers' k-th powers. Every gait's heel strike needs the impulse that the masses' momentum, summed one by one,
-says; one that would have to pull is objected to. `light-hips` are the compasses whose gaits are hardest to follow
+says; one that would have to pull is objected to. The first walkers of a type walk over rough ground from a start near
+their gait, some of them until a foot lands just ahead of the other: each of these walks is SciPy's, step by step.
+`light-hips` are the compasses whose gaits are hardest to follow
 from a vanishing slope: without any start drawn at random both ordinary gaits must be found by name, and each repeat
 itself in one step of SciPy's DOP853. `kneed-torque` have a constant torque and a spring at the hip: each gait's cost of
 transport is held against SciPy's integral of the positive power.
@@ -33,10 +35,12 @@ from scipy.optimize import root
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 
+from plain_rigid_walk import plain_walk
 from rigid_physics import momentum_of_masses, torque_work_of_a_step
 
 from walkerlab.config.walkers import CompassWalker, Kneed, KneeJoint, PartsWalker, Shank, StraightLegs, Thigh, Torso
 from walkerlab.hybrid.recorded_walk import take_walk
+from walkerlab.hybrid.rigid_walk import SHORTEST_LANDING
 from walkerlab.mechanics.parts import Assembly
 from walkerlab.mechanics.rigid import standing
 from walkerlab.mechanics.standing import Standing
@@ -44,6 +48,7 @@ from walkerlab.orbits.fixed_point import MAX_START, MIN_START, GaitSearch, Rigid
 from walkerlab.orbits.shooting import SHORTEST_STEP, coordinates_of, on_section, section_of
 from walkerlab.orbits.similarity import unit_walker
 from walkerlab.orbits.small_slope import LONG_PERIOD, SHORT_PERIOD
+from walkerlab.outcome import Outcome
 from walkerlab.scene.parts import AnyWalker, assembly_of, knee_locked_at_strike
 from walkerlab.solvers.registry import Tolerances
 
@@ -60,6 +65,9 @@ SETTINGS = SearchSettings(random_starts=30)
 FOLLOWED_ONLY = SearchSettings(random_starts=0, further_starts=0)
 RETURNS_TO = 1e-7  # rad, rad/s: a tolerance of 1e-11, grown by an unstable gait's multipliers
 OTHER_STARTS, TRIED, EVALUATIONS = 3000, 40, 60  # drawn where nothing is found, tried of those that walk; steps each
+ROUGH_WALKERS, ROUGH_STEPS = 10, 4  # of a type, and of each of their walks, which take SciPy some seconds
+ROUGHEST, SLOWEST, FASTEST = 0.01, 0.75, 1.05  # of the leg length; of the gait's rates, at the start
+SAME_TIME = 1e-6  # s, of touches
 SOLVED, APART = 1e-9, 1e-3  # residual of a gait; rad, half the angle between its legs at least
 
 
@@ -202,6 +210,7 @@ class Tally:
     wrong: list[str] = field(default_factory=list)
     slowest_s: float = 0.0
     steps_seen: int = 0  # whose effect was held against the multipliers
+    short_landings: int = 0  # walks on rough ground that end with a foot just ahead of the other
     overlooked: int = 0  # searches that find none where another method finds a gait
 
 
@@ -223,6 +232,9 @@ def tally(name: str, walkers: int, seed: int) -> Tally:
         faults, steps = (ordinary_faults(walker, search), 0) if light else judged(walker, search)
         found.steps_seen += steps
         faults += impulse_faults(assembly, walker, search) + cost_faults(walker, search)
+        if index < ROUGH_WALKERS and search.gait is not None:
+            rough, short = rough_walk(walker, search.gait, np.random.default_rng((seed, index)))
+            faults, found.short_landings = faults + rough, found.short_landings + short
         if spent > LONGEST_SEARCH_S:
             faults.append(f"the search took {spent:.0f} s")
         found.ends[end_of(search)] += 1
@@ -302,6 +314,26 @@ def cost_faults(walker: Standing, search: GaitSearch) -> list[str]:
     return faults
 
 
+def rough_walk(walker: Standing, gait: RigidGait, draw: Draw) -> tuple[list[str], bool]:
+    """What is wrong with a walk over random heights from near a gait, and whether a foot landed just ahead in it."""
+    n, nearest = len(gait.state) // 2, SHORTEST_LANDING * gait.step_length
+    share = draw.uniform(SLOWEST, FASTEST)
+    start = (*gait.state[:n], *(share * rate for rate in gait.state[n:]))
+    heights = np.append(0.0, draw.normal(0.0, draw.uniform(0.0, ROUGHEST) * walker.leg_length, ROUGH_STEPS))
+    tolerances = Tolerances("dop853", RTOL, ATOL, BUDGET)
+    walk = take_walk(walker, tolerances, start, ROUGH_STEPS, heights=heights, step_length=gait.step_length)
+    touches, outcome, ahead = plain_walk(walker, np.array(start), heights, nearest)
+    ended = Outcome.WALKED if walk.outcome is Outcome.LIFTED_OFF else walk.outcome
+    faults = []
+    if (ended, walk.steps) != (outcome, len(touches)):
+        faults.append(
+            f"on rough ground: {ended.label} after {walk.steps}, by SciPy {outcome.label} after {len(touches)}"
+        )
+    elif walk.steps and np.abs(walk.touch_time_s - touches[:, 0]).max() > SAME_TIME:
+        faults.append(f"on rough ground feet land at {walk.touch_time_s}, by SciPy at {touches[:, 0]}")
+    return faults, bool(ahead) and ahead[-1] < nearest
+
+
 def ordinary_faults(walker: Standing, search: GaitSearch) -> list[str]:
     """What is wrong with the two ordinary gaits, the one chosen among them."""
     found = {name: [gait for gait in search.gaits if name in gait.found_by] for name in (LONG_PERIOD, SHORT_PERIOD)}
@@ -361,13 +393,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--types", nargs="+", choices=TYPES, default=list(TYPES))
     options = parser.parse_args(arguments)
-    print(f"| type | {' | '.join(ENDS)} | overlooked | steps held against multipliers | longest search | faults |")
-    print("|---" * (len(ENDS) + 5) + "|")
+    others = ("overlooked", "steps held against multipliers", "short landings", "longest search", "faults")
+    print(f"| {' | '.join(('type', *ENDS, *others))} |")
+    print("|---" * (1 + len(ENDS) + len(others)) + "|")
     wrong: list[str] = []
     for name in options.types:
         found = tally(name, options.walkers, options.seed)
         counts = " | ".join(str(count) for count in (*(found.ends[end] for end in ENDS), found.overlooked))
-        row = f"| `{name}` | {counts} | {found.steps_seen} | {found.slowest_s:.1f} s | {len(found.wrong)} |"
+        seen = f"{found.steps_seen} | {found.short_landings}"
+        row = f"| `{name}` | {counts} | {seen} | {found.slowest_s:.1f} s | {len(found.wrong)} |"
         print(row, flush=True)
         wrong += found.wrong
     print("\n".join(wrong))

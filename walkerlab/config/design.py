@@ -7,7 +7,13 @@ from pydantic import field_validator
 from walkerlab.config.fields import Block, against, key, wrong
 
 Quantity = Literal[
-    "period_s", "step_length_m", "speed_m_s", "spectral_radius", "gait_sensitivity_norm", "cost_of_transport"
+    "period_s",
+    "step_length_m",
+    "speed_m_s",
+    "spectral_radius",
+    "gait_sensitivity_norm",
+    "gait_sensitivity_norm_scaled",
+    "cost_of_transport",
 ]
 _NAMES: Final = ", ".join(get_args(Quantity))
 Bounds = dict[str, list[float]]

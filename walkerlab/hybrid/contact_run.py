@@ -144,7 +144,7 @@ class ContactWalkResult(WalkRecord):
     def advice(self) -> str:
         """What the outcome means and what to try next."""
         if self.energy_balance_residual_J <= self.explained_residual_J:
-            return self.outcome.advice
+            return super().advice
         return (
             f"The energy balance does not close: it is off by {self.energy_balance_residual_J:.3g} J, of which the "
             f"solver's tolerance explains {self.explained_residual_J:.2g} J at most, so the walk is wrong; tighten "

@@ -59,6 +59,7 @@ from walkerlab.solvers.system import State
 
 STEPS_AT_ONCE = 64
 BUDGET_OF_A_STEP = 50_000  # right-hand sides; the tightest tolerance there is needs about 700
+MOST_FRICTION = 1.0  # coefficient; rubber on dry concrete has about as much
 SAMPLES_PER_UNIT_TIME = 64  # in sqrt(L/g)
 CLOSEST_SAMPLES = 1e-2  # of the time between samples; one nearer to a heel strike is dropped
 
@@ -89,6 +90,21 @@ class RigidWalkResult(WalkRecord):
     energy_drift: float  # J, between least and most of it within a swing; the largest of all swings
     mean_energy: float  # J, time mean; potential from the contact point at each step's touch
     samples: Samples | None
+
+    @property
+    def objections(self) -> tuple[str, ...]:
+        """What the model assumes of the ground along this walk and hardly any ground can give."""
+        found = []
+        if self.min_normal_force < 0.0:
+            found.append(f"the ground would have to pull with {-self.min_normal_force:.3g} N")
+        if self.min_normal_impulse is not None and self.min_normal_impulse < 0.0:
+            found.append(f"the ground would have to pull with {-self.min_normal_impulse:.3g} N s in a strike")
+        if self.max_friction_ratio > MOST_FRICTION:
+            found.append(
+                f"the stance foot would slip: it takes a friction coefficient of {self.max_friction_ratio:.3g}, and "
+                f"hardly any ground gives more than {MOST_FRICTION:g}"
+            )
+        return tuple(found)
 
     @property
     def final_state(self) -> State:

@@ -71,7 +71,8 @@ class WalkRecord:
     @property
     def advice(self) -> str:
         """What the outcome means and what to try next."""
-        return self.outcome.advice
+        even = self.foothold_height_m is None
+        return self.outcome.advice if even else self.outcome.advice_on_uneven_ground
 
     @property
     def steps(self) -> int:

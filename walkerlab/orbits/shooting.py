@@ -16,12 +16,21 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from walkerlab.hybrid.recorded_walk import take_walk
+from walkerlab.hybrid.recorded_walk import as_state, take_walk
 from walkerlab.hybrid.rigid_observer import Observer, unwatched
 from walkerlab.hybrid.rigid_walk import EVENTS, SHORTEST_LANDING, HeelStrikes, new_heel_strikes, take_step, walk
 from walkerlab.kernels import inlined, kernel, matrix, vector
 from walkerlab.mechanics.impact import pushed_at_hip
-from walkerlab.mechanics.standing import AT_STRIKE, STANCE, STRAIGHT, SWING, Standing, feet_on_slope, step_lengths
+from walkerlab.mechanics.standing import (
+    AT_STRIKE,
+    STANCE,
+    STRAIGHT,
+    SWING,
+    Standing,
+    feet_on_slope,
+    momentum,
+    step_lengths,
+)
 from walkerlab.orbits.similarity import Units, unit_walker
 from walkerlab.orbits.step_map import REMEMBERED, DisturbedWalk, Iterates, MappedStep, Monitor, StepMap, no_step
 from walkerlab.outcome import Outcome
@@ -335,6 +344,25 @@ class RigidMap(StepMap):
             return None
         taken = take_walk(unit.walker, EXACT, on_section(unit.walker, z), 1)
         return float(taken.driven.cost_of_transport(taken.lengths_m[0])) if taken.steps else None
+
+    def ground_after_push(self, z: Floats, p: float, push_N_s: float, steps: int) -> tuple[float, float]:
+        """What the ground must give for a push at the hip, negative where it would have to pull.
+
+        Returns its normal impulse (N s) in the push itself, and the minimum of its normal force (N) in the steps after.
+        """
+        unit = self._unit_at(p)
+        assert unit is not None, "what is pushed has a gait"
+        walker, units, start = unit.walker, unit.units, on_section(unit.walker, z)
+        pushed = as_state(pushed_at_hip(walker, start, push_N_s / units.impulse))
+        impulse = momentum(walker, pushed)[1] - momentum(walker, start)[1]
+        walked = take_walk(walker, WATCHED, pushed, steps)
+        return impulse * units.impulse, walked.min_normal_force * units.force
+
+    def leg_and_pendulum(self, p: float) -> tuple[float, float]:
+        """Units of the walker at p."""
+        unit = self._unit_at(p)
+        assert unit is not None, "what is measured has a gait"
+        return unit.units.length, unit.units.time
 
     def at(self, tolerances: Tolerances) -> RigidMap:
         """The same map, its steps integrated otherwise."""

@@ -115,6 +115,7 @@ def walk(model: str, summary: Summary) -> list[str | Table]:
         side_by_side("", columns, taken, head="step"),
         side_by_side("", OF_THE_WALK, {"": summary}, head=""),
         f"numerical error: {off_by(error)}." if error else "",
+        f"Not a walk on real ground: {'; '.join(objections)}." if (objections := summary.get("objections")) else "",
         f"advice: {summary['advice']}" if advised else "",
     ]
 

@@ -60,6 +60,7 @@ def summary(config: SimulateConfig, walk: RigidWalkResult) -> dict[str, Any]:
         "min_normal_force_N": walk.min_normal_force,
         "max_friction_ratio": walk.max_friction_ratio or None,
         "max_scuff_depth_m": walk.max_scuff_depth,
+        "objections": list(walk.objections),
         "equations": config.equations,
         "slope_rad": config.slope_rad,
         "left_out": list(of_rigid_walk(config)),
