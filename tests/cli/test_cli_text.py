@@ -79,8 +79,8 @@ def test_the_time_left_comes_down_while_a_long_part_is_at_work(clock):
 def test_that_there_is_no_answer_at_all_is_not_called_stored(summary, stored):
     said = {"message": "none is installed", "advice": "Install one."}
     summary = {**summary, "no_answer": said}
-    artifact = Path("runs/paper/engines.h5")
+    artifact = Path("runs/paper/drop.h5")
     report = StageReport(
-        "engines", artifact.parent, artifact, False, 0.0, (), summary, (), NoAnswer(said["message"], said["advice"])
+        "drop", artifact.parent, artifact, False, 0.0, (), summary, (), NoAnswer(said["message"], said["advice"])
     )
-    assert (f"stored in {artifact}" in printed(Request("engines"), report)) == stored
+    assert (f"stored in {artifact}" in printed(Request("drop"), report)) == stored
