@@ -104,7 +104,7 @@ def safe_name(text: str) -> str:
 
 
 def doubts(config: Config, tree: Mapping) -> Iterator[str]:
-    """What is perhaps meant otherwise: a leg whose mass is left behind, lengths in mm, degrees, masses in grams."""
+    """What is perhaps meant otherwise: a leg whose mass stays, units that look wrong, a pitch where there are no pads."""
     walker, block = config.walker, tree.entries.get("walker")
     places = block.keys if isinstance(block, Mapping) else {}
     length = short(walker.leg_length_m)
@@ -120,6 +120,10 @@ def doubts(config: Config, tree: Mapping) -> Iterator[str]:
     if slope is not None and abs(config.slope_rad) > STEEP_RAD:
         degrees = short(round(math.degrees(config.slope_rad), 1))
         yield str(Problem(slope, f"slope_rad is in radians, so this is {degrees} degrees; slope_deg takes degrees"))
+    contact = config.contact
+    if contact is not None and contact.terrain != "checkerboard" and not isinstance(contact.pad_pitch, str):
+        text = f"contact.pad_pitch has no effect on {contact.terrain}, which has no pads"
+        yield str(Problem(key_at(tree, ("contact", "pad_pitch")), f"{text}; only checkerboard has some"))
     for path, value in numbers(("walker",), walker.model_dump(mode="json")):
         key, text = str(path[-1]), f"{'.'.join(map(str, path))} is {short(value)}"
         if key.endswith("length_m") and value > LONG_M:
