@@ -531,14 +531,13 @@ def take_steps(walker, y, h, hinged, diary):
                 if walker.terrain == AFTER_MID_SWING and above and foot != stance:
                     has_ground[foot] = (side[PASSING] > 0.0) == (foot == 1)
             ahead = (side[PASSING] > 0.0) == (swing == 1)
-            if ahead and (swing_above or not has_ground[swing]):
-                # the next foothold counts, unless the foot stands in the ground
-                if changes_level(walker, levels, done, swing):
-                    set_level(walker, levels, side, swing, next_level(walker, done), y)
-                    has_ground[swing] = side[3 * swing] > 0.0
-                    if not has_ground[swing] and walker.terrain == PLANE:
-                        outcome = STUBBED
-                        break
+            # the next foothold counts, unless the foot stands in the ground
+            if ahead and (swing_above or not has_ground[swing]) and changes_level(walker, levels, done, swing):
+                set_level(walker, levels, side, swing, next_level(walker, done), y)
+                has_ground[swing] = side[3 * swing] > 0.0
+                if not has_ground[swing] and walker.terrain == PLANE:
+                    outcome = STUBBED
+                    break
             continue
         foot, kind = event // 3, event % 3
         other = 1 - foot

@@ -44,7 +44,7 @@ def test_so_does_one_over_footholds_of_drawn_heights(campaign, seed):
     assert max(error for judged in one.judged[1:] for error in judged.error.values()) < 1e-4
 
 
-@pytest.mark.parametrize("kind, seed", [("passing", 1), ("passing", 5), ("explicit", 0)])
+@pytest.mark.parametrize(("kind", "seed"), [("passing", 1), ("passing", 5), ("explicit", 0)])
 def test_so_do_slow_starts_on_uneven_planes_and_bouncing_feet_by_dop853(campaign, kind, seed):
     assert campaign.compare(campaign.WALKERS[kind](seed), steps=1).wrong == []
 

@@ -104,7 +104,7 @@ def safe_name(text: str) -> str:
 
 
 def doubts(config: Config, tree: Mapping) -> Iterator[str]:
-    """What is perhaps meant otherwise: a leg whose mass stays, units that look wrong, a pitch where there are no pads."""
+    """What is perhaps meant otherwise: a leg whose mass stays, wrong units, a pitch without pads."""
     walker, block = config.walker, tree.entries.get("walker")
     places = block.keys if isinstance(block, Mapping) else {}
     length = short(walker.leg_length_m)
