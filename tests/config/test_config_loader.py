@@ -120,6 +120,13 @@ def test_a_coupled_part_follows_by_its_weights_in_a_start(loaded: Loaded) -> Non
     assert list(start) == pytest.approx([-0.2, 0.2, 0.1, -0.4, -0.8, -0.7], abs=1e-15)
 
 
+@pytest.mark.parametrize("terrain", ["plane", "after-mid-swing"])
+def test_a_pitch_where_there_are_no_pads_is_doubted(loaded: Loaded, terrain: str) -> None:
+    (doubt,) = loaded(f"contact: {{terrain: {terrain}, pad_pitch: 0.4}}\n").warnings
+    assert f"contact.pad_pitch has no effect on {terrain}" in doubt
+    assert loaded("contact: {terrain: checkerboard, pad_pitch: 0.4}\n").warnings == ()
+
+
 def test_legs_as_long_as_towers_are_doubted(loaded: Loaded) -> None:
     (said,) = loaded("walker: {leg_length_m: 1000, foot_to_mass_m: 500}\n").warnings
     assert said.endswith("mine.yaml:1:10: walker.leg_length_m is 1000 m; lengths are in m, not in mm")

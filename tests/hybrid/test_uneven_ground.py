@@ -226,6 +226,104 @@ def test_past_mid_swing_a_foot_is_carried_once_it_has_been_above_its_foothold():
         assert (walk.outcome, walk.steps) == (Outcome.FELL, 1)
 
 
+# ---- feet that pass again, and a foot that the ground lets go late ---------------------------------------------------
+
+SLIDES_BACK = (
+    "walker.leg_length_m=0.54348",
+    "walker.foot_to_mass_m=0.29446",
+    "walker.leg_mass_kg=1.9927",
+    "walker.hip_mass_kg=3.0816",
+    "walker.leg_inertia_kg_m2=0.0",
+    "walker.torso.mass_kg=3.9275",
+    "walker.torso.above_hip_m=0.083685",
+    "walker.torso.inertia_kg_m2=0.077183",
+    "walker.foot_radius_m=0.0",
+    "slope_deg=1.0239",
+    "gravity_m_s2=7.1294",
+    "contact.units=adams",
+    "contact.stiffness=7630.6",
+    "contact.exponent=1.7297",
+    "contact.damping=2.014",
+    "contact.full_damping_penetration=0.028293",
+    "contact.friction=coulomb",
+    "contact.static_friction=0.43271",
+    "contact.dynamic_friction=0.33768",
+    "contact.stiction_velocity=83.315",
+    "contact.friction_velocity=738.19",
+    "contact.terrain=after-mid-swing",
+    "contact.stance=free",
+    "contact.pad_pitch=0.25256840117250196",
+)
+SLIDES_BACK_FROM = (
+    -0.2523760668588472,
+    0.21663521443650732,
+    -0.01787042621116994,
+    -0.5403676726626706,
+    -0.6726384293295232,
+    -0.6065030509960969,
+)
+LETS_GO_LATE = (
+    "walker.leg_length_m=0.91916",
+    "walker.foot_to_mass_m=0.4834",
+    "walker.leg_mass_kg=4.7903",
+    "walker.hip_mass_kg=22.624",
+    "walker.leg_inertia_kg_m2=0.0",
+    "walker.torso.mass_kg=22.695",
+    "walker.torso.above_hip_m=0.061144",
+    "walker.torso.inertia_kg_m2=0.0",
+    "walker.foot_radius_m=0.0",
+    "slope_deg=1.8429",
+    "gravity_m_s2=5.1229",
+    "contact.units=adams",
+    "contact.stiffness=16176.0",
+    "contact.exponent=1.6127",
+    "contact.damping=29.577",
+    "contact.full_damping_penetration=0.24202",
+    "contact.friction=coulomb",
+    "contact.static_friction=1.0917",
+    "contact.dynamic_friction=0.77087",
+    "contact.stiction_velocity=14.551",
+    "contact.friction_velocity=137.92",
+    "contact.terrain=after-mid-swing",
+    "contact.stance=free",
+    "contact.pad_pitch=0.5100936570165115",
+)
+LETS_GO_LATE_FROM = (
+    -0.3133328712460464,
+    0.24900352567603942,
+    -0.0321646727850035,
+    -0.4281380957459881,
+    -0.7019139059117369,
+    -0.5650260008288625,
+)
+
+
+def walk_from(sets, start, steps, heights, tolerances=ON_GROUND):
+    scene = contact_scene(load(None, sets).config, 0.35)
+    return scene.walk(start_state(scene, start), steps, tolerances, heights=heights)
+
+
+@pytest.mark.parametrize("terrain", ["after-mid-swing", "plane"])
+def test_a_foot_that_stands_in_the_ground_as_the_feet_pass_again_is_carried_as_on_even_ground(terrain):
+    """Only a foothold that is never reached is not level."""
+    sets = (*SLIDES_BACK, f"contact.terrain={terrain}")
+    heights = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1e-6])
+    even, uneven = (walk_from(sets, SLIDES_BACK_FROM, 3, each) for each in (None, heights))
+    assert uneven.outcome is even.outcome
+    assert uneven.outcome is not Outcome.SOLVER_FAILED
+    assert uneven.end_time_s == pytest.approx(even.end_time_s, abs=1e-9)
+
+
+def test_an_instant_at_which_the_ground_lets_go_is_found_at_every_tight_tolerance():
+    heights = np.array([0.0, 5.5611e-05, -0.00097804, 0.00096203])
+    walks = (
+        walk_from(LETS_GO_LATE, LETS_GO_LATE_FROM, 3, heights, Tolerances("radau5", 1e-11, atol, 10**7))
+        for atol in (1e-12, 1e-13, 4.641588833612772e-13)
+    )
+    first, *others = (walk.end_time_s for walk in walks)
+    assert others == pytest.approx([first, first], abs=2e-9)
+
+
 # ---- heights -------------------------------------------------------------------------------------------------------
 
 

@@ -123,7 +123,7 @@ def safe_name(text: str) -> str:
 
 
 def doubts(config: Config, tree: Mapping) -> Iterator[str]:
-    """What is perhaps meant otherwise: a mass left behind, lengths in mm, degrees, masses in grams, gravity in cm."""
+    """Warn of what is perhaps meant otherwise: a leg whose mass stays, wrong units, a pitch without pads."""
     walker, block = config.walker, tree.entries.get("walker")
     places = block.keys if isinstance(block, Mapping) else {}
     length = short(walker.leg_length_m)
@@ -143,6 +143,10 @@ def doubts(config: Config, tree: Mapping) -> Iterator[str]:
     if gravity is not None and config.gravity_m_s2 > STRONG_M_S2:
         text = f"gravity_m_s2 is {short(config.gravity_m_s2)}; it is in m/s^2 (9.81 on earth), not in cm/s^2"
         yield str(Problem(gravity, text))
+    contact = config.contact
+    if contact is not None and contact.terrain != "checkerboard" and not isinstance(contact.pad_pitch, str):
+        text = f"contact.pad_pitch has no effect on {contact.terrain}, which has no pads"
+        yield str(Problem(key_at(tree, ("contact", "pad_pitch")), f"{text}; only checkerboard has some"))
     for path, value in numbers(("walker",), walker.model_dump(mode="json")):
         key, text = str(path[-1]), f"{'.'.join(map(str, path))} is {short(value)}"
         if key.endswith("length_m") and value > LONG_M:

@@ -64,7 +64,7 @@ from walkerlab.hybrid.contact_walk import AT_LIFT, NEVER, walk_in_form
 from walkerlab.hybrid.walk_record import DrivenWork, WalkRecord, WalkWork
 from walkerlab.kernels import kernel, uncompiled, vector
 from walkerlab.outcome import Outcome
-from walkerlab.solvers.registry import Tolerances, finder_for, sharing
+from walkerlab.solvers.registry import Tolerances, finder_for, method_named, sharing
 from walkerlab.solvers.stepping import ACCEPTED, JACOBIANS, REJECTED, RHS, T
 from walkerlab.solvers.system import Floats, State
 
@@ -74,6 +74,7 @@ USUAL_STEP = 3.0  # pendulum times that most steps are shorter than
 # 1e-9 (scripts/contact_campaign.py prints those of its walks), and 9 by the libraries' multistep methods; cases of the
 # stability catalogue, of which ground of 1e14 N/m is the worst, leave at most 9.
 UNEXPLAINED = 100.0
+SET_STIFF = "set solver.contact.method to radau5."
 FINEST = 1e-10  # rtol below which a walk's rounding, and no longer its tolerance, makes the residual
 
 
@@ -139,16 +140,24 @@ class ContactWalkResult(WalkRecord):
     explained_residual_J: float  # what the tolerance explains of it at most
     dissipated_J: Floats  # (5,)
     samples: ContactSamples | None
+    method: str  # by which it was integrated
 
     @property
     def advice(self) -> str:
         """What the outcome means and what to try next."""
+        stiff = method_named(self.method).stiff
+        if self.outcome is Outcome.BUDGET_EXHAUSTED and not stiff:
+            return (
+                f"The walk exhausted its evaluation budget by {self.method}, which stiff ground holds to short steps "
+                f"at any tolerance; {SET_STIFF}"
+            )
         if self.energy_balance_residual_J <= self.explained_residual_J:
             return super().advice
         return (
             f"The energy balance does not close: it is off by {self.energy_balance_residual_J:.3g} J, of which the "
-            f"solver's tolerance explains {self.explained_residual_J:.2g} J at most, so the walk is wrong; tighten "
-            "solver.contact.rtol or choose another solver.contact.method. If neither helps, the program is at fault."
+            f"solver's tolerance explains {self.explained_residual_J:.2g} J at most, so the walk is wrong; "
+            + ("tighten solver.contact.rtol or choose another solver.contact.method." if stiff else SET_STIFF)
+            + " If that does not help, the program is at fault."
         )
 
 
@@ -453,4 +462,5 @@ def gather(
         dissipated_J=observer.account[SO_FAR, LOST].copy(),
         driven=driven_work(walker, along, up, observer.account[AT_TOUCH]),
         samples=samples,
+        method=tolerances.method,
     )
