@@ -19,7 +19,7 @@ def branch(period, value, stable, spread, marks):
         "multiplier_imag": Variable(np.zeros((points, 1)), ("point", "multiplier"), "1", "imaginary"),
         "mark_after": Variable(np.array([m[0] for m in marks]), ("mark",), "1", "after"),
         "mark_value": Variable(np.array([m[1] for m in marks]), ("mark",), "deg", "value"),
-        "mark_kind": Variable(np.array(["flip" for _ in marks]), ("mark",), "", "kind"),
+        "mark_kind": Variable(np.array(["flip" for _ in marks], object), ("mark",), "", "kind"),
     }
     for name, (middle, unit) in sizes.items():
         variables[name] = Variable(middle + spread[:, None] * steps, ("point", "step"), unit, name)

@@ -7,12 +7,13 @@ import re
 import sys
 import warnings
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 from typer.core import TyperGroup
 
-from walkerlab import __version__
+import walkerlab
 from walkerlab.cli import housekeeping, lifecycle, sweep
 from walkerlab.cli import runs as whole_runs
 from walkerlab.cli.request import OF_A_RUN, OF_TALK, Request, SetByOption, command, keys_to_vary, option
@@ -84,10 +85,10 @@ def print_version(asked: bool) -> None:
     """Print the version with the commit that the code is from, if that is known, and exit, if asked."""
     if asked:
         # Imported here: nothing else that is answered on sight asks git.
-        from walkerlab.store.provenance import git_commit
+        from walkerlab.store.commit import commit_of_package
 
-        commit = git_commit()
-        typer.echo(f"walkerlab {__version__}" + (f" (commit {commit})" if commit else ""))
+        commit = commit_of_package(Path(walkerlab.__file__).parent)
+        typer.echo(f"walkerlab {walkerlab.__version__}" + (f" (commit {commit})" if commit else ""))
         raise typer.Exit
 
 

@@ -36,6 +36,11 @@ def commit_of_installation(package: Path) -> str | None:
     return (installed.read_text(IN_METADATA) or "").strip() or None
 
 
+def commit_of_package(package: Path) -> str | None:
+    """The commit that the package in a folder is run from, or was built from; None if nobody knows."""
+    return commit_of_checkout(package.parent) or commit_of_installation(package)
+
+
 def commit_of_source(root: Path) -> str | None:
     """The commit of a source tree that is to be built: a checkout, or an unpacked source distribution."""
     written = root / FILE

@@ -14,7 +14,7 @@ from pathlib import Path
 import walkerlab
 from walkerlab.config.schema import Config
 from walkerlab.config.writer import to_yaml
-from walkerlab.store.commit import commit_of_checkout, commit_of_installation
+from walkerlab.store.commit import commit_of_package
 from walkerlab.store.files import as_text
 
 LIBRARIES = ("numpy", "scipy", "numba", "llvmlite", "h5py", "pydantic", "ruamel.yaml", "matplotlib", "jinja2")
@@ -94,5 +94,4 @@ def library_versions() -> dict[str, str]:
 
 def git_commit() -> str | None:
     """The commit of the source tree that the package is run from, or was built from; None if nobody knows."""
-    package = Path(walkerlab.__file__).parent
-    return commit_of_checkout(package.parent) or commit_of_installation(package)
+    return commit_of_package(Path(walkerlab.__file__).parent)
