@@ -304,6 +304,7 @@ def gait_with(radius, pull=0.0):
         None,
         {},
         0.0,
+        0.13,
     )
 
 
