@@ -16,8 +16,9 @@ from walkerlab.config.problems import meant
 from walkerlab.config.schema import Config
 from walkerlab.errors import ConfigError, StaleError, StorageError
 from walkerlab.labels import with_unit
+from walkerlab.pipeline.executor import Executor
 from walkerlab.pipeline.graph import PIPELINE
-from walkerlab.pipeline.plan import Planner
+from walkerlab.pipeline.results import FolderResults
 from walkerlab.pipeline.runs import config_of, makes, read_all, result_in, results_in
 from walkerlab.report.numbers import listed
 from walkerlab.report.outcomes import MODELS
@@ -171,13 +172,13 @@ def named_in(folder: RunFolder, name: str) -> Illustration | Table:
     raise ConfigError(f"nothing is called {name}.{near}", advice)
 
 
-def planned(folder: RunFolder) -> Planner:
-    """A run's planner, which has its current results; of a config that is none any more there are none."""
+def planned(folder: RunFolder) -> Executor:
+    """Executor of a run that holds its current results; without any if the run's config is not valid any more."""
     config = config_of(folder)
-    planner = Planner(config or Config(), folder, elsewhere=False)
-    if config is not None:
-        planner.plan(PIPELINE.stages)
-    return planner
+    stages = () if config is None else PIPELINE.stages
+    executor = Executor(config or Config(), FolderResults(folder, elsewhere=False), stages)
+    executor.plan()
+    return executor
 
 
 def figure(
@@ -195,10 +196,10 @@ def figure(
         made = [makes(folder, PIPELINE[stage]) for stage in illustration.stages if stage not in stored]
         advice = f"{listed(made)} {'makes' if len(made) == 1 else 'make'} what it needs." if made else ""
         raise StaleError(f"{illustration.name} cannot be drawn: {why}.", advice)
-    planner, plot = planned(folder), PIPELINE["plot"]
-    taken = planner.inputs(plot)
-    known = taken.keys() | planner.left_out.keys()
-    outdated, _ = read_all(folder, (name for name in plot.results(planner.config) if name not in known))
+    run, plot = planned(folder), PIPELINE["plot"]
+    taken = {name: result for name, result in run.inputs(plot).items() if isinstance(result, Stored)}
+    known = taken.keys() | run.left_out.keys()
+    outdated, _ = read_all(folder, (name for name in plot.results(run.config) if name not in known))
     left_out = stored.keys() <= taken.keys()
     if not left_out:
         taken |= stored | {name: result for name, result in outdated.items() if result.complete}

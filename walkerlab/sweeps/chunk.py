@@ -17,7 +17,9 @@ from typing import Annotated, Any, Final, Literal, NamedTuple
 from walkerlab.config.schema import Config
 from walkerlab.errors import WalkerlabError
 from walkerlab.labels import Label, labels_of
+from walkerlab.pipeline.executor import answer_in_memory
 from walkerlab.pipeline.graph import Graph
+from walkerlab.pipeline.results import MemoryResults
 from walkerlab.store import artifact
 from walkerlab.store.artifact import Damaged, OtherLayout
 from walkerlab.store.columns import rows_group
@@ -52,12 +54,12 @@ class PointResult:
 class SweepPoint(NamedTuple):
     """A point of a sweep.
 
-    keys   of its result and of the results it needs, by stage
+    key    of its result
     again  whether its walk is taken a second time for its numerical error
     """
 
     config: Config
-    keys: dict[str, str]
+    key: str
     again: bool
 
 
@@ -92,40 +94,38 @@ class Chunk:
 
 def compute(task: ChunkTask) -> Chunk:
     """Compute a chunk's points in this process; what goes wrong with one does not end the others."""
-    worker = worker_at(task.graph)
+    memory = memory_for(task.graph)
     labels: dict[str, tuple[str, str]] = {}
     rows = []
     for point in task.points:
         started = time.perf_counter()
-        row, content = row_of(worker, task.target, point)
+        row, content = row_of(memory, task.target, point)
         rows.append(replace(row, wall_s=time.perf_counter() - started))
         labels.update(labels_in(content, labels))
     return Chunk(tuple(rows), labels)
 
 
 @cache
-def worker_at(where: str) -> Any:
+def memory_for(where: str) -> MemoryResults:
     """This process's memory of what points need, kept from chunk to chunk; `where` as in `ChunkTask`."""
-    from walkerlab.pipeline.in_memory import InMemory
-
     module, _, name = where.partition(":")
-    return InMemory(getattr(importlib.import_module(module), name))
+    return MemoryResults(getattr(importlib.import_module(module), name))
 
 
-def row_of(worker: Any, target: str, point: SweepPoint) -> tuple[PointResult, Content]:
+def row_of(memory: MemoryResults, target: str, point: SweepPoint) -> tuple[PointResult, Content]:
     """One point's row, and the content it is from."""
-    key = point.keys[target]
+    graph = memory.keys.graph
     try:
-        config = without_outputs(point.config, target, worker.graph)
-        again = point.again or not worker.graph[target].walks
-        answer = worker.answer(config, target, point.keys, again=again)
+        config = without_outputs(point.config, target, graph)
+        again = point.again or not graph[target].walks
+        answer = answer_in_memory(config, target, memory, again=again)
     except WalkerlabError as error:
-        return PointResult(key, "failed", error.message), Content()
+        return PointResult(point.key, "failed", error.message), Content()
     except Exception as error:
         why = f"a bug: {type(error).__name__}: {error}"
-        return PointResult(key, "failed", why, bug=traceback.format_exc()), Content()
+        return PointResult(point.key, "failed", why, bug=traceback.format_exc()), Content()
     why_not = None if answer.no_answer is None else answer.no_answer.message
-    return told(key, answer.content, why_not), answer.content
+    return told(point.key, answer, why_not), answer
 
 
 def told(key: str, content: Content, no_answer: str | None) -> PointResult:

@@ -103,5 +103,5 @@ class FanOut:
             self._again.append(replace(one, failures=one.failures + 1))
         else:
             self.point_s = self.point_s or 1.0
-            key = one.points[0].keys[self.target]
+            key = one.points[0].key
             self.keep(Chunk((PointResult(key, "failed", f"its worker died: {said}"),), {}))

@@ -280,7 +280,7 @@ class SweepRun:
         sample = set(np.sort(self.first)[evenly_spread(self.first.size, SAMPLE)].tolist())
         for index in indices:
             config = self.config(index)
-            yield SweepPoint(config, self.keys.of(config, self.question.stage), index in sample)
+            yield SweepPoint(config, self.keys.of(config, self.question.stage)[self.question.stage], index in sample)
 
 
 def refuse_unknown_stage(name: str, graph: Graph) -> None:
