@@ -41,7 +41,7 @@ class Toy:
     def plan(self, target, *sets, config=None, force=False):
         loaded, folder = self.loaded(*sets, config=config)
         stages = self.graph.needed_for(target, loaded)
-        return Executor(loaded, FolderResults(folder, self.graph), stages, self.graph, force=force).plan()
+        return Executor(loaded, FolderResults(folder, self.graph), stages, force=force).plan()
 
     def preview(self, target, *sets, config=None, **options):
         loaded, folder = self.loaded(*sets, config=config)

@@ -24,7 +24,7 @@ from walkerlab.store.content import untimed
 from walkerlab.store.files import refused
 from walkerlab.store.runfolder import RunFolder
 from walkerlab.sweeps import sweep as sweeps
-from walkerlab.sweeps.chunk import FOLDER, Chunk, PointResult, SweepPoint, by_name, row_of, without_outputs
+from walkerlab.sweeps.chunk import FOLDER, Chunk, PointResult, by_name, compute_point, without_outputs
 from walkerlab.sweeps.drawing import said_of
 from walkerlab.sweeps.question import asked, axis_of_text
 from walkerlab.sweeps.result import Merge, as_csv, last_of_each
@@ -310,7 +310,7 @@ def test_the_file_says_what_was_asked(toy):
 @pytest.mark.parametrize("stage", ["simulate", "contact-sim"])
 def test_a_walk_in_a_sweep_has_the_summary_of_the_walk_alone(stage):
     config = load(sets=("strides=1",)).config
-    row, _ = row_of(MemoryResults(), stage, SweepPoint(config, "key", True))
+    (row,) = compute_point(config, "key", sweeps.PIPELINE_AT, stage, again=True).rows
     alone = answer_in_memory(config, stage, MemoryResults())
     assert "trajectory" in alone.groups
     assert json.loads(row.numbers) == by_name(untimed(alone.summary, alone.timed))

@@ -16,7 +16,7 @@ from walkerlab.pipeline.progress import Reporter, Silent, StageReporter
 from walkerlab.pipeline.results import FolderResults, MemoryResults, Results, Step
 from walkerlab.pipeline.task import Precompiler, StageTask, nothing_compiled_yet, run_in_worker, task_of
 from walkerlab.scene.left_out import STILL_COMPUTED, LeftOut
-from walkerlab.store.artifact import NOT_THERE, StageAnswer
+from walkerlab.store.artifact import NOT_THERE, StageAnswer, Stored
 from walkerlab.store.key import Identity
 from walkerlab.store.runfolder import RunFolder
 from walkerlab.workers import WorkerPool
@@ -58,7 +58,6 @@ class Executor:
         config: Config,
         results: Results,
         stages: Sequence[Stage],
-        graph: Graph = PIPELINE,
         *,
         force: bool = False,
         jobs: int = 1,
@@ -66,7 +65,7 @@ class Executor:
         reporter: Reporter | None = None,
     ) -> None:
         """Decide nothing yet."""
-        self.config, self.results, self.stages, self.graph = config, results, tuple(stages), graph
+        self.config, self.results, self.stages, self.graph = config, results, tuple(stages), results.keys.graph
         self.force, self.jobs, self.again, self.reporter = force, jobs, again, reporter or Silent()
         self.answers: dict[str, StageAnswer] = {}
         self.left_out: dict[str, str] = {}
@@ -253,7 +252,7 @@ class Executor:
         total = max(self._total, number)
         place = [f"{number} of {total}"] if total > 1 else []
         why = [step.reason] if step.reason != NOT_THERE else []
-        expected = None if step.found is None else step.found.took_s
+        expected = step.found.provenance.took_s if isinstance(step.found, Stored) else None
         reporter = self.reporter.begin(stage.name, ", ".join(place + why), expected)
         return Begun(step, task, reporter, time.perf_counter())
 
@@ -294,7 +293,7 @@ class Executor:
 
 def survey(config: Config, folder: RunFolder, graph: Graph = PIPELINE) -> tuple[Step, ...]:
     """What is stored in a run's own folder, and what running each stage there would do; touches nothing."""
-    return Executor(config, FolderResults(folder, graph, elsewhere=False), graph.stages, graph).plan()
+    return Executor(config, FolderResults(folder, graph, elsewhere=False), graph.stages).plan()
 
 
 def answer_in_memory(
@@ -311,8 +310,8 @@ def answer_in_memory(
 
     Raises ConfigError as `Graph.needed_in_memory`.
     """
-    graph = memory.keys.graph
-    run = Executor(config, memory, graph.needed_in_memory(target, config), graph, again=again, reporter=reporter)
+    stages = memory.keys.graph.needed_in_memory(target, config)
+    run = Executor(config, memory, stages, again=again, reporter=reporter)
     run.carry_out()
     if target in run.answers:
         return run.answers[target]

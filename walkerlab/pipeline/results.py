@@ -11,10 +11,10 @@ from walkerlab.pipeline.graph import PIPELINE, Graph, Stage
 from walkerlab.pipeline.identity import Keys
 from walkerlab.store import artifact, provenance
 from walkerlab.store.artifact import StageAnswer, Stored, Verdict
+from walkerlab.store.checkpoint import Checkpoint
 from walkerlab.store.elsewhere import find_elsewhere, take_over
 from walkerlab.store.index import broken_file
 from walkerlab.store.key import Identity, changed_parts
-from walkerlab.store.parts import Parts
 from walkerlab.store.provenance import Provenance
 from walkerlab.store.runfolder import RunFolder
 
@@ -55,7 +55,7 @@ class FolderResults:
     def __init__(self, folder: RunFolder, graph: Graph = PIPELINE, elsewhere: bool = True) -> None:
         """Read nothing yet."""
         self.run, self.folder, self.elsewhere, self.keys = folder, folder.path, elsewhere, Keys(graph)
-        self._begun: dict[str, tuple[Provenance, Parts]] = {}
+        self._begun: dict[str, tuple[Provenance, Checkpoint]] = {}
 
     def find(self, stage: Stage, identity: Identity, inputs: Mapping[str, StageAnswer], force: bool) -> Step:
         """Find a stage's result: a step that reuses it, or runs the stage; with `force` it always runs."""
@@ -82,24 +82,24 @@ class FolderResults:
     def begin(self, step: Step, config: Config, inputs: Mapping[str, StageAnswer], force: bool) -> Mapping[str, Any]:
         """Prepare to keep a result; return what the stage may ask for, see `StageTask`.
 
-        With `force` the parts that an interrupted run has left are dropped.
+        With `force` what an interrupted run has left is dropped.
         """
         stage, identity = step.stage, step.identity
         assert identity is not None, "a stage that is left out does not run"
-        parts = Parts(self.run.parts(stage.name), identity.key)
+        checkpoint = Checkpoint(self.run.checkpoint(stage.name), identity.key)
         if force:
-            parts.forget()
+            checkpoint.forget()
         digests = {name: input_digest(stage, result) for name, result in inputs.items()}
-        self._begun[stage.name] = provenance.begin(config, digests), parts
-        return {"parts": parts, "folder": self.folder}
+        self._begun[stage.name] = provenance.begin(config, digests), checkpoint
+        return {"checkpoint": checkpoint, "folder": self.folder}
 
     def keep(self, step: Step, answer: StageAnswer, awaited: bool) -> Stored:  # noqa: ARG002
-        """Store a result, and remove its parts; StorageError if the system refuses."""
-        begun, parts = self._begun.pop(step.stage.name)
+        """Store a result, and remove its checkpoint; StorageError if the system refuses."""
+        begun, checkpoint = self._begun.pop(step.stage.name)
         assert step.identity is not None, "a stage that is left out does not run"
         path = self.run.artifact(step.stage.name)
         stored = artifact.write(path, answer, step.identity, begun.until_now(), answer.complete)
-        parts.forget()
+        checkpoint.forget()
         return stored
 
     def _why_outdated(
@@ -155,8 +155,8 @@ class MemoryResults:
         """Do nothing: there is no other folder."""
 
     def begin(self, step: Step, config: Config, inputs: Mapping[str, StageAnswer], force: bool) -> Mapping[str, Any]:  # noqa: ARG002
-        """Keep parts in memory alone."""
-        return {"parts": Parts(None, "")}
+        """Keep checkpoints in memory alone."""
+        return {"checkpoint": Checkpoint(None, "")}
 
     def keep(self, step: Step, answer: StageAnswer, awaited: bool) -> StageAnswer:
         """Remember a result that another stage awaits."""

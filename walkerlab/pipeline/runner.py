@@ -101,7 +101,7 @@ def execute(
 
     def executor() -> Executor:
         results = FolderResults(folder, graph)
-        return Executor(config, results, stages, graph, force=options.force, jobs=options.jobs, reporter=reporter)
+        return Executor(config, results, stages, force=options.force, jobs=options.jobs, reporter=reporter)
 
     run = executor()
     steps = run.plan()

@@ -29,11 +29,11 @@ class StageTask:
     config   what it takes of the config
     inputs   the results that it gets
     offered  what else it may ask for, by the names of parameters of its `run`:
-             jobs      processes for independent cells
-             parts     of its result, kept from a run that was cut off
-             again     whether walks are taken a second time for their numerical error
-             folder    of its run, which it draws into
-             left_out  the results that it has to do without as it draws
+             jobs        processes for independent cells
+             checkpoint  what an interrupted run has left of its result
+             again       whether walks are taken a second time for their numerical error
+             folder      of its run, which it draws into
+             left_out    the results that it has to do without as it draws
     """
 
     name: str

@@ -64,11 +64,6 @@ class StageAnswer(Content):
         """The summary of what was computed, without the reason why there is no answer."""
         return {key: value for key, value in self.summary.items() if self.complete or key != "no_answer"}
 
-    @property
-    def took_s(self) -> float | None:
-        """Time of the computation, s; None if it was not recorded."""
-        return None
-
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Stored(StageAnswer):
@@ -80,11 +75,6 @@ class Stored(StageAnswer):
     identity: Identity
     provenance: Provenance
     seal: str
-
-    @property
-    def took_s(self) -> float:
-        """Time of the computation, s."""
-        return self.provenance.took_s
 
 
 @dataclass(frozen=True)
