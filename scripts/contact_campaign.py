@@ -6,6 +6,8 @@
     python scripts/contact_campaign.py --walker light  # feet that bounce: 0.02 to 0.4 times critical damping
     python scripts/contact_campaign.py --walker driven  # spring, damper, torque, push-offs
     python scripts/contact_campaign.py --walker uneven  # footholds of drawn heights; every other is driven
+    python scripts/contact_campaign.py --walker passing  # slow starts on uneven planes: feet pass again, in the ground
+    python scripts/contact_campaign.py --walker explicit  # feet that bounce, walked by dop853
 
 Each walk is drawn from a seed of its own: checkerboard, after-mid-swing or plane; a free or a hinged (`pinned`) first
 stance; ground into which the weight sinks by 1 um to 1 mm, with exponents from 1 to 3 and 0.05 to 3 times critical
@@ -233,7 +235,25 @@ def uneven(seed: int) -> Drawn:
     return replace(one, heights_m=(0.0, *(die.gauss(0.0, share) for _ in range(4))))
 
 
-WALKERS = {"both": both, "compass": compass, "kneed": kneed, "light": light, "driven": driven, "uneven": uneven}
+def passing(seed: int) -> Drawn:
+    """The uneven ones on planes, started too slowly to vault: the feet pass again while they stand in the ground."""
+    one, die = uneven(seed), random.Random(seed)
+    ground = (f"contact.terrain={die.choice(('after-mid-swing', 'after-mid-swing', 'plane'))}",)
+    angles, rates = np.array(one.start).reshape(2, -1)
+    slower = die.uniform(0.2, 0.9) * rates
+    return replace(one, sets=(*one.sets, *ground), start=(*angles.tolist(), *slower.tolist()))
+
+
+def explicit(seed: int) -> Drawn:
+    """The lightly damped ones by dop853, whose long steps of high order the energy balance has to follow."""
+    one = light(seed)
+    return replace(one, sets=(*one.sets, "solver.contact.method=dop853"))
+
+
+WALKERS = {
+    "both": both, "compass": compass, "kneed": kneed, "light": light, "driven": driven, "uneven": uneven,
+    "passing": passing, "explicit": explicit,
+}  # fmt: skip
 
 
 def plain_scene(config: Config, pitch_m: float, heights_m: tuple[float, ...]) -> plain_walk.Plain:

@@ -18,7 +18,7 @@ OWN_PARTS = re.compile(r"```yaml\n(name: own-parts\n.*?)```", re.DOTALL)
 PICTURES: dict[str, tuple[str, tuple[str, ...]]] = {
     "compass": ("paper", ()),
     "straight-legs": ("round-feet", ("walker.leg_mass_ahead_m=0.02", "walker.foot_centre_ahead_m=0.03")),
-    "kneed": ("kneed-round-feet", ("walker.shank.mass_ahead_m=0.04",)),
+    "kneed": ("kneed-round-feet", ("walker.shank.mass_ahead_m=0.04", "walker.foot_centre_ahead_m=0.03")),
     "torso": ("torso", ()),
 }
 

@@ -8,15 +8,19 @@ Every search has to end in a gait or in words. Where it finds none, SciPy's `roo
 to either side of it along every coordinate of the step map (unit leg length and gravity): as long as theory keeps
 these walks within 1e-3 of the gait they go on, and the trace of what k steps did to the starts is the sum of the
 multipliers' k-th powers. Every gait's heel strike needs the impulse that the masses' momentum, summed one by one,
-says; one that would have to pull is objected to. `light-hips` are the compasses whose gaits are hardest to follow
+says; one that would have to pull is objected to. The first walkers of a type walk over rough ground from a start near
+their gait, some of them until a foot lands just ahead of the other: each of these walks is SciPy's, step by step.
+`light-hips` are the compasses whose gaits are hardest to follow
 from a vanishing slope: without any start drawn at random both ordinary gaits must be found by name, and each repeat
-itself in one step of SciPy's DOP853.
+itself in one step of SciPy's DOP853. `kneed-torque` have a constant torque and a spring at the hip: each gait's cost of
+transport is held against SciPy's integral of the positive power.
 Prints a table in Markdown, then what went wrong; exits 1 if anything did.
 """
 
 from __future__ import annotations
 
 import argparse
+import math
 import sys
 import time
 from collections import Counter
@@ -31,10 +35,12 @@ from scipy.optimize import root
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 
-from rigid_physics import momentum_of_masses
+from plain_rigid_walk import plain_walk
+from rigid_physics import momentum_of_masses, torque_work_of_a_step
 
 from walkerlab.config.walkers import CompassWalker, Kneed, KneeJoint, PartsWalker, Shank, StraightLegs, Thigh, Torso
 from walkerlab.hybrid.recorded_walk import take_walk
+from walkerlab.hybrid.rigid_walk import SHORTEST_LANDING
 from walkerlab.mechanics.parts import Assembly
 from walkerlab.mechanics.rigid import standing
 from walkerlab.mechanics.standing import Standing
@@ -42,6 +48,7 @@ from walkerlab.orbits.fixed_point import MAX_START, MIN_START, GaitSearch, Rigid
 from walkerlab.orbits.shooting import SHORTEST_STEP, coordinates_of, on_section, section_of
 from walkerlab.orbits.similarity import unit_walker
 from walkerlab.orbits.small_slope import LONG_PERIOD, SHORT_PERIOD
+from walkerlab.outcome import Outcome
 from walkerlab.scene.parts import AnyWalker, assembly_of, knee_locked_at_strike
 from walkerlab.solvers.registry import Tolerances
 
@@ -51,12 +58,16 @@ ASIDE = 1e-6  # of starts from the gait, in units of leg length and gravity
 STILL_LINEAR = 1e-3  # distance from the gait up to which its derivative tells where a walk goes
 AGREES = 1e-4  # of traces, in parts of the derivative's size: rounding by ASIDE, and what is left of curvature
 IMPULSES = 1e-8  # N s, of a walker of some kilograms
+COSTS = 1e-7  # relative, of an integral whose power has a kink at each turn of the legs
 RTOL, ATOL, BUDGET = 1e-12, 1e-15, 1_000_000
 LONGEST_SEARCH_S = 60.0  # processor time; one that takes longer hangs to a user
 SETTINGS = SearchSettings(random_starts=30)
 FOLLOWED_ONLY = SearchSettings(random_starts=0, further_starts=0)
 RETURNS_TO = 1e-7  # rad, rad/s: a tolerance of 1e-11, grown by an unstable gait's multipliers
 OTHER_STARTS, TRIED, EVALUATIONS = 3000, 40, 60  # drawn where nothing is found, tried of those that walk; steps each
+ROUGH_WALKERS, ROUGH_STEPS = 10, 4  # of a type, and of each of their walks, which take SciPy some seconds
+ROUGHEST, SLOWEST, FASTEST = 0.01, 0.75, 1.05  # of the leg length; of the gait's rates, at the start
+SAME_TIME = 1e-6  # s, of touches
 SOLVED, APART = 1e-9, 1e-3  # residual of a gait; rad, half the angle between its legs at least
 
 
@@ -174,11 +185,17 @@ def light_hips(draw: Draw) -> CompassWalker:
     )
 
 
+def torque_and_spring(draw: Draw) -> dict[str, Any]:
+    """A constant torque and a spring at the hip, by fields of the rigid model."""
+    return {"driven_hip": True, "hip": (draw.uniform(0.0, 3.0), 0.0, draw.uniform(0.02, 0.4))}
+
+
 TYPES: dict[str, Callable[[Draw], AnyWalker]] = {
     "light-hips": light_hips,
     "straight-legs": straight_legs,
     "kneed": kneed,
     "kneed-free": kneed_free,
+    "kneed-torque": kneed,
     "kneed-torso": kneed_with_torso,
     "torso": torso,
     "parts": parts,
@@ -193,6 +210,7 @@ class Tally:
     wrong: list[str] = field(default_factory=list)
     slowest_s: float = 0.0
     steps_seen: int = 0  # whose effect was held against the multipliers
+    short_landings: int = 0  # walks on rough ground that end with a foot just ahead of the other
     overlooked: int = 0  # searches that find none where another method finds a gait
 
 
@@ -204,6 +222,8 @@ def tally(name: str, walkers: int, seed: int) -> Tally:
         described, slope = TYPES[name](draw), float(10.0 ** draw.uniform(*((-3.5, -1.3) if light else (-2.3, -1.0))))
         assembly = assembly_of(described, rigid=True)
         walker = standing(assembly, 9.81, slope, knee_locked_at_strike(described))
+        if name == "kneed-torque":
+            walker = walker.changed(**torque_and_spring(draw))
         start = time.process_time()
         search = find_gaits(walker, settings=FOLLOWED_ONLY if light else SETTINGS)
         # the first of a type compiles
@@ -211,7 +231,10 @@ def tally(name: str, walkers: int, seed: int) -> Tally:
         found.slowest_s = max(found.slowest_s, spent)
         faults, steps = (ordinary_faults(walker, search), 0) if light else judged(walker, search)
         found.steps_seen += steps
-        faults += impulse_faults(assembly, walker, search)
+        faults += impulse_faults(assembly, walker, search) + cost_faults(walker, search)
+        if index < ROUGH_WALKERS and search.gait is not None:
+            rough, short = rough_walk(walker, search.gait, np.random.default_rng((seed, index)))
+            faults, found.short_landings = faults + rough, found.short_landings + short
         if spent > LONGEST_SEARCH_S:
             faults.append(f"the search took {spent:.0f} s")
         found.ends[end_of(search)] += 1
@@ -279,6 +302,38 @@ def impulse_faults(assembly: Assembly, walker: Standing, search: GaitSearch) -> 
     return faults
 
 
+def cost_faults(walker: Standing, search: GaitSearch) -> list[str]:
+    """Gaits whose cost of transport is not that of gravity's work and the torque's positive work integrated plainly."""
+    faults = []
+    for gait in search.gaits if walker.hip[2] != 0.0 else ():
+        step = take_walk(walker, Tolerances("dop853", RTOL, ATOL, BUDGET), gait.state, 1)
+        _, positive = torque_work_of_a_step(walker, gait.state, step)
+        cost = math.sin(walker.slope) + positive / (walker.mass * walker.gravity * step.lengths_m[0])
+        if abs(gait.cost_of_transport - cost) > COSTS * cost:
+            faults.append(f"the gait of {gait.period:.4g} s costs {cost:.10g}, told is {gait.cost_of_transport:.10g}")
+    return faults
+
+
+def rough_walk(walker: Standing, gait: RigidGait, draw: Draw) -> tuple[list[str], bool]:
+    """What is wrong with a walk over random heights from near a gait, and whether a foot landed just ahead in it."""
+    n, nearest = len(gait.state) // 2, SHORTEST_LANDING * gait.step_length
+    share = draw.uniform(SLOWEST, FASTEST)
+    start = (*gait.state[:n], *(share * rate for rate in gait.state[n:]))
+    heights = np.append(0.0, draw.normal(0.0, draw.uniform(0.0, ROUGHEST) * walker.leg_length, ROUGH_STEPS))
+    tolerances = Tolerances("dop853", RTOL, ATOL, BUDGET)
+    walk = take_walk(walker, tolerances, start, ROUGH_STEPS, heights=heights, step_length=gait.step_length)
+    touches, outcome, ahead = plain_walk(walker, np.array(start), heights, nearest)
+    ended = Outcome.WALKED if walk.outcome is Outcome.LIFTED_OFF else walk.outcome
+    faults = []
+    if (ended, walk.steps) != (outcome, len(touches)):
+        faults.append(
+            f"on rough ground: {ended.label} after {walk.steps}, by SciPy {outcome.label} after {len(touches)}"
+        )
+    elif walk.steps and np.abs(walk.touch_time_s - touches[:, 0]).max() > SAME_TIME:
+        faults.append(f"on rough ground feet land at {walk.touch_time_s}, by SciPy at {touches[:, 0]}")
+    return faults, bool(ahead) and ahead[-1] < nearest
+
+
 def ordinary_faults(walker: Standing, search: GaitSearch) -> list[str]:
     """What is wrong with the two ordinary gaits, the one chosen among them."""
     found = {name: [gait for gait in search.gaits if name in gait.found_by] for name in (LONG_PERIOD, SHORT_PERIOD)}
@@ -338,13 +393,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--types", nargs="+", choices=TYPES, default=list(TYPES))
     options = parser.parse_args(arguments)
-    print(f"| type | {' | '.join(ENDS)} | overlooked | steps held against multipliers | longest search | faults |")
-    print("|---" * (len(ENDS) + 5) + "|")
+    others = ("overlooked", "steps held against multipliers", "short landings", "longest search", "faults")
+    print(f"| {' | '.join(('type', *ENDS, *others))} |")
+    print("|---" * (1 + len(ENDS) + len(others)) + "|")
     wrong: list[str] = []
     for name in options.types:
         found = tally(name, options.walkers, options.seed)
         counts = " | ".join(str(count) for count in (*(found.ends[end] for end in ENDS), found.overlooked))
-        row = f"| `{name}` | {counts} | {found.steps_seen} | {found.slowest_s:.1f} s | {len(found.wrong)} |"
+        seen = f"{found.steps_seen} | {found.short_landings}"
+        row = f"| `{name}` | {counts} | {seen} | {found.slowest_s:.1f} s | {len(found.wrong)} |"
         print(row, flush=True)
         wrong += found.wrong
     print("\n".join(wrong))

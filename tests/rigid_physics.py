@@ -1,11 +1,12 @@
 """The rigid model's functions for states in tuples, in Python, where scratch that is read unwritten is no number."""
 
 import numpy as np
+from scipy.integrate import solve_ivp
 
 from walkerlab.mechanics import impact
 from walkerlab.mechanics.assembly import Anchor, levers, masses
 from walkerlab.mechanics.rigid import places_of
-from walkerlab.mechanics.standing import Mode, energies, linked
+from walkerlab.mechanics.standing import BENT, STANCE, STRAIGHT, SWING, Mode, energies, linked
 from walkerlab.solvers.system import derivative
 
 
@@ -38,6 +39,29 @@ def struck(strike, model, y, columns):
     after = np.full(before.size, np.nan)
     strike(model, before, after)
     return tuple(after)
+
+
+def torque_work_of_a_step(model, start, step):
+    """Work (J) of the constant hip torque in a step, net and positive: SciPy's integral of its power, phase by phase.
+
+    step  a walk of one step from `start`, which has the times of its strikes
+    """
+    n, torque = len(model.arm_x), model.hip[2]
+    knee_strikes = () if step.knee_strike_time_s is None else step.knee_strike_time_s[:1].tolist()
+    y, t, work = np.array(start), 0.0, np.zeros(2)
+    for phase, end in ((BENT, knee_strikes), (STRAIGHT, step.touch_time_s[:1].tolist())):
+        if not end:
+            continue
+
+        def rate(_, x, phase=phase):
+            power = torque * (x[n + SWING] - x[n + STANCE])
+            return (*x[n : 2 * n], *rates(model, phase, tuple(x[: 2 * n])), power, max(0.0, power))
+
+        # no step is long enough to leap over two turns of the legs
+        swing = solve_ivp(rate, (t, *end), (*y, 0.0, 0.0), "DOP853", rtol=1e-11, atol=1e-13, max_step=2e-2)
+        y, t, work = swing.y[: 2 * n, -1], end[0], work + swing.y[2 * n :, -1]
+        y = np.array(knee_strike(model, y)) if phase == BENT else y
+    return work
 
 
 def state_linked(model, phase, y):

@@ -69,6 +69,7 @@ def truth():
         work=WalkWork(0, 0, 0, 0),
         driven=DrivenWork(1.0, 0.0, 0.0, 0.0, 0.0),
         samples=None,
+        method="radau5",
     )
     return Truth(2.0, np.zeros(8), times[:2], 2e-12, walk)
 

@@ -2,6 +2,7 @@
 
 import ast
 import doctest
+import itertools
 import subprocess
 import sys
 from pathlib import Path
@@ -252,3 +253,15 @@ def test_robustness_and_design_are_asked_in_memory():
         walkerlab.compass(), over={"slope_deg": np.array([2, 3])}, maximise="speed_m_s", slope_deg=2.5, starts=1
     )
     assert walker.summary["best"] == {"slope_deg": 3.0}
+
+
+def test_a_sweep_without_xarray_computes_nothing(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "xarray", None)
+    with pytest.raises(ConfigError, match="a Dataset needs xarray"):
+        walkerlab.sweep("fixedpoint", {"slope_deg": [1, 2]}, runs=tmp_path / "runs")
+    assert not (tmp_path / "runs").exists()
+
+
+def test_a_list_without_an_end_is_refused(tmp_path):
+    with pytest.raises(ConfigError, match="10000001 points"):
+        walkerlab.sweep("fixedpoint", {"seed": itertools.count()}, runs=tmp_path / "runs")

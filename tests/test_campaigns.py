@@ -70,7 +70,14 @@ def test_random_walkers_with_light_hips_have_both_their_ordinary_gaits():
     assert script("walker_campaign").tally("light-hips", 25, seed=1).wrong == []
 
 
-@pytest.mark.parametrize("name", ["straight-legs", "parts", "torso", "kneed-torso"])
+def test_random_walkers_on_rough_ground_land_short_where_a_library_says():
+    """Landings just ahead of the other foot, which once were steps, are among what is drawn."""
+    found = script("walker_campaign").tally("straight-legs", 8, seed=1)
+    assert found.wrong == []
+    assert found.short_landings > 0
+
+
+@pytest.mark.parametrize("name", ["straight-legs", "parts", "torso", "kneed-torso", "kneed-torque"])
 def test_gaits_of_random_walkers_forget_starts_aside_as_their_multipliers_say(name):
     found = script("walker_campaign").tally(name, 6, seed=2)
     assert found.wrong == []

@@ -9,7 +9,7 @@ import shlex
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 import pytest
@@ -19,7 +19,9 @@ from typer.testing import CliRunner
 import walkerlab
 from walkerlab.cli.main import program
 from walkerlab.config.loader import load
+from walkerlab.config.schema import Contact
 from walkerlab.figures import illustration
+from walkerlab.ground.friction import friction_coefficient, lacking
 from walkerlab.pipeline.graph import PIPELINE, Stage, results_of
 from walkerlab.store.content import Content, Group, Variable
 
@@ -90,14 +92,21 @@ def test_the_stage_of_the_docs_runs():
     assert found.summary == {"speed_m_s": 1.0, "froude": 0.1}
 
 
-def test_the_friction_of_the_docs_has_the_derivative_that_it_says():
+def test_the_friction_of_the_docs_is_a_whole_law_with_the_derivative_that_it_says(monkeypatch):
     code = next(code for code in code_to_add() if "friction_coefficient" in code)
-    names = {"math": math, "Smooth": object}
-    exec(code.partition("\n")[2], names)
-    law, h = SimpleNamespace(coefficient=0.8, velocity=0.1), 1e-6
-    low, high = (names["smooth_coefficient"](law, 0.05 + side * h)[0] for side in (-1, 1))
-    assert names["smooth_coefficient"](law, 0.05)[1] == pytest.approx((high - low) / (2 * h), rel=1e-8)
+    monkeypatch.setattr(friction_coefficient, "_bodies", dict(friction_coefficient._bodies))
+    names = {"math": math, "NamedTuple": NamedTuple, "Any": Any, "friction_coefficient": friction_coefficient}
+    exec(f"from __future__ import annotations\n{code}", names)
+    assert lacking(names["Smooth"]) == []
+    law, h = names["Smooth"].of(Contact(units="si")), 1e-6
+    assert law == (0.7, 0.1)
+    low, high = (friction_coefficient(law, 0.05 + side * h)[0] for side in (-1, 1))
+    assert friction_coefficient(law, 0.05)[1] == pytest.approx((high - low) / (2 * h), rel=1e-8)
     assert low < 0.0
+    assert -friction_coefficient(law, law.rising_until)[0] == pytest.approx(law.largest, rel=0.005)
+    assert friction_coefficient(law.with_creep(0.5), 0.02) == pytest.approx(
+        (friction_coefficient(law, 0.04)[0], 2.0 * friction_coefficient(law, 0.04)[1])
+    )
 
 
 def test_files_and_names_of_the_pipeline_page_are_there():

@@ -1,5 +1,6 @@
 import itertools
 import os
+import shutil
 import subprocess
 import sys
 import textwrap
@@ -12,6 +13,7 @@ from walkerlab.pipeline.graph import STAGES
 from walkerlab.sources import Sources
 
 NUMBER = itertools.count()
+NO_CACHES = shutil.ignore_patterns("__pycache__")
 
 
 @pytest.fixture
@@ -143,3 +145,18 @@ def test_what_python_imports_is_in_the_closure(name, imported):
     """The scanner reads text; the interpreter is the independent witness."""
     assert name in imported[name]
     assert imported[name] <= {module.name for module in Sources().closure(name)}
+
+
+def test_a_new_version_number_changes_no_stage_key(tmp_path):
+    def digest(version):
+        shutil.copytree(Path(walkerlab.__file__).parent, tmp_path / version / "walkerlab", ignore=NO_CACHES)
+        init = tmp_path / version / "walkerlab" / "__init__.py"
+        init.write_text(init.read_text().replace(walkerlab.__version__, version))
+        code = "from walkerlab.sources import Sources; print(Sources().code_digest('walkerlab.stages.engines'))"
+        done = subprocess.run(
+            [sys.executable, "-c", code], cwd=tmp_path / version, env={}, capture_output=True, text=True
+        )
+        assert not done.stderr
+        return done.stdout
+
+    assert digest("7.0.0") == digest("8.0.0.dev0")

@@ -6,7 +6,7 @@ checkers `__init__.pyi` lists the same.
 
 from typing import Any
 
-__version__ = "0.2.0"
+__version__ = "0.3.0.dev0"
 
 __all__ = [
     "Config",

@@ -2,10 +2,10 @@
 
 from typing import NamedTuple
 
-# places in the account, J so far; the last is what of the hip torque's work is positive, and in no balance
-DAMPING, FRICTION, EDGES, KNEE_STRIKES, KNEE_STOP, PUSH_OFF, HIP, FORWARD = range(8)
+# places in the account, J so far; the last two are the hip torque's part of the hip's work, and what of it is positive
+DAMPING, FRICTION, EDGES, KNEE_STRIKES, KNEE_STOP, PUSH_OFF, HIP, TORQUE, FORWARD = range(9)
 ENTRIES = FORWARD + 1
-LOST, GIVEN = slice(DAMPING, PUSH_OFF), slice(PUSH_OFF, FORWARD)
+LOST, GIVEN = slice(DAMPING, PUSH_OFF), slice(PUSH_OFF, TORQUE)
 
 
 class Loss(NamedTuple):

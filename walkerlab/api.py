@@ -1,5 +1,6 @@
 """The package from Python: runs that are stored as the command line stores them, and plain objects in memory."""
 
+import itertools
 import json
 import os
 import warnings
@@ -243,6 +244,7 @@ def sweep(
     from walkerlab.sweeps.question import asked
     from walkerlab.sweeps.sweep import SweepRun, SweepWork, modules_of
 
+    xarray_here()  # the answer is a Dataset
     found = resolve(str(config), settings(set), runs=folder_of(runs), name=name)
     warn(found.loaded.warnings)
     if not isinstance(over, Mapping):
@@ -432,16 +434,21 @@ def question(stage: str, keys: dict[str, Any], **given: Any) -> dict[str, Any]:
 
 def dataset(group: Group) -> Any:
     """A group of labelled arrays as an xarray Dataset: variables named as a dimension are its coordinates."""
-    try:
-        import xarray
-    except ImportError as error:
-        raise ConfigError("a Dataset needs xarray, which is not installed.", "pip install xarray") from error
     data = {
         name: (variable.dims, variable.values, {"units": variable.units, "long_name": variable.long_name})
         for name, variable in group.variables.items()
     }
-    made = xarray.Dataset(data, attrs=dict(group.attrs))
+    made = xarray_here().Dataset(data, attrs=dict(group.attrs))
     return made.set_coords(str(group.attrs.get("coordinates", "")).split())
+
+
+def xarray_here() -> Any:
+    """Import xarray; ConfigError if it is not installed."""
+    try:
+        import xarray
+    except ImportError as error:
+        raise ConfigError("a Dataset needs xarray, which is not installed.", "pip install xarray") from error
+    return xarray
 
 
 def in_memory(stage: str, config: Config) -> Result:
@@ -511,6 +518,9 @@ def folder_of(runs: Any) -> Path:
 
 def values_of(key: str, given: Any) -> str | list[Any]:
     """The values of a parameter of a sweep, or the text of a range; ConfigError for what is neither."""
+    # Imported here: few callers sweep.
+    from walkerlab.sweeps.question import MAX_POINTS
+
     if isinstance(given, str) and not given.lstrip().startswith("["):
         return given
     if isinstance(given, str) or not isinstance(given, Iterable):
@@ -518,7 +528,7 @@ def values_of(key: str, given: Any) -> str | list[Any]:
             f"over {key}: {given!r} is not a list of values, nor a range FROM:TO:N.",
             f'For example {{"{key}": [1, 2]}} or {{"{key}": "1:3:5"}}.',
         )
-    return list(given)
+    return list(itertools.islice(given, MAX_POINTS + 1))  # more are refused, and need not be held for that
 
 
 def refuse_unknown_stage(stage: str) -> None:

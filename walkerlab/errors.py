@@ -36,9 +36,17 @@ class WalkerlabError(Exception):
 
 
 class ConfigError(WalkerlabError):
-    """The config (file, `extends`, `--set`) is not usable; nothing was run."""
+    """The config (file, `extends`, `--set`) is not usable; nothing was run.
+
+    key  path of the key that is wrong; empty where the message says where it is, or it is no key's fault
+    """
 
     exit_code = 3
+
+    def __init__(self, message: str, advice: str = "", key: tuple[int | str, ...] = ()) -> None:
+        """Say what is wrong, what to do next, and about which key."""
+        super().__init__(message, advice)
+        self.key = key
 
 
 class NoAnswer(WalkerlabError):  # noqa: N818 (no answer is a result, not an error)

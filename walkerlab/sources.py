@@ -37,12 +37,12 @@ class Sources:
     def code_digest(self, name: str) -> str:
         """The sha256 over the sources of a module and of everything of its own package, or of this one, it imports.
 
-        Data files beside those modules (templates, tables) count as code. Raises ModuleNotFoundError if there is
-        no such module.
+        Data files beside those modules (templates, tables) count as code; this package's `__init__` does not, since a
+        new version number alone changes no result. Raises ModuleNotFoundError if there is no such module.
         """
         closure = self.closure(name)
         files = {f"{module.name}:{path.name}": path for module in closure for path in module.data}
-        texts = [(module.name, module.text) for module in closure]
+        texts = [(module.name, module.text) for module in closure if module.name != PACKAGE]
         return digest_of(texts + [(label, path.read_bytes()) for label, path in sorted(files.items())])
 
     def closure(self, *names: str) -> list[Module]:

@@ -45,6 +45,8 @@ Hear = Callable[[Any], None]
 class WorkerDiedError(WalkerlabError):
     """A worker ended before it had answered: it crashed, or was killed."""
 
+    exit_code = 4
+
     def __init__(self, exit_code: int) -> None:
         """Say how.
 

@@ -56,6 +56,15 @@ def test_locked_thigh_and_shank_are_one_body_and_the_released_ones_two():
     assert scene.model.balls[1].centre_m[1] == pytest.approx(-1.0)
 
 
+def test_feet_ahead_of_the_shanks_are_ahead_in_an_engine_too():
+    scene = kneed("walker.foot_centre_ahead_m=0.03", "walker.foot_radius_m=0.2")
+    bent, straight = (scene.model.balls[foot] for foot in (0, 1))
+    # of the swing leg in its shank's frame, of the stance leg, which is one link, in its thigh's
+    assert bent.centre_m == pytest.approx((0.03, 0.2 - 0.5))
+    assert straight.centre_m == pytest.approx((0.03, 0.2 - 1.0))
+    assert {ball.radius_m for ball in (bent, straight)} == {0.2}
+
+
 @pytest.mark.parametrize("doing", [(BENT, BENT), (LOCKED, BENT), (LOCKED, LOCKED)])
 def test_coordinates_of_a_kneed_walker_lead_to_an_engine_and_back(doing):
     scene = kneed().with_knees_locked(np.array(doing, np.int8))

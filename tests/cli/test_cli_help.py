@@ -8,6 +8,7 @@ from typer.testing import CliRunner
 import walkerlab
 from walkerlab.cli.main import program
 from walkerlab.pipeline.graph import STAGES
+from walkerlab.store.provenance import git_commit
 
 HEAVY = (
     "numpy",
@@ -65,8 +66,10 @@ def test_every_stage_has_the_common_options_and_strides_if_it_walks(walker, stag
     assert ("--open" in words) == (stage.name == "report")
 
 
-def test_version(walker):
-    assert walker("--version").stdout == f"walkerlab {walkerlab.__version__}\n"
+def test_the_version_is_followed_by_the_commit(walker):
+    commit = git_commit()
+    known = f" (commit {commit})" if commit else ""
+    assert walker("--version").stdout == f"walkerlab {walkerlab.__version__}{known}\n"
 
 
 @pytest.mark.parametrize(

@@ -112,3 +112,10 @@ def test_clean_asks_on_a_terminal(toy):
         os.close(ours)
         os.close(theirs)
         assert artifact.exists() == left
+
+
+def test_status_gives_a_reason_once(toy):
+    toy("page", "--set", "slope_rad=1.2")
+    lines = toy("status", "--set", "slope_rad=1.2").stdout.splitlines()
+    reasons = [line.split(maxsplit=3)[3] for line in lines[3:] if "left out" in line]
+    assert reasons == ["it needs drop", "as roll"]

@@ -3,6 +3,7 @@
 import json
 import os
 import re
+import shlex
 import signal
 import subprocess
 from pathlib import Path
@@ -33,6 +34,13 @@ def test_init_knows_the_types_of_walkers(walker):
     done = walker("init", "x.yaml", "--type", "compas")
     assert done.returncode == 3
     assert "Did you mean compass?" in done.stderr
+
+
+def test_init_says_what_walkerlab_is_not_for(walker):
+    done = walker("init", "x.yaml", "--type", "runner")
+    assert done.returncode == 3
+    assert "no running: its walkers always have a foot on the ground" in done.stderr
+    assert "mean" not in done.stderr
 
 
 @pytest.mark.parametrize(
@@ -228,3 +236,67 @@ def test_a_full_stdout_is_told(walker):
     assert done.returncode == 4
     assert b"error: the output could not be written" in done.stderr
     assert b"Traceback" not in done.stderr
+
+
+def test_init_on_a_full_disk_leaves_nothing_cut_short(walker):
+    command = f"ulimit -f 1; exec {shlex.join(walker.command)} init x.yaml"
+    done = subprocess.run(["bash", "-c", command], cwd=walker.folder, env=walker.environment, capture_output=True)
+    assert done.returncode == 4
+    assert b"x.yaml could not be written" in done.stderr
+    assert list(walker.folder.iterdir()) == []
+
+
+def test_a_pipe_is_written_into_and_not_replaced(walker):
+    os.mkfifo(walker.folder / "pipe")
+    with walker.start("draw", "simplest", "--to", "svg", "-o", "pipe", stdout=subprocess.DEVNULL) as process:
+        drawn = (walker.folder / "pipe").read_bytes()
+        assert process.wait(timeout=60) == 0
+    assert drawn.startswith(b"<?xml")
+    assert drawn.rstrip().endswith(b"</svg>")
+    assert (walker.folder / "pipe").is_fifo()
+
+
+def test_a_link_is_followed_and_not_replaced(walker):
+    (walker.folder / "link.svg").symlink_to("walker.svg")
+    assert walker("draw", "simplest", "-o", "link.svg").returncode == 0
+    assert (walker.folder / "link.svg").is_symlink()
+    assert (walker.folder / "walker.svg").read_text().startswith("<?xml")
+
+
+@pytest.mark.parametrize(
+    ("target", "said"),
+    [
+        ("mine.yaml", "mine.yaml is what this command reads"),
+        ("base.yaml", "base.yaml is what this command reads"),
+        (".", ". is a folder"),
+    ],
+)
+def test_a_drawing_replaces_neither_what_it_is_drawn_from_nor_a_folder(walker, target, said):
+    (walker.folder / "base.yaml").write_text("extends: paper\n")
+    (walker.folder / "mine.yaml").write_text("extends: base.yaml\n")
+    done = walker("draw", "mine.yaml", "--to", "svg", "-o", target)
+    assert done.returncode == 3
+    assert said in done.stderr
+    assert "Traceback" not in done.stderr
+    assert (walker.folder / "mine.yaml").read_text() == "extends: base.yaml\n"
+    assert (walker.folder / "base.yaml").read_text() == "extends: paper\n"
+
+
+def test_names_that_are_no_text_are_escaped_where_they_are_printed(walker):
+    odd = os.fsdecode(b"r\xff")
+    for command in (("status", "--runs", odd), ("draw", "simplest", "-o", f"{odd}.svg"), ("export", odd, "7")):
+        done = walker(*command)
+        assert "Traceback" not in done.stderr, done.stderr
+        assert "r\\udcff" in done.stdout + done.stderr
+    assert (walker.folder / f"{odd}.svg").is_file()
+
+
+def test_letters_that_the_terminal_lacks_are_escaped(walker):
+    done = walker("schema", "slope_rad", environment={"PYTHONIOENCODING": "ascii"})
+    assert (done.returncode, "Traceback" in done.stderr) == (0, False)
+
+
+def test_a_closed_stdout_ends_quietly(walker):
+    command = f"exec {shlex.join(walker.command)} schema >&-"
+    done = subprocess.run(["bash", "-c", command], cwd=walker.folder, env=walker.environment, capture_output=True)
+    assert (done.returncode, done.stderr) == (0, b"")

@@ -1,9 +1,15 @@
 """JSON values as text for people, and how far a stage is."""
 
+from pathlib import Path
+
 import pytest
 
 from walkerlab.cli import console
 from walkerlab.cli.console import Console, StageLine
+from walkerlab.cli.request import Request
+from walkerlab.cli.stage import printed
+from walkerlab.errors import NoAnswer
+from walkerlab.pipeline.runner import StageReport
 from walkerlab.report.tables import LONGEST_CELL
 from walkerlab.report.text import described_summary, table
 
@@ -67,3 +73,14 @@ def test_the_time_left_comes_down_while_a_long_part_is_at_work(clock):
     for clock[0] in (24.0, 32.0, 39.0, 41.0):
         told.append(line.seconds_left())
     assert told == [16.0, 8.0, 1.0, None]
+
+
+@pytest.mark.parametrize(("summary", "stored"), [({}, False), ({"period_s": 0.7}, True)])
+def test_that_there_is_no_answer_at_all_is_not_called_stored(summary, stored):
+    said = {"message": "none is installed", "advice": "Install one."}
+    summary = {**summary, "no_answer": said}
+    artifact = Path("runs/paper/drop.h5")
+    report = StageReport(
+        "drop", artifact.parent, artifact, False, 0.0, (), summary, (), NoAnswer(said["message"], said["advice"])
+    )
+    assert (f"stored in {artifact}" in printed(Request("drop"), report)) == stored

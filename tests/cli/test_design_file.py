@@ -36,6 +36,57 @@ def test_the_optimum_is_a_config_that_extends_the_start_and_is_written_over_noth
     assert path.read_text(encoding="utf-8") == "extends: paper\n"
 
 
+OVER = "--over walker.foot_radius_m=0.1:0.7"
+
+
+@pytest.mark.parametrize(
+    ("command", "message"),
+    [
+        (
+            f"design -c round-feet --minimise period_s {OVER}",
+            f"{OVER}: design.over: walker.foot_radius_m cannot be 0.7 m: it must be below leg_length_m, 0.4",
+        ),
+        (
+            "design --minimise period_s --over walker.leg_mass_kg=5:1",
+            "--over walker.leg_mass_kg=5:1: design.over: a block has bounds for walker.leg_mass_kg, [5, 1], that are "
+            "not two numbers, the first below the second",
+        ),
+        ("continuation --over slope_deg --from 2 --to 1", "--to 1: continuation.to: 1.0 must be above `from`, 2"),
+        ("continuation --over foo --from 1 --to 2", "--over foo: continuation.over: foo is not a key of the config"),
+        ("continuation --over slope_deg --from 2 --to 91", "--to 91: continuation.to: slope_deg cannot be 91 deg"),
+        (
+            "robustness --set robustness.to=[walker.hip_mass_kg,foo]",
+            "--set robustness.to=[walker.hip_mass_kg,foo]: robustness.to: foo is not a key of the config",
+        ),
+        ("fixedpoint --set slope_deg=95", "--set slope_deg=95: slope_deg: 95 is out of bounds"),
+    ],
+)
+def test_what_is_wrong_is_told_as_it_was_typed_with_its_reason(command, message, tmp_path):
+    program = [sys.executable, "-m", "walkerlab", *command.split()]
+    done = subprocess.run(program, cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 3
+    assert done.stderr.startswith(f"error: {message}"), done.stderr
+
+
+def test_help_offers_the_models_that_the_schema_allows(tmp_path):
+    for stage, models in (("design", "rigid|contact "), ("robustness", "rigid|contact|both")):
+        done = subprocess.run(
+            [sys.executable, "-m", "walkerlab", stage, "--help"],
+            cwd=tmp_path,
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        assert f"--model {models}" in done.stdout
+
+
+def test_a_config_without_contact_is_shown_the_block_to_add(tmp_path):
+    program = [sys.executable, "-m", "walkerlab", "contact-sim", "-c", "kneed", "--set", "contact=null"]
+    done = subprocess.run(program, cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 3
+    assert "`contact: {stiffness: 8000, damping: 7.2, terrain: plane}`" in done.stderr
+
+
 @pytest.mark.parametrize("stage", ["robustness", "design", "continuation"])
 def test_the_model_that_is_asked_about_is_an_option_that_goes_by_itself(stage, tmp_path):
     command = [sys.executable, "-m", "walkerlab", stage, "--model", "contact", "--dry-run", "--json"]

@@ -1,10 +1,15 @@
 """Runs as configs: what `-c` names, where that runs, and that no result of another config is overwritten."""
 
 import json
+import os
 import re
 import shlex
+import shutil
+from dataclasses import replace
 
 import pytest
+
+from walkerlab.store import artifact
 
 
 def config(toy, path, gravity, name="stone"):
@@ -267,3 +272,73 @@ def test_a_damaged_result_is_called_so_once(toy):
     (toy.folder / "runs" / "paper" / "drop.h5").write_bytes(b"half a file")
     (line,) = (line for line in toy("status", "paper").stdout.splitlines() if line.startswith("drop"))
     assert line.count("damaged") == 1
+
+
+LONG = ("--set", "gravity_m_s2=1.62", "--set", "walker.leg_mass_kg=6.25")
+LONG_AS_LISTED = ["walker.leg_mass_kg=6.25", "gravity_m_s2=1.62"]
+
+
+def test_status_lists_what_was_changed_where_a_name_is_too_short_for_it(toy):
+    folder = run_dir(toy("drop", *LONG, "--json"))
+    assert re.fullmatch(r"runs/paper@walker\.leg_mass_kg-[0-9a-f]{8}", folder)
+    toy("drop")
+    found = json.loads(toy("status", "--json").stdout)["runs"]
+    assert {run["name"]: run["changes"] for run in found} == {"paper": [], folder.removeprefix("runs/"): LONG_AS_LISTED}
+    assert "changed: walker.leg_mass_kg=6.25, gravity_m_s2=1.62" in toy("status", folder).stdout
+    of_all = toy("status").stdout
+    assert "walker.leg_mass_kg=6.25, gravity_m_s2=1.62" in of_all
+    further = run_dir(toy("drop", "-c", folder, "--set", "strides=9", "--json"))
+    assert json.loads(toy("status", further, "--json").stdout)["changes"] == [*LONG_AS_LISTED, "strides=9"]
+    named = run_dir(toy("drop", *LONG, "--name", "moon", "--json"))
+    assert json.loads(toy("status", named, "--json").stdout)["changes"] == LONG_AS_LISTED
+
+
+def test_a_run_under_a_long_name_of_an_older_version_goes_on_under_it(toy):
+    old = "paper@walker.leg_mass_kg=6.25,gravity_m_s2=1.62,strides=9-cd9cca311320"
+    made = run_dir(toy("drop", *LONG, "--json"))
+    (toy.folder / made).rename(toy.folder / "runs" / old)
+    record = toy.folder / "runs" / old / ".run.json"
+    written = {**json.loads(record.read_text()), "run": old}
+    del written["changes"]
+    record.write_text(json.dumps(written))
+    done = json.loads(toy("drop", "-c", old, "--json").stdout)
+    assert (done["run_dir"], done["reused"]) == (f"runs/{old}", True)
+    assert json.loads(toy("roll", "-c", old, "--json").stdout)["run_dir"] == f"runs/{old}"
+    assert "walker.leg_mass_kg=6.25" in toy("status", old).stdout
+
+
+def test_a_provenance_keeps_a_command_whose_names_are_no_text(toy):
+    odd = os.fsdecode(b"r\xff")
+    assert toy("drop", "--runs", odd, "--json").returncode == 0
+    assert "r\\xff" in json.loads(toy("show", "drop", "--runs", odd, "--json").stdout)["provenance"]["command_line"]
+
+
+@pytest.mark.parametrize("config", ["extends: /etc/hostname\n", "stability: {cases: /etc/hostname}\n"])
+def test_a_config_that_a_stranger_stored_with_a_result_opens_no_file(toy, config):
+    toy("drop")
+    path = toy.folder / "runs/paper/drop.h5"
+    stored = artifact.read(path)
+    artifact.write(path, stored, stored.identity, replace(stored.provenance, config=config))
+    done = toy("drop", "-c", "runs/paper/drop.h5")
+    assert done.returncode == 3
+    assert "a config that is stored with a result names a file to be read" in done.stderr
+    assert "hostname" not in done.stderr
+
+
+def test_a_result_of_another_stage_is_not_taken_for_ones_own(toy):
+    toy("drop")
+    (toy.folder / "runs/paper/drop.h5").rename(toy.folder / "runs/paper/roll.h5")
+    rows = json.loads(toy("status", "-c", "paper", "--json").stdout)["stages"]
+    roll = next(row for row in rows if row["stage"] == "roll")
+    assert (roll["state"], roll["why"]) == ("damaged", "damaged: it is a result of drop, not of roll")
+    assert toy("diff", "paper", "paper").returncode == 5
+
+
+def test_diff_warns_of_a_result_that_belongs_to_another_config(toy):
+    toy("drop")
+    toy("drop", "--set", "slope_deg=3")
+    shutil.copy(toy.folder / "runs/paper@slope_deg=3/drop.h5", toy.folder / "runs/paper/drop.h5")
+    done = toy("diff", "paper", "paper@slope_deg=3")
+    assert done.returncode == 0
+    assert "warning: runs/paper/drop.h5 is out of date: slope_rad" in done.stderr
+    assert "warning: runs/paper@slope_deg=3" not in done.stderr

@@ -10,9 +10,12 @@ from pathlib import Path
 import pytest
 
 from walkerlab.config import schema
-from walkerlab.config.files import BUILTIN_FOLDER
+from walkerlab.config.files import BUILTIN_FOLDER, builtin_names
 from walkerlab.config.loader import LoadedConfig, load
+from walkerlab.config.problems import beyond_scope
+from walkerlab.config.reference import keys
 from walkerlab.config.schema import Config, Contact
+from walkerlab.config.walkers import contact_to_add
 from walkerlab.errors import ConfigError
 
 Write = Callable[..., Path]
@@ -117,11 +120,73 @@ def test_a_coupled_part_follows_by_its_weights_in_a_start(loaded: Loaded) -> Non
     assert list(start) == pytest.approx([-0.2, 0.2, 0.1, -0.4, -0.8, -0.7], abs=1e-15)
 
 
+@pytest.mark.parametrize("terrain", ["plane", "after-mid-swing"])
+def test_a_pitch_where_there_are_no_pads_is_doubted(loaded: Loaded, terrain: str) -> None:
+    (doubt,) = loaded(f"contact: {{terrain: {terrain}, pad_pitch: 0.4}}\n").warnings
+    assert f"contact.pad_pitch has no effect on {terrain}" in doubt
+    assert loaded("contact: {terrain: checkerboard, pad_pitch: 0.4}\n").warnings == ()
+
+
 def test_legs_as_long_as_towers_are_doubted(loaded: Loaded) -> None:
     (said,) = loaded("walker: {leg_length_m: 1000, foot_to_mass_m: 500}\n").warnings
     assert said.endswith("mine.yaml:1:10: walker.leg_length_m is 1000 m; lengths are in m, not in mm")
     (said,) = loaded("extends: kneed\nwalker:\n  thigh:\n    length_m: 500\n").warnings
     assert said.endswith("mine.yaml:4:5: walker.thigh.length_m is 500 m; lengths are in m, not in mm")
+
+
+def test_gravity_in_centimetres_is_doubted(loaded: Loaded) -> None:
+    (said,) = loaded("gravity_m_s2: 981\n").warnings
+    assert said.endswith("mine.yaml:1:1: gravity_m_s2 is 981; it is in m/s^2 (9.81 on earth), not in cm/s^2")
+    for gravity in (1.0, 1.62, 9.81, 24.8):
+        assert loaded(f"gravity_m_s2: {gravity}\n").warnings == ()
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("controller: {kp: 1}\n", "walkerlab has no controllers; push_off and walker.hip drive a walker"),
+        ("walker: {controls: 1}\n", "walkerlab has no controllers"),
+        ("type: 3d\n", "walkerlab is planar"),
+        ("walker: {type: 3D}\n", "walkerlab is planar"),
+        ("walker: {type: runner}\n", "walkerlab has no running"),
+        ("walker: {type: quadruped}\n", "walkerlab's walkers have two legs"),
+    ],
+)
+def test_what_walkerlab_is_not_for_is_refused_with_the_reason_and_no_guess(
+    refused: Refused, text: str, why: str
+) -> None:
+    message = refused(text)
+    assert f"; {why}" in message
+    assert "did you mean" not in message
+
+
+def test_no_key_and_no_built_in_config_sounds_as_if_it_were_beyond_scope() -> None:
+    names = {part for key in keys() for part in key.key.split(".")}
+    assert [name for name in (*names, *builtin_names()) if beyond_scope(name)] == []
+
+
+def test_the_place_of_an_error_in_a_question_is_that_of_its_key(loaded: Loaded) -> None:
+    config = loaded("robustness:\n  to: [walker.hip_mass_kg, foo]\n")
+    error = config.placed(ConfigError("robustness.to: foo is no key", "advice", ("robustness", "to", 1)))
+    assert error.message.endswith("mine.yaml:2:28: robustness.to: foo is no key")
+    elsewhere = ConfigError("of no key")
+    assert config.placed(elsewhere) is elsewhere
+    assert config.placed(ConfigError("of a default", "", ("design", "over"))).message == "of a default"
+
+
+@pytest.mark.parametrize(
+    ("name", "terrain"), [("kneed", "plane"), ("parts", "plane"), ("round-feet", "after-mid-swing")]
+)
+def test_the_contact_block_that_is_advised_is_the_papers_by_mass_and_can_be_added(
+    loaded: Loaded, name: str, terrain: str
+) -> None:
+    without = loaded(f"extends: {name}\ncontact: null\n").config
+    contact = loaded(f"extends: {name}\n{contact_to_add(without.walker)}\n").config.contact
+    built_in = load(Path(name)).config.contact
+    assert contact is not None
+    assert built_in is not None
+    assert contact.terrain == terrain
+    assert (contact.stiffness, contact.damping) == pytest.approx((built_in.stiffness, built_in.damping), rel=5e-3)
 
 
 def test_the_papers_own_start_stands_on_its_slope_and_nothing_is_said(loaded: Loaded) -> None:
@@ -273,7 +338,7 @@ def test_a_key_of_another_type_is_told_with_those_of_its_own(refused: Refused) -
 
 def test_a_leg_length_that_the_parts_have_not_is_refused_with_the_one_they_have(refused: Refused) -> None:
     message = refused("extends: parts\n", ["walker.leg_length_m=1.2"])
-    assert "1:21: walker.leg_length_m: 1.2 is not what the parts have" in message
+    assert "--set walker.leg_length_m=1.2: walker.leg_length_m: 1.2 is not what the parts have" in message
     assert "it is 1 m" in message
     arcs = [f"{{body: shank {leg}, centre_m: [0.02, -0.45], radius_m: 0.1}}" for leg in (1, 2)]
     assert "it is 1.05 m" in refused("extends: parts\n", [f"walker.feet=[{', '.join(arcs)}]"])

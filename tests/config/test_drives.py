@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from walkerlab.config.drives import Hip, drives_of
+from walkerlab.config.drives import Hip, acting_on, drives_of, springs_of
 from walkerlab.config.loader import load
 from walkerlab.errors import ConfigError
 
@@ -31,12 +31,12 @@ def test_what_cannot_drive_a_walker_is_refused_in_words(asked):
 @pytest.mark.parametrize("name", ["paper", "round-feet", "kneed", "parts"])
 def test_walkers_of_every_type_are_driven(name):
     sets = (PUSH, "walker.hip.spring_N_m_per_rad=0.01", "walker.hip.damping_N_m_s_per_rad=0.02")
-    assert drives_of(load(Path(name)).config) == ()
-    assert drives_of(load(Path(name), sets).config) == (
-        "a push-off of 0.1 N s", "a hip spring of 0.01 N m/rad", "a hip damper of 0.02 N m s/rad"
-    )  # fmt: skip
+    assert acting_on(load(Path(name)).config) == ()
+    driven = load(Path(name), sets).config
+    assert drives_of(driven) == ("a push-off of 0.1 N s",)
+    assert springs_of(driven) == ("a hip spring of 0.01 N m/rad", "a hip damper of 0.02 N m s/rad")
 
 
 @pytest.mark.parametrize("number", Hip.model_fields)
 def test_every_number_of_the_hip_is_told_in_words(number):
-    assert len(drives_of(load(Path("paper"), (f"walker.hip.{number}=0.01",)).config)) == 1
+    assert len(acting_on(load(Path("paper"), (f"walker.hip.{number}=0.01",)).config)) == 1

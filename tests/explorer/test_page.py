@@ -114,6 +114,52 @@ def test_any_other_key_is_found_and_turned(page):
     assert "No key" in page.evaluate("document.getElementById('found').textContent")
 
 
+def test_enter_takes_the_only_hit_of_a_search(page):
+    page.evaluate("document.getElementById('search').focus()")
+    page.call("Input.insertText", text="gravity_m")
+    page.press("Enter", 13)
+    assert page.evaluate("document.activeElement.id") == "turn-gravity_m_s2"
+
+
+def test_an_answer_that_arrives_leaves_alone_what_is_being_typed(page):
+    page.evaluate(
+        "(async () => { const late = settle(); window.typing = rows.get('slope_deg').text; typing.focus();"
+        " typing.value = '2.'; await late; })()"
+    )
+    assert page.evaluate("typing.value") == "2."
+    page.call("Input.insertText", text="5")
+    page.evaluate("typing.blur()")
+    page.until(f"{SHOWN} === 'Shown: paper with slope_deg 2.5'")
+
+
+def test_an_answer_about_older_values_is_not_put_over_newer_ones(page):
+    first, value = page.evaluate(
+        "(async () => { turn('slope_deg', 3, false); const late = settle(), first = rows.get('slope_deg').number.start;"
+        " turn('slope_deg', first, false); await late; return [first, Number(rows.get('slope_deg').text.value)]; })()"
+    )
+    assert value == pytest.approx(first, rel=1e-6)
+    page.until(f"{SHOWN} === 'Shown: paper'")
+
+
+def test_the_camera_follows_what_still_walks(page):
+    """The first minutes of the lesson of docs/explore.md: on pads of equal length the contact model trips."""
+    typed(page, "slope_deg", "4.7")
+    page.until(f"{SHOWN} === 'Shown: paper with slope_deg 4.7' && {STATE} === 'shown'")
+    ends = page.evaluate("['simulate', 'contact-sim'].map((stage) => shown.answer[stage].touch_times_s.at(-1) ?? 0)")
+    assert max(ends) > 7 > 3 > min(ends)
+    for time in (3, 5, 7):
+        page.evaluate(
+            f"(() => {{ const s = document.querySelector('.time'); s.value = {time};"
+            " s.dispatchEvent(new Event('input')); })()"
+        )
+        walks = "Rigid" if ends[0] > ends[1] else "Contact"
+        [x, width] = page.evaluate(
+            f"(() => {{ const hip = player.walk.points.find(({{ said }}) => said.startsWith('{walks} model, hip'));"
+            " return [hip.at[0], player.walk.width]; })()"
+        )
+        assert x == pytest.approx(width / 2, abs=0.1 * width)
+
+
 def test_gaits_along_the_number_are_drawn_and_a_click_goes_there(page):
     page.until("along.series?.length > 0")
     page.evaluate("along.cursor.scrollIntoView()")

@@ -229,6 +229,14 @@ def test_gaits_along_a_number_are_those_of_the_continuation(served):
     assert 0.9 * limit < max(stable) <= limit
 
 
+def test_walks_that_settle_on_an_attractor_are_no_branch_of_gaits(served):
+    """The page itself asks for gaits of one step alone, of which there are no attractors."""
+    span = {"over": "slope_deg", "from": 0.86, "to": 0.87, "points": 4, "periods": 2}
+    block = {f"continuation.{key}": value for key, value in span.items()}
+    status, said = served.asked("/api/along", {"config": "simplest", "set": block})
+    assert (status, {curve["model"] for curve in said["curves"]}) == (200, {"rigid"})
+
+
 def test_gaits_that_nobody_waits_for_any_more_are_dropped_and_their_worker_kept(served):
     span = {"over": "slope_deg", "from": 0.5, "to": 5.0, "points": 200, "periods": 1, "model": "contact"}
     block = {f"continuation.{key}": value for key, value in span.items()}
@@ -307,6 +315,30 @@ def test_a_report_that_is_being_made_ends_with_the_server(tmp_path):
         assert one.process.wait(10) == 130
         assert time.monotonic() - began < 2
         assert not at_work_for(tmp_path)
+    finally:
+        one.close()
+
+
+def test_a_report_that_is_being_made_ends_with_a_server_that_is_killed(tmp_path):
+    one = Served(tmp_path)
+    assert one.asked("/api/job", {"kind": "report"})[0] == 200
+    while not at_work_for(tmp_path):
+        time.sleep(0.05)
+    one.close()
+    deadline = time.monotonic() + 5
+    while at_work_for(tmp_path):
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+
+
+def test_a_question_after_an_idle_worker_died_is_answered(tmp_path):
+    one = Served(tmp_path)
+    try:
+        for slope in (2, 2.1):
+            for file in workers_of(one.process.pid):
+                os.kill(int(file.parts[2]), signal.SIGKILL)
+            status, said = one.walk({"slope_deg": slope})
+            assert (status, said["simulate"]["outcome"]) == (200, "walked")
     finally:
         one.close()
 

@@ -25,7 +25,7 @@ RUNS = (
 
 def rows():
     made = [
-        MethodRow("rigid", method, tolerance, outcome, error, "dop853", False, wall_s, wall_s, 1, work, work, 0)
+        MethodRow("rigid", method, tolerance, outcome, error, "dop853", False, wall_s, wall_s, wall_s, 1, work, work, 0)
         for method, tolerance, outcome, error, wall_s, work in RUNS
     ]
     return rows_group(made, labels_of(MethodRow))

@@ -1,6 +1,7 @@
 """What leaves a run for use elsewhere: figures, tables, trajectories, films."""
 
 import csv
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -23,9 +24,9 @@ from walkerlab.figures import illustration
 from walkerlab.figures.style import WIDTH
 from walkerlab.pipeline.graph import PIPELINE
 from walkerlab.pipeline.progress import Silent
-from walkerlab.report.tables import in_tex
+from walkerlab.report.tex import in_tex
 from walkerlab.stages import plot
-from walkerlab.store.artifact import write
+from walkerlab.store.artifact import read, write
 from walkerlab.store.content import Content
 from walkerlab.store.provenance import begin
 from walkerlab.store.runfolder import Record, RunFolder
@@ -138,11 +139,10 @@ def test_a_trajectory_as_netcdf_opens_without_a_group(run):
 
 def test_a_table_for_latex_guards_its_letters(run):
     text = export_from(run, "table-3", Target("tex", None), 516.0, "", QUIET).read_text()
-    assert r"$t_\mathrm{left}$ & s & $0.7$ \\" in text
+    assert r"left step period, $t_\mathrm{left}$ (s) & 0.70000 \\" in text
     assert in_tex("x_p, dtheta_1") == r"$x_p$, $\dot{\theta}_1$"
     assert in_tex("θ̇₁ (rad/s)") == r"$\dot{\theta}_{1}$ (rad/s)"
     assert in_tex("end_time_s") == r"end\_time\_s"
-    assert in_tex(1.5e-9) == r"$1.5 \times 10^{-9}$"
     assert in_tex("50 %") == r"50 \%"
     assert in_tex("m/s^2, 10^-4") == "m/s$^{2}$, 10$^{-4}$"
 
@@ -250,3 +250,32 @@ def test_a_damaged_result_is_told_from_python_too(run):
     assert "compare" in opened.stages
     with pytest.raises(StaleError, match=r"compare\.h5 is damaged"):
         opened.result("compare")
+
+
+def test_an_export_writes_over_no_result(run):
+    before = run.artifact("simulate").read_bytes()
+    for owned in ("simulate.h5", "later.h5", ".run.json"):
+        with pytest.raises(ConfigError, match="belongs to the results of the run"):
+            export_from(run, "trajectory", Target("csv", run.path / owned), WIDTH, "simulate", QUIET)
+    assert run.artifact("simulate").read_bytes() == before
+    assert export_from(run, "trajectory", Target("csv", run.path / "mine.csv"), WIDTH, "simulate", QUIET).is_file()
+
+
+def test_what_is_exported_of_an_outdated_result_comes_with_a_warning(run, capsys):
+    export_from(run, "trajectory", Target("csv", None), WIDTH, "simulate", Console())
+    assert f"warning: {run.artifact('simulate')} is out of date: " in capsys.readouterr().err
+
+
+def test_a_film_of_an_older_result_is_refused_in_words_where_it_lacks_what_is_drawn(run):
+    stored = read(run.artifact("simulate"))
+    known = {key: value for key, value in stored.identity.config_slice.items() if key != "push_off"}
+    write(run.artifact("simulate"), stored, replace(stored.identity, config_slice=known), stored.provenance)
+    with pytest.raises(StaleError, match=r"simulate\.h5 is outdated and lacks 'push_off'") as caught:
+        write_film(run, Target("gif", None), Film("simulate", 1, 5, 1.0), QUIET)
+    assert "walkerlab simulate -c" in caught.value.advice
+
+
+def test_what_there_is_to_export_is_a_list(run):
+    with pytest.raises(ConfigError) as caught:
+        export_from(run, "99", Target(None, None), WIDTH, "simulate", QUIET)
+    assert {"  figure-07", "  trajectory"} <= set(caught.value.advice.splitlines())

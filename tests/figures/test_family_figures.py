@@ -1,6 +1,7 @@
 """What the figures of families of gaits show."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from walkerlab.figures.families import (
     STYLES,
     Curve,
     DrawnBranch,
+    births_in,
     curve_of,
     finely,
     multipliers_of,
@@ -43,6 +45,33 @@ def test_the_same_families_give_the_same_bytes(figure):
 def test_curves_over_two_parameters_are_left_out_where_none_were_asked_for():
     why = FIGURE_16.why_left_out(families(curves=False), {})
     assert why == "continuation: no curves over two parameters (continuation.second)"
+
+
+def test_gaits_that_are_born_in_a_fold_have_their_steps_above_the_axes_and_in_the_caption():
+    results = families()
+    branch = results["continuation"].groups["rigid/branch_1"]
+    kinds = replace(branch.variables["mark_kind"], values=np.array(["fold"]))
+    value = branch.variables["mark_value"]
+    moved = replace(value, values=value.values + 0.3)
+    born = replace(branch, variables=branch.variables | {"mark_kind": kinds, "mark_value": moved}, attrs={"period": 5})
+    assert births_in([DrawnBranch("rigid", born), DrawnBranch("rigid", branch)], (3.0, 5.0)) == [(FLIP + 0.3, 5)]
+    assert births_in([DrawnBranch("rigid", born)], (3.0, 4.0)) == []
+    results["continuation"] = replace(
+        results["continuation"], groups=results["continuation"].groups | {"rigid/branch_1": born}
+    )
+    with styled():
+        figure, _ = FIGURE_13.draw(results)
+    close = figure.axes[1]
+    [above] = close.child_axes
+    assert [label.get_text() for label in above.get_xticklabels()] == ["5"]
+    assert "5 steps at 4.3 deg." in " ".join(FIGURE_13.caption(results).split())
+
+
+def test_in_one_column_the_parts_stand_under_one_another():
+    with styled(3.5):
+        figure, _ = FIGURE_13.draw(families())
+    assert {axes.get_subplotspec().colspan.start for axes in figure.axes} == {0}
+    assert len(figure.axes) == 4
 
 
 def test_a_branch_is_solid_up_to_its_flip_and_dashed_beyond():
@@ -154,8 +183,8 @@ def test_keys_are_words_on_axes():
     for key, unit, said in (
         ("walker.hip_mass_kg", "kg", "hip mass (kg)"),
         ("walker.thigh.mass_below_hip_m", "m", "thigh mass below hip (m)"),
-        ("contact.stiffness", "N/mm^e", "contact stiffness (N/mm$^{e}$)"),
-        ("gravity_m_s2", "m/s^2", "gravity (m/s$^{2}$)"),
+        ("contact.stiffness", "N/mm^e", "contact stiffness (N/mmᵉ)"),
+        ("gravity_m_s2", "m/s^2", "gravity (m/s²)"),
         ("contact.exponent", "1", "contact exponent"),
     ):
         result.summary.update(over=key, unit=unit)

@@ -47,7 +47,7 @@ CASES = [
     if figure.why_left_out(results, {}) is None
     for width in COLUMNS.values()
 ]
-WITH_UNIT = re.compile(r".+ \((deg|m|mm|s|m/s|rad|rad/s|kg|J|N|N/m\$\^\{2\.2\}\$|SI)\)")
+WITH_UNIT = re.compile(r".+ \((deg|m|mm|s|m/s|rad|rad/s|kg|J|N|N/m²·²|SI)\)")
 PURE = re.compile("error|steps?|right-hand sides|(real|imaginary) part|magnitude|factor on .*")
 SMALLEST = 5.0
 """Of letters that are read, pt."""

@@ -8,8 +8,8 @@ from matplotlib.colors import to_hex, to_rgb
 from synthetic_walks import LEG_LENGTH, SLOPE, STEP_LENGTH, both_models, contact, rigid, rigid_alone
 
 from walkerlab.figures.canvas import styled
-from walkerlab.figures.stick_diagram import FIGURE_2, FIGURE_6, entries, pictures, stick_diagram, sticks_of
-from walkerlab.figures.style import LEGS
+from walkerlab.figures.stick_diagram import FIGURE_2, FIGURE_6, entries, film_times, pictures, stick_diagram, sticks_of
+from walkerlab.figures.style import LEGS, VERMILLION
 
 ROUNDING = 1e-12
 
@@ -130,6 +130,31 @@ def test_a_film_of_a_walk_on_pads_shows_them_and_no_plane():
     plane, on_pads = film_frame(result), film_frame(result, result.groups["terrain"])
     tinted = [int((np.ptp(picture, axis=2) > 10).sum()) for picture in (plane, on_pads)]
     assert tinted[1] > tinted[0] + 200
+
+
+def test_a_film_of_a_walk_that_falls_shows_the_fall_and_stays_there_for_a_second():
+    walk = sticks_of(contact(1, outcome="fell"))
+    late = replace(walk, time=walk.time * 1.5)  # after the last landing it goes on
+    times = film_times(late, None, 25, 1.0)
+    assert times[-25:].tolist() == [late.time[-1]] * 25
+    assert film_times(late, 1, 25, 1.0)[-1] < late.strikes[0]  # the first step alone was asked for
+    assert film_times(replace(late, ending=""), None, 25, 1.0)[-1] < late.time[-1]
+    falling, fallen = pictures(late, late.time[-1:] * np.array([0.999, 1.0]))
+    assert (falling != fallen).any()  # the clock says that it fell
+
+
+def test_a_film_of_a_long_walk_that_falls_begins_four_steps_before():
+    walk = replace(sticks_of(both_models()["simulate"]), ending="fell")
+    assert film_times(walk, None, 25, 1.0)[0] == walk.strikes[-5] if walk.strikes.size > 4 else 0.0
+
+
+def test_a_film_draws_rough_ground_once_more_so_high_that_it_is_seen():
+    begins, rough = np.array([-1.0, 0.2, 0.6]), np.array([0.0, 0.002, -0.001])
+    even, uneven = (film_frame(rigid(), ground=(begins, heights)) for heights in (0.0 * rough, rough))
+    red = np.round(255.0 * np.array(to_rgb(VERMILLION))).astype(np.uint8)
+    rows = [np.flatnonzero((picture == red).all(axis=2).any(axis=1)) for picture in (even, uneven)]
+    assert rows[0].size == 0
+    assert np.ptp(rows[1]) > 20
 
 
 def test_the_leg_behind_pushes_off_just_after_each_landing():

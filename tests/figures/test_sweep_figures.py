@@ -6,7 +6,7 @@ import pytest
 from walkerlab.errors import ConfigError
 from walkerlab.figures.canvas import styled
 from walkerlab.figures.maps import is_logarithmic
-from walkerlab.figures.sweep import choose, illustration, lines, maps
+from walkerlab.figures.sweep import choose, illustration, lines, maps, one_over_another
 from walkerlab.store.content import Group, Variable
 from walkerlab.sweeps.drawing import refuse_unheard
 
@@ -83,6 +83,24 @@ def test_pictures_of_walks_begin_with_the_last_steps_period_and_length():
 
 
 def test_a_name_that_no_first_result_has_is_refused_and_headlines_and_nested_ones_are_not():
-    refuse_unheard("contact-sim", ["steps", "last_step_period_s", "gaits.3.period_s"], ["steps"])
-    with pytest.raises(ConfigError, match="--show nonsense: no such number"):
-        refuse_unheard("contact-sim", ["nonsense"], ["steps"])
+    known = ("steps", "last_step_period_s", "gaits.3.period_s")
+    refuse_unheard("contact-sim", {f"--show {name}": name for name in known}, ["steps"])
+    with pytest.raises(ConfigError, match="--show nonsense: no such quantity"):
+        refuse_unheard("contact-sim", {"--show nonsense": "nonsense"}, ["steps"])
+
+
+def test_one_quantity_is_drawn_over_another():
+    x = Variable(np.arange(3.0), ("x",), "1", "x")
+    speed, cost = np.array([0.2, 0.5, 0.4]), np.array([0.03, 0.01, 0.02])
+    words = Variable(np.array(["answered"] * 3, object), ("x",), "", "status")
+    group = Group({
+        "x": x, "status": words, "outcome": words,
+        "speed_m_s": Variable(speed, ("x",), "m/s", "speed"), "cost_of_transport": Variable(cost, ("x",), "1", "cost"),
+    })  # fmt: skip
+    with styled():
+        axes = one_over_another(group, ("x",), ["cost_of_transport"], "speed_m_s").axes[0]
+    (curve,) = axes.lines
+    np.testing.assert_array_equal((curve.get_xdata(), curve.get_ydata()), (speed, cost))
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("speed (m/s)", "cost of transport")
+    made = illustration(group, "fixedpoint", ["x"], ("x",), ["cost_of_transport"], "speed_m_s").drawn({})
+    assert made.caption.startswith("Cost over speed, for values of x: 3 answered.")

@@ -19,7 +19,13 @@ from walkerlab.figures.measures import drawn, of_parts, of_type, upright
 ROOT = Path(__file__).parents[2]
 SCRIPT = runpy.run_path(str(ROOT / "scripts" / "draw_walkers.py"))
 WORDS = re.compile(r"<text[^>]*>(.*?)</text>", re.DOTALL)
-KNEED = Kneed(type="kneed", foot_radius_m=0.1, shank={"mass_ahead_m": 0.03}, thigh={"mass_ahead_m": 0.02})
+KNEED = Kneed(
+    type="kneed",
+    foot_radius_m=0.1,
+    foot_centre_ahead_m=0.04,
+    shank={"mass_ahead_m": 0.03},
+    thigh={"mass_ahead_m": 0.02},
+)
 
 
 def words(picture):
@@ -48,6 +54,7 @@ def test_every_length_of_the_walker_is_named_with_its_value():
     for limb, keys in (("thigh", ("mass_below_hip_m",)), ("shank", ("mass_below_knee_m",))):
         for key in ("length_m", "mass_kg", "mass_ahead_m", *keys):
             assert f"{limb}.{key}: {getattr(getattr(KNEED, limb), key):g}" in shown
+    assert "foot_centre_ahead_m: 0.04" in shown
 
 
 @pytest.mark.parametrize("walker", [KNEED, StraightLegs(type="straight-legs", foot_centre_ahead_m=0.02)])
@@ -80,6 +87,8 @@ OF_TYPES = (
     ("round-feet", ["walker.leg_mass_below_hip_m=0.02", "walker.foot_centre_ahead_m=-0.05"]),
     ("paper", ["walker.foot_to_mass_m=0.02", "walker.foot_radius_m=0.01"]),
     ("kneed", ["walker.thigh.length_m=0.4", "walker.shank.length_m=0.42", "walker.shank.mass_ahead_m=0.02"]),
+    ("kneed-round-feet", ["walker.foot_centre_ahead_m=0.05"]),
+    ("kneed", ["walker.foot_centre_ahead_m=0.05"]),
     ("kneed", ["walker.thigh.mass_below_hip_m=0.0123", "walker.thigh.mass_ahead_m=0.0312",
                "walker.shank.inertia_kg_m2=0.0123", "walker.shank.mass_below_knee_m=0.4567"]),
 )  # fmt: skip

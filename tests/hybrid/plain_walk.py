@@ -389,6 +389,18 @@ def set_level(walker, levels, side, foot, level, y):
     return held
 
 
+@inner
+def next_level(walker, done):
+    """Height (m) of the swing foot's next foothold."""
+    return walker.heights[min(done + 1, walker.heights.size - 1)]
+
+
+@inner
+def changes_level(walker, levels, done, foot):
+    """Whether the ground for a foot that comes ahead on a plane has yet to take the height of its next foothold."""
+    return walker.terrain != CHECKERBOARD and levels[foot] != next_level(walker, done)
+
+
 @njit
 def take_steps(walker, y, h, hinged, diary):
     """Walk from y, foot 1 standing, `hinged` or not (-1), until the diary is full or the walk ends.
@@ -508,24 +520,24 @@ def take_steps(walker, y, h, hinged, diary):
         along = np.array([x0, x1])
         if event == PASSING:
             side[PASSING] = -side[PASSING]
-            swing = 1 - stance
-            if uneven and walker.terrain != CHECKERBOARD and (side[PASSING] > 0.0) == (swing == 1):
-                level = walker.heights[min(done + 1, walker.heights.size - 1)]
-                held = set_level(walker, levels, side, swing, level, y)
-                if has_ground[swing] and done < steps:
-                    lost[EDGES] += held
-                has_ground[swing] = side[3 * swing] > 0.0
-                if not has_ground[swing] and walker.terrain == PLANE:
-                    outcome = STUBBED
-                    break
-                continue
+            swing, swing_above = 1 - stance, False
             for foot in range(2):
                 _, height, _, vertical_velocity, _ = foot_at(walker, foot, y)
                 height -= levels[foot]
                 # equal legs of a hinged step pass each other on the ground: rounding neither lifts a foot nor holds one
                 above = height > ROUNDING or (height > -ROUNDING and vertical_velocity > 0.0)
+                if foot == swing:
+                    swing_above = above
                 if walker.terrain == AFTER_MID_SWING and above and foot != stance:
                     has_ground[foot] = (side[PASSING] > 0.0) == (foot == 1)
+            ahead = (side[PASSING] > 0.0) == (swing == 1)
+            # the next foothold counts, unless the foot stands in the ground
+            if ahead and (swing_above or not has_ground[swing]) and changes_level(walker, levels, done, swing):
+                set_level(walker, levels, side, swing, next_level(walker, done), y)
+                has_ground[swing] = side[3 * swing] > 0.0
+                if not has_ground[swing] and walker.terrain == PLANE:
+                    outcome = STUBBED
+                    break
             continue
         foot, kind = event // 3, event % 3
         other = 1 - foot
@@ -556,6 +568,12 @@ def take_steps(walker, y, h, hinged, diary):
                 leaving[foot] = False
             if walker.terrain == AFTER_MID_SWING and foot != stance:
                 has_ground[foot] = (side[PASSING] > 0.0) == (foot == 1)
+            if foot != stance and (side[PASSING] > 0.0) == (foot == 1) and changes_level(walker, levels, done, foot):
+                set_level(walker, levels, side, foot, next_level(walker, done), y)
+                has_ground[foot] = side[3 * foot] > 0.0
+                if not has_ground[foot] and walker.terrain == PLANE:
+                    outcome = STUBBED
+                    break
             continue
         if not has_ground[foot]:
             continue

@@ -82,3 +82,16 @@ def test_a_ladder_of_methods_is_measured_by_its_errors_alone(nothing_explained):
     ground, start = scene.ground, start_state(scene, FIXED_POINT)
     trial = ContactTrial(scene.walker, ground, start, 1, "contact")
     assert trial.prepare("radau5", 1e-3, 100_000)().outcome == "walked"
+
+
+def test_the_balance_of_a_walk_by_dop853_closes_far_within_what_its_tolerance_explains():
+    """A rule of order 5 on steps of order 8 left two hundredths here, and more than the whole on bouncing feet."""
+    walk = contact_walks.walked(steps=3, method="dop853")
+    assert walk.energy_balance_residual_J < 1e-3 * walk.explained_residual_J
+
+
+def test_a_stiff_walk_that_exhausts_dop853_is_advised_to_take_radau5():
+    walk = contact_walks.walked(steps=3, method="dop853", budget=3000)
+    assert walk.outcome is Outcome.BUDGET_EXHAUSTED
+    assert "solver.contact.method to radau5" in walk.advice
+    assert "rtol" not in walk.advice

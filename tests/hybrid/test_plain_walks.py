@@ -44,6 +44,11 @@ def test_so_does_one_over_footholds_of_drawn_heights(campaign, seed):
     assert max(error for judged in one.judged[1:] for error in judged.error.values()) < 1e-4
 
 
+@pytest.mark.parametrize(("kind", "seed"), [("passing", 1), ("passing", 5), ("explicit", 0)])
+def test_so_do_slow_starts_on_uneven_planes_and_bouncing_feet_by_dop853(campaign, kind, seed):
+    assert campaign.compare(campaign.WALKERS[kind](seed), steps=1).wrong == []
+
+
 def test_the_walks_of_the_short_campaign_are_on_every_ground(campaign):
     grounds = {campaign.both(seed).ground for seed in SEEDS}
     assert {f"paper, {terrain}, {stance}" for terrain in campaign.TERRAINS for stance in ("free", "pinned")} <= grounds

@@ -4,13 +4,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
+from plain_rigid_walk import foot_of, plain_walk
 
 from walkerlab.config.ground import Footholds
 from walkerlab.config.loader import load
 from walkerlab.hybrid.recorded_walk import take_walk
-from walkerlab.mechanics import impact
-from walkerlab.mechanics.standing import BENT, NO_SHANK, STANCE, STRAIGHT, SWING, Mode
+from walkerlab.mechanics.standing import STANCE, SWING
 from walkerlab.orbits.fixed_point import find_gaits
 from walkerlab.orbits.shooting import EXACT, SMALL, Shooting, coordinates_of, section_of
 from walkerlab.outcome import Outcome
@@ -18,7 +17,6 @@ from walkerlab.scene.contact import contact_scene, start_state
 from walkerlab.scene.footholds import foothold_heights
 from walkerlab.scene.rigid import rigid_walker
 from walkerlab.solvers.registry import Tolerances
-from walkerlab.solvers.system import derivative
 
 TIGHT = Tolerances("dop853", 1e-12, 1e-13, 10**7)
 ON_GROUND = Tolerances("radau5", 1e-8, 1e-10, 10**7)
@@ -38,62 +36,65 @@ def heights_of(walker, seed, steps, share=2e-4):
 # ---- rigid model ---------------------------------------------------------------------------------------------------
 
 
-def foot_of(walker, y):
-    """Ahead of and over the present contact point (m), by the levers' definition."""
-    psi = np.array(y[: len(walker.arm_x)]) + walker.slope
-    return (
-        float(np.cos(psi) @ walker.foot_x - np.sin(psi) @ walker.foot_y),
-        float(np.sin(psi) @ walker.foot_x + np.cos(psi) @ walker.foot_y),
-    )
-
-
-def plain_walk(walker, y, heights):
-    """Times and states after heel strikes, each swing by a library's method with one event for each of its ends."""
-    n, t, seen = len(walker.arm_x), 0.0, []
-    for rise in np.diff(heights):
-        phases = (BENT, STRAIGHT) if walker.shank != NO_SHANK else (STRAIGHT,)
-        for phase in phases:
-            system = Mode(walker, phase)
-
-            def rate(_t, y, system=system):
-                f = np.zeros(2 * n)
-                derivative(system, 0.0, y, f)
-                return f
-
-            def strike(_t, y, rise=rise):
-                ahead, height = foot_of(walker, y)
-                return height - rise if ahead > 0.0 else 1.0
-
-            def knee(_t, y):
-                return y[walker.shank] - y[walker.thigh]
-
-            event = knee if phase == BENT else strike
-            event.terminal, event.direction = True, 1 if phase == BENT else -1
-            # a knee has just been released, a foot stands beside the other's contact: none is the next event
-            begun = (
-                solve_ivp(rate, (0.0, 1e-3), y, "DOP853", rtol=1e-12, atol=1e-13).y[:, -1] if phase == phases[0] else y
-            )
-            late = 1e-3 if phase == phases[0] else 0.0
-            swing = solve_ivp(rate, (late, 10.0), begun, "DOP853", events=event, rtol=1e-12, atol=1e-13)
-            assert swing.t_events[0].size, "neither knee nor heel strikes"
-            y, t = swing.y[:, -1], t + swing.t[-1]
-            new = np.zeros(2 * n)
-            (impact.knee_strike if phase == BENT else impact.heel_strike)(walker, y, new)
-            y = new
-        seen.append((t, *y))
-    return np.array(seen)
-
-
 @pytest.mark.parametrize("name", WALKERS)
 def test_rigid_walk_over_random_heights_is_that_of_a_library(name):
     _, walker, gait = gait_of(name)
     heights = heights_of(walker, 5, 5)
     walk = take_walk(walker, TIGHT, gait.state, 5, heights=heights)
     assert walk.outcome is Outcome.WALKED
-    plain = plain_walk(walker, np.array(gait.state), heights)
+    plain, outcome, _ = plain_walk(walker, np.array(gait.state), heights)
+    assert outcome is Outcome.WALKED
     np.testing.assert_allclose(walk.touch_time_s, plain[:, 0], rtol=0.0, atol=1e-8)
     np.testing.assert_allclose(walk.after, plain[:, 1:], rtol=0.0, atol=1e-7)
     assert walk.energy_balance_residual < 1e-8 * walker.mass * walker.gravity * walker.leg_length
+
+
+ROUND_FEET_UPHILL = (
+    "gravity_m_s2=10.366",
+    "slope_deg=-0.36498",
+    "push_off.impulse_N_s=1.0814",
+    "walker={type: straight-legs, leg_length_m: 0.97194, leg_mass_kg: 5.2396, leg_mass_below_hip_m: 0.36637, "
+    "leg_mass_ahead_m: -0.0012931, leg_inertia_kg_m2: 0.023407, hip_mass_kg: 0.0, foot_radius_m: 0.17015, "
+    "torso: {mass_kg: 4.9067, above_hip_m: 0.29383}, hip: {spring_N_m_per_rad: 6.8532, torque_N_m: 1.332}}",
+)
+FEET_TOGETHER = (
+    -0.12694069585151044,
+    0.13968090125936825,
+    0.006370102703928905,
+    -0.47726602005185587,
+    -0.3848651668375102,
+    -0.43106559344468304,
+)
+
+
+def test_a_backward_landing_ends_the_walk_as_fell_and_is_no_step():
+    """The foot comes down 2 mm ahead of the other, which has rolled back by 8 mm."""
+    walker = rigid_walker(load(Path("rigid-only"), ROUND_FEET_UPHILL).config)
+    heights = np.array([0.0, 0.403e-3, 0.907e-3])
+    plain, _, ahead = plain_walk(walker, np.array(FEET_TOGETHER), heights[:2])
+    rolled_back = walker.radius * (plain[0, 1] - FEET_TOGETHER[STANCE])
+    assert 0.0 < ahead[0] < 3e-3 < rolled_back
+    walk = take_walk(walker, TIGHT, FEET_TOGETHER, 2, heights=heights)
+    assert (walk.outcome, walk.steps) == (Outcome.FELL, 0)
+    assert walk.end_time_s == pytest.approx(plain[0, 0], abs=1e-8)
+
+
+@pytest.mark.parametrize(("name", "share", "seed"), [("level", 1e-3, 8), ("level", 1e-3, 47), ("slope-3deg", 8e-3, 14)])
+def test_a_foot_that_lands_less_than_a_quarter_of_the_gaits_step_ahead_is_no_step(name, share, seed):
+    _, walker, gait = gait_of(name)
+    heights, nearest = heights_of(walker, seed, 5, share), 0.25 * gait.step_length
+    plain, outcome, ahead = plain_walk(walker, np.array(gait.state), heights, nearest)
+    assert outcome is Outcome.FELL
+    assert 0.0 < ahead[-1] < nearest < min(ahead[:-1])
+    walk = take_walk(walker, TIGHT, gait.state, 5, heights=heights, step_length=gait.step_length)
+    assert walk.outcome is Outcome.FELL
+    np.testing.assert_allclose(walk.touch_time_s, plain[:, 0], rtol=0.0, atol=1e-7)
+
+
+def test_a_walk_on_even_ground_has_no_shortest_landing():
+    _, walker, gait = gait_of("slope-3deg")
+    even, judged = (take_walk(walker, TIGHT, gait.state, 3, step_length=length) for length in (None, 1e3))
+    np.testing.assert_array_equal(even.after, judged.after)
 
 
 @pytest.mark.parametrize("name", ["slope-3deg", "kneed", "round-feet"])
@@ -113,6 +114,18 @@ def test_columns_change_over_steps_up_and_down_as_differences_say(name):
         ends = {k: end(z + k * h).strikes.after[-1][: 2 * n] for k in (-2, -1, 1, 2)}
         slope = (8.0 * (ends[1] - ends[-1]) - (ends[2] - ends[-2])) / 12e-4
         np.testing.assert_allclose(columns[:, j], slope, rtol=1e-6, atol=1e-6)
+
+
+def test_gravitys_work_on_uneven_ground_includes_the_change_of_height():
+    """And so does the cost of transport: what the walker descends is spent."""
+    _, walker, gait = gait_of("paper")
+    weight = walker.mass * walker.gravity
+    for height in (-5e-4, 5e-4):
+        walk = take_walk(walker, TIGHT, gait.state, 3, heights=np.array([0.0, 0.0, 0.0, height]))
+        along = walk.touch_along_m[-1]
+        descended = along * np.sin(walker.slope) - height * np.cos(walker.slope)
+        assert walk.driven.gravity == pytest.approx(weight * descended, rel=1e-12)
+        assert walk.driven.cost_of_transport(along) == pytest.approx(descended / along, rel=1e-12)
 
 
 def test_feet_land_at_the_heights_of_their_footholds():
@@ -211,6 +224,104 @@ def test_past_mid_swing_a_foot_is_carried_once_it_has_been_above_its_foothold():
     for height in (0.3, -0.4):
         _, walk = on_terrain("slope-3deg", "after-mid-swing", np.array([0.0, 0.0, height]))
         assert (walk.outcome, walk.steps) == (Outcome.FELL, 1)
+
+
+# ---- feet that pass again, and a foot that the ground lets go late ---------------------------------------------------
+
+SLIDES_BACK = (
+    "walker.leg_length_m=0.54348",
+    "walker.foot_to_mass_m=0.29446",
+    "walker.leg_mass_kg=1.9927",
+    "walker.hip_mass_kg=3.0816",
+    "walker.leg_inertia_kg_m2=0.0",
+    "walker.torso.mass_kg=3.9275",
+    "walker.torso.above_hip_m=0.083685",
+    "walker.torso.inertia_kg_m2=0.077183",
+    "walker.foot_radius_m=0.0",
+    "slope_deg=1.0239",
+    "gravity_m_s2=7.1294",
+    "contact.units=adams",
+    "contact.stiffness=7630.6",
+    "contact.exponent=1.7297",
+    "contact.damping=2.014",
+    "contact.full_damping_penetration=0.028293",
+    "contact.friction=coulomb",
+    "contact.static_friction=0.43271",
+    "contact.dynamic_friction=0.33768",
+    "contact.stiction_velocity=83.315",
+    "contact.friction_velocity=738.19",
+    "contact.terrain=after-mid-swing",
+    "contact.stance=free",
+    "contact.pad_pitch=0.25256840117250196",
+)
+SLIDES_BACK_FROM = (
+    -0.2523760668588472,
+    0.21663521443650732,
+    -0.01787042621116994,
+    -0.5403676726626706,
+    -0.6726384293295232,
+    -0.6065030509960969,
+)
+LETS_GO_LATE = (
+    "walker.leg_length_m=0.91916",
+    "walker.foot_to_mass_m=0.4834",
+    "walker.leg_mass_kg=4.7903",
+    "walker.hip_mass_kg=22.624",
+    "walker.leg_inertia_kg_m2=0.0",
+    "walker.torso.mass_kg=22.695",
+    "walker.torso.above_hip_m=0.061144",
+    "walker.torso.inertia_kg_m2=0.0",
+    "walker.foot_radius_m=0.0",
+    "slope_deg=1.8429",
+    "gravity_m_s2=5.1229",
+    "contact.units=adams",
+    "contact.stiffness=16176.0",
+    "contact.exponent=1.6127",
+    "contact.damping=29.577",
+    "contact.full_damping_penetration=0.24202",
+    "contact.friction=coulomb",
+    "contact.static_friction=1.0917",
+    "contact.dynamic_friction=0.77087",
+    "contact.stiction_velocity=14.551",
+    "contact.friction_velocity=137.92",
+    "contact.terrain=after-mid-swing",
+    "contact.stance=free",
+    "contact.pad_pitch=0.5100936570165115",
+)
+LETS_GO_LATE_FROM = (
+    -0.3133328712460464,
+    0.24900352567603942,
+    -0.0321646727850035,
+    -0.4281380957459881,
+    -0.7019139059117369,
+    -0.5650260008288625,
+)
+
+
+def walk_from(sets, start, steps, heights, tolerances=ON_GROUND):
+    scene = contact_scene(load(None, sets).config, 0.35)
+    return scene.walk(start_state(scene, start), steps, tolerances, heights=heights)
+
+
+@pytest.mark.parametrize("terrain", ["after-mid-swing", "plane"])
+def test_a_foot_that_stands_in_the_ground_as_the_feet_pass_again_is_carried_as_on_even_ground(terrain):
+    """Only a foothold that is never reached is not level."""
+    sets = (*SLIDES_BACK, f"contact.terrain={terrain}")
+    heights = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1e-6])
+    even, uneven = (walk_from(sets, SLIDES_BACK_FROM, 3, each) for each in (None, heights))
+    assert uneven.outcome is even.outcome
+    assert uneven.outcome is not Outcome.SOLVER_FAILED
+    assert uneven.end_time_s == pytest.approx(even.end_time_s, abs=1e-9)
+
+
+def test_an_instant_at_which_the_ground_lets_go_is_found_at_every_tight_tolerance():
+    heights = np.array([0.0, 5.5611e-05, -0.00097804, 0.00096203])
+    walks = (
+        walk_from(LETS_GO_LATE, LETS_GO_LATE_FROM, 3, heights, Tolerances("radau5", 1e-11, atol, 10**7))
+        for atol in (1e-12, 1e-13, 4.641588833612772e-13)
+    )
+    first, *others = (walk.end_time_s for walk in walks)
+    assert others == pytest.approx([first, first], abs=2e-9)
 
 
 # ---- heights -------------------------------------------------------------------------------------------------------

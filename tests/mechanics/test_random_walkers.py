@@ -48,16 +48,22 @@ limbs = st.builds(
 )  # fmt: skip
 
 
-def kneed_of(upper, lower, hip_mass_kg, foot_radius_m, torso):
+def kneed_of(upper, lower, hip_mass_kg, foot_radius_m, foot_ahead_m, torso):
     thigh, shank = dict(upper), dict(lower)
     thigh["mass_below_hip_m"] = thigh.pop("below") * thigh["length_m"]
     shank["mass_below_knee_m"] = shank.pop("below") * shank["length_m"]
     return Kneed(
-        type="kneed", thigh=thigh, shank=shank, hip_mass_kg=hip_mass_kg, foot_radius_m=foot_radius_m, torso=torso
+        type="kneed",
+        thigh=thigh,
+        shank=shank,
+        hip_mass_kg=hip_mass_kg,
+        foot_radius_m=foot_radius_m,
+        foot_centre_ahead_m=foot_ahead_m,
+        torso=torso,
     )
 
 
-kneed = st.builds(kneed_of, limbs, limbs, mass, radius, torsos)
+kneed = st.builds(kneed_of, limbs, limbs, mass, radius, ahead, torsos)
 TYPES = {"compass": compasses, "straight-legs": straight, "kneed": kneed}
 each_type = pytest.mark.parametrize("kind", TYPES)
 

@@ -1,6 +1,7 @@
 """A step of a kneed walker with a torso on the legs' bisector, by Lagrange's equations and SciPy alone.
 
-Masses sit at sums of arms times exp(i theta) in the complex plane, from the stance foot; feet are points. Bodies: swing
+Masses sit at sums of arms times exp(i theta) in the complex plane, from the stance foot; feet are points, perhaps ahead
+of the shank's line. Bodies: swing
 thigh, stance leg, swing shank and torso. Section: stance angle, rates of swing and stance leg just after heel strike.
 """
 
@@ -16,7 +17,7 @@ FIRST_STEP_S = 1e-3
 
 
 class Walker(NamedTuple):
-    """Masses, arms (masses, bodies) from the stance foot, inertias of the bodies, thigh and shank length, SI."""
+    """Masses, arms (masses, bodies) from the stance foot, inertias of the bodies, leg length, lean of its feet, SI."""
 
     masses: np.ndarray
     arms: np.ndarray
@@ -24,21 +25,24 @@ class Walker(NamedTuple):
     leg: float
     gravity: float
     slope: float
+    lean: float
 
 
-def walker_of(thigh, shank, hip_mass, torso, gravity, slope):
+def walker_of(thigh, shank, hip_mass, torso, gravity, slope, foot_ahead=0.0):
     """From (length, mass, below, ahead, inertia) of thigh and shank and (mass, above, inertia) of the torso."""
     upper, _, below_hip, thigh_ahead, _ = thigh
     lower, _, below_knee, shank_ahead, _ = shank
     leg = upper + lower
     arms = np.zeros((6, 4), complex)
-    arms[0:2, 1] = [1j * (leg - below_hip) + thigh_ahead, 1j * (lower - below_knee) + shank_ahead]
-    arms[2:, 1] = 1j * leg  # the hip and all that hangs on it
+    arms[0:2, 1] = -foot_ahead
+    arms[0:2, 1] += [1j * (leg - below_hip) + thigh_ahead, 1j * (lower - below_knee) + shank_ahead]
+    arms[2:, 1] = 1j * leg - foot_ahead  # the hip and all that hangs on it
     arms[3, 3] = 1j * torso[1]
     arms[4, 0], arms[5, 0] = -1j * below_hip + thigh_ahead, -1j * upper
     arms[5, 2] = -1j * below_knee + shank_ahead
     masses = np.array([thigh[1], shank[1], hip_mass, torso[0], thigh[1], shank[1]])
-    return Walker(masses, arms, np.array([thigh[4], thigh[4] + shank[4], shank[4], torso[2]]), leg, gravity, slope)
+    inertias = np.array([thigh[4], thigh[4] + shank[4], shank[4], torso[2]])
+    return Walker(masses, arms, inertias, leg, gravity, slope, np.arctan2(foot_ahead, leg))
 
 
 def mass_matrix(walker, theta):
@@ -70,14 +74,15 @@ def swung(walker, free, y, t, event, longest=10.0):
 
 def step(walker, z):
     """Where z (3,) leads, how long it takes, and when the knee strikes (s)."""
-    swing, stance = -2.0 * walker.slope - z[0], z[0]
-    y = np.array([swing, stance, swing, -walker.slope, z[1], z[2], z[1], 0.5 * (z[1] + z[2])])
+    tilt = 2.0 * (walker.slope + walker.lean)
+    swing, stance = -tilt - z[0], z[0]
+    y = np.array([swing, stance, swing, -0.5 * tilt, z[1], z[2], z[1], 0.5 * (z[1] + z[2])])
 
     def knee(_t, y):
         return y[2] - y[0]
 
     def heel(_t, y):
-        return y[0] + y[1] + 2.0 * walker.slope if y[0] > y[1] else 1.0
+        return y[0] + y[1] + tilt if y[0] > y[1] else 1.0
 
     knee.terminal = heel.terminal = True
     knee.direction, heel.direction = 1.0, -1.0

@@ -5,16 +5,21 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from rigid_physics import heel_strike, potential_energy, rates
+from rigid_physics import heel_strike, potential_energy, rates, torque_work_of_a_step
 from scipy.integrate import solve_ivp
 from test_step_derivatives import AGREEMENT, NEAR_THE_GAIT, RIGID_STEP, STEPS, slope_of, stepped
 
 from walkerlab.config import loader
 from walkerlab.hybrid.recorded_walk import take_walk, with_scaled_rates
+from walkerlab.mechanics.impact import push_off_work
 from walkerlab.mechanics.standing import STANCE, STRAIGHT, SWING, kinetic_energy, on_slope
 from walkerlab.orbits.fixed_point import find_gaits
-from walkerlab.orbits.shooting import EXACT, Shooting, coordinates_of, section_of
+from walkerlab.orbits.gradients import gradients
+from walkerlab.orbits.newton import Effort
+from walkerlab.orbits.robustness import Standpoint
+from walkerlab.orbits.shooting import EXACT, RigidMap, Shooting, coordinates_of, section_of
 from walkerlab.orbits.similarity import unit_walker
+from walkerlab.orbits.step_map import gait_near
 from walkerlab.scene.contact import contact_scene
 from walkerlab.scene.rigid import rigid_walker
 
@@ -134,6 +139,24 @@ def test_a_passive_gaits_cost_of_transport_is_the_slopes_sine(name):
     assert gait.work["gravity"] > gait.work["push_off"] == gait.work["hip"] == 0.0
 
 
+def test_kuos_walker_spends_half_the_square_of_its_push_off_over_its_mass():
+    """Kuo (2002): the push-off comes before the strike, and legs without mass move the hip alone."""
+    config = loader.load(Path("kuo")).config
+    gait = find_gaits(rigid_walker(config)).gait
+    assert gait.work["push_off"] == pytest.approx(0.0176156, abs=5e-8)
+    assert gait.work["push_off"] == pytest.approx(0.5 * 0.1877**2, rel=1e-11)
+    assert gait.cost_of_transport == pytest.approx(0.0253083, abs=5e-8)
+
+
+def test_uphill_what_gravity_takes_is_no_income():
+    walker = on_slope(walker_of("paper", push_off=4.0), -0.005)
+    walk = take_walk(walker, EXACT, find_gaits(walker).gait.state, 2)
+    assert walk.driven.gravity < 0.0
+    spent = walk.driven.push_off / (walk.driven.weight * walk.touch_along_m[-1])
+    assert walk.driven.cost_of_transport(walk.touch_along_m[-1]) == pytest.approx(spent, rel=1e-12)
+
+
+GIVERS = ("gravity", "push_off", "hip")
 DRIVES = {**DRIVEN, "paper": {"push_off": 4.0, "driven_hip": True, "hip": (10.0, 0.0, 0.3)}}
 
 
@@ -145,7 +168,7 @@ def test_the_energies_of_a_driven_walk_balance(name):
     weight = walker.mass * walker.gravity * walker.leg_length
     walk = take_walk(walker, EXACT, gait.state, 4)
     assert walk.energy_balance_residual < 1e-11 * weight
-    assert sum(gait.work.values()) == pytest.approx(walk.lost_in_strikes / 4, rel=1e-9)
+    assert sum(gait.work[name] for name in GIVERS) == pytest.approx(walk.lost_in_strikes / 4, rel=1e-9)
     off = with_scaled_rates(walker, gait.state, 1.01, 1.02)
     assert take_walk(walker, EXACT, off, 2).energy_balance_residual < 1e-11 * weight
 
@@ -159,15 +182,47 @@ def test_a_hips_damper_takes_the_integral_of_its_power():
     assert walk.driven.hip - spring == pytest.approx(damper, rel=1e-3)
 
 
-def test_of_a_hip_torques_work_that_is_spent_which_is_positive():
-    """Against an integral of the sampled power; late in the swing the legs turn back."""
-    walker = on_slope(walker_of("paper", push_off=4.0, driven_hip=True, hip=(10.0, 0.0, 0.3)), 0.0)
-    walk = take_walk(walker, EXACT, find_gaits(walker).gait.state, 1, sampled=True)
-    y, t = walk.samples.state[:-1], walk.samples.time_s[:-1]
-    power = 0.3 * (y[:, 2] - y[:, 3])
-    assert power.min() < 0.0
-    assert walk.driven.forward == pytest.approx(np.trapezoid(np.maximum(power, 0.0), t), rel=1e-3)
-    assert walk.driven.forward > walk.driven.hip
+TURNED = {
+    "paper": {"push_off": 4.0, "driven_hip": True, "hip": (10.0, 0.0, 0.3)},
+    "kneed": {"push_off": 0.2, "driven_hip": True, "hip": (2.0, 0.0, 0.3)},
+    "kneed-round-feet": {"push_off": 0.2, "driven_hip": True, "hip": (0.0, 0.0, 0.15)},
+}
+
+
+@pytest.mark.parametrize("name", TURNED)
+def test_a_hip_torques_positive_work_is_the_integral_of_its_positive_power(name):
+    """Late in the swing the legs turn back; with knees the knee strike reverses the rate between the thighs at once."""
+    walker = on_slope(walker_of(name, **TURNED[name]), 0.0)
+    start = find_gaits(walker).gait.state
+    net, positive = torque_work_of_a_step(walker, start, take_walk(walker, EXACT, start, 1))
+    assert positive > net + 1e-3 * abs(net)
+    for steps in (1, 2, 4, 10):
+        driven = take_walk(walker, EXACT, start, steps).driven
+        assert driven.hip_torque / steps == pytest.approx(net, rel=1e-8)
+        assert driven.hip_torque_positive / steps == pytest.approx(positive, rel=1e-7)
+    assert driven.hip_torque == pytest.approx(driven.hip, rel=1e-9)
+
+
+def test_a_costs_derivative_across_a_knee_strike_is_the_slope_of_independent_costs():
+    """By the hip's spring, of a walker whose knee strike reverses the rate between its thighs."""
+
+    def driven(spring):
+        return on_slope(walker_of("kneed", push_off=0.2, driven_hip=True, hip=(spring, 0.0, 0.3)), 0.0)
+
+    def cost(spring):
+        walker = driven(spring)
+        start = find_gaits(walker).gait.state
+        step = take_walk(walker, EXACT, start, 1)
+        _, positive = torque_work_of_a_step(walker, start, step)
+        return (push_off_work(walker, step.before)[0] + positive) / (walker.mass * walker.gravity * step.lengths_m[0])
+
+    step_map = RigidMap(driven, 1.0, driven(2.0))
+    gait = gait_near(step_map, np.array(find_gaits(driven(2.0)).gait.z), 2.0, Effort(1e-13))
+    at = Standpoint(step_map, 2.0, gait.z, gait.DP, unit_walker(driven(2.0))[1])
+    found = gradients(at, 2.0, ["cost_of_transport"])["cost_of_transport"]
+    slope = (cost(2.02) - cost(1.98)) / 0.04
+    assert found.value == pytest.approx(slope, rel=1e-3)
+    assert found.error < 1e-3 * abs(found.value)
 
 
 HIP = ("walker.hip.spring_N_m_per_rad=10", "walker.hip.damping_N_m_s_per_rad=0.4", "walker.hip.torque_N_m=1.5")

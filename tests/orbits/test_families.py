@@ -395,6 +395,18 @@ def test_a_branch_ends_where_no_walker_has_the_parameters_value():
     assert 12.5 < branch.ends[1].value < 13.0
 
 
+@pytest.mark.parametrize("first", [8.0, 10.0])
+def test_a_span_that_begins_where_the_walkers_do_is_followed_to_its_end(first):
+    def walker_at(mass):
+        return paper_walker(0.05)._replace(hip_mass=mass) if mass >= 8.0 else None
+
+    follower = BranchFollower(map_of(walker_at, 10.0), ValueSpan(8.0, 18.0))
+    branch = follower.family(seeds_at(walker_at, first), 1)[0]
+    assert [(end.value, end.reason) for end in branch.ends] == [(8.0, "end of the span"), (18.0, "end of the span")]
+    assert (branch.values[0], branch.values[-1]) == (8.0, 18.0)
+    assert np.all(np.diff(branch.values) > 1e-3)
+
+
 def test_a_branch_that_ends_in_a_push_off_that_lasts_too_long_says_so():
     assert why_lost(NotConverged(Outcome.REJECTED)) == "its push-off is not over when the feet pass each other"
     assert why_lost(NotConverged(Outcome.FELL)).startswith("fell: ")

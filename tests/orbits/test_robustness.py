@@ -5,10 +5,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from plain_rigid_walk import plain_walk
 
 from walkerlab.config.loader import load
+from walkerlab.hybrid.walk_record import rough_heights
 from walkerlab.mechanics.impact import pushed_at_hip
-from walkerlab.mechanics.standing import energies, momentum
+from walkerlab.mechanics.standing import energies, equations, momentum
 from walkerlab.orbits.fixed_point import find_gaits
 from walkerlab.orbits.gradients import QUANTITIES, gait_numbers, gradients
 from walkerlab.orbits.newton import Effort
@@ -125,6 +127,20 @@ def test_a_push_at_the_hip_keeps_the_foot_and_gives_its_impulse_along_the_hips_l
     assert momentum(walker, pushed)[0] > momentum(walker, y)[0]
 
 
+def test_a_push_at_the_hip_comes_after_the_release_of_the_trailing_knee():
+    """It turns the free shank, whose moment of momentum about its knee stays; the norm is that of another code."""
+    at = standpoint("kneed")
+    walker = at.step_map._unit_at(at.p).walker
+    n, y = len(walker.arm_x), np.array(on_section(walker, at.z))
+    change = (pushed_at_hip(walker, y, 1e-3) - y)[n:]
+    assert abs(change[walker.shank] - change[walker.thigh]) > 1e-4
+    M, r, s, c, F, U = np.zeros((n, n)), *np.zeros((5, n))
+    equations(walker, y, s, c, F, U, M, r)
+    assert abs(M[walker.shank] @ change) < 1e-15
+    in_seconds = sensitivity(at, "hip-push").norm[0]
+    assert in_seconds == pytest.approx(0.621718267, rel=1e-8)
+
+
 # ---- large disturbances --------------------------------------------------------------------------------------------
 
 
@@ -146,6 +162,18 @@ def test_rough_ground_takes_the_compass_as_many_steps_as_is_known():
     seen = rough_walks(np.array([steps_on_rough_ground(at, 2e-3, (0, walk), 5000) for walk in range(200)]), 5000)
     assert seen.method == "all-failed"
     assert abs(seen.mean_steps - 18.4) < 4.0 * math.hypot(seen.standard_error, 0.7)
+
+
+def test_a_foot_that_lands_just_ahead_of_the_other_ends_a_walk_on_rough_ground():
+    """The level compass, 1 mm: its fourth walk comes down once more after a sixth step, by a library's integrator."""
+    at = standpoint("level")
+    walker, units = at.step_map._unit_at(at.p)[:2]
+    length = at.step_map.step(at.z, at.p).length_m / units.length
+    heights = rough_heights(1e-3, (0, 3), 8) / units.length
+    plain, outcome, ahead = plain_walk(walker, np.array(on_section(walker, at.z)), heights, 0.25 * length)
+    assert outcome is Outcome.FELL
+    assert 0.0 < ahead[-1] < 0.25 * length < min(ahead[:-1])
+    assert steps_on_rough_ground(at, 1e-3, (0, 3), 8) == len(plain) == 6
 
 
 def rimless_wheel(deviation_deg, walks, most, seed=0):
@@ -277,3 +305,12 @@ def test_a_walk_that_ends_has_fewer_steps_and_says_how():
     walk = disturbed(at, "floor-drop", 0.2, 3)
     assert walk.outcome is Outcome.FELL
     assert walk.durations_s.size < 3
+
+
+def test_a_gradient_takes_the_step_whose_error_is_small():
+    """Twice the usual step leaves the range over which the level compass's gait changes smoothly with its hip."""
+    at = on_compliant_ground("level", "walker.hip_mass_kg", ("contact.terrain=after-mid-swing",))
+    found = gradients(at, abs(at.p), ("period_s",))["period_s"]
+    assert not found.why
+    assert found.value == pytest.approx(0.00922006, abs=2e-8)
+    assert found.error < 1e-4 * found.value

@@ -70,6 +70,29 @@ def test_newton_from_starts_all_around_and_another_integrator_come_to_the_same_g
     assert (period, knee) == pytest.approx((gait.period, gait.knee_strike), abs=1e-8)
 
 
+def test_a_point_foot_ahead_of_the_shank_takes_the_steps_of_another_integrator():
+    slope, ahead, torso = math.radians(2.5), 0.03, (1.0, 0.4, 0.01)
+    walker = Kneed(
+        type="kneed",
+        thigh={"length_m": 0.46, "mass_kg": 2.345, "mass_below_hip_m": 0.2, "inertia_kg_m2": 0.02},
+        shank={"length_m": 0.54, "mass_kg": 1.013, "mass_below_knee_m": 0.24, "inertia_kg_m2": 0.03},
+        hip_mass_kg=10.0,
+        torso=Torso(**dict(zip(("mass_kg", "above_hip_m", "inertia_kg_m2"), torso, strict=True))),
+        foot_centre_ahead_m=ahead,
+    )
+    found = find_gaits(standing(assembly_of(walker, rigid=True), 9.81, slope)).gaits
+    hand = walker_of(
+        (0.46, 2.345, 0.2, 0.0, 0.02), (0.54, 1.013, 0.24, 0.0, 0.03), 10.0, torso, 9.81, slope, ahead
+    )  # fmt: skip
+    assert found
+    for gait in found:
+        z = np.array([gait.state[1], gait.state[4], gait.state[5]])
+        after, period, knee = step(hand, z)
+        np.testing.assert_allclose(after, z, atol=1e-8)
+        assert (period, knee) == pytest.approx((gait.period, gait.knee_strike), abs=1e-8)
+        assert gait.step_length == pytest.approx(2.0 * math.hypot(1.0, ahead) * math.sin(z[0] + slope + hand.lean))
+
+
 def test_a_knee_that_is_released_into_extension_is_not_caught_by_rounding(found):
     walker, _ = unit_walker(with_torso())
     starts = np.random.default_rng(1).uniform(MIN_START[:3], MAX_START[:3], (2000, 3))

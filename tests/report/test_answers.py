@@ -1,12 +1,16 @@
 """What people read on stdout: a headline in words, symbols and units, digits that count, long rows cut short."""
 
+import csv
+
 import pytest
+from synthetic_results import paper_row
 
 from walkerlab.outcome import Outcome
 from walkerlab.report.answers import ANSWERS, answer, elided, verdict
 from walkerlab.report.gaits import gait_table
 from walkerlab.report.numbers import number
-from walkerlab.report.tables import Column, aligned, as_csv, as_tex, in_lines, measured, side_by_side, table, width
+from walkerlab.report.tables import Column, aligned, as_csv, csv_text, in_lines, measured, side_by_side, table, width
+from walkerlab.report.tex import as_tex
 from walkerlab.report.text import COLUMNS, described_summary
 
 GAIT = {
@@ -51,6 +55,15 @@ def test_multipliers_are_written_as_complex_numbers():
     assert row(lines, "multipliers λ₁") == ["0.3633", "+", "0.4596i"]
     assert row(lines, "λ₂") == ["0.3633", "−", "0.4596i"]
     assert row(lines, "λ₃") == ["0.2160"]
+
+
+def test_an_answer_says_what_drives_a_walker_and_a_spring_does_not():
+    spring = {"driven_by": [], "springs": ["a hip spring of 10 N m/rad"]}
+    head = said(answer("fixedpoint", {**GAIT, **spring}))
+    assert ", with a hip spring of 10 N m/rad, there is a stable gait" in head
+    assert "driven" not in head
+    head = said(answer("fixedpoint", {**GAIT, **spring, "driven_by": ["a push-off of 4 N s"]}))
+    assert ", driven by a push-off of 4 N s, with a hip spring of 10 N m/rad, there is" in head
 
 
 def test_what_is_right_is_named_only_beside_what_is_misprinted():
@@ -216,13 +229,15 @@ def test_columns_line_up_under_letters_with_dots():
 
 
 def test_the_verdict_of_a_run_is_three_paragraphs():
-    numbers = {"verdicts": {"reproduced": 3, "explained": 1}, "paper_numbers": []}
+    rows = [paper_row("Table 1", "m", "5", verdict, "") for verdict in ("input", *("reproduced",) * 3)]
+    numbers = {"verdicts": {}, "paper_numbers": rows}
     cases = {"passed": 5, "failed": 0, "cases": [], "known": []}
-    judged = "5 of 5 extreme cases and known problems came out right."
-    begun = ("On a slope of 0.0174", "The rigid model walks all 20000 steps.", "Of 4 numbers that the paper prints:")
+    judged = "5 of 5 extreme cases and known problems came out as expected."
+    of_the_paper = "Of 4 values that the paper prints 1 is an input, 3 are reproduced,"
+    begun = ("On a slope of 0.0174", "The rigid model walks all 20000 steps.", of_the_paper)
     said = verdict({"fixedpoint": GAIT, "simulate": WALK, "compare": numbers, "stability": cases})
     assert [head for line in said for head in begun if line.startswith(head)] == [*begun]
-    assert " ".join(said).endswith(f"1 explained. {judged}")
+    assert " ".join(said).endswith(f"0 not reproduced. {judged}")
     assert verdict({"compare": {"steps": {}, "outcomes": {}}, "stability": cases}) == [judged]
 
 
@@ -280,6 +295,19 @@ def test_a_terminal_has_no_room_for_sentences_and_a_column_for_the_titles_of_gro
     assert as_csv(shown).decode().splitlines()[:2] == ["family,case,error,why", f"start,slow,0.5,{LONG}"]
 
 
+@pytest.mark.parametrize(
+    ("value", "cell"),
+    [
+        ("=cmd|' /C calc'!A0", "'=cmd|' /C calc'!A0"), ("@SUM(A1)", "'@SUM(A1)"), ("+x", "'+x"),
+        ("-b ahead", "'-b ahead"), ("-2.5e-3", "-2.5e-3"), (-2.5, "-2.5"), ("fell", "fell"), (None, ""),
+    ],
+)  # fmt: skip
+def test_a_text_that_a_spreadsheet_would_compute_begins_with_an_apostrophe_and_a_value_does_not(value, cell):
+    lines = list(csv.reader(csv_text(["case", str(value)], [["a", value]]).decode().splitlines()))
+    assert lines[1] == ["a", cell]
+    assert lines[0] == ["case", cell or "None"]
+
+
 def test_records_side_by_side_have_a_row_for_what_one_of_them_has():
     lines = [measured("period", "period_s"), measured("slip", "slip_m", prefix="m"), measured("torque", "torque_N")]
     shown = side_by_side("", lines, {"rigid": {"period_s": 0.7}, "contact": {"period_s": 0.71, "slip_m": 5e-4}})
@@ -293,4 +321,4 @@ def test_what_is_written_for_people_and_for_programs_comes_from_one_cell():
     shown = table("", [measured("period", "period_s", lambda value: number(value, 2))], [{"period_s": 0.7036}])
     assert in_lines(shown) == ["period (s)", "0.7"]
     assert as_csv(shown) == b"period (s)\n0.7036\n"
-    assert rb"$0.7036$ \\" in as_tex(shown)
+    assert rb"0.70360 \\" in as_tex(shown)

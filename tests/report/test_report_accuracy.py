@@ -18,6 +18,9 @@ def row(method, tolerance, error, wall_s, outcome="walked", scene="rigid"):
         "outcome": outcome,
         "error": error,
         "wall_s": wall_s,
+        "least_wall_s": 0.9 * wall_s,
+        "largest_wall_s": 1.4 * wall_s,
+        "repeats_of_wall_s": 1 if wall_s > 0.1 else 7,
         "rhs_evaluations": 1234,
     }
 
@@ -33,9 +36,24 @@ ROWS = [
 SUMMARY = {
     "rows": ROWS,
     "repeats": 7,
+    "budget": 200_000,
     "reference": {
-        "rigid": {"method": "heyoka-taylor", "second_method": "dop853", "agreement": 9e-16},
-        "contact": {"method": "radau5", "second_method": "dop853", "agreement": 1e-12},
+        "rigid": {
+            "method": "heyoka-taylor",
+            "second_method": "dop853",
+            "agreement": 9e-16,
+            "from_outside": True,
+            "tolerance": 0.0,
+            "rhs_evaluations": 0,
+        },
+        "contact": {
+            "method": "radau5",
+            "second_method": "dop853",
+            "agreement": 1e-12,
+            "from_outside": False,
+            "tolerance": 1e-11,
+            "rhs_evaluations": 1_200_000,
+        },
     },
     "best": {"rigid": {"1e-3": "dop853", "1e-6": "dop853"}, "contact": {"1e-3": "radau5"}},
     "conclusions": {"rigid": "rigid: at 1e-03, dop853 is fastest.", "contact": "contact: at 1e-03, radau5 is fastest."},
@@ -70,9 +88,9 @@ def test_without_the_result_there_is_no_section():
 
 def test_each_method_has_its_least_time_for_each_error_and_its_smallest_error(made):
     costs = tables(made)["Least run time for an error, method by method"]
-    assert costs["rigid", "dop853"][:4] == ["0.05", "0.2", "7 × 10⁻¹⁵", "1,234"]
+    assert costs["rigid", "dop853"][:4] == ["0.05 (0.045 to 0.07)", "0.2 (0.18 to 0.28)", "7 × 10⁻¹⁵", "1,234"]
     assert costs["rigid", "scipy-bdf"][:3] == ["200", "–", "0.0003"]
-    assert costs["contact", "radau5"][:2] == ["5", "50"]
+    assert costs["contact", "radau5"][:2] == ["5 (4.5 to 7)", "50 (45 to 70)"]
 
 
 def test_an_error_below_what_the_reference_is_known_to_is_told_as_a_bound(made):
@@ -106,7 +124,29 @@ def test_the_section_comes_to_the_fastest_methods(made):
 
 
 def test_references_come_with_what_is_known_of_them(made):
-    assert tables(made)["References"]["", "rigid"] == ["heyoka-taylor", "dop853", "9 × 10⁻¹⁶"]
+    assert tables(made)["References"]["", "rigid"] == [
+        "heyoka-taylor",
+        "heyoka, at machine precision",
+        "dop853",
+        "9 × 10⁻¹⁶",
+    ]
+    assert tables(made)["References"]["", "contact"][1] == "ours, at 10⁻¹¹, 1,200,000 right-hand sides"
+
+
+def test_a_reference_of_our_own_is_not_said_to_be_from_outside(made):
+    (note,) = [block.note for block in made.blocks if getattr(block, "caption", "") == "References"]
+    assert "On rigid the reference is heyoka’s, another program" in note
+    assert "On contact both methods are our own" in note
+    assert "scipy-bdf comes nearest on rigid, to 0.0003." in note
+
+
+def test_a_budget_that_is_used_up_is_explained_as_such():
+    used_up = {**SUMMARY, "rows": [*ROWS, row("dop853", 1e-8, None, 0.1, "budget-exhausted", scene="contact")]}
+    made = section(Results(config(), {"accuracy": stored("accuracy", {}, used_up)}))
+    costs = next(block for block in made.blocks if isinstance(block, Table))
+    assert costs.groups["contact"][-1][-1].text == "budget used up at 10⁻⁸"
+    assert "A run may take 200,000 right-hand sides" in costs.note
+    assert "that is the budget’s end, not the method’s" in costs.note
 
 
 def test_what_was_not_run_is_said_once_for_each_reason(made):

@@ -1,9 +1,23 @@
 """The report in a real browser: it asks for nothing, its player plays, every view follows, and no table overflows."""
 
+import html
+import itertools
+from dataclasses import replace
+
 import pytest
 from browser import Browser, executable
-from synthetic_results import EVERYTHING, config, contact_sim, families_that_move, simulate, stored, with_motion
+from synthetic_results import (
+    EVERYTHING,
+    config,
+    contact_sim,
+    families_that_move,
+    plotted,
+    simulate,
+    stored,
+    with_motion,
+)
 
+from walkerlab.config.schema import Source
 from walkerlab.stages.report import write_pages
 
 PATH = executable()
@@ -64,6 +78,58 @@ def test_pages_beside_it_complain_of_nothing_either(browser, folder):
         browser.open(file)
         assert browser.complaints() == []
         assert browser.requests() == [file.as_uri()]
+
+
+HOSTILE = """</script><img src=x onerror="window.harmed = 1">'"><svg onload='window.harmed = 1'>&lt;b&gt;"""
+"""What would run or become an element, if a page took it for markup: in a text, in an attribute, in a script."""
+DRAWING = f"""<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 9 9" onload="window.harmed = 1">
+<script>window.harmed = 1</script><a href="javascript:window.harmed = 1"><text>linked</text></a>
+<image href="file:///etc/passwd"/><path d="M0 0L9 9" onclick="window.harmed = 1" style="fill: url(https://elsewhere)"/>
+<text>{html.escape(HOSTILE)}</text></svg>"""
+
+
+@pytest.fixture(scope="module")
+def hostile_folder(tmp_path_factory):
+    """A report whose every free text, from the config, the results and the figures, is hostile."""
+    folder = tmp_path_factory.mktemp("hostile")
+    source = {
+        "title": HOSTILE,
+        "authors": HOSTILE,
+        "published": HOSTILE,
+        "url": f"https://x/{HOSTILE.replace(' ', '/')}",
+    }
+    asked = config().model_copy(update={"name": HOSTILE, "source": Source(**source)})
+    fallen = simulate("fell", advice=HOSTILE)
+    made = {"fixedpoint": EVERYTHING["fixedpoint"](), "simulate": with_motion(fallen)}
+    made = {name: replace(one, provenance=replace(one.provenance, command_line=HOSTILE)) for name, one in made.items()}
+    figure = {"title": HOSTILE, "caption": HOSTILE, "alt": HOSTILE, "number": 7, "svg": "a.svg", "png": "a.png"}
+    (folder / "a.svg").write_text(DRAWING)
+    (folder / "a.png").write_bytes(b"\x89PNG")
+    made["plot"] = stored("plot", {}, {"figures": [figure]})
+    write_pages(asked, made, folder)
+    return folder
+
+
+def test_hostile_names_sources_and_labels_are_shown_as_text_and_do_nothing(browser, hostile_folder):
+    for file in sorted(hostile_folder.glob("report*.html")):
+        browser.open(file)
+        browser.evaluate("document.querySelectorAll('details').forEach((one) => (one.open = true))")
+        browser.evaluate("document.querySelectorAll('[data-large]').forEach((one) => one.click())")
+        assert browser.evaluate("window.harmed") is None
+        assert (
+            browser.evaluate(
+                "document.querySelectorAll('img, [onerror], [onload], [onclick], svg a, svg script').length"
+            )
+            == 0
+        )
+        assert browser.evaluate("document.scripts.length") == 1
+        assert browser.complaints() == []  # nothing that its policy had to stop
+        assert browser.requests() == [file.as_uri()]
+    browser.open(hostile_folder / "report.html")
+    # as often as it was put in: heading, source, advice, figure, command line
+    assert browser.evaluate("document.documentElement.textContent").count(HOSTILE) >= 8
+    assert HOSTILE in browser.evaluate("document.querySelector('[data-large]').getAttribute('aria-label')")
+    assert browser.evaluate("document.querySelector('cite a').protocol") == "https:"
 
 
 def test_the_player_plays_and_pauses(page):
@@ -129,6 +195,55 @@ def test_the_values_under_the_pointer_are_told(page):
 )
 def test_rounding_is_no_length(page, value, said):
     assert page.evaluate(f"metres({value})") == said
+
+
+LETTERS = """[...document.querySelectorAll('.picture text, .diagram text, .sheet text')]
+    .flatMap((text) => (text.querySelector('tspan') ? [...text.querySelectorAll('tspan')] : [text]))
+    .filter((text) => text.textContent.trim())
+    .map((text) => [parseFloat(getComputedStyle(text).fontSize), text.getScreenCTM()])
+    .map(([size, { a, b }]) => size * Math.hypot(a, b))"""
+
+
+@pytest.fixture(scope="module")
+def folder_with_figures(tmp_path_factory):
+    """The same report with figures as they are drawn."""
+    folder = tmp_path_factory.mktemp("drawn")
+    made = {name: make() for name, make in EVERYTHING.items()}
+    made |= {"simulate": with_motion(simulate()), "contact-sim": with_motion(contact_sim())}
+    made["continuation"] = families_that_move(made["simulate"])
+    made["plot"] = plotted(folder)
+    write_pages(config(), made, folder)
+    return folder
+
+
+@pytest.mark.parametrize("width", [400, 768, 1280])
+def test_letters_of_figures_have_nine_pixels_before_a_click(browser, folder_with_figures, width):
+    seen = 0
+    for file in sorted(folder_with_figures.glob("report*.html")):
+        browser.open(file, width)
+        browser.evaluate("document.querySelectorAll('details').forEach((one) => (one.open = true))")
+        sizes = browser.evaluate(LETTERS)
+        seen += len(sizes)
+        assert min(sizes, default=9.0) >= 9.0
+        assert browser.evaluate("document.documentElement.scrollWidth") <= width
+    assert seen > 200
+
+
+def test_figures_fill_their_frames_and_stand_close_together(browser, folder_with_figures):
+    for name in ("report.html", "report-accuracy.html"):
+        browser.open(folder_with_figures / name, 1280)
+        shares = browser.evaluate(
+            "[...document.querySelectorAll('.frame')].map((frame) =>"
+            " frame.querySelector('svg, img').getBoundingClientRect().width / frame.clientWidth)"
+        )
+        assert min(shares, default=1.0) > 0.95
+    browser.open(folder_with_figures / "report.html", 1280)
+    boxes = browser.evaluate(
+        "[...document.querySelectorAll('.picture')].map((one) => one.getBoundingClientRect())"
+        ".map(({ left, top, bottom }) => [left, top, bottom])"
+    )
+    for (left, _, bottom), (next_left, top, _) in itertools.pairwise(boxes):
+        assert left != next_left or top - bottom < 40
 
 
 def test_a_figure_grows_on_a_click_and_escape_closes_it(page):

@@ -38,6 +38,7 @@ from walkerlab.report.tracks import Track, slip_since_touch
 from walkerlab.report.words import words
 from walkerlab.scene.left_out import LeftOut
 
+SHARES = "0 are inputs, 1 is reproduced, 1 explained, 2 contradicted by its own other values and 0 not reproduced"
 NO_GAIT = "no gait at a slope of 0.2 rad: nothing repeats itself"
 WITHOUT_GAIT = (
     LeftOut("fixedpoint", NO_GAIT),
@@ -86,12 +87,17 @@ def test_each_result_brings_its_sections():
     assert {"paper-numbers", "errata"} <= sections(["compare"]).keys()
 
 
-def test_without_contact_nothing_is_said_of_contact():
+def test_without_contact_the_lead_alone_says_that_it_was_not_asked():
     found = sections(["fixedpoint", "simulate"], sets=("contact=null",))
     assert not {"contact", "paper-numbers", "errata"} & found.keys()
     spoken = " ".join(texts(found[name]) for name in found if name != "provenance").lower()
     assert "contact" not in spoken
-    assert "contact" not in lead(config("contact=null"), "rigid-only").lower()
+    said = lead(config("contact=null"), "rigid-only")
+    assert said.endswith("alone. The contact model was not asked: the config has no contact block.")
+    assert said.lower().count("contact") == 2
+    assert lead(config(), "paper").endswith("as a rigid model and as one with contact.")
+    simplest = load(Path("simplest")).config
+    assert "not asked: the walker's feet have next to no mass" in lead(simplest, "simplest")
 
 
 def test_a_slope_without_a_gait_is_said_in_words_first():
@@ -113,8 +119,8 @@ def test_the_page_opens_with_what_holds_what_fails_and_what_follows():
         return plain(sections(**changed)["verdict"].blocks[0].text)
 
     assert opening() == (
-        "Both models walk all 4 steps, and the gait is stable; 1 of the 4 numbers that the paper prints come out and 2 "
-        "are refuted, and as its equations have a sign error (A.5), the corrected ones are to be used."
+        f"Both models walk all 4 steps, and the gait is stable; of the 4 values that the paper prints {SHARES}, and as "
+        "its equations have a sign error (A.5), the corrected ones are to be used."
     )
     slower = {"step_periods_s": [0.7, 0.7, 0.7, 0.707]}
     other = stored("compare", {}, {"departures": ["hip_mass_kg 12 instead of 10"]})
@@ -131,7 +137,7 @@ def test_the_page_opens_with_what_holds_what_fails_and_what_follows():
 
 def test_of_a_driven_walker_title_lead_and_verdict_say_what_drives_it_and_at_what_cost():
     driven = ("slope_deg=0", "push_off.impulse_N_s=4", "walker.hip.spring_N_m_per_rad=10")
-    by = "driven by a push-off of 4 N s and a hip spring of 10 N m/rad"
+    by = "driven by a push-off of 4 N s, with a hip spring of 10 N m/rad"
     gait = stored("fixedpoint", {}, {**fixedpoint().summary, "cost_of_transport": 0.00998})
     costly = {"fixedpoint": gait, "contact-sim": contact_sim(cost_of_transport=0.0195)}
     found = sections(sets=driven, **costly)
@@ -141,6 +147,14 @@ def test_of_a_driven_walker_title_lead_and_verdict_say_what_drives_it_and_at_wha
     assert "Cost of transport" in texts(found["glossary"])
     assert by in plain(lead(config(*driven), "level"))
     assert "driven" not in plain(sections()["verdict"].blocks[0].text)
+
+
+def test_a_spring_alone_does_not_drive_a_walker():
+    sprung = ("walker.hip.spring_N_m_per_rad=10",)
+    said = plain(lead(config(*sprung), "paper"))
+    assert "with a hip spring of 10 N m/rad" in said
+    assert "driven" not in said
+    assert "driven" not in plain(sections(sets=sprung)["verdict"].blocks[0].text)
 
 
 def test_work_that_is_rounding_is_not_told():
@@ -218,15 +232,15 @@ def test_every_end_of_a_walk_is_told_with_its_numbers(outcome, changed, said):
 def test_the_papers_numbers_are_counted_by_verdict():
     printed = sections()["printed"]
     (shares,) = blocks(printed, Shares)
-    assert printed.finding == "Of 4 numbers, 1 reproduced, 2 refuted and 1 explained."
-    assert shares.parts == (("reproduced", 1, "good"), ("explained", 1, "fair"), ("refuted", 2, "bad"))
+    assert printed.finding == f"Of 4 values that the paper prints {SHARES}."
+    assert shares.parts == (("reproduced", 1, "good"), ("explained", 1, "fair"), ("contradicted", 2, "bad"))
     assert sum(count for _, count, _ in shares.parts) == len(PAPER_ROWS)
 
 
 def test_the_verdict_says_which_numbers_fared_how():
     said = {finding.about: finding.text for finding in blocks(sections()["printed"], Statements)[0].items}
-    assert list(said) == ["Reproduced:", "Explained:", "Refuted:"]
-    assert said["Refuted:"] == "Table 3 (all 2)."
+    assert list(said) == ["Reproduced:", "Explained:", "Contradicted:"]
+    assert said["Contradicted:"] == "Table 3 (all 2)."
 
 
 def test_the_verdict_names_the_gravest_errors_with_what_was_measured():
@@ -252,8 +266,8 @@ def test_a_scene_that_is_not_the_papers_has_its_own_results_first_and_the_paper_
 
 def test_the_papers_tables_stand_beside_ours_without_empty_columns():
     first, third = blocks(sections()["tables"], Table)
-    assert [column.title for column in first.columns] == ["row", "quantity", "paper", "used here", "where"]
-    assert [column.title for column in third.columns] == ["row", "paper, MATLAB", "corrected"]
+    assert [column.title for column in first.columns] == ["symbol", "quantity", "paper", "used here", "where"]
+    assert [column.title for column in third.columns] == ["quantity", "paper, MATLAB", "corrected"]
     assert next(iter(third.groups.values()))[0][0].text == "left step period, t_left (s)"
 
 

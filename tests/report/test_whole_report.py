@@ -77,7 +77,9 @@ def test_every_table_of_the_pages_is_exported_by_its_caption(run, tmp_path, monk
             file = tmp_path / f"{number}.{kind}"
             texts.append(export_from(folder, caption, Target(None, file), 252.0, "", Console(quiet=True)).read_text())
         heads.add(texts[0].splitlines()[0])
-        assert texts[1].startswith("\\begin{table}\n\\centering\n\\caption{" + caption[:5])
+        assert texts[1].startswith(
+            "% \\usepackage{booktabs, siunitx}\n\\begin{table}\n\\centering\n\\caption{" + caption[:5]
+        )
         assert not set("θωφμλ₁₂⁻−×") & set(texts[1])
     assert len(heads) > 10
     with pytest.raises(ConfigError) as refused:

@@ -1,4 +1,4 @@
-"""Where a walker without a gait has one: along the slope, and on the way from a built-in walker."""
+"""Where a walker without a gait has one: along the slope, and with its feet ahead of its shanks."""
 
 import math
 import re
@@ -9,13 +9,18 @@ import pytest
 
 from walkerlab.config.loader import load
 from walkerlab.orbits.fixed_point import find_gaits
-from walkerlab.scene.nearby import between, gaits_on_other_slopes, nearby, way_from_built_in
+from walkerlab.scene.nearby import gaits_on_other_slopes, nearby
 from walkerlab.scene.rigid import rigid_walker
 
 KNEED = (
     "walker={type: kneed, thigh: {length_m: 0.40, mass_kg: 2.345, mass_below_hip_m: 0.2}, "
     "shank: {length_m: 0.42, mass_kg: 1.013, mass_below_knee_m: 0.21, mass_ahead_m: 0.02}, hip_mass_kg: 5, "
     "foot_radius_m: 0.15}"
+)
+MCGEER = (
+    "walker={type: kneed, thigh: {length_m: 0.46, mass_kg: 2.345, mass_below_hip_m: 0.2, inertia_kg_m2: 0.02}, "
+    "shank: {length_m: 0.54, mass_kg: 1.013, mass_below_knee_m: 0.24, inertia_kg_m2: 0.02}, hip_mass_kg: 10, "
+    "foot_radius_m: 0.2}"
 )
 
 
@@ -47,13 +52,22 @@ def test_the_command_that_is_told_finds_a_stable_gait(slope):
     assert gait_of(config(*sets)).stable
 
 
-def test_the_way_from_a_built_in_walker_has_a_gait_as_far_as_is_said():
-    one = config(KNEED, "slope_deg=3", base=Path("kneed"))
-    begin, met = way_from_built_in(one)
-    assert begin.walker.type == "kneed"
-    assert 0.0 < met.whole[1] < 1.0
-    assert gait_of(between(begin, one, 0.95 * met.whole[1])) is not None
-    assert between(begin, one, 1.0).walker == one.walker
+@pytest.mark.parametrize("degrees", [1.4, 2.5, 4.0])
+def test_a_kneed_walker_without_a_gait_is_told_to_put_its_feet_ahead(degrees):
+    sets = (MCGEER, f"slope_deg={degrees}")
+    assert gait_of(config(*sets, base=Path("kneed"))) is None
+    advice = nearby(config(*sets, base=Path("kneed")), " -c mcgeer.yaml")
+    command = re.search("`walkerlab fixedpoint -c mcgeer.yaml --set (walker.foot_centre_ahead_m=[0-9.]+)`", advice)[1]
+    assert gait_of(config(*sets, command, base=Path("kneed"))).stable
+    assert advice.count("--set") <= 2
+
+
+def test_where_nothing_near_has_a_gait_no_long_command_is_advised():
+    one = config(MCGEER, "slope_deg=3", "walker.shank.mass_kg=100", "walker.thigh.mass_kg=0.001", base=Path("kneed"))
+    advice = nearby(one)
+    assert "walker.foot_centre_ahead_m" in advice
+    assert "kneed-round-feet" in advice
+    assert "--set" not in advice
 
 
 def test_uphill_nothing_is_sought():

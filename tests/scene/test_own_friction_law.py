@@ -17,9 +17,11 @@ from walkerlab.ground import friction
 from walkerlab.ground.friction import FRICTION_LAWS, Frictionless, friction_coefficient, steepest_change
 from walkerlab.orbits.contact_gait import why_there_is_none, with_rigidity, with_scaled_laws
 from walkerlab.orbits.rigid_limit import STICTION, series_of
+from walkerlab.pipeline.runner import execute
 from walkerlab.scene.contact import contact_scene, friction_law, scene_measures, start_state
 from walkerlab.solvers.registry import Tolerances
 from walkerlab.stages.contact_sim import tell_unresolved_slip
+from walkerlab.store.runfolder import RunFolder
 
 START = (-0.2042, 0.1694, -0.605819, -0.861041)
 
@@ -77,6 +79,14 @@ def test_an_incomplete_law_is_told_in_words_when_a_scene_is_made(monkeypatch):
         "the friction law Wordless ('coulomb') is incomplete: it lacks sliding_from, with_creep, in_words, "
         "a body @friction_coefficient.case(Wordless)."
     )
+
+
+@pytest.mark.parametrize("stage", ["contact-sim", "report"])
+def test_an_incomplete_law_is_refused_before_anything_runs(stage, monkeypatch, tmp_path):
+    monkeypatch.setitem(FRICTION_LAWS, "coulomb", Wordless)
+    with pytest.raises(ConfigError, match="it lacks sliding_from, with_creep, in_words"):
+        execute(load().config, stage, RunFolder(tmp_path, "paper"))
+    assert [*tmp_path.rglob("*.h5")] == []
 
 
 def test_a_law_that_counts_its_formulas_must_also_tell_where_they_change(own, monkeypatch):

@@ -1,5 +1,6 @@
 """Walkers described in YAML: types, limits, own parts, and what is refused."""
 
+import math
 import re
 from pathlib import Path
 
@@ -9,6 +10,9 @@ import pytest
 from walkerlab.config.loader import load
 from walkerlab.errors import ConfigError
 from walkerlab.mechanics.standing import Standing
+from walkerlab.orbits.fixed_point import find_gaits
+from walkerlab.scene.contact import contact_scene
+from walkerlab.scene.families import numbers_in
 from walkerlab.scene.parts import assembly_of
 from walkerlab.scene.rigid import coordinates, equation_sets, rigid_walker
 
@@ -33,6 +37,81 @@ def test_the_kneed_walker_described_by_its_parts_is_the_kneed_walker(tmp_path):
     assert (one.section_indices, one.roles.tolist()) == (other.section_indices, other.roles.tolist())
 
 
+def kneed_with_feet_ahead(radius_m):
+    """A kneed walker whose feet are 3 cm ahead of its shanks, on a slope of 2.5 degrees."""
+    return load(
+        Path("kneed"),
+        [
+            "slope_deg=2.5",
+            "walker.thigh={length_m: 0.46, mass_kg: 2.345, mass_below_hip_m: 0.2, inertia_kg_m2: 0.02}",
+            "walker.shank={length_m: 0.54, mass_kg: 1.013, mass_below_knee_m: 0.24, inertia_kg_m2: 0.02}",
+            f"walker.foot_radius_m={radius_m}",
+            "walker.foot_centre_ahead_m=0.03",
+            "walker.hip_mass_kg=10",
+        ],
+    ).config
+
+
+def by_its_parts(radius_m):
+    """The same, put together from its parts."""
+    limbs = {
+        "thigh": "mass_kg: 2.345, centre_m: [0.0, -0.2], inertia_kg_m2: 0.02",
+        "shank": "mass_kg: 1.013, centre_m: [0.0, -0.24], inertia_kg_m2: 0.02",
+    }
+    bodies = [f"{{name: {limb} {k}, {measures}}}" for limb, measures in limbs.items() for k in (1, 2)]
+    foot = f"centre_m: [0.03, {radius_m - 0.54!r}], radius_m: {radius_m}"
+    walker = {
+        "leg_length_m": "1.0",
+        "bodies": f"[{', '.join(bodies)}]",
+        "particles": "[{name: hip, mass_kg: 10, body: thigh 2, at_m: [0.0, 0.0]}]",
+        "feet": f"[{{body: shank 1, {foot}}}, {{body: shank 2, {foot}}}]",
+    }
+    walker["hinges"] = (
+        "[{name: hip, parent: thigh 2, parent_point_m: [0.0, 0.0], child: thigh 1, child_point_m: [0.0, 0.0]}"
+        + "".join(
+            f", {{name: knee {k}, parent: thigh {k}, parent_point_m: [0.0, -0.46], child: shank {k}, "
+            "child_point_m: [0.0, 0.0], locks: true}"
+            for k in (1, 2)
+        )
+        + "]"
+    )
+    return load(Path("parts"), ["slope_deg=2.5", *(f"walker.{key}={value}" for key, value in walker.items())]).config
+
+
+@pytest.mark.parametrize("radius_m", [0.0, 0.2])
+def test_a_kneed_walker_with_its_feet_ahead_is_the_one_put_together_from_its_parts(radius_m):
+    own, parts = kneed_with_feet_ahead(radius_m), by_its_parts(radius_m)
+    one, other = rigid_walker(own), rigid_walker(parts)
+    assert one.lean == pytest.approx(math.atan2(0.03, 1.0 - radius_m), rel=1e-15)
+    assert own.walker.lean_rad == one.lean
+    assert numbers_of(one) == pytest.approx(numbers_of(other), rel=1e-14, abs=1e-16)
+    on_ground = [contact_scene(config, 0.67, 0.67).walker for config in (own, parts)]
+    for number, same in zip(*map(numbers_in, on_ground), strict=True):
+        if getattr(number, "dtype", np.dtype("O")).names:
+            number, same = numbers_of(number), numbers_of(same)
+        if isinstance(number, (float, np.ndarray)):
+            np.testing.assert_allclose(number, same, rtol=1e-14, atol=1e-16)
+
+
+def test_a_kneed_walker_with_its_feet_ahead_has_the_gait_found_elsewhere():
+    """The numbers are those of independent code for the walker put together from its parts."""
+    gait = find_gaits(rigid_walker(kneed_with_feet_ahead(0.2))).gait
+    assert gait.period == pytest.approx(0.8295992430, abs=1e-9)
+    assert gait.step_length == pytest.approx(0.6736206197, abs=1e-9)
+    assert gait.spectral_radius == pytest.approx(0.3333740739, abs=1e-8)
+
+
+def test_a_start_of_a_walker_with_its_feet_ahead_is_moved_onto_the_slope():
+    start = "start=[0.0, 0.26, 0.0, -0.49, -1.157, -0.49]"
+    config = kneed_with_feet_ahead(0.2)
+    moved = load(Path("kneed"), ["slope_deg=2.5", "walker.foot_radius_m=0.2", "walker.foot_centre_ahead_m=0.03", start])
+    swing, stance, shank, *_ = moved.config.start
+    # both soles touch the slope: each foot's centre is as far below the hip, along the slope's normal
+    depth = [math.cos(angle + config.slope_rad + config.walker.lean_rad) for angle in (swing, stance)]
+    assert depth[0] == pytest.approx(depth[1], rel=1e-14)
+    assert shank == swing
+
+
 @pytest.mark.parametrize(
     ("name", "mass", "numbers"),
     [("simplest", 1.0, 4), ("round-feet", 2.0, 4), ("kneed", 1.6, 6), ("kneed-round-feet", 1.6, 6), ("torso", 20.0, 6)],
@@ -49,6 +128,12 @@ def test_a_built_in_walker_has_its_mass_and_its_state(name, mass, numbers):
 def test_appendix_a_is_a_plain_compass_only():
     assert equation_sets(load().config) == ("corrected", "as-printed")
     assert equation_sets(load(Path("torso")).config) == ("corrected",)
+
+
+def test_equations_as_printed_are_beside_the_corrected_ones_for_the_papers_walker_only():
+    assert equation_sets(load(None, ("slope_deg=3",)).config) == ("corrected", "as-printed")
+    assert equation_sets(load(None, ("walker.hip_mass_kg=12",)).config) == ("corrected",)
+    assert equation_sets(load(None, ("walker.hip_mass_kg=12", "equations=as-printed")).config) == ("as-printed",)
 
 
 @pytest.mark.parametrize(

@@ -186,9 +186,8 @@ def test_a_knee_that_does_not_lock_is_a_gap():
     kneed = of_steps([0.7, 1.4], knee_strike_time_s=[0.5, np.nan])
     np.testing.assert_array_equal(kneed["knee_strike_time_s"].values, [0.5, np.nan])
     times, along, strikes = np.array([[0.7, 1.4], [0.3, 0.6], [0.5, np.nan]])
-    walk = WalkRecord(
-        Outcome.WALKED, times, along, strikes, 1.4, WalkWork(0, 0, 0, 0), None, DrivenWork(1.0, 0.0, 0.0, 0.0, 0.0)
-    )
+    nothing = DrivenWork(1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    walk = WalkRecord(Outcome.WALKED, times, along, strikes, 1.4, WalkWork(0, 0, 0, 0), None, nothing)
     assert numbers_of(walk)["knee_strike_times_s"] == [0.5, None]
     assert walk.knee_strikes_s.tolist() == [0.5]
 

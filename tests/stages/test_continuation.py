@@ -56,6 +56,19 @@ def test_values_are_in_the_unit_of_the_key_that_was_asked_for(in_degrees):
     assert first == pytest.approx(math.degrees(in_radians), abs=1e-9)
 
 
+def test_a_spring_is_followed_from_none_on_and_a_gait_that_goes_on_neither_way_is_no_branch():
+    sets = {"over": "walker.hip.spring_N_m_per_rad", "from": 0, "to": 40, "periods": 1}
+    asked = load(Path("level"), [f"continuation.{key}={value}" for key, value in sets.items()]).config
+    summary = continuation.run(only(asked, PIPELINE["continuation"].takes), {}, Silent(), again=False).summary
+    assert len(summary["branches"]) == 2
+    for branch in summary["branches"]:
+        assert (branch["from"], branch["to"]) == (0.0, 40.0)
+        assert [end["reason"] for end in branch["ends"]] == ["end of the span"] * 2
+    (alone,) = [one for one in summary["left_out"] if "goes on neither way" in one["why"]]
+    assert alone["what"].startswith("a gait of the rigid model at 20 N m/rad")
+    assert alone["why"].endswith("Newton's method finds no further gait")  # not that there is no walker
+
+
 def test_the_summary_has_its_keys_and_the_artifact_a_group_for_each_branch(in_degrees):
     said = in_degrees.summary
     assert set(said) >= {"branches", "bifurcations", "lyapunov", "over", "unit"}

@@ -43,6 +43,16 @@ def test_the_error_is_of_the_size_of_that_against_a_far_tighter_walk(stage, mode
         assert right["numerical_error"][key] < 1e-3 * true
 
 
+def test_the_error_of_a_hip_torques_cost_is_of_the_size_of_that_against_a_far_tighter_walk():
+    driven = ("walker.hip.torque_N_m=0.3", "outputs=[]", "strides=2")
+    loose = walk("simulate", "solver.rigid.rtol=1e-4", "solver.rigid.atol=1e-6", *driven)
+    right = walk("simulate", "solver.rigid.rtol=1e-10", "solver.rigid.atol=1e-12", *driven)
+    true = abs(loose["cost_of_transport"] - right["cost_of_transport"])
+    assert loose["numerical_error"]["cost_of_transport"] == pytest.approx(true, rel=0.2)
+    assert right["numerical_error"]["cost_of_transport"] < 1e-3 * true
+    assert "cost_of_transport" not in walk("simulate", "outputs=[]", "strides=2")["numerical_error"]
+
+
 def test_tolerances_that_cannot_be_a_hundred_times_tighter_are_ten_times_tighter_or_give_way_to_another_method():
     assert [bound.ge for bound in SolverSettings.model_fields["rtol"].metadata if isinstance(bound, Ge)] == [LEAST_RTOL]
     usual, by = tightened(Tolerances("dop853", 1e-12, 1e-12, 1))

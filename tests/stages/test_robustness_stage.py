@@ -9,9 +9,15 @@ import pytest
 from walkerlab.config.loader import load
 from walkerlab.config.reads import only
 from walkerlab.errors import ConfigError, NoAnswer
+from walkerlab.hybrid.recorded_walk import take_walk
+from walkerlab.hybrid.rigid_measures import reactions
+from walkerlab.mechanics.impact import pushed_at_hip
+from walkerlab.orbits.shooting import EXACT
 from walkerlab.pipeline.graph import PIPELINE
 from walkerlab.pipeline.progress import Silent
 from walkerlab.report.answers import answer
+from walkerlab.report.sections.robustness import tables
+from walkerlab.scene.rigid import rigid_walker
 from walkerlab.stages import fixedpoint, robustness
 from walkerlab.store.checkpoint import Checkpoint
 from walkerlab.store.columns import rows_group
@@ -24,6 +30,7 @@ FIXED_KEYS = {
     "largest_push": {"model", "forward_N_s", "backward_N_s", "steps"},
     "rough_ground": {"model", "roughness_m", "mean_steps", "standard_error", "walks", "capped"},
 }
+SCALED = "gait_sensitivity_norm_scaled"
 FEW = ("robustness.walks=20", "robustness.roughness_m=[0.002]", "robustness.to=[slope_deg, walker.hip_mass_kg]")
 
 
@@ -94,7 +101,7 @@ def test_a_builder_understands_the_answer(rigid):
 
 def test_what_to_change_is_a_number_of_the_walker_that_rounding_has_not_eaten(rigid):
     """Neither gravity, nor what has no effect."""
-    row = next(row for row in rigid.summary["sensitivity"] if row["of"] == "gait_sensitivity_norm")
+    row = next(row for row in rigid.summary["sensitivity"] if row["of"] == "gait_sensitivity_norm_scaled")
     others = [row | {"to": "gravity_m_s2", "relative": -9.0}, row | {"to": "walker.x", "why": "lost in rounding"}]
     own = [row | {"to": "walker.hip_mass_kg", "relative": 0.25}]
     said = said_of({**rigid.summary, "sensitivity": [*others, *own]})
@@ -103,6 +110,40 @@ def test_what_to_change_is_a_number_of_the_walker_that_rounding_has_not_eaten(ri
         in said
     )
     assert "What to change first" not in said_of({**rigid.summary, "sensitivity": others})
+
+
+def test_a_longer_leg_does_not_win_by_the_dimension_of_the_norm():
+    """All lengths together scale the walker, which leaves the dimensionless norm as it is; keys are the config's."""
+    found = run("slope-3deg", "robustness.model=rigid", "robustness.roughness_m=[]", "robustness.steps=1")
+    shares = {row["to"]: row.get("relative") for row in found.summary["sensitivity"] if row["of"] == SCALED}
+    lengths = [key for key in shares if key.endswith("_m")]
+    assert {"walker.leg_length_m", "walker.foot_to_mass_m"} <= set(lengths)
+    assert sum(shares[key] or 0.0 for key in lengths) == pytest.approx(0.0, abs=1e-6)
+    assert abs(shares["gravity_m_s2"]) < 1e-6
+    assert "slope_deg" in shares
+    assert "slope_rad" not in shares
+    shown = {
+        one.caption: [row[1].text for rows in one.groups.values() for row in rows] for one in tables(found.summary)
+    }
+    assert all(key.startswith("walker.") for key in shown["What to change first"])
+    assert set(shown["Gravity, slope and ground"]) == {"gravity_m_s2", "slope_deg"}
+    assert "push_off.impulse_N_s" in shown["Parameters that are zero"]
+
+
+def test_a_push_says_whether_the_ground_then_pushes(rigid, both):
+    """By the force on all masses: their weight and what accelerates them, along the walk that follows the push."""
+    (push,) = rigid.summary["largest_push"]
+    assert push["forward_normal_impulse_N_s"] > 0.0 > push["backward_normal_impulse_N_s"]
+    said = said_of(rigid.summary)
+    assert "After the largest push forward the ground still pushes, with at least" in said
+    assert "For the largest push backward the ground would have to pull with" in said
+    config = load(Path("slope-3deg")).config
+    walker, gait = rigid_walker(config), fixedpoint.run(config, {}, Silent()).summary["state"]
+    pushed = pushed_at_hip(walker, np.array(gait), -push["backward_N_s"])
+    walk = take_walk(walker, EXACT, tuple(pushed), 50, sampled=True)
+    lowest = reactions(walker, walk.samples.state)[:, 1].min()
+    assert push["backward_min_normal_force_N"] == pytest.approx(lowest, abs=0.05)
+    assert {value for key, value in both.summary["largest_push"][1].items() if "normal" in key} == {None}
 
 
 def test_what_moves_the_gait_is_ranked_over_both_models(both):

@@ -14,6 +14,7 @@ from walkerlab.errors import NoAnswer
 from walkerlab.hybrid import recorded_walk
 from walkerlab.pipeline.graph import PIPELINE
 from walkerlab.pipeline.progress import Silent
+from walkerlab.report.answers import answer
 from walkerlab.stages import fixedpoint, simulate
 
 # design contract, section 4
@@ -158,6 +159,27 @@ def test_a_pulling_ground_is_said():
     assert result.summary["outcome"] == "lifted-off"
     assert result.summary["steps"] == 2
     assert result.summary["min_normal_force_N"] < 0.0
+
+
+def test_a_walk_says_what_no_ground_can_give():
+    """A pull, also of a walk that falls, and friction; nothing of a walk that keeps to both."""
+    fast = run(contact=None, start=(-0.3, 0.25, -1.5, -2.6), strides=1).summary
+    assert fast["min_normal_force_N"] < 0.0
+    assert f"pull with {-fast['min_normal_force_N']:.3g} N" in fast["objections"][0]
+    slippery = [one for one in fast["objections"] if f"coefficient of {fast['max_friction_ratio']:.3g}" in one]
+    assert bool(slippery) == (fast["max_friction_ratio"] > 1.0)
+    assert any("Not a walk on real ground: the ground would have to pull" in line for line in answer("simulate", fast))
+    assert run(contact=None, strides=1).summary["objections"] == []
+
+
+@pytest.mark.parametrize("heights", [(-0.03, 0.05), (0.0, 0.0)])
+def test_a_fall_on_uneven_ground_is_not_blamed_on_the_start(heights):
+    uneven = any(heights)
+    start = "fixed-point" if uneven else SLOW
+    walk = run(contact=None, start=start, ground={"heights_m": heights}, strides=2).summary
+    assert walk["outcome"] == "fell"
+    assert ("lower the footholds (ground.heights_m" in walk["advice"]) == uneven
+    assert ("start nearer to a gait" in walk["advice"]) != uneven
 
 
 def test_where_the_ground_would_have_to_pull_all_along_there_is_no_friction_ratio():

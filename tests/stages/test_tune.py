@@ -72,6 +72,18 @@ def test_the_papers_own_start_does_not_walk_and_says_why():
     assert "221.5 J" in start["reason"]
 
 
+def test_both_fates_of_the_papers_adams_start_are_told_with_model_and_ground():
+    start = small("paper").summary["paper_start"]
+    rigid, contact = start["reason"].split("the contact model on ")
+    assert "in the rigid model, whose stance foot is hinged to an even slope" in rigid
+    assert "with its foot held down like that the walk ends (fell) at 0.347 s" in rigid
+    assert contact.startswith("its checkerboard of pads has ground that cannot pull")
+    assert f"ends there at {start['end_time_s']:.3g} s" in contact
+    assert "off-pad: a foot meets a pad from the side, where the rigid model has no pads" in contact
+    # pads are what ends it: without them it flies on
+    assert small("paper", "contact.terrain=after-mid-swing").summary["paper_start"]["outcome"] != "off-pad"
+
+
 def test_percentages_are_given_on_both_bases():
     row = small("paper").summary["table2"]["dtheta_2"]
     assert row["paper_percent_of_matlab"] == pytest.approx(100 * (3.20 - 0.84) / 0.84)

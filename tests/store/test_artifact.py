@@ -139,6 +139,7 @@ def test_root_says_where_the_result_comes_from(tmp_path, content, identity, orig
     assert root["content_digest"] == content.digest()
     assert root["started_utc"].endswith("+00:00")
     assert json.loads(root["summary_json"]) == content.summary
+    assert (root["title"], root["Conventions"]) == ("walkerlab simulate", "CF-1.11")
     expected = {"schema_version", "code_digest", "package_version", "platform", "seed", "ended_utc", "command_line"}
     assert expected <= set(root)
 

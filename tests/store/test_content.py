@@ -140,3 +140,9 @@ def test_summary_is_plain_json():
 def test_groups_on_the_way_to_others_are_there():
     assert sorted(Content({"a/b/c": Group({})}).groups) == ["a", "a/b", "a/b/c"]
     assert Content({"a/b": Group({})}).digest() == Content({"a/b": Group({}), "a": Group({})}).digest()
+
+
+@pytest.mark.parametrize("values", [[1.0], [1], [True]])
+def test_a_number_without_a_unit_is_refused(values):
+    with pytest.raises(ValueError, match="has no unit; that of a pure number is '1'"):
+        Variable(np.array(values), ("x",), "", "how many")

@@ -5,7 +5,7 @@ import pytest
 
 from walkerlab.config.loader import load
 from walkerlab.errors import ConfigError
-from walkerlab.sweeps.question import asked, axis_of_text, described, distinct_ends
+from walkerlab.sweeps.question import asked, axis_of_text, described, distinct_ends, refuse_unrecorded
 
 
 def question(*over, **options):
@@ -32,6 +32,15 @@ def test_a_range_of_whole_numbers_is_of_integers_where_the_key_is_one():
     assert question("strides=2:4:3").axes[0].values == (2, 3, 4)
     assert all(isinstance(value, int) for value in question("strides=2:4:3").axes[0].values)
     assert question("slope_deg=2:4:3").axes[0].values == (2.0, 3.0, 4.0)
+
+
+@pytest.mark.parametrize("option", ["--show", "--against"])
+def test_a_quantity_that_a_stage_never_has_is_refused_before_anything_is_computed(option):
+    slopes = question("slope_deg=1:3:3")
+    for name in ("froude", "slope_deg", "work_per_step_J.hip_torque", "gaits.1.period_s"):
+        refuse_unrecorded(slopes, {f"{option} {name}": name})
+    with pytest.raises(ConfigError, match=rf"{option} froud: fixedpoint has no such quantity.*mean froude"):
+        refuse_unrecorded(slopes, {f"{option} froud": "froud"})
 
 
 def test_zip_pairs_values():
@@ -108,3 +117,18 @@ def test_a_parameter_has_the_unit_of_its_key_and_of_the_blocks_units():
     assert described(load().config, "contact.stiffness")[0] == "N/mm^e"
     in_si = load(sets=["contact={units: si}"]).config
     assert described(in_si, "contact.stiffness")[0] == "N/m^e"
+
+
+@pytest.mark.parametrize(
+    ("over", "options"),
+    [
+        (["slope_deg=0.5:3:1000000000"], {}),
+        (["slope_deg=0.5:3:1000000000"], {"zip": True}),
+        (["slope_deg=0.5:3:1000000000"], {"sample": "random:10"}),
+        (["slope_deg=0.5:3:5000", "strides=1:5000:5000"], {}),
+        (["slope_deg=0.5:3"], {"sample": "sobol:1000000000"}),
+    ],
+)
+def test_every_way_to_ask_for_too_many_points_is_refused_before_they_are_made(over, options):
+    with pytest.raises(ConfigError, match=r"0 points; allowed: up to 10000000 in one sweep"):
+        question(*over, **options)

@@ -71,6 +71,24 @@ def test_report_says_in_red_what_failed():
     assert report_of(None) is None
 
 
+def test_a_case_that_gives_up_as_expected_is_counted_apart_and_is_not_green():
+    gave_up = replace(GOOD, name="rings", expected=("budget-exhausted",), outcome="budget-exhausted")
+    summary = summary_of([GOOD, gave_up], [RIGHT], [])
+    shown = report_of(summary)
+    counted = "3 of 3 extreme cases and known problems came out as expected, of which 1 gave up."
+    assert shown.finding == counted
+    (table,) = [block for block in shown.blocks if getattr(block, "caption", "") == "Extreme cases"]
+    assert [row[1].tone for row in next(iter(table.groups.values()))] == ["good", "fair"]
+    assert report_of(summary_of([GOOD], [RIGHT], [])).finding.endswith("came out as expected.")
+
+
+def test_the_page_lists_what_no_case_covers():
+    gaps = [
+        item.about for block in report_of(summary_of([GOOD], [], [])).blocks for item in getattr(block, "items", ())
+    ]
+    assert {"Very stiff linear springs:", "The loosest tolerances:", "ADAMS:"} <= {*gaps}
+
+
 def test_the_worst_measure_is_of_what_is_right_and_not_of_work():
     busy = replace(GOOD, findings=(Measure(BUDGET_USED, 0.9, 1.0), Measure("x", 0.25, 1.0)))
     table = next(block for block in report_of(summary_of([busy], [], [])).blocks if isinstance(block, Table))

@@ -63,6 +63,7 @@ class MethodRow:
     within_reference: bool  # whether the error is below what the reference is known to, and so only a bound
     wall_s: Annotated[float, Label("s", "median run time", timing=True)]
     least_wall_s: Annotated[float, Label("s", "least run time", timing=True)]
+    largest_wall_s: Annotated[float, Label("s", "largest run time", timing=True)]
     repeats_of_wall_s: Annotated[int, Label("1", "timed repeats", timing=True, name="repeats")]
     rhs_evaluations: Annotated[int, Label("1", "right-hand sides")]
     accepted: Annotated[int, Label("1", "accepted steps")]
@@ -146,10 +147,22 @@ def row_of(one: Ascent, run: MethodRun, reference: Reference) -> MethodRow:
     end, result = reference.for_method(one.method), run.result
     error = float(np.max(np.abs(result.state - end.state))) if result.state.size else None
     known = error is not None and error <= reference.agreement
-    asked = one.trial.name, one.method, run.tolerance
-    work = result.rhs_evaluations, result.accepted, result.rejected
-    times = median(run.walls_s), min(run.walls_s), len(run.walls_s)
-    return MethodRow(*asked, result.outcome, error, end.method, known, *times, *work)
+    return MethodRow(
+        scene=one.trial.name,
+        method=one.method,
+        tolerance=run.tolerance,
+        outcome=result.outcome,
+        error=error,
+        against=end.method,
+        within_reference=known,
+        wall_s=median(run.walls_s),
+        least_wall_s=min(run.walls_s),
+        largest_wall_s=max(run.walls_s),
+        repeats_of_wall_s=len(run.walls_s),
+        rhs_evaluations=result.rhs_evaluations,
+        accepted=result.accepted,
+        rejected=result.rejected,
+    )
 
 
 def left_of(one: Ascent) -> list[dict[str, Any]]:

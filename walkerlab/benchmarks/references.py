@@ -18,10 +18,16 @@ TIGHTEST_RIGID = {"dop853": 1e-14, "radau5": 1e-12}
 
 @dataclass(frozen=True)
 class End:
-    """Where a walk ends, by which method."""
+    """Where a walk ends, by which method.
+
+    tolerance        relative; 0 for Taylor series at machine precision
+    rhs_evaluations  that it took; 0 where they are not counted
+    """
 
     method: str
     state: Floats
+    tolerance: float = 0.0
+    rhs_evaluations: int = 0
 
 
 @dataclass(frozen=True)
@@ -45,6 +51,21 @@ class Reference:
     def second_method(self) -> str:
         """The other method."""
         return self.second.method
+
+    @property
+    def from_outside(self) -> bool:
+        """Whether the first end comes from another program: not our solvers, event search or equations."""
+        return self.method == taylor_reference.NAME
+
+    @property
+    def tolerance(self) -> float:
+        """Relative tolerance of the first end."""
+        return self.first.tolerance
+
+    @property
+    def rhs_evaluations(self) -> int:
+        """Right-hand sides that the first end took."""
+        return self.first.rhs_evaluations
 
     @property
     def agreement(self) -> float:
@@ -100,4 +121,4 @@ def tightest(trial: Trial, method: str) -> End:
         raise WalkEndsError(f"{why} right-hand sides, so that nothing tells how well its end is known")
     if not result.state.size:
         raise WalkEndsError(f"the walk ends early ({result.outcome}), so that there is no end state to compare")
-    return End(method, result.state)
+    return End(method, result.state, tolerances[method], result.rhs_evaluations)

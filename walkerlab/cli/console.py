@@ -23,7 +23,7 @@ ENOUGH_DONE, ENOUGH_S = 0.1, 3.0
 
 
 class Console:
-    """The reporter of the command line; see `stages.progress`."""
+    """The reporter of the command line: a `pipeline.progress.Progress`."""
 
     def __init__(self, quiet: bool = False, verbose: bool = False, open_page: bool = False) -> None:
         """Say nothing but warnings if `quiet`, and details too if `verbose`; show the first page with `open_page`."""

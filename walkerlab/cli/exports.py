@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import re
+import shlex
 import shutil
 import subprocess
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -19,12 +20,14 @@ from walkerlab.labels import with_unit
 from walkerlab.pipeline.executor import Executor
 from walkerlab.pipeline.graph import PIPELINE
 from walkerlab.pipeline.results import FolderResults
-from walkerlab.pipeline.runs import config_of, makes, read_all, result_in, results_in
+from walkerlab.pipeline.runs import config_of, makes, read_all, refusing_older, results_in, results_to_show, the_result
 from walkerlab.report.numbers import listed
 from walkerlab.report.outcomes import MODELS
-from walkerlab.report.tables import Table, as_csv, as_tex, csv_text, of_records
+from walkerlab.report.tables import Table, as_csv, csv_text, of_records
+from walkerlab.report.tex import as_tex
 from walkerlab.store.artifact import Stored
-from walkerlab.store.files import write_atomically
+from walkerlab.store.clean import owner_of
+from walkerlab.store.files import as_text, storing, write_through
 from walkerlab.store.runfolder import RunFolder
 
 if TYPE_CHECKING:
@@ -52,15 +55,17 @@ class Target:
 
     to      a format or, as long as there is no other file, a file whose name ends in one; None for what the file says
     output  the file; None for one in this folder that is named after the run and what it is
+    inputs  files that the command reads, which are not written over
     """
 
     to: str | None
     output: Path | None
+    inputs: tuple[Path, ...] = ()
 
     def of(self, what: str, stem: str, kinds: Sequence[str]) -> tuple[Path, str]:
         """File and format; the first of the formats if none is named.
 
-        Raises ConfigError for a format that there is not, and for two at once.
+        Raises ConfigError for an unknown format, for two at once, and for a file that must not be written over.
         """
         a_file = self.to is not None and self.output is None and "." in self.to
         output = Path(str(self.to)) if a_file else self.output
@@ -72,13 +77,30 @@ class Target:
             raise ConfigError(
                 f"--to {kind} and {output} name two formats.", "Leave out --to, or give the file that ending."
             )
-        return output or Path(f"{stem}.{kind}"), kind
+        path = output or Path(f"{stem}.{kind}")
+        with storing(path):
+            self.refuse(path, kind)
+        return path, kind
+
+    def refuse(self, path: Path, kind: str) -> None:
+        """Raise ConfigError if the file is a folder, what the command reads, or a result of a run."""
+        another = "Nothing was written; name another file with -o."
+        if path.is_dir():
+            raise ConfigError(f"{path} is a folder.", f"Name a file in it: -o {shlex.quote(f'{path}/NAME.{kind}')}")
+        if path.exists() and any(one.exists() and path.samefile(one) for one in self.inputs):
+            raise ConfigError(f"{path} is what this command reads.", another)
+        owner = owner_of(path, (stage.name for stage in PIPELINE.stages))
+        if owner is not None:
+            raise ConfigError(f"{path} belongs to the results of the run {owner.path}.", another)
 
 
 def put(path: Path, data: bytes, console: Console) -> Path:
-    """Write a file, and say so if that replaces another one."""
+    """Write a file, and say so if that replaces another one; StorageError if the system refuses."""
     replaced = path.is_file() and path.read_bytes() != data
-    write_atomically(path, data)
+    try:
+        write_through(path, data)
+    except StorageError as error:
+        raise StorageError(error.message, "Name another file with -o.") from error
     if replaced:
         console.warn(f"{path} was there and is replaced.")
     return path
@@ -99,8 +121,10 @@ def export_from(
     make: Callable[[str], bytes]
     kinds: Sequence[str]
     if what == TRAJECTORY:
-        stem, kinds, make = f"{model}-{what}", TRAJECTORY_KINDS, lambda kind: trajectory(result_in(folder, model), kind)
-    elif isinstance(found := table(folder, what) if what in TABLES else named_in(folder, what), Table):
+        stem, kinds, make = f"{model}-{what}", TRAJECTORY_KINDS, lambda kind: trajectory(folder, model, kind, console)
+    elif what in TABLES:
+        stem, kinds, make = what, tuple(WRITERS), lambda kind: WRITERS[kind](table(folder, what, kind, console))
+    elif isinstance(found := named_in(folder, what), Table):
         stem, kinds, make = hyphened(what), tuple(WRITERS), lambda kind: WRITERS[kind](found)
     else:
         stem, kinds, make = what, FIGURE_KINDS, lambda kind: figure(folder, found, kind, (width, dpi), console)
@@ -111,14 +135,16 @@ def export_from(
 def draw_walker(config: Path, target: Target, console: Console) -> Path:
     """Draw the walker of a config with its measures; ConfigError for a bad config or format."""
     # Imported here: other exports draw no walker.
+    from walkerlab.config.files import files_read, find
     from walkerlab.config.loader import load
     from walkerlab.figures.measures import drawn
 
     loaded = load(config, ())
     for warning in loaded.warnings:
         console.warn(warning)
+    target = replace(target, inputs=tuple(files_read(find(config))))
     path, kind = target.of("a walker", f"{loaded.run_name}-walker", DRAWING_KINDS)
-    return put(path, drawn(loaded.config.walker, path.stem, kind), console)
+    return put(path, drawn(loaded.config.walker, as_text(path.stem), kind), console)
 
 
 def hyphened(words: str) -> str:
@@ -167,7 +193,7 @@ def named_in(folder: RunFolder, name: str) -> Illustration | Table:
     there += tables
     there += [TRAJECTORY] * any(TRAJECTORY in result.groups for result in stored.values())
     nothing = f"{folder.path} has nothing yet: {makes(folder, PIPELINE['report'])} makes it all."
-    advice = f"{folder.path} has {listed(there)}." if there else nothing
+    advice = "\n  ".join([f"{folder.path} has", *there]) if there else nothing
     near = meant(name, (*named, *TABLES, TRAJECTORY, *tables))
     raise ConfigError(f"nothing is called {name}.{near}", advice)
 
@@ -191,15 +217,16 @@ def figure(
     Where what it needs is outdated, so may be all that is there, and the console is told.
     """
     stored = results_in(folder, illustration.stages)
-    why = illustration.why_left_out(stored, {})
-    if why is not None:
-        made = [makes(folder, PIPELINE[stage]) for stage in illustration.stages if stage not in stored]
-        advice = f"{listed(made)} {'makes' if len(made) == 1 else 'make'} what it needs." if made else ""
-        raise StaleError(f"{illustration.name} cannot be drawn: {why}.", advice)
     run, plot = planned(folder), PIPELINE["plot"]
     taken = {name: result for name, result in run.inputs(plot).items() if isinstance(result, Stored)}
     known = taken.keys() | run.left_out.keys()
     outdated, _ = read_all(folder, (name for name in plot.results(run.config) if name not in known))
+    with refusing_older(folder, outdated):
+        why = illustration.why_left_out(stored, {})
+    if why is not None:
+        made = [makes(folder, PIPELINE[stage]) for stage in illustration.stages if stage not in stored]
+        advice = f"{listed(made)} {'makes' if len(made) == 1 else 'make'} what it needs." if made else ""
+        raise StaleError(f"{illustration.name} cannot be drawn: {why}.", advice)
     left_out = stored.keys() <= taken.keys()
     if not left_out:
         taken |= stored | {name: result for name, result in outdated.items() if result.complete}
@@ -208,25 +235,37 @@ def figure(
             f"{folder.path} has outdated results, which are {'left out' if left_out else 'drawn all the same'}: "
             f"{listed(sorted(outdated))}; {makes(folder, PIPELINE['report'])} makes them anew."
         )
-    return illustration.as_file(taken, kind, *size)
+    with refusing_older(folder, outdated):
+        return illustration.as_file(taken, kind, *size)
 
 
-def table(folder: RunFolder, name: str) -> Table:
-    """A table of the paper's numbers; ConfigError if the walker is another than the paper's."""
-    summary = result_in(folder, "compare").summary
+def table(folder: RunFolder, name: str, kind: str, console: Console) -> Table:
+    """A table of the paper's numbers; ConfigError if the walker is another than the paper's.
+
+    kind  csv, for programs: records by their keys; tex, for readers: as the page has it
+    """
+    with results_to_show(folder, ["compare"], console.warn) as results:
+        summary = the_result(results, folder, "compare").summary
     if TABLES[name] not in summary:
         raise ConfigError(
             f"{folder.path} has no {name}: it compares with the paper's walker, and this run's walker is another.",
             f"Its page has {listed(page_tables(folder))}.",
         )
     rows = summary[TABLES[name]]
+    if kind == "tex":
+        # Imported here: CSV needs no page.
+        from walkerlab.report.sections.paper import table_of
+
+        return table_of(TABLES[name], rows)
     if isinstance(rows, Mapping):
         rows = [{"quantity": quantity, **row} for quantity, row in rows.items()]
     return of_records(rows)
 
 
-def trajectory(stored: Stored, kind: str) -> bytes:
+def trajectory(folder: RunFolder, model: str, kind: str, console: Console) -> bytes:
     """A walk in time: a column for each variable and leg, or a netCDF file."""
+    with results_to_show(folder, [model], console.warn) as results:
+        stored = the_result(results, folder, model)
     group = stored.groups.get(TRAJECTORY)
     if group is None:
         raise StaleError("the walk was stored without a trajectory.", STORED_WITH)
@@ -234,7 +273,11 @@ def trajectory(stored: Stored, kind: str) -> bytes:
         # Imported here: CSV needs no HDF5.
         from walkerlab.store import hdf5
 
-        about = {"title": f"walkerlab {stored.identity.stage}", "content_digest": stored.digest()}
+        about = {
+            "title": f"walkerlab {stored.identity.stage}",
+            "Conventions": hdf5.CONVENTIONS,
+            "content_digest": stored.digest(),
+        }
         return hdf5.image({"/": replace(group, attrs={**group.attrs, **about})}, {})
     columns = {}
     for name, variable in sorted(group.variables.items(), key=lambda named: (named[0] != "time", named[0])):
@@ -251,13 +294,13 @@ class Film:
     """What is shown.
 
     model   the stage whose walk it is
-    steps   how many of its steps
+    steps   how many of its first steps; None for those that `film_times` chooses
     rate    pictures a second
     slower  so many times slower than life
     """
 
     model: str
-    steps: int
+    steps: int | None
     rate: int
     slower: float
 
@@ -286,22 +329,23 @@ def write_film(folder: RunFolder, target: Target, film: Film, console: Console) 
     # Imported here: what cannot be written is told before anything is loaded that draws.
     from walkerlab.figures.stick_diagram import OF_STAGE, film_times, pictures, sticks_of
 
-    results = {film.model: result_in(folder, film.model)}
-    why = OF_STAGE[film.model].why_left_out(results, {})
-    if why is not None:
-        raise StaleError(f"the walk cannot be drawn: {why}.", STORED_WITH)
-    sticks = sticks_of(results[film.model])
-    at = film_times(sticks, film.steps, film.rate, film.slower)
-    line = console.begin("animate", f"{at.size} pictures")
-    line.start("drawing", int(at.size))
+    with results_to_show(folder, [film.model], console.warn) as results:
+        walk = the_result(results, folder, film.model)
+        why = OF_STAGE[film.model].why_left_out(results, {})
+        if why is not None:
+            raise StaleError(f"the walk cannot be drawn: {why}.", STORED_WITH)
+        sticks = sticks_of(walk)
+        at = film_times(sticks, film.steps, film.rate, film.slower)
+        line = console.begin("animate", f"{at.size} pictures")
+        line.start("drawing", int(at.size))
 
-    def told() -> Iterator[Any]:
-        for picture in pictures(sticks, at, results[film.model].groups.get("terrain")):
-            yield picture
-            line.advance()
+        def told() -> Iterator[Any]:
+            for picture in pictures(sticks, at, walk.groups.get("terrain")):
+                yield picture
+                line.advance()
 
-    data = gif(told(), film.rate) if kind == "gif" else mp4(told(), film.rate, str(ffmpeg))
-    line.end("")
+        data = gif(told(), film.rate) if kind == "gif" else mp4(told(), film.rate, str(ffmpeg))
+        line.end("")
     return put(path, data, console)
 
 

@@ -6,15 +6,14 @@ from pathlib import Path
 
 from walkerlab.config.files import DEFAULT, builtin_names
 from walkerlab.config.loader import load, safe_name
-from walkerlab.config.problems import meant
+from walkerlab.config.problems import beyond_scope, meant
 from walkerlab.config.reference import as_json_schema
-from walkerlab.config.schema import Config
+from walkerlab.config.schema import QUESTIONS, Config
 from walkerlab.config.writer import commented
 from walkerlab.errors import ConfigError, StorageError
+from walkerlab.store.files import make_folder, write_atomically
 
 SCHEMA = ".walkerlab-schema.json"
-QUESTIONS = ("stability", "tune", "continuation", "basin", "robustness", "design", "sweep")
-"""Blocks that are written only where they are not at their defaults."""
 
 
 def write_config(file: Path, walker: str) -> str:
@@ -30,12 +29,13 @@ def write_config(file: Path, walker: str) -> str:
     named = config.model_copy(update={"name": safe_name(file.stem), "source": None})
     text = f"# yaml-language-server: $schema={SCHEMA}\n{commented(named, untouched)}"
     try:
-        file.parent.mkdir(parents=True, exist_ok=True)
-        (file.parent / SCHEMA).write_text(json.dumps(as_json_schema(), indent=1) + "\n", encoding="utf-8")
-        file.write_text(text, encoding="utf-8")
-    except OSError as error:
+        make_folder(file.parent)
+        write_atomically(file.parent / SCHEMA, json.dumps(as_json_schema(), indent=1).encode() + b"\n")
+        write_atomically(file, text.encode())
+    except StorageError as error:
+        reason = getattr(error.__cause__, "strerror", None) or error.message
         raise StorageError(
-            f"{file} could not be written: {error.strerror or error}.", "Choose a file in a folder that can be written."
+            f"{file} could not be written: {reason}.", "Choose a file in a folder that can be written and has room."
         ) from error
     return f"{file} written, with its schema beside it; next: `walkerlab report -c {shlex.quote(str(file))}`"
 
@@ -47,7 +47,7 @@ def template(walker: str) -> str:
         types.setdefault(load(Path(name)).config.walker.type, name)
     named = types | {name: name for name in builtin_names()}
     if walker not in named:
-        raise ConfigError(
-            f"there is no type of walker {walker!r}.{meant(walker, named)}", f"There are {', '.join(named)}."
-        )
+        beyond = beyond_scope(walker)
+        said = f"; {beyond}." if beyond else f".{meant(walker, named)}"
+        raise ConfigError(f"there is no type of walker {walker!r}{said}", f"There are {', '.join(named)}.")
     return named[walker]

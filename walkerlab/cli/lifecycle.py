@@ -146,7 +146,10 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
         ] = None,
         output: Output = None,
         model: Annotated[str | None, typer.Option(metavar="STAGE", help=f"Whose walk; {FIRST_WALK}.")] = None,
-        steps: Annotated[int, typer.Option(min=1, help="Steps to show.")] = 4,
+        steps: Annotated[
+            int | None,
+            typer.Option(min=1, help="First steps to show. Default: 4; of a walk that falls the last 4 and the fall."),
+        ] = None,
         rate: Annotated[int, typer.Option(min=1, max=60, help="Frames per second.")] = 25,
         slower: Annotated[float, typer.Option(min=0.01, help="Slow motion: 2 is half speed.")] = 1.0,
     ) -> None:

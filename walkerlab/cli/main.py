@@ -2,7 +2,9 @@
 
 import atexit
 import gc
+import os
 import re
+import sys
 import warnings
 from dataclasses import dataclass
 from typing import Annotated, Any
@@ -13,7 +15,7 @@ from typer.core import TyperGroup
 from walkerlab import __version__
 from walkerlab.cli import housekeeping, lifecycle, sweep
 from walkerlab.cli import runs as whole_runs
-from walkerlab.cli.request import OF_A_RUN, OF_TALK, Request, command, keys_to_vary, option
+from walkerlab.cli.request import OF_A_RUN, OF_TALK, Request, SetByOption, command, keys_to_vary, option
 from walkerlab.pipeline.graph import PIPELINE, Graph, Stage
 
 
@@ -33,7 +35,16 @@ def main() -> None:
         return f"warning: {message}\n" if own else as_python_has_it(message, category, filename, lineno, line)
 
     warnings.formatwarning = worded
+    print_whatever_there_is_to_print()
     program()()
+
+
+def print_whatever_there_is_to_print() -> None:
+    """Have output go nowhere where it is closed, and escape what its encoding lacks, such as names that are no text."""
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:
+            setattr(sys, name, os.fdopen(os.open(os.devnull, os.O_WRONLY), "w", encoding="utf-8"))
+        getattr(sys, name).reconfigure(errors="backslashreplace")
 
 
 class Commands(TyperGroup):
@@ -70,15 +81,19 @@ def program(graph: Graph = PIPELINE) -> typer.Typer:
 
 
 def print_version(asked: bool) -> None:
-    """Print the version and exit, if asked."""
+    """Print the version with the commit that the code is from, if that is known, and exit, if asked."""
     if asked:
-        typer.echo(f"walkerlab {__version__}")
+        # Imported here: nothing else that is answered on sight asks git.
+        from walkerlab.store.provenance import git_commit
+
+        commit = git_commit()
+        typer.echo(f"walkerlab {__version__}" + (f" (commit {commit})" if commit else ""))
         raise typer.Exit
 
 
 def options_of_the_program(
     version: Annotated[
-        bool, typer.Option("--version", is_eager=True, callback=print_version, help="Print the version.")
+        bool, typer.Option("--version", is_eager=True, callback=print_version, help="Print the version and the commit.")
     ] = False,
 ) -> None:
     """Nothing but `--version`, which is answered on sight."""
@@ -104,32 +119,40 @@ class StageRequest(Request):
         "--over", metavar="KEY=A:B", help="Number of the config that may change, and its bounds."
     )
     keep: list[str] | None = option("--keep", metavar="QUANTITY=A:B", help="Number of the gait to keep within bounds.")
+    designed: str | None = option("--model", metavar="rigid|contact", help="Which model's gait to design.")
 
     @property
     def settings(self) -> tuple[str, ...]:
         """The options as settings of the config, too; typer.BadParameter for a span or bounds that are none."""
         if self.over is not None and (self.begin is None or self.end is None):
             raise typer.BadParameter("a span goes with a key: give --from and --to, in its unit", param_hint="--over")
-        given = {
-            f"{self.command}.model": self.model,
-            "continuation.over": self.over,
-            "continuation.from": self.begin,
-            "continuation.to": self.end,
-            "continuation.periods": self.periods,
-            "design.minimise": self.least,
-            "design.maximise": self.most,
-            "design.over": bounds("over", self.within),
-            "design.keep": bounds("keep", self.keep),
-        }
-        return (*super().settings, *(f"{key}={value}" for key, value in given.items() if value is not None))
+        given = [
+            ("--model", f"{self.command}.model", self.model or self.designed),
+            ("--over", "continuation.over", self.over),
+            ("--from", "continuation.from", self.begin),
+            ("--to", "continuation.to", self.end),
+            ("--periods", "continuation.periods", self.periods),
+            ("--minimise", "design.minimise", self.least),
+            ("--maximise", "design.maximise", self.most),
+        ]
+        own = [
+            SetByOption(f"{key}={value}", f"{flag} {str(value).removesuffix('.0')}")
+            for flag, key, value in given
+            if value is not None
+        ]
+        for name, given_bounds in (("over", self.within), ("keep", self.keep)):
+            if given_bounds:
+                typed = " ".join(f"--{name} {one}" for one in given_bounds)
+                own.append(SetByOption(f"design.{name}={bounds(name, given_bounds)}", typed))
+        return (*super().settings, *own)
 
 
-def bounds(option: str, given: list[str] | None) -> str | None:
-    """Bounds KEY=A:B as a block in YAML; None if there are none."""
-    parts = [re.fullmatch(r"([^=]+)=([^:]+):([^:]+)", one) for one in given or ()]
+def bounds(option: str, given: list[str]) -> str:
+    """Bounds KEY=A:B as a block in YAML; typer.BadParameter where they have another form."""
+    parts = [re.fullmatch(r"([^=]+)=([^:]+):([^:]+)", one) for one in given]
     if None in parts:
         raise typer.BadParameter("give a name and its bounds, NAME=A:B", param_hint=f"--{option}")
-    return "{" + ", ".join(f"{one[1]}: [{one[2]}, {one[3]}]" for one in parts if one) + "}" if parts else None
+    return "{" + ", ".join(f"{one[1]}: [{one[2]}, {one[3]}]" for one in parts if one) + "}"
 
 
 def add_stage(app: typer.Typer, stage: Stage, graph: Graph) -> None:
@@ -140,8 +163,10 @@ def add_stage(app: typer.Typer, stage: Stage, graph: Graph) -> None:
         shared.remove("strides")
     shared += ["open_page"] if last else []
     shared += ["over", "begin", "end", "periods"] if stage.follows else []
-    shared += ["model"] if stage.of_a_model else []
-    shared += ["least", "most", "within", "keep"] if stage.designs else []
+    if stage.designs:
+        shared += ["least", "most", "within", "keep", "designed"]
+    elif stage.of_a_model:
+        shared += ["model"]
     shared += ["full"] if graph.campaigns_of(stage.name) else []
 
     @command(app, *shared, name=stage.name, purpose=stage.purpose, asks=StageRequest)

@@ -52,6 +52,18 @@ def configs_and_files(incomplete: str) -> list[str]:
     return [*(name for name in builtin_names() if name.startswith(incomplete)), *files]
 
 
+class SetByOption(str):
+    """A setting KEY=VALUE that an option of its own stands for; messages name that option as it was typed."""
+
+    source: str
+
+    def __new__(cls, text: str, source: str) -> "SetByOption":
+        """Make the setting, typed as `source`."""
+        made = super().__new__(cls, text)
+        made.source = source
+        return made
+
+
 def option(*flags: str, default: Any = None, **about: Any) -> Any:
     """A field of a request that commands may have as an option: its flags, and what typer is told of it."""
     return field(default=default, metadata={"option": typer.Option(*flags, **about)})

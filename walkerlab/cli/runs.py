@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -37,16 +38,19 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
     ) -> None:
         """Say how two runs differ: configs, headline numbers with relative change, walks over one another."""
         from walkerlab.errors import StaleError
-        from walkerlab.pipeline.runs import config_of, difference, results_in, run_named
+        from walkerlab.pipeline.runs import config_of, difference, results_to_show, run_named
 
         folders = (run_named(first, request.runs), run_named(second, request.runs))
         names = [stage.name for stage in graph.stages]
-        results = [results_in(folder, names, graph) for folder in folders]
-        for folder, found in zip(folders, results, strict=True):
-            if not found:
-                raise StaleError(f"{folder.path} has no results.", "Run a stage first.")
-        found_difference = difference(results[0], results[1], [config_of(folder) for folder in folders])
-        figures = draw(folders, results)
+        with contextlib.ExitStack() as stack:
+            results = [
+                stack.enter_context(results_to_show(folder, names, request.console.warn, graph)) for folder in folders
+            ]
+            for folder, found in zip(folders, results, strict=True):
+                if not found:
+                    raise StaleError(f"{folder.path} has no results.", "Run a stage first.")
+            found_difference = difference(results[0], results[1], [config_of(folder) for folder in folders])
+            figures = draw(folders, results)
         shown = lines(folders, found_difference, figures, request.every)
         tell(request, as_object(folders, found_difference, figures), shown)
 

@@ -11,8 +11,9 @@ from walkerlab.cli.request import Request
 from walkerlab.config.files import builtin_names, extendable
 from walkerlab.config.layers import setting_of
 from walkerlab.config.loader import load
+from walkerlab.config.walkers import why_rigid_alone
 from walkerlab.config.writer import extending
-from walkerlab.errors import NoAnswer
+from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.pipeline.executor import told_once
 from walkerlab.pipeline.graph import PIPELINE, Graph, Stage
 from walkerlab.pipeline.runner import Options, StageReport, execute
@@ -27,6 +28,14 @@ DRAWN_AT_ONCE = {stage.name for stage in PIPELINE.stages if stage.on_demand}
 
 def run_stage(request: Request, stage: Stage, graph: Graph, full: bool) -> None:
     """Do what the command asks and print it; typer.Exit(4) if there is no answer, else as `execute` raises."""
+    try:
+        report_on(request, stage, graph, full)
+    except ConfigError as error:
+        raise request.loaded.placed(error) from None
+
+
+def report_on(request: Request, stage: Stage, graph: Graph, full: bool) -> None:
+    """The same; ConfigError without the place of what is wrong."""
     options = Options(request.force, not request.no_wait, request.processes, full, request.dry_run)
     config, folder = request.resolved, request.folder
     if options.dry:
@@ -87,10 +96,12 @@ def printed(request: Request, report: StageReport) -> list[str]:
         shows = f"`walkerlab open {shlex.quote(str(report.run_dir))}` shows it"
         others = f"`walkerlab show STAGE{request.typed}` has every number"
         where = ["", f"page: {page}", f"next: {shows}; {others}."]
-        lines = [*verdict(report.results), *answer(report.stage, own), *where]
+        rigid_alone = ["", why_rigid_alone(request.resolved.walker)] if request.resolved.contact is None else []
+        lines = [*verdict(report.results), *answer(report.stage, own), *rigid_alone, *where]
     else:
         found = answer(report.stage, own)
-        lines = [*found, *([""] if found else []), f"stored in {report.artifact}"]
+        # that there is no answer is kept, too, but nobody would look there for a result
+        lines = [*found, *([""] if found else []), *([f"stored in {report.artifact}"] if own else [])]
     if report.stage in DRAWN_AT_ONCE:
         # Imported here: most stages draw nothing.
         from walkerlab.stages.plot import draw_at_once

@@ -1,13 +1,14 @@
 """What is stored: `walkerlab status`, which results are current, and `walkerlab show STAGE`, what is in one."""
 
 from collections import Counter
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from typing import Any
 
 from walkerlab.cli.failures import tell
 from walkerlab.cli.request import Request
 from walkerlab.errors import ConfigError, StaleError
-from walkerlab.pipeline.executor import survey
+from walkerlab.pipeline.executor import survey, told_once
 from walkerlab.pipeline.graph import Graph
 from walkerlab.pipeline.results import UP_TO_DATE, Step
 from walkerlab.pipeline.runs import RunSummary, config_of, run_named, runs_in
@@ -46,13 +47,20 @@ def print_status(request: Request, graph: Graph, check: bool, run: str | None) -
         }
         for step in steps
     ]
-    status: dict[str, Any] = {"run_dir": str(folder.path), "current": error is None, "stages": rows}
-    table = aligned([["stage", "state", "why"], *([s.stage.name, state_of(s), why(s)] for s in steps)])
-    lines = [f"{folder.path}:", *table]
+    status: dict[str, Any] = {
+        "run_dir": str(folder.path),
+        "changes": list(folder.changes),
+        "current": error is None,
+        "stages": rows,
+    }
+    names = [step.stage.name for step in steps]
+    table = aligned([["stage", "state", "why"], *map(list, zip(names, map(state_of, steps), whys(steps), strict=True))])
+    changed = [f"changed: {', '.join(folder.changes)}"] if folder.changes else []
+    lines = [f"{folder.path}:", *changed, *table]
     if listed is not None:
         status["runs"] = [vars(one) | {"run_dir": str(one.run_dir)} for one in listed]
     if listed:
-        head = ["run", "results", "up to date", "sweeps", "size", "last written"]
+        head = ["run", "results", "up to date", "sweeps", "size", "last written", "changed"]
         lines += ["", f"all runs in {request.runs}:", *aligned([head, *map(row_of, listed)])]
     tell(request, status, lines, error if check else None)
 
@@ -61,7 +69,8 @@ def row_of(run: RunSummary) -> list[str]:
     """One run as a table's row."""
     unknown = "unknown config" if run.stages else "0"
     current = unknown if run.current is None else str(len([s for s in run.stages if s in run.current]))
-    return [run.name, str(len(run.stages)), current, str(len(run.sweeps)), f"{run.bytes / 1e6:.1f} MB", run.changed_utc]
+    counts = [str(len(run.stages)), current, str(len(run.sweeps))]
+    return [run.name, *counts, f"{run.bytes / 1e6:.1f} MB", run.changed_utc, ", ".join(run.changes)]
 
 
 def state_of(step: Step) -> str:
@@ -80,6 +89,16 @@ def state_of(step: Step) -> str:
 def why(step: Step) -> str:
     """Why a stage's result is in its state; nothing where the state says it."""
     return "" if step.reason in (NOT_THERE, UP_TO_DATE) else step.reason.removeprefix(f"{state_of(step)}: ")
+
+
+def whys(steps: Sequence[Step]) -> Iterator[str]:
+    """The same of each stage in full once; of a later stage with the same reason, which stage has it."""
+    first: dict[str, str] = {}
+    for step in steps:
+        reason = told_once(why(step)) if step.action == "leave out" else why(step)
+        yield f"as {first[reason]}" if reason in first else reason
+        if reason:
+            first.setdefault(reason, step.stage.name)
 
 
 def failing(steps: tuple[Step, ...], last: str) -> StaleError | None:

@@ -51,6 +51,7 @@ class SweepRequest(Request):
         "--chunk-seconds", metavar="S", help="Target duration of a chunk; default by engine."
     )
     show: list[str] | None = option("--show", metavar="NAME", help="Quantity to plot; may be repeated.")
+    against: str | None = option("--against", metavar="NAME", help="Quantity to plot it over; default: the parameters.")
     as_csv: bool = option(
         "--csv", default=False, help="Print the points with the headline numbers as a table, kept beside the result."
     )
@@ -67,7 +68,7 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
         """Run a stage over many values of parameters; results that exist are reused."""
         from walkerlab.config.sweep import Sweep
         from walkerlab.sweeps.engines import Order, engine_named
-        from walkerlab.sweeps.question import asked, axis_of_text
+        from walkerlab.sweeps.question import asked, axis_of_text, refuse_unrecorded
         from walkerlab.sweeps.sweep import SweepRun, SweepWork, modules_of
 
         options = dict(text.split("=", 1) for text in request.engine_option or () if "=" in text)
@@ -84,6 +85,9 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
             request.sample if request.sample is not None else "" if over else given.sample,
             given.seed if request.seed is None else request.seed,
         )
+        shown = {f"--show {name}": name for name in request.show or ()}
+        shown |= {f"--against {request.against}": request.against} if request.against else {}
+        refuse_unrecorded(question, shown)
         order = Order(
             workers=request.at_once,
             address=address,
@@ -103,7 +107,8 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
             def check(there: Collection[str]) -> None:
                 from walkerlab.sweeps.drawing import refuse_unheard
 
-                refuse_unheard(question.stage, request.show or (), there)
+                named = {flag: name for flag, name in shown.items() if name not in question.names}
+                refuse_unheard(question.stage, named, there)
 
             seconds, waits = request.chunk_seconds, not request.no_wait
             work = SweepWork(begun, order, seconds, waits, request.force, where(graph), check)
@@ -167,7 +172,7 @@ def show_result(request: SweepRequest, swept: "Swept") -> None:
     from walkerlab.sweeps.drawing import draw
     from walkerlab.sweeps.result import as_csv as table_of
 
-    drawn = draw(swept, request.folder, tuple(request.show or ()))
+    drawn = draw(swept, request.folder, tuple(request.show or ()), request.against or "")
     summary = swept.summary
     value = {
         **common(request, swept.path, swept.wall_s),

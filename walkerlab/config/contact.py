@@ -88,7 +88,8 @@ class Contact(Block):
     pad_pitch: PadPitch = key(
         "rigid",
         "m",
-        "pitch of the pads: step length of the rigid or the contact (own) gait, or a number, in m in any units",
+        "pitch of the checkerboard's pads: step length of the rigid or the contact (own) gait, or a number, in m in "
+        "any units; without effect on other terrains",
         _SECTION_4,
         bounds="rigid, own, or 1e-6 to 1e4",
     )

@@ -7,7 +7,13 @@ from pydantic import field_validator
 from walkerlab.config.fields import Block, against, key, wrong
 
 Quantity = Literal[
-    "period_s", "step_length_m", "speed_m_s", "spectral_radius", "gait_sensitivity_norm", "cost_of_transport"
+    "period_s",
+    "step_length_m",
+    "speed_m_s",
+    "spectral_radius",
+    "gait_sensitivity_norm",
+    "gait_sensitivity_norm_scaled",
+    "cost_of_transport",
 ]
 _NAMES: Final = ", ".join(get_args(Quantity))
 Bounds = dict[str, list[float]]
@@ -37,7 +43,8 @@ class Design(Block):
     def _upwards(cls, value: Bounds) -> Bounds:
         for name, bounds in value.items():
             if len(bounds) != 2 or bounds[0] >= bounds[1]:
-                raise wrong(f"gives {name} bounds that are not two numbers, the first below the second")
+                text = ", ".join(f"{bound:g}" for bound in bounds)
+                raise wrong(f"has bounds for {name}, [{text}], that are not two numbers, the first below the second")
         return value
 
     @field_validator("keep")

@@ -1,5 +1,6 @@
 """What drives a walker: keys of the blocks `walker.hip` and `push_off`."""
 
+from collections.abc import Mapping
 from typing import Any, Final
 
 from walkerlab.config.fields import Block, key
@@ -32,7 +33,7 @@ class Hip(Block):
 
 
 class PushOff(Block):
-    """An impulse along the trailing leg, from foot to hip, as the other foot lands."""
+    """An impulse along the trailing leg, from foot to hip, just before the other foot lands."""
 
     impulse_N_s: float = key(0.0, "N s", "impulse at the trailing foot, 0 for none", KUO, ge=0.0, le=STRONGEST)
     duration_s: float = key(
@@ -41,12 +42,25 @@ class PushOff(Block):
 
 
 def drives_of(config: Any) -> tuple[str, ...]:
-    """What acts on the walker of a config beside gravity and ground, in words; nothing on a passive one."""
-    hip = config.walker.hip
-    acting = {
-        f"a push-off of {short(config.push_off.impulse_N_s)} N s": config.push_off.impulse_N_s,
-        f"a hip torque of {short(hip.torque_N_m)} N m": hip.torque_N_m,
-        f"a hip spring of {short(hip.spring_N_m_per_rad)} N m/rad": hip.spring_N_m_per_rad,
-        f"a hip damper of {short(hip.damping_N_m_s_per_rad)} N m s/rad": hip.damping_N_m_s_per_rad,
-    }
+    """What gives the walker of a config energy besides gravity, in words."""
+    push, torque = config.push_off.impulse_N_s, config.walker.hip.torque_N_m
+    return present({f"a push-off of {short(push)} N s": push, f"a hip torque of {short(torque)} N m": torque})
+
+
+def springs_of(config: Any) -> tuple[str, ...]:
+    """What acts between the legs and gives no energy of its own, in words: a spring gives back, a damper takes."""
+    stiffness, damping = config.walker.hip.spring_N_m_per_rad, config.walker.hip.damping_N_m_s_per_rad
+    return present({
+        f"a hip spring of {short(stiffness)} N m/rad": stiffness,
+        f"a hip damper of {short(damping)} N m s/rad": damping,
+    })  # fmt: skip
+
+
+def present(acting: Mapping[str, float]) -> tuple[str, ...]:
+    """Words of what is not zero."""
     return tuple(words for words, value in acting.items() if value != 0.0)
+
+
+def acting_on(config: Any) -> tuple[str, ...]:
+    """What acts on the walker of a config besides gravity and ground, in words."""
+    return drives_of(config) + springs_of(config)

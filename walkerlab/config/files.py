@@ -2,12 +2,13 @@
 
 import contextlib
 import stat
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import Final
 
-from walkerlab.config.problems import KEYS_ARE_LISTED, nearest, refused, shown
+from walkerlab.config.problems import KEYS_ARE_LISTED, beyond_scope, nearest, refused, shown
 from walkerlab.config.reader import MAX_CHARACTERS, read
 from walkerlab.config.tree import Mapping, Position, Scalar, Sequence
 
@@ -18,6 +19,7 @@ DEFAULT: Final = "paper"
 SUFFIXES: Final = (".yaml", ".yml")
 MAX_EXTENDS: Final = 16
 SHOWN_PATH: Final = 240
+STORED_IS_COMPLETE: Final = "every key with its value; a stored config extends nothing"
 parsed = lru_cache(maxsize=32)(read)  # trees of texts that were read already: they are changed in copies alone
 
 
@@ -25,14 +27,16 @@ parsed = lru_cache(maxsize=32)(read)  # trees of texts that were read already: t
 class ConfigFile:
     """One config file.
 
-    path   of the file
-    label  as messages name it
-    text   of the config, if it is not the file's own
+    path     of the file; of a run its folder's name
+    label    as messages name it
+    text     of the config that a run or an artifact holds; None if it is the file's own
+    changes  KEY=VALUE that made the run's config from its file
     """
 
     path: Path
     label: str
     text: str | None = None
+    changes: tuple[str, ...] = ()
 
 
 def builtin_names() -> tuple[str, ...]:
@@ -66,9 +70,24 @@ def file_at(path: Path) -> ConfigFile:
 def read_layers(file: ConfigFile) -> list[Mapping]:
     """The blocks of a file and of all it extends, the furthest ancestor first.
 
-    Raises ConfigError if one of them cannot be read, is not a block of keys, or extends itself.
+    Raises ConfigError if one of them cannot be read, is not a block of keys, or extends itself, and for a stored config
+    that names a file: it is complete.
     """
-    layers: list[Mapping] = []
+    layers = [with_cases(root.without("extends"), one.path.parent) for one, root in files_and_blocks(file)]
+    return layers[::-1]
+
+
+def files_read(file: ConfigFile) -> list[Path]:
+    """The files that a config is read from: its own, those that it extends, and lists of cases."""
+    found = []
+    for one, root in files_and_blocks(file):
+        cases = cases_file(root, one.path.parent)
+        found += [one.path] + ([] if cases is None else [cases[0].path])
+    return found
+
+
+def files_and_blocks(file: ConfigFile) -> Iterator[tuple[ConfigFile, Mapping]]:
+    """A config's file with its block of keys, then the file that it extends, and so on; raises as `read_layers`."""
     seen: list[str] = []
     asked: Position | None = None  # where the file's name stands
     while True:
@@ -83,15 +102,38 @@ def read_layers(file: ConfigFile) -> list[Mapping]:
             held = "is empty" if empty else f"holds a {'single value' if isinstance(root, Scalar) else 'list'}"
             start = root.position if root else Position(file.label, 1, 1)
             raise refused(start, f"the file {held}", "a block of keys, e.g. `extends: paper`")
-        layers.insert(0, with_cases(root.without("extends"), file.path.parent))
+        if file.text is not None:
+            _refuse_named_files(root)
+        yield file, root
         extends = root.entries.get("extends")
         if extends is None:
-            return layers
+            return
         asked = extends.position
         if not isinstance(extends, Scalar) or not isinstance(extends.value, str) or not extends.value:
             raise refused(asked, "extends: is not the name of a config", _what_there_is())
         named = extends.value in builtin_names()  # else a path from the file's folder
         file = builtin(extends.value) if named else file_at(file.path.parent / extends.value)
+
+
+def _refuse_named_files(root: Mapping) -> None:
+    """Raise ConfigError if a stored config names a file to be read: it may be from a stranger, and has all its keys."""
+    cases = cases_file(root, Path())
+    places = [root.entries["extends"].position] if "extends" in root.entries else []
+    places += [] if cases is None else [cases[1]]
+    if places:
+        raise refused(places[0], "a config that is stored with a result names a file to be read", STORED_IS_COMPLETE)
+
+
+def cases_file(layer: Mapping, folder: Path) -> tuple[ConfigFile, Position] | None:
+    """The file that a config names under stability.cases, and where; None if it lists the cases itself.
+
+    folder  which relative names start from
+    """
+    block = layer.entries.get("stability")
+    named = block.entries.get("cases") if isinstance(block, Mapping) else None
+    if not isinstance(named, Scalar) or not isinstance(named.value, str):
+        return None
+    return file_at(folder / named.value), named.position
 
 
 def with_cases(layer: Mapping, folder: Path) -> Mapping:
@@ -101,12 +143,11 @@ def with_cases(layer: Mapping, folder: Path) -> Mapping:
 
     Raises ConfigError if the file cannot be read or holds no list.
     """
-    block = layer.entries.get("stability")
-    named = block.entries.get("cases") if isinstance(block, Mapping) else None
-    if not isinstance(block, Mapping) or not isinstance(named, Scalar) or not isinstance(named.value, str):
+    named, block = cases_file(layer, folder), layer.entries.get("stability")
+    if named is None or not isinstance(block, Mapping):
         return layer
-    file = file_at(folder / named.value)
-    cases = read(_text_of(file, named.position, "a file that holds a list of cases"), file.label)
+    file, position = named
+    cases = read(_text_of(file, position, "a file that holds a list of cases"), file.label)
     if not isinstance(cases, Sequence):
         raise refused(Position(file.label, 1, 1), "the file does not hold a list", "a list of stability cases")
     whole, inner = layer.without(), block.without()
@@ -138,7 +179,9 @@ def _text_of(file: ConfigFile, asked: Position | None, wanted: str = "") -> str:
     except FileNotFoundError:
         there_is = wanted or _what_there_is() if asked else f"a run, {_what_there_is()}"
         advice = KEYS_ARE_LISTED if wanted else "`walkerlab init` writes a config to begin with"
-        raise refused(asked, f"there is no {kind} {file.label}", there_is, _near(file), advice) from None
+        beyond = "" if wanted or file.path.suffix else beyond_scope(file.path.name)
+        text = f"there is no {kind} {file.label}{f'; {beyond}' if beyond else ''}"
+        raise refused(asked, text, there_is, "" if beyond else _near(file), advice) from None
     except (OSError, ValueError, RuntimeError) as error:  # ValueError: a null byte in the name; RuntimeError: a loop
         reason = (error.strerror if isinstance(error, OSError) else None) or str(error)
         raise refused(asked, f"{kind} {file.label} cannot be read: {reason.lower()}") from None

@@ -61,9 +61,12 @@ def _refuse_two_slopes(given: dict[str, Position]) -> None:
 
 
 def setting_of(text: str) -> ConfigSetting:
-    """One `--set` option; ConfigError if it is not KEY=VALUE with a YAML value."""
+    """One `--set` option; ConfigError if it is not KEY=VALUE with a YAML value.
+
+    text  with a `source` where another option stands for it
+    """
     key, equals, value = text.partition("=")
-    source = f"--set {shown(text)}"
+    source = shown(getattr(text, "source", "")) or f"--set {shown(text)}"
     start = Position(source, 1, 1)
     path = tuple(part.strip() for part in key.split("."))
     if not equals or not all(path):

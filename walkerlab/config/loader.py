@@ -1,6 +1,7 @@
 """From a file, `--set` and `--strides` to one typed config, its warnings and the name of its run.
 
-A config changed by `--set` runs beside the unchanged one, in a folder named after the change.
+A config changed by `--set` runs beside the unchanged one, in a folder named after the change. The name follows from
+what differs and not from how the change was typed: one experiment, one folder.
 """
 
 import hashlib
@@ -19,15 +20,18 @@ from walkerlab.config.layers import ConfigSetting, option_setting, setting_of, s
 from walkerlab.config.numbers import short
 from walkerlab.config.overlay import refuse_bad_cases
 from walkerlab.config.problems import Problem
-from walkerlab.config.schema import Config
+from walkerlab.config.schema import QUESTIONS, Config
 from walkerlab.config.tree import Mapping, Position, Scalar
-from walkerlab.config.validation import Location, key_at, on_the_slope, typed
+from walkerlab.config.validation import Location, key_at, node_at, on_the_slope, typed
 from walkerlab.config.walkers import CompassWalker
+from walkerlab.errors import ConfigError
 
 STEEP_RAD: Final = 0.5
 """No passive walker is known to walk on a slope as steep; a number above it is perhaps in degrees."""
 LONG_M: Final = 20.0
 """Nobody builds longer legs; a number above it is perhaps in millimetres."""
+STRONG_M_S2: Final = 30.0
+"""No planet of the solar system pulls as strongly; a number above it is perhaps in cm/s^2."""
 HEAVY_KG_M3: Final = 1000.0
 """A mass above that of a cube of water as wide as the legs are long is perhaps in grams."""
 
@@ -38,6 +42,7 @@ class LoadedConfig:
 
     config    resolved, in the schema's types
     run_name  name of its folder below the runs folder
+    changes   KEY=VALUE of each key in which it differs from its file; for a run's config, those of the run come first
     warnings  what was changed in it, in words
     source    the file it is from
     tree      what it was typed from
@@ -45,9 +50,15 @@ class LoadedConfig:
 
     config: Config
     run_name: str
+    changes: tuple[str, ...]
     warnings: tuple[str, ...]
     source: str
     tree: Mapping
+
+    def placed(self, error: ConfigError) -> ConfigError:
+        """The error with the place of the key that it is about, where the config's text has one."""
+        where = node_at(self.tree, error.key)[1] if error.key and self.tree.entries.get(str(error.key[0])) else None
+        return ConfigError(f"{where}: {error.message}", error.advice) if where else error
 
     def variant(self, settings: Sequence[ConfigSetting]) -> Config:
         """The config with some keys set, checked by the schema; ConfigError with the places of what is wrong."""
@@ -88,13 +99,21 @@ def load(
     config, moved = on_the_slope(changed, changed_tree)
     slope = changed_tree.entries.get("slope_deg")
     degrees = float(slope.value) if isinstance(slope, Scalar) and isinstance(slope.value, int | float) else None
-    folder = name or run_name(base, changed, degrees, None if file.text is None else file.path.name)
+    new = changes_of(base, changed, degrees)
+    keys = {key_of(change) for change in new}
+    changes = (*(earlier for earlier in file.changes if key_of(earlier) not in keys), *new)
+    if changed.name != base.name:
+        folder = run_name(changed.name, new)
+    elif file.text is not None and not new:  # a run goes on in its folder, however that is named
+        folder = file.path.name
+    else:
+        folder = run_name(base.name if file.text is None else file.path.name.partition("@")[0], changes)
     named = tree.entries["name"]
     warnings = [*doubts(config, changed_tree), *moved]
     if isinstance(named, Scalar) and named.position == start and named.value != file.path.stem:
         cannot = "since a run folder cannot be named as the file is"
         warnings.insert(0, f"{file.label}: the run is named {named.value}, {cannot}")
-    return LoadedConfig(config, folder, tuple(warnings), file.label, changed_tree)
+    return LoadedConfig(config, name or folder, changes, tuple(warnings), file.label, changed_tree)
 
 
 def safe_name(text: str) -> str:
@@ -104,7 +123,7 @@ def safe_name(text: str) -> str:
 
 
 def doubts(config: Config, tree: Mapping) -> Iterator[str]:
-    """What is perhaps meant otherwise: a leg whose mass is left behind, lengths in mm, degrees, masses in grams."""
+    """Warn of what is perhaps meant otherwise: a leg whose mass stays, wrong units, a pitch without pads."""
     walker, block = config.walker, tree.entries.get("walker")
     places = block.keys if isinstance(block, Mapping) else {}
     length = short(walker.leg_length_m)
@@ -120,6 +139,14 @@ def doubts(config: Config, tree: Mapping) -> Iterator[str]:
     if slope is not None and abs(config.slope_rad) > STEEP_RAD:
         degrees = short(round(math.degrees(config.slope_rad), 1))
         yield str(Problem(slope, f"slope_rad is in radians, so this is {degrees} degrees; slope_deg takes degrees"))
+    gravity = tree.keys.get("gravity_m_s2")
+    if gravity is not None and config.gravity_m_s2 > STRONG_M_S2:
+        text = f"gravity_m_s2 is {short(config.gravity_m_s2)}; it is in m/s^2 (9.81 on earth), not in cm/s^2"
+        yield str(Problem(gravity, text))
+    contact = config.contact
+    if contact is not None and contact.terrain != "checkerboard" and not isinstance(contact.pad_pitch, str):
+        text = f"contact.pad_pitch has no effect on {contact.terrain}, which has no pads"
+        yield str(Problem(key_at(tree, ("contact", "pad_pitch")), f"{text}; only checkerboard has some"))
     for path, value in numbers(("walker",), walker.model_dump(mode="json")):
         key, text = str(path[-1]), f"{'.'.join(map(str, path))} is {short(value)}"
         if key.endswith("length_m") and value > LONG_M:
@@ -137,38 +164,48 @@ def numbers(path: Location, value: Any) -> Iterator[tuple[Location, float]]:
         yield path, float(value)
 
 
-MAX_CHANGE: Final = 80
-KEPT_OF_A_LONG_CHANGE: Final = 56
+MAX_NAME: Final = 40
+"""Characters of a run folder's name that shows its changes."""
+UNSAFE: Final = re.compile(r"[^A-Za-z0-9._,@=+-]")
 
 
-def run_name(base: Config, changed: Config, slope_deg: float | None = None, run: str | None = None) -> str:
-    """Name of the run folder of `changed`, which `--set` made of `base`: `name`, or `name@key=value,...`.
-
-    The name follows from what differs and not from how the change was typed: one experiment, one folder.
+def changes_of(base: Config, changed: Config, slope_deg: float | None = None) -> tuple[str, ...]:
+    """KEY=VALUE of each key in which `--set` changed `base`, in the schema's order, however that was typed.
 
     slope_deg  the slope as the user gave it, if in degrees
-    run        the folder that `base` was taken from, which has perhaps a change in its name already
     """
-    before, after = base.model_dump(mode="json"), changed.model_dump(mode="json")
-    parts = []
-    for name, field in Config.model_fields.items():
-        block = block_of(field)
+    before, after = base.model_dump(mode="json", exclude={"name"}), changed.model_dump(mode="json", exclude={"name"})
+    added = []
+    for name in before:
+        block = block_of(Config.model_fields[name])
         if block is not None and before[name] is None and after[name] is not None:
             before[name] = block().model_dump(mode="json")
-            parts.append(f"{name}=added")
+            added.append(f"{name}=added")
     known = dict(flattened(before))
     differing = {key: value for key, value in flattened(after) if key not in known or known[key] != value}
-    renamed = differing.pop("name", None)
-    whole, _, earlier = (renamed or run or base.name).partition("@")
     if slope_deg is not None and "slope_rad" in differing:
         differing = {"slope_deg" if key == "slope_rad" else key: value for key, value in differing.items()}
         differing["slope_deg"] = slope_deg
-    parts = [earlier] * bool(earlier) + parts + [f"{key}={_word(value)}" for key, value in differing.items()]
-    change = ",".join(parts)
-    if len(change) > MAX_CHANGE:
-        digest = hashlib.sha256(change.encode()).hexdigest()[:12]
-        change = f"{change[:KEPT_OF_A_LONG_CHANGE].rstrip('.,_=-')}-{digest}"
-    return f"{whole}@{change}" if change else whole
+    return (*added, *(f"{key}={_word(value)}" for key, value in differing.items()))
+
+
+def run_name(name: str, changes: Sequence[str]) -> str:
+    """Name of a run folder: `name@key=value,...` if that is short, otherwise `name@label-` and 8 hex digits.
+
+    The label is the stage whose question was changed, if there is one, and otherwise the first key.
+    """
+    change = ",".join(changes)
+    whole = f"{name}@{change}" if change else name
+    if not change or (len(whole) <= MAX_NAME and not UNSAFE.search(change)):
+        return whole
+    keys = [key_of(one) for one in changes]
+    label = next((key.partition(".")[0] for key in keys if key.partition(".")[0] in QUESTIONS), keys[0])
+    return f"{name}@{UNSAFE.sub('-', label)}-{hashlib.sha256(change.encode()).hexdigest()[:8]}"
+
+
+def key_of(change: str) -> str:
+    """The key of KEY=VALUE."""
+    return change.partition("=")[0]
 
 
 def _word(value: Any) -> str:

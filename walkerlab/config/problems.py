@@ -1,8 +1,10 @@
 """Problems with a config: where, which value, what is allowed, and the nearest key."""
 
 import difflib
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Final
 
 from walkerlab.config.tree import Mapping, Node, Position, Scalar
 from walkerlab.errors import ConfigError
@@ -34,6 +36,13 @@ class Problem:
         return f"{where}{self.text}{meant}{allowed}"
 
 
+BEYOND_SCOPE: Final = {
+    r"control|feedback|\bpid\b|\blqr\b": "walkerlab has no controllers; push_off and walker.hip drive a walker",
+    r"runner|running|hopp|jump": "walkerlab has no running: its walkers always have a foot on the ground",
+    r"3-?d\b|three-?d|spatial|lateral": "walkerlab is planar: its walkers move in one vertical plane",
+    r"quadruped|four-?leg|hexapod|monoped": "walkerlab's walkers have two legs",
+}
+"""Names that people try, as patterns, and why walkerlab has nothing of the kind."""
 KEYS_ARE_LISTED = "`walkerlab schema` lists every key with its unit, bounds and default"
 
 
@@ -50,6 +59,11 @@ def refused(
 ) -> ConfigError:
     """One error for one problem; see `Problem`."""
     return refusal([Problem(position, text, allowed, near)], advice)
+
+
+def beyond_scope(word: str) -> str:
+    """Why walkerlab has nothing of a name, in a sentence; empty if it is not beyond what walkerlab is for."""
+    return next((why for pattern, why in BEYOND_SCOPE.items() if re.search(pattern, word.lower())), "")
 
 
 def nearest(word: str, candidates: Iterable[str]) -> str:

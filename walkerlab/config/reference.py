@@ -4,7 +4,7 @@ import json
 import re
 import textwrap
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 from pydantic.fields import FieldInfo
@@ -87,7 +87,10 @@ def as_paragraphs(asked: str = "") -> str:
 
 
 def asked_for(asked: str) -> list[KeyReference]:
-    """The keys of a block, the key of that name, or all keys; ConfigError with the nearest key if there is none."""
+    """The keys of a block, the key of that name, or all keys; ConfigError with the nearest key if there is none.
+
+    A key that is the same in every kind of a block is listed once.
+    """
     plain = {key: OF_A_KIND.sub("", key.key) for key in keys()}
     found = [
         key for key in plain if not asked or any(f"{name}.".startswith(f"{asked}.") for name in (key.key, plain[key]))
@@ -96,7 +99,8 @@ def asked_for(asked: str) -> list[KeyReference]:
         names = {".".join(name.split(".")[:depth]) for name in plain.values() for depth in (1, 2, 3)}
         near = meant(asked, names) or meant(asked, {name.split(".")[-1] for name in names})
         raise ConfigError(f"the config has no key {asked}.{near}", "`walkerlab schema` lists every key")
-    return found
+    everywhere = {key for key in found if key.key == plain[key]}
+    return [key for key in found if key in everywhere or replace(key, key=plain[key]) not in everywhere]
 
 
 def as_json_schema(asked: str = "") -> dict[str, Any]:

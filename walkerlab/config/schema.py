@@ -11,7 +11,7 @@ from walkerlab.config.basin import Basin
 from walkerlab.config.contact import Contact
 from walkerlab.config.continuation import Continuation
 from walkerlab.config.design import Design
-from walkerlab.config.drives import PushOff, drives_of
+from walkerlab.config.drives import PushOff, acting_on
 from walkerlab.config.fields import Block, against, key, wrong
 from walkerlab.config.ground import Footholds
 from walkerlab.config.robustness import Robustness
@@ -163,6 +163,10 @@ class Tune(Block):
         return value
 
 
+QUESTIONS: Final = ("stability", "tune", "continuation", "basin", "robustness", "design", "sweep")
+"""Blocks that say what a stage or a sweep is asked, not what walks."""
+
+
 class Source(Block):
     """The study that a config redoes, as the report names it."""
 
@@ -239,8 +243,8 @@ class Config(Block):
     def _appendix_a_is_a_compass(cls, value: Equations, info: ValidationInfo) -> Equations:
         if value == "as-printed" and {"walker", "push_off"} <= info.data.keys():
             given = SimpleNamespace(**info.data)
-            if drives := drives_of(given):
-                raise wrong(f"is for a passive compass, and this walker has {', '.join(drives)}")
+            if acting := acting_on(given):
+                raise wrong(f"is for a passive compass, and this walker has {', '.join(acting)}")
             if not is_plain_compass(given):
                 raise wrong("is for a compass; this walker is another")
         return value

@@ -19,8 +19,8 @@ class Position:
         return bool(self.source)
 
     def __str__(self) -> str:
-        """As editors and terminals understand it: source:line:column; an option is itself where it begins."""
-        whole = not self.line or (self.source.startswith("--") and (self.line, self.column) == (1, 1))
+        """As editors and terminals understand it: source:line:column; an option is short enough to stand for itself."""
+        whole = not self.line or self.source.startswith("--")
         return self.source if whole else f"{self.source}:{self.line}:{self.column}"
 
 

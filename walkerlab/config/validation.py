@@ -13,7 +13,7 @@ from walkerlab.config.fields import Block, allowed, block_of, kinds_of, leaves, 
 from walkerlab.config.files import DEFAULT, builtin, builtin_names, read_layers
 from walkerlab.config.layers import stacked
 from walkerlab.config.numbers import short
-from walkerlab.config.problems import Problem, nearest, refusal, shown, shown_value
+from walkerlab.config.problems import Problem, beyond_scope, nearest, refusal, shown, shown_value
 from walkerlab.config.schema import Config, SlopeInDegrees
 from walkerlab.config.tree import Mapping, Node, Position, Scalar, plain
 from walkerlab.config.tree import Sequence as Listed
@@ -161,8 +161,9 @@ def _problem(detail: ErrorDetails, tree: Mapping, model: type[Block]) -> Problem
     if what == "union_tag_invalid":
         node, position = node_at(tree, (*location, "type"))
         word = str(node.value) if isinstance(node, Scalar) else ""
-        text = f"{location[0]}.type: {shown(word)} is of no known type"
-        return Problem(position, text, f"one of {', '.join(kinds)}", nearest(word, kinds))
+        beyond = beyond_scope(word)
+        text = f"{location[0]}.type: {shown(word)} is of no known type{f'; {beyond}' if beyond else ''}"
+        return Problem(position, text, f"one of {', '.join(kinds)}", "" if beyond else nearest(word, kinds))
     if len(location) > 1 and location[1] in kinds:  # pydantic's word for the kind that it tried
         location = (location[0], *location[2:])
     if what == "extra_forbidden":
@@ -228,11 +229,15 @@ def _unknown_key(location: Location, tree: Mapping) -> Problem:
     if location == ("extends",):
         return Problem(parent.keys[name], "extends: belongs in a file, not in --set", "-c FILE with `extends` in it")
     siblings = [*block.model_fields, *(("slope_deg", "extends") if block is Config else ())]
+    text = f"{shown('.'.join((*above, name)))}: unknown key ({shown_value(parent.entries[name])})"
+    value = parent.entries[name]
+    beyond = beyond_scope(name) or (beyond_scope(value.text) if name == "type" and isinstance(value, Scalar) else "")
+    if beyond:
+        return Problem(parent.keys[name], f"{text}; {beyond}", ", ".join(siblings))
     beside = nearest(name, siblings) if "." not in name else ""
     if beside == "slope_rad" and "rad" not in name:
         beside = "slope_deg"
     meant = ".".join((*above, beside)) if beside else _elsewhere(name, exactly=bool(above))
-    text = f"{shown('.'.join((*above, name)))}: unknown key ({shown_value(parent.entries[name])})"
     return Problem(parent.keys[name], text, ", ".join(siblings), meant)
 
 

@@ -5,16 +5,18 @@ from collections.abc import Callable
 from contextlib import suppress
 from itertools import pairwise
 from types import SimpleNamespace
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Any, Final, Literal, TypeGuard
 
 from pydantic import Discriminator, Field, Tag, ValidationInfo, field_validator
 
-from walkerlab.config.drives import QUICKEST, Hip, drives_of
+from walkerlab.config.contact import Contact
+from walkerlab.config.drives import QUICKEST, Hip, acting_on
 from walkerlab.config.fields import Block, against, key, wrong
-from walkerlab.config.numbers import same
+from walkerlab.config.numbers import same, short
 from walkerlab.errors import ConfigError
 
 WISSE: Final = "Wisse, Schwab, Int. J. Robotics Research 24 (2005): arc feet"
+MCGEER: Final = "McGeer, Passive walking with knees, IEEE Int. Conf. Robotics and Automation (1990)"
 HSU_CHEN: Final = "Hsu Chen, Passive dynamic walking with knees, MIT (2007)"
 LONGEST: Final = 1e3  # m
 LEG_LENGTH_DIGITS: Final = 1e-6  # relative, to which a leg's length agrees with its parts
@@ -95,9 +97,10 @@ class _Legged(Block):
     """What walkers have in common."""
 
     @property
-    def lean_rad(self) -> float:
-        """Angle of the line from hip to foot centre in an upright leg; of parts a start is taken as given."""
-        return 0.0
+    def lean_rad(self: Any) -> float:
+        """Angle of the line from hip to foot centre in an upright leg; 0 for parts, whose start is taken as given."""
+        ahead = getattr(self, "foot_centre_ahead_m", 0.0)
+        return math.atan2(ahead, self.leg_length_m - self.foot_radius_m)
 
     @property
     def total_mass_kg(self: Any) -> float:
@@ -178,11 +181,6 @@ class StraightLegs(_Legged):
         "leg_inertia_kg_m2", "the leg's mass at the hip: the swing leg", "leg_mass_below_hip_m", "leg_mass_ahead_m"
     )
 
-    @property
-    def lean_rad(self) -> float:
-        """Angle of the line from hip to foot centre in an upright leg."""
-        return math.atan2(self.foot_centre_ahead_m, self.leg_length_m - self.foot_radius_m)
-
 
 class Thigh(Block):
     """The upper half of a leg with a knee."""
@@ -234,6 +232,9 @@ class Kneed(_Legged):
     hip_mass_kg: float = mass(0.5, "mass at the hip", HSU_CHEN, 0.0)
     foot_radius_m: float = key(
         0.0, "m", "radius of the sole's arc, 0 is a point", HSU_CHEN, bounds="from 0 to below shank.length_m", ge=0.0
+    )
+    foot_centre_ahead_m: float = offset(
+        0.0, "the arc's centre, or the point, ahead of the shank's line, perpendicular to it", MCGEER
     )
     knee: KneeJoint = KneeJoint()
     torso: Torso | None = None
@@ -395,7 +396,7 @@ def followers(walker: Any) -> dict[int, tuple[str, dict[int, float]]]:
 
 def is_plain_compass(config: Any) -> bool:
     """Whether this is the walker of Appendix A."""
-    return bool(config.walker.type == "compass" and config.walker.torso is None and not drives_of(config))
+    return bool(config.walker.type == "compass" and config.walker.torso is None and not acting_on(config))
 
 
 def is_the_papers(config: Any) -> bool:
@@ -464,6 +465,24 @@ def why_no_state(start: Any, walker: Any) -> str:
     numbers = 2 * rigid_bodies(walker)
     fits = isinstance(start, str) or len(start) == numbers
     return "" if fits else f"has {len(start)} numbers, and this walker's state has {numbers}"
+
+
+def contact_to_add(walker: Any) -> str:
+    """A contact block for a walker, in YAML: the paper's numbers by mass, and ground that its legs can walk on."""
+    share, paper = walker.total_mass_kg / CompassWalker().total_mass_kg, Contact()
+    stiffness, damping = (short(float(f"{share * one:.3g}")) for one in (paper.stiffness, paper.damping))
+    numbers = f"stiffness: {stiffness}, damping: {damping}"
+    return f"contact: {{{numbers}, terrain: {'plane' if has_knees(walker) else 'after-mid-swing'}}}"
+
+
+def has_knees(walker: Any) -> TypeGuard["Kneed | PartsWalker"]:
+    """Whether a walker's swing leg shortens, so that it clears plain ground."""
+    return isinstance(walker, Kneed) or (isinstance(walker, PartsWalker) and any(one.locks for one in walker.hinges))
+
+
+def why_rigid_alone(walker: Any) -> str:
+    """Why the contact model is not asked about a walker without a contact block, as a sentence."""
+    return f"The contact model was not asked: {too_light_for_contact(walker) or 'the config has no contact block'}."
 
 
 def without_contact(asked: str, walker: Any, instead: str) -> ConfigError:

@@ -28,11 +28,17 @@ def extending(start: str, base: Config, changed: Config, name: str) -> str:
     """YAML text of a config that extends another one, `base` by the name `start`, and says only what differs."""
     different = _different(base.model_dump(mode="json"), changed.model_dump(mode="json"))
     blocks = {"extends": start, "name": name, **{key: value for key, value in different.items() if key != "name"}}
-    degrees = float(f"{math.degrees(changed.slope_rad):.12g}")
-    if "slope_rad" in blocks and math.radians(degrees) == changed.slope_rad:
+    degrees = slope_in_degrees(changed.slope_rad)
+    if "slope_rad" in blocks and degrees is not None:
         blocks["slope_deg"] = degrees
         del blocks["slope_rad"]
     return "".join(f"{line}\n" for line in _lines(blocks, ""))
+
+
+def slope_in_degrees(slope_rad: float) -> float | None:
+    """The degrees that a slope was written as; None for one that was written in radians."""
+    degrees = float(f"{math.degrees(slope_rad):.12g}")
+    return degrees if math.radians(degrees) == slope_rad else None
 
 
 def _different(base: dict[str, Any], changed: dict[str, Any]) -> dict[str, Any]:

@@ -14,12 +14,13 @@ from typing import Any
 from urllib.parse import quote
 
 from walkerlab.explorer.walks import Answered, ExploredConfig
+from walkerlab.stopping import PATIENCE_S
 
 KINDS = ("report", "gif")
 EARLY = re.compile(r"page: (.+) \(partial")
 """How a command says that there is a page already."""
-PATIENCE_S = 1.0
-"""How long a command may take to keep what is finished, once the page ends."""
+START = "from walkerlab.stopping import end_with_parent; end_with_parent(); from walkerlab.cli.main import main; main()"
+"""Run a command, as `python -m walkerlab` does, for as long as the server is there."""
 
 
 class Job:
@@ -77,20 +78,20 @@ class Job:
 
     def _command(self, *words: str) -> dict[str, Any]:
         """What a command prints as JSON; RuntimeError with what it said last if it fails."""
-        command = [sys.executable, "-m", "walkerlab", *words]
+        command = [sys.executable, "-c", START, *words]
         lines = []
         # Into a file: a pipe that nobody reads meanwhile would fill.
         with tempfile.TemporaryFile("w+") as output:
-            self._process = subprocess.Popen(
-                command, stdout=output, stderr=subprocess.PIPE, text=True, start_new_session=True
-            )
-            assert self._process.stderr is not None
-            for line in self._process.stderr:
-                lines.append(line.strip())
-                self._told = {**self._told, "said": line.strip()}
-                if (early := EARLY.search(line)) is not None:
-                    self._told = {**self._told, "url": self._url(Path(early[1]))}
-            status = self._process.wait()
+            with subprocess.Popen(
+                command, stdin=subprocess.PIPE, stdout=output, stderr=subprocess.PIPE, text=True, start_new_session=True
+            ) as self._process:
+                assert self._process.stderr is not None
+                for line in self._process.stderr:
+                    lines.append(line.strip())
+                    self._told = {**self._told, "said": line.strip()}
+                    if (early := EARLY.search(line)) is not None:
+                        self._told = {**self._told, "url": self._url(Path(early[1]))}
+                status = self._process.wait()
             output.seek(0)
             printed = output.read()
         if status != 0:

@@ -50,20 +50,25 @@ class Desk:
         return worker
 
     def ask(self, call: Callable[[], Answered]) -> Answered:
-        """What the call returns there, once the worker is free; status 409 if a newer question came meanwhile."""
+        """Return what the call returns there, once the worker is free; status 409 if a newer question came meanwhile.
+
+        A call whose worker dies is given to another one, once: an idle worker may have died before.
+        """
         with self._count:
             self._newest += 1
             number = self._newest
         if self.drops and self._turn.locked():
             self.worker.process.send_signal(GIVE_WAY)
         with self._turn:
-            # again, if what was to end the question before has come late
+            deaths = 0
+            # again, if what was to end the question before has come late, or if the worker died while nobody asked
             while number == self._newest:
                 try:
                     answer = self.worker.do(call, self._heard)
                 except WorkerDiedError as error:
                     self.worker = self._hired()
-                    if error.exit_code_of_worker != -GIVE_WAY:  # not even begun, and so told
+                    deaths += error.exit_code_of_worker != -GIVE_WAY  # not even begun
+                    if deaths > 1:
                         return failed(500, error.message, error.advice)
                 except Exception as error:
                     return failed(500, f"this is a bug of walkerlab: {type(error).__name__}: {error}")

@@ -167,8 +167,9 @@ def along(question: ExploredConfig) -> Answered:
         return question.refused(error)
     except SupersededError:
         return SUPERSEDED
-    followed = [(path, group) for path, group in answer.groups.items() if "step_period" in group.variables]
-    curves = [{"model": path.partition("/")[0], **curve(group)} for path, group in followed if walkable(group)]
+    # the steps of an attractor have periods, but they are no branch
+    branches = [(path, group) for path, group in answer.groups.items() if "step_length" in group.variables]
+    curves = [{"model": path.partition("/")[0], **curve(group)} for path, group in branches if walkable(group)]
     return 200, {"over": config.continuation.over, "curves": curves}
 
 

@@ -2,6 +2,7 @@
 
 import contextlib
 import io
+import math
 import re
 import textwrap
 from collections.abc import Iterator, Sequence
@@ -29,6 +30,7 @@ SHRINKS = 0.7
 
 BETWEEN_DECADES: Final = ((15.0, (2.0, 5.0)), (100.0, (3.0,)))
 """Multiples of a power of ten that have labels too, on axes whose ends are less than a factor apart."""
+RAISED: Final = str.maketrans("0123456789-.e", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻·ᵉ")
 LONGEST: Final = 1e4
 """Number that is written without its exponent."""
 
@@ -42,6 +44,11 @@ def styled(width: float = WIDTH) -> Iterator[None]:
     size = {"figure.figsize": (width, width)}
     with matplotlib.style.context(["default", RC, *([NARROW] if width < NARROW_BELOW else []), size]):
         yield
+
+
+def is_narrow() -> bool:
+    """Whether figures are of one column."""
+    return bool(matplotlib.rcParams["figure.figsize"][0] < NARROW_BELOW)
 
 
 def blank(height: float) -> Figure:
@@ -60,7 +67,7 @@ def panels(height: float, rows: int = 1, columns: int = 1, **how: Any) -> tuple[
 
 def label_of(words: str, unit: str) -> str:
     """An axis in words, with its unit."""
-    return with_unit(words, re.sub(r"\^([\w.]+)", r"$^{\1}$", unit))
+    return with_unit(words, re.sub(r"\^([\d.]+|e\b)", lambda power: power[1].translate(RAISED), unit))
 
 
 def label_ticks(axis: Axis) -> None:
@@ -69,8 +76,15 @@ def label_ticks(axis: Axis) -> None:
     between = next((subs for span, subs in BETWEEN_DECADES if last < min(span * least, LONGEST)), ())
     axis.set_major_locator(LogLocator(subs=(1.0, *between)))
     axis.set_minor_locator(NullLocator())
-    if between:
-        axis.set_major_formatter(FuncFormatter(lambda value, _place: f"{value:g}"))
+    axis.set_major_formatter(FuncFormatter((lambda value, _place: f"{value:g}") if between else power_of_ten))
+
+
+def power_of_ten(value: float, _place: float | None = None) -> str:
+    """A power of ten, as an axis writes its ticks.
+
+    Its exponent has signs of its own, since the small letters of a formula would be too small on a page.
+    """
+    return "10" + str(round(math.log10(value))).translate(RAISED)
 
 
 def entry(label: str, **look: Any) -> Line2D:

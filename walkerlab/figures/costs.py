@@ -17,7 +17,7 @@ from walkerlab.figures.canvas import add_legend, blank, entry, label_ticks, pane
 from walkerlab.figures.illustration import Drawn, Illustration, Need, Results, paper_figure
 from walkerlab.figures.style import BLACK, BLUE, CONTACT, GREEN, GREY, ORANGE, PALE, PURPLE, VERMILLION, Look
 from walkerlab.figures.walks import TUNE_STAGE, Array, redoes_the_paper
-from walkerlab.paper.printed import ANGLE_ERROR
+from walkerlab.paper.printed import LARGEST_ERROR
 
 if TYPE_CHECKING:
     from matplotlib.typing import LineStyleType
@@ -254,14 +254,14 @@ def draw_limit(results: Results) -> Drawn:
         decades(axes)
         axes.set(title=title if len(found) > 1 else "", xlabel="run time of the walk (s)")
         if of_the_paper:
-            axes.axhline(ANGLE_ERROR.value, **CLAIM)
+            axes.axhline(LARGEST_ERROR.value, **CLAIM)
     both[0].set_ylabel("error")
     key = [entry(look.label, **look.line, marker=look.marker, markersize=4) for look in ERRORS.values()]
     if of_the_paper:
         key.append(entry("the paper's claim", **CLAIM))
     add_legend(figure, [*key, entry("the config's contact", **CONFIGS)])
     first, *point_feet = [rows[ALIGNED] for rows, _ in found]
-    claim = ANGLE_ERROR.text if of_the_paper else ""
+    claim = LARGEST_ERROR.text if of_the_paper else ""
     pushes = results[TUNE_STAGE].identity.config_slice["push_off"]["impulse_N_s"] != 0.0
     return figure, (first[0], first[-1], point_feet[0][-1] if point_feet else None, claim, pushes)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import count, cycle, pairwise
@@ -14,7 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Circle
 from numpy.typing import NDArray
 
-from walkerlab.figures.canvas import add_legend, entry, label_of, panels
+from walkerlab.figures.canvas import add_legend, entry, is_narrow, label_of, panels
 from walkerlab.figures.illustration import Drawn, Need, Results, paper_figure
 from walkerlab.figures.maps import Kind, draw_kinds
 from walkerlab.figures.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, VERMILLION
@@ -146,6 +146,8 @@ ROOM: Final = 0.06
 """Beside what is stable, as a share of it: unstable branches that go far away are cut there."""
 LEAST: Final = 0.05
 """Of the span, what the part with bifurcations is at least; of a quantity, what its axis spans at least."""
+TOLD_APART: Final = 0.04
+"""Of the axis, between labels of births."""
 BETWEEN: Final = 16
 """Points between two of a branch, where a quantity's largest and least values are sought, and multipliers drawn."""
 
@@ -153,12 +155,20 @@ BETWEEN: Final = 16
 def draw_branches(results: Results) -> Drawn:
     """Both quantities over the whole span on the left, over the part with bifurcations on the right if there are some.
 
-    Caption: where the models' gaits of one step change, where cascades accumulate, and the unit of both.
+    In a figure of one column the two parts stand under one another.
+
+    Caption: where the models' gaits of one step change, where cascades accumulate, where gaits of several steps are
+    born in folds, and the unit of all.
     """
     summary = results[STAGE].summary
     branches, settled, close = list(branches_of(results)), list(clouds(results)), close_of(results)
     parts = {"(a) all of it": None} | ({"(b) where gaits change": close} if close else {})
-    figure, both = panels(5.6, 2, len(parts), squeeze=False)
+    if is_narrow():
+        figure, stack = panels(5.6 * len(parts), 2 * len(parts))
+        both = stack.reshape(len(parts), 2).T
+    else:
+        figure, both = panels(5.6, 2, len(parts), squeeze=False)
+    births = births_in(branches, close) if close else []
     kinds: set[str] = set()
     for row, (name, words) in zip(both, QUANTITIES.items(), strict=True):
         for axes, shown in zip(row, parts.values(), strict=True):
@@ -170,6 +180,7 @@ def draw_branches(results: Results) -> Drawn:
             axes.set(xlabel=parameter_of(results), ylabel=label_of(words, branches[0].group.variables[name].units))
             if shown is not None:
                 axes.set_xlim(*shown)
+                label_births(axes, births)
             axes.set_ylim(*bounds(results, name, shown))
     for axes, title in zip(both[0], parts, strict=True):
         axes.set_title(title if close else "")
@@ -185,7 +196,36 @@ def draw_branches(results: Results) -> Drawn:
         key.append(entry(kind, color=colour, linestyle="none", marker=marker, markersize=4))
     add_legend(figure, key)
     cascades = [one for one in summary["cascades"] if one["period"] == 1 and "accumulates_at" in one]
-    return figure, (summary["first_doubling"], cascades, "" if summary["unit"] == "1" else summary["unit"])
+    return figure, (summary["first_doubling"], cascades, births, "" if summary["unit"] == "1" else summary["unit"])
+
+
+def births_in(branches: Sequence[DrawnBranch], shown: tuple[float, float]) -> list[tuple[float, int]]:
+    """Where in a part of the axis gaits of several steps are born in a fold, and of how many, by their place.
+
+    Of births too close to be told apart that of the fewest steps.
+    """
+    folds = [
+        (branch.period, float(curve.value[place]))
+        for branch in branches
+        if branch.colour == OTHER
+        for curve in (curve_of(branch.group, "step_period"),)
+        for place, kind in curve.marks
+        if kind == "fold"
+    ]
+    births: list[tuple[float, int]] = []
+    for period, value in sorted(folds):
+        apart = all(abs(value - other) > TOLD_APART * (shown[1] - shown[0]) for other, _ in births)
+        if shown[0] <= value <= shown[1] and apart:
+            births.append((value, period))
+    return sorted(births)
+
+
+def label_births(axes: Axes, births: Sequence[tuple[float, int]]) -> None:
+    """Say above the axes of how many steps gaits are where they are born: some live in windows as thin as a line."""
+    if births:
+        above = axes.secondary_xaxis("top")
+        above.set_xticks([value for value, _ in births], [str(period) for _, period in births])
+        above.set_xlabel("steps of gaits that are born in folds")
 
 
 def close_of(results: Results) -> tuple[float, float] | None:

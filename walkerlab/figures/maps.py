@@ -15,7 +15,7 @@ from matplotlib.ticker import LogLocator, NullLocator
 from numpy.typing import NDArray
 
 from walkerlab.config.contact import Contact
-from walkerlab.figures.canvas import add_legend, entry, label_of, label_ticks, panels
+from walkerlab.figures.canvas import add_legend, entry, label_of, label_ticks, panels, power_of_ten
 from walkerlab.figures.illustration import Drawn, Illustration, Need, Results, paper_figure
 from walkerlab.figures.style import BLACK, BLUE, GREEN, GREY, ORANGE, PALE, PURPLE, VERMILLION
 from walkerlab.figures.walks import TUNE_STAGE, redoes_the_paper, redoes_the_procedure
@@ -227,6 +227,7 @@ class OverStiffness:
             axes.xaxis.set_major_locator(LogLocator())
             for axis in (axes.xaxis, axes.yaxis):
                 axis.set_minor_locator(NullLocator())
+                axis.set_major_formatter(power_of_ten)
         self.left.set_ylabel(axis_of(cells, up))
 
     def draw(self, axes: Axes, values: NDArray[Any], **look: Any) -> Any:

@@ -111,7 +111,7 @@ def upright(walker: CompassWalker | StraightLegs | Kneed) -> UprightLeg:
             measured(ahead, (0.0, mass[1]), mass)
         measured(f"{limb}length_m", above, end)
         masses.append((weighing(walker, limb), mass))
-    if isinstance(walker, StraightLegs):
+    if isinstance(walker, StraightLegs | Kneed):
         centre = (walker.foot_centre_ahead_m, radius)
         measured("foot_centre_ahead_m", (0.0, radius), centre)
     measured("foot_radius_m", centre, (centre[0], 0.0))
@@ -216,6 +216,8 @@ def draw_leg(axes: Axes, line: Sequence[Point], centre: Point, radius: float, co
     across, up = np.subtract(line[-1], line[-2])
     around = np.arctan2(across, -up) + ARC
     axes.plot(centre[0] + radius * np.sin(around), centre[1] - radius * np.cos(around), color=colour, linewidth=2.0)
+    if radius == 0.0:  # a point, perhaps ahead of the leg's line
+        axes.plot(*np.transpose([line[-1], centre]), color=colour, linewidth=2.0, zorder=2)
 
 
 def turned(angle: float, origin: Point, point: Point, moved_to: Point) -> Point:

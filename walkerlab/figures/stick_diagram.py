@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from walkerlab.figures.canvas import add_legend, blank, entry, styled
 from walkerlab.figures.illustration import Drawn, Illustration, Need, Results, paper_figure
-from walkerlab.figures.style import BLACK, GREY, LEGS, PURPLE
+from walkerlab.figures.style import BLACK, GREY, LEGS, PURPLE, VERMILLION
 from walkerlab.figures.walks import (
     CONTACT_STAGE,
     JOINTS,
@@ -30,6 +30,7 @@ from walkerlab.figures.walks import (
     TRAJECTORY,
     Array,
 )
+from walkerlab.outcome import outcome_of
 from walkerlab.store.artifact import Stored
 from walkerlab.store.content import Group
 from walkerlab.store.footholds import FAR, ground_levels
@@ -69,6 +70,7 @@ class Sticks:
     head     (samples, 2), the torso's centre of mass; None without a torso
     ground   as `ground_levels` says
     pushes   whether the trailing foot pushes off as the other one lands
+    ending   how the walk ended before its last step, such as fell; empty where it did not
     """
 
     time: Array
@@ -82,6 +84,7 @@ class Sticks:
     head: Array | None = None
     ground: tuple[Array, Array] | None = None
     pushes: bool = False
+    ending: str = ""
 
     def pushing(self, time: float) -> int | None:
         """The leg that pushes off at a time (s), for as long as an eye sees it; None if none does."""
@@ -160,11 +163,13 @@ def sticks_of(result: Stored, under: str = "") -> Sticks:
         radius = 0.0  # a compass has point feet in the rigid model, whatever its ball feet
     ground = ground_levels(steps)
     pushes = asked["push_off"]["impulse_N_s"] != 0.0
+    outcome = None if under else outcome_of(str(result.summary.get("outcome")))
+    ending = outcome.label if outcome is not None and outcome.stumbled else ""
     landings = np.append(0.0, steps["touch_along_m"])
     landings = np.column_stack((landings, np.zeros(landings.size) if ground is None else ground[1]))
     return Sticks(
         trajectory["time"], hip, joints("foot"), steps["touch_time_s"], landings, slope, knees, radius, head, ground,
-        pushes,
+        pushes, ending,
     )  # fmt: skip
 
 
@@ -321,14 +326,45 @@ SEEN_S, PUSH_SHARE = 0.08, 0.3
 """How long a push-off is seen in a film, and how long it is drawn, in parts of the leg."""
 FILM_SIZE, FILM_DPI = (6.4, 3.6), 100
 """Of a picture, in and pixels per in: both sides are even, as video formats want them."""
+STEPS_SHOWN = 4
+RELIEF, RELIEF_UNDER = 0.04, 0.075
+"""How high uneven ground is drawn once more at most, and how far below it, leg lengths."""
 OF_STAGE: dict[str, Illustration] = {RIGID_STAGE: FIGURE_2, CONTACT_STAGE: FIGURE_6}
 """The stick diagrams of the walks, which need what a film of them needs."""
 
 
-def film_times(sticks: Sticks, steps: int, rate: int, slower: float) -> Array:
-    """Times of the pictures (s): the first steps, `rate` pictures a second, so many times slower than life."""
-    end = float(sticks.strikes[min(steps, sticks.strikes.size) - 1]) if sticks.strikes.size else float(sticks.time[-1])
-    return np.arange(0.0, end, 1.0 / (rate * slower))
+def film_times(sticks: Sticks, steps: int | None, rate: int, slower: float) -> Array:
+    """Times of the pictures (s), `rate` a second, so many times slower than life; a fall is looked at for a second.
+
+    steps  the first ones; None for the first four, or for the last four and the fall if the walk ended in one
+    """
+    begin, shown = 0, STEPS_SHOWN if steps is None else steps
+    if steps is None and sticks.ending:
+        begin, shown = max(0, sticks.strikes.size - STEPS_SHOWN), sticks.strikes.size + 1
+    strikes = np.append(0.0, sticks.strikes)
+    to_its_end = shown >= strikes.size
+    end = float(sticks.time[-1] if to_its_end else strikes[shown])
+    times = np.arange(strikes[begin], end, 1.0 / (rate * slower))
+    return np.append(times, np.full(rate, end)) if sticks.ending and to_its_end else times
+
+
+def draw_relief(axes: Axes, sticks: Sticks) -> None:
+    """The levels of uneven ground again, under it and so much higher that an eye sees them, and by how much."""
+    if sticks.ground is None or not (roughest := float(np.abs(sticks.ground[1]).max())):
+        return
+    room = RELIEF * sticks.leg_length / roughest
+    ten = 10.0 ** math.floor(math.log10(room))
+    times = ten * next(digit for digit in (5.0, 2.0, 1.0) if digit * ten <= room)
+    if times <= 1.0:
+        return
+    begins, heights = sticks.ground
+    edges = np.repeat(np.append(begins, begins[-1] + FAR), 2)[1:-1]
+    under = times * np.repeat(heights, 2) - RELIEF_UNDER * sticks.leg_length
+    axes.plot(*sticks.in_plane(np.column_stack((edges, under))).T, color=VERMILLION, linewidth=0.9)
+    axes.text(
+        0.99, 0.97, f"below: the ground, its heights × {times:g}", transform=axes.transAxes, va="top", ha="right",
+        color=VERMILLION,
+    )  # fmt: skip
 
 
 def pictures(sticks: Sticks, at: Array, pads: Group | None = None) -> Iterator[NDArray[np.uint8]]:
@@ -353,6 +389,7 @@ def pictures(sticks: Sticks, at: Array, pads: Group | None = None) -> Iterator[N
         left, bottom, right, top = surrounding(shown.reshape(-1, 2), sticks.leg_length)
         axes.set(xlim=(left, right), ylim=(bottom, top), **AXES)
         draw_ground(axes, sticks, pads)
+        draw_relief(axes, sticks)
         parts = [axes.plot([], [], **look, linewidth=2.2)[0] for _, look in lines]
         (hip,) = axes.plot([], [], linestyle="none", marker="o", markersize=6.0, color=BLACK)
         (push,) = axes.plot([], [], color=PURPLE, linewidth=5.0, solid_capstyle="round", zorder=9)
@@ -366,6 +403,7 @@ def pictures(sticks: Sticks, at: Array, pads: Group | None = None) -> Iterator[N
             push.set_data(
                 *np.stack((own[-1], own[-1] + PUSH_SHARE * (own[0] - own[-1]))).T if leg is not None else ([], [])
             )
-            clock.set_text(f"{time:.2f} s")
+            over = sticks.ending and time >= sticks.time[-1]
+            clock.set_text(f"{time:.2f} s: {sticks.ending}" if over else f"{time:.2f} s")
             canvas.draw()  # type: ignore[no-untyped-call]
             yield np.asarray(canvas.buffer_rgba())[:, :, :3].copy()  # type: ignore[no-untyped-call]

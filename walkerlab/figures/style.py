@@ -45,7 +45,7 @@ RC: Final = {
     "font.sans-serif": ["DejaVu Sans"],
     "font.size": 9.0,
     "legend.borderaxespad": 0.2,
-    "legend.fontsize": 8.5,
+    "legend.fontsize": 9.0,
     "legend.frameon": False,
     "legend.handlelength": 2.6,
     "lines.dash_capstyle": "butt",
@@ -53,9 +53,9 @@ RC: Final = {
     "pdf.fonttype": 42,
     "ps.fonttype": 42,
     "svg.fonttype": "none",
-    "xtick.labelsize": 8.0,
+    "xtick.labelsize": 9.0,
     "xtick.major.width": 0.7,
-    "ytick.labelsize": 8.0,
+    "ytick.labelsize": 9.0,
     "ytick.major.width": 0.7,
 }
 """On top of matplotlib's own defaults, whatever the user's matplotlibrc says; TrueType, as journals want it."""

@@ -55,31 +55,67 @@ def is_number(group: Group, name: str, dims: tuple[str, ...]) -> bool:
 
 
 def illustration(
-    group: Group, stage: str, parameters: Sequence[str], dims: tuple[str, ...], names: Sequence[str]
+    group: Group,
+    stage: str,
+    parameters: Sequence[str],
+    dims: tuple[str, ...],
+    names: Sequence[str],
+    against: str = "",
 ) -> Illustration:
-    """The figure of some numbers over the parameters.
+    """The figure of some numbers over the parameters, or over one of the numbers.
 
     parameters  names of the coordinates
     dims        of the points
     names       what to draw, at least one
+    against     the number, or parameter, on the other axis; without one the parameters
     """
-    drawing = partial(draw, group, parameters, dims, names)
+    drawing = partial(draw, group, parameters, dims, names, against)
     return Illustration(f"sweep-{stage}", (), drawing, words="sweep", scene=f"{stage} over {', '.join(parameters)}")
 
 
 def draw(
-    group: Group, parameters: Sequence[str], dims: tuple[str, ...], names: Sequence[str], _results: Results
+    group: Group,
+    parameters: Sequence[str],
+    dims: tuple[str, ...],
+    names: Sequence[str],
+    against: str,
+    _results: Results,
 ) -> Drawn:
     """Caption: what is drawn over what, how points came out, how gaps are seen, and whether there is a line of one."""
-    a_map = len(dims) == 2 and not in_lines(group, dims)
-    if len(dims) != 2:
+    a_map = len(dims) == 2 and not against and not in_lines(group, dims)
+    if against:
+        figure = one_over_another(group, dims, names, against)
+    elif len(dims) != 2:
         figure = scattered(group, parameters, dims, names)
     else:
         figure = (maps if a_map else lines)(group, parameters, names)
     outcomes = zip(*np.unique(group["outcome"].astype(str), return_counts=True), strict=True)
-    gaps = "" if np.all(group["status"] == "answered") else "map" if a_map else "marks" if len(dims) < 3 else ""
-    what = [group.variables[name].long_name.replace("_", " ") for name in names]
-    return figure, (what, parameters, list(outcomes), gaps, a_map, RADIUS in names)
+    marked_gaps = "" if against or len(dims) > 2 else "marks"
+    gaps = "" if np.all(group["status"] == "answered") else "map" if a_map else marked_gaps
+    what, other = ([spoken(group, name) for name in each] for each in (names, [against] if against else []))
+    return figure, (what, parameters, list(outcomes), gaps, a_map, RADIUS in names, *other)
+
+
+def one_over_another(group: Group, dims: tuple[str, ...], names: Sequence[str], against: str) -> Figure:
+    """A row for each number, over another one; the points of a single parameter are joined in its order."""
+    x = spread(group, against, dims)
+    few = np.unique(np.linspace(0, x.size - 1, min(x.size, MAX_SCATTERED)).astype(int))
+    figure, axes = panels(0.8 + PANEL_HEIGHT * len(names), len(names), sharex=True, squeeze=False)
+    for one, name in zip(axes[:, 0], names, strict=True):
+        line = "-" if len(dims) == 1 else "none"
+        y = group[name].astype(float).ravel()
+        one.plot(x[few], y[few], color=BLUE, linestyle=line, linewidth=1.2, marker="o", markersize=2.6)
+        if name == RADIUS:
+            one.axhline(1.0, color=GREY, linewidth=0.8)
+            add_legend(figure, [entry(ONE, color=GREY, linewidth=0.8)])
+        one.set_ylabel(label(group, name))
+    axes[-1, 0].set_xlabel(label(group, against))
+    return figure
+
+
+def spoken(group: Group, name: str) -> str:
+    """A variable in a sentence."""
+    return group.variables[name].long_name.replace("_", " ")
 
 
 def label(group: Group, name: str) -> str:

@@ -14,10 +14,10 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from walkerlab.figures.canvas import add_legend, entry, files_of, label_of, panels, styled
+from walkerlab.figures.canvas import add_legend, entry, files_of, label_of, panels, power_of_ten, styled
 from walkerlab.figures.illustration import Drawn, Need, Results, paper_figure
 from walkerlab.figures.style import BLACK, BLUE, CONTACT, GREY, ORANGE, PALE, RIGID, VERMILLION, Look
-from walkerlab.paper.printed import ANGLE_ERROR, VELOCITY_ERROR
+from walkerlab.paper.printed import LARGEST_ERROR
 from walkerlab.store.content import Content, Group
 
 Array = NDArray[np.float64]
@@ -226,15 +226,15 @@ ROOM = 3.0
 ZERO_CROSSING = 1e-3
 """Part of the largest error below which nothing is shown: where a difference changes its sign it is nothing."""
 QUANTITIES = (
-    ("a", "angle", "angle_error_rad", ANGLE_ERROR),
-    ("b", "angular velocity", "velocity_error_rad_s", VELOCITY_ERROR),
+    ("a", "angle", "angle_error_rad"),
+    ("b", "angular velocity", "velocity_error_rad_s"),
 )
-"""What of the legs is compared: letter, words, variable of the errors (stored raw and aligned), the paper's error."""
-RAW_ERRORS = Need(COMPARE_STAGE, "errors", ("time", *(f"raw_{name}" for _, _, name, _ in QUANTITIES)), NO_STATES)
+"""What of the legs is compared: letter, words, variable of the errors (stored raw and aligned)."""
+RAW_ERRORS = Need(COMPARE_STAGE, "errors", ("time", *(f"raw_{name}" for _, _, name in QUANTITIES)), NO_STATES)
 ALIGNED_ERRORS = Need(
     COMPARE_STAGE,
     "aligned",
-    ("phase", *(f"aligned_{name}" for _, _, name, _ in QUANTITIES)),
+    ("phase", *(f"aligned_{name}" for _, _, name in QUANTITIES)),
     "no step was completed by both models",
 )
 
@@ -249,7 +249,7 @@ def draw_differences(results: Results) -> Drawn:
     of_the_paper, early = redoes_the_paper(results), raw["time"] <= rigid.time[-1]
     figure, axes = time_axes(4, 1.55, [rigid])
     rows = [(*quantity, leg) for quantity in QUANTITIES for leg in (0, 1)]
-    for one, (letter, words, name, printed, leg) in zip(axes, rows, strict=True):
+    for one, (letter, words, name, leg) in zip(axes, rows, strict=True):
         raw_error = np.abs(raw[f"raw_{name}"][early, leg])
         aligned_error = np.abs(aligned[f"aligned_{name}"][: rigid.strikes.size, :, leg])
         line(one, raw["time"][early], raw_error, AT_SAME_TIME)
@@ -258,18 +258,19 @@ def draw_differences(results: Results) -> Drawn:
         largest = max(float(raw_error.max()), float(aligned_error.max()))
         bottom, top = ZERO_CROSSING * largest, ROOM * largest
         if of_the_paper:
-            one.axhline(printed.value, **PAPER.line)
-            bottom, top = min(printed.value / ROOM, bottom), max(ROOM * printed.value, top)
+            one.axhline(LARGEST_ERROR.value, **PAPER.line)
+            bottom, top = min(LARGEST_ERROR.value / ROOM, bottom), max(ROOM * LARGEST_ERROR.value, top)
         one.set_yscale("log", subs=[])
+        one.yaxis.set_major_formatter(power_of_ten)
         one.set(ylim=(bottom, top), ylabel=label_of("error", raw.variables[f"raw_{name}"].units))
         one.set_title(f"({letter}{leg + 1}) {words} of leg {leg + 1}")
     looks = [AT_SAME_TIME, IN_PHASE, *([PAPER] if of_the_paper else [])]
     add_legend(figure, [*(entry(look.label, **look.line) for look in looks), strike_entry(rigid.look)])
     caption_values = []
-    for _, words, name, _ in QUANTITIES:
+    for _, words, name in QUANTITIES:
         at_once, in_phase = np.abs(raw[f"raw_{name}"]).max(), np.abs(aligned[f"aligned_{name}"]).max()
         caption_values.append((words, at_once, in_phase, raw.variables[f"raw_{name}"].units))
-    return figure, (caption_values, ANGLE_ERROR.text if of_the_paper else "")
+    return figure, (caption_values, LARGEST_ERROR.text if of_the_paper else "")
 
 
 CYCLES = 20

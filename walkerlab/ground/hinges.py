@@ -12,6 +12,7 @@ from walkerlab.mechanics.hinges import (
     hinge_energy,
     hinge_torque,
     hip_law,
+    legs_apart,
 )
 
 
@@ -90,12 +91,19 @@ def hip_energy(system: OnGround, y: Any) -> float:
 
 
 @inlined
-def hip_power(system: OnGround, y: Any) -> tuple[float, float]:
-    """Power (W) that it gives and does not store, and what of its constant torque's is positive."""
+def hip_power(system: OnGround, y: Any) -> float:
+    """Power (W) that it gives and does not store."""
     form = system.form
     if not form.driven_hip:
-        return 0.0, 0.0
+        return 0.0
     swing, stance = swing_and_stance(system)
-    law, rate = hip_law(form), ahead(form, swing, stance, y, half_size(form))
-    now = torque_now(law, form, swing, stance, y)
-    return (now.elastic - now.torque) * rate, max(0.0, law.torque * rate)
+    now = torque_now(hip_law(form), form, swing, stance, y)
+    return (now.elastic - now.torque) * ahead(form, swing, stance, y, half_size(form))
+
+
+@legs_apart.case(OnGround)
+def legs_apart_on_ground(system: OnGround, y: Any) -> tuple[float, float]:
+    """The uppermost bodies of both legs."""
+    form = system.form
+    swing, stance = swing_and_stance(system)
+    return ahead(form, swing, stance, y, 0), ahead(form, swing, stance, y, half_size(form))

@@ -2,23 +2,33 @@
 
 from typing import Any, NamedTuple
 
-from walkerlab.account import DAMPING, EDGES, ENTRIES, FORWARD, FRICTION, GIVEN, HIP, KNEE_STOP, LOST, PUSH_OFF
+from walkerlab.account import DAMPING, EDGES, ENTRIES, FORWARD, FRICTION, GIVEN, HIP, KNEE_STOP, LOST, PUSH_OFF, TORQUE
 from walkerlab.ground.energy import dissipated_power, foot_elastic_energy, push_power, total_energy
 from walkerlab.ground.hinges import hip_energy, hip_power, knee_power
 from walkerlab.ground.walker import OF_STATES, STOPPING, OnGround, one_foot_motion, over_ground, store_whole
-from walkerlab.hybrid.contact_events import HEIGHT, PER_FOOT, STANCE, VERTICAL_VELOCITY, WalkState
+from walkerlab.hybrid.contact_events import HEIGHT, LEGS_TURN, PER_FOOT, STANCE, VERTICAL_VELOCITY, WalkState
 from walkerlab.hybrid.contact_tangent import Tangent, carry_tangent
-from walkerlab.kernels import by_reference, entered, inlined, matrix, vector
+from walkerlab.hybrid.hip_torque import torque_work
+from walkerlab.kernels import by_reference, by_type_or_default, entered, inlined, matrix, vector
+from walkerlab.mechanics.hinges import hip_law
 from walkerlab.solvers.events import RISING, CrossingFinder, first_crossing
+from walkerlab.solvers.radau5 import Radau5
 from walkerlab.solvers.stepping import T_OLD, T, interpolate, sample
 
 # rows of `account`
 SO_FAR, AT_TOUCH = 0, 1
 # indices into `extremes`
 MAX_PENETRATION, RESIDUAL, START_ENERGY, AT_HAND, START_SPRING = 0, 1, 2, 3, 4
-# the start of a step and the nodes of the Radau quadrature on it, with its weights: exact to the order of that method
-NODES = (0.0, 0.15505102572168219, 0.6449489742783178, 1.0)
-WEIGHTS = (0.0, 0.37640306270046725, 0.5124858261884216, 0.1111111111111111)
+# the start of a step and the nodes of a Radau quadrature on it, with its weights
+Quadrature = tuple[tuple[float, ...], tuple[float, ...]]
+OF_ORDER_5: Quadrature = (
+    (0.0, 0.15505102572168219, 0.6449489742783178, 1.0),
+    (0.0, 0.37640306270046725, 0.5124858261884216, 0.1111111111111111),
+)
+OF_ORDER_9: Quadrature = (
+    (0.0, 0.05710419611451768, 0.2768430136381238, 0.5835904323689168, 0.8602401356562195, 1.0),
+    (0.0, 0.14371356079122594, 0.28135601514946207, 0.31182652297574126, 0.22310390108357075, 0.04),
+)
 
 
 @by_reference
@@ -66,6 +76,7 @@ def observe(
     record_samples(observer, method, system, walk_state)
     if observer.track_energy:
         balance(observer, method, system)
+        note_torque(observer, method, system, finder)
         for foot in range(2):
             if system.has_ground[foot] != 0:
                 note_depth(observer, method, system, finder, foot)
@@ -108,6 +119,16 @@ def balance(observer: ContactObserver, method: Any, system: OnGround) -> None:
 
 
 @inlined
+def note_torque(observer: ContactObserver, method: Any, system: OnGround, finder: CrossingFinder) -> None:
+    """Work of the hip's constant torque in the last step."""
+    torque = hip_law(system.form).torque
+    if torque != 0.0:
+        given = torque_work(torque, method, system, finder, LEGS_TURN, 1.0)
+        observer.account[SO_FAR, TORQUE] += given.net
+        observer.account[SO_FAR, FORWARD] += given.positive
+
+
+@inlined
 def note_work(observer: ContactObserver, system: OnGround, y: Any) -> None:
     """A step has ended: what was given until now belongs to steps that were taken, and what the hip's spring gave."""
     for entry in range(ENTRIES):
@@ -141,47 +162,67 @@ def end_energy(system: OnGround, y: Any) -> float:
     return total_energy(system, y)
 
 
+@by_type_or_default
+def quadrature(method: Any) -> Quadrature:
+    """The rule that sums up what a step of a method took and gave: as exact as the best dense output."""
+    return OF_ORDER_9
+
+
+@quadrature.case(Radau5)
+def of_collocation(method: Radau5) -> Quadrature:
+    """That of the method's own order."""
+    return OF_ORDER_5
+
+
 @inlined
 def add_work_until(method: Any, system: OnGround, fraction: float, account: Any) -> None:
     """Add to an account (entries,) what the first part of the last step took and gave (J)."""
-    fractions, states = vector(NODES), matrix(OF_STATES)
-    for i in range(len(NODES)):
-        fractions[i] = fraction * NODES[i]
+    nodes, weights = quadrature(method)
+    fractions, states = vector(nodes), matrix(OF_STATES)
+    for i in range(len(nodes)):
+        fractions[i] = fraction * nodes[i]
     sample(method, system, fractions, states)
-    add_work(system, states, method.clock[T_OLD], fraction * (method.clock[T] - method.clock[T_OLD]), account)
+    span = fraction * (method.clock[T] - method.clock[T_OLD])
+    add_work(system, states, nodes, weights, method.clock[T_OLD], span, account)
 
 
 @entered
-def add_work(system: OnGround, states: Any, begin: float, span: float, account: Any) -> None:
-    """The same of a time `span` (s) from `begin` on, with the states at its NODES."""
+def add_work(
+    system: OnGround,
+    states: Any,
+    nodes: tuple[float, ...],
+    weights: tuple[float, ...],
+    begin: float,
+    span: float,
+    account: Any,
+) -> None:
+    """The same of a time `span` (s) from `begin` on, with the states at its nodes."""
     for foot in range(2):
         if system.has_ground[foot] != 0:
-            damping, friction = foot_work(system, states, foot, span)
+            damping, friction = foot_work(system, states, weights, foot, span)
             account[DAMPING] += damping
             account[FRICTION] += friction
     stopping = system.knee[0] == STOPPING or system.knee[1] == STOPPING
-    for i in range(1, len(NODES)):
-        weight = span * WEIGHTS[i]
+    for i in range(1, len(nodes)):
+        weight = span * weights[i]
         if stopping:
             account[KNEE_STOP] += weight * knee_power(system, states[i])
-        hip, forward = hip_power(system, states[i])
-        account[HIP] += weight * hip
-        account[FORWARD] += weight * forward
-        account[PUSH_OFF] += weight * push_power(system, begin + NODES[i] * span, states[i])
+        account[HIP] += weight * hip_power(system, states[i])
+        account[PUSH_OFF] += weight * push_power(system, begin + nodes[i] * span, states[i])
 
 
 @inlined
-def foot_work(system: OnGround, states: Any, foot: int, span: float) -> tuple[float, float]:
+def foot_work(system: OnGround, states: Any, weights: tuple[float, ...], foot: int, span: float) -> tuple[float, float]:
     """Work (J) lost under a foot that there is ground for.
 
     Where the force law has let go, what is lost is what the spring gives up, whose powers of the penetration no
     quadrature likes; steps end where it lets go.
     """
-    damping, friction, let_go, last = 0.0, 0.0, True, len(NODES) - 1
-    for i in range(1, len(NODES)):
+    damping, friction, let_go, last = 0.0, 0.0, True, len(weights) - 1
+    for i in range(1, len(weights)):
         power = dissipated_power(system, foot, states[i])
-        damping += span * WEIGHTS[i] * power[0]
-        friction += span * WEIGHTS[i] * power[1]
+        damping += span * weights[i] * power[0]
+        friction += span * weights[i] * power[1]
         let_go = let_go and (i == last or power[2] == 0.0)
     if let_go:
         damping = foot_elastic_energy(system, foot, states[0]) - foot_elastic_energy(system, foot, states[last])

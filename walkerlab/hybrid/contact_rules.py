@@ -71,29 +71,23 @@ def apply_event(
     feet = over_ground(system, 0, first), over_ground(system, 1, second)
     if event == PASSING:
         walk_state.sides[PASSING] = -walk_state.sides[PASSING]
-        swing = 1 - walk_state.feet[STANCE]
-        if is_uneven(terrain) and not terrain.has_pads and is_ahead(walk_state, swing):
-            # its next foothold counts from now on, and carries it once it has been above it
-            level = foothold_height(terrain, walk_state.feet[STEPS] + 1)
-            set_level(system, observer, walk_state, feet[swing], swing, level, y)
-            if not is_above(walk_state, swing):
-                walk_state.has_ground[swing] = 0
-                return GOES_ON if terrain.order_matters else STUBBED
-            walk_state.has_ground[swing] = 1
-            find_ground(terrain, walk_state, 1 - swing, is_above(walk_state, 1 - swing))
-            return GOES_ON
+        outcome = GOES_ON
         for foot in range(2):
             # equal legs of a hinged step pass each other on the surface: rounding neither lifts a foot nor holds one
             at_surface = abs(feet[foot].height) < AT_SURFACE
             above = feet[foot].vertical_velocity > 0.0 if at_surface else is_above(walk_state, foot)
             find_ground(terrain, walk_state, foot, above)
-        return GOES_ON
+            if (above or walk_state.has_ground[foot] == 0) and next_foothold_counts(terrain, walk_state, foot):
+                outcome = set_foothold(system, terrain, observer, walk_state, feet[foot], foot, y)
+        return outcome
     foot = event // PER_FOOT
     kind = event % PER_FOOT
     if kind == HEIGHT:
         walk_state.sides[event] = -walk_state.sides[event]
         if is_above(walk_state, foot):
             lift(system.form, terrain, walk_state, feet, foot, y)
+            if next_foothold_counts(terrain, walk_state, foot):
+                return set_foothold(system, terrain, observer, walk_state, feet[foot], foot, y)
         else:
             return touch(system.form, terrain, walk_state, feet, foot, t, y)
     elif kind == LEFT_EDGE or kind == RIGHT_EDGE:
@@ -138,6 +132,31 @@ def set_level(
     walk_state.level[foot] = level
     walk_state.sides[foot * PER_FOOT + HEIGHT] = 1 if height > 0.0 else -1
     walk_state.at_zero[foot * PER_FOOT + HEIGHT] = 0
+
+
+@inlined
+def next_foothold_counts(terrain: Terrain, walk_state: WalkState, foot: int) -> bool:
+    """Whether the ground for a foot that nothing carries is to take the height of its next foothold, if it has not."""
+    if terrain.has_pads or not is_uneven(terrain) or foot == walk_state.feet[STANCE]:
+        return False
+    level = foothold_height(terrain, walk_state.feet[STEPS] + 1)
+    return is_ahead(walk_state, foot) and walk_state.level[foot] != level
+
+
+@inlined
+def set_foothold(
+    system: OnGround,
+    terrain: Terrain,
+    observer: ContactObserver,
+    walk_state: WalkState,
+    motion: FootMotion,
+    foot: int,
+    y: Any,
+) -> int:
+    """The ground for a swing foot takes the height of its next foothold, and carries it once it has been above it."""
+    set_level(system, observer, walk_state, motion, foot, foothold_height(terrain, walk_state.feet[STEPS] + 1), y)
+    walk_state.has_ground[foot] = 1 if is_above(walk_state, foot) else 0
+    return GOES_ON if is_above(walk_state, foot) or terrain.order_matters else STUBBED
 
 
 @inlined

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from walkerlab.account import ENTRIES, KNEE_STRIKES, LOSSES, LOST, PUSH_OFF
+from walkerlab.account import ENTRIES, KNEE_STRIKES, LOSSES, LOST, PUSH_OFF, TORQUE
 from walkerlab.ground.energy import kinetic_energy, potential_energy, total_energy
 from walkerlab.ground.hinges import hip_energy
 from walkerlab.ground.knees import FLEXED, extension
@@ -38,6 +38,7 @@ from walkerlab.hybrid.contact_events import (
     PASSING,
     PER_FOOT,
     RIGHT_EDGE,
+    ROWS,
     SLIDE,
     STEPS,
     JudgedGround,
@@ -63,7 +64,7 @@ from walkerlab.hybrid.contact_walk import AT_LIFT, NEVER, walk_in_form
 from walkerlab.hybrid.walk_record import DrivenWork, WalkRecord, WalkWork
 from walkerlab.kernels import kernel, uncompiled, vector
 from walkerlab.outcome import Outcome
-from walkerlab.solvers.registry import Tolerances, finder_for, sharing
+from walkerlab.solvers.registry import Tolerances, finder_for, method_named, sharing
 from walkerlab.solvers.stepping import ACCEPTED, JACOBIANS, REJECTED, RHS, T
 from walkerlab.solvers.system import Floats, State
 
@@ -73,6 +74,7 @@ USUAL_STEP = 3.0  # pendulum times that most steps are shorter than
 # 1e-9 (scripts/contact_campaign.py prints those of its walks), and 9 by the libraries' multistep methods; cases of the
 # stability catalogue, of which ground of 1e14 N/m is the worst, leave at most 9.
 UNEXPLAINED = 100.0
+SET_STIFF = "set solver.contact.method to radau5."
 FINEST = 1e-10  # rtol below which a walk's rounding, and no longer its tolerance, makes the residual
 
 
@@ -138,16 +140,24 @@ class ContactWalkResult(WalkRecord):
     explained_residual_J: float  # what the tolerance explains of it at most
     dissipated_J: Floats  # (5,)
     samples: ContactSamples | None
+    method: str  # by which it was integrated
 
     @property
     def advice(self) -> str:
         """What the outcome means and what to try next."""
+        stiff = method_named(self.method).stiff
+        if self.outcome is Outcome.BUDGET_EXHAUSTED and not stiff:
+            return (
+                f"The walk exhausted its evaluation budget by {self.method}, which stiff ground holds to short steps "
+                f"at any tolerance; {SET_STIFF}"
+            )
         if self.energy_balance_residual_J <= self.explained_residual_J:
-            return self.outcome.advice
+            return super().advice
         return (
             f"The energy balance does not close: it is off by {self.energy_balance_residual_J:.3g} J, of which the "
-            f"solver's tolerance explains {self.explained_residual_J:.2g} J at most, so the walk is wrong; tighten "
-            "solver.contact.rtol or choose another solver.contact.method. If neither helps, the program is at fault."
+            f"solver's tolerance explains {self.explained_residual_J:.2g} J at most, so the walk is wrong; "
+            + ("tighten solver.contact.rtol or choose another solver.contact.method." if stiff else SET_STIFF)
+            + " If that does not help, the program is at fault."
         )
 
 
@@ -295,7 +305,7 @@ def walk_on(
         tangent[: y.size] = folded(system.form, tangent)
     lead = tolerances.new(y.size)
     lead.clock[T] = walk_state.times[NOW]
-    by_size, finder = {y.size: lead}, finder_for(lead, EVENT_FUNCTIONS, walker.size)
+    by_size, finder = {y.size: lead}, finder_for(lead, ROWS, walker.size)
     while True:
         if y.size not in by_size:
             by_size[y.size] = sharing(tolerances.new(y.size), lead.clock, lead.counts)
@@ -400,7 +410,7 @@ def explained_residual(observer: ContactObserver, tolerances: Tolerances) -> flo
     It is UNEXPLAINED times rtol times energy and work exchanged: the energy at the start, kinetic, elastic, and
     potential over the slope below, and all that has been dissipated since.
     """
-    exchanged = observer.extremes[AT_HAND] + np.abs(observer.account[SO_FAR]).sum()
+    exchanged = observer.extremes[AT_HAND] + np.abs(observer.account[SO_FAR, :TORQUE]).sum()
     return float(UNEXPLAINED * max(tolerances.rtol, FINEST) * exchanged)
 
 
@@ -452,4 +462,5 @@ def gather(
         dissipated_J=observer.account[SO_FAR, LOST].copy(),
         driven=driven_work(walker, along, up, observer.account[AT_TOUCH]),
         samples=samples,
+        method=tolerances.method,
     )

@@ -113,9 +113,13 @@ def walk_in_form(
                 rewind(method, system)
                 continue
             if early and is_switching(found):
-                # its event function is not smooth there: the step may pass it over, but nothing else that is in it
-                walk_state.feet[PASSES_SWITCHING] = 1
-                arriving, refinements, rewinds, target = False, 0, 0, method.clock[T]
+                # its event function is no polynomial on this step: on half of it, it is nearer to one
+                arriving, refinements, target = False, 0, 0.5 * (method.clock[T_OLD] + method.clock[T])
+                rewinds += 1
+                if rewinds > REWINDS:
+                    # nor on a short one: the step may pass it over, but nothing else that is in it
+                    walk_state.feet[PASSES_SWITCHING] = 1
+                    rewinds, target = 0, method.clock[T]
                 rewind(method, system)
                 continue
         elif arriving and method.clock[T] >= target:

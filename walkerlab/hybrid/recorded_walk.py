@@ -14,22 +14,31 @@ from numpy.typing import NDArray
 from walkerlab.hybrid.rigid_observer import (
     DURATION,
     ENERGY_DRIFT,
+    FORWARD,
     INTEGRAL,
     MAX_FRICTION_RATIO,
     MAX_IMPULSE_RATIO,
     MAX_SCUFF_DEPTH,
     MIN_IMPULSE,
     MIN_NORMAL_FORCE,
-    PUSH_OFF,
     STRIKES,
+    TAKEN,
     Observer,
     new_observer,
     observe_start,
 )
-from walkerlab.hybrid.rigid_walk import EVENTS, LONGEST_SWING, hip_above_fall, new_heel_strikes, walk
+from walkerlab.hybrid.rigid_walk import (
+    EVENTS,
+    LONGEST_SWING,
+    SHORTEST_LANDING,
+    hip_above_fall,
+    new_heel_strikes,
+    walk,
+)
 from walkerlab.hybrid.walk_record import Array, DrivenWork, WalkRecord, WalkWork
 from walkerlab.kernels import uncompiled
 from walkerlab.mechanics.hinges import hinge_energy, hinge_torque, hip_law
+from walkerlab.mechanics.impact import push_off_work
 from walkerlab.mechanics.standing import (
     AT_STRIKE,
     BENT,
@@ -41,6 +50,7 @@ from walkerlab.mechanics.standing import (
     energy_at_touch,
     linked,
     step_lengths,
+    swing_foot,
 )
 from walkerlab.outcome import Outcome
 from walkerlab.solvers.registry import Tolerances, finder_for
@@ -49,6 +59,7 @@ from walkerlab.solvers.system import State
 
 STEPS_AT_ONCE = 64
 BUDGET_OF_A_STEP = 50_000  # right-hand sides; the tightest tolerance there is needs about 700
+MOST_FRICTION = 1.0  # coefficient; rubber on dry concrete has about as much
 SAMPLES_PER_UNIT_TIME = 64  # in sqrt(L/g)
 CLOSEST_SAMPLES = 1e-2  # of the time between samples; one nearer to a heel strike is dropped
 
@@ -81,6 +92,21 @@ class RigidWalkResult(WalkRecord):
     samples: Samples | None
 
     @property
+    def objections(self) -> tuple[str, ...]:
+        """What the model assumes of the ground along this walk and hardly any ground can give."""
+        found = []
+        if self.min_normal_force < 0.0:
+            found.append(f"the ground would have to pull with {-self.min_normal_force:.3g} N")
+        if self.min_normal_impulse is not None and self.min_normal_impulse < 0.0:
+            found.append(f"the ground would have to pull with {-self.min_normal_impulse:.3g} N s in a strike")
+        if self.max_friction_ratio > MOST_FRICTION:
+            found.append(
+                f"the stance foot would slip: it takes a friction coefficient of {self.max_friction_ratio:.3g}, and "
+                f"hardly any ground gives more than {MOST_FRICTION:g}"
+            )
+        return tuple(found)
+
+    @property
     def final_state(self) -> State:
         """State after the last heel strike; the start if there was none."""
         return as_state(self.after[-1]) if self.steps else self.start
@@ -99,19 +125,25 @@ def take_walk(
     sampled: bool = False,
     advance: Callable[[int], None] | None = None,
     heights: Array | None = None,
+    step_length: float | None = None,
 ) -> RigidWalkResult:
     """Walk `steps` steps from `start`, or until the walk ends.
 
-    tolerances  how to integrate; no step is given more right-hand sides than any step needs
-    sampled     whether states in time are wanted
-    advance     told how many more steps were taken
-    heights     (steps + 1,) m, of the footholds over the slope, the start's first; even ground without
+    tolerances   how to integrate; no step is given more right-hand sides than any step needs
+    sampled      whether states in time are wanted
+    advance      told how many more steps were taken
+    heights      (steps + 1,) m, of the footholds over the slope, the start's first; even ground without
+    step_length  m, of the gait; the start's foot distance without. On uneven ground a foot that lands less than a
+                 quarter of it ahead of the other ends the walk as a fall
 
     A negative normal force does not stop the walk, since the model assumes it away, but the outcome says so.
     """
     recorder = Recorder(walker, tolerances, start, sampled)
     recorder.heights = heights
     rises = np.zeros(steps + 1) if heights is None else np.diff(heights, prepend=heights[0])
+    if rises.any():
+        judged_by = abs(swing_foot(walker, start)[1]) if step_length is None else step_length
+        recorder.nearest = SHORTEST_LANDING * judged_by
     if hip_above_fall(walker, start) < 0.0:
         return recorder.finished(Outcome.REJECTED)
     status = Outcome.WALKED
@@ -128,11 +160,11 @@ class Recorder:
 
     def __init__(self, walker: Standing, tolerances: Tolerances, start: State, sampled: bool) -> None:
         """Stand at `start`, at time 0."""
-        self.walker, self.wanted, self.budget = walker, sampled, tolerances.budget
-        self.sampled = sampled or hip_law(walker).torque != 0.0
+        self.walker, self.sampled, self.budget = walker, sampled, tolerances.budget
         self.method = method = tolerances.new(len(walker.zero_state))
         self.start = self.state = start
         self.heights: Array | None = None
+        self.nearest = 0.0
         self.time, self.steps, self.grid_index = 0.0, 0, 0
         self.interval = math.sqrt(walker.leg_length / walker.gravity) / SAMPLES_PER_UNIT_TIME
         self.finder = finder_for(method, EVENTS, len(walker.zero_state))
@@ -150,7 +182,7 @@ class Recorder:
     def walk_on(self, rises: Array) -> Outcome:
         """Take up to so many more steps as footholds rise (m) over the present one, whose own rise is the first."""
         steps = rises.size - 1
-        seen, times = new_heel_strikes(steps, self.numbers, self.kneed, rises), np.zeros(0)
+        seen, times = new_heel_strikes(steps, self.numbers, self.kneed, rises, self.nearest), np.zeros(0)
         if self.sampled:  # as many as the steps may reach, from the start of the first of them
             most = math.ceil(steps * LONGEST_SWING * SAMPLES_PER_UNIT_TIME) + 1
             times = self.interval * np.arange(self.grid_index, self.grid_index + most, dtype=np.float64) - self.time
@@ -193,29 +225,22 @@ class Recorder:
     def _driven_work(self, before: Array, after: Array, gravity: float) -> tuple[DrivenWork, float]:
         """What was given over the steps taken, by gravity that much (J); and what does not balance (J).
 
-        The balance gives the damper's work, which the states before and after strikes do not tell.
+        A push-off works before its strike, which loses what that leaves. The balance gives the damper's work, which
+        the states before and after strikes do not tell.
         """
-        walker, law, push = self.walker, hip_law(self.walker), float(self.work[PUSH_OFF])
+        walker, law = self.walker, hip_law(self.walker)
         starts = np.vstack((self.start, after[:-1])) if self.steps else before
         apart = [each[:, SWING] - each[:, STANCE] for each in (starts, before)]
-        given = [law.torque * each - hinge_energy(law, each) for each in apart]
-        hip = float((given[1] - given[0]).sum())
+        torque = float(law.torque * (apart[1] - apart[0]).sum())
+        hip = torque - float(np.sum(hinge_energy(law, apart[1]) - hinge_energy(law, apart[0])))
         # what the spring gives is among the works
         unsprung = walker.changed(hip=0.0) if walker.driven_hip else walker
         ends = [sum(energies(unsprung, y)) - energy_at_touch(unsprung, y[STANCE]) for y in (self.start, self.state)]
-        left = float(ends[1] - ends[0] - gravity - push - hip + self.work[STRIKES])
+        left = float(ends[1] - ends[0] - gravity - hip + self.work[TAKEN, STRIKES])
         hip, left = (hip + left, 0.0) if hinge_torque(law, 0.0, 0.0).by_rate else (hip, left)
-        forward = self._forward_work() if law.torque and self.steps else 0.0
-        return DrivenWork(float(walker.mass * walker.gravity), gravity, push, hip, forward), abs(left)
-
-    def _forward_work(self) -> float:
-        """What of the torque's work is positive (J) in the steps taken."""
-        samples, n, torque = joined(self.pieces), self.numbers // 2, float(hip_law(self.walker).torque)
-        apart, rate = (samples.state[:, first + SWING] - samples.state[:, first + STANCE] for first in (0, n))
-        within = (samples.step[1:] == samples.step[:-1]) & (samples.step[1:] < self.steps)
-        turned = turning_values(np.diff(samples.time_s), apart, rate)
-        ways = turned - apart[:-1], apart[1:] - turned
-        return float(sum(np.maximum(torque * way[within], 0.0).sum() for way in ways))
+        push = float(push_off_work(walker, before).sum()) if walker.push_off else 0.0
+        weight, forward = float(walker.mass * walker.gravity), float(self.work[TAKEN, FORWARD])
+        return DrivenWork(weight, gravity, push, hip, torque, forward), abs(left)
 
     def _samples(self, observer: Observer, strikes: Array, before: Array, after: Array, knees: Array) -> Samples:
         """The grid's samples with both sides of the heel strikes put between them."""
@@ -258,7 +283,7 @@ class Recorder:
             foothold_height_m=None if self.heights is None else self.heights[1 : self.steps + 1],
             driven=driven,
             energy_balance_residual=residual,
-            lost_in_strikes=float(self.work[STRIKES]),
+            lost_in_strikes=float(self.work[TAKEN, STRIKES]) + driven.push_off,
             start=self.start,
             before=before,
             after=after,
@@ -269,7 +294,7 @@ class Recorder:
             max_impulse_ratio=float(self.extremes[MAX_IMPULSE_RATIO]),
             energy_drift=float(self.extremes[ENERGY_DRIFT]),
             mean_energy=self._mean_energy(strikes, after),
-            samples=joined(self.pieces) if self.pieces and self.wanted else None,
+            samples=joined(self.pieces) if self.pieces else None,
         )
 
 
@@ -278,21 +303,6 @@ def with_scaled_rates(walker: Standing, state: State, swing: float, stance: floa
     n = len(state) // 2
     rates = [(stance if place == STANCE else swing) * rate for place, rate in enumerate(state[n:])]
     return (*state[:n], *linked(walker, AT_STRIKE, rates).tolist())
-
-
-def turning_values(h: Array, value: Array, rate: Array) -> Array:
-    """Where something turns back between samples (n,) h apart, by Hermite's cubic; its value before where it does not.
-
-    Returns (n - 1,) values.
-    """
-    begin, end, change = h * rate[:-1], h * rate[1:], np.diff(value)
-    square, cube = 3.0 * change - 2.0 * begin - end, begin + end - 2.0 * change
-    turns = begin * end < 0.0
-    root = np.sqrt(np.where(turns, square * square - 3.0 * cube * begin, 0.0))
-    # where the slope, begin + 2 square u + 3 cube u^2, falls or rises through zero between 0 and 1
-    under = square - np.sign(begin) * root
-    u = np.divide(-begin, under, out=np.zeros_like(h), where=turns & (under != 0.0))
-    return np.asarray(value[:-1] + u * (begin + u * (square + u * cube)))
 
 
 def far_from(times: Array, events: Array, distance: float) -> NDArray[np.bool_]:

@@ -4,10 +4,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from walkerlab.hybrid.hip_torque import torque_work
 from walkerlab.kernels import by_reference, inlined, vector
+from walkerlab.mechanics.hinges import hip_law
 from walkerlab.mechanics.impact import push_off
-from walkerlab.mechanics.standing import STANCE, Mode, energies, ground_reaction, momentum, swing_foot
-from walkerlab.solvers.stepping import T_OLD, T, interpolate
+from walkerlab.mechanics.standing import Mode, energies, ground_reaction, momentum, swing_foot
+from walkerlab.solvers.events import CrossingFinder
+from walkerlab.solvers.stepping import T_OLD, T, interpolate, sample
 
 NO_FORCE = 1e300  # above any normal force
 # indices into Observer.extremes
@@ -15,8 +18,9 @@ MIN_NORMAL_FORCE, MAX_FRICTION_RATIO, MAX_SCUFF_DEPTH, ENERGY_DRIFT, MIN_IMPULSE
 # indices into Observer.energy
 LEAST, MOST, LATEST, INTEGRAL, DURATION = 0, 1, 2, 3, 4
 CLOSER = 3  # parabolas to an extremum
-# indices into Observer.work: what strikes take in the step at hand and in the steps taken, and what these push off
-AT_HAND, STRIKES, PUSH_OFF = 0, 1, 2
+# rows of Observer.work, and columns: kinetic energy that strikes take, positive work of the hip's constant torque
+TAKEN, AT_HAND = 0, 1
+STRIKES, FORWARD = 0, 1
 # composite Simpson rule on eighths
 SIMPSON = (1.0 / 24.0, 4.0 / 24.0, 2.0 / 24.0, 4.0 / 24.0, 2.0 / 24.0, 4.0 / 24.0, 2.0 / 24.0, 4.0 / 24.0, 1.0 / 24.0)
 
@@ -34,7 +38,7 @@ class Observer(NamedTuple):
     # impulses the least normal one N s, and the largest ratio of tangential to normal
     extremes: Any
     energy: Any  # (5,) from the stance foot: least and most of this swing J, latest J, integral over time J s, time s
-    work: Any  # (3,) J
+    work: Any  # (2, 2) J, in the steps taken and in the one at hand
 
 
 def new_observer(times: Any, numbers: int) -> Observer:
@@ -49,7 +53,7 @@ def new_observer(times: Any, numbers: int) -> Observer:
         np.zeros(1, np.int64),
         extremes,
         np.zeros(5),
-        np.zeros(3),
+        np.zeros((2, 2)),
     )
 
 
@@ -69,26 +73,24 @@ def observe_start(observer: Observer, mode: Mode, y: Any) -> None:
 
 @inlined
 def observe_strike(observer: Observer, mode: Mode, heel: bool, before: Any, after: Any) -> None:
-    """Take note of what a strike of knee or heel takes, and of the ground's impulse on the foot that stands afterwards.
+    """Record what a strike of knee or heel takes, and the ground's impulse on the foot that stands afterwards.
 
-    It is all of the change of momentum but the push-off's part.
+    That impulse is all of the change of momentum but the push-off's part. A heel strike ends the step at hand.
     """
     if observer.watching:
         model, extremes, work = mode.model, observer.extremes, observer.work
         along, normal = momentum(model, before)
         along_after, normal_after = momentum(model, after)
         along, impulse = along_after - along, normal_after - normal
-        work[AT_HAND] += energies(model, before)[0] - energies(model, after)[0]
+        work[AT_HAND, STRIKES] += energies(model, before)[0] - energies(model, after)[0]
         if heel:
             if model.push_off != 0.0:
                 push = push_off(model, after)
                 along, impulse = along - push.along, impulse - push.upward
                 extremes[MAX_IMPULSE_RATIO] = max(extremes[MAX_IMPULSE_RATIO], abs(push.along) / push.upward)
-                given = 0.5 * push.angular * after[len(model.arm_x) + STANCE]  # its foot rested before
-                work[PUSH_OFF] += given
-                work[AT_HAND] += given
-            work[STRIKES] += work[AT_HAND]
-            work[AT_HAND] = 0.0
+            for entry in range(2):
+                work[TAKEN, entry] += work[AT_HAND, entry]
+                work[AT_HAND, entry] = 0.0
         extremes[MIN_IMPULSE] = min(extremes[MIN_IMPULSE], impulse)
         if impulse > 0.0:
             extremes[MAX_IMPULSE_RATIO] = max(extremes[MAX_IMPULSE_RATIO], abs(along) / impulse)
@@ -164,11 +166,19 @@ def ascend_to_worst(
 
 
 @inlined
-def observe(observer: Observer, method: Any, mode: Mode, fraction: float, step: int) -> None:
+def observe(
+    observer: Observer, method: Any, mode: Mode, finder: CrossingFinder, row: int, fraction: float, step: int
+) -> None:
     """Take note of the last integration step up to `fraction` of it; its dense output is ready.
 
     Samples that fall into it are kept; extremes and the energy's integral are taken from eighths of it.
+
+    row  of the finder's values that is free
     """
+    torque = hip_law(mode.model).torque
+    if torque != 0.0:
+        sample(method, mode, finder.nodes, finder.states)
+        observer.work[AT_HAND, FORWARD] += torque_work(torque, method, mode, finder, row, fraction).positive
     t, h = method.clock[T_OLD], method.clock[T] - method.clock[T_OLD]
     t_end, spacing = t + fraction * h, 0.125 * fraction
     mean_energy = SIMPSON[0] * observer.energy[LATEST]

@@ -24,6 +24,7 @@ from walkerlab.mechanics.standing import (
     Standing,
     feet_on_slope,
     hip_height,
+    swing_foot,
     swing_foot_motion,
 )
 from walkerlab.outcome import Outcome
@@ -53,10 +54,12 @@ from walkerlab.solvers.system import derivative
 LONGEST_SWING = 10.0  # pendulum times sqrt(L/g) within which a heel strike must come
 HULL_ROOM = 0.125
 FALLEN_HIP = 0.5  # hip height over the slope in leg lengths
+SHORTEST_LANDING = 0.25  # of the gait's step length, ahead of the stance foot, on uneven ground
 RELEASED = 1e-6  # of the first step; a knee in line and at its thigh's rate crosses by rounding within 1e-9 of it
 # event functions, rows of the finder
 HEEL_STRIKE, FALL, AHEAD, KNEE = range(4)
-EVENTS = 4
+LEGS_TURN = 4  # no event: the rate between the legs
+EVENTS = 5
 KNEE_STRUCK = -1  # how a phase of a swing ends beside the outcomes
 WALKED, FELL, BENT_KNEE = int(Outcome.WALKED), int(Outcome.FELL), int(Outcome.BENT_KNEE)
 NO_HEEL_STRIKE, REJECTED = int(Outcome.NO_HEEL_STRIKE), int(Outcome.REJECTED)
@@ -177,6 +180,8 @@ def take_step(
         status = swing_phase(method, system, finder, observer, t, y, latest, step)
         if status != WALKED and status != KNEE_STRUCK:
             return status, method.clock[T]
+        if status == WALKED and strikes.nearest > 0.0 and swing_foot(model, method.y)[1] < strikes.nearest:
+            return FELL, method.clock[T]
         t = pass_event(method, system, y)
         observe_strike(observer, system, status == WALKED, method.y, y)
         if status == WALKED:
@@ -212,7 +217,7 @@ def swing_phase(
             sample(method, system, finder.nodes, finder.states)
             strike, fall, struck = events_in_step(system, finder, at_start)
         if observer.watching:
-            observe(observer, method, system, min(1.0, strike, fall, struck), step)
+            observe(observer, method, system, finder, LEGS_TURN, min(1.0, strike, fall, struck), step)
         if fall < min(strike, struck):
             return FELL
         if is_bent(system) and strike < struck:
@@ -284,16 +289,17 @@ class HeelStrikes(NamedTuple):
     after: Any  # (steps, m) just after, roles changed
     knee_time: Any  # (steps,) s, of the knee strikes before them, if there are knees
     rise: Any  # (steps + 1,) m, of each foothold over the one before, of the present one first: given
+    nearest: float  # m, ahead of the stance foot: a foot that lands nearer ends the walk; 0 on even ground
 
 
-def new_heel_strikes(steps: int, m: int, kneed: bool = True, rise: Any = None) -> HeelStrikes:
+def new_heel_strikes(steps: int, m: int, kneed: bool = True, rise: Any = None, nearest: float = 0.0) -> HeelStrikes:
     """Room for some heel strikes, with states of m numbers, and for the knee strikes before them if there are knees.
 
-    rise  as `HeelStrikes` has it; even ground without
+    rise, nearest  as `HeelStrikes` has them; even ground without
     """
     before, after = np.zeros((2, steps, m))
     even = np.zeros(steps + 1) if rise is None else rise
-    return HeelStrikes(np.zeros(steps), before, after, np.zeros(steps if kneed else 0), even)
+    return HeelStrikes(np.zeros(steps), before, after, np.zeros(steps if kneed else 0), even, nearest)
 
 
 @kernel

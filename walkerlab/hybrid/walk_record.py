@@ -24,18 +24,27 @@ class DrivenWork(NamedTuple):
     """Work of the steps taken, and the weight that it carries along."""
 
     weight: float  # N
-    gravity: float  # J, of the weight along the slope from the first touch to the last
+    gravity: float  # J, of the weight from the first foothold to the last: along the slope and over uneven ground
     push_off: float  # J
     hip: float  # J, of spring, damper and torque
-    forward: float  # J, what of the torque's is positive
+    hip_torque: float  # J, the constant torque's part of that
+    hip_torque_positive: float  # J, its positive work alone
+
+    @property
+    def given(self) -> float:
+        """Net work of all of them (J)."""
+        return self.gravity + self.push_off + self.hip
 
     def per_step(self, steps: int) -> dict[str, float]:
-        """Mean over the steps (J), by what gives it."""
-        return {name: getattr(self, name) / steps for name in ("gravity", "push_off", "hip")}
+        """Mean over the steps (J), by what gives it; the hip torque's are parts of the hip's."""
+        return {name: getattr(self, name) / steps for name in self._fields if name != "weight"}
 
     def cost_of_transport(self, distance: float) -> float:
-        """What was spent over weight times distance (m) along the slope; a spring gives back what it takes."""
-        return (self.gravity + self.push_off + self.forward) / (self.weight * distance)
+        """Work spent over weight times distance (m) along the slope.
+
+        A spring gives back what it takes, and what gravity takes uphill is paid for by what drives the walker.
+        """
+        return (max(0.0, self.gravity) + self.push_off + self.hip_torque_positive) / (self.weight * distance)
 
 
 def rough_heights(roughness_m: float, seed: int | tuple[int, ...], steps: int) -> Array:
@@ -62,7 +71,8 @@ class WalkRecord:
     @property
     def advice(self) -> str:
         """What the outcome means and what to try next."""
-        return self.outcome.advice
+        even = self.foothold_height_m is None
+        return self.outcome.advice if even else self.outcome.advice_on_uneven_ground
 
     @property
     def steps(self) -> int:

@@ -11,6 +11,12 @@ from typing import Any, NamedTuple
 from walkerlab.kernels import always_inline, by_type_or_default, inlined
 
 
+@by_type_or_default
+def legs_apart(system: Any, y: Any) -> tuple[float, float]:
+    """By how much the swing leg is ahead of the stance leg (rad), and how fast it gets further ahead (rad/s)."""
+    return 0.0, 0.0
+
+
 class HingeTorque(NamedTuple):
     """Torque against the angle by which a body is ahead of another, and its derivatives."""
 

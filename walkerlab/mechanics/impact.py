@@ -15,9 +15,20 @@ from numpy.typing import NDArray
 
 from walkerlab.kernels import always_inline, inlined, matrix, vector
 from walkerlab.mechanics.links import factor_linked, solve_linked
-from walkerlab.mechanics.standing import AT_STRIKE, STANCE, STRAIGHT, SWING, Standing, equations, hip_height
+from walkerlab.mechanics.standing import (
+    AT_STRIKE,
+    BENT,
+    NO_SHANK,
+    STANCE,
+    STRAIGHT,
+    SWING,
+    Standing,
+    equations,
+    hip_height,
+)
 from walkerlab.mechanics.tree import projections, sines_cosines
 from walkerlab.mechanics.trigonometry import sine_cosine
+from walkerlab.solvers.system import Floats
 
 
 @inlined
@@ -121,19 +132,50 @@ def push_off(model: Standing, new: Any) -> PushOffImpulse:
     return PushOffImpulse(share * x_t, share * y_t, angular, by_trailing, by_leading)
 
 
+def push_off_work(model: Standing, before: Floats) -> Floats:
+    """Work (strikes,) in J of the push-offs at heel strikes, each done just before its strike.
+
+    The walker is free of the ground then, its knees locked and its torso coupled: an impulse P along e gives
+    P^2 / 2 J M^-1 J', with J the velocity along e of the trailing contact point, or of the hip on the same line.
+    Angular velocities leave of M the apparent mass at the hip, m - C' I^-1 C, with moments C and inertia I about it.
+
+    before  (strikes, 2 n) states just before the strikes
+
+    Source: Kuo (2002), whose legs without mass leave P^2 / (2 m).
+    """
+    n, E = len(model.arm_x), model.E[STRAIGHT]
+    Z = E[:, np.diag(E) != 0.0]
+    A, B, arm_x, arm_y = (each.copy() for each in (model.A, model.B, model.arm_x, model.arm_y))
+    # the trailing leg hangs from the hip as the leading one does, and seen from there nothing hangs from it
+    leg = [SWING] if model.shank == NO_SHANK else [SWING, int(model.shank)]
+    own = A[np.ix_(leg, leg)].sum()
+    for pairs in (A, B):
+        pairs[STANCE, :], pairs[:, STANCE] = 0.0, 0.0
+    A[STANCE, STANCE], arm_x[STANCE], arm_y[STANCE] = own, arm_x[leg].sum(), arm_y[leg].sum()
+    psi = before[:, :n] + model.slope
+    s, c, turned = np.sin(psi), np.cos(psi), psi[:, None, :] - psi[:, :, None]
+    inertia = Z.T @ (A * np.cos(turned) + B * np.sin(turned)) @ Z
+    moments = Z.T @ np.stack((-s * arm_x - c * arm_y, c * arm_x - s * arm_y), axis=2)
+    apparent = model.mass * np.eye(2) - moments.transpose(0, 2, 1) @ np.linalg.solve(inertia, moments)
+    s_t, c_t = s[:, STANCE], c[:, STANCE]
+    to_hip = np.stack((c_t * model.hip_x - s_t * model.hip_y, s_t * model.hip_x + c_t * model.hip_y + model.radius), 1)
+    impulse = model.push_off * to_hip / np.linalg.norm(to_hip, axis=1, keepdims=True)
+    return np.asarray(0.5 * (impulse[:, None, :] @ np.linalg.solve(apparent, impulse[:, :, None]))[:, 0, 0])
+
+
 def pushed_at_hip(model: Standing, y: Any, impulse: float) -> NDArray[np.float64]:
     """The state (2 n) just after a heel strike y, changed by an impulse (N s) at the hip along the slope.
 
-    The new stance foot stays where it is, and the constraints are those of the heel strike.
+    The new stance foot stays where it is. It comes after the release of the trailing knee, which is free.
     """
-    n, new = len(model.arm_x), np.array(y, float)
+    n, new, phase = len(model.arm_x), np.array(y, float), BENT if model.kneed else STRAIGHT
     s, c, F, U, p = np.zeros((5, n))
     M = np.zeros((n, n))
     equations(model, new, s, c, F, U, M, p)
     p[:] = 0.0
     p[STANCE] = -impulse * hip_height(model, new)
-    factor_linked(model, AT_STRIKE, M)
-    solve_linked(model, AT_STRIKE, M, p)
+    factor_linked(model, phase, M)
+    solve_linked(model, phase, M, p)
     new[n:] += p
     return new
 

@@ -28,6 +28,7 @@ from walkerlab.mechanics.hinges import (
     hinge_energy,
     hinge_torque,
     hip_law,
+    legs_apart,
 )
 from walkerlab.mechanics.links import factor_linked, solve_linked, spread
 from walkerlab.mechanics.tree import (
@@ -193,6 +194,13 @@ def hip_torque(model: Standing, y: Any) -> HingeTorque:
     """The torque between the legs, by how far the swing leg is ahead."""
     n = len(model.arm_x)
     return hinge_torque(hip_law(model), y[SWING] - y[STANCE], y[n + SWING] - y[n + STANCE])
+
+
+@legs_apart.case(Mode)
+def legs_apart_standing(system: Mode, y: Any) -> tuple[float, float]:
+    """The uppermost bodies of both legs."""
+    n = len(system.model.arm_x)
+    return y[SWING] - y[STANCE], y[n + SWING] - y[n + STANCE]
 
 
 @always_inline

@@ -41,7 +41,7 @@ class GaitAnswer:
 
 
 def find_gait_from(walker: ContactWalker, ground: JudgedGround, tolerances: Tolerances, start: State) -> GaitAnswer:
-    """The contact gait near a start with both feet on the ground (state of the free walker, 8 numbers).
+    """The contact gait near a start with both feet on the ground, a state of the free walker.
 
     Never raises for want of a gait: the answer says why there is none and what to try.
     """

@@ -375,6 +375,12 @@ class ContactMap(StepMap):
         step = self.step(z, p, derived=False)
         return step.driven.cost_of_transport(step.length_m) if isinstance(step, SectionStep) else None
 
+    def leg_and_pendulum(self, p: float) -> tuple[float, float]:
+        """Units of the walker at p."""
+        here = self._at(p)
+        assert here is not None, "what is measured has a gait"
+        return here.ground.frame.leg_length, here.ground.frame.pendulum_time
+
     def at(self, tolerances: Tolerances) -> ContactMap:
         """The same map, its steps integrated otherwise."""
         other = copy(self)

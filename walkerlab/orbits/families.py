@@ -35,6 +35,8 @@ NEAR_CIRCLE = 1.6  # magnitude of multipliers that this is asked of
 EVALUATIONS = 20  # of Newton's method from a seed
 ROUND = "comes round to where it began"
 NO_WALKER = "no walker has the parameter's next value"
+END_OF_SPAN = "end of the span"
+AT_AN_END = 1e-12  # of the span
 POINTS, GROWTH = 400, 1e4  # of one branch; of a disturbance over a cycle, beyond which no gait is resolved
 
 
@@ -53,6 +55,10 @@ class ValueSpan:
     def __contains__(self, value: float) -> bool:
         """Whether a value lies inside."""
         return self.least <= value <= self.most
+
+    def nearest(self, value: float) -> float:
+        """The value inside that is nearest to another one."""
+        return min(max(value, self.least), self.most)
 
 
 CONTROL = StepControl()
@@ -248,12 +254,11 @@ class BranchFollower:
             if len(points) >= self.most:
                 end = BranchEnd(points[-1].value, f"{self.most} points are used up")
                 break
-            following = stepped(equations, last, step, self.control, self.near_enough(last), before)
-            if isinstance(following, NotConverged):
-                end = BranchEnd(points[-1].value, why_lost(following))
+            following = self.onward(equations, last, step, before)
+            if isinstance(following, BranchEnd):
+                end = following
                 break
-            solved, step = following
-            end, solved = self.within(equations, last, solved)
+            solved, step, end = following
             if passes(Segment(equations, last, solved, self.control.tolerance), start, self.control.turn):
                 end, solved = BranchEnd(points[0].value, ROUND), start
             if period % 2 == 0 and halves_meet(last.evaluated.data, solved.evaluated.data):
@@ -288,22 +293,44 @@ class BranchFollower:
 
         return near
 
-    def within(
-        self, equations: GaitEquations, last: Solved[Cycle], solved: Solved[Cycle]
-    ) -> tuple[BranchEnd | None, Solved[Cycle]]:
-        """A point that has left the span is brought back to its end, where the branch ends."""
+    def onward(
+        self, equations: GaitEquations, last: Solved[Cycle], step: float, before: Solved[Cycle] | None
+    ) -> tuple[Solved[Cycle], float, BranchEnd | None] | BranchEnd:
+        """The next point, how far to look for the one after it, and the branch's end if that is there.
+
+        A step that leads out of the span goes to the span's end: beyond it there may be no walker. Returns the end
+        alone where there is no further point.
+        """
+        ahead, acceptable = last.x + step * last.tangent, self.near_enough(last)
+        edge = self.span.nearest(equations.value(ahead))
+        if edge != equations.value(ahead):
+            if abs(edge - equations.value(last.x)) <= AT_AN_END * self.span.size:
+                return BranchEnd(edge, END_OF_SPAN)
+            at_edge = self.at_edge(equations, last, ahead)
+            if at_edge is not None and at_edge.tangent @ last.tangent > self.control.turn and acceptable(at_edge):
+                return at_edge, step, BranchEnd(edge, END_OF_SPAN)
+        following = stepped(equations, last, step, self.control, acceptable, before)
+        if isinstance(following, NotConverged):
+            return BranchEnd(equations.value(last.x), why_lost(following))
+        solved, step = following
         value = equations.value(solved.x)
         if value in self.span:
-            return None, solved
-        edge = self.span.least if value < self.span.least else self.span.most
-        share = (edge - equations.value(last.x)) / (value - equations.value(last.x))
-        guess = last.x + share * (solved.x - last.x)
+            return solved, step, None
+        at_edge = self.at_edge(equations, last, solved.x)
+        if at_edge is None:
+            return solved, step, BranchEnd(value, END_OF_SPAN)
+        return at_edge, step, BranchEnd(self.span.nearest(value), END_OF_SPAN)
+
+    def at_edge(self, equations: GaitEquations, last: Solved[Cycle], beyond: Floats) -> Solved[Cycle] | None:
+        """The gait at the end of the span, between the last one and a point (d + 1,) beyond; None if it is lost."""
+        start, value = equations.value(last.x), equations.value(beyond)
+        edge = self.span.nearest(value)
+        guess = last.x + (edge - start) / (value - start) * (beyond - last.x)
         guess[-1] = edge / self.span.size
-        at_edge = corrected(equations, guess, np.eye(guess.size)[-1], self.control.tolerance)
-        if isinstance(at_edge, NotConverged):
-            return BranchEnd(value, "end of the span"), solved
-        along = at_edge.tangent if at_edge.tangent @ last.tangent > 0.0 else -at_edge.tangent
-        return BranchEnd(edge, "end of the span"), replace(at_edge, tangent=along)
+        found = corrected(equations, guess, np.eye(guess.size)[-1], self.control.tolerance)
+        if isinstance(found, NotConverged):
+            return None
+        return found if found.tangent @ last.tangent > 0.0 else replace(found, tangent=-found.tangent)
 
     def point(self, solved: Solved[Cycle]) -> Cycle:
         """The gait at a point of the curve, watched."""

@@ -61,10 +61,16 @@ class RigidGait:
     trailing_foot_rises: bool  # after the heel strike
     knee_strike: float | None  # s; None for legs without knees
     work: dict[str, float]  # J a step, by what gives it
-    cost_of_transport: float  # work given over weight and distance
+    cost_of_transport: float  # work spent over weight and distance
+    froude: float  # speed over sqrt(g L)
     swings: int = 1  # how often the swing leg passes the stance leg in a step
     found_by: tuple[str, ...] = ()  # the searches that led here
     z: tuple[float, ...] = ()  # section coordinates of the unit walker
+
+    @property
+    def speed(self) -> float:
+        """Step length over period (m/s)."""
+        return self.step_length / self.period
 
     @property
     def spectral_radius(self) -> float:
@@ -117,6 +123,7 @@ def measured(walker: Standing, units: Units, gait: Cycle) -> RigidGait | None:
         trailing_foot_rises=bool(swing_foot_motion(walker, start, start[len(start) // 2 :])[2] >= 0.0),
         work={name: given * units.energy for name, given in step.driven.per_step(1).items()},
         cost_of_transport=step.driven.cost_of_transport(float(step.lengths_m[0])),
+        froude=float(step.lengths_m[0] / step.periods_s[0]),
         swings=int(np.count_nonzero(np.diff(np.signbit(apart)))),
         knee_strike=None if step.knee_strike_time_s is None else float(step.knee_strike_time_s[0]) * units.time,
         z=tuple(gait.z.tolist()),

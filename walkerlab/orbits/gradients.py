@@ -1,8 +1,9 @@
 """How a gait's numbers answer a number of the walker: by the implicit function theorem.
 
 With z the section's coordinates and P the step map, dz/dp = (I - A)^-1 dP/dp; all that follows from the gait changes
-along (dz/dp, 1). The derivatives by p are difference quotients of exact steps at two step sizes, which tell their
-error, along the family as far as it is known; that of a multiplier comes from A's by its left and right eigenvectors.
+along (dz/dp, 1). The derivatives by p are difference quotients of exact steps along the family as far as it is known;
+that of a multiplier comes from A's by its left and right eigenvectors. The difference between two step sizes is the
+error, and the steps are halved as long as that makes errors smaller which are no small part of their derivatives.
 """
 
 from __future__ import annotations
@@ -26,13 +27,17 @@ QUANTITIES: Final[Mapping[str, str]] = {
     "speed_m_s": "m/s",
     "spectral_radius": "1",
     "gait_sensitivity_norm": "s/m",
+    "gait_sensitivity_norm_scaled": "1",
     "cost_of_transport": "1",
 }
-"""What is differentiated, with units; the norm is that of the step period for a drop of the floor."""
+"""What is differentiated, with units; the norms are of the step period for a drop of the floor, the scaled one in
+pendulum times over leg lengths of the walker itself."""
 OWN = 3  # of them that a step itself has
 APART = 1e-6  # |l' r| of the largest multiplier's eigenvectors, below which multipliers meet
 STEP = 1.5  # of a difference quotient, in fifth roots of the relative tolerance
 APPROACH = (1e-4, 1e-2)  # of that: steps by which the direction of the family is found
+SIZES = (2.0, 1.0, 0.5, 0.25, 0.125)  # of the steps of difference quotients, one after the other
+SMALL = 1e-3  # error, relative to a derivative, that needs no smaller step
 LOST = 0.1  # error, relative to a derivative, from which rounding has eaten it
 
 
@@ -43,6 +48,15 @@ class Gradient:
     value: float | None
     error: float | None
     why: str = ""
+
+    @property
+    def small(self) -> bool:
+        """Whether no smaller step is needed, or would help."""
+        return self.value is None or self.error is None or self.error <= SMALL * abs(self.value)
+
+    def halves(self, other: Gradient | None) -> bool:
+        """Whether its error is less than half of another one's."""
+        return other is None or (self.error is not None and self.error < 0.5 * (other.error or 0.0))
 
 
 def gait_numbers(at: Standpoint, wanted: Collection[str] = QUANTITIES) -> dict[str, float] | None:
@@ -55,9 +69,9 @@ def gait_numbers(at: Standpoint, wanted: Collection[str] = QUANTITIES) -> dict[s
         return None
     radius = float(np.abs(multipliers_of(step.DP)).max())
     found = dict(zip(QUANTITIES, (*own_numbers(step), radius), strict=False))
-    for name, of in OTHERS.items():
-        value = of(at._replace(A=step.DP)) if name in wanted else None
-        found |= {} if value is None else {name: value}
+    for names, of in OTHERS.items():
+        values = None if set(names).isdisjoint(wanted) else of(at._replace(A=step.DP))
+        found |= {} if values is None else dict(zip(names, values, strict=True))
     return found
 
 
@@ -66,16 +80,26 @@ def own_numbers(step: MappedStep) -> tuple[float, float, float]:
     return step.period_s, step.length_m, step.length_m / step.period_s
 
 
-def norm_of(at: Standpoint) -> float | None:
-    """The norm of the step period for a drop of the floor; None of an unstable gait."""
+def norms_of(at: Standpoint) -> tuple[float, float] | None:
+    """The norm of the step period for a drop of the floor, and the scaled one; None of an unstable gait."""
     answer = response(at, "floor-drop")
-    return None if answer is None else float(answer[0][0])
+    if answer is None:
+        return None
+    length, time = at.step_map.leg_and_pendulum(at.p)
+    return float(answer[0][0]), float(answer[0][0]) * length / time
 
 
-OTHERS: Final[Mapping[str, Callable[[Standpoint], float | None]]] = {
-    "gait_sensitivity_norm": norm_of,
-    "cost_of_transport": lambda at: at.step_map.cost_of_transport(at.z, at.p),
+def cost_of(at: Standpoint) -> tuple[float] | None:
+    """The cost of transport; None where the step ends."""
+    cost = at.step_map.cost_of_transport(at.z, at.p)
+    return None if cost is None else (cost,)
+
+
+OTHERS: Final[Mapping[tuple[str, ...], Callable[[Standpoint], tuple[float, ...] | None]]] = {
+    ("gait_sensitivity_norm", "gait_sensitivity_norm_scaled"): norms_of,
+    ("cost_of_transport",): cost_of,
 }
+"""What takes more than the step itself, by the names of the values."""
 
 
 def gradients(at: Standpoint, scale: float, wanted: Collection[str] = QUANTITIES) -> dict[str, Gradient]:
@@ -90,15 +114,26 @@ def gradients(at: Standpoint, scale: float, wanted: Collection[str] = QUANTITIES
         if closer is None:
             return {}
         along = closer
-    fine, coarse = (changes(at, times * h, along, wanted) for times in (1.0, 2.0))
-    if fine is None or coarse is None:
-        return {}
+    found, coarse = dict[str, Gradient](), None
+    for size in SIZES:
+        fine = changes(at, size * h, along, wanted)
+        if fine is not None and coarse is not None:
+            better = {name: one for name, one in pair(at.A, fine, coarse).items() if one.halves(found.get(name))}
+            found |= better
+            if not better or all(one.small for one in found.values()):
+                break
+        coarse = fine
+    return found
+
+
+def pair(A: Floats, fine: Changes, coarse: Changes) -> dict[str, Gradient]:
+    """The derivatives by the finer of two steps, with the errors that the coarser one shows."""
     found = {
         name: told(value, abs(value - coarse.numbers[name]))
         for name, value in fine.numbers.items()
         if name in coarse.numbers
     }
-    return found | {"spectral_radius": of_radius(at.A, fine.A, coarse.A - fine.A)}
+    return found | {"spectral_radius": of_radius(A, fine.A, coarse.A - fine.A)}
 
 
 class Changes(NamedTuple):
@@ -138,17 +173,18 @@ def changes(at: Standpoint, h: float, guess: Floats, wanted: Collection[str]) ->
         _, step = beside(off)
         return np.append(own_numbers(step), step.DP) if step.outcome is Outcome.WALKED else None
 
-    def other(off: float, of: Callable[[Standpoint], float | None]) -> Floats | None:
+    def other(off: float, of: Callable[[Standpoint], tuple[float, ...] | None]) -> Floats | None:
         here, step = beside(off)
-        value = of(here) if step.outcome is Outcome.WALKED else None
-        return None if value is None else np.array(value)
+        values = of(here) if step.outcome is Outcome.WALKED else None
+        return None if values is None else np.array(values)
 
     changed = slope_of(of_step, h)
     if changed is None:
         return None
-    others = {name: slope_of(partial(other, of=of), h) for name, of in OTHERS.items() if name in wanted}
     numbers = dict(zip(QUANTITIES, changed[:OWN].tolist(), strict=False))
-    numbers |= {name: float(value) for name, value in others.items() if value is not None}
+    for names, of in OTHERS.items():
+        slopes = None if set(names).isdisjoint(wanted) else slope_of(partial(other, of=of), h)
+        numbers |= {} if slopes is None else dict(zip(names, slopes.tolist(), strict=True))
     return Changes(numbers, changed[OWN:].reshape(at.A.shape))
 
 
@@ -170,8 +206,10 @@ def of_radius(A: Floats, change: Floats, error: Floats) -> Gradient:
     if left is None or meets or values[largest] == 0.0:
         return Gradient(None, None, "multipliers meet")
     towards = values[largest].conjugate() / abs(values[largest])
-    found, off = ((towards * (left[largest] @ part @ right[:, largest])).real for part in (change, error))
-    return told(float(found), abs(float(off)))
+    found = (towards * (left[largest] @ change @ right[:, largest])).real
+    # errors of A's elements may cancel by chance, which says nothing of the next step
+    off = np.abs(left[largest]) @ np.abs(error) @ np.abs(right[:, largest])
+    return told(float(found), float(off))
 
 
 def relative(value: float, parameter: float, quantity: float) -> float | None:

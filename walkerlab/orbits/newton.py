@@ -103,4 +103,7 @@ def newton(equations: Equations[D], guess: Floats, effort: Effort) -> Solution[D
                 break
             share *= 0.5
         x, here, residual, corrections = x + share * move, ahead, left, corrections + 1
-    return Solution(x, here, corrections) if here.outcome is Outcome.WALKED else NotConverged(here.outcome)
+    if here.outcome is Outcome.WALKED:
+        return Solution(x, here, corrections)
+    # a move that left the walkers says nothing of the guess
+    return NotConverged(Outcome.WALKED if here.outcome is None and corrections else here.outcome)

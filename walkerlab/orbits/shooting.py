@@ -16,12 +16,21 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from walkerlab.hybrid.recorded_walk import take_walk
+from walkerlab.hybrid.recorded_walk import as_state, take_walk
 from walkerlab.hybrid.rigid_observer import Observer, unwatched
-from walkerlab.hybrid.rigid_walk import EVENTS, HeelStrikes, new_heel_strikes, take_step, walk
+from walkerlab.hybrid.rigid_walk import EVENTS, SHORTEST_LANDING, HeelStrikes, new_heel_strikes, take_step, walk
 from walkerlab.kernels import inlined, kernel, matrix, vector
 from walkerlab.mechanics.impact import pushed_at_hip
-from walkerlab.mechanics.standing import AT_STRIKE, STANCE, STRAIGHT, SWING, Standing, feet_on_slope, step_lengths
+from walkerlab.mechanics.standing import (
+    AT_STRIKE,
+    STANCE,
+    STRAIGHT,
+    SWING,
+    Standing,
+    feet_on_slope,
+    momentum,
+    step_lengths,
+)
 from walkerlab.orbits.similarity import Units, unit_walker
 from walkerlab.orbits.step_map import REMEMBERED, DisturbedWalk, Iterates, MappedStep, Monitor, StepMap, no_step
 from walkerlab.outcome import Outcome
@@ -134,20 +143,28 @@ class Shooting(local):
         )
 
     def walk(
-        self, section: StrikeSection, z: Floats, steps: int = 1, derived: bool = True, rises: Floats | None = None
+        self,
+        section: StrikeSection,
+        z: Floats,
+        steps: int = 1,
+        derived: bool = True,
+        rises: Floats | None = None,
+        nearest: float = 0.0,
+        start: Floats | None = None,
     ) -> Steps:
         """Walk from z (d,), with the derivative if it is wanted: without, it is two thirds of the work.
 
-        rises  as HeelStrikes has them, in units of the walker; even ground without
+        rises, nearest  as HeelStrikes has them, in units of the walker; even ground without
+        start           (2 n,) state off the section from which to walk instead, without a derivative
         """
         memory = self.memory
         method = memory.varied if derived else self.plain
         d, size = section.basis.shape
         y = section.start[: method.y.size].copy()
-        y[:size] += z @ section.basis
+        y[:size] = y[:size] + z @ section.basis if start is None else start
         method.counts[:BUDGET] = 0
         method.clock[H_NEXT] = 0.0
-        strikes: HeelStrikes = new_heel_strikes(steps, y.size, rise=rises)
+        strikes: HeelStrikes = new_heel_strikes(steps, y.size, rise=rises, nearest=nearest)
         status, taken = walk(section.walker, method, memory.finder, memory.observer, y, strikes)
         ahead = strikes.after[:taken].take(section.places if derived else section.places[:d], axis=1)
         DP = ahead[:, d:].reshape(taken, d if derived else 0, d) / SMALL
@@ -306,16 +323,17 @@ class RigidMap(StepMap):
         return np.array(extremes) * (units.force, 1.0, units.length)
 
     def disturbed(self, z: Floats, p: float, heights_m: Floats, push_N_s: float = 0.0) -> DisturbedWalk:
-        """Walk over footholds (m), after a push just after the heel strike that z is."""
+        """Walk over footholds (m) from a gait z, after a push just after the heel strike that z is."""
         unit = self._unit_at(p)
         assert unit is not None, "what is disturbed has a gait"
-        walker, units, section = unit.walker, unit.units, unit.section
-        if push_N_s != 0.0:
-            z = coordinates_of(walker, pushed_at_hip(walker, on_section(walker, z), push_N_s / units.impulse))
+        walker, units, section, start = unit.walker, unit.units, unit.section, np.array(on_section(unit.walker, z))
+        start = pushed_at_hip(walker, start, push_N_s / units.impulse) if push_N_s != 0.0 else start
+        step_length = unit.step_length(float(z[0]), float(z[0]))
         rises = np.diff(heights_m, prepend=heights_m[0]) / units.length
-        walked = self._exact.walk(section, z, rises.size - 1, derived=False, rises=rises)
+        nearest = SHORTEST_LANDING * step_length if rises.any() else 0.0
+        walked = self._exact.walk(section, z, rises.size - 1, False, rises, nearest, start)
         before, after = (states[: len(walked.time)] for states in (walked.strikes.before, walked.strikes.after))
-        lengths = step_lengths(walker, np.vstack((on_section(walker, z), after))[:-1], before)
+        lengths = step_lengths(walker, np.vstack((start, after))[:-1], before)
         durations = np.diff(walked.time, prepend=0.0) * units.time
         return DisturbedWalk(walked.outcome, durations, lengths * units.length, walked.z[-1] if walked.z.size else z)
 
@@ -326,6 +344,25 @@ class RigidMap(StepMap):
             return None
         taken = take_walk(unit.walker, EXACT, on_section(unit.walker, z), 1)
         return float(taken.driven.cost_of_transport(taken.lengths_m[0])) if taken.steps else None
+
+    def ground_after_push(self, z: Floats, p: float, push_N_s: float, steps: int) -> tuple[float, float]:
+        """What the ground must give for a push at the hip, negative where it would have to pull.
+
+        Returns its normal impulse (N s) in the push itself, and the minimum of its normal force (N) in the steps after.
+        """
+        unit = self._unit_at(p)
+        assert unit is not None, "what is pushed has a gait"
+        walker, units, start = unit.walker, unit.units, on_section(unit.walker, z)
+        pushed = as_state(pushed_at_hip(walker, start, push_N_s / units.impulse))
+        impulse = momentum(walker, pushed)[1] - momentum(walker, start)[1]
+        walked = take_walk(walker, WATCHED, pushed, steps)
+        return impulse * units.impulse, walked.min_normal_force * units.force
+
+    def leg_and_pendulum(self, p: float) -> tuple[float, float]:
+        """Units of the walker at p."""
+        unit = self._unit_at(p)
+        assert unit is not None, "what is measured has a gait"
+        return unit.units.length, unit.units.time
 
     def at(self, tolerances: Tolerances) -> RigidMap:
         """The same map, its steps integrated otherwise."""

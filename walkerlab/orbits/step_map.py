@@ -127,6 +127,9 @@ class StepMap(Stepper, Protocol):
     def cost_of_transport(self, z: Floats, p: float) -> float | None:
         """Work given over weight and distance of a step from z (d,); None where it ends."""
 
+    def leg_and_pendulum(self, p: float) -> tuple[float, float]:
+        """Leg length (m) and pendulum time (s) of the walker at p."""
+
     def at(self, tolerances: Tolerances) -> StepMap:
         """The same map, its steps integrated otherwise."""
 

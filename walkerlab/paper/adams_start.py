@@ -51,6 +51,7 @@ class AdamsStart:
 class AdamsWalk:
     """The walk of the contact model from there, and what explains it.
 
+    terrain             of the contact model's ground
     rigid               the same start in the rigid model, both feet on the config's slope
     airborne_from       s, from when on no foot of the contact model is in contact; None if one always is
     later_normal_force  N, the most that the contact model's ground carries once the rigid one's would have to pull
@@ -58,6 +59,7 @@ class AdamsWalk:
     mechanical          (samples,) J, kinetic and potential energy of the contact model
     """
 
+    terrain: str
     rigid: AdamsStart
     walk: ContactWalkResult
     airborne_from: float | None
@@ -93,10 +95,13 @@ def adams_start(walker: Standing, state: State) -> AdamsStart:
     )
 
 
-def adams_walk(walker: Standing, walk: Callable[[State], ContactWalkResult], contact: ContactWalker) -> AdamsWalk:
+def adams_walk(
+    walker: Standing, walk: Callable[[State], ContactWalkResult], contact: ContactWalker, terrain: str
+) -> AdamsWalk:
     """Run Table 2's ADAMS start in the contact model: the printed stance angle and velocities on the walker's slope.
 
-    walk  walks the contact model from a rigid start state, with samples
+    walk     walks the contact model from a rigid start state, with samples
+    terrain  what it walks on, as configs name it
     """
     _, theta_2, omega_1, omega_2 = adams_start_as_printed()
     rigid = adams_start(walker, (-2.0 * walker.slope - theta_2, theta_2, omega_1, omega_2))
@@ -107,6 +112,7 @@ def adams_walk(walker: Standing, walk: Callable[[State], ContactWalkResult], con
     airborne = time[(total <= 0.0) & (time > 0.0)]
     later = np.zeros(0) if rigid.pull_from is None else total[time >= rigid.pull_from]
     return AdamsWalk(
+        terrain=terrain,
         rigid=rigid,
         walk=result,
         airborne_from=float(airborne[0]) if airborne.size else None,

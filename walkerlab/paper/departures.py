@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator
 from typing import Any, Final
 
 from walkerlab.config.contact import BOUNDS_SI, Contact
-from walkerlab.config.drives import drives_of
+from walkerlab.config.drives import acting_on
 from walkerlab.config.numbers import same
 from walkerlab.config.reads import CompareConfig
 from walkerlab.config.schema import Config
@@ -27,8 +27,8 @@ def departures(config: CompareConfig, start_moved: bool) -> Departures:
     walker, contact, paper = config.walker, config.contact, CompassWalker()
     rigid: list[str] = []
     of_contact: list[str] = []
-    if drives := drives_of(config):
-        rigid.append(f"the walker is driven by {' and '.join(drives)}")
+    if acting := acting_on(config):
+        rigid.append(f"the walker has {' and '.join(acting)}")
     if not config.ground.even:
         rigid.append("the ground is uneven")
     if not isinstance(walker, CompassWalker):

@@ -1,7 +1,8 @@
 """The paper's numbers, each with its verdict, in their order; then its three tables beside what was measured."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any, Literal
@@ -9,22 +10,24 @@ from typing import Any, Literal
 from walkerlab.config.contact import MM_PER_M
 from walkerlab.hybrid.comparison import Quantity
 from walkerlab.paper import printed
+from walkerlab.paper.contradictions import contradictions, percent_left_open
 from walkerlab.paper.measured import CYCLES, Measured
 from walkerlab.paper.printed import Printed, speed_difference
 from walkerlab.paper.prose import prose
 from walkerlab.paper.study import PaperStudy
 
-AROUND = 2.0  # 'around 1e-4' is up to twice that
 SETS = ("as-printed", "corrected")
 WALKER_PARAMETERS = ("leg_length", "leg_mass", "hip_mass", "gravity")
 
 
 class NumberVerdict(StrEnum):
-    """How a printed number fares."""
+    """How a printed value fares; each counts once."""
 
+    INPUT = "input"  # it is used as given
     REPRODUCED = "reproduced"  # it comes out to the printed digits
     EXPLAINED = "explained"  # it does not, or not by itself, and what was measured says why
-    REFUTED = "refuted"  # it contradicts what was measured, or the paper's own numbers
+    CONTRADICTED = "contradicted"  # other values of the paper contradict it, which wins over all other classes
+    NOT_REPRODUCED = "not-reproduced"  # it does not come out; values of ADAMS, which was not run, are among these
 
 
 @dataclass(frozen=True)
@@ -42,9 +45,16 @@ class JudgedNumber:
     evidence: str
 
 
-REPRODUCED, EXPLAINED, REFUTED = NumberVerdict
+INPUT, REPRODUCED, EXPLAINED, CONTRADICTED, NOT_REPRODUCED = NumberVerdict
 Scene = Literal["rigid", "contact", "any"]
-"""Whose scene has to be the paper's if a mismatch is to refute it: any, for what the paper's own numbers decide."""
+"""Whose scene has to be the paper's if a mismatch is to count: any, for what the paper's own values decide."""
+
+
+def counted(rows: Iterable[JudgedNumber]) -> dict[str, int]:
+    """Values by verdict, and `refuted`, which repeats the last two of them until 0.3 is released."""
+    verdicts = Counter(row.verdict for row in rows)
+    by_class = {verdict.value: verdicts[verdict] for verdict in NumberVerdict}
+    return {**by_class, "refuted": verdicts[CONTRADICTED] + verdicts[NOT_REPRODUCED]}
 
 
 def paper_rows(measured: Measured, study: PaperStudy) -> Iterator[JudgedNumber]:
@@ -58,23 +68,15 @@ def paper_rows(measured: Measured, study: PaperStudy) -> Iterator[JudgedNumber]:
     yield judge.input(printed.LEG_INERTIA, walker.leg_inertia, "rigid")
     yield judge.input(printed.FOOT_RADIUS, contact.foot_radius * MM_PER_M, "contact")
     for entry, value in ((printed.STIFFNESS, contact.law.stiffness), (printed.DAMPING, contact.law.damping)):
-        # printed without a unit
-        yield judge.row(entry, {}, value, False, EXPLAINED, "contact", prose("evidence.unitless", contact))
+        yield judge.input(entry, value, "contact", prose("evidence.unitless", contact))
     yield judge.input(printed.STATIC_FRICTION, contact.law.static_friction, "contact")
     yield judge.input(printed.DYNAMIC_FRICTION, contact.law.dynamic_friction, "contact")
     yield judge.lost_balance()
-    for coordinate, entry in enumerate(printed.RAISED, 2):
-        agrees = bool(entry.agreement(printed.TABLE_2[coordinate].percent_of_matlab))
-        text = prose("evidence.raised", contact, judge.raised[2:])
-        yield judge.row(entry, {}, judge.raised[coordinate], agrees, REFUTED, "any", text)
     for coordinate, row in enumerate(printed.TABLE_2):
-        yield judge.fixed_point(row.matlab, coordinate)
         yield judge.adams_start(row.adams, coordinate)
         yield judge.percent(row, coordinate)
     yield judge.strides()
-    late = abs(printed.T_LEFT.matlab.value - printed.T_LEFT.adams.value)
-    yield judge.error(printed.ANGLE_ERROR, "angle", late, study.fastest * late)
-    yield judge.error(printed.VELOCITY_ERROR, "velocity", late, study.largest_jump)
+    yield judge.error()
     yield judge.step_length()
     yield judge.velocity_difference()
     for result in printed.TABLE_3:
@@ -93,22 +95,21 @@ class Judge:
         entry: Printed,
         rigid: Mapping[str, float],
         contact: float | None,
-        agrees: bool,
-        otherwise: NumberVerdict,
+        verdict: NumberVerdict,
         scene: Scene,
         evidence: str,
     ) -> JudgedNumber:
-        """A printed number beside those of the rigid model, by set of equations, and of the contact model.
+        """A printed value beside those of the rigid model, by set of equations, and of the contact model.
 
-        agrees     the number came out
-        otherwise  what is said if it did not, of the paper's own scene: in another one a mismatch refutes nothing
+        verdict  of the paper's own scene, if no other value of the paper contradicts this one
         """
         departures = self.measured.departures
         differs = "; ".join(departures.rigid if scene == "rigid" else departures.contact)
-        verdict = REPRODUCED if agrees else otherwise
+        if (contradiction := contradictions().get(entry)) is not None:
+            verdict, scene, evidence = CONTRADICTED, "any", f"{contradiction}. {evidence}"
         if differs and scene == "any":
             evidence += f" The verdict is about the paper's own numbers, not about this scene ({differs})."
-        elif differs and not agrees:
+        elif differs and verdict not in (INPUT, REPRODUCED):
             verdict, evidence = EXPLAINED, f"Not the paper's scene ({differs}). {evidence}"
         about, (as_printed, corrected) = (entry.where, entry.quantity, entry.unit, entry.text), map(rigid.get, SETS)
         return JudgedNumber(*about, as_printed, corrected, contact, verdict.value, evidence)
@@ -122,24 +123,24 @@ class Judge:
         pairs = zip(start, gait.state, strict=True)
         return [None if ours == 0.0 else 100.0 * (begun / ours - 1.0) for begun, ours in pairs]
 
-    def input(self, entry: Printed, value: float, scene: Scene) -> JudgedNumber:
+    def input(self, entry: Printed, value: float, scene: Scene, evidence: str = "") -> JudgedNumber:
         """A parameter of both models, or of the contact model alone."""
         rigid = dict.fromkeys(SETS, value) if scene == "rigid" else {}
-        agrees = math.isclose(value, entry.value, rel_tol=1e-12)
-        return self.row(entry, rigid, value, agrees, EXPLAINED, scene, prose("evidence.input", value, entry.unit))
+        verdict = INPUT if math.isclose(value, entry.value, rel_tol=1e-12) else EXPLAINED
+        return self.row(entry, rigid, value, verdict, scene, evidence or prose("evidence.input", value, entry.unit))
 
     def fixed_point(self, entry: Printed, coordinate: int) -> JudgedNumber:
         """A coordinate of x_p."""
         values = {name: model.state[coordinate] for name, model in self.measured.models.items()}
         found = {name: entry.agreement(value) for name, value in values.items()}
         text = prose("evidence.fixed_point", values, found)
-        return self.row(entry, values, None, any(found.values()), REFUTED, "rigid", text)
+        return self.row(entry, values, None, came_out(any(found.values())), "rigid", text)
 
     def eigenvalue(self) -> JudgedNumber:
         """Whether the gait is stable."""
         entry, radii = printed.EIGENVALUES, self.measured.spectral_radii
         stable = bool(radii) and max(radii.values()) < entry.value
-        return self.row(entry, radii, None, stable, REFUTED, "rigid", prose("evidence.eigenvalue", radii))
+        return self.row(entry, radii, None, came_out(stable), "rigid", prose("evidence.eigenvalue", radii))
 
     def lost_balance(self) -> JudgedNumber:
         """The failure from MATLAB's initial conditions."""
@@ -148,47 +149,48 @@ class Judge:
         short = None if right is None else 100.0 * (1.0 - printed.X_P[3].value / right.state[3])
         text = prose("evidence.lost_balance", steps, 2 * CYCLES, outcome, short)
         agrees = outcome != "walked" and steps == printed.LOST_BALANCE.value
-        return self.row(printed.LOST_BALANCE, {}, float(steps), agrees, REFUTED, "contact", text)
+        return self.row(printed.LOST_BALANCE, {}, float(steps), came_out(agrees), "contact", text)
 
     def percent(self, row: printed.StartRow, coordinate: int) -> JudgedNumber:
         """A percentage of Table 2: arithmetic, whatever the config."""
         entry = row.percent
-        agrees = bool(entry.agreement(row.percent_of_matlab))
-        otherwise = EXPLAINED if entry.agreement(row.percent_of_adams) else REFUTED
-        text = prose("evidence.percent", row, REPRODUCED if agrees else otherwise)
-        return self.row(entry, {}, self.raised[coordinate], agrees, otherwise, "any", text)
+        verdict = REPRODUCED if entry.agreement(row.percent_of_matlab) else EXPLAINED
+        left_open = None if entry in contradictions() else percent_left_open(row)
+        text = prose("evidence.percent", row, left_open, self.measured.contact, self.raised[2:])
+        return self.row(entry, {}, self.raised[coordinate], verdict, "any", text)
 
     def adams_start(self, entry: Printed, coordinate: int) -> JudgedNumber:
-        """A coordinate of the ADAMS start: what it is, whatever the config, and what ours was."""
-        contact, start, is_angle = self.measured.contact, self.study.adams, coordinate < 2
+        """A coordinate of the ADAMS start, and what ours was: an input where the contact model starts from it."""
+        contact = self.measured.contact
         value = None if contact.start is None else contact.start[coordinate]
-        # whether a foot that can only push carries the rigid model to a heel strike
-        starts_a_gait = start.heel_strikes > 0 and start.pull_from is None
-        otherwise = EXPLAINED if is_angle or starts_a_gait else REFUTED
-        text = prose("evidence.adams_start", self.study, is_angle, contact, self.raised[2:])
-        return self.row(entry, {}, value, bool(entry.agreement(value)), otherwise, "any", text)
+        verdict = INPUT if entry.agreement(value) else NOT_REPRODUCED
+        text = prose("evidence.adams_start", self.study, coordinate < 2, contact, self.raised[2:])
+        return self.row(entry, {}, value, verdict, "contact", text)
 
     def strides(self) -> JudgedNumber:
-        """Five gait cycles."""
+        """Five gait cycles, which the rigid models are walked for as well."""
         entry, contact = printed.STRIDES, self.measured.contact
         rigid = {name: float(model.steps // 2) for name, model in self.measured.models.items()}
-        done, went_on = contact.steps // 2, contact.outcome == "walked"
-        all_done = done >= entry.value
-        text = prose("evidence.strides", contact, done, went_on and not all_done)
-        return self.row(entry, rigid, float(done), all_done, EXPLAINED if went_on else REFUTED, "contact", text)
+        done = contact.steps // 2
+        text = prose("evidence.strides", contact, done, contact.outcome == "walked" and done < entry.value)
+        return self.row(entry, rigid, float(done), INPUT, "contact", text)
 
-    def error(self, entry: Printed, which: Quantity, late: float, off: float) -> JudgedNumber:
-        """The largest error of Fig. 8; that it cannot be so small follows from Table 3 alone, whatever the config.
-
-        late, off  by how much Table 3's periods differ (s), and the error that this makes alone
-        """
-        errors = {way: difference.largest(which) for way, difference in self.measured.errors.items()}
-        text = prose("evidence.error", entry, late, off, self.measured.equations, errors)
-        raw, aligned = (max(errors[way]) if way in errors else None for way in ("raw", "aligned"))
-        limit = AROUND * entry.value
-        otherwise = EXPLAINED if aligned is not None and aligned <= limit else REFUTED
-        agrees = raw is not None and raw <= limit
-        return self.row(entry, {}, raw if aligned is None else aligned, agrees, otherwise, "any", text)
+    def error(self) -> JudgedNumber:
+        """The largest error of Fig. 8, for angles and angular velocities alike."""
+        entry, study, differences = printed.LARGEST_ERROR, self.study, self.measured.errors
+        late = abs(printed.T_LEFT.matlab.value - printed.T_LEFT.adams.value)
+        quantities: tuple[tuple[Quantity, float, str], ...] = (
+            ("angle", study.fastest * late, "rad"),
+            ("velocity", study.largest_jump, "rad/s"),
+        )
+        found = [
+            (f"{off:.2g} {unit}", unit, {way: one.largest(quantity) for way, one in differences.items()})
+            for quantity, off, unit in quantities
+        ]
+        text = prose("evidence.error", late, self.measured.equations, found)
+        way = "aligned" if "aligned" in differences else "raw"
+        largest = max((max(errors[way]) for _, _, errors in found if way in errors), default=None)
+        return self.row(entry, {}, largest, NOT_REPRODUCED, "any", text)
 
     def step_length(self) -> JudgedNumber:
         """The step length of section 5."""
@@ -197,7 +199,7 @@ class Judge:
         longest = max((*lengths.values(), *(() if contact is None else (contact,))), default=None)
         text = prose("evidence.step_length", lengths, contact, longest)
         agrees = any(entry.agreement(length) for length in lengths.values())
-        return self.row(entry, lengths, contact, agrees, REFUTED, "rigid", text)
+        return self.row(entry, lengths, contact, came_out(agrees), "rigid", text)
 
     def velocity_difference(self) -> JudgedNumber:
         """The difference of the average velocities: ours in the columns, the paper's own arithmetic in words."""
@@ -213,7 +215,7 @@ class Judge:
         sums = speed_difference(left.matlab.value + right.matlab.value, left.adams.value + right.adams.value)
         text = prose("evidence.velocity_difference", found, by_cycle, sums)
         agrees = bool(found) and max(found.values()) < entry.value
-        return self.row(entry, found, None, agrees, REFUTED if sums >= entry.value else EXPLAINED, "any", text)
+        return self.row(entry, found, None, came_out(agrees), "contact", text)
 
     def table_3(self, row: printed.PrintedRow) -> Iterator[JudgedNumber]:
         """A row of Table 3: MATLAB's number against the rigid model, and that of ADAMS against the contact model."""
@@ -226,13 +228,17 @@ class Judge:
         means = {"five": study.five_steps_energy, "ten": study.from_x_p.E_avg} if row is printed.E_AVG else {}
         taken = [steps for steps, mean in means.items() if row.matlab.agreement(mean)]
         # an energy that is the mean over another number of steps is explained by the misprint, which does not keep it
-        otherwise = EXPLAINED if taken else REFUTED
+        verdict = EXPLAINED if taken else NOT_REPRODUCED
         text = prose("evidence.matlab", row, measured, names, study, taken)
         agrees = any(row.matlab.agreement(value) for value in rigid.values())
-        yield self.row(row.matlab, rigid, contact, agrees, otherwise, "rigid", text)
-        otherwise = EXPLAINED if contact is None else REFUTED
+        yield self.row(row.matlab, rigid, contact, REPRODUCED if agrees else verdict, "rigid", text)
         text = prose("evidence.adams", row, measured, names)
-        yield self.row(row.adams, rigid, contact, bool(row.adams.agreement(contact)), otherwise, "contact", text)
+        yield self.row(row.adams, rigid, contact, came_out(bool(row.adams.agreement(contact))), "contact", text)
+
+
+def came_out(agrees: bool) -> NumberVerdict:
+    """The verdict on a value that is measured here."""
+    return REPRODUCED if agrees else NOT_REPRODUCED
 
 
 Table = dict[str, dict[str, Any]]
@@ -269,6 +275,7 @@ def table_2(measured: Measured) -> Table:
         table[coordinate] = {
             **beside(row, states, None if start is None else start[place]),
             "paper_percent": row.percent.value,
+            "paper_percent_text": row.percent.text,
             "percent_of_matlab": row.percent_of_matlab,
             "percent_of_adams": row.percent_of_adams,
         }
@@ -289,7 +296,9 @@ def beside(row: printed.PrintedRow, rigid: Mapping[str, float | None], contact: 
     return {
         "unit": row.matlab.unit,
         "paper_matlab": row.matlab.value,
+        "paper_matlab_text": row.matlab.text,
         "paper_adams": row.adams.value,
+        "paper_adams_text": row.adams.text,
         "as_printed": rigid.get("as-printed"),
         "corrected": rigid.get("corrected"),
         "contact": contact,

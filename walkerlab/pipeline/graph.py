@@ -127,10 +127,12 @@ class Stage:
 
     def refuse_unsuited(self, asked: str, config: Config) -> None:
         """Raise ConfigError if it means nothing under a config, being what is asked for or what this needs."""
-        from walkerlab.config.walkers import without_contact  # not for the help of the command line
+        from walkerlab.config.walkers import contact_to_add, without_contact  # not for the help of the command line
 
         if self.why_unsuited(config) is not None:
-            raise without_contact(asked, config.walker, "Add one to the config; `walkerlab schema` lists its keys.")
+            block = f"`{contact_to_add(config.walker)}`"
+            instead = f"Add one to the config, such as the paper's by this walker's mass: {block}."
+            raise without_contact(asked, config.walker, f"{instead} `walkerlab schema contact` explains its keys.")
 
     def refuse_question(self, config: Config) -> None:
         """Raise ConfigError, before anything runs, for what `refuse` of its module refuses: of stages on demand."""

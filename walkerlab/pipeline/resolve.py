@@ -55,7 +55,7 @@ def resolve(
     changes = [*sets, *([] if strides is None else [f"strides={strides}"])]
     if name is not None and changes:
         source += f" with {', '.join(changes)}"
-    return ResolvedRun(read, RunFolder(runs, read.run_name, source))
+    return ResolvedRun(read, RunFolder(runs, read.run_name, source, read.changes))
 
 
 def refuse_what_makes_no_walker(read: LoadedConfig) -> None:
@@ -84,7 +84,7 @@ def artifact_at(path: Path) -> tuple[RunFolder, ConfigFile] | None:
             f"{path} is damaged, and no config can be taken from it: {error}.",
             f"`-c {folder.typed}` takes the one of its folder.",
         ) from None
-    return folder, ConfigFile(Path(folder.name), str(path), stored.provenance.config)
+    return folder, ConfigFile(Path(folder.name), str(path), stored.provenance.config, folder.changes)
 
 
 def run_at(text: str, runs: Path) -> tuple[RunFolder, ConfigFile] | None:
@@ -98,7 +98,7 @@ def run_at(text: str, runs: Path) -> tuple[RunFolder, ConfigFile] | None:
         raise ConfigError(
             f"{folder.path} has no result to take a config from.{bad}", "Give a run folder, an artifact or a file."
         )
-    return folder, ConfigFile(Path(folder.name), str(folder.path), config)
+    return folder, ConfigFile(Path(folder.name), str(folder.path), config, folder.changes)
 
 
 def source_of(path: Path | None, runs: Path) -> str:

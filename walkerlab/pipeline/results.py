@@ -60,7 +60,7 @@ class FolderResults:
     def find(self, stage: Stage, identity: Identity, inputs: Mapping[str, StageAnswer], force: bool) -> Step:
         """Find a stage's result: a step that reuses it, or runs the stage; with `force` it always runs."""
         path = self.run.artifact(stage.name)
-        verdict = artifact.check(path, identity.key)
+        verdict = artifact.check(path, identity.key, stage.name)
         stored, damaged = verdict.artifact, path if verdict.damaged else None
         why = "--force" if force else self._why_outdated(stage, identity, verdict, inputs)
         if not why and stored is not None:

@@ -11,7 +11,7 @@ from walkerlab.errors import NoAnswer
 from walkerlab.pipeline.executor import Executor, StageDone, left_out
 from walkerlab.pipeline.graph import PIPELINE, Graph, Stage
 from walkerlab.pipeline.progress import Reporter
-from walkerlab.pipeline.results import FolderResults
+from walkerlab.pipeline.results import FolderResults, Step
 from walkerlab.pipeline.runs import claim, refuse_another_config
 from walkerlab.scene.left_out import LeftOut
 from walkerlab.store.runfolder import RunFolder
@@ -109,6 +109,7 @@ def execute(
     if changes and options.dry:
         refuse_another_config(folder, config)
     if changes and not options.dry:
+        refuse_incomplete_law(config, steps)
         reused = "" if options.force else ", and its results will be reused"
         with folder.locked(options.wait, lambda held: run.reporter.note(held + reused)):
             claim(folder, config)
@@ -119,6 +120,15 @@ def execute(
         for step in steps:
             run.skip(step)
     return report_of(run, folder, graph[target], time.perf_counter() - started)
+
+
+def refuse_incomplete_law(config: Config, steps: Sequence[Step]) -> None:
+    """Raise ConfigError, before anything is compiled, for a friction law of the user's own that lacks something."""
+    if config.contact is not None and any(step.stage.needs_contact for step in steps if step.action == "run"):
+        # Imported here: it loads the compiler, as what runs will.
+        from walkerlab.scene.contact import friction_law
+
+        friction_law(config.contact)
 
 
 def report_of(run: Executor, folder: RunFolder, target: Stage, wall_s: float) -> StageReport:

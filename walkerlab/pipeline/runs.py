@@ -1,7 +1,8 @@
 """Run folders: which there are, what config and results each holds, and how two of them differ."""
 
+import contextlib
 import datetime
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -23,6 +24,8 @@ from walkerlab.store.artifact import Stored
 from walkerlab.store.key import differences
 from walkerlab.store.runfolder import Record, RunFolder
 
+SWEEP = "sweep-"
+"""What names of sweeps' files begin with."""
 SHOWN_CHANGES = 3
 """Keys that a refusal names."""
 
@@ -31,6 +34,7 @@ SHOWN_CHANGES = 3
 class RunSummary:
     """One run folder.
 
+    changes   KEY=VALUE of each key in which its config differs from the file that it is from
     stages    names of those with a stored result
     current   of these, the ones that are up to date; None if the run's config is not known any more
     sweeps    files of sweeps
@@ -40,6 +44,7 @@ class RunSummary:
 
     name: str
     run_dir: Path
+    changes: tuple[str, ...]
     stages: tuple[str, ...]
     current: tuple[str, ...] | None
     sweeps: tuple[str, ...]
@@ -50,9 +55,9 @@ class RunSummary:
 def runs_in(runs_dir: Path, graph: Graph = PIPELINE) -> Iterator[RunSummary]:
     """Every run in a folder, by name; folders without results are none."""
     for path in sorted(runs_dir.glob("*/")):
-        folder = RunFolder(runs_dir, path.name)
+        folder = RunFolder.at(path)
         stages = tuple(stage.name for stage in graph.stages if folder.artifact(stage.name).is_file())
-        sweeps = tuple(sorted(file.name for file in path.glob("sweep-*.h5")))
+        sweeps = tuple(sorted(file.name for file in path.glob(f"{SWEEP}*.h5")))
         if not stages and not sweeps:
             continue
         config, current = config_of(folder), None
@@ -61,7 +66,7 @@ def runs_in(runs_dir: Path, graph: Graph = PIPELINE) -> Iterator[RunSummary]:
         stats = [file.stat() for file in path.rglob("*") if file.is_file()]
         when = datetime.datetime.fromtimestamp(max(stat.st_mtime for stat in stats), datetime.UTC)
         size, changed = sum(stat.st_size for stat in stats), when.isoformat(timespec="seconds")
-        yield RunSummary(folder.name, folder.path, stages, current, sweeps, size, changed)
+        yield RunSummary(folder.name, folder.path, folder.changes, stages, current, sweeps, size, changed)
 
 
 def config_text(folder: RunFolder) -> str | None:
@@ -93,7 +98,7 @@ def read_all(folder: RunFolder, stages: Iterable[str]) -> tuple[dict[str, Stored
     bad: dict[str, str] = {}
     for stage in stages:
         path = folder.artifact(stage)
-        found = artifact.check(path)
+        found = artifact.check(path, stage=None if stage.startswith(SWEEP) else stage)
         if found.artifact is not None:
             intact[stage] = found.artifact
         elif found.reason != artifact.NOT_THERE:
@@ -113,10 +118,52 @@ def results_in(folder: RunFolder, stages: Iterable[str], graph: Graph = PIPELINE
 
 def result_in(folder: RunFolder, stage: str, graph: Graph = PIPELINE) -> Stored:
     """A stage's result; StaleError if it is not there, or cannot be read."""
-    found = results_in(folder, [stage], graph)
-    if stage not in found:
+    return the_result(results_in(folder, [stage], graph), folder, stage, graph)
+
+
+def the_result(results: Mapping[str, Stored], folder: RunFolder, stage: str, graph: Graph = PIPELINE) -> Stored:
+    """A stage's result among those of its run; StaleError if it is not there."""
+    if stage not in results:
         raise StaleError(f"{folder.path} has no result of {stage}.", f"{makes(folder, graph[stage])} computes it.")
-    return found[stage]
+    return results[stage]
+
+
+@contextlib.contextmanager
+def results_to_show(
+    folder: RunFolder, stages: Iterable[str], warn: Callable[[str], None], graph: Graph = PIPELINE
+) -> Iterator[dict[str, Stored]]:
+    """The results of these stages, so far as they are there, for a body that shows them; warn of what is outdated.
+
+    Raises StaleError as `results_in`, and where an outdated result lacks what the body needs.
+    """
+    results = results_in(folder, stages, graph)
+    outdated = why_outdated(folder, results, graph)
+    for stage, why in outdated.items():
+        warn(f"{folder.artifact(stage)} is out of date: {why}; {makes(folder, graph[stage])} makes it anew.")
+    with refusing_older(folder, outdated, graph):
+        yield results
+
+
+def why_outdated(folder: RunFolder, stages: Collection[str], graph: Graph = PIPELINE) -> dict[str, str]:
+    """By stage, why its result is not the one of the run's config and this version; only those that are not."""
+    config = config_of(folder)
+    if config is None:
+        return dict.fromkeys(stages, "this version cannot read the config of its run")
+    steps = {step.stage.name: step for step in survey(config, folder, graph)}
+    return {name: steps[name].reason for name in stages if steps[name].action != "reuse"}
+
+
+@contextlib.contextmanager
+def refusing_older(folder: RunFolder, outdated: Collection[str], graph: Graph = PIPELINE) -> Iterator[None]:
+    """Raise StaleError where a body does not find in outdated results what this version stores."""
+    try:
+        yield
+    except KeyError as missing:
+        if not outdated:
+            raise
+        paths, commands = ([*map(str, map(folder.artifact, outdated))], [makes(folder, graph[one]) for one in outdated])
+        they = "is outdated and lacks" if len(paths) == 1 else "are outdated and lack"
+        raise StaleError(f"{listed(paths)} {they} {missing}.", f"{listed(commands)} computes it anew.") from missing
 
 
 def makes(folder: RunFolder, stage: Stage) -> str:
@@ -149,7 +196,7 @@ def claim(folder: RunFolder, config: Config) -> None:
     """
     refuse_another_config(folder, config)
     record = folder.record()
-    asked = Record(folder.name, folder.source, to_yaml(config))
+    asked = Record(folder.name, folder.source, to_yaml(config), folder.changes)
     if record is None or (comes_from(record, folder) and record != asked):
         folder.write_record(asked)
 

@@ -57,6 +57,7 @@ def fixedpoint(summary: Summary) -> list[str | Table]:
     if "state" not in summary:
         return [f"No gait on a slope of {slope}: {summary['reason']}."]
     driven = f", driven by {listed(summary['driven_by'])}," if summary.get("driven_by") else ""
+    driven += f"{'' if driven else ','} with {listed(summary['springs'])}," if summary.get("springs") else ""
     head = (
         f"On a slope of {slope}{driven} there is {'a stable' if summary['stable'] else 'an unstable'} gait: steps of "
         f"{fixed(summary['step_length_m'], 4)} m in {fixed(summary['period_s'], 4)} s; "
@@ -86,6 +87,8 @@ def energy_lost(dissipated: Mapping[str, float]) -> str:
 OF_EACH_STEP = {"step_periods_s": "period (s)", "step_lengths_m": "length (m)", "slips_m": "slip (mm)"}
 OF_THE_WALK = (
     *gaits.works(partial(number, digits=4)),
+    told("speed", "speed_m_s"),
+    told("Froude number", "froude"),
     told("cost of transport", "cost_of_transport"),
     told("mean energy", "mean_energy_J", 7),
     told("energy drift", "energy_drift_J", 2),
@@ -112,6 +115,7 @@ def walk(model: str, summary: Summary) -> list[str | Table]:
         side_by_side("", columns, taken, head="step"),
         side_by_side("", OF_THE_WALK, {"": summary}, head=""),
         f"numerical error: {off_by(error)}." if error else "",
+        f"Not a walk on real ground: {'; '.join(objections)}." if (objections := summary.get("objections")) else "",
         f"advice: {summary['advice']}" if advised else "",
     ]
 
@@ -153,13 +157,13 @@ def tune(summary: Summary) -> list[str | Table]:
 
 
 def compare(summary: Summary) -> list[str | Table]:
-    """What of the paper's numbers comes out, as printed beside corrected; of another walker, how the models differ."""
+    """How the values that the paper prints fare; of another walker, how the models differ."""
     errors = summary.get("numerical_error", {})
     told = [f"numerical error of the {model} walk: {off_by(error)}." for model, error in errors.items()]
     if "verdicts" in summary:
-        from walkerlab.report.sections.paper import numbers_table
+        from walkerlab.report.sections.paper import by_verdict, numbers_table
 
-        head = words("paper.finding", summary["verdicts"])
+        head = words("paper.finding", by_verdict(row["verdict"] for row in summary["paper_numbers"]))
         return [head, numbers_table(summary["paper_numbers"]), *told]
     return [words("models.answer", summary["outcomes"]), last_steps(summary, errors), *told]
 

@@ -96,7 +96,7 @@ class Picture:
 
 @dataclass(frozen=True)
 class Gallery:
-    """Figures side by side, small until they are asked for."""
+    """Figures in columns, large enough to be read; a click enlarges one."""
 
     template: ClassVar[str] = "gallery"
     pictures: tuple[Picture, ...]

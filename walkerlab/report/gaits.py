@@ -34,6 +34,8 @@ def gait_table(sets: Mapping[str, Mapping[str, Any]], names: Sequence[str], note
         Column("spectral radius", "spectral_radius", partial(fixed, decimals=5)),
         Column("stable", "stable"),
         *works(partial(number, digits=4)),
+        measured("speed", "speed_m_s", partial(fixed, decimals=4)),
+        measured("Froude number", "froude", partial(fixed, decimals=4)),
         measured("cost of transport", "cost_of_transport", partial(fixed, decimals=5)),
         measured("energy from the stance foot", "energy_J", partial(fixed, decimals=3)),
         measured("energy drift", "energy_drift_J", partial(number, digits=2)),

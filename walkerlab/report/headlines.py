@@ -1,4 +1,4 @@
-"""The numbers of each stage's summary that say most: at most ten of them, for differences and tables of many runs."""
+"""The numbers of each stage's summary: which say most, for differences and tables of many runs, and which there are."""
 
 from collections.abc import Iterable, Mapping
 from itertools import chain
@@ -6,16 +6,17 @@ from typing import Final
 
 HEADLINES: Final[Mapping[str, tuple[str, ...]]] = {
     "fixedpoint": (
-        "period_s", "step_length_m", "spectral_radius", "stable", "knee_strike_s", "energy_J", "min_normal_force_N",
-        "max_friction_ratio", "max_scuff_depth_m", "gaits_found",
+        "period_s", "step_length_m", "speed_m_s", "froude", "cost_of_transport", "spectral_radius", "stable",
+        "knee_strike_s", "energy_J", "min_normal_force_N", "max_friction_ratio", "max_scuff_depth_m", "gaits_found",
     ),
     "simulate": (
-        "outcome", "steps", "last_step_period_s", "last_step_length_m", "mean_energy_J", "min_normal_force_N",
-        "max_friction_ratio", "max_scuff_depth_m", "energy_drift_J",
+        "outcome", "steps", "last_step_period_s", "last_step_length_m", "speed_m_s", "froude", "cost_of_transport",
+        "mean_energy_J", "min_normal_force_N", "max_friction_ratio", "max_scuff_depth_m", "energy_drift_J",
     ),
     "contact-sim": (
-        "outcome", "steps", "last_step_period_s", "last_step_length_m", "slip_per_step_m", "max_penetration_m",
-        "static_penetration_m", "damping_ratio", "end_time_s", "energy_balance_residual_J",
+        "outcome", "steps", "last_step_period_s", "last_step_length_m", "speed_m_s", "froude", "cost_of_transport",
+        "slip_per_step_m", "max_penetration_m", "static_penetration_m", "damping_ratio", "end_time_s",
+        "energy_balance_residual_J",
     ),
     "tune": (
         "adjustment.needed", "adjustment.found", "adjustment.scale_dtheta1", "adjustment.scale_dtheta2",
@@ -39,7 +40,22 @@ HEADLINES: Final[Mapping[str, tuple[str, ...]]] = {
     "report": (),
 }  # fmt: skip
 """By stage; a name that ends in a point stands for all numbers below it."""
-MOST: Final = 10
+MOST: Final = 13
+OF_WALKS: Final = (
+    "work_per_step_J.", "numerical_error.", "end_time_s", "rhs_evaluations", "accepted_steps", "rejected_steps",
+    "energy_balance_residual_J", "slope_rad",
+)  # fmt: skip
+QUANTITIES: Final[Mapping[str, tuple[str, ...]]] = {
+    "fixedpoint": (
+        *HEADLINES["fixedpoint"], "residual", "energy_drift_J", "min_normal_impulse_N_s", "max_impulse_ratio",
+        "work_per_step_J.", "random_starts", "slope_rad", "gaits.", "equation_sets.",
+    ),
+    "simulate": (*HEADLINES["simulate"], *OF_WALKS, "lost_in_strikes_J"),
+    "contact-sim": (
+        *HEADLINES["contact-sim"], *OF_WALKS, "rolling_per_step_m", "dissipated_J.", "jacobians", "pitch_m",
+    ),
+}  # fmt: skip
+"""By stage, every number that one point of a sweep may have, besides texts; written as `HEADLINES`."""
 LAST_OF: Final[Mapping[str, str]] = {"last_step_period_s": "step_periods_s", "last_step_length_m": "step_lengths_m"}
 """Headlines that are the last of a list, with the name of the list."""
 
@@ -52,8 +68,15 @@ def headlines(stage: str, names: Iterable[str]) -> list[str]:
     there = list(dict.fromkeys(names))
     if stage not in HEADLINES:
         return [name for name in there if "." not in name][:MOST]
-    meant = (
-        [name for name in there if name == wanted or (wanted.endswith(".") and name.startswith(wanted))]
-        for wanted in HEADLINES[stage]
-    )
+    meant = ([name for name in there if stands_for(wanted, name)] for wanted in HEADLINES[stage])
     return list(chain(*meant))[:MOST]
+
+
+def stands_for(wanted: str, name: str) -> bool:
+    """Whether an entry of a stage's numbers stands for a number."""
+    return name == wanted or (wanted.endswith(".") and name.startswith(wanted))
+
+
+def has_quantity(stage: str, name: str) -> bool:
+    """Whether a stage may have a number of that name; of a stage without any on record nothing is known."""
+    return stage not in QUANTITIES or any(stands_for(known, name) for known in QUANTITIES[stage])

@@ -41,6 +41,7 @@ ERRORS = {
     "rolling_m": ("in a rolling", "m"),
     "knee_strike_time_s": ("in the time of a knee strike", "s"),
     "end_time_s": ("at the end", "s"),
+    "cost_of_transport": ("in the cost of transport", "1"),
 }
 """What `numerical_error` is of, in words, and its unit."""
 

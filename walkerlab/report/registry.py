@@ -6,10 +6,10 @@ needs with `Results.summary(stage)` and `Results.group(stage, path)`, which give
 
 import math
 
-from walkerlab.config.drives import drives_of
+from walkerlab.config.drives import drives_of, springs_of
 from walkerlab.config.files import DEFAULT
 from walkerlab.config.schema import Config
-from walkerlab.config.walkers import is_plain_compass
+from walkerlab.config.walkers import is_plain_compass, why_rigid_alone
 from walkerlab.report.blocks import MAIN, Section
 from walkerlab.report.page import Page
 from walkerlab.report.results import Results, SectionMaker
@@ -83,7 +83,9 @@ def lead(config: Config, run: str) -> str:
     """What was run: the walker, its slope and what it was to do."""
     equations = config.equations if is_plain_compass(config) else ""
     change = run.partition("@")[2].replace(",", ", ")
-    return words("lead.scene", config, change, math.degrees(config.slope_rad), equations, drives_of(config))
+    degrees, alone = math.degrees(config.slope_rad), why_rigid_alone(config.walker)
+    acting = drives_of(config), springs_of(config)
+    return words("lead.scene", config, change, degrees, equations, *acting, alone)
 
 
 def sections_of(results: Results, makers: tuple[SectionMaker, ...] = SECTIONS) -> tuple[Section, ...]:

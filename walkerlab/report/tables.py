@@ -1,4 +1,7 @@
-"""One description of a table, for page, terminal, CSV and TeX: its columns, and the records whose values they show."""
+"""One description of a table, for page, terminal, CSV and TeX: its columns, and the records whose values they show.
+
+`tex` writes it for LaTeX.
+"""
 
 import csv
 import io
@@ -11,29 +14,16 @@ from typing import Any, ClassVar, Final, Literal
 
 from walkerlab.labels import labels_of, unit_by_name, with_unit
 from walkerlab.report.numbers import NONE, number
-from walkerlab.report.symbols import DOT, LETTERS, SUBSCRIPTS, SUPERSCRIPTS
 
-Tone = Literal["plain", "good", "fair", "bad"]
+Tone = Literal["plain", "good", "fair", "bad", "given"]
 PREFIXES: Final = {"": 1.0, "m": 1e3, "µ": 1e6}
 LONGEST_CELL: Final = 100
 """Letters; a column of records with longer cells holds sentences."""
-RAISED = re.compile(r"\\\^\{\}(-?\d+)")
-"""A power in a text whose letters are guarded already."""
-SYMBOL = re.compile(rf"\b(d?)({'|'.join(LETTERS)}|[A-Za-z])\\_([A-Za-z0-9]+)\b(?!\\_)")
-"""A quantity in plain letters, guarded already."""
-IN_MATHS = {
-    **{f"{sign}{DOT}": rf"$\dot{{\{name}}}$" for name, sign in LETTERS.items()},
-    **{sign: rf"$\{name}$" for name, sign in LETTERS.items()},
-    **{chr(low): f"$_{{{chr(plain)}}}$" for plain, low in SUBSCRIPTS.items()},
-    **{chr(high): f"$^{{{chr(plain)}}}$" for plain, high in SUPERSCRIPTS.items()},
-    **{"−": "$-$", "×": r"$\times$", "±": r"$\pm$", "≤": r"$\le$", "≥": r"$\ge$", "Δ": r"$\Delta$", "°": r"$^\circ$"},
-    **{"√": r"$\sqrt{}$", "≈": r"$\approx$", "µ": r"$\mu$", "…": r"\ldots{}"},
-}
-SIGNS = re.compile("|".join(map(re.escape, IN_MATHS)))
-"""Signs that LaTeX sets in maths only."""
 BARE = re.compile(r"[-−+\d.e ×⁰¹²³⁴⁵⁶⁷⁸⁹⁻\xa0\u2009\u202f]+|-?(inf|nan)")
 """A number without unit or words."""
-TEX = str.maketrans({letter: f"\\{letter}" for letter in "&%$#_{}"} | {"~": r"\textasciitilde{}", "^": r"\^{}"})
+FORMULA = re.compile(r"[=+\-@\t\r]")
+"""How texts begin that spreadsheets compute."""
+NUMERAL = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 
 
 @dataclass(frozen=True)
@@ -192,7 +182,11 @@ def side_by_side(
 def of_records(rows: Sequence[Mapping[str, Any]], written: Callable[[Any], str] = str) -> Table:
     """A table of all that records have, their keys as its heads; nothing where a record lacks one."""
     names = list(dict.fromkeys(name for row in rows for name in row))
-    cells = [[Cell(written(row[name]) if name in row else "", value=row.get(name)) for name in names] for row in rows]
+    there = [[row.get(name) is not None for name in names] for row in rows]
+    cells = [
+        [Cell(written(row[name]) if known else "", value=row.get(name)) for name, known in zip(names, has, strict=True)]
+        for row, has in zip(rows, there, strict=True)
+    ]
     lengths = [max(len(row[place].text) for row in cells) for place in range(len(names))]
     room = any(length <= LONGEST_CELL for length in lengths)
     columns = [Column(name, wide=room and length > LONGEST_CELL) for name, length in zip(names, lengths, strict=True)]
@@ -246,38 +240,13 @@ def csv_text(heads: Sequence[str], rows: Iterable[Sequence[Any]]) -> bytes:
     """Values as CSV under their heads; nothing where one is missing."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(heads)
-    writer.writerows(["" if value is None else value for value in row] for row in rows)
+    writer.writerow(map(csv_cell, heads))
+    writer.writerows(map(csv_cell, row) for row in rows)
     return text.getvalue().encode()
 
 
-def as_tex(shown: Table) -> bytes:
-    """A table's values for LaTeX with the package booktabs, afloat where it has a caption; without sentences."""
-    heads, rows = flat(shown)
-    values = [[name.replace("_", " ") for name in heads], *([cell.datum for cell in row] for row in rows)]
-    head, *lines = [" & ".join(map(in_tex, line)) + r" \\" for line in values]
-    body = [rf"\begin{{tabular}}{{{'l' * len(heads)}}}", r"\toprule", head, r"\midrule", *lines, r"\bottomrule"]
-    caption = in_tex(". ".join(filter(None, (shown.caption, shown.note))))
-    float_on, float_off = [r"\begin{table}", r"\centering", rf"\caption{{{caption}}}"], [r"\end{table}"]
-    whole = [*body, r"\end{tabular}"]
-    return "\n".join([*([*float_on, *whole, *float_off] if caption else whole), ""]).encode()
-
-
-def in_tex(value: Any) -> str:
-    """A value in a LaTeX table: numbers in maths, text with symbols and powers set and special letters guarded."""
-    if value is None:
-        return "--"
-    if isinstance(value, float):
-        mantissa, _, exponent = f"{value:.5g}".partition("e")
-        return f"${mantissa}" + (rf" \times 10^{{{int(exponent)}}}$" if exponent else "$")
-    text = SIGNS.sub(lambda found: IN_MATHS[found[0]], RAISED.sub(r"$^{\1}$", str(value).translate(TEX)))
-    return SYMBOL.sub(symbol_in_tex, text).replace("$$", "")
-
-
-def symbol_in_tex(found: re.Match[str]) -> str:
-    """A symbol with its subscript, such as t_left or dtheta_1, in maths."""
-    rate, letter, below = found.groups()
-    letter = rf"\{letter}" if letter in LETTERS else letter
-    below = below if len(below) == 1 else rf"\mathrm{{{below}}}"
-    letter = rf"\dot{{{letter}}}" if rate else letter
-    return rf"${letter}_{below}$"
+def csv_cell(value: Any) -> Any:
+    """A value of a CSV file; a text that a spreadsheet would compute as a formula begins with an apostrophe."""
+    if isinstance(value, str) and FORMULA.match(value) and not NUMERAL.fullmatch(value):
+        return f"'{value}"
+    return "" if value is None else value

@@ -86,4 +86,5 @@ def not_read(where: str, key: str, models: Sequence[str]) -> ConfigError:
     return ConfigError(
         f"{where}: {key} does not touch the {' or the '.join(models)} model",
         "Choose a key that the model is made of, or another model (--model).",
+        tuple(where.split(".")),
     )

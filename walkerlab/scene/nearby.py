@@ -1,8 +1,7 @@
-"""Where a walker without a gait has one: on other slopes, and on the way from a built-in walker to it.
+"""Where a walker without a gait has one: with its feet ahead of its shanks, and on other slopes.
 
-On a few slopes a gait is sought, and its branch followed over the slope. Where no slope has one, the gait of the
-built-in walker most like this one is followed along a straight way of its numbers, slope and gravity among them, to
-this walker's.
+A kneed walker is tried with its feet a little ahead, where those of real ones are. On a few slopes a gait is sought,
+and its branch followed over the slope.
 """
 
 import math
@@ -12,16 +11,16 @@ from pathlib import Path
 
 import numpy as np
 
-from walkerlab.config.fields import held, kind, leaves
 from walkerlab.config.files import builtin_names
 from walkerlab.config.loader import load
 from walkerlab.config.schema import Config
+from walkerlab.config.walkers import Kneed
 from walkerlab.mechanics.standing import Standing
 from walkerlab.orbits.families import BranchFollower, GaitBranch, Seed, ValueSpan
-from walkerlab.orbits.fixed_point import SearchSettings, find_gaits
+from walkerlab.orbits.fixed_point import RigidGait, SearchSettings, find_gaits
 from walkerlab.orbits.shooting import RigidMap
 from walkerlab.scene.families import rigid_walkers
-from walkerlab.scene.parameter import PHYSICAL, SLOPE, Parameter
+from walkerlab.scene.parameter import SLOPE, Parameter
 from walkerlab.scene.rigid import walker_or_none
 
 SLOPES = (0.7, 1.5, 2.3, 0.35, 0.1)  # of one's own, in the order in which they are looked at
@@ -30,7 +29,8 @@ STEEP, STEEPEST = 0.2, 0.35  # rad, up to which gaits are followed: at least, an
 QUICK = SearchSettings(random_starts=50, further_starts=100)
 POINTS = 60  # of a branch
 INSIDE = 0.1  # of a range, from its end
-OF_A_WALKER = frozenset(PHYSICAL) - {"contact"}  # keys whose numbers lead from one walker to another
+AHEAD = "foot_centre_ahead_m"
+FEET_AHEAD = (0.02, 0.03, 0.04, 0.05)  # of a kneed walker, in leg lengths
 
 
 @dataclass(frozen=True)
@@ -86,68 +86,57 @@ def walkable(branches: tuple[GaitBranch, ...]) -> Iterator[Met]:
 
 
 def nearby(config: Config, typed: str = "") -> str:
-    """Where gaits are met near a config that has none, with the command that shows one: in words.
+    """Where gaits exist near a config that has none, with the commands that show them: in words.
 
     typed  the options that say which config it is, with a blank in front
     """
     if config.slope_rad <= 0.0:
         return ""
-    met = gaits_on_other_slopes(config)
+    feet, met = gait_with_feet_ahead(config), gaits_on_other_slopes(config)
+    advice = []
+    if feet is not None:
+        ahead_m, gait = feet
+        what = "a stable gait" if gait.stable else "a gait, unstable"
+        command = f"`walkerlab fixedpoint{typed} --set walker.{AHEAD}={ahead_m:.3g}`"
+        advice.append(f"With its feet {ahead_m:.3g} m ahead of the shanks this walker has {what}: {command}.")
     if met is not None:
         in_degrees = tuple(math.degrees(value) for value in met.stable or met.whole)
         what = "A stable gait" if met.stable else "A gait, unstable,"
         slope = met.value_towards(config.slope_rad)
         setting = f"slope_rad={slope:.4g}" if "slope_rad=" in typed else f"slope_deg={math.degrees(slope):.3g}"
-        return (
-            f"{what} exists from {in_degrees[0]:.3g} to {in_degrees[1]:.3g} deg: "
-            f"`walkerlab fixedpoint{typed} --set {setting}`."
-        )
-    way = way_from_built_in(config)
-    if way is None:
-        return "No gait was met on gentler or steeper slopes."
-    begin, met = way
-    share = met.value_towards(1.0)
-    there, start = between(begin, config, share), numbers_of(begin)
-    sets = "" if there is None else "".join(
-        f" --set {'.'.join(path)}={value:.5g}" for path, value in numbers_of(there).items() if value != start[path]
-    )  # fmt: skip
-    return (
-        f"No gait was met on gentler or steeper slopes. From the built-in walker {begin.name} a gait goes on for "
-        f"{met.whole[1]:.0%} of the straight way of its numbers to this walker's: "
-        f"`walkerlab fixedpoint -c {begin.name}{sets}`."
-    )
+        command = f"`walkerlab fixedpoint{typed} --set {setting}`"
+        advice.append(f"{what} exists from {in_degrees[0]:.3g} to {in_degrees[1]:.3g} deg: {command}.")
+    if not advice:
+        advice.append(f"No gait was met on gentler or steeper slopes{with_feet_ahead(config)}.{begin_with(config)}")
+    return " ".join(advice)
 
 
-def way_from_built_in(config: Config) -> tuple[Config, Met] | None:
-    """The built-in walker most like the config's, and how far (0 to 1) its gait goes on along the way to this one."""
-    own = numbers_of(config)
-    others = [load(Path(name)).config for name in builtin_names()]
-    like = [one for one in others if one.walker.type == config.walker.type and set(numbers_of(one)) == set(own)]
-    if not like:
-        return None
-    begin = min(like, key=lambda one: (unlikeness(own, numbers_of(one)), one.name))
-    branches = followed(lambda share: walker_or_none(between(begin, config, share)), ValueSpan(0.0, 1.0), 0.0)
-    return next(((begin, met) for met in walkable(branches)), None)
+def gait_with_feet_ahead(config: Config) -> tuple[float, RigidGait] | None:
+    """The stablest gait of a kneed walker with its feet ahead of the shanks, and how far (m); None without one."""
+    found = []
+    for ahead_m in feet_ahead(config):
+        walker = walker_or_none(Parameter(f"walker.{AHEAD}", "m", ("walker", AHEAD)).config_at(config, ahead_m))
+        gaits = () if walker is None else find_gaits(walker, settings=QUICK).gaits
+        found += [(ahead_m, gait) for gait in gaits if not gait.objections]
+    return min(found, key=lambda one: one[1].spectral_radius, default=None)
 
 
-def numbers_of(config: Config) -> dict[tuple[str, ...], float]:
-    """The numbers of walker, slope and gravity, by their paths."""
-    own = (path for path, field in leaves(Config, held=config) if "number" in kind(field.annotation))
-    values = {path: held(config, path) for path in own if path[0] in OF_A_WALKER}
-    return {path: value for path, value in values.items() if isinstance(value, float)}
+def feet_ahead(config: Config) -> tuple[float, ...]:
+    """How far ahead (m) feet are tried: those of a kneed walker, whose feet belong ahead of its shanks."""
+    if not isinstance(config.walker, Kneed):
+        return ()
+    return tuple(float(f"{share * config.walker.leg_length_m:.3g}") for share in FEET_AHEAD)
 
 
-def unlikeness(one: dict[tuple[str, ...], float], other: dict[tuple[str, ...], float]) -> float:
-    """How different two walkers' numbers are, each against the larger of both."""
-    return sum(abs(one[key] - other[key]) / max(abs(one[key]), abs(other[key]), 1e-12) for key in one)
+def with_feet_ahead(config: Config) -> str:
+    """The feet that were tried, as the end of a sentence; empty if there are none."""
+    tried = feet_ahead(config)
+    return f", nor with feet {tried[0]:g} to {tried[-1]:g} m ahead of the shanks (walker.{AHEAD})" if tried else ""
 
 
-def between(begin: Config, end: Config, share: float) -> Config | None:
-    """The config a share of the way from one to another; None where the schema refuses it."""
-    changed: Config | None = begin
-    for path, value in numbers_of(end).items():
-        if changed is not None:
-            parameter = Parameter(".".join(path), "", path)
-            was = parameter.value_in(begin)
-            changed = parameter.config_at(changed, was + share * (value - was))
-    return changed
+def begin_with(config: Config) -> str:
+    """Which built-in walkers of the same type to begin with, as a sentence; empty without one."""
+    alike = [name for name in builtin_names() if load(Path(name)).config.walker.type == config.walker.type]
+    if not alike:
+        return ""
+    return f" Begin with a built-in walker of this type (`-c NAME`: {', '.join(alike)}) and change one key at a time."

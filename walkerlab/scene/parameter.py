@@ -15,6 +15,7 @@ from walkerlab.config.schema import Config
 from walkerlab.errors import ConfigError
 
 R = TypeVar("R")
+Key = tuple[int | str, ...]
 SLOPE_DEG, SLOPE_RAD = "slope_deg", "slope_rad"
 PHYSICAL = tuple(keys_of(ContactConfig))
 """The keys that a model is made of."""
@@ -39,15 +40,33 @@ class Parameter:
 
     def config_at(self, config: ContactConfig, value: float) -> Config | None:
         """The config with another value there and all that follows from it; None if the schema refuses it."""
+        try:
+            return self._changed(config, value)
+        except ValidationError:
+            return None
+
+    def refusal(self, config: ContactConfig, value: float, key: Key) -> ConfigError:
+        """What to raise where a key of the config asks for a value that the schema refuses: with its reason."""
+        why = ""
+        try:
+            self._changed(config, value)
+        except ValidationError as error:
+            (*_, name), reason = error.errors()[0]["loc"], error.errors()[0]["msg"]
+            subject = "it" if name == self.path[-1] else name
+            why = f": {subject} {reason.replace('Input should', 'should')}"
+        return ConfigError(
+            f"{dotted(key)}: {self.key} cannot be {value:g} {self.unit}{why}",
+            f"`walkerlab schema {self.key}` says what the key allows.",
+            key,
+        )
+
+    def _changed(self, config: ContactConfig, value: float) -> Config:
         data = {name: _as_given(getattr(config, name)) for name in PHYSICAL}
         block = data
         for name in self.path[:-1]:
             block = block.setdefault(name, {})
         block[self.path[-1]] = math.radians(value) if self.key == SLOPE_DEG else value
-        try:
-            return Config.model_validate(data)
-        except ValidationError:
-            return None
+        return Config.model_validate(data)
 
     def over(self, config: ContactConfig, make: Callable[[Config], R]) -> Callable[[float], R | None]:
         """What is made of the config, at a value of the parameter; None where the schema refuses the value."""
@@ -70,14 +89,22 @@ def _as_given(value: Any) -> Any:
     return {**given, "type": value.type} if hasattr(value, "type") else given
 
 
-def parameter_of(key: str, config: ContactConfig) -> Parameter:
-    """The parameter of a key of the config's own walker; ConfigError if it is no number that a model is made of."""
+def dotted(key: Key) -> str:
+    """A key's path as messages have it; an item of a list belongs to the list's key."""
+    return ".".join(part for part in key if isinstance(part, str))
+
+
+def parameter_of(key: str, config: ContactConfig, asker: Key = ()) -> Parameter:
+    """The parameter of a key of the config's own walker; ConfigError if it is no number that a model is made of.
+
+    asker  the key of the config that names it, if one does
+    """
     if key == SLOPE_DEG:
         return Parameter(key, "deg", (SLOPE_RAD,))
     own = {".".join(path): field for path, field in leaves(Config, held=config)}
     why = why_no_parameter(key, config, own)
     if why:
-        raise ConfigError(f"{shown(key)} {why}", _ADVICE)
+        raise ConfigError(f"{f'{dotted(asker)}: ' if asker else ''}{shown(key)} {why}", _ADVICE, asker)
     unit = extra(own[key], "unit") or "1"
     return Parameter(key, config.contact.unit_of(unit) if config.contact else unit, tuple(key.split(".")))
 

@@ -31,7 +31,7 @@ def assembly_of(walker: AnyWalker, rigid: bool = False) -> Assembly:
         upper, lower = walker.thigh, walker.shank
         thigh = Limb(upper.length_m, upper.mass_kg, upper.mass_below_hip_m, upper.mass_ahead_m, upper.inertia_kg_m2)
         shank = Limb(lower.length_m, lower.mass_kg, lower.mass_below_knee_m, lower.mass_ahead_m, lower.inertia_kg_m2)
-        parts = kneed_legs(thigh, shank, walker.hip_mass_kg, Arc(walker.foot_radius_m))
+        parts = kneed_legs(thigh, shank, walker.hip_mass_kg, Arc(walker.foot_radius_m, walker.foot_centre_ahead_m))
     else:
         parts = own_parts(walker)
     torso = walker.torso

@@ -8,7 +8,7 @@ from functools import lru_cache
 from typing import TYPE_CHECKING
 
 from walkerlab.config.ground import Footholds
-from walkerlab.config.walkers import CompassWalker, Walker, is_plain_compass
+from walkerlab.config.walkers import CompassWalker, Walker, is_plain_compass, is_the_papers
 from walkerlab.errors import ConfigError
 from walkerlab.hybrid.recorded_walk import RigidWalkResult, take_walk
 from walkerlab.mechanics.rigid import knee_of, on_level_ground, places_of
@@ -43,10 +43,11 @@ class RigidScene:
         tolerances: Tolerances,
         sampled: bool = False,
         advance: Callable[[int], None] | None = None,
+        step_length: float | None = None,
     ) -> RigidWalkResult:
         """Walk up to `steps` steps from a state (2 n); `sampled` if anything in time is wanted. See `take_walk`."""
-        heights = foothold_heights(self.ground, steps)
-        return take_walk(self.walker, tolerances, start, steps, sampled and bool(self.outputs), advance, heights)
+        heights, sampled = foothold_heights(self.ground, steps), sampled and bool(self.outputs)
+        return take_walk(self.walker, tolerances, start, steps, sampled, advance, heights, step_length)
 
 
 def rigid_scene(config: RigidConfig, ground: Footholds, outputs: tuple[Output, ...]) -> RigidScene:
@@ -110,5 +111,5 @@ def coordinates(config: RigidConfig) -> tuple[str, ...]:
 
 
 def equation_sets(config: RigidConfig) -> tuple[Equations, ...]:
-    """The sets of equations that a config's walker has: Appendix A is a compass's."""
-    return ("corrected", "as-printed") if is_plain_compass(config) else ("corrected",)
+    """The sets of equations that gaits are sought with: the config's own, and both for the paper's walker."""
+    return ("corrected", "as-printed") if is_the_papers(config) else (config.equations,)

@@ -8,7 +8,7 @@ from typing import Any
 
 from walkerlab.benchmarks.ladder import BUDGET, REPEATS, Ascent, MethodRow, ascend, finished, left_of, row_of
 from walkerlab.benchmarks.references import End, Reference, WalkEndsError, second_end
-from walkerlab.benchmarks.trials import RigidTrial, Trial
+from walkerlab.benchmarks.trials import USER_SCRIPT, RigidTrial, Trial
 from walkerlab.config.reads import ContactConfig, SceneConfig
 from walkerlab.config.walkers import is_plain_compass
 from walkerlab.hybrid.recorded_walk import with_scaled_rates
@@ -116,7 +116,7 @@ def summary_of(
     rows: Sequence[MethodRow], not_run: list[dict[str, Any]], references: Mapping[str, Reference], jobs: int
 ) -> dict[str, Any]:
     """What the command prints."""
-    parts = ("method", "second_method", "agreement", "state")
+    parts = ("method", "second_method", "agreement", "state", "from_outside", "tolerance", "rhs_evaluations")
     return {
         "rows": [asdict(row) for row in rows],
         "repeats": REPEATS,
@@ -152,7 +152,11 @@ def conclusion(rows: Sequence[MethodRow], scene: str) -> str:
         runs = good_enough(rows, scene, level)
         own = runs[0].method.split("-")[0] if runs else ""
         libraries = (
-            one for one in runs if one.method.split("-")[0] != own and one.method.startswith(("scipy", "cvode"))
+            one
+            for one in runs
+            if one.method.split("-")[0] != own
+            and one.method.startswith(("scipy", "cvode"))
+            and one.method != USER_SCRIPT  # its right-hand side is not ours
         )
         levels.append((level, runs[0] if runs else None, next(libraries, None)))
     return words("accuracy.conclusion", scene, levels)

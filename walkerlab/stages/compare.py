@@ -27,7 +27,7 @@ from walkerlab.paper.measured import (
     rigid_model,
 )
 from walkerlab.paper.printed import fixed_point_as_printed
-from walkerlab.paper.rows import NumberVerdict, paper_rows, table_1, table_2, table_3
+from walkerlab.paper.rows import NumberVerdict, counted, paper_rows, table_1, table_2, table_3
 from walkerlab.paper.study import study_the_paper
 from walkerlab.pipeline.progress import Progress
 from walkerlab.scene.contact import GAIT, contact_scene, start_state, with_contact
@@ -62,10 +62,13 @@ MEANINGS = {
     "paper_matlab": "the paper's MATLAB model",
     "paper_adams": "the paper's MSC ADAMS model",
     "paper_percent": "difference rate as printed",
+    "paper_matlab_text": "the paper's MATLAB model, as text",
+    "paper_adams_text": "the paper's MSC ADAMS model, as text",
+    "paper_percent_text": "difference rate, as text",
     "percent_of_matlab": "difference in percent of the MATLAB value",
     "percent_of_adams": "difference in percent of the ADAMS value",
     "printed": "as printed",
-    "verdict": "reproduced, explained or refuted",
+    "verdict": ", ".join(NumberVerdict),
     "evidence": "why",
 }
 """Columns of the paper's numbers and tables."""
@@ -96,14 +99,14 @@ def against_the_paper(
     study = study_the_paper()
     progress.advance()
     measured = measure(config, inputs, motion)
-    rows, found = [vars(row) for row in paper_rows(measured, study)], errata(study)
+    judged, found = tuple(paper_rows(measured, study)), errata(study)
+    rows = [vars(row) for row in judged]
     tables = {"table1": table_1(measured, study), "table2": table_2(measured), "table3": table_3(measured)}
     groups = {name: numbers_group(list(table.values()), table) for name, table in tables.items()}
     groups |= {"paper_numbers": numbers_group(rows), "errata": rows_group(found, labels_of(Erratum))}
-    verdicts = [row["verdict"] for row in rows]
     return groups, {
         "paper_numbers": rows,
-        "verdicts": {verdict.value: verdicts.count(verdict.value) for verdict in NumberVerdict},
+        "verdicts": counted(judged),
         **tables,
         "errata": [vars(erratum) for erratum in found],
         "departures": list(measured.departures.contact),

@@ -31,7 +31,7 @@ from walkerlab.scene.footholds import foothold_heights
 from walkerlab.scene.left_out import of_contact_walk
 from walkerlab.solvers.registry import Tolerances
 from walkerlab.solvers.system import Floats, State
-from walkerlab.stages.walk import content_of_walk, legs, numbers_of, of_body, over_time, rigid_start, steps_of
+from walkerlab.stages.walk import content_of_walk, legs, numbers_of, of_body, over_time, pace_of, rigid_start, steps_of
 from walkerlab.store.columns import numbered
 from walkerlab.store.content import Content, Group, Variable
 
@@ -116,6 +116,7 @@ def summary(config: ContactSimConfig, scene: ContactScene, walk: ContactWalkResu
     strikes = walk.knee_strike_time_s
     return {
         **numbers_of(walk),
+        **pace_of(config, walk),
         "advice": SCUFFED if scuffed else walk.advice,
         "max_penetration_m": walk.max_penetration_m,
         "slip_per_step_m": mean_of(walk.slip_m),

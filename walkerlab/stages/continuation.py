@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from typing import Any, Final
 
@@ -63,17 +63,13 @@ class FamilyQuestion:
     def second(self) -> FamilyQuestion | None:
         """The same over the second key, if there is one."""
         block = self.config.continuation.second
-        return None if block is None else question_over(block, self.config)
+        return None if block is None else question_over(block, self.config, "continuation", "second")
 
-    def refuse_ends(self, block: str) -> None:
+    def refuse_ends(self, *block: str) -> None:
         """Raise ConfigError, about keys of the block, for an end of the span that the config cannot have."""
-        key = self.parameter.key
         for name, value in (("from", self.span.least), ("to", self.span.most)):
             if self.parameter.config_at(self.config, value) is None:
-                raise ConfigError(
-                    f"continuation.{block}{name}: {key} cannot be {value:g} {self.parameter.unit}",
-                    f"`walkerlab schema {key}` says what the key allows.",
-                )
+                raise self.parameter.refusal(self.config, value, (*block, name))
 
     def touches(self, model: str) -> bool:
         """Whether a model changes over the span."""
@@ -87,9 +83,10 @@ class FamilyQuestion:
         return touched
 
 
-def question_over(block: Span, config: ContinuationConfig) -> FamilyQuestion:
-    """What a block of the config asks."""
-    return FamilyQuestion(config, parameter_of(block.over, config), ValueSpan(block.least, block.most))
+def question_over(block: Span, config: ContinuationConfig, *path: str) -> FamilyQuestion:
+    """What a block of the config asks, which is at a path of keys."""
+    parameter = parameter_of(block.over, config, (*path, "over"))
+    return FamilyQuestion(config, parameter, ValueSpan(block.least, block.most))
 
 
 def run(config: ContinuationConfig, _inputs: Mapping[str, Content], progress: Progress, again: bool = True) -> Content:
@@ -99,14 +96,16 @@ def run(config: ContinuationConfig, _inputs: Mapping[str, Content], progress: Pr
 
     Raises ConfigError for a key that is no number of the model, NoAnswer for a span without a gait.
     """
-    block, found = config.continuation, []
-    asked = question_over(block, config)
+    block, found, alone = config.continuation, [], []
+    asked = question_over(block, config, "continuation")
     parameter = asked.parameter
     for model in models_of(asked):
         search = search_of(model, asked, progress)
         family = Family(model, None) if search is None else search.family(np.random.default_rng(config.seed))
-        found.append(family)
+        alone += [alone_at(branch, model, parameter) for branch in family.branches if len(branch.points) == 1]
+        found.append(replace(family, branches=tuple(one for one in family.branches if len(one.points) > 1)))
     said, second = summary(found, asked, again), asked.second
+    said["left_out"] += alone
     content = Content(groups(found, said, config, parameter, None if second is None else second.parameter), said)
     if not any(family.branches for family in found):
         raise NoAnswer(
@@ -120,7 +119,7 @@ def run(config: ContinuationConfig, _inputs: Mapping[str, Content], progress: Pr
 
 def refuse(config: ContinuationConfig) -> None:
     """Raise ConfigError for a question that cannot be meant."""
-    models_of(question_over(config.continuation, config))
+    models_of(question_over(config.continuation, config, "continuation"))
 
 
 def models_of(asked: FamilyQuestion) -> tuple[str, ...]:
@@ -132,9 +131,9 @@ def models_of(asked: FamilyQuestion) -> tuple[str, ...]:
     config, second = asked.config, asked.second
     if asked.models != (RIGID,) and config.contact is None:
         raise without_contact("the contact model", config.walker, "Use --model rigid.")
-    asked.refuse_ends("")
+    asked.refuse_ends("continuation")
     if second is not None:
-        second.refuse_ends("second.")
+        second.refuse_ends("continuation", "second")
         own, span, name = second.parameter.value_in(config), second.span, second.parameter.key
         if second.parameter.path == asked.parameter.path:
             raise ConfigError(
@@ -411,6 +410,13 @@ def region_rows(family: Family) -> Iterator[dict[str, Any]]:
         periods, counts = np.unique(family.regions.period, return_counts=True)
         for period, cells in zip(periods.tolist(), counts.tolist(), strict=True):
             yield {"period": period, "share": cells / family.regions.period.size}
+
+
+def alone_at(branch: GaitBranch, model: str, parameter: Parameter) -> dict[str, str]:
+    """The entry of a gait that goes on neither way: one from which the step map jumps is no branch."""
+    (gait,) = branch.points
+    what = f"a gait of the {model} model at {gait.value:.5g} {parameter.unit} ({gait.period_s:.4g} s)"
+    return {"what": what, "why": f"it goes on neither way: {branch.ends[1].reason}", "saves": ""}
 
 
 def left_out(found: Sequence[Family], asked: FamilyQuestion) -> list[dict[str, str]]:

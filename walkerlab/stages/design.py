@@ -123,7 +123,7 @@ def refuse(config: DesignConfig) -> None:
         )
     if asked.model == "contact" and config.contact is None:
         raise without_contact("design.model: contact", config.walker, "Add one.")
-    parameters = [parameter_of(key, config) for key in asked.over]
+    parameters = [parameter_of(key, config, ("design", "over")) for key in asked.over]
     for key in asked.over:
         if not reads(asked.model, config, key):
             raise not_read("design.over", key, (asked.model,))
@@ -133,10 +133,7 @@ def refuse(config: DesignConfig) -> None:
         for bound in bounds[place]:
             beside = (np.where(np.arange(len(parameters)) == place, bound, others) for others in corners)
             if all(config_with(config, parameters, x) is None for x in beside):
-                raise ConfigError(
-                    f"design.over: {parameter.key} cannot be {bound:g} {parameter.unit}",
-                    f"`walkerlab schema {parameter.key}` says what the key allows.",
-                )
+                raise parameter.refusal(config, bound, ("design", "over"))
 
 
 def config_with(config: DesignConfig, parameters: Sequence[Parameter], x: Floats) -> Config | None:

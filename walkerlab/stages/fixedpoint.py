@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from walkerlab.config.drives import drives_of
+from walkerlab.config.drives import drives_of, springs_of
 from walkerlab.config.reads import FixedPointConfig, RigidConfig
 from walkerlab.errors import NoAnswer
 from walkerlab.labels import Label
@@ -24,7 +24,9 @@ NUMBERS = {
     "residual": Label("rad", "what is left of P(x) - x, velocities times sqrt(L/g)"),
     "energy": Label("J", "time mean of the energy from the stance foot", name="energy_J"),
     "energy_drift": Label("J", "spread of the energy within the swing", name="energy_drift_J"),
-    "cost_of_transport": Label("1", "work given over weight and distance"),
+    "speed": Label("m/s", "step length over period", name="speed_m_s"),
+    "froude": Label("1", "speed over sqrt(g L), L the leg length"),
+    "cost_of_transport": Label("1", "work spent over weight and distance"),
     "min_normal_force": Label("N", "least normal force on the stance foot", name="min_normal_force_N"),
     "max_friction_ratio": Label("1", "largest ratio of tangential to normal force"),
     "min_normal_impulse": Label(
@@ -33,7 +35,7 @@ NUMBERS = {
     "max_impulse_ratio": Label("1", "largest ratio of tangential to normal impulse in a strike"),
     "max_scuff_depth": Label("m", "depth of the swing foot below the slope", name="max_scuff_depth_m"),
 }
-"""What is stored and printed of a gait, each a field of `Gait`."""
+"""What is stored and printed of a gait, each a field of `RigidGait`."""
 OF_KNEES = {"knee_strike": Label("s", "time of the knee strike after the heel strike", name="knee_strike_s")}
 STATE = Label("rad, rad/s", "state just after heel strike", ("coordinate",))
 
@@ -92,7 +94,7 @@ def summary(config: RigidConfig, searches: Mapping[str, GaitSearch]) -> dict[str
             "random_hits": list(search.random_hits),
             "lost": list(search.lost),
         }
-    driven = {"driven_by": list(drives_of(config))}
+    driven = {"driven_by": list(drives_of(config)), "springs": list(springs_of(config))}
     return {**sets[config.equations], **driven, "state_names": list(coordinates(config)), "equation_sets": sets}
 
 

@@ -26,8 +26,9 @@ def numerical_error(walked: Summary, tolerances: Tolerances, walk: Callable[[Tol
     tolerances  that it was walked with
     walk        the same walk with others, as its summary
 
-    Returns the largest changes of what its steps have, named as in `ERROR_OF_EACH_STEP`, and `end_time_s` (s); `by`
-    tells what was changed if it is not the usual. Only `reason` if the second walk ends otherwise.
+    Returns the largest changes of what its steps have, named as in `ERROR_OF_EACH_STEP`, `end_time_s` (s), and of a
+    driven walk its `cost_of_transport`; `by` tells what was changed if it is not the usual. Only `reason` if the second
+    walk ends otherwise.
     """
     tighter, by = tightened(tolerances)
     return change(walked, walk(tighter), by)
@@ -59,6 +60,9 @@ def change(walked: Summary, again: Summary, by: str = USUAL) -> dict[str, Any]:
         if apart and any(walked[key]):  # points do not roll
             changes[name] = max(apart)
     changes["end_time_s"] = abs(walked["end_time_s"] - again["end_time_s"])
+    # a passive walk's cost is the slope's sine, however large the walk's error
+    if any(work for giver, work in walked.get("work_per_step_J", {}).items() if giver != "gravity"):
+        changes["cost_of_transport"] = abs(walked["cost_of_transport"] - again["cost_of_transport"])
     return changes if by == USUAL else {**changes, "by": by}
 
 

@@ -15,6 +15,7 @@ from walkerlab.config.ground import Footholds
 from walkerlab.config.reads import ContactConfig, DesignConfig, RobustnessConfig
 from walkerlab.config.schema import Config
 from walkerlab.config.walkers import without_contact
+from walkerlab.config.writer import slope_in_degrees
 from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.hybrid.recorded_walk import as_state
 from walkerlab.hybrid.walk_record import rough_heights
@@ -31,13 +32,13 @@ from walkerlab.orbits.robustness import (
     sensitivity,
     steps_on_rough_ground,
 )
-from walkerlab.orbits.shooting import EXACT, coordinates_of
+from walkerlab.orbits.shooting import EXACT, RigidMap, coordinates_of
 from walkerlab.orbits.similarity import unit_walker
 from walkerlab.orbits.step_map import StepMap
 from walkerlab.pipeline.progress import Progress, each_told
 from walkerlab.pipeline.work import WorkUnit, complete
 from walkerlab.scene.families import contact_map, not_read, reads, rigid_map
-from walkerlab.scene.parameter import SLOPE, Parameter, parameter_of, why_no_parameter
+from walkerlab.scene.parameter import SLOPE, SLOPE_DEG, SLOPE_RAD, Parameter, parameter_of, why_no_parameter
 from walkerlab.scene.rigid import rigid_scene, rigid_walker
 from walkerlab.solvers.registry import ENDLESS, Tolerances
 from walkerlab.solvers.system import Floats
@@ -55,6 +56,8 @@ WALKS_AT_ONCE: Final = 25
 STEPS_DRAWN: Final = 8
 MAX_STEPS: Final = {RIGID: 2_000_000, CONTACT: 40_000}
 """On one rough ground, all walks together."""
+GIVEN: Final = ("normal_impulse_N_s", "min_normal_force_N")
+"""What the ground gives in a push and after it, as `RigidMap.ground_after_push` returns it."""
 UNITS: Final = {"floor-drop": "m", "hip-push": "N s"}
 OF: Final = dict(zip(INDICATORS, ("s", "m", "m/s"), strict=True))
 MODEL: Final = {"model": Label("", "which model walks")}
@@ -74,6 +77,14 @@ LABELS: Final[dict[str, dict[str, Label]]] = {
     "largest_push": {
         "forward_N_s": Label("N s", "largest push forward at the hip after which the walk goes on"),
         "backward_N_s": Label("N s", "largest push backward"),
+        **{
+            f"{way}_{name}": Label(unit, f"{what} of the largest push {way}; negative where the ground would pull")
+            for way in ("forward", "backward")
+            for name, unit, what in (
+                (GIVEN[0], "N s", "normal impulse of the ground at the instant"),
+                (GIVEN[1], "N", "minimum of the ground's normal force in the steps after the instant"),
+            )
+        },
     },
     "rough_ground": {
         "roughness_m": Label("m", "standard deviation of the footholds' heights"),
@@ -125,10 +136,13 @@ def run(
         units, processes = [*single(subject, config), *rough_walks], jobs if rough_walks else jobs_but_for_walks
         # with the gait's own numbers all kernels are there
         done, _ = complete(units, checkpoint, label, progress, processes, compiled=True)
-        (down,), (up,), (forward,), (backward,), *walks = done
+        (down,), (up,), (forward, *ahead), (backward, *behind), *walks = done
         of, wanted = {"model": subject.model}, {"steps": config.robustness.steps}
         found["largest_step"].append({**of, "down_m": down, "up_m": up, **wanted})
         found["largest_push"].append({**of, "forward_N_s": forward, "backward_N_s": backward, **wanted})
+        pushes = found["largest_push"][-1]
+        for way, given in (("forward", ahead), ("backward", behind)):
+            pushes |= zip((f"{way}_{name}" for name in GIVEN), given or (None, None), strict=True)
         every = np.array([taken for some in walks for taken in some])
         steps[subject.model] = every.reshape(-1, config.robustness.walks)
         found["rough_ground"] += rough_rows(subject.model, config, steps[subject.model])
@@ -149,8 +163,8 @@ def refuse(config: RobustnessConfig) -> None:
     asked = config.robustness
     if asked.model in (CONTACT, "both") and config.contact is None:
         raise without_contact(f"robustness.model: {asked.model}", config.walker, "Add one, or ask for rigid.")
-    for key in asked.to:
-        parameter_of(key, config)
+    for place, key in enumerate(asked.to):
+        parameter_of(key, config, ("robustness", "to", place))
         if not any(reads(model, config, key) for model in models_of(config)):
             raise not_read("robustness.to", key, models_of(config))
     half = 0.5 * config.walker.leg_length_m
@@ -270,8 +284,11 @@ def single(subject: Subject, config: RobustnessConfig) -> Iterator[WorkUnit]:
 
 
 def single_of(subject: Subject, disturbance: Any, sign: float, steps: int) -> list[float]:
-    """The largest disturbance of a sign."""
-    return [largest_disturbance(subject.at(exact=False), disturbance, sign, steps)]
+    """The largest disturbance of a sign; behind a push what the rigid model's ground must give, as `GIVEN` names it."""
+    size = largest_disturbance(subject.at(exact=False), disturbance, sign, steps)
+    if disturbance == "hip-push" and isinstance(rigid := subject.at().step_map, RigidMap):
+        return [size, *rigid.ground_after_push(subject.z, SLOPE.value_in(subject.config), sign * size, steps)]
+    return [size]
 
 
 def rough(subject: Subject, config: RobustnessConfig) -> Iterator[WorkUnit]:
@@ -311,10 +328,12 @@ def rough_steps(config: RobustnessConfig, steps: Mapping[str, Floats]) -> Group:
 
 def rough_walk(config: RobustnessConfig, inputs: Mapping[str, Content]) -> dict[str, Group]:
     """The beginning of the first walk on the roughest ground, as the rigid model takes it, to be drawn."""
-    gait = as_state(inputs["fixedpoint"].summary["state"])
+    gait = inputs["fixedpoint"].summary
     _, *heights = rough_heights(max(config.robustness.roughness_m), (config.seed, 0), STEPS_DRAWN).tolist()
     scene = rigid_scene(config, Footholds(heights_m=tuple(heights)), ("states",))
-    walk = scene.walk(gait, STEPS_DRAWN, EXACT, sampled=True)
+    walk = scene.walk(
+        as_state(gait["state"]), STEPS_DRAWN, EXACT, sampled=True, step_length=float(gait["step_length_m"])
+    )
     return {f"rough_walk/{name}": group for name, group in groups_of_walk(scene, walk).items()}
 
 
@@ -359,7 +378,9 @@ def gradients_of(subject: Subject, key: str) -> dict[str, Gradient]:
 
 
 def numbers_read(subject: Subject, wanted: tuple[str, ...] = ()) -> tuple[str, ...]:
-    """Those of some numbers of the config, or of all, that the model reads, dotted."""
+    """Those of some parameters of the config, or of all, that the model reads, dotted, as the config writes them."""
     own = {".".join(path): field for path, field in leaves(Config, held=subject.config)}
-    every = (key for key in own if not why_no_parameter(key, subject.config, own))
+    in_degrees = slope_in_degrees(subject.config.slope_rad) is not None
+    written = {SLOPE_RAD: SLOPE_DEG} if in_degrees else {}
+    every = (written.get(key, key) for key in own if not why_no_parameter(key, subject.config, own))
     return tuple(key for key in wanted or every if reads(subject.model, subject.config, key))

@@ -21,6 +21,7 @@ from walkerlab.stages.walk import (
     numbers_of,
     of_body,
     over_time,
+    pace_of,
     rigid_start,
     steps_of,
 )
@@ -34,11 +35,12 @@ def run(config: SimulateConfig, inputs: Mapping[str, Content], progress: Progres
     """
     scene, settings = rigid_scene(config, config.ground, config.outputs), config.solver.rigid
     tolerances = Tolerances(settings.method, settings.rtol, settings.atol, ENDLESS)
-    (_, start), steps = rigid_start(config, inputs), 2 * config.strides
+    (length, start), steps = rigid_start(config, inputs), 2 * config.strides
+    of_gait = length if "fixedpoint" in inputs else None
 
     def walk(tolerances: Tolerances, sampled: bool) -> RigidWalkResult:
         progress.start("simulate" if sampled else "simulate: numerical error", steps)
-        return scene.walk(start, steps, tolerances, sampled, progress.advance)
+        return scene.walk(start, steps, tolerances, sampled, progress.advance, of_gait)
 
     of_scene, of_config = partial(groups, scene), partial(summary, config)
     return content_of_walk("simulate", walk, tolerances, of_scene, of_config, progress, again)
@@ -48,6 +50,7 @@ def summary(config: SimulateConfig, walk: RigidWalkResult) -> dict[str, Any]:
     """What the command prints."""
     return {
         **numbers_of(walk),
+        **pace_of(config, walk),
         "start_state": list(walk.start),
         "final_state": list(walk.final_state),
         "energy_drift_J": walk.energy_drift,
@@ -57,6 +60,7 @@ def summary(config: SimulateConfig, walk: RigidWalkResult) -> dict[str, Any]:
         "min_normal_force_N": walk.min_normal_force,
         "max_friction_ratio": walk.max_friction_ratio or None,
         "max_scuff_depth_m": walk.max_scuff_depth,
+        "objections": list(walk.objections),
         "equations": config.equations,
         "slope_rad": config.slope_rad,
         "left_out": list(of_rigid_walk(config)),

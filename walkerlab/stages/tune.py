@@ -136,7 +136,8 @@ class TuneRun:
             self.adjusted_state = with_scaled_rates(self.rigid, self.rigid_state, *factors)
             self.take("adjusted", self.adjusted_state)
         if is_the_papers(self.config):
-            self.paper = adams_walk(self.rigid, self.walk, self.scene.walker)
+            terrain = with_contact(self.config).terrain
+            self.paper = adams_walk(self.rigid, self.walk, self.scene.walker, terrain)
 
     def adjusted(self, quick: scaled_starts.ScaledStarts) -> scaled_starts.Adjustment | None:
         """The smallest change of the velocities that walks; None if none does."""
@@ -277,9 +278,9 @@ def gait_summary(found: TuneRun) -> dict[str, Any]:
         "residual": gait.residual,
         "lost_J": by_channel(found.scene.walker, step.dissipated_J),
         "height_lost_J": step.driven.gravity,
-        "work_per_step_J": (given := step.driven.per_step(1)),
+        "work_per_step_J": step.driven.per_step(1),
         "cost_of_transport": step.driven.cost_of_transport(step.length_m),
-        "balance_J": float(step.dissipated_J.sum() - sum(given.values())),
+        "balance_J": float(step.dissipated_J.sum() - step.driven.given),
     }
 
 

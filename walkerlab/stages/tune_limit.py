@@ -25,7 +25,7 @@ from walkerlab.orbits.rigid_limit import (
     observed_orders,
 )
 from walkerlab.orbits.step_map import Cycle
-from walkerlab.paper.printed import ANGLE_ERROR
+from walkerlab.paper.printed import LARGEST_ERROR
 from walkerlab.pipeline.progress import Progress
 from walkerlab.scene.contact import ContactScene, knee_rules, start_state, with_drives
 from walkerlab.scene.parts import assembly_of
@@ -141,9 +141,9 @@ def limit_summary(found: LimitFindings) -> dict[str, Any]:
     reaches = {}
     for name in found.walked:
         walked = [one for one in found.series[name] if one.angle is not None]
-        first = next((one for one in walked if (one.angle or 0.0) <= ANGLE_ERROR.value), None)
+        first = next((one for one in walked if (one.angle or 0.0) <= LARGEST_ERROR.value), None)
         reaches[name] = {
-            "claim_rad": ANGLE_ERROR.value,
+            "claim_rad": LARGEST_ERROR.value,
             "settings": [setting(one) for one in walked],
             "first_within_claim": None if first is None else setting(first),
         }

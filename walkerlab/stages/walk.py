@@ -4,6 +4,7 @@ Both models store a walk under the same names, in the same shapes, with the same
 absent. Of a long walk's samples all of its beginning and end are stored, and between them what shows each step.
 """
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any, Final
@@ -197,8 +198,19 @@ def steps_of(walk: WalkRecord, **values: ArrayLike | None) -> dict[str, Variable
     return of_steps(walk.touch_time_s, **known, **values)
 
 
+def pace_of(config: SceneConfig | SimulateConfig, walk: WalkRecord) -> dict[str, float]:
+    """Mean speed (m/s) from the first foothold to the last touch, and over sqrt(g L); nothing of a walk without a step.
+
+    config  of which leg length L and gravity g are
+    """
+    if not walk.steps:
+        return {}
+    speed = float(walk.touch_along_m[-1] / walk.touch_time_s[-1])
+    return {"speed_m_s": speed, "froude": speed / math.sqrt(config.gravity_m_s2 * config.walker.leg_length_m)}
+
+
 def driven_by(walk: WalkRecord) -> dict[str, Any]:
-    """What drives a walk, and its cost of transport; of a walk that came nowhere nothing is known."""
+    """Work of what drives a walk, and its cost of transport; of a walk that came nowhere nothing is known."""
     distance = float(walk.touch_along_m[-1]) if walk.steps else 0.0
     if distance <= 0.0:
         return {}

@@ -31,7 +31,7 @@ SEAL_BYTES = 83
 NESTED = ("config_slice", "input_keys", "library_versions", "input_digests")
 """What of an identity and a provenance is a mapping, which an attribute holds as JSON."""
 ROOT_ATTRIBUTES = frozenset(one.name for one in (*fields(Identity), *fields(Provenance))) | {
-    "stage_key", "summary_json", "summary_timed", "content_digest", "complete"
+    "title", "Conventions", "stage_key", "summary_json", "summary_timed", "content_digest", "complete"
 }  # fmt: skip
 """What every artifact says of itself; a content with arrays at the root may say more there."""
 
@@ -179,8 +179,8 @@ def read(path: Path) -> Stored:
         raise Damaged(f"it is not an artifact: {error or type(error).__name__}") from error
 
 
-def check(path: Path, key: str | None = None) -> Verdict:
-    """Whether the file at `path` is intact, and the artifact for `key` if one is given; never raises for what it is."""
+def check(path: Path, key: str | None = None, stage: str | None = None) -> Verdict:
+    """Whether the file at `path` is intact, of `stage` and made for `key`, if these are given; never raises."""
     try:
         artifact = read(path)
     except (FileNotFoundError, NotADirectoryError):
@@ -189,6 +189,8 @@ def check(path: Path, key: str | None = None) -> Verdict:
         return Verdict(False, str(error))
     except Damaged as error:
         return Verdict(False, f"damaged: {error}", damaged=True)
+    if stage not in (None, artifact.identity.stage):
+        return Verdict(False, f"damaged: it is a result of {artifact.identity.stage}, not of {stage}", damaged=True)
     if key not in (None, artifact.identity.key):
         return Verdict(False, "made for another key", artifact)
     return Verdict(True, "", artifact)
@@ -200,6 +202,8 @@ def root_attributes(
     """What stands at the root of the file: all but the arrays."""
     facts = {name: value for name, value in {**vars(identity), **vars(provenance)}.items() if value is not None}
     return {
+        "title": f"walkerlab {identity.stage}",
+        "Conventions": hdf5.CONVENTIONS,
         **{name: canonical_json(dict(value)) if name in NESTED else value for name, value in facts.items()},
         "stage_key": identity.key,
         "summary_json": json.dumps(content.summary, ensure_ascii=False, allow_nan=False),

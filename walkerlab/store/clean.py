@@ -7,12 +7,13 @@ from pathlib import Path
 from walkerlab.store.artifact import Damaged, read
 from walkerlab.store.files import TEMPORARY, storing
 from walkerlab.store.index import indexed_files
-from walkerlab.store.runfolder import RECORD, RunFolder
+from walkerlab.store.runfolder import LOCK, RECORD, RunFolder
 
 DRAWN = ("figures/figure-*.svg", "figures/figure-*.png", "report.html", "report-*.html")
 """What the drawing stages write, for the case that the index of it is gone."""
 CHUNKS, FIGURES = "sweep-chunks", "figures"
 SWEPT = ("sweep-*.h5", "sweep-*.csv", f"{CHUNKS}/*.h5", "sweep.html", "figures/sweep-*.svg", "figures/sweep-*.png")
+STATE_ENDINGS = (".h5", ".parts")
 COMPARED = ("figures/diff-*.svg", "figures/diff-*.png")
 
 
@@ -26,6 +27,19 @@ def files_of(folder: RunFolder, stages: Iterable[str]) -> list[Path]:
             listed = indexed_files(read(folder.artifact(stage)))
             found |= {folder.path / name for name in listed if (inside / name).resolve().is_relative_to(inside)}
     return sorted(path for path in found if path.is_file() or path.is_symlink())
+
+
+def owner_of(path: Path, stages: Iterable[str]) -> RunFolder | None:
+    """The run that a file belongs to: a result, what a result lists, or a record; None for a file of the user's own."""
+    whole = path.resolve()
+    for place in (whole.parent, whole.parent.parent):
+        folder = RunFolder.at(place)
+        if folder.record() is None and not any(place.glob("*.h5")):
+            continue
+        is_state = whole.parent == place and (whole.suffix in STATE_ENDINGS or whole.name in (RECORD, LOCK))
+        if is_state or whole in {one.resolve() for one in files_of(folder, stages)}:
+            return folder
+    return None
 
 
 def remove(folder: RunFolder, files: Iterable[Path]) -> None:
@@ -43,7 +57,7 @@ def remove(folder: RunFolder, files: Iterable[Path]) -> None:
 
 def remove_if_empty(folder: RunFolder) -> None:
     """Remove a run folder that has nothing in it but its lock; to be called after its lock was given back."""
-    lock = folder.path / ".lock"
+    lock = folder.path / LOCK
     if list(folder.path.iterdir()) == [lock]:
         with contextlib.suppress(OSError):
             lock.unlink()

@@ -54,6 +54,8 @@ class Variable:
             raise ValueError(f"{self.long_name!r}: shape {values.shape} does not go with dimensions {self.dims}")
         if values.dtype.kind == "f" and not self.missing and not np.isfinite(values).all():
             raise ValueError(f"{self.long_name!r} holds values that are not finite; leave out what was not computed")
+        if values.dtype.kind != "O" and not self.units:
+            raise ValueError(f"{self.long_name!r} has no unit; that of a pure number is '1'")
         check_text(self.units, self.long_name)
 
 

@@ -67,6 +67,24 @@ def write_atomically(path: Path, *parts: bytes) -> None:
         file.writelines(parts)
 
 
+def as_text(name: str) -> str:
+    """A name from the command line as text that can be stored: bytes that are not UTF-8 are escaped."""
+    return os.fsencode(name).decode(errors="backslashreplace")
+
+
+def write_through(path: Path, data: bytes) -> None:
+    """Write to a file that a user names: whole or not at all if it is a regular one, into it if it is a device or pipe.
+
+    A link is followed, never replaced. Raises StorageError if the system refuses.
+    """
+    with storing(path):
+        special = path.exists() and not stat.S_ISREG(path.stat().st_mode)
+        if special:
+            path.write_bytes(data)
+            return
+    write_atomically(path.resolve(), data)
+
+
 @contextlib.contextmanager
 def replacing(path: Path) -> Iterator[Path]:
     """A temporary file to be written, then put in place, complete and on the disk; if that fails nothing is changed.

@@ -13,6 +13,8 @@ from walkerlab.store.content import Attribute, Group, Variable
 
 # What netCDF readers take for a dimension without a coordinate; the number is its length, by their convention.
 BARE_DIMENSION = "This is a netCDF dimension but not a netCDF variable."
+CONVENTIONS = "CF-1.11"
+"""Metadata conventions that the files follow, as netCDF readers look for them."""
 TEXT = h5py.string_dtype()
 MAX_LEVELS = 16
 STRINGS_AT_ONCE = 64

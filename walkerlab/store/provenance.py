@@ -15,6 +15,7 @@ import walkerlab
 from walkerlab.config.schema import Config
 from walkerlab.config.writer import to_yaml
 from walkerlab.store.commit import commit_of_checkout, commit_of_installation
+from walkerlab.store.files import as_text
 
 LIBRARIES = ("numpy", "scipy", "numba", "llvmlite", "h5py", "pydantic", "ruamel.yaml", "matplotlib", "jinja2")
 """The libraries whose versions are recorded: those that numbers and figures may depend on."""
@@ -62,7 +63,7 @@ def begin(config: Config, input_digests: Mapping[str, str]) -> Provenance:
     now = utc_now()
     return Provenance(
         config=to_yaml(config),
-        command_line=shlex.join(["walkerlab" if program == "__main__.py" else program, *sys.argv[1:]]),
+        command_line=shlex.join(["walkerlab" if program == "__main__.py" else program, *map(as_text, sys.argv[1:])]),
         seed=config.seed,
         started_utc=now,
         ended_utc=now,

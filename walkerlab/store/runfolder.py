@@ -13,23 +13,25 @@ from pathlib import Path
 from walkerlab.errors import LockedError
 from walkerlab.store.files import make_folder, read_bounded, remove_leftovers, storing, write_atomically
 
-RECORD = ".run.json"
+RECORD, LOCK = ".run.json", ".lock"
 RECORD_BYTES = 1 << 20
 """No record is larger."""
 
 
 @dataclass(frozen=True)
 class Record:
-    """What a run folder says of its results; a result that was taken over tells of the run that it was made in.
+    """What a run folder says of its results; a result that was taken over names the run that it was made in.
 
-    run     the folder's name when it was written
-    source  where the config is from, as in `RunFolder`
-    config  that they were asked for with, resolved, as YAML text
+    run      the folder's name when it was written
+    source   where the config is from, as in `RunFolder`
+    config   that they were asked for with, resolved, as YAML text
+    changes  as in `RunFolder`
     """
 
     run: str
     source: str
     config: str
+    changes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -39,18 +41,22 @@ class RunFolder:
     runs_dir  the folder of all runs
     name      of the run; path-safe
     source    where its config is from: a file as seen from `runs_dir`, or a built-in one; empty if unknown
+    changes   KEY=VALUE of each key in which the config differs from that file
     """
 
     runs_dir: Path
     name: str
     source: str = ""
+    changes: tuple[str, ...] = ()
 
     @classmethod
     def at(cls, path: Path) -> RunFolder:
-        """The run in a folder; its source is the one that it was written from."""
+        """The run in a folder; source and changes are those that it was written with."""
         whole = path if path.name not in ("", "..") else path.resolve()
         record = cls(whole.parent, whole.name).record()
-        return cls(whole.parent, whole.name, "" if record is None else record.source)
+        if record is None:
+            return cls(whole.parent, whole.name, "", changes_in(whole.name))
+        return cls(whole.parent, whole.name, record.source, record.changes)
 
     @property
     def path(self) -> Path:
@@ -85,8 +91,10 @@ class RunFolder:
         """What the folder says of its results; None if it says nothing that can be read."""
         try:
             said = json.loads(read_bounded(self.path / RECORD, RECORD_BYTES))
-            return Record(str(said["run"]), str(said["source"]), str(said["config"]))
-        except (OSError, ValueError, LookupError, TypeError, RecursionError):
+            run, changes = str(said["run"]), said.get("changes")
+            listed = changes_in(run) if changes is None else tuple(map(str, changes))
+            return Record(run, str(said["source"]), str(said["config"]), listed)
+        except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError):
             return None
 
     def write_record(self, record: Record) -> None:
@@ -108,8 +116,8 @@ class RunFolder:
         from filelock import FileLock, Timeout
 
         make_folder(self.path)
-        lock = FileLock(self.path / ".lock")
-        with storing(self.path / ".lock"):
+        lock = FileLock(self.path / LOCK)
+        with storing(self.path / LOCK):
             try:
                 lock.acquire(timeout=0)
             except Timeout:
@@ -124,3 +132,8 @@ class RunFolder:
             yield
         finally:
             lock.release()
+
+
+def changes_in(name: str) -> tuple[str, ...]:
+    """The changes that a folder's name shows: all there is to tell where no record lists them."""
+    return tuple(filter(None, name.partition("@")[2].split(",")))

@@ -34,19 +34,22 @@ class Files:
     figures: tuple[Path, ...]
 
 
-def draw(swept: Swept, folder: RunFolder, names: Sequence[str] = ()) -> Files:
+def draw(swept: Swept, folder: RunFolder, names: Sequence[str] = (), against: str = "") -> Files:
     """Draw a sweep and write its page.
 
-    names  the numbers to draw; none are those that say most
+    names    the quantities to draw; without any those that say most
+    against  the quantity to draw them over; without one the parameters
 
-    Raises ConfigError for a number that is not there, StorageError if the system refuses.
+    Raises ConfigError for a quantity that is not there, StorageError if the system refuses.
     """
     group, question = swept.group, swept.question
     refuse_unknown(group, question.dims, names)
-    shown = list(names) or choose(group, question.dims, question.names)
-    own = None if names else robustness.of_sweep(group, question.names)
+    if against and against not in question.names:
+        refuse_unknown(group, question.dims, [against], "--against")
+    shown = [*names] or [name for name in choose(group, question.dims, question.names) if name != against]
+    own = None if names or against else robustness.of_sweep(group, question.names)
     if own is None and shown:
-        own = illustration(group, question.stage, question.names, question.dims, shown)
+        own = illustration(group, question.stage, question.names, question.dims, shown, against)
     paths: list[Path] = []
     pictures: list[Picture] = []
     if own is not None:
@@ -63,21 +66,24 @@ def draw(swept: Swept, folder: RunFolder, names: Sequence[str] = ()) -> Files:
     return Files(page, tuple(paths))
 
 
-def refuse_unknown(group: Group, dims: tuple[str, ...], names: Sequence[str]) -> None:
-    """Raise ConfigError for a name that is no number of the result."""
+def refuse_unknown(group: Group, dims: tuple[str, ...], names: Sequence[str], option: str = "--show") -> None:
+    """Raise ConfigError for a name that is no quantity of the result."""
     for name in names:
         if not is_number(group, name, dims):
             there = ", ".join(one for one in group.variables if is_number(group, one, dims) and "." not in one)
-            raise ConfigError(f"--show {name}: no such number in the result.", f"There are {there}.")
+            raise ConfigError(f"{option} {name}: no such quantity in the result.", f"There are {there}.")
 
 
-def refuse_unheard(stage: str, names: Sequence[str], there: Collection[str]) -> None:
-    """Raise ConfigError for a name that the first results have not; of nested numbers others may have more."""
+def refuse_unheard(stage: str, names: Mapping[str, str], there: Collection[str]) -> None:
+    """Raise ConfigError for a name that the first results do not have; others may have more nested quantities.
+
+    names  by the option that asks for each, as it was typed
+    """
     known = sorted({*there, *HEADLINES.get(stage, ())} - {"outcome"})
-    for name in names:
+    for asked, name in names.items():
         if name not in known and "." not in name:
             listed = ", ".join(one for one in known if "." not in one)
-            raise ConfigError(f"--show {name}: no such number in the first results.", f"There are {listed}.")
+            raise ConfigError(f"{asked}: no such quantity in the first results.", f"There are {listed}.")
 
 
 PARAMETER_COLUMNS = (Column("name"), Column("key"), Column("unit"), Column("values"), Column("meaning", wide=True))

@@ -1,7 +1,8 @@
 """What a sweep asks: a stage, parameters with their values, and how they are combined."""
 
 import math
-from collections.abc import Iterator, Sequence
+import re
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import Any, Final, Literal
@@ -17,12 +18,14 @@ from walkerlab.config.schema import Config, SlopeInDegrees
 from walkerlab.config.tree import Position, Scalar, plain
 from walkerlab.config.tree import Sequence as Listed
 from walkerlab.errors import ConfigError
+from walkerlab.report.headlines import QUANTITIES, has_quantity
 
 Value = float | int | str | bool
 Layout = Literal["grid", "list"]
 
 POINT: Final = "point"
 MAX_POINTS: Final = 10_000_000
+"""In one sweep, however they are asked for."""
 FORMS: Final = "FROM:TO:N, FROM:TO:N:log, or a list [a, b, ...]; for --sample also FROM:TO"
 EXAMPLE: Final = "For example: `walkerlab sweep --over slope_deg=0.5:5:10 --stage fixedpoint`"
 SAMPLERS: Final = ("latin-hypercube", "sobol", "random")
@@ -126,7 +129,11 @@ def asked(
 
     Raises ConfigError for what cannot be meant.
     """
-    axes = tuple(axis(key, values, source) for key, values, source in over)
+    axes: tuple[Axis, ...] = ()
+    for key, values, source in over:
+        axes = (*axes, axis(key, values, source))
+        if not (zip or sample):  # before the values of the next parameter are written out
+            refuse_too_many("sweep", math.prod(max(1, len(one.values)) for one in axes))
     repeated = {one.key for one in axes if sum(other.key == one.key for other in axes) > 1}
     if not axes or repeated:
         text = f"{min(repeated)}: given twice" if repeated else "no parameter is given"
@@ -139,10 +146,13 @@ def asked(
     if zip and len({len(one.values) for one in axes}) > 1:
         lengths = ", ".join(f"{one.key} {len(one.values)}" for one in axes)
         raise refused(None, f"--zip: the parameters have different numbers of values: {lengths}")
-    question = SweptStage(stage, axes, "list" if zip else "grid")
-    if len(question) > MAX_POINTS:
-        raise refused(None, f"sweep: {len(question)} points", f"up to {MAX_POINTS} in one sweep")
-    return question
+    return SweptStage(stage, axes, "list" if zip else "grid")
+
+
+def refuse_too_many(what: str, count: int) -> None:
+    """Raise ConfigError if a sweep has more points than there may be; `what` asks for them."""
+    if count > MAX_POINTS:
+        raise refused(None, f"{what}: {count} points", f"up to {MAX_POINTS} in one sweep")
 
 
 def axis_of_text(text: str) -> tuple[str, Any, str]:
@@ -182,6 +192,7 @@ def axis(key: str, values: Any, source: str) -> Axis:
         odd = next((value for value in values if not isinstance(value, Value)), None)
         if odd is not None or not values:
             raise bad(source, f"{key}: {odd if values else 'an empty list'}", FORMS)
+        refuse_too_many(key, len(values))
         return Axis(key, tuple(values), source)
     parts = str(values).split(":")
     try:
@@ -189,6 +200,7 @@ def axis(key: str, values: Any, source: str) -> Axis:
         count = int(parts[2]) if len(parts) > 2 else 0
     except (ValueError, IndexError):
         count = -1
+    refuse_too_many(f"{key}={values}", count)
     logarithmic = parts[3:] == ["log"]
     if count < 0 or (len(parts) > 2 and count < 1) or len(parts) > 3 + logarithmic or not math.isfinite(low + high):
         raise bad(source, f"{key}: {values} is not a range of values", FORMS)
@@ -219,9 +231,10 @@ def sampled(axes: Sequence[Axis], sample: str, seed: int) -> tuple[Axis, ...]:
     sample  SAMPLER:N
     """
     name, _, number = sample.partition(":")
-    if name not in SAMPLERS or not number.isdigit() or not 1 <= int(number) <= MAX_POINTS:
+    if name not in SAMPLERS or not re.fullmatch("[0-9]{1,18}", number) or int(number) < 1:
         allowed = ", ".join(f"{known}:N" for known in SAMPLERS)
         raise refused(Position(f"--sample {sample}", 1, 1), "is not a sampler with a number", allowed)
+    refuse_too_many(f"--sample {sample}", int(number))
     import numpy as np
 
     count, dimensions, generator = int(number), len(axes), np.random.default_rng(seed)
@@ -257,3 +270,17 @@ def described(config: Config, key: str) -> tuple[str, str]:
         return "1", key
     unit = extra(field, "unit")
     return (config.contact or Contact()).unit_of(unit), field.description or key
+
+
+def refuse_unrecorded(question: SweptStage, names: Mapping[str, str]) -> None:
+    """Raise ConfigError for a name that the stage never has, before anything is computed.
+
+    names  by the option that asks for each, as it was typed
+    """
+    for asked, name in names.items():
+        if name not in question.names and not has_quantity(question.stage, name):
+            known = QUANTITIES[question.stage]
+            near = nearest(name, (*known, *question.names))
+            listed = ", ".join(one + "…" if one.endswith(".") else one for one in known if one != "outcome")
+            meant = f" Did you mean {near}?" if near else ""
+            raise ConfigError(f"{asked}: {question.stage} has no such quantity.{meant}", f"There are {listed}.")

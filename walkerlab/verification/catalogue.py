@@ -14,7 +14,7 @@ from walkerlab.config.reader import read
 from walkerlab.config.schema import Config
 from walkerlab.config.stability import FATES, Case, Fate
 from walkerlab.config.tree import plain
-from walkerlab.config.walkers import Kneed, PartsWalker
+from walkerlab.config.walkers import has_knees
 from walkerlab.errors import ConfigError
 
 CATALOGUE: Final = Path(__file__).parent / "catalogue.yaml"
@@ -87,7 +87,7 @@ def features(config: Config) -> set[str]:
     walker, found = config.walker, {"rigid"}
     if config.contact is not None:
         found |= {"contact", "friction"} if config.contact.has_friction else {"contact"}
-    if isinstance(walker, Kneed) or (isinstance(walker, PartsWalker) and any(one.locks for one in walker.hinges)):
+    if has_knees(walker):
         found |= {f"release at {walker.knee.release}", f"{walker.knee.lock} lock"}
     return found
 

@@ -261,6 +261,11 @@ class Row {
     this.range?.setAttribute("aria-valuetext", `${value} ${this.number.unit}`);
     const text = typeof value === "number" ? String(Number(value.toPrecision(7))) : typeof value === "string" ? value : JSON.stringify(value);
     if (document.activeElement !== this.text || Number(this.text.value) !== value) this.text.value = text;
+    this.written = this.text.value;
+  }
+  // What is typed and not yet entered stays, whatever answer arrives meanwhile.
+  get edited() {
+    return this.text && this.text.value !== this.written;
   }
 }
 
@@ -275,9 +280,11 @@ function turn(key, value, settled) {
   else along.mark();
 }
 
-// Other values may follow from the one that was turned.
+// Other values may follow from the one that was turned. An answer about values that have changed meanwhile is late.
 async function settle() {
+  const asked = fragment();
   const [status, answer] = await ask("/api/numbers", question()).catch(() => [0]);
+  if (fragment() !== asked) return;
   if (status === 200) arrange(answer.numbers);
   along.draw();
 }
@@ -289,10 +296,10 @@ function arrange(numbers) {
   rows = new Map();
   for (const number of numbers) {
     const old = before.get(number.key);
-    const same = old && old.number.start === number.start && old.number.from === number.from && old.number.to === number.to;
-    const row = same ? old : new Row(number);
+    const same = old && old.number.start === number.start && "from" in old.number === "from" in number;
+    const row = same ? Object.assign(old, { number }) : new Row(number);
     row.wanted = asked.has(number.key) || (number.rank === null && number.key in state.set);
-    row.put(state.set[number.key] ?? number.value);
+    if (!row.edited) row.put(state.set[number.key] ?? number.value);
     rows.set(number.key, row);
   }
   const seen = [...rows.values()].filter(({ number, wanted }) => number.rank !== null || wanted);
@@ -498,6 +505,10 @@ const along = new Along(document.querySelector("#along .view"));
 byId("config").addEventListener("change", () => choose(byId("config").value));
 byId("reset").addEventListener("click", () => choose(state.config));
 byId("search").addEventListener("input", search);
+byId("search").addEventListener("keydown", ({ key }) => {
+  const hits = byId("found").children;
+  if (key === "Enter" && hits.length === 1) hits[0].click();
+});
 byId("what").addEventListener("change", () => along.plot());
 for (const model of Object.keys(MODELS)) {
   byId(model).addEventListener("change", () => {

@@ -4,8 +4,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any
 
+from walkerlab.outcome import Outcome
 from walkerlab.report.blocks import COSTS, Gallery, PageBlock, Paragraph, Section, Statement, Statements
-from walkerlab.report.numbers import listed, number, power_of_ten, whole
+from walkerlab.report.numbers import NONE, listed, number, power_of_ten, whole
 from walkerlab.report.results import Results, of_stage
 from walkerlab.report.tables import Cell, Column, Table, grouped, table
 from walkerlab.report.words import words
@@ -19,11 +20,17 @@ def section(results: Results, summary: Row) -> Section | None:
     told = {scene: summary["conclusions"][scene].removeprefix(f"{scene}: ") for scene in summary["reference"]}
     concluded = tuple(Statement(scene, text[:1].upper() + text[1:]) for scene, text in told.items())
     references = [{"scene": scene, **entry} for scene, entry in summary["reference"].items()]
+    nearest = {scene: run for scene in summary["reference"] if (run := nearest_library(summary, scene))}
     blocks: tuple[PageBlock, ...] = (
         Paragraph(words("accuracy.introduction", summary)),
         Statements(concluded),
         costs(summary),
-        table("References", REFERENCE_COLUMNS, references, note=words("accuracy.references")),
+        table(
+            "References",
+            REFERENCE_COLUMNS,
+            references,
+            note=words("accuracy.references", list(summary["reference"].items()), nearest),
+        ),
         *(Gallery((picture,)) for picture in results.pictures if picture.name.startswith("accuracy")),
         not_run(summary),
     )
@@ -38,13 +45,13 @@ def costs(summary: Row) -> Table:
     levels = sorted({float(level) for best in summary["best"].values() for level in best}, reverse=True)
     columns = (
         Column("method", "method"),
-        *(Column(f"ms for {power_of_ten(at, 1)}", f"{at}", partial(number, digits=3), numeric=True) for at in levels),
+        *(Column(f"ms for {power_of_ten(at, 1)}", f"{at}", with_spread, numeric=True) for at in levels),
         Column("smallest error", "smallest_error", numeric=True),
         Column("its right-hand sides", "rhs_evaluations", whole, numeric=True),
         Column("ended otherwise", "failures", wide=True),
     )
     methods = {scene: list(methods_of(summary, scene, levels)) for scene in summary["reference"]}
-    note = words("accuracy.costs", summary["environment"])
+    note = words("accuracy.costs", summary)
     return table("Least run time for an error, method by method", columns, methods, note=note)
 
 
@@ -58,22 +65,54 @@ def methods_of(summary: Row, scene: str, levels: Sequence[float]) -> Iterator[Ro
         ended = [run for run in runs if run["error"] is not None]
         exact: Row = min(ended, key=lambda run: float(run["error"]), default={})
         error = exact.get("error")
-        failed = [f"{run['outcome']} at {power_of_ten(run['tolerance'], 1)}" for run in runs if run["error"] is None]
+        failed = [f"{ended_as(run)} at {power_of_ten(run['tolerance'], 1)}" for run in runs if run["error"] is None]
         yield {
             "method": Cell(method, "good" if method in best else None),
             "smallest_error": number(error, 2) if error is None or error > known else f"≤ {number(known, 2)}",
             "rhs_evaluations": exact.get("rhs_evaluations"),
             "failures": listed(failed),
             **{
-                f"{level}": min((1e3 * run["wall_s"] for run in ended if run["error"] <= level), default=None)
+                f"{level}": min(
+                    (run for run in ended if run["error"] <= level), key=lambda run: run["wall_s"], default=None
+                )
                 for level in levels
             },
         }
 
 
+def with_spread(run: Row | None) -> Cell:
+    """A run's median time (ms), with the least and the largest where it was repeated."""
+    if run is None:
+        return Cell(NONE)
+    median, least, largest = (number(1e3 * run[name], 3) for name in ("wall_s", "least_wall_s", "largest_wall_s"))
+    alone = run["repeats_of_wall_s"] == 1
+    return Cell(median if alone else f"{median} ({least} to {largest})", value=1e3 * run["wall_s"])
+
+
+def ended_as(run: Row) -> str:
+    """How a run ended that did not arrive."""
+    return "budget used up" if run["outcome"] == Outcome.BUDGET_EXHAUSTED.label else str(run["outcome"])
+
+
+def nearest_library(summary: Row, scene: str) -> Row | None:
+    """The run of a library's method that ends nearest to the reference; None without any."""
+    runs = [row for row in summary["rows"] if row["scene"] == scene and row["error"] is not None]
+    of_libraries = [row for row in runs if row["method"].startswith(("scipy", "cvode"))]
+    return min(of_libraries, key=lambda row: float(row["error"]), default=None)
+
+
+def whose(reference: Row) -> str:
+    """Who made a reference, and at which tolerance."""
+    if reference["from_outside"]:
+        return "heyoka, at machine precision"
+    spent = f", {whole(reference['rhs_evaluations'])} right-hand sides"
+    return f"ours, at {power_of_ten(reference['tolerance'], 1)}{spent}"
+
+
 REFERENCE_COLUMNS = (
     Column("scene", "scene"),
     Column("reference", "method"),
+    Column("by", whose),
     Column("second method", "second_method"),
     Column("they differ by", "agreement", partial(number, digits=2), numeric=True),
 )

@@ -1,7 +1,7 @@
 """The page of the paper: every number that it prints beside what is computed here, its tables, and its errata."""
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -15,9 +15,17 @@ from walkerlab.report.words import words
 
 Row = Mapping[str, Any]
 
-TONES: dict[str, Tone] = {"reproduced": "good", "explained": "fair", "refuted": "bad"}
-"""The verdicts, and how each is set."""
+TONES: dict[str, Tone] = {
+    "input": "given",
+    "reproduced": "good",
+    "explained": "fair",
+    "contradicted": "bad",
+    "not-reproduced": "plain",
+}
+"""The verdicts on printed values, each of which counts once, and how they are set."""
 
+TEXT = "_text"
+"""Ends the key of a printed number's text."""
 BESIDE = {"as_printed": "as printed", "corrected": "corrected", "contact": "contact model"}
 """What a number of the paper is compared with."""
 
@@ -28,11 +36,10 @@ def numbers(results: Results) -> Section | None:
     if not rows:
         return None
     meanings = words.terms("paper.verdicts").items()
-    told = tuple(Statement(f"{name.capitalize()}:", meaning, tone=TONES[name]) for name, meaning in meanings)
+    told = tuple(Statement(f"{spelled(name).capitalize()}:", meaning, tone=TONES[name]) for name, meaning in meanings)
     departs = words("paper.departs", results.departures) if results.departures else ""
     blocks = (Paragraph(departs, "fair"), Statements(told, "lines"), numbers_table(rows))
-    verdicts = Counter(row["verdict"] for row in rows)
-    finding = words("paper.finding", {name: verdicts[name] for name in TONES})
+    finding = words("paper.finding", by_verdict(row["verdict"] for row in rows))
     return Section.of("paper-numbers", "The paper’s numbers", blocks, finding, PAPER)
 
 
@@ -43,11 +50,22 @@ def numbers_table(rows: Sequence[Row]) -> Table:
         Column("quantity", lambda row: named(row["quantity"], row.get("unit"))),
         Column("printed", "printed", in_signs, numeric=True),
         *(Column(BESIDE[key], key, number, numeric=True) for key in models),
-        Column("verdict", "verdict", lambda verdict: Cell(verdict, TONES.get(verdict, "plain"))),
+        Column("verdict", "verdict", lambda verdict: Cell(spelled(verdict), TONES.get(verdict, "plain"))),
         Column("evidence", "evidence", in_signs, wide=True),
     )
     caption = "What the paper prints, and what its equations give"
     return table(caption, columns, grouped(rows, "where"), wordy=True, by="where")
+
+
+def by_verdict(verdicts: Iterable[str]) -> dict[str, int]:
+    """How many values of the paper have each verdict."""
+    counts = Counter(verdicts)
+    return {name: counts[name] for name in TONES}
+
+
+def spelled(verdict: str) -> str:
+    """A verdict as it is written in a sentence."""
+    return verdict.replace("-", " ")
 
 
 def named(name: str, unit: str | None) -> str:
@@ -63,26 +81,38 @@ def paper_numbers(results: Results) -> Sequence[Row]:
 
 def tables(results: Results) -> Section | None:
     """The tables that there are."""
-    summary, notes = results.summary("compare"), words.terms("paper.notes")
-    shown = (
-        paper_table(caption, summary.get(key) or {}, notes.get(key, ""))
-        for key, caption in words.terms("paper.tables").items()
-    )
+    summary = results.summary("compare")
+    shown = (table_of(key, summary.get(key) or {}) for key in words.terms("paper.tables"))
     return Section.of("tables", "The paper’s tables", shown, page=PAPER)
 
 
+def table_of(key: str, rows: Any) -> Table:
+    """The paper's numbers, or one of its tables, by its key in the summary of `compare`."""
+    captions = words.terms("paper.tables")
+    if key not in captions:
+        return numbers_table(rows)
+    return paper_table(captions[key], rows, words.terms("paper.notes").get(key, ""))
+
+
 def paper_table(caption: str, rows: Mapping[str, Row], note: str) -> Table:
-    """One table; its rows are named by their symbol and unit, and columns without any value are left away."""
-    columns, heads = [Column("row", "row")], words.terms("paper.heads")
+    """One table; its rows are named by their symbol and unit, and columns without any value are left away.
+
+    Where a row has the text of a number as the paper prints it, that is shown, to its digits.
+    """
+    has_quantities = any("quantity" in row for row in rows.values())
+    columns, heads = [Column("symbol" if has_quantities else "quantity", "row")], words.terms("paper.heads")
     for key in dict.fromkeys(key for row in rows.values() for key, value in row.items() if value is not None):
+        if key == "unit" or key.endswith(TEXT):
+            continue
         texts = any(isinstance(row.get(key), str) for row in rows.values())
-        written = in_signs if texts else partial(number, digits=3 if "percent" in key else 6)
-        columns.append(Column(heads.get(key, key.replace("_", " ")), key, written, numeric=not texts))
-    shown = [column for column in columns if column.of != "unit"]
+        as_text = texts or any(f"{key}{TEXT}" in row for row in rows.values())
+        written = in_signs if as_text else partial(number, digits=3 if "percent" in key else 6)
+        of = key if texts or not as_text else f"{key}{TEXT}"
+        columns.append(Column(heads.get(key, key.replace("_", " ")), of, written, numeric=not texts))
     names = {symbol: f"{said}, {symbol}" for symbol, said in words.terms("paper.quantities").items()}
     return table(
         caption,
-        shown,
+        columns,
         [{"row": named(names.get(one, one), row.get("unit")), **row} for one, row in rows.items()],
         note=note,
     )

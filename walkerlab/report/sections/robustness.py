@@ -12,7 +12,9 @@ from walkerlab.report.words import words
 SHOWN = 12
 """Derivatives in the table."""
 BUILT = ("walker.", "push_off.")
-"""How the numbers begin that a builder can change."""
+"""How the keys begin that a builder can change."""
+NORM = "gait_sensitivity_norm_scaled"
+"""What the parameters are ranked by: a norm in s/m falls with a longer leg by its dimension alone."""
 MODEL = Column("model", "model")
 NORMS = (
     MODEL,
@@ -75,19 +77,30 @@ def findings(summary: Mapping[str, Any]) -> list[str]:
     """What there is to say, sentence by sentence."""
     first: dict[str, Mapping[str, Any]] = {}
     for row in summary["sensitivity"]:
-        told = "relative" in row and not row.get("why")
-        if told and row["of"] == "gait_sensitivity_norm" and row["to"].startswith(BUILT):
+        if row["of"] == NORM and row["to"].startswith(BUILT) and ranks(row):
             first.setdefault(row["model"], row)
     return words.parts("robustness.findings", summary, [*first.values()])
 
 
+def ranks(row: Mapping[str, Any]) -> bool:
+    """Whether a derivative has a relative effect that can be compared with others."""
+    return row.get("relative") is not None and not row.get("why")
+
+
 def tables(summary: Mapping[str, Any]) -> list[Table]:
     """Norms, rough ground and what moves the gait."""
-    moving = [row for row in summary["sensitivity"] if row.get("relative") is not None and not row.get("why")]
-    shown = sorted(moving, key=lambda row: -abs(row["relative"]))[:SHOWN]  # of both models
-    left = len(summary["sensitivity"]) - len(shown)
+    rows = summary["sensitivity"]
+    ranked = sorted((row for row in rows if ranks(row)), key=lambda row: -abs(row["relative"]))  # of both models
+    built = [row for row in ranked if row["to"].startswith(BUILT)]
+    around = [row for row in ranked if not row["to"].startswith(BUILT)]
+    zeros = [row for row in rows if row["of"] == NORM and "relative" not in row and row["value"] is not None]
+    first, shown = [row for row in built if row["of"] == NORM][:SHOWN], built[:SHOWN]
+    left = len(rows) - len(shown) - len(around[:SHOWN])
     return [
         table("Gait sensitivity norms", NORMS, summary["gait_sensitivity_norm"], note=words("robustness.norms")),
         table("Steps on rough ground", ROUGH, summary["rough_ground"], note=words("robustness.rough")),
+        table("What to change first", MOVES, first, note=words("robustness.first")),
         table("What moves the gait", MOVES, shown, note=words("robustness.moves", left)),
+        table("Gravity, slope and ground", MOVES, around[:SHOWN]),
+        table("Parameters that are zero", MOVES, zeros, note=words("robustness.zeros")),
     ]

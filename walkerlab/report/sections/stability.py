@@ -5,8 +5,9 @@ from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any
 
-from walkerlab.report.blocks import CASES, Gallery, PageBlock, Paragraph, Section
-from walkerlab.report.numbers import count, number, whole
+from walkerlab.outcome import outcome_of
+from walkerlab.report.blocks import CASES, Gallery, PageBlock, Paragraph, Section, Statement, Statements
+from walkerlab.report.numbers import number, whole
 from walkerlab.report.results import Results, of_stage
 from walkerlab.report.tables import Cell, Column, Table, Tone, grouped, measured, table
 from walkerlab.report.words import words
@@ -31,6 +32,8 @@ def section(results: Results, summary: Row) -> Section | None:
         Paragraph(words("stability.judgement")),
         table("Extreme cases", CASE_COLUMNS, grouped(cases, "family"), wordy=True, note=note),
         table("Problems with known answers, run through the contact code", KNOWN_COLUMNS, known, wordy=True),
+        Paragraph("What no case covers:"),
+        Statements(tuple(Statement(f"{what}:", why) for what, why in words.terms("stability.not_covered").items())),
         ordinary_table(summary),
         Paragraph(words("stability.maps", planes) if planes else words("stability.how_to_map")),
         *(Gallery((picture,)) for picture in results.pictures if picture.name.startswith("stability")),
@@ -39,9 +42,19 @@ def section(results: Results, summary: Row) -> Section | None:
 
 
 def finding(summary: Row) -> str:
-    """How many came out right."""
-    total = summary["passed"] + summary["failed"]
-    return f"{summary['passed']} of {count(total, 'extreme case')} and known problems came out right."
+    """How many came out as expected, and how many of these have no answer."""
+    return words("stability.finding", summary, len([row for row in summary["cases"] if row["ok"] and gave_up(row)]))
+
+
+def gave_up(row: Row) -> bool:
+    """Whether a case ended without an answer."""
+    outcome = outcome_of(row["outcome"])
+    return outcome is not None and not outcome.answered
+
+
+def ending(row: Row) -> Cell:
+    """How a case ended: green only for an answer that came out as expected."""
+    return Cell(row["outcome"], ("fair" if gave_up(row) else "good") if row["ok"] else "bad")
 
 
 def failures(summary: Row) -> list[str]:
@@ -58,7 +71,7 @@ def worst_measure(row: Row) -> float | None:
 
 CASE_COLUMNS = (
     Column("case", "name"),
-    Column("ended as", lambda row: Cell(row["outcome"], "good" if row["ok"] else "bad")),
+    Column("ended as", ending),
     Column("steps", "steps", whole, numeric=True),
     Column("other method", "second_method", lambda name: name or "none"),
     Column("worst measure over its limit", worst_measure, partial(number, digits=2), numeric=True),

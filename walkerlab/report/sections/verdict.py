@@ -5,13 +5,13 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from walkerlab.config.drives import drives_of
+from walkerlab.config.drives import drives_of, springs_of
 from walkerlab.report.blocks import PageBlock, Paragraph, Section, Shares, Statement, Statements
-from walkerlab.report.numbers import count, listed
+from walkerlab.report.numbers import count
 from walkerlab.report.outcomes import MODELS, tone
 from walkerlab.report.results import Results
 from walkerlab.report.sections.models import departure
-from walkerlab.report.sections.paper import TONES, errata, paper_numbers
+from walkerlab.report.sections.paper import TONES, by_verdict, errata, paper_numbers, spelled
 from walkerlab.report.symbols import in_signs
 from walkerlab.report.tables import Tone
 from walkerlab.report.words import words
@@ -21,11 +21,13 @@ def section(results: Results) -> Section | None:
     """What a reader should know who reads no further."""
     rows = paper_numbers(results) if results.of_the_paper else ()
     walked = {model.lower(): summary for stage, model in MODELS.items() if (summary := results.summary(stage))}
-    verdicts = Counter(row["verdict"] for row in rows)
+    verdicts = by_verdict(row["verdict"] for row in rows) if rows else {}
     misprint = any(erratum["where"].startswith("A.5") for erratum in errata(results))
     # what holds, what fails and what follows
     found, config = (results.summary("fixedpoint"), verdicts, misprint), results.config
-    said = words("verdict.opening", walked, *found, drives_of(config), config.ground.even) if walked else ""
+    said = ""
+    if walked:
+        said = words("verdict.opening", walked, *found, drives_of(config), springs_of(config), config.ground.even)
     fared = sorted(how_all_fared(results), key=lambda one: one.tone != "bad")
     blocks = (
         *(Paragraph(failure, "bad") for failure in failures(results)),
@@ -41,8 +43,7 @@ def printed(results: Results) -> Section | None:
     rows = paper_numbers(results) if results.of_the_paper else ()
     if not rows:
         return None
-    fared = Counter(row["verdict"] for row in rows)
-    finding = f"Of {count(len(rows), 'number')}, {listed(f'{many} {name}' for name, many in fared.items())}."
+    finding = words("paper.finding", by_verdict(row["verdict"] for row in rows))
     return Section("printed", "What the paper prints", tuple(of_the_paper(results, rows)), finding)
 
 
@@ -88,11 +89,11 @@ def of_the_paper(results: Results, rows: Sequence[Mapping[str, Any]]) -> Iterato
     """How the paper's numbers fared, by verdict and by where they stand, and its gravest errors."""
     found = errata(results)
     places = {name: Counter(row["where"] for row in rows if row["verdict"] == name) for name in TONES}
-    parts = tuple((name, here.total(), TONES[name]) for name, here in places.items() if here)
-    yield Shares(f"Of {count(len(rows), 'number')} that the paper prints", parts)
+    parts = tuple((spelled(name), here.total(), TONES[name]) for name, here in places.items() if here)
+    yield Shares(f"Of {count(len(rows), 'value')} that the paper prints", parts)
     every = Counter(row["where"] for row in rows)
     told = (
-        Statement(f"{name.capitalize()}:", words("verdict.places", here, every), tone=TONES[name])
+        Statement(f"{spelled(name).capitalize()}:", words("verdict.places", here, every), tone=TONES[name])
         for name, here in places.items()
         if here
     )

@@ -41,6 +41,8 @@ def contact_rows(summary: Mapping[str, Any]) -> list[tuple[str, str | Cell, str]
         "slip, step by step": span([1e3 * slip for slip in get("slips_m") or ()], "mm", 3),
         "rolling a step": length(get("rolling_per_step_m") or None),
         **{f"work of {giver}": joules(given[name]) for name, giver in GIVEN_BY.items() if given.get(name)},
+        "speed": quantity(get("speed_m_s"), "m/s", 4),
+        "Froude number": number(get("froude"), 4),
         "cost of transport": number(get("cost_of_transport"), 4),
         "energy balance residual": joules(summary["energy_balance_residual_J"]),
         **{f"energy lost {CHANNELS.get(key, key)}": joules(value) for key, value in lost.items()},

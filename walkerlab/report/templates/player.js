@@ -95,7 +95,9 @@ function drawWalk(picture, scene, tracks, colours, back = 0) {
   const { context: c, width, height } = picture;
   const scale = (0.66 * height) / (scene.leg_m + scene.torso_m);
   const [sin, cos] = [Math.sin(scene.slope_rad), Math.cos(scene.slope_rad)];
-  const hip = tracks.reduce((sum, track) => sum + track.at("hx"), 0) / tracks.length;
+  // The camera follows what still walks: it leaves a walker that has ended within half a second.
+  const shares = tracks.map((track) => clamp(1 - (track.time - track.end) / 0.5, 0, 1));
+  const hip = tracks.reduce((sum, track, index) => sum + shares[index] * track.at("hx"), 0) / shares.reduce((sum, share) => sum + share, 0);
   const place = picture.place = (x, y) => [
     width / 2 + scale * (cos * (x - hip) + sin * y),
     0.83 * height + scale * (sin * (x - hip) - cos * y),
@@ -142,8 +144,22 @@ function drawWalk(picture, scene, tracks, colours, back = 0) {
     const room = 0.5 * c.measureText(said).width;
     if (x > room && x < width - room) c.fillText(said, x, y);
   }
+  drawRelief(picture, scene, levels, colours);
   picture.points = [];
   tracks.forEach((track, index) => drawWalker(picture, scene, track, colours, scale, index));
+}
+
+// Levels of uneven ground again, under it, so much higher that an eye sees them, and by how much.
+function drawRelief({ context: c, place, height }, scene, levels, colours) {
+  const roughest = Math.max(0, ...scene.ground.map(([, level]) => Math.abs(level)));
+  const times = roughest ? niceStep((0.04 * scene.leg_m) / roughest) : 0;
+  if (times <= 1) return;
+  c.strokeStyle = c.fillStyle = colours.bad;
+  c.beginPath();
+  for (const [from, to, level] of levels) for (const x of [from, to]) c.lineTo(...place(x, times * level - 0.19 * scene.leg_m));
+  c.stroke();
+  c.textAlign = "left";
+  c.fillText(`red line: the ground, its heights × ${digits(times)}`, 8, height - 8);
 }
 
 function drawWalker(picture, scene, track, colours, scale, index) {
