@@ -38,6 +38,27 @@ def be_told_to_end_twice():
     time.sleep(600.0)
 
 
+def kill_itself_once(path):
+    if not path.exists():
+        path.touch()
+        kill_itself()
+    return numbers()
+
+
+def numbers(number=0):
+    return [float(number)]
+
+
+def once_a_file_has(path, text, patience_s=60.0):
+    """Return 1 once a file holds a text, 0 if it does not come."""
+    deadline = time.monotonic() + patience_s
+    while time.monotonic() < deadline:
+        if path.exists() and text in path.read_bytes():
+            return numbers(1)
+        time.sleep(0.01)
+    return numbers()
+
+
 def leave_with_3():
     sys.exit(3)
 

@@ -6,7 +6,6 @@ import os
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 from types import NoneType
 from typing import Any, TypedDict, Unpack, cast
@@ -22,10 +21,10 @@ from walkerlab.config.sweep import Sweep as SweepBlock
 from walkerlab.config.tree import NOWHERE
 from walkerlab.config.validation import on_the_slope, typed
 from walkerlab.errors import ConfigError, NoAnswer, StaleError
+from walkerlab.pipeline.executor import answer_in_memory
 from walkerlab.pipeline.graph import PIPELINE
-from walkerlab.pipeline.identity import Keys
-from walkerlab.pipeline.in_memory import InMemory
 from walkerlab.pipeline.resolve import resolve
+from walkerlab.pipeline.results import MemoryResults
 from walkerlab.pipeline.runner import Options, execute
 from walkerlab.pipeline.runs import config_of, headline_values, result_in, run_named
 from walkerlab.report.text import in_words
@@ -456,14 +455,8 @@ def in_memory(stage: str, config: Config) -> Result:
     """A stage's result, with what it needs, without files; ConfigError if the config has not what it needs."""
     refuse_unknown_stage(stage)
     PIPELINE[stage].refuse_question(config)
-    answer = InMemory().answer(config, stage, keys_here().of(config, stage))
-    return result_of(stage, answer.content.summary, answer.content, answer.no_answer)
-
-
-@cache
-def keys_here() -> Keys:
-    """The stage keys of the code that this process has loaded."""
-    return Keys()
+    answer = answer_in_memory(config, stage, MemoryResults())
+    return result_of(stage, answer.findings, answer, answer.no_answer)
 
 
 def config_of_scene(walker: Any, given: Mapping[str, Any], keys: Mapping[str, Any]) -> Config:

@@ -8,7 +8,7 @@ from synthetic_walks import both_models, rigid_alone
 from walkerlab.config.reads import only
 from walkerlab.config.schema import Config
 from walkerlab.pipeline.graph import PIPELINE
-from walkerlab.pipeline.plan import LeftOut
+from walkerlab.scene.left_out import LeftOut
 from walkerlab.stages import plot
 from walkerlab.store import index
 

@@ -10,7 +10,8 @@ import pytest
 
 import walkerlab
 from walkerlab.config.loader import load
-from walkerlab.pipeline.plan import Planner
+from walkerlab.pipeline.executor import Executor
+from walkerlab.pipeline.results import FolderResults
 from walkerlab.pipeline.runner import Options, execute
 from walkerlab.store.runfolder import RunFolder
 
@@ -39,7 +40,8 @@ class Toy:
 
     def plan(self, target, *sets, config=None, force=False):
         loaded, folder = self.loaded(*sets, config=config)
-        return Planner(loaded, folder, self.graph, force).plan(self.graph.needed_for(target, loaded))
+        stages = self.graph.needed_for(target, loaded)
+        return Executor(loaded, FolderResults(folder, self.graph), stages, force=force).plan()
 
     def preview(self, target, *sets, config=None, **options):
         loaded, folder = self.loaded(*sets, config=config)

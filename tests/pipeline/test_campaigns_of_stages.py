@@ -3,7 +3,7 @@
 import pytest
 
 from walkerlab.cli.stored import state_of
-from walkerlab.pipeline.plan import survey
+from walkerlab.pipeline.executor import survey
 from walkerlab.store.artifact import read
 
 

@@ -84,6 +84,14 @@ def test_the_papers_cases_are_judged_for_the_papers_own_walker_alone():
     assert stability.takes_under(load(sets=["walker.hip_mass_kg=9"]).config) is SceneCasesConfig
 
 
+def test_a_walk_that_was_not_taken_again_is_not_taken_for_one_with_a_numerical_error():
+    config, keys = load().config, Keys()
+    once, twice = (keys.identity(PIPELINE["simulate"], config, {}, again).key for again in (False, True))
+    assert once != twice
+    gaits = {keys.identity(PIPELINE["fixedpoint"], config, {}, again).key for again in (False, True)}
+    assert len(gaits) == 1  # a stage without walks says the same either way
+
+
 def test_the_fixed_stages_are_there_in_order():
     fixed = ["fixedpoint", "simulate", "contact-sim", "compare", "plot", "report"]
     assert [name for name in NAMES if name in fixed] == fixed

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from walkerlab.config.loader import load
-from walkerlab.pipeline import runner
+from walkerlab.pipeline import executor
 from walkerlab.pipeline.graph import PIPELINE, Graph
 from walkerlab.pipeline.task import Precompiler
 from walkerlab.store.artifact import read
@@ -65,7 +65,7 @@ def compiling_bounce(toy, monkeypatch):
         with (toy.source / "toy" / "__init__.py").open("a") as file:
             file.write("\nimport walkerlab.kernels\n")
         monkeypatch.setenv("WALKERLAB_CACHE", str(toy.source / "nothing-compiled"))
-        monkeypatch.setattr(runner, "nothing_compiled_yet", lambda: True)
+        monkeypatch.setattr(executor, "nothing_compiled_yet", lambda: True)
         stages = (replace(one, compiles_long=one.name == "bounce") for one in toy.graph.stages)
         toy.graph = Graph(*stages)
         return toy
@@ -93,5 +93,5 @@ def test_what_a_user_can_act_on_is_left_to_the_stage_to_tell(compiling_bounce, j
 def test_nothing_is_begun_for_stages_that_compile_fast():
     with WorkerPool(1) as pool:
         precompiler = Precompiler(pool, load(None, ()).config)
-        precompiler.begin((PIPELINE["compare"], PIPELINE["plot"]))
-        assert not precompiler.begun
+        for name in ("compare", "plot"):
+            assert precompiler.begin(PIPELINE[name], only_first=False) is None

@@ -7,8 +7,8 @@ import pytest
 
 from walkerlab.config.reads import StartConfig
 from walkerlab.errors import ConfigError, LockedError, StorageError
+from walkerlab.pipeline.executor import survey
 from walkerlab.pipeline.graph import Graph, Stage
-from walkerlab.pipeline.plan import survey
 from walkerlab.pipeline.runner import execute
 from walkerlab.store.artifact import read
 

@@ -7,9 +7,10 @@ from dataclasses import replace
 import pytest
 from process_table import workers_below
 
+from walkerlab.pipeline.executor import any_side_by_side
 from walkerlab.pipeline.graph import Graph
-from walkerlab.pipeline.plan import STILL_COMPUTED
-from walkerlab.pipeline.runner import Options, any_side_by_side, execute
+from walkerlab.pipeline.runner import Options, execute
+from walkerlab.scene.left_out import STILL_COMPUTED
 from walkerlab.store.artifact import read
 from walkerlab.workers import WorkerDiedError
 

@@ -9,9 +9,9 @@ from synthetic_results import EVERYTHING, config, stored
 from walkerlab.config.schema import Config
 from walkerlab.errors import StorageError
 from walkerlab.pipeline.graph import PIPELINE
-from walkerlab.pipeline.plan import STILL_COMPUTED, LeftOut
 from walkerlab.pipeline.progress import Silent
 from walkerlab.report.pictures import fitting
+from walkerlab.scene.left_out import STILL_COMPUTED, LeftOut
 from walkerlab.stages import report
 from walkerlab.stages.report import write_pages
 from walkerlab.store.index import broken_file, indexed_files

@@ -10,8 +10,8 @@ from synthetic_families import families
 
 from walkerlab.config.loader import load
 from walkerlab.orbits import plane
-from walkerlab.pipeline.identity import Keys
-from walkerlab.pipeline.in_memory import InMemory
+from walkerlab.pipeline.executor import answer_in_memory
+from walkerlab.pipeline.results import MemoryResults
 
 SMALL = {
     "fixedpoint": (),
@@ -42,14 +42,14 @@ NO_LIMIT = "limit"  # takes seconds: its columns are asked for by figures/costs.
 @pytest.fixture(scope="module")
 def real():
     """What stages store of small runs of the paper's walker, computed as they are asked for."""
-    memory, known = InMemory(), {}
+    memory, known = MemoryResults(), {}
 
     def stored(stage):
         if stage not in known:
             config = load(None, ["strides=1", *SMALL[stage]]).config
             with pytest.MonkeyPatch.context() as patch:
                 patch.setattr(plane, "CELLS", (3, 2))
-                known[stage] = memory.answer(config, stage, Keys().of(config, stage)).content
+                known[stage] = answer_in_memory(config, stage, memory)
         return known[stage]
 
     return stored

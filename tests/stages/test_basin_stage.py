@@ -14,8 +14,8 @@ from walkerlab.pipeline.graph import PIPELINE
 from walkerlab.pipeline.progress import Silent
 from walkerlab.stages import basin
 from walkerlab.stages.basin import RigidQuestion
+from walkerlab.store.checkpoint import Checkpoint
 from walkerlab.store.content import Content
-from walkerlab.store.parts import Parts
 
 GAIT = {
     "state": [-0.2041996085033517, 0.1693996085033517, -0.605819000148935, -0.8610407199844384],
@@ -41,11 +41,11 @@ class CutOff(Silent):
 
 def run(folder, *sets, progress=None, jobs=1, **gait):
     config = only(load(None, sets or SMALL).config, PIPELINE["basin"].takes)
-    parts = Parts(folder / "basin.parts", "key")
+    checkpoint = Checkpoint(folder / "basin.parts", "key")
     inputs = {"fixedpoint": Content({}, GAIT | gait)}
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(basin, "DRAWN", 300)  # one attractor is found soon
-        return basin.run(config, inputs, progress or Silent(), parts=parts, jobs=jobs)
+        return basin.run(config, inputs, progress or Silent(), checkpoint=checkpoint, jobs=jobs)
 
 
 @pytest.fixture(scope="module")
@@ -158,7 +158,9 @@ def test_walkers_with_more_coordinates_are_refused(tmp_path):
     free = load(Path("kneed"), ["walker.knee.at_heel_strike=free"]).config
     inputs = {"fixedpoint": Content({}, GAIT)}
     with pytest.raises(ConfigError, match="3 coordinates just after heel strike; this one has 4"):
-        basin.run(only(free, PIPELINE["basin"].takes), inputs, Silent(), parts=Parts(tmp_path / "parts", "key"))
+        basin.run(
+            only(free, PIPELINE["basin"].takes), inputs, Silent(), checkpoint=Checkpoint(tmp_path / "parts", "key")
+        )
 
 
 def test_a_window_upside_down_is_refused(tmp_path):

@@ -18,10 +18,10 @@ from walkerlab.orbits.families import ValueSpan
 from walkerlab.orbits.family_search import THOROUGHNESS
 from walkerlab.orbits.newton import Effort
 from walkerlab.orbits.step_map import gait_near
+from walkerlab.pipeline.executor import answer_in_memory
 from walkerlab.pipeline.graph import PIPELINE
-from walkerlab.pipeline.identity import Keys
-from walkerlab.pipeline.in_memory import InMemory
 from walkerlab.pipeline.progress import Silent
+from walkerlab.pipeline.results import MemoryResults
 from walkerlab.scene.families import rigid_map
 from walkerlab.scene.parameter import parameter_of
 from walkerlab.stages import continuation
@@ -96,8 +96,8 @@ def test_a_sample_of_gaits_is_walked_again_and_how_many_is_told(in_degrees):
 
 def test_families_that_are_only_looked_at_are_the_same_without_a_numerical_error():
     asked = config("over=slope_deg", "from=1", "to=1.5", "periods=1")
-    keys = Keys().of(asked, "continuation")
-    looked_at, whole = (InMemory().answer(asked, "continuation", keys, again=again).content for again in (False, True))
+    memory = MemoryResults()
+    looked_at, whole = (answer_in_memory(asked, "continuation", memory, again=again) for again in (False, True))
     assert whole.summary["numerical_error"].keys() == {"rigid"}
     assert looked_at.summary == {**whole.summary, "numerical_error": {}}
 

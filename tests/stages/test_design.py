@@ -20,7 +20,7 @@ from walkerlab.scene.rigid import rigid_walker
 from walkerlab.solvers.registry import Tolerances
 from walkerlab.stages import design, fixedpoint
 from walkerlab.stages.robustness import subject_of
-from walkerlab.store.parts import Parts
+from walkerlab.store.checkpoint import Checkpoint
 
 # design contract, section 4
 FIXED_KEYS = {
@@ -28,11 +28,14 @@ FIXED_KEYS = {
 }  # fmt: skip
 
 
-def run(name, *changes, parts=None):
+def run(name, *changes, checkpoint=None):
     config = load(Path(name), changes).config
     gait = fixedpoint.run(only(config, PIPELINE["fixedpoint"].takes), {}, Silent())
     return design.run(
-        only(config, PIPELINE["design"].takes), {"fixedpoint": gait}, Silent(), parts=parts or Parts(None, "")
+        only(config, PIPELINE["design"].takes),
+        {"fixedpoint": gait},
+        Silent(),
+        checkpoint=checkpoint or Checkpoint(None, ""),
     ).summary
 
 
@@ -66,11 +69,11 @@ def test_a_search_far_from_the_configs_own_numbers_is_on_the_gait_that_is_sought
 
 def test_searches_that_were_cut_off_go_on_where_they_stopped(tmp_path):
     asked = ("design.minimise=spectral_radius", "design.over={walker.hip_mass_kg: [5, 50]}", "design.starts=2")
-    whole = run("slope-3deg", *asked, parts=Parts(tmp_path / "parts", "key"))
-    kept = Parts(tmp_path / "parts", "key")
+    whole = run("slope-3deg", *asked, checkpoint=Checkpoint(tmp_path / "parts", "key"))
+    kept = Checkpoint(tmp_path / "parts", "key")
     assert list(kept.kept) == ["search 0", "search 1"]
     del kept.kept["search 1"]  # cut off while it was at work
-    again = run("slope-3deg", *asked, parts=kept)
+    again = run("slope-3deg", *asked, checkpoint=kept)
     for name in ("evaluations", "without_gait", "optima", "on_bound", "best"):
         assert again[name] == whole[name]
     assert again["best"] == {"walker.hip_mass_kg": 50.0}

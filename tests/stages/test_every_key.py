@@ -16,10 +16,10 @@ from walkerlab.config.schema import Config
 from walkerlab.errors import ConfigError
 from walkerlab.orbits.families import ValueSpan
 from walkerlab.orbits.family_search import CONTACT, RIGID
+from walkerlab.pipeline.executor import answer_in_memory
 from walkerlab.pipeline.graph import PIPELINE
-from walkerlab.pipeline.identity import Keys
-from walkerlab.pipeline.in_memory import InMemory
 from walkerlab.pipeline.progress import Silent
+from walkerlab.pipeline.results import MemoryResults
 from walkerlab.scene.parameter import PHYSICAL, parameter_of
 from walkerlab.stages import robustness
 from walkerlab.stages.continuation import FamilyQuestion, models_of
@@ -130,7 +130,7 @@ def test_a_second_number_is_followed_or_refused_too(walker, config, keys):
 
 @pytest.fixture(scope="module")
 def fixedpoint(config):
-    return InMemory().answer(config, "fixedpoint", Keys().of(config, "fixedpoint")).content
+    return answer_in_memory(config, "fixedpoint", MemoryResults())
 
 
 @pytest.fixture(scope="module")

@@ -19,8 +19,8 @@ from walkerlab.report.answers import answer
 from walkerlab.report.sections.robustness import tables
 from walkerlab.scene.rigid import rigid_walker
 from walkerlab.stages import fixedpoint, robustness
+from walkerlab.store.checkpoint import Checkpoint
 from walkerlab.store.columns import rows_group
-from walkerlab.store.parts import Parts
 
 # design contract, section 4
 FIXED_KEYS = {
@@ -34,11 +34,13 @@ SCALED = "gait_sensitivity_norm_scaled"
 FEW = ("robustness.walks=20", "robustness.roughness_m=[0.002]", "robustness.to=[slope_deg, walker.hip_mass_kg]")
 
 
-def run(name, *changes, jobs=1, parts=None):
+def run(name, *changes, jobs=1, checkpoint=None):
     config = load(Path(name), changes).config
     gait = fixedpoint.run(only(config, PIPELINE["fixedpoint"].takes), {}, Silent())
     asked = only(config, PIPELINE["robustness"].takes)
-    return robustness.run(asked, {"fixedpoint": gait}, Silent(), parts=parts or Parts(None, ""), jobs=jobs)
+    return robustness.run(
+        asked, {"fixedpoint": gait}, Silent(), checkpoint=checkpoint or Checkpoint(None, ""), jobs=jobs
+    )
 
 
 @pytest.fixture(scope="module")
@@ -159,11 +161,11 @@ def test_large_means_are_told_to_the_digits_that_mean_something(rigid):
 
 def test_walks_are_the_same_for_any_number_of_processes_and_after_an_interruption(rigid, tmp_path):
     assert run("slope-3deg", "robustness.model=rigid", *FEW, jobs=3).summary == rigid.summary
-    kept = Parts(tmp_path / "parts", "key")
-    run("slope-3deg", "robustness.model=rigid", *FEW, parts=kept)
-    again = Parts(tmp_path / "parts", "key")
+    kept = Checkpoint(tmp_path / "parts", "key")
+    run("slope-3deg", "robustness.model=rigid", *FEW, checkpoint=kept)
+    again = Checkpoint(tmp_path / "parts", "key")
     assert len(again.kept) == 5
-    assert run("slope-3deg", "robustness.model=rigid", *FEW, parts=again).summary == rigid.summary
+    assert run("slope-3deg", "robustness.model=rigid", *FEW, checkpoint=again).summary == rigid.summary
 
 
 def test_a_number_that_no_walker_beside_has_is_told_with_the_reason():

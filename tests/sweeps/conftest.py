@@ -10,6 +10,7 @@ import pytest
 import walkerlab
 from walkerlab.config.loader import load
 from walkerlab.store.runfolder import RunFolder
+from walkerlab.sweeps.chunk import memory_for
 from walkerlab.sweeps.engines import Order, Pool, SweepEngine
 from walkerlab.sweeps.question import asked, axis_of_text
 from walkerlab.sweeps.sweep import SweepRun, SweepWork
@@ -57,5 +58,6 @@ def marks(tmp_path, monkeypatch):
     """Where points that are computed leave a mark: their number."""
     folder = tmp_path / "marks"
     folder.mkdir()
+    memory_for.cache_clear()  # earlier sweeps in this process leave what they needed
     monkeypatch.setenv("TOY_SWEEP_MARKS", str(folder))
     return lambda: len(list(folder.iterdir()))

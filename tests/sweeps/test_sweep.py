@@ -13,10 +13,10 @@ import xarray as xr
 from walkerlab.benchmarks.engines import registry
 from walkerlab.config.loader import load
 from walkerlab.errors import ConfigError
+from walkerlab.pipeline.executor import Executor, answer_in_memory
 from walkerlab.pipeline.graph import PIPELINE
 from walkerlab.pipeline.identity import Keys
-from walkerlab.pipeline.in_memory import InMemory
-from walkerlab.pipeline.plan import Planner
+from walkerlab.pipeline.results import FolderResults, MemoryResults
 from walkerlab.pipeline.runner import execute
 from walkerlab.stages.numerical_error import SAMPLE
 from walkerlab.store import artifact
@@ -24,7 +24,7 @@ from walkerlab.store.content import untimed
 from walkerlab.store.files import refused
 from walkerlab.store.runfolder import RunFolder
 from walkerlab.sweeps import sweep as sweeps
-from walkerlab.sweeps.chunk import FOLDER, Chunk, PointResult, SweepPoint, by_name, row_of, without_outputs
+from walkerlab.sweeps.chunk import FOLDER, Chunk, PointResult, by_name, compute_point, without_outputs
 from walkerlab.sweeps.drawing import said_of
 from walkerlab.sweeps.question import asked, axis_of_text
 from walkerlab.sweeps.result import Merge, as_csv, last_of_each
@@ -166,7 +166,7 @@ def test_keys_are_those_that_the_pipeline_stores_under(toy):
     report = execute(config, "roll", RunFolder(toy.runs, "alone"), graph=toy.graph)
     keys = Keys(toy.graph).of(config, "roll")
     assert keys == {name: artifact.read(toy.runs / "alone" / f"{name}.h5").identity.key for name in ("drop", "roll")}
-    assert report.summary == InMemory(toy.graph).answer(config, "roll", keys).content.summary
+    assert report.summary == answer_in_memory(config, "roll", MemoryResults(toy.graph)).summary
 
 
 @pytest.mark.parametrize("name", ["paper", "round-feet", "kneed"])
@@ -174,7 +174,8 @@ def test_a_point_of_any_stage_has_the_key_of_its_single_run(name, tmp_path):
     loaded = load(Path(name))
     stages = [stage for stage in PIPELINE.stages if not stage.draws]
     folder = RunFolder(tmp_path, loaded.run_name)
-    single = {step.stage.name: step.identity.key for step in Planner(loaded.config, folder).plan(stages)}
+    steps = Executor(loaded.config, FolderResults(folder), stages).plan()
+    single = {step.stage.name: step.identity.key for step in steps}
     assert {stage.name: Keys().of(loaded.config, stage.name)[stage.name] for stage in stages} == single
 
 
@@ -309,9 +310,8 @@ def test_the_file_says_what_was_asked(toy):
 @pytest.mark.parametrize("stage", ["simulate", "contact-sim"])
 def test_a_walk_in_a_sweep_has_the_summary_of_the_walk_alone(stage):
     config = load(sets=("strides=1",)).config
-    keys = Keys().of(config, stage)
-    row, _ = row_of(InMemory(), stage, SweepPoint(config, keys, True))
-    alone = InMemory().answer(config, stage, keys).content
+    (row,) = compute_point(config, "key", sweeps.PIPELINE_AT, stage, again=True).rows
+    alone = answer_in_memory(config, stage, MemoryResults())
     assert "trajectory" in alone.groups
     assert json.loads(row.numbers) == by_name(untimed(alone.summary, alone.timed))
 

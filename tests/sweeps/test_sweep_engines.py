@@ -14,8 +14,8 @@ import pytest
 from process_table import THERE, is_alive, processes_below
 
 from walkerlab.errors import ConfigError, NoAnswer
-from walkerlab.sweeps.engines import ENGINES, ONE_THREAD, JobExecutor, Order, SweepEngine, engine_named, one_thread_each
-from walkerlab.sweeps.fan_out import FanOut
+from walkerlab.pipeline.work import Spread
+from walkerlab.sweeps.engines import ENGINES, ONE_THREAD, JobExecutor, Order, engine_named, one_thread_each
 
 LOCAL = ENGINES["local"]
 
@@ -215,11 +215,11 @@ def test_an_engine_that_is_not_there_or_not_installed_is_said_so(monkeypatch):
 
 
 def test_chunks_grow_with_what_was_measured_and_shrink_towards_the_end():
-    work = FanOut(SweepEngine(None, 5.0), Order(), 5.0, iter(()), 10_000)
-    assert work._chunk_size(2) == 2
-    work.point_s = 0.01
-    assert work._chunk_size(2) == 500
+    work = Spread(iter(()), 10_000, list, print, 5.0)
+    assert work._batch_size(2) == 2
+    work.unit_s = 0.01
+    assert work._batch_size(2) == 500
     work.left = 60
-    assert work._chunk_size(2) == 50  # half a second of work, however little is left
-    work.point_s = 20.0
-    assert work._chunk_size(2) == 1
+    assert work._batch_size(2) == 50  # half a second of work, however little is left
+    work.unit_s = 20.0
+    assert work._batch_size(2) == 1

@@ -9,15 +9,15 @@ from walkerlab.outcome import Outcome
 from walkerlab.pipeline.graph import PIPELINE
 from walkerlab.pipeline.progress import Silent
 from walkerlab.stages import stability_maps
-from walkerlab.store.parts import Parts
+from walkerlab.store.checkpoint import Checkpoint
 from walkerlab.verification.maps import (
     NONE,
     PAPER_STIFFNESS,
     VERDICTS,
-    pieces_of,
     prepared_on_ground,
     step_column,
     stiction_cell,
+    units_of,
 )
 
 CELLS = 2
@@ -41,8 +41,8 @@ class CutOff(Silent):
 
 def run(folder, progress=None, jobs=1):
     config = only(load(None, [f"stability.map_cells={CELLS}"]).config, PIPELINE["stability-maps"].takes)
-    parts = Parts(folder / "maps.parts", "key")
-    return stability_maps.run(config, {}, progress or Silent(), parts=parts, jobs=jobs)
+    checkpoint = Checkpoint(folder / "maps.parts", "key")
+    return stability_maps.run(config, {}, progress or Silent(), checkpoint=checkpoint, jobs=jobs)
 
 
 @pytest.fixture(scope="module")
@@ -87,9 +87,9 @@ def test_where_no_error_was_measured_the_map_has_a_gap():
 
 
 def test_every_cell_has_a_name_of_its_own():
-    pieces = list(pieces_of(3))
-    assert len({name for name, *_ in pieces}) == len(pieces)
-    assert sum(cells for _, cells, _ in pieces) == 2 * 3 * 3
+    units = list(units_of(3))
+    assert len({name for name, *_ in units}) == len(units)
+    assert sum(cells for _, cells, _ in units) == 2 * 3 * 3
 
 
 def test_both_maps_are_stored(whole):
@@ -110,7 +110,7 @@ def test_on_oil_the_walker_slides_however_stiff_the_ground_below(stiffer):
 def test_a_run_that_was_cut_off_goes_on_and_comes_to_the_same(whole, tmp_path):
     with pytest.raises(KeyboardInterrupt):
         run(tmp_path, CutOff(left=1 + 3))  # what was there, and three pieces
-    kept = Parts(tmp_path / "maps.parts", "key").kept
+    kept = Checkpoint(tmp_path / "maps.parts", "key").kept
     assert sorted(kept) == ["step 0", "step 1", "stiction 0 0"]
     rest = CutOff(left=99)
     assert run(tmp_path, rest).digest() == whole.digest()

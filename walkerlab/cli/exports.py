@@ -17,13 +17,15 @@ from walkerlab.config.problems import meant
 from walkerlab.config.schema import Config
 from walkerlab.errors import ConfigError, StaleError, StorageError
 from walkerlab.labels import with_unit
+from walkerlab.pipeline.executor import Executor
 from walkerlab.pipeline.graph import PIPELINE
-from walkerlab.pipeline.plan import Planner
+from walkerlab.pipeline.results import FolderResults
 from walkerlab.pipeline.runs import config_of, makes, read_all, refusing_older, results_in, results_to_show, the_result
 from walkerlab.report.numbers import listed
 from walkerlab.report.outcomes import MODELS
 from walkerlab.report.tables import Table, as_csv, csv_text, of_records
 from walkerlab.report.tex import as_tex
+from walkerlab.store.artifact import Stored
 from walkerlab.store.clean import owner_of
 from walkerlab.store.files import as_text, storing, write_through
 from walkerlab.store.runfolder import RunFolder
@@ -196,13 +198,13 @@ def named_in(folder: RunFolder, name: str) -> Illustration | Table:
     raise ConfigError(f"nothing is called {name}.{near}", advice)
 
 
-def planned(folder: RunFolder) -> Planner:
-    """A run's planner, which has its current results; of a config that is none any more there are none."""
+def planned(folder: RunFolder) -> Executor:
+    """Executor of a run that holds its current results; without any if the run's config is not valid any more."""
     config = config_of(folder)
-    planner = Planner(config or Config(), folder, elsewhere=False)
-    if config is not None:
-        planner.plan(PIPELINE.stages)
-    return planner
+    stages = () if config is None else PIPELINE.stages
+    executor = Executor(config or Config(), FolderResults(folder, elsewhere=False), stages)
+    executor.plan()
+    return executor
 
 
 def figure(
@@ -215,10 +217,10 @@ def figure(
     Where what it needs is outdated, so may be all that is there, and the console is told.
     """
     stored = results_in(folder, illustration.stages)
-    planner, plot = planned(folder), PIPELINE["plot"]
-    taken = planner.inputs(plot)
-    known = taken.keys() | planner.left_out.keys()
-    outdated, _ = read_all(folder, (name for name in plot.results(planner.config) if name not in known))
+    run, plot = planned(folder), PIPELINE["plot"]
+    taken = {name: result for name, result in run.inputs(plot).items() if isinstance(result, Stored)}
+    known = taken.keys() | run.left_out.keys()
+    outdated, _ = read_all(folder, (name for name in plot.results(run.config) if name not in known))
     with refusing_older(folder, outdated):
         why = illustration.why_left_out(stored, {})
     if why is not None:

@@ -14,8 +14,9 @@ from walkerlab.config.loader import load
 from walkerlab.config.walkers import why_rigid_alone
 from walkerlab.config.writer import extending
 from walkerlab.errors import ConfigError, NoAnswer
+from walkerlab.pipeline.executor import told_once
 from walkerlab.pipeline.graph import PIPELINE, Graph, Stage
-from walkerlab.pipeline.runner import Options, StageReport, execute, told_once
+from walkerlab.pipeline.runner import Options, StageReport, execute
 from walkerlab.report.answers import answer, verdict
 from walkerlab.report.tables import aligned
 from walkerlab.store.files import storing

@@ -8,9 +8,9 @@ from typing import Any
 from walkerlab.cli.failures import tell
 from walkerlab.cli.request import Request
 from walkerlab.errors import ConfigError, StaleError
+from walkerlab.pipeline.executor import survey, told_once
 from walkerlab.pipeline.graph import Graph
-from walkerlab.pipeline.plan import UP_TO_DATE, Step, survey
-from walkerlab.pipeline.runner import told_once
+from walkerlab.pipeline.results import UP_TO_DATE, Step
 from walkerlab.pipeline.runs import RunSummary, config_of, run_named, runs_in
 from walkerlab.report.tables import aligned
 from walkerlab.report.text import described_summary
@@ -116,7 +116,7 @@ def print_stored(request: Request, graph: Graph, stage: str) -> None:
     step = next(step for step in survey(request.resolved, request.folder, graph) if step.stage.name == stage)
     if not request.folder.path.is_dir():
         raise ConfigError(f"there is no run at {request.folder.path}.", f"`walkerlab {stage}` creates it.")
-    if step.found is None:
+    if not isinstance(step.found, Stored):
         why = "there is none yet" if step.reason == NOT_THERE else step.reason
         raise StaleError(f"{path} cannot be shown: {why}.", f"`walkerlab {stage}` computes it.")
     if step.action != "reuse":

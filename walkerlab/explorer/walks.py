@@ -16,10 +16,10 @@ from walkerlab.config.schema import Config
 from walkerlab.config.writer import extending, to_yaml
 from walkerlab.errors import ConfigError, WalkerlabError
 from walkerlab.explorer.numbers import adjustable
-from walkerlab.pipeline.identity import Keys
-from walkerlab.pipeline.in_memory import InMemory
+from walkerlab.pipeline.executor import answer_in_memory
 from walkerlab.pipeline.progress import Silent
 from walkerlab.pipeline.resolve import resolve
+from walkerlab.pipeline.results import MemoryResults
 from walkerlab.report.results import Results
 from walkerlab.report.sections import motion
 from walkerlab.store.content import Content, Group
@@ -110,14 +110,13 @@ def sets_of(config: Config) -> tuple[str, ...]:
 
 
 @cache
-def memory() -> tuple[InMemory, Keys]:
-    """What this process remembers of earlier questions."""
-    return InMemory(), Keys()
+def memory() -> MemoryResults:
+    """Return what this process remembers of earlier questions."""
+    return MemoryResults()
 
 
 def walked(question: ExploredConfig) -> Answered:
     """The gait and the walks, with what a player has to know to show them."""
-    stages, keys = memory()
     try:
         loaded = question.loaded
         config = loaded.config
@@ -125,8 +124,7 @@ def walked(question: ExploredConfig) -> Answered:
         # The walks first: they leave the gait behind, and it is then there without being sought again.
         with kernel_cache.watched(tell):
             answers = {
-                stage: stages.answer(config, stage, keys.of(config, stage), again=False, anew=False)
-                for stage in (*wanted, "fixedpoint")
+                stage: answer_in_memory(config, stage, memory(), again=False) for stage in (*wanted, "fixedpoint")
             }
     except ConfigError as error:
         return question.refused(error)
@@ -135,13 +133,13 @@ def walked(question: ExploredConfig) -> Answered:
     walks: dict[str, Content] = {}
     for stage in ("fixedpoint", *wanted):
         said = answers[stage].no_answer
-        found[stage] = dict(answers[stage].content.summary)
+        found[stage] = answers[stage].findings
         if said is not None:
             found[stage]["error"] = {"message": said.message, "advice": said.advice, "exit_code": said.exit_code}
             if stage == "fixedpoint":
                 break
         elif stage != "fixedpoint":
-            walks[stage] = answers[stage].content
+            walks[stage] = answers[stage]
     if (player := motion.player(Results(config, walks), MAX_STEPS)) is not None:
         found["scene"] = player.scene
         tracks = [{"meta": walker.meta, "floats": walker.track.packed()} for walker in player.walkers]
@@ -162,16 +160,15 @@ def along(question: ExploredConfig) -> Answered:
 
     The question's changes hold the block `continuation`: key, ends and points. Status 409 if a newer question came.
     """
-    stages, keys = memory()
     try:
         config = question.loaded.config
-        answer = stages.answer(config, "continuation", keys.of(config, "continuation"), GivingWay(), again=False)
+        answer = answer_in_memory(config, "continuation", memory(), again=False, reporter=GivingWay())
     except ConfigError as error:
         return question.refused(error)
     except SupersededError:
         return SUPERSEDED
     # the steps of an attractor have periods, but they are no branch
-    branches = [(path, group) for path, group in answer.content.groups.items() if "step_length" in group.variables]
+    branches = [(path, group) for path, group in answer.groups.items() if "step_length" in group.variables]
     curves = [{"model": path.partition("/")[0], **curve(group)} for path, group in branches if walkable(group)]
     return 200, {"over": config.continuation.over, "curves": curves}
 

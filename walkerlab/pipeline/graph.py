@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from walkerlab.config import reads
 from walkerlab.config.reads import RigidConfig, SceneConfig, StartConfig
+from walkerlab.errors import ConfigError
 from walkerlab.scene.left_out import of_adjustment, of_contact_walk, of_rigid_walk, of_the_paper, of_verification
 
 # The table is also what the command line's help is made of, which loads no config and no pydantic.
@@ -171,6 +172,18 @@ class Graph:
             if stage.name in needed:
                 needed.update(stage.inputs(config))
         return tuple(stage for stage in self.stages if stage.name in needed)
+
+    def needed_in_memory(self, target: str, config: Config) -> tuple[Stage, ...]:
+        """The same for a result without files.
+
+        Raises ConfigError if the config lacks what a stage needs, and for a stage that draws the files of its run.
+        """
+        stages = self.needed_for(target, config)
+        for stage in stages:
+            if stage.draws:
+                raise ConfigError(f"{stage.name} draws the files of its run; it has no result without them.")
+            stage.refuse_unsuited(target, config)
+        return stages
 
     def campaigns_of(self, target: str) -> tuple[Stage, ...]:
         """What `--full` runs besides."""

@@ -6,7 +6,6 @@ from typing import Any
 from walkerlab.config.canonical import slice_of
 from walkerlab.config.overlay import over_paper
 from walkerlab.config.schema import Config
-from walkerlab.errors import ConfigError
 from walkerlab.pipeline.graph import PIPELINE, Graph, Stage
 from walkerlab.sources import Sources
 from walkerlab.store.key import Identity
@@ -23,23 +22,18 @@ class Keys:
         self._fixed: dict[str, dict[str, Any]] = {}
 
     def of(self, config: Config, target: str) -> dict[str, str]:
-        """The key of a stage and of each that it needs, by name.
-
-        Raises ConfigError if the config has not what it needs, and for a stage that has no result but files of its run.
-        """
+        """The key of a stage and of each that it needs, by name; ConfigError as `Graph.needed_in_memory` raises."""
         keys: dict[str, str] = {}
-        for stage in self.graph.needed_for(target, config):
-            if stage.draws:
-                raise ConfigError(f"{stage.name} draws the files of its run; it has no result without them.")
-            stage.refuse_unsuited(target, config)
+        for stage in self.graph.needed_in_memory(target, config):
             given = {name: keys[name] for name in stage.inputs(config)}
             keys[stage.name] = self.identity(stage, config, given).key
         return keys
 
-    def identity(self, stage: Stage, config: Config, input_keys: Mapping[str, str]) -> Identity:
+    def identity(self, stage: Stage, config: Config, input_keys: Mapping[str, str], again: bool = True) -> Identity:
         """The identity of a stage's result under a config.
 
         input_keys  keys of the results that it takes, by stage
+        again       whether its walks are taken a second time for their numerical error, as all that are stored
         """
         if stage.name not in self._fixed:
             # as `paper` what its own cases take of the built-in config, as `programs` the versions of those it drives
@@ -48,8 +42,9 @@ class Keys:
                 fixed["paper"] = slice_of(over_paper({}), stage.takes_of_paper)
             if stage.programs is not None:
                 fixed["programs"] = dict(stage.programs())
-        own = slice_of(config, stage.takes_under(config))
-        return Identity(stage.name, {**own, **self._fixed[stage.name]}, input_keys, self.code_digest(stage.name))
+        once = {} if again or not (stage.walks or stage.follows) else {"again": False}
+        own = {**slice_of(config, stage.takes_under(config)), **self._fixed[stage.name], **once}
+        return Identity(stage.name, own, input_keys, self.code_digest(stage.name))
 
     def code_digest(self, target: str) -> str:
         """The digest of a stage's code, as it was when it was first asked for."""

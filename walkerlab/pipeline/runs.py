@@ -15,8 +15,8 @@ from walkerlab.config.tree import Mapping as Tree
 from walkerlab.config.validation import typed
 from walkerlab.config.writer import to_yaml
 from walkerlab.errors import ConfigError, StaleError
+from walkerlab.pipeline.executor import survey
 from walkerlab.pipeline.graph import PIPELINE, Graph, Stage
-from walkerlab.pipeline.plan import survey
 from walkerlab.report.headlines import LAST_OF, headlines
 from walkerlab.report.numbers import listed
 from walkerlab.store import artifact

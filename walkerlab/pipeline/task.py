@@ -3,9 +3,9 @@
 import contextlib
 import importlib
 import sys
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping
 from concurrent.futures import Future
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from inspect import signature
 from typing import Any
@@ -16,25 +16,10 @@ from walkerlab.config.schema import Config
 from walkerlab.errors import NoAnswer, WalkerlabError
 from walkerlab.pipeline.graph import Stage
 from walkerlab.pipeline.progress import Progress
+from walkerlab.store.artifact import StageAnswer
 from walkerlab.store.content import Content
 from walkerlab.store.files import drawing_into
 from walkerlab.workers import WorkerPool, tell
-
-
-@dataclass(frozen=True)
-class StageAnswer:
-    """What a stage said: its content, which is partial if there is no answer and `no_answer` says why."""
-
-    content: Content
-    no_answer: NoAnswer | None = None
-
-    @property
-    def stored(self) -> Content:
-        """What is stored of it: of a stage without an answer what it has got, and what it says."""
-        if self.no_answer is None:
-            return self.content
-        said = {"message": self.no_answer.message, "advice": self.no_answer.advice}
-        return replace(self.content, summary={**self.content.summary, "no_answer": said})
 
 
 @dataclass(frozen=True)
@@ -44,11 +29,11 @@ class StageTask:
     config   what it takes of the config
     inputs   the results that it gets
     offered  what else it may ask for, by the names of parameters of its `run`:
-             jobs      processes for independent cells
-             parts     of its result, kept from a run that was cut off
-             again     whether walks are taken a second time for their numerical error
-             folder    of its run, which it draws into
-             left_out  the results that it has to do without as it draws
+             jobs        processes for independent cells
+             checkpoint  what an interrupted run has left of its result
+             again       whether walks are taken a second time for their numerical error
+             folder      of its run, which it draws into
+             left_out    the results that it has to do without as it draws
     """
 
     name: str
@@ -68,10 +53,11 @@ class StageTask:
                 content = run(self.config, self.inputs, progress, **given)
         except NoAnswer as error:
             partial = error.partial if isinstance(error.partial, Content) else Content()
-            return StageAnswer(partial, NoAnswer(error.message, error.advice))
+            why = {"no_answer": {"message": error.message, "advice": error.advice}}
+            return StageAnswer(partial.groups, {**partial.summary, **why}, partial.timed, complete=False)
         if not isinstance(content, Content):
             raise TypeError(f"{self.module}.run returned {type(content).__name__}, not Content")
-        return StageAnswer(content)
+        return StageAnswer(content.groups, content.summary, content.timed)
 
 
 def task_of(stage: Stage, config: Config, inputs: Mapping[str, Content], **offered: Any) -> StageTask:
@@ -119,24 +105,13 @@ class Precompiler:
         self._pool, self._config = pool, config
         self._begun: dict[str, Future[None]] = {}
 
-    @property
-    def begun(self) -> bool:
-        """Whether anything is."""
-        return bool(self._begun)
+    def begin(self, stage: Stage, only_first: bool) -> Future[None] | None:
+        """Compile for a stage that takes long to compile, once; None if nothing is begun.
 
-    def begin(self, later: Sequence[Stage]) -> None:
-        """Compile for the first of the later stages that takes long to compile."""
-        slow = [stage for stage in later if stage.compiles_long]
-        if slow:
-            self._start(slow[0], only_first=False)
-
-    def begin_if_first(self, stage: Stage) -> Future[None] | None:
-        """Compile for a stage that takes long to, once, if nothing is compiled yet."""
+        only_first  only where nothing is compiled yet, which the worker finds out
+        """
         if not stage.compiles_long or stage.name in self._begun:
             return None
-        return self._start(stage, only_first=True)
-
-    def _start(self, stage: Stage, only_first: bool) -> Future[None]:
         work = partial(compile_kernels, stage.module, self._config, only_first)
         future = self._begun[stage.name] = self._pool.start(work)
         return future

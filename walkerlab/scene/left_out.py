@@ -21,6 +21,9 @@ if TYPE_CHECKING:
     from walkerlab.config.schema import Output
     from walkerlab.config.walkers import Walker
 
+STILL_COMPUTED = "still being computed"
+"""Why a drawing made early has to do without a result."""
+
 
 @dataclass(frozen=True)
 class LeftOut:

@@ -1,4 +1,4 @@
-"""Which starts walk, which attractor each comes to and in how many steps; made piece by piece: a run may be cut off."""
+"""Which starts walk, and which attractor each reaches in how many steps; an interrupted run goes on."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ from walkerlab.orbits.scaled_starts import ScaledStarts
 from walkerlab.orbits.shooting import on_section
 from walkerlab.orbits.similarity import unit_walker
 from walkerlab.outcome import Outcome
-from walkerlab.pipeline.pieces import Piece, complete
 from walkerlab.pipeline.progress import Progress
+from walkerlab.pipeline.work import WorkUnit, complete
 from walkerlab.scene.contact import ContactScene, contact_gait, start_state, with_contact
 from walkerlab.scene.endings import Pads, endings
 from walkerlab.scene.rigid import rigid_walker
@@ -44,8 +44,8 @@ from walkerlab.solvers.system import Floats
 from walkerlab.stages.contact_sim import scene_on_pads, tolerances_of
 from walkerlab.stages.numerical_error import evenly_spread, tightened
 from walkerlab.stages.walk import OUTCOMES, counted
+from walkerlab.store.checkpoint import Checkpoint
 from walkerlab.store.content import Content, Group, Variable
-from walkerlab.store.parts import Parts
 
 HALF_WIDTH = (0.15, 0.25, 0.25)  # of the usual window, in rad and sqrt(g/L)
 SAMPLE = 100  # cells that are walked again
@@ -57,12 +57,12 @@ TEXTS = ("angle of the stance leg", "angular velocity of the swing leg", "angula
 
 
 def run(
-    config: BasinConfig, inputs: Mapping[str, Content], progress: Progress, *, parts: Parts, jobs: int = 1
+    config: BasinConfig, inputs: Mapping[str, Content], progress: Progress, *, checkpoint: Checkpoint, jobs: int = 1
 ) -> Content:
     """Walk from every cell that is not there yet, then from the parts of those at edges.
 
-    parts  cells that an earlier run has left, and where new ones are kept
-    jobs   processes
+    checkpoint  cells that an earlier run has left, and where new ones are kept
+    jobs        processes
 
     Raises ConfigError for the contact model without a contact block, NoAnswer if its pads are to fit a gait that
     there is not.
@@ -79,8 +79,8 @@ def run(
     question = question_of(config, inputs, window, rigid)
     begun, shared_from = time.perf_counter(), question.shared_from
     every = range(window.size)
-    pieces = pieces_of("cells", every, question.cells_at_once, 1, partial(ends_of, question, window))
-    ends, walks = complete(pieces, parts, "basin", progress, jobs, shared_from)
+    units = units_of("cells", every, question.cells_at_once, 1, partial(ends_of, question, window))
+    ends, walks = complete(units, checkpoint, "basin", progress, jobs, shared_from)
     found = WalkEnds(*np.concatenate([np.reshape(part, (3, -1)) for part in ends], axis=1).astype(np.int64))
     walked = found.outcome == Outcome.WALKED
     edges = edge_cells(np.where(walked, found.attractor, FAILED).reshape(window.cells))
@@ -88,8 +88,8 @@ def run(
     if config.basin.refine > 1 and edges.size:
         refine = config.basin.refine
         walks_of_cell, shares = refine ** len(window.axes), partial(shares_of, question, window, refine)
-        pieces = pieces_of("edge", edges.tolist(), question.edges_at_once, walks_of_cell, shares)
-        of_edges, more = complete(pieces, parts, "basin: edges", progress, jobs, shared_from)
+        units = units_of("edge", edges.tolist(), question.edges_at_once, walks_of_cell, shares)
+        of_edges, more = complete(units, checkpoint, "basin: edges", progress, jobs, shared_from)
         walking[edges], walks = np.concatenate(of_edges), walks + more
     rate = {"trajectories_per_s": walks / (time.perf_counter() - begun)} if walks else {}
     aperiodic = isinstance(question, RigidQuestion) and question.attractors.aperiodic
@@ -302,12 +302,12 @@ class ContactQuestion:
 Question = RigidQuestion | ContactQuestion
 
 
-def pieces_of(
+def units_of(
     name: str, cells: Sequence[int], at_once: int, walks: int, run: Callable[[Sequence[int]], list[float]]
-) -> list[Piece]:
-    """Cells as pieces of so many at once, each named by its first cell; a cell takes so many walks."""
-    pieces = (cells[first : first + at_once] for first in range(0, len(cells), at_once))
-    return [Piece(f"{name} {piece[0]}", walks * len(piece), partial(run, piece)) for piece in pieces]
+) -> list[WorkUnit]:
+    """Divide cells into units of `at_once`, each named by its first cell; a cell takes `walks` walks."""
+    groups = (cells[first : first + at_once] for first in range(0, len(cells), at_once))
+    return [WorkUnit(f"{name} {group[0]}", walks * len(group), partial(run, group)) for group in groups]
 
 
 def ends_of(question: Question, window: Window, cells: Sequence[int]) -> list[float]:

@@ -26,9 +26,9 @@ from walkerlab.scene.parameter import Parameter, parameter_of
 from walkerlab.scene.rigid import rigid_walker
 from walkerlab.solvers.system import Floats
 from walkerlab.stages.robustness import Subject, section_coordinates, subject_of
+from walkerlab.store.checkpoint import Checkpoint
 from walkerlab.store.columns import rows_group
 from walkerlab.store.content import Content
-from walkerlab.store.parts import Parts
 
 SOLVED: Final = Effort(1e-10)
 MEETING: Final = 1e-3  # between magnitudes of multipliers
@@ -40,10 +40,10 @@ LABELS: Final = {
 ADVICE: Final = "Widen the bounds (--over), or let other numbers go further (--keep)."
 
 
-def run(config: DesignConfig, inputs: Mapping[str, Content], progress: Progress, *, parts: Parts) -> Content:
+def run(config: DesignConfig, inputs: Mapping[str, Content], progress: Progress, *, checkpoint: Checkpoint) -> Content:
     """Search; raises ConfigError for a question that cannot be meant, NoAnswer where no walker keeps the bounds.
 
-    parts  ends of searches that an earlier run has left, and where new ones are kept
+    checkpoint  ends of searches that an earlier run has left, and where new ones are kept
     """
     refuse(config)
     asked = config.design or Design()
@@ -61,8 +61,8 @@ def run(config: DesignConfig, inputs: Mapping[str, Content], progress: Progress,
     def search(number: int, start: Floats) -> Descent:
         progress.start(f"design: search {number + 1} of {asked.starts}")
         name, before, gaits.z = f"search {number}", gaits.counts.copy(), own_z
-        if name in parts.kept:
-            kept = np.array(parts.kept[name])
+        if name in checkpoint.kept:
+            kept = np.array(checkpoint.kept[name])
             counts, gradient_norm, x, gaits.z = np.split(kept, (2, 3, 3 + own.size))
             point = gaits.at(x)
             gaits.counts = before + counts.astype(int)
@@ -70,7 +70,7 @@ def run(config: DesignConfig, inputs: Mapping[str, Content], progress: Progress,
         one = sought(question, start)
         if one.point is not None:
             z = gaits.found[one.x.tobytes()]
-            parts.keep(name, [*(gaits.counts - before).tolist(), one.gradient_norm, *one.x.tolist(), *z.tolist()])
+            checkpoint.keep(name, [*(gaits.counts - before).tolist(), one.gradient_norm, *one.x.tolist(), *z.tolist()])
         return one
 
     searches = searched(question, own, asked.starts, config.seed, search)

@@ -6,7 +6,6 @@ from pathlib import Path
 
 from walkerlab.config.schema import Config
 from walkerlab.pipeline.graph import PIPELINE
-from walkerlab.pipeline.plan import STILL_COMPUTED
 from walkerlab.pipeline.progress import Progress
 from walkerlab.report.blocks import MAIN
 from walkerlab.report.page import Page, render
@@ -15,7 +14,7 @@ from walkerlab.report.registry import pages_of
 from walkerlab.report.results import Results
 from walkerlab.report.sections.closing import TITLES
 from walkerlab.report.tables import Table
-from walkerlab.scene.left_out import LeftOut
+from walkerlab.scene.left_out import STILL_COMPUTED, LeftOut
 from walkerlab.store import index
 from walkerlab.store.artifact import Stored
 from walkerlab.store.content import Content

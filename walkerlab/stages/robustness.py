@@ -1,4 +1,4 @@
-"""What a gait withstands, in both models, and which numbers of the config move it; walks are kept piece by piece."""
+"""What a gait withstands, in both models, and which numbers of the config move it; walks are kept as they are taken."""
 
 from __future__ import annotations
 
@@ -35,17 +35,17 @@ from walkerlab.orbits.robustness import (
 from walkerlab.orbits.shooting import EXACT, RigidMap, coordinates_of
 from walkerlab.orbits.similarity import unit_walker
 from walkerlab.orbits.step_map import StepMap
-from walkerlab.pipeline.pieces import Piece, complete
 from walkerlab.pipeline.progress import Progress, each_told
+from walkerlab.pipeline.work import WorkUnit, complete
 from walkerlab.scene.families import contact_map, not_read, reads, rigid_map
 from walkerlab.scene.parameter import SLOPE, SLOPE_DEG, SLOPE_RAD, Parameter, parameter_of, why_no_parameter
 from walkerlab.scene.rigid import rigid_scene, rigid_walker
 from walkerlab.solvers.registry import ENDLESS, Tolerances
 from walkerlab.solvers.system import Floats
 from walkerlab.stages.simulate import groups as groups_of_walk
+from walkerlab.store.checkpoint import Checkpoint
 from walkerlab.store.columns import rows_group
 from walkerlab.store.content import Content, Group, Variable
-from walkerlab.store.parts import Parts
 from walkerlab.workers import in_order
 
 Rows = list[dict[str, Any]]
@@ -56,8 +56,6 @@ WALKS_AT_ONCE: Final = 25
 STEPS_DRAWN: Final = 8
 MAX_STEPS: Final = {RIGID: 2_000_000, CONTACT: 40_000}
 """On one rough ground, all walks together."""
-COMPILED: Final = ()
-"""No piece comes first: with the gait's own numbers all kernels are there."""
 GIVEN: Final = ("normal_impulse_N_s", "min_normal_force_N")
 """What the ground gives in a push and after it, as `RigidMap.ground_after_push` returns it."""
 UNITS: Final = {"floor-drop": "m", "hip-push": "N s"}
@@ -105,12 +103,17 @@ LABELS: Final[dict[str, dict[str, Label]]] = {
 
 
 def run(
-    config: RobustnessConfig, inputs: Mapping[str, Content], progress: Progress, *, parts: Parts, jobs: int = 1
+    config: RobustnessConfig,
+    inputs: Mapping[str, Content],
+    progress: Progress,
+    *,
+    checkpoint: Checkpoint,
+    jobs: int = 1,
 ) -> Content:
     """Ask each model; raises NoAnswer, with what there is, for an unstable gait, which has no norm.
 
-    parts  walks that an earlier run has left, and where new ones are kept
-    jobs   processes
+    checkpoint  walks that an earlier run has left, and where new ones are kept
+    jobs        processes
 
     Raises ConfigError for a question that cannot be meant.
     """
@@ -130,8 +133,9 @@ def run(
             continue
         found["gait_sensitivity_norm"] += norms(subject.model, here)
         rough_walks, label = [*rough(subject, config)], f"robustness: {subject.model} model"
-        pieces = [*single(subject, config), *rough_walks]
-        done, _ = complete(pieces, parts, label, progress, jobs if rough_walks else jobs_but_for_walks, first=COMPILED)
+        units, processes = [*single(subject, config), *rough_walks], jobs if rough_walks else jobs_but_for_walks
+        # with the gait's own numbers all kernels are there
+        done, _ = complete(units, checkpoint, label, progress, processes, compiled=True)
         (down,), (up,), (forward, *ahead), (backward, *behind), *walks = done
         of, wanted = {"model": subject.model}, {"steps": config.robustness.steps}
         found["largest_step"].append({**of, "down_m": down, "up_m": up, **wanted})
@@ -271,12 +275,12 @@ def norms(model: str, here: Standpoint) -> Iterator[dict[str, Any]]:
             }
 
 
-def single(subject: Subject, config: RobustnessConfig) -> Iterator[Piece]:
+def single(subject: Subject, config: RobustnessConfig) -> Iterator[WorkUnit]:
     """The search for the largest drop and push of either sign."""
     for disturbance in DISTURBANCES:
         for sign in (1.0, -1.0):
             run = partial(single_of, subject, disturbance, sign, config.robustness.steps)
-            yield Piece(f"{subject.model} {disturbance} {sign:g}", 1, run)
+            yield WorkUnit(f"{subject.model} {disturbance} {sign:g}", 1, run)
 
 
 def single_of(subject: Subject, disturbance: Any, sign: float, steps: int) -> list[float]:
@@ -287,14 +291,14 @@ def single_of(subject: Subject, disturbance: Any, sign: float, steps: int) -> li
     return [size]
 
 
-def rough(subject: Subject, config: RobustnessConfig) -> Iterator[Piece]:
+def rough(subject: Subject, config: RobustnessConfig) -> Iterator[WorkUnit]:
     """The walks on rough ground, some at a time."""
     asked, most = config.robustness, cap(subject.model, config)
     for roughness in asked.roughness_m:
         for first in range(0, asked.walks, WALKS_AT_ONCE):
             walks = range(first, min(first + WALKS_AT_ONCE, asked.walks))
             run = partial(rough_of, subject, roughness, config.seed, walks, most)
-            yield Piece(f"{subject.model} rough {roughness:g} {first}", len(walks), run)
+            yield WorkUnit(f"{subject.model} rough {roughness:g} {first}", len(walks), run)
 
 
 def cap(model: str, config: RobustnessConfig) -> int:
@@ -349,7 +353,7 @@ def sensitivities(
     """Rows of derivatives, the largest relative effect first, numbers that are 0 behind those that are not."""
     keys = numbers_read(subject, wanted)
     label, rows = f"robustness: gradients of the {subject.model} model", list[dict[str, Any]]()
-    found = in_order([partial(gradients_of, subject, key) for key in keys], jobs, COMPILED)
+    found = in_order([partial(gradients_of, subject, key) for key in keys], jobs)
     for key, of_key in each_told(progress, label, len(keys), zip(keys, found, strict=True)):
         parameter = parameter_of(key, subject.config)
         value = parameter.value_in(subject.config)

@@ -1,4 +1,4 @@
-"""Maps of stability over stiffness, stiction velocity and step size, made piece by piece: a run may be cut off."""
+"""Maps of stability over stiffness, stiction velocity and step size; an interrupted run goes on."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -7,11 +7,11 @@ import numpy as np
 
 from walkerlab.config.reads import MapsConfig
 from walkerlab.outcome import Outcome
-from walkerlab.pipeline.pieces import Piece, complete
 from walkerlab.pipeline.progress import Progress
+from walkerlab.pipeline.work import WorkUnit, complete
 from walkerlab.stages.walk import OUTCOMES, counted
+from walkerlab.store.checkpoint import Checkpoint
 from walkerlab.store.content import Content, Group, Variable
-from walkerlab.store.parts import Parts
 from walkerlab.verification import maps
 from walkerlab.verification.ordinary import FINE, STEPS
 
@@ -26,16 +26,16 @@ OF_STICTION = {
 
 
 def run(
-    config: MapsConfig, _inputs: Mapping[str, Content], progress: Progress, *, parts: Parts, jobs: int = 1
+    config: MapsConfig, _inputs: Mapping[str, Content], progress: Progress, *, checkpoint: Checkpoint, jobs: int = 1
 ) -> Content:
     """Compute what is not there yet of both maps.
 
-    parts  cells that an earlier run has left, and where new ones are kept
-    jobs   processes
+    checkpoint  cells that an earlier run has left, and where new ones are kept
+    jobs        processes
     """
     cells = config.stability.map_cells
-    complete([Piece(*one) for one in maps.pieces_of(cells)], parts, "stability maps", progress, jobs)
-    stiction, step = stiction_group(cells, parts.kept), step_group(cells, parts.kept)
+    complete([WorkUnit(*unit) for unit in maps.units_of(cells)], checkpoint, "stability maps", progress, jobs)
+    stiction, step = stiction_group(cells, checkpoint.kept), step_group(cells, checkpoint.kept)
     return Content({"stiction": stiction, "step": step}, summary_of(stiction, step))
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from walkerlab.config.canonical import canonical_json
+from walkerlab.errors import NoAnswer
 from walkerlab.store import hdf5
 from walkerlab.store.content import Attribute, Content, Digest, Group, Variable
 from walkerlab.store.files import file_digest, read_bounded, refuse_full_disk, replacing, write_atomically
@@ -44,16 +45,35 @@ class OtherLayout(Damaged):
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Stored(Content):
+class StageAnswer(Content):
+    """Answer of a stage, in memory or stored.
+
+    complete  False for the partial results of a stage that found no answer; the summary then says why
+    """
+
+    complete: bool = True
+
+    @property
+    def no_answer(self) -> NoAnswer | None:
+        """Why there is no answer, with advice; None if there is one."""
+        said = self.summary.get("no_answer", {})
+        return None if self.complete else NoAnswer(said.get("message", "no answer"), said.get("advice", ""))
+
+    @property
+    def findings(self) -> dict[str, Any]:
+        """The summary of what was computed, without the reason why there is no answer."""
+        return {key: value for key, value in self.summary.items() if self.complete or key != "no_answer"}
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Stored(StageAnswer):
     """The content of an artifact as read back, with what it was determined by and where it comes from.
 
-    complete  False for the partial results of a stage that found no answer
-    seal      sha256 of the file, provenance and timings included
+    seal  sha256 of the file, provenance and timings included
     """
 
     identity: Identity
     provenance: Provenance
-    complete: bool
     seal: str
 
 

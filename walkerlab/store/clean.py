@@ -22,7 +22,7 @@ def files_of(folder: RunFolder, stages: Iterable[str]) -> list[Path]:
     found = {path for pattern in (*DRAWN, *SWEPT, *COMPARED, f"**/{TEMPORARY}") for path in folder.path.glob(pattern)}
     inside = folder.path.resolve()
     for stage in stages:
-        found |= {folder.artifact(stage), folder.parts(stage)}
+        found |= {folder.artifact(stage), folder.checkpoint(stage)}
         with contextlib.suppress(OSError, Damaged):
             listed = indexed_files(read(folder.artifact(stage)))
             found |= {folder.path / name for name in listed if (inside / name).resolve().is_relative_to(inside)}

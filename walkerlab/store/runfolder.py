@@ -83,8 +83,8 @@ class RunFolder:
         """The file of a stage's result."""
         return self.path / f"{stage}.h5"
 
-    def parts(self, stage: str) -> Path:
-        """The file of what there is of a stage's result while it is in the making."""
+    def checkpoint(self, stage: str) -> Path:
+        """The file of what was computed of a stage's result until it is complete."""
         return self.path / f"{stage}.parts"
 
     def record(self) -> Record | None:

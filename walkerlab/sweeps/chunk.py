@@ -1,4 +1,4 @@
-"""A chunk of a sweep: some points computed in one go, anywhere, and kept as one file named by what is in it."""
+"""Points of a sweep: computed anywhere, and kept in chunks, each a file named by what is in it."""
 
 from __future__ import annotations
 
@@ -6,20 +6,22 @@ import hashlib
 import importlib
 import json
 import re
-import time
 import traceback
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
-from typing import Annotated, Any, Final, Literal, NamedTuple
+from typing import Annotated, Any, Final, Literal
 
 from walkerlab.config.schema import Config
 from walkerlab.errors import WalkerlabError
 from walkerlab.labels import Label, labels_of
+from walkerlab.pipeline.executor import answer_in_memory
 from walkerlab.pipeline.graph import Graph
+from walkerlab.pipeline.results import MemoryResults
+from walkerlab.pipeline.work import WorkUnit
 from walkerlab.store import artifact
-from walkerlab.store.artifact import Damaged, OtherLayout
+from walkerlab.store.artifact import Damaged, OtherLayout, StageAnswer
 from walkerlab.store.columns import rows_group
 from walkerlab.store.content import Content, untimed
 from walkerlab.store.key import Identity
@@ -49,39 +51,6 @@ class PointResult:
     """The traceback of the bug that stopped it; empty if none did."""
 
 
-class SweepPoint(NamedTuple):
-    """A point of a sweep.
-
-    keys   of its result and of the results it needs, by stage
-    again  whether its walk is taken a second time for its numerical error
-    """
-
-    config: Config
-    keys: dict[str, str]
-    again: bool
-
-
-@dataclass(frozen=True)
-class ChunkTask:
-    """What a worker is sent.
-
-    graph     where the pipeline is, as module:NAME
-    target    the stage
-    failures  failed attempts
-    """
-
-    graph: str
-    target: str
-    points: tuple[SweepPoint, ...]
-    failures: int = 0
-
-    def split(self) -> Iterator[ChunkTask]:
-        """Both halves of a chunk of at least two points."""
-        middle = len(self.points) // 2
-        for half in (self.points[:middle], self.points[middle:]):
-            yield replace(self, points=half)
-
-
 @dataclass(frozen=True)
 class Chunk:
     """Some points' rows, with unit and meaning of the numbers that the stage itself has labelled."""
@@ -90,51 +59,50 @@ class Chunk:
     labels: Labels
 
 
-def compute(task: ChunkTask) -> Chunk:
-    """Compute a chunk's points in this process; what goes wrong with one does not end the others."""
-    worker = worker_at(task.graph)
-    labels: dict[str, tuple[str, str]] = {}
-    rows = []
-    for point in task.points:
-        started = time.perf_counter()
-        row, content = row_of(worker, task.target, point)
-        rows.append(replace(row, wall_s=time.perf_counter() - started))
-        labels.update(labels_in(content, labels))
-    return Chunk(tuple(rows), labels)
+def unit_of(config: Config, key: str, graph: str, target: str, again: bool) -> WorkUnit:
+    """The computation of one point, which may be done anywhere.
+
+    key    of the result
+    graph  where the pipeline is, as module:NAME
+    again  whether its walk is taken a second time for its numerical error
+    """
+    return WorkUnit(key, 1, partial(compute_point, config, key, graph, target, again))
 
 
 @cache
-def worker_at(where: str) -> Any:
-    """This process's memory of what points need, kept from chunk to chunk; `where` as in `ChunkTask`."""
-    from walkerlab.pipeline.in_memory import InMemory
-
-    module, _, name = where.partition(":")
-    return InMemory(getattr(importlib.import_module(module), name))
+def memory_for(graph: str) -> MemoryResults:
+    """Return this process's memory of what points need, kept from chunk to chunk; `graph` as in `unit_of`."""
+    module, _, name = graph.partition(":")
+    return MemoryResults(getattr(importlib.import_module(module), name))
 
 
-def row_of(worker: Any, target: str, point: SweepPoint) -> tuple[PointResult, Content]:
-    """One point's row, and the content it is from."""
-    key = point.keys[target]
+def compute_point(config: Config, key: str, graph: str, target: str, again: bool) -> Chunk:
+    """Compute one point in this process; what goes wrong with it does not end the others."""
+    memory = memory_for(graph)
+    stages = memory.keys.graph
     try:
-        config = without_outputs(point.config, target, worker.graph)
-        again = point.again or not worker.graph[target].walks
-        answer = worker.answer(config, target, point.keys, again=again)
+        config = without_outputs(config, target, stages)
+        answer = answer_in_memory(config, target, memory, again=again or not stages[target].walks)
     except WalkerlabError as error:
-        return PointResult(key, "failed", error.message), Content()
+        return Chunk((PointResult(key, "failed", error.message),), {})
     except Exception as error:
         why = f"a bug: {type(error).__name__}: {error}"
-        return PointResult(key, "failed", why, bug=traceback.format_exc()), Content()
-    why_not = None if answer.no_answer is None else answer.no_answer.message
-    return told(key, answer.content, why_not), answer.content
+        return Chunk((PointResult(key, "failed", why, bug=traceback.format_exc()),), {})
+    return chunk_of(key, answer)
 
 
-def told(key: str, content: Content, no_answer: str | None) -> PointResult:
-    """A stage's result as a row.
+def joined(points: Sequence[tuple[Chunk, float]]) -> Chunk:
+    """Join chunks of a point each, with the time (s) that each took."""
+    rows = tuple(replace(row, wall_s=wall_s) for point, wall_s in points for row in point.rows)
+    return Chunk(rows, {name: label for point, _ in points for name, label in point.labels.items()})
 
-    no_answer  why there is none
-    """
-    numbers = json.dumps(by_name(untimed(content.summary, content.timed)), allow_nan=False, separators=(",", ":"))
-    return PointResult(key, "answered" if no_answer is None else "no-answer", no_answer or "", numbers)
+
+def chunk_of(key: str, answer: StageAnswer) -> Chunk:
+    """A stage's answer as a chunk of one point."""
+    numbers = json.dumps(by_name(untimed(answer.summary, answer.timed)), allow_nan=False, separators=(",", ":"))
+    status: Status = "answered" if answer.no_answer is None else "no-answer"
+    reason = "" if answer.no_answer is None else answer.no_answer.message
+    return Chunk((PointResult(key, status, reason, numbers),), labels_in(answer))
 
 
 def by_name(summary: Mapping[str, Any]) -> dict[str, Any]:
@@ -181,14 +149,12 @@ def without_outputs(config: Config, target: str, graph: Graph) -> Config:
     return config.model_copy(update={"outputs": ()}) if asking == [target] else config
 
 
-def labels_in(content: Content, known: Mapping[str, Any]) -> dict[str, tuple[str, str]]:
+def labels_in(content: Content) -> dict[str, tuple[str, str]]:
     """Unit and meaning of the summary's numbers that are a variable in a group as well."""
-    missing = [name for name in content.summary if name not in known]
     found = {}
-    for group in content.groups.values() if missing else ():
-        for name in missing:
-            if name in group.variables:
-                found[name] = (group.variables[name].units, group.variables[name].long_name)
+    for group in content.groups.values():
+        for name in content.summary.keys() & group.variables.keys():
+            found[name] = (group.variables[name].units, group.variables[name].long_name)
     return found
 
 
@@ -232,5 +198,4 @@ def stored_chunks(
         except (OSError, Damaged):
             continue
         if stored.identity.key in wanted:
-            why_not = None if stored.complete else str(stored.summary.get("no_answer", {}).get("message", ""))
-            yield Chunk((told(stored.identity.key, stored, why_not),), labels_in(stored, {}))
+            yield chunk_of(stored.identity.key, stored)

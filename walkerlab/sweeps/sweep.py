@@ -19,6 +19,7 @@ from walkerlab.pipeline.graph import PIPELINE, Graph
 from walkerlab.pipeline.identity import Keys
 from walkerlab.pipeline.progress import Progress, Reporter, Silent
 from walkerlab.pipeline.runs import claim, refuse_another_config
+from walkerlab.pipeline.work import Spread, WorkUnit
 from walkerlab.stages.numerical_error import SAMPLE, evenly_spread
 from walkerlab.store import artifact, provenance
 from walkerlab.store.content import Content, Group
@@ -26,9 +27,8 @@ from walkerlab.store.files import make_folder
 from walkerlab.store.hdf5 import GroupOnDisk
 from walkerlab.store.key import Identity
 from walkerlab.store.runfolder import RunFolder
-from walkerlab.sweeps.chunk import Chunk, PointResult, SweepPoint, store, stored_chunks
+from walkerlab.sweeps.chunk import Chunk, PointResult, joined, store, stored_chunks, unit_of
 from walkerlab.sweeps.engines import ENGINES, Order, SweepEngine
-from walkerlab.sweeps.fan_out import FanOut
 from walkerlab.sweeps.question import SweptStage
 from walkerlab.sweeps.result import Merge
 
@@ -270,17 +270,23 @@ class SweepRun:
                     bugs[place] = bug
             progress.advance(len(chunk.rows))
 
-        todo = self._points(missing.tolist())
-        chunk_s = work.chunk_s or work.engine.chunk_s
-        FanOut(work.engine, work.order, chunk_s, todo, int(missing.size)).run(work.graph, stage, keep)
+        def give_up(unit: WorkUnit, error: BaseException) -> None:
+            why = f"its worker died: {type(error).__name__}: {error}"
+            keep(Chunk((PointResult(unit.name, "failed", why),), {}))
+
+        todo, chunk_s = self._units(missing.tolist(), work.graph), work.chunk_s or work.engine.chunk_s
+        spread = Spread(todo, int(missing.size), lambda _units, points: keep(joined(points)), give_up, chunk_s)
+        with work.engine.opened(work.order) as pool:
+            spread.run(pool.executor, pool.workers)
         return tuple(bugs.values())
 
-    def _points(self, indices: list[int]) -> Iterator[SweepPoint]:
-        """Points; of a sample of all walks are taken again."""
+    def _units(self, indices: list[int], graph: str) -> Iterator[WorkUnit]:
+        """Points to compute; of a sample of all points walks are taken again."""
+        stage = self.question.stage
         sample = set(np.sort(self.first)[evenly_spread(self.first.size, SAMPLE)].tolist())
         for index in indices:
             config = self.config(index)
-            yield SweepPoint(config, self.keys.of(config, self.question.stage), index in sample)
+            yield unit_of(config, self.keys.of(config, stage)[stage], graph, stage, index in sample)
 
 
 def refuse_unknown_stage(name: str, graph: Graph) -> None:

@@ -86,8 +86,8 @@ def step_column(stiffness: float, steps_s: tuple[float, ...]) -> Numbers:
     return numbers
 
 
-def pieces_of(cells: int) -> Iterator[tuple[str, int, Callable[[], Numbers]]]:
-    """Everything there is to compute for maps of `cells` cells along each axis: of each piece name, cells and call."""
+def units_of(cells: int) -> Iterator[tuple[str, int, Callable[[], Numbers]]]:
+    """Yield all units of work for maps of `cells` cells along each axis: name, number of cells, and call."""
     stiffness = np.geomspace(*STIFFNESS, cells)
     steps = tuple(float(h) for h in np.geomspace(*STEP, cells))
     for i, k in enumerate(stiffness):

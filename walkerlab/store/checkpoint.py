@@ -1,7 +1,7 @@
-"""Parts of a result that is long in the making, kept so that a run that was cut off goes on where it stopped.
+"""Checkpoint of a result that takes long to compute: an interrupted run goes on where it stopped.
 
-A journal beside the artifact: a line for each part, each with a checksum, the first line with the key of the result
-they belong to. Lines are only ever added; a last one that was cut short is dropped.
+A journal beside the artifact: a line for each unit of work, each with a checksum, the first line with the key of the
+result they belong to. Lines are only ever added; a last one that was cut short is dropped.
 """
 
 import contextlib
@@ -15,13 +15,13 @@ from walkerlab.store.files import storing
 Numbers = list[float]
 
 
-class Parts:
-    """The parts of one result."""
+class Checkpoint:
+    """Numbers of the units of work that one result is made of, by name."""
 
     def __init__(self, path: Path | None, key: str) -> None:
-        """Take up what a run with the same key has left at `path`; anything else is begun anew with the first part.
+        """Resume from the journal at `path` if its key matches; otherwise start over with the first unit.
 
-        path  of the journal; None keeps parts in memory alone
+        path  of the journal; None keeps numbers in memory alone
         """
         self.path, self.key = path, key
         self.kept: dict[str, Numbers] = {}
@@ -38,7 +38,7 @@ class Parts:
                 self._intact += len(text)
 
     def keep(self, name: str, numbers: Numbers) -> None:
-        """Add a part; StorageError if the system refuses."""
+        """Add the numbers of a unit; StorageError if the system refuses."""
         self.kept[name] = numbers
         if self.path is None:
             return
@@ -53,7 +53,7 @@ class Parts:
             self._intact = file.tell()
 
     def forget(self) -> None:
-        """Remove all parts; StorageError if the system refuses."""
+        """Remove all that was kept; StorageError if the system refuses."""
         self.kept, self._intact = {}, 0
         if self.path is not None:
             with storing(self.path):

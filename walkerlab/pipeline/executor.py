@@ -1,0 +1,350 @@
+"""The executor: decides for each stage whether its result is reused, made or left out, and carries that out."""
+
+import importlib
+import time
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future
+from dataclasses import dataclass
+from functools import partial
+from queue import SimpleQueue
+from typing import Any
+
+from walkerlab.config.schema import Config
+from walkerlab.kernel_cache import watched
+from walkerlab.pipeline.graph import NO_CONTACT, PIPELINE, Graph, Stage
+from walkerlab.pipeline.progress import Reporter, Silent, StageReporter
+from walkerlab.pipeline.results import FolderResults, MemoryResults, Results, Step
+from walkerlab.pipeline.task import Precompiler, StageTask, nothing_compiled_yet, run_in_worker, task_of
+from walkerlab.scene.left_out import STILL_COMPUTED, LeftOut
+from walkerlab.store.artifact import NOT_THERE, StageAnswer, Stored
+from walkerlab.store.key import Identity
+from walkerlab.store.runfolder import RunFolder
+from walkerlab.workers import WorkerPool
+
+
+@dataclass(frozen=True)
+class StageDone:
+    """What was done with one stage: `action` as in `Step`, `wall_s` the time it ran."""
+
+    stage: str
+    action: str
+    reason: str
+    wall_s: float = 0.0
+
+
+@dataclass(frozen=True)
+class Begun:
+    """A stage that runs."""
+
+    step: Step
+    task: StageTask
+    reporter: StageReporter
+    started: float
+
+
+class Executor:
+    """Decides on the stages of a config, one after another, and carries out what it decides.
+
+    stages    in an order in which they can run; `force`: each runs that is not left out
+    jobs      processes for stages that do not need each other, and for independent cells of a stage
+    again     whether walks are taken a second time for their numerical error
+    answers   those that there are, by stage
+    left_out  the stages that are left out, and why
+    done      what was done with each stage
+    """
+
+    def __init__(
+        self,
+        config: Config,
+        results: Results,
+        stages: Sequence[Stage],
+        *,
+        force: bool = False,
+        jobs: int = 1,
+        again: bool = True,
+        reporter: Reporter | None = None,
+    ) -> None:
+        """Decide nothing yet."""
+        self.config, self.results, self.stages, self.graph = config, results, tuple(stages), results.keys.graph
+        self.force, self.jobs, self.again, self.reporter = force, jobs, again, reporter or Silent()
+        self.answers: dict[str, StageAnswer] = {}
+        self.left_out: dict[str, str] = {}
+        self.done: list[StageDone] = []
+        self._keys: dict[str, str] = {}
+        self._waiting: list[Stage] = []
+        self._running: dict[Future[Any] | None, Begun] = {}
+        self._working: set[Future[Any]] = set()
+        self._events: SimpleQueue[Callable[[], bool]] = SimpleQueue()
+        self._left: list[str] = []
+        self._total = 0
+
+    def plan(self) -> tuple[Step, ...]:
+        """Decide on all stages, assuming that each goes as decided; touches nothing."""
+        steps = []
+        for stage in self.stages:
+            step = self._decide(stage)
+            if not (stage.optional and step.action == "run"):  # what is optional is counted on once it is there
+                self._expect(step)
+            steps.append(step)
+        return tuple(steps)
+
+    def carry_out(self, likely: Sequence[Stage] = ()) -> None:
+        """Decide on the stages and do what is decided; those of `likely` will probably run."""
+        self._waiting, self._left, self._total = list(self.stages), [stage.name for stage in likely], len(likely)
+        beside = self.jobs > 1 and any_side_by_side(likely, self.config)
+        try:
+            with WorkerPool(self.jobs) as pool:
+                precompiler = Precompiler(pool, self.config)
+                while self._waiting or self._running:
+                    self._start_ready_stages(pool if beside else None, precompiler)
+                    while self._working and not self._events.get()():
+                        pass
+                    self._draw_early()
+                precompiler.raise_bugs({done.stage for done in self.done if done.action == "run"})
+        finally:
+            for begun in self._running.values():
+                begun.reporter.end("")
+
+    def skip(self, step: Step) -> None:
+        """Take note of a stage that does not run."""
+        done = StageDone(step.stage.name, step.action, step.reason)
+        self.done.append(done)
+        self.reporter.note(said_of(done))
+
+    def inputs(self, stage: Stage) -> dict[str, StageAnswer]:
+        """The results that a stage gets: those it needs, and those it takes if they are there."""
+        there = self.answers.keys() - self.left_out.keys()
+        return {name: self.answers[name] for name in stage.results(self.config) if name in there}
+
+    def missing_inputs(self, stage: Stage) -> tuple[LeftOut, ...]:
+        """The results that a stage does without, and why."""
+        missing = (name for name in stage.results(self.config) if name not in self._keys)
+        return tuple(left_out(name, self._why_absent(name)) for name in missing)
+
+    def _decide(self, stage: Stage) -> Step:
+        """Decide on a stage, given what became of its inputs.
+
+        Of the results that it takes if they are current those are looked at that are not planned for themselves; one
+        that is damaged is not passed over in silence.
+        """
+        for name in stage.if_current:
+            if self.graph[name] not in self.stages:
+                step = self._judge(self.graph[name], force=False)
+                if step.action == "reuse" and step.origin is None:
+                    self._expect(step)
+                elif step.damaged:
+                    self.left_out[name] = f"its result is {step.reason}; {self._command_of(name)} recomputes it"
+        return self._judge(stage, self.force)
+
+    def _judge(self, stage: Stage, force: bool) -> Step:
+        why = stage.why_unsuited(self.config)
+        for name in () if stage.draws else stage.inputs(self.config):
+            if why is None and name in self.left_out:
+                why = f"it needs {name}: {self.left_out[name]}"
+        if why is not None:
+            return Step(stage, "leave out", why)
+        return self.results.find(stage, self._identity(stage), self.inputs(stage), force)
+
+    def _identity(self, stage: Stage) -> Identity:
+        keys = {name: self._keys[name] for name in stage.results(self.config) if name in self._keys}
+        # what a drawing says about results left out depends on why they are
+        keys |= {absent.what: f"left out: {absent.why}" for absent in self.missing_inputs(stage)}
+        return self.results.keys.identity(stage, self.config, keys, self.again)
+
+    def _expect(self, step: Step) -> None:
+        """Assume that a step goes as decided: what is to run will have a result."""
+        if step.identity is None:
+            self.left_out[step.stage.name] = step.reason
+        elif step.action == "reuse" and step.found is not None:
+            self._settle(step, step.found)
+        else:
+            self._keys[step.stage.name] = step.identity.key
+
+    def _settle(self, step: Step, answer: StageAnswer) -> None:
+        """Take note of a stage's answer, which may be that there is none."""
+        self.answers[step.stage.name] = answer
+        if answer.no_answer is not None:
+            self.left_out[step.stage.name] = answer.no_answer.message
+        elif step.identity is not None:
+            self._keys[step.stage.name] = step.identity.key
+
+    def _why_absent(self, name: str) -> str:
+        command = self._command_of(name)
+        if self.graph[name].optional:
+            return self.left_out.get(name, f"it was not asked for; {command} computes it")
+        none_yet = self.graph[name].why_unsuited(self.config) or f"no current result; {command} computes one"
+        return self.left_out.get(name, none_yet)
+
+    def _command_of(self, name: str) -> str:
+        return f"`walkerlab {self.graph[name].command}`"
+
+    def _start_ready_stages(self, pool: WorkerPool | None, precompiler: Precompiler) -> None:
+        """Run the next stage here, or without any in `pool` those whose inputs are there, and compile for others."""
+        for stage in list(self._waiting):
+            if len(self._working) == self.jobs or any(begun.step.stage.alone for begun in self._running.values()):
+                return
+            if not self._is_ready(stage):
+                if stage.name in self._left and (compiling := precompiler.begin(stage, only_first=True)) is not None:
+                    self._watch(compiling)
+                continue
+            step = self._decide(stage)
+            if step.action != "run":
+                self._waiting.remove(stage)
+                self.results.take_over(step)
+                self._expect(step)
+                self.skip(step)
+            elif pool is None:
+                self._waiting.remove(stage)
+                self._run_here(step, precompiler)
+                return
+            elif not (stage.alone and self._running):
+                self._waiting.remove(stage)
+                begun = self._begin(step)
+                future = pool.start(partial(run_in_worker, begun.task), partial(self._hear, begun.reporter))
+                self._running[future] = begun
+                self._watch(future)
+
+    def _run_here(self, step: Step, precompiler: Precompiler) -> None:
+        """Run a stage in this process; on a new machine a worker compiles for a later one meanwhile."""
+        importlib.import_module(step.stage.module)
+        slow = [stage for stage in self._waiting if stage.compiles_long]
+        if slow and nothing_compiled_yet():
+            precompiler.begin(slow[0], only_first=False)
+        precompiler.wait_for(step.stage)
+        begun = self._running[None] = self._begin(step)
+        with watched(begun.reporter.compiling):
+            answer = begun.task.run(begun.reporter)
+        self._finish(None, answer)
+
+    def _watch(self, future: Future[Any]) -> None:
+        """Look after a process's work; its end is an event."""
+        self._working.add(future)
+        future.add_done_callback(lambda ended: self._events.put(partial(self._ended, ended)))
+
+    def _hear(self, reporter: StageReporter, message: tuple[str, Any]) -> None:
+        """Pass on a process's message in this thread's turn; it arrives in another one, and ends nothing."""
+        call, *arguments = message
+        self._events.put(lambda: bool(getattr(reporter, call)(*arguments)))
+
+    def _ended(self, future: Future[Any]) -> bool:
+        """Keep what a stage has returned; True, since a process is free."""
+        self._working.remove(future)
+        if future in self._running:
+            self._finish(future, future.result())
+        return True
+
+    def _is_ready(self, stage: Stage) -> bool:
+        """Whether all that a stage takes is there, or known not to come."""
+        return self._unsettled().isdisjoint(stage.results(self.config))
+
+    def _unsettled(self) -> set[str]:
+        """The stages that wait or run."""
+        return {one.name for one in self._waiting} | {begun.task.name for begun in self._running.values()}
+
+    def _begin(self, step: Step) -> Begun:
+        if step.damaged is not None:
+            self.reporter.warn(f"{step.damaged} is {step.reason}; recomputed")
+        stage, inputs = step.stage, self.inputs(step.stage)
+        offered = self.results.begin(step, self.config, inputs, self.force)
+        absent = self.missing_inputs(stage)
+        task = task_of(stage, self.config, inputs, jobs=self.jobs, again=self.again, left_out=absent, **offered)
+        number = self._total - len(self._left) + 1 + len(self._running)
+        total = max(self._total, number)
+        place = [f"{number} of {total}"] if total > 1 else []
+        why = [step.reason] if step.reason != NOT_THERE else []
+        expected = step.found.provenance.took_s if isinstance(step.found, Stored) else None
+        reporter = self.reporter.begin(stage.name, ", ".join(place + why), expected)
+        return Begun(step, task, reporter, time.perf_counter())
+
+    def _finish(self, future: Future[Any] | None, answer: StageAnswer) -> None:
+        """Keep what a stage has returned, or what it has got where it found that there is no answer."""
+        begun = self._running[future]
+        step, name = begun.step, begun.task.name
+        awaited = any(name in stage.results(self.config) for stage in self._waiting)
+        kept = self.results.keep(step, answer, awaited)
+        del self._running[future]
+        self._settle(step, kept)
+        reason = step.reason if kept.no_answer is None else f"no answer: {kept.no_answer.message}"
+        done = StageDone(name, "run", reason, time.perf_counter() - begun.started)
+        self.done.append(done)
+        self._left = [other for other in self._left if other != name]
+        answered = [] if kept.complete else ["no answer"]
+        left = [f"left: {', '.join(self._left)}"] if self._left else []
+        begun.reporter.end("; ".join([said_of(done), *answered, *left]))
+
+    def _draw_early(self) -> None:
+        """Draw what is to be looked at while the rest is still being computed."""
+        unsettled = self._unsettled()
+        folder = self.results.folder
+        if folder is None:
+            return
+        for stage in self._waiting:
+            inputs = self.inputs(stage)
+            wanted = unsettled.intersection(stage.inputs(self.config))
+            pending = {name for name in wanted if self.graph[name].why_unsuited(self.config) is None}
+            others = [name for name in pending if not self.graph[name].draws]
+            if not stage.early_with or not others or not inputs or unsettled & set(stage.early_with):
+                continue
+            absent = [entry for entry in self.missing_inputs(stage) if entry.what not in pending]
+            absent += [LeftOut(one.name, STILL_COMPUTED) for one in self.stages if one.name in pending]
+            task = task_of(stage, self.config, inputs, folder=folder, left_out=tuple(absent))
+            self.reporter.drawn(task.run(Silent()).summary, folder)
+
+
+def survey(config: Config, folder: RunFolder, graph: Graph = PIPELINE) -> tuple[Step, ...]:
+    """What is stored in a run's own folder, and what running each stage there would do; touches nothing."""
+    return Executor(config, FolderResults(folder, graph, elsewhere=False), graph.stages).plan()
+
+
+def answer_in_memory(
+    config: Config,
+    target: str,
+    memory: MemoryResults,
+    *,
+    again: bool = True,
+    reporter: Reporter | None = None,
+) -> StageAnswer:
+    """Answer a stage's question without a file, computing what it needs and the memory does not have.
+
+    again  whether walks are taken a second time for their numerical error
+
+    Raises ConfigError as `Graph.needed_in_memory`.
+    """
+    stages = memory.keys.graph.needed_in_memory(target, config)
+    run = Executor(config, memory, stages, again=again, reporter=reporter)
+    run.carry_out()
+    if target in run.answers:
+        return run.answers[target]
+    advice = next(answer.no_answer.advice for answer in run.answers.values() if answer.no_answer is not None)
+    return StageAnswer({}, {"no_answer": {"message": run.left_out[target], "advice": advice}}, complete=False)
+
+
+def left_out(stage: str, why: str) -> LeftOut:
+    """A stage that does not run."""
+    return LeftOut(stage, why, "loading and compiling contact code" if why == NO_CONTACT else "")
+
+
+def any_side_by_side(stages: Sequence[Stage], config: Config) -> bool:
+    """Whether two of the stages need nothing of each other."""
+    needed: dict[str, set[str]] = {}
+    for stage in stages:
+        own = {name for name in stage.results(config) if name in needed}
+        needed[stage.name] = own.union(*(needed[name] for name in own))
+    return any(len(needed[stage.name]) < place for place, stage in enumerate(stages))
+
+
+def told_once(why: str) -> str:
+    """A reason without that of another stage or of the error, which are told themselves."""
+    return why.partition(": ")[0] if why.startswith(("it needs ", "no answer: ")) else why.partition(": no answer: ")[0]
+
+
+def said_of(done: StageDone) -> str:
+    """One line about what was done with a stage."""
+    why = told_once(done.reason)
+    match done.action:
+        case "run":
+            return f"{done.stage}: ran in {done.wall_s:.2f} s"
+        case "reuse":
+            return f"{done.stage}: reused ({why})"
+        case _:
+            return f"{done.stage}: left out ({why})"

@@ -1,0 +1,170 @@
+"""Where results of stages are found and kept: in a run's folder, or in the memory of this process."""
+
+from collections import OrderedDict
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from walkerlab.config.schema import Config
+from walkerlab.pipeline.graph import PIPELINE, Graph, Stage
+from walkerlab.pipeline.identity import Keys
+from walkerlab.store import artifact, provenance
+from walkerlab.store.artifact import StageAnswer, Stored, Verdict
+from walkerlab.store.checkpoint import Checkpoint
+from walkerlab.store.elsewhere import find_elsewhere, take_over
+from walkerlab.store.index import broken_file
+from walkerlab.store.key import Identity, changed_parts
+from walkerlab.store.provenance import Provenance
+from walkerlab.store.runfolder import RunFolder
+
+Action = Literal["reuse", "run", "leave out"]
+
+UP_TO_DATE = "up to date"
+REMEMBERED = 256
+"""Results that are remembered: neighbouring points of a sweep often need the same."""
+
+
+@dataclass(frozen=True)
+class Step:
+    """What happens with one stage.
+
+    reason    why, in words
+    identity  what its result is determined by; None if it is left out
+    found     the stored result, if it is intact: the one to reuse, or an outdated one
+    damaged   its file, if that is not to be trusted
+    origin    its file, if that lies in another run's folder
+    """
+
+    stage: Stage
+    action: Action
+    reason: str
+    identity: Identity | None = None
+    found: StageAnswer | None = None
+    damaged: Path | None = None
+    origin: Path | None = None
+
+
+class FolderResults:
+    """Results in a run's folder; with `elsewhere` equal ones in other run folders are reused too.
+
+    keys    identities of results
+    folder  of the run
+    """
+
+    def __init__(self, folder: RunFolder, graph: Graph = PIPELINE, elsewhere: bool = True) -> None:
+        """Read nothing yet."""
+        self.run, self.folder, self.elsewhere, self.keys = folder, folder.path, elsewhere, Keys(graph)
+        self._begun: dict[str, tuple[Provenance, Checkpoint]] = {}
+
+    def find(self, stage: Stage, identity: Identity, inputs: Mapping[str, StageAnswer], force: bool) -> Step:
+        """Find a stage's result: a step that reuses it, or runs the stage; with `force` it always runs."""
+        path = self.run.artifact(stage.name)
+        verdict = artifact.check(path, identity.key, stage.name)
+        stored, damaged = verdict.artifact, path if verdict.damaged else None
+        why = "--force" if force else self._why_outdated(stage, identity, verdict, inputs)
+        if not why and stored is not None:
+            reason = UP_TO_DATE if stored.no_answer is None else f"no answer: {stored.no_answer.message}"
+            return Step(stage, "reuse", reason, identity, stored)
+        # drawings stand beside their artifact and are made anew
+        looks = self.elsewhere and not force and not stage.draws
+        found = find_elsewhere(self.run, stage.name, identity.key) if looks else None
+        if found is not None and not recomputed_input(stage, found[1], inputs):
+            origin, result = found
+            return Step(stage, "reuse", f"the same as in {origin.parent}", identity, result, damaged, origin)
+        return Step(stage, "run", why, identity, stored, damaged)
+
+    def take_over(self, step: Step) -> None:
+        """Put a result from another run's folder into this one."""
+        if step.origin is not None:
+            take_over(step.origin, self.run.artifact(step.stage.name))
+
+    def begin(self, step: Step, config: Config, inputs: Mapping[str, StageAnswer], force: bool) -> Mapping[str, Any]:
+        """Prepare to keep a result; return what the stage may ask for, see `StageTask`.
+
+        With `force` what an interrupted run has left is dropped.
+        """
+        stage, identity = step.stage, step.identity
+        assert identity is not None, "a stage that is left out does not run"
+        checkpoint = Checkpoint(self.run.checkpoint(stage.name), identity.key)
+        if force:
+            checkpoint.forget()
+        digests = {name: input_digest(stage, result) for name, result in inputs.items()}
+        self._begun[stage.name] = provenance.begin(config, digests), checkpoint
+        return {"checkpoint": checkpoint, "folder": self.folder}
+
+    def keep(self, step: Step, answer: StageAnswer, awaited: bool) -> Stored:  # noqa: ARG002
+        """Store a result, and remove its checkpoint; StorageError if the system refuses."""
+        begun, checkpoint = self._begun.pop(step.stage.name)
+        assert step.identity is not None, "a stage that is left out does not run"
+        path = self.run.artifact(step.stage.name)
+        stored = artifact.write(path, answer, step.identity, begun.until_now(), answer.complete)
+        checkpoint.forget()
+        return stored
+
+    def _why_outdated(
+        self, stage: Stage, identity: Identity, verdict: Verdict, inputs: Mapping[str, StageAnswer]
+    ) -> str:
+        """Why a stage has to run, in words; empty if its result is current."""
+        found = verdict.artifact
+        if not verdict.accepted or found is None:
+            changes = changed_parts(found.identity, identity) if found is not None else []
+            return ", ".join(changes) or verdict.reason
+        return broken_file(self.folder, found) or recomputed_input(stage, found, inputs)
+
+
+def recomputed_input(stage: Stage, found: Stored, inputs: Mapping[str, StageAnswer]) -> str:
+    """Say which input of a result has another content than the result was made with; empty if all are the same."""
+    for name, result in inputs.items():
+        if found.provenance.input_digests.get(name) != input_digest(stage, result):
+            return f"input {name} was recomputed"
+    return ""
+
+
+def input_digest(stage: Stage, result: StageAnswer) -> str:
+    """What a stage's result records of an input: numbers follow from its content, drawings also show its timings."""
+    return result.seal if stage.draws and isinstance(result, Stored) else result.digest()
+
+
+class LoadedCodeKeys(Keys):
+    """Identities under the code that this process has loaded: no digest needs to name it."""
+
+    def code_digest(self, target: str) -> str:  # noqa: ARG002
+        """Return nothing."""
+        return ""
+
+
+class MemoryResults:
+    """The same in memory: the results that other stages need, of which the latest are remembered."""
+
+    folder = None
+
+    def __init__(self, graph: Graph = PIPELINE, size: int = REMEMBERED) -> None:
+        """Remember nothing yet."""
+        self.keys, self.size = LoadedCodeKeys(graph), size
+        self._kept: OrderedDict[str, StageAnswer] = OrderedDict()
+
+    def find(self, stage: Stage, identity: Identity, inputs: Mapping[str, StageAnswer], force: bool) -> Step:  # noqa: ARG002
+        """Find a stage's result, or run the stage."""
+        if identity.key not in self._kept:
+            return Step(stage, "run", artifact.NOT_THERE, identity)
+        self._kept.move_to_end(identity.key)
+        return Step(stage, "reuse", UP_TO_DATE, identity, self._kept[identity.key])
+
+    def take_over(self, step: Step) -> None:
+        """Do nothing: there is no other folder."""
+
+    def begin(self, step: Step, config: Config, inputs: Mapping[str, StageAnswer], force: bool) -> Mapping[str, Any]:  # noqa: ARG002
+        """Keep checkpoints in memory alone."""
+        return {"checkpoint": Checkpoint(None, "")}
+
+    def keep(self, step: Step, answer: StageAnswer, awaited: bool) -> StageAnswer:
+        """Remember a result that another stage awaits."""
+        if awaited and step.identity is not None:
+            self._kept[step.identity.key] = answer
+            if len(self._kept) > self.size:
+                self._kept.popitem(last=False)
+        return answer
+
+
+Results = FolderResults | MemoryResults
