@@ -44,9 +44,17 @@ def test_so_does_one_over_footholds_of_drawn_heights(campaign, seed):
     assert max(error for judged in one.judged[1:] for error in judged.error.values()) < 1e-4
 
 
-@pytest.mark.parametrize(("kind", "seed"), [("passing", 1), ("passing", 5), ("explicit", 0)])
-def test_so_do_slow_starts_on_uneven_planes_and_bouncing_feet_by_dop853(campaign, kind, seed):
-    assert campaign.compare(campaign.WALKERS[kind](seed), steps=1).wrong == []
+@pytest.mark.parametrize("seed", [6, 25])
+def test_so_does_one_whose_foot_stands_in_uneven_ground_as_the_feet_pass(campaign, seed):
+    """The first was once said to stub its foot, and the second lost the ground under a loaded one."""
+    assert campaign.compare(campaign.passing(seed), steps=1).wrong == []
+
+
+def test_so_does_one_of_bouncing_feet_by_dop853(campaign):
+    """Work summed by a rule of order 5 left 41 times rtol x (energy + work exchanged) at rtol 1e-9; 0.02 is right."""
+    one = campaign.compare(campaign.explicit(17), steps=2)
+    assert one.wrong == []
+    assert max(one.residuals) < 0.1 * campaign.BALANCED
 
 
 def test_the_walks_of_the_short_campaign_are_on_every_ground(campaign):
