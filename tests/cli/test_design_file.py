@@ -61,6 +61,10 @@ OVER = "--over walker.foot_radius_m=0.1:0.7"
             "robustness --set robustness.to=[walker.hip_mass_kg,foo]",
             "--set robustness.to=[walker.hip_mass_kg,foo]: robustness.to: foo is not a key of the config",
         ),
+        (
+            "sweep --stage fixedpoint --over slope_deg=1:2:2 --show froude --against=",
+            "--against : fixedpoint has no such quantity",
+        ),
         ("fixedpoint --set slope_deg=95", "--set slope_deg=95: slope_deg: 95 is out of bounds"),
     ],
 )
