@@ -53,10 +53,17 @@ OVER = "--over walker.foot_radius_m=0.1:0.7"
         ),
         ("continuation --over slope_deg --from 2 --to 1", "--to 1: continuation.to: 1.0 must be above `from`, 2"),
         ("continuation --over foo --from 1 --to 2", "--over foo: continuation.over: foo is not a key of the config"),
-        ("continuation --over slope_deg --from 2 --to 91", "--to 91: continuation.to: slope_deg cannot be 91 deg"),
+        (
+            "continuation --over slope_deg --from 2 --to 91",
+            "--to 91: continuation.to: slope_deg cannot be 91 deg: it should be between -90 and 90",
+        ),
         (
             "robustness --set robustness.to=[walker.hip_mass_kg,foo]",
             "--set robustness.to=[walker.hip_mass_kg,foo]: robustness.to: foo is not a key of the config",
+        ),
+        (
+            "sweep --stage fixedpoint --over slope_deg=1:2:2 --show froude --against=",
+            "--against : fixedpoint has no such quantity",
         ),
         ("fixedpoint --set slope_deg=95", "--set slope_deg=95: slope_deg: 95 is out of bounds"),
     ],

@@ -32,6 +32,7 @@ from walkerlab.orbits.small_slope import LONG_PERIOD, SHORT_PERIOD, seeds
 from walkerlab.outcome import Outcome
 from walkerlab.paper.appendix_a import AS_PRINTED, CORRECTED, RigidWalker, assembled
 from walkerlab.scene.parts import assembly_of
+from walkerlab.scene.rigid import rigid_walker
 from walkerlab.solvers.registry import Tolerances
 from walkerlab.solvers.stepping import RHS
 
@@ -223,6 +224,19 @@ def test_a_gait_whose_strike_would_have_to_pull_is_not_walked():
     assert pulled.spectral_radius == pytest.approx(2.391, abs=1e-3)
     assert pulled.min_normal_impulse == pytest.approx(-0.0055, abs=5e-5)
     assert search.gait is not pulled
+
+
+def test_a_gait_whose_feet_meet_on_the_ground_in_mid_swing_is_not_walked():
+    config = load(Path("level"), ["walker.hip.spring_N_m_per_rad=20"]).config
+    walker = rigid_walker(config)
+    *others, symmetric = find_gaits_of_model(walker).gaits
+    assert not any(gait.objections for gait in others)
+    (objection,) = symmetric.objections
+    assert "meet on the ground" in objection
+    faster = [*symmetric.state]
+    faster[2] += 1e-7
+    step = take_walk(walker, TIGHT, tuple(faster), 1)
+    assert step.lengths_m[0] < 1e-6 * symmetric.step_length  # the swing foot strikes on its way back
 
 
 def test_however_unstable_a_gait_is_it_can_be_walked():

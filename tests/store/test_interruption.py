@@ -96,7 +96,7 @@ def test_read_only_folder_leaves_the_old_artifact(tmp_path, content, identity, o
 
 
 def test_a_folder_that_is_gone_is_told(tmp_path):
-    with pytest.raises(StorageError, match="no longer exists"):
+    with pytest.raises(StorageError, match="there is no folder"):
         write_atomically(tmp_path / "gone" / "a", b"")
 
 

@@ -86,7 +86,7 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
             given.seed if request.seed is None else request.seed,
         )
         shown = {f"--show {name}": name for name in request.show or ()}
-        shown |= {f"--against {request.against}": request.against} if request.against else {}
+        shown |= {f"--against {request.against}": request.against} if request.against is not None else {}
         refuse_unrecorded(question, shown)
         order = Order(
             workers=request.at_once,

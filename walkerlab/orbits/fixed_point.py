@@ -26,6 +26,7 @@ from walkerlab.solvers.system import Floats, State
 
 RANDOM_START = "random start"
 SMALLEST_ANGLE = 1e-5  # rad, half the angle between the legs; less on level ground or after a random start is standing
+NO_STEP = 1e-3  # of the angle between the legs at heel strike; samples do not tell a smaller one from zero
 SAME = 1e-5  # relative distance of states below which two searches found one gait
 LOOKING = Tolerances("dop853", 1e-7, 1e-10, 20_000)  # of steps while gaits are looked for; EXACT while they are solved
 SOLVED, ENOUGH = 1e-14, 1e-11  # residual wanted, and that of an acceptable gait, which may be rounding on a steep slope
@@ -64,6 +65,7 @@ class RigidGait:
     cost_of_transport: float  # work spent over weight and distance
     froude: float  # speed over sqrt(g L)
     swings: int = 1  # how often the swing leg passes the stance leg in a step
+    feet_meet: bool = False  # on the ground in mid-swing
     found_by: tuple[str, ...] = ()  # the searches that led here
     z: tuple[float, ...] = ()  # section coordinates of the unit walker
 
@@ -92,7 +94,22 @@ class RigidGait:
             found.append(f"the ground would have to pull with {-self.min_normal_impulse:.3g} N s in a strike")
         if not self.trailing_foot_rises:
             found.append("the foot behind would have to leave through the ground")
+        if self.feet_meet:
+            found.append("its feet meet on the ground in mid-swing, where the slightest disturbance may end the step")
         return tuple(found)
+
+
+def feet_meet(walker: Standing, swing: Floats) -> bool:
+    """Whether the swing foot comes down just where the stance foot stands, so that the step map jumps at this gait.
+
+    A foot that came down any further ahead would strike.
+
+    swing  (samples, 2 n) states with both legs straight
+    """
+    over, ahead = feet_on_slope(walker, swing[:, SWING], swing[:, STANCE]), swing[:, SWING] - swing[:, STANCE]
+    down = np.flatnonzero((over[:-1] > 0.0) & (over[1:] <= 0.0))
+    where = ahead[down] + np.diff(ahead)[down] * over[down] / (over[down] - over[down + 1])
+    return bool(np.any(np.abs(where) < NO_STEP * abs(ahead[-1])))
 
 
 def measured(walker: Standing, units: Units, gait: Cycle) -> RigidGait | None:
@@ -125,6 +142,7 @@ def measured(walker: Standing, units: Units, gait: Cycle) -> RigidGait | None:
         cost_of_transport=step.driven.cost_of_transport(float(step.lengths_m[0])),
         froude=float(step.lengths_m[0] / step.periods_s[0]),
         swings=int(np.count_nonzero(np.diff(np.signbit(apart)))),
+        feet_meet=feet_meet(walker, swing[~step.samples.bent[step.samples.step == 0]]),
         knee_strike=None if step.knee_strike_time_s is None else float(step.knee_strike_time_s[0]) * units.time,
         z=tuple(gait.z.tolist()),
     )

@@ -51,7 +51,10 @@ class Parameter:
         try:
             self._changed(config, value)
         except ValidationError as error:
-            (*_, name), reason = error.errors()[0]["loc"], error.errors()[0]["msg"]
+            first = error.errors()[0]
+            (*_, name), reason = first["loc"], first["msg"]
+            if self.key == SLOPE_DEG and first["type"] in ("less_than", "greater_than"):
+                reason = "Input should be between -90 and 90, both excluded"
             subject = "it" if name == self.path[-1] else name
             why = f": {subject} {reason.replace('Input should', 'should')}"
         return ConfigError(

@@ -94,7 +94,7 @@ def replacing(path: Path) -> Iterator[Path]:
     temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}.tmp")
     with storing(path):
         if not path.parent.is_dir():
-            raise StorageError(f"{path} could not be stored: its folder no longer exists.")
+            raise StorageError(f"{path} could not be stored: there is no folder {path.parent}.")
         try:
             yield temporary
             with temporary.open("rb") as file:
