@@ -16,6 +16,7 @@ from walkerlab.report.blocks import MAIN, Section
 from walkerlab.report.symbols import CARET, POWER, power, raised
 
 TEMPLATES = Path(__file__).parent / "templates"
+COMMENT = re.compile(r"^ *//.*\n", re.MULTILINE)
 TYPED = re.compile(r"`([^`]*)`")
 """What is to be typed, or stands in a file, as texts mark it."""
 
@@ -86,5 +87,5 @@ def said(text: str) -> Markup:
 
 
 def source(name: str) -> str:
-    """A file that goes into the page as it is."""
-    return (TEMPLATES / name).read_text(encoding="utf-8").strip()
+    """Read a file that goes into the page, without its lines of comment."""
+    return COMMENT.sub("", (TEMPLATES / name).read_text(encoding="utf-8")).strip()
