@@ -27,6 +27,7 @@ from leaving_out import HEAD, leaving_out_rows
 from right_hand_sides import ONE_DEGREE, times_ns
 from whole_process import whole_process_times
 
+from walkerlab.benchmarks.accuracy import OFF_THE_GAIT
 from walkerlab.benchmarks.contact_trials import contact_trial
 from walkerlab.benchmarks.references import Reference, reference_for
 from walkerlab.benchmarks.trials import USER_SCRIPT, ContactTrial, RigidTrial, Trial
@@ -44,14 +45,14 @@ from walkerlab.orbits.newton import Effort
 from walkerlab.orbits.shooting import on_section
 from walkerlab.orbits.small_slope import seeds
 from walkerlab.orbits.step_map import Cycle, gait_near
+from walkerlab.paper.walker import compass, compass_or_none
 from walkerlab.pipeline.progress import Silent
 from walkerlab.pipeline.runner import Options, execute
 from walkerlab.scene.contact import contact_scene, start_state
 from walkerlab.scene.parameter import parameter_of
-from walkerlab.scene.rigid import compass, compass_or_none, rigid_walker
-from walkerlab.stages.accuracy import OFF_THE_GAIT
+from walkerlab.scene.rigid import rigid_walker
+from walkerlab.scene.scaled import MAP_RTOL
 from walkerlab.stages.continuation import FamilyQuestion, search_of
-from walkerlab.stages.tune import MAP_RTOL
 from walkerlab.store.runfolder import RunFolder
 
 PRINTED_START = (0.1674, -0.60, -0.84)  # theta_2 and the velocities of x_p, eq. 11

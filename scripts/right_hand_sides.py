@@ -14,8 +14,9 @@ from walkerlab.ground.walker import ContactWalker, on_ground
 from walkerlab.kernels import inlined, kernel
 from walkerlab.mechanics.standing import BENT, Mode, Standing, swing_foot
 from walkerlab.paper.appendix_a import RigidWalker, accelerations, swing_constants
+from walkerlab.paper.walker import compass
 from walkerlab.scene.contact import contact_scene
-from walkerlab.scene.rigid import compass, rigid_walker
+from walkerlab.scene.rigid import rigid_walker
 from walkerlab.solvers.system import State, derivative
 
 ONE_DEGREE = loader.load(None, ("slope_deg=1",)).config

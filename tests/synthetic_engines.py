@@ -2,13 +2,13 @@
 
 import numpy as np
 
+from walkerlab.benchmarks.engines import stage as engines
 from walkerlab.benchmarks.engines.experiments import Truth
 from walkerlab.benchmarks.engines.rows import EngineRow, SwingRow, TuningRow
+from walkerlab.benchmarks.engines.stage import EngineFindings
 from walkerlab.hybrid.contact_run import ContactWalkResult
 from walkerlab.hybrid.walk_record import DrivenWork, WalkWork
 from walkerlab.outcome import Outcome
-from walkerlab.stages import engines
-from walkerlab.stages.engines import EngineFindings
 
 PERIOD, LENGTH = 0.711, 0.3608
 

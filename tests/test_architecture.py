@@ -1,6 +1,7 @@
 """Walls between the parts of the package: imports run downward, kernels stay at home, configs have one source."""
 
 import ast
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -17,15 +18,15 @@ LAYERS = (
     "api",
     "explorer",
     "sweeps",
-    "stages",
-    "pipeline",
-    "report",
-    "figures",
-    "store",
     "verification",
     "benchmarks",
-    "scene",
     "paper",
+    "report",
+    "figures",
+    "stages",
+    "pipeline",
+    "store",
+    "scene",
     "orbits",
     "hybrid",
     "ground",
@@ -39,6 +40,7 @@ LAYERS = (
     "sources",
     "labels",
     "prose",
+    "registration",
     "stopping",
     "outcome",
     "account",
@@ -156,3 +158,15 @@ def test_a_gait_is_found_and_told_without_the_page_or_scipy_linalg(tmp_path):
     assert "there is a stable gait" in done.stdout
     loaded = done.stdout.splitlines()[-1].split()
     assert [name for name in loaded if name.startswith(("scipy.linalg", "walkerlab.report.sections", "jinja2"))] == []
+
+
+EVIDENCE = ("verification", "benchmarks", "paper")
+REGISTRIES = {"scene/studies.py", "pipeline/graph.py", "figures/registry.py", "report/registry.py", "report/answers.py"}
+QUOTED_EVIDENCE = re.compile(rf"[\"']walkerlab\.(?:{'|'.join(EVIDENCE)})\.")
+
+
+def test_evidence_is_named_by_registries_alone():
+    """What stands below the study, the verification and the benchmarks names them only where they register."""
+    below = LAYERS.index(EVIDENCE[-1])
+    core = [path for path in IN_LAYERS if LAYERS.index(layer_of(path)) > below]
+    assert {named(path) for path in core if QUOTED_EVIDENCE.search(path.read_text())} == REGISTRIES

@@ -10,8 +10,8 @@ from walkerlab.config.loader import load
 from walkerlab.errors import ConfigError
 from walkerlab.report.page import Page, render
 from walkerlab.report.results import Results
-from walkerlab.report.sections.stability import section
-from walkerlab.stages.stability import summary_of
+from walkerlab.verification.section import section
+from walkerlab.verification.stability import summary_of
 from walkerlab.verification.verdict import CaseResult
 
 SCRIPTS = Path(__file__).parent.parent / "scripts"

@@ -152,7 +152,8 @@ def test_a_new_version_number_changes_no_stage_key(tmp_path):
         shutil.copytree(Path(walkerlab.__file__).parent, tmp_path / version / "walkerlab", ignore=NO_CACHES)
         init = tmp_path / version / "walkerlab" / "__init__.py"
         init.write_text(init.read_text().replace(walkerlab.__version__, version))
-        code = "from walkerlab.sources import Sources; print(Sources().code_digest('walkerlab.stages.engines'))"
+        stage = "walkerlab.benchmarks.engines.stage"
+        code = f"from walkerlab.sources import Sources; print(Sources().code_digest({stage!r}))"
         done = subprocess.run(
             [sys.executable, "-c", code], cwd=tmp_path / version, env={}, capture_output=True, text=True
         )

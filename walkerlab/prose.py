@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -31,6 +31,12 @@ def f(value: float, spec: str) -> str:
 def percent(share: float, digits: int = 3) -> str:
     """A share in percent."""
     return f"{100.0 * share:.{digits}g} %"
+
+
+def listed(parts: Iterable[str]) -> str:
+    """Join words in a row: 'a', 'a and b', 'a, b and c'."""
+    words = list(parts)
+    return " and ".join([", ".join(words[:-1]), words[-1]]) if len(words) > 1 else "".join(words)
 
 
 @dataclass(frozen=True)

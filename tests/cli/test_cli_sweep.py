@@ -10,8 +10,8 @@ import pytest
 
 from walkerlab.cli.clean import listed
 from walkerlab.cli.runs import lines, percent
+from walkerlab.pipeline.headlines import MOST
 from walkerlab.pipeline.runs import Pair, difference
-from walkerlab.report.headlines import MOST
 from walkerlab.store.content import Content
 from walkerlab.store.runfolder import RunFolder
 

@@ -3,8 +3,8 @@
 from synthetic_walks import stored
 
 from walkerlab.outcome import Outcome
-from walkerlab.stages.stability_maps import step_group, stiction_group, summary_of
 from walkerlab.verification.maps import NONE, VERDICTS
+from walkerlab.verification.stability_maps import step_group, stiction_group, summary_of
 
 CELLS = 3
 # outcome, outcome at a ten times tighter tolerance, error

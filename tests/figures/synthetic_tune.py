@@ -3,8 +3,8 @@
 import numpy as np
 from synthetic_walks import motion, stored
 
-from walkerlab.figures.costs import ERRORS, LIMITS, WALL
 from walkerlab.outcome import Outcome
+from walkerlab.paper.figures import ERRORS, LIMITS, WALL
 from walkerlab.stages.walk import over_time
 from walkerlab.store.content import Group, Variable
 

@@ -150,7 +150,7 @@ def compared(steps=10, period=0.7, aligned=True):
                 "aligned_velocity_error_rad_s": Variable(9.0 * in_phase, dims, "rad/s", "velocity"),
             }
         )
-    return stored("compare", groups, {})
+    return stored("compare", groups, {"paper_numbers": [{"printed": "10^-4"}]})
 
 
 def without(result, group, *names):

@@ -5,9 +5,9 @@ import pytest
 from matplotlib.colors import to_hex
 from synthetic_methods import RUNS, SCENES, measured_methods
 
-from walkerlab.figures import costs
+from walkerlab.benchmarks import figures as costs
+from walkerlab.benchmarks.figures import LOOKS, entries, series_of
 from walkerlab.figures.canvas import styled
-from walkerlab.figures.costs import LOOKS, entries, series_of
 from walkerlab.solvers.registry import METHODS
 
 FIGURES = [figure for figure in costs.FIGURES if figure.name.startswith("accuracy")]

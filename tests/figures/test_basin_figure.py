@@ -5,12 +5,12 @@ import pytest
 from synthetic_basin import CONFIG, basin
 
 from walkerlab.config.loader import load
+from walkerlab.figures import stage as plot
 from walkerlab.figures.maps import FIGURE_15 as FIGURE
 from walkerlab.figures.maps import attractor_name, sides_of
 from walkerlab.orbits.basin import NONE
 from walkerlab.report.results import Results
 from walkerlab.report.sections.families import basin as section
-from walkerlab.stages import plot
 from walkerlab.store import artifact
 from walkerlab.store.content import Content
 

@@ -21,11 +21,11 @@ from walkerlab.config.schema import Config
 from walkerlab.config.writer import to_yaml
 from walkerlab.errors import ConfigError, StaleError
 from walkerlab.figures import illustration
+from walkerlab.figures import stage as plot
 from walkerlab.figures.style import WIDTH
 from walkerlab.pipeline.graph import PIPELINE
 from walkerlab.pipeline.progress import Silent
 from walkerlab.report.tex import in_tex
-from walkerlab.stages import plot
 from walkerlab.store.artifact import read, write
 from walkerlab.store.content import Content
 from walkerlab.store.provenance import begin

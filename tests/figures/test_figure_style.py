@@ -22,8 +22,8 @@ from walkerlab.figures.canvas import settle, styled
 from walkerlab.figures.maps import ATTRACTORS
 from walkerlab.figures.registry import FIGURES
 from walkerlab.figures.style import CONTACT, LEGS, POINT, RIGID
-from walkerlab.figures.walks import AT_SAME_TIME, IN_PHASE, PAPER
 from walkerlab.outcome import TOLD, Outcome
+from walkerlab.paper.figures import AT_SAME_TIME, IN_PHASE, PAPER
 
 RESULTS = {
     "both models": both_models(),

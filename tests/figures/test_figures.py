@@ -20,7 +20,7 @@ from walkerlab.figures.canvas import styled
 from walkerlab.figures.illustration import WORDS, Illustration
 from walkerlab.figures.registry import FIGURES as ALL_FIGURES
 from walkerlab.figures.style import CONTACT, RIGID
-from walkerlab.figures.walks import AT_SAME_TIME, IN_PHASE, PAPER
+from walkerlab.paper.figures import AT_SAME_TIME, IN_PHASE, PAPER
 from walkerlab.store.content import Group, Variable
 
 SVG = "{http://www.w3.org/2000/svg}"

@@ -7,9 +7,9 @@ from synthetic_walks import both_models, rigid_alone
 
 from walkerlab.config.reads import only
 from walkerlab.config.schema import Config
+from walkerlab.figures import stage as plot
 from walkerlab.pipeline.graph import PIPELINE
 from walkerlab.scene.left_out import LeftOut
-from walkerlab.stages import plot
 from walkerlab.store import index
 
 WITHOUT_CONTACT = [LeftOut(name, "the config has no contact block") for name in ("contact-sim", "compare")]

@@ -16,6 +16,7 @@ from walkerlab.config.reads import CompassCasesConfig, SceneCasesConfig, dotted_
 from walkerlab.config.schema import Config
 from walkerlab.pipeline.graph import PIPELINE, STAGES, Graph, Stage, results_of
 from walkerlab.pipeline.identity import Keys
+from walkerlab.sources import Sources
 from walkerlab.store.key import differences
 
 NAMES = [stage.name for stage in STAGES]
@@ -127,3 +128,29 @@ def test_the_table_is_read_without_loading_config_or_arrays():
     code = f"import sys, walkerlab.pipeline.graph; print([name for name in ({heavy}) if name in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert done.stdout.strip() == "[]", done.stderr
+
+
+DRAW = {stage.name for stage in STAGES if stage.draws}
+EVIDENCE = ("compare", "tune", "accuracy", "engines", "known-problems", "stability", "stability-maps")
+
+
+@pytest.fixture(scope="module")
+def made_of():
+    sources = Sources()
+    return {stage.name: {module.name for module in sources.closure(stage.module)} for stage in STAGES}
+
+
+@pytest.mark.parametrize("stage", EVIDENCE)
+def test_an_edited_stage_of_evidence_renews_its_own_key_alone(made_of, stage):
+    assert {name for name in set(made_of) - DRAW if PIPELINE[stage].module in made_of[name]} == {stage}
+
+
+@pytest.mark.parametrize("stage", [stage.name for stage in STAGES if not stage.draws])
+def test_no_result_is_made_with_the_registry_of_stages_figures_or_sections(made_of, stage):
+    registries = {"walkerlab.pipeline.graph", "walkerlab.figures.registry", "walkerlab.report.registry"}
+    assert not registries & made_of[stage]
+
+
+def test_the_torque_law_of_the_study_is_part_of_what_walks_are_made_of(made_of):
+    assert "walkerlab.paper.law" in made_of["simulate"]
+    assert "walkerlab.paper.compare" not in made_of["simulate"]

@@ -4,8 +4,8 @@ import pytest
 
 import walkerlab
 from walkerlab.pipeline.graph import STAGES
+from walkerlab.pipeline.headlines import HEADLINES, MOST, QUANTITIES, has_quantity, headlines
 from walkerlab.pipeline.runs import headline_values
-from walkerlab.report.headlines import HEADLINES, MOST, QUANTITIES, has_quantity, headlines
 from walkerlab.store import artifact
 from walkerlab.sweeps.chunk import by_name
 

@@ -8,13 +8,13 @@ import pytest
 from html_page import Page
 
 from walkerlab.config.loader import load
+from walkerlab.paper.compared_releases import RELEASES, STEPS
 from walkerlab.pipeline.runner import execute
 from walkerlab.report.blocks import Player
 from walkerlab.report.registry import sections_of
 from walkerlab.report.results import Results
 from walkerlab.report.sections import models, motion, verdict
-from walkerlab.stages.compared_releases import RELEASES, STEPS
-from walkerlab.stages.report import write_pages
+from walkerlab.report.stage import write_pages
 from walkerlab.store import artifact
 from walkerlab.store.runfolder import RunFolder
 

@@ -18,7 +18,7 @@ from synthetic_results import (
 )
 
 from walkerlab.config.schema import Source
-from walkerlab.stages.report import write_pages
+from walkerlab.report.stage import write_pages
 
 PATH = executable()
 pytestmark = pytest.mark.skipif(PATH is None, reason="no Chromium is installed; `CHROMIUM` may name one")

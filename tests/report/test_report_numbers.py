@@ -4,7 +4,8 @@ import math
 
 import pytest
 
-from walkerlab.report.numbers import count, fixed, length, listed, number, power_of_ten, quantity, span
+from walkerlab.prose import listed
+from walkerlab.report.numbers import count, fixed, length, number, power_of_ten, quantity, span
 
 
 def plain(text):

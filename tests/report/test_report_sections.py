@@ -443,7 +443,7 @@ def test_a_section_is_one_function_and_one_entry():
 
 def test_the_report_loads_no_plotting_and_no_compiler():
     heavy = ("matplotlib", "numba", "scipy", "walkerlab.mechanics", "walkerlab.hybrid", "walkerlab.scene.rigid")
-    code = f"import sys, walkerlab.stages.report; print([name for name in {heavy} if name in sys.modules])"
+    code = f"import sys, walkerlab.report.stage; print([name for name in {heavy} if name in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
 

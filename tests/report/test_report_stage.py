@@ -10,10 +10,10 @@ from walkerlab.config.schema import Config
 from walkerlab.errors import StorageError
 from walkerlab.pipeline.graph import PIPELINE
 from walkerlab.pipeline.progress import Silent
+from walkerlab.report import stage as report
 from walkerlab.report.pictures import fitting
+from walkerlab.report.stage import write_pages
 from walkerlab.scene.left_out import STILL_COMPUTED, LeftOut
-from walkerlab.stages import report
-from walkerlab.stages.report import write_pages
 from walkerlab.store.index import broken_file, indexed_files
 
 SVG = b"""<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 518.4 396" onload="alert(1)"><script>alert(1)</script>

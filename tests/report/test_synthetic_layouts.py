@@ -36,7 +36,7 @@ MADE = {
     "tune": {"tune": synthetic_tune.tuned()["tune"]},
 }
 CASES = [(title, stage) for title, results in MADE.items() for stage in results]
-NO_LIMIT = "limit"  # takes seconds: its columns are asked for by figures/costs.py
+NO_LIMIT = "limit"  # takes seconds: its columns are asked for by paper/figures.py
 
 
 @pytest.fixture(scope="module")

@@ -1,6 +1,6 @@
 """Tables for LaTeX: aligned decimals, one number of digits a column, heads and captions in words."""
 
-from walkerlab.report.sections.paper import table_of
+from walkerlab.paper.sections import table_of
 from walkerlab.report.tables import Column, as_csv, of_records, table
 from walkerlab.report.tex import as_tex
 

@@ -14,7 +14,8 @@ from walkerlab.orbits.fixed_point import find_gaits
 from walkerlab.scene.contact import contact_scene
 from walkerlab.scene.families import numbers_in
 from walkerlab.scene.parts import assembly_of
-from walkerlab.scene.rigid import coordinates, equation_sets, rigid_walker
+from walkerlab.scene.rigid import coordinates, rigid_walker
+from walkerlab.scene.studies import equation_sets
 
 DOCS = Path(__file__).parents[2] / "docs" / "walkers.md"
 

@@ -5,7 +5,8 @@ import pytest
 from walkerlab.benchmarks import ladder
 from walkerlab.benchmarks.engines import rows as engines
 from walkerlab.labels import labels_of, unit_by_name
-from walkerlab.stages import fixedpoint, tune_limit, walk
+from walkerlab.paper import tune_limit
+from walkerlab.stages import fixedpoint, walk
 from walkerlab.verification.known import Known
 from walkerlab.verification.verdict import CaseResult
 

@@ -8,8 +8,8 @@ from walkerlab.config.reads import only
 from walkerlab.outcome import Outcome
 from walkerlab.pipeline.graph import PIPELINE
 from walkerlab.pipeline.progress import Silent
-from walkerlab.stages import stability_maps
 from walkerlab.store.checkpoint import Checkpoint
+from walkerlab.verification import stability_maps
 from walkerlab.verification.maps import (
     NONE,
     PAPER_STIFFNESS,

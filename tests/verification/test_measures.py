@@ -11,8 +11,9 @@ from walkerlab.config.drives import Hip
 from walkerlab.config.loader import load
 from walkerlab.orbits.similarity import Units, unit_walker
 from walkerlab.paper.appendix_a import impact
+from walkerlab.paper.walker import compass
 from walkerlab.scene.parts import assembly_of
-from walkerlab.scene.rigid import compass, rigid_walker
+from walkerlab.scene.rigid import rigid_walker
 from walkerlab.verification.catalogue import config_of, shipped
 from walkerlab.verification.judge import time_difference
 from walkerlab.verification.masses import RigidMasses

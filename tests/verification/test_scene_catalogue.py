@@ -15,12 +15,12 @@ from walkerlab.pipeline.graph import PIPELINE
 from walkerlab.pipeline.identity import Keys
 from walkerlab.scene.parts import assembly_of
 from walkerlab.scene.rigid import rigid_walker
-from walkerlab.stages.stability import spelled_out
 from walkerlab.store.content import Content
 from walkerlab.verification.catalogue import ENDS, STOPS, scene_cases
 from walkerlab.verification.judge import CaseCell
 from walkerlab.verification.masses import RigidMasses
 from walkerlab.verification.scaling import scaled, to_twin
+from walkerlab.verification.stability import spelled_out
 
 OTHERS = ("kneed", "kneed-round-feet", "round-feet", "torso")
 GAIT = {"state": [-0.2889854602533978, 0.18818546025339777, -0.2889854602533978,

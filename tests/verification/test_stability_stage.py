@@ -10,12 +10,12 @@ from walkerlab.config.stability import Case
 from walkerlab.errors import ConfigError
 from walkerlab.report.results import Results
 from walkerlab.report.sections import verdict as verdict_section
-from walkerlab.report.sections.stability import section
 from walkerlab.report.tables import Table
-from walkerlab.stages.stability import summary_of
 from walkerlab.verification.catalogue import config_of, shipped
 from walkerlab.verification.judge import CaseCell, judge, run_cells
 from walkerlab.verification.known import Known
+from walkerlab.verification.section import section
+from walkerlab.verification.stability import summary_of
 from walkerlab.verification.starts import prepared
 from walkerlab.verification.verdict import BUDGET_USED, CaseResult, Measure, NotMeasured
 

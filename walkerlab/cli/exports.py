@@ -21,7 +21,7 @@ from walkerlab.pipeline.executor import Executor
 from walkerlab.pipeline.graph import PIPELINE
 from walkerlab.pipeline.results import FolderResults
 from walkerlab.pipeline.runs import config_of, makes, read_all, refusing_older, results_in, results_to_show, the_result
-from walkerlab.report.numbers import listed
+from walkerlab.prose import listed
 from walkerlab.report.outcomes import MODELS
 from walkerlab.report.tables import Table, as_csv, csv_text, of_records
 from walkerlab.report.tex import as_tex
@@ -254,7 +254,7 @@ def table(folder: RunFolder, name: str, kind: str, console: Console) -> Table:
     rows = summary[TABLES[name]]
     if kind == "tex":
         # Imported here: CSV needs no page.
-        from walkerlab.report.sections.paper import table_of
+        from walkerlab.paper.sections import table_of
 
         return table_of(TABLES[name], rows)
     if isinstance(rows, Mapping):

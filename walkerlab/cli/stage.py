@@ -104,7 +104,7 @@ def printed(request: Request, report: StageReport) -> list[str]:
         lines = [*found, *([""] if found else []), *([f"stored in {report.artifact}"] if own else [])]
     if report.stage in DRAWN_AT_ONCE:
         # Imported here: most stages draw nothing.
-        from walkerlab.stages.plot import draw_at_once
+        from walkerlab.figures.stage import draw_at_once
 
         drawn = draw_at_once(report.stage, report.run_dir, anew=not report.reused)
         lines += [f"figure: {path}" for path in drawn]

@@ -20,7 +20,7 @@ from walkerlab.config.sweep import Sweep
 from walkerlab.config.walkers import (
     CompassWalker,
     Walker,
-    is_plain_compass,
+    is_passive_compass,
     why_no_contact,
     why_no_push_off,
     why_no_state,
@@ -245,7 +245,7 @@ class Config(Block):
             given = SimpleNamespace(**info.data)
             if acting := acting_on(given):
                 raise wrong(f"is for a passive compass, and this walker has {', '.join(acting)}")
-            if not is_plain_compass(given):
+            if not is_passive_compass(given):
                 raise wrong("is for a compass; this walker is another")
         return value
 

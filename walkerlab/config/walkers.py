@@ -12,7 +12,7 @@ from pydantic import Discriminator, Field, Tag, ValidationInfo, field_validator
 from walkerlab.config.contact import Contact
 from walkerlab.config.drives import QUICKEST, Hip, acting_on
 from walkerlab.config.fields import Block, against, key, wrong
-from walkerlab.config.numbers import same, short
+from walkerlab.config.numbers import short
 from walkerlab.errors import ConfigError
 
 WISSE: Final = "Wisse, Schwab, Int. J. Robotics Research 24 (2005): arc feet"
@@ -394,17 +394,9 @@ def followers(walker: Any) -> dict[int, tuple[str, dict[int, float]]]:
     return found
 
 
-def is_plain_compass(config: Any) -> bool:
-    """Whether this is the walker of Appendix A."""
+def is_passive_compass(config: Any) -> bool:
+    """Whether a config has a compass without a torso on which nothing but gravity acts: Appendix A describes these."""
     return bool(config.walker.type == "compass" and config.walker.torso is None and not acting_on(config))
-
-
-def is_the_papers(config: Any) -> bool:
-    """Whether this is the paper's own walker, up to rounding of its numbers."""
-    walker, paper = config.walker, CompassWalker()
-    return is_plain_compass(config) and all(
-        same(getattr(walker, name), getattr(paper, name)) for name in CompassWalker.model_fields
-    )
 
 
 def leg_inertia(walker: Any) -> float:

@@ -11,7 +11,9 @@ from typing import Any, Final
 
 import matplotlib
 import matplotlib.style
+import numpy as np
 from matplotlib.artist import Artist
+from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
@@ -77,6 +79,22 @@ def label_ticks(axis: Axis) -> None:
     axis.set_major_locator(LogLocator(subs=(1.0, *between)))
     axis.set_minor_locator(NullLocator())
     axis.set_major_formatter(FuncFormatter((lambda value, _place: f"{value:g}") if between else power_of_ten))
+
+
+def error_axis(axes: Axes) -> None:
+    """Make the vertical axis logarithmic, for errors."""
+    if np.isfinite(axes.dataLim.intervaly).all():
+        axes.set_yscale("log")
+        label_ticks(axes.yaxis)
+
+
+def cost_axis(axes: Axes) -> None:
+    """Make the horizontal axis logarithmic, for costs; a panel without any says so."""
+    if np.isfinite(axes.dataLim.intervalx).all():
+        axes.set_xscale("log")
+        label_ticks(axes.xaxis)
+    else:
+        axes.text(0.5, 0.5, "no walk came to its end", transform=axes.transAxes, ha="center")
 
 
 def power_of_ten(value: float, _place: float | None = None) -> str:

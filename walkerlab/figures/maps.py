@@ -18,7 +18,7 @@ from walkerlab.config.contact import Contact
 from walkerlab.figures.canvas import add_legend, entry, label_of, label_ticks, panels, power_of_ten
 from walkerlab.figures.illustration import Drawn, Illustration, Need, Results, paper_figure
 from walkerlab.figures.style import BLACK, BLUE, GREEN, GREY, ORANGE, PALE, PURPLE, VERMILLION
-from walkerlab.figures.walks import TUNE_STAGE, redoes_the_paper, redoes_the_procedure
+from walkerlab.figures.walks import TUNE_STAGE, claims_in, redoes_the_procedure
 from walkerlab.outcome import TOLD, Outcome
 from walkerlab.store.content import Group
 
@@ -119,7 +119,7 @@ def draw_starts(results: Results) -> Drawn:
         key.append(entry(label, **mark, markerfacecolor=face))
     both[0].set(xlim=across[[0, -1]], ylim=up[[0, -1]])
     add_legend(figure, key)
-    rows = [summary["table2"][name] for name in ("dtheta_1", "dtheta_2")] if redoes_the_paper(results) else []
+    rows = [summary["table2"][name] for name in ("dtheta_1", "dtheta_2")] if claims_in(results) else []
     paper = [abs(row["paper_adams"] / row["ours_rigid"]) for row in rows]
     return figure, (summary["map"], cells.attrs["steps_wanted"], paper)
 

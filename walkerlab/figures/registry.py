@@ -1,12 +1,13 @@
-"""The illustrations there are, in the order in which they are shown."""
+"""The illustrations there are, in the order in which they are shown, those that evidence registers among them."""
 
-from walkerlab.figures import costs, families, ground, maps, robustness, stick_diagram, walks
+from walkerlab.figures import families, ground, maps, robustness, stick_diagram, walks
 from walkerlab.figures.illustration import Illustration
+from walkerlab.registration import registered
 
 NUMBERED = (*stick_diagram.FIGURES, *walks.FIGURES, *maps.FIGURES, *families.FIGURES, *robustness.FIGURES)
 FIGURES: tuple[Illustration, ...] = (
-    *sorted((costs.FIGURE_12, *NUMBERED), key=lambda figure: figure.name),
+    *sorted((*registered("walkerlab.paper.figures", "FIGURES"), *NUMBERED), key=lambda figure: figure.name),
     *ground.FIGURES,
-    *costs.FIGURES,
+    *registered("walkerlab.benchmarks.figures", "FIGURES"),
     *maps.STABILITY,
 )

@@ -1,4 +1,4 @@
-"""The walks of both models: 5, 7 and 10 in time, 8 their difference, 9 their limit cycles; and two runs overlaid."""
+"""The walks of both models: 5, 7 and 10 in time, 9 their limit cycles; and two runs overlaid."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from walkerlab.figures.canvas import add_legend, entry, files_of, label_of, panels, power_of_ten, styled
+from walkerlab.figures.canvas import add_legend, entry, files_of, label_of, panels, styled
 from walkerlab.figures.illustration import Drawn, Need, Results, paper_figure
-from walkerlab.figures.style import BLACK, BLUE, CONTACT, GREY, ORANGE, PALE, RIGID, VERMILLION, Look
-from walkerlab.paper.printed import LARGEST_ERROR
+from walkerlab.figures.style import BLUE, CONTACT, GREY, ORANGE, PALE, RIGID, Look
+from walkerlab.pipeline.headlines import claims
 from walkerlab.store.content import Content, Group
 
 Array = NDArray[np.float64]
@@ -44,9 +44,9 @@ PAPER_STRIDES = 5
 STRIKE_WIDTH = 0.6
 
 
-def redoes_the_paper(results: Results) -> bool:
-    """Whether the scene is the paper's own; of any other, figures say nothing of the paper."""
-    return COMPARE_STAGE in results and not results[COMPARE_STAGE].summary.get("departures")
+def claims_in(results: Results) -> Sequence[Mapping[str, Any]]:
+    """Return the values that a study claims of this very scene; of any other, figures say nothing of the study."""
+    return claims(results[COMPARE_STAGE].summary) if COMPARE_STAGE in results else ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -218,61 +218,6 @@ def draw_states(results: Results) -> Drawn:
     return figure, (extent, walks)
 
 
-AT_SAME_TIME: Final = Look("difference at the same time", VERMILLION, (0.0, (3.2, 1.4)), 1.2, "", order=3)
-IN_PHASE: Final = Look("at the same phase of a step", BLACK, "-", 1.2, "", order=4)
-PAPER: Final = Look("largest error in the paper", GREY, ":", 1.6, "", order=2)
-ROOM = 3.0
-"""Factor between what is shown of errors and the axis's ends."""
-ZERO_CROSSING = 1e-3
-"""Part of the largest error below which nothing is shown: where a difference changes its sign it is nothing."""
-QUANTITIES = (
-    ("a", "angle", "angle_error_rad"),
-    ("b", "angular velocity", "velocity_error_rad_s"),
-)
-"""What of the legs is compared: letter, words, variable of the errors (stored raw and aligned)."""
-RAW_ERRORS = Need(COMPARE_STAGE, "errors", ("time", *(f"raw_{name}" for _, _, name in QUANTITIES)), NO_STATES)
-ALIGNED_ERRORS = Need(
-    COMPARE_STAGE,
-    "aligned",
-    ("phase", *(f"aligned_{name}" for _, _, name in QUANTITIES)),
-    "no step was completed by both models",
-)
-
-
-def draw_differences(results: Results) -> Drawn:
-    """A row for each leg's angle and angular velocity, on logarithmic scales, over the rigid walk's steps.
-
-    Caption: the largest errors of all that was compared, in both ways, and the paper's.
-    """
-    (rigid,), _ = shown([walk_of(results[RIGID_STAGE], RIGID)])
-    raw, aligned = (results[COMPARE_STAGE][need.group] for need in (RAW_ERRORS, ALIGNED_ERRORS))
-    of_the_paper, early = redoes_the_paper(results), raw["time"] <= rigid.time[-1]
-    figure, axes = time_axes(4, 1.55, [rigid])
-    rows = [(*quantity, leg) for quantity in QUANTITIES for leg in (0, 1)]
-    for one, (letter, words, name, leg) in zip(axes, rows, strict=True):
-        raw_error = np.abs(raw[f"raw_{name}"][early, leg])
-        aligned_error = np.abs(aligned[f"aligned_{name}"][: rigid.strikes.size, :, leg])
-        line(one, raw["time"][early], raw_error, AT_SAME_TIME)
-        for begin, end, error in zip((0.0, *rigid.strikes), rigid.strikes, aligned_error, strict=False):
-            line(one, begin + (end - begin) * aligned["phase"], error, IN_PHASE)
-        largest = max(float(raw_error.max()), float(aligned_error.max()))
-        bottom, top = ZERO_CROSSING * largest, ROOM * largest
-        if of_the_paper:
-            one.axhline(LARGEST_ERROR.value, **PAPER.line)
-            bottom, top = min(LARGEST_ERROR.value / ROOM, bottom), max(ROOM * LARGEST_ERROR.value, top)
-        one.set_yscale("log", subs=[])
-        one.yaxis.set_major_formatter(power_of_ten)
-        one.set(ylim=(bottom, top), ylabel=label_of("error", raw.variables[f"raw_{name}"].units))
-        one.set_title(f"({letter}{leg + 1}) {words} of leg {leg + 1}")
-    looks = [AT_SAME_TIME, IN_PHASE, *([PAPER] if of_the_paper else [])]
-    add_legend(figure, [*(entry(look.label, **look.line) for look in looks), strike_entry(rigid.look)])
-    caption_values = []
-    for _, words, name in QUANTITIES:
-        at_once, in_phase = np.abs(raw[f"raw_{name}"]).max(), np.abs(aligned[f"aligned_{name}"]).max()
-        caption_values.append((words, at_once, in_phase, raw.variables[f"raw_{name}"].units))
-    return figure, (caption_values, LARGEST_ERROR.text if of_the_paper else "")
-
-
 CYCLES = 20
 """Strides that are shown: a transient is over by then; more lines would only lie on one another."""
 LAST_STRIDE = 2
@@ -369,7 +314,7 @@ def draw_energies(results: Results) -> Drawn:
     impacts = any(walk.look is CONTACT for walk in walks)
     asked = results[RIGID_STAGE].identity.config_slice
     driven = any((asked["push_off"]["impulse_N_s"], *asked["walker"]["hip"].values()))
-    return figure, (extent, means, redoes_the_paper(results), impacts, driven, walks)
+    return figure, (extent, means, bool(claims_in(results)), impacts, driven, walks)
 
 
 OVERLAY_ROWS: Final[tuple[tuple[str, Any, str], ...]] = (
@@ -419,7 +364,6 @@ def draw_overlay(both: list[tuple[str, list[Group]]], names: tuple[str, str]) ->
 FIGURES = (
     paper_figure(5, (ADJUSTED, FROM_RIGID), draw_adjusted),
     paper_figure(7, (RIGID_STATES,), draw_states),
-    paper_figure(8, (RAW_ERRORS, ALIGNED_ERRORS, STEPS_TAKEN_RIGID), draw_differences),
     paper_figure(9, (RIGID_STATES,), draw_cycles),
     paper_figure(10, (RIGID_ENERGIES,), draw_energies),
 )

@@ -53,7 +53,7 @@ class TwoLegs(NamedTuple):
     arm_x: tuple[float, ...]  # (2,)
     arm_y: tuple[float, ...]
     hip: SpringDamper
-    misprint: float  # kg m^2; numbers of the model by value, which loops need not load again
+    unpaired: float  # kg m^2; values of the model, which loops need not load again
     mass: float  # kg
     radius: float  # m
     gravity_along: float  # m/s^2
@@ -73,7 +73,7 @@ def two_legs(model: Standing) -> TwoLegs | None:
     lowest = (FALLEN_HIP * model.leg_length - model.radius) / math.hypot(x, y)
 
     held: dict[str, Any] = {name: tuple(model[name].ravel().tolist()) for name in ("A", "B", "arm_x", "arm_y")}
-    for name in ("misprint", "mass", "radius", "gravity_along", "gravity_down", "slope", "lean"):
+    for name in ("unpaired", "mass", "radius", "gravity_along", "gravity_down", "slope", "lean"):
         held[name] = float(model[name])
     return TwoLegs(
         model,
@@ -102,7 +102,7 @@ def swing_derivative(system: TwoLegs, t: float, y: Any) -> Any:
         r_2 = r_2 - R * pulled
         M_12, M_22 = M_12 + R * U_1, M_22 + 2.0 * R * U_2 + system.mass * R * R
     turning = system.A[2] * sin_d - system.B[2] * cos_d
-    r_2 = r_2 + squared_1 * (turning + system.misprint * sin_d)
+    r_2 = r_2 + squared_1 * (turning + system.unpaired * sin_d)
     r_1 = r_1 - squared_2 * turning
     hip = hinge_torque(system.hip, y[0] - y[1], y[2] - y[3]).torque
     r_1, r_2 = r_1 - hip, r_2 + hip

@@ -68,7 +68,7 @@ class Standing(np.record):  # type: ignore[misc]  # NumPy's stubs call one of it
     driven_hip: bool  # whether anything acts between the legs
     hip: Floats  # numbers of that: see `hinges.hip_law`
     push_off: float  # N s, along the trailing leg in the heel strike
-    misprint: float  # kg m^2, of a torque on the stance leg that no hinge gives: see `add_misprint`
+    unpaired: float  # kg m^2, of a torque on the stance leg that no hinge gives: see `add_unpaired_torque`
     mass: float  # kg
     radius: float  # [R] m, of either foot; 0 is a point
     hip_x: float  # m, to the hip, which belongs to the stance leg
@@ -178,7 +178,7 @@ def equations(model: Standing, y: Any, s: Any, c: Any, F: Any, U: Any, M: Any, r
     add_inertia(model, n, s, c, omega, M, r)
     if model.driven_hip:
         add_hinge_torque(hip_torque(model, y), SWING, STANCE, r)
-    add_misprint(model, s, c, omega, r)
+    add_unpaired_torque(model, s, c, omega, r)
     if R != 0.0:
         pulled = model.mass * model.gravity_along
         for k in range(n):
@@ -204,24 +204,25 @@ def legs_apart_standing(system: Mode, y: Any) -> tuple[float, float]:
 
 
 @always_inline
-def add_misprint(model: Standing, s: Any, c: Any, omega: Any, r: Any) -> None:
-    """Add the torque (N m) on the stance leg by which printed equations differ from Lagrange's; none has no misprint.
+def add_unpaired_torque(model: Standing, s: Any, c: Any, omega: Any, r: Any) -> None:
+    """Add a torque (N m) on the stance leg, by the swing leg's angular velocity squared, that nothing answers.
 
-    It is that of a centrifugal term with another factor: of the swing leg's angular velocity squared.
+    It is centrifugal, unpaired sin(theta_1 - theta_2) omega_1^2, without a counterpart on the swing leg, so it does not
+    keep the energy. Walkers of Lagrange's equations have none of it.
     """
-    if model.misprint != 0.0:
-        r[STANCE] += model.misprint * omega[SWING] * omega[SWING] * (s[SWING] * c[STANCE] - c[SWING] * s[STANCE])
+    if model.unpaired != 0.0:
+        r[STANCE] += model.unpaired * omega[SWING] * omega[SWING] * (s[SWING] * c[STANCE] - c[SWING] * s[STANCE])
 
 
 @always_inline
-def add_misprint_gradients(model: Standing, s: Any, c: Any, omega: Any, by_angle: Any, by_rate: Any) -> None:
+def add_unpaired_gradients(model: Standing, s: Any, c: Any, omega: Any, by_angle: Any, by_rate: Any) -> None:
     """Add its derivatives by the angles and by their velocities."""
-    if model.misprint != 0.0:
+    if model.unpaired != 0.0:
         cos_d, sin_d = c[SWING] * c[STANCE] + s[SWING] * s[STANCE], s[SWING] * c[STANCE] - c[SWING] * s[STANCE]
-        turning = model.misprint * omega[SWING] * omega[SWING] * cos_d
+        turning = model.unpaired * omega[SWING] * omega[SWING] * cos_d
         by_angle[STANCE, SWING] += turning
         by_angle[STANCE, STANCE] -= turning
-        by_rate[STANCE, SWING] += 2.0 * model.misprint * omega[SWING] * sin_d
+        by_rate[STANCE, SWING] += 2.0 * model.unpaired * omega[SWING] * sin_d
 
 
 @derivative.case(Mode)
@@ -265,7 +266,7 @@ def torque_gradients(model: Standing, y: Any, s: Any, c: Any, alpha: Any, by_ang
     add_inertia_gradients(model, n, s, c, omega, alpha, by_angle, by_rate)
     if model.driven_hip:
         add_hinge_gradients(hip_torque(model, y), SWING, STANCE, by_angle, by_rate)
-    add_misprint_gradients(model, s, c, omega, by_angle, by_rate)
+    add_unpaired_gradients(model, s, c, omega, by_angle, by_rate)
     if R != 0.0:
         for l in range(n):
             by_angle[STANCE, l] -= R * (F[l] * alpha[l] - omega[l] * omega[l] * U[l])

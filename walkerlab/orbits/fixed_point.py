@@ -203,7 +203,7 @@ def find_gaits(walker: Standing, seed: int = 0, settings: SearchSettings = Searc
 
     seed  of the random starting values
     """
-    if walker.slope <= 0.0 and walker.misprint == 0.0 and not walker.driven:
+    if walker.slope <= 0.0 and walker.unpaired == 0.0 and not walker.driven:
         return GaitSearch((), None, NO_DESCENT)
     search = Search(walker)
     generator = np.random.default_rng(seed)

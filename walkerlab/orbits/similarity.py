@@ -50,7 +50,7 @@ def unit_walker(walker: Standing) -> tuple[Standing, Units]:
     units = Units(length, mass, math.sqrt(length / walker.gravity))
     inertia, moment = 1.0 / (mass * length * length), 1.0 / (mass * length)
     scales = {
-        **dict.fromkeys(("A", "B", "misprint"), inertia),
+        **dict.fromkeys(("A", "B", "unpaired"), inertia),
         **dict.fromkeys(("arm_x", "arm_y"), moment),
         "hip": np.array(SpringDamper(1.0 / units.energy, 1.0 / (units.energy * units.time), 1.0 / units.energy)),
         "push_off": 1.0 / units.impulse,

@@ -11,9 +11,10 @@ import math
 from typing import NamedTuple
 
 from walkerlab.mechanics.rigid import standing
-from walkerlab.mechanics.standing import STANCE, SWING, Standing
+from walkerlab.mechanics.standing import Standing
 from walkerlab.mechanics.trigonometry import sine_cosine
 from walkerlab.mechanics.walkers import Arc, Limb, straight_legs
+from walkerlab.paper.law import as_printed
 from walkerlab.solvers.fused import fused
 
 CORRECTED = -1.0
@@ -104,11 +105,6 @@ def impact(
     r2 = B_22 * omega_2
     scale = 1.0 / (A_11 * A_22 - A_12 * A_12)
     return theta_2, theta_1, (A_11 * r2 - A_12 * r1) * scale, (A_22 * r1 - A_12 * r2) * scale
-
-
-def as_printed(model: Standing) -> Standing:
-    """A compass whose centrifugal torque on the stance leg, C_21 dtheta_1, has the sign that (A.5) prints."""
-    return model.changed(misprint=-2.0 * model.A[STANCE, SWING])
 
 
 def assembled(walker: RigidWalker) -> Standing:

@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING, Any
 from walkerlab.config import reads
 from walkerlab.config.reads import RigidConfig, SceneConfig, StartConfig
 from walkerlab.errors import ConfigError
-from walkerlab.scene.left_out import of_adjustment, of_contact_walk, of_rigid_walk, of_the_paper, of_verification
+from walkerlab.registration import later
+from walkerlab.scene.left_out import of_contact_walk, of_rigid_walk
+from walkerlab.scene.studies import is_studied
 
 # The table is also what the command line's help is made of, which loads no config and no pydantic.
 if TYPE_CHECKING:
@@ -43,15 +45,8 @@ def gait_for_start_or_pads(config: SceneConfig) -> tuple[str, ...]:
 
 
 def known_and_start(config: SceneConfig) -> tuple[str, ...]:
-    """The known problems, and for other walkers than the paper's compass, judged in their own scene, its start."""
-    return ("known-problems", *(() if of_the_paper(config) else gait_for_start_or_pads(config)))
-
-
-def engines_installed() -> Mapping[str, str]:
-    """The engines that are installed, with their versions."""
-    from walkerlab.benchmarks.engines.registry import installed
-
-    return {engine.name: engine.version for engine in installed()}
+    """The known problems, and for walkers that are no study's, judged in their own scene, its start."""
+    return ("known-problems", *(() if is_studied(config) else gait_for_start_or_pads(config)))
 
 
 @dataclass(frozen=True)
@@ -62,7 +57,7 @@ class Stage:
     module         where its `run` is; imported only when it runs
     purpose        one line for the user
     takes          type of the config that its `run` takes, and so what its result depends on; None for all of it
-    takes_of_scene the same for another walker than the paper's compass, where it is another type
+    takes_of_scene the same for a walker that is no study's, where it is another type
     takes_of_paper what its own cases stand on of the built-in paper config
     programs       the versions of other programs that its result depends on, by name
     inputs         the stages whose results it needs under a config, earlier in the table
@@ -115,7 +110,7 @@ class Stage:
 
     def takes_under(self, config: RigidConfig) -> type | None:
         """What its result depends on under a config."""
-        return self.takes if self.takes_of_scene is None or of_the_paper(config) else self.takes_of_scene
+        return self.takes if self.takes_of_scene is None or is_studied(config) else self.takes_of_scene
 
     def results(self, config: Config) -> tuple[str, ...]:
         """The stages whose results it gets: those that it needs, and those that it takes if they are current."""
@@ -206,36 +201,37 @@ PIPELINE = Graph(
         does_without=of_contact_walk,
     ),
     Stage(
-        "tune", "walkerlab.stages.tune",
+        "tune", "walkerlab.paper.tune",
         "Adjust the initial velocities until the contact model walks; say whether, how much, and why.",
-        reads.TuneConfig, results_of("fixedpoint"), needs_contact=True, does_without=of_adjustment,
+        reads.TuneConfig, results_of("fixedpoint"), needs_contact=True,
+        does_without=later("walkerlab.paper.left_out", "of_adjustment"),
     ),
     Stage(
-        "compare", "walkerlab.stages.compare",
+        "compare", "walkerlab.paper.compare",
         "Compare both models with each other and with every number of the paper.", reads.CompareConfig,
         results_of(*WALKED), needs_contact=True,
     ),
     Stage(
-        "accuracy", "walkerlab.stages.accuracy", "Measure error against run time, method by method.",
+        "accuracy", "walkerlab.benchmarks.accuracy", "Measure error against run time, method by method.",
         reads.SceneConfig, gait_for_start_or_pads, alone=True,
     ),
     Stage(
-        "engines", "walkerlab.stages.engines",
+        "engines", "walkerlab.benchmarks.engines.stage",
         "Walk in other engines (MuJoCo, Drake, Exudyn): our contact law in their integrators, then their own contact.",
         reads.SceneConfig, gait_for_start_or_pads, needs_contact=True, on_demand=True,
-        programs=engines_installed,
+        programs=later("walkerlab.benchmarks.engines.registry", "installed_versions"),
     ),
     Stage(
-        "known-problems", "walkerlab.stages.known_problems",
+        "known-problems", "walkerlab.verification.known_problems",
         "Check the contact code on problems whose answers are known, once for all scenes.", object,
     ),
     Stage(
-        "stability", "walkerlab.stages.stability", "Verify extreme cases and problems with known answers.",
-        reads.CompassCasesConfig, known_and_start, does_without=of_verification,
-        takes_of_scene=reads.SceneCasesConfig, takes_of_paper=reads.WalksConfig,
+        "stability", "walkerlab.verification.stability", "Verify extreme cases and problems with known answers.",
+        reads.CompassCasesConfig, known_and_start, takes_of_scene=reads.SceneCasesConfig,
+        takes_of_paper=reads.WalksConfig, does_without=later("walkerlab.verification.left_out", "of_verification"),
     ),
     Stage(
-        "stability-maps", "walkerlab.stages.stability_maps",
+        "stability-maps", "walkerlab.verification.stability_maps",
         "Map stability over stiffness, stiction velocity and step size; resumes where it was interrupted.",
         reads.MapsConfig, campaign_of="stability", takes_of_paper=reads.WalksConfig,
     ),
@@ -260,12 +256,12 @@ PIPELINE = Graph(
         reads.DesignConfig, results_of("fixedpoint"), on_demand=True, designs=True, of_a_model=True,
     ),
     Stage(
-        "plot", "walkerlab.stages.plot", "Draw the figures from the stored results.", reads.NamedConfig,
+        "plot", "walkerlab.figures.stage", "Draw the figures from the stored results.", reads.NamedConfig,
         results_of(*WALKED, "compare"), draws=True,
         if_current=("accuracy", "engines", "tune", "stability-maps", "continuation", "basin", "robustness"),
     ),
     Stage(
-        "report", "walkerlab.stages.report", "Write the report, one HTML file.", None,
+        "report", "walkerlab.report.stage", "Write the report, one HTML file.", None,
         results_of(*WALKED, "tune", "compare", "accuracy", "stability", "plot"), draws=True, early_with=WALKED,
         if_current=("engines", "stability-maps", "continuation", "basin", "robustness"),
     ),

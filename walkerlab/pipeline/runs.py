@@ -17,8 +17,8 @@ from walkerlab.config.writer import to_yaml
 from walkerlab.errors import ConfigError, StaleError
 from walkerlab.pipeline.executor import survey
 from walkerlab.pipeline.graph import PIPELINE, Graph, Stage
-from walkerlab.report.headlines import LAST_OF, headlines
-from walkerlab.report.numbers import listed
+from walkerlab.pipeline.headlines import LAST_OF, headlines
+from walkerlab.prose import listed
 from walkerlab.store import artifact
 from walkerlab.store.artifact import Stored
 from walkerlab.store.key import differences

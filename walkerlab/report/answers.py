@@ -11,8 +11,10 @@ from typing import Any
 
 from walkerlab.account import CHANNELS
 from walkerlab.labels import unit_by_name
+from walkerlab.prose import listed
+from walkerlab.registration import later
 from walkerlab.report import gaits
-from walkerlab.report.numbers import count, decimals_left, fixed, length, listed, number, quantity
+from walkerlab.report.numbers import count, decimals_left, fixed, length, number, quantity
 from walkerlab.report.outcomes import MODELS, WALKED, off_by
 from walkerlab.report.outcomes import walks as comes
 from walkerlab.report.tables import Cell, Column, Table, in_lines, measured, side_by_side, table
@@ -156,18 +158,6 @@ def tune(summary: Summary) -> list[str | Table]:
     return [*told, own, adjustment.margins_table(summary)]
 
 
-def compare(summary: Summary) -> list[str | Table]:
-    """How the values that the paper prints fare; of another walker, how the models differ."""
-    errors = summary.get("numerical_error", {})
-    told = [f"numerical error of the {model} walk: {off_by(error)}." for model, error in errors.items()]
-    if "verdicts" in summary:
-        from walkerlab.report.sections.paper import by_verdict, numbers_table
-
-        head = words("paper.finding", by_verdict(row["verdict"] for row in summary["paper_numbers"]))
-        return [head, numbers_table(summary["paper_numbers"]), *told]
-    return [words("models.answer", summary["outcomes"]), last_steps(summary, errors), *told]
-
-
 LAST_STEP = (
     Column("last step", "name"),
     measured("period", "period_s"),
@@ -197,13 +187,6 @@ def accuracy(summary: Summary) -> list[str | Table]:
     scenes = [{"scene": scene, **best} for scene, best in summary["best"].items()]
     head = f"{len(summary['rows'])} runs measured; the fastest method by the error that is asked for:"
     return [head, table("", [Column("scene", "scene"), *columns], scenes), *summary["conclusions"].values()]
-
-
-def extreme_cases(summary: Summary) -> list[str | Table]:
-    """How many cases ended as they should, and those that did not."""
-    from walkerlab.report.sections.stability import failures, family_table, finding
-
-    return [finding(summary), family_table(summary["cases"]), *failures(summary)]
 
 
 def continuation(summary: Summary) -> list[str | Table]:
@@ -266,9 +249,9 @@ ANSWERS: dict[str, Answer] = {
     "fixedpoint": fixedpoint,
     **{stage: partial(walk, model.lower()) for stage, model in MODELS.items()},
     "tune": tune,
-    "compare": compare,
+    "compare": later("walkerlab.paper.sections", "answer"),
     "accuracy": accuracy,
-    "stability": extreme_cases,
+    "stability": later("walkerlab.verification.section", "answer"),
     "continuation": continuation,
     "basin": starts,
     "robustness": stood,
@@ -283,7 +266,7 @@ def verdict(results: Mapping[str, Summary]) -> list[str]:
     """What a whole run has found, in three paragraphs at most: the gait, both walks, and what of the paper holds."""
     walked = [(model.lower(), results[stage]) for stage, model in MODELS.items() if stage in results]
     said = "; the ".join(f"{model} {comes(one['steps'], one['outcome'])}" for model, one in walked)
-    of_the_paper = ("compare",) if "verdicts" in results.get("compare", {}) else ()
-    told = [stage for stage in ("fixedpoint", *of_the_paper, "stability") if stage in results]
+    judged = ("compare",) if "verdicts" in results.get("compare", {}) else ()
+    told = [stage for stage in ("fixedpoint", *judged, "stability") if stage in results]
     heads = {stage: str(ANSWERS[stage](results[stage])[0]) for stage in told}
     return laid_out([heads.pop("fixedpoint", ""), f"The {said}." if said else "", " ".join(heads.values())])

@@ -92,9 +92,3 @@ def span(values: Iterable[float], unit: str, digits: int = 5) -> str:
 def count(how_many: int, what: str, several: str = "") -> str:
     """A number of things, as in '1 step' or '10 steps'."""
     return f"{how_many} {what if how_many == 1 else several or what + 's'}"
-
-
-def listed(parts: Iterable[str]) -> str:
-    """Words in a row: 'a', 'a and b', 'a, b and c'."""
-    words = list(parts)
-    return " and ".join([", ".join(words[:-1]), words[-1]]) if len(words) > 1 else "".join(words)

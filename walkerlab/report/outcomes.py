@@ -4,7 +4,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from walkerlab.outcome import TOLD, Outcome, outcome_of
-from walkerlab.report.numbers import count, listed, quantity
+from walkerlab.prose import listed
+from walkerlab.report.numbers import count, quantity
 from walkerlab.report.tables import Tone
 
 RIGID, CONTACT = "simulate", "contact-sim"

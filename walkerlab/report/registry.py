@@ -1,4 +1,4 @@
-"""The sections of the report in their order: one file each, and one entry here.
+"""The sections of the report in their order: an entry for each, those that evidence registers among them.
 
 A section is a function that makes a `Section` of the results, or None if there is nothing to show. It finds what it
 needs with `Results.summary(stage)` and `Results.group(stage, path)`, which give None for a stage that did not run.
@@ -9,7 +9,8 @@ import math
 from walkerlab.config.drives import drives_of, springs_of
 from walkerlab.config.files import DEFAULT
 from walkerlab.config.schema import Config
-from walkerlab.config.walkers import is_plain_compass, why_rigid_alone
+from walkerlab.config.walkers import is_passive_compass, why_rigid_alone
+from walkerlab.registration import registered
 from walkerlab.report.blocks import MAIN, Section
 from walkerlab.report.page import Page
 from walkerlab.report.results import Results, SectionMaker
@@ -17,15 +18,12 @@ from walkerlab.report.sections import (
     accuracy,
     adjustment,
     closing,
-    engines,
     families,
     gaits,
     models,
     motion,
-    paper,
     provenance,
     robustness,
-    stability,
     verdict,
     walks,
 )
@@ -34,7 +32,7 @@ from walkerlab.report.words import words
 SECTIONS: tuple[SectionMaker, ...] = (
     verdict.section,
     motion.section,
-    verdict.printed,
+    registered("walkerlab.paper.sections", "printed"),
     motion.figures,
     gaits.section,
     families.section,
@@ -45,12 +43,12 @@ SECTIONS: tuple[SectionMaker, ...] = (
     families.basin,
     robustness.section,
     models.section,
-    paper.numbers,
-    paper.tables,
-    paper.errors,
-    stability.section,
+    registered("walkerlab.paper.sections", "numbers"),
+    registered("walkerlab.paper.sections", "tables"),
+    registered("walkerlab.paper.sections", "errors"),
+    registered("walkerlab.verification.section", "section"),
     accuracy.section,
-    engines.section,
+    registered("walkerlab.benchmarks.engines.section", "section"),
     adjustment.limit,
     closing.glossary,
     closing.left_out,
@@ -81,7 +79,7 @@ def pages_of(results: Results, run: str) -> tuple[Page, ...]:
 
 def lead(config: Config, run: str) -> str:
     """What was run: the walker, its slope and what it was to do."""
-    equations = config.equations if is_plain_compass(config) else ""
+    equations = config.equations if is_passive_compass(config) else ""
     change = run.partition("@")[2].replace(",", ", ")
     degrees, alone = math.degrees(config.slope_rad), why_rigid_alone(config.walker)
     acting = drives_of(config), springs_of(config)

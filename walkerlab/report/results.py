@@ -6,6 +6,7 @@ from functools import wraps
 from typing import Any
 
 from walkerlab.config.schema import Config
+from walkerlab.pipeline.headlines import claims
 from walkerlab.report.blocks import Picture, Section
 from walkerlab.scene.left_out import LeftOut
 from walkerlab.store.content import Content, Group
@@ -37,9 +38,9 @@ class Results:
         return found
 
     @property
-    def of_the_paper(self) -> bool:
-        """Whether the scene is the paper's own, so that the paper's numbers are what a reader wants first."""
-        return "compare" in self.stored and not self.departures
+    def claims(self) -> Sequence[Mapping[str, Any]]:
+        """Judged values that a study claims of this very scene, whose numbering its reader knows; none of another."""
+        return claims(self.summary("compare"))
 
     def summary(self, stage: str) -> Mapping[str, Any]:
         """The summary of a stage's result; empty if there is none."""

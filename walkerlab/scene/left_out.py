@@ -12,10 +12,8 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from walkerlab.config.reads import (
-        CompassCasesConfig,
         ContactSimConfig,
         RigidConfig,
-        SceneCasesConfig,
         SimulateConfig,
     )
     from walkerlab.config.schema import Output
@@ -36,7 +34,6 @@ class LeftOut:
 
 Entry = dict[str, str]
 """The same as summaries hold it."""
-PAPERS = "it is the paper's procedure with its compass"
 RIGID_NUMBERS: Mapping[Output, int] = {"states": 10, "energies": 3, "forces": 4}
 CONTACT_NUMBERS: Mapping[Output, int] = {"states": 10, "energies": 8, "forces": 8}
 """How many numbers a sample each output takes, model by model."""
@@ -84,49 +81,11 @@ def of_contact_walk(config: ContactSimConfig) -> tuple[Entry, ...]:
     return (*found, *of_legs(config), *of_outputs(config.outputs, "contact", CONTACT_NUMBERS))
 
 
-def of_adjustment(config: RigidConfig) -> tuple[Entry, ...]:
-    """What the adjustment of another walker than the paper's compass does without."""
-    found = []
-    if not of_the_compass(config):
-        found.append(left_out("the first step with a hinged stance foot", PAPERS, "two walks"))
-    if not of_the_paper(config):
-        found.append(left_out("the paper's start of its ADAMS model", "it is of the paper's own compass", "a walk"))
-    return tuple(found)
-
-
-def of_verification(config: CompassCasesConfig | SceneCasesConfig) -> tuple[Entry, ...]:
-    """What the verification of another walker than the paper's compass does without."""
-    if of_the_paper(config):
-        return ()
-    return (
-        left_out(
-            "the named extreme cases",
-            "they are the paper's compass's; this walker has its own",
-            "about a hundred cases",
-        ),
-        left_out("ordinary methods on the extreme cases", "they are shown on the paper's compass", "8 runs a case"),
-    )
-
-
 def angles_of_a_step(walker: Walker) -> int:
     """How many angles a step's motion has; a stop that has latched keeps the stance shank's."""
     from walkerlab.config.walkers import rigid_bodies  # not for the help of the command line
 
     return rigid_bodies(walker) + int(walker.type == "kneed" and walker.knee.lock == "compliant")
-
-
-def of_the_compass(config: object) -> bool:
-    """Whether the walker of a config is the one of Appendix A."""
-    from walkerlab.config.walkers import is_plain_compass  # not for the help of the command line
-
-    return is_plain_compass(config)
-
-
-def of_the_paper(config: object) -> bool:
-    """Whether the walker of a config is the paper's own."""
-    from walkerlab.config.walkers import is_the_papers  # not for the help of the command line
-
-    return is_the_papers(config)
 
 
 def of_legs(config: RigidConfig) -> Iterator[Entry]:

@@ -8,14 +8,14 @@ from functools import lru_cache
 from typing import TYPE_CHECKING
 
 from walkerlab.config.ground import Footholds
-from walkerlab.config.walkers import CompassWalker, Walker, is_plain_compass, is_the_papers
+from walkerlab.config.walkers import Walker
 from walkerlab.errors import ConfigError
 from walkerlab.hybrid.recorded_walk import RigidWalkResult, take_walk
 from walkerlab.mechanics.rigid import knee_of, on_level_ground, places_of
 from walkerlab.mechanics.standing import Standing, on_slope
-from walkerlab.paper.appendix_a import AS_PRINTED, CORRECTED, RigidWalker, as_printed
 from walkerlab.scene.footholds import foothold_heights
 from walkerlab.scene.parts import SHOWN_IN, assembly_of, drive_numbers, knee_locked_at_strike
+from walkerlab.scene.studies import moved_by
 from walkerlab.solvers.registry import Tolerances
 from walkerlab.solvers.system import State
 
@@ -62,10 +62,9 @@ def rigid_scene(config: RigidConfig, ground: Footholds, outputs: tuple[Output, .
 
 
 def rigid_walker(config: RigidConfig, equations: Equations | None = None) -> Standing:
-    """The walker of a config, with its own set of equations or one of both; those as printed are a compass's."""
+    """Return the walker of a config, moving by its own set of equations or by another one."""
     passive = on_slope(level_walker(config.walker, config.gravity_m_s2), config.slope_rad)
-    model = passive.changed(**drive_numbers(config))
-    return as_printed(model) if (equations or config.equations) == "as-printed" else model
+    return moved_by(passive.changed(**drive_numbers(config)), equations or config.equations)
 
 
 def walker_or_none(config: RigidConfig | None) -> Standing | None:
@@ -82,34 +81,7 @@ def level_walker(walker: Walker, gravity: float) -> Standing:
         raise ConfigError(f"walker: {error}", SHOWN_IN) from None
 
 
-def compass(config: RigidConfig, equations: Equations) -> RigidWalker:
-    """The walker of Appendix A that a plain compass of a config is; ValueError for another walker."""
-    walker = config.walker
-    if not isinstance(walker, CompassWalker) or walker.torso is not None:
-        raise ValueError(f"a walker of type {walker.type} is none of Appendix A")
-    return RigidWalker(
-        leg_length=walker.leg_length_m,
-        foot_to_mass=walker.foot_to_mass_m,
-        leg_mass=walker.leg_mass_kg,
-        hip_mass=walker.hip_mass_kg,
-        leg_inertia=walker.leg_inertia_kg_m2,
-        gravity=config.gravity_m_s2,
-        slope=config.slope_rad,
-        c21_sign=AS_PRINTED if equations == "as-printed" else CORRECTED,
-    )
-
-
-def compass_or_none(config: RigidConfig, equations: Equations) -> RigidWalker | None:
-    """`compass`, or None for another walker."""
-    return compass(config, equations) if is_plain_compass(config) else None
-
-
 def coordinates(config: RigidConfig) -> tuple[str, ...]:
     """Names of the numbers of the rigid model's state."""
     angles = tuple(f"theta_{name}" for name in places_of(assembly_of(config.walker, rigid=True)).names)
     return (*angles, *(f"d{name}" for name in angles))
-
-
-def equation_sets(config: RigidConfig) -> tuple[Equations, ...]:
-    """The sets of equations that gaits are sought with: the config's own, and both for the paper's walker."""
-    return ("corrected", "as-printed") if is_the_papers(config) else (config.equations,)

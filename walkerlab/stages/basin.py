@@ -150,7 +150,7 @@ def contact_question(config: BasinConfig, inputs: Mapping[str, Content], rigid: 
     if config.contact is None:
         raise without_contact("basin.model: contact", config.walker, "Add one.")
     # Imported here: it brings interpolation along, which the rigid model's basin does without.
-    from walkerlab.stages.tune import for_a_map, starts_of
+    from walkerlab.scene.scaled import for_a_map, starts_of
 
     gait, steps = inputs["fixedpoint"].summary, config.basin.contact_steps
     step_length_m, state = float(gait["step_length_m"]), as_state(gait["state"])

@@ -11,7 +11,8 @@ from walkerlab.errors import NoAnswer
 from walkerlab.labels import Label
 from walkerlab.orbits.fixed_point import GaitSearch, RigidGait, find_gaits
 from walkerlab.pipeline.progress import Progress, each_told
-from walkerlab.scene.rigid import coordinates, equation_sets, rigid_walker
+from walkerlab.scene.rigid import coordinates, rigid_walker
+from walkerlab.scene.studies import equation_sets
 from walkerlab.store.columns import printed, real_and_imaginary, rows_group
 from walkerlab.store.content import Content, Group, Variable
 

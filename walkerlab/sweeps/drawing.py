@@ -8,8 +8,8 @@ from typing import Any
 from walkerlab.errors import ConfigError
 from walkerlab.figures import robustness
 from walkerlab.figures.sweep import choose, illustration, is_number
+from walkerlab.pipeline.headlines import HEADLINES
 from walkerlab.report.blocks import Gallery, Picture, Section
-from walkerlab.report.headlines import HEADLINES
 from walkerlab.report.numbers import number
 from walkerlab.report.page import Page, render
 from walkerlab.report.pictures import picture

@@ -18,7 +18,7 @@ from walkerlab.config.schema import Config, SlopeInDegrees
 from walkerlab.config.tree import Position, Scalar, plain
 from walkerlab.config.tree import Sequence as Listed
 from walkerlab.errors import ConfigError
-from walkerlab.report.headlines import QUANTITIES, has_quantity
+from walkerlab.pipeline.headlines import QUANTITIES, has_quantity
 
 Value = float | int | str | bool
 Layout = Literal["grid", "list"]

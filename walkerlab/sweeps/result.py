@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from walkerlab.config.schema import Config
 from walkerlab.labels import ERROR_OF_EACH_STEP, in_words, unit_by_name
-from walkerlab.report.headlines import LAST_OF, headlines
+from walkerlab.pipeline.headlines import LAST_OF, headlines
 from walkerlab.report.tables import csv_text
 from walkerlab.scene.endings import Pads, endings
 from walkerlab.solvers.system import Integers

@@ -17,13 +17,13 @@ import numpy as np
 from walkerlab.benchmarks.user_script import walk_as_a_script
 from walkerlab.config.reads import RigidConfig, WalksConfig
 from walkerlab.config.stability import Case
-from walkerlab.config.walkers import is_plain_compass
+from walkerlab.config.walkers import is_passive_compass
 from walkerlab.ground.on_pads import OnPads
 from walkerlab.ground.walker import on_ground
 from walkerlab.hybrid.contact_run import ContactWalkResult
 from walkerlab.hybrid.recorded_walk import RigidWalkResult
 from walkerlab.paper.appendix_a import RigidWalker
-from walkerlab.scene.rigid import compass_or_none
+from walkerlab.paper.walker import compass_or_none
 from walkerlab.solvers.registry import Tolerances
 from walkerlab.solvers.scipy_methods import OutOfBudgetError, counted
 from walkerlab.solvers.semi_implicit_euler import RUNAWAY, semi_implicit_euler
@@ -67,7 +67,7 @@ def choices(case: Case, config: WalksConfig) -> tuple[Choice, ...]:
     None if the case has no start or moves nowhere, if no equation without events describes its ground, or for another
     walker than a compass: a script without events describes no knee that locks, and Appendix A no other walker.
     """
-    if not is_plain_compass(config):
+    if not is_passive_compass(config):
         return ()
     short = case.model_copy(update={"steps": min(case.steps, STEPS), "budget": max(case.budget, REFERENCE_BUDGET)})
     start = prepared(config, short)

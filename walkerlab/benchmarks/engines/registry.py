@@ -68,3 +68,8 @@ ENGINES = {
 def installed() -> tuple[Engine, ...]:
     """Those that are there."""
     return tuple(engine for engine in ENGINES.values() if engine.is_installed)
+
+
+def installed_versions() -> dict[str, str]:
+    """Return the versions of the engines that are installed, by engine."""
+    return {engine.name: engine.version for engine in installed()}

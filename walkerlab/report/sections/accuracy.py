@@ -5,8 +5,9 @@ from functools import partial
 from typing import Any
 
 from walkerlab.outcome import Outcome
+from walkerlab.prose import listed
 from walkerlab.report.blocks import COSTS, Gallery, PageBlock, Paragraph, Section, Statement, Statements
-from walkerlab.report.numbers import NONE, listed, number, power_of_ten, whole
+from walkerlab.report.numbers import NONE, number, power_of_ten, whole
 from walkerlab.report.results import Results, of_stage
 from walkerlab.report.tables import Cell, Column, Table, grouped, table
 from walkerlab.report.words import words

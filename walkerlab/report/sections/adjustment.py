@@ -4,9 +4,10 @@ from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any
 
+from walkerlab.prose import listed
 from walkerlab.report.blocks import COSTS, Paragraph, Section
 from walkerlab.report.gaits import symbol, works
-from walkerlab.report.numbers import NONE, fixed, length, listed, number, quantity
+from walkerlab.report.numbers import NONE, fixed, length, number, quantity
 from walkerlab.report.outcomes import tone
 from walkerlab.report.results import Results, of_stage
 from walkerlab.report.symbols import in_signs
@@ -19,9 +20,9 @@ Summary = Mapping[str, Any]
 @of_stage("tune", "adjustment")
 def section(results: Results, summary: Summary) -> Section | None:
     """The verdict on the adjustment, with the tables behind it."""
-    changed = results.of_the_paper or summary["adjustment"]["needed"]
+    changed = results.claims or summary["adjustment"]["needed"]
     blocks = (
-        Paragraph(words("adjustment.explained", summary, results.of_the_paper)),
+        Paragraph(words("adjustment.explained", summary, results.claims)),
         starts_table(results, summary) if changed else None,
         gait_table(summary, results.summary("fixedpoint")) if summary["gait"]["found"] else None,
         margins_table(summary),
@@ -54,14 +55,14 @@ def starts_table(results: Results, summary: Summary) -> Table:
     """The start before and after; beside Table 2 if the paper is what is redone."""
     rows = [{"name": name, **row} for name, row in summary["table2"].items()]
     caption, note, head = "The start before and after the adjustment", "", "coordinate"
-    if results.of_the_paper:
+    if results.claims:
         caption, head = "Table 2 again: the start before and after the adjustment", "row"
         note = "The paper's percentages are those of the ADAMS value, without saying so."
-    named = in_signs if results.of_the_paper else symbol
+    named = in_signs if results.claims else symbol
     first = Column(head, lambda row: f"{named(row['name'])} ({row['unit']})")
     beside = (
         Column(title, key, partial(number, digits=3 if "percent" in key else 6), numeric=True)
-        for key, title in words.terms("adjustment.starts", results.of_the_paper).items()
+        for key, title in words.terms("adjustment.starts", results.claims).items()
     )
     return table(caption, (first, *beside), rows, note=note)
 
@@ -139,6 +140,6 @@ def walks_table(results: Results, summary: Summary) -> Table:
     """The procedure, walk by walk."""
     names = words.terms("adjustment.walks", "hinged" in summary["procedure"])
     walks = [{"walk": names[name], **walk} for name, walk in summary["procedure"].items() if walk is not None]
-    if results.of_the_paper:
+    if results.claims:
         walks.append({"walk": "from the paper's ADAMS start", **summary["paper_start"]})
     return table("The procedure, walk by walk", WALK_COLUMNS, walks)

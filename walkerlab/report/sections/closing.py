@@ -3,8 +3,9 @@
 from collections.abc import Iterator, Mapping, Sequence
 
 from walkerlab.config.drives import drives_of
+from walkerlab.prose import listed
 from walkerlab.report.blocks import CASES, COSTS, PAPER, Cards, Paragraph, Section, Terms
-from walkerlab.report.numbers import count, listed
+from walkerlab.report.numbers import count
 from walkerlab.report.results import Results
 from walkerlab.report.tables import Column, table
 from walkerlab.report.words import words
@@ -22,7 +23,7 @@ def further(results: Results, pages: Mapping[str, Sequence[Section]]) -> Section
     """Links to the other pages, each with what it comes to in a sentence for each section, and what will be there."""
     items = []
     for file, found in pages.items():
-        silent = file == PAPER and not results.of_the_paper
+        silent = file == PAPER and not results.claims
         items.append((file, TITLES[file], "" if silent else " ".join(filter(None, (one.finding for one in found)))))
     waiting = (Paragraph(words("closing.pending", name), "waiting") for name in results.pending)
     title = "Further pages" if items else "Still to come"

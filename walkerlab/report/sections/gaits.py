@@ -16,7 +16,7 @@ from walkerlab.report.words import words
 def section(results: Results, summary: Mapping[str, Any]) -> Section | None:
     """The gait of this walker on this slope."""
     names = summary.get("state_names", STATE)
-    shown = SETS if results.of_the_paper else (summary["equations"],)
+    shown = SETS if results.claims else (summary["equations"],)
     sets = summary.get("equation_sets", {summary.get("equations"): summary})
     found = {name: sets[name] for name in shown if name in sets}
     gaits = {name: one for name, one in found.items() if one.get("state")}

@@ -133,5 +133,5 @@ def view(tracks: tuple[Track, ...], slope: float, margin: float) -> tuple[int, i
 def figures(results: Results) -> Section | None:
     """The figures of the walks and gaits."""
     shown = tuple(picture for picture in results.pictures if picture.page == MAIN)
-    numbered = (Paragraph(words("figures.numbered")),) if results.of_the_paper else ()
+    numbered = (Paragraph(words("figures.numbered")),) if results.claims else ()
     return Section("figures", "Figures", (*numbered, Gallery(shown))) if shown else None

@@ -2,27 +2,22 @@
 
 import math
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from collections.abc import Iterator
 
 from walkerlab.config.drives import drives_of, springs_of
-from walkerlab.report.blocks import PageBlock, Paragraph, Section, Shares, Statement, Statements
-from walkerlab.report.numbers import count
+from walkerlab.report.blocks import Paragraph, Section, Statement, Statements
 from walkerlab.report.outcomes import MODELS, tone
 from walkerlab.report.results import Results
 from walkerlab.report.sections.models import departure
-from walkerlab.report.sections.paper import TONES, by_verdict, errata, paper_numbers, spelled
-from walkerlab.report.symbols import in_signs
 from walkerlab.report.tables import Tone
 from walkerlab.report.words import words
 
 
 def section(results: Results) -> Section | None:
     """What a reader should know who reads no further."""
-    rows = paper_numbers(results) if results.of_the_paper else ()
     walked = {model.lower(): summary for stage, model in MODELS.items() if (summary := results.summary(stage))}
-    verdicts = by_verdict(row["verdict"] for row in rows) if rows else {}
-    misprint = any(erratum["where"].startswith("A.5") for erratum in errata(results))
+    verdicts = Counter(row["verdict"] for row in results.claims)
+    misprint = any(erratum["where"].startswith("A.5") for erratum in results.summary("compare").get("errata", ()))
     # what holds, what fails and what follows
     found, config = (results.summary("fixedpoint"), verdicts, misprint), results.config
     said = ""
@@ -36,15 +31,6 @@ def section(results: Results) -> Section | None:
         Paragraph(departure(results)),
     )
     return Section.of("verdict", "Verdict", blocks if any(blocks) else (Paragraph("There are no results to judge."),))
-
-
-def printed(results: Results) -> Section | None:
-    """How the numbers that the paper prints fared, and its gravest errors; None for another walker's results."""
-    rows = paper_numbers(results) if results.of_the_paper else ()
-    if not rows:
-        return None
-    finding = words("paper.finding", by_verdict(row["verdict"] for row in rows))
-    return Section("printed", "What the paper prints", tuple(of_the_paper(results, rows)), finding)
 
 
 def failures(results: Results) -> list[str]:
@@ -83,27 +69,3 @@ def end_of(results: Results, stage: str) -> tuple[float | None, float | None]:
         return summary.get("end_time_s"), None
     height = float(trajectory["hip_height_m"][-1]) if "hip_height_m" in trajectory.variables else None
     return summary.get("end_time_s", float(trajectory["time"][-1])), height
-
-
-def of_the_paper(results: Results, rows: Sequence[Mapping[str, Any]]) -> Iterator[PageBlock]:
-    """How the paper's numbers fared, by verdict and by where they stand, and its gravest errors."""
-    found = errata(results)
-    places = {name: Counter(row["where"] for row in rows if row["verdict"] == name) for name in TONES}
-    parts = tuple((spelled(name), here.total(), TONES[name]) for name, here in places.items() if here)
-    yield Shares(f"Of {count(len(rows), 'value')} that the paper prints", parts)
-    every = Counter(row["where"] for row in rows)
-    told = (
-        Statement(f"{spelled(name).capitalize()}:", words("verdict.places", here, every), tone=TONES[name])
-        for name, here in places.items()
-        if here
-    )
-    yield Statements(tuple(told), "lines")
-    headlines = words.terms("verdict.headlines").items()
-    gravest = [(said, one) for place, said in headlines for one in found if one["where"].startswith(place)]
-    if gravest:
-        yield Paragraph(words("verdict.reasons"))
-        told = (
-            Statement(in_signs(f"{said} ({one['where']}):"), words("verdict.gravest", one), tone="fair")
-            for said, one in gravest
-        )
-        yield Statements(tuple(told), "columns")

@@ -79,7 +79,7 @@ def assumptions(results: Results) -> Section | None:
         if summary.get(key) is not None and not (key == "energy_drift_J" and works):
             (assumption, _, measured), (value, verdict) = said.partition(": "), judgement(key, summary, results)
             judged.append({"assumption": assumption, "measured": measured, "value": value, "verdict": verdict})
-    where = " (sections 3.1 and 3.2)" if results.of_the_paper else ""
+    where = " (sections 3.1 and 3.2)" if results.claims else ""
     caption = f"What the rigid model assumes{where}, and what its walk says"
     shown = table(caption, ASSUMPTION_COLUMNS, judged, wordy=True)
     return Section.of("assumptions", "Assumptions, checked", (shown,), words("walks.assumptions", judged))

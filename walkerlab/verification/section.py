@@ -120,3 +120,8 @@ def ordinary_cell(row: Row | None) -> Cell:
         return Cell("")
     error = f" {number(row['error'], 2)}," if "error" in row else ""
     return Cell(f"{row['verdict']}:{error} {number(1e3 * row['wall_s'], 2)} ms", VERDICTS[row["verdict"]])
+
+
+def answer(summary: Row) -> list[str | Table]:
+    """Answer how many cases ended as they should, and which did not."""
+    return [finding(summary), family_table(summary["cases"]), *failures(summary)]

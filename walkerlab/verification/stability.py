@@ -6,16 +6,16 @@ from typing import Any, TypeGuard
 
 from walkerlab.config.reads import CompassCasesConfig, SceneCasesConfig, WalksConfig, keys_of
 from walkerlab.config.schema import Config
-from walkerlab.config.walkers import is_the_papers
 from walkerlab.labels import labels_of
 from walkerlab.pipeline.progress import Progress, each_told
-from walkerlab.scene.left_out import of_verification
+from walkerlab.scene.studies import is_studied
 from walkerlab.stages.contact_sim import scene_on_pads
 from walkerlab.stages.walk import rigid_start
 from walkerlab.store.columns import rows_group
 from walkerlab.store.content import Content
 from walkerlab.verification.catalogue import judged, scene_cases
 from walkerlab.verification.judge import CaseCell, run_cells
+from walkerlab.verification.left_out import of_verification
 from walkerlab.verification.ordinary import CAP, FINE, Choice
 from walkerlab.verification.verdict import CaseResult
 
@@ -48,7 +48,7 @@ def run(
 
 def judged_in_its_scene(config: CompassCasesConfig | SceneCasesConfig) -> TypeGuard[SceneCasesConfig]:
     """Whether the walker is another one than the paper's compass."""
-    return not is_the_papers(config)
+    return not is_studied(config)
 
 
 def spelled_out(config: WalksConfig, inputs: Mapping[str, Content]) -> Config:

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from walkerlab.benchmarks import ladder
+from walkerlab.benchmarks import accuracy, ladder
+from walkerlab.benchmarks.accuracy import best_methods, conclusion, summary_of
 from walkerlab.benchmarks.ladder import (
     Ascent,
     MethodRow,
@@ -20,9 +21,8 @@ from walkerlab.benchmarks.references import End, Reference, WalkEndsError, refer
 from walkerlab.benchmarks.trials import USER_SCRIPT, RigidTrial, TrialRun
 from walkerlab.config.loader import load
 from walkerlab.labels import labels_of
-from walkerlab.scene.rigid import compass, rigid_walker
-from walkerlab.stages import accuracy
-from walkerlab.stages.accuracy import best_methods, conclusion, summary_of
+from walkerlab.paper.walker import compass
+from walkerlab.scene.rigid import rigid_walker
 from walkerlab.store.columns import rows_group
 
 CONFIG = load(None, ("contact=null",)).config

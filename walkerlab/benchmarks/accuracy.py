@@ -1,22 +1,22 @@
 """Error against run time: every method on every scene of the config, over a ladder of tolerances."""
 
-import os
-import platform
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
+from walkerlab.benchmarks.conditions import environment, hinge_left_out, plain_power
 from walkerlab.benchmarks.ladder import BUDGET, REPEATS, Ascent, MethodRow, ascend, finished, left_of, row_of
 from walkerlab.benchmarks.references import End, Reference, WalkEndsError, second_end
 from walkerlab.benchmarks.trials import USER_SCRIPT, RigidTrial, Trial
-from walkerlab.config.reads import ContactConfig, SceneConfig
-from walkerlab.config.walkers import is_plain_compass
+from walkerlab.benchmarks.words import words
+from walkerlab.config.reads import SceneConfig
+from walkerlab.config.walkers import is_passive_compass
 from walkerlab.hybrid.recorded_walk import with_scaled_rates
 from walkerlab.labels import labels_of
+from walkerlab.paper.walker import compass_or_none
 from walkerlab.pipeline.progress import Progress
-from walkerlab.scene.rigid import compass_or_none, rigid_walker
+from walkerlab.scene.rigid import rigid_walker
 from walkerlab.stages.walk import rigid_start
-from walkerlab.stages.words import words
 from walkerlab.store.columns import rows_group
 from walkerlab.store.content import Content
 
@@ -39,7 +39,7 @@ def run(config: SceneConfig, inputs: Mapping[str, Content], progress: Progress, 
     trials: list[Trial] = []
     seconds: list[End] = []
     climbs: list[Ascent] = []
-    compass = is_plain_compass(config)
+    compass = is_passive_compass(config)
     left_out = hinge_left_out(config, "methods") + ([] if compass or config.contact is None else list(LESS))
     for trial in scenes(config, inputs):
         progress.start(f"accuracy: {trial.name}", len(trial.methods))
@@ -71,23 +71,6 @@ def run(config: SceneConfig, inputs: Mapping[str, Content], progress: Progress, 
     return Content(groups, summary, timed=("best", "conclusions", "environment"))
 
 
-def hinge_left_out(config: ContactConfig, measured: str) -> list[dict[str, str]]:
-    """That no hinge holds the first step of the walk that something is measured on, if the config has one."""
-    if config.contact is None or config.contact.stance != "pinned":
-        return []
-    return [{"what": "hinged first step", "why": f"{measured} are measured on a walk that is free from its start"}]
-
-
-def environment() -> dict[str, Any]:
-    """What run times hang on."""
-    return {"processor": platform.machine(), "cores": os.cpu_count(), "python": platform.python_version()}
-
-
-def plain_power(level: float) -> str:
-    """A power of ten, such as 1e-3."""
-    return f"{level:.0e}".replace("e-0", "e-")
-
-
 def without(trial: Trial, why: WalkEndsError) -> dict[str, Any]:
     """A scene that nothing can be measured on."""
     start = f"from {OFF_THE_GAIT} of the start's velocities " if isinstance(trial, RigidTrial) else ""
@@ -105,7 +88,7 @@ def scenes(config: SceneConfig, inputs: Mapping[str, Content]) -> Iterator[Trial
     # contact code is loaded only for scenes that have contact
     from walkerlab.benchmarks.contact_trials import contact_trial, near_rigid_trial
 
-    if not is_plain_compass(config):
+    if not is_passive_compass(config):
         yield contact_trial(config, state, length, OTHERS_CONTACT_STEPS)
         return
     yield contact_trial(config, state, length, CONTACT_STEPS)

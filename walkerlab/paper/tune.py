@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from walkerlab.config.reads import TuneConfig
-from walkerlab.config.walkers import is_plain_compass, is_the_papers
+from walkerlab.config.walkers import is_passive_compass
 from walkerlab.ground.terrain import STANCE_FOOT
 from walkerlab.ground.walker import ContactWalker
 from walkerlab.hybrid.contact_run import ContactWalkResult, by_channel, sampled_feet
@@ -22,26 +22,25 @@ from walkerlab.orbits.rigid_limit import motion_of_legs
 from walkerlab.orbits.step_map import Cycle
 from walkerlab.outcome import Outcome
 from walkerlab.paper.adams_start import AdamsWalk, adams_walk
+from walkerlab.paper.law import is_own_walker
+from walkerlab.paper.left_out import of_adjustment
 from walkerlab.paper.printed import TABLE_2
+from walkerlab.paper.tune_limit import limit_findings, limit_groups, limit_summary
 from walkerlab.pipeline.progress import Progress, each_told
 from walkerlab.scene.contact import ContactScene, contact_gait, start_state, with_contact
 from walkerlab.scene.endings import Pads, endings
-from walkerlab.scene.left_out import of_adjustment
 from walkerlab.scene.rigid import coordinates, rigid_walker
+from walkerlab.scene.scaled import for_a_map, starts_of
 from walkerlab.solvers.registry import ENDLESS, Tolerances
 from walkerlab.solvers.system import State
 from walkerlab.stages.contact_sim import SAMPLES_PER_PENDULUM_TIME, scene_on_pads, tolerances_of
 from walkerlab.stages.numerical_error import numerical_error
 from walkerlab.stages.simulate import leg_variables
-from walkerlab.stages.tune_limit import limit_findings, limit_groups, limit_summary
 from walkerlab.stages.walk import OUTCOMES, TIME, counted, legs, numbers_of, of_steps, over_time, rigid_start
 from walkerlab.store.columns import numbered, real_and_imaginary, rows_group
 from walkerlab.store.content import Content, Group, Variable
 from walkerlab.workers import in_order
 
-# tolerances of a map: away from edges its outcomes are those of the config's (docs/adjustment.md)
-MAP_RTOL, MAP_ATOL = 1e-4, 1e-6
-LEAST_BUDGET, BUDGET_FACTOR = 60_000, 4  # right-hand sides of a cell: at least, and of the rigid start's walk
 RIGID = Tolerances("dop853", 1e-10, 1e-12, ENDLESS)
 AS_IT_STANDS = (1.0, 1.0)
 # walks with knees or rolling feet take several times as long as the compass's: their map and margins are coarser
@@ -68,24 +67,6 @@ def run(config: TuneConfig, inputs: Mapping[str, Content], progress: Progress, j
     return Content(stored, said)
 
 
-def starts_of(
-    scene: ContactScene, rigid: Standing, state: State, steps: int, answer: GaitAnswer, tolerances: Tolerances
-) -> scaled_starts.ScaledStarts:
-    """A rigid start with its velocities scaled, in a scene, to settle on the gait if one was found."""
-    own = None if answer.gait is None else (answer.gait.step.period_s, answer.gait.step.length_m)
-
-    def start(swing: float, stance: float) -> State:
-        return start_state(scene, with_scaled_rates(rigid, state, swing, stance))
-
-    starts = scaled_starts.scaled_starts(scene.walker, scene.ground, start, steps, own)
-    return replace(starts, tolerances=replace(tolerances, method=scaled_starts.TOLERANCES.method))
-
-
-def for_a_map(starts: scaled_starts.ScaledStarts, evaluations: int) -> scaled_starts.ScaledStarts:
-    """The same at tolerances of a map, with a budget by what the walk from the start as it stands evaluates."""
-    return starts.coarser(MAP_RTOL, MAP_ATOL, max(LEAST_BUDGET, BUDGET_FACTOR * evaluations))
-
-
 class TuneRun:
     """What the parts of the stage share, and all that they find.
 
@@ -104,7 +85,7 @@ class TuneRun:
         self.names, self.steps = coordinates(config), 2 * config.strides
         self.tolerances = tolerances_of(config, self.steps)
         self.rigid: Standing = rigid_walker(config)
-        self.hinge = is_plain_compass(config)
+        self.hinge = is_passive_compass(config)
         self.starts = starts_of(scene, self.rigid, rigid_state, self.steps, gait, self.tolerances)
         self.walks: dict[str, ContactWalkResult] = {}
         self.printed: dict[str, dict[str, Any]] = {}
@@ -135,7 +116,7 @@ class TuneRun:
             self.margins = scaled_starts.margins(self.starts, factors, **({} if self.hinge else COARSE))
             self.adjusted_state = with_scaled_rates(self.rigid, self.rigid_state, *factors)
             self.take("adjusted", self.adjusted_state)
-        if is_the_papers(self.config):
+        if is_own_walker(self.config):
             terrain = with_contact(self.config).terrain
             self.paper = adams_walk(self.rigid, self.walk, self.scene.walker, terrain)
 

@@ -70,7 +70,7 @@ def write_pages(
     names = {entry.what for entry in waited}
     failed = frozenset(name for name in names if has_failed(config, name, names))
     plain = Results(config, inputs, (), tuple(waited), tuple(pending), failed)
-    results = replace(plain, pictures=pictures(inputs, folder, numbered=plain.of_the_paper))
+    results = replace(plain, pictures=pictures(inputs, folder, numbered=bool(plain.claims)))
     pages = pages_of(results, folder.name)
     for page in pages:
         write_atomically(folder / page.file, render(page).encode())

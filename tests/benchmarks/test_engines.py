@@ -6,17 +6,17 @@ import pytest
 from synthetic_engines import ROWS, SWINGS, TUNING, content, row, truth
 
 from walkerlab.benchmarks.engines import registry
+from walkerlab.benchmarks.engines import stage as engines
 from walkerlab.benchmarks.engines.experiments import TOLERANCES, EngineOnScene
 from walkerlab.benchmarks.engines.process import TaskLost
 from walkerlab.benchmarks.engines.registry import ENGINES, Engine
 from walkerlab.benchmarks.engines.scenes import scenes
+from walkerlab.benchmarks.engines.stage import closest, ratios, three_digits
 from walkerlab.config.loader import load
 from walkerlab.errors import NoAnswer
 from walkerlab.pipeline.graph import PIPELINE
 from walkerlab.pipeline.identity import Keys
 from walkerlab.pipeline.progress import Silent
-from walkerlab.stages import engines
-from walkerlab.stages.engines import closest, ratios, three_digits
 from walkerlab.store.key import differences
 
 ABSENT = Engine("absent", "no_such_engine_module", "absent-engine")

@@ -11,14 +11,15 @@ from walkerlab.config.loader import load
 from walkerlab.config.reads import only
 from walkerlab.errors import NoAnswer
 from walkerlab.orbits.rigid_limit import ALL, NORMAL, ContactFactors, Distance, Extrapolation
+from walkerlab.paper import tune
+from walkerlab.paper.tune_limit import LimitFindings, causes
 from walkerlab.pipeline.graph import PIPELINE
 from walkerlab.pipeline.progress import Silent
 from walkerlab.report.blocks import Statements
 from walkerlab.report.results import Results
 from walkerlab.report.sections import adjustment, verdict
 from walkerlab.report.words import words
-from walkerlab.stages import fixedpoint, tune
-from walkerlab.stages.tune_limit import LimitFindings, causes
+from walkerlab.stages import fixedpoint
 
 
 @functools.cache

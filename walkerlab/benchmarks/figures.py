@@ -1,11 +1,11 @@
-"""What exactness costs: errors of methods and of other engines against run time, and figure 12, the rigid limit."""
+"""What exactness costs: errors of methods and of other engines against run time."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -13,23 +13,15 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from walkerlab.benchmarks.engines.rows import OURS, OWN_LAW, SAME_LAW
-from walkerlab.figures.canvas import add_legend, blank, entry, label_ticks, panels
-from walkerlab.figures.illustration import Drawn, Illustration, Need, Results, paper_figure
+from walkerlab.figures.canvas import add_legend, cost_axis, entry, error_axis, panels
+from walkerlab.figures.illustration import Drawn, Illustration, Need, Results
 from walkerlab.figures.style import BLACK, BLUE, CONTACT, GREEN, GREY, ORANGE, PALE, PURPLE, VERMILLION, Look
-from walkerlab.figures.walks import TUNE_STAGE, Array, redoes_the_paper
-from walkerlab.paper.printed import LARGEST_ERROR
+from walkerlab.figures.walks import Array
 
 if TYPE_CHECKING:
     from matplotlib.typing import LineStyleType
 
 DASHED, DOTTED = (0.0, (3.2, 1.4)), (0.0, (1.0, 1.2))
-
-
-def decades(axes: Axes) -> None:
-    """A logarithmic axis of errors."""
-    if np.isfinite(axes.dataLim.intervaly).all():
-        axes.set_yscale("log")
-        label_ticks(axes.yaxis)
 
 
 @dataclass(frozen=True)
@@ -114,8 +106,8 @@ def draw_methods(scene: str, results: Results) -> Drawn:
             axes.plot(cost[there], np.maximum(one.runs["error"][there], floor), **one.line, zorder=order)
             cross: dict[str, Any] = {"color": one.look.colour, "linestyle": "none", "marker": "x", "markersize": 5.0}
             axes.plot(cost[~there], np.full(np.count_nonzero(~there), failed), **cross, zorder=order)
-        costs(axes)
-        decades(axes)
+        cost_axis(axes)
+        error_axis(axes)
         axes.set_ylim(0.3 * floor, 4.0 * failed)
     left.set(ylabel="error of the end state (SI)", title="(a) against run time")
     right.set_title("(b) against right-hand sides")
@@ -173,23 +165,14 @@ def draw_errors(scene: str, results: Results) -> Drawn:
         every = list(engines_of(scene, experiment, results))
         for one in every:
             draw_engine(axes, one, "wall_s", one.runs["error"])
-        costs(axes)
-        decades(axes)
+        cost_axis(axes)
+        error_axis(axes)
         axes.set(xlabel="run time (s)", ylabel=label, title=title)
         found = [one.key for one in every if np.isfinite(one.runs["error"]).any()]
         if found:
             add_legend(figure, found, title, edge)
     summary = results[ENGINES_STAGE].summary
     return figure, (summary["reference"][scene], summary["conclusions"][scene][SAME_LAW])
-
-
-def costs(axes: Axes) -> None:
-    """A logarithmic axis of costs; without any, the panel says so."""
-    if np.isfinite(axes.dataLim.intervalx).all():
-        axes.set_xscale("log")
-        label_ticks(axes.xaxis)
-    else:
-        axes.text(0.5, 0.5, "no walk came to its end", transform=axes.transAxes, ha="center")
 
 
 def draw_engine(axes: Axes, one: Series, cost: str, values: Array) -> None:
@@ -212,58 +195,11 @@ def draw_periods(scene: str, results: Results) -> Drawn:
     if "rigid_period_s" in reference:
         level = reference["rigid_period_s"]
         levels.append(axes.axhline(level, color=GREY, linewidth=1.2, linestyle=":", label="rigid gait"))
-    costs(axes)
+    cost_axis(axes)
     axes.set(xlabel="step size (s)", ylabel="period of the last step (s)")
     add_legend(figure, [*levels, *(one.key for one in engines if one.walked.any())])
     failed = [(one.look.label, one.runs["step_s"][~one.walked]) for one in every if not one.walked.all()]
     return figure, (summary["conclusions"][scene][OWN_LAW], failed)
-
-
-ALIGNED, NUMERICAL, WALL = "angle_error_rad", "numerical_time_s", "wall_s"
-LIMITS: Final = (("limit/all", "(a) feet as they are"), ("limit/all-point-foot", "(b) point feet"))
-ERRORS: Final = {
-    "raw_angle_error_rad": Look("angle at the same time (rad)", VERMILLION, ":", 1.2, "v"),
-    ALIGNED: Look("angle in phase (rad)", BLUE, "-", 1.6, "o"),
-    "velocity_error_rad_s": Look("angular velocity in phase (rad/s)", ORANGE, "--", 1.4, "s"),
-    NUMERICAL: Look("numerical error, last touch (s)", GREY, "-.", 1.0, "x"),
-}
-LIMIT = Need(TUNE_STAGE, LIMITS[0][0], (WALL, *ERRORS), "no gait to lead towards the rigid limit")
-CLAIM: Final[dict[str, Any]] = {"color": BLACK, "linestyle": (0.0, (1.0, 2.0)), "linewidth": 1.0}
-CONFIGS: Final[dict[str, Any]] = {"color": BLACK, "linestyle": "", "marker": "o", "markersize": 9, "fillstyle": "none"}
-LEAST = 1e-14
-"""Shown in place of a numerical error of nothing, which has no place on a logarithmic axis."""
-
-
-def draw_limit(results: Results) -> Drawn:
-    """Errors over run time, one setting a point, from the config's contact to the most rigid one.
-
-    Caption: what both amount to, with point feet besides, the paper's claim, and whether the walker pushes off.
-    """
-    figure, of_the_paper = blank(3.6), redoes_the_paper(results)
-    # feet that roll in both models too are not made points as well
-    stored = results[TUNE_STAGE].groups
-    found = [(stored[name], title) for name, title in LIMITS if name in stored and ALIGNED in stored[name].variables]
-    both = figure.subplots(1, len(found), sharex=True, sharey=True, squeeze=False)[0]
-    for axes, (rows, title) in zip(both, found, strict=True):
-        for name, look in ERRORS.items():
-            values = np.maximum(np.abs(rows[name]), LEAST)
-            axes.plot(rows[WALL], values, **look.line, marker=look.marker, markersize=4)
-            if name != NUMERICAL:
-                axes.plot(rows[WALL][:1], values[:1], **CONFIGS)
-        costs(axes)
-        decades(axes)
-        axes.set(title=title if len(found) > 1 else "", xlabel="run time of the walk (s)")
-        if of_the_paper:
-            axes.axhline(LARGEST_ERROR.value, **CLAIM)
-    both[0].set_ylabel("error")
-    key = [entry(look.label, **look.line, marker=look.marker, markersize=4) for look in ERRORS.values()]
-    if of_the_paper:
-        key.append(entry("the paper's claim", **CLAIM))
-    add_legend(figure, [*key, entry("the config's contact", **CONFIGS)])
-    first, *point_feet = [rows[ALIGNED] for rows, _ in found]
-    claim = LARGEST_ERROR.text if of_the_paper else ""
-    pushes = results[TUNE_STAGE].identity.config_slice["push_off"]["impulse_N_s"] != 0.0
-    return figure, (first[0], first[-1], point_feet[0][-1] if point_feet else None, claim, pushes)
 
 
 SCENES = ("rigid", "contact", "contact-near-rigid")
@@ -284,4 +220,3 @@ FIGURES = tuple(
     )
     for scene, need in needs.items()
 )
-FIGURE_12 = paper_figure(12, (LIMIT,), draw_limit)

@@ -10,19 +10,19 @@ from typing import Any
 import numpy as np
 
 from walkerlab import __version__
+from walkerlab.benchmarks.conditions import environment, hinge_left_out, plain_power
 from walkerlab.benchmarks.engines import experiments
 from walkerlab.benchmarks.engines.experiments import EngineOnScene
 from walkerlab.benchmarks.engines.process import OwnProcess, TaskLost
 from walkerlab.benchmarks.engines.registry import ENGINES, EXTRA, installed
 from walkerlab.benchmarks.engines.rows import OURS, OWN_LAW, SAME_LAW, EngineRow, SwingRow, TuningRow
 from walkerlab.benchmarks.engines.scenes import scenes
+from walkerlab.benchmarks.words import words
 from walkerlab.config.reads import SceneConfig
 from walkerlab.errors import NoAnswer
 from walkerlab.labels import labels_of
 from walkerlab.pipeline.progress import Progress
-from walkerlab.stages.accuracy import environment, hinge_left_out, plain_power
 from walkerlab.stages.walk import rigid_start
-from walkerlab.stages.words import words
 from walkerlab.store.columns import rows_group
 from walkerlab.store.content import Content
 

@@ -9,11 +9,12 @@ from numpy.testing import assert_allclose
 
 from walkerlab.config.loader import load
 from walkerlab.config.reads import only
+from walkerlab.paper import compare
 from walkerlab.paper.study import study_the_paper
 from walkerlab.pipeline.graph import PIPELINE
 from walkerlab.pipeline.progress import Silent
 from walkerlab.pipeline.runner import execute
-from walkerlab.stages import compare, simulate
+from walkerlab.stages import simulate
 from walkerlab.stages.walk import of_steps, over_time
 from walkerlab.store.content import Content, Group
 from walkerlab.store.runfolder import RunFolder

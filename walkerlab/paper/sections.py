@@ -1,13 +1,15 @@
-"""The page of the paper: every number that it prints beside what is computed here, its tables, and its errata."""
+"""Sections on the paper: every value that it prints next to what is computed here, its tables and its errata."""
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any
 
 from walkerlab.labels import with_unit
-from walkerlab.report.blocks import PAPER, Paragraph, Section, Statement, Statements
+from walkerlab.report.answers import last_steps
+from walkerlab.report.blocks import PAPER, PageBlock, Paragraph, Section, Shares, Statement, Statements
 from walkerlab.report.numbers import count, number
+from walkerlab.report.outcomes import off_by
 from walkerlab.report.results import Results
 from walkerlab.report.symbols import in_signs
 from walkerlab.report.tables import Cell, Column, Table, Tone, grouped, table
@@ -135,3 +137,46 @@ def errata(results: Results) -> Sequence[Row]:
     """The errata that `compare` found, by the names of their parts; none without it."""
     found: Sequence[Row] = results.summary("compare").get("errata", ())
     return found
+
+
+def printed(results: Results) -> Section | None:
+    """Show how the values that the paper prints fared, and its gravest errors; None for another scene."""
+    rows = results.claims
+    if not rows:
+        return None
+    finding = words("paper.finding", by_verdict(row["verdict"] for row in rows))
+    return Section("printed", "What the paper prints", tuple(fates(results, rows)), finding)
+
+
+def fates(results: Results, rows: Sequence[Row]) -> Iterator[PageBlock]:
+    """Yield how the paper's values fared, by verdict and by where they stand, and its gravest errors."""
+    found = errata(results)
+    places = {name: Counter(row["where"] for row in rows if row["verdict"] == name) for name in TONES}
+    parts = tuple((spelled(name), here.total(), TONES[name]) for name, here in places.items() if here)
+    yield Shares(f"Of {count(len(rows), 'value')} that the paper prints", parts)
+    every = Counter(row["where"] for row in rows)
+    told = (
+        Statement(f"{spelled(name).capitalize()}:", words("verdict.places", here, every), tone=TONES[name])
+        for name, here in places.items()
+        if here
+    )
+    yield Statements(tuple(told), "lines")
+    headlines = words.terms("verdict.headlines").items()
+    gravest = [(said, one) for place, said in headlines for one in found if one["where"].startswith(place)]
+    if gravest:
+        yield Paragraph(words("verdict.reasons"))
+        told = (
+            Statement(in_signs(f"{said} ({one['where']}):"), words("verdict.gravest", one), tone="fair")
+            for said, one in gravest
+        )
+        yield Statements(tuple(told), "columns")
+
+
+def answer(summary: Row) -> list[str | Table]:
+    """Answer how the values that the paper prints fare or, for another walker, how the models differ."""
+    errors = summary.get("numerical_error", {})
+    told = [f"numerical error of the {model} walk: {off_by(error)}." for model, error in errors.items()]
+    if "verdicts" in summary:
+        head = words("paper.finding", by_verdict(row["verdict"] for row in summary["paper_numbers"]))
+        return [head, numbers_table(summary["paper_numbers"]), *told]
+    return [words("models.answer", summary["outcomes"]), last_steps(summary, errors), *told]

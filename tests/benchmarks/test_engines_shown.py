@@ -5,13 +5,13 @@ import pytest
 from synthetic_engines import PERIOD, ROWS, content
 
 from walkerlab.benchmarks.engines.rows import EngineRow
+from walkerlab.benchmarks.engines.section import section
+from walkerlab.benchmarks.figures import COLOURS, FIGURES, engines_of
 from walkerlab.config.loader import load
 from walkerlab.figures.canvas import as_file, styled
-from walkerlab.figures.costs import COLOURS, FIGURES, engines_of
 from walkerlab.labels import labels_of
 from walkerlab.report.blocks import Statements
 from walkerlab.report.results import Results
-from walkerlab.report.sections.engines import section
 from walkerlab.report.tables import Table
 
 ERRORS, PERIODS = (

@@ -1,8 +1,8 @@
 """The numbers of each stage's summary: which say most, for differences and tables of many runs, and which there are."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import chain
-from typing import Final
+from typing import Any, Final
 
 HEADLINES: Final[Mapping[str, tuple[str, ...]]] = {
     "fixedpoint": (
@@ -80,3 +80,12 @@ def stands_for(wanted: str, name: str) -> bool:
 def has_quantity(stage: str, name: str) -> bool:
     """Whether a stage may have a number of that name; of a stage without any on record nothing is known."""
     return stage not in QUANTITIES or any(stands_for(known, name) for known in QUANTITIES[stage])
+
+
+def claims(compared: Mapping[str, Any]) -> Sequence[Mapping[str, Any]]:
+    """Return the values that a study claims of this very scene, each as it was judged; none of another scene.
+
+    compared  the summary of `compare`; empty without a result
+    """
+    judged: Sequence[Mapping[str, Any]] = compared.get("paper_numbers", ())
+    return () if compared.get("departures") else judged

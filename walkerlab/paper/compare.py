@@ -10,12 +10,13 @@ import numpy as np
 
 from walkerlab.config.reads import CompareConfig
 from walkerlab.config.schema import Equations
-from walkerlab.config.walkers import is_the_papers
 from walkerlab.hybrid import comparison
 from walkerlab.hybrid.recorded_walk import as_state
 from walkerlab.labels import labels_of
+from walkerlab.paper.compared_releases import LEFT_OUT, compare_releases
 from walkerlab.paper.departures import departures
 from walkerlab.paper.errata import Erratum, errata
+from walkerlab.paper.law import is_own_walker
 from walkerlab.paper.measured import (
     CYCLES,
     ContactModel,
@@ -29,10 +30,9 @@ from walkerlab.paper.measured import (
 from walkerlab.paper.printed import fixed_point_as_printed
 from walkerlab.paper.rows import NumberVerdict, counted, paper_rows, table_1, table_2, table_3
 from walkerlab.paper.study import study_the_paper
+from walkerlab.paper.walker import compass
 from walkerlab.pipeline.progress import Progress
 from walkerlab.scene.contact import GAIT, contact_scene, start_state, with_contact
-from walkerlab.scene.rigid import compass
-from walkerlab.stages.compared_releases import LEFT_OUT, compare_releases
 from walkerlab.stages.walk import LEG, STEP, TIME, last_step, legs, over_time
 from walkerlab.store.columns import numbered, rows_group
 from walkerlab.store.content import Content, Group, Variable
@@ -76,7 +76,7 @@ MEANINGS = {
 
 def run(config: CompareConfig, inputs: Mapping[str, Content], progress: Progress) -> Content:
     """Compare the walks of both models and, if walker and ground are the paper's, hold both against the paper."""
-    papers = is_the_papers(config) and config.ground.even
+    papers = is_own_walker(config) and config.ground.even
     progress.start("compare", 3 if papers else 2)
     motion = compare_motion(motion_of(inputs["simulate"]), motion_of(inputs["contact-sim"]))
     walks = {"rigid": inputs["simulate"].summary, "contact": inputs["contact-sim"].summary}

@@ -1,0 +1,132 @@
+"""Figures that show the paper's claim: 8, how far both models' walks are apart, and 12, the rigid limit."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import numpy as np
+
+from walkerlab.figures.canvas import add_legend, blank, cost_axis, entry, error_axis, label_of, power_of_ten
+from walkerlab.figures.illustration import Drawn, Need, Results, paper_figure
+from walkerlab.figures.style import BLACK, BLUE, GREY, ORANGE, RIGID, VERMILLION, Look
+from walkerlab.figures.walks import (
+    COMPARE_STAGE,
+    NO_STATES,
+    RIGID_STAGE,
+    STEPS_TAKEN_RIGID,
+    TUNE_STAGE,
+    claims_in,
+    line,
+    shown,
+    strike_entry,
+    time_axes,
+    walk_of,
+)
+from walkerlab.paper.printed import LARGEST_ERROR
+
+AT_SAME_TIME: Final = Look("difference at the same time", VERMILLION, (0.0, (3.2, 1.4)), 1.2, "", order=3)
+IN_PHASE: Final = Look("at the same phase of a step", BLACK, "-", 1.2, "", order=4)
+PAPER: Final = Look("largest error in the paper", GREY, ":", 1.6, "", order=2)
+ROOM = 3.0
+"""Factor between what is shown of errors and the axis's ends."""
+ZERO_CROSSING = 1e-3
+"""Part of the largest error below which nothing is shown: where a difference changes its sign it is nothing."""
+QUANTITIES = (
+    ("a", "angle", "angle_error_rad"),
+    ("b", "angular velocity", "velocity_error_rad_s"),
+)
+"""What of the legs is compared: letter, words, variable of the errors (stored raw and aligned)."""
+RAW_ERRORS = Need(COMPARE_STAGE, "errors", ("time", *(f"raw_{name}" for _, _, name in QUANTITIES)), NO_STATES)
+ALIGNED_ERRORS = Need(
+    COMPARE_STAGE,
+    "aligned",
+    ("phase", *(f"aligned_{name}" for _, _, name in QUANTITIES)),
+    "no step was completed by both models",
+)
+
+
+def draw_differences(results: Results) -> Drawn:
+    """A row for each leg's angle and angular velocity, on logarithmic scales, over the rigid walk's steps.
+
+    Caption: the largest errors of all that was compared, in both ways, and the paper's.
+    """
+    (rigid,), _ = shown([walk_of(results[RIGID_STAGE], RIGID)])
+    raw, aligned = (results[COMPARE_STAGE][need.group] for need in (RAW_ERRORS, ALIGNED_ERRORS))
+    claimed, early = bool(claims_in(results)), raw["time"] <= rigid.time[-1]
+    figure, axes = time_axes(4, 1.55, [rigid])
+    rows = [(*quantity, leg) for quantity in QUANTITIES for leg in (0, 1)]
+    for one, (letter, words, name, leg) in zip(axes, rows, strict=True):
+        raw_error = np.abs(raw[f"raw_{name}"][early, leg])
+        aligned_error = np.abs(aligned[f"aligned_{name}"][: rigid.strikes.size, :, leg])
+        line(one, raw["time"][early], raw_error, AT_SAME_TIME)
+        for begin, end, error in zip((0.0, *rigid.strikes), rigid.strikes, aligned_error, strict=False):
+            line(one, begin + (end - begin) * aligned["phase"], error, IN_PHASE)
+        largest = max(float(raw_error.max()), float(aligned_error.max()))
+        bottom, top = ZERO_CROSSING * largest, ROOM * largest
+        if claimed:
+            one.axhline(LARGEST_ERROR.value, **PAPER.line)
+            bottom, top = min(LARGEST_ERROR.value / ROOM, bottom), max(ROOM * LARGEST_ERROR.value, top)
+        one.set_yscale("log", subs=[])
+        one.yaxis.set_major_formatter(power_of_ten)
+        one.set(ylim=(bottom, top), ylabel=label_of("error", raw.variables[f"raw_{name}"].units))
+        one.set_title(f"({letter}{leg + 1}) {words} of leg {leg + 1}")
+    looks = [AT_SAME_TIME, IN_PHASE, *([PAPER] if claimed else [])]
+    add_legend(figure, [*(entry(look.label, **look.line) for look in looks), strike_entry(rigid.look)])
+    caption_values = []
+    for _, words, name in QUANTITIES:
+        at_once, in_phase = np.abs(raw[f"raw_{name}"]).max(), np.abs(aligned[f"aligned_{name}"]).max()
+        caption_values.append((words, at_once, in_phase, raw.variables[f"raw_{name}"].units))
+    return figure, (caption_values, LARGEST_ERROR.text if claimed else "")
+
+
+ALIGNED, NUMERICAL, WALL = "angle_error_rad", "numerical_time_s", "wall_s"
+LIMITS: Final = (("limit/all", "(a) feet as they are"), ("limit/all-point-foot", "(b) point feet"))
+ERRORS: Final = {
+    "raw_angle_error_rad": Look("angle at the same time (rad)", VERMILLION, ":", 1.2, "v"),
+    ALIGNED: Look("angle in phase (rad)", BLUE, "-", 1.6, "o"),
+    "velocity_error_rad_s": Look("angular velocity in phase (rad/s)", ORANGE, "--", 1.4, "s"),
+    NUMERICAL: Look("numerical error, last touch (s)", GREY, "-.", 1.0, "x"),
+}
+LIMIT = Need(TUNE_STAGE, LIMITS[0][0], (WALL, *ERRORS), "no gait to lead towards the rigid limit")
+CLAIM: Final[dict[str, Any]] = {"color": BLACK, "linestyle": (0.0, (1.0, 2.0)), "linewidth": 1.0}
+CONFIGS: Final[dict[str, Any]] = {"color": BLACK, "linestyle": "", "marker": "o", "markersize": 9, "fillstyle": "none"}
+LEAST = 1e-14
+"""Shown in place of a numerical error of nothing, which has no place on a logarithmic axis."""
+
+
+def draw_limit(results: Results) -> Drawn:
+    """Errors over run time, one setting a point, from the config's contact to the most rigid one.
+
+    Caption: what both amount to, with point feet besides, the paper's claim, and whether the walker pushes off.
+    """
+    figure, claimed = blank(3.6), bool(claims_in(results))
+    # feet that roll in both models too are not made points as well
+    stored = results[TUNE_STAGE].groups
+    found = [(stored[name], title) for name, title in LIMITS if name in stored and ALIGNED in stored[name].variables]
+    both = figure.subplots(1, len(found), sharex=True, sharey=True, squeeze=False)[0]
+    for axes, (rows, title) in zip(both, found, strict=True):
+        for name, look in ERRORS.items():
+            values = np.maximum(np.abs(rows[name]), LEAST)
+            axes.plot(rows[WALL], values, **look.line, marker=look.marker, markersize=4)
+            if name != NUMERICAL:
+                axes.plot(rows[WALL][:1], values[:1], **CONFIGS)
+        cost_axis(axes)
+        error_axis(axes)
+        axes.set(title=title if len(found) > 1 else "", xlabel="run time of the walk (s)")
+        if claimed:
+            axes.axhline(LARGEST_ERROR.value, **CLAIM)
+    both[0].set_ylabel("error")
+    key = [entry(look.label, **look.line, marker=look.marker, markersize=4) for look in ERRORS.values()]
+    if claimed:
+        key.append(entry("the paper's claim", **CLAIM))
+    add_legend(figure, [*key, entry("the config's contact", **CONFIGS)])
+    first, *point_feet = [rows[ALIGNED] for rows, _ in found]
+    claim = LARGEST_ERROR.text if claimed else ""
+    pushes = results[TUNE_STAGE].identity.config_slice["push_off"]["impulse_N_s"] != 0.0
+    return figure, (first[0], first[-1], point_feet[0][-1] if point_feet else None, claim, pushes)
+
+
+FIGURES = (
+    paper_figure(8, (RAW_ERRORS, ALIGNED_ERRORS, STEPS_TAKEN_RIGID), draw_differences),
+    paper_figure(12, (LIMIT,), draw_limit),
+)

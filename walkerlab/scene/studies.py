@@ -1,0 +1,34 @@
+"""Where the study that is redone registers what a scene needs of it: its own walker, and equations besides Lagrange's.
+
+It is named in quotes and imported late: nothing here depends on it, yet its law is part of the code that results are
+made of (see sources.py).
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from walkerlab.registration import registered
+
+if TYPE_CHECKING:
+    from walkerlab.config.schema import Equations
+    from walkerlab.mechanics.standing import Standing
+
+STUDY = "walkerlab.paper.law"
+LAGRANGES: Equations = "corrected"
+
+
+def is_studied(config: Any) -> bool:
+    """Whether a config has the study's own walker."""
+    return bool(registered(STUDY, "is_own_walker")(config))
+
+
+def moved_by(model: Standing, equations: Equations) -> Standing:
+    """Return a walker that moves by a set of equations, Lagrange's or one of the study's."""
+    moved: Standing = model if equations == LAGRANGES else registered(STUDY, "LAWS")[equations](model)
+    return moved
+
+
+def equation_sets(config: Any) -> tuple[Equations, ...]:
+    """Return the sets of equations that gaits are sought with: the config's, and every set for the study's walker."""
+    return (LAGRANGES, *registered(STUDY, "LAWS")) if is_studied(config) else (config.equations,)
