@@ -67,7 +67,7 @@ def truth():
         dissipated_J=np.zeros(5),
         knee_strike_time_s=None,
         work=WalkWork(0, 0, 0, 0),
-        driven=DrivenWork(1.0, 0.0, 0.0, 0.0, 0.0),
+        driven=DrivenWork(1.0, 0.0, 0.0, 0.0, 0.0, 0.0),
         samples=None,
         method="radau5",
     )
