@@ -43,7 +43,7 @@ def contents(draw):
     for path in draw(st.lists(st.lists(NAMES, min_size=1, max_size=3).map("/".join), max_size=3)):
         arrays = draw(st.dictionaries(NAMES, VALUES, max_size=3))
         variables = {
-            name: Variable(values, (draw(st.sampled_from([name, f"{name}_dim"])),), draw(TEXTS), draw(TEXTS))
+            name: Variable(values, (draw(st.sampled_from([name, f"{name}_dim"])),), draw(TEXTS) or "1", draw(TEXTS))
             for name, values in arrays.items()
             if values.dtype.kind != "O" or values.size
         }
