@@ -8,7 +8,16 @@ from matplotlib.colors import to_hex, to_rgb
 from synthetic_walks import LEG_LENGTH, SLOPE, STEP_LENGTH, both_models, contact, rigid, rigid_alone
 
 from walkerlab.figures.canvas import styled
-from walkerlab.figures.stick_diagram import FIGURE_2, FIGURE_6, entries, film_times, pictures, stick_diagram, sticks_of
+from walkerlab.figures.stick_diagram import (
+    FIGURE_2,
+    FIGURE_6,
+    FILM_NEEDS,
+    entries,
+    film_times,
+    pictures,
+    stick_diagram,
+    sticks_of,
+)
 from walkerlab.figures.style import LEGS, VERMILLION
 
 ROUNDING = 1e-12
@@ -143,9 +152,22 @@ def test_a_film_of_a_walk_that_falls_shows_the_fall_and_stays_there_for_a_second
     assert (falling != fallen).any()  # the clock says that it fell
 
 
-def test_a_film_of_a_long_walk_that_falls_begins_four_steps_before():
-    walk = replace(sticks_of(both_models()["simulate"]), ending="fell")
-    assert film_times(walk, None, 25, 1.0)[0] == walk.strikes[-5] if walk.strikes.size > 4 else 0.0
+@pytest.mark.parametrize("landings", [1, 4, 5, 10])
+def test_a_film_of_a_walk_that_falls_shows_its_last_four_steps_and_the_fall(landings):
+    period = 0.5
+    walk = replace(sticks_of(rigid(landings + 1, period, completed=landings)), ending="fell")
+    times = film_times(walk, None, 25, 1.0)
+    assert times[0] == pytest.approx(period * max(0, landings - 4))
+    assert times[-1] == walk.time[-1] > period * landings
+
+
+def test_a_walk_that_falls_in_its_first_step_has_a_film():
+    fall = rigid(1, outcome="fell", completed=0)
+    assert FILM_NEEDS["simulate"].missing_in({"simulate": fall}, {}) is None
+    walk = sticks_of(fall)
+    times = film_times(walk, None, 25, 1.0)
+    assert (times[0], times[-1]) == (0.0, walk.time[-1])
+    assert len([*pictures(walk, times[-1:])]) == 1
 
 
 def test_a_film_draws_rough_ground_once_more_so_high_that_it_is_seen():

@@ -1,5 +1,6 @@
 """The printed numbers: how they are read, when a value agrees with one, and what verdicts follow."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -214,6 +215,11 @@ def test_values_are_contradicted_by_other_values_of_the_paper_with_the_computati
         T_CYCLE.adams: f"0.59 + 0.77 s is {0.59 + 0.77:.2f} s",
     }.items():
         assert computed in found[entry].evidence
+
+
+def test_evidence_beside_a_contradiction_is_a_sentence_of_its_own(rows):
+    for row in rows().values():
+        assert not re.search(r"[a-z)]\. [a-z]", row.evidence), row.evidence
 
 
 def test_rounding_is_left_open_before_a_value_counts_as_contradicted(rows):

@@ -327,11 +327,11 @@ def write_film(folder: RunFolder, target: Target, film: Film, console: Console) 
     if kind == "mp4" and ffmpeg is None:
         raise ConfigError("an MP4 needs ffmpeg, which is not installed.", "Install it, or write a .gif.")
     # Imported here: what cannot be written is told before anything is loaded that draws.
-    from walkerlab.figures.stick_diagram import OF_STAGE, film_times, pictures, sticks_of
+    from walkerlab.figures.stick_diagram import FILM_NEEDS, film_times, pictures, sticks_of
 
     with results_to_show(folder, [film.model], console.warn) as results:
         walk = the_result(results, folder, film.model)
-        why = OF_STAGE[film.model].why_left_out(results, {})
+        why = FILM_NEEDS[film.model].missing_in(results, {})
         if why is not None:
             raise StaleError(f"the walk cannot be drawn: {why}.", STORED_WITH)
         sticks = sticks_of(walk)

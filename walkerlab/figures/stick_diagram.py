@@ -17,7 +17,7 @@ from matplotlib.patches import Patch, Polygon
 from numpy.typing import NDArray
 
 from walkerlab.figures.canvas import add_legend, blank, entry, styled
-from walkerlab.figures.illustration import Drawn, Illustration, Need, Results, paper_figure
+from walkerlab.figures.illustration import Drawn, Need, Results, paper_figure
 from walkerlab.figures.style import BLACK, GREY, LEGS, PURPLE, VERMILLION
 from walkerlab.figures.walks import (
     CONTACT_STAGE,
@@ -27,12 +27,13 @@ from walkerlab.figures.walks import (
     STATES,
     STEPS_TAKEN_CONTACT,
     STEPS_TAKEN_RIGID,
+    TOUCHES,
     TRAJECTORY,
     Array,
 )
 from walkerlab.outcome import outcome_of
 from walkerlab.store.artifact import Stored
-from walkerlab.store.content import Group
+from walkerlab.store.content import Group, Variable
 from walkerlab.store.footholds import FAR, ground_levels
 
 CYCLE = 2
@@ -53,6 +54,9 @@ UNDER, BESIDE, ABOVE = 0.36, 0.7, 1.05
 """What times of landings take below the lowest foot, and axes' labels and legend beside the axes and above them, in."""
 SHAPE = 0.68
 """Height of the axes in parts of their width, unless the walker is taller or longer."""
+NO_STEPS = Group(
+    {name: Variable(np.zeros(0), ("step",), unit, name) for name, unit in ((TOUCHES, "s"), ("touch_along_m", "m"))}
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,7 +152,8 @@ class Sticks:
 def sticks_of(result: Stored, under: str = "") -> Sticks:
     """The joints' places as a walk has stored them, `under` a group if that is named."""
     asked = result.identity.config_slice
-    trajectory, steps, walker = result[f"{under}trajectory"], result[f"{under}steps"], asked["walker"]
+    trajectory, walker = result[f"{under}trajectory"], asked["walker"]
+    steps = result.groups.get(f"{under}steps", NO_STEPS)
 
     def joints(name: str) -> Array:
         return np.stack((trajectory[f"{name}_along_m"], trajectory[f"{name}_height_m"]), axis=-1)
@@ -168,7 +173,7 @@ def sticks_of(result: Stored, under: str = "") -> Sticks:
     landings = np.append(0.0, steps["touch_along_m"])
     landings = np.column_stack((landings, np.zeros(landings.size) if ground is None else ground[1]))
     return Sticks(
-        trajectory["time"], hip, joints("foot"), steps["touch_time_s"], landings, slope, knees, radius, head, ground,
+        trajectory["time"], hip, joints("foot"), steps[TOUCHES], landings, slope, knees, radius, head, ground,
         pushes, ending,
     )  # fmt: skip
 
@@ -312,12 +317,10 @@ def draw_cycle(stage: str, results: Results) -> Drawn:
     return figure, (*caption_values, sticks.radius, result.identity.config_slice["contact"]["terrain"], pitch)
 
 
+FILM_NEEDS = {stage: Need(stage, TRAJECTORY, (*STATES, *JOINTS), NO_STATES) for stage in (RIGID_STAGE, CONTACT_STAGE)}
+"""What a film of a stage's walk cannot be drawn without; a walk that ends in its first step has a film, too."""
 FIGURE_2, FIGURE_6 = (
-    paper_figure(
-        number,
-        (Need(stage, TRAJECTORY, (*STATES, *JOINTS), NO_STATES), steps_taken),
-        partial(draw_cycle, stage),
-    )
+    paper_figure(number, (FILM_NEEDS[stage], steps_taken), partial(draw_cycle, stage))
     for number, stage, steps_taken in ((2, RIGID_STAGE, STEPS_TAKEN_RIGID), (6, CONTACT_STAGE, STEPS_TAKEN_CONTACT))
 )
 FIGURES = (FIGURE_2, FIGURE_6)
@@ -329,8 +332,6 @@ FILM_SIZE, FILM_DPI = (6.4, 3.6), 100
 STEPS_SHOWN = 4
 RELIEF, RELIEF_UNDER = 0.04, 0.075
 """How high uneven ground is drawn once more at most, and how far below it, leg lengths."""
-OF_STAGE: dict[str, Illustration] = {RIGID_STAGE: FIGURE_2, CONTACT_STAGE: FIGURE_6}
-"""The stick diagrams of the walks, which need what a film of them needs."""
 
 
 def film_times(sticks: Sticks, steps: int | None, rate: int, slower: float) -> Array:

@@ -106,11 +106,11 @@ class Judge:
         departures = self.measured.departures
         differs = "; ".join(departures.rigid if scene == "rigid" else departures.contact)
         if (contradiction := contradictions().get(entry)) is not None:
-            verdict, scene, evidence = CONTRADICTED, "any", f"{contradiction}. {evidence}"
+            verdict, scene, evidence = CONTRADICTED, "any", f"{contradiction}. {evidence[:1].upper()}{evidence[1:]}"
         if differs and scene == "any":
             evidence += f" The verdict is about the paper's own numbers, not about this scene ({differs})."
         elif differs and verdict not in (INPUT, REPRODUCED):
-            verdict, evidence = EXPLAINED, f"Not the paper's scene ({differs}). {evidence}"
+            verdict, evidence = EXPLAINED, f"Not the paper's scene ({differs}): {evidence}"
         about, (as_printed, corrected) = (entry.where, entry.quantity, entry.unit, entry.text), map(rigid.get, SETS)
         return JudgedNumber(*about, as_printed, corrected, contact, verdict.value, evidence)
 
