@@ -119,8 +119,8 @@ def outputs(*names: str) -> str:
 def reductions() -> list[Reduction]:
     """Every reduction there is, and one that there is not."""
     whole, none = contact(), contact(outputs())
-    import_stage = "import walkerlab.stages.{}, walkerlab.pipeline.runner"
-    walking, drawing = import_stage.format("simulate"), import_stage.format("plot")
+    import_stage = "import walkerlab.{}, walkerlab.pipeline.runner"
+    walking, drawing = import_stage.format("stages.simulate"), import_stage.format("figures.stage")
     return [
         Reduction(
             "the contact model: no contact block",
@@ -128,7 +128,7 @@ def reductions() -> list[Reduction]:
             ("contact", "rigid"),
             (contact(), rigid("contact=null")),
             compile=True,
-            imports=(import_stage.format("contact_sim"), walking),
+            imports=(import_stage.format("stages.contact_sim"), walking),
         ),
         Reduction(
             "floating base and stance contact: first step hinged",
