@@ -4,7 +4,7 @@ import numpy as np
 
 from walkerlab.benchmarks.engines.experiments import Truth
 from walkerlab.benchmarks.engines.rows import EngineRow, SwingRow, TuningRow
-from walkerlab.hybrid.contact_run import ContactWalkResult
+from walkerlab.hybrid.contact_result import ContactWalkResult
 from walkerlab.hybrid.walk_record import DrivenWork, WalkWork
 from walkerlab.outcome import Outcome
 from walkerlab.stages import engines
