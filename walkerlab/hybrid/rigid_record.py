@@ -9,45 +9,20 @@ from walkerlab.kernels import by_reference, inlined, vector
 from walkerlab.mechanics.hinges import hip_law
 from walkerlab.mechanics.impact import push_off
 from walkerlab.mechanics.standing import Mode, energies, ground_reaction, momentum, swing_foot
-from walkerlab.mechanics.tree import new_record, read_at_once, record_type
 from walkerlab.solvers.events import CrossingFinder
 from walkerlab.solvers.stepping import T_OLD, T, interpolate, sample
 
 NO_FORCE = 1e300  # above any normal force
+# indices into Observer.extremes
+MIN_NORMAL_FORCE, MAX_FRICTION_RATIO, MAX_SCUFF_DEPTH, ENERGY_DRIFT, MIN_IMPULSE, MAX_IMPULSE_RATIO = range(6)
+# indices into Observer.energy
+LEAST, MOST, LATEST, INTEGRAL, DURATION = 0, 1, 2, 3, 4
 CLOSER = 3  # parabolas to an extremum
+# rows of Observer.work, and columns: kinetic energy that strikes take, positive work of the hip's constant torque
+TAKEN, AT_HAND = 0, 1
+STRIKES, FORWARD = 0, 1
 # composite Simpson rule on eighths
 SIMPSON = (1.0 / 24.0, 4.0 / 24.0, 2.0 / 24.0, 4.0 / 24.0, 2.0 / 24.0, 4.0 / 24.0, 2.0 / 24.0, 4.0 / 24.0, 1.0 / 24.0)
-
-
-@read_at_once
-class RigidTally(np.record):  # type: ignore[misc]  # NumPy's stubs call one of its bases final
-    """Counts, extremes and energies of a walk: a structured scalar that kernels write to."""
-
-    recorded: int  # samples
-    min_normal_force: float  # N
-    max_friction_ratio: float  # |T / N|
-    max_scuff_depth: float  # m
-    energy_drift: float  # J, the largest in a swing
-    min_impulse: float  # N s, the smallest normal one of the strikes
-    max_impulse_ratio: float  # the largest ratio of a strike's tangential impulse to its normal one
-    lowest_energy: float  # J, from the stance foot, of this swing
-    highest_energy: float
-    latest_energy: float
-    energy_integral: float  # J s, over time
-    duration: float  # s
-    lost_in_strikes: float  # J, kinetic energy that the strikes of the steps taken cost
-    lost_in_step: float  # J, the same of the step at hand
-    forward: float  # J, positive work of the hip's constant torque in the steps taken
-    forward_in_step: float  # J, the same of the step at hand
-
-
-RIGID_TALLY = record_type(RigidTally, {})
-
-
-def new_tally() -> RigidTally:
-    """The tally of a walk that has not begun."""
-    tally: RigidTally = new_record(RIGID_TALLY, min_normal_force=NO_FORCE, min_impulse=NO_FORCE)
-    return tally
 
 
 @by_reference
@@ -58,12 +33,28 @@ class Observer(NamedTuple):
     times: Any  # (samples,) s, rising
     states: Any  # (samples, 2 n)
     steps: Any  # (samples,) which step a sample belongs to
-    tally: RigidTally
+    recorded: Any  # (1,) samples recorded so far
+    # (6,) least normal force N, largest |T/N|, deepest scuff m, largest drift of energy in a swing J; of the strikes'
+    # impulses the least normal one N s, and the largest ratio of tangential to normal
+    extremes: Any
+    energy: Any  # (5,) from the stance foot: least and most of this swing J, latest J, integral over time J s, time s
+    work: Any  # (2, 2) J, in the steps taken and in the one at hand
 
 
 def new_observer(times: Any, numbers: int) -> Observer:
     """An observer with memory for samples of a state of some `numbers` at `times` (s, rising)."""
-    return Observer(True, times, np.zeros((times.size, numbers)), np.zeros(times.size, np.int64), new_tally())
+    extremes = np.array([NO_FORCE, 0.0, 0.0, 0.0, NO_FORCE, 0.0])
+    steps = np.zeros(times.size, np.int64)
+    return Observer(
+        True,
+        times,
+        np.zeros((times.size, numbers)),
+        steps,
+        np.zeros(1, np.int64),
+        extremes,
+        np.zeros(5),
+        np.zeros((2, 2)),
+    )
 
 
 def unwatched() -> Observer:
@@ -76,7 +67,7 @@ def observe_start(observer: Observer, mode: Mode, y: Any) -> None:
     """Take note of the start of a swing phase, whose energy it must keep."""
     if observer.watching:
         kinetic, potential = energies(mode.model, y)
-        observer.tally.lowest_energy = observer.tally.highest_energy = kinetic + potential
+        observer.energy[LEAST], observer.energy[MOST] = kinetic + potential, kinetic + potential
         record_extremes(observer, mode, y)
 
 
@@ -87,22 +78,22 @@ def observe_strike(observer: Observer, mode: Mode, heel: bool, before: Any, afte
     That impulse is all of the change of momentum but the push-off's part. A heel strike ends the step at hand.
     """
     if observer.watching:
-        model, tally = mode.model, observer.tally
+        model, extremes, work = mode.model, observer.extremes, observer.work
         along, normal = momentum(model, before)
         along_after, normal_after = momentum(model, after)
         along, impulse = along_after - along, normal_after - normal
-        tally.lost_in_step += energies(model, before)[0] - energies(model, after)[0]
+        work[AT_HAND, STRIKES] += energies(model, before)[0] - energies(model, after)[0]
         if heel:
             if model.push_off != 0.0:
                 push = push_off(model, after)
                 along, impulse = along - push.along, impulse - push.upward
-                tally.max_impulse_ratio = max(tally.max_impulse_ratio, abs(push.along) / push.upward)
-            tally.lost_in_strikes += tally.lost_in_step
-            tally.forward += tally.forward_in_step
-            tally.lost_in_step = tally.forward_in_step = 0.0
-        tally.min_impulse = min(tally.min_impulse, impulse)
+                extremes[MAX_IMPULSE_RATIO] = max(extremes[MAX_IMPULSE_RATIO], abs(push.along) / push.upward)
+            for entry in range(2):
+                work[TAKEN, entry] += work[AT_HAND, entry]
+                work[AT_HAND, entry] = 0.0
+        extremes[MIN_IMPULSE] = min(extremes[MIN_IMPULSE], impulse)
         if impulse > 0.0:
-            tally.max_impulse_ratio = max(tally.max_impulse_ratio, abs(along) / impulse)
+            extremes[MAX_IMPULSE_RATIO] = max(extremes[MAX_IMPULSE_RATIO], abs(along) / impulse)
 
 
 @inlined
@@ -125,25 +116,25 @@ def assumptions_at(method: Any, mode: Mode, fraction: float) -> tuple[float, flo
 
 
 @inlined
-def keep_worst(observer: Observer, worst: tuple[float, float, float]) -> None:
+def keep_worst(observer: Observer, found: tuple[float, float, float]) -> None:
     """Keep the worst of what the model assumes."""
-    tally = observer.tally
-    tally.min_normal_force = min(tally.min_normal_force, -worst[0])
-    tally.max_friction_ratio = max(tally.max_friction_ratio, worst[1])
-    tally.max_scuff_depth = max(tally.max_scuff_depth, worst[2])
+    extremes = observer.extremes
+    extremes[MIN_NORMAL_FORCE] = min(extremes[MIN_NORMAL_FORCE], -found[0])
+    extremes[MAX_FRICTION_RATIO] = max(extremes[MAX_FRICTION_RATIO], found[1])
+    extremes[MAX_SCUFF_DEPTH] = max(extremes[MAX_SCUFF_DEPTH], found[2])
 
 
 @inlined
 def record_extremes(observer: Observer, mode: Mode, y: Any) -> tuple[float, float, float]:
     """Keep the worst of what the model assumes, and the energy."""
-    tally, worst = observer.tally, assumptions(mode, y)
-    keep_worst(observer, worst)
+    extremes, energy = observer.extremes, observer.energy
+    found = assumptions(mode, y)
+    keep_worst(observer, found)
     kinetic, potential = energies(mode.model, y)
     now = kinetic + potential
-    tally.lowest_energy, tally.highest_energy = min(tally.lowest_energy, now), max(tally.highest_energy, now)
-    tally.latest_energy = now
-    tally.energy_drift = max(tally.energy_drift, tally.highest_energy - tally.lowest_energy)
-    return worst
+    energy[LEAST], energy[MOST], energy[LATEST] = min(energy[LEAST], now), max(energy[MOST], now), now
+    extremes[ENERGY_DRIFT] = max(extremes[ENERGY_DRIFT], energy[MOST] - energy[LEAST])
+    return found
 
 
 @inlined
@@ -187,27 +178,27 @@ def observe(
     torque = hip_law(mode.model).torque
     if torque != 0.0:
         sample(method, mode, finder.nodes, finder.states)
-        observer.tally.forward_in_step += torque_work(torque, method, mode, finder, row, fraction).positive
+        observer.work[AT_HAND, FORWARD] += torque_work(torque, method, mode, finder, row, fraction).positive
     t, h = method.clock[T_OLD], method.clock[T] - method.clock[T_OLD]
     t_end, spacing = t + fraction * h, 0.125 * fraction
-    mean_energy = SIMPSON[0] * observer.tally.latest_energy
+    mean_energy = SIMPSON[0] * observer.energy[LATEST]
     y = vector(mode.model.zero_state)
     before = at = assumptions_at(method, mode, 0.0)
     for eighth in range(1, 9):
         interpolate(method, mode, spacing * eighth, y)
         after = record_extremes(observer, mode, y)
-        mean_energy += SIMPSON[eighth] * observer.tally.latest_energy
+        mean_energy += SIMPSON[eighth] * observer.energy[LATEST]
         for measure in range(3):
             if eighth > 1 and abs(vertex(before[measure], at[measure], after[measure])) <= 1.0:
                 ascend_to_worst(observer, method, mode, measure, spacing * (eighth - 1), spacing, fraction)
         before, at = at, after
-    observer.tally.energy_integral += mean_energy * fraction * h
-    observer.tally.duration += fraction * h
-    index = observer.tally.recorded
+    observer.energy[INTEGRAL] += mean_energy * fraction * h
+    observer.energy[DURATION] += fraction * h
+    index = observer.recorded[0]
     while index < observer.times.size and observer.times[index] <= t_end:
         interpolate(method, mode, (observer.times[index] - t) / h, y)
         for i in range(len(y)):
             observer.states[index, i] = y[i]
         observer.steps[index] = step
         index += 1
-    observer.tally.recorded = index
+    observer.recorded[0] = index
