@@ -35,9 +35,9 @@ from walkerlab.benchmarks.user_script import walk_as_a_script
 from walkerlab.config.basin import COORDINATES
 from walkerlab.config.loader import load
 from walkerlab.config.schema import Config
+from walkerlab.hybrid.endings import FALLEN_HIP
 from walkerlab.hybrid.recorded_walk import with_scaled_rates
 from walkerlab.hybrid.rigid_lanes import new_fates, new_lane_memory, two_legs, walk_lanes
-from walkerlab.hybrid.rigid_walk import FALLEN_HIP
 from walkerlab.orbits.basin import ATOL, RTOL, Attractors
 from walkerlab.orbits.families import ValueSpan
 from walkerlab.orbits.fixed_point import LOOKING, RigidGait, Search, SlopeBranch, find_gaits, over_slope

@@ -48,8 +48,8 @@ import plain_walk
 from walkerlab.config.loader import load
 from walkerlab.config.schema import Config
 from walkerlab.config.walkers import Kneed
-from walkerlab.hybrid.contact_run import UNEXPLAINED, ContactWalkResult
-from walkerlab.hybrid.contact_walk import EVENT_TIME
+from walkerlab.hybrid.contact_loop import EVENT_TIME
+from walkerlab.hybrid.contact_result import UNEXPLAINED, ContactWalkResult
 from walkerlab.outcome import Outcome
 from walkerlab.scene.contact import ContactScene, contact_scene, start_state
 from walkerlab.solvers.registry import Tolerances

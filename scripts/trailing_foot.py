@@ -32,7 +32,7 @@ from walkerlab.ground.walker import (
     on_ground,
     sines_cosines,
 )
-from walkerlab.hybrid.contact_run import walk_contact
+from walkerlab.hybrid.contact_result import walk_contact
 from walkerlab.mechanics.tree import add_inertia, projections
 from walkerlab.orbits.fixed_point import find_gaits
 from walkerlab.scene.rigid import rigid_walker

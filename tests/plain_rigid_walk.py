@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from walkerlab.hybrid.rigid_walk import FALLEN_HIP
+from walkerlab.hybrid.endings import FALLEN_HIP
 from walkerlab.mechanics import impact
 from walkerlab.mechanics.standing import BENT, NO_SHANK, STANCE, STRAIGHT, Mode
 from walkerlab.outcome import Outcome

@@ -6,7 +6,7 @@ from walkerlab.benchmarks.engines import stage as engines
 from walkerlab.benchmarks.engines.experiments import Truth
 from walkerlab.benchmarks.engines.rows import EngineRow, SwingRow, TuningRow
 from walkerlab.benchmarks.engines.stage import EngineFindings
-from walkerlab.hybrid.contact_run import ContactWalkResult
+from walkerlab.hybrid.contact_result import ContactWalkResult
 from walkerlab.hybrid.walk_record import DrivenWork, WalkWork
 from walkerlab.outcome import Outcome
 

@@ -11,7 +11,7 @@ from walkerlab.errors import ConfigError
 from walkerlab.ground.friction import friction_coefficient
 from walkerlab.ground.terrain import STANCE_FOOT
 from walkerlab.ground.walker import BENT, LOCKED
-from walkerlab.hybrid.contact_run import walk_contact
+from walkerlab.hybrid.contact_result import walk_contact
 from walkerlab.mechanics.hinges import hip_law
 from walkerlab.outcome import Outcome
 from walkerlab.solvers.registry import Tolerances
@@ -136,7 +136,8 @@ def test_forces_of_drives_do_the_work_that_our_walk_gives():
     samples = result.samples
     rules = RuleFollower(scene, 2, *scene.from_base(scene.start), carries=False)
     begin, end = (int(np.searchsorted(samples.time_s, result.touch_time_s[0] + late)) for late in (1e-4, 0.05))
-    rules.walk_state.feet[:2], rules.walk_state.times[0] = (0, 1), result.touch_time_s[0]
+    progress = rules.walk_state.progress
+    progress.stance, progress.steps, progress.last_touch = 0, 1, result.touch_time_s[0]
     powers = []
     for i in range(begin, end + 1):
         q, v = scene.from_base(tuple(samples.states[i]))

@@ -11,7 +11,7 @@ from system_rates import gradient_of, rate_of
 from test_foot_on_ground import differenced
 
 from walkerlab.config import loader
-from walkerlab.ground.walker import LOCKED, RELEASED, changed_forms, on_ground
+from walkerlab.ground.walker import LOCKED, RELEASED, changed_forms, new_progress, on_ground
 from walkerlab.mechanics.standing import STRAIGHT, Mode
 from walkerlab.orbits.fixed_point import find_gaits
 from walkerlab.scene.contact import contact_scene, start_state
@@ -44,7 +44,7 @@ def test_a_hinged_walker_moves_as_the_rigid_one(theta, omega):
 def test_their_derivatives_are_those_of_differences(theta, omega, stance):
     walker = changed_forms(ground.compass(radius=0.01, inertia=0.2), **HIP)
     state = (0.0, 5.0, *theta, 0.2, -0.1, *omega)
-    system = on_ground(walker, IN_THE_AIR, feet=(stance,))
+    system = on_ground(walker, IN_THE_AIR, progress=new_progress(stance))
     expected = differenced(system, state, (1e-5,) * 8)
     assert np.abs(gradient_of(system, state) - expected).max() < 1e-7 * (1.0 + np.abs(expected).max())
 
@@ -56,7 +56,9 @@ def test_with_knees_they_act_on_the_thighs():
     y = (0.0, 5.0, -0.2, 0.2, -0.3, 0.2, *(0.0,) * 6)
     free = (RELEASED, RELEASED)
     for stance in range(2):
-        change = np.subtract(*(rate_of(on_ground(w, IN_THE_AIR, free, feet=(stance,)), y) for w in (pushed, passive)))
+        change = np.subtract(
+            *(rate_of(on_ground(w, IN_THE_AIR, free, progress=new_progress(stance)), y) for w in (pushed, passive))
+        )
         momentum = np.subtract(change[8:10], change[9:7:-1])
         assert momentum[1 - stance] > 0.0 > momentum[stance]
     locked = on_ground(pushed, IN_THE_AIR, (RELEASED, LOCKED))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from contact_walks import scene_of, walked
 
-from walkerlab.hybrid.contact_run import sampled_feet
+from walkerlab.hybrid.contact_result import sampled_feet
 
 
 def test_samples_do_not_change_the_walk():

@@ -8,7 +8,7 @@ from contact_walks import FIXED_POINT, RIGID_STEP, faster, scene_of, settings, w
 
 from walkerlab.ground.terrain import checkerboard
 from walkerlab.hybrid.contact_events import JudgedGround
-from walkerlab.hybrid.contact_run import walk_contact
+from walkerlab.hybrid.contact_result import walk_contact
 from walkerlab.scene.contact import start_state
 
 

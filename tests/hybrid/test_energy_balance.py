@@ -8,8 +8,8 @@ from contact_walks import FIXED_POINT, RIGID_STEP, scene_of, settings
 from walkerlab.benchmarks.trials import ContactTrial
 from walkerlab.errors import NoAnswer
 from walkerlab.ground.terrain import STANCE_FOOT
-from walkerlab.hybrid import contact_run
-from walkerlab.hybrid.contact_run import walk_contact
+from walkerlab.hybrid import contact_result
+from walkerlab.hybrid.contact_result import walk_contact
 from walkerlab.orbits.contact_gait import find_gait_from
 from walkerlab.orbits.contact_map import step_from_section
 from walkerlab.orbits.scaled_starts import scaled_starts
@@ -25,7 +25,7 @@ FEET_ABREAST = np.array([0.875, 0.0, 0.5, 0.0, 1.0, -0.5])
 @pytest.fixture
 def nothing_explained(monkeypatch):
     """Every residual but none is too large."""
-    monkeypatch.setattr(contact_run, "UNEXPLAINED", 0.0)
+    monkeypatch.setattr(contact_result, "UNEXPLAINED", 0.0)
 
 
 def test_a_walk_by_equations_of_another_walker_is_refused_with_its_residual_in_words():

@@ -29,8 +29,8 @@ from walkerlab.ground.compliant import KneeRules, contact_walker
 from walkerlab.ground.knees import lock
 from walkerlab.ground.normal_force import NormalLaw
 from walkerlab.ground.walker import LOCKED, RELEASED, STOPPING, feet_motion, on_ground
-from walkerlab.hybrid.contact_run import by_channel
-from walkerlab.hybrid.contact_walk import walk_in_form
+from walkerlab.hybrid.contact_loop import walk_in_form
+from walkerlab.hybrid.contact_result import by_channel
 from walkerlab.mechanics.parts import Assembly, Particle
 from walkerlab.mechanics.walkers import Arc, Limb, straight_legs
 from walkerlab.orbits.contact_gait import find_gait_from, section_points

@@ -6,7 +6,7 @@ from contact_walks import scene_of, walked
 
 from walkerlab.ground.friction import Coulomb
 from walkerlab.ground.normal_force import NormalLaw
-from walkerlab.hybrid.contact_run import sampled_feet
+from walkerlab.hybrid.contact_result import sampled_feet
 from walkerlab.verification.known import ALONG_RATE, GRAVITY, HEIGHT, HEIGHT_RATE, rig, run_until, state
 
 MASS, DROP = 2.0, 0.1

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from contact_walks import FIXED_POINT, scene_of, walked
 
-from walkerlab.hybrid.contact_run import sampled_feet
+from walkerlab.hybrid.contact_result import sampled_feet
 from walkerlab.outcome import Outcome
 
 GLUE = ("contact.static_friction=100", "contact.dynamic_friction=100")

@@ -8,7 +8,7 @@ from contact_walks import TOLERANCE, settings, walked
 from kneed_walks import RIGID_ANGLES, RIGID_RATES
 
 from walkerlab.config.loader import load
-from walkerlab.hybrid.contact_events import leaves_side
+from walkerlab.hybrid.contact_crossings import leaves_side
 from walkerlab.hybrid.recorded_walk import take_walk
 from walkerlab.orbits.fixed_point import find_gaits
 from walkerlab.outcome import Outcome

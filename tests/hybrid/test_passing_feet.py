@@ -7,8 +7,9 @@ from contact_walks import scene_of
 from walkerlab.ground.terrain import STANCE_FOOT
 from walkerlab.ground.walker import on_ground
 from walkerlab.hybrid.contact_events import HEIGHT, PASSING, PER_FOOT
-from walkerlab.hybrid.contact_rules import GOES_ON, apply_event
-from walkerlab.hybrid.contact_run import new_walk_state
+from walkerlab.hybrid.contact_state import new_walk_state
+from walkerlab.hybrid.contact_transitions import apply_event
+from walkerlab.hybrid.endings import GOES_ON
 from walkerlab.scene.contact import start_state
 
 SWING_FOOT = 1 - STANCE_FOOT

@@ -8,8 +8,8 @@ import pytest
 from walkerlab.config.loader import load
 from walkerlab.ground.motion import foot_wrench
 from walkerlab.ground.pulse import pulse_force
-from walkerlab.ground.walker import LOCKED, OF_BODIES, on_ground
-from walkerlab.hybrid.contact_run import sampled_feet
+from walkerlab.ground.walker import LOCKED, OF_BODIES, new_progress, on_ground
+from walkerlab.hybrid.contact_result import sampled_feet
 from walkerlab.orbits.contact_map import step_from_section
 from walkerlab.orbits.fixed_point import find_gaits
 from walkerlab.outcome import Outcome
@@ -55,20 +55,20 @@ def test_the_paper_compass_walks_the_level_with_short_pulses_and_leaves_its_pads
 
 def test_a_pulse_has_the_impulse_of_the_push_off_and_is_smooth_at_its_ends():
     _, scene, _ = scene_of("level")
-    system = on_ground(scene.walker, (True, True), feet=(1, 1), times=(2.0,))
+    system = on_ground(scene.walker, (True, True), progress=new_progress(steps=1, last_touch=2.0))
     times = 2.0 + np.linspace(-0.001, 0.006, 70_001)
     force = np.array([pulse_force(system, t) for t in times])
     assert np.trapezoid(force, times) == pytest.approx(4.0, rel=1e-6)
     assert not force[(times < 1.99999) | (times > 2.00501)].any()
     assert np.abs(np.diff(force)).max() < 1e-3 * force.max()
-    before_any_touch = on_ground(scene.walker, (True, True), feet=(1, 0), times=(2.0,))
+    before_any_touch = on_ground(scene.walker, (True, True), progress=new_progress(last_touch=2.0))
     assert pulse_force(before_any_touch, 2.002) == 0.0
 
 
 @pytest.mark.parametrize("name", PUSHED)
 def test_the_equations_derivatives_in_a_pulse_are_differences(name):
     _, scene, gait = scene_of(name, *PUSHED[name])
-    system = on_ground(scene.walker, (False, False), feet=(1, 1), times=(0.0,))
+    system = on_ground(scene.walker, (False, False), progress=new_progress(steps=1))
     y = np.array(start_state(scene, gait.state))
     J, t = np.zeros((y.size, y.size)), 0.3 * scene.walker.whole.push_off_duration
     jacobian(system, t, y, J)
@@ -87,7 +87,7 @@ def test_the_equations_derivatives_in_a_pulse_are_differences(name):
 def test_the_force_acts_along_the_line_from_the_foot_to_the_hip_and_turns_nothing_about_the_hip():
     """About the hip, the root's acceleration taken along, the trailing leg feels no torque of it."""
     _, scene, gait = scene_of("level")
-    system = on_ground(scene.walker, (False, False), feet=(1, 1), times=(0.0,))
+    system = on_ground(scene.walker, (False, False), progress=new_progress(steps=1))
     form, y = scene.walker.whole, np.array(start_state(scene, gait.state))
     n = int(form.bodies)
     s, c, r = np.sin(y[2 : 2 + n]), np.cos(y[2 : 2 + n]), np.zeros(len(OF_BODIES))

@@ -5,8 +5,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
+from walkerlab.hybrid.endings import GOES_ON, WALKED
 from walkerlab.hybrid.recorded_walk import take_walk
-from walkerlab.hybrid.rigid_lanes import GOES_ON, WALKED, new_fates, new_lane_memory, struck, two_legs, walk_lanes
+from walkerlab.hybrid.rigid_lanes import new_fates, new_lane_memory, struck, two_legs, walk_lanes
 from walkerlab.outcome import Outcome
 from walkerlab.paper.appendix_a import CORRECTED, RigidWalker, assembled
 from walkerlab.solvers.registry import Tolerances

@@ -17,13 +17,13 @@ from walkerlab.workers import WorkerPool
 COMPILED_THEN_RUN = """
 import sys
 from walkerlab.config.loader import load
-from walkerlab.hybrid import contact_run
+from walkerlab.hybrid import contact_result
 from walkerlab.stages import contact_sim
 from walkerlab.pipeline.progress import Silent
 from walkerlab.store.content import Content
 
 def compiled():
-    kernels = (vars(contact_run)[name] for name in sorted(vars(contact_run)))
+    kernels = (vars(contact_result)[name] for name in sorted(vars(contact_result)))
     return [len(kernel.signatures) for kernel in kernels if hasattr(kernel, "signatures")]
 
 config = load(None, ("strides=1", *sys.argv[1:])).config

@@ -14,7 +14,7 @@ from walkerlab.config.loader import load
 from walkerlab.ground.friction import Coulomb, Frictionless
 from walkerlab.ground.terrain import after_mid_swing, checkerboard
 from walkerlab.ground.walker import feet_motion
-from walkerlab.hybrid.contact_events import hip_height
+from walkerlab.hybrid.contact_crossings import hip_height
 from walkerlab.scene.contact import contact_scene, resting, start_state
 from walkerlab.scene.left_out import of_contact_walk
 from walkerlab.scene.rigid import rigid_walker

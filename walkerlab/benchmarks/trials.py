@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from walkerlab.benchmarks.user_script import walk_as_a_script
-from walkerlab.hybrid.rigid_observer import unwatched
+from walkerlab.hybrid.rigid_record import unwatched
 from walkerlab.hybrid.rigid_walk import EVENTS as RIGID_EVENTS
 from walkerlab.hybrid.rigid_walk import new_heel_strikes, walk
 from walkerlab.kernels import uncompiled
@@ -104,7 +104,7 @@ class ContactTrial:
     def prepare(self, method: str, rtol: float, budget: int) -> Callable[[], TrialRun]:
         """A function that does the walk with a method, ready to be timed."""
         from walkerlab.ground.terrain import STANCE_FOOT
-        from walkerlab.hybrid.contact_run import walk_contact
+        from walkerlab.hybrid.contact_result import walk_contact
 
         scene = self.walker, self.ground, False, STANCE_FOOT, self.start
         tolerances = Tolerances(method, rtol, rtol * ATOL_PER_RTOL, budget, track_energy=False)

@@ -67,7 +67,7 @@ def push_power(system: OnGround, t: float, y: Any) -> float:
     """Power (W) that the push-off gives."""
     if system.form.push_off == 0.0:
         return 0.0
-    s, c, foot = vector(OF_BODIES), vector(OF_BODIES), 1 - system.feet[0]
+    s, c, foot = vector(OF_BODIES), vector(OF_BODIES), 1 - system.progress.stance
     sines_cosines(system.form, y, s, c)
     push, motion = push_on(system, t, foot, s, c), foot_motion(system.form, foot, s, c, y)
     return push.along * motion.slip + push.upward * motion.vertical_velocity

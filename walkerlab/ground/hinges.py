@@ -31,7 +31,7 @@ def torque_now(law: Any, form: Form, body: int, other: int, y: Any) -> HingeTorq
 @inlined
 def swing_and_stance(system: OnGround) -> tuple[int, int]:
     """The uppermost bodies of the leg that swings and of that which stands: at a touch they change places."""
-    stance = system.feet[0]
+    stance = system.progress.stance
     return system.form.uppers[1 - stance], system.form.uppers[stance]
 
 

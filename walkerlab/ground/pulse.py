@@ -10,16 +10,13 @@ from typing import Any, NamedTuple
 from walkerlab.ground.walker import Form, OnGround
 from walkerlab.kernels import inlined
 
-LAST_TOUCH = 0  # index into a walk state's times
-STANCE, STEPS = 0, 1  # indices into a walk state's feet
-
 
 @inlined
 def pulse_force(system: OnGround, t: float) -> float:
     """Force (N) of the pulse at a time; 0 where none lasts."""
-    if system.form.push_off == 0.0 or system.feet[STEPS] == 0:
+    if system.form.push_off == 0.0 or system.progress.steps == 0:
         return 0.0
-    u = (t - system.times[LAST_TOUCH]) / system.form.push_off_duration
+    u = (t - system.progress.last_touch) / system.form.push_off_duration
     if u <= 0.0 or u >= 1.0:
         return 0.0
     return 30.0 * (u * (1.0 - u)) ** 2 * system.form.push_off / system.form.push_off_duration
@@ -28,9 +25,9 @@ def pulse_force(system: OnGround, t: float) -> float:
 @inlined
 def pulse_left(system: OnGround, t: float) -> float:
     """How much longer (s) a pulse lasts; nothing where none does."""
-    if system.form.push_off == 0.0 or system.feet[STEPS] == 0:
+    if system.form.push_off == 0.0 or system.progress.steps == 0:
         return 0.0
-    return max(0.0, system.times[LAST_TOUCH] + system.form.push_off_duration - t)
+    return max(0.0, system.progress.last_touch + system.form.push_off_duration - t)
 
 
 class Push(NamedTuple):
@@ -45,7 +42,7 @@ class Push(NamedTuple):
 @inlined
 def push_on(system: OnGround, t: float, foot: int, s: Any, c: Any) -> Push:
     """What pushes a foot at a time; no force where no pulse lasts."""
-    form, force = system.form, pulse_force(system, t) if foot != system.feet[STANCE] else 0.0
+    form, force = system.form, pulse_force(system, t) if foot != system.progress.stance else 0.0
     if force == 0.0:
         return Push(0.0, 0.0, 0.0, 0.0)
     ahead, above = 0.0, form.radius[foot]

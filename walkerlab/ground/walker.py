@@ -144,6 +144,28 @@ def changed_forms(walker: ContactWalker, **fields: Any) -> ContactWalker:
     return walker._replace(forms=forms)
 
 
+@tree.read_at_once
+class Progress(np.record):  # type: ignore[misc]  # NumPy's stubs call one of its bases final
+    """How far a walk has come: a structured scalar that the rules of a walk write to."""
+
+    stance: int  # the foot that carries the step at hand
+    steps: int  # how many have been taken
+    last_touch: float  # s, when the last of them was
+    airborne_since: float  # s, when a foot was on the ground last
+    stopped_at: float  # s, up to where it has been integrated
+    release: int  # when the trailing knee is to be released: see hybrid/contact_state.py
+    passes_switching: bool  # whether the integration step at hand may go past switching points
+
+
+PROGRESS = tree.record_type(Progress, {})
+
+
+def new_progress(stance: int = 1, steps: int = 0, last_touch: float = 0.0) -> Progress:
+    """The progress of a walk that one foot carries, after some steps, the last of them at a time (s)."""
+    progress: Progress = tree.new_record(PROGRESS, stance=stance, steps=steps, last_touch=last_touch)
+    return progress
+
+
 @by_reference
 class OnGround(NamedTuple):
     """The walker in one of its forms, with what may change while it moves so: in memory of the walk's own."""
@@ -154,9 +176,8 @@ class OnGround(NamedTuple):
     stop: Any
     has_ground: Any  # (2,) whether there is ground under a foot
     knee: Any  # (2,) what each knee is doing
-    feet: Any  # that of a walk state: the stance foot first
     level: Any  # (2,) m, height over the slope of the ground for each foot
-    times: Any  # that of a walk state: the last touch (s) first
+    progress: Progress
 
 
 def on_ground(
@@ -164,24 +185,20 @@ def on_ground(
     has_ground: Any,
     knee: Any = (RELEASED, RELEASED),
     hinged: bool = False,
-    feet: Any = (1, 0),
     level: Any = (0.0, 0.0),
-    times: Any = (0.0,),
+    progress: Progress | None = None,
 ) -> OnGround:
     """The walker in the form that its knees give it.
 
     has_ground  (2,) whether there is ground under a foot
     knee        (2,) what each knee is doing
-    feet        the stance foot, and what a walk state has behind it
     level       (2,) m, height of the ground for each foot
-    times       the last touch (s), and what a walk state has behind it
+    progress    of the walk; without it foot 1 carries the first step
     """
-    memory = (
-        np.asarray(has_ground, np.int8), np.asarray(knee, np.int8), np.asarray(feet, np.int64),
-        np.asarray(level, float), np.asarray(times, float),
-    )  # fmt: skip
+    memory = np.asarray(has_ground, np.int8), np.asarray(knee, np.int8), np.asarray(level, float)
     form = walker.forms[int(hinged), locked_knees(knee)]
-    return OnGround(form, walker.normal, walker.friction, walker.stop, *memory)
+    progress = new_progress() if progress is None else progress
+    return OnGround(form, walker.normal, walker.friction, walker.stop, *memory, progress)
 
 
 @inlined

@@ -1,1 +1,37 @@
-"""Walking: motion between events, what the events change, and how a walk ends."""
+"""Walks as hybrid systems: smooth motion between events, jumps at them, and how a walk ends.
+
+Rigid model (`rigid_walk`; many walks side by side in `rigid_lanes`)
+    modes         one foot on the slope, the swing knee BENT or STRAIGHT (`mechanics/standing`)
+    KNEE          the bent knee straightens: plastic strike, the knee locks; BENT -> STRAIGHT
+    HEEL_STRIKE   the swing foot comes down with AHEAD positive: plastic strike, a push-off before it, the legs change
+                  roles; a step; STRAIGHT -> BENT, or STRAIGHT without knees
+    FALL          the hip is too low: fell
+    other ends    a heel strike with a bent knee, or none in time
+
+Contact model (`contact_loop`)
+    modes         forms of the tree (`ground/walker`): the first stance foot hinged or free, either knee locked or not;
+                  in each a foot has ground or not, and a knee is RELEASED, BENT, STOPPING or LOCKED
+    of each foot  HEIGHT: touch, which ends a step if it is far enough ahead, or lift; LEFT_EDGE, RIGHT_EDGE: the foot
+                  changes its pad; RELEASE, FULL_DAMPING, FRICTION_SWITCHES: switching points of the force law, where
+                  steps of the integration end and nothing else happens; VERTICAL_VELOCITY: the leading foot stops
+                  sinking in, and the trailing knee is released
+    of the walker PASSING: the feet pass each other, and the ground under either may come or go; FALL: fell;
+                  SLIDE: the stance foot slid too far: slid
+    of each knee  EXTENSION: a bent knee gets straight, and locks or meets its stop; EXTENSION_RATE: it turns back in
+                  its stop, and latches
+    no function   PULSE_END: the push-off is over, and a trailing knee that waited for that is released
+    other ends    no touch in time, no foot on the ground for too long, a touch with a bent knee, off a pad, stubbed
+
+| file | what is in it |
+|---|---|
+| `endings` | how kernels say that a walk ended, for both models |
+| `contact_events`, `contact_crossings` | the events; their functions along a step, and the first zero |
+| `contact_state` | the memory of a walk: what stands, what has touched, the side each event function is on |
+| `contact_loop` | steps of the integration, and the search for the time of an event |
+| `contact_transitions`, `contact_jumps` | what an event changes in the memory; in velocities, energy and tangent |
+| `contact_record`, `contact_tangent` | samples and energy balance; the derivative by the start |
+| `contact_result` | a whole walk in all its forms, and its result |
+| `rigid_walk`, `rigid_record`, `recorded_walk` | loop and events; samples and extremes; a whole walk and its result |
+| `walk_record`, `hip_torque` | for both: what every result has; work of the hip's torque |
+| `rigid_measures`, `comparison` | energies and forces along a rigid walk; how far two walks differ |
+"""

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from walkerlab.hybrid.rigid_observer import (
+from walkerlab.hybrid.rigid_record import (
     DURATION,
     ENERGY_DRIFT,
     FORWARD,

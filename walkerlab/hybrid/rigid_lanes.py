@@ -10,13 +10,21 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from walkerlab.hybrid.rigid_walk import FALLEN_HIP, LONGEST_SWING, hip_above_fall, hull
+from walkerlab.hybrid.endings import (
+    BUDGET_EXHAUSTED,
+    FALLEN_HIP,
+    FELL,
+    GOES_ON,
+    NO_HEEL_STRIKE,
+    REJECTED,
+    SOLVER_FAILED,
+)
+from walkerlab.hybrid.rigid_walk import LONGEST_SWING, hip_above_fall, hull
 from walkerlab.kernels import by_type, inlined, kernel, vector
 from walkerlab.mechanics.hinges import SpringDamper, hinge_torque, hip_law
 from walkerlab.mechanics.impact import heel_strike
 from walkerlab.mechanics.standing import Standing, feet_on_slope
 from walkerlab.mechanics.trigonometry import sine_cosine
-from walkerlab.outcome import Outcome
 from walkerlab.solvers.dop853 import GROW_MOST, SAFETY, SHRINK_MOST
 from walkerlab.solvers.events import NO_CROSSING, CrossingFinder, new_crossing_finder
 from walkerlab.solvers.hermite import Jet, Quintic, first_fall, hermite, value_of
@@ -31,7 +39,6 @@ ARRIVING, FIRST, TRIES, EVENT, USUAL = 20, 21, 22, 23, 24
 ROWS = 25
 SLOT_OF_START, STEPS_TAKEN = 0, 1  # rows of whole numbers
 
-GOES_ON = -1
 NOBODY = -1
 FIRST_STEP = 0.1  # pendulum times
 ARRIVED = 1e-5  # pendulum times between the end of a step and the heel strike that a Taylor expansion bridges
@@ -39,9 +46,6 @@ REFINEMENTS = 6
 MAX_TRIES = 20_000  # of steps in one swing
 SMALLEST_STEP = 1e-13  # pendulum times
 NO_ERROR = 1e-300
-WALKED, FELL, REJECTED = int(Outcome.WALKED), int(Outcome.FELL), int(Outcome.REJECTED)
-NO_HEEL_STRIKE, BUDGET_EXHAUSTED = int(Outcome.NO_HEEL_STRIKE), int(Outcome.BUDGET_EXHAUSTED)
-SOLVER_FAILED = int(Outcome.SOLVER_FAILED)
 
 
 class TwoLegs(NamedTuple):

@@ -10,7 +10,17 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from walkerlab.hybrid.rigid_observer import Observer, observe, observe_start, observe_strike
+from walkerlab.hybrid.endings import (
+    BENT_KNEE,
+    BUDGET_EXHAUSTED,
+    FALLEN_HIP,
+    FELL,
+    KNEE_STRUCK,
+    NO_HEEL_STRIKE,
+    SOLVER_FAILED,
+    WALKED,
+)
+from walkerlab.hybrid.rigid_record import Observer, observe, observe_start, observe_strike
 from walkerlab.kernels import entered, inlined, kernel, vector
 from walkerlab.mechanics.impact import strike
 from walkerlab.mechanics.standing import (
@@ -27,7 +37,6 @@ from walkerlab.mechanics.standing import (
     swing_foot,
     swing_foot_motion,
 )
-from walkerlab.outcome import Outcome
 from walkerlab.solvers.events import (
     FALLING,
     NO_CROSSING,
@@ -53,17 +62,12 @@ from walkerlab.solvers.system import derivative
 
 LONGEST_SWING = 10.0  # pendulum times sqrt(L/g) within which a heel strike must come
 HULL_ROOM = 0.125
-FALLEN_HIP = 0.5  # hip height over the slope in leg lengths
 SHORTEST_LANDING = 0.25  # of the gait's step length, ahead of the stance foot, on uneven ground
 RELEASED = 1e-6  # of the first step; a knee in line and at its thigh's rate crosses by rounding within 1e-9 of it
 # event functions, rows of the finder
 HEEL_STRIKE, FALL, AHEAD, KNEE = range(4)
 LEGS_TURN = 4  # no event: the rate between the legs
 EVENTS = 5
-KNEE_STRUCK = -1  # how a phase of a swing ends beside the outcomes
-WALKED, FELL, BENT_KNEE = int(Outcome.WALKED), int(Outcome.FELL), int(Outcome.BENT_KNEE)
-NO_HEEL_STRIKE, REJECTED = int(Outcome.NO_HEEL_STRIKE), int(Outcome.REJECTED)
-BUDGET_EXHAUSTED, SOLVER_FAILED = int(Outcome.BUDGET_EXHAUSTED), int(Outcome.SOLVER_FAILED)
 
 
 @inlined

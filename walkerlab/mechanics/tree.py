@@ -47,6 +47,14 @@ def record_type(kind: type, shapes: Mapping[str, tuple[int, ...]]) -> Any:
     return np.dtype((kind, fields))
 
 
+def new_record(kind: Any, **fields: Any) -> Any:
+    """A structured scalar of a type from `record_type` that kernels write to; fields not named are zero."""
+    record = np.zeros((), kind)[()]
+    for name, value in fields.items():
+        record[name] = value
+    return record
+
+
 @always_inline
 def sines_cosines(tree: Any, n: int, theta: Any, s: Any, c: Any) -> None:
     """Sines and cosines (n,) of the bodies' angles from the slope's normal, into s and c; theta from the vertical."""

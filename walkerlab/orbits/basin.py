@@ -12,17 +12,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from walkerlab.hybrid.rigid_lanes import (
-    GOES_ON,
-    REJECTED,
-    WALKED,
-    Fates,
-    TwoLegs,
-    new_fates,
-    new_lane_memory,
-    struck,
-    walk_lanes,
-)
+from walkerlab.hybrid.endings import GOES_ON, REJECTED, WALKED
+from walkerlab.hybrid.rigid_lanes import Fates, TwoLegs, new_fates, new_lane_memory, struck, walk_lanes
 from walkerlab.hybrid.rigid_walk import hip_above_fall
 from walkerlab.mechanics.standing import Standing
 from walkerlab.orbits.shooting import Shooting, on_section, section_of, states_on_section

@@ -13,8 +13,9 @@ import numpy as np
 
 from walkerlab.ground.terrain import STANCE_FOOT
 from walkerlab.ground.walker import ContactWalker
-from walkerlab.hybrid.contact_events import PASSING, STANCE, STEPS, JudgedGround
-from walkerlab.hybrid.contact_run import new_observer, new_walk_state, walk_on
+from walkerlab.hybrid.contact_events import PASSING, JudgedGround
+from walkerlab.hybrid.contact_result import new_observer, walk_on
+from walkerlab.hybrid.contact_state import new_walk_state
 from walkerlab.orbits.contact_map import OwnPads, coordinates_of
 from walkerlab.orbits.continuation import Follower, Strides, Way
 from walkerlab.orbits.newton import Effort, NotConverged
@@ -90,8 +91,8 @@ def section_points(
         enough = replace(tolerances, budget=(steps + 1) * tolerances.budget)
         stopped = walk_on(walker, ground, enough, walk_state, observer, start, steps)
         if stopped.outcome is Outcome.WALKED and walk_state.at_zero[PASSING]:
-            yield steps, coordinates_of(walker, np.array(stopped.state), int(walk_state.feet[STANCE]))
-        elif walk_state.feet[STEPS] > steps:
+            yield steps, coordinates_of(walker, np.array(stopped.state), int(walk_state.progress.stance))
+        elif walk_state.progress.steps > steps:
             return
 
 

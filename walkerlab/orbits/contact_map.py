@@ -31,11 +31,11 @@ from walkerlab.ground.terrain import (
     has_ground_in_air,
 )
 from walkerlab.ground.walker import ContactWalker, OnGround, feet_motion, folded, on_ground, sines_cosines, unfolded
-from walkerlab.hybrid.contact_events import PASSING, STANCE, STEPS, JudgedGround, WalkState, material_along
-from walkerlab.hybrid.contact_knee import rate_of
-from walkerlab.hybrid.contact_observer import SO_FAR
-from walkerlab.hybrid.contact_run import Stopped, driven_work, in_walk, new_observer, new_walk_state, walk_on
-from walkerlab.hybrid.contact_walk import NEVER
+from walkerlab.hybrid.contact_events import PASSING, JudgedGround
+from walkerlab.hybrid.contact_jumps import rate_of
+from walkerlab.hybrid.contact_loop import NEVER
+from walkerlab.hybrid.contact_result import Stopped, driven_work, in_walk, new_observer, walk_on
+from walkerlab.hybrid.contact_state import WalkState, material_along, new_walk_state
 from walkerlab.hybrid.walk_record import DrivenWork
 from walkerlab.mechanics.links import Counted, factor_linked, solve_linked
 from walkerlab.mechanics.tree import add_inertia
@@ -195,8 +195,8 @@ def step_from_section(
         float(walk_state.touch_time[0]),
         float(walk_state.slip[0] + slipped),
         float(walk_state.rolling[0] + rolled),
-        observer.account[SO_FAR, LOST].copy(),
-        driven_work(walker, way, rose, observer.account[SO_FAR]),
+        observer.account[LOST].copy(),
+        driven_work(walker, way, rose, observer.account),
         stopped.work,
     )
 
@@ -219,29 +219,25 @@ def walk_from_section(
 
     stopped = Stopped(Outcome.WALKED, 0.0, start, np.zeros(4, np.int64))
     if push != 0.0:
-        until_touch = resized(walk_state, 1)
-        stopped = go_on(until_touch, start)
-        for before, after in zip(until_touch, walk_state, strict=True):
-            after[: len(before)] = before
+        stopped = go_on(cut_to(walk_state, 1), start)
         pushed = pushed_at_hip(on_ground(walker, walk_state.has_ground, walk_state.knee), walker, stopped.state, push)
         stopped = replace(stopped, state=pushed)
     if stopped.outcome is Outcome.WALKED:
         stopped = go_on(walk_state, stopped.state, steps)
     if stopped.outcome is Outcome.WALKED:
-        stance = int(walk_state.feet[STANCE])
+        stance = int(walk_state.progress.stance)
         z = coordinates_of(walker, np.array(stopped.state), stance)
         z[0] -= walk_state.level[stance]
         stopped = go_on(walk_state, stopped.state)
-    touched = int(walk_state.feet[STEPS])
+    touched = int(walk_state.progress.steps)
     times, places = walk_state.touch_time[:touched], walk_state.touch_along[:touched]
     return DisturbedWalk(stopped.outcome, np.diff(times), np.diff(places), z)
 
 
-def resized(walk_state: WalkState, steps: int) -> WalkState:
-    """The walk state with room for fewer steps; what is not counted in steps is a copy."""
+def cut_to(walk_state: WalkState, steps: int) -> WalkState:
+    """The walk state with room for fewer steps, in the same memory."""
     of_steps = ("touch_time", "touch_along", "touch_height", "slip", "rolling")
-    room = {name: getattr(walk_state, name)[:steps] for name in of_steps}
-    return WalkState(**{**{k: v.copy() for k, v in walk_state._asdict().items()}, **room})
+    return walk_state._replace(**{name: getattr(walk_state, name)[:steps] for name in of_steps})
 
 
 def pushed_at_hip(system: OnGround, walker: ContactWalker, state: State, impulse: float) -> State:

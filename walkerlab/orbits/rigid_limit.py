@@ -23,7 +23,7 @@ from walkerlab.hybrid.comparison import (
     sampled_at_strikes,
 )
 from walkerlab.hybrid.contact_events import JudgedGround
-from walkerlab.hybrid.contact_run import ContactWalkResult, walk_contact
+from walkerlab.hybrid.contact_result import ContactWalkResult, walk_contact
 from walkerlab.orbits.contact_gait import EFFORT, with_scaled_laws
 from walkerlab.orbits.contact_map import OwnPads, step_of
 from walkerlab.orbits.step_map import Cycle, gait_near

@@ -17,7 +17,7 @@ import numpy as np
 from walkerlab.ground.terrain import STANCE_FOOT
 from walkerlab.ground.walker import ContactWalker
 from walkerlab.hybrid.contact_events import JudgedGround
-from walkerlab.hybrid.contact_run import ContactWalkResult, walk_contact
+from walkerlab.hybrid.contact_result import ContactWalkResult, walk_contact
 from walkerlab.hybrid.recorded_walk import take_walk, with_scaled_rates
 from walkerlab.mechanics.standing import Standing
 from walkerlab.outcome import Outcome

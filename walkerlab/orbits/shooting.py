@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from walkerlab.hybrid.recorded_walk import as_state, take_walk
-from walkerlab.hybrid.rigid_observer import Observer, unwatched
+from walkerlab.hybrid.rigid_record import Observer, unwatched
 from walkerlab.hybrid.rigid_walk import EVENTS, SHORTEST_LANDING, HeelStrikes, new_heel_strikes, take_step, walk
 from walkerlab.kernels import inlined, kernel, matrix, vector
 from walkerlab.mechanics.impact import pushed_at_hip

@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 
 from walkerlab.ground.walker import ContactWalker
 from walkerlab.hybrid.comparison import Array
-from walkerlab.hybrid.contact_run import ContactWalkResult, sampled_energies, sampled_feet
+from walkerlab.hybrid.contact_result import ContactWalkResult, sampled_energies, sampled_feet
+from walkerlab.hybrid.endings import FALLEN_HIP
 from walkerlab.hybrid.recorded_walk import take_walk
 from walkerlab.hybrid.rigid_measures import energies, reactions
-from walkerlab.hybrid.rigid_walk import FALLEN_HIP
 from walkerlab.mechanics.standing import Standing
 from walkerlab.outcome import Outcome
 from walkerlab.paper.measured import TIGHT

@@ -9,7 +9,7 @@ from typing import Any
 
 from walkerlab.config.reads import ContactConfig
 from walkerlab.ground.walker import changed_forms
-from walkerlab.hybrid.contact_run import ContactWalkResult, by_channel
+from walkerlab.hybrid.contact_result import ContactWalkResult, by_channel
 from walkerlab.hybrid.recorded_walk import take_walk
 from walkerlab.mechanics.rigid import standing
 from walkerlab.scene.contact import ContactScene, contact_scene, start_state

@@ -11,7 +11,7 @@ from walkerlab.config.reads import TuneConfig
 from walkerlab.config.walkers import is_passive_compass
 from walkerlab.ground.terrain import STANCE_FOOT
 from walkerlab.ground.walker import ContactWalker
-from walkerlab.hybrid.contact_run import ContactWalkResult, by_channel, sampled_feet
+from walkerlab.hybrid.contact_result import ContactWalkResult, by_channel, sampled_feet
 from walkerlab.hybrid.recorded_walk import as_state, take_walk, with_scaled_rates
 from walkerlab.labels import Label
 from walkerlab.mechanics.standing import STANCE, SWING, Standing

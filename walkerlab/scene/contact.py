@@ -18,7 +18,7 @@ from walkerlab.ground.resting import RestingFoot, resting_foot
 from walkerlab.ground.terrain import STANCE_FOOT, Terrain, after_mid_swing, checkerboard, plane
 from walkerlab.ground.walker import ContactWalker, changed_forms, floating_state
 from walkerlab.hybrid.contact_events import Frame, JudgedGround
-from walkerlab.hybrid.contact_run import ContactWalkResult, walk_contact
+from walkerlab.hybrid.contact_result import ContactWalkResult, walk_contact
 from walkerlab.mechanics.parts import Assembly
 from walkerlab.mechanics.rigid import places_of
 from walkerlab.orbits.contact_gait import GaitAnswer, find_gait_from

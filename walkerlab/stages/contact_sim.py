@@ -12,8 +12,8 @@ from walkerlab.config.reads import ContactConfig, ContactSimConfig, GroundConfig
 from walkerlab.errors import NoAnswer
 from walkerlab.ground.compliant import hinge_of
 from walkerlab.ground.terrain import STANCE_FOOT
-from walkerlab.hybrid.contact_observer import ContactSamples
-from walkerlab.hybrid.contact_run import ContactWalkResult, by_channel, sampled_energies, sampled_feet
+from walkerlab.hybrid.contact_record import ContactSamples
+from walkerlab.hybrid.contact_result import ContactWalkResult, by_channel, sampled_energies, sampled_feet
 from walkerlab.mechanics.rigid import places_of
 from walkerlab.mechanics.walkers import TORSO
 from walkerlab.orbits.contact_gait import GaitAnswer

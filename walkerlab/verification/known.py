@@ -21,10 +21,10 @@ from walkerlab.ground.normal_force import NormalLaw
 from walkerlab.ground.resting import resting_foot
 from walkerlab.ground.terrain import checkerboard
 from walkerlab.ground.walker import ContactWalker, one_foot_motion
-from walkerlab.hybrid.contact_events import LAST_TOUCH, Frame, JudgedGround
-from walkerlab.hybrid.contact_observer import SO_FAR
-from walkerlab.hybrid.contact_run import new_observer, new_walk_state, walk_on
-from walkerlab.hybrid.contact_walk import LONGEST_FLIGHT, LONGEST_STEP
+from walkerlab.hybrid.contact_events import Frame, JudgedGround
+from walkerlab.hybrid.contact_loop import LONGEST_FLIGHT, LONGEST_STEP
+from walkerlab.hybrid.contact_result import new_observer, walk_on
+from walkerlab.hybrid.contact_state import new_walk_state
 from walkerlab.labels import Label
 from walkerlab.mechanics.parts import Assembly, BallFoot, Body, Position, Revolute
 from walkerlab.outcome import Outcome
@@ -87,14 +87,14 @@ def run_until(
     ground = JudgedGround(checkerboard(ENDLESS, (0.0, 0.0)), frame)
     walk_state = new_walk_state(walker, ground.terrain, 1, 1, start)
     walk_state.at_zero[:] = 0
-    walk_state.times[LAST_TOUCH] = duration_s - LONGEST_STEP * frame.pendulum_time
+    walk_state.progress.last_touch = duration_s - LONGEST_STEP * frame.pendulum_time
     observer = new_observer(walker, walk_state, start, np.arange(SAMPLES, dtype=np.float64) * duration_s / SAMPLES)
     stopped = walk_on(walker, ground, Tolerances("radau5", rtol, atol, BUDGET), walk_state, observer, start)
     if stopped.outcome is not Outcome.NO_HEEL_STRIKE:
         raise ArithmeticError(f"ended as {stopped.outcome.label} at {stopped.time_s:.4g} s of {duration_s:.4g} s")
-    seen = int(observer.recorded[0])
+    seen = int(observer.tally.recorded)
     times, states = observer.samples.time_s[:seen].copy(), observer.samples.states[:seen].copy()
-    return ParticleRun(times, states, stopped.state, observer.account[SO_FAR, LOST].copy())
+    return ParticleRun(times, states, stopped.state, observer.account[LOST].copy())
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from walkerlab.config.reads import RigidConfig, WalksConfig
 from walkerlab.config.stability import Case
 from walkerlab.ground.friction import steepest_change
-from walkerlab.hybrid.contact_observer import ContactSamples
-from walkerlab.hybrid.contact_run import sampled_feet
+from walkerlab.hybrid.contact_record import ContactSamples
+from walkerlab.hybrid.contact_result import sampled_feet
 from walkerlab.scene.contact import ContactScene
 from walkerlab.scene.parts import assembly_of
 from walkerlab.solvers.registry import Tolerances

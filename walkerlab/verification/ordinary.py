@@ -20,7 +20,7 @@ from walkerlab.config.stability import Case
 from walkerlab.config.walkers import is_passive_compass
 from walkerlab.ground.on_pads import OnPads
 from walkerlab.ground.walker import on_ground
-from walkerlab.hybrid.contact_run import ContactWalkResult
+from walkerlab.hybrid.contact_result import ContactWalkResult
 from walkerlab.hybrid.recorded_walk import RigidWalkResult
 from walkerlab.paper.appendix_a import RigidWalker
 from walkerlab.paper.walker import compass_or_none

@@ -8,7 +8,7 @@ import numpy as np
 
 from walkerlab.config.reads import WalksConfig
 from walkerlab.config.stability import Case
-from walkerlab.hybrid.contact_run import ContactWalkResult
+from walkerlab.hybrid.contact_result import ContactWalkResult
 from walkerlab.hybrid.recorded_walk import RigidWalkResult, as_state, take_walk
 from walkerlab.mechanics.standing import Standing, swing_foot
 from walkerlab.orbits.fixed_point import RigidGait, find_gaits

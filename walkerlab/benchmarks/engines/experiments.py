@@ -20,7 +20,8 @@ from walkerlab.ground.friction import friction_coefficient
 from walkerlab.ground.resting import resting_foot
 from walkerlab.ground.terrain import STANCE_FOOT
 from walkerlab.ground.walker import changed_forms, folded, on_ground, unfolded
-from walkerlab.hybrid.contact_run import ContactWalkResult, knees_at_start, walk_contact
+from walkerlab.hybrid.contact_result import ContactWalkResult, walk_contact
+from walkerlab.hybrid.contact_state import knees_at_start
 from walkerlab.outcome import Outcome
 from walkerlab.solvers.registry import Tolerances
 from walkerlab.solvers.system import Floats, derivative

@@ -16,9 +16,10 @@ from walkerlab.ground.knees import FLEXED, lock
 from walkerlab.ground.pulse import pulse_left
 from walkerlab.ground.terrain import STANCE_FOOT, cell_at, cell_edges, has_ground_in_cell
 from walkerlab.ground.walker import BENT, LOCKED, RELEASED, FootMotion, locked_knees, on_ground
-from walkerlab.hybrid import contact_events, contact_rules
-from walkerlab.hybrid.contact_run import new_walk_state
-from walkerlab.hybrid.contact_walk import LONGEST_FLIGHT, LONGEST_STEP
+from walkerlab.hybrid import contact_events, contact_state, contact_transitions
+from walkerlab.hybrid.contact_loop import LONGEST_FLIGHT, LONGEST_STEP
+from walkerlab.hybrid.contact_state import new_walk_state
+from walkerlab.hybrid.endings import FALLEN_HIP, GOES_ON
 from walkerlab.outcome import Outcome
 from walkerlab.solvers.scipy_methods import entry_point
 from walkerlab.solvers.system import Floats
@@ -67,8 +68,8 @@ class RuleFollower:
     def _see(self, scene: EngineScene, q: Floats, v: Floats) -> None:
         """Look at a scene's model in a state, by the compiled function with what stays the same in its calls."""
         size, state = scene.model.size, self.walk_state
-        # these arrays are the walk state's own and change with it
-        system = on_ground(scene.walker, self._ground, feet=state.feet, times=state.times)
+        # what it reads of them is the walk state's own and changes with it
+        system = on_ground(scene.walker, self._ground, progress=state.progress)
         self.scene, self._fixed = scene, (system, scene.model.chain)
         self._motion, self._forces, self._none = np.zeros((2, 4)), np.zeros(size), np.zeros(0)
         self._call = entry_point(
@@ -136,7 +137,7 @@ class RuleFollower:
         if (before[0].along < before[1].along) != (now[0].along < now[1].along):
             walk_state.sides[contact_events.PASSING] = 1 if now[1].along > now[0].along else -1
             for foot in range(2):
-                contact_rules.find_ground(terrain, walk_state, foot, contact_rules.is_above(walk_state, foot))
+                contact_transitions.find_ground(terrain, walk_state, foot, contact_state.is_above(walk_state, foot))
         h = time_s - self.time_s
         for foot in range(2):
             above = now[foot].height >= 0.0
@@ -148,24 +149,24 @@ class RuleFollower:
             there = within(before[0], now[0], share, h), within(before[1], now[1], share, h)
             y = tuple(self.scene.about_centre(q - (1.0 - share) * h * v, v).tolist())
             if above:
-                contact_rules.lift(form, terrain, walk_state, there, foot, y)
+                contact_transitions.lift(form, terrain, walk_state, there, foot, y)
             else:
-                self._end(contact_rules.touch(form, terrain, walk_state, there, foot, self.time_s + share * h, y))
-        taken = walk_state.feet[contact_events.STEPS] == walk_state.touch_time.size
-        if taken and not contact_rules.is_to_lift(walk_state):
+                self._end(contact_transitions.touch(form, terrain, walk_state, there, foot, self.time_s + share * h, y))
+        taken = walk_state.progress.steps == walk_state.touch_time.size
+        if taken and not contact_state.is_to_lift(walk_state):
             self._end(int(Outcome.WALKED))
 
     def _turning(self, h: float, now: Feet, bends: list[tuple[float, float]]) -> Turn | None:
         """The first knee to lock or to be released within a step of h (s), if there is one."""
         walk_state, found = self.walk_state, []
-        stance = walk_state.feet[contact_events.STANCE]
+        stance = walk_state.progress.stance
         pushing_s = pulse_left(self._fixed[0], self.time_s)
-        if walk_state.releasing[0] == contact_rules.OWED:
+        if walk_state.progress.release == contact_state.AT_PULSE_END:
             if pushing_s <= h:
                 found.append(Turn(pushing_s / h, contact_events.PULSE_END))
-        elif walk_state.releasing[0] and now[stance].vertical_velocity >= 0.0 and pushing_s > h:
-            walk_state.releasing[0] = contact_rules.OWED
-        elif walk_state.releasing[0] and now[stance].vertical_velocity >= 0.0:
+        elif walk_state.progress.release and now[stance].vertical_velocity >= 0.0 and pushing_s > h:
+            walk_state.progress.release = contact_state.AT_PULSE_END
+        elif walk_state.progress.release and now[stance].vertical_velocity >= 0.0:
             sinking = max(0.0, -self._feet[stance].vertical_velocity)
             share = sinking / (sinking + now[stance].vertical_velocity) if sinking > 0.0 else 0.0
             found.append(Turn(share, int(stance) * contact_events.PER_FOOT + contact_events.VERTICAL_VELOCITY))
@@ -188,10 +189,10 @@ class RuleFollower:
         """
         walker, walk_state, y = self.scene.ours, self.walk_state, self.scene.about_centre(q, v)
         if self.turn is not None and contact_events.EXTENSION <= self.turn.event < contact_events.PULSE_END:
-            contact_rules.knee_stops(walker.stop, walk_state, self.turn.event, self.time_s)
+            contact_transitions.knee_stops(walker.stop, walk_state, self.turn.event, self.time_s)
             y = lock(walker.whole, walker.forms[0, locked_knees(walk_state.knee)], y).state
         elif self.turn is not None:
-            contact_rules.release(walk_state, 1 - int(walk_state.feet[contact_events.STANCE]))
+            contact_transitions.release(walk_state, 1 - int(walk_state.progress.stance))
         self.turn = None
         scene = self.scene.with_knees_locked(walk_state.knee)
         q, v = scene.from_base(tuple(y.tolist()))
@@ -200,7 +201,7 @@ class RuleFollower:
 
     def _end(self, outcome: int) -> None:
         """End the walk with the first outcome there is."""
-        if outcome != contact_rules.GOES_ON and self.outcome is None:
+        if outcome != GOES_ON and self.outcome is None:
             self.outcome = Outcome(outcome)
 
     def _judge(self, now: Feet, q: Floats, v: Floats) -> None:
@@ -210,18 +211,18 @@ class RuleFollower:
         inside = (now[0].height < 0.0 and has_ground[0] != 0, now[1].height < 0.0 and has_ground[1] != 0)
         if inside[0] or inside[1]:
             self.grounded_s = t
-            stance = self.walk_state.feet[contact_events.STANCE]
+            stance = self.walk_state.progress.stance
             far = contact_events.farthest_slide(ground.terrain)
             if inside[stance] and abs(now[stance].along - self.walk_state.foothold[stance]) > far:
                 y = tuple(self.scene.about_centre(q, v).tolist())
-                material = contact_events.material_along(self.scene.ours.whole, stance, now[stance].along, y)
+                material = contact_state.material_along(self.scene.ours.whole, stance, now[stance].along, y)
                 if abs(material - self.walk_state.touched[stance]) > far:
                     self._end(int(Outcome.SLID))
         elif t - self.grounded_s > LONGEST_FLIGHT * tau:
             self._end(int(Outcome.LIFTED_OFF))
-        if q[1] < contact_events.FALLEN_HIP * ground.frame.leg_length:
+        if q[1] < FALLEN_HIP * ground.frame.leg_length:
             self._end(int(Outcome.FELL))
-        elif t - self.walk_state.times[contact_events.LAST_TOUCH] > LONGEST_STEP * tau:
+        elif t - self.walk_state.progress.last_touch > LONGEST_STEP * tau:
             self._end(int(Outcome.NO_HEEL_STRIKE))
 
 

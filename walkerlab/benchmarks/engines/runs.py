@@ -13,8 +13,7 @@ from walkerlab.benchmarks.engines.follow import RuleFollower
 from walkerlab.benchmarks.engines.registry import ENGINES
 from walkerlab.benchmarks.engines.scenes import EngineScene
 from walkerlab.ground.terrain import STANCE_FOOT
-from walkerlab.hybrid.contact_events import STEPS
-from walkerlab.hybrid.contact_rules import steps_with_lift
+from walkerlab.hybrid.contact_state import steps_with_lift
 from walkerlab.mechanics.assembly import Anchor
 from walkerlab.outcome import Outcome
 from walkerlab.solvers.system import Floats
@@ -72,7 +71,7 @@ class WalkTask:
         if outcome is None:
             outcome = Outcome.WALKED if walk.is_over else Outcome.BUDGET_EXHAUSTED
         end = rules.scene.about_centre(walk.q, walk.v) if outcome is Outcome.WALKED else None
-        done, lifted = int(walk_state.feet[STEPS]), steps_with_lift(walk_state)
+        done, lifted = int(walk_state.progress.steps), steps_with_lift(walk_state)
         touches = walk_state.touch_time[:done].copy(), walk_state.touch_along[:done].copy()
         slips = walk_state.slip[:lifted].copy()
         return WalkAnswer(outcome.label, end, *touches, slips, walk.steps, walk.time_s, walk.wall_s)

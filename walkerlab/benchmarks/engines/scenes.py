@@ -16,7 +16,7 @@ from walkerlab.ground.knees import IdealLock
 from walkerlab.ground.terrain import STANCE_FOOT
 from walkerlab.ground.walker import LOCKED, MAX_BODIES, ContactWalker, changed_forms
 from walkerlab.hybrid.contact_events import JudgedGround
-from walkerlab.hybrid.contact_run import knees_at_start
+from walkerlab.hybrid.contact_state import knees_at_start
 from walkerlab.mechanics.assembly import Anchor, levers, masses, total_mass
 from walkerlab.mechanics.parts import Assembly, Knee
 from walkerlab.scene.contact import contact_scene, knee_rules, start_state

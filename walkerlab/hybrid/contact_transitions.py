@@ -28,30 +28,30 @@ from walkerlab.hybrid.contact_events import (
     EXTENSION_RATE,
     FALL,
     HEIGHT,
-    LAST_TOUCH,
     LEFT_EDGE,
     PASSING,
     PER_FOOT,
     RIGHT_EDGE,
     SLIDE,
-    STANCE,
-    STEPS,
     VERTICAL_VELOCITY,
-    WalkState,
     farthest_slide,
+)
+from walkerlab.hybrid.contact_record import ContactObserver, observe_edge
+from walkerlab.hybrid.contact_state import (
+    AT_COMPRESSION,
+    AT_PULSE_END,
+    NOT_DUE,
+    WalkState,
+    is_above,
+    is_ahead,
     material_along,
 )
-from walkerlab.hybrid.contact_observer import ContactObserver, observe_edge
+from walkerlab.hybrid.endings import BENT_KNEE, FELL, GOES_ON, OFF_PAD, SLID, STUBBED
 from walkerlab.kernels import by_type_or_default, inlined
-from walkerlab.outcome import Outcome
 
 AHEAD = 0.25  # of the stride measure: how far ahead a step must land
 AT_SURFACE = 1e-11  # m: how far off the surface a foot may be, by the error of an event's time, that is at it
 TRIP = 0.25  # of the stride measure: how far from where it stood a foot must come down to have tripped
-FELL, OFF_PAD, SLID = int(Outcome.FELL), int(Outcome.OFF_PAD), int(Outcome.SLID)
-BENT_KNEE, STUBBED = int(Outcome.BENT_KNEE), int(Outcome.STUBBED)
-GOES_ON = -1
-OWED = 2  # of a knee's release: it comes when the push-off ends
 
 
 @inlined
@@ -107,7 +107,7 @@ def apply_event(
     elif kind == VERTICAL_VELOCITY:
         walk_state.at_zero[event] = 0
         if pulse_left(system, t) > 0.0:
-            walk_state.releasing[0] = OWED
+            walk_state.progress.release = AT_PULSE_END
         else:
             release(walk_state, 1 - foot)
     return GOES_ON
@@ -137,9 +137,9 @@ def set_level(
 @inlined
 def next_foothold_counts(terrain: Terrain, walk_state: WalkState, foot: int) -> bool:
     """Whether the ground for a foot that nothing carries is to take the height of its next foothold, if it has not."""
-    if terrain.has_pads or not is_uneven(terrain) or foot == walk_state.feet[STANCE]:
+    if terrain.has_pads or not is_uneven(terrain) or foot == walk_state.progress.stance:
         return False
-    level = foothold_height(terrain, walk_state.feet[STEPS] + 1)
+    level = foothold_height(terrain, walk_state.progress.steps + 1)
     return is_ahead(walk_state, foot) and walk_state.level[foot] != level
 
 
@@ -154,39 +154,16 @@ def set_foothold(
     y: Any,
 ) -> int:
     """The ground for a swing foot takes the height of its next foothold, and carries it once it has been above it."""
-    set_level(system, observer, walk_state, motion, foot, foothold_height(terrain, walk_state.feet[STEPS] + 1), y)
+    set_level(system, observer, walk_state, motion, foot, foothold_height(terrain, walk_state.progress.steps + 1), y)
     walk_state.has_ground[foot] = 1 if is_above(walk_state, foot) else 0
     return GOES_ON if is_above(walk_state, foot) or terrain.order_matters else STUBBED
-
-
-@inlined
-def is_above(walk_state: WalkState, foot: int) -> bool:
-    """Whether a foot is above the ground."""
-    return walk_state.sides[foot * PER_FOOT + HEIGHT] > 0
-
-
-@inlined
-def is_to_lift(walk_state: WalkState) -> bool:
-    """Whether the foot that carried the last step is still to lift from it."""
-    return walk_state.leaving[1 - walk_state.feet[STANCE]] != 0
-
-
-def steps_with_lift(walk_state: WalkState) -> int:
-    """How many steps have a slip and a rolling, which end where their foot lifts: all, or all but the last."""
-    return int(walk_state.feet[STEPS]) - int(is_to_lift(walk_state))
-
-
-@inlined
-def is_ahead(walk_state: WalkState, foot: int) -> bool:
-    """Whether a foot is further along than the other; known where the order of the feet is watched."""
-    return (walk_state.sides[PASSING] > 0) == (foot == 1)
 
 
 @inlined
 def find_ground(terrain: Terrain, walk_state: WalkState, foot: int, above: bool) -> None:
     """A foot above the surface may find ground, or lose it, as the feet change places or roles."""
     if above:
-        stands = foot == walk_state.feet[STANCE]
+        stands = foot == walk_state.progress.stance
         has_ground = has_ground_in_air(terrain, walk_state.has_ground[foot] != 0, stands, is_ahead(walk_state, foot))
         walk_state.has_ground[foot] = 1 if has_ground else 0
 
@@ -201,12 +178,12 @@ def lift(
     y: Any,
 ) -> None:
     """A foot rose above the ground: from its stance, or out of a scuff."""
-    stands = foot == walk_state.feet[STANCE]
+    stands = foot == walk_state.progress.stance
     if stands or walk_state.leaving[foot] != 0:
         note_slip(form, walk_state, feet, foot, y)
         if not stands:
-            step = walk_state.feet[STEPS] - 1
-            walk_state.slip[step], walk_state.rolling[step] = walk_state.stood[foot, 0], walk_state.stood[foot, 1]
+            step = walk_state.progress.steps - 1
+            walk_state.slip[step], walk_state.rolling[step] = walk_state.slipped[foot], walk_state.rolled[foot]
         walk_state.leaving[foot] = 0
     find_ground(terrain, walk_state, foot, True)
 
@@ -215,8 +192,8 @@ def lift(
 def note_slip(form: Form, walk_state: WalkState, feet: tuple[FootMotion, FootMotion], foot: int, y: Any) -> None:
     """How far a foot has slipped and rolled since it touched."""
     slip = material_along(form, foot, feet[foot].along, y) - walk_state.touched[foot]
-    walk_state.stood[foot, 0] = slip
-    walk_state.stood[foot, 1] = feet[foot].along - walk_state.foothold[foot] - slip
+    walk_state.slipped[foot] = slip
+    walk_state.rolled[foot] = feet[foot].along - walk_state.foothold[foot] - slip
 
 
 @inlined
@@ -234,7 +211,7 @@ def touch(
     It ends the step if it is the swing foot, on another pad than it left and far enough ahead. A swing foot that comes
     down on the pad it left, away from where it stood, has tripped over it: it scuffs.
     """
-    stance = walk_state.feet[STANCE]
+    stance = walk_state.progress.stance
     if walk_state.has_ground[foot] == 0:
         return GOES_ON
     material = material_along(form, foot, feet[foot].along, y)
@@ -242,27 +219,27 @@ def touch(
         return SLID if abs(material - walk_state.touched[foot]) > farthest_slide(terrain) else GOES_ON
     measure = terrain.stride_measure
     if terrain.has_pads and walk_state.cells[foot] == walk_state.left_cells[foot]:
-        away = abs(feet[foot].along - walk_state.foothold[foot] - walk_state.stood[foot, 1])
+        away = abs(feet[foot].along - walk_state.foothold[foot] - walk_state.rolled[foot])
         return OFF_PAD if away > TRIP * measure else GOES_ON
     if feet[foot].along - feet[stance].along < AHEAD * measure:
         return GOES_ON
     if not is_straight(form, walk_state, foot):
         return BENT_KNEE
-    step = walk_state.feet[STEPS]
+    step = walk_state.progress.steps
     walk_state.touch_time[step] = t
     walk_state.touch_along[step] = feet[foot].along
     walk_state.touch_height[step] = walk_state.level[foot]
     if not is_above(walk_state, stance):
         note_slip(form, walk_state, feet, stance, y)
         walk_state.leaving[stance] = 1
-    walk_state.slip[step], walk_state.rolling[step] = walk_state.stood[stance, 0], walk_state.stood[stance, 1]
+    walk_state.slip[step], walk_state.rolling[step] = walk_state.slipped[stance], walk_state.rolled[stance]
     walk_state.foothold[foot] = feet[foot].along
     walk_state.touched[foot] = material
     walk_state.left_cells[foot] = walk_state.cells[foot]
     walk_state.leaving[foot] = 0
-    walk_state.times[LAST_TOUCH] = t
-    walk_state.feet[STANCE] = foot
-    walk_state.feet[STEPS] = step + 1
+    walk_state.progress.last_touch = t
+    walk_state.progress.stance = foot
+    walk_state.progress.steps = step + 1
     find_ground(terrain, walk_state, stance, is_above(walk_state, stance))
     follow_strike(form, walk_state, stance)
     return GOES_ON
@@ -288,13 +265,13 @@ def knee_stops(stop: Any, walk_state: WalkState, event: int, t: float) -> None:
         return
     walk_state.at_zero[event] = 0
     walk_state.knee[(event - EXTENSION) % 2] = LOCKED
-    walk_state.knee_strike[walk_state.feet[STEPS]] = t
+    walk_state.knee_strike[walk_state.progress.steps] = t
 
 
 @inlined
 def release(walk_state: WalkState, knee: int) -> None:
     """A knee is free again: its shank turns on its own."""
-    walk_state.releasing[0] = 0
+    walk_state.progress.release = NOT_DUE
     walk_state.knee[knee] = RELEASED
 
 
@@ -309,11 +286,11 @@ def follow_strike(form: Form, walk_state: WalkState, trailing: int) -> None:
     """The other foot has touched: the trailing knee is released, at once or when the leading foot stops sinking in."""
     if form.kneed:
         if form.release_at_touch and form.push_off != 0.0:
-            walk_state.releasing[0] = OWED
+            walk_state.progress.release = AT_PULSE_END
         elif form.release_at_touch:
             release(walk_state, trailing)
         else:
-            walk_state.releasing[0] = 1
+            walk_state.progress.release = AT_COMPRESSION
 
 
 @inlined

@@ -15,11 +15,12 @@ from walkerlab.ground.walker import (
     Form,
     OnGround,
     folded,
+    new_progress,
     sines_cosines,
     unfolded,
 )
 from walkerlab.hybrid.contact_events import EXTENSION, EXTENSION_RATE, HEIGHT, PER_FOOT, PULSE_END
-from walkerlab.hybrid.contact_observer import SO_FAR, ContactObserver
+from walkerlab.hybrid.contact_record import ContactObserver
 from walkerlab.kernels import vector
 from walkerlab.mechanics.tree import projections
 from walkerlab.solvers.events import shift_column
@@ -46,15 +47,15 @@ def change_form(
     x = unfolded(before.form, y, size)
     new, reset = x, np.eye(size)
     if event < EXTENSION and event % PER_FOOT == HEIGHT:  # a step's touch: the other leg stood before
-        before = before._replace(feet=1 - after.feet)
+        before = before._replace(progress=new_progress(stance=1 - after.progress.stance))
     if EXTENSION <= event < PULSE_END:
         new, lost, reset = lock(whole, after.form, x)
-        observer.account[SO_FAR, KNEE_STRIKES] += lost
+        observer.account[KNEE_STRIKES] += lost
         if event >= EXTENSION_RATE:
             stopping = before.knee.copy()
             stopping[(event - EXTENSION) % 2] = STOPPING
             before = before._replace(knee=stopping)
-            observer.account[SO_FAR, KNEE_STOP] += knee_energy(before, y)
+            observer.account[KNEE_STOP] += knee_energy(before, y)
     z = folded(after.form, new)
     Phi = observer.tangent.Phi
     if Phi.shape[1] > 0:

@@ -2,23 +2,23 @@
 
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from walkerlab.account import DAMPING, EDGES, ENTRIES, FORWARD, FRICTION, GIVEN, HIP, KNEE_STOP, LOST, PUSH_OFF, TORQUE
 from walkerlab.ground.energy import dissipated_power, foot_elastic_energy, push_power, total_energy
 from walkerlab.ground.hinges import hip_energy, hip_power, knee_power
 from walkerlab.ground.walker import OF_STATES, STOPPING, OnGround, one_foot_motion, over_ground, store_whole
-from walkerlab.hybrid.contact_events import HEIGHT, LEGS_TURN, PER_FOOT, STANCE, VERTICAL_VELOCITY, WalkState
+from walkerlab.hybrid.contact_events import HEIGHT, LEGS_TURN, PER_FOOT, VERTICAL_VELOCITY
+from walkerlab.hybrid.contact_state import WalkState
 from walkerlab.hybrid.contact_tangent import Tangent, carry_tangent
 from walkerlab.hybrid.hip_torque import torque_work
 from walkerlab.kernels import by_reference, by_type_or_default, entered, inlined, matrix, vector
 from walkerlab.mechanics.hinges import hip_law
+from walkerlab.mechanics.tree import read_at_once, record_type
 from walkerlab.solvers.events import RISING, CrossingFinder, first_crossing
 from walkerlab.solvers.radau5 import Radau5
 from walkerlab.solvers.stepping import T_OLD, T, interpolate, sample
 
-# rows of `account`
-SO_FAR, AT_TOUCH = 0, 1
-# indices into `extremes`
-MAX_PENETRATION, RESIDUAL, START_ENERGY, AT_HAND, START_SPRING = 0, 1, 2, 3, 4
 # the start of a step and the nodes of a Radau quadrature on it, with its weights
 Quadrature = tuple[tuple[float, ...], tuple[float, ...]]
 OF_ORDER_5: Quadrature = (
@@ -54,17 +54,30 @@ class ContactSamples(NamedTuple):
         return self.account[:, GIVEN]
 
 
+@read_at_once
+class ContactTally(np.record):  # type: ignore[misc]  # NumPy's stubs call one of its bases final
+    """Counts and extremes of a walk, and the energy that it began with: a structured scalar that kernels write to."""
+
+    recorded: int  # samples
+    max_penetration: float  # m
+    residual: float  # J, the largest of the energy balance
+    start_energy: float  # J, its potential from a fixed origin
+    energy_below: float  # J, the same with its potential from the slope below the walker
+    start_spring: float  # J, the part of the hip's spring
+
+
+CONTACT_TALLY = record_type(ContactTally, {})
+
+
 @by_reference
 class ContactObserver(NamedTuple):
     """Samples, energy balance and tangent of a walk; what is not wanted has no room and costs a look."""
 
     track_energy: bool  # whether to keep the energy balance
     samples: ContactSamples
-    recorded: Any  # (1,) how many of them
-    account: Any  # (2, entries) J so far, and until the last step's touch
-    # (5,) deepest penetration m, largest residual of the energy balance J, energy at the start J: its potential from a
-    # fixed origin, and from the slope below; and the part of the hip's spring J
-    extremes: Any
+    account: Any  # (entries,) J, so far
+    account_at_touch: Any  # (entries,) J, until the last step's touch
+    tally: ContactTally
     tangent: Tangent  # derivative of the state with respect to where it started, if wanted
 
 
@@ -88,34 +101,34 @@ def observe(
 def record_samples(observer: ContactObserver, method: Any, system: OnGround, walk_state: WalkState) -> None:
     """The samples that fall into the last step."""
     t, h = method.clock[T_OLD], method.clock[T] - method.clock[T_OLD]
-    samples, index = observer.samples, observer.recorded[0]
+    samples, index = observer.samples, observer.tally.recorded
     y = vector(OF_STATES)[: method.y.size]
     while index < samples.time_s.size and samples.time_s[index] <= method.clock[T]:
         fraction = (samples.time_s[index] - t) / h
         interpolate(method, system, fraction, y)
         store_whole(system.form, y, samples.states[index])
         for entry in range(ENTRIES):
-            samples.account[index, entry] = observer.account[SO_FAR, entry]
+            samples.account[index, entry] = observer.account[entry]
         add_work_until(method, system, fraction, samples.account[index])
         for k in range(2):
             samples.knees[index, k] = walk_state.knee[k]
             samples.has_ground[index, k] = walk_state.has_ground[k]
             samples.level[index, k] = walk_state.level[k]
-        samples.stance[index] = walk_state.feet[STANCE]
+        samples.stance[index] = walk_state.progress.stance
         index += 1
-    observer.recorded[0] = index
+    observer.tally.recorded = index
 
 
 @inlined
 def balance(observer: ContactObserver, method: Any, system: OnGround) -> None:
     """What the last step took and gave, and how well the energy balances at its end."""
-    account = observer.account[SO_FAR]
+    account = observer.account
     add_work_until(method, system, 1.0, account)
     lost = -account[PUSH_OFF] - account[HIP]
     for entry in range(PUSH_OFF):
         lost += account[entry]
-    residual = end_energy(system, method.y) + lost - observer.extremes[START_ENERGY]
-    observer.extremes[RESIDUAL] = max(observer.extremes[RESIDUAL], abs(residual))
+    residual = end_energy(system, method.y) + lost - observer.tally.start_energy
+    observer.tally.residual = max(observer.tally.residual, abs(residual))
 
 
 @inlined
@@ -124,16 +137,16 @@ def note_torque(observer: ContactObserver, method: Any, system: OnGround, finder
     torque = hip_law(system.form).torque
     if torque != 0.0:
         given = torque_work(torque, method, system, finder, LEGS_TURN, 1.0)
-        observer.account[SO_FAR, TORQUE] += given.net
-        observer.account[SO_FAR, FORWARD] += given.positive
+        observer.account[TORQUE] += given.net
+        observer.account[FORWARD] += given.positive
 
 
 @inlined
 def note_work(observer: ContactObserver, system: OnGround, y: Any) -> None:
     """A step has ended: what was given until now belongs to steps that were taken, and what the hip's spring gave."""
     for entry in range(ENTRIES):
-        observer.account[AT_TOUCH, entry] = observer.account[SO_FAR, entry]
-    observer.account[AT_TOUCH, HIP] += observer.extremes[START_SPRING] - hip_energy(system, y)
+        observer.account_at_touch[entry] = observer.account[entry]
+    observer.account_at_touch[HIP] += observer.tally.start_spring - hip_energy(system, y)
 
 
 @inlined
@@ -146,14 +159,14 @@ def note_depth(observer: ContactObserver, method: Any, system: OnGround, finder:
         y = vector(OF_STATES)[: method.y.size]
         interpolate(method, system, min(at, 1.0), y)
         deepest = max(deepest, -over_ground(system, foot, one_foot_motion(system.form, foot, y)).height)
-    observer.extremes[MAX_PENETRATION] = max(observer.extremes[MAX_PENETRATION], deepest)
+    observer.tally.max_penetration = max(observer.tally.max_penetration, deepest)
 
 
 @inlined
 def observe_edge(observer: ContactObserver, system: OnGround, foot: int, y: Any) -> None:
     """A foot left its pad: the spring under it is gone, and what it held with it."""
     if system.has_ground[foot] != 0 and observer.track_energy:
-        observer.account[SO_FAR, EDGES] += foot_elastic_energy(system, foot, y)
+        observer.account[EDGES] += foot_elastic_energy(system, foot, y)
 
 
 @entered

@@ -9,13 +9,9 @@ from numpy.typing import NDArray
 from walkerlab.account import ENTRIES, KNEE_STRIKES, LOSSES, LOST, PUSH_OFF, TORQUE
 from walkerlab.ground.energy import kinetic_energy, potential_energy, total_energy
 from walkerlab.ground.hinges import hip_energy
-from walkerlab.ground.knees import FLEXED, extension
-from walkerlab.ground.terrain import Terrain, cell_at, has_ground_in_cell, is_uneven, starts_with_ground
+from walkerlab.ground.terrain import Terrain, is_uneven
 from walkerlab.ground.walker import (
-    BENT,
-    LOCKED,
     OF_BODIES,
-    RELEASED,
     ContactWalker,
     FootMotion,
     OnGround,
@@ -27,42 +23,17 @@ from walkerlab.ground.walker import (
     sines_cosines,
     unfolded,
 )
-from walkerlab.hybrid.contact_events import (
-    AIRBORNE_SINCE,
-    EVENT_FUNCTIONS,
-    FALL,
-    FALLEN_HIP,
-    HEIGHT,
-    LEFT_EDGE,
-    NOW,
-    PASSING,
-    PER_FOOT,
-    RIGHT_EDGE,
-    ROWS,
-    SLIDE,
-    STEPS,
-    JudgedGround,
-    WalkState,
-    hip_height,
-    material_along,
-)
-from walkerlab.hybrid.contact_knee import change_form
-from walkerlab.hybrid.contact_observer import (
-    AT_HAND,
-    AT_TOUCH,
-    MAX_PENETRATION,
-    RESIDUAL,
-    SO_FAR,
-    START_ENERGY,
-    START_SPRING,
-    ContactObserver,
-    ContactSamples,
-)
-from walkerlab.hybrid.contact_rules import GOES_ON, steps_with_lift
+from walkerlab.hybrid.contact_crossings import hip_height
+from walkerlab.hybrid.contact_events import HEIGHT, PER_FOOT, ROWS, JudgedGround
+from walkerlab.hybrid.contact_jumps import change_form
+from walkerlab.hybrid.contact_loop import AT_LIFT, NEVER, walk_in_form
+from walkerlab.hybrid.contact_record import CONTACT_TALLY, ContactObserver, ContactSamples
+from walkerlab.hybrid.contact_state import WalkState, material_along, new_walk_state, steps_with_lift
 from walkerlab.hybrid.contact_tangent import new_tangent
-from walkerlab.hybrid.contact_walk import AT_LIFT, NEVER, walk_in_form
+from walkerlab.hybrid.endings import CHANGES_FORM, FALLEN_HIP
 from walkerlab.hybrid.walk_record import DrivenWork, WalkRecord, WalkWork
 from walkerlab.kernels import kernel, uncompiled, vector
+from walkerlab.mechanics.tree import new_record
 from walkerlab.outcome import Outcome
 from walkerlab.solvers.registry import Tolerances, finder_for, method_named, sharing
 from walkerlab.solvers.stepping import ACCEPTED, JACOBIANS, REJECTED, RHS, T
@@ -161,81 +132,6 @@ class ContactWalkResult(WalkRecord):
         )
 
 
-def new_walk_state(walker: ContactWalker, terrain: Terrain, stance: int, steps: int, y: State) -> WalkState:
-    """The walk state of a walk of `steps` steps that starts from y with both feet on the ground."""
-    feet = feet_motion(walker.whole, y)
-    cells = np.array([cell_at(terrain, foot, feet[foot].along) for foot in range(2)], np.int64)
-    has_ground = np.zeros(2, np.int8)
-    for foot in range(2):
-        on_pad = has_ground_in_cell(int(cells[foot]))
-        has_ground[foot] = on_pad and starts_with_ground(terrain, foot == stance)
-    sides, at_zero = known_sides(walker, feet, stance, y)
-    return WalkState(
-        touch_time=np.zeros(steps),
-        touch_along=np.zeros(steps),
-        touch_height=np.zeros(steps),
-        slip=np.zeros(steps),
-        rolling=np.zeros(steps),
-        has_ground=has_ground,
-        level=np.zeros(2),
-        cells=cells,
-        left_cells=cells.copy(),
-        foothold=np.array([motion.along for motion in feet]),
-        touched=np.array([material_along(walker.whole, foot, feet[foot].along, y) for foot in range(2)]),
-        stood=np.zeros((2, 2)),
-        knee=knees_at_start(walker, stance, y),
-        releasing=np.zeros(1, np.int8),
-        knee_strike=np.full(steps + 1, -1.0),
-        leaving=np.zeros(2, np.int8),
-        sides=sides,
-        at_zero=at_zero,
-        times=np.zeros(3),
-        feet=np.array([stance, 0, 0]),
-    )
-
-
-def knees_at_start(walker: ContactWalker, stance: int, y: State) -> NDArray[np.int8]:
-    """What each knee is doing (2,): that of the stance leg is locked, the other is not."""
-    knee = np.full(2, RELEASED, np.int8)
-    if walker.kneed:
-        knee[stance] = LOCKED
-        if extension(walker.whole, 1 - stance, y) < -FLEXED:
-            knee[1 - stance] = BENT
-    return knee
-
-
-def known_sides(
-    walker: ContactWalker, feet: tuple[FootMotion, FootMotion], stance: int, y: State
-) -> tuple[NDArray[np.int8], NDArray[np.int8]]:
-    """On which side of zero every event function is at the start, and which are at zero, by rounding at most.
-
-    Of these the velocity tells the side. A foot on the ground at rest is in it; of feet side by side at rest the stance
-    foot is the one ahead.
-    """
-    sides, at_zero = np.zeros(EVENT_FUNCTIONS, np.int8), np.zeros(EVENT_FUNCTIONS, np.int8)
-    sides[[FALL, SLIDE]] = 1
-    n, whole = int(walker.whole.bodies), walker.whole
-    size = float(max(np.abs(whole.foot_x[0]).max(), np.abs(whole.foot_y[0]).max()))
-    speed = max(abs(float(x)) for x in y[2 + n :])
-    for foot in range(2):
-        first = foot * PER_FOOT
-        sides[[first + LEFT_EDGE, first + RIGHT_EDGE]] = 1
-        signs = (feet[foot].height, feet[foot].vertical_velocity)
-        sides[first + HEIGHT], at_zero[first + HEIGHT] = side_of(signs, (size, speed), -1)
-    rates = [feet[k].slip - float(whole.rolling[k, :n] @ np.array(y[4 + n :])) for k in range(2)]
-    order = (feet[1].along - feet[0].along, rates[1] - rates[0])
-    sides[PASSING], at_zero[PASSING] = side_of(order, (size, speed), 1 if stance == 1 else -1)
-    return sides, at_zero
-
-
-def side_of(value_and_rate: tuple[float, float], scales: tuple[float, float], otherwise: int) -> tuple[int, bool]:
-    """On which side of zero something is, or goes to if it is zero to rounding; whether it is zero."""
-    for number, scale in zip(value_and_rate, scales, strict=True):
-        if abs(number) > ROUNDING * scale:
-            return (1 if number > 0.0 else -1), number is not value_and_rate[0]
-    return otherwise, True
-
-
 def new_observer(
     walker: ContactWalker,
     walk_state: WalkState,
@@ -252,13 +148,11 @@ def new_observer(
     """
     times = np.zeros(0) if times is None else times
     samples = times.size
-    extremes = np.zeros(5)
+    tally = new_record(CONTACT_TALLY)
     if track_energy or walker.whole.driven_hip:
-        here = on_ground(
-            walker, walk_state.has_ground, feet=walk_state.feet, level=walk_state.level, times=walk_state.times
-        )
-        extremes[START_ENERGY], extremes[START_SPRING] = total_energy(here, y), hip_energy(here, y)
-        extremes[AT_HAND] = extremes[START_ENERGY] + walker.mass * walker.gravity_along * y[0]
+        here = on_ground(walker, walk_state.has_ground, level=walk_state.level, progress=walk_state.progress)
+        tally.start_energy, tally.start_spring = total_energy(here, y), hip_energy(here, y)
+        tally.energy_below = tally.start_energy + walker.mass * walker.gravity_along * y[0]
     room = ContactSamples(
         times,
         np.zeros((samples, walker.size)),
@@ -268,14 +162,14 @@ def new_observer(
         np.zeros((samples, 2)),
         np.zeros((samples, ENTRIES)),
     )
-    seen, account, tangent = np.zeros(1, np.int64), np.zeros((2, ENTRIES)), new_tangent(walker.size, directions)
-    return ContactObserver(track_energy, room, seen, account, extremes, tangent)
+    tangent = new_tangent(walker.size, directions)
+    return ContactObserver(track_energy, room, np.zeros(ENTRIES), np.zeros(ENTRIES), tally, tangent)
 
 
 def in_walk(walker: ContactWalker, walk_state: WalkState, hinged: bool = False) -> OnGround:
     """The walker in the form that a walk has it in, which changes what it remembers."""
     at = walk_state
-    return on_ground(walker, at.has_ground, at.knee, hinged, at.feet, at.level, at.times)
+    return on_ground(walker, at.has_ground, at.knee, hinged, at.level, at.progress)
 
 
 def walk_on(
@@ -304,7 +198,7 @@ def walk_on(
     if tangent.shape[1] > 0:
         tangent[: y.size] = folded(system.form, tangent)
     lead = tolerances.new(y.size)
-    lead.clock[T] = walk_state.times[NOW]
+    lead.clock[T] = walk_state.progress.stopped_at
     by_size, finder = {y.size: lead}, finder_for(lead, ROWS, walker.size)
     while True:
         if y.size not in by_size:
@@ -312,14 +206,14 @@ def walk_on(
         method = by_size[y.size]
         method.y[:] = y
         ended, event = walk(system, ground, method, finder, observer, walk_state, until)
-        if ended != GOES_ON:
+        if ended != CHANGES_FORM:
             break
         before, system = system, in_walk(walker, walk_state, hinged)
         y = change_form(walker, before, system, event, observer, method)
     if tangent.shape[1] > 0:
         tangent[:] = unfolded(system.form, tangent[: method.y.size], walker.size)
     end = floating_state(system.form, method.y, walker.size)
-    walk_state.times[NOW] = lead.clock[T]
+    walk_state.progress.stopped_at = lead.clock[T]
     return Stopped(balanced(ended, observer, tolerances), float(lead.clock[T]), end, lead.counts[:4].copy())
 
 
@@ -355,7 +249,7 @@ def walk_contact(
         times = sampling * np.arange(room, dtype=np.float64) if isinstance(sampling, float) else sampling
         observer = new_observer(walker, walk_state, start, times, tolerances.track_energy)
         stopped = run_parts(walker, ground, hinged, start, tolerances, observer, walk_state)
-        if room == 0 or observer.recorded[0] < room:
+        if room == 0 or observer.tally.recorded < room:
             return gather(stopped, walk_state, observer, walker, ground.terrain, tolerances)
         room *= 2
 
@@ -380,7 +274,7 @@ def run_parts(
         release_hinge(walker, walk_state, y)
         if first.outcome is not Outcome.WALKED:
             return first
-        walk_state.times[AIRBORNE_SINCE] = first.time_s
+        walk_state.progress.airborne_since = first.time_s
     stopped = walk_on(walker, ground, tolerances, walk_state, observer, y)
     if stopped.outcome is Outcome.WALKED:
         unseen = new_observer(walker, walk_state, stopped.state, track_energy=False)
@@ -397,10 +291,10 @@ def by_channel(walker: ContactWalker, dissipated: Floats) -> dict[str, float]:
 
 def release_hinge(walker: ContactWalker, walk_state: WalkState, y: State) -> None:
     """A hinged foot has neither slipped nor rolled until now; it is on the ground, about to leave."""
-    foot, steps = int(walker.forms[1, 0]["hinged"]), walk_state.feet[STEPS]
+    foot, steps = int(walker.forms[1, 0]["hinged"]), walk_state.progress.steps
     walk_state.slip[:steps], walk_state.rolling[:steps] = 0.0, 0.0
     walk_state.touched[foot] = material_along(walker.whole, foot, feet_motion(walker.whole, y)[foot].along, y)
-    walk_state.stood[foot] = 0.0
+    walk_state.slipped[foot], walk_state.rolled[foot] = 0.0, 0.0
     walk_state.at_zero[foot * PER_FOOT + HEIGHT] = 1
 
 
@@ -410,7 +304,7 @@ def explained_residual(observer: ContactObserver, tolerances: Tolerances) -> flo
     It is UNEXPLAINED times rtol times energy and work exchanged: the energy at the start, kinetic, elastic, and
     potential over the slope below, and all that has been dissipated since.
     """
-    exchanged = observer.extremes[AT_HAND] + np.abs(observer.account[SO_FAR, :TORQUE]).sum()
+    exchanged = observer.tally.energy_below + np.abs(observer.account[:TORQUE]).sum()
     return float(UNEXPLAINED * max(tolerances.rtol, FINEST) * exchanged)
 
 
@@ -419,7 +313,7 @@ def balanced(ended: int, observer: ContactObserver, tolerances: Tolerances) -> O
 
     This detects faults and estimates no error: a walk may be off by far more than its balance.
     """
-    closes = observer.extremes[RESIDUAL] <= explained_residual(observer, tolerances)
+    closes = observer.tally.residual <= explained_residual(observer, tolerances)
     return Outcome(ended) if closes else Outcome.SOLVER_FAILED
 
 
@@ -438,7 +332,7 @@ def gather(
     tolerances: Tolerances,
 ) -> ContactWalkResult:
     """The result of a walk from what was written on the way."""
-    done, lifted, seen = int(walk_state.feet[STEPS]), steps_with_lift(walk_state), int(observer.recorded[0])
+    done, lifted, seen = int(walk_state.progress.steps), steps_with_lift(walk_state), int(observer.tally.recorded)
     samples = ContactSamples(*(each[:seen] for each in observer.samples)) if observer.samples.time_s.size else None
     strikes = walk_state.knee_strike[:done]
     along, up = (
@@ -456,11 +350,11 @@ def gather(
         slip_m=walk_state.slip[:lifted],
         rolling_m=walk_state.rolling[:lifted],
         end_state=stopped.state,
-        max_penetration_m=float(observer.extremes[MAX_PENETRATION]),
-        energy_balance_residual_J=float(observer.extremes[RESIDUAL]),
+        max_penetration_m=float(observer.tally.max_penetration),
+        energy_balance_residual_J=float(observer.tally.residual),
         explained_residual_J=explained_residual(observer, tolerances),
-        dissipated_J=observer.account[SO_FAR, LOST].copy(),
-        driven=driven_work(walker, along, up, observer.account[AT_TOUCH]),
+        dissipated_J=observer.account[LOST].copy(),
+        driven=driven_work(walker, along, up, observer.account_at_touch),
         samples=samples,
         method=tolerances.method,
     )
