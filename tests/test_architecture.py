@@ -80,7 +80,7 @@ def test_every_part_of_the_package_has_its_layer():
 
 
 def test_the_docs_tell_of_the_same_layers():
-    text = (Path(__file__).parent.parent / "docs" / "pipeline.md").read_text()
+    text = (Path(__file__).parent.parent / "docs" / "architecture.md").read_text()
     told = text.partition("## Layers")[2].partition("Each imports")[0]
     assert tuple(told.replace(">", " ").split()) == LAYERS
 

@@ -62,11 +62,11 @@ def test_links_lead_to_files_that_are_there(path):
 
 def code_to_add():
     """The Python of the page that says how to add something: figure, stage (its type, its module, its entry), law."""
-    return re.findall(r"^```python\n(.*?)^```$", text_of(ROOT / "docs" / "pipeline.md"), re.DOTALL | re.MULTILINE)
+    return re.findall(r"^```python\n(.*?)^```$", text_of(ROOT / "docs" / "adding.md"), re.DOTALL | re.MULTILINE)
 
 
 def test_the_figure_of_the_docs_is_drawn(tmp_path, monkeypatch):
-    words = re.search(r"^```jinja\n(.*?)^```$", text_of(ROOT / "docs" / "pipeline.md"), re.DOTALL | re.MULTILINE)[1]
+    words = re.search(r"^```jinja\n(.*?)^```$", text_of(ROOT / "docs" / "adding.md"), re.DOTALL | re.MULTILINE)[1]
     (tmp_path / "slip-per-step.j2").write_text(words, encoding="utf-8")
     monkeypatch.setattr(illustration, "WORDS", replace(illustration.WORDS, folder=tmp_path))
     names = {}
@@ -109,8 +109,9 @@ def test_the_friction_of_the_docs_is_a_whole_law_with_the_derivative_that_it_say
     )
 
 
-def test_files_and_names_of_the_pipeline_page_are_there():
-    text = re.sub(r"^```.*?^```$", "", text_of(ROOT / "docs" / "pipeline.md"), flags=re.DOTALL | re.MULTILINE)
+@pytest.mark.parametrize("page", ["architecture", "pipeline", "adding"])
+def test_files_and_names_of_the_pages_about_the_inside_are_there(page):
+    text = re.sub(r"^```.*?^```$", "", text_of(ROOT / "docs" / f"{page}.md"), flags=re.DOTALL | re.MULTILINE)
     source = "".join(text_of(file) for file in (ROOT / "walkerlab").rglob("*.py"))
     said = set(re.findall(r"`([a-z_/]+\.py|[a-z_]+/[a-z_/]+)`", text)) - {
         "walkerlab/figures/slip.py",

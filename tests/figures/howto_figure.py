@@ -1,9 +1,9 @@
-"""The figure that docs/pipeline.md adds as an example, made of what stands there."""
+"""The figure that docs/adding.md adds as an example, made of what stands there."""
 
 import re
 from pathlib import Path
 
-PAGE = (Path(__file__).parents[2] / "docs" / "pipeline.md").read_text(encoding="utf-8")
+PAGE = (Path(__file__).parents[2] / "docs" / "adding.md").read_text(encoding="utf-8")
 
 
 def example():

@@ -156,7 +156,7 @@ def friction_law(contact: Contact) -> FrictionLaw:
     try:
         return law_named(contact.friction, contact.in_si())
     except TypeError as error:
-        raise ConfigError(f"{error}.", "docs/pipeline.md says what a law has.") from error
+        raise ConfigError(f"{error}.", "docs/adding.md says what a law has.") from error
 
 
 def start_state(scene: ContactScene, rigid_state: State) -> State:
