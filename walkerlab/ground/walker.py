@@ -145,7 +145,7 @@ def changed_forms(walker: ContactWalker, **fields: Any) -> ContactWalker:
 
 
 @tree.read_at_once
-class Progress(np.record):  # type: ignore[misc]  # NumPy's stubs call one of its bases final
+class WalkProgress(np.record):  # type: ignore[misc]  # NumPy's stubs call one of its bases final
     """How far a walk has come: a structured scalar that the rules of a walk write to."""
 
     stance: int  # the foot that carries the step at hand
@@ -157,12 +157,12 @@ class Progress(np.record):  # type: ignore[misc]  # NumPy's stubs call one of it
     passes_switching: bool  # whether the integration step at hand may go past switching points
 
 
-PROGRESS = tree.record_type(Progress, {})
+PROGRESS = tree.record_type(WalkProgress, {})
 
 
-def new_progress(stance: int = 1, steps: int = 0, last_touch: float = 0.0) -> Progress:
+def new_progress(stance: int = 1, steps: int = 0, last_touch: float = 0.0) -> WalkProgress:
     """The progress of a walk that one foot carries, after some steps, the last of them at a time (s)."""
-    progress: Progress = tree.new_record(PROGRESS, stance=stance, steps=steps, last_touch=last_touch)
+    progress: WalkProgress = tree.new_record(PROGRESS, stance=stance, steps=steps, last_touch=last_touch)
     return progress
 
 
@@ -177,7 +177,7 @@ class OnGround(NamedTuple):
     has_ground: Any  # (2,) whether there is ground under a foot
     knee: Any  # (2,) what each knee is doing
     level: Any  # (2,) m, height over the slope of the ground for each foot
-    progress: Progress
+    progress: WalkProgress
 
 
 def on_ground(
@@ -186,7 +186,7 @@ def on_ground(
     knee: Any = (RELEASED, RELEASED),
     hinged: bool = False,
     level: Any = (0.0, 0.0),
-    progress: Progress | None = None,
+    progress: WalkProgress | None = None,
 ) -> OnGround:
     """The walker in the form that its knees give it.
 

@@ -60,7 +60,7 @@ def scan(
     return earliest_crossing(system, ground, walk_state, watch_order, finder)
 
 
-class Search(NamedTuple):
+class EventSearch(NamedTuple):
     """The search for the time of an event, by steps that end where it is expected."""
 
     target: float  # s, how far the next step may lead
@@ -131,15 +131,15 @@ def steps_are_left(walk_state: WalkState, until: int) -> bool:
 
 
 @inlined
-def seek(target: float, event: int) -> Search:
+def seek(target: float, event: int) -> EventSearch:
     """Look for the next event, from a step that stands up to a time (s); `event` was the last one."""
-    return Search(target, event, target, False, 0, 0, False, False)
+    return EventSearch(target, event, target, False, 0, 0, False, False)
 
 
 @inlined
 def aim(
-    search: Search, walk_state: WalkState, method: Any, finder: CrossingFinder, fraction: float, event: int
-) -> Search:
+    search: EventSearch, walk_state: WalkState, method: Any, finder: CrossingFinder, fraction: float, event: int
+) -> EventSearch:
     """Decide whether the last step stands, and whether its event happens, or how far it is to lead instead.
 
     fraction  of the step, at which the event lies; above 1 if there is none in it
@@ -149,11 +149,13 @@ def aim(
         return approach(search, walk_state, start, end, fraction, event)
     if search.arriving and end >= search.target:
         return confirm(search, start, time_to_zero(method, finder, search.event))
-    return Search(end, search.event, end, False, 0, 0, True, False)
+    return EventSearch(end, search.event, end, False, 0, 0, True, False)
 
 
 @inlined
-def approach(search: Search, walk_state: WalkState, start: float, end: float, fraction: float, event: int) -> Search:
+def approach(
+    search: EventSearch, walk_state: WalkState, start: float, end: float, fraction: float, event: int
+) -> EventSearch:
     """Let the step from start to end (s) lead only up to the event in it; it stands if the event is at its end.
 
     So it does where rounding moves the event with each try.
@@ -163,26 +165,26 @@ def approach(search: Search, walk_state: WalkState, start: float, end: float, fr
     wait = max(fraction * (end - start), EVENT_TIME)
     early = start + wait < end - EVENT_TIME
     if early and refinements <= REFINEMENTS and search.rewinds < REWINDS:
-        return Search(start + wait, event, latest, True, refinements + 1, search.rewinds + 1, False, False)
+        return EventSearch(start + wait, event, latest, True, refinements + 1, search.rewinds + 1, False, False)
     if early and is_switching(event):
         # its event function is no polynomial on this step: on half of it, it is nearer to one
         if search.rewinds < REWINDS:
-            return Search(0.5 * (start + end), event, latest, False, 0, search.rewinds + 1, False, False)
+            return EventSearch(0.5 * (start + end), event, latest, False, 0, search.rewinds + 1, False, False)
         # nor on a short one: the step may pass it over, but nothing else that is in it
         walk_state.progress.passes_switching = True
-        return Search(end, event, latest, False, 0, 0, False, False)
-    return Search(end, event, latest, True, refinements, search.rewinds, True, True)
+        return EventSearch(end, event, latest, False, 0, 0, False, False)
+    return EventSearch(end, event, latest, True, refinements, search.rewinds, True, True)
 
 
 @inlined
-def confirm(search: Search, start: float, wait: float) -> Search:
+def confirm(search: EventSearch, start: float, wait: float) -> EventSearch:
     """Let the event happen at the end of a step that just did not reach it, or lead the step on by `wait` (s)."""
     happens = abs(wait) <= EVENT_TIME
     doubtful = search.refinements <= REFINEMENTS and search.rewinds < DOUBTS
     target, refinements, rewinds = search.target + wait, search.refinements + 1, search.rewinds + 1
     if not happens and doubtful and start < target <= search.latest:
-        return Search(target, search.event, search.latest, True, refinements, rewinds, False, False)
-    return Search(search.target, search.event, search.latest, True, refinements, rewinds, True, happens)
+        return EventSearch(target, search.event, search.latest, True, refinements, rewinds, False, False)
+    return EventSearch(search.target, search.event, search.latest, True, refinements, rewinds, True, happens)
 
 
 @inlined

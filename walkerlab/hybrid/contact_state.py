@@ -14,7 +14,7 @@ from walkerlab.ground.walker import (
     ContactWalker,
     FootMotion,
     Form,
-    Progress,
+    WalkProgress,
     feet_motion,
     new_progress,
 )
@@ -58,7 +58,7 @@ class WalkState(NamedTuple):
     knee_strike: Any  # (steps + 1,) s, when the knee of the step's swing leg locked; -1 if it has not
     sides: Any  # (event functions,) on which side of zero each event function is known to be
     at_zero: Any  # (event functions,) which event functions the last event left at zero
-    progress: Progress
+    progress: WalkProgress
 
 
 def new_walk_state(walker: ContactWalker, terrain: Terrain, stance: int, steps: int, y: State) -> WalkState:
