@@ -10,6 +10,7 @@ import pytest
 
 import walkerlab
 from walkerlab.kernel_cache import KERNEL_HOMES
+from walkerlab.pipeline.graph import PIPELINE
 
 PACKAGE = Path(walkerlab.__file__).parent
 # each imports only those after it
@@ -170,3 +171,12 @@ def test_evidence_is_named_by_registries_alone():
     below = LAYERS.index(EVIDENCE[-1])
     core = [path for path in IN_LAYERS if LAYERS.index(layer_of(path)) > below]
     assert {named(path) for path in core if QUOTED_EVIDENCE.search(path.read_text())} == REGISTRIES
+
+
+STAGE_MODULES = {stage.module for stage in PIPELINE.stages}
+
+
+@pytest.mark.parametrize("module", sorted(STAGE_MODULES))
+def test_stages_import_no_other_stage(module):
+    path = PACKAGE.parent / Path(*module.split(".")).with_suffix(".py")
+    assert STAGE_MODULES & set(imported_modules(path)) == set()

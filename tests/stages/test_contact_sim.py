@@ -14,6 +14,7 @@ from walkerlab.hybrid.walk_record import DrivenWork, WalkRecord, WalkWork
 from walkerlab.outcome import Outcome
 from walkerlab.pipeline.graph import PIPELINE
 from walkerlab.pipeline.progress import Silent
+from walkerlab.scene import contact
 from walkerlab.stages import contact_sim, simulate
 from walkerlab.stages.walk import numbers_of, of_steps
 from walkerlab.store import artifact
@@ -247,7 +248,7 @@ def test_without_a_gait_or_a_start_there_is_nothing_to_walk_from():
 
 
 def test_an_exhausted_budget_is_no_answer_and_keeps_what_was_walked(monkeypatch):
-    monkeypatch.setattr(contact_sim, "BUDGET_PER_STEP", 1000)
+    monkeypatch.setattr(contact, "BUDGET_PER_STEP", 1000)
     with pytest.raises(NoAnswer) as caught:
         run()
     partial = caught.value.partial
@@ -260,7 +261,7 @@ def test_an_exhausted_budget_is_no_answer_and_keeps_what_was_walked(monkeypatch)
 def test_a_step_whose_foot_did_not_lift_has_a_gap_and_is_not_in_the_mean(monkeypatch):
     whole = run("strides=1")
     # ten more right-hand sides than to the last touch, of hundreds to the lift
-    monkeypatch.setattr(contact_sim, "BUDGET_PER_STEP", whole.summary["rhs_evaluations"] // 2 + 5)
+    monkeypatch.setattr(contact, "BUDGET_PER_STEP", whole.summary["rhs_evaluations"] // 2 + 5)
     cut = run("strides=1")
     first = whole.summary["slips_m"][0]
     assert cut.summary["outcome"] == "walked"
@@ -295,7 +296,7 @@ def test_a_tolerance_that_leaves_friction_to_chance_is_told(atol, told):
 
 
 def test_a_budget_that_ends_before_the_first_sample_is_no_answer_either(monkeypatch):
-    monkeypatch.setattr(contact_sim, "BUDGET_PER_STEP", 0)
+    monkeypatch.setattr(contact, "BUDGET_PER_STEP", 0)
     with pytest.raises(NoAnswer) as caught:
         run()
     assert caught.value.partial["trajectory"]["time"].size == 0

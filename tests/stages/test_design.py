@@ -17,9 +17,9 @@ from walkerlab.pipeline.progress import Silent
 from walkerlab.report.answers import answer
 from walkerlab.scene.contact import contact_scene, gait_off_pads, start_state
 from walkerlab.scene.rigid import rigid_walker
+from walkerlab.scene.subject import subject_of
 from walkerlab.solvers.registry import Tolerances
 from walkerlab.stages import design, fixedpoint
-from walkerlab.stages.robustness import subject_of
 from walkerlab.store.checkpoint import Checkpoint
 
 # design contract, section 4
@@ -166,7 +166,7 @@ def contact_gait(name):
     walker = rigid_walker(config, config.equations)
     gait = find_gaits(walker).gait
     told = {"state": gait.state, "step_length_m": gait.step_length}
-    here = subject_of("contact", config, told, Silent()).at()
+    here = subject_of("contact", config, told, Silent().note).at()
     found = gait_off_pads(config, gait.step_length, gait.state).gait
     return config, gait, found.step, gait_numbers(here, ["cost_of_transport"])["cost_of_transport"]
 

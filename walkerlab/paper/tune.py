@@ -27,15 +27,22 @@ from walkerlab.paper.left_out import of_adjustment
 from walkerlab.paper.printed import TABLE_2
 from walkerlab.paper.tune_limit import limit_findings, limit_groups, limit_summary
 from walkerlab.pipeline.progress import Progress, each_told
-from walkerlab.scene.contact import ContactScene, contact_gait, start_state, with_contact
+from walkerlab.scene.contact import (
+    SAMPLES_PER_PENDULUM_TIME,
+    ContactScene,
+    contact_gait,
+    scene_on_pads,
+    start_state,
+    tolerances_of,
+    with_contact,
+)
 from walkerlab.scene.endings import Pads, endings
 from walkerlab.scene.rigid import coordinates, rigid_walker
 from walkerlab.scene.scaled import for_a_map, starts_of
 from walkerlab.solvers.registry import ENDLESS, Tolerances
 from walkerlab.solvers.system import State
-from walkerlab.stages.contact_sim import SAMPLES_PER_PENDULUM_TIME, scene_on_pads, tolerances_of
 from walkerlab.stages.numerical_error import numerical_error
-from walkerlab.stages.simulate import leg_variables
+from walkerlab.stages.rigid_groups import leg_variables
 from walkerlab.stages.walk import OUTCOMES, TIME, counted, legs, numbers_of, of_steps, over_time, rigid_start
 from walkerlab.store.columns import numbered, real_and_imaginary, rows_group
 from walkerlab.store.content import Content, Group, Variable

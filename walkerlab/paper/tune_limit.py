@@ -27,11 +27,10 @@ from walkerlab.orbits.rigid_limit import (
 from walkerlab.orbits.step_map import Cycle
 from walkerlab.paper.printed import LARGEST_ERROR
 from walkerlab.pipeline.progress import Progress
-from walkerlab.scene.contact import ContactScene, knee_rules, start_state, with_drives
+from walkerlab.scene.contact import SAMPLES_PER_PENDULUM_TIME, ContactScene, knee_rules, start_state, with_drives
 from walkerlab.scene.parts import assembly_of
 from walkerlab.solvers.system import State
-from walkerlab.stages.contact_sim import SAMPLES_PER_PENDULUM_TIME
-from walkerlab.stages.simulate import leg_variables
+from walkerlab.stages.rigid_groups import leg_variables
 from walkerlab.store.columns import columns, printed, rows_group
 from walkerlab.store.content import Group
 

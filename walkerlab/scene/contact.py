@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from walkerlab.config.walkers import Kneed, PartsWalker
-from walkerlab.errors import ConfigError
+from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.ground.compliant import KneeRules, contact_walker
 from walkerlab.ground.friction import FrictionLaw, law_named
 from walkerlab.ground.normal_force import NormalLaw
@@ -29,9 +29,11 @@ from walkerlab.solvers.system import Floats, State
 
 if TYPE_CHECKING:
     from walkerlab.config.contact import Contact
-    from walkerlab.config.reads import ContactConfig
+    from walkerlab.config.reads import ContactConfig, GroundConfig
     from walkerlab.config.schema import Config
 
+BUDGET_PER_STEP = 1_000_000  # right-hand sides
+SAMPLES_PER_PENDULUM_TIME = 200  # of a walk that is stored
 GAIT = Tolerances("radau5", 1e-10, 1e-12, 10_000_000)  # the tangent is exact for this method
 FULL_STOP_DAMPING = 1e-5  # rad into a compliant knee stop from which on its damping is full
 
@@ -75,6 +77,28 @@ def contact_scene(config: ContactConfig, rigid_step_length_m: float, own_pitch_m
     frame = Frame(leg, math.sqrt(leg / gravity), locate_switching=True)
     ground = JudgedGround(TERRAINS[contact.terrain](pitch), frame)
     return ContactScene(walker, ground, contact.stance == "pinned", pitch, assembly)
+
+
+def tolerances_of(config: GroundConfig, steps: int) -> Tolerances:
+    """Return the config's tolerances for a walk of at most `steps` steps."""
+    settings = config.solver.contact
+    return Tolerances(settings.method, settings.rtol, settings.atol, steps * BUDGET_PER_STEP)
+
+
+def scene_on_pads(
+    config: ContactConfig, rigid_step: float, rigid_state: State, answer: GaitAnswer | None = None
+) -> ContactScene:
+    """Return the config's scene with its pads laid; raises NoAnswer if they follow a contact gait and there is none.
+
+    answer  of a search for that gait; None to search here
+    """
+    own = None
+    if wants_own_pitch(with_contact(config)):
+        answer = answer or contact_gait(config, rigid_step, rigid_state)
+        if answer.gait is None:
+            raise NoAnswer(f"no contact gait to lay the pads for: {answer.reason}", answer.advice)
+        own = answer.gait.step.length_m
+    return contact_scene(config, rigid_step, own)
 
 
 def with_drives(walker: ContactWalker, config: ContactConfig) -> ContactWalker:

@@ -37,11 +37,10 @@ from walkerlab.orbits.similarity import unit_walker
 from walkerlab.outcome import Outcome
 from walkerlab.pipeline.progress import Progress
 from walkerlab.pipeline.work import WorkUnit, complete
-from walkerlab.scene.contact import ContactScene, contact_gait, start_state, with_contact
+from walkerlab.scene.contact import ContactScene, contact_gait, scene_on_pads, start_state, tolerances_of, with_contact
 from walkerlab.scene.endings import Pads, endings
 from walkerlab.scene.rigid import rigid_walker
 from walkerlab.solvers.system import Floats
-from walkerlab.stages.contact_sim import scene_on_pads, tolerances_of
 from walkerlab.stages.numerical_error import evenly_spread, tightened
 from walkerlab.stages.walk import OUTCOMES, counted
 from walkerlab.store.checkpoint import Checkpoint

@@ -8,35 +8,32 @@ from typing import Any
 import numpy as np
 
 from walkerlab.account import SAMPLED
-from walkerlab.config.reads import ContactConfig, ContactSimConfig, GroundConfig
-from walkerlab.errors import NoAnswer
+from walkerlab.config.reads import ContactSimConfig
 from walkerlab.ground.compliant import hinge_of
 from walkerlab.ground.terrain import STANCE_FOOT
 from walkerlab.hybrid.contact_record import ContactSamples
 from walkerlab.hybrid.contact_result import ContactWalkResult, by_channel, sampled_energies, sampled_feet
 from walkerlab.mechanics.rigid import places_of
 from walkerlab.mechanics.walkers import TORSO
-from walkerlab.orbits.contact_gait import GaitAnswer
 from walkerlab.pipeline.progress import Progress
 from walkerlab.scene.contact import (
+    SAMPLES_PER_PENDULUM_TIME,
     ContactScene,
-    contact_gait,
     contact_scene,
     scene_measures,
+    scene_on_pads,
     start_state,
-    wants_own_pitch,
+    tolerances_of,
     with_contact,
 )
 from walkerlab.scene.footholds import foothold_heights
 from walkerlab.scene.left_out import of_contact_walk
 from walkerlab.solvers.registry import Tolerances
-from walkerlab.solvers.system import Floats, State
+from walkerlab.solvers.system import Floats
 from walkerlab.stages.walk import content_of_walk, legs, numbers_of, of_body, over_time, pace_of, rigid_start, steps_of
 from walkerlab.store.columns import numbered
 from walkerlab.store.content import Content, Group, Variable
 
-BUDGET_PER_STEP = 1_000_000  # right-hand sides
-SAMPLES_PER_PENDULUM_TIME = 200
 RESOLVED = 0.1  # of the stiction velocity: a tolerance that still tells slips apart
 HALF_ANGLE = 0.2  # rad, between the legs of a walker whose walk is only to be compiled
 SCUFFED = (
@@ -86,28 +83,6 @@ def tell_unresolved_slip(atol: float, scene: ContactScene, progress: Progress) -
             f"contact-sim: lower solver.contact.atol ({atol:g} m/s): it is large beside contact.stiction_velocity, up "
             f"to which friction rises ({rising:g} m/s), so friction and how the walk ends may be chance"
         )
-
-
-def tolerances_of(config: GroundConfig, steps: int) -> Tolerances:
-    """The config's tolerances for a walk of so many steps."""
-    settings = config.solver.contact
-    return Tolerances(settings.method, settings.rtol, settings.atol, steps * BUDGET_PER_STEP)
-
-
-def scene_on_pads(
-    config: ContactConfig, rigid_step: float, rigid_state: State, answer: GaitAnswer | None = None
-) -> ContactScene:
-    """The config's scene with its pads laid; raises NoAnswer if they are to fit a contact gait that there is not.
-
-    answer  what a search for that gait has found; None if there was none
-    """
-    own = None
-    if wants_own_pitch(with_contact(config)):
-        answer = answer or contact_gait(config, rigid_step, rigid_state)
-        if answer.gait is None:
-            raise NoAnswer(f"no contact gait to lay the pads for: {answer.reason}", answer.advice)
-        own = answer.gait.step.length_m
-    return contact_scene(config, rigid_step, own)
 
 
 def summary(config: ContactSimConfig, scene: ContactScene, walk: ContactWalkResult) -> dict[str, Any]:

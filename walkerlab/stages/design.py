@@ -24,8 +24,8 @@ from walkerlab.pipeline.progress import Progress
 from walkerlab.scene.families import not_read, reads
 from walkerlab.scene.parameter import Parameter, parameter_of
 from walkerlab.scene.rigid import rigid_walker
+from walkerlab.scene.subject import Subject, section_coordinates, subject_of
 from walkerlab.solvers.system import Floats
-from walkerlab.stages.robustness import Subject, section_coordinates, subject_of
 from walkerlab.store.checkpoint import Checkpoint
 from walkerlab.store.columns import rows_group
 from walkerlab.store.content import Content
@@ -169,7 +169,7 @@ class Gaits:
         self.counts = np.zeros(2, int)  # evaluations, and those without such a gait
         self.found: dict[bytes, Floats] = {}  # section coordinates of gaits, by the numbers that were asked for
         self.length = float(gait["step_length_m"])
-        self.z = subject_of(asked.model, config, gait, progress).z
+        self.z = subject_of(asked.model, config, gait, progress.note).z
 
     def at(self, x: Floats) -> Point | None:
         """The gait; None where there is none, or the config refuses the numbers."""

@@ -24,7 +24,7 @@ from walkerlab.scene.rigid import rigid_scene
 from walkerlab.solvers.registry import ENDLESS, Tolerances
 from walkerlab.solvers.system import Floats
 from walkerlab.stages.numerical_error import evenly_spread
-from walkerlab.stages.simulate import trajectory_group
+from walkerlab.stages.rigid_groups import trajectory_group
 from walkerlab.stages.walk import only_at
 from walkerlab.store.columns import columns, labelled, real_and_imaginary
 from walkerlab.store.content import Attribute, Group, Variable

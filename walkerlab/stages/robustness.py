@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict
 from functools import partial
 from typing import Any, Final
 
@@ -12,7 +12,7 @@ import numpy as np
 from walkerlab.config.drives import drives_of
 from walkerlab.config.fields import leaves
 from walkerlab.config.ground import Footholds
-from walkerlab.config.reads import ContactConfig, DesignConfig, RobustnessConfig
+from walkerlab.config.reads import RobustnessConfig
 from walkerlab.config.schema import Config
 from walkerlab.config.walkers import without_contact
 from walkerlab.config.writer import slope_in_degrees
@@ -20,9 +20,8 @@ from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.hybrid.recorded_walk import as_state
 from walkerlab.hybrid.walk_record import rough_heights
 from walkerlab.labels import Label
-from walkerlab.mechanics.standing import Standing
 from walkerlab.orbits.family_search import CONTACT, RIGID
-from walkerlab.orbits.gradients import QUANTITIES, Gradient, gait_numbers, gradients, relative
+from walkerlab.orbits.gradients import QUANTITIES, Gradient, gait_numbers, relative
 from walkerlab.orbits.robustness import (
     DISTURBANCES,
     INDICATORS,
@@ -32,17 +31,15 @@ from walkerlab.orbits.robustness import (
     sensitivity,
     steps_on_rough_ground,
 )
-from walkerlab.orbits.shooting import EXACT, RigidMap, coordinates_of
-from walkerlab.orbits.similarity import unit_walker
-from walkerlab.orbits.step_map import StepMap
+from walkerlab.orbits.shooting import EXACT, RigidMap
 from walkerlab.pipeline.progress import Progress, each_told
 from walkerlab.pipeline.work import WorkUnit, complete
-from walkerlab.scene.families import contact_map, not_read, reads, rigid_map
-from walkerlab.scene.parameter import SLOPE, SLOPE_DEG, SLOPE_RAD, Parameter, parameter_of, why_no_parameter
-from walkerlab.scene.rigid import rigid_scene, rigid_walker
-from walkerlab.solvers.registry import ENDLESS, Tolerances
+from walkerlab.scene.families import not_read, reads
+from walkerlab.scene.parameter import SLOPE, SLOPE_DEG, SLOPE_RAD, parameter_of, why_no_parameter
+from walkerlab.scene.rigid import rigid_scene
+from walkerlab.scene.subject import Subject, subject_of
 from walkerlab.solvers.system import Floats
-from walkerlab.stages.simulate import groups as groups_of_walk
+from walkerlab.stages.rigid_groups import groups as groups_of_walk
 from walkerlab.store.checkpoint import Checkpoint
 from walkerlab.store.columns import rows_group
 from walkerlab.store.content import Content, Group, Variable
@@ -50,8 +47,6 @@ from walkerlab.workers import in_order
 
 Rows = list[dict[str, Any]]
 
-QUICK: Final = {RIGID: Tolerances("dop853", 1e-7, 1e-9, ENDLESS), CONTACT: Tolerances("radau5", 1e-6, 1e-8, 1_000_000)}
-"""Of walks that are counted; the budget is a step's."""
 WALKS_AT_ONCE: Final = 25
 STEPS_DRAWN: Final = 8
 MAX_STEPS: Final = {RIGID: 2_000_000, CONTACT: 40_000}
@@ -176,83 +171,18 @@ def refuse(config: RobustnessConfig) -> None:
             )
 
 
-@dataclass(frozen=True, eq=False)
-class Subject:
-    """A model whose gait is disturbed, as other processes are handed it.
-
-    config    whose scene it walks in
-    z         (d,) the gait on the section
-    length_m  of its steps
-    """
-
-    model: str
-    config: ContactConfig
-    z: Floats
-    length_m: float
-
-    def at(self, parameter: Parameter = SLOPE, exact: bool = True) -> Standpoint:
-        """The gait on the step map over a parameter."""
-        p = parameter.value_in(self.config)
-        step_map: StepMap = (
-            rigid_map(self.config, parameter, 1.0)
-            if self.model == RIGID
-            else contact_map(self.config, parameter, 1.0, self.length_m)
-        )
-        step_map = step_map if exact else step_map.at(QUICK[self.model])
-        _, units = unit_walker(rigid_walker(self.config))
-        return Standpoint(step_map, p, self.z, step_map.step(self.z, p).DP, units)
-
-    def gradients(self, parameter: Parameter, wanted: Collection[str]) -> dict[str, Gradient]:
-        """Derivatives of the gait's numbers by a parameter."""
-        return gradients(self.at(parameter), abs(parameter.value_in(self.config)) or 1e-2, wanted)
-
-
 def subjects(config: RobustnessConfig, inputs: Mapping[str, Content], progress: Progress) -> Iterator[Subject]:
     """The models that are asked for, with their gaits."""
     progress.start("robustness: gaits")
     gait = inputs["fixedpoint"].summary
     for model in models_of(config):
-        yield subject_of(model, config, gait, progress)
+        yield subject_of(model, config, gait, progress.note)
 
 
 def models_of(config: RobustnessConfig) -> tuple[str, ...]:
     """The models that are asked for."""
     asked = config.robustness.model or (RIGID if config.contact is None else "both")
     return (RIGID, CONTACT) if asked == "both" else (asked,)
-
-
-def section_coordinates(walker: Standing, state: Sequence[float]) -> Floats:
-    """Where a state (SI) lies on the section of the unit walker."""
-    _, units = unit_walker(walker)
-    z = coordinates_of(walker, state)
-    z[1:] *= units.time
-    return z
-
-
-def subject_of(
-    model: str, config: RobustnessConfig | DesignConfig, gait: Mapping[str, Any], progress: Progress
-) -> Subject:
-    """A model with its gait, the contact model off its pads; raises NoAnswer if it has none.
-
-    gait  summary of `fixedpoint`
-    """
-    length = float(gait["step_length_m"])
-    if model == RIGID:
-        z = section_coordinates(rigid_walker(config), gait["state"])
-        return Subject(RIGID, config, z, length)
-    # Imported here: the rigid model alone does without.
-    from walkerlab.scene.contact import gait_off_pads, with_contact
-
-    own = SLOPE.config_at(config, config.slope_rad)
-    assert own is not None, "a config keeps its slope"
-    found = gait_off_pads(own, length, as_state(gait["state"]))
-    if found.gait is None:
-        raise NoAnswer(f"no gait of the contact model: {found.reason}", found.advice)
-    if with_contact(config).terrain == "checkerboard":
-        progress.note("robustness: the contact model is disturbed on after-mid-swing: pads would end its walks")
-    length = found.gait.step.length_m
-    z = contact_map(config, SLOPE, 1.0, length).of_section(found.gait.z)
-    return Subject(CONTACT, config, z, length)
 
 
 def norms(model: str, here: Standpoint) -> Iterator[dict[str, Any]]:

@@ -4,28 +4,15 @@ from collections.abc import Mapping
 from functools import partial
 from typing import Any
 
-import numpy as np
-
 from walkerlab.config.reads import SimulateConfig
-from walkerlab.hybrid.recorded_walk import RigidWalkResult, Samples
-from walkerlab.hybrid.rigid_measures import energies, places, reactions
-from walkerlab.mechanics.standing import STANCE, energy_at_touch
+from walkerlab.hybrid.recorded_walk import RigidWalkResult
 from walkerlab.pipeline.progress import Progress
 from walkerlab.scene.left_out import of_rigid_walk
-from walkerlab.scene.rigid import RigidScene, rigid_scene
+from walkerlab.scene.rigid import rigid_scene
 from walkerlab.solvers.registry import ENDLESS, Tolerances
-from walkerlab.stages.walk import (
-    COORDINATE,
-    content_of_walk,
-    legs,
-    numbers_of,
-    of_body,
-    over_time,
-    pace_of,
-    rigid_start,
-    steps_of,
-)
-from walkerlab.store.content import Content, Group, Variable
+from walkerlab.stages.rigid_groups import groups
+from walkerlab.stages.walk import content_of_walk, numbers_of, pace_of, rigid_start
+from walkerlab.store.content import Content
 
 
 def run(config: SimulateConfig, inputs: Mapping[str, Content], progress: Progress, again: bool = True) -> Content:
@@ -65,80 +52,3 @@ def summary(config: SimulateConfig, walk: RigidWalkResult) -> dict[str, Any]:
         "slope_rad": config.slope_rad,
         "left_out": list(of_rigid_walk(config)),
     }
-
-
-def groups(scene: RigidScene, walk: RigidWalkResult) -> dict[str, Group]:
-    """The datasets of the artifact."""
-    stored = {}
-    if walk.steps:
-        set_down = np.append(walk.start[STANCE], walk.after[:-1, STANCE])
-        rolling = scene.walker.radius * (set_down - walk.before[:, STANCE])
-        columns = steps_of(walk, rolling_m=rolling, state_before=walk.before, state_after=walk.after)
-        names = Variable(np.array(scene.names), (COORDINATE,), "", "coordinate of the state")
-        stored["steps"] = Group({**columns, COORDINATE: names})
-    if walk.samples is not None and walk.samples.time_s.size:
-        stored["trajectory"] = trajectory_group(scene, walk, walk.samples)
-    return stored
-
-
-def trajectory_group(scene: RigidScene, walk: RigidWalkResult, samples: Samples) -> Group:
-    """Samples of the walk, both sides of each heel strike among them: what `outputs` asks for."""
-    stance = stance_leg(samples)
-    variables = {**over_time(time=samples.time_s, stance_leg=stance + 1, step=samples.step), **legs()}
-    if "states" in scene.outputs:
-        variables |= leg_variables(samples)
-        variables |= body_variables(scene, samples, stance)
-        variables |= place_variables(scene, walk, samples, stance)
-    if "energies" in scene.outputs:
-        kinetic, potential = energies(scene.walker, samples.state).T
-        touched = np.append(walk.start[STANCE], walk.after[:, STANCE])
-        potential -= energy_at_touch(scene.walker, touched)[samples.step]
-        variables |= over_time(kinetic_J=kinetic, potential_J=potential, mechanical_J=kinetic + potential)
-    if "forces" in scene.outputs:
-        friction, normal = (
-            of_legs(np.column_stack((np.zeros_like(force), force)), stance)
-            for force in reactions(scene.walker, samples.state, samples.bent).T
-        )
-        variables |= over_time(normal_force_N=normal, friction_force_N=friction)
-    return Group(variables)
-
-
-def stance_leg(samples: Samples) -> Any:
-    """The leg that stands (samples,): leg 0 swings in even steps, leg 1 in odd ones."""
-    return 1 - samples.step % 2
-
-
-def leg_variables(samples: Samples) -> dict[str, Variable]:
-    """Angles and velocities of the legs themselves, which change roles at every heel strike."""
-    n, stance = samples.state.shape[1] // 2, stance_leg(samples)
-    by_leg = {"angle": of_legs(samples.state[:, :2], stance), "velocity": of_legs(samples.state[:, n : n + 2], stance)}
-    return over_time(**by_leg)
-
-
-def of_legs(by_role: Any, stance: Any) -> Any:
-    """Numbers (samples, 2) of swing and stance leg as those of leg 0 and leg 1."""
-    return np.take_along_axis(by_role, np.where(stance[:, None] == 1, [[0, 1]], [[1, 0]]), axis=1)
-
-
-def body_variables(scene: RigidScene, samples: Samples, stance: Any) -> dict[str, Variable]:
-    """Angles and velocities of the bodies below and above the legs: shanks, a torso."""
-    n = samples.state.shape[1] // 2
-    found: dict[str, Variable] = {}
-    for k, name in enumerate(scene.names[2:n], 2):
-        angle, rate = samples.state[:, k], samples.state[:, n + k]
-        if name.startswith("theta_1_"):  # the stance leg's is in line with it
-            angle = of_legs(np.column_stack((angle, samples.state[:, 1])), stance)
-            rate = of_legs(np.column_stack((rate, samples.state[:, n + 1])), stance)
-        found |= of_body(name.split("_")[-1], angle, rate)
-    return found
-
-
-def place_variables(scene: RigidScene, walk: RigidWalkResult, samples: Samples, stance: Any) -> dict[str, Variable]:
-    """Where hip, knees and feet are, along the slope from the first foothold and over it."""
-    at = places(scene.walker, scene.knee_m, walk, samples)
-    points = {"foot": np.stack((at.swing_foot, at.contact), axis=1)} | ({} if at.knees is None else {"knee": at.knees})
-    found = over_time(hip_along_m=at.hip[:, 0], hip_height_m=at.hip[:, 1])
-    for name, point in points.items():
-        along, height = (of_legs(point[:, :, axis], stance) for axis in range(2))
-        found |= over_time(**{f"{name}_along_m": along, f"{name}_height_m": height})
-    return found

@@ -8,8 +8,8 @@ from walkerlab.config.reads import CompassCasesConfig, SceneCasesConfig, WalksCo
 from walkerlab.config.schema import Config
 from walkerlab.labels import labels_of
 from walkerlab.pipeline.progress import Progress, each_told
+from walkerlab.scene.contact import scene_on_pads
 from walkerlab.scene.studies import is_studied
-from walkerlab.stages.contact_sim import scene_on_pads
 from walkerlab.stages.walk import rigid_start
 from walkerlab.store.columns import rows_group
 from walkerlab.store.content import Content
