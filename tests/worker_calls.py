@@ -24,7 +24,7 @@ def sleep():
 
 def begun_at():
     begun = time.monotonic()
-    time.sleep(0.1)
+    time.sleep(1.0)  # longer than one worker takes to start after another
     return begun
 
 
