@@ -16,7 +16,7 @@ from numba.core.itanium_mangler import mangle_type
 
 from walkerlab import compiler
 from walkerlab.compiler import compiling
-from walkerlab.kernel_cache import watched
+from walkerlab.kernel_cache import watch_compilation
 from walkerlab.kernels import (
     always_inline,
     by_reference,
@@ -235,7 +235,7 @@ CHOSEN = """
 from typing import NamedTuple
 from walkerlab import compiler
 from walkerlab.compiler import compiling
-from walkerlab.kernel_cache import watched
+from walkerlab.kernel_cache import watch_compilation
 from walkerlab.kernels import by_type, by_type_or_default, inlined, kernel, vector, always_inline
 
 
@@ -299,7 +299,7 @@ def test_without_numbas_inner_parts_kernels_are_compiled_as_numba_does_it_and_it
     expected, _, silent = run_without("nothing", tmp_path)
     assert number == expected
     assert told.count("RuntimeWarning") == 1
-    assert f"is without {named}: compiling takes longer" in told
+    assert f"lacks {named}: compiling takes longer" in told
     assert silent == ""
     if part == "class":
         stored = {path: path.stat().st_mtime_ns for path in folder.rglob("*.nbc")}
@@ -341,7 +341,7 @@ def test_a_kernel_is_told_of_until_it_is_compiled_itself_and_not_only_what_it_ca
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     told = []
-    with watched(told.append):
+    with watch_compilation(told.append):
         assert module.outer(1.0) == 4.0
     assert told == ["outer", "inner", "outer", ""]
 
