@@ -5,7 +5,6 @@ with the same results.
 """
 
 import functools
-import gc
 import hashlib
 import importlib
 import sys
@@ -18,17 +17,6 @@ import numba
 from numba import types
 
 from walkerlab.kernel_cache import PACKAGE, cache_folder, lock_of, watchers
-
-# thresholds of the garbage collector while compiling, which makes objects by the million and leaves few behind: at the
-# usual ones a quarter of the time goes into looking them through
-SELDOM = (100_000, 50, 100)
-
-# passes of numba's for closures, array expressions and functions put into others by numba: kernels have none
-NEEDLESS = {
-    "DumpParforDiagnostics", "FindLiterallyCalls", "InlineClosureLikes", "InlineInlinables", "InlineOverloads",
-    "LiteralPropagationSubPipelinePass", "LiteralUnroll", "MakeFunctionToJitFunction", "NopythonRewrites",
-    "WithLifting",
-}  # fmt: skip
 
 compiling: list[tuple["KernelCache", str]] = []
 """Kernels that this process is compiling, with their signatures; each is called by the one before it."""
@@ -55,12 +43,10 @@ IPythonCacheLocator = private_class("numba.core.caching.IPythonCacheLocator", "f
 UserProvidedCacheLocator = private_class(
     "numba.core.caching.UserProvidedCacheLocator", "from_function", "get_suitable_cache_subpath"
 )
-private_class("numba.core.codegen.CPUCodegen", "_function_pass_manager")
 JITCodeLibrary = private_class(
     "numba.core.codegen.JITCodeLibrary",
     "codegen",
     "get_pointer_to_function",
-    "_optimize_functions",
     "_ensure_finalized",
     "_optimize_final_module",
     "_finalize_final_module",
@@ -214,36 +200,31 @@ def _release(lock: Any) -> None:
 
 
 class QuickFlags(Flags):  # type: ignore[misc, valid-type]
-    """How a function is compiled, told apart by what was set.
+    """Compiler flags that compare only flags that are set.
 
-    Numba goes by flags wherever an operator is looked up, and compares all that could be set.
+    Numba looks operators up by flags and compares every flag that exists.
     """
 
     def __eq__(self, other: object) -> bool:
-        """Whether the same was set."""
+        """Whether the same flags are set to the same values."""
         return isinstance(other, QuickFlags) and self._values == other._values
 
     def __hash__(self) -> int:
-        """By what was set, to whatever value."""
+        """Hash the names of the flags that are set."""
         return hash(frozenset(self._values))
 
 
 class KernelCompiler(Compiler):  # type: ignore[misc, valid-type]
-    """Numba's own compiler, with garbage collected seldom meanwhile, and loops of few turns left as they are."""
+    """Numba's compiler without vectorised loops, which releases the kernel's lock if it fails."""
 
-    def __init__(self, *given: Any) -> None:
-        """With what numba's own is given."""
-        super().__init__(*given)
+    def __init__(self, *arguments: Any) -> None:
+        """Take the arguments of numba's compiler."""
+        super().__init__(*arguments)
         self.state.flags = QuickFlags(self.state.flags)
 
-    def define_pipelines(self) -> list[Any]:
-        """Numba's own."""
-        return with_what_is_needed(super().define_pipelines())
-
     def compile_extra(self, func: Any) -> Any:
-        """The compiled function."""
-        usual, vectorized = gc.get_threshold(), numba.config.LOOP_VECTORIZE
-        gc.set_threshold(*SELDOM)
+        """Compile a function."""
+        vectorize = numba.config.LOOP_VECTORIZE
         numba.config.LOOP_VECTORIZE = 0
         try:
             return super().compile_extra(func)
@@ -253,20 +234,11 @@ class KernelCompiler(Compiler):  # type: ignore[misc, valid-type]
                 cache.finish(signature)
             raise
         finally:
-            gc.set_threshold(*usual)
-            numba.config.LOOP_VECTORIZE = vectorized
-
-
-def with_what_is_needed(pipelines: list[Any]) -> list[Any]:
-    """Numba's pipelines without passes that do nothing to kernels but take time."""
-    for pipeline in pipelines:
-        pipeline.passes = [(each, said) for each, said in pipeline.passes if each.__name__ not in NEEDLESS]
-        pipeline.finalize()
-    return pipelines
+            numba.config.LOOP_VECTORIZE = vectorize
 
 
 class _Refreshed:
-    """A context of numba's as it is: what a kernel is compiled in knows all that its parts can use."""
+    """Context of numba that is not refreshed again: the kernel's own compiler has done so."""
 
     def __init__(self, context: Any) -> None:
         self._context = context
@@ -275,27 +247,27 @@ class _Refreshed:
         return getattr(self._context, name)
 
     def refresh(self) -> None:
-        """Leave the context as the compiler of the kernel has refreshed it."""
+        """Do nothing."""
 
 
-class _TypingOfNumbers(_Refreshed):
-    """A context that looks up only once what an operator or a function makes of numbers.
+class _NumberTyping(_Refreshed):
+    """Typing context that resolves each operator and function of numbers only once.
 
-    Numba tries all that an operator can do with arrays, sets and strings at every place where it stands.
+    Numba tries all overloads for arrays, sets and strings at every call.
     """
 
-    found: dict[Any, Any] = {}  # noqa: RUF012 - one for all parts
+    signatures: dict[Any, Any] = {}  # noqa: RUF012 - shared by all parts
 
-    def resolve_function_type(self, function: Any, given: tuple[Any, ...], named: dict[str, Any]) -> Any:
-        """The signature."""
-        if named or not all(isinstance(each, types.Number) for each in given):
-            return self._context.resolve_function_type(function, given, named)
-        if (function, given) not in self.found:
-            found = self._context.resolve_function_type(function, given, named)
-            if found is None:
+    def resolve_function_type(self, function: Any, arguments: tuple[Any, ...], keywords: dict[str, Any]) -> Any:
+        """Return the signature of a call, or None if there is no overload."""
+        if keywords or not all(isinstance(argument, types.Number) for argument in arguments):
+            return self._context.resolve_function_type(function, arguments, keywords)
+        if (function, arguments) not in self.signatures:
+            resolved = self._context.resolve_function_type(function, arguments, keywords)
+            if resolved is None:
                 return None
-            self.found[function, given] = found
-        return self.found[function, given]
+            self.signatures[function, arguments] = resolved
+        return self.signatures[function, arguments]
 
 
 class _WithoutEnvironment:
@@ -325,13 +297,6 @@ class _PartLibrary(JITCodeLibrary):  # type: ignore[misc, valid-type]
         self._ensure_finalized()
         return 0
 
-    def _optimize_functions(self, module: Any) -> None:
-        """Simplify only, since the kernel is optimised as a whole."""
-        module.data_layout = self._codegen._data_layout
-        manager, passes = self._codegen._function_pass_manager(opt=1)
-        for function in module.functions:
-            manager.run(function, passes)
-
     def _optimize_final_module(self) -> None:
         pass
 
@@ -341,19 +306,19 @@ class _PartLibrary(JITCodeLibrary):  # type: ignore[misc, valid-type]
 
 
 class PartCompiler(CompilerBase):  # type: ignore[misc, valid-type]
-    """Numba's own passes, into a library of parts."""
+    """Numba's passes with a `_PartLibrary`."""
 
     def __init__(self, typing: Any, target: Any, *rest: Any) -> None:
-        """In contexts that the kernel's own compiler has refreshed."""
+        """Reuse the contexts that the kernel's compiler has refreshed."""
         super().__init__(_Refreshed(typing), _Refreshed(target), *rest)
-        self.state.typingctx, self.state.flags = _TypingOfNumbers(typing), QuickFlags(self.state.flags)
+        self.state.typingctx, self.state.flags = _NumberTyping(typing), QuickFlags(self.state.flags)
 
     def define_pipelines(self) -> list[Any]:
-        """The passes."""
+        """Return numba's pipeline."""
         state = self.state
         if state.library is None:
             state.library = _PartLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
-        return with_what_is_needed([DefaultPassBuilder.define_nopython_pipeline(state)])
+        return [DefaultPassBuilder.define_nopython_pipeline(state)]
 
 
 def cached_plainly(function: Callable[..., Any], flags: dict[str, Any]) -> Any:

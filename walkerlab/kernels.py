@@ -3,7 +3,6 @@
 import functools
 import hashlib
 from collections.abc import Callable
-from types import CodeType
 from typing import Any, TypeVar, cast
 
 import numba
@@ -39,19 +38,8 @@ F = TypeVar("F", bound=Callable[..., Any])
 C = TypeVar("C", bound=type)
 
 
-def refuse_nested(function: Any) -> None:
-    """Refuse a lambda, a comprehension or a function inside another: the passes that would compile it are left out."""
-    for inner in getattr(function, "py_func", function).__code__.co_consts:
-        if isinstance(inner, CodeType):
-            raise TypeError(
-                f"{inner.co_filename}:{inner.co_firstlineno}: {inner.co_name} inside {function.__name__}: compiled "
-                "functions hold no others and no comprehensions; write a loop, or a function beside it"
-            )
-
-
 def kernel(function: F) -> F:
     """Compile `function` on its first call and keep the machine code on disk for later processes."""
-    refuse_nested(function)
     if absent:
         return cast(F, cached_plainly(function, FLAGS))
     compiled = numba.njit(pipeline_class=KernelCompiler, **FLAGS)(function)
@@ -62,7 +50,6 @@ def kernel(function: F) -> F:
 
 def inlined(function: F) -> F:
     """Leave `function` as it is in Python, and compile it into the kernels that call it."""
-    refuse_nested(function)
     compile_as(function, lambda *_: (function, PART_FLAGS))
     return function
 
@@ -81,7 +68,6 @@ def entered(function: F) -> F:
 
 def always_inline(function: F) -> F:
     """As `inlined`, with a copy of its code in every caller, however large."""
-    refuse_nested(function)
     compile_as(function, lambda *_: (function, ALWAYS_INLINE_FLAGS))
     return function
 
@@ -143,7 +129,6 @@ class ByType:
         """
 
         def register(body: F) -> F:
-            refuse_nested(body)
             self._bodies[chosen] = body
             if always_inline:
                 self._always_inline.add(chosen)
