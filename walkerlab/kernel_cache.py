@@ -1,8 +1,7 @@
-"""Where the machine code of kernels is kept: one folder for each state of the sources, version of numba and processor.
+"""Folder of compiled kernels: one for each state of the sources, version of numba and processor.
 
-Numba's own cache does not notice that a called function in another file changed, so the folder is keyed by a digest of
-all sources that kernels can be made of: an edited function can never run stale. It serves this package's kernels alone:
-caches of other programs that compile with Numba are untouched.
+Numba's cache does not notice changes of a called function in another file. The folder's name therefore holds a digest
+of all sources that kernels can use, and an edited function never runs stale. Caches of other programs are not touched.
 """
 
 import contextlib
@@ -22,44 +21,44 @@ from typing import Any
 from walkerlab.sources import Sources, digest_of
 
 PACKAGE = Path(__file__).parent
-# the only packages in which compiled functions may stand (a test says so)
+# the only packages that may hold compiled functions (tested)
 KERNEL_HOMES = ("solvers", "mechanics", "ground", "hybrid", "orbits")
 HOLDS_KERNELS = re.compile(rb"walkerlab\.kernels|numba|\.case\(")
 KEPT_GENERATIONS = 8
-UNUSED_S = 30 * 86_400.0  # an older generation that no process has begun to use for so long may be deleted
+UNUSED_S = 30 * 86_400.0  # older generations that no process has opened for so long may be deleted
 
 
 class CacheWarning(RuntimeWarning):
-    """Compiled code is not kept where it was meant to be."""
+    """Compiled code is stored in another folder than the chosen one."""
 
 
 watchers: list[Callable[[str], None]] = []
-"""Told the name of the kernel that this process compiles, or waits for, and '' once none is."""
+"""Called with the name of the kernel that this process compiles or waits for, and with '' at the end."""
 
 
 @contextlib.contextmanager
-def watched(tell: Callable[[str], None]) -> Iterator[None]:
-    """Have `tell` among the watchers of what is compiled meanwhile."""
-    watchers.append(tell)
+def watch_compilation(watcher: Callable[[str], None]) -> Iterator[None]:
+    """Call `watcher` when compilations start and end within the context; see `watchers`."""
+    watchers.append(watcher)
     try:
         yield
     finally:
-        watchers.remove(tell)
+        watchers.remove(watcher)
 
 
 def sources_digest() -> str:
-    """Digest (hex) of every source that a kernel can be made of: files that hold any, and what these import."""
+    """Digest (hex) of all files that hold kernels and of everything these import."""
     sources = Sources()
     homes = (path for home in KERNEL_HOMES for path in (PACKAGE / home).rglob("*.py"))
-    holding = (path.relative_to(PACKAGE.parent) for path in homes if HOLDS_KERNELS.search(path.read_bytes()))
-    names = [".".join(path.with_suffix("").parts) for path in holding]
-    made_of = sources.closure(f"{PACKAGE.name}.kernels", *names)
-    return digest_of((module.name, module.text) for module in made_of if module.name != PACKAGE.name)
+    files = (path.relative_to(PACKAGE.parent) for path in homes if HOLDS_KERNELS.search(path.read_bytes()))
+    names = [".".join(path.with_suffix("").parts) for path in files]
+    modules = sources.closure(f"{PACKAGE.name}.kernels", *names)
+    return digest_of((module.name, module.text) for module in modules if module.name != PACKAGE.name)
 
 
-def compiled_for() -> str:
-    """The processor that code is compiled for: its name, and a digest of its features."""
-    # Imported here and below: who asks only whether the folder can be written loads no compiler.
+def processor_name() -> str:
+    """Name of the processor that code is compiled for, with a digest of its features."""
+    # imported here and below so that checking whether the folder is writable loads no compiler
     import numba
     from llvmlite import binding as llvm
 
@@ -71,9 +70,9 @@ def compiled_for() -> str:
 
 
 def cache_root() -> Path:
-    """The folder of all compiled code: $WALKERLAB_CACHE, else the user's cache folder, else a temporary one.
+    """Folder of all compiled code: $WALKERLAB_CACHE, else the user's cache folder, else a temporary one.
 
-    Warns, once in a process, if the first that is meant cannot be written into.
+    Warns once per process if the first choice is not writable.
     """
     chosen = os.environ.get("WALKERLAB_CACHE")
     usual = Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser() / "walkerlab"
@@ -91,20 +90,20 @@ def _first_usable(candidates: tuple[Path, ...]) -> Path:
         folder = Path(tempfile.mkdtemp(prefix="walkerlab-cache-"))
     if folder != candidates[0]:
         lost = "" if folder in candidates else ", which later processes do not find"
-        said = f"{candidates[0]} cannot be written into: compiled code is kept in {folder}{lost}"
-        warnings.warn(f"{said}. WALKERLAB_CACHE chooses another folder.", CacheWarning, stacklevel=3)
+        message = f"{candidates[0]} cannot be written into: compiled code is kept in {folder}{lost}"
+        warnings.warn(f"{message}. WALKERLAB_CACHE chooses another folder.", CacheWarning, stacklevel=3)
     return folder
 
 
 @functools.cache
 def cache_folder() -> Path:
-    """This processor's folder of this state of the sources, chosen and made when this process first needs it.
+    """Return this processor's folder for this state of the sources.
 
-    A new one takes the place of what has not been used for long.
+    The first call of a process creates it if necessary and then deletes folders that were not used for long.
     """
     import numba
 
-    root, host = cache_root(), compiled_for()
+    root, host = cache_root(), processor_name()
     compiler = f"py{sys.version_info.major}{sys.version_info.minor}-numba{numba.__version__}"
     folder = root / f"kernels-{sources_digest()[:16]}-{compiler}-{host}"
     if not folder.is_dir():
@@ -115,10 +114,10 @@ def cache_folder() -> Path:
 
 
 def _remove_unused(generations: list[Path]) -> None:
-    """Remove those that were not used for long, beyond the latest few; a process that has one open compiles anew."""
+    """Delete folders that were not used for long, except the latest few; a process that uses one compiles again."""
     last_used: dict[Path, float] = {}  # s since the epoch
     for folder in generations:
-        with contextlib.suppress(OSError):  # one that has just gone
+        with contextlib.suppress(OSError):  # another process may have deleted it
             last_used[folder] = folder.stat().st_mtime
     for folder in sorted(last_used, key=last_used.__getitem__, reverse=True)[KEPT_GENERATIONS:]:
         if time.time() - last_used[folder] > UNUSED_S:
@@ -126,13 +125,13 @@ def _remove_unused(generations: list[Path]) -> None:
 
 
 def nothing_compiled_yet() -> bool:
-    """Whether this state of the sources has no compiled code so far: the first run on a machine, or after a change."""
+    """Whether this state of the sources has no compiled code: the first run on a machine, or after a change."""
     return next(cache_folder().rglob("*.nbc"), None) is None
 
 
 def lock_of(name: str) -> Any:
-    """A lock between processes in the folder of compiled code."""
-    # Imported here: a process that finds everything compiled takes no lock.
+    """Create a lock between processes in the folder of compiled code."""
+    # imported here because a process that finds everything compiled takes no lock
     from filelock import FileLock
 
     return FileLock(cache_folder() / f"{hashlib.sha256(name.encode()).hexdigest()[:16]}.lock")

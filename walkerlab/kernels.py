@@ -1,9 +1,8 @@
-"""How physics becomes machine code: compiled functions, and functions whose bodies are chosen by type."""
+"""Compiled functions, and functions whose bodies are chosen by the type of their first argument."""
 
 import functools
 import hashlib
 from collections.abc import Callable
-from types import CodeType
 from typing import Any, TypeVar, cast
 
 import numba
@@ -25,71 +24,58 @@ from numba.np.arrayobj import make_array, populate_array
 
 from walkerlab.compiler import KernelCache, KernelCompiler, PartCompiler, absent, cached_plainly
 
-# No licence to contract or reorder: code compiled twice computes the same to the last bit.
-# No counting of references (_nrt): kernels allocate nothing and borrow all arrays from their caller, and counting takes
-# as long as the arithmetic.
+# The compiler may not contract or reorder arithmetic, so that code compiled twice computes the same to the last bit.
+# No reference counts (_nrt): kernels allocate nothing and borrow arrays from their caller, and counting would take as
+# long as the arithmetic.
 FLAGS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"nsz"}, "_nrt": False}
-# parts of a kernel are never entered from outside
+# Python never calls parts of a kernel
 PART_FLAGS: dict[str, Any] = {**FLAGS, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 if not absent:
     PART_FLAGS["pipeline_class"] = PartCompiler
-# of what takes lanes: handing them on in memory costs as much as the work
+# passing lanes through memory costs as much as the arithmetic on them
 ALWAYS_INLINE_FLAGS: dict[str, Any] = {**PART_FLAGS, "forceinline": True}
 F = TypeVar("F", bound=Callable[..., Any])
 C = TypeVar("C", bound=type)
 
 
-def refuse_nested(function: Any) -> None:
-    """Refuse a lambda, a comprehension or a function inside another: the passes that would compile it are left out."""
-    for inner in getattr(function, "py_func", function).__code__.co_consts:
-        if isinstance(inner, CodeType):
-            raise TypeError(
-                f"{inner.co_filename}:{inner.co_firstlineno}: {inner.co_name} inside {function.__name__}: compiled "
-                "functions hold no others and no comprehensions; write a loop, or a function beside it"
-            )
-
-
 def kernel(function: F) -> F:
     """Compile `function` on its first call and keep the machine code on disk for later processes."""
-    refuse_nested(function)
     if absent:
         return cast(F, cached_plainly(function, FLAGS))
     compiled = numba.njit(pipeline_class=KernelCompiler, **FLAGS)(function)
-    # what enable_caching does, with the kernels' own folder
+    # as enable_caching does, but with the kernels' own cache
     compiled._cache = KernelCache(function)
     return cast(F, compiled)
 
 
 def inlined(function: F) -> F:
     """Leave `function` as it is in Python, and compile it into the kernels that call it."""
-    refuse_nested(function)
     compile_as(function, lambda *_: (function, PART_FLAGS))
     return function
 
 
 def entered(function: F) -> F:
-    """As `inlined`, and a kernel for Python: what a walk in Python hands over to compiled code at once."""
+    """As `inlined`, and called from Python as a kernel."""
     whole = kernel(function)
 
     @functools.wraps(function)
-    def enter(*given: Any) -> Any:
-        return whole(*given)
+    def enter(*arguments: Any) -> Any:
+        return whole(*arguments)
 
     compile_as(enter, lambda *_: (function, PART_FLAGS))
     return cast(F, enter)
 
 
 def always_inline(function: F) -> F:
-    """As `inlined`, and put into the code of its callers, however large."""
-    refuse_nested(function)
+    """As `inlined`, with a copy of its code in every caller, however large."""
     compile_as(function, lambda *_: (function, ALWAYS_INLINE_FLAGS))
     return function
 
 
 def compile_as(function: Any, body_for: Callable[..., tuple[Callable[..., Any], dict[str, Any]]]) -> None:
-    """Have compiled code that calls `function` call another body, once compiled for all its callers.
+    """Let compiled calls of `function` use a body chosen from the argument types; each body is compiled once.
 
-    body_for  gives the body and how it is compiled, from numba's types of the arguments
+    body_for  returns the body and its compiler flags for numba's types of the arguments
     """
     parts: dict[Any, Any] = {}
     compiled: dict[Any, Any] = {}
@@ -97,27 +83,27 @@ def compile_as(function: Any, body_for: Callable[..., tuple[Callable[..., Any], 
     class Template(AbstractTemplate):  # type: ignore[misc]
         key = function
 
-        def generic(self, given: Any, named: Any) -> Any:
-            body, flags = body_for(*given)
+        def generic(self, arguments: Any, keywords: Any) -> Any:
+            body, flags = body_for(*arguments)
             if body not in parts:
                 parts[body] = numba.njit(**flags)(body)
-            found: Any = types.Dispatcher(parts[body]).get_call_type(self.context, given, named)
-            compiled[found.args] = parts[body].get_overload(found.args)
-            return found
+            called: Any = types.Dispatcher(parts[body]).get_call_type(self.context, arguments, keywords)
+            compiled[called.args] = parts[body].get_overload(called.args)
+            return called
 
-        def get_impl_key(self, found: Any) -> Any:
-            return compiled[found.args]
+        def get_impl_key(self, called: Any) -> Any:
+            return compiled[called.args]
 
     infer_global(function, types.Function(Template))
 
 
 def uncompiled(compiled: F) -> F:
-    """The Python function that a kernel was made of: the same source, for methods that are not compiled themselves."""
+    """Return the Python function of a kernel, for methods that are not compiled."""
     return cast(F, cast(Any, compiled).py_func)
 
 
 class ByType:
-    """A function whose body is chosen by the type of its first argument, in Python and in compiled code alike."""
+    """Function whose body is chosen by the type of its first argument, in Python and in compiled code."""
 
     __name__: str
 
@@ -133,17 +119,16 @@ class ByType:
         return self._body_for(type(chooser), str(type(chooser)))(chooser, *rest)
 
     def __contains__(self, chosen: type) -> bool:
-        """Whether a type has a body of its own."""
+        """Whether a body is registered for a type."""
         return chosen in self._bodies
 
     def case(self, chosen: type, always_inline: bool = False) -> Callable[[F], F]:
         """Register the decorated function as the body for first arguments of type `chosen`.
 
-        always_inline  it is put into the code of its callers, however large, and never called
+        always_inline  copy its code into every caller, however large
         """
 
         def register(body: F) -> F:
-            refuse_nested(body)
             self._bodies[chosen] = body
             if always_inline:
                 self._always_inline.add(chosen)
@@ -157,23 +142,23 @@ class ByType:
         return body
 
     def compiled_body(self, kind: Any, *_: Any) -> tuple[Callable[..., Any], dict[str, Any]]:
-        """The body for numba's type of a first argument, and how it is compiled."""
+        """Return the body for numba's type of a first argument, and its compiler flags."""
         chosen = getattr(kind, "instance_class", type(None))
         return self._body_for(chosen, str(kind)), ALWAYS_INLINE_FLAGS if chosen in self._always_inline else PART_FLAGS
 
-    def _body_for(self, chosen: type, said: str) -> Callable[..., Any]:
+    def _body_for(self, chosen: type, label: str) -> Callable[..., Any]:
         body = self._bodies.get(chosen, self._default)
         if body is None:
-            name = chosen.__name__ if hasattr(chosen, "_fields") else said
-            # an error that is not one of numba's own leaves its compiler as it is, in one line
+            name = chosen.__name__ if hasattr(chosen, "_fields") else label
+            # numba passes on errors of other classes than its own unchanged
             raise TypeError(f"{self.__name__} has no body for {name}: register one with @{self.__name__}.case(...)")
         return body
 
 
 def by_type(declaration: Callable[..., Any]) -> ByType:
-    """Declare a function that has one body per type of its first argument (a NamedTuple class).
+    """Declare a function with one body per type of its first argument (a NamedTuple class).
 
-    A variant that a scene does not have compiles to nothing: the choice is made while compiling.
+    The choice is made while compiling, so variants that a scene does not use cost nothing.
     """
     chosen = ByType(declaration)
 
@@ -182,35 +167,36 @@ def by_type(declaration: Callable[..., Any]) -> ByType:
 
 
 def by_type_or_default(declaration: Callable[..., Any]) -> ByType:
-    """As `by_type`, of a function whose own body runs for all types that have none."""
+    """As `by_type`; the declaration's own body serves all types without a registered one."""
     chosen = by_type(declaration)
     chosen.default(declaration)
     return chosen
 
 
 class ByAddress(types.Type):
-    """Numba's type of a NamedTuple that is handed on by its address: see `by_reference`."""
+    """Numba's type of a NamedTuple that is passed by its address: see `by_reference`."""
 
     def __init__(self, held: Any) -> None:
-        """To a NamedTuple, by numba's type of that."""
+        """Create the type of a reference to a NamedTuple of numba type `held`."""
         self.held, self.instance_class = held, held.instance_class
         super().__init__(f"reference to {held.name}")
 
     @property
     def mangling_args(self) -> tuple[str, tuple[()]]:
-        """Its name in compiled code: the whole one, with those of all fields, is longer than most functions."""
+        """A short symbol name. The full one, with all field types, is longer than most functions."""
         return f"{self.instance_class.__name__}_{hashlib.sha256(self.name.encode()).hexdigest()[:16]}", ()
 
 
 def by_reference(chosen: C) -> C:
-    """Have kernels hand on the address of a NamedTuple, not each of its fields' numbers: made in Python, read in them.
+    """Let kernels pass a NamedTuple class by address; Python creates its values, kernels only read their fields.
 
-    A function with a record of twenty arrays for an argument else takes a hundred more, and most of the time to compile
-    goes into taking them apart and together.
+    Otherwise numba turns a record of twenty arrays into a hundred arguments, and most of the compile time goes into
+    packing and unpacking them.
     """
 
-    def reference(value: Any, asked: Any) -> ByAddress:
-        return ByAddress(types.containers.BaseTuple.from_types([typeof_impl(field, asked) for field in value], chosen))
+    def reference(value: Any, purpose: Any) -> ByAddress:
+        fields = [typeof_impl(field, purpose) for field in value]
+        return ByAddress(types.containers.BaseTuple.from_types(fields, chosen))
 
     typeof_impl.register(chosen)(reference)
     return chosen
@@ -242,23 +228,23 @@ def _unbox_reference(kind: ByAddress, value: Any, c: Any) -> Any:
 
 
 def vector(like: Any) -> Any:
-    """Scratch (n,) of the function that asks for it, gone when that returns; written before it is read.
+    """Allocate scratch (n,) that lives until the calling function returns; write it before reading.
 
-    like  of length n, which its type tells: a tuple, or an array inside a structured scalar
+    like  value whose type fixes the length n: a tuple, or an array inside a structured scalar
 
-    In Python it holds NaN, so that what is read unwritten shows.
+    In Python it holds NaN, so that reading unwritten scratch shows.
     """
     return np.full(len(like), np.nan)
 
 
 def matrix(like: Any) -> Any:
-    """Scratch (n, n), as `vector`."""
+    """Allocate scratch (n, n), as `vector` does."""
     return np.full((len(like), len(like)), np.nan)
 
 
 @intrinsic  # type: ignore[untyped-decorator]
 def zeros(context: Any, like: Any) -> Any:  # noqa: ARG001 - numba calls it so
-    """A tuple of as many zeros as `like` is long: compiled code without counted references returns no arrays."""
+    """Return a tuple of len(like) zeros; compiled code without reference counts cannot return arrays."""
 
     def generate(context: Any, builder: Any, called: Any, _arguments: Any) -> Any:
         return context.get_constant_generic(builder, called.return_type, (0.0,) * called.return_type.count)
@@ -267,16 +253,16 @@ def zeros(context: Any, like: Any) -> Any:  # noqa: ARG001 - numba calls it so
 
 
 def _on_the_stack(function: Callable[..., Any], dimensions: int) -> None:
-    """Have a function of `like` give memory of its caller's frame in compiled code.
+    """Make compiled calls of `function(like)` return memory of the caller's frame.
 
-    An intrinsic behind an overload would give memory of the overload's own frame.
+    An intrinsic behind an overload would return memory of the overload's frame.
     """
 
     class Scratch(AbstractTemplate):  # type: ignore[misc]
         key = function
 
-        def generic(self, given: Any, named: Any) -> Any:  # noqa: ARG002 - numba calls it so
-            return signature(types.Array(types.float64, dimensions, "C"), *given)
+        def generic(self, arguments: Any, keywords: Any) -> Any:  # noqa: ARG002 - numba calls it so
+            return signature(types.Array(types.float64, dimensions, "C"), *arguments)
 
     infer_global(function)(Scratch)
 

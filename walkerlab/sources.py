@@ -1,4 +1,4 @@
-"""What a module is made of: its source and that of all it imports from its own package, read without importing it."""
+"""Digests of a module's source and of everything it imports, found without importing it."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from pathlib import Path
 
 PACKAGE = __name__.partition(".")[0]
 
-# Found in the text rather than by importing: the digest must cost milliseconds and load no compiler. Full names in
-# quotes count too, since that is how a registry names what it imports late. Each way begins with a letter, which is
-# sought three times as fast as a word's beginning.
+# Imports are found in the text because the digest must cost milliseconds and load no compiler. Full names in quotes
+# count too: registries name modules that they import late. Each alternative begins with a letter, which `re` finds
+# three times as fast as a word boundary.
 COMMENT = re.compile(r"#[^\n]*")
 IMPORT = re.compile(
     r"from(?<=\bfrom)[ \t]+(?P<origin>\.*[\w.]*)[ \t]+import\b[ \t]*(?P<names>\([^)]*\)|[^\n;]*)"
@@ -22,23 +22,22 @@ IMPORT = re.compile(
     r"|[\"'](?P<quoted>[^\W\d]\w*(?:\.\w+)+)[\"']"
 )
 
-# The built-in configs, which a wheel has in the package, reach a stage through the slice of the config that it reads,
-# which is in its key already.
+# A wheel keeps the built-in configs inside the package. A stage's key already holds the part of the config it reads.
 INPUT_FOLDERS = ("config/builtin",)
 
 
 class Sources:
-    """The sources of packages as they are on the disk now; each file is read and scanned once."""
+    """Sources of packages on disk; each file is read and scanned once."""
 
     def __init__(self) -> None:
         """Start with nothing read."""
         self._modules: dict[str, Module | None] = {}
 
     def code_digest(self, name: str) -> str:
-        """The sha256 over the sources of a module and of everything of its own package, or of this one, it imports.
+        """SHA-256 of a module and of everything it imports from its own package or this one.
 
-        Data files beside those modules (templates, tables) count as code; this package's `__init__` does not, since a
-        new version number alone changes no result. Raises ModuleNotFoundError if there is no such module.
+        Includes data files of those packages (templates, tables) but not this package's `__init__`, since a new version
+        number changes no result. Raises ModuleNotFoundError if there is no such module.
         """
         closure = self.closure(name)
         files = {f"{module.name}:{path.name}": path for module in closure for path in module.data}
@@ -46,27 +45,27 @@ class Sources:
         return digest_of(texts + [(label, path.read_bytes()) for label, path in sorted(files.items())])
 
     def closure(self, *names: str) -> list[Module]:
-        """The modules and all they import, by whatever way, from their own packages and from this one, by name.
+        """Modules and everything they import, directly or not, from their own packages and this one; sorted by name.
 
         Raises ModuleNotFoundError if there is no such module.
         """
-        found: dict[str, Module] = {}
+        modules: dict[str, Module] = {}
         for name in names:
             start = self.module(name)
             if start is None:
                 raise ModuleNotFoundError(f"no module named {name!r}", name=name)
-            found[name] = start
-        waiting = list(found.values())
-        while waiting:
-            for other in waiting.pop().imports:
-                module = self.module(other)
-                if module is not None and other not in found:
-                    found[other] = module
-                    waiting.append(module)
-        return [found[key] for key in sorted(found)]
+            modules[name] = start
+        queue = list(modules.values())
+        while queue:
+            for imported in queue.pop().imports:
+                module = self.module(imported)
+                if module is not None and imported not in modules:
+                    modules[imported] = module
+                    queue.append(module)
+        return [modules[name] for name in sorted(modules)]
 
     def module(self, name: str) -> Module | None:
-        """A module by its full name, or None if there is no file for it."""
+        """Return the module with a full name, or None if it has no file."""
         if name not in self._modules:
             self._modules[name] = self._find(name)
         return self._modules[name]
@@ -88,54 +87,54 @@ class Sources:
 
 
 class Module:
-    """A module's source file."""
+    """Source file of a module, read on first use."""
 
     def __init__(self, name: str, path: Path) -> None:
-        """Nothing is read yet."""
+        """Refer to a module by its full name and file."""
         self.name = name
         self.path = path
         self.is_package = path.name == "__init__.py"
 
     @cached_property
     def text(self) -> bytes:
-        """The source."""
+        """Source text."""
         return self.path.read_bytes()
 
     @cached_property
     def imports(self) -> list[str]:
-        """Names that may be modules it imports, the packages above them and above itself included."""
-        return imports_of(self.name, self.is_package, self.text)
+        """See `find_imports`."""
+        return find_imports(self.name, self.is_package, self.text)
 
     @cached_property
     def data(self) -> list[Path]:
-        """Files of a package that are not Python, in its folder and in folders below that are no packages."""
+        """Files of a package that are not Python, in its folder and in subfolders that are not packages."""
         return sorted(data_files(self.path.parent)) if self.is_package else []
 
 
 @cache
-def imports_of(module: str, is_package: bool, source: bytes) -> list[str]:
-    """Names that may be modules a module imports, the packages above them and above itself included."""
+def find_imports(module: str, is_package: bool, source: bytes) -> list[str]:
+    """Full names of possible modules that a module imports, including all parent packages and its own."""
     text = COMMENT.sub("", source.decode()).replace("\\\n", " ")
     own = {PACKAGE, module.partition(".")[0]}
-    names = {module, *(name for name in imported(module, is_package, text) if name.partition(".")[0] in own)}
+    names = {module, *(name for name in imported_names(module, is_package, text) if name.partition(".")[0] in own)}
     return sorted(set(chain.from_iterable(accumulate(name.split("."), "{}.{}".format) for name in names)))
 
 
-def imported(module: str, is_package: bool, text: str) -> Iterator[str]:
-    """What a module's text without comments imports, by full names, and what it has in quotes that may be one."""
-    for found in IMPORT.finditer(text):
-        if found["quoted"]:
-            yield found["quoted"]
+def imported_names(module: str, is_package: bool, text: str) -> Iterator[str]:
+    """Full names in the import statements of a module's text (without comments), and dotted names in quotes."""
+    for match in IMPORT.finditer(text):
+        if match["quoted"]:
+            yield match["quoted"]
         else:
-            origin = None if found["modules"] else absolute(module, is_package, found["origin"])
+            origin = None if match["modules"] else absolute_name(module, is_package, match["origin"])
             yield from [origin] if origin else []
-            listed = (found["modules"] or found["names"].strip("() \t\n")).split(",")
+            listed = (match["modules"] or match["names"].strip("() \t\n")).split(",")
             names = [entry.split()[0] for entry in listed if entry.strip()]  # of 'a, b as c'
             yield from (f"{origin}.{name}" if origin else name for name in names)
 
 
-def absolute(module: str, is_package: bool, origin: str) -> str:
-    """The full name of what follows `from` in a module, be it relative."""
+def absolute_name(module: str, is_package: bool, origin: str) -> str:
+    """Full name of the module in `from ... import`, which may be relative."""
     name = origin.lstrip(".")
     levels = len(origin) - len(name)
     if not levels:
@@ -146,7 +145,7 @@ def absolute(module: str, is_package: bool, origin: str) -> str:
 
 
 def digest_of(parts: Iterable[tuple[str, bytes]]) -> str:
-    """The sha256 (hex) over parts, each with its name."""
+    """SHA-256 (hex) of named parts."""
     digest = hashlib.sha256()
     for name, data in parts:
         digest.update(f"{name}\0{len(data)}\0".encode() + data)
@@ -154,7 +153,7 @@ def digest_of(parts: Iterable[tuple[str, bytes]]) -> str:
 
 
 def data_files(folder: Path) -> Iterator[Path]:
-    """The files that a package's code may read: all but Python, caches, hidden files and built-in configs."""
+    """Files that a package's code may read: all except Python, caches, hidden files and built-in configs."""
     for path in folder.iterdir():
         if path.name.startswith((".", "__pycache__")) or path.as_posix().endswith(INPUT_FOLDERS):
             continue

@@ -122,7 +122,7 @@ def walked(question: ExploredConfig) -> Answered:
         config = loaded.config
         wanted = [STAGES[model] for model in question.models if model == "rigid" or config.contact is not None]
         # The walks first: they leave the gait behind, and it is then there without being sought again.
-        with kernel_cache.watched(tell):
+        with kernel_cache.watch_compilation(tell):
             answers = {
                 stage: answer_in_memory(config, stage, memory(), again=False) for stage in (*wanted, "fixedpoint")
             }

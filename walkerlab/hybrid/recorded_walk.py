@@ -11,22 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from walkerlab.hybrid.rigid_record import (
-    DURATION,
-    ENERGY_DRIFT,
-    FORWARD,
-    INTEGRAL,
-    MAX_FRICTION_RATIO,
-    MAX_IMPULSE_RATIO,
-    MAX_SCUFF_DEPTH,
-    MIN_IMPULSE,
-    MIN_NORMAL_FORCE,
-    STRIKES,
-    TAKEN,
-    Observer,
-    new_observer,
-    observe_start,
-)
+from walkerlab.hybrid.rigid_record import Observer, RigidTally, new_observer, observe_start
 from walkerlab.hybrid.rigid_walk import (
     EVENTS,
     LONGEST_SWING,
@@ -172,8 +157,7 @@ class Recorder:
         self.walk: Callable[..., tuple[int, int]] = walk if tolerances.compiled else uncompiled(walk)
         self.numbers, self.kneed = len(walker.zero_state), walker.kneed
         self.seen = new_observer(np.zeros(0), self.numbers)
-        self.extremes, self.work = self.seen.extremes, self.seen.work
-        self.energy_integral, self.duration = 0.0, 0.0
+        self.tally: RigidTally = self.seen.tally[()]
         self.counts = np.zeros_like(method.counts)
         no_states = np.zeros((0, self.numbers))
         self.strikes, self.before, self.after, self.knees = [np.zeros(0)], [no_states], [no_states], [np.zeros(0)]
@@ -193,14 +177,13 @@ class Recorder:
             np.asarray(self.walker), self.method, self.finder, observer, np.array(self.state), seen
         )
         self.counts += self.method.counts
-        worst = self.extremes
-        for index in (MIN_NORMAL_FORCE, MIN_IMPULSE):
-            worst[index] = min(worst[index], observer.extremes[index])
-        for index in (MAX_FRICTION_RATIO, MAX_SCUFF_DEPTH, ENERGY_DRIFT, MAX_IMPULSE_RATIO):
-            worst[index] = max(worst[index], observer.extremes[index])
-        self.work += observer.work
-        self.energy_integral += float(observer.energy[INTEGRAL])
-        self.duration += float(observer.energy[DURATION])
+        total, part = self.tally, observer.tally[()]
+        for name in ("min_normal_force", "min_impulse"):
+            total[name] = min(total[name], part[name])
+        for name in ("max_friction_ratio", "max_scuff_depth", "energy_drift", "max_impulse_ratio"):
+            total[name] = max(total[name], part[name])
+        for name in ("strike_loss", "forward_work", "energy_integral", "duration"):
+            total[name] += part[name]
         strikes, before, after = seen.time[:taken] + self.time, seen.before[:taken], seen.after[:taken]
         knees = seen.knee_time + self.time
         if self.sampled:
@@ -217,10 +200,10 @@ class Recorder:
     def _mean_energy(self, strikes: Array, after: Array) -> float:
         """Time mean of the energy (J), in each step from the contact point at its touch."""
         zeros = energy_at_touch(self.walker, np.append(self.start[STANCE], after[:, STANCE]))
-        if self.duration == 0.0:
+        if self.tally.duration == 0.0:
             return float(sum(energies(self.walker, self.start)) - zeros[0])
-        durations = np.diff(strikes, prepend=0.0, append=max(self.duration, self.time))
-        return float((self.energy_integral - zeros @ durations) / self.duration)
+        durations = np.diff(strikes, prepend=0.0, append=max(float(self.tally.duration), self.time))
+        return float((self.tally.energy_integral - zeros @ durations) / float(self.tally.duration))
 
     def _driven_work(self, before: Array, after: Array, gravity: float) -> tuple[DrivenWork, float]:
         """What was given over the steps taken, by gravity that much (J); and what does not balance (J).
@@ -236,15 +219,15 @@ class Recorder:
         # what the spring gives is among the works
         unsprung = walker.changed(hip=0.0) if walker.driven_hip else walker
         ends = [sum(energies(unsprung, y)) - energy_at_touch(unsprung, y[STANCE]) for y in (self.start, self.state)]
-        left = float(ends[1] - ends[0] - gravity - hip + self.work[TAKEN, STRIKES])
+        left = float(ends[1] - ends[0] - gravity - hip + self.tally.strike_loss)
         hip, left = (hip + left, 0.0) if hinge_torque(law, 0.0, 0.0).by_rate else (hip, left)
         push = float(push_off_work(walker, before).sum()) if walker.push_off else 0.0
-        weight, forward = float(walker.mass * walker.gravity), float(self.work[TAKEN, FORWARD])
+        weight, forward = float(walker.mass * walker.gravity), float(self.tally.forward_work)
         return DrivenWork(weight, gravity, push, hip, torque, forward), abs(left)
 
     def _samples(self, observer: Observer, strikes: Array, before: Array, after: Array, knees: Array) -> Samples:
         """The grid's samples with both sides of the heel strikes put between them."""
-        found = int(observer.recorded[0])
+        found = int(observer.tally[()].recorded)
         grid = self.interval * np.arange(self.grid_index, self.grid_index + found, dtype=np.float64)
         self.grid_index += found
         events = np.append(strikes, self.time) if self.steps else strikes
@@ -261,10 +244,10 @@ class Recorder:
 
     def finished(self, outcome: Outcome) -> RigidWalkResult:
         """All that was seen."""
-        if self.duration == 0.0:  # a swing that begins observes its own start
+        if self.tally.duration == 0.0:  # a swing that begins observes its own start
             observe_start(self.seen, Mode(self.walker, BENT), self.start)
-        end_time = self.time if outcome == Outcome.WALKED else self.duration
-        if outcome == Outcome.WALKED and self.extremes[MIN_NORMAL_FORCE] < 0.0:
+        end_time = self.time if outcome == Outcome.WALKED else float(self.tally.duration)
+        if outcome == Outcome.WALKED and self.tally.min_normal_force < 0.0:
             outcome = Outcome.LIFTED_OFF
         strikes, before, after = (np.concatenate(kept) for kept in (self.strikes, self.before, self.after))
         lengths = step_lengths(self.walker, np.vstack((self.start, after))[:-1], before)
@@ -283,16 +266,16 @@ class Recorder:
             foothold_height_m=None if self.heights is None else self.heights[1 : self.steps + 1],
             driven=driven,
             energy_balance_residual=residual,
-            lost_in_strikes=float(self.work[TAKEN, STRIKES]) + driven.push_off,
+            lost_in_strikes=float(self.tally.strike_loss) + driven.push_off,
             start=self.start,
             before=before,
             after=after,
-            min_normal_force=float(self.extremes[MIN_NORMAL_FORCE]),
-            max_friction_ratio=float(self.extremes[MAX_FRICTION_RATIO]),
-            max_scuff_depth=float(self.extremes[MAX_SCUFF_DEPTH]),
-            min_normal_impulse=float(self.extremes[MIN_IMPULSE]) if self.steps else None,
-            max_impulse_ratio=float(self.extremes[MAX_IMPULSE_RATIO]),
-            energy_drift=float(self.extremes[ENERGY_DRIFT]),
+            min_normal_force=float(self.tally.min_normal_force),
+            max_friction_ratio=float(self.tally.max_friction_ratio),
+            max_scuff_depth=float(self.tally.max_scuff_depth),
+            min_normal_impulse=float(self.tally.min_impulse) if self.steps else None,
+            max_impulse_ratio=float(self.tally.max_impulse_ratio),
+            energy_drift=float(self.tally.energy_drift),
             mean_energy=self._mean_energy(strikes, after),
             samples=joined(self.pieces) if self.pieces else None,
         )

@@ -1,4 +1,4 @@
-"""What is recorded of a rigid walk besides its heel strikes: samples, extremes of what the model assumes, energy."""
+"""Records of a rigid walk besides its heel strikes: samples, energies, and how far the model's assumptions hold."""
 
 from typing import Any, NamedTuple
 
@@ -9,98 +9,109 @@ from walkerlab.kernels import by_reference, inlined, vector
 from walkerlab.mechanics.hinges import hip_law
 from walkerlab.mechanics.impact import push_off
 from walkerlab.mechanics.standing import Mode, energies, ground_reaction, momentum, swing_foot
+from walkerlab.mechanics.tree import new_record, read_at_once, record_type
 from walkerlab.solvers.events import CrossingFinder
 from walkerlab.solvers.stepping import T_OLD, T, interpolate, sample
 
 NO_FORCE = 1e300  # above any normal force
-# indices into Observer.extremes
-MIN_NORMAL_FORCE, MAX_FRICTION_RATIO, MAX_SCUFF_DEPTH, ENERGY_DRIFT, MIN_IMPULSE, MAX_IMPULSE_RATIO = range(6)
-# indices into Observer.energy
-LEAST, MOST, LATEST, INTEGRAL, DURATION = 0, 1, 2, 3, 4
-CLOSER = 3  # parabolas to an extremum
-# rows of Observer.work, and columns: kinetic energy that strikes take, positive work of the hip's constant torque
-TAKEN, AT_HAND = 0, 1
-STRIKES, FORWARD = 0, 1
+REFINEMENTS = 3  # parabolas fitted around a maximum, each eight times narrower than the last
 # composite Simpson rule on eighths
 SIMPSON = (1.0 / 24.0, 4.0 / 24.0, 2.0 / 24.0, 4.0 / 24.0, 2.0 / 24.0, 4.0 / 24.0, 2.0 / 24.0, 4.0 / 24.0, 1.0 / 24.0)
 
 
+@read_at_once
+class RigidTally(np.record):  # type: ignore[misc]  # NumPy's stubs call one of its bases final
+    """Counts, extremes and energies of a walk, written by kernels.
+
+    Extremes cover the whole walk. Energies are measured from the stance foot and, except for the drift, belong to the
+    current swing. `strike_loss` and `forward_work` cover completed steps, `step_*` the current step.
+    """
+
+    recorded: int  # samples
+    min_normal_force: float  # N
+    max_friction_ratio: float  # tangential over normal force
+    max_scuff_depth: float  # m
+    energy_drift: float  # J, the largest of all swings
+    min_impulse: float  # N s, normal
+    max_impulse_ratio: float  # tangential over normal impulse
+    min_energy: float  # J
+    max_energy: float  # J
+    energy: float  # J, the latest
+    energy_integral: float  # J s, over the walk
+    duration: float  # s, of the walk
+    strike_loss: float  # J, kinetic energy lost in strikes
+    forward_work: float  # J, positive work of the hip's constant torque
+    step_strike_loss: float  # J
+    step_forward_work: float  # J
+
+
+RIGID_TALLY = record_type(RigidTally, {})
+
+
 @by_reference
 class Observer(NamedTuple):
-    """What is recorded of a walk besides its heel strikes; nothing, if it is not `watching`."""
+    """Record of a walk besides its heel strikes; empty unless `watching`."""
 
     watching: bool
     times: Any  # (samples,) s, rising
     states: Any  # (samples, 2 n)
-    steps: Any  # (samples,) which step a sample belongs to
-    recorded: Any  # (1,) samples recorded so far
-    # (6,) least normal force N, largest |T/N|, deepest scuff m, largest drift of energy in a swing J; of the strikes'
-    # impulses the least normal one N s, and the largest ratio of tangential to normal
-    extremes: Any
-    energy: Any  # (5,) from the stance foot: least and most of this swing J, latest J, integral over time J s, time s
-    work: Any  # (2, 2) J, in the steps taken and in the one at hand
+    steps: Any  # (samples,) the step of each sample
+    tally: Any  # () array of RIGID_TALLY: passing a structured scalar to a kernel takes as long as a step
 
 
-def new_observer(times: Any, numbers: int) -> Observer:
-    """An observer with memory for samples of a state of some `numbers` at `times` (s, rising)."""
-    extremes = np.array([NO_FORCE, 0.0, 0.0, 0.0, NO_FORCE, 0.0])
-    steps = np.zeros(times.size, np.int64)
-    return Observer(
-        True,
-        times,
-        np.zeros((times.size, numbers)),
-        steps,
-        np.zeros(1, np.int64),
-        extremes,
-        np.zeros(5),
-        np.zeros((2, 2)),
-    )
+def new_observer(times: Any, state_size: int) -> Observer:
+    """Create an observer with memory for samples of states (state_size,) at `times` (s, rising)."""
+    tally = new_record(RIGID_TALLY, min_normal_force=NO_FORCE, min_impulse=NO_FORCE)
+    return Observer(True, times, np.zeros((times.size, state_size)), np.zeros(times.size, np.int64), np.asarray(tally))
 
 
 def unwatched() -> Observer:
-    """The observer of a walk of which only the heel strikes are wanted."""
+    """Create an observer that records nothing."""
     return new_observer(np.zeros(0), 0)._replace(watching=False)
 
 
 @inlined
 def observe_start(observer: Observer, mode: Mode, y: Any) -> None:
-    """Take note of the start of a swing phase, whose energy it must keep."""
+    """Record the start of a swing, whose energy the swing must keep."""
     if observer.watching:
         kinetic, potential = energies(mode.model, y)
-        observer.energy[LEAST], observer.energy[MOST] = kinetic + potential, kinetic + potential
-        record_extremes(observer, mode, y)
+        tally = observer.tally[()]
+        tally.min_energy = kinetic + potential
+        tally.max_energy = kinetic + potential
+        record_extremes(tally, mode, y)
 
 
 @inlined
 def observe_strike(observer: Observer, mode: Mode, heel: bool, before: Any, after: Any) -> None:
-    """Record what a strike of knee or heel takes, and the ground's impulse on the foot that stands afterwards.
+    """Record the energy lost in a knee or heel strike and the impulse on the new stance foot.
 
-    That impulse is all of the change of momentum but the push-off's part. A heel strike ends the step at hand.
+    The impulse is the change of momentum without the push-off's part. A heel strike ends the current step.
     """
     if observer.watching:
-        model, extremes, work = mode.model, observer.extremes, observer.work
+        model, tally = mode.model, observer.tally[()]
         along, normal = momentum(model, before)
         along_after, normal_after = momentum(model, after)
         along, impulse = along_after - along, normal_after - normal
-        work[AT_HAND, STRIKES] += energies(model, before)[0] - energies(model, after)[0]
+        tally.step_strike_loss += energies(model, before)[0] - energies(model, after)[0]
         if heel:
             if model.push_off != 0.0:
                 push = push_off(model, after)
                 along, impulse = along - push.along, impulse - push.upward
-                extremes[MAX_IMPULSE_RATIO] = max(extremes[MAX_IMPULSE_RATIO], abs(push.along) / push.upward)
-            for entry in range(2):
-                work[TAKEN, entry] += work[AT_HAND, entry]
-                work[AT_HAND, entry] = 0.0
-        extremes[MIN_IMPULSE] = min(extremes[MIN_IMPULSE], impulse)
+                tally.max_impulse_ratio = max(tally.max_impulse_ratio, abs(push.along) / push.upward)
+            tally.strike_loss += tally.step_strike_loss
+            tally.forward_work += tally.step_forward_work
+            tally.step_strike_loss = 0.0
+            tally.step_forward_work = 0.0
+        tally.min_impulse = min(tally.min_impulse, impulse)
         if impulse > 0.0:
-            extremes[MAX_IMPULSE_RATIO] = max(extremes[MAX_IMPULSE_RATIO], abs(along) / impulse)
+            tally.max_impulse_ratio = max(tally.max_impulse_ratio, abs(along) / impulse)
 
 
 @inlined
 def assumptions(mode: Mode, y: Any) -> tuple[float, float, float]:
-    """What the model assumes (section 3.1 of the paper), worst where largest.
+    """Measures of the model's assumptions (section 3.1 of the paper); each is worst where it is largest.
 
-    Pull of the ground (N), friction ratio where it pushes, depth of the swing foot (m).
+    Pull of the ground (N), friction ratio where the ground pushes, depth of the swing foot (m).
     """
     along, normal = ground_reaction(mode, y)
     ratio = abs(along) / normal if normal > 0.0 else 0.0
@@ -116,51 +127,50 @@ def assumptions_at(method: Any, mode: Mode, fraction: float) -> tuple[float, flo
 
 
 @inlined
-def keep_worst(observer: Observer, found: tuple[float, float, float]) -> None:
-    """Keep the worst of what the model assumes."""
-    extremes = observer.extremes
-    extremes[MIN_NORMAL_FORCE] = min(extremes[MIN_NORMAL_FORCE], -found[0])
-    extremes[MAX_FRICTION_RATIO] = max(extremes[MAX_FRICTION_RATIO], found[1])
-    extremes[MAX_SCUFF_DEPTH] = max(extremes[MAX_SCUFF_DEPTH], found[2])
+def keep_worst(tally: Any, measures: tuple[float, float, float]) -> None:
+    """Update the extremes with the measures of `assumptions`."""
+    tally.min_normal_force = min(tally.min_normal_force, -measures[0])
+    tally.max_friction_ratio = max(tally.max_friction_ratio, measures[1])
+    tally.max_scuff_depth = max(tally.max_scuff_depth, measures[2])
 
 
 @inlined
-def record_extremes(observer: Observer, mode: Mode, y: Any) -> tuple[float, float, float]:
-    """Keep the worst of what the model assumes, and the energy."""
-    extremes, energy = observer.extremes, observer.energy
-    found = assumptions(mode, y)
-    keep_worst(observer, found)
+def record_extremes(tally: Any, mode: Mode, y: Any) -> tuple[float, float, float]:
+    """Update the extremes and the energies with state y; returns its `assumptions`."""
+    measures = assumptions(mode, y)
+    keep_worst(tally, measures)
     kinetic, potential = energies(mode.model, y)
-    now = kinetic + potential
-    energy[LEAST], energy[MOST], energy[LATEST] = min(energy[LEAST], now), max(energy[MOST], now), now
-    extremes[ENERGY_DRIFT] = max(extremes[ENERGY_DRIFT], energy[MOST] - energy[LEAST])
-    return found
+    tally.energy = kinetic + potential
+    tally.min_energy = min(tally.min_energy, tally.energy)
+    tally.max_energy = max(tally.max_energy, tally.energy)
+    tally.energy_drift = max(tally.energy_drift, tally.max_energy - tally.min_energy)
+    return measures
 
 
 @inlined
-def vertex(before: float, at: float, after: float) -> float:
-    """Where between three evenly spaced values (at -1, 0, 1) the parabola through them is largest; beyond: nowhere."""
-    bend = before - 2.0 * at + after
+def vertex(before: float, middle: float, after: float) -> float:
+    """Maximum (-1 to 1) of the parabola through values at -1, 0 and 1; 2 if it has none there."""
+    bend = before - 2.0 * middle + after
     return 0.5 * (before - after) / bend if bend < 0.0 else 2.0
 
 
 @inlined
 def ascend_to_worst(
-    observer: Observer, method: Any, mode: Mode, measure: int, middle: float, spacing: float, last: float
+    tally: Any, method: Any, mode: Mode, measure: int, middle: float, spacing: float, last: float
 ) -> None:
-    """Follow a measure of `assumptions` to its maximum near `middle` of the step, by parabolas that close in.
+    """Follow a measure of `assumptions` to its maximum near fraction `middle` of the step, by ever narrower parabolas.
 
-    The fractions of the step are kept below `last`.
+    last  the fractions stay below it
     """
-    for _ in range(CLOSER):
+    for _ in range(REFINEMENTS):
         before = assumptions_at(method, mode, middle - spacing)
-        at = assumptions_at(method, mode, middle)
+        centre = assumptions_at(method, mode, middle)
         after = assumptions_at(method, mode, middle + spacing)
-        shift = vertex(before[measure], at[measure], after[measure])
+        shift = vertex(before[measure], centre[measure], after[measure])
         if abs(shift) > 1.0:
             return
         middle += shift * spacing
-        keep_worst(observer, assumptions_at(method, mode, middle))
+        keep_worst(tally, assumptions_at(method, mode, middle))
         spacing *= 0.125
         middle = min(max(middle, spacing), last - spacing)
 
@@ -169,36 +179,37 @@ def ascend_to_worst(
 def observe(
     observer: Observer, method: Any, mode: Mode, finder: CrossingFinder, row: int, fraction: float, step: int
 ) -> None:
-    """Take note of the last integration step up to `fraction` of it; its dense output is ready.
+    """Record the last integration step up to `fraction` of it; its dense output is ready.
 
-    Samples that fall into it are kept; extremes and the energy's integral are taken from eighths of it.
+    Keeps the samples in it; takes the extremes and the energy's integral from its eighths.
 
-    row  of the finder's values that is free
+    row  a free row of the finder's values
     """
+    tally = observer.tally[()]
     torque = hip_law(mode.model).torque
     if torque != 0.0:
         sample(method, mode, finder.nodes, finder.states)
-        observer.work[AT_HAND, FORWARD] += torque_work(torque, method, mode, finder, row, fraction).positive
+        tally.step_forward_work += torque_work(torque, method, mode, finder, row, fraction).positive
     t, h = method.clock[T_OLD], method.clock[T] - method.clock[T_OLD]
     t_end, spacing = t + fraction * h, 0.125 * fraction
-    mean_energy = SIMPSON[0] * observer.energy[LATEST]
+    mean_energy = SIMPSON[0] * tally.energy
     y = vector(mode.model.zero_state)
-    before = at = assumptions_at(method, mode, 0.0)
+    before = middle = assumptions_at(method, mode, 0.0)
     for eighth in range(1, 9):
         interpolate(method, mode, spacing * eighth, y)
-        after = record_extremes(observer, mode, y)
-        mean_energy += SIMPSON[eighth] * observer.energy[LATEST]
+        after = record_extremes(tally, mode, y)
+        mean_energy += SIMPSON[eighth] * tally.energy
         for measure in range(3):
-            if eighth > 1 and abs(vertex(before[measure], at[measure], after[measure])) <= 1.0:
-                ascend_to_worst(observer, method, mode, measure, spacing * (eighth - 1), spacing, fraction)
-        before, at = at, after
-    observer.energy[INTEGRAL] += mean_energy * fraction * h
-    observer.energy[DURATION] += fraction * h
-    index = observer.recorded[0]
+            if eighth > 1 and abs(vertex(before[measure], middle[measure], after[measure])) <= 1.0:
+                ascend_to_worst(tally, method, mode, measure, spacing * (eighth - 1), spacing, fraction)
+        before, middle = middle, after
+    tally.energy_integral += mean_energy * fraction * h
+    tally.duration += fraction * h
+    index = tally.recorded
     while index < observer.times.size and observer.times[index] <= t_end:
         interpolate(method, mode, (observer.times[index] - t) / h, y)
         for i in range(len(y)):
             observer.states[index, i] = y[i]
         observer.steps[index] = step
         index += 1
-    observer.recorded[0] = index
+    tally.recorded = index

@@ -10,7 +10,7 @@ from queue import SimpleQueue
 from typing import Any
 
 from walkerlab.config.schema import Config
-from walkerlab.kernel_cache import watched
+from walkerlab.kernel_cache import watch_compilation
 from walkerlab.pipeline.graph import NO_CONTACT, PIPELINE, Graph, Stage
 from walkerlab.pipeline.progress import Reporter, Silent, StageReporter
 from walkerlab.pipeline.results import FolderResults, MemoryResults, Results, Step
@@ -212,7 +212,7 @@ class Executor:
             precompiler.begin(slow[0], only_first=False)
         precompiler.wait_for(step.stage)
         begun = self._running[None] = self._begin(step)
-        with watched(begun.reporter.compiling):
+        with watch_compilation(begun.reporter.compiling):
             answer = begun.task.run(begun.reporter)
         self._finish(None, answer)
 

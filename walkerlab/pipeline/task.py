@@ -77,7 +77,7 @@ def run_in_worker(task: StageTask) -> StageAnswer:
     """Run a stage in a worker, telling its progress."""
     reporter: Any = PipeReporter()
     importlib.import_module(task.module)
-    with kernel_cache.watched(reporter.compiling):
+    with kernel_cache.watch_compilation(reporter.compiling):
         return task.run(reporter)
 
 

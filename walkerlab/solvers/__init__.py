@@ -1,1 +1,1 @@
-"""Integrators: one method a file, one signature, one registry; events located on dense output."""
+"""Integrators, one method per file, and the location of events on their dense output."""

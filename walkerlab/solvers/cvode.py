@@ -1,6 +1,6 @@
-"""CVODE of SUNDIALS with the interface of SciPy's solvers, so that both stand behind the same functions.
+"""CVODE of SUNDIALS with the interface of SciPy's solvers.
 
-Optional (extra `cvode`, package scikit-sundae). Hindmarsh and others: SUNDIALS, ACM TOMS 31 (2005) 363-396.
+Optional (extra `cvode`, package scikit-sundae). Source: Hindmarsh and others, SUNDIALS, ACM TOMS 31 (2005) 363-396.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 PACKAGE = "sksundae"
-# CVODE asks where the walk is going to choose its first step; an event ends the walk long before
+# CVODE needs an end time to choose its first step; an event ends the walk long before
 FAR_AHEAD = 1e3
 
 
@@ -22,7 +22,7 @@ def is_installed() -> bool:
 
 
 class CvodeSolver:
-    """One integration, step by step; fields and methods as of `scipy.integrate.OdeSolver`."""
+    """Integration step by step, with the fields and methods of `scipy.integrate.OdeSolver`."""
 
     def __init__(
         self,
@@ -41,7 +41,7 @@ class CvodeSolver:
         """
         from sksundae.cvode import CVODE
 
-        # arrays of CVODE's own memory, which may not be written to
+        # copies, because CVODE's arrays must not be written to
         def rate(t: float, y: Any, dy: Any) -> None:
             dy[:] = fun(t, np.array(y))
 
@@ -52,14 +52,14 @@ class CvodeSolver:
         self.solver.init_step(t, y)
         self.t_old, self.t, self.y = t, t, y
         self.status = "running"
-        self.looked_back = False
+        self.interpolated = False
 
     def step(self) -> None:
-        """Take one step of CVODE's own choice."""
-        if self.looked_back:
-            # CVODE first returns to the end of its step
+        """Take one step of a size that CVODE chooses."""
+        if self.interpolated:
+            # after interpolation CVODE must first return to the end of its step
             self.solver.step(self.t, "normal", None)
-            self.looked_back = False
+            self.interpolated = False
         ahead = self.solver.step(self.t + FAR_AHEAD, "onestep", None)
         if not ahead.success:
             self.status = "failed"
@@ -67,24 +67,24 @@ class CvodeSolver:
         self.t_old, self.t, self.y = self.t, float(ahead.t), ahead.y
 
     def dense_output(self) -> LastStep:
-        """The solution within the last step, until the next one is taken."""
+        """Return the solution within the last step, valid until the next step."""
         return LastStep(self)
 
 
 class LastStep:
-    """CVODE's own interpolating polynomial, which it keeps for the last step."""
+    """CVODE's interpolating polynomial of the last step."""
 
-    def __init__(self, of: CvodeSolver) -> None:
-        """The last step of a solver."""
-        self.of = of
+    def __init__(self, solver: CvodeSolver) -> None:
+        """Interpolate within the last step of `solver`."""
+        self.solver = solver
 
     def __call__(self, times: Any) -> Any:
-        """States (n,) at a time, or (n, times) at several."""
-        self.of.looked_back = True
+        """Evaluate the state (n,) at one time (s), or states (n, times) at several."""
+        self.solver.interpolated = True
         if np.ndim(times) == 0:
-            return self.at(float(times))
-        return np.column_stack([self.at(time) for time in times.tolist()])
+            return self.state_at(float(times))
+        return np.column_stack([self.state_at(time) for time in times.tolist()])
 
-    def at(self, time: float) -> Any:
-        """The state (n,) at a time of the step."""
-        return self.of.solver.step(time, "normal", None).y
+    def state_at(self, time: float) -> Any:
+        """State (n,) at a time (s) of the step."""
+        return self.solver.solver.step(time, "normal", None).y

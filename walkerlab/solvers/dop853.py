@@ -1,4 +1,4 @@
-"""DOP853: explicit Runge-Kutta method of order 8 with error control of order 5 and 3 and dense output of order 7.
+"""DOP853: explicit Runge-Kutta method of order 8 with error estimates of order 5 and 3 and dense output of order 7.
 
 Source: Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, 2nd ed. (1993), sections II.4 to II.6.
 """
@@ -33,7 +33,8 @@ from walkerlab.solvers.stepping import (
 )
 from walkerlab.solvers.system import Floats, block, derivative
 
-# Hairer's code has 0.9: a fifth of a walk's steps was rejected, and the same error took 11 % more work.
+# Hairer's code has a safety factor of 0.9: it rejects a fifth of a walk's steps and takes 11 % more work for the same
+# error.
 SAFETY, SHRINK_MOST, GROW_MOST = 0.8, 0.333, 6.0
 EXPONENT = 1.0 / 8.0
 STAGES, EXTRA_STAGES = 12, 3
@@ -41,12 +42,12 @@ LAST, ALL = STAGES, STAGES + 1 + EXTRA_STAGES  # row of the derivative at the st
 
 
 def rows(weights: Sequence[Sequence[float]], length: int) -> Floats:
-    """Weights as the rows of a matrix (rows, length), filled up with zeros."""
+    """Build a matrix (rows, length) from rows of weights, padded with zeros."""
     return np.array([[*row, *[0.0] * (length - len(row))] for row in weights])
 
 
 C = np.array(tableau.C)
-# row s: the weights that lead to the state of stage s; the solution's own stand in row LAST
+# row s: weights of the state of stage s; row LAST: weights of the solution
 A = rows([(), *(getattr(tableau, f"A_{stage}") for stage in range(2, ALL + 1))], ALL)
 D = rows([tableau.D_4, tableau.D_5, tableau.D_6, tableau.D_7], ALL)
 ERROR_5, ERROR_3 = np.array(tableau.ERROR_5), np.array(tableau.ERROR_3)
@@ -54,7 +55,7 @@ ERROR_5, ERROR_3 = np.array(tableau.ERROR_5), np.array(tableau.ERROR_3)
 
 @by_reference
 class Dop853(NamedTuple):
-    """The method with its memory for n equations."""
+    """DOP853 with memory for n equations; see `stepping` for the first six fields."""
 
     rtol: float
     atol: float
@@ -62,13 +63,13 @@ class Dop853(NamedTuple):
     y_old: Any
     y: Any
     counts: Any
-    at: Any  # (n,) state of the stage evaluated last
+    at: Any  # (n,) state of the last evaluated stage
     stages: Any  # (ALL, n) derivatives at the stages
     dense: Any  # (7, n) nested coefficients of the dense output
 
 
 def new_dop853(n: int, rtol: float, atol: float, budget: int) -> Dop853:
-    """A DOP853 for n equations that may evaluate `budget` right-hand sides."""
+    """Create a DOP853 for n equations and at most `budget` right-hand sides."""
     counts = np.zeros(COUNTS, np.int64)
     counts[BUDGET] = budget
     y_old, y, at = np.zeros((3, n))
@@ -77,7 +78,7 @@ def new_dop853(n: int, rtol: float, atol: float, budget: int) -> Dop853:
 
 @inlined
 def evaluate_stages(method: Dop853, system: Any, t: float, h: float, first: int, end: int) -> None:
-    """Stages first to end - 1 of the step from `y_old` at time t over h; the last one's state is left in `at`."""
+    """Evaluate stages first to end - 1 of the step from `y_old` at time t over h; `at` keeps the state of the last."""
     y, at, K = method.y_old, method.at, method.stages
     total = vector(block(system))
     width = len(total)
@@ -98,10 +99,7 @@ def evaluate_stages(method: Dop853, system: Any, t: float, h: float, first: int,
 
 @inlined
 def try_step(method: Dop853, system: Any, t: float, h: float) -> float:
-    """The step from `y_old` over h into `y`; returns its error relative to the tolerance.
-
-    Section II.10, formula (10.17).
-    """
+    """Compute the step from `y_old` over h into `y`; returns its error relative to the tolerance, (10.17)."""
     y_old, y, at, K = method.y_old, method.y, method.at, method.stages
     evaluate_stages(method, system, t, h, 1, LAST + 1)
     by_order_5, by_order_3 = vector(block(system)), vector(block(system))
@@ -129,7 +127,7 @@ def try_step(method: Dop853, system: Any, t: float, h: float) -> float:
 
 @inlined
 def scaled_norm(method: Dop853, v: Any) -> float:
-    """Root of the sum of squares of v over the tolerance at the state."""
+    """Norm of v with each component divided by its tolerance at the current state."""
     total = 0.0
     for i in range(v.size):
         relative = v[i] / (method.atol + method.rtol * abs(method.y[i]))
@@ -139,13 +137,13 @@ def scaled_norm(method: Dop853, v: Any) -> float:
 
 @inlined
 def change_of_step(error: float) -> float:
-    """How much the next step may differ from one with this error: the eighth root in three square roots."""
+    """Factor from a step with this error to the next; the eighth root is three square roots."""
     return max(SHRINK_MOST, SAFETY / math.sqrt(math.sqrt(math.sqrt(error))))
 
 
 @begin.case(Dop853)
 def begin_dop853(method: Dop853, system: Any, t: float, y: Any, h: float) -> None:
-    """Derivative at the start and, for h = 0, the first step after Hairer's hinit."""
+    """Evaluate the derivative and, for h = 0, choose the first step as Hairer's hinit does."""
     clock, at, slope, ahead = method.clock, method.at, method.stages[LAST], method.stages[0]
     clock[T_OLD], clock[T], clock[H_NEXT] = t, t, h
     for i in range(method.y.size):
@@ -164,13 +162,13 @@ def begin_dop853(method: Dop853, system: Any, t: float, y: Any, h: float) -> Non
         at[i] = ahead[i] - slope[i]
     curvature = scaled_norm(method, at) / guess
     steepest = max(steepness, curvature)
-    wanted = max(1e-6, guess * 1e-3) if steepest <= 1e-15 else (0.01 / steepest) ** EXPONENT
-    clock[H_NEXT] = min(100.0 * guess, wanted)
+    h_curvature = max(1e-6, guess * 1e-3) if steepest <= 1e-15 else (0.01 / steepest) ** EXPONENT
+    clock[H_NEXT] = min(100.0 * guess, h_curvature)
 
 
 @advance.case(Dop853)
 def advance_dop853(method: Dop853, system: Any, t_end: float) -> int:
-    """One accepted step with Hairer's step control, a little more careful."""
+    """Use Hairer's step control with a smaller safety factor."""
     clock, counts, y_old, y, K = method.clock, method.counts, method.y_old, method.y, method.stages
     t, h = clock[T], clock[H_NEXT]
     for i in range(y.size):
@@ -186,12 +184,12 @@ def advance_dop853(method: Dop853, system: Any, t_end: float) -> int:
             counts[ACCEPTED] += 1
             growth = limit if error == 0.0 else min(limit, change_of_step(error))
             clock[T_OLD], clock[T] = t, t_end if last else t + h
-            # a step cut short by t_end says little about the next one
+            # a step shortened by t_end says little about the next one
             clock[H_NEXT] = max(clock[H_NEXT], h * growth) if last else h * growth
             return STEP_DONE
         counts[REJECTED] += 1
         limit = 1.0
-        # a step whose error is not a number is cut hard
+        # the error may be infinite or not a number
         h *= change_of_step(error) if error < 1e300 else 0.1
         clock[H_NEXT] = h
         if h <= SMALLEST_STEP * max(abs(t), 1.0):
@@ -204,7 +202,7 @@ def advance_dop853(method: Dop853, system: Any, t_end: float) -> int:
 
 @rewind.case(Dop853)
 def rewind_dop853(method: Dop853, system: Any) -> None:
-    """State and derivative of the step's start are its end again."""
+    """Restore state and derivative of the step's start."""
     for i in range(method.y.size):
         method.y[i], method.stages[LAST, i] = method.y_old[i], method.stages[0, i]
     method.clock[T] = method.clock[T_OLD]
@@ -212,7 +210,7 @@ def rewind_dop853(method: Dop853, system: Any) -> None:
 
 @prepare_dense.case(Dop853)
 def prepare_dense_dop853(method: Dop853, system: Any) -> None:
-    """Three more stages and the coefficients of the polynomial of degree 7."""
+    """Evaluate three more stages and the coefficients of degree 7."""
     t, h = method.clock[T_OLD], method.clock[T] - method.clock[T_OLD]
     evaluate_stages(method, system, t, h, LAST + 1, ALL)
     y_old, y, K, dense = method.y_old, method.y, method.stages, method.dense
@@ -229,7 +227,7 @@ def prepare_dense_dop853(method: Dop853, system: Any) -> None:
 
 @interpolate.case(Dop853)
 def interpolate_dop853(method: Dop853, system: Any, fraction: float, y: Any) -> None:
-    """Hairer's contd8, its nested products multiplied out into one weight a row."""
+    """Evaluate Hairer's contd8, with nested products expanded into one weight per row."""
     s, r, d = fraction, 1.0 - fraction, method.dense
     w1, w3 = s * r, s * r * s * r
     for i in range(y.size):

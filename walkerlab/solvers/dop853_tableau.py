@@ -1,8 +1,8 @@
-"""The coefficients of DOP853, the explicit Runge-Kutta pair of order 8(5,3) of Dormand and Prince.
+"""Coefficients of DOP853, the explicit Runge-Kutta pair of order 8(5,3) of Dormand and Prince.
 
 Source: Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, 2nd ed. (1993), section II.5 and II.6, and
 the authors' Fortran code dop853.f. Rows are named as in the book: A_s holds the weights of the stages before stage s,
-A_13 those of the solution of order 8. `nonzero` drops what a row does not use; dop853.py names the stages it does.
+A_13 those of the solution of order 8. `nonzero` drops unused weights.
 """
 
 # fmt: off
@@ -118,5 +118,5 @@ D_7 = (
 
 
 def nonzero(row: tuple[float, ...]) -> tuple[float, ...]:
-    """The weights of `row` that are not zero."""
+    """Return the weights of a row that are not zero."""
     return tuple(weight for weight in row if weight != 0.0)

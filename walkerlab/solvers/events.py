@@ -1,12 +1,12 @@
-"""Where an event function crosses zero within a step: every crossing, also two or three between the step's ends.
+"""Zero crossings of event functions within a step, including several crossings in one step.
 
-An event function is known on a step by its values along the dense output, as a polynomial. In Bernstein form a
-polynomial lies in the hull of its coefficients: coefficients of one sign prove that there is no crossing, and halving
-isolates those there are. A sign check at the ends of a step misses double crossings.
+An event function on a step is a polynomial through its values on the dense output. A polynomial in Bernstein form lies
+in the hull of its coefficients: coefficients of one sign prove that there is no crossing, and bisection isolates the
+crossings otherwise. A sign check at the ends of a step would miss double crossings.
 
-Definitions. A crossing is a change of sign; an event function that touches zero and turns back does not cross. A zero
-exactly at the start, where the event before left the event function, is divided out, so that it is neither found again
-nor hides a crossing right behind it. Of several event functions that cross in one step, the caller takes the earliest.
+A crossing is a change of sign; an event function that touches zero and turns back does not cross. The last event leaves
+its event function at zero. This zero at the start is divided out, so that it is not found again and does not hide a
+crossing right after it. If several event functions cross in one step, the caller takes the earliest.
 
 Source: Farouki, The Bernstein polynomial basis: a centennial retrospective, CAGD 29 (2012), sections 3.4 and 5.
 """
@@ -21,9 +21,9 @@ from walkerlab.kernels import by_reference, inlined
 
 NO_CROSSING = 2.0
 FALLING, RISING = -1, 1
-NARROWEST = 2.0**-48
-CLOSEST = 2.0**-52  # how finely a crossing is located within its piece
-DEPTH = 64
+MIN_PIECE = 2.0**-48
+RESOLUTION = 2.0**-52  # of a crossing within its piece
+DEPTH = 64  # pieces on the stack
 
 
 @by_reference
@@ -31,27 +31,24 @@ class CrossingFinder(NamedTuple):
     """Memory and matrices for event functions sampled at `nodes` (fractions of a step)."""
 
     nodes: Any  # (degree + 1,)
-    to_bernstein: Any  # (degree + 1, degree + 1), from values at the nodes to Bernstein coefficients
-    states: Any  # (degree + 1, numbers) at the nodes, and
+    to_bernstein: Any  # (degree + 1, degree + 1) maps values at the nodes to Bernstein coefficients
+    states: Any  # (degree + 1, state_size) at the nodes, filled by the caller
     values: Any  # (event functions, degree + 1), filled by the caller
     stack: Any  # (DEPTH, degree + 1) coefficients of the pieces still to search
-    ends: Any  # (DEPTH, 2) where those pieces begin and end
+    ends: Any  # (DEPTH, 2) fractions at which those pieces begin and end
 
 
-def new_crossing_finder(degree: int, event_functions: int = 1, numbers: int = 0) -> CrossingFinder:
-    """A finder for `event_functions` event functions on steps whose dense output has degree `degree`.
-
-    numbers  of a state that event functions are of
-    """
+def new_crossing_finder(degree: int, event_functions: int = 1, state_size: int = 0) -> CrossingFinder:
+    """Create a finder for steps whose dense output has degree `degree`."""
     nodes, to_bernstein = sampling(degree)
     size = degree + 1
-    rooms = ((size, numbers), (event_functions, size), (DEPTH, size), (DEPTH, 2))
-    return CrossingFinder(nodes, to_bernstein, *map(np.zeros, rooms))
+    shapes = ((size, state_size), (event_functions, size), (DEPTH, size), (DEPTH, 2))
+    return CrossingFinder(nodes, to_bernstein, *map(np.zeros, shapes))
 
 
 @lru_cache
 def sampling(degree: int) -> tuple[Any, Any]:
-    """The nodes of a polynomial of this degree, and what takes its values there to Bernstein coefficients."""
+    """Compute nodes (degree + 1,) and the matrix from values there to Bernstein coefficients."""
     size = degree + 1
     nodes = 0.5 * (1.0 - np.cos(np.pi * np.arange(size) / degree))
     basis = np.zeros((size, size))
@@ -67,14 +64,12 @@ def sampling(degree: int) -> tuple[Any, Any]:
 
 @inlined
 def first_crossing(finder: CrossingFinder, event: int, direction: int, after: float, zero_at_start: bool) -> float:
-    """Fraction of the step at which an event function first changes sign.
+    """Find the fraction of the step at which an event function first changes sign; NO_CROSSING if it does not.
 
-    event         row of `finder.values`
+    event          row of `finder.values`
     direction      FALLING, RISING, or 0 for both
-    after          fraction of the step before which crossings are passed over
+    after          ignore crossings before this fraction
     zero_at_start  the event function is zero at the step's start: divide that zero out
-
-    Returns NO_CROSSING if there is none.
     """
     if not spans_zero(finder, event):
         return NO_CROSSING
@@ -83,7 +78,7 @@ def first_crossing(finder: CrossingFinder, event: int, direction: int, after: fl
 
 @inlined
 def crossing_of_piece(finder: CrossingFinder, size: int, direction: int, after: float) -> float:
-    """`first_crossing` of the polynomial whose `size` Bernstein coefficients are at the bottom of the stack."""
+    """Find the first crossing of the polynomial at the bottom of the stack, with `size` Bernstein coefficients."""
     stack, ends = finder.stack, finder.ends
     ends[0, 0], ends[0, 1] = 0.0, 1.0
     top = 0
@@ -93,7 +88,7 @@ def crossing_of_piece(finder: CrossingFinder, size: int, direction: int, after: 
         if high <= after or signs == 0:
             top -= 1
             continue
-        if (signs == 1 and low >= after) or high - low < NARROWEST:
+        if (signs == 1 and low >= after) or high - low < MIN_PIECE:
             top -= 1
             rising = stack[top + 1, 0] < 0.0
             turned = (stack[top + 1, 0] < 0.0) != (stack[top + 1, size - 1] < 0.0)
@@ -110,13 +105,13 @@ def crossing_of_piece(finder: CrossingFinder, size: int, direction: int, after: 
 
 @inlined
 def value_at(finder: CrossingFinder, event: int, fraction: float) -> float:
-    """Value of a sampled event function at a fraction of the step."""
+    """Evaluate a sampled event function at a fraction of the step."""
     return evaluate(finder.stack, 0, set_root_piece(finder, event, False), fraction)
 
 
 @inlined
 def spans_zero(finder: CrossingFinder, event: int) -> bool:
-    """Whether an event function could cross: false where it stays further from zero than it varies."""
+    """Whether an event function may cross: false if it stays further from zero than it varies."""
     smallest, largest = finder.values[event, 0], finder.values[event, 0]
     for i in range(1, finder.nodes.size):
         smallest = min(smallest, finder.values[event, i])
@@ -127,7 +122,7 @@ def spans_zero(finder: CrossingFinder, event: int) -> bool:
 
 @inlined
 def set_root_piece(finder: CrossingFinder, event: int, zero_at_start: bool) -> int:
-    """Coefficients of the whole step into the first place of the stack; returns how many there are."""
+    """Write the whole step's coefficients to the bottom of the stack; returns their number."""
     stack, size = finder.stack, finder.nodes.size
     for i in range(size):
         total = 0.0
@@ -139,7 +134,7 @@ def set_root_piece(finder: CrossingFinder, event: int, zero_at_start: bool) -> i
 
 @inlined
 def without_zero_at_start(stack: Any, size: int) -> int:
-    """Divide a zero at the start out of the coefficients at the bottom of the stack; returns how many are left."""
+    """Divide a zero at the start out of the polynomial at the bottom of the stack; returns its new size."""
     degree = size - 1
     for i in range(1, size):
         stack[0, i - 1] = stack[0, i] * degree / i
@@ -148,11 +143,11 @@ def without_zero_at_start(stack: Any, size: int) -> int:
 
 @inlined
 def way_from_zero(finder: CrossingFinder, event: int, clearly: float) -> float:
-    """Which way an event function goes that is zero at the step's start: a number of that sign; 0 while it stays there.
+    """Direction of an event function that is zero at the step's start, as a number of its sign; 0 if it stays there.
 
-    What the error of an event's time left of the value there does not count.
+    The error of the last event's time leaves a small value at the start, which is subtracted.
 
-    clearly  what a coefficient of its slope (per step) must exceed to count
+    clearly  minimum slope (per step) of a coefficient that decides
     """
     size = set_root_piece(finder, event, False)
     for i in range(1, size):
@@ -164,7 +159,7 @@ def way_from_zero(finder: CrossingFinder, event: int, clearly: float) -> float:
 
 @inlined
 def sign_changes(stack: Any, piece: int, size: int) -> int:
-    """How often the coefficients of a piece change sign; zero counts as positive."""
+    """Count sign changes of a piece's coefficients; zero counts as positive."""
     changes = 0
     for i in range(1, size):
         if (stack[piece, i] < 0.0) != (stack[piece, i - 1] < 0.0):
@@ -174,7 +169,7 @@ def sign_changes(stack: Any, piece: int, size: int) -> int:
 
 @inlined
 def split(stack: Any, piece: int, size: int) -> None:
-    """De Casteljau at the middle: the left half goes on top of the stack, the right half takes the piece's place."""
+    """Bisect a piece by de Casteljau: its left half goes on top of the stack, its right half replaces it."""
     for i in range(size):
         stack[piece + 1, i] = stack[piece, i]
     for level in range(1, size):
@@ -186,15 +181,15 @@ def split(stack: Any, piece: int, size: int) -> None:
 
 @inlined
 def regula_falsi(stack: Any, piece: int, size: int, low: float, high: float) -> float:
-    """Fraction at which the only crossing of a piece lies: the Illinois variant, kept inside its bracket."""
+    """Find the only crossing of a piece by the Illinois variant, as a fraction of the step."""
     a, b = 0.0, 1.0
     value_a, value_b = stack[piece, 0], stack[piece, size - 1]
     side = 0
     for _ in range(100):
-        if b - a <= 2.0 * CLOSEST or value_a == value_b:
+        if b - a <= 2.0 * RESOLUTION or value_a == value_b:
             break
-        # rounding may put the secant's zero on an end: a step inside shrinks the bracket to it
-        c = min(max((a * value_b - b * value_a) / (value_b - value_a), a + CLOSEST), b - CLOSEST)
+        # rounding may put the secant's zero on an end; keep it inside so that the bracket shrinks
+        c = min(max((a * value_b - b * value_a) / (value_b - value_a), a + RESOLUTION), b - RESOLUTION)
         value_c = evaluate(stack, piece, size, c)
         if value_c == 0.0:
             a, b = c, c
@@ -211,7 +206,7 @@ def regula_falsi(stack: Any, piece: int, size: int, low: float, high: float) -> 
 
 @inlined
 def evaluate(stack: Any, piece: int, size: int, x: float) -> float:
-    """Value of a piece at x (0 to 1): Bernstein form by nested products."""
+    """Evaluate a piece at x (0 to 1) by nested products."""
     degree = size - 1
     u, power, binomial = 1.0 - x, 1.0, 1.0
     total = stack[piece, 0] * u
@@ -224,13 +219,11 @@ def evaluate(stack: Any, piece: int, size: int, x: float) -> float:
 
 @inlined
 def shift_column(columns: Any, at: int, rate: Any, wait: float) -> None:
-    """Take a column of a state's derivative from equal times to the event itself: Phi + f wait (saltation).
+    """Move a variational column from fixed time to the event's time, or back: Phi + f wait (saltation).
 
-    Before the event by the wait for it; after a jump, where time goes on as before, back by the same wait.
-
-    columns  numbers of which those from `at` on are the column; written
-    rate     (n,) f, the state's own derivative in time
-    wait     derivative of the event's time by what the column is for
+    columns  array that holds the column from index `at` on; written
+    rate     (n,) f, time derivative of the state
+    wait     derivative of the event's time with respect to the column's parameter; negative after a jump, to go back
     """
     for i in range(len(rate)):
         columns[at + i] += rate[i] * wait

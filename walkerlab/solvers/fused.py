@@ -1,6 +1,6 @@
-"""A product and a sum rounded once, where it is written and nowhere else.
+"""Fused multiply-add, only where it is written.
 
-A general licence to contract would let the compiler choose, and code compiled twice could differ in the last bits.
+If the compiler were free to contract, code compiled twice could differ in the last bits.
 """
 
 from typing import Any
@@ -13,7 +13,7 @@ from walkerlab.solvers.lanes import LANES, multiply_add
 
 
 def fused(a: float, b: float, c: float) -> float:
-    """a b + c, rounded once in compiled code and twice in Python."""
+    """Compute a b + c, rounded once in compiled code and twice in Python."""
     return a * b + c
 
 

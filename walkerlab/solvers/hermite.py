@@ -1,7 +1,6 @@
-"""Hermite's quintic of an event function over a step, for crossings that a later step refines.
+"""Hermite interpolation of an event function over a step, for crossings that another step then refines.
 
-It takes values and two derivatives at the step's ends, which an explicit method has at no cost, while dense output
-would cost stages; a step that ends at the crossing so found misses it by little.
+It needs values and two derivatives at both ends, which an explicit method has for free; dense output costs stages.
 """
 
 from walkerlab.kernels import inlined
@@ -11,13 +10,13 @@ Jet = tuple[float, float, float]
 """A value with its first two derivatives in time."""
 Quintic = tuple[float, float, float, float, float, float]
 """Bernstein coefficients over the step."""
-CLOSE = 1e-4  # of the step, Newton's last move: it misses by the square of that
+LAST_MOVE = 1e-4  # of the step; Newton's error is about the square of its last move
 MAX_ITERATIONS = 50
 
 
 @inlined
 def hermite(h: float, start: Jet, end: Jet) -> Quintic:
-    """The quintic over a step h (s) with these values and derivatives at its ends."""
+    """Quintic over a step h (s) with these values and derivatives at its ends."""
     slope, bend = 0.2 * h * start[1], 0.05 * h * h * start[2]
     last_slope, last_bend = 0.2 * h * end[1], 0.05 * h * h * end[2]
     return (
@@ -32,13 +31,13 @@ def hermite(h: float, start: Jet, end: Jet) -> Quintic:
 
 @inlined
 def value_of(quintic: Quintic, x: float) -> float:
-    """Value at a fraction x of the step."""
+    """Evaluate a quintic at fraction x of the step."""
     return value_and_slope(in_powers(quintic), x)[0]
 
 
 @inlined
 def in_powers(quintic: Quintic) -> Quintic:
-    """Coefficients of the powers of the fraction, the lowest first."""
+    """Convert to coefficients of powers of the fraction, lowest first."""
     b0, b1, b2, b3, b4, b5 = quintic
     return (
         b0,
@@ -52,7 +51,7 @@ def in_powers(quintic: Quintic) -> Quintic:
 
 @inlined
 def value_and_slope(powers: Quintic, x: float) -> tuple[float, float]:
-    """Value and derivative at x of a polynomial given by its powers."""
+    """Evaluate a polynomial and its derivative at x from coefficients of powers."""
     c0, c1, c2, c3, c4, c5 = powers
     value = c0 + x * (c1 + x * (c2 + x * (c3 + x * (c4 + x * c5))))
     slope = c1 + x * (2.0 * c2 + x * (3.0 * c3 + x * (4.0 * c4 + x * (5.0 * c5))))
@@ -63,10 +62,10 @@ def value_and_slope(powers: Quintic, x: float) -> tuple[float, float]:
 def first_fall(finder: CrossingFinder, quintic: Quintic, zero_at_start: bool, after: float) -> float:
     """Fraction of the step at which a quintic first falls through zero; NO_CROSSING if it does not.
 
-    after  fraction before which crossings are passed over
+    after  ignore crossings before this fraction
 
-    Coefficients of one sign have no crossing, those that once change from positive to negative have one; for all else
-    there is `crossing_of_piece`.
+    Coefficients of one sign prove that there is no crossing, a single change from positive to negative that there is
+    one; `crossing_of_piece` treats the rest.
     """
     changes = 0
     for i in range(1 if zero_at_start else 0, 5):
@@ -83,7 +82,7 @@ def first_fall(finder: CrossingFinder, quintic: Quintic, zero_at_start: bool, af
 
 @inlined
 def only_crossing(quintic: Quintic) -> float:
-    """The zero of a quintic that has one and falls: Newton's method from the end, halving where that leads astray."""
+    """Find the zero of a quintic with a single, falling crossing: Newton from the end, safeguarded by bisection."""
     powers = in_powers(quintic)
     low, high, x = 0.0, 1.0, 1.0
     for _ in range(MAX_ITERATIONS):
@@ -96,6 +95,6 @@ def only_crossing(quintic: Quintic) -> float:
         if not low < new < high:
             new = 0.5 * (low + high)
         x, change = new, abs(new - x)
-        if change < CLOSE:
+        if change < LAST_MOVE:
             break
     return x

@@ -1,4 +1,4 @@
-"""A step of DOP853 in lanes: states are tuples of lanes, which stay in registers; see `dop853.py`."""
+"""Steps of DOP853 on states that are tuples of lanes, which stay in registers; see `dop853`."""
 
 from typing import Any
 
@@ -21,13 +21,13 @@ ERROR_5, ERROR_3 = nonzero(tableau.ERROR_5), nonzero(tableau.ERROR_3)
 
 @by_type
 def derivative(system: Any, t: float, y: State) -> State:
-    """dy/dt of `system` at time t (s) and state y, both tuples of numbers or of lanes."""
+    """Return dy/dt of `system` at time t (s) and state y, both tuples of numbers or lanes."""
 
 
 def _sums(builder: Any, weights: Any, vectors: Any, length: int) -> list[Any]:
-    """Components of the sum of weights[j] vectors[j], as chains of fused multiply-adds."""
+    """Build the components of the sum of weights[j] vectors[j] as chains of fused multiply-adds."""
     columns = [cgutils.unpack_tuple(builder, vector) for vector in cgutils.unpack_tuple(builder, vectors)]
-    factors = [like(builder, factor, columns[0][0]) for factor in cgutils.unpack_tuple(builder, weights)]
+    factors = [match_lanes(builder, factor, columns[0][0]) for factor in cgutils.unpack_tuple(builder, weights)]
     sums = []
     for i in range(length):
         total = builder.fmul(factors[0], columns[0][i])
@@ -37,14 +37,14 @@ def _sums(builder: Any, weights: Any, vectors: Any, length: int) -> list[Any]:
     return sums
 
 
-def like(builder: Any, number: Any, other: Any) -> Any:
-    """A number as it is, or in each lane where `other` is lanes."""
-    return spread_over(builder, number) if other.type == VECTOR else number
+def match_lanes(builder: Any, number: Any, partner: Any) -> Any:
+    """Repeat a number in each lane if `partner` is lanes."""
+    return spread_over(builder, number) if partner.type == VECTOR else number
 
 
 @intrinsic
 def combine(context: Any, weights: Any, vectors: Any) -> Any:
-    """Sum of weights[j] vectors[j], both tuples, as a tuple of the vectors' length."""
+    """Return the sum of weights[j] vectors[j]; all are tuples."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         sums = _sums(builder, arguments[0], arguments[1], vectors.dtype.count)
@@ -54,14 +54,14 @@ def combine(context: Any, weights: Any, vectors: Any) -> Any:
 
 
 @intrinsic
-def shifted(context: Any, y: Any, h: Any, weights: Any, vectors: Any) -> Any:
-    """The state y + h times the sum of weights[j] vectors[j]: a stage of a Runge-Kutta step."""
+def stage_state(context: Any, y: Any, h: Any, weights: Any, vectors: Any) -> Any:
+    """Return y + h sum(weights[j] vectors[j]), the state of a Runge-Kutta stage."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         state, step, factors, columns = arguments
         sums = _sums(builder, factors, columns, y.count)
         start = cgutils.unpack_tuple(builder, state)
-        step = like(builder, step, start[0])
+        step = match_lanes(builder, step, start[0])
         moved = [multiply_add(builder, step, total, value) for total, value in zip(sums, start, strict=True)]
         return context.make_tuple(builder, signature.return_type, moved)
 
@@ -70,26 +70,26 @@ def shifted(context: Any, y: Any, h: Any, weights: Any, vectors: Any) -> Any:
 
 @inlined
 def stages_of(system: Any, t: float, y: State, k1: State, h: float) -> tuple[tuple[State, ...], State, State]:
-    """The stages that the solution, its error and dense output use (k1, k6 .. k12), the solution and its derivative."""
-    k2 = derivative(system, t + C[1] * h, shifted(y, h, A_2, (k1,)))
-    k3 = derivative(system, t + C[2] * h, shifted(y, h, A_3, (k1, k2)))
-    k4 = derivative(system, t + C[3] * h, shifted(y, h, A_4, (k1, k3)))
-    k5 = derivative(system, t + C[4] * h, shifted(y, h, A_5, (k1, k3, k4)))
-    k6 = derivative(system, t + C[5] * h, shifted(y, h, A_6, (k1, k4, k5)))
-    k7 = derivative(system, t + C[6] * h, shifted(y, h, A_7, (k1, k4, k5, k6)))
-    k8 = derivative(system, t + C[7] * h, shifted(y, h, A_8, (k1, k4, k5, k6, k7)))
-    k9 = derivative(system, t + C[8] * h, shifted(y, h, A_9, (k1, k4, k5, k6, k7, k8)))
-    k10 = derivative(system, t + C[9] * h, shifted(y, h, A_10, (k1, k4, k5, k6, k7, k8, k9)))
-    k11 = derivative(system, t + C[10] * h, shifted(y, h, A_11, (k1, k4, k5, k6, k7, k8, k9, k10)))
-    k12 = derivative(system, t + h, shifted(y, h, A_12, (k1, k4, k5, k6, k7, k8, k9, k10, k11)))
+    """Compute the stages that solution and error use (k1, k6 .. k12), the solution and its derivative."""
+    k2 = derivative(system, t + C[1] * h, stage_state(y, h, A_2, (k1,)))
+    k3 = derivative(system, t + C[2] * h, stage_state(y, h, A_3, (k1, k2)))
+    k4 = derivative(system, t + C[3] * h, stage_state(y, h, A_4, (k1, k3)))
+    k5 = derivative(system, t + C[4] * h, stage_state(y, h, A_5, (k1, k3, k4)))
+    k6 = derivative(system, t + C[5] * h, stage_state(y, h, A_6, (k1, k4, k5)))
+    k7 = derivative(system, t + C[6] * h, stage_state(y, h, A_7, (k1, k4, k5, k6)))
+    k8 = derivative(system, t + C[7] * h, stage_state(y, h, A_8, (k1, k4, k5, k6, k7)))
+    k9 = derivative(system, t + C[8] * h, stage_state(y, h, A_9, (k1, k4, k5, k6, k7, k8)))
+    k10 = derivative(system, t + C[9] * h, stage_state(y, h, A_10, (k1, k4, k5, k6, k7, k8, k9)))
+    k11 = derivative(system, t + C[10] * h, stage_state(y, h, A_11, (k1, k4, k5, k6, k7, k8, k9, k10)))
+    k12 = derivative(system, t + h, stage_state(y, h, A_12, (k1, k4, k5, k6, k7, k8, k9, k10, k11)))
     used = (k1, k6, k7, k8, k9, k10, k11, k12)
-    y_new = shifted(y, h, A_13, used)
+    y_new = stage_state(y, h, A_13, used)
     return used, y_new, derivative(system, t + h, y_new)
 
 
 @inlined
 def error_sums(method: Any, y: State, y_new: State, by_order_5: State, by_order_3: State) -> tuple[float, float]:
-    """Sums of squares of both errors over the tolerance; `method` is whatever holds rtol and atol."""
+    """Sum the squares of both errors divided by the tolerance; `method` holds rtol and atol."""
     error_5, error_3 = 0.0, 0.0
     for i in range(len(y)):
         scale = 1.0 / (method.atol + method.rtol * max(abs(y[i]), abs(y_new[i])))

@@ -1,11 +1,8 @@
-"""Several numbers side by side, one of each walk, in one register of the processor: arithmetic does all at once.
+"""Vector type of compiled code with one number per walk, so that one instruction serves several walks.
 
-A function on floats compiles for lanes too, as long as it does not branch on them: sums, products, roots, `min`, `max`
-and `abs` mean what they mean for floats, lane by lane, and a float beside lanes stands for the same number in each.
-Lanes never mix, so that what becomes of a walk does not depend on its neighbours. Systems with shorter registers take
-several of them.
-
-They exist in compiled code only.
+A function of floats also compiles for lanes if it does not branch on them: arithmetic, square roots, `min`, `max` and
+`abs` act on each lane, and a float combined with lanes is the same in each lane. Lanes never mix, so a walk does not
+depend on its neighbours. Processors with shorter registers use several of them.
 """
 
 import functools
@@ -21,25 +18,25 @@ from numba.core.typeconv import Conversion
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 from numba.extending import intrinsic, lower_builtin, lower_cast, models, register_model
 
-WIDTH = 8  # doubles; what AVX-512 holds
+WIDTH = 8  # doubles in a register of AVX-512
 
 Lanes = Any
-"""A number in each lane; for annotations."""
+"""Annotation for a value with a number in each lane."""
 
 
 class LanesType(types.Type):  # type: ignore[misc]
-    """Type of lanes in compiled code; floats convert to it."""
+    """Numba's type of lanes; floats convert to it."""
 
     def __init__(self) -> None:
-        """There is one width only."""
+        """Create the type; there is only one width."""
         super().__init__(name="lanes")
 
     def can_convert_from(self, typingctx: Any, other: Any) -> Any:  # noqa: ARG002 - numba calls it so
-        """Floats may."""
+        """Allow conversion from floats and integers."""
         return Conversion.safe if isinstance(other, types.Float | types.Integer) else None
 
     def unify(self, typingctx: Any, other: Any) -> Any:  # noqa: ARG002 - numba calls it so
-        """A variable that is a float here and lanes there is lanes."""
+        """Make a variable lanes if it is a float on one path and lanes on another."""
         return self if isinstance(other, types.Float | types.Integer) else None
 
 
@@ -54,13 +51,13 @@ class _LanesModel(models.PrimitiveModel):  # type: ignore[misc]
 
 
 def spread_over(builder: Any, value: Any) -> Any:
-    """A value as lanes: itself, or the same number in each."""
+    """Return lanes unchanged, and a number repeated in each lane."""
     if value.type == VECTOR:
         return value
-    nothing = ir.Constant(VECTOR, ir.Undefined)
-    first = builder.insert_element(nothing, value, ir.Constant(ir.IntType(32), 0))
-    everywhere = ir.Constant(ir.VectorType(ir.IntType(32), WIDTH), [0] * WIDTH)
-    return builder.shuffle_vector(first, nothing, everywhere)
+    undefined = ir.Constant(VECTOR, ir.Undefined)
+    first = builder.insert_element(undefined, value, ir.Constant(ir.IntType(32), 0))
+    mask = ir.Constant(ir.VectorType(ir.IntType(32), WIDTH), [0] * WIDTH)
+    return builder.shuffle_vector(first, undefined, mask)
 
 
 def _as_lanes(context: Any, builder: Any, value: Any, kind: Any) -> Any:
@@ -76,22 +73,22 @@ def _cast(context: Any, builder: Any, kind: Any, _to: Any, value: Any) -> Any:
 
 
 def holds_lanes(kind: Any) -> bool:
-    """Whether a type of numba's is that of lanes, or of a tuple of them."""
+    """Whether a numba type is lanes or a tuple of lanes."""
     return isinstance(kind, LanesType) or (isinstance(kind, types.UniTuple) and isinstance(kind.dtype, LanesType))
 
 
-def _number(kind: Any) -> bool:
+def _is_number(kind: Any) -> bool:
     return isinstance(kind, LanesType | types.Float | types.Integer)
 
 
 def _define(function: Callable[..., Any], build: Callable[..., Any], arguments: Any) -> None:
-    """Have a function of numbers work on lanes; `build` gets the builder and the arguments, all of them lanes."""
+    """Define a function of numbers for lanes; `build` receives the builder and all arguments as lanes."""
 
     class LaneTemplate(AbstractTemplate):  # type: ignore[misc]
         key = function
 
         def generic(self, given: Any, named: Any) -> Any:
-            if named or not all(_number(kind) for kind in given) or LANES not in given:
+            if named or not all(_is_number(kind) for kind in given) or LANES not in given:
                 return None
             return signature(LANES, *(LANES for _ in given))
 
@@ -103,13 +100,12 @@ def _define(function: Callable[..., Any], build: Callable[..., Any], arguments: 
     lower_builtin(function, *arguments)(generate)
 
 
-def _instruction_of(name: str) -> Callable[..., Any]:
-    """One of LLVM's own instructions."""
-    return lambda builder, one, other: getattr(builder, name)(one, other)
+def _instruction(name: str) -> Callable[..., Any]:
+    return lambda builder, a, b: getattr(builder, name)(a, b)
 
 
-def _called(name: str) -> Callable[..., Any]:
-    """An intrinsic of LLVM on lanes."""
+def _intrinsic(name: str) -> Callable[..., Any]:
+    """Return a builder of calls of LLVM's vector intrinsic."""
 
     def build(builder: Any, *lanes: Any) -> Any:
         kind = ir.FunctionType(VECTOR, [VECTOR] * len(lanes))
@@ -120,8 +116,8 @@ def _called(name: str) -> Callable[..., Any]:
 
 
 def _pairwise(name: str) -> Callable[..., Any]:
-    """An intrinsic of two arguments, for as many as there are."""
-    both = _called(name)
+    """Extend an intrinsic of two arguments to any number of arguments."""
+    both = _intrinsic(name)
 
     def build(builder: Any, first: Any, *rest: Any) -> Any:
         for lanes in rest:
@@ -132,17 +128,17 @@ def _pairwise(name: str) -> Callable[..., Any]:
 
 
 def multiply_add(builder: Any, a: Any, b: Any, c: Any) -> Any:
-    """a b + c rounded once, of floats or of lanes."""
-    return _called("fma")(builder, a, b, c) if a.type == VECTOR else builder.fma(a, b, c)
+    """Build a b + c, rounded once, for floats or lanes."""
+    return _intrinsic("fma")(builder, a, b, c) if a.type == VECTOR else builder.fma(a, b, c)
 
 
 @functools.cache
 def teach_arithmetic() -> None:
-    """Register arithmetic on lanes with numba, before the first kernel that does any is compiled.
+    """Register arithmetic on lanes with numba; needed before the first kernel with lanes is compiled.
 
-    Operators are registered for all that a process compiles, so not by an import alone.
+    An import alone does not do this because it affects everything that the process compiles.
     """
-    one, two, some = (LANES,), (LANES, LANES), (types.VarArg(LANES),)
+    unary, binary, variadic = (LANES,), (LANES, LANES), (types.VarArg(LANES),)
     for plain, in_place, instruction in (
         (operator.add, operator.iadd, "fadd"),
         (operator.sub, operator.isub, "fsub"),
@@ -150,43 +146,43 @@ def teach_arithmetic() -> None:
         (operator.truediv, operator.itruediv, "fdiv"),
     ):
         for each in (plain, in_place):
-            _define(each, _instruction_of(instruction), two)
-    _define(operator.neg, lambda builder, a: builder.fneg(a), one)
-    _define(abs, _called("fabs"), one)
-    _define(math.sqrt, _called("sqrt"), one)
-    _define(min, _pairwise("minnum"), some)
-    _define(max, _pairwise("maxnum"), some)
+            _define(each, _instruction(instruction), binary)
+    _define(operator.neg, lambda builder, a: builder.fneg(a), unary)
+    _define(abs, _intrinsic("fabs"), unary)
+    _define(math.sqrt, _intrinsic("sqrt"), unary)
+    _define(min, _pairwise("minnum"), variadic)
+    _define(max, _pairwise("maxnum"), variadic)
 
 
 @intrinsic
 def nearest(context: Any, x: Any) -> Any:
-    """The nearest whole number in each lane."""
+    """Round each lane to the nearest integer."""
     if not isinstance(x, LanesType):
         return None
 
     def generate(context: Any, builder: Any, sig: Any, arguments: Any) -> Any:
-        return _called("rint")(builder, arguments[0])
+        return _intrinsic("rint")(builder, arguments[0])
 
     return LANES(LANES), generate
 
 
 @intrinsic
-def choose(context: Any, sign: Any, one: Any, other: Any) -> Any:
-    """`one` in lanes where `sign` is positive, `other` in the others, also where `sign` is not a number."""
+def choose(context: Any, sign: Any, if_positive: Any, otherwise: Any) -> Any:
+    """Select `if_positive` in lanes where `sign` is positive, `otherwise` elsewhere, also where `sign` is NaN."""
 
     def generate(context: Any, builder: Any, sig: Any, arguments: Any) -> Any:
-        sign, one, other = (
+        sign, if_positive, otherwise = (
             _as_lanes(context, builder, value, kind) for value, kind in zip(arguments, sig.args, strict=True)
         )
         positive = builder.fcmp_ordered(">", sign, ir.Constant(VECTOR, [0.0] * WIDTH))
-        return builder.select(positive, one, other)
+        return builder.select(positive, if_positive, otherwise)
 
-    return LANES(sign, one, other), generate
+    return LANES(sign, if_positive, otherwise), generate
 
 
 @intrinsic
 def any_positive(context: Any, x: Any) -> Any:
-    """Whether a lane is positive."""
+    """Whether any lane is positive."""
 
     def generate(context: Any, builder: Any, sig: Any, arguments: Any) -> Any:
         positive = builder.fcmp_ordered(">", arguments[0], ir.Constant(VECTOR, [0.0] * WIDTH))
@@ -196,8 +192,7 @@ def any_positive(context: Any, x: Any) -> Any:
     return types.boolean(LANES), generate
 
 
-def _place(context: Any, builder: Any, array_type: Any, array: Any, row: Any) -> Any:
-    """Address of a row of a contiguous array (rows, WIDTH)."""
+def _row_pointer(context: Any, builder: Any, array_type: Any, array: Any, row: Any) -> Any:
     data = context.make_array(array_type)(context, builder, array).data
     element = builder.gep(data, [builder.mul(row, ir.Constant(row.type, WIDTH))])
     return builder.bitcast(element, VECTOR.as_pointer())
@@ -205,21 +200,21 @@ def _place(context: Any, builder: Any, array_type: Any, array: Any, row: Any) ->
 
 @intrinsic
 def load_lanes(context: Any, array: Any, row: Any) -> Any:
-    """Row `row` of a contiguous array (rows, WIDTH)."""
+    """Load row `row` of a contiguous array (rows, WIDTH)."""
 
     def generate(context: Any, builder: Any, sig: Any, arguments: Any) -> Any:
-        return builder.load(_place(context, builder, sig.args[0], *arguments), align=8)
+        return builder.load(_row_pointer(context, builder, sig.args[0], *arguments), align=8)
 
     return LANES(array, types.intp), generate
 
 
 @intrinsic
 def store_lanes(context: Any, value: Any, array: Any, row: Any) -> Any:
-    """Write lanes into row `row` of a contiguous array (rows, WIDTH)."""
+    """Store lanes in row `row` of a contiguous array (rows, WIDTH)."""
 
     def generate(context: Any, builder: Any, sig: Any, arguments: Any) -> Any:
         lanes = _as_lanes(context, builder, arguments[0], sig.args[0])
-        builder.store(lanes, _place(context, builder, sig.args[1], *arguments[1:]), align=8)
+        builder.store(lanes, _row_pointer(context, builder, sig.args[1], *arguments[1:]), align=8)
         return context.get_dummy_value()
 
     return types.void(value, array, types.intp), generate

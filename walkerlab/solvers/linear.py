@@ -8,12 +8,12 @@ from walkerlab.kernels import PART_FLAGS, compile_as, inlined
 
 
 def reciprocal(x: Any) -> Any:
-    """Of a real or complex number."""
+    """Reciprocal of a real or complex number."""
     return 1.0 / x
 
 
 def complex_reciprocal(x: Any) -> Any:
-    """The same to the last bit, by Smith's formulas as in Python; numba compiles a function for its division."""
+    """Reciprocal by Smith's formulas, equal to Python's to the last bit; numba's division is a function call."""
     if abs(x.real) >= abs(x.imag):
         ratio = x.imag / x.real
         whole = x.real + x.imag * ratio
@@ -28,13 +28,13 @@ compile_as(reciprocal, lambda x: (complex_reciprocal if isinstance(x, types.Comp
 
 @inlined
 def size(x: Any) -> float:
-    """Real and imaginary part's sizes together: enough to choose a pivot by, and without a root."""
+    """Sum of the sizes of real and imaginary part: chooses pivots without a square root."""
     return abs(x.real) + abs(x.imag)
 
 
 @inlined
 def factor(A: Any, pivots: Any, n: int) -> bool:
-    """LU factors of the first n rows and columns of A with row exchanges, in place; False if they are singular.
+    """Compute LU factors of A[:n, :n] in place, with row exchanges; returns False if it is singular.
 
     Works for real and complex A. The diagonal holds the pivots' reciprocals.
     """
@@ -61,7 +61,7 @@ def factor(A: Any, pivots: Any, n: int) -> bool:
 
 @inlined
 def solve(A: Any, pivots: Any, b: Any, first: int, n: int) -> None:
-    """Solve with the factors from `factor`, overwriting the n numbers of b from `first` on."""
+    """Solve with factors from `factor`, overwriting b[first : first + n]."""
     for k in range(n):
         best = pivots[k]
         if best != k:

@@ -1,4 +1,4 @@
-"""Radau IIA of order 5: implicit, L-stable, for stiff contact; simplified Newton with the system's exact Jacobian.
+"""Radau IIA of order 5: implicit and L-stable, for stiff contact; simplified Newton with an exact Jacobian.
 
 Source: Hairer, Wanner, Solving Ordinary Differential Equations II, 2nd ed. (1996), section IV.8.
 """
@@ -46,16 +46,16 @@ INV_2 = (-4.17871859155190428, -0.32768282076106237, 0.47662355450055044)
 INV_3 = (0.50287263494578682, -2.57192694985560522, 0.59603920482822492)
 # error estimate (8.19): h gamma_0 f(y_0) + sum e_i z_i, times gamma
 ERROR = ((-13.0 - 7.0 * ROOT6) / 3.0, (-13.0 + 7.0 * ROOT6) / 3.0, -1.0 / 3.0)
-# the collocation polynomial: z(s) = s (P_1 + s (P_2 + s P_3)), each a combination of z_1, z_2, z_3
+# collocation polynomial z(s) = s (P_1 + s (P_2 + s P_3)), each a combination of z_1, z_2, z_3
 P_1 = (13.0 / 3.0 + 7.0 * ROOT6 / 3.0, 13.0 / 3.0 - 7.0 * ROOT6 / 3.0, 1.0 / 3.0)
 P_2 = (-23.0 / 3.0 - 22.0 * ROOT6 / 3.0, -23.0 / 3.0 + 22.0 * ROOT6 / 3.0, -8.0 / 3.0)
 P_3 = (10.0 / 3.0 + 5.0 * ROOT6, 10.0 / 3.0 - 5.0 * ROOT6, 10.0 / 3.0)
 
 SAFETY, SHRINK_MOST, GROW_MOST = 0.9, 0.125, 8.0
-KEEP_LOW, KEEP_HIGH = 1.0, 1.2  # step ratios within which the factored matrices are kept
-FRESH_RATE = 1e-3  # Newton convergence below which the Jacobian is kept
+KEEP_LOW, KEEP_HIGH = 1.0, 1.2  # step ratios for which the factored matrices are kept
+FRESH_RATE = 1e-3  # the Jacobian is kept if Newton converges faster
 FIRST_STEP = 1e-6
-NEWTON_MOST = 7
+MAX_NEWTON = 7
 
 # indices into `control`
 H_FACTORED, H_OLD, ERROR_OLD, RATE, SMOOTH, FRESH, UNKNOWNS = 0, 1, 2, 3, 4, 5, 6
@@ -63,7 +63,7 @@ H_FACTORED, H_OLD, ERROR_OLD, RATE, SMOOTH, FRESH, UNKNOWNS = 0, 1, 2, 3, 4, 5, 
 
 @by_reference
 class Radau5(NamedTuple):
-    """The method with its memory for n equations."""
+    """Radau IIA with memory for n equations; see `stepping` for the first six fields."""
 
     rtol: float
     atol: float
@@ -71,23 +71,23 @@ class Radau5(NamedTuple):
     y_old: Any
     y: Any
     counts: Any
-    at: Any  # (n,) where a derivative is asked for
-    slope: Any  # (2, n) derivative at the start of the next step, and of the last
-    z: Any  # (3, n) stages less the step's start
-    w: Any  # (3, n) the same, transformed
-    f: Any  # (3, n) stage derivatives, transformed; Newton's right-hand sides
+    at: Any  # (n,) state at which a derivative is evaluated
+    slope: Any  # (2, n) derivative at the start of the next and of the last step
+    z: Any  # (3, n) stages minus the step's start
+    w: Any  # (3, n) z, transformed
+    f: Any  # (3, n) stage derivatives
     dense: Any  # (3, n) coefficients of the collocation polynomial
     J: Any  # (n, n)
     real: Any  # (n, n) factors of gamma/h I - J
     pair: Any  # (n, n) complex factors of (alpha - i beta)/h I - J
     pivots: Any  # (2, n)
-    move: Any  # (n,) Newton's move, real part of the transformed system
-    move_pair: Any  # (n,) complex, the pair's
+    move: Any  # (n,) Newton's move in the real part of the transformed system
+    move_pair: Any  # (n,) complex, in the other part
     control: Any  # (7,) see the indices above
 
 
 def new_radau5(n: int, rtol: float, atol: float, budget: int) -> Radau5:
-    """A Radau IIA method for n equations that may evaluate `budget` right-hand sides."""
+    """Create a Radau IIA method for n equations and at most `budget` right-hand sides."""
     counts = np.zeros(COUNTS, np.int64)
     counts[BUDGET] = budget
     three, square = (3, n), (n, n)
@@ -101,11 +101,11 @@ def new_radau5(n: int, rtol: float, atol: float, budget: int) -> Radau5:
 
 @inlined
 def factor_matrices(method: Radau5, h: float) -> bool:
-    """Factors of both matrices of the simplified Newton iteration for step h."""
-    left = int(method.control[UNKNOWNS])
+    """Factor both matrices of the simplified Newton iteration for step h; returns False if one is singular."""
+    size = int(method.control[UNKNOWNS])
     method.control[H_FACTORED] = h
-    real = factor_shifted(method.J, left, GAMMA / h, method.real, method.pivots[0])
-    return real and factor_shifted(method.J, left, complex(ALPHA / h, -BETA / h), method.pair, method.pivots[1])
+    real = factor_shifted(method.J, size, GAMMA / h, method.real, method.pivots[0])
+    return real and factor_shifted(method.J, size, complex(ALPHA / h, -BETA / h), method.pair, method.pivots[1])
 
 
 @inlined
@@ -125,7 +125,7 @@ def solve_pair(method: Radau5, r: Any) -> None:
 
 @inlined
 def first_guess(method: Radau5, h: float) -> None:
-    """Stages from the collocation polynomial of the step before, or zero after a start."""
+    """Extrapolate the stages from the last step's collocation polynomial; zero after a start."""
     ratio = h / method.control[H_OLD] if method.control[SMOOTH] > 0.0 else 0.0
     z, w, dense = method.z, method.w, method.dense
     for i in range(method.y.size):
@@ -140,7 +140,7 @@ def first_guess(method: Radau5, h: float) -> None:
 
 @inlined
 def newton_move(method: Radau5, system: Any, t: float, h: float) -> float:
-    """One simplified Newton iteration on the stages; returns the size of its move relative to the tolerance."""
+    """Do one simplified Newton iteration; returns the size of its move relative to the tolerance."""
     y, z, w, f = method.y, method.z, method.w, method.f
     n = y.size
     for stage in range(3):
@@ -172,11 +172,11 @@ def newton_move(method: Radau5, system: Any, t: float, h: float) -> float:
 
 @inlined
 def solve_stages(method: Radau5, system: Any, t: float, h: float) -> int:
-    """Iterate until the stages are accurate to a part of the tolerance; the iterations used, 0 if they diverge."""
+    """Iterate until the stages are accurate enough; returns the number of iterations, 0 if they diverge."""
     tolerance = max(10.0 * 2.3e-16 / method.rtol, min(0.03, math.sqrt(method.rtol)))
     first_guess(method, h)
     size_old, rate = 0.0, method.control[RATE]
-    for iteration in range(1, NEWTON_MOST + 1):
+    for iteration in range(1, MAX_NEWTON + 1):
         size = newton_move(method, system, t, h)
         if not size < 1e100:
             return 0
@@ -184,7 +184,7 @@ def solve_stages(method: Radau5, system: Any, t: float, h: float) -> int:
             rate = size / size_old
             if rate >= 0.99:
                 return 0
-            ahead = rate ** (NEWTON_MOST - iteration) / (1.0 - rate) * size
+            ahead = rate ** (MAX_NEWTON - iteration) / (1.0 - rate) * size
             if ahead > 10.0 * tolerance:
                 return 0
             method.control[RATE] = rate
@@ -196,7 +196,7 @@ def solve_stages(method: Radau5, system: Any, t: float, h: float) -> int:
 
 @begin.case(Radau5)
 def begin_radau5(method: Radau5, system: Any, t: float, y: Any, h: float) -> None:
-    """Derivative and Jacobian at the start; what was learnt of the step before is forgotten."""
+    """Evaluate derivative and Jacobian at the start, and discard step control's history."""
     clock, control = method.clock, method.control
     clock[T_OLD], clock[T], clock[H_NEXT] = t, t, h if h > 0.0 else FIRST_STEP
     for i in range(method.y.size):
@@ -209,7 +209,7 @@ def begin_radau5(method: Radau5, system: Any, t: float, y: Any, h: float) -> Non
 
 @inlined
 def step_error(method: Radau5, system: Any, t: float, h: float, again: bool) -> float:
-    """Error relative to the tolerance, (8.19); filtered once more, (8.20), after a rejection or a start."""
+    """Error relative to the tolerance, (8.19); filtered again by (8.20) after a rejection or a start."""
     n = method.y.size
     error, z = method.f[0], method.z
     for i in range(n):
@@ -231,7 +231,7 @@ def step_error(method: Radau5, system: Any, t: float, h: float, again: bool) -> 
 
 @inlined
 def error_size(method: Radau5, error: Any) -> float:
-    """Root mean square of the error over the tolerance."""
+    """Root mean square of the error divided by the tolerance."""
     y, total = method.y, 0.0
     for i in range(y.size):
         scale = method.atol + method.rtol * max(abs(y[i]), abs(y[i] + method.z[2, i]))
@@ -241,7 +241,7 @@ def error_size(method: Radau5, error: Any) -> float:
 
 @advance.case(Radau5)
 def advance_radau5(method: Radau5, system: Any, t_end: float) -> int:
-    """One accepted step with Hairer's predictive step control."""
+    """Use Hairer's predictive step control."""
     clock, control = method.clock, method.control
     t, h = clock[T], clock[H_NEXT]
     rejected = False
@@ -263,7 +263,7 @@ def advance_radau5(method: Radau5, system: Any, t_end: float) -> int:
             rejected = True
             continue
         error = step_error(method, system, t, h, rejected or control[SMOOTH] == 0.0)
-        safety = min(SAFETY, SAFETY * (1 + 2 * NEWTON_MOST) / (iterations + 2 * NEWTON_MOST))
+        safety = min(SAFETY, SAFETY * (1 + 2 * MAX_NEWTON) / (iterations + 2 * MAX_NEWTON))
         shrink = max(1.0 / GROW_MOST, min(1.0 / SHRINK_MOST, error**0.25 / safety))
         if error < 1.0:
             accept(method, system, t, t_end if last else t + h)
@@ -279,7 +279,7 @@ def advance_radau5(method: Radau5, system: Any, t_end: float) -> int:
 
 @inlined
 def refresh(method: Radau5, system: Any) -> None:
-    """The Jacobian at the step's start."""
+    """Evaluate the Jacobian at the step's start."""
     jacobian(system, method.clock[T], method.y, method.J)
     method.counts[JACOBIANS] += 1
     method.control[FRESH], method.control[H_FACTORED] = 1.0, 0.0
@@ -288,7 +288,7 @@ def refresh(method: Radau5, system: Any) -> None:
 
 @inlined
 def next_step(method: Radau5, h: float, error: float, shrink: float, safety: float) -> float:
-    """The step after an accepted one: the smaller of the error's and Gustafsson's prediction, (8.25)."""
+    """Step after an accepted one: the smaller of the standard and Gustafsson's prediction, (8.25)."""
     control = method.control
     if control[ERROR_OLD] > 0.0 and control[H_OLD] > 0.0:
         predicted = control[H_OLD] / h * (error * error / control[ERROR_OLD]) ** 0.25 / safety
@@ -302,7 +302,7 @@ def next_step(method: Radau5, h: float, error: float, shrink: float, safety: flo
 
 @inlined
 def accept(method: Radau5, system: Any, t: float, t_new: float) -> None:
-    """Make the step's end the state, keep its polynomial, and renew derivative and Jacobian."""
+    """Move to the end of the step, store its polynomial, and update derivative and Jacobian."""
     clock, control = method.clock, method.control
     y, z, slope, dense = method.y, method.z, method.slope, method.dense
     for i in range(y.size):
@@ -323,7 +323,7 @@ def accept(method: Radau5, system: Any, t: float, t_new: float) -> None:
 
 @rewind.case(Radau5)
 def rewind_radau5(method: Radau5, system: Any) -> None:
-    """Back to the step's start; the Jacobian of its end is near enough, the polynomial is not used."""
+    """Go back to the step's start; the next step's first guess does not use the polynomial."""
     clock, control = method.clock, method.control
     for i in range(method.y.size):
         method.y[i], method.slope[0, i] = method.y_old[i], method.slope[1, i]
@@ -334,12 +334,12 @@ def rewind_radau5(method: Radau5, system: Any) -> None:
 
 @prepare_dense.case(Radau5)
 def prepare_dense_radau5(method: Radau5, system: Any) -> None:
-    """The collocation polynomial is there already."""
+    """Nothing to do: `accept` has stored the polynomial."""
 
 
 @interpolate.case(Radau5)
 def interpolate_radau5(method: Radau5, system: Any, fraction: float, y: Any) -> None:
-    """The collocation polynomial."""
+    """Evaluate the collocation polynomial."""
     s, dense = fraction, method.dense
     for i in range(y.size):
         y[i] = fused(s * s * s, dense[2, i], fused(s * s, dense[1, i], fused(s, dense[0, i], method.y_old[i])))

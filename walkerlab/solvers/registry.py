@@ -1,4 +1,4 @@
-"""Every method by name: one list, one signature."""
+"""Registry of integration methods, and the settings to integrate with."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -17,10 +17,10 @@ class Method:
     """An integration method.
 
     name      as in configs
-    new       builds it: (equations, rtol, atol, budget of right-hand sides)
-    stiff     whether it is meant for stiff problems
-    orders    lowest and highest; the same but for methods that vary it
-    compiled  whether whole walks compile with it; a library's method walks in Python
+    new       factory: (number of equations, rtol, atol, budget of right-hand sides)
+    stiff     whether it suits stiff problems
+    orders    minimum and maximum; equal unless the method varies its order
+    compiled  whether whole walks compile with it; walks with a library's method run in Python
     """
 
     name: str
@@ -30,10 +30,10 @@ class Method:
     compiled: bool = False
 
 
-def of_scipy(class_name: str, takes_jacobian: bool = True) -> Callable[[int, float, float, int], ScipyMethod]:
-    """What builds methods with a class of scipy.integrate, which is loaded where one starts.
+def scipy_factory(class_name: str, takes_jacobian: bool = True) -> Callable[[int, float, float, int], ScipyMethod]:
+    """Return a factory for methods with a class of scipy.integrate; scipy is imported on first use.
 
-    takes_jacobian  whether there is use for the Jacobian
+    takes_jacobian  whether the class uses the Jacobian
     """
 
     def new_solver(*problem: Any, **options: Any) -> Any:
@@ -44,8 +44,8 @@ def of_scipy(class_name: str, takes_jacobian: bool = True) -> Callable[[int, flo
     return partial(ScipyMethod, new_solver, takes_jacobian)
 
 
-def of_cvode(family: str) -> Callable[[int, float, float, int], ScipyMethod]:
-    """What builds methods with one of CVODE's families of formulas."""
+def cvode_factory(family: str) -> Callable[[int, float, float, int], ScipyMethod]:
+    """Return a factory for methods with one of CVODE's families, "BDF" or "Adams"."""
     return partial(ScipyMethod, partial(cvode.CvodeSolver, family), True)
 
 
@@ -54,21 +54,21 @@ OWN = (
     Method("radau5", new_radau5, stiff=True, orders=(5, 5), compiled=True),
 )
 SCIPY = (
-    Method("scipy-rk45", of_scipy("RK45", takes_jacobian=False), stiff=False, orders=(5, 5)),
-    Method("scipy-dop853", of_scipy("DOP853", takes_jacobian=False), stiff=False, orders=(8, 8)),
-    Method("scipy-lsoda", of_scipy("LSODA"), stiff=True, orders=(1, 12)),
-    Method("scipy-radau", of_scipy("Radau"), stiff=True, orders=(5, 5)),
-    Method("scipy-bdf", of_scipy("BDF"), stiff=True, orders=(1, 5)),
+    Method("scipy-rk45", scipy_factory("RK45", takes_jacobian=False), stiff=False, orders=(5, 5)),
+    Method("scipy-dop853", scipy_factory("DOP853", takes_jacobian=False), stiff=False, orders=(8, 8)),
+    Method("scipy-lsoda", scipy_factory("LSODA"), stiff=True, orders=(1, 12)),
+    Method("scipy-radau", scipy_factory("Radau"), stiff=True, orders=(5, 5)),
+    Method("scipy-bdf", scipy_factory("BDF"), stiff=True, orders=(1, 5)),
 )
 CVODE = (
-    Method("cvode-bdf", of_cvode("BDF"), stiff=True, orders=(1, 5)),
-    Method("cvode-adams", of_cvode("Adams"), stiff=False, orders=(1, 12)),
+    Method("cvode-bdf", cvode_factory("BDF"), stiff=True, orders=(1, 5)),
+    Method("cvode-adams", cvode_factory("Adams"), stiff=False, orders=(1, 12)),
 )
 METHODS = {method.name: method for method in (*OWN, *SCIPY, *(CVODE if cvode.is_installed() else ()))}
 
 
 def method_named(name: str) -> Method:
-    """The method of that name; KeyError names those there are."""
+    """Return a method by name; raise KeyError with all names if there is none."""
     if name in METHODS:
         return METHODS[name]
     if any(method.name == name for method in CVODE):
@@ -77,17 +77,17 @@ def method_named(name: str) -> Method:
 
 
 ENDLESS = 2**62
-"""A budget for a walk that is given its right-hand sides step by step."""
+"""Budget of a walk whose right-hand sides are limited per step instead."""
 
 
 @dataclass(frozen=True)
 class Tolerances:
-    """By which method a walk is integrated, and how exactly.
+    """Method and tolerances of a walk's integration.
 
-    method        its name
-    rtol, atol    on the error of a step
-    budget        right-hand sides of a walk
-    track_energy  whether a contact walk keeps its energy balance, by which it is judged; ladders of methods do without
+    method        name of the method
+    rtol, atol    tolerances on the error of a step
+    budget        right-hand sides per walk
+    track_energy  whether a contact walk is checked by its energy balance; comparisons of methods do without
     """
 
     method: str
@@ -98,16 +98,16 @@ class Tolerances:
 
     @property
     def compiled(self) -> bool:
-        """Whether whole walks compile with the method."""
+        """See `Method.compiled`."""
         return method_named(self.method).compiled
 
     def new(self, n: int) -> Any:
-        """The method with memory for n equations."""
+        """Create the method with memory for n equations."""
         return method_named(self.method).new(n, self.rtol, self.atol, self.budget)
 
 
 def sharing(method: Any, clock: Any, counts: Any) -> Any:
-    """The method with another's clock and counts for its own: both integrate one walk, by turns."""
+    """Return the method with the clock and counts of another one: both integrate the same walk in turns."""
     if isinstance(method, ScipyMethod):
         method.clock, method.counts = clock, counts
         return method
@@ -115,10 +115,10 @@ def sharing(method: Any, clock: Any, counts: Any) -> Any:
 
 
 def dense_degree(method: Any) -> int:
-    """Degree of the polynomial that `interpolate` evaluates."""
+    """Degree of a method's dense output."""
     return DENSE_DEGREE if isinstance(method, ScipyMethod) else len(method.dense)
 
 
-def finder_for(method: Any, event_functions: int, numbers: int) -> CrossingFinder:
-    """A crossing finder that fits a method's dense output, for event functions of a state of some numbers."""
-    return new_crossing_finder(dense_degree(method), event_functions, numbers)
+def finder_for(method: Any, event_functions: int, state_size: int) -> CrossingFinder:
+    """Create a crossing finder for a method's dense output and event functions of states (state_size,)."""
+    return new_crossing_finder(dense_degree(method), event_functions, state_size)

@@ -1,6 +1,6 @@
-"""Libraries' integrators behind the same functions as our own, with the compiled right-hand side: SciPy's, and CVODE.
+"""Integrators of SciPy and SUNDIALS behind the functions of `stepping`, for comparison and as a check.
 
-They serve as peers and as a check. Walks with them run in Python: the same source, uncompiled.
+The right-hand side is compiled; the walk itself runs in Python from the same source.
 """
 
 from collections.abc import Callable
@@ -32,41 +32,41 @@ from walkerlab.solvers.stepping import (
 from walkerlab.solvers.system import Integers, derivative, jacobian
 
 DENSE_DEGREE = 7
-"""High enough for the dense output of all of them."""
+"""Degree of all methods' dense output, or higher."""
 
 
 class OutOfBudgetError(Exception):
-    """The right-hand sides are used up; ends a step of a library that knows no budget."""
+    """Raised within a library's step when the budget of right-hand sides is exhausted."""
 
 
 @kernel
 def right_hand_side(system: Any, t: float, y: Any, dy: Any) -> None:
-    """dy/dt of any system, arrays in and out."""
+    """See `derivative`."""
     derivative(system, t, y, dy)
 
 
 @kernel
 def jacobian_matrix(system: Any, t: float, y: Any, J: Any) -> None:
-    """The Jacobian of any system, arrays in and out."""
+    """See `jacobian`."""
     jacobian(system, t, y, J)
 
 
 def entry_point(function: Any, *arguments: Any) -> Callable[..., None]:
-    """The machine code of a kernel for arguments of these types, without the cost of looking at them again."""
+    """Return a kernel's machine code for arguments of these types, without the cost of dispatch."""
     code: Callable[..., None] = function.compile(tuple(numba.typeof(argument) for argument in arguments))
     return code
 
 
 class ScipyMethod:
-    """A library's integrator with the fields of a method."""
+    """Integrator of a library with the fields that `stepping` requires."""
 
     def __init__(
         self, new_solver: Callable[..., Any], takes_jacobian: bool, n: int, rtol: float, atol: float, budget: int
     ) -> None:
-        """Prepare for n equations; the solver itself is made by `begin`.
+        """Prepare for n equations; `begin` creates the solver.
 
-        new_solver      makes it, called as the classes of scipy.integrate are
-        takes_jacobian  whether there is use for the Jacobian
+        new_solver      factory with the signature of the classes of scipy.integrate
+        takes_jacobian  whether the solver uses the Jacobian
         """
         self.new_solver, self.takes_jacobian = new_solver, takes_jacobian
         self.rtol, self.atol = rtol, atol
@@ -78,8 +78,8 @@ class ScipyMethod:
         self.dense: Any = None
 
 
-def counted(counts: Integers, system: Any, n: int) -> Callable[[float, Any], Any]:
-    """The compiled right-hand side as libraries call it, counting and keeping the budget."""
+def counting_rhs(counts: Integers, system: Any, n: int) -> Callable[[float, Any], Any]:
+    """Return the compiled right-hand side as libraries call it; it counts calls and raises OutOfBudgetError."""
     probe = np.zeros(n)
     code = entry_point(right_hand_side, system, 0.0, probe, probe)
 
@@ -94,8 +94,8 @@ def counted(counts: Integers, system: Any, n: int) -> Callable[[float, Any], Any
     return fun
 
 
-def counted_jacobian(method: ScipyMethod, system: Any, n: int) -> Callable[[float, Any], Any]:
-    """The compiled Jacobian as libraries call it, counting."""
+def counting_jacobian(method: ScipyMethod, system: Any, n: int) -> Callable[[float, Any], Any]:
+    """Return the compiled Jacobian as libraries call it; it counts calls."""
     code = entry_point(jacobian_matrix, system, 0.0, np.zeros(n), np.zeros((n, n)))
 
     def jac(t: float, y: Any) -> Any:
@@ -109,23 +109,23 @@ def counted_jacobian(method: ScipyMethod, system: Any, n: int) -> Callable[[floa
 
 @begin.case(ScipyMethod)
 def begin_scipy(method: ScipyMethod, system: Any, t: float, y: Any, h: float) -> None:
-    """Make a new solver; it chooses its first step itself."""
+    """Create a new solver, which chooses its first step."""
     n = method.y.size
     method.y[:] = y
     method.clock[T_OLD] = method.clock[T] = t
     options: dict[str, Any] = {"rtol": max(method.rtol, 2.3e-14), "atol": method.atol}
     if method.takes_jacobian:
-        options["jac"] = counted_jacobian(method, system, n)
+        options["jac"] = counting_jacobian(method, system, n)
     method.dense = None
     try:
-        method.solver = method.new_solver(counted(method.counts, system, n), t, method.y.copy(), np.inf, **options)
+        method.solver = method.new_solver(counting_rhs(method.counts, system, n), t, method.y.copy(), np.inf, **options)
     except OutOfBudgetError:
         method.solver = None
 
 
 @advance.case(ScipyMethod)
 def advance_scipy(method: ScipyMethod, system: Any, t_end: float) -> int:
-    """What is left of the solver's last step, if that was cut short or rewound, else its next; never beyond t_end."""
+    """Take the rest of the solver's last step if it was cut short or rewound, otherwise its next step."""
     clock = method.clock
     if method.dense is None or method.solver.t <= clock[T]:
         status = step_solver(method)
@@ -139,16 +139,16 @@ def advance_scipy(method: ScipyMethod, system: Any, t_end: float) -> int:
 
 
 def step_solver(method: ScipyMethod) -> int:
-    """One step of the solver's own choice, with its dense output; returns what became of it."""
+    """Take one step of a size that the solver chooses; returns a status as `advance` does."""
     if method.solver is None:
         return OUT_OF_BUDGET
     try:
-        # a step tried too far may leave all bounds: the library then takes a shorter one
+        # a trial step may overflow; the library then takes a shorter one
         with np.errstate(over="ignore", invalid="ignore"):
             method.solver.step()
         if method.solver.status == "failed":
             return STEP_TOO_SMALL
-        # some dense outputs evaluate the right-hand side too
+        # dense output may evaluate the right-hand side and exhaust the budget
         method.dense = method.solver.dense_output()
     except OutOfBudgetError:
         return OUT_OF_BUDGET
@@ -159,26 +159,26 @@ def step_solver(method: ScipyMethod) -> int:
 
 @rewind.case(ScipyMethod)
 def rewind_scipy(method: ScipyMethod, system: Any) -> None:
-    """The step's dense output stays; `advance` reads the event's state off it."""
+    """Keep the dense output of the step; `advance` then evaluates it at the event."""
     method.clock[T] = method.clock[T_OLD]
     method.y[:] = method.y_old
 
 
 @prepare_dense.case(ScipyMethod)
 def prepare_dense_scipy(method: ScipyMethod, system: Any) -> None:
-    """Each step makes its own."""
+    """Nothing to do: `step_solver` has stored the dense output."""
 
 
 @interpolate.case(ScipyMethod)
 def interpolate_scipy(method: ScipyMethod, system: Any, fraction: float, y: Any) -> None:
-    """The library's dense output."""
+    """Evaluate the library's dense output."""
     t_old, t = method.clock[T_OLD], method.clock[T]
     y[:] = method.dense(t_old + fraction * (t - t_old))[: y.size]
 
 
 @sample.case(ScipyMethod)
 def sample_scipy(method: ScipyMethod, system: Any, fractions: Any, states: Any) -> None:
-    """All at once."""
+    """Evaluate the library's dense output at all fractions in one call."""
     t_old, t = method.clock[T_OLD], method.clock[T]
-    found = method.dense(t_old + fractions * (t - t_old))[: states.shape[1]]
-    states[: len(fractions), : len(found)] = found.T
+    columns = method.dense(t_old + fractions * (t - t_old))[: states.shape[1]]
+    states[: len(fractions), : len(columns)] = columns.T

@@ -1,6 +1,6 @@
-"""Semi-implicit Euler with a fixed step, as game engines integrate: velocities first, then positions with the new ones.
+"""Semi-implicit Euler with a fixed step, as in game engines: new velocities first, then positions from them.
 
-No error estimate, no events, first order: here to show what it does where the project's own methods are used.
+First order, without error estimate or events; used only for comparison.
 """
 
 import math
@@ -9,7 +9,7 @@ from typing import Any
 from walkerlab.kernels import kernel
 from walkerlab.solvers.system import derivative
 
-RUNAWAY = 1e12  # a number of the state beyond which a run has diverged
+DIVERGED = 1e12  # a component of the state beyond this means that the run diverged
 
 
 @kernel
@@ -18,8 +18,8 @@ def semi_implicit_euler(system: Any, y: Any, rate: Any, end: float, h: float, mo
 
     rate  (n,) scratch
 
-    The first half of y are positions, the second half their velocities. Returns how many steps were taken: fewer than
-    lead to `end` if `most_steps` are used up, or if a number of the state runs away or is none any more.
+    The first half of y holds positions, the second half their velocities. Returns the number of steps taken, which stop
+    before `end` after `most_steps` or when a component of the state diverges or is not a number.
     """
     half = y.size // 2
     steps = math.ceil(end / h * (1.0 - 1e-12))
@@ -31,6 +31,6 @@ def semi_implicit_euler(system: Any, y: Any, rate: Any, end: float, h: float, mo
         for i in range(half):
             y[i] += span * y[half + i]
         for i in range(y.size):
-            if not abs(y[i]) < RUNAWAY:
+            if not abs(y[i]) < DIVERGED:
                 return step + 1
     return min(steps, most_steps)

@@ -1,7 +1,7 @@
-"""What a continuous system is to an integrator: functions whose bodies are chosen by the type of the system.
+"""Interface of continuous systems: functions whose bodies are chosen by the type of the system.
 
-A system is a NamedTuple that registers a body for each of these; an integrator calls nothing else. States are arrays
-(n,) in memory of the caller, which `derivative` and `jacobian` read and never write.
+A system is a NamedTuple that registers a body for each of these; integrators call nothing else. States are arrays (n,)
+in the caller's memory, which `derivative` and `jacobian` never write.
 """
 
 from typing import Any
@@ -14,12 +14,12 @@ from walkerlab.kernels import by_type
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 State = tuple[float, ...]
-"""A state outside compiled code: it is never written to."""
+"""Immutable state, outside compiled code."""
 
 
 @by_type
 def block(system: Any) -> Any:
-    """As long as the blocks that loops over the state run in: its length, known while compiling, divides n."""
+    """Value whose length is the block size of loops over the state: fixed at compile time, it divides n."""
 
 
 @by_type

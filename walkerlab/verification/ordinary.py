@@ -25,8 +25,8 @@ from walkerlab.hybrid.recorded_walk import RigidWalkResult
 from walkerlab.paper.appendix_a import RigidWalker
 from walkerlab.paper.walker import compass_or_none
 from walkerlab.solvers.registry import Tolerances
-from walkerlab.solvers.scipy_methods import OutOfBudgetError, counted
-from walkerlab.solvers.semi_implicit_euler import RUNAWAY, semi_implicit_euler
+from walkerlab.solvers.scipy_methods import OutOfBudgetError, counting_rhs
+from walkerlab.solvers.semi_implicit_euler import DIVERGED, semi_implicit_euler
 from walkerlab.solvers.stepping import BUDGET, COUNTS, RHS
 from walkerlab.solvers.system import Floats
 from walkerlab.verification.scaling import pendulum_time
@@ -107,7 +107,7 @@ class Arrival:
             return Choice(self.case, method, "gives up", None, count, wall_s)
         error = finite(float(np.max(np.abs((y - self.state) / self.units))))
         scale = max(1.0, float(np.max(np.abs(self.state / self.units))))
-        if error > RUNS_AWAY * scale or float(np.max(np.abs(y[: y.size // 2]))) >= RUNAWAY:
+        if error > RUNS_AWAY * scale or float(np.max(np.abs(y[: y.size // 2]))) >= DIVERGED:
             return Choice(self.case, method, "diverges", None, count, wall_s)
         return Choice(self.case, method, "fine" if error <= FINE * scale else "wrong silently", error, count, wall_s)
 
@@ -152,7 +152,7 @@ def library(arrival: Arrival, ready: ContactStart, method: str) -> Choice:
     start = np.array(ready.start)
     counts = np.zeros(COUNTS, np.int64)
     counts[BUDGET] = CAP
-    right_hand_side = counted(counts, system, start.size)
+    right_hand_side = counting_rhs(counts, system, start.size)
     began = time.perf_counter()
     y = None
     with in_silence():
@@ -169,5 +169,5 @@ def fixed(arrival: Arrival, ready: ContactStart, h: float, cap: int = CAP) -> Ch
     began = time.perf_counter()
     taken = int(semi_implicit_euler(system, y, np.empty_like(y), arrival.time_s, h, cap))
     wall_s = time.perf_counter() - began
-    late = taken == cap and taken * h < arrival.time_s * (1.0 - 1e-9) and bool(np.all(np.abs(y) < RUNAWAY))
+    late = taken == cap and taken * h < arrival.time_s * (1.0 - 1e-9) and bool(np.all(np.abs(y) < DIVERGED))
     return arrival.judged(f"semi-implicit Euler, {h:g} s", None if late else y, taken, wall_s)
