@@ -50,6 +50,17 @@ def test_workers_of_this_machine_may_begin_before_there_are_points():
             assert pool.executor.submit(os.getpid).result() in workers
 
 
+def test_only_a_forced_sweep_computes_again_what_its_workers_remember(toy, marks, tmp_path):
+    counts = []
+    with LOCAL.begun(Order(workers=1)) as begun:
+        for first, force in ((2, False), (4, False), (4, True), (4, True)):
+            toy.run("roll", f"strides={first}:{first + 1}:2", engine=begun, order=Order(1), force=force)
+            counts.append(marks())
+            for mark in (tmp_path / "marks").iterdir():
+                mark.unlink()
+    assert counts == [1, 0, 1, 1]
+
+
 def test_a_worker_that_dies_by_chance_costs_nothing(toy, tmp_path, monkeypatch):
     monkeypatch.setenv("TOY_SWEEP_ONCE", str(tmp_path / "died"))
     swept = toy.run("deadly", "seed=18:24:7", engine=LOCAL, order=order())

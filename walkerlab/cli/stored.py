@@ -81,7 +81,7 @@ def state_of(step: Step) -> str:
         return "current" if step.found is not None and step.found.complete else "no answer"
     if step.damaged:
         return "damaged"
-    if step.stage.optional:
+    if step.stage.only_by:
         return "not run" if step.found is None else "outdated"
     return "missing" if step.found is None else "stale"
 

@@ -11,12 +11,13 @@ from typing import Any
 
 from walkerlab.config.schema import Config
 from walkerlab.kernel_cache import watched
-from walkerlab.pipeline.graph import NO_CONTACT, PIPELINE, Graph, Stage
+from walkerlab.pipeline.graph import PIPELINE, Graph, Stage, without_block
 from walkerlab.pipeline.progress import Reporter, Silent, StageReporter
 from walkerlab.pipeline.results import FolderResults, MemoryResults, Results, Step
 from walkerlab.pipeline.task import Precompiler, StageTask, nothing_compiled_yet, run_in_worker, task_of
 from walkerlab.scene.left_out import STILL_COMPUTED, LeftOut
-from walkerlab.store.artifact import NOT_THERE, StageAnswer, Stored
+from walkerlab.store.artifact import NOT_THERE, Stored
+from walkerlab.store.content import Content
 from walkerlab.store.key import Identity
 from walkerlab.store.runfolder import RunFolder
 from walkerlab.workers import WorkerPool
@@ -67,7 +68,7 @@ class Executor:
         """Decide nothing yet."""
         self.config, self.results, self.stages, self.graph = config, results, tuple(stages), results.keys.graph
         self.force, self.jobs, self.again, self.reporter = force, jobs, again, reporter or Silent()
-        self.answers: dict[str, StageAnswer] = {}
+        self.answers: dict[str, Content] = {}
         self.left_out: dict[str, str] = {}
         self.done: list[StageDone] = []
         self._keys: dict[str, str] = {}
@@ -83,7 +84,7 @@ class Executor:
         steps = []
         for stage in self.stages:
             step = self._decide(stage)
-            if not (stage.optional and step.action == "run"):  # what is optional is counted on once it is there
+            if not (stage.only_by and step.action == "run"):  # what is optional is counted on once it is there
                 self._expect(step)
             steps.append(step)
         return tuple(steps)
@@ -111,7 +112,7 @@ class Executor:
         self.done.append(done)
         self.reporter.note(said_of(done))
 
-    def inputs(self, stage: Stage) -> dict[str, StageAnswer]:
+    def inputs(self, stage: Stage) -> dict[str, Content]:
         """The results that a stage gets: those it needs, and those it takes if they are there."""
         there = self.answers.keys() - self.left_out.keys()
         return {name: self.answers[name] for name in stage.results(self.config) if name in there}
@@ -160,7 +161,7 @@ class Executor:
         else:
             self._keys[step.stage.name] = step.identity.key
 
-    def _settle(self, step: Step, answer: StageAnswer) -> None:
+    def _settle(self, step: Step, answer: Content) -> None:
         """Take note of a stage's answer, which may be that there is none."""
         self.answers[step.stage.name] = answer
         if answer.no_answer is not None:
@@ -170,7 +171,7 @@ class Executor:
 
     def _why_absent(self, name: str) -> str:
         command = self._command_of(name)
-        if self.graph[name].optional:
+        if self.graph[name].only_by:
             return self.left_out.get(name, f"it was not asked for; {command} computes it")
         none_yet = self.graph[name].why_unsuited(self.config) or f"no current result; {command} computes one"
         return self.left_out.get(name, none_yet)
@@ -181,7 +182,8 @@ class Executor:
     def _start_ready_stages(self, pool: WorkerPool | None, precompiler: Precompiler) -> None:
         """Run the next stage here, or without any in `pool` those whose inputs are there, and compile for others."""
         for stage in list(self._waiting):
-            if len(self._working) == self.jobs or any(begun.step.stage.alone for begun in self._running.values()):
+            timing = any(begun.step.stage.work == "times" for begun in self._running.values())
+            if timing or len(self._working) == self.jobs:
                 return
             if not self._is_ready(stage):
                 if stage.name in self._left and (compiling := precompiler.begin(stage, only_first=True)) is not None:
@@ -197,7 +199,7 @@ class Executor:
                 self._waiting.remove(stage)
                 self._run_here(step, precompiler)
                 return
-            elif not (stage.alone and self._running):
+            elif not (stage.work == "times" and self._running):
                 self._waiting.remove(stage)
                 begun = self._begin(step)
                 future = pool.start(partial(run_in_worker, begun.task), partial(self._hear, begun.reporter))
@@ -207,7 +209,7 @@ class Executor:
     def _run_here(self, step: Step, precompiler: Precompiler) -> None:
         """Run a stage in this process; on a new machine a worker compiles for a later one meanwhile."""
         importlib.import_module(step.stage.module)
-        slow = [stage for stage in self._waiting if stage.compiles_long]
+        slow = [stage for stage in self._waiting if stage.precompile]
         if slow and nothing_compiled_yet():
             precompiler.begin(slow[0], only_first=False)
         precompiler.wait_for(step.stage)
@@ -256,7 +258,7 @@ class Executor:
         reporter = self.reporter.begin(stage.name, ", ".join(place + why), expected)
         return Begun(step, task, reporter, time.perf_counter())
 
-    def _finish(self, future: Future[Any] | None, answer: StageAnswer) -> None:
+    def _finish(self, future: Future[Any] | None, answer: Content) -> None:
         """Keep what a stage has returned, or what it has got where it found that there is no answer."""
         begun = self._running[future]
         step, name = begun.step, begun.task.name
@@ -303,7 +305,7 @@ def answer_in_memory(
     *,
     again: bool = True,
     reporter: Reporter | None = None,
-) -> StageAnswer:
+) -> Content:
     """Answer a stage's question without a file, computing what it needs and the memory does not have.
 
     again  whether walks are taken a second time for their numerical error
@@ -316,12 +318,12 @@ def answer_in_memory(
     if target in run.answers:
         return run.answers[target]
     advice = next(answer.no_answer.advice for answer in run.answers.values() if answer.no_answer is not None)
-    return StageAnswer({}, {"no_answer": {"message": run.left_out[target], "advice": advice}}, complete=False)
+    return Content({}, {"no_answer": {"message": run.left_out[target], "advice": advice}}, complete=False)
 
 
 def left_out(stage: str, why: str) -> LeftOut:
     """A stage that does not run."""
-    return LeftOut(stage, why, "loading and compiling contact code" if why == NO_CONTACT else "")
+    return LeftOut(stage, why, "loading and compiling contact code" if why == without_block("contact") else "")
 
 
 def any_side_by_side(stages: Sequence[Stage], config: Config) -> bool:

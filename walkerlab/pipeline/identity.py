@@ -1,6 +1,8 @@
 """What a stage's result is determined by, whether it is stored, a point of a sweep, or an answer in memory."""
 
 from collections.abc import Mapping
+from importlib import import_module
+from inspect import signature
 from typing import Any
 
 from walkerlab.config.canonical import slice_of
@@ -9,6 +11,11 @@ from walkerlab.config.schema import Config
 from walkerlab.pipeline.graph import PIPELINE, Graph, Stage
 from walkerlab.sources import Sources
 from walkerlab.store.key import Identity
+
+
+def takes_again(stage: Stage) -> bool:
+    """Whether a stage's `run` can leave out the second walk, which gives the numerical error."""
+    return "again" in signature(import_module(stage.module).run).parameters
 
 
 class Keys:
@@ -42,7 +49,7 @@ class Keys:
                 fixed["paper"] = slice_of(over_paper({}), stage.takes_of_paper)
             if stage.programs is not None:
                 fixed["programs"] = dict(stage.programs())
-        once = {} if again or not (stage.walks or stage.follows) else {"again": False}
+        once = {} if again or not takes_again(stage) else {"again": False}
         own = {**slice_of(config, stage.takes_under(config)), **self._fixed[stage.name], **once}
         return Identity(stage.name, own, input_keys, self.code_digest(stage.name))
 

@@ -10,8 +10,9 @@ from walkerlab.config.schema import Config
 from walkerlab.pipeline.graph import PIPELINE, Graph, Stage
 from walkerlab.pipeline.identity import Keys
 from walkerlab.store import artifact, provenance
-from walkerlab.store.artifact import StageAnswer, Stored, Verdict
+from walkerlab.store.artifact import Stored, Verdict
 from walkerlab.store.checkpoint import Checkpoint
+from walkerlab.store.content import Content
 from walkerlab.store.elsewhere import find_elsewhere, take_over
 from walkerlab.store.index import broken_file
 from walkerlab.store.key import Identity, changed_parts
@@ -40,7 +41,7 @@ class Step:
     action: Action
     reason: str
     identity: Identity | None = None
-    found: StageAnswer | None = None
+    found: Content | None = None
     damaged: Path | None = None
     origin: Path | None = None
 
@@ -57,7 +58,7 @@ class FolderResults:
         self.run, self.folder, self.elsewhere, self.keys = folder, folder.path, elsewhere, Keys(graph)
         self._begun: dict[str, tuple[Provenance, Checkpoint]] = {}
 
-    def find(self, stage: Stage, identity: Identity, inputs: Mapping[str, StageAnswer], force: bool) -> Step:
+    def find(self, stage: Stage, identity: Identity, inputs: Mapping[str, Content], force: bool) -> Step:
         """Find a stage's result: a step that reuses it, or runs the stage; with `force` it always runs."""
         path = self.run.artifact(stage.name)
         verdict = artifact.check(path, identity.key, stage.name)
@@ -79,7 +80,7 @@ class FolderResults:
         if step.origin is not None:
             take_over(step.origin, self.run.artifact(step.stage.name))
 
-    def begin(self, step: Step, config: Config, inputs: Mapping[str, StageAnswer], force: bool) -> Mapping[str, Any]:
+    def begin(self, step: Step, config: Config, inputs: Mapping[str, Content], force: bool) -> Mapping[str, Any]:
         """Prepare to keep a result; return what the stage may ask for, see `StageTask`.
 
         With `force` what an interrupted run has left is dropped.
@@ -93,18 +94,16 @@ class FolderResults:
         self._begun[stage.name] = provenance.begin(config, digests), checkpoint
         return {"checkpoint": checkpoint, "folder": self.folder}
 
-    def keep(self, step: Step, answer: StageAnswer, awaited: bool) -> Stored:  # noqa: ARG002
+    def keep(self, step: Step, answer: Content, awaited: bool) -> Stored:  # noqa: ARG002
         """Store a result, and remove its checkpoint; StorageError if the system refuses."""
         begun, checkpoint = self._begun.pop(step.stage.name)
         assert step.identity is not None, "a stage that is left out does not run"
         path = self.run.artifact(step.stage.name)
-        stored = artifact.write(path, answer, step.identity, begun.until_now(), answer.complete)
+        stored = artifact.write(path, answer, step.identity, begun.until_now())
         checkpoint.forget()
         return stored
 
-    def _why_outdated(
-        self, stage: Stage, identity: Identity, verdict: Verdict, inputs: Mapping[str, StageAnswer]
-    ) -> str:
+    def _why_outdated(self, stage: Stage, identity: Identity, verdict: Verdict, inputs: Mapping[str, Content]) -> str:
         """Why a stage has to run, in words; empty if its result is current."""
         found = verdict.artifact
         if not verdict.accepted or found is None:
@@ -113,7 +112,7 @@ class FolderResults:
         return broken_file(self.folder, found) or recomputed_input(stage, found, inputs)
 
 
-def recomputed_input(stage: Stage, found: Stored, inputs: Mapping[str, StageAnswer]) -> str:
+def recomputed_input(stage: Stage, found: Stored, inputs: Mapping[str, Content]) -> str:
     """Say which input of a result has another content than the result was made with; empty if all are the same."""
     for name, result in inputs.items():
         if found.provenance.input_digests.get(name) != input_digest(stage, result):
@@ -121,7 +120,7 @@ def recomputed_input(stage: Stage, found: Stored, inputs: Mapping[str, StageAnsw
     return ""
 
 
-def input_digest(stage: Stage, result: StageAnswer) -> str:
+def input_digest(stage: Stage, result: Content) -> str:
     """What a stage's result records of an input: numbers follow from its content, drawings also show its timings."""
     return result.seal if stage.draws and isinstance(result, Stored) else result.digest()
 
@@ -142,9 +141,9 @@ class MemoryResults:
     def __init__(self, graph: Graph = PIPELINE, size: int = REMEMBERED) -> None:
         """Remember nothing yet."""
         self.keys, self.size = LoadedCodeKeys(graph), size
-        self._kept: OrderedDict[str, StageAnswer] = OrderedDict()
+        self._kept: OrderedDict[str, Content] = OrderedDict()
 
-    def find(self, stage: Stage, identity: Identity, inputs: Mapping[str, StageAnswer], force: bool) -> Step:  # noqa: ARG002
+    def find(self, stage: Stage, identity: Identity, inputs: Mapping[str, Content], force: bool) -> Step:  # noqa: ARG002
         """Find a stage's result, or run the stage."""
         if identity.key not in self._kept:
             return Step(stage, "run", artifact.NOT_THERE, identity)
@@ -154,11 +153,11 @@ class MemoryResults:
     def take_over(self, step: Step) -> None:
         """Do nothing: there is no other folder."""
 
-    def begin(self, step: Step, config: Config, inputs: Mapping[str, StageAnswer], force: bool) -> Mapping[str, Any]:  # noqa: ARG002
+    def begin(self, step: Step, config: Config, inputs: Mapping[str, Content], force: bool) -> Mapping[str, Any]:  # noqa: ARG002
         """Keep checkpoints in memory alone."""
         return {"checkpoint": Checkpoint(None, "")}
 
-    def keep(self, step: Step, answer: StageAnswer, awaited: bool) -> StageAnswer:
+    def keep(self, step: Step, answer: Content, awaited: bool) -> Content:
         """Remember a result that another stage awaits."""
         if awaited and step.identity is not None:
             self._kept[step.identity.key] = answer

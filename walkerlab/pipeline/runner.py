@@ -124,7 +124,7 @@ def execute(
 
 def refuse_incomplete_law(config: Config, steps: Sequence[Step]) -> None:
     """Raise ConfigError, before anything is compiled, for a friction law of the user's own that lacks something."""
-    if config.contact is not None and any(step.stage.needs_contact for step in steps if step.action == "run"):
+    if config.contact is not None and any("contact" in step.stage.requires for step in steps if step.action == "run"):
         # Imported here: it loads the compiler, as what runs will.
         from walkerlab.scene.contact import friction_law
 
@@ -158,7 +158,7 @@ def all_left_out(run: Executor, target: Stage, by_stage: Sequence[dict[str, str]
     What is optional and nobody asked for was not left out; a drawing says all the same that there is one.
     """
     found = list(run.missing_inputs(target)) if target.draws else []
-    found = [entry for entry in found if not run.graph[entry.what].optional]
+    found = [entry for entry in found if not run.graph[entry.what].only_by]
     found += [left_out(done.stage, done.reason) for done in run.done if done.action == "leave out"]
     entries = [*by_stage]
     for done in run.done:

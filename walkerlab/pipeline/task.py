@@ -5,7 +5,7 @@ import importlib
 import sys
 from collections.abc import Callable, Collection, Mapping
 from concurrent.futures import Future
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from inspect import signature
 from typing import Any
@@ -16,7 +16,6 @@ from walkerlab.config.schema import Config
 from walkerlab.errors import NoAnswer, WalkerlabError
 from walkerlab.pipeline.graph import Stage
 from walkerlab.pipeline.progress import Progress
-from walkerlab.store.artifact import StageAnswer
 from walkerlab.store.content import Content
 from walkerlab.store.files import drawing_into
 from walkerlab.workers import WorkerPool, tell
@@ -42,7 +41,7 @@ class StageTask:
     inputs: Mapping[str, Content]
     offered: Mapping[str, Any]
 
-    def run(self, progress: Progress) -> StageAnswer:
+    def run(self, progress: Progress) -> Content:
         """Call the stage's `run` with what it declared and nothing else."""
         # Imported now and not before: a stage brings its libraries and compiled code along.
         run = importlib.import_module(self.module).run
@@ -54,10 +53,10 @@ class StageTask:
         except NoAnswer as error:
             partial = error.partial if isinstance(error.partial, Content) else Content()
             why = {"no_answer": {"message": error.message, "advice": error.advice}}
-            return StageAnswer(partial.groups, {**partial.summary, **why}, partial.timed, complete=False)
+            return replace(partial, summary={**partial.summary, **why}, complete=False)
         if not isinstance(content, Content):
             raise TypeError(f"{self.module}.run returned {type(content).__name__}, not Content")
-        return StageAnswer(content.groups, content.summary, content.timed)
+        return content
 
 
 def task_of(stage: Stage, config: Config, inputs: Mapping[str, Content], **offered: Any) -> StageTask:
@@ -73,7 +72,7 @@ class PipeReporter:
         return lambda *arguments: tell((call, *arguments))
 
 
-def run_in_worker(task: StageTask) -> StageAnswer:
+def run_in_worker(task: StageTask) -> Content:
     """Run a stage in a worker, telling its progress."""
     reporter: Any = PipeReporter()
     importlib.import_module(task.module)
@@ -86,11 +85,11 @@ def nothing_compiled_yet() -> bool:
     return "walkerlab.kernels" in sys.modules and kernel_cache.nothing_compiled_yet()
 
 
-def compile_kernels(module: str, config: Config, only_first: bool) -> None:
-    """Compile the kernels of a stage; if they are to be the first, only where nothing is compiled yet."""
+def compile_kernels(module: str, function: str, config: Config, only_first: bool) -> None:
+    """Compile the kernels of a stage; with `only_first`, only where nothing is compiled yet."""
     stage = importlib.import_module(module)
     if not only_first or nothing_compiled_yet():
-        stage.compile_kernels(config)
+        getattr(stage, function)(config)
 
 
 class Precompiler:
@@ -110,9 +109,9 @@ class Precompiler:
 
         only_first  only where nothing is compiled yet, which the worker finds out
         """
-        if not stage.compiles_long or stage.name in self._begun:
+        if not stage.precompile or stage.name in self._begun:
             return None
-        work = partial(compile_kernels, stage.module, self._config, only_first)
+        work = partial(compile_kernels, stage.module, stage.precompile, self._config, only_first)
         future = self._begun[stage.name] = self._pool.start(work)
         return future
 

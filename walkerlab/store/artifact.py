@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 from walkerlab.config.canonical import canonical_json
-from walkerlab.errors import NoAnswer
 from walkerlab.store import hdf5
 from walkerlab.store.content import Attribute, Content, Digest, Group, Variable
 from walkerlab.store.files import file_digest, read_bounded, refuse_full_disk, replacing, write_atomically
@@ -45,28 +44,7 @@ class OtherLayout(Damaged):
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class StageAnswer(Content):
-    """Answer of a stage, in memory or stored.
-
-    complete  False for the partial results of a stage that found no answer; the summary then says why
-    """
-
-    complete: bool = True
-
-    @property
-    def no_answer(self) -> NoAnswer | None:
-        """Why there is no answer, with advice; None if there is one."""
-        said = self.summary.get("no_answer", {})
-        return None if self.complete else NoAnswer(said.get("message", "no answer"), said.get("advice", ""))
-
-    @property
-    def findings(self) -> dict[str, Any]:
-        """The summary of what was computed, without the reason why there is no answer."""
-        return {key: value for key, value in self.summary.items() if self.complete or key != "no_answer"}
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Stored(StageAnswer):
+class Stored(Content):
     """The content of an artifact as read back, with what it was determined by and where it comes from.
 
     seal  sha256 of the file, provenance and timings included
@@ -92,12 +70,12 @@ class Verdict:
     damaged: bool = False
 
 
-def write(path: Path, content: Content, identity: Identity, provenance: Provenance, complete: bool = True) -> Stored:
+def write(path: Path, content: Content, identity: Identity, provenance: Provenance) -> Stored:
     """Store a result at `path`, replacing what is there in one step.
 
     Raises StorageError if the system refuses; what was there before is then intact, and nothing else is left.
     """
-    root = root_attributes(content, identity, provenance, complete, content.digest())
+    root = root_attributes(content, identity, provenance, content.complete, content.digest())
     own = content.groups[""].attrs if "" in content.groups else {}
     if not own.keys().isdisjoint(ROOT_ATTRIBUTES):
         raise ValueError(f"attributes of the root that say something else: {sorted(own)}")
@@ -105,7 +83,7 @@ def write(path: Path, content: Content, identity: Identity, provenance: Provenan
     seal = hashlib.sha256(image).hexdigest()
     write_atomically(path, image, f"\nwalkerlab sha256 {seal}\n".encode())
     parts = content.groups, content.summary, content.timed
-    return Stored(*parts, identity=identity, provenance=provenance, complete=complete, seal=seal)
+    return Stored(*parts, complete=content.complete, identity=identity, provenance=provenance, seal=seal)
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from walkerlab.config.canonical import canonical_json
+from walkerlab.errors import NoAnswer
 
 Attribute = str | int | float | bool
 
@@ -101,6 +102,7 @@ class Content:
     groups   by path, such as 'corrected/gaits', '' for the file's root; groups above one are there too, if only empty
     summary  what `--json` prints of it: JSON, SI units; 'wall_s' and keys that end in '_wall_s' count as timings
     timed    further top-level keys of the summary that follow from timings, such as 'best'
+    complete False for the partial results of a stage that found no answer; `no_answer` of the summary says why
 
     Raises ValueError or TypeError for a summary that is not JSON or not finite, and for clashing names.
     """
@@ -108,6 +110,7 @@ class Content:
     groups: Mapping[str, Group] = field(default_factory=dict)
     summary: Mapping[str, Any] = field(default_factory=dict)
     timed: tuple[str, ...] = ()
+    complete: bool = field(default=True, kw_only=True)
 
     def __post_init__(self) -> None:
         """Bring the summary to plain JSON types and check the paths."""
@@ -128,6 +131,17 @@ class Content:
     def __getitem__(self, path: str) -> Group:
         """The group at a path."""
         return self.groups[path]
+
+    @property
+    def no_answer(self) -> NoAnswer | None:
+        """The reason why there is no answer, with advice; None if there is one."""
+        why = self.summary.get("no_answer", {})
+        return None if self.complete else NoAnswer(why.get("message", "no answer"), why.get("advice", ""))
+
+    @property
+    def findings(self) -> dict[str, Any]:
+        """The summary without the reason why there is no answer."""
+        return {key: value for key, value in self.summary.items() if self.complete or key != "no_answer"}
 
     def digest(self) -> str:
         """The sha256 of all that is determined by the inputs: timings are left out."""

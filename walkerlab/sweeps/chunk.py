@@ -9,7 +9,7 @@ import re
 import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache, partial
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
@@ -17,11 +17,11 @@ from walkerlab.config.schema import Config
 from walkerlab.errors import WalkerlabError
 from walkerlab.labels import Label, labels_of
 from walkerlab.pipeline.executor import answer_in_memory
-from walkerlab.pipeline.graph import Graph
+from walkerlab.pipeline.graph import STRIDES, Graph
 from walkerlab.pipeline.results import MemoryResults
 from walkerlab.pipeline.work import WorkUnit
 from walkerlab.store import artifact
-from walkerlab.store.artifact import Damaged, OtherLayout, StageAnswer
+from walkerlab.store.artifact import Damaged, OtherLayout
 from walkerlab.store.columns import rows_group
 from walkerlab.store.content import Content, untimed
 from walkerlab.store.key import Identity
@@ -33,6 +33,8 @@ Labels = Mapping[str, tuple[str, str]]
 
 FOLDER: Final = "sweep-chunks"
 NOT_OF_THE_POINT: Final = ("left_out", "no_answer")
+MEMORIES: Final = 2
+"""Sweeps whose inputs a process remembers."""
 UNFIT: Final = re.compile(r"[^A-Za-z0-9_.+-]")
 
 
@@ -59,30 +61,31 @@ class Chunk:
     labels: Labels
 
 
-def unit_of(config: Config, key: str, graph: str, target: str, again: bool) -> WorkUnit:
+def unit_of(config: Config, key: str, graph: str, target: str, again: bool, forced: str = "") -> WorkUnit:
     """The computation of one point, which may be done anywhere.
 
-    key    of the result
-    graph  where the pipeline is, as module:NAME
-    again  whether its walk is taken a second time for its numerical error
+    key     of the result
+    graph   where the pipeline is, as module:NAME
+    again   whether its walk is taken a second time for its numerical error
+    forced  what names a sweep that reuses no earlier result; empty for others
     """
-    return WorkUnit(key, 1, partial(compute_point, config, key, graph, target, again))
+    return WorkUnit(key, 1, partial(compute_point, config, key, graph, target, again, forced))
 
 
-@cache
-def memory_for(graph: str) -> MemoryResults:
-    """Return this process's memory of what points need, kept from chunk to chunk; `graph` as in `unit_of`."""
+@lru_cache(maxsize=MEMORIES)
+def memory_for(graph: str, forced: str) -> MemoryResults:  # noqa: ARG001 - one memory for each forced sweep
+    """Return this process's memory of what points need, kept from chunk to chunk; arguments as in `unit_of`."""
     module, _, name = graph.partition(":")
     return MemoryResults(getattr(importlib.import_module(module), name))
 
 
-def compute_point(config: Config, key: str, graph: str, target: str, again: bool) -> Chunk:
-    """Compute one point in this process; what goes wrong with it does not end the others."""
-    memory = memory_for(graph)
+def compute_point(config: Config, key: str, graph: str, target: str, again: bool, forced: str = "") -> Chunk:
+    """Compute one point in this process; a failure becomes its result."""
+    memory = memory_for(graph, forced)
     stages = memory.keys.graph
     try:
         config = without_outputs(config, target, stages)
-        answer = answer_in_memory(config, target, memory, again=again or not stages[target].walks)
+        answer = answer_in_memory(config, target, memory, again=again or STRIDES not in stages[target].options)
     except WalkerlabError as error:
         return Chunk((PointResult(key, "failed", error.message),), {})
     except Exception as error:
@@ -97,7 +100,7 @@ def joined(points: Sequence[tuple[Chunk, float]]) -> Chunk:
     return Chunk(rows, {name: label for point, _ in points for name, label in point.labels.items()})
 
 
-def chunk_of(key: str, answer: StageAnswer) -> Chunk:
+def chunk_of(key: str, answer: Content) -> Chunk:
     """A stage's answer as a chunk of one point."""
     numbers = json.dumps(by_name(untimed(answer.summary, answer.timed)), allow_nan=False, separators=(",", ":"))
     status: Status = "answered" if answer.no_answer is None else "no-answer"

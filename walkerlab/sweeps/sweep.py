@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from secrets import token_hex
 from typing import Any
 
 import numpy as np
@@ -274,19 +275,19 @@ class SweepRun:
             why = f"its worker died: {type(error).__name__}: {error}"
             keep(Chunk((PointResult(unit.name, "failed", why),), {}))
 
-        todo, chunk_s = self._units(missing.tolist(), work.graph), work.chunk_s or work.engine.chunk_s
+        todo, chunk_s = self._units(missing.tolist(), work), work.chunk_s or work.engine.chunk_s
         spread = Spread(todo, int(missing.size), lambda _units, points: keep(joined(points)), give_up, chunk_s)
         with work.engine.opened(work.order) as pool:
             spread.run(pool.executor, pool.workers)
         return tuple(bugs.values())
 
-    def _units(self, indices: list[int], graph: str) -> Iterator[WorkUnit]:
+    def _units(self, indices: list[int], work: SweepWork) -> Iterator[WorkUnit]:
         """Points to compute; of a sample of all points walks are taken again."""
-        stage = self.question.stage
+        stage, forced = self.question.stage, token_hex() if work.force else ""
         sample = set(np.sort(self.first)[evenly_spread(self.first.size, SAMPLE)].tolist())
         for index in indices:
             config = self.config(index)
-            yield unit_of(config, self.keys.of(config, stage)[stage], graph, stage, index in sample)
+            yield unit_of(config, self.keys.of(config, stage)[stage], work.graph, stage, index in sample, forced)
 
 
 def refuse_unknown_stage(name: str, graph: Graph) -> None:
