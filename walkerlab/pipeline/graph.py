@@ -30,28 +30,28 @@ def without_block(name: str) -> str:
 
 
 def nothing(_config: object) -> tuple[Any, ...]:
-    """No results of other stages, or nothing that is left out."""
+    """Return an empty tuple: no inputs, or nothing left out."""
     return ()
 
 
 def results_of(*names: str) -> Inputs:
-    """The results of these stages, whatever the config."""
+    """Return a function that gives these names for every config."""
     return lambda _config: names
 
 
 def gait_unless_start_is_given(config: StartConfig) -> tuple[str, ...]:
-    """The fixed point, unless the config has a start state: so a slope without a gait can be walked too."""
+    """Need the fixed point unless the config gives a start state; so slopes without a gait can be walked as well."""
     return ("fixedpoint",) if config.start == "fixed-point" else ()
 
 
 def gait_for_start_or_pads(config: SceneConfig) -> tuple[str, ...]:
-    """The fixed point, if the start state or the pads' pitch is taken from it."""
+    """Need the fixed point if it gives the start state or the pads' pitch."""
     pitch_of_gait = config.contact is not None and config.contact.pad_pitch == "rigid"
     return ("fixedpoint",) if pitch_of_gait else gait_unless_start_is_given(config)
 
 
 def known_and_start(config: SceneConfig) -> tuple[str, ...]:
-    """The known problems, and for walkers that are no study's, judged in their own scene, its start."""
+    """Need the known problems; for walkers of no study also the start of their own scene."""
     return ("known-problems", *(() if is_studied(config) else gait_for_start_or_pads(config)))
 
 
@@ -80,15 +80,15 @@ STRIDES = Option("--strides", "strides", "N", "Strides to walk; one stride is tw
 class Stage:
     """One stage of the pipeline.
 
-    name           as on the command line, and of its artifact
-    module         where its `run` is; imported only when it runs
+    name           of its command and its artifact
+    module         of its `run`; imported only when the stage runs
     purpose        one line for the user
-    takes          type of the config that its `run` takes, and so what its result depends on; None for all of it
-    takes_of_scene the same for a walker that is no study's, where it is another type
-    takes_of_paper what its own cases stand on of the built-in paper config
-    programs       the versions of other programs that its result depends on, by name
-    inputs         the stages whose results it needs under a config, earlier in the table
-    if_current     the stages whose results it takes if they happen to be there and current
+    takes          type of the config that `run` takes, whose keys its result depends on; None for the whole config
+    takes_of_scene the same for a walker of no study, where that is another type
+    takes_of_paper keys of the built-in paper config that its own cases are based on
+    programs       versions of other programs that its result depends on, by name
+    inputs         stages whose results it needs under a config, earlier in the table
+    if_current     stages whose results it takes if they are current
     options        of its command, besides those of all stages
     requires       blocks without which it is left out
     work           "times" runs with nothing beside it; "draws" writes files beside its artifact, from whatever results
@@ -118,7 +118,7 @@ class Stage:
 
     @property
     def reads(self) -> tuple[str, ...]:
-        """The keys of the config that its result depends on, dotted."""
+        """Return the keys of the config that its result depends on, dotted."""
         if self.takes is not None:
             return tuple(reads.dotted_keys(self.takes))
         from walkerlab.config.schema import Config  # not for the help of the command line
@@ -126,29 +126,29 @@ class Stage:
         return tuple(Config.model_fields)
 
     def takes_under(self, config: RigidConfig) -> type | None:
-        """What its result depends on under a config."""
+        """Return the type of the part of a config that its result depends on."""
         return self.takes if self.takes_of_scene is None or is_studied(config) else self.takes_of_scene
 
     def results(self, config: Config) -> tuple[str, ...]:
-        """The stages whose results it gets: those that it needs, and those that it takes if they are current."""
+        """Return the stages whose results it takes: required ones, then optional ones."""
         return (*self.inputs(config), *self.if_current)
 
     def why_unsuited(self, config: Config) -> str | None:
-        """Why it means nothing under a config; None if it does."""
+        """Return why it cannot run under a config; None if it can."""
         missing = (block for block in self.requires if getattr(config, block) is None)
         return next(map(without_block, missing), None)
 
-    def refuse_unsuited(self, asked: str, config: Config) -> None:
-        """Raise ConfigError if it means nothing under a config, being what is asked for or what this needs."""
+    def refuse_unsuited(self, target: str, config: Config) -> None:
+        """Raise ConfigError if it cannot run under a config, although `target` needs it."""
         from walkerlab.config.walkers import contact_to_add, without_contact  # not for the help of the command line
 
         if self.why_unsuited(config) is not None:
             block = f"`{contact_to_add(config.walker)}`"
             instead = f"Add one to the config, such as the paper's by this walker's mass: {block}."
-            raise without_contact(asked, config.walker, f"{instead} `walkerlab schema contact` explains its keys.")
+            raise without_contact(target, config.walker, f"{instead} `walkerlab schema contact` explains its keys.")
 
     def refuse_question(self, config: Config) -> None:
-        """Raise ConfigError, before anything runs, for what `refuse` of its module refuses: of stages on demand."""
+        """Raise ConfigError for a question that `refuse` of its module rejects; only for stages on demand."""
         refuse = getattr(importlib.import_module(self.module), "refuse", None) if self.on_demand else None
         if refuse is not None:
             refuse(reads.only(config, self.takes_under(config)))
@@ -173,18 +173,18 @@ class Graph:
     """Stages in an order in which they can run."""
 
     def __init__(self, *stages: Stage) -> None:
-        """Keep the stages; ValueError if two have one name."""
+        """Store the stages; ValueError if two share a name."""
         self.stages = stages
         self._by_name = {stage.name: stage for stage in stages}
         if len(self._by_name) != len(stages):
             raise ValueError("two stages have one name")
 
     def __getitem__(self, name: str) -> Stage:
-        """The stage of a name; KeyError if there is none."""
+        """Return a stage by its name."""
         return self._by_name[name]
 
     def needed_for(self, target: str, config: Config) -> tuple[Stage, ...]:
-        """The target and all it needs under a config, in the order in which they run."""
+        """Return the target and all it needs under a config, in running order."""
         needed = {target}
         for stage in reversed(self.stages):
             if stage.name in needed:
@@ -192,9 +192,9 @@ class Graph:
         return tuple(stage for stage in self.stages if stage.name in needed)
 
     def needed_in_memory(self, target: str, config: Config) -> tuple[Stage, ...]:
-        """The same for a result without files.
+        """Return the same for a result without files.
 
-        Raises ConfigError if the config lacks what a stage needs, and for a stage that draws the files of its run.
+        Raises ConfigError if the config lacks a block that a stage requires, and for stages that draw files.
         """
         stages = self.needed_for(target, config)
         for stage in stages:
@@ -204,7 +204,7 @@ class Graph:
         return stages
 
     def campaigns_of(self, target: str) -> tuple[Stage, ...]:
-        """The stages that `--full` adds."""
+        """Return the stages that `--full` adds."""
         return tuple(stage for stage in self.stages if stage.only_by == f"{target} --full")
 
 

@@ -1,4 +1,4 @@
-"""One stage ready to run, here or in another process, and what is compiled ahead of it."""
+"""Tasks: a stage with its arguments, to run in this or another process, and kernels compiled ahead of it."""
 
 import contextlib
 import importlib
@@ -23,16 +23,16 @@ from walkerlab.workers import WorkerPool, tell
 
 @dataclass(frozen=True)
 class StageTask:
-    """A stage with all that it is given.
+    """A stage with its arguments.
 
-    config   what it takes of the config
-    inputs   the results that it gets
-    offered  what else it may ask for, by the names of parameters of its `run`:
+    config   the part of the config that it takes
+    inputs   results of other stages
+    offered  arguments that its `run` may have, by name:
              jobs        processes for independent cells
-             checkpoint  what an interrupted run has left of its result
-             again       whether walks are taken a second time for their numerical error
+             checkpoint  units of the result that an interrupted run has computed
+             again       whether walks are repeated for their numerical error
              folder      of its run, which it draws into
-             left_out    the results that it has to do without as it draws
+             left_out    results that are missing in a drawing
     """
 
     name: str
@@ -42,8 +42,8 @@ class StageTask:
     offered: Mapping[str, Any]
 
     def run(self, progress: Progress) -> Content:
-        """Call the stage's `run` with what it declared and nothing else."""
-        # Imported now and not before: a stage brings its libraries and compiled code along.
+        """Call the stage's `run` with the arguments that it declares."""
+        # imported only now: a stage loads its libraries and compiled code
         run = importlib.import_module(self.module).run
         given = {name: self.offered[name] for name in self.offered.keys() & signature(run).parameters.keys()}
         folder = given.get("folder")
@@ -60,20 +60,20 @@ class StageTask:
 
 
 def task_of(stage: Stage, config: Config, inputs: Mapping[str, Content], **offered: Any) -> StageTask:
-    """The task of a stage under a config; see `StageTask` for what may be offered."""
+    """Build the task of a stage under a config; `offered` as in `StageTask`."""
     return StageTask(stage.name, stage.module, only(config, stage.takes_under(config)), inputs, offered)
 
 
 class PipeReporter:
-    """The progress of a stage in a worker: each call is told as it is to the process that waits."""
+    """Progress of a stage in a worker: passes each call to the parent process."""
 
     def __getattr__(self, call: str) -> Callable[..., None]:
-        """What a stage calls."""
+        """Return a function that sends its name and arguments."""
         return lambda *arguments: tell((call, *arguments))
 
 
 def run_in_worker(task: StageTask) -> Content:
-    """Run a stage in a worker, telling its progress."""
+    """Run a stage in a worker and send its progress to the parent."""
     reporter: Any = PipeReporter()
     importlib.import_module(task.module)
     with kernel_cache.watched(reporter.compiling):
@@ -81,7 +81,7 @@ def run_in_worker(task: StageTask) -> Content:
 
 
 def nothing_compiled_yet() -> bool:
-    """Whether what was imported has kernels, and none of them was compiled on this machine yet."""
+    """Whether kernels are imported and none was compiled on this machine yet."""
     return "walkerlab.kernels" in sys.modules and kernel_cache.nothing_compiled_yet()
 
 
@@ -93,21 +93,21 @@ def compile_kernels(module: str, function: str, config: Config, only_first: bool
 
 
 class Precompiler:
-    """Kernels of later stages, compiled in the workers of a pool while earlier stages compile their own; their errors.
+    """Compiles kernels of later stages in workers while earlier stages compile theirs.
 
-    On a new machine they would otherwise wait for the compiler, one after the other. What is compiled goes into the
-    cache that all processes share. A stage whose kernels were not compiled ahead compiles for itself.
+    On a new machine the stages would otherwise wait for the compiler one after the other. All processes share the
+    cache of compiled code. A stage whose kernels were not compiled ahead compiles them itself.
     """
 
     def __init__(self, pool: WorkerPool, config: Config) -> None:
-        """Nothing is compiled ahead so far."""
+        """Start with nothing compiled ahead."""
         self._pool, self._config = pool, config
         self._begun: dict[str, Future[None]] = {}
 
     def begin(self, stage: Stage, only_first: bool) -> Future[None] | None:
-        """Compile for a stage that takes long to compile, once; None if nothing is begun.
+        """Compile a stage's kernels if it declares `precompile` and they were not begun; None if nothing is begun.
 
-        only_first  only where nothing is compiled yet, which the worker finds out
+        only_first  only where nothing is compiled yet, which the worker checks
         """
         if not stage.precompile or stage.name in self._begun:
             return None
@@ -116,14 +116,14 @@ class Precompiler:
         return future
 
     def wait_for(self, stage: Stage) -> None:
-        """Let what is compiled for a stage be there before it runs, or have failed."""
+        """Wait until a stage's kernels are compiled, or have failed to."""
         if stage.name in self._begun:
             self._begun[stage.name].exception()
 
     def raise_bugs(self, ran: Collection[str]) -> None:
-        """Raise what stopped a compilation; what a user can act on, the stage itself has told.
+        """Raise a bug that stopped a compilation; errors that a user can act on are reported by the stage itself.
 
-        ran  names of the stages that ran: what is still compiled for others is not waited for
+        ran  names of the stages that ran; compilation for other stages is not waited for
         """
         for name, future in self._begun.items():
             ended = (name in ran or future.done()) and not future.cancelled()
