@@ -117,7 +117,7 @@ class Worker:
         theirs.close()
 
     def do(self, call: Callable[[], R], hear: Hear | None = None, timeout_s: float | None = None) -> R:
-        """Run a call in the worker; returns and raises what the call does.
+        """Run a call in the worker; returns its value or raises its error.
 
         hear       receives the call's messages
         timeout_s  maximum time between two messages, s

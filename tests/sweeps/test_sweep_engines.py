@@ -79,11 +79,11 @@ from pathlib import Path
 from walkerlab.config.loader import load
 from walkerlab.store.runfolder import RunFolder
 from walkerlab.sweeps.engines import Order
-from walkerlab.sweeps.question import asked, axis_of_text
+from walkerlab.sweeps.question import axis_of_text, build_sweep
 from walkerlab.sweeps.sweep import SweepRun, SweepWork
 from toy_sweep.sweep_pipeline import GRAPH
 read = load()
-question = asked("deadly", [axis_of_text("seed=100:179:80")])
+question = build_sweep("deadly", [axis_of_text("seed=100:179:80")])
 sweep = SweepRun(question, read, RunFolder(Path(sys.argv[1]), "paper"), GRAPH)
 order = Order(2, modules=("toy_sweep.deadly",))
 swept = sweep.run(SweepWork(order=order, chunk_s=0.05, graph="toy_sweep.sweep_pipeline:GRAPH"))

@@ -14,7 +14,7 @@ from walkerlab.config.loader import load
 from walkerlab.config.walkers import why_rigid_alone
 from walkerlab.config.writer import extending
 from walkerlab.errors import ConfigError, NoAnswer
-from walkerlab.pipeline.executor import told_once
+from walkerlab.pipeline.executor import short_reason
 from walkerlab.pipeline.graph import PIPELINE, Graph, Stage
 from walkerlab.pipeline.runner import Options, StageReport, execute
 from walkerlab.report.answers import answer, verdict
@@ -125,6 +125,6 @@ def left_out_lines(request: Request, report: StageReport) -> list[str]:
 def each_left_out(report: StageReport) -> list[str]:
     """What was left out, why, and what that saves."""
     return [
-        f"left out: {entry.what} ({told_once(entry.why)})" + (f"; saves {entry.saves}" if entry.saves else "")
+        f"left out: {entry.what} ({short_reason(entry.why)})" + (f"; saves {entry.saves}" if entry.saves else "")
         for entry in report.left_out
     ]

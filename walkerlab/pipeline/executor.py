@@ -111,7 +111,7 @@ class Executor:
         """Record a stage that does not run."""
         done = StageDone(step.stage.name, step.action, step.reason)
         self.done.append(done)
-        self.reporter.note(said_of(done))
+        self.reporter.note(outcome_line(done))
 
     def inputs(self, stage: Stage) -> dict[str, Content]:
         """Return the results that a stage gets: those it needs, and optional ones that are current."""
@@ -270,7 +270,7 @@ class Executor:
         self._left = [other for other in self._left if other != name]
         answered = [] if kept.complete else ["no answer"]
         left = [f"left: {', '.join(self._left)}"] if self._left else []
-        begun.reporter.end("; ".join([said_of(done), *answered, *left]))
+        begun.reporter.end("; ".join([outcome_line(done), *answered, *left]))
 
     def _draw_early(self) -> None:
         """Draw a partial page once its main results exist, while others are being computed."""
@@ -333,14 +333,14 @@ def any_side_by_side(stages: Sequence[Stage], config: Config) -> bool:
     return any(len(needed[stage.name]) < place for place, stage in enumerate(stages))
 
 
-def told_once(why: str) -> str:
+def short_reason(why: str) -> str:
     """Shorten a reason that quotes another stage's reason or an error; those have lines of their own."""
     return why.partition(": ")[0] if why.startswith(("it needs ", "no answer: ")) else why.partition(": no answer: ")[0]
 
 
-def said_of(done: StageDone) -> str:
+def outcome_line(done: StageDone) -> str:
     """Describe an outcome in one line."""
-    why = told_once(done.reason)
+    why = short_reason(done.reason)
     match done.action:
         case "run":
             return f"{done.stage}: ran in {done.wall_s:.2f} s"

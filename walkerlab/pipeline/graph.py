@@ -1,4 +1,4 @@
-"""The pipeline on one page: every stage, what it reads of the config, its options and the results it needs.
+"""The pipeline on one page: every stage with its part of the config, its options and its inputs.
 
 The command line's help is made from this page, so it imports no stage, no config and no arrays.
 """
@@ -91,12 +91,12 @@ class Stage:
     if_current     stages whose results it takes if they are current
     options        of its command, besides those of all stages
     requires       blocks without which it is left out
-    work           "times" runs with nothing beside it; "draws" writes files beside its artifact, from whatever results
+    work           "times" runs alone; "draws" writes files besides its artifact, from whatever results
                    there are
-    precompile     function of its module that compiles its kernels, where that is worth doing beside an earlier stage
+    precompile     function of its module that compiles its kernels, where that pays while an earlier stage runs
     only_by        the one command that runs it, its own or `STAGE --full`; nothing is stale without its result
     early_with     the results with which it is worth drawing while others are still being computed
-    does_without   what is left out of its scene under a config: what, why, and what that saves
+    does_without   parts that its scene lacks under a config: name, reason and saving
     """
 
     name: str
@@ -155,12 +155,12 @@ class Stage:
 
     @property
     def draws(self) -> bool:
-        """Whether it writes files beside its artifact."""
+        """Whether it writes files besides its artifact."""
         return self.work == "draws"
 
     @property
     def command(self) -> str:
-        """What to type for its result."""
+        """The command that computes its result."""
         return self.only_by or self.name
 
     @property
@@ -278,13 +278,13 @@ PIPELINE = Graph(
     ),
     Stage(
         "robustness", "walkerlab.stages.robustness",
-        "Ask what a gait withstands: drops, pushes, rough ground, and which number of the walker moves it most.",
+        "Find the largest drop, push and roughness that a gait survives, and the parameter that matters most.",
         reads.RobustnessConfig, results_of("fixedpoint"), only_by="robustness",
         options=(Option("--model", "robustness.model", "rigid|contact|both", MODEL_HELP),),
     ),
     Stage(
         "design", "walkerlab.stages.design",
-        "Find the walker whose gait has the least or largest of a number, within bounds.",
+        "Optimise walker parameters within bounds.",
         reads.DesignConfig, results_of("fixedpoint"), only_by="design",
         options=(
             Option("--minimise", "design.minimise", "QUANTITY", "Gait quantity to minimise."),

@@ -22,7 +22,7 @@ class Progress(Protocol):
         """Show one line about the work."""
 
 
-def each_told(progress: Progress, label: str, total: int, done: Iterable[R], n: int = 1) -> Iterator[R]:
+def track(progress: Progress, label: str, total: int, done: Iterable[R], n: int = 1) -> Iterator[R]:
     """Iterate over `done`, advancing `progress` by `n` after each item."""
     progress.start(label, total)
     for one in done:

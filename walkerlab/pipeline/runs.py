@@ -93,7 +93,7 @@ def config_of(folder: RunFolder) -> Config | None:
 
 
 def read_all(folder: RunFolder, stages: Iterable[str]) -> tuple[dict[str, Stored], dict[str, str]]:
-    """Return the readable results of these stages, and what is wrong with the unreadable ones."""
+    """Return the readable results of these stages, and the faults of the unreadable ones."""
     intact: dict[str, Stored] = {}
     bad: dict[str, str] = {}
     for stage in stages:
@@ -110,7 +110,7 @@ def results_in(folder: RunFolder, stages: Iterable[str], graph: Graph = PIPELINE
     """Return the existing results of these stages; raises StaleError that names all unreadable ones."""
     intact, bad = read_all(folder, stages)
     if bad:
-        commands = listed(makes(folder, graph[stage]) for stage in bad)
+        commands = listed(command(folder, graph[stage]) for stage in bad)
         them = "recomputes it" if len(bad) == 1 else "recompute them"
         raise StaleError(f"{'; '.join(bad.values())}.", f"{commands} {them}.")
     return intact
@@ -124,7 +124,7 @@ def result_in(folder: RunFolder, stage: str, graph: Graph = PIPELINE) -> Stored:
 def the_result(results: Mapping[str, Stored], folder: RunFolder, stage: str, graph: Graph = PIPELINE) -> Stored:
     """Select a stage's result among those of its run; raises StaleError if it is missing."""
     if stage not in results:
-        raise StaleError(f"{folder.path} has no result of {stage}.", f"{makes(folder, graph[stage])} computes it.")
+        raise StaleError(f"{folder.path} has no result of {stage}.", f"{command(folder, graph[stage])} computes it.")
     return results[stage]
 
 
@@ -139,7 +139,7 @@ def results_to_show(
     results = results_in(folder, stages, graph)
     outdated = why_outdated(folder, results, graph)
     for stage, why in outdated.items():
-        warn(f"{folder.artifact(stage)} is out of date: {why}; {makes(folder, graph[stage])} makes it anew.")
+        warn(f"{folder.artifact(stage)} is out of date: {why}; {command(folder, graph[stage])} makes it anew.")
     with refusing_older(folder, outdated, graph):
         yield results
 
@@ -161,12 +161,13 @@ def refusing_older(folder: RunFolder, outdated: Collection[str], graph: Graph = 
     except KeyError as missing:
         if not outdated:
             raise
-        paths, commands = ([*map(str, map(folder.artifact, outdated))], [makes(folder, graph[one]) for one in outdated])
+        paths = [str(folder.artifact(stage)) for stage in outdated]
+        commands = [command(folder, graph[stage]) for stage in outdated]
         they = "is outdated and lacks" if len(paths) == 1 else "are outdated and lack"
         raise StaleError(f"{listed(paths)} {they} {missing}.", f"{listed(commands)} computes it anew.") from missing
 
 
-def makes(folder: RunFolder, stage: Stage) -> str:
+def command(folder: RunFolder, stage: Stage) -> str:
     """Return the command that computes a stage's result in a run's folder."""
     return f"`walkerlab {stage.command} -c {folder.typed}`"
 

@@ -48,7 +48,7 @@ class InPlace(Executor):
     """Executor that runs each call at once in this process."""
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
-        """Run a call; raises what the call raises."""
+        """Run a call; its errors are raised."""
         future: Future[Any] = Future()
         future.set_result(fn(*args, **kwargs))
         return future

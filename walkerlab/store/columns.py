@@ -22,7 +22,7 @@ def columns(rows: Sequence[Any], labels: Mapping[str, Label], dim: str) -> dict[
     return {label.name or name: column([of(row, name) for row in rows], label, dim) for name, label in labels.items()}
 
 
-def printed(row: Any, labels: Mapping[str, Label]) -> dict[str, Any]:
+def values_by_column(row: Any, labels: Mapping[str, Label]) -> dict[str, Any]:
     """Return the labelled fields of one row by column name."""
     return {label.name or name: getattr(row, name) for name, label in labels.items()}
 

@@ -55,10 +55,10 @@ def differences(where: str, old: Any, new: Any) -> Iterator[str]:
         for name in sorted({*old, *new}):
             yield from differences(f"{where}.{name}" if where else name, old.get(name), new.get(name))
     elif canonical_json(old) != canonical_json(new):
-        yield f"{where} {shown(old)} -> {shown(new)}"
+        yield f"{where} {brief(old)} -> {brief(new)}"
 
 
-def shown(value: Any) -> str:
+def brief(value: Any) -> str:
     """Format a config value briefly."""
     if value is None:
         return "none"

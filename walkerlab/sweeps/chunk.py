@@ -9,7 +9,7 @@ import re
 import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache, partial
+from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
@@ -19,7 +19,6 @@ from walkerlab.labels import Label, labels_of
 from walkerlab.pipeline.executor import answer_in_memory
 from walkerlab.pipeline.graph import STRIDES, Graph
 from walkerlab.pipeline.results import MemoryResults
-from walkerlab.pipeline.work import WorkUnit
 from walkerlab.store import artifact
 from walkerlab.store.artifact import Damaged, OtherLayout
 from walkerlab.store.columns import rows_group
@@ -61,26 +60,21 @@ class Chunk:
     labels: Labels
 
 
-def unit_of(config: Config, key: str, graph: str, target: str, again: bool, forced: str = "") -> WorkUnit:
-    """Return the computation of one point, for any process.
+@lru_cache(maxsize=MEMORIES)
+def memory_for(graph: str, forced: str) -> MemoryResults:  # noqa: ARG001 - one memory for each forced sweep
+    """Return this process's memory of inputs, kept from chunk to chunk; arguments as in `compute_point`."""
+    module, _, name = graph.partition(":")
+    return MemoryResults(getattr(importlib.import_module(module), name))
+
+
+def compute_point(config: Config, key: str, graph: str, target: str, again: bool, forced: str = "") -> Chunk:
+    """Compute one point in this process; a failure becomes its result.
 
     key     of the result
     graph   import path of the pipeline, module:NAME
     again   whether its walk is repeated for the numerical error
     forced  identifies a sweep that reuses no earlier result; empty for others
     """
-    return WorkUnit(key, 1, partial(compute_point, config, key, graph, target, again, forced))
-
-
-@lru_cache(maxsize=MEMORIES)
-def memory_for(graph: str, forced: str) -> MemoryResults:  # noqa: ARG001 - one memory for each forced sweep
-    """Return this process's memory of inputs, kept from chunk to chunk; arguments as in `unit_of`."""
-    module, _, name = graph.partition(":")
-    return MemoryResults(getattr(importlib.import_module(module), name))
-
-
-def compute_point(config: Config, key: str, graph: str, target: str, again: bool, forced: str = "") -> Chunk:
-    """Compute one point in this process; a failure becomes its result."""
     memory = memory_for(graph, forced)
     stages = memory.keys.graph
     try:
@@ -94,7 +88,7 @@ def compute_point(config: Config, key: str, graph: str, target: str, again: bool
     return chunk_of(key, answer)
 
 
-def joined(points: Sequence[tuple[Chunk, float]]) -> Chunk:
+def join_points(points: Sequence[tuple[Chunk, float]]) -> Chunk:
     """Join chunks of one point each, adding their run times (s)."""
     rows = tuple(replace(row, wall_s=wall_s) for point, wall_s in points for row in point.rows)
     return Chunk(rows, {name: label for point, _ in points for name, label in point.labels.items()})

@@ -94,11 +94,12 @@ def page_of(swept: Swept, pictures: Sequence[Picture], shown: Sequence[str]) -> 
     summary, question, group = swept.summary, swept.question, swept.group
     outcomes = ", ".join(f"{count} {name}" for name, count in summary["outcomes"].items())
     parameters = [
-        (name, f"`{axis.key}`", group.variables[name].units, spoken(axis.values), group.variables[name].long_name)
+        (name, f"`{axis.key}`", variable.units, values_summary(axis.values), variable.long_name)
         for name, axis in zip(question.names, question.axes, strict=True)
+        for variable in [group.variables[name]]
     ]
     columns = [
-        *(Column(name, written=in_words, numeric=True) for name in (*question.names, *shown)),
+        *(Column(name, written=format_value, numeric=True) for name in (*question.names, *shown)),
         *(Column("outcome"), Column("reason", wide=True)),
     ]
     listed = f"Of the {len(question)} points the first {MAX_ROWS} are listed. " if len(question) > MAX_ROWS else ""
@@ -108,18 +109,18 @@ def page_of(swept: Swept, pictures: Sequence[Picture], shown: Sequence[str]) -> 
         table("Points", columns, rows(group, question, shown), note=f"{listed}{where}"),
     )
     section = Section("points", "Numbers", (*([Gallery(tuple(pictures))] if pictures else []), *tables))
-    lead = (f"{summary['points']} points: {outcomes}.", *said_of(summary))
+    lead = (f"{summary['points']} points: {outcomes}.", *summary_lines(summary))
     return Page(f"{question.stage} over {', '.join(question.names)}", (section,), lead, PAGE)
 
 
-def said_of(summary: Mapping[str, Any]) -> list[str]:
+def summary_lines(summary: Mapping[str, Any]) -> list[str]:
     """Describe how a sweep's walks ended and their numerical error."""
     ended = [str(one["said"]) for one in summary.get("endings", ())]
     error = summary.get("numerical_error")
     return ended if error is None else [*ended, words("error.of_sample", error, "points")]
 
 
-def spoken(values: Sequence[object]) -> str:
+def values_summary(values: Sequence[object]) -> str:
     """Summarise values in one phrase."""
     listed = [f"{value:.6g}" if isinstance(value, float) else str(value) for value in values]
     return ", ".join(listed) if len(listed) <= 8 else f"{len(listed)} values, {listed[0]} to {listed[-1]}"
@@ -134,6 +135,6 @@ def rows(group: Group, question: SweptStage, shown: Sequence[str]) -> list[tuple
     return list(zip(*columns, strict=True))
 
 
-def in_words(value: Any) -> str:
+def format_value(value: Any) -> str:
     """Format a value for a table."""
     return number(value, 6) if isinstance(value, float) else str(value)

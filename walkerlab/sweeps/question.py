@@ -115,7 +115,7 @@ def distinct_ends(keys: Sequence[str]) -> tuple[str, ...]:
     return tuple(found)
 
 
-def asked(
+def build_sweep(
     stage: str,
     over: Sequence[tuple[str, Any, str]],
     zip: bool = False,
@@ -248,10 +248,11 @@ def sampled(axes: Sequence[Axis], sample: str, seed: int) -> tuple[Axis, ...]:
             unit = qmc.Sobol(dimensions, seed=generator).random_base2(math.ceil(math.log2(count)))[:count]
         else:
             unit = qmc.LatinHypercube(dimensions, seed=generator).random(count)
-    return tuple(Axis(one.key, tuple(drawn(one, column)), one.source) for one, column in zip(axes, unit.T, strict=True))
+    pairs = zip(axes, unit.T, strict=True)
+    return tuple(Axis(axis.key, tuple(values_at(axis, column)), axis.source) for axis, column in pairs)
 
 
-def drawn(one: Axis, column: Any) -> Iterator[Value]:
+def values_at(one: Axis, column: Any) -> Iterator[Value]:
     """Map numbers from 0 to 1 to values of one parameter."""
     for share in column.tolist():
         if one.ends is not None:
@@ -277,10 +278,10 @@ def refuse_unrecorded(question: SweptStage, names: Mapping[str, str]) -> None:
 
     names  by option, as typed
     """
-    for asked, name in names.items():
+    for option, name in names.items():
         if name not in question.names and not has_quantity(question.stage, name):
             known = QUANTITIES[question.stage]
             near = nearest(name, (*known, *question.names))
             listed = ", ".join(one + "…" if one.endswith(".") else one for one in known if one != "outcome")
             meant = f" Did you mean {near}?" if near else ""
-            raise ConfigError(f"{asked}: {question.stage} has no such quantity.{meant}", f"There are {listed}.")
+            raise ConfigError(f"{option}: {question.stage} has no such quantity.{meant}", f"There are {listed}.")

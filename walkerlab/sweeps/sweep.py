@@ -5,6 +5,7 @@ import hashlib
 import time
 from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from secrets import token_hex
 from typing import Any
@@ -28,7 +29,7 @@ from walkerlab.store.files import make_folder
 from walkerlab.store.hdf5 import GroupOnDisk
 from walkerlab.store.key import Identity
 from walkerlab.store.runfolder import RunFolder
-from walkerlab.sweeps.chunk import Chunk, PointResult, joined, store, stored_chunks, unit_of
+from walkerlab.sweeps.chunk import Chunk, PointResult, compute_point, join_points, store, stored_chunks
 from walkerlab.sweeps.engines import ENGINES, Order, SweepEngine
 from walkerlab.sweeps.question import SweptStage
 from walkerlab.sweeps.result import Merge
@@ -275,7 +276,7 @@ class SweepRun:
             keep(Chunk((PointResult(unit.name, "failed", why),), {}))
 
         todo, chunk_s = self._units(missing.tolist(), work), work.chunk_s or work.engine.chunk_s
-        spread = Spread(todo, int(missing.size), lambda _units, points: keep(joined(points)), give_up, chunk_s)
+        spread = Spread(todo, int(missing.size), lambda _units, points: keep(join_points(points)), give_up, chunk_s)
         with work.engine.opened(work.order) as pool:
             spread.run(pool.executor, pool.workers)
         return tuple(bugs.values())
@@ -286,7 +287,8 @@ class SweepRun:
         sample = set(np.sort(self.first)[evenly_spread(self.first.size, SAMPLE)].tolist())
         for index in indices:
             config = self.config(index)
-            yield unit_of(config, self.keys.of(config, stage)[stage], work.graph, stage, index in sample, forced)
+            key = self.keys.of(config, stage)[stage]
+            yield WorkUnit(key, 1, partial(compute_point, config, key, work.graph, stage, index in sample, forced))
 
 
 def refuse_unknown_stage(name: str, graph: Graph) -> None:
