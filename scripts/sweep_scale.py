@@ -72,13 +72,13 @@ def measure(points: int) -> None:
     """Sweep once, and say what it took."""
     from walkerlab.config.loader import load
     from walkerlab.store.runfolder import RunFolder
-    from walkerlab.sweeps.question import asked, axis_of_text
+    from walkerlab.sweeps.question import axis_of_text, build_sweep
     from walkerlab.sweeps.sweep import SweepRun, SweepWork
 
     runs = Path(os.environ["SWEEP_SCALE_RUNS"], str(points))
     real_summary()
     before, started, used = peak_mb(), time.perf_counter(), time.process_time()
-    question = asked("echo", [axis_of_text(f"slope_deg=0.5:5:{points}")])
+    question = build_sweep("echo", [axis_of_text(f"slope_deg=0.5:5:{points}")])
     swept = SweepRun(question, load(), RunFolder(runs, "scale"), GRAPH).run(SweepWork(graph=f"{HERE.stem}:GRAPH"))
     wall, used = time.perf_counter() - started, time.process_time() - used
     size, chunks = swept.path.stat().st_size, list(swept.path.parent.glob("sweep-chunks/*.h5"))

@@ -195,9 +195,9 @@ def run(
     True
     """
     refuse_unknown_stage(stage)
-    asked = resolve(str(config), settings(set), strides, folder_of(runs), name)
-    warn(asked.loaded.warnings)
-    report = execute(asked.loaded.config, stage, asked.folder, Options(force=force, jobs=jobs))
+    resolved = resolve(str(config), settings(set), strides, folder_of(runs), name)
+    warn(resolved.loaded.warnings)
+    report = execute(resolved.loaded.config, stage, resolved.folder, Options(force=force, jobs=jobs))
     content = artifact.read(report.artifact) if report.artifact is not None else Content()
     return result_of(stage, report.as_json(), content, report.no_answer, report.artifact)
 
@@ -241,7 +241,7 @@ def sweep(
     [0.7036, 0.7343]
     """
     from walkerlab.sweeps.engines import Order, engine_named
-    from walkerlab.sweeps.question import asked
+    from walkerlab.sweeps.question import build_sweep
     from walkerlab.sweeps.sweep import SweepRun, SweepWork, modules_of
 
     xarray_here()  # the answer is a Dataset
@@ -252,7 +252,7 @@ def sweep(
     listed = [(key, values_of(key, value), f"over {key}") for key, value in over.items()]
     block = found.loaded.config.sweep or SweepBlock()
     said: dict[str, Any] = {key: value for key, value in combined.items() if value is not None}
-    question = asked(stage, listed, **{"seed": block.seed, **said})
+    question = build_sweep(stage, listed, **{"seed": block.seed, **said})
     chosen, address = engine_named(engine)
     order = Order(jobs, address, modules_of(stage, found.loaded.config, PIPELINE), found.folder.path)
     swept = SweepRun(question, found.loaded, found.folder).run(SweepWork(chosen, order))

@@ -1,6 +1,6 @@
-"""Registration of code that nothing below may depend on: a registry names it in quotes and imports it when it is used.
+"""Late imports for registries: code is named by a quoted string and imported when it is used.
 
-The name is written in full, so that the code counts among what a result is made of (see sources.py).
+Names are written in full, so that digests of code include them (see sources.py).
 """
 
 from collections.abc import Callable
@@ -9,10 +9,10 @@ from typing import Any
 
 
 def registered(module: str, name: str) -> Any:
-    """Return what a module registers under a name."""
+    """Import a module and return one of its names."""
     return getattr(import_module(module), name)
 
 
 def later(module: str, name: str) -> Callable[..., Any]:
-    """Return a function that is imported only when it is called."""
+    """Return a stand-in for a function that is imported when first called."""
     return lambda *arguments: registered(module, name)(*arguments)

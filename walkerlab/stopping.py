@@ -1,4 +1,4 @@
-"""Signals that end what runs: they raise an error in the main thread, and not where that would be dropped."""
+"""Signals that stop a command: they raise an error in the main thread, except inside LLVM callbacks, which drop it."""
 
 import _thread
 import os
@@ -9,14 +9,14 @@ from types import FrameType
 
 SOON_S = 0.02
 CALLED_BACK = "_raw_object_cache"
-"""How the functions begin that LLVM calls when it has compiled or loaded something; what they raise is lost."""
+"""Prefix of the functions that LLVM calls after compiling or loading; errors raised there are lost."""
 
 PATIENCE_S = 1.0
-"""How long a command may take to keep what is finished, once the process that started it has ended."""
+"""Time for a command to store finished results after its parent has ended."""
 
 
 def raise_on(number: int, error: type[BaseException]) -> None:
-    """Have a signal raise an error from now on; where LLVM has called back, as soon as it has gone on."""
+    """Make a signal raise an error; inside an LLVM callback the signal is sent again shortly after."""
     again: list[threading.Timer] = []
 
     def arrived(number: int, frame: FrameType | None) -> None:
@@ -31,7 +31,7 @@ def raise_on(number: int, error: type[BaseException]) -> None:
 
 
 def is_called_back(frame: FrameType | None) -> bool:
-    """Whether a frame, or one that called it, is of a function that LLVM has called."""
+    """Whether a frame or one of its callers is an LLVM callback."""
     while frame is not None:
         if frame.f_code.co_name.startswith(CALLED_BACK):
             return True
@@ -40,9 +40,9 @@ def is_called_back(frame: FrameType | None) -> bool:
 
 
 def end_with_parent() -> None:
-    """End this process, the leader of its session, and all it has started once its parent is gone, however that ended.
+    """End this process and all it has started as soon as its parent is gone.
 
-    The parent holds the other end of standard input and never writes to it.
+    This process leads its session; the parent holds the other end of standard input and never writes to it.
     """
 
     def watch() -> None:

@@ -1,8 +1,8 @@
-"""Processes that work beside this one: `in_order` for a list of calls, `WorkerPool` for calls that come bit by bit.
+"""Worker processes: `in_order` for a list of calls, `WorkerPool` for calls that arrive one by one.
 
-A worker is an interpreter of its own that is sent calls and sends back what they return. It never runs the caller's
-script, so that scripts without a guard, code from standard input and notebooks can have workers. Workers end with the
-process that started them, however that ends; an interrupt of the keyboard is that process's to deal with.
+A worker is a separate interpreter that receives calls and returns their results. It never runs the caller's script, so
+scripts without a guard, code from standard input and notebooks can use workers. Workers end with their parent, however
+that ends; the parent handles keyboard interrupts.
 """
 
 import contextlib
@@ -29,7 +29,7 @@ from walkerlab.kernel_cache import cache_root
 from walkerlab.stopping import raise_on
 
 PATIENCE_S = 5.0
-"""How long a worker may take to end what it began, before it is killed."""
+"""Time for a worker to end before it is killed."""
 START = """
 import signal, sys
 signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -43,12 +43,12 @@ Hear = Callable[[Any], None]
 
 
 class WorkerDiedError(WalkerlabError):
-    """A worker ended before it had answered: it crashed, or was killed."""
+    """A worker crashed or was killed before it answered."""
 
     exit_code = 4
 
     def __init__(self, exit_code: int) -> None:
-        """Say how.
+        """Describe the end of a worker.
 
         exit_code  of the process, negative for a signal
         """
@@ -60,31 +60,31 @@ class WorkerDiedError(WalkerlabError):
         self.exit_code_of_worker = exit_code
 
     def __reduce__(self) -> tuple[type, tuple[int]]:
-        """What a copy in another process is made of."""
+        """Support pickling."""
         return type(self), (self.exit_code_of_worker,)
 
 
 class WorkerTimeoutError(Exception):
-    """A worker has not answered in time."""
+    """A worker did not answer in time."""
 
 
 @dataclass(frozen=True)
 class Told:
-    """What a call says while it runs."""
+    """Message of a running call."""
 
     value: Any
 
 
 @dataclass(frozen=True)
 class Answer:
-    """What became of a call: the value that it returned, or the error that it raised."""
+    """Result of a call: its value, or the error that it raised."""
 
     value: Any = None
     error: Exception | None = None
 
 
 class Worker:
-    """One process, which does one call after the other."""
+    """A process that runs one call after the other."""
 
     def __init__(
         self,
@@ -93,12 +93,12 @@ class Worker:
         folder: Path | None = None,
         quiet: bool = False,
     ) -> None:
-        """Start it.
+        """Start the process.
 
-        modules      that it loads at once, while nothing is asked of it yet
+        modules      to import at once, before the first call
         environment  variables that differ from this process's
-        folder       that it works in; this process's if left out
-        quiet        whether what it prints is dropped
+        folder       working folder; default: this process's
+        quiet        discard its output
         """
         self._line, theirs = Pipe()
         path = [os.path.abspath(entry) for entry in sys.path]  # noqa: PTH100 (entries are texts, '' the folder here)
@@ -111,21 +111,21 @@ class Worker:
             stdout=output,
             stderr=output,
             cwd=folder,
-            # One folder of compiled code for all, chosen and told of here.
+            # all processes share one folder of compiled code
             env={**os.environ, "WALKERLAB_CACHE": str(cache_root()), **(environment or {})},
         )
         theirs.close()
 
     def do(self, call: Callable[[], R], hear: Hear | None = None, timeout_s: float | None = None) -> R:
-        """What a call returns there; raises what it raises.
+        """Run a call in the worker; returns its value or raises its error.
 
-        hear       is given what the call tells meanwhile
-        timeout_s  the longest time between two things that are heard, s
+        hear       receives the call's messages
+        timeout_s  maximum time between two messages, s
 
         Raises WorkerDiedError and WorkerTimeoutError.
         """
         work = pickle.dumps(call)
-        with contextlib.suppress(OSError):  # a worker that is dead says so as well by never answering
+        with contextlib.suppress(OSError):  # a dead worker shows in the missing answer
             self._line.send_bytes(work)
         while isinstance(message := self._received(timeout_s), Told):
             if hear is not None:
@@ -146,15 +146,15 @@ class Worker:
 
     @property
     def alive(self) -> bool:
-        """Whether it can be asked for more."""
+        """Whether the process runs."""
         return self.process.poll() is None
 
     def leave(self) -> None:
-        """Ask it to drop what it is at, and to end."""
+        """Ask the process to drop its call and end."""
         self.process.terminate()
 
     def ended(self) -> int:
-        """Wait for its end, and kill it if that does not come; its exit code."""
+        """Wait for its end, kill it if it does not end in time, and return its exit code."""
         try:
             return self.process.wait(PATIENCE_S)
         except subprocess.TimeoutExpired:
@@ -169,10 +169,10 @@ class Worker:
 
 
 class WorkerPool(Executor):
-    """Workers that are started as they are needed, and anew in place of those that die; ended with the pool."""
+    """Executor whose workers start as needed, replace dead ones, and end with the pool."""
 
     def __init__(self, size: int, modules: Sequence[str] = (), environment: Mapping[str, str] | None = None) -> None:
-        """At most `size` workers; none is started. For `modules` and `environment` see `Worker`."""
+        """Set up at most `size` workers without starting one; `modules` and `environment` as in `Worker`."""
         self.size = size
         self._new_worker = partial(Worker, modules, environment)
         self._threads = ThreadPoolExecutor(size)  # each waits for one worker
@@ -182,16 +182,16 @@ class WorkerPool(Executor):
         self._closed = False
 
     def start_all(self) -> None:
-        """Start all workers at once, so that they load what they need meanwhile."""
+        """Start all workers now, so that they import their modules meanwhile."""
         with self._lock:
             self._idle += [self._new_worker() for _ in range(self.size - len(self._idle) - len(self._busy))]
 
     def start(self, call: Callable[[], R], hear: Hear | None = None) -> Future[R]:
-        """Have a call done by the next worker that is free; `hear` is given what it tells, in another thread."""
+        """Run a call in the next free worker; `hear` receives its messages in another thread."""
         return self._threads.submit(self._do, call, hear)
 
     def submit(self, fn: Callable[..., R], /, *args: Any, **kwargs: Any) -> Future[R]:
-        """Have a function called by the next worker that is free."""
+        """Run a function in the next free worker."""
         return self.start(partial(fn, *args, **kwargs))
 
     def _do(self, call: Callable[[], R], hear: Hear | None) -> R:
@@ -209,7 +209,7 @@ class WorkerPool(Executor):
                 self._idle.append(worker)
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """End the workers; with `wait`, once they have done what they were given."""
+        """End the workers; with `wait`, after they have finished their calls."""
         self._threads.shutdown(wait=wait, cancel_futures=cancel_futures)
         with self._lock:
             self._closed = True
@@ -223,18 +223,18 @@ class WorkerPool(Executor):
             worker.close()
 
     def __exit__(self, *_: object) -> None:
-        """End the workers, whatever they are at."""
+        """End the workers at once."""
         self.shutdown(wait=False, cancel_futures=True)
 
 
 def in_order(
     calls: Sequence[Callable[[], R]], jobs: int, first: Sequence[int] = (), rank: Callable[[int], float] = float
 ) -> Iterator[R]:
-    """What independent calls return, in their order, whoever did them.
+    """Iterate over the results of independent calls, in order.
 
     jobs   processes
-    first  places of calls that are done here, before several processes would each compile the same
-    rank   by place: calls of least rank begin first, so that no process is left alone with a long one at the end
+    first  indices of calls to run in this process beforehand, so that kernels are compiled once
+    rank   of an index; calls of lowest rank start first, so that no long call runs alone at the end
     """
     if jobs <= 1 or len(calls) <= 1:
         for call in calls:
@@ -247,46 +247,46 @@ def in_order(
             yield ready[place] if place in ready else others[place].result()
 
 
-# What follows runs in the worker.
+# The rest runs in the worker.
 
 
 class LeaveError(BaseException):
-    """This process is to end, and what it has begun with it."""
+    """This process is asked to end and to drop its call."""
 
 
 def tell(value: Any) -> None:
-    """Say something to whom waits for the call that runs."""
+    """Send a message to the parent process."""
     assert _lines, "only calls in a worker can tell"
     _lines[0].send(Told(value))
 
 
 _lines: list[Connection] = []
-"""In a worker: to the process that started it."""
+"""In a worker: the connection to its parent."""
 
 
 def serve(number: int, modules: Sequence[str]) -> None:
-    """Do one call after the other, until this process is told to end.
+    """Run calls until this process is told to end.
 
-    number  of the open file that calls come through
+    number  descriptor of the connection to the parent
     """
     os.set_inheritable(number, False)
     line = Connection(number)
     _lines.append(line)
     calls: queue.SimpleQueue[bytes] = queue.SimpleQueue()
     threading.Thread(target=receive, args=(line, calls), daemon=True).start()
-    # Until there is something to drop, a process that is told to end just ends.
+    # before the first call, a signal just ends the process
     for module in modules:
         importlib.import_module(module)
     with contextlib.suppress(LeaveError):
         raise_on(signal.SIGTERM, LeaveError)
         while True:
             line.send_bytes(answer(calls.get()))
-    # What was begun is dropped: told once more, as by a terminal and by who started it, the process just ends.
+    # the call is dropped; a second signal, as from terminal and parent, just ends the process
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
 
 
 def receive(line: Connection, calls: queue.SimpleQueue[bytes]) -> None:
-    """Take what is sent, and end this process once nobody is there to send any more."""
+    """Queue incoming calls, and end this process once the parent is gone."""
     with contextlib.suppress(EOFError, OSError):
         while True:
             calls.put(line.recv_bytes())
@@ -294,7 +294,7 @@ def receive(line: Connection, calls: queue.SimpleQueue[bytes]) -> None:
 
 
 def answer(work: bytes) -> bytes:
-    """Do a call; the answer, which names in words what cannot be sent."""
+    """Run a pickled call; return its pickled answer, with a description of errors that cannot be pickled."""
     try:
         return pickle.dumps(Answer(pickle.loads(work)()))
     except Exception as error:

@@ -7,7 +7,9 @@ from typer.testing import CliRunner
 
 import walkerlab
 from walkerlab.cli.main import program
-from walkerlab.pipeline.graph import STAGES
+from walkerlab.config.fields import block_of, words_of
+from walkerlab.config.schema import Config
+from walkerlab.pipeline.graph import PIPELINE, STAGES
 from walkerlab.store.provenance import git_commit
 
 HEAVY = (
@@ -64,6 +66,22 @@ def test_every_stage_has_the_common_options_and_strides_if_it_walks(walker, stag
     assert "--jobs" in words
     assert ("--strides" in words) == (stage.name in ("simulate", "contact-sim", "report"))
     assert ("--open" in words) == (stage.name == "report")
+
+
+OF_STAGES = [(stage.name, option) for stage in STAGES for option in stage.options]
+
+
+@pytest.mark.parametrize(("stage", "option"), OF_STAGES, ids=lambda entry: getattr(entry, "flag", entry))
+def test_an_option_of_a_stage_sets_a_key_and_offers_the_words_that_the_key_allows(stage, option):
+    block, _, name = option.key.rpartition(".")
+    fields = block_of(Config.model_fields[block]).model_fields if block else Config.model_fields
+    names = {field.alias or key: field for key, field in fields.items()}
+    assert block in ("", stage)
+    assert not set(option.needs) - {other.flag for other in PIPELINE[stage].options}
+    if "|" in option.metavar:
+        assert set(option.metavar.split("|")) == set(words_of(names[name].annotation))
+    else:
+        assert name in names
 
 
 def test_the_version_is_followed_by_the_commit(walker):

@@ -66,8 +66,8 @@ def compiling_bounce(toy, monkeypatch):
             file.write("\nimport walkerlab.kernels\n")
         monkeypatch.setenv("WALKERLAB_CACHE", str(toy.source / "nothing-compiled"))
         monkeypatch.setattr(executor, "nothing_compiled_yet", lambda: True)
-        stages = (replace(one, compiles_long=one.name == "bounce") for one in toy.graph.stages)
-        toy.graph = Graph(*stages)
+        compiled = {"bounce": "compile_kernels"}
+        toy.graph = Graph(*(replace(stage, precompile=compiled.get(stage.name, "")) for stage in toy.graph.stages))
         return toy
 
     return with_kernels

@@ -255,7 +255,7 @@ def test_looking_touches_nothing(toy):
     assert toy.preview("page").reused
     assert set(actions(toy.preview("page", force=True)).values()) == {"run"}
     config, folder = toy.loaded()
-    assert [step.action for step in survey(config, folder, toy.graph) if not step.stage.campaign_of] == ["reuse"] * 6
+    assert [step.action for step in survey(config, folder, toy.graph) if not step.stage.only_by] == ["reuse"] * 6
     assert sorted((path, path.stat().st_mtime_ns) for path in toy.runs.rglob("*")) == before
 
 

@@ -184,7 +184,7 @@ def test_a_bad_block_is_refused_in_words(setting, said):
 
 
 def test_nothing_is_stale_without_it():
-    assert PIPELINE["basin"].optional
+    assert PIPELINE["basin"].only_by == "basin"
     assert all("basin" not in stage.inputs(load(None, ()).config) for stage in PIPELINE.stages)
     assert "basin" in PIPELINE["plot"].if_current
     assert "basin" in PIPELINE["report"].if_current

@@ -12,7 +12,7 @@ from walkerlab.config.loader import load
 from walkerlab.store.runfolder import RunFolder
 from walkerlab.sweeps.chunk import memory_for
 from walkerlab.sweeps.engines import Order, Pool, SweepEngine
-from walkerlab.sweeps.question import asked, axis_of_text
+from walkerlab.sweeps.question import axis_of_text, build_sweep
 from walkerlab.sweeps.sweep import SweepRun, SweepWork
 
 HERE = Path(__file__).parent
@@ -37,7 +37,7 @@ class Toy:
 
     def sweep(self, stage, *over, config=None, sets=(), **options):
         read = load(config, sets)
-        question = asked(stage, [axis_of_text(text) for text in over], **options)
+        question = build_sweep(stage, [axis_of_text(text) for text in over], **options)
         return SweepRun(question, read, RunFolder(self.runs, read.run_name), self.graph)
 
     def run(self, stage, *over, engine=HERE_AND_NOW, order=None, chunk_s=None, reporter=None, force=False, **options):

@@ -5,11 +5,11 @@ import pytest
 
 from walkerlab.config.loader import load
 from walkerlab.errors import ConfigError
-from walkerlab.sweeps.question import asked, axis_of_text, described, distinct_ends, refuse_unrecorded
+from walkerlab.sweeps.question import axis_of_text, build_sweep, described, distinct_ends, refuse_unrecorded
 
 
 def question(*over, **options):
-    return asked("fixedpoint", [axis_of_text(text) for text in over], **options)
+    return build_sweep("fixedpoint", [axis_of_text(text) for text in over], **options)
 
 
 def test_a_range_has_both_ends_and_a_list_its_own_values():

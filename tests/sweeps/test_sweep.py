@@ -25,8 +25,8 @@ from walkerlab.store.files import refused
 from walkerlab.store.runfolder import RunFolder
 from walkerlab.sweeps import sweep as sweeps
 from walkerlab.sweeps.chunk import FOLDER, Chunk, PointResult, by_name, compute_point, without_outputs
-from walkerlab.sweeps.drawing import said_of
-from walkerlab.sweeps.question import asked, axis_of_text
+from walkerlab.sweeps.drawing import summary_lines
+from walkerlab.sweeps.question import axis_of_text, build_sweep
 from walkerlab.sweeps.result import Merge, as_csv, last_of_each
 
 GRAVITIES = "gravity_m_s2=1:9:5"
@@ -92,7 +92,7 @@ def test_an_evenly_spread_sample_of_walks_is_taken_again_and_told(toy):
     assert np.diff(np.flatnonzero(again)).max() <= 3  # of forty points sixteen: one of two or three
     told = {"walked_again": 16, "of": 40, "ended_otherwise": 0, "end_time_s": 1e-9, "step_period_s": 0.04}
     assert swept.summary["numerical_error"] == pytest.approx(told)
-    assert plain(said_of(swept.summary)) == [
+    assert plain(summary_lines(swept.summary)) == [
         "Largest numerical error: 0.04 s in a period and 10⁻⁹ s at the end, by a second walk with a hundred times "
         "tighter tolerances; 16 of 40 points were walked again."
     ]
@@ -102,20 +102,20 @@ def test_of_few_points_all_are_walked_again_and_those_that_end_otherwise_counted
     swept = toy.run("roll", "strides=[5, 7, 8]", sets=WALKED_AGAIN)
     error = swept.summary["numerical_error"]
     assert (error["walked_again"], error["of"], error["ended_otherwise"]) == (3, 3, 1)
-    assert said_of(swept.summary)[0].endswith("3 of 3 points were walked again, of which 1 ended otherwise.")
+    assert summary_lines(swept.summary)[0].endswith("3 of 3 points were walked again, of which 1 ended otherwise.")
     unknown = toy.run("roll", "strides=[7]", sets=WALKED_AGAIN).summary
-    assert said_of(unknown)[0].startswith("Numerical errors are unknown; 1 of 1 points")
+    assert summary_lines(unknown)[0].startswith("Numerical errors are unknown; 1 of 1 points")
 
 
 def test_a_sweep_of_contact_walks_says_that_pads_ended_them_with_pitch_and_last_steps():
-    question = asked("contact-sim", [axis_of_text("contact.stiffness=[1e5, 2e5, 3e5]")])
+    question = build_sweep("contact-sim", [axis_of_text("contact.stiffness=[1e5, 2e5, 3e5]")])
     rows = {
         "0": {"outcome": "off-pad", "pitch_m": 0.37, "step_lengths_m": [0.36, 0.35]},
         "1": {"outcome": "off-pad", "pitch_m": 0.3, "step_lengths_m": [0.4]},
         "2": {"outcome": "walked", "pitch_m": 0.5, "step_lengths_m": [0.5, 0.5, 0.5]},
     }
     found = [PointResult(key, "answered", "", json.dumps(row)) for key, row in rows.items()]
-    over_pitch = asked("contact-sim", [axis_of_text("contact.pad_pitch=[0.3, 0.37, 0.5]")])
+    over_pitch = build_sweep("contact-sim", [axis_of_text("contact.pad_pitch=[0.3, 0.37, 0.5]")])
     both = [Merge(one, load().config, np.arange(3)) for one in (question, over_pitch)]
     for merge in both:
         merge.put(Chunk(tuple(found), {}), {key: int(key) for key in rows})
@@ -128,7 +128,7 @@ def test_a_sweep_of_contact_walks_says_that_pads_ended_them_with_pitch_and_last_
 def test_a_stage_that_does_not_walk_has_no_numerical_error(toy):
     summary = toy.run("drop", GRAVITIES).summary
     assert "numerical_error" not in summary
-    assert said_of(summary) == []
+    assert summary_lines(summary) == []
 
 
 def test_nothing_is_computed_twice(toy, marks):

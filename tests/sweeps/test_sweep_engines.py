@@ -50,6 +50,17 @@ def test_workers_of_this_machine_may_begin_before_there_are_points():
             assert pool.executor.submit(os.getpid).result() in workers
 
 
+def test_only_a_forced_sweep_computes_again_what_its_workers_remember(toy, marks, tmp_path):
+    counts = []
+    with LOCAL.begun(Order(workers=1)) as begun:
+        for first, force in ((2, False), (4, False), (4, True), (4, True)):
+            toy.run("roll", f"strides={first}:{first + 1}:2", engine=begun, order=Order(1), force=force)
+            counts.append(marks())
+            for mark in (tmp_path / "marks").iterdir():
+                mark.unlink()
+    assert counts == [1, 0, 1, 1]
+
+
 def test_a_worker_that_dies_by_chance_costs_nothing(toy, tmp_path, monkeypatch):
     monkeypatch.setenv("TOY_SWEEP_ONCE", str(tmp_path / "died"))
     swept = toy.run("deadly", "seed=18:24:7", engine=LOCAL, order=order())
@@ -68,11 +79,11 @@ from pathlib import Path
 from walkerlab.config.loader import load
 from walkerlab.store.runfolder import RunFolder
 from walkerlab.sweeps.engines import Order
-from walkerlab.sweeps.question import asked, axis_of_text
+from walkerlab.sweeps.question import axis_of_text, build_sweep
 from walkerlab.sweeps.sweep import SweepRun, SweepWork
 from toy_sweep.sweep_pipeline import GRAPH
 read = load()
-question = asked("deadly", [axis_of_text("seed=100:179:80")])
+question = build_sweep("deadly", [axis_of_text("seed=100:179:80")])
 sweep = SweepRun(question, read, RunFolder(Path(sys.argv[1]), "paper"), GRAPH)
 order = Order(2, modules=("toy_sweep.deadly",))
 swept = sweep.run(SweepWork(order=order, chunk_s=0.05, graph="toy_sweep.sweep_pipeline:GRAPH"))

@@ -20,7 +20,15 @@ from walkerlab.labels import with_unit
 from walkerlab.pipeline.executor import Executor
 from walkerlab.pipeline.graph import PIPELINE
 from walkerlab.pipeline.results import FolderResults
-from walkerlab.pipeline.runs import config_of, makes, read_all, refusing_older, results_in, results_to_show, the_result
+from walkerlab.pipeline.runs import (
+    command,
+    config_of,
+    read_all,
+    refusing_older,
+    results_in,
+    results_to_show,
+    the_result,
+)
 from walkerlab.prose import listed
 from walkerlab.report.outcomes import MODELS
 from walkerlab.report.tables import Table, as_csv, csv_text, of_records
@@ -192,7 +200,7 @@ def named_in(folder: RunFolder, name: str) -> Illustration | Table:
     there += [table for table, key in TABLES.items() if key in compared]
     there += tables
     there += [TRAJECTORY] * any(TRAJECTORY in result.groups for result in stored.values())
-    nothing = f"{folder.path} has nothing yet: {makes(folder, PIPELINE['report'])} makes it all."
+    nothing = f"{folder.path} has nothing yet: {command(folder, PIPELINE['report'])} makes it all."
     advice = "\n  ".join([f"{folder.path} has", *there]) if there else nothing
     near = meant(name, (*named, *TABLES, TRAJECTORY, *tables))
     raise ConfigError(f"nothing is called {name}.{near}", advice)
@@ -224,7 +232,7 @@ def figure(
     with refusing_older(folder, outdated):
         why = illustration.why_left_out(stored, {})
     if why is not None:
-        made = [makes(folder, PIPELINE[stage]) for stage in illustration.stages if stage not in stored]
+        made = [command(folder, PIPELINE[stage]) for stage in illustration.stages if stage not in stored]
         advice = f"{listed(made)} {'makes' if len(made) == 1 else 'make'} what it needs." if made else ""
         raise StaleError(f"{illustration.name} cannot be drawn: {why}.", advice)
     left_out = stored.keys() <= taken.keys()
@@ -233,7 +241,7 @@ def figure(
     if outdated:
         console.warn(
             f"{folder.path} has outdated results, which are {'left out' if left_out else 'drawn all the same'}: "
-            f"{listed(sorted(outdated))}; {makes(folder, PIPELINE['report'])} makes them anew."
+            f"{listed(sorted(outdated))}; {command(folder, PIPELINE['report'])} makes them anew."
         )
     with refusing_older(folder, outdated):
         return illustration.as_file(taken, kind, *size)

@@ -3,10 +3,8 @@
 import atexit
 import gc
 import os
-import re
 import sys
 import warnings
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -16,8 +14,8 @@ from typer.core import TyperGroup
 import walkerlab
 from walkerlab.cli import housekeeping, lifecycle, sweep
 from walkerlab.cli import runs as whole_runs
-from walkerlab.cli.request import OF_A_RUN, OF_TALK, Request, SetByOption, command, keys_to_vary, option
-from walkerlab.pipeline.graph import PIPELINE, Graph, Stage
+from walkerlab.cli.request import OF_A_RUN, OF_TALK, Request, command
+from walkerlab.pipeline.graph import PIPELINE, STRIDES, Graph, Stage
 
 
 def main() -> None:
@@ -100,79 +98,18 @@ def options_of_the_program(
     """Nothing but `--version`, which is answered on sight."""
 
 
-@dataclass(frozen=True)
-class StageRequest(Request):
-    """What a stage's command is asked, with its question where it has one."""
-
-    over: str | None = option(
-        "--over", metavar="KEY", help="Key to follow gaits over, e.g. slope_deg.", autocompletion=keys_to_vary
-    )
-    begin: float | None = option("--from", metavar="A", help="Where the span begins, in the key's unit.")
-    end: float | None = option("--to", metavar="B", help="Where the span ends.")
-    model: str | None = option("--model", metavar="rigid|contact|both", help="Which model's gaits to ask about.")
-    periods: int | None = option("--periods", metavar="N", help="Steps of the longest gaits wanted.")
-    full: bool = option(
-        "--full", default=False, help="Run the long campaign too; if interrupted, it resumes the next time."
-    )
-    least: str | None = option("--minimise", metavar="QUANTITY", help="Number of the gait to make least.")
-    most: str | None = option("--maximise", metavar="QUANTITY", help="Number of the gait to make largest.")
-    within: list[str] | None = option(
-        "--over", metavar="KEY=A:B", help="Number of the config that may change, and its bounds."
-    )
-    keep: list[str] | None = option("--keep", metavar="QUANTITY=A:B", help="Number of the gait to keep within bounds.")
-    designed: str | None = option("--model", metavar="rigid|contact", help="Which model's gait to design.")
-
-    @property
-    def settings(self) -> tuple[str, ...]:
-        """The options as settings of the config, too; typer.BadParameter for a span or bounds that are none."""
-        if self.over is not None and (self.begin is None or self.end is None):
-            raise typer.BadParameter("a span goes with a key: give --from and --to, in its unit", param_hint="--over")
-        given = [
-            ("--model", f"{self.command}.model", self.model or self.designed),
-            ("--over", "continuation.over", self.over),
-            ("--from", "continuation.from", self.begin),
-            ("--to", "continuation.to", self.end),
-            ("--periods", "continuation.periods", self.periods),
-            ("--minimise", "design.minimise", self.least),
-            ("--maximise", "design.maximise", self.most),
-        ]
-        own = [
-            SetByOption(f"{key}={value}", f"{flag} {str(value).removesuffix('.0')}")
-            for flag, key, value in given
-            if value is not None
-        ]
-        for name, given_bounds in (("over", self.within), ("keep", self.keep)):
-            if given_bounds:
-                typed = " ".join(f"--{name} {one}" for one in given_bounds)
-                own.append(SetByOption(f"design.{name}={bounds(name, given_bounds)}", typed))
-        return (*super().settings, *own)
-
-
-def bounds(option: str, given: list[str]) -> str:
-    """Bounds KEY=A:B as a block in YAML; typer.BadParameter where they have another form."""
-    parts = [re.fullmatch(r"([^=]+)=([^:]+):([^:]+)", one) for one in given]
-    if None in parts:
-        raise typer.BadParameter("give a name and its bounds, NAME=A:B", param_hint=f"--{option}")
-    return "{" + ", ".join(f"{one[1]}: [{one[2]}, {one[3]}]" for one in parts if one) + "}"
-
-
 def add_stage(app: typer.Typer, stage: Stage, graph: Graph) -> None:
     """Add the command of one stage to a program, with the options that mean something to it."""
     shared = [*OF_A_RUN, "jobs", "force", "dry_run", "no_wait", *OF_TALK]
-    last = stage is graph.stages[-1]
-    if not (stage.walks or last):
+    if STRIDES not in stage.options:
         shared.remove("strides")
-    shared += ["open_page"] if last else []
-    shared += ["over", "begin", "end", "periods"] if stage.follows else []
-    if stage.designs:
-        shared += ["least", "most", "within", "keep", "designed"]
-    elif stage.of_a_model:
-        shared += ["model"]
+    shared += ["open_page"] if stage is graph.stages[-1] else []
     shared += ["full"] if graph.campaigns_of(stage.name) else []
+    own = [option for option in stage.options if option is not STRIDES]
 
-    @command(app, *shared, name=stage.name, purpose=stage.purpose, asks=StageRequest)
-    def run(request: StageRequest) -> None:
+    @command(app, *shared, name=stage.name, purpose=stage.purpose, sets=own)
+    def run(request: Request) -> None:
         # Imported here: help loads neither a config nor an array.
         from walkerlab.cli.stage import run_stage
 
-        run_stage(request, stage, graph, request.full)
+        run_stage(request, stage, graph)

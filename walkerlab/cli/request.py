@@ -5,9 +5,10 @@ import inspect
 import os
 import re
 import shlex
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import Field, dataclass, field, fields
 from functools import cached_property
+from itertools import starmap
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -21,6 +22,7 @@ from walkerlab.cli.failures import exit_on_failure
 if TYPE_CHECKING:
     from walkerlab.config.loader import LoadedConfig
     from walkerlab.config.schema import Config
+    from walkerlab.pipeline.graph import Option
     from walkerlab.pipeline.resolve import ResolvedRun
     from walkerlab.store.runfolder import RunFolder
 
@@ -53,15 +55,15 @@ def configs_and_files(incomplete: str) -> list[str]:
 
 
 class SetByOption(str):
-    """A setting KEY=VALUE that an option of its own stands for; messages name that option as it was typed."""
+    """A setting KEY=VALUE from an option of its own; messages show that option as typed."""
 
     source: str
 
     def __new__(cls, text: str, source: str) -> "SetByOption":
         """Make the setting, typed as `source`."""
-        made = super().__new__(cls, text)
-        made.source = source
-        return made
+        setting = super().__new__(cls, text)
+        setting.source = source
+        return setting
 
 
 def option(*flags: str, default: Any = None, **about: Any) -> Any:
@@ -75,14 +77,58 @@ def as_parameter(one: Field[Any]) -> inspect.Parameter:
     return inspect.Parameter(one.name, kind, default=one.default, annotation=Annotated[one.type, told])
 
 
+def settings_from(options: Sequence["Option"], values: Mapping[str, Any]) -> tuple[SetByOption, ...]:
+    """Return the settings that a stage's own options stand for.
+
+    values  by flag; None where an option was not given
+
+    Raises typer.BadParameter for an option without those it needs, and for bounds of another form.
+    """
+    settings = []
+    for option in options:
+        value = values[option.flag]
+        if not value and value != 0:
+            continue
+        if any(values[flag] is None for flag in option.needs):
+            raise typer.BadParameter(f"also give {' and '.join(option.needs)}", param_hint=option.flag)
+        if isinstance(value, list):
+            text, typed = bounds(option.flag, value), " ".join(f"{option.flag} {item}" for item in value)
+        else:
+            text, typed = str(value), f"{option.flag} {str(value).removesuffix('.0')}"
+        settings.append(SetByOption(f"{option.key}={text}", typed))
+    return tuple(settings)
+
+
+def bounds(flag: str, values: Sequence[str]) -> str:
+    """Return bounds NAME=A:B as a YAML block; typer.BadParameter for another form."""
+    parts = [re.fullmatch(r"([^=]+)=([^:]+):([^:]+)", value) for value in values]
+    if None in parts:
+        raise typer.BadParameter("give a name and its bounds, NAME=A:B", param_hint=flag)
+    return "{" + ", ".join(f"{part[1]}: [{part[2]}, {part[3]}]" for part in parts if part) + "}"
+
+
+def own_parameter(name: str, option: "Option") -> inspect.Parameter:
+    """Return a stage's own option as a parameter of a function whose signature typer reads."""
+    complete = keys_to_vary if option.metavar == "KEY" else None
+    declared = typer.Option(option.flag, metavar=option.metavar, help=option.help, autocompletion=complete)
+    kind: Any = list[str] if "=A:B" in option.metavar else option.type
+    annotation = Annotated[kind | None, declared]
+    return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=annotation)
+
+
 @dataclass(frozen=True)
 class Request:
-    """What a command is asked: those of these options that it has; the others are as if they had not been given.
+    """Options of a command; those that it does not have keep their defaults.
 
     command  as it is typed
+    own      settings of the config from options of its own
     """
 
     command: str
+    own: tuple[SetByOption, ...] = ()
+    full: bool = option(
+        "--full", default=False, help="Run the long campaign too; if interrupted, it resumes the next time."
+    )
     config: str | None = option(
         "--config", "-c", metavar="FILE", autocompletion=configs_and_files,
         help="Config file, built-in config, or run by its name or folder; default: paper.",
@@ -117,7 +163,7 @@ class Request:
     @property
     def settings(self) -> tuple[str, ...]:
         """Every change of the config, as `--set` has it."""
-        return tuple(self.sets or ())
+        return (*(self.sets or ()), *self.own)
 
     @property
     def typed(self) -> str:
@@ -200,7 +246,12 @@ class KeysAreNoOptions(TyperCommand):
 
 
 def command(
-    app: typer.Typer, *shared: str, name: str | None = None, purpose: str | None = None, asks: type[Request] = Request
+    app: typer.Typer,
+    *shared: str,
+    name: str | None = None,
+    purpose: str | None = None,
+    asks: type[Request] = Request,
+    sets: Sequence["Option"] = (),
 ) -> Callable[[Callable[..., None]], Callable[..., None]]:
     """Add the decorated function to a program: it takes a request, then the options that are its own.
 
@@ -208,22 +259,26 @@ def command(
     name     as it is typed; default: the function's
     purpose  what help says; default: the function's docstring
     asks     the request's type, whose own fields help has before those of `Request`
+    sets     options that set keys of the config, which help has first
 
     What the function raises ends the command as `exit_on_failure` says.
     """
 
     def register(function: Callable[..., None]) -> Callable[..., None]:
         typed = name or function.__name__
+        names = {f"set_{option.flag[2:]}": option for option in sets}  # `from` alone is no name of a parameter
 
         def run(**given: Any) -> None:
-            request = asks(typed, **{field: given.pop(field) for field in shared})
+            values = {option.flag: given.pop(parameter) for parameter, option in names.items()}
+            settings = settings_from(sets, values)
+            request = asks(typed, settings, **{field: given.pop(field) for field in shared})
             with exit_on_failure(request):
                 function(request, **given)
 
         _, *own = inspect.signature(function, eval_str=True).parameters.values()
         options = sorted((one for one in fields(asks) if one.name in shared), key=fields(Request).__contains__)
         by_name = [one.replace(kind=inspect.Parameter.KEYWORD_ONLY) for one in (*own, *map(as_parameter, options))]
-        run.__signature__ = inspect.Signature(by_name)  # type: ignore[attr-defined]
+        run.__signature__ = inspect.Signature([*starmap(own_parameter, names.items()), *by_name])  # type: ignore[attr-defined]
         app.command(typed, cls=KeysAreNoOptions, help=purpose or inspect.getdoc(function))(run)
         return function
 

@@ -14,7 +14,7 @@ from walkerlab.config.loader import load
 from walkerlab.config.walkers import why_rigid_alone
 from walkerlab.config.writer import extending
 from walkerlab.errors import ConfigError, NoAnswer
-from walkerlab.pipeline.executor import told_once
+from walkerlab.pipeline.executor import short_reason
 from walkerlab.pipeline.graph import PIPELINE, Graph, Stage
 from walkerlab.pipeline.runner import Options, StageReport, execute
 from walkerlab.report.answers import answer, verdict
@@ -26,24 +26,24 @@ SEARCHING = ("fixedpoint", "report")
 DRAWN_AT_ONCE = {stage.name for stage in PIPELINE.stages if stage.on_demand}
 
 
-def run_stage(request: Request, stage: Stage, graph: Graph, full: bool) -> None:
+def run_stage(request: Request, stage: Stage, graph: Graph) -> None:
     """Do what the command asks and print it; typer.Exit(4) if there is no answer, else as `execute` raises."""
     try:
-        report_on(request, stage, graph, full)
+        report_on(request, stage, graph)
     except ConfigError as error:
         raise request.loaded.placed(error) from None
 
 
-def report_on(request: Request, stage: Stage, graph: Graph, full: bool) -> None:
+def report_on(request: Request, stage: Stage, graph: Graph) -> None:
     """The same; ConfigError without the place of what is wrong."""
-    options = Options(request.force, not request.no_wait, request.processes, full, request.dry_run)
+    options = Options(request.force, not request.no_wait, request.processes, request.full, request.dry_run)
     config, folder = request.resolved, request.folder
     if options.dry:
         report = execute(config, stage.name, folder, options, graph=graph)
         tell(request, report.as_json() | {"dry_run": True}, planned(report))
         return
     report = with_nearby_gaits(execute(config, stage.name, folder, options, request.console, graph), request)
-    if stage.designs and report.no_answer is None:
+    if stage.name == "design" and report.no_answer is None:
         report.summary["config"] = str(write_optimum(request, report))
     lines = printed(request, report)
     if request.open_page and "html" in report.summary and not request.console.shown:
@@ -125,6 +125,6 @@ def left_out_lines(request: Request, report: StageReport) -> list[str]:
 def each_left_out(report: StageReport) -> list[str]:
     """What was left out, why, and what that saves."""
     return [
-        f"left out: {entry.what} ({told_once(entry.why)})" + (f"; saves {entry.saves}" if entry.saves else "")
+        f"left out: {entry.what} ({short_reason(entry.why)})" + (f"; saves {entry.saves}" if entry.saves else "")
         for entry in report.left_out
     ]

@@ -8,7 +8,7 @@ from typing import Any
 from walkerlab.cli.failures import tell
 from walkerlab.cli.request import Request
 from walkerlab.errors import ConfigError, StaleError
-from walkerlab.pipeline.executor import survey, told_once
+from walkerlab.pipeline.executor import short_reason, survey
 from walkerlab.pipeline.graph import Graph
 from walkerlab.pipeline.results import UP_TO_DATE, Step
 from walkerlab.pipeline.runs import RunSummary, config_of, run_named, runs_in
@@ -81,7 +81,7 @@ def state_of(step: Step) -> str:
         return "current" if step.found is not None and step.found.complete else "no answer"
     if step.damaged:
         return "damaged"
-    if step.stage.optional:
+    if step.stage.only_by:
         return "not run" if step.found is None else "outdated"
     return "missing" if step.found is None else "stale"
 
@@ -95,7 +95,7 @@ def whys(steps: Sequence[Step]) -> Iterator[str]:
     """The same of each stage in full once; of a later stage with the same reason, which stage has it."""
     first: dict[str, str] = {}
     for step in steps:
-        reason = told_once(why(step)) if step.action == "leave out" else why(step)
+        reason = short_reason(why(step)) if step.action == "leave out" else why(step)
         yield f"as {first[reason]}" if reason in first else reason
         if reason:
             first.setdefault(reason, step.stage.name)

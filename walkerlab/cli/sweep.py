@@ -68,7 +68,7 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
         """Run a stage over many values of parameters; results that exist are reused."""
         from walkerlab.config.sweep import Sweep
         from walkerlab.sweeps.engines import Order, engine_named
-        from walkerlab.sweeps.question import asked, axis_of_text, refuse_unrecorded
+        from walkerlab.sweeps.question import axis_of_text, build_sweep, refuse_unrecorded
         from walkerlab.sweeps.sweep import SweepRun, SweepWork, modules_of
 
         options = dict(text.split("=", 1) for text in request.engine_option or () if "=" in text)
@@ -78,7 +78,7 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
         loaded, over = request.loaded, request.over or ()
         given = loaded.config.sweep or Sweep()  # what the options leave open
         own = [(key, values, f"sweep.over.{key}") for key, values in given.over.items()]
-        question = asked(
+        question = build_sweep(
             request.stage or given.stage,
             [axis_of_text(text) for text in over] or own,
             request.zipped or (given.zip and not over),
@@ -192,7 +192,7 @@ def show_result(request: SweepRequest, swept: "Swept") -> None:
 
 def printed(swept: "Swept", page: Path) -> list[str]:
     """The result for people."""
-    from walkerlab.sweeps.drawing import said_of
+    from walkerlab.sweeps.drawing import summary_lines
 
     summary = swept.summary
     outcomes = ", ".join(f"{count} {name}" for name, count in summary["outcomes"].items())
@@ -200,7 +200,7 @@ def printed(swept: "Swept", page: Path) -> list[str]:
     return [
         f"sweep of {summary['of']} over {over}: {summary['points']} points, {outcomes}",
         *([f"  {swept.reused} of them existed already"] if swept.reused else []),
-        *(line for said in said_of(summary) for line in paragraph(said)),
+        *(line for said in summary_lines(summary) for line in paragraph(said)),
         f"  numbers  {swept.path}",
         f"  page     {page}",
     ]

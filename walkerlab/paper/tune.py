@@ -26,7 +26,7 @@ from walkerlab.paper.law import is_own_walker
 from walkerlab.paper.left_out import of_adjustment
 from walkerlab.paper.printed import TABLE_2
 from walkerlab.paper.tune_limit import limit_findings, limit_groups, limit_summary
-from walkerlab.pipeline.progress import Progress, each_told
+from walkerlab.pipeline.progress import Progress, track
 from walkerlab.scene.contact import (
     SAMPLES_PER_PENDULUM_TIME,
     ContactScene,
@@ -43,7 +43,7 @@ from walkerlab.solvers.registry import ENDLESS, Tolerances
 from walkerlab.solvers.system import State
 from walkerlab.stages.numerical_error import numerical_error
 from walkerlab.stages.rigid_groups import leg_variables
-from walkerlab.stages.walk import OUTCOMES, TIME, counted, legs, numbers_of, of_steps, over_time, rigid_start
+from walkerlab.stages.walk import OUTCOMES, TIME, count_outcomes, legs, numbers_of, of_steps, over_time, rigid_start
 from walkerlab.store.columns import numbered, real_and_imaginary, rows_group
 from walkerlab.store.content import Content, Group, Variable
 from walkerlab.workers import in_order
@@ -113,7 +113,7 @@ class TuneRun:
         self.as_it_stands = self.starts.walk(*AS_IT_STANDS)
         quick = for_a_map(self.starts, self.as_it_stands.evaluations)
         rows = in_order([partial(scaled_starts.contact_row, quick, swing, float(factor)) for factor in stance], jobs)
-        every = [*each_told(progress, "tune: map", swing.size * stance.size, rows, swing.size)]
+        every = [*track(progress, "tune: map", swing.size * stance.size, rows, swing.size)]
         self.contact_map = scaled_starts.as_map(swing, stance, every)
         progress.start("tune: rigid map and margins")
         self.rigid_map = scaled_starts.rigid_map(self.rigid, self.rigid_state, swing, stance, self.steps)
@@ -180,7 +180,7 @@ def walk_summary(walk: ContactWalkResult) -> dict[str, Any]:
 
 def summary(found: TuneRun) -> dict[str, Any]:
     """What the command prints."""
-    paper, pitch, ends = found.paper, found.scene.pitch_m, counted(found.contact_map.outcome)
+    paper, pitch, ends = found.paper, found.scene.pitch_m, count_outcomes(found.contact_map.outcome)
     pads = Pads((pitch, pitch), laid=str(with_contact(found.config).pad_pitch))
     return {
         "table2": table_2(found),
@@ -192,7 +192,7 @@ def summary(found: TuneRun) -> dict[str, Any]:
             "cells": int(found.contact_map.outcome.size),
             "walks_share": found.contact_map.share(),
             "contact": ends,
-            "rigid": counted(found.rigid_map.outcome),
+            "rigid": count_outcomes(found.rigid_map.outcome),
             "endings": endings(ends, found.config, True, pads),
         },
         "slope_rad": found.scene.walker.slope,

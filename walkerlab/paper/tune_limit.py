@@ -31,7 +31,7 @@ from walkerlab.scene.contact import SAMPLES_PER_PENDULUM_TIME, ContactScene, kne
 from walkerlab.scene.parts import assembly_of
 from walkerlab.solvers.system import State
 from walkerlab.stages.rigid_groups import leg_variables
-from walkerlab.store.columns import columns, printed, rows_group
+from walkerlab.store.columns import columns, rows_group, values_by_column
 from walkerlab.store.content import Group
 
 FINER = 4  # samples, as many times as contact-sim takes: what is left between them is far below the model error
@@ -154,7 +154,7 @@ def setting(one: Distance) -> dict[str, Any]:
     """A setting and how far it is from the rigid walk."""
     differences = ("period_error", "angle", "velocity", "raw_angle", "numerical_time")
     labels = {name: (DISTANCES | OF_WALKS)[name] for name in differences}
-    return {**printed(one.setting, FACTORS), **printed(one, labels), "run_wall_s": one.wall_s}
+    return {**values_by_column(one.setting, FACTORS), **values_by_column(one, labels), "run_wall_s": one.wall_s}
 
 
 def causes(found: LimitFindings) -> dict[str, Any]:

@@ -1,1 +1,1 @@
-"""The pipeline: what the stages are, in which order they run, what determines a result, and who computes it."""
+"""The pipeline: its stages, their order, the keys of their results, and how they are run."""

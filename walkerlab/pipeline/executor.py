@@ -1,4 +1,4 @@
-"""The executor: decides for each stage whether its result is reused, made or left out, and carries that out."""
+"""The executor: decides for each stage whether to reuse its result, run it or leave it out, and does so."""
 
 import importlib
 import time
@@ -11,12 +11,13 @@ from typing import Any
 
 from walkerlab.config.schema import Config
 from walkerlab.kernel_cache import watch_compilation
-from walkerlab.pipeline.graph import NO_CONTACT, PIPELINE, Graph, Stage
+from walkerlab.pipeline.graph import PIPELINE, Graph, Stage, without_block
 from walkerlab.pipeline.progress import Reporter, Silent, StageReporter
 from walkerlab.pipeline.results import FolderResults, MemoryResults, Results, Step
 from walkerlab.pipeline.task import Precompiler, StageTask, nothing_compiled_yet, run_in_worker, task_of
 from walkerlab.scene.left_out import STILL_COMPUTED, LeftOut
-from walkerlab.store.artifact import NOT_THERE, StageAnswer, Stored
+from walkerlab.store.artifact import NOT_THERE, Stored
+from walkerlab.store.content import Content
 from walkerlab.store.key import Identity
 from walkerlab.store.runfolder import RunFolder
 from walkerlab.workers import WorkerPool
@@ -24,7 +25,7 @@ from walkerlab.workers import WorkerPool
 
 @dataclass(frozen=True)
 class StageDone:
-    """What was done with one stage: `action` as in `Step`, `wall_s` the time it ran."""
+    """Outcome of a step: `action` as in `Step`, `wall_s` the run time."""
 
     stage: str
     action: str
@@ -34,7 +35,7 @@ class StageDone:
 
 @dataclass(frozen=True)
 class Begun:
-    """A stage that runs."""
+    """A running stage."""
 
     step: Step
     task: StageTask
@@ -43,14 +44,15 @@ class Begun:
 
 
 class Executor:
-    """Decides on the stages of a config, one after another, and carries out what it decides.
+    """Brings the results of some stages under one config up to date.
 
-    stages    in an order in which they can run; `force`: each runs that is not left out
-    jobs      processes for stages that do not need each other, and for independent cells of a stage
-    again     whether walks are taken a second time for their numerical error
-    answers   those that there are, by stage
-    left_out  the stages that are left out, and why
-    done      what was done with each stage
+    stages    in an order in which they can run
+    force     run every stage that is not left out, even if its result is current
+    jobs      processes for independent stages, and for independent cells of a stage
+    again     repeat walks at tighter tolerances for their numerical error
+    answers   results so far, by stage
+    left_out  reason for each stage that is left out
+    done      outcomes so far
     """
 
     def __init__(
@@ -64,10 +66,10 @@ class Executor:
         again: bool = True,
         reporter: Reporter | None = None,
     ) -> None:
-        """Decide nothing yet."""
+        """Store the arguments; nothing is read or run."""
         self.config, self.results, self.stages, self.graph = config, results, tuple(stages), results.keys.graph
         self.force, self.jobs, self.again, self.reporter = force, jobs, again, reporter or Silent()
-        self.answers: dict[str, StageAnswer] = {}
+        self.answers: dict[str, Content] = {}
         self.left_out: dict[str, str] = {}
         self.done: list[StageDone] = []
         self._keys: dict[str, str] = {}
@@ -79,17 +81,17 @@ class Executor:
         self._total = 0
 
     def plan(self) -> tuple[Step, ...]:
-        """Decide on all stages, assuming that each goes as decided; touches nothing."""
+        """Decide on all stages, assuming that each step succeeds; changes no file."""
         steps = []
         for stage in self.stages:
             step = self._decide(stage)
-            if not (stage.optional and step.action == "run"):  # what is optional is counted on once it is there
+            if not (stage.only_by and step.action == "run"):  # an optional result counts once it exists
                 self._expect(step)
             steps.append(step)
         return tuple(steps)
 
     def carry_out(self, likely: Sequence[Stage] = ()) -> None:
-        """Decide on the stages and do what is decided; those of `likely` will probably run."""
+        """Decide on each stage and carry that out; `likely` are the stages that the plan would run."""
         self._waiting, self._left, self._total = list(self.stages), [stage.name for stage in likely], len(likely)
         beside = self.jobs > 1 and any_side_by_side(likely, self.config)
         try:
@@ -106,26 +108,25 @@ class Executor:
                 begun.reporter.end("")
 
     def skip(self, step: Step) -> None:
-        """Take note of a stage that does not run."""
+        """Record a stage that does not run."""
         done = StageDone(step.stage.name, step.action, step.reason)
         self.done.append(done)
-        self.reporter.note(said_of(done))
+        self.reporter.note(outcome_line(done))
 
-    def inputs(self, stage: Stage) -> dict[str, StageAnswer]:
-        """The results that a stage gets: those it needs, and those it takes if they are there."""
+    def inputs(self, stage: Stage) -> dict[str, Content]:
+        """Return the results that a stage gets: those it needs, and optional ones that are current."""
         there = self.answers.keys() - self.left_out.keys()
         return {name: self.answers[name] for name in stage.results(self.config) if name in there}
 
     def missing_inputs(self, stage: Stage) -> tuple[LeftOut, ...]:
-        """The results that a stage does without, and why."""
+        """Return the results that a stage has to do without, with the reasons."""
         missing = (name for name in stage.results(self.config) if name not in self._keys)
         return tuple(left_out(name, self._why_absent(name)) for name in missing)
 
     def _decide(self, stage: Stage) -> Step:
-        """Decide on a stage, given what became of its inputs.
+        """Decide on a stage after its inputs.
 
-        Of the results that it takes if they are current those are looked at that are not planned for themselves; one
-        that is damaged is not passed over in silence.
+        Optional inputs outside this plan are looked up here; a damaged one is reported as left out.
         """
         for name in stage.if_current:
             if self.graph[name] not in self.stages:
@@ -147,12 +148,12 @@ class Executor:
 
     def _identity(self, stage: Stage) -> Identity:
         keys = {name: self._keys[name] for name in stage.results(self.config) if name in self._keys}
-        # what a drawing says about results left out depends on why they are
+        # a drawing states why results are left out
         keys |= {absent.what: f"left out: {absent.why}" for absent in self.missing_inputs(stage)}
         return self.results.keys.identity(stage, self.config, keys, self.again)
 
     def _expect(self, step: Step) -> None:
-        """Assume that a step goes as decided: what is to run will have a result."""
+        """Assume that a step succeeds: a stage that is to run will have a result."""
         if step.identity is None:
             self.left_out[step.stage.name] = step.reason
         elif step.action == "reuse" and step.found is not None:
@@ -160,8 +161,8 @@ class Executor:
         else:
             self._keys[step.stage.name] = step.identity.key
 
-    def _settle(self, step: Step, answer: StageAnswer) -> None:
-        """Take note of a stage's answer, which may be that there is none."""
+    def _settle(self, step: Step, answer: Content) -> None:
+        """Record a stage's result, which may be that there is no answer."""
         self.answers[step.stage.name] = answer
         if answer.no_answer is not None:
             self.left_out[step.stage.name] = answer.no_answer.message
@@ -170,7 +171,7 @@ class Executor:
 
     def _why_absent(self, name: str) -> str:
         command = self._command_of(name)
-        if self.graph[name].optional:
+        if self.graph[name].only_by:
             return self.left_out.get(name, f"it was not asked for; {command} computes it")
         none_yet = self.graph[name].why_unsuited(self.config) or f"no current result; {command} computes one"
         return self.left_out.get(name, none_yet)
@@ -179,9 +180,10 @@ class Executor:
         return f"`walkerlab {self.graph[name].command}`"
 
     def _start_ready_stages(self, pool: WorkerPool | None, precompiler: Precompiler) -> None:
-        """Run the next stage here, or without any in `pool` those whose inputs are there, and compile for others."""
+        """Start all ready stages in `pool`, or run the next one in this process if `pool` is None."""
         for stage in list(self._waiting):
-            if len(self._working) == self.jobs or any(begun.step.stage.alone for begun in self._running.values()):
+            timing = any(begun.step.stage.work == "times" for begun in self._running.values())
+            if timing or len(self._working) == self.jobs:
                 return
             if not self._is_ready(stage):
                 if stage.name in self._left and (compiling := precompiler.begin(stage, only_first=True)) is not None:
@@ -197,7 +199,7 @@ class Executor:
                 self._waiting.remove(stage)
                 self._run_here(step, precompiler)
                 return
-            elif not (stage.alone and self._running):
+            elif not (stage.work == "times" and self._running):
                 self._waiting.remove(stage)
                 begun = self._begin(step)
                 future = pool.start(partial(run_in_worker, begun.task), partial(self._hear, begun.reporter))
@@ -205,9 +207,9 @@ class Executor:
                 self._watch(future)
 
     def _run_here(self, step: Step, precompiler: Precompiler) -> None:
-        """Run a stage in this process; on a new machine a worker compiles for a later one meanwhile."""
+        """Run a stage in this process; on a new machine a worker compiles for a later stage meanwhile."""
         importlib.import_module(step.stage.module)
-        slow = [stage for stage in self._waiting if stage.compiles_long]
+        slow = [stage for stage in self._waiting if stage.precompile]
         if slow and nothing_compiled_yet():
             precompiler.begin(slow[0], only_first=False)
         precompiler.wait_for(step.stage)
@@ -217,29 +219,27 @@ class Executor:
         self._finish(None, answer)
 
     def _watch(self, future: Future[Any]) -> None:
-        """Look after a process's work; its end is an event."""
+        """Track a future; its completion enters the event queue."""
         self._working.add(future)
         future.add_done_callback(lambda ended: self._events.put(partial(self._ended, ended)))
 
     def _hear(self, reporter: StageReporter, message: tuple[str, Any]) -> None:
-        """Pass on a process's message in this thread's turn; it arrives in another one, and ends nothing."""
+        """Queue a worker's message for this thread; messages arrive in another one."""
         call, *arguments = message
         self._events.put(lambda: bool(getattr(reporter, call)(*arguments)))
 
     def _ended(self, future: Future[Any]) -> bool:
-        """Keep what a stage has returned; True, since a process is free."""
+        """Keep a stage's result; return True, since a process is free now."""
         self._working.remove(future)
         if future in self._running:
             self._finish(future, future.result())
         return True
 
     def _is_ready(self, stage: Stage) -> bool:
-        """Whether all that a stage takes is there, or known not to come."""
         return self._unsettled().isdisjoint(stage.results(self.config))
 
     def _unsettled(self) -> set[str]:
-        """The stages that wait or run."""
-        return {one.name for one in self._waiting} | {begun.task.name for begun in self._running.values()}
+        return {stage.name for stage in self._waiting} | {begun.task.name for begun in self._running.values()}
 
     def _begin(self, step: Step) -> Begun:
         if step.damaged is not None:
@@ -256,8 +256,8 @@ class Executor:
         reporter = self.reporter.begin(stage.name, ", ".join(place + why), expected)
         return Begun(step, task, reporter, time.perf_counter())
 
-    def _finish(self, future: Future[Any] | None, answer: StageAnswer) -> None:
-        """Keep what a stage has returned, or what it has got where it found that there is no answer."""
+    def _finish(self, future: Future[Any] | None, answer: Content) -> None:
+        """Keep a stage's result, which is partial if there is no answer."""
         begun = self._running[future]
         step, name = begun.step, begun.task.name
         awaited = any(name in stage.results(self.config) for stage in self._waiting)
@@ -270,10 +270,10 @@ class Executor:
         self._left = [other for other in self._left if other != name]
         answered = [] if kept.complete else ["no answer"]
         left = [f"left: {', '.join(self._left)}"] if self._left else []
-        begun.reporter.end("; ".join([said_of(done), *answered, *left]))
+        begun.reporter.end("; ".join([outcome_line(done), *answered, *left]))
 
     def _draw_early(self) -> None:
-        """Draw what is to be looked at while the rest is still being computed."""
+        """Draw a partial page once its main results exist, while others are being computed."""
         unsettled = self._unsettled()
         folder = self.results.folder
         if folder is None:
@@ -292,7 +292,7 @@ class Executor:
 
 
 def survey(config: Config, folder: RunFolder, graph: Graph = PIPELINE) -> tuple[Step, ...]:
-    """What is stored in a run's own folder, and what running each stage there would do; touches nothing."""
+    """Return the state of each stage in a run's own folder and the step that would update it; changes no file."""
     return Executor(config, FolderResults(folder, graph, elsewhere=False), graph.stages).plan()
 
 
@@ -303,10 +303,10 @@ def answer_in_memory(
     *,
     again: bool = True,
     reporter: Reporter | None = None,
-) -> StageAnswer:
-    """Answer a stage's question without a file, computing what it needs and the memory does not have.
+) -> Content:
+    """Compute a stage's result without files, reusing inputs that the memory holds.
 
-    again  whether walks are taken a second time for their numerical error
+    again  repeat walks at tighter tolerances for their numerical error
 
     Raises ConfigError as `Graph.needed_in_memory`.
     """
@@ -316,12 +316,12 @@ def answer_in_memory(
     if target in run.answers:
         return run.answers[target]
     advice = next(answer.no_answer.advice for answer in run.answers.values() if answer.no_answer is not None)
-    return StageAnswer({}, {"no_answer": {"message": run.left_out[target], "advice": advice}}, complete=False)
+    return Content({}, {"no_answer": {"message": run.left_out[target], "advice": advice}}, complete=False)
 
 
 def left_out(stage: str, why: str) -> LeftOut:
-    """A stage that does not run."""
-    return LeftOut(stage, why, "loading and compiling contact code" if why == NO_CONTACT else "")
+    """Describe a stage that does not run."""
+    return LeftOut(stage, why, "loading and compiling contact code" if why == without_block("contact") else "")
 
 
 def any_side_by_side(stages: Sequence[Stage], config: Config) -> bool:
@@ -333,14 +333,14 @@ def any_side_by_side(stages: Sequence[Stage], config: Config) -> bool:
     return any(len(needed[stage.name]) < place for place, stage in enumerate(stages))
 
 
-def told_once(why: str) -> str:
-    """A reason without that of another stage or of the error, which are told themselves."""
+def short_reason(why: str) -> str:
+    """Shorten a reason that quotes another stage's reason or an error; those have lines of their own."""
     return why.partition(": ")[0] if why.startswith(("it needs ", "no answer: ")) else why.partition(": no answer: ")[0]
 
 
-def said_of(done: StageDone) -> str:
-    """One line about what was done with a stage."""
-    why = told_once(done.reason)
+def outcome_line(done: StageDone) -> str:
+    """Describe an outcome in one line."""
+    why = short_reason(done.reason)
     match done.action:
         case "run":
             return f"{done.stage}: ran in {done.wall_s:.2f} s"

@@ -1,11 +1,14 @@
-"""The pipeline on one page: every stage, what it reads of the config, and which results it needs."""
+"""The pipeline on one page: every stage with its part of the config, its options and its inputs.
+
+The command line's help is made from this page, so it imports no stage, no config and no arrays.
+"""
 
 from __future__ import annotations
 
 import importlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from walkerlab.config import reads
 from walkerlab.config.reads import RigidConfig, SceneConfig, StartConfig
@@ -14,67 +17,86 @@ from walkerlab.registration import later
 from walkerlab.scene.left_out import of_contact_walk, of_rigid_walk
 from walkerlab.scene.studies import is_studied
 
-# The table is also what the command line's help is made of, which loads no config and no pydantic.
 if TYPE_CHECKING:
     from walkerlab.config.schema import Config
 
-NO_CONTACT = "the config has no contact block"
 Inputs = Callable[["Config"], tuple[str, ...]]
 Lacks = Callable[["Config"], tuple[dict[str, str], ...]]
 
 
+def without_block(name: str) -> str:
+    """Say that the config lacks a block."""
+    return f"the config has no {name} block"
+
+
 def nothing(_config: object) -> tuple[Any, ...]:
-    """No results of other stages, or nothing that is left out."""
+    """Return an empty tuple: no inputs, or nothing left out."""
     return ()
 
 
 def results_of(*names: str) -> Inputs:
-    """The results of these stages, whatever the config."""
+    """Return a function that gives these names for every config."""
     return lambda _config: names
 
 
 def gait_unless_start_is_given(config: StartConfig) -> tuple[str, ...]:
-    """The fixed point, unless the config has a start state: so a slope without a gait can be walked too."""
+    """Need the fixed point unless the config gives a start state; so slopes without a gait can be walked as well."""
     return ("fixedpoint",) if config.start == "fixed-point" else ()
 
 
 def gait_for_start_or_pads(config: SceneConfig) -> tuple[str, ...]:
-    """The fixed point, if the start state or the pads' pitch is taken from it."""
+    """Need the fixed point if it gives the start state or the pads' pitch."""
     pitch_of_gait = config.contact is not None and config.contact.pad_pitch == "rigid"
     return ("fixedpoint",) if pitch_of_gait else gait_unless_start_is_given(config)
 
 
 def known_and_start(config: SceneConfig) -> tuple[str, ...]:
-    """The known problems, and for walkers that are no study's, judged in their own scene, its start."""
+    """Need the known problems; for walkers of no study also the start of their own scene."""
     return ("known-problems", *(() if is_studied(config) else gait_for_start_or_pads(config)))
+
+
+@dataclass(frozen=True)
+class Option:
+    """Option of a stage's command that sets a key of the config.
+
+    flag      as typed
+    key       dotted
+    metavar   "KEY" for the name of a key, "...=A:B" for bounds by name, which may be repeated
+    needs     flags without which it means nothing
+    """
+
+    flag: str
+    key: str
+    metavar: str
+    help: str
+    type: type = str
+    needs: tuple[str, ...] = ()
+
+
+STRIDES = Option("--strides", "strides", "N", "Strides to walk; one stride is two steps.", int)
 
 
 @dataclass(frozen=True)
 class Stage:
     """One stage of the pipeline.
 
-    name           as on the command line, and of its artifact
-    module         where its `run` is; imported only when it runs
+    name           of its command and its artifact
+    module         of its `run`; imported only when the stage runs
     purpose        one line for the user
-    takes          type of the config that its `run` takes, and so what its result depends on; None for all of it
-    takes_of_scene the same for a walker that is no study's, where it is another type
-    takes_of_paper what its own cases stand on of the built-in paper config
-    programs       the versions of other programs that its result depends on, by name
-    inputs         the stages whose results it needs under a config, earlier in the table
-    if_current     the stages whose results it takes if they happen to be there and current
-    needs_contact  whether it is left out when the config has no contact block
-    draws          whether it writes files beside its artifact, from whatever results there are
-    walks          whether `--strides` means something to it; its `run` walks a second time for the numerical error,
-                   unless told not to: `again`
-    compiles_long  whether its kernels are worth compiling beside an earlier stage: its module has `compile_kernels`
-    campaign_of    the stage whose `--full` runs it too; it is the user's choice, so nothing is stale without it
-    on_demand      whether only its own command runs it; nothing is stale without it
-    alone          whether it measures times, and so runs with nothing beside it
+    takes          type of the config that `run` takes, whose keys its result depends on; None for the whole config
+    takes_of_scene the same for a walker of no study, where that is another type
+    takes_of_paper keys of the built-in paper config that its own cases are based on
+    programs       versions of other programs that its result depends on, by name
+    inputs         stages whose results it needs under a config, earlier in the table
+    if_current     stages whose results it takes if they are current
+    options        of its command, besides those of all stages
+    requires       blocks without which it is left out
+    work           "times" runs alone; "draws" writes files besides its artifact, from whatever results
+                   there are
+    precompile     function of its module that compiles its kernels, where that pays while an earlier stage runs
+    only_by        the one command that runs it, its own or `STAGE --full`; nothing is stale without its result
     early_with     the results with which it is worth drawing while others are still being computed
-    follows        whether it runs over a parameter: `--over`, `--from`, `--to`, `--periods`; `again` is for it, too
-    of_a_model     whether it asks about gaits of a model that is to be named: `--model`
-    designs        whether it has a question of its own: `--minimise`, `--maximise`, `--over`, `--keep`
-    does_without   what is left out of its scene under a config: what, why, and what that saves
+    does_without   parts that its scene lacks under a config: name, reason and saving
     """
 
     name: str
@@ -83,17 +105,12 @@ class Stage:
     takes: type | None
     inputs: Inputs = nothing
     if_current: tuple[str, ...] = ()
-    needs_contact: bool = False
-    draws: bool = False
-    walks: bool = False
-    compiles_long: bool = False
-    campaign_of: str = ""
-    on_demand: bool = False
-    alone: bool = False
+    options: tuple[Option, ...] = ()
+    requires: tuple[str, ...] = ()
+    work: Literal["computes", "times", "draws"] = "computes"
+    precompile: str = ""
+    only_by: str = ""
     early_with: tuple[str, ...] = ()
-    follows: bool = False
-    of_a_model: bool = False
-    designs: bool = False
     does_without: Lacks = nothing
     takes_of_scene: type | None = None
     takes_of_paper: type | None = None
@@ -101,7 +118,7 @@ class Stage:
 
     @property
     def reads(self) -> tuple[str, ...]:
-        """The keys of the config that its result depends on, dotted."""
+        """Return the keys of the config that its result depends on, dotted."""
         if self.takes is not None:
             return tuple(reads.dotted_keys(self.takes))
         from walkerlab.config.schema import Config  # not for the help of the command line
@@ -109,59 +126,65 @@ class Stage:
         return tuple(Config.model_fields)
 
     def takes_under(self, config: RigidConfig) -> type | None:
-        """What its result depends on under a config."""
+        """Return the type of the part of a config that its result depends on."""
         return self.takes if self.takes_of_scene is None or is_studied(config) else self.takes_of_scene
 
     def results(self, config: Config) -> tuple[str, ...]:
-        """The stages whose results it gets: those that it needs, and those that it takes if they are current."""
+        """Return the stages whose results it takes: required ones, then optional ones."""
         return (*self.inputs(config), *self.if_current)
 
     def why_unsuited(self, config: Config) -> str | None:
-        """Why it means nothing under a config; None if it does."""
-        return NO_CONTACT if self.needs_contact and config.contact is None else None
+        """Return why it cannot run under a config; None if it can."""
+        missing = (block for block in self.requires if getattr(config, block) is None)
+        return next(map(without_block, missing), None)
 
-    def refuse_unsuited(self, asked: str, config: Config) -> None:
-        """Raise ConfigError if it means nothing under a config, being what is asked for or what this needs."""
+    def refuse_unsuited(self, target: str, config: Config) -> None:
+        """Raise ConfigError if it cannot run under a config, although `target` needs it."""
         from walkerlab.config.walkers import contact_to_add, without_contact  # not for the help of the command line
 
         if self.why_unsuited(config) is not None:
             block = f"`{contact_to_add(config.walker)}`"
             instead = f"Add one to the config, such as the paper's by this walker's mass: {block}."
-            raise without_contact(asked, config.walker, f"{instead} `walkerlab schema contact` explains its keys.")
+            raise without_contact(target, config.walker, f"{instead} `walkerlab schema contact` explains its keys.")
 
     def refuse_question(self, config: Config) -> None:
-        """Raise ConfigError, before anything runs, for what `refuse` of its module refuses: of stages on demand."""
+        """Raise ConfigError for a question that `refuse` of its module rejects; only for stages on demand."""
         refuse = getattr(importlib.import_module(self.module), "refuse", None) if self.on_demand else None
         if refuse is not None:
             refuse(reads.only(config, self.takes_under(config)))
 
     @property
-    def command(self) -> str:
-        """What is typed to have its result."""
-        return f"{self.campaign_of} --full" if self.campaign_of else self.name
+    def draws(self) -> bool:
+        """Whether it writes files besides its artifact."""
+        return self.work == "draws"
 
     @property
-    def optional(self) -> bool:
-        """Whether it runs only if the user asks for it."""
-        return self.on_demand or bool(self.campaign_of)
+    def command(self) -> str:
+        """The command that computes its result."""
+        return self.only_by or self.name
+
+    @property
+    def on_demand(self) -> bool:
+        """Whether only its own command runs it."""
+        return self.only_by == self.name
 
 
 class Graph:
     """Stages in an order in which they can run."""
 
     def __init__(self, *stages: Stage) -> None:
-        """Keep the stages; ValueError if two have one name."""
+        """Store the stages; ValueError if two share a name."""
         self.stages = stages
         self._by_name = {stage.name: stage for stage in stages}
         if len(self._by_name) != len(stages):
             raise ValueError("two stages have one name")
 
     def __getitem__(self, name: str) -> Stage:
-        """The stage of a name; KeyError if there is none."""
+        """Return a stage by its name."""
         return self._by_name[name]
 
     def needed_for(self, target: str, config: Config) -> tuple[Stage, ...]:
-        """The target and all it needs under a config, in the order in which they run."""
+        """Return the target and all it needs under a config, in running order."""
         needed = {target}
         for stage in reversed(self.stages):
             if stage.name in needed:
@@ -169,9 +192,9 @@ class Graph:
         return tuple(stage for stage in self.stages if stage.name in needed)
 
     def needed_in_memory(self, target: str, config: Config) -> tuple[Stage, ...]:
-        """The same for a result without files.
+        """Return the same for a result without files.
 
-        Raises ConfigError if the config lacks what a stage needs, and for a stage that draws the files of its run.
+        Raises ConfigError if the config lacks a block that a stage requires, and for stages that draw files.
         """
         stages = self.needed_for(target, config)
         for stage in stages:
@@ -181,10 +204,11 @@ class Graph:
         return stages
 
     def campaigns_of(self, target: str) -> tuple[Stage, ...]:
-        """What `--full` runs besides."""
-        return tuple(stage for stage in self.stages if stage.campaign_of == target)
+        """Return the stages that `--full` adds."""
+        return tuple(stage for stage in self.stages if stage.only_by == f"{target} --full")
 
 
+MODEL_HELP = "Model whose gaits to study."
 WALKED = ("fixedpoint", "simulate", "contact-sim")
 PIPELINE = Graph(
     Stage(
@@ -193,32 +217,32 @@ PIPELINE = Graph(
     ),
     Stage(
         "simulate", "walkerlab.stages.simulate", "Walk the rigid model.", reads.SimulateConfig,
-        gait_unless_start_is_given, walks=True, does_without=of_rigid_walk,
+        gait_unless_start_is_given, options=(STRIDES,), does_without=of_rigid_walk,
     ),
     Stage(
         "contact-sim", "walkerlab.stages.contact_sim", "Walk the contact model, its contact forces as in ADAMS.",
-        reads.ContactSimConfig, gait_for_start_or_pads, needs_contact=True, walks=True, compiles_long=True,
-        does_without=of_contact_walk,
+        reads.ContactSimConfig, gait_for_start_or_pads, options=(STRIDES,), requires=("contact",),
+        precompile="compile_kernels", does_without=of_contact_walk,
     ),
     Stage(
         "tune", "walkerlab.paper.tune",
         "Adjust the initial velocities until the contact model walks; say whether, how much, and why.",
-        reads.TuneConfig, results_of("fixedpoint"), needs_contact=True,
+        reads.TuneConfig, results_of("fixedpoint"), requires=("contact",),
         does_without=later("walkerlab.paper.left_out", "of_adjustment"),
     ),
     Stage(
         "compare", "walkerlab.paper.compare",
         "Compare both models with each other and with every number of the paper.", reads.CompareConfig,
-        results_of(*WALKED), needs_contact=True,
+        results_of(*WALKED), requires=("contact",),
     ),
     Stage(
         "accuracy", "walkerlab.benchmarks.accuracy", "Measure error against run time, method by method.",
-        reads.SceneConfig, gait_for_start_or_pads, alone=True,
+        reads.SceneConfig, gait_for_start_or_pads, work="times",
     ),
     Stage(
         "engines", "walkerlab.benchmarks.engines.stage",
         "Walk in other engines (MuJoCo, Drake, Exudyn): our contact law in their integrators, then their own contact.",
-        reads.SceneConfig, gait_for_start_or_pads, needs_contact=True, on_demand=True,
+        reads.SceneConfig, gait_for_start_or_pads, requires=("contact",), only_by="engines",
         programs=later("walkerlab.benchmarks.engines.registry", "installed_versions"),
     ),
     Stage(
@@ -233,36 +257,52 @@ PIPELINE = Graph(
     Stage(
         "stability-maps", "walkerlab.verification.stability_maps",
         "Map stability over stiffness, stiction velocity and step size; resumes where it was interrupted.",
-        reads.MapsConfig, campaign_of="stability", takes_of_paper=reads.WalksConfig,
+        reads.MapsConfig, only_by="stability --full", takes_of_paper=reads.WalksConfig,
     ),
     Stage(
         "continuation", "walkerlab.stages.continuation",
         "Follow families of gaits over a parameter: branches, bifurcations, cascades, chaos.",
-        reads.ContinuationConfig, on_demand=True, follows=True, of_a_model=True,
+        reads.ContinuationConfig, only_by="continuation",
+        options=(
+            Option("--over", "continuation.over", "KEY", "Key to vary, e.g. slope_deg.", needs=("--from", "--to")),
+            Option("--from", "continuation.from", "A", "First value, in the key's unit.", float),
+            Option("--to", "continuation.to", "B", "Last value.", float),
+            Option("--model", "continuation.model", "rigid|contact|both", MODEL_HELP),
+            Option("--periods", "continuation.periods", "N", "Maximum number of steps in a gait's period.", int),
+        ),
     ),
     Stage(
         "basin", "walkerlab.stages.basin",
         "Map which starts reach which attractor, and which fall; resumes where it was interrupted.",
-        reads.BasinConfig, results_of("fixedpoint"), on_demand=True,
+        reads.BasinConfig, results_of("fixedpoint"), only_by="basin",
     ),
     Stage(
         "robustness", "walkerlab.stages.robustness",
-        "Ask what a gait withstands: drops, pushes, rough ground, and which number of the walker moves it most.",
-        reads.RobustnessConfig, results_of("fixedpoint"), on_demand=True, of_a_model=True,
+        "Find the largest drop, push and roughness that a gait survives, and the parameter that matters most.",
+        reads.RobustnessConfig, results_of("fixedpoint"), only_by="robustness",
+        options=(Option("--model", "robustness.model", "rigid|contact|both", MODEL_HELP),),
     ),
     Stage(
         "design", "walkerlab.stages.design",
-        "Find the walker whose gait has the least or largest of a number, within bounds.",
-        reads.DesignConfig, results_of("fixedpoint"), on_demand=True, designs=True, of_a_model=True,
+        "Optimise walker parameters within bounds.",
+        reads.DesignConfig, results_of("fixedpoint"), only_by="design",
+        options=(
+            Option("--minimise", "design.minimise", "QUANTITY", "Gait quantity to minimise."),
+            Option("--maximise", "design.maximise", "QUANTITY", "Gait quantity to maximise."),
+            Option("--over", "design.over", "KEY=A:B", "Key to vary, with its bounds."),
+            Option("--keep", "design.keep", "QUANTITY=A:B", "Gait quantity to keep within bounds."),
+            Option("--model", "design.model", "rigid|contact", "Model whose gait to design."),
+        ),
     ),
     Stage(
         "plot", "walkerlab.figures.stage", "Draw the figures from the stored results.", reads.NamedConfig,
-        results_of(*WALKED, "compare"), draws=True,
+        results_of(*WALKED, "compare"), work="draws",
         if_current=("accuracy", "engines", "tune", "stability-maps", "continuation", "basin", "robustness"),
     ),
     Stage(
         "report", "walkerlab.report.stage", "Write the report, one HTML file.", None,
-        results_of(*WALKED, "tune", "compare", "accuracy", "stability", "plot"), draws=True, early_with=WALKED,
+        results_of(*WALKED, "tune", "compare", "accuracy", "stability", "plot"), options=(STRIDES,), work="draws",
+        early_with=WALKED,
         if_current=("engines", "stability-maps", "continuation", "basin", "robustness"),
     ),
 )  # fmt: skip

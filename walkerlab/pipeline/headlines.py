@@ -1,4 +1,4 @@
-"""The numbers of each stage's summary: which say most, for differences and tables of many runs, and which there are."""
+"""Headline quantities of each stage's summary, and the quantities that a sweep can record."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import chain
@@ -39,7 +39,7 @@ HEADLINES: Final[Mapping[str, tuple[str, ...]]] = {
     "plot": (),
     "report": (),
 }  # fmt: skip
-"""By stage; a name that ends in a point stands for all numbers below it."""
+"""By stage; a name that ends in a point covers all quantities below it."""
 MOST: Final = 13
 OF_WALKS: Final = (
     "work_per_step_J.", "numerical_error.", "end_time_s", "rhs_evaluations", "accepted_steps", "rejected_steps",
@@ -55,15 +55,15 @@ QUANTITIES: Final[Mapping[str, tuple[str, ...]]] = {
         *HEADLINES["contact-sim"], *OF_WALKS, "rolling_per_step_m", "dissipated_J.", "jacobians", "pitch_m",
     ),
 }  # fmt: skip
-"""By stage, every number that one point of a sweep may have, besides texts; written as `HEADLINES`."""
+"""By stage, all numeric quantities of a sweep's point; written as `HEADLINES`."""
 LAST_OF: Final[Mapping[str, str]] = {"last_step_period_s": "step_periods_s", "last_step_length_m": "step_lengths_m"}
-"""Headlines that are the last of a list, with the name of the list."""
+"""Headlines that are the last entry of a list, with the list's name."""
 
 
 def headlines(stage: str, names: Iterable[str]) -> list[str]:
-    """The names of a stage's headline numbers, in order; of a stage without any on record, its first numbers.
+    """Return the names of a stage's headline quantities in order; for an unlisted stage its first quantities.
 
-    names  all numbers that there are, dotted
+    names  of all quantities, dotted
     """
     there = list(dict.fromkeys(names))
     if stage not in HEADLINES:
@@ -73,19 +73,19 @@ def headlines(stage: str, names: Iterable[str]) -> list[str]:
 
 
 def stands_for(wanted: str, name: str) -> bool:
-    """Whether an entry of a stage's numbers stands for a number."""
+    """Whether an entry of `HEADLINES` or `QUANTITIES` covers a quantity."""
     return name == wanted or (wanted.endswith(".") and name.startswith(wanted))
 
 
 def has_quantity(stage: str, name: str) -> bool:
-    """Whether a stage may have a number of that name; of a stage without any on record nothing is known."""
+    """Whether a stage may have a quantity of that name; always true for an unlisted stage."""
     return stage not in QUANTITIES or any(stands_for(known, name) for known in QUANTITIES[stage])
 
 
 def claims(compared: Mapping[str, Any]) -> Sequence[Mapping[str, Any]]:
-    """Return the values that a study claims of this very scene, each as it was judged; none of another scene.
+    """Return the study's published values with their verdicts; none if the scene departs from the study's.
 
-    compared  the summary of `compare`; empty without a result
+    compared  summary of `compare`; empty without a result
     """
     judged: Sequence[Mapping[str, Any]] = compared.get("paper_numbers", ())
     return () if compared.get("departures") else judged

@@ -1,6 +1,8 @@
-"""What a stage's result is determined by, whether it is stored, a point of a sweep, or an answer in memory."""
+"""Identities of results: the config slice, inputs and code that determine a stored, swept or in-memory result."""
 
 from collections.abc import Mapping
+from importlib import import_module
+from inspect import signature
 from typing import Any
 
 from walkerlab.config.canonical import slice_of
@@ -11,18 +13,23 @@ from walkerlab.sources import Sources
 from walkerlab.store.key import Identity
 
 
+def takes_again(stage: Stage) -> bool:
+    """Whether a stage's `run` can leave out the second walk, which gives the numerical error."""
+    return "again" in signature(import_module(stage.module).run).parameters
+
+
 class Keys:
-    """Identities of results, without looking at a file; what no config changes is looked up once for each stage."""
+    """Identities of results; parts that no config changes are computed once per stage."""
 
     def __init__(self, graph: Graph = PIPELINE) -> None:
-        """Read no code yet."""
+        """Start with no code read."""
         self.graph = graph
         self._sources = Sources()
         self._digests: dict[str, str] = {}
         self._fixed: dict[str, dict[str, Any]] = {}
 
     def of(self, config: Config, target: str) -> dict[str, str]:
-        """The key of a stage and of each that it needs, by name; ConfigError as `Graph.needed_in_memory` raises."""
+        """Return the keys of a stage and of all it needs, by name; raises as `Graph.needed_in_memory`."""
         keys: dict[str, str] = {}
         for stage in self.graph.needed_in_memory(target, config):
             given = {name: keys[name] for name in stage.inputs(config)}
@@ -30,24 +37,23 @@ class Keys:
         return keys
 
     def identity(self, stage: Stage, config: Config, input_keys: Mapping[str, str], again: bool = True) -> Identity:
-        """The identity of a stage's result under a config.
+        """Return the identity of a stage's result under a config.
 
-        input_keys  keys of the results that it takes, by stage
-        again       whether its walks are taken a second time for their numerical error, as all that are stored
+        input_keys  keys of its inputs, by stage
+        again       whether walks are repeated for their numerical error, as in every stored result
         """
         if stage.name not in self._fixed:
-            # as `paper` what its own cases take of the built-in config, as `programs` the versions of those it drives
             fixed = self._fixed[stage.name] = {}
             if stage.takes_of_paper is not None:
                 fixed["paper"] = slice_of(over_paper({}), stage.takes_of_paper)
             if stage.programs is not None:
                 fixed["programs"] = dict(stage.programs())
-        once = {} if again or not (stage.walks or stage.follows) else {"again": False}
+        once = {} if again or not takes_again(stage) else {"again": False}
         own = {**slice_of(config, stage.takes_under(config)), **self._fixed[stage.name], **once}
         return Identity(stage.name, own, input_keys, self.code_digest(stage.name))
 
     def code_digest(self, target: str) -> str:
-        """The digest of a stage's code, as it was when it was first asked for."""
+        """Return the digest of a stage's code, as of the first call."""
         if target not in self._digests:
             self._digests[target] = self._sources.code_digest(self.graph[target].module)
         return self._digests[target]

@@ -1,4 +1,4 @@
-"""What a stage tells of its progress, and the runner of its doings; how it is shown is the caller's affair."""
+"""Interfaces through which stages and the runner report progress; callers decide how to show it."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ R = TypeVar("R")
 
 
 class Progress(Protocol):
-    """What a stage may call while it runs."""
+    """Progress of a running stage."""
 
     def start(self, label: str, total: int | None = None) -> None:
-        """Begin a piece of work of `total` parts, if their number is known; ends the one before."""
+        """Begin a phase of `total` parts (None if unknown); ends the previous phase."""
 
     def advance(self, n: int = 1) -> None:
-        """Count `n` more parts as done."""
+        """Count `n` more parts."""
 
     def note(self, text: str) -> None:
-        """Say one line about the work."""
+        """Show one line about the work."""
 
 
-def each_told(progress: Progress, label: str, total: int, done: Iterable[R], n: int = 1) -> Iterator[R]:
-    """What is done, a piece of work of `total` parts, each worth `n` of them once the next is asked for."""
+def track(progress: Progress, label: str, total: int, done: Iterable[R], n: int = 1) -> Iterator[R]:
+    """Iterate over `done`, advancing `progress` by `n` after each item."""
     progress.start(label, total)
     for one in done:
         yield one
@@ -31,43 +31,43 @@ def each_told(progress: Progress, label: str, total: int, done: Iterable[R], n: 
 
 
 class StageReporter(Progress, Protocol):
-    """What the runner calls besides, of a stage that runs."""
+    """Progress of a stage, as the runner reports it."""
 
     def compiling(self, kernel: str) -> None:
-        """Say that a kernel is being compiled; '' once it is there and the computing goes on."""
+        """Show the name of the kernel being compiled; '' once it is compiled."""
 
     def end(self, said: str) -> None:
-        """End the stage with one line about it; '' if it has failed, which others will tell."""
+        """End the stage with one line; '' if it failed, which is reported elsewhere."""
 
 
 class Reporter(Protocol):
-    """Whom the runner tells."""
+    """Receives the runner's messages."""
 
     def begin(self, stage: str, place: str, expected_s: float | None = None) -> StageReporter:
-        """Begin a stage, perhaps beside others.
+        """Begin a stage; others may be running.
 
-        place       which of how many it is, and why it runs anew, in words; '' if it is the only one and new
-        expected_s  how long it took the last time, if that is known
+        place       its number among the stages to run and why it runs again; '' for a single new one
+        expected_s  its last run time, if known
         """
 
     def drawn(self, summary: Mapping[str, Any], folder: Path) -> None:
-        """Say that something can be looked at in a run's folder while the rest is still being computed."""
+        """Announce a partial page in a run's folder while the rest is being computed."""
 
     def note(self, text: str) -> None:
-        """Say one line."""
+        """Show one line."""
 
     def warn(self, text: str) -> None:
-        """Say one line that the user should not miss."""
+        """Show a warning."""
 
 
 class Silent:
-    """A reporter that says nothing, of stages too."""
+    """A reporter that shows nothing."""
 
     def begin(self, stage: str, place: str, expected_s: float | None = None) -> Silent:  # noqa: ARG002
-        """Say nothing of a stage either."""
+        """Return itself."""
         return self
 
     def note(self, *_told: Any, **_named: Any) -> None:
-        """Let it go untold."""
+        """Discard the message."""
 
     start = advance = warn = compiling = end = drawn = note

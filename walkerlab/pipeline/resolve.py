@@ -1,4 +1,4 @@
-"""What a command is asked about: a config, and the run folder that its results belong in."""
+"""Resolve a `--config` argument to a config and the folder of its run."""
 
 import os
 from collections.abc import Sequence
@@ -20,7 +20,7 @@ SUFFIX = ".h5"
 
 @dataclass(frozen=True)
 class ResolvedRun:
-    """A config, ready to be varied, and its run folder."""
+    """A loaded config and its run folder."""
 
     loaded: LoadedConfig
     folder: RunFolder
@@ -33,15 +33,15 @@ def resolve(
     runs: Path = Path("runs"),
     name: str | None = None,
 ) -> ResolvedRun:
-    """What `--config` names: a file, a built-in config, or a run by its name, its folder or one of its artifacts.
+    """Resolve `--config`: a file, a built-in config, or a run by its name, its folder or one of its artifacts.
 
-    text     looked for in that order; None is the built-in paper config
+    text     searched in that order; None is the built-in paper config
     sets     `--set` options, KEY=VALUE, in order
     strides  `--strides`, over everything else
-    runs     the folder of all runs; a run that is given by a path stays in its own
-    name     of the run's folder, whatever the settings; None names it after them
+    runs     the folder of all runs; a run given by its path stays in its own
+    name     of the run's folder; None names it after the settings
 
-    Raises ConfigError if nothing has that name, and for a config that is not usable.
+    Raises ConfigError if nothing has that name, and for an invalid config.
     """
     path, run = None if text is None else Path(text), None
     if path is not None and text not in builtin_names() and not (path.is_file() and path.suffix != SUFFIX):
@@ -59,7 +59,7 @@ def resolve(
 
 
 def refuse_what_makes_no_walker(read: LoadedConfig) -> None:
-    """Raise ConfigError, with its place, if the parts that a config lists make no walker."""
+    """Raise ConfigError, with its position, if the parts listed in a config do not form a walker."""
     config = read.config
     if not isinstance(config.walker, PartsWalker):
         return
@@ -73,7 +73,7 @@ def refuse_what_makes_no_walker(read: LoadedConfig) -> None:
 
 
 def artifact_at(path: Path) -> tuple[RunFolder, ConfigFile] | None:
-    """The run of an artifact, with the config that it was made with; None if there is no such file."""
+    """Return the run of an artifact and the config stored in it; None if there is no such file."""
     if path.suffix != SUFFIX or not path.is_file():
         return None
     folder = RunFolder.at(path.parent)
@@ -88,7 +88,7 @@ def artifact_at(path: Path) -> tuple[RunFolder, ConfigFile] | None:
 
 
 def run_at(text: str, runs: Path) -> tuple[RunFolder, ConfigFile] | None:
-    """The run of a name or a folder, with its config; None if there is none."""
+    """Return the run of a name or folder and its config; None if there is none."""
     folder = find_run(text, runs)
     if folder is None:
         return None
@@ -102,9 +102,9 @@ def run_at(text: str, runs: Path) -> tuple[RunFolder, ConfigFile] | None:
 
 
 def source_of(path: Path | None, runs: Path) -> str:
-    """Where a config is from: a built-in one by its name, a file as seen from the folder of all runs.
+    """Return the source of a config: a built-in name, or a path relative to the folder of all runs.
 
-    Seen from there so that a project can be moved with its runs.
+    Relative, so that a project can be moved with its runs.
     """
     file = (builtin(DEFAULT) if path is None else find(path)).path.resolve()
     if file.parent == BUILTIN_FOLDER.resolve():

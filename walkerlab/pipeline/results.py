@@ -1,4 +1,4 @@
-"""Where results of stages are found and kept: in a run's folder, or in the memory of this process."""
+"""Stores of results: a run's folder, or the memory of this process."""
 
 from collections import OrderedDict
 from collections.abc import Mapping
@@ -10,8 +10,9 @@ from walkerlab.config.schema import Config
 from walkerlab.pipeline.graph import PIPELINE, Graph, Stage
 from walkerlab.pipeline.identity import Keys
 from walkerlab.store import artifact, provenance
-from walkerlab.store.artifact import StageAnswer, Stored, Verdict
+from walkerlab.store.artifact import Stored, Verdict
 from walkerlab.store.checkpoint import Checkpoint
+from walkerlab.store.content import Content
 from walkerlab.store.elsewhere import find_elsewhere, take_over
 from walkerlab.store.index import broken_file
 from walkerlab.store.key import Identity, changed_parts
@@ -22,34 +23,35 @@ Action = Literal["reuse", "run", "leave out"]
 
 UP_TO_DATE = "up to date"
 REMEMBERED = 256
-"""Results that are remembered: neighbouring points of a sweep often need the same."""
+"""Number of remembered results: neighbouring points of a sweep often share inputs."""
 
 
 @dataclass(frozen=True)
 class Step:
-    """What happens with one stage.
+    """Planned step for one stage.
 
-    reason    why, in words
-    identity  what its result is determined by; None if it is left out
-    found     the stored result, if it is intact: the one to reuse, or an outdated one
-    damaged   its file, if that is not to be trusted
-    origin    its file, if that lies in another run's folder
+    reason    for the action
+    identity  of its result; None if the stage is left out
+    found     the stored result, if intact: the one to reuse, or an outdated one
+    damaged   its file, if that cannot be trusted
+    origin    its file, if that is in another run's folder
     """
 
     stage: Stage
     action: Action
     reason: str
     identity: Identity | None = None
-    found: StageAnswer | None = None
+    found: Content | None = None
     damaged: Path | None = None
     origin: Path | None = None
 
 
 class FolderResults:
-    """Results in a run's folder; with `elsewhere` equal ones in other run folders are reused too.
+    """Results in a run's folder.
 
-    keys    identities of results
-    folder  of the run
+    elsewhere  whether equal results in other run folders are reused
+    keys       identities of results
+    folder     of the run
     """
 
     def __init__(self, folder: RunFolder, graph: Graph = PIPELINE, elsewhere: bool = True) -> None:
@@ -57,8 +59,8 @@ class FolderResults:
         self.run, self.folder, self.elsewhere, self.keys = folder, folder.path, elsewhere, Keys(graph)
         self._begun: dict[str, tuple[Provenance, Checkpoint]] = {}
 
-    def find(self, stage: Stage, identity: Identity, inputs: Mapping[str, StageAnswer], force: bool) -> Step:
-        """Find a stage's result: a step that reuses it, or runs the stage; with `force` it always runs."""
+    def find(self, stage: Stage, identity: Identity, inputs: Mapping[str, Content], force: bool) -> Step:
+        """Return a step that reuses a stage's result, or runs the stage, as always with `force`."""
         path = self.run.artifact(stage.name)
         verdict = artifact.check(path, identity.key, stage.name)
         stored, damaged = verdict.artifact, path if verdict.damaged else None
@@ -66,7 +68,7 @@ class FolderResults:
         if not why and stored is not None:
             reason = UP_TO_DATE if stored.no_answer is None else f"no answer: {stored.no_answer.message}"
             return Step(stage, "reuse", reason, identity, stored)
-        # drawings stand beside their artifact and are made anew
+        # drawings are files beside their artifact and are always drawn in their own folder
         looks = self.elsewhere and not force and not stage.draws
         found = find_elsewhere(self.run, stage.name, identity.key) if looks else None
         if found is not None and not recomputed_input(stage, found[1], inputs):
@@ -75,14 +77,14 @@ class FolderResults:
         return Step(stage, "run", why, identity, stored, damaged)
 
     def take_over(self, step: Step) -> None:
-        """Put a result from another run's folder into this one."""
+        """Copy a result from another run's folder into this one."""
         if step.origin is not None:
             take_over(step.origin, self.run.artifact(step.stage.name))
 
-    def begin(self, step: Step, config: Config, inputs: Mapping[str, StageAnswer], force: bool) -> Mapping[str, Any]:
-        """Prepare to keep a result; return what the stage may ask for, see `StageTask`.
+    def begin(self, step: Step, config: Config, inputs: Mapping[str, Content], force: bool) -> Mapping[str, Any]:
+        """Prepare to keep a result; return the optional arguments of the stage, see `StageTask`.
 
-        With `force` what an interrupted run has left is dropped.
+        `force` drops the checkpoint of an interrupted run.
         """
         stage, identity = step.stage, step.identity
         assert identity is not None, "a stage that is left out does not run"
@@ -93,19 +95,17 @@ class FolderResults:
         self._begun[stage.name] = provenance.begin(config, digests), checkpoint
         return {"checkpoint": checkpoint, "folder": self.folder}
 
-    def keep(self, step: Step, answer: StageAnswer, awaited: bool) -> Stored:  # noqa: ARG002
-        """Store a result, and remove its checkpoint; StorageError if the system refuses."""
+    def keep(self, step: Step, answer: Content, awaited: bool) -> Stored:  # noqa: ARG002
+        """Store a result and remove its checkpoint; raises StorageError if the system refuses."""
         begun, checkpoint = self._begun.pop(step.stage.name)
         assert step.identity is not None, "a stage that is left out does not run"
         path = self.run.artifact(step.stage.name)
-        stored = artifact.write(path, answer, step.identity, begun.until_now(), answer.complete)
+        stored = artifact.write(path, answer, step.identity, begun.until_now())
         checkpoint.forget()
         return stored
 
-    def _why_outdated(
-        self, stage: Stage, identity: Identity, verdict: Verdict, inputs: Mapping[str, StageAnswer]
-    ) -> str:
-        """Why a stage has to run, in words; empty if its result is current."""
+    def _why_outdated(self, stage: Stage, identity: Identity, verdict: Verdict, inputs: Mapping[str, Content]) -> str:
+        """Return why a stage has to run; empty if its result is current."""
         found = verdict.artifact
         if not verdict.accepted or found is None:
             changes = changed_parts(found.identity, identity) if found is not None else []
@@ -113,39 +113,39 @@ class FolderResults:
         return broken_file(self.folder, found) or recomputed_input(stage, found, inputs)
 
 
-def recomputed_input(stage: Stage, found: Stored, inputs: Mapping[str, StageAnswer]) -> str:
-    """Say which input of a result has another content than the result was made with; empty if all are the same."""
+def recomputed_input(stage: Stage, found: Stored, inputs: Mapping[str, Content]) -> str:
+    """Name an input whose content differs from the one that a result was made with; empty if there is none."""
     for name, result in inputs.items():
         if found.provenance.input_digests.get(name) != input_digest(stage, result):
             return f"input {name} was recomputed"
     return ""
 
 
-def input_digest(stage: Stage, result: StageAnswer) -> str:
-    """What a stage's result records of an input: numbers follow from its content, drawings also show its timings."""
+def input_digest(stage: Stage, result: Content) -> str:
+    """Return the digest of an input that a result records; drawings also show timings, so theirs covers the file."""
     return result.seal if stage.draws and isinstance(result, Stored) else result.digest()
 
 
 class LoadedCodeKeys(Keys):
-    """Identities under the code that this process has loaded: no digest needs to name it."""
+    """Identities within this process, whose code does not change; no digest is needed."""
 
     def code_digest(self, target: str) -> str:  # noqa: ARG002
-        """Return nothing."""
+        """Return an empty digest."""
         return ""
 
 
 class MemoryResults:
-    """The same in memory: the results that other stages need, of which the latest are remembered."""
+    """Results in memory: the latest inputs of other stages are remembered."""
 
     folder = None
 
     def __init__(self, graph: Graph = PIPELINE, size: int = REMEMBERED) -> None:
-        """Remember nothing yet."""
+        """Start empty."""
         self.keys, self.size = LoadedCodeKeys(graph), size
-        self._kept: OrderedDict[str, StageAnswer] = OrderedDict()
+        self._kept: OrderedDict[str, Content] = OrderedDict()
 
-    def find(self, stage: Stage, identity: Identity, inputs: Mapping[str, StageAnswer], force: bool) -> Step:  # noqa: ARG002
-        """Find a stage's result, or run the stage."""
+    def find(self, stage: Stage, identity: Identity, inputs: Mapping[str, Content], force: bool) -> Step:  # noqa: ARG002
+        """Return a step that reuses a remembered result, or runs the stage."""
         if identity.key not in self._kept:
             return Step(stage, "run", artifact.NOT_THERE, identity)
         self._kept.move_to_end(identity.key)
@@ -154,12 +154,12 @@ class MemoryResults:
     def take_over(self, step: Step) -> None:
         """Do nothing: there is no other folder."""
 
-    def begin(self, step: Step, config: Config, inputs: Mapping[str, StageAnswer], force: bool) -> Mapping[str, Any]:  # noqa: ARG002
+    def begin(self, step: Step, config: Config, inputs: Mapping[str, Content], force: bool) -> Mapping[str, Any]:  # noqa: ARG002
         """Keep checkpoints in memory alone."""
         return {"checkpoint": Checkpoint(None, "")}
 
-    def keep(self, step: Step, answer: StageAnswer, awaited: bool) -> StageAnswer:
-        """Remember a result that another stage awaits."""
+    def keep(self, step: Step, answer: Content, awaited: bool) -> Content:
+        """Remember a result if another stage awaits it."""
         if awaited and step.identity is not None:
             self._kept[step.identity.key] = answer
             if len(self._kept) > self.size:

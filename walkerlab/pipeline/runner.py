@@ -1,4 +1,4 @@
-"""A stage in a run's folder: brought up to date with all it needs, under the folder's lock, and how that went."""
+"""Bring a stage in a run's folder up to date under the folder's lock, and report how that went."""
 
 import time
 from collections.abc import Mapping, Sequence
@@ -19,17 +19,17 @@ from walkerlab.store.runfolder import RunFolder
 
 @dataclass(frozen=True)
 class StageReport:
-    """How running a stage went.
+    """Report on running a stage.
 
     run_dir    the run's folder
-    artifact   the file of its result; None if there is none
-    reused     whether the result was there already
-    wall_s     time of the whole, what it needs included
-    left_out   what was not computed on the way, and why
+    artifact   file of the result; None if there is no result
+    reused     whether the result existed already
+    wall_s     total time, inputs included
+    left_out   results that were not computed, with the reasons
     summary    of the result; empty if there is none
-    steps      what was done with each stage
-    no_answer  message and advice, if the computation has no answer or the drawing had to do without one
-    results    the summaries of all stages on the way that have a result
+    steps      outcome of each stage
+    no_answer  message and advice if the computation, or an input of the drawing, has no answer
+    results    summaries of all stages involved that have a result
     """
 
     stage: str
@@ -44,7 +44,7 @@ class StageReport:
     results: Mapping[str, dict[str, Any]] = field(default_factory=dict)
 
     def as_json(self) -> dict[str, Any]:
-        """The one JSON object of a stage: the keys that all stages have, then those of its summary."""
+        """Return the JSON object of a stage: keys common to all stages, then those of its summary."""
         common: dict[str, Any] = {
             "stage": self.stage,
             "run_dir": str(self.run_dir),
@@ -60,13 +60,13 @@ class StageReport:
 
 @dataclass(frozen=True)
 class Options:
-    """How a stage is run.
+    """Options of running a stage.
 
-    force  run it and all it needs, up to date or not
-    wait   for another process that works in the folder, and reuse what it made
-    jobs   processes: stages that do not need each other run side by side, and so do independent cells of a stage
-    full   run its campaigns too
-    dry    only say what would be done, as the report before anything has run; touches nothing
+    force  run the stage and all it needs even if current
+    wait   wait for another process that works in the folder, then reuse its results
+    jobs   processes for independent stages, and for independent cells of a stage
+    full   also run the stage's long campaigns
+    dry    only report the plan; changes no file
     """
 
     force: bool = False
@@ -89,9 +89,9 @@ def execute(
 ) -> StageReport:
     """Bring a stage's result up to date, running whatever it needs.
 
-    Raises ConfigError if the config has not what the target needs or the folder holds results of another one,
-    LockedError (only without `options.wait`), StorageError.
-    No answer is no exception here: see `StageReport.no_answer`.
+    Raises ConfigError if the config lacks a block that the target requires or the folder holds results of another
+    config, LockedError (only without `options.wait`) and StorageError. A missing answer is not raised; see
+    `StageReport.no_answer`.
     """
     started = time.perf_counter()
     graph[target].refuse_unsuited(target, config)
@@ -113,7 +113,7 @@ def execute(
         reused = "" if options.force else ", and its results will be reused"
         with folder.locked(options.wait, lambda held: run.reporter.note(held + reused)):
             claim(folder, config)
-            # Decided anew, stage by stage: another process may have worked here until now.
+            # decide again: another process may have worked here until now
             run = executor()
             run.carry_out([step.stage for step in steps if step.action == "run"])
     else:
@@ -123,8 +123,8 @@ def execute(
 
 
 def refuse_incomplete_law(config: Config, steps: Sequence[Step]) -> None:
-    """Raise ConfigError, before anything is compiled, for a friction law of the user's own that lacks something."""
-    if config.contact is not None and any(step.stage.needs_contact for step in steps if step.action == "run"):
+    """Raise ConfigError, before anything is compiled, for an incomplete friction law of the user."""
+    if config.contact is not None and any("contact" in step.stage.requires for step in steps if step.action == "run"):
         # Imported here: it loads the compiler, as what runs will.
         from walkerlab.scene.contact import friction_law
 
@@ -132,7 +132,7 @@ def refuse_incomplete_law(config: Config, steps: Sequence[Step]) -> None:
 
 
 def report_of(run: Executor, folder: RunFolder, target: Stage, wall_s: float) -> StageReport:
-    """Report how the executor brought a target up to date."""
+    """Build the report of an executor that has finished."""
     result = run.answers.get(target.name)
     summary = dict(result.summary) if result is not None else {}
     for campaign in run.graph.campaigns_of(target.name):
@@ -148,35 +148,35 @@ def report_of(run: Executor, folder: RunFolder, target: Stage, wall_s: float) ->
         summary=summary,
         steps=tuple(run.done),
         no_answer=no_answer_of(run, summary.get("no_answer")),
-        results={name: dict(one.summary) for name, one in run.answers.items() if one.complete},
+        results={name: dict(answer.summary) for name, answer in run.answers.items() if answer.complete},
     )
 
 
 def all_left_out(run: Executor, target: Stage, by_stage: Sequence[dict[str, str]]) -> tuple[LeftOut, ...]:
-    """Stages that were left out on the way, results that a drawing did without, and what scenes do without.
+    """Return stages that were left out, results that a drawing lacks, and parts that scenes lack.
 
-    What is optional and nobody asked for was not left out; a drawing says all the same that there is one.
+    An optional result that nobody requested does not count.
     """
-    found = list(run.missing_inputs(target)) if target.draws else []
-    found = [entry for entry in found if not run.graph[entry.what].optional]
-    found += [left_out(done.stage, done.reason) for done in run.done if done.action == "leave out"]
+    missing = run.missing_inputs(target) if target.draws else ()
+    absent = [entry for entry in missing if not run.graph[entry.what].only_by]
+    absent += [left_out(done.stage, done.reason) for done in run.done if done.action == "leave out"]
     entries = [*by_stage]
     for done in run.done:
         if done.action != "leave out":
             entries += run.graph[done.stage].does_without(run.config)
-    found += [LeftOut(**entry) for entry in entries]
-    return tuple(dict.fromkeys(found))
+    absent += [LeftOut(**entry) for entry in entries]
+    return tuple(dict.fromkeys(absent))
 
 
 def no_answer_of(run: Executor, message: dict[str, str] | None) -> NoAnswer | None:
-    """Say that the target, or something that it needs or has to do without, has no answer; None if all have.
+    """Return the error of the target or of the first stage without an answer; None if all have one.
 
-    message  that of the target itself, with advice
+    message  the target's own message and advice
     """
     if message is not None:
         return NoAnswer(message["message"], message["advice"])
     for name, answer in ((done.stage, run.answers.get(done.stage)) for done in run.done):
-        said = None if answer is None else answer.summary.get("no_answer")
-        if said is not None:
-            return NoAnswer(f"{name}: {said['message']}", said["advice"])
+        reason = None if answer is None else answer.summary.get("no_answer")
+        if reason is not None:
+            return NoAnswer(f"{name}: {reason['message']}", reason["advice"])
     return None

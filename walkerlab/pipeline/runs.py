@@ -1,4 +1,4 @@
-"""Run folders: which there are, what config and results each holds, and how two of them differ."""
+"""Run folders: listing them, reading their configs and results, and comparing two of them."""
 
 import contextlib
 import datetime
@@ -25,21 +25,21 @@ from walkerlab.store.key import differences
 from walkerlab.store.runfolder import Record, RunFolder
 
 SWEEP = "sweep-"
-"""What names of sweeps' files begin with."""
+"""Prefix of sweep files."""
 SHOWN_CHANGES = 3
-"""Keys that a refusal names."""
+"""Maximum number of changed keys in a message."""
 
 
 @dataclass(frozen=True)
 class RunSummary:
     """One run folder.
 
-    changes   KEY=VALUE of each key in which its config differs from the file that it is from
-    stages    names of those with a stored result
-    current   of these, the ones that are up to date; None if the run's config is not known any more
-    sweeps    files of sweeps
-    bytes     size of all its files
-    changed_utc  when the last of them was written, UTC, ISO 8601
+    changes   KEY=VALUE of each key in which its config differs from its file
+    stages    names of stages with a stored result
+    current   those that are up to date; None if the run's config is unknown
+    sweeps    sweep files
+    bytes     total size of its files
+    changed_utc  time of the last change, UTC, ISO 8601
     """
 
     name: str
@@ -53,7 +53,7 @@ class RunSummary:
 
 
 def runs_in(runs_dir: Path, graph: Graph = PIPELINE) -> Iterator[RunSummary]:
-    """Every run in a folder, by name; folders without results are none."""
+    """Iterate over the runs in a folder by name, without folders that hold no result."""
     for path in sorted(runs_dir.glob("*/")):
         folder = RunFolder.at(path)
         stages = tuple(stage.name for stage in graph.stages if folder.artifact(stage.name).is_file())
@@ -70,7 +70,7 @@ def runs_in(runs_dir: Path, graph: Graph = PIPELINE) -> Iterator[RunSummary]:
 
 
 def config_text(folder: RunFolder) -> str | None:
-    """The resolved config of a run, as YAML; None if nothing in its folder tells it."""
+    """Return the resolved config of a run as YAML; None if nothing in its folder states it."""
     record = folder.record()
     if record is not None:
         return record.config
@@ -79,12 +79,12 @@ def config_text(folder: RunFolder) -> str | None:
 
 
 def stored_in(folder: RunFolder) -> list[str]:
-    """The stages of whose results there are files in a folder, whether or not they can be read."""
+    """Return the stages with a result file in a folder, readable or not."""
     return [path.stem for path in folder.path.glob("*.h5")]
 
 
 def config_of(folder: RunFolder) -> Config | None:
-    """The config of a run; None if nothing tells it, or this program's schema does not take it any more."""
+    """Return the config of a run; None if it is unknown or this version's schema rejects it."""
     try:
         tree = read_text(config_text(folder) or "", "stored config")
         return typed(tree) if isinstance(tree, Tree) else None
@@ -93,7 +93,7 @@ def config_of(folder: RunFolder) -> Config | None:
 
 
 def read_all(folder: RunFolder, stages: Iterable[str]) -> tuple[dict[str, Stored], dict[str, str]]:
-    """The results of these stages that can be read, and what is wrong with the others that are there, in words."""
+    """Return the readable results of these stages, and the faults of the unreadable ones."""
     intact: dict[str, Stored] = {}
     bad: dict[str, str] = {}
     for stage in stages:
@@ -107,24 +107,24 @@ def read_all(folder: RunFolder, stages: Iterable[str]) -> tuple[dict[str, Stored
 
 
 def results_in(folder: RunFolder, stages: Iterable[str], graph: Graph = PIPELINE) -> dict[str, Stored]:
-    """The results of these stages, so far as they are there; StaleError that names all that cannot be read."""
+    """Return the existing results of these stages; raises StaleError that names all unreadable ones."""
     intact, bad = read_all(folder, stages)
     if bad:
-        commands = listed(makes(folder, graph[stage]) for stage in bad)
+        commands = listed(command(folder, graph[stage]) for stage in bad)
         them = "recomputes it" if len(bad) == 1 else "recompute them"
         raise StaleError(f"{'; '.join(bad.values())}.", f"{commands} {them}.")
     return intact
 
 
 def result_in(folder: RunFolder, stage: str, graph: Graph = PIPELINE) -> Stored:
-    """A stage's result; StaleError if it is not there, or cannot be read."""
+    """Return a stage's result; raises StaleError if it is missing or unreadable."""
     return the_result(results_in(folder, [stage], graph), folder, stage, graph)
 
 
 def the_result(results: Mapping[str, Stored], folder: RunFolder, stage: str, graph: Graph = PIPELINE) -> Stored:
-    """A stage's result among those of its run; StaleError if it is not there."""
+    """Select a stage's result among those of its run; raises StaleError if it is missing."""
     if stage not in results:
-        raise StaleError(f"{folder.path} has no result of {stage}.", f"{makes(folder, graph[stage])} computes it.")
+        raise StaleError(f"{folder.path} has no result of {stage}.", f"{command(folder, graph[stage])} computes it.")
     return results[stage]
 
 
@@ -132,20 +132,20 @@ def the_result(results: Mapping[str, Stored], folder: RunFolder, stage: str, gra
 def results_to_show(
     folder: RunFolder, stages: Iterable[str], warn: Callable[[str], None], graph: Graph = PIPELINE
 ) -> Iterator[dict[str, Stored]]:
-    """The results of these stages, so far as they are there, for a body that shows them; warn of what is outdated.
+    """Give a `with` block the existing results of these stages; warn of outdated ones.
 
-    Raises StaleError as `results_in`, and where an outdated result lacks what the body needs.
+    Raises StaleError as `results_in`, and where an outdated result lacks something that the block reads.
     """
     results = results_in(folder, stages, graph)
     outdated = why_outdated(folder, results, graph)
     for stage, why in outdated.items():
-        warn(f"{folder.artifact(stage)} is out of date: {why}; {makes(folder, graph[stage])} makes it anew.")
+        warn(f"{folder.artifact(stage)} is out of date: {why}; {command(folder, graph[stage])} makes it anew.")
     with refusing_older(folder, outdated, graph):
         yield results
 
 
 def why_outdated(folder: RunFolder, stages: Collection[str], graph: Graph = PIPELINE) -> dict[str, str]:
-    """By stage, why its result is not the one of the run's config and this version; only those that are not."""
+    """Return, for each stage whose result is outdated, the reason."""
     config = config_of(folder)
     if config is None:
         return dict.fromkeys(stages, "this version cannot read the config of its run")
@@ -155,24 +155,25 @@ def why_outdated(folder: RunFolder, stages: Collection[str], graph: Graph = PIPE
 
 @contextlib.contextmanager
 def refusing_older(folder: RunFolder, outdated: Collection[str], graph: Graph = PIPELINE) -> Iterator[None]:
-    """Raise StaleError where a body does not find in outdated results what this version stores."""
+    """Turn a KeyError of a `with` block into StaleError if results are outdated."""
     try:
         yield
     except KeyError as missing:
         if not outdated:
             raise
-        paths, commands = ([*map(str, map(folder.artifact, outdated))], [makes(folder, graph[one]) for one in outdated])
+        paths = [str(folder.artifact(stage)) for stage in outdated]
+        commands = [command(folder, graph[stage]) for stage in outdated]
         they = "is outdated and lacks" if len(paths) == 1 else "are outdated and lack"
         raise StaleError(f"{listed(paths)} {they} {missing}.", f"{listed(commands)} computes it anew.") from missing
 
 
-def makes(folder: RunFolder, stage: Stage) -> str:
-    """The command that makes a stage's result in a run's folder."""
+def command(folder: RunFolder, stage: Stage) -> str:
+    """Return the command that computes a stage's result in a run's folder."""
     return f"`walkerlab {stage.command} -c {folder.typed}`"
 
 
 def find_run(text: str, runs_dir: Path) -> RunFolder | None:
-    """The run of a name in the folder of all runs, or of a folder's path; None if there is none."""
+    """Find a run by its name in the folder of all runs, or by its path; None if there is none."""
     path = Path(text)
     is_name = path.name == text and text != ".."
     places = (runs_dir / path, path) if is_name else (path,)
@@ -180,7 +181,7 @@ def find_run(text: str, runs_dir: Path) -> RunFolder | None:
 
 
 def run_named(text: str, runs_dir: Path) -> RunFolder:
-    """The run of a name in the folder of all runs, or of a folder's path; ConfigError if there is none."""
+    """Find a run by its name in the folder of all runs, or by its path; raises ConfigError if there is none."""
     found = find_run(text, runs_dir)
     if found is not None:
         return found
@@ -190,7 +191,7 @@ def run_named(text: str, runs_dir: Path) -> RunFolder:
 
 
 def claim(folder: RunFolder, config: Config) -> None:
-    """Have a folder say that its results are of a config, before one is written; to be called under its lock.
+    """Record in a folder which config its results belong to; call it under the lock, before any result is written.
 
     Raises ConfigError as `refuse_another_config`.
     """
@@ -229,13 +230,13 @@ def refuse_another_config(folder: RunFolder, config: Config) -> None:
 
 
 def comes_from(record: Record, folder: RunFolder) -> bool:
-    """Whether what a folder holds was made under its name from the same file, perhaps before that was edited."""
+    """Whether a folder's results were made under its name from the same file, perhaps before that was edited."""
     return (record.run, record.source) == (folder.name, folder.source)
 
 
 @dataclass(frozen=True)
 class Pair:
-    """A number of two runs; `change` is relative to the first, None where that is no number or zero."""
+    """A quantity of two runs; `change` is relative to the first, None where that is not a number or zero."""
 
     name: str
     first: Any
@@ -245,12 +246,12 @@ class Pair:
 
 @dataclass(frozen=True)
 class RunDifference:
-    """How two runs differ.
+    """Differences of two runs.
 
     config       keys with both values, as JSON
-    numbers      by stage, every number and word of the two summaries; stages that only one has are left out
-    headlines    by stage, the few of them that say most
-    only_first, only_second  stages that only one has
+    numbers      by stage of both, all values of the two summaries
+    headlines    by stage, the headline quantities
+    only_first, only_second  stages with a result in one run only
     """
 
     config: tuple[tuple[str, Any, Any], ...]
@@ -263,7 +264,7 @@ class RunDifference:
 def difference(
     first: Mapping[str, Stored], second: Mapping[str, Stored], configs: Sequence[Config | None]
 ) -> RunDifference:
-    """How the results of two runs differ, and the configs of both; nothing is said of a config that is not known."""
+    """Compare the results and configs of two runs; an unknown config counts as empty."""
     both = [name for name in first if name in second]
     one, other = ({} if config is None else dict(flattened(config.model_dump(mode="json"))) for config in configs)
     return RunDifference(
@@ -276,19 +277,19 @@ def difference(
 
 
 def pairs(first: Mapping[str, Any], second: Mapping[str, Any]) -> tuple[Pair, ...]:
-    """Numbers and words of two results side by side, by name."""
+    """Pair the values of two results by name."""
     both = {name: (first.get(name), second.get(name)) for name in {**first, **second}}
     return tuple(Pair(name, *values, change(*values)) for name, values in both.items())
 
 
 def headline_values(stage: str, summary: Mapping[str, Any]) -> dict[str, Any]:
-    """The numbers of a stage's summary that say most, by name."""
+    """Return the headline quantities of a stage's summary, by name."""
     last = {name: summary[whole][-1] for name, whole in LAST_OF.items() if summary.get(whole)}
     every = dict(flattened(summary, lists=True)) | last
     return {name: every[name] for name in headlines(stage, every)}
 
 
 def change(first: Any, second: Any) -> float | None:
-    """Relative change of a number."""
+    """Return the relative change of a number; None where it has none."""
     numbers = all(isinstance(value, int | float) and not isinstance(value, bool) for value in (first, second))
     return float(second / first - 1.0) if numbers and first else None

@@ -1,4 +1,4 @@
-"""Work that resumes: units of it are spread over processes in batches, and each is kept as soon as it is there."""
+"""Resumable work: batches of units spread over processes, each unit stored as soon as it is computed."""
 
 import math
 import time
@@ -15,22 +15,22 @@ from walkerlab.store.checkpoint import Checkpoint, Numbers
 from walkerlab.workers import WorkerDiedError, WorkerPool
 
 SCOUTS: Final = 2
-"""Units of the first batch, which goes ahead alone: it has the kernels compiled once and measures what a unit takes."""
+"""Size of the first batch, which runs alone: it compiles the kernels once and measures the time of a unit."""
 MIN_BATCH_S: Final = 0.5
 MAX_BATCH: Final = 1000
 SHARES: Final = 3
-"""A batch is at most this part of what is left to a worker, so that all end together."""
+"""A batch is at most this fraction (1/3) of a worker's share of the remaining work, so that workers end together."""
 BUGS: Final = (ArithmeticError, AssertionError, AttributeError, ImportError, LookupError, NameError, TypeError)
-"""Errors that mean a bug, which another attempt would meet again."""
+"""Errors that indicate a bug, which a retry would repeat."""
 MAX_DEATHS: Final = 12
-"""Deaths before any batch has come back, after which it is the machine and not the work."""
+"""Worker deaths before any result arrives, after which the machine is to blame, not the work."""
 
 
 class WorkUnit(NamedTuple):
-    """Work that is computed in one go, and kept under its name.
+    """Piece of work that is computed at once and stored under its name.
 
-    size  in what its progress counts
-    run   computes the result, in any process
+    size  in units of the progress count
+    run   computes the result in any process
     """
 
     name: str
@@ -39,16 +39,16 @@ class WorkUnit(NamedTuple):
 
 
 Batch = tuple[WorkUnit, ...]
-"""Units that a process is sent at once."""
+"""Units sent to a process together."""
 Timed = tuple[Any, float]
-"""Result of a unit, and the time (s) it took."""
+"""Result of a unit and its run time (s)."""
 
 
 class InPlace(Executor):
-    """Executor that calls in this process, at once."""
+    """Executor that runs each call at once in this process."""
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
-        """Call; raises what the call raises."""
+        """Run a call; its errors are raised."""
         future: Future[Any] = Future()
         future.set_result(fn(*args, **kwargs))
         return future
@@ -65,13 +65,13 @@ def compute(units: Batch) -> list[Timed]:
 
 @dataclass
 class Spread:
-    """Units spread over an executor; a worker that dies takes nothing with it.
+    """Spreads units over an executor; the work of a worker that dies is tried again.
 
     todo     units, of which `left` are not handed out yet
-    keep     takes units and their results as they arrive
-    give_up  takes a unit that was attempted in vain, and why
-    batch_s  how long a batch is to take, s; 0: a unit at a time
-    unit_s   how long a unit takes, s; None before the first batch is back, which then goes ahead alone
+    keep     called with units and their results as they arrive
+    give_up  called with a unit whose attempts failed, and the last error
+    batch_s  target duration of a batch, s; 0: one unit at a time
+    unit_s   run time of a unit, s; None before the first batch is back, which then runs alone
     """
 
     todo: Iterator[WorkUnit]
@@ -86,12 +86,12 @@ class Spread:
     _alive: bool = False
 
     def run(self, executor: Executor, workers: int) -> None:
-        """Compute all units; `workers` is 0 if the executor works in place.
+        """Compute all units; `workers` is 0 if the executor works in this process.
 
-        Raises NoAnswer if no worker lives long enough to compute anything, and bugs at once.
+        Raises NoAnswer if no worker lives long enough to compute anything; bugs are raised at once.
         """
         while self.left or self._again or self._running:
-            # as much as the workers can work on, and one batch more for each that waits
+            # one batch more than workers, so that none waits
             most = 1 if self.unit_s is None else workers + 1
             while len(self._running) < most and (self._again or self.left):
                 batch, failures = self._again.popleft() if self._again else (self._next_batch(workers), 0)
@@ -122,13 +122,13 @@ class Spread:
     def _arrived(self, batch: Batch, results: Sequence[Timed]) -> None:
         self._alive = True
         walls = [wall_s for _, wall_s in results]
-        # The first units also load the compiled code; the last ones tell better what the next will take.
+        # the first units also load compiled code, so the last one predicts the next better
         latest = max(1e-6, walls[-1] if self.unit_s is None else sum(walls) / len(walls))
         self.unit_s = latest if self.unit_s is None else 0.5 * (self.unit_s + latest)
         self.keep(batch, results)
 
     def _failed(self, batch: Batch, failures: int, error: BaseException) -> None:
-        """Try a batch again, then split it, then give its unit up; a bug is raised."""
+        """Retry a batch, then split it, then give up its unit; raise a bug."""
         if isinstance(error, BUGS) or (isinstance(error, WalkerlabError) and not isinstance(error, WorkerDiedError)):
             raise error
         self._deaths += 1
@@ -156,14 +156,14 @@ def complete(
     shared_from: int = 0,
     compiled: bool = False,
 ) -> tuple[list[Numbers], int]:
-    """Compute the units that are not there yet, and keep each as soon as it is.
+    """Compute the units that the checkpoint lacks, and store each in it.
 
-    checkpoint   what an earlier run has left, and where new results are kept
+    checkpoint   units of an earlier run
     jobs         processes
-    shared_from  size of all units that takes longer than starting another process
-    compiled     whether all kernels are there; otherwise the first unit goes ahead, so that one process compiles
+    shared_from  total size above which starting processes pays
+    compiled     whether all kernels are compiled; otherwise the first unit runs alone, so that one process compiles
 
-    Returns the numbers of each unit, and the size of those that were computed.
+    Returns the numbers of each unit, and the total size of the units computed now.
     """
     waiting = [unit for unit in units if unit.name not in checkpoint.kept]
     size = sum(unit.size for unit in waiting)

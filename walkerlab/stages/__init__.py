@@ -1,1 +1,1 @@
-"""The stages, one module for each: its question, its answer, and what is stored of it."""
+"""Stages of the core, one module each, with the groups and summaries that they store."""

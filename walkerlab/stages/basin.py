@@ -1,4 +1,4 @@
-"""Which starts walk, and which attractor each reaches in how many steps; an interrupted run goes on."""
+"""Basins of attraction: which starts walk, and which attractor each reaches in how many steps."""
 
 from __future__ import annotations
 
@@ -42,13 +42,13 @@ from walkerlab.scene.endings import Pads, endings
 from walkerlab.scene.rigid import rigid_walker
 from walkerlab.solvers.system import Floats
 from walkerlab.stages.numerical_error import evenly_spread, tightened
-from walkerlab.stages.walk import OUTCOMES, counted
+from walkerlab.stages.walk import OUTCOMES, count_outcomes
 from walkerlab.store.checkpoint import Checkpoint
 from walkerlab.store.content import Content, Group, Variable
 
-HALF_WIDTH = (0.15, 0.25, 0.25)  # of the usual window, in rad and sqrt(g/L)
-SAMPLE = 100  # cells that are walked again
-DRAWN = 4_000  # starts from which attractors are sought
+HALF_WIDTH = (0.15, 0.25, 0.25)  # of the default window, rad and sqrt(g/L)
+SAMPLE = 100  # cells whose walks are repeated
+DRAWN = 4_000  # starts of the search for attractors
 SIGMAS = 3.0  # of the Gaussian window, from its middle to the box's sides
 FAILED = NONE - 1  # class of a cell that does not walk
 UNITS = ("rad", "rad/s", "rad/s")
@@ -58,9 +58,9 @@ TEXTS = ("angle of the stance leg", "angular velocity of the swing leg", "angula
 def run(
     config: BasinConfig, inputs: Mapping[str, Content], progress: Progress, *, checkpoint: Checkpoint, jobs: int = 1
 ) -> Content:
-    """Walk from every cell that is not there yet, then from the parts of those at edges.
+    """Walk from every cell that the checkpoint lacks, then from subcells of cells at the basin's edge.
 
-    checkpoint  cells that an earlier run has left, and where new ones are kept
+    checkpoint  cells of an earlier run
     jobs        processes
 
     Raises ConfigError for the contact model without a contact block, NoAnswer if its pads are to fit a gait that
@@ -108,7 +108,7 @@ def run(
 
 
 def sample_again(question: Question, window: Window, found: WalkEnds) -> dict[str, int]:
-    """Of some cells, evenly spread, how many end otherwise if they are walked again at tighter tolerances."""
+    """Count cells of an even sample whose walk ends differently at tighter tolerances."""
     cells = np.array(evenly_spread(window.size, SAMPLE))
     again = question.tightened().walked(window.starts(cells))
     otherwise = (again.outcome != found.outcome[cells]) | (again.attractor != found.attractor[cells])
@@ -116,7 +116,7 @@ def sample_again(question: Question, window: Window, found: WalkEnds) -> dict[st
 
 
 def window_of(config: BasinConfig, z: list[float]) -> Window:
-    """The grid of a config around the gait's section coordinates z (3)."""
+    """Build the config's grid around the gait's section coordinates z (3)."""
     settings = config.basin
     axes = tuple(COORDINATES.index(name) for name in settings.plane)
     rate = math.sqrt(config.gravity_m_s2 / config.walker.leg_length_m)
@@ -129,7 +129,7 @@ def window_of(config: BasinConfig, z: list[float]) -> Window:
 
 
 def question_of(config: BasinConfig, inputs: Mapping[str, Content], window: Window, rigid: Standing) -> Question:
-    """What is walked."""
+    """Build the model whose walks are classified, with its attractors."""
     if config.basin.model == "contact":
         return contact_question(config, inputs, rigid)
     unit, units = unit_walker(rigid)
@@ -145,10 +145,10 @@ def question_of(config: BasinConfig, inputs: Mapping[str, Content], window: Wind
 
 
 def contact_question(config: BasinConfig, inputs: Mapping[str, Content], rigid: Standing) -> ContactQuestion:
-    """The contact model at the tolerances of `tune`'s map."""
+    """Build the same for the contact model, at the tolerances of `tune`'s map."""
     if config.contact is None:
         raise without_contact("basin.model: contact", config.walker, "Add one.")
-    # Imported here: it brings interpolation along, which the rigid model's basin does without.
+    # imported here: it loads interpolation code, which the rigid model does not need
     from walkerlab.scene.scaled import for_a_map, starts_of
 
     gait, steps = inputs["fixedpoint"].summary, config.basin.contact_steps
@@ -160,7 +160,7 @@ def contact_question(config: BasinConfig, inputs: Mapping[str, Content], rigid: 
 
 
 def group_of(settings: Basin, window: Window, found: WalkEnds, walking: Floats) -> Group:
-    """The grid."""
+    """Build the group of the grid."""
     dims: tuple[str, ...] = tuple(settings.plane)
     variables: dict[str, Variable] = {
         name: Variable(window.along(place), (name,), UNITS[axis], TEXTS[axis])
@@ -183,7 +183,7 @@ def group_of(settings: Basin, window: Window, found: WalkEnds, walking: Floats) 
 
 
 def attractors_of(question: Question, rigid: Standing) -> list[dict[str, Any]]:
-    """Period and a state (SI) of each attractor."""
+    """Return period and a state (SI) of each attractor."""
     if isinstance(question, ContactQuestion):
         own = question.starts.gait
         return [] if own is None else [{"period": 1, "period_s": own[0], "step_length_m": own[1]}]
@@ -197,7 +197,7 @@ def attractors_of(question: Question, rigid: Standing) -> list[dict[str, Any]]:
 def summary(
     settings: Basin, window: Window, found: WalkEnds, walking: Floats, attractors: list[dict[str, Any]], aperiodic: bool
 ) -> dict[str, Any]:
-    """What the command prints of the grid and of the attractors that are reached."""
+    """Summarise the grid and the attractors that are reached."""
     walked = found.outcome == Outcome.WALKED
     for number, row in enumerate(attractors):
         there = walked & (found.attractor == number)
@@ -214,7 +214,7 @@ def summary(
         "held": {name: value for name, value in rest if name not in settings.plane},
         "share_walking": float(walking.mean()),
         "share_walking_gaussian": float(np.sum(walking * gaussian(window))),
-        "outcomes": counted(found.outcome),
+        "outcomes": count_outcomes(found.outcome),
         "attractors": attractors,
         "aperiodic": aperiodic,
         "unsettled_cells": int(np.count_nonzero(walked & (found.attractor == NONE))),
@@ -223,16 +223,16 @@ def summary(
 
 
 def gaussian(window: Window) -> Floats:
-    """Weights of the cells, their sum 1: a normal distribution in the middle of the window, SIGMAS to its sides."""
+    """Return weights of the cells with sum 1: a centred normal distribution, SIGMAS from the middle to the sides."""
     off = ((np.arange(cells) + 0.5 - 0.5 * cells) / (0.5 * cells / SIGMAS) for cells in window.cells)
     weights = reduce(np.multiply.outer, (np.exp(-0.5 * sigmas**2) for sigmas in off))
     return np.asarray(weights / weights.sum())
 
 
 def margin_of(config: RigidConfig, window: Window, found: WalkEnds, gait: Mapping[str, Any]) -> dict[str, Any]:
-    """Distance from a stable gait to the nearest cell that does not walk, to within the size of a cell.
+    """Return the distance from a stable gait to the nearest cell that does not walk, in rad and sqrt(g/L).
 
-    In rad and sqrt(g/L). Left out if the gait is unstable, or the window holds no such cell.
+    Accurate to the size of a cell; empty if the gait is unstable or the window holds no such cell.
     """
     failing = np.flatnonzero(found.outcome != Outcome.WALKED)
     if not gait["stable"] or not failing.size:
@@ -247,7 +247,7 @@ class RigidQuestion:
     """Starts of the rigid model.
 
     walker  the unit walker
-    scale   (3) units of the section's coordinates: unit walker's over SI
+    scale   (3) factors from SI to the unit walker's section coordinates
     """
 
     walker: Walker
@@ -256,7 +256,7 @@ class RigidQuestion:
     steps: int
     cells_at_once: int = 10_000
     edges_at_once: int = 1_000
-    shared_from: int = 200_000  # walks that take longer than starting another process
+    shared_from: int = 200_000  # number of walks above which starting processes pays
     tolerances: tuple[float, float] = (RTOL, ATOL)
 
     def walked(self, z: Floats) -> WalkEnds:
@@ -272,7 +272,7 @@ class RigidQuestion:
 
 @dataclass(frozen=True, eq=False)
 class ContactQuestion:
-    """Starts of the contact model: those of the rigid one with the stance foot just touching, at rest and rolling."""
+    """Starts of the contact model: rigid states with the stance foot just touching, rolling without slip."""
 
     scene: ContactScene
     rigid: Standing
@@ -287,7 +287,7 @@ class ContactQuestion:
         return WalkEnds(*np.array(rows, np.int64).reshape(-1, 3).T)
 
     def walk(self, z: tuple[float, float, float]) -> tuple[int, int, int]:
-        """Outcome, attractor and steps of one walk."""
+        """Return outcome, attractor and steps of one walk."""
         state = on_section(self.rigid, z)
         walk = self.starts.walked_from(start_state(self.scene, state))
         settled = self.starts.settled_after(walk) if walk.outcome is Outcome.WALKED else None
@@ -310,13 +310,13 @@ def units_of(
 
 
 def ends_of(question: Question, window: Window, cells: Sequence[int]) -> list[float]:
-    """Outcomes, attractors and steps of the cells, each walked from its middle, one after the other."""
+    """Return outcomes, attractors and steps of cells, walked from their middles, as one flat list."""
     found = question.walked(window.starts(np.array(cells)))
     return [float(number) for number in (*found.outcome, *found.attractor, *found.steps)]
 
 
 def shares_of(question: Question, window: Window, refine: int, cells: Sequence[int]) -> list[float]:
-    """The share of each cell that walks, from the middles of its parts."""
+    """Return the walking share of each cell, from the middles of its subcells."""
     inside = inside_cell(refine, len(window.axes))
     found = question.walked(window.starts(np.repeat(cells, len(inside)), np.tile(inside, (len(cells), 1))))
     walking = (found.outcome == Outcome.WALKED).reshape(len(cells), -1)

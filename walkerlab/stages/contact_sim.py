@@ -30,12 +30,12 @@ from walkerlab.scene.footholds import foothold_heights
 from walkerlab.scene.left_out import of_contact_walk
 from walkerlab.solvers.registry import Tolerances
 from walkerlab.solvers.system import Floats
-from walkerlab.stages.walk import content_of_walk, legs, numbers_of, of_body, over_time, pace_of, rigid_start, steps_of
+from walkerlab.stages.walk import content_of_walk, legs, numbers_of, over_time, pace_of, rigid_start, steps_of, turning
 from walkerlab.store.columns import numbered
 from walkerlab.store.content import Content, Group, Variable
 
-RESOLVED = 0.1  # of the stiction velocity: a tolerance that still tells slips apart
-HALF_ANGLE = 0.2  # rad, between the legs of a walker whose walk is only to be compiled
+RESOLVED = 0.1  # maximum tolerance over stiction velocity that resolves slips
+HALF_ANGLE = 0.2  # rad, between the legs in the walk that compiles the kernels
 SCUFFED = (
     "A straight swing leg cannot pass the stance leg on a plane: its foot scuffs. Give it room with "
     "contact.terrain: after-mid-swing, or checkerboard."
@@ -43,9 +43,9 @@ SCUFFED = (
 
 
 def run(config: ContactSimConfig, inputs: Mapping[str, Content], progress: Progress, again: bool = True) -> Content:
-    """Walk `config.strides` strides, and again for the numerical error; raises NoAnswer if the solver gives none.
+    """Walk `config.strides` strides; raises NoAnswer if the solver fails.
 
-    again  whether the second walk, which takes about as long as two or three, is wanted
+    again  whether to repeat the walk for its numerical error, which takes about twice as long
     """
     rigid_step, rigid_state = rigid_start(config, inputs)
     scene = scene_on_pads(config, rigid_step, rigid_state)
@@ -66,7 +66,7 @@ def run(config: ContactSimConfig, inputs: Mapping[str, Content], progress: Progr
 
 
 def compile_kernels(config: ContactSimConfig) -> None:
-    """Have everything compiled that `run` calls, by a walk that may evaluate next to nothing."""
+    """Compile all kernels of `run` by a walk with a minimal evaluation budget."""
     scene = contact_scene(config, config.walker.leg_length_m * 2.0 * float(np.sin(HALF_ANGLE)))
     places = places_of(scene.assembly).names
     angles = [HALF_ANGLE if name == "2" else -HALF_ANGLE if name.startswith("1") else 0.0 for name in places]
@@ -76,7 +76,7 @@ def compile_kernels(config: ContactSimConfig) -> None:
 
 
 def tell_unresolved_slip(atol: float, scene: ContactScene, progress: Progress) -> None:
-    """Say so if the tolerance on velocities (m/s) leaves friction to chance."""
+    """Warn if the tolerance on velocities (m/s) is too coarse for the friction law."""
     rising = scene.walker.friction.rising_until
     if atol > RESOLVED * rising:
         progress.note(
@@ -86,7 +86,7 @@ def tell_unresolved_slip(atol: float, scene: ContactScene, progress: Progress) -
 
 
 def summary(config: ContactSimConfig, scene: ContactScene, walk: ContactWalkResult) -> dict[str, Any]:
-    """What the command prints."""
+    """Summarise the walk."""
     scuffed = with_contact(config).terrain == "plane" and walk.outcome.stumbled and not scene.walker.kneed
     strikes = walk.knee_strike_time_s
     return {
@@ -112,12 +112,12 @@ def summary(config: ContactSimConfig, scene: ContactScene, walk: ContactWalkResu
 
 
 def mean_of(values: Floats) -> float | None:
-    """The mean of a number of each step; None of no step."""
+    """Return the mean over steps; None without steps."""
     return float(np.mean(values)) if values.size else None
 
 
 def groups(config: ContactSimConfig, scene: ContactScene, walk: ContactWalkResult) -> dict[str, Group]:
-    """The datasets of the artifact."""
+    """Build the groups of the artifact."""
     stored: dict[str, Group] = {}
     if walk.steps:
         stored["steps"] = Group(steps_of(walk, slip_m=walk.slip_m, rolling_m=walk.rolling_m))
@@ -129,7 +129,7 @@ def groups(config: ContactSimConfig, scene: ContactScene, walk: ContactWalkResul
 
 
 def pads_group(pitch: float, end: float) -> Group:
-    """The pads from behind the start to ahead of the walk's end (m)."""
+    """Build the group of pads from behind the start to beyond the walk's end."""
     numbers = np.arange(-2, int(np.ceil(end / pitch)) + 3)
     return Group(
         {
@@ -144,7 +144,7 @@ def pads_group(pitch: float, end: float) -> Group:
 def trajectory_group(
     config: ContactSimConfig, scene: ContactScene, walk: ContactWalkResult, samples: ContactSamples
 ) -> Group:
-    """Samples of the walk: what `outputs` asks for."""
+    """Build the group of samples that `outputs` selects."""
     variables = {**over_time(time=samples.time_s, stance_leg=samples.stance + 1), **legs()}
     feet = sampled_feet(scene.walker, samples)
     if "states" in config.outputs:
@@ -166,7 +166,7 @@ def trajectory_group(
 
 
 def state_variables(scene: ContactScene, y: Floats) -> dict[str, Variable]:
-    """How legs, shanks and a torso turn, and where hip and knees are."""
+    """Return motion of legs, shanks and torso, and positions of hip and knees."""
     walker, whole = scene.walker, scene.walker.whole
     names = [body.name for body in scene.assembly.bodies]
     n = len(names)
@@ -179,7 +179,7 @@ def state_variables(scene: ContactScene, y: Floats) -> dict[str, Variable]:
     found = over_time(**of_legs, hip_along_m=along, hip_height_m=height)
     if walker.kneed:
         thighs, shanks = whole.thighs.tolist(), whole.shanks.tolist()
-        found |= of_body("shank", angle[:, shanks], velocity[:, shanks])
+        found |= turning("shank", angle[:, shanks], velocity[:, shanks])
         knees = np.zeros((2, len(y), 2))
         for leg, (thigh, shank) in enumerate(zip(thighs, shanks, strict=True)):
             hip = hinge_of(scene.assembly, names[thigh], names[thighs[1 - leg]])
@@ -189,7 +189,7 @@ def state_variables(scene: ContactScene, y: Floats) -> dict[str, Variable]:
             knees[1, :, leg] = height + s[:, thigh] * ahead + c[:, thigh] * up
         found |= over_time(knee_along_m=knees[0], knee_height_m=knees[1])
     if TORSO in names:
-        found |= of_body(TORSO, angle[:, names.index(TORSO)], velocity[:, names.index(TORSO)])
+        found |= turning(TORSO, angle[:, names.index(TORSO)], velocity[:, names.index(TORSO)])
     return found
 
 

@@ -1,4 +1,4 @@
-"""Families of gaits over a key of the config: branches, bifurcations, cascades, and the chaos beyond them."""
+"""Families of gaits over a parameter: branches, bifurcations, cascades and chaos."""
 
 from __future__ import annotations
 
@@ -34,39 +34,39 @@ from walkerlab.store.content import Content
 
 Begun = tuple[list[Seed], Callable[[ContactConfig], StepMap]]
 """Seeds, and the step map over the parameter of a config."""
-LOOKED_AT = 5  # values of the span at which gaits are sought, its ends among them
-TIGHTEST = Effort(1e-13)  # what gaits are solved to whose numerical error is told
-OF_A_GAIT = ("step_period_s", "step_length_m")  # what a family's numerical error is told of
+LOOKED_AT = 5  # values in the span, ends included, where the search looks for gaits
+TIGHTEST = Effort(1e-13)  # for the numerical error
+OF_A_GAIT = ("step_period_s", "step_length_m")  # quantities with a numerical error
 
 
 @dataclass(frozen=True)
 class FamilyQuestion:
-    """What is followed: a parameter of a config over a span."""
+    """A parameter of a config and the span to follow gaits over."""
 
     config: ContinuationConfig
     parameter: Parameter
     span: ValueSpan
 
     def looked_at(self) -> list[float]:
-        """Values of the span at which gaits are sought: the config's own first."""
+        """Values where the search looks for gaits: the config's own first."""
         own = self.parameter.value_in(self.config)
         spread = np.linspace(self.span.least, self.span.most, LOOKED_AT)
         return [*([own] if own in self.span else []), *(float(one) for one in spread)]
 
     @property
     def models(self) -> tuple[str, ...]:
-        """The models that are asked for."""
+        """Requested models."""
         model = self.config.continuation.model
         return (RIGID, CONTACT) if model == "both" else (model,)
 
     @property
     def second(self) -> FamilyQuestion | None:
-        """The same over the second key, if there is one."""
+        """The same over the second key; None without one."""
         block = self.config.continuation.second
         return None if block is None else question_over(block, self.config, "continuation", "second")
 
     def refuse_ends(self, *block: str) -> None:
-        """Raise ConfigError, about keys of the block, for an end of the span that the config cannot have."""
+        """Raise ConfigError for an end of the span that the config rejects."""
         for name, value in (("from", self.span.least), ("to", self.span.most)):
             if self.parameter.config_at(self.config, value) is None:
                 raise self.parameter.refusal(self.config, value, (*block, name))
@@ -76,7 +76,7 @@ class FamilyQuestion:
         return differs(model, self.config, self.parameter, (self.span.least, self.span.most))
 
     def touched(self, key: str) -> tuple[str, ...]:
-        """The models asked for that change over the span; ConfigError, about the block's key, if none does."""
+        """Return the requested models that the parameter affects; raises ConfigError if there is none."""
         touched = tuple(model for model in self.models if self.touches(model))
         if not touched:
             raise not_read(f"continuation.{key}", self.parameter.key, self.models)
@@ -84,13 +84,13 @@ class FamilyQuestion:
 
 
 def question_over(block: Span, config: ContinuationConfig, *path: str) -> FamilyQuestion:
-    """What a block of the config asks, which is at a path of keys."""
+    """Build the question of a config block at a path of keys."""
     parameter = parameter_of(block.over, config, (*path, "over"))
     return FamilyQuestion(config, parameter, ValueSpan(block.least, block.most))
 
 
 def run(config: ContinuationConfig, _inputs: Mapping[str, Content], progress: Progress, again: bool = True) -> Content:
-    """Follow the families that the config asks for.
+    """Follow the requested families.
 
     again  whether some gaits are solved for a second time, for the numerical error
 
@@ -118,12 +118,12 @@ def run(config: ContinuationConfig, _inputs: Mapping[str, Content], progress: Pr
 
 
 def refuse(config: ContinuationConfig) -> None:
-    """Raise ConfigError for a question that cannot be meant."""
+    """Raise ConfigError for an invalid question."""
     models_of(question_over(config.continuation, config, "continuation"))
 
 
 def models_of(asked: FamilyQuestion) -> tuple[str, ...]:
-    """The models that are followed.
+    """Return the models to follow.
 
     Raises ConfigError for one that the config has not, for keys that touch none or cannot have the ends of their spans,
     and for a second key that is the first, or whose range leaves out the config's own value.
@@ -149,7 +149,7 @@ def models_of(asked: FamilyQuestion) -> tuple[str, ...]:
 
 
 def search_of(model: str, asked: FamilyQuestion, progress: Progress) -> FamilySearch | None:
-    """The search of a model, also over the plane of a second key that touches it; None without a gait to begin from."""
+    """Search a model's families, over a plane if there is a second key; None without a first gait."""
     begun, second, block = SEEDS[model](asked, progress), asked.second, asked.config.continuation
     if begun is None:
         return None
@@ -163,7 +163,7 @@ def search_of(model: str, asked: FamilyQuestion, progress: Progress) -> FamilySe
 
 
 def rigid_seeds(asked: FamilyQuestion, progress: Progress) -> Begun:
-    """Every gait of one step of the rigid model at the values looked at."""
+    """Find all one-step gaits of the rigid model at some values."""
     walker_at, seeds = rigid_walkers(asked.config, asked.parameter), list[Seed]()
     progress.start("continuation: gaits of the rigid model")
     for value in asked.looked_at():
@@ -174,7 +174,7 @@ def rigid_seeds(asked: FamilyQuestion, progress: Progress) -> Begun:
 
 
 def contact_seeds(asked: FamilyQuestion, progress: Progress) -> Begun | None:
-    """The first gait of the contact model at the values looked at; None if there is none."""
+    """Find the first gait of the contact model at some values; None if there is none."""
     from walkerlab.scene.contact import gait_off_pads
 
     progress.start("continuation: a gait of the contact model")
@@ -203,7 +203,7 @@ SEEDS: Final[Mapping[str, Callable[[FamilyQuestion, Progress], Begun | None]]] =
 
 
 def summary(found: Sequence[Family], asked: FamilyQuestion, again: bool) -> dict[str, Any]:
-    """What the command prints; values are in the unit of the key that was asked for. For `again` see `run`."""
+    """Summarise the families, with values in the unit of the requested key; `again` as in `run`."""
     config, parameter = asked.config, asked.parameter
 
     def rows(of_model: Callable[[Family], Iterable[Mapping[str, Any]]]) -> list[dict[str, Any]]:
@@ -230,7 +230,7 @@ def summary(found: Sequence[Family], asked: FamilyQuestion, again: bool) -> dict
 
 
 def branch_rows(family: Family) -> Iterator[dict[str, Any]]:
-    """The branches of a model: between which values, how far each is stable, and why it ends."""
+    """Return rows of a model's branches: their values, stable parts and ends."""
     for branch in family.branches:
         ranges = branch.stable_ranges
         widest = max(ranges, key=lambda pair: pair[1] - pair[0], default=None)
@@ -246,7 +246,7 @@ def branch_rows(family: Family) -> Iterator[dict[str, Any]]:
 
 
 def bifurcation_rows(family: Family) -> Iterator[dict[str, Any]]:
-    """The bifurcations of a model, branch by branch."""
+    """Return rows of a model's bifurcations, branch by branch."""
     for number, branch in enumerate(family.branches):
         for one in branch.bifurcations:
             yield {
@@ -259,7 +259,7 @@ def bifurcation_rows(family: Family) -> Iterator[dict[str, Any]]:
 
 
 def first_doubling(branches: Sequence[GaitBranch]) -> float | None:
-    """The least flip at which a gait of one step ceases to be stable; None if there is none.
+    """Return the first flip where a one-step gait loses stability; None if there is none.
 
     branches  of one model; one that is unstable on both sides of a flip does not count
     """
@@ -274,7 +274,7 @@ def first_doubling(branches: Sequence[GaitBranch]) -> float | None:
 
 
 def limit_rows(family: Family) -> Iterator[dict[str, Any]]:
-    """Where assumptions of a model cease to hold."""
+    """Return rows of crossings where a model's assumptions cease to hold."""
     for branch in family.branches:
         for crossing in branch.crossings:
             monitor = crossing.monitor
@@ -283,7 +283,7 @@ def limit_rows(family: Family) -> Iterator[dict[str, Any]]:
 
 
 def sample_again(family: Family) -> dict[str, Any] | None:
-    """What tighter tolerances change in some gaits, spread evenly over all branches; None without any.
+    """Return the change of some gaits at tighter tolerances, spread evenly over all branches; None without gaits.
 
     They are solved for again, so that what Newton's method left over counts, too.
     """
@@ -307,7 +307,7 @@ def sample_again(family: Family) -> dict[str, Any] | None:
 
 
 def ending_rows(family: Family, parameter: Parameter, config: ContactConfig) -> Iterator[dict[str, Any]]:
-    """What ends walks along the branches, and what the ground has to do with it, in words: `said`."""
+    """Describe how walks along the branches end, and the role of the ground."""
     for branch in family.branches:
         gait = f"the {family.model} model's gait of {branch.period} {steps_word(branch.period)}"
         for end in branch.ends:
@@ -327,7 +327,7 @@ def ending_rows(family: Family, parameter: Parameter, config: ContactConfig) -> 
 
 
 def side_beyond(branch: GaitBranch, crossing: Crossing, step_map: StepMap | None) -> str:
-    """On which side of a crossing what is watched is beyond its limit, as its neighbour there has it."""
+    """Return on which side of a crossing the monitored quantity exceeds its limit."""
     assert step_map is not None, "a branch is followed with one"
     place, limit = list(step_map.monitors).index(crossing.monitor), crossing.monitor.limit
     nearest = min(branch.points, key=lambda point: abs(point.value - crossing.value))
@@ -336,7 +336,7 @@ def side_beyond(branch: GaitBranch, crossing: Crossing, step_map: StepMap | None
 
 
 def cascade_rows(family: Family) -> Iterator[dict[str, Any]]:
-    """Chains of branches, each born in a flip of the one before, with the ratios of their flips' distances."""
+    """Return rows of period-doubling cascades with the ratios of distances between flips."""
     for first in family.branches:
         if any(is_born_in(first, flip, other) for other in family.branches for flip in other.bifurcations):
             continue
@@ -348,7 +348,7 @@ def cascade_rows(family: Family) -> Iterator[dict[str, Any]]:
 
 
 def chain(branch: GaitBranch, branches: Sequence[GaitBranch]) -> list[float]:
-    """Flips of a branch, of the branch born there, and so on, wherever a branch is stable before it."""
+    """Iterate over chains of flips: of a branch, of the branch born there, and so on."""
     flips = [one for one in branch.bifurcations if one.kind == "flip"]
     for flip in flips:
         for child in branches:
@@ -358,14 +358,14 @@ def chain(branch: GaitBranch, branches: Sequence[GaitBranch]) -> list[float]:
 
 
 def is_born_in(child: GaitBranch, flip: Bifurcation, parent: GaitBranch) -> bool:
-    """Whether a branch begins at a flip of another one, at either of its ends."""
+    """Whether either end of a branch is a flip of another branch."""
     if flip.kind != "flip" or child.period != 2 * parent.period:
         return False
     return child.ends[0].value == flip.value or any(child.closes_on(flip))
 
 
 def attractor_summary(family: Family) -> dict[str, Any]:
-    """Over which values the attractor was followed, and what became of it.
+    """Describe the range of the attractor and its fate.
 
     Just beyond a flip walks leave the gait slowly: what has not repeated itself by then counts as aperiodic only where
     neighbours may part, and neither a gait that was followed is stable nor a cascade still doubles.
@@ -391,7 +391,7 @@ def attractor_summary(family: Family) -> dict[str, Any]:
 
 
 def curve_rows(family: Family) -> Iterator[dict[str, Any]]:
-    """Curves of bifurcations over the plane: where they begin and end, and why."""
+    """Return rows of bifurcation curves over the plane: their ends and the reasons."""
     for curve in family.curves:
         points = list(zip(curve.first.tolist(), curve.second.tolist(), strict=True))
         yield {
@@ -405,7 +405,7 @@ def curve_rows(family: Family) -> Iterator[dict[str, Any]]:
 
 
 def region_rows(family: Family) -> Iterator[dict[str, Any]]:
-    """Which share of the plane each kind of attractor has."""
+    """Return the share of the plane of each kind of attractor."""
     if family.regions is not None:
         periods, counts = np.unique(family.regions.period, return_counts=True)
         for period, cells in zip(periods.tolist(), counts.tolist(), strict=True):
@@ -413,14 +413,14 @@ def region_rows(family: Family) -> Iterator[dict[str, Any]]:
 
 
 def alone_at(branch: GaitBranch, model: str, parameter: Parameter) -> dict[str, str]:
-    """The entry of a gait that goes on neither way: one from which the step map jumps is no branch."""
+    """Report a gait that continues in neither direction, since the step map is discontinuous there."""
     (gait,) = branch.points
     what = f"a gait of the {model} model at {gait.value:.5g} {parameter.unit} ({gait.period_s:.4g} s)"
     return {"what": what, "why": f"it goes on neither way: {branch.ends[1].reason}", "saves": ""}
 
 
 def left_out(found: Sequence[Family], asked: FamilyQuestion) -> list[dict[str, str]]:
-    """What was not followed, and why."""
+    """Report a family that was not followed, and why."""
     followed, entries, second = {one.model: one for one in found}, [], asked.second
     for model in asked.models:
         if model not in followed:

@@ -1,4 +1,4 @@
-"""The walker whose gait has the least or largest of a number, within bounds: a config that extends the start."""
+"""Optimise parameters of a walker within bounds for a quantity of its gait."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from walkerlab.store.columns import rows_group
 from walkerlab.store.content import Content
 
 SOLVED: Final = Effort(1e-10)
-MEETING: Final = 1e-3  # between magnitudes of multipliers
+MEETING: Final = 1e-3  # relative difference of multipliers that count as meeting
 LABELS: Final = {
     "to": Label("", "number of the config"),
     "start": Label("SI", "where the search began"),
@@ -41,7 +41,7 @@ ADVICE: Final = "Widen the bounds (--over), or let other numbers go further (--k
 
 
 def run(config: DesignConfig, inputs: Mapping[str, Content], progress: Progress, *, checkpoint: Checkpoint) -> Content:
-    """Search; raises ConfigError for a question that cannot be meant, NoAnswer where no walker keeps the bounds.
+    """Search for the optimum; raises ConfigError for an invalid question, NoAnswer if no walker keeps the bounds.
 
     checkpoint  ends of searches that an earlier run has left, and where new ones are kept
     """
@@ -114,7 +114,7 @@ def run(config: DesignConfig, inputs: Mapping[str, Content], progress: Progress,
 
 
 def refuse(config: DesignConfig) -> None:
-    """Raise ConfigError for a question that cannot be meant."""
+    """Raise ConfigError for an invalid question."""
     asked = config.design or Design()
     if (asked.minimise or asked.maximise) is None or not asked.over:
         raise ConfigError(
@@ -137,7 +137,7 @@ def refuse(config: DesignConfig) -> None:
 
 
 def config_with(config: DesignConfig, parameters: Sequence[Parameter], x: Floats) -> Config | None:
-    """The config with other numbers (parameters,); None if it refuses them."""
+    """Return the config with other parameter values (parameters,); None if it rejects them."""
     changed: Config | None = None
     for parameter, value in zip(parameters, x.tolist(), strict=True):
         changed = parameter.config_at(config if changed is None else changed, value)
@@ -147,13 +147,13 @@ def config_with(config: DesignConfig, parameters: Sequence[Parameter], x: Floats
 
 
 def on_bound(asked: Design, x: Floats) -> list[str]:
-    """The keys of which the optimum lies on a bound."""
+    """Return the keys whose optimum lies on a bound."""
     pairs = zip(asked.over.items(), x.tolist(), strict=True)
     return [key for (key, (low, high)), value in pairs if min(value - low, high - value) < ON_BOUND * (high - low)]
 
 
 class Gaits:
-    """The gait at numbers of the config, with its gradients, each sought from the last one."""
+    """Gait and gradients as functions of the parameters; each search starts at the last gait."""
 
     def __init__(
         self,
@@ -163,16 +163,16 @@ class Gaits:
         gait: Mapping[str, Any],
         progress: Progress,
     ) -> None:
-        """Begin at the gait of the config."""
+        """Start at the config's gait."""
         self.config, self.model, self.parameters, self.progress = config, asked.model, parameters, progress
         self.wanted = {*filter(None, (asked.minimise, asked.maximise)), *asked.keep}
-        self.counts = np.zeros(2, int)  # evaluations, and those without such a gait
-        self.found: dict[bytes, Floats] = {}  # section coordinates of gaits, by the numbers that were asked for
+        self.counts = np.zeros(2, int)  # evaluations, and those without a gait
+        self.found: dict[bytes, Floats] = {}  # section coordinates of gaits, by parameter values
         self.length = float(gait["step_length_m"])
         self.z = subject_of(asked.model, config, gait, progress.note).z
 
     def at(self, x: Floats) -> Point | None:
-        """The gait; None where there is none, or the config refuses the numbers."""
+        """Return the gait; None if there is none or the config rejects the values."""
         self.counts[0] += 1
         self.progress.advance()
         changed = config_with(self.config, self.parameters, x)
@@ -184,7 +184,7 @@ class Gaits:
         return found
 
     def gait_of(self, config: Config) -> Point | None:
-        """The gait of a config: near the last one, or where a search finds it."""
+        """Find the gait of a config near the last one, or by a search."""
         subject = Subject(self.model, config, self.z, self.length)
         here = subject.at()
         found = self.near(here, self.z)
@@ -206,7 +206,7 @@ class Gaits:
         return Point(numbers, {name: np.array([one[name] for one in by_key]) for name in self.wanted}, apart)
 
     def near(self, at: Standpoint, z: Floats) -> tuple[Standpoint, dict[str, float]] | None:
-        """The gait near z (d,) with its numbers; None where it has not all that are wanted."""
+        """Find the gait near z (d,) with its quantities; None if one is undefined."""
         cycle = gait_near(at.step_map, z, at.p, SOLVED)
         if isinstance(cycle, NotConverged):
             return None

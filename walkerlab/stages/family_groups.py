@@ -1,4 +1,4 @@
-"""What is stored of families of gaits: branches with their bifurcations, attractors, curves, and gaits that walk."""
+"""Groups of families of gaits: branches with bifurcations, attractors, curves and sampled walks."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ from walkerlab.stages.walk import only_at
 from walkerlab.store.columns import columns, labelled, real_and_imaginary
 from walkerlab.store.content import Attribute, Group, Variable
 
-MOTIONS_OF_BRANCH, LONGEST = 12, 4  # gaits of one branch, and steps of a gait, that are walked
-STRIDE = 2  # steps, after which each leg is where it was
+MOTIONS_OF_BRANCH, LONGEST = 12, 4  # walked gaits of a branch; maximum period of a walked gait
+STRIDE = 2  # steps until the legs have their first roles again
 TOLERANCES = Tolerances("dop853", 1e-9, 1e-11, ENDLESS)
 ALL_OUTPUTS: Final[tuple[Output, ...]] = ("states", "energies", "forces")
-EVERY = 3  # which samples are kept beside those at heel strikes
+EVERY = 3  # interval of stored samples between heel strikes
 
 MODEL, KIND = Label("", "model"), Label("", "fold, flip or torus")
 PERIOD = Label("1", "steps of the gait")
@@ -66,7 +66,7 @@ def groups(
     found: Sequence[Family], said: Mapping[str, Any], config: ContactConfig, parameter: Parameter,
     second: Parameter | None,
 ) -> dict[str, Group]:  # fmt: skip
-    """One group a branch and a curve, and one for bifurcations, exponents and attractor of each model.
+    """Build a group for each branch and curve, and for each model's bifurcations, exponents and attractor.
 
     said    the summary, of which branches, bifurcations and curves are stored as tables too
     second  key of the plane, if there is one
@@ -75,7 +75,7 @@ def groups(
     stored: dict[str, Group] = {}
 
     def over(plane: BifurcationCurve | Regions, *dims: str) -> dict[str, Variable]:
-        """Values of both parameters."""
+        """Return coordinates of both parameters."""
         axes = zip(("value", "second"), (plane.first, plane.second), (parameter, second), dims, strict=True)
         return {name: labelled(values, Label(one.unit, one.key), dim) for name, values, one, dim in axes if one}
 
@@ -113,7 +113,7 @@ def groups(
 
 
 class Mark(NamedTuple):
-    """A bifurcation among the points of a branch: after which point, and the steps of the gait there."""
+    """A bifurcation on a branch: the index of the point before it, and the gait's steps."""
 
     after: int
     kind: str
@@ -123,7 +123,7 @@ class Mark(NamedTuple):
 
 
 def marks_on(branch: GaitBranch) -> list[Mark]:
-    """The bifurcations of a branch in their order along it."""
+    """Return the bifurcations of a branch in their order along it."""
     return [
         Mark(index, one.kind, one.value, one.gait.periods_s, one.gait.angles)
         for index, (before, after) in enumerate(pairwise(branch.points))
@@ -132,7 +132,7 @@ def marks_on(branch: GaitBranch) -> list[Mark]:
 
 
 def birth_of(branch: GaitBranch, branches: Sequence[GaitBranch]) -> list[Mark]:
-    """The flip that a branch begins at: its parent's gait, twice."""
+    """Return the flip where a branch begins, with its parent's gait repeated twice."""
     for parent in branches:
         for one in parent.bifurcations:
             if one.kind == "flip" and 2 * parent.period == branch.period and one.value == branch.ends[0].value:
@@ -143,7 +143,7 @@ def birth_of(branch: GaitBranch, branches: Sequence[GaitBranch]) -> list[Mark]:
 def branch_group(
     branch: GaitBranch, marks: Sequence[Mark], monitors: Sequence[Monitor], value: Mapping[str, Label]
 ) -> Group:
-    """The gaits of a branch in their order along it, and where on it its bifurcations are.
+    """Build the group of a branch: its gaits in order, and its bifurcations.
 
     value  label of the parameter's values
     """
@@ -168,7 +168,7 @@ def branch_group(
 
 
 def motions(branches: Sequence[GaitBranch], config: ContactConfig, parameter: Parameter) -> dict[str, Group]:
-    """Some gaits of each branch of the rigid model, walking, by branch and point: branch_0/motion_7."""
+    """Build groups of sampled walks of some gaits of each rigid branch: branch_0/motion_7."""
     return {
         f"branch_{number}/motion_{place}": group
         for number, branch in enumerate(branches)
@@ -179,7 +179,7 @@ def motions(branches: Sequence[GaitBranch], config: ContactConfig, parameter: Pa
 
 
 def motion(point: Cycle, period: int, config: ContactConfig, parameter: Parameter) -> Iterator[Group]:
-    """A gait walking, as `simulate` stores a walk; nothing where the config refuses the value."""
+    """Walk a gait and yield its group as `simulate` stores it; nothing if the config rejects the value."""
     changed = parameter.config_at(config, point.value)
     if changed is None:
         return

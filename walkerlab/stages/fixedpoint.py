@@ -1,4 +1,4 @@
-"""The periodic gaits of the rigid model, with the corrected equations and with those that the paper prints."""
+"""Periodic gaits of the rigid model, with the corrected equations and with those printed in the paper."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -10,10 +10,10 @@ from walkerlab.config.reads import FixedPointConfig, RigidConfig
 from walkerlab.errors import NoAnswer
 from walkerlab.labels import Label
 from walkerlab.orbits.fixed_point import GaitSearch, RigidGait, find_gaits
-from walkerlab.pipeline.progress import Progress, each_told
+from walkerlab.pipeline.progress import Progress, track
 from walkerlab.scene.rigid import coordinates, rigid_walker
 from walkerlab.scene.studies import equation_sets
-from walkerlab.store.columns import printed, real_and_imaginary, rows_group
+from walkerlab.store.columns import real_and_imaginary, rows_group, values_by_column
 from walkerlab.store.content import Content, Group, Variable
 
 GAIT = "gait"
@@ -36,17 +36,17 @@ NUMBERS = {
     "max_impulse_ratio": Label("1", "largest ratio of tangential to normal impulse in a strike"),
     "max_scuff_depth": Label("m", "depth of the swing foot below the slope", name="max_scuff_depth_m"),
 }
-"""What is stored and printed of a gait, each a field of `RigidGait`."""
+"""Quantities of a gait that are stored and printed, fields of `RigidGait`."""
 OF_KNEES = {"knee_strike": Label("s", "time of the knee strike after the heel strike", name="knee_strike_s")}
 STATE = Label("rad, rad/s", "state just after heel strike", ("coordinate",))
 
 
 def run(config: FixedPointConfig, _inputs: Mapping[str, Content], progress: Progress) -> Content:
-    """Find the gaits of both sets of equations; raises NoAnswer if those of the config have none to walk."""
+    """Find the gaits of both sets of equations; raises NoAnswer if the config's set has no physical one."""
     sets = equation_sets(config)
     searches: dict[str, GaitSearch] = {
         equations: find_gaits(rigid_walker(config, equations), config.seed)
-        for equations in each_told(progress, "fixedpoint", len(sets), sets)
+        for equations in track(progress, "fixedpoint", len(sets), sets)
     }
     chosen = searches[config.equations]
     content = Content(
@@ -60,7 +60,7 @@ def run(config: FixedPointConfig, _inputs: Mapping[str, Content], progress: Prog
 
 
 def advice(config: RigidConfig) -> str:
-    """What to do about a slope without a gait."""
+    """Advise on a slope without a gait."""
     walk_anyway = (
         f"to walk there all the same, give a start state (start: [{', '.join(coordinates(config))}]), and the "
         "contact model a pitch of its pads (contact.pad_pitch: a number)"
@@ -76,7 +76,7 @@ def advice(config: RigidConfig) -> str:
 
 
 def summary(config: RigidConfig, searches: Mapping[str, GaitSearch]) -> dict[str, Any]:
-    """What the command prints: the chosen gait of the config's equations, and both sets side by side."""
+    """Summarise the chosen gait of the config's equations, and both sets side by side."""
     sets = {}
     for equations, search in searches.items():
         gaits = [
@@ -100,23 +100,23 @@ def summary(config: RigidConfig, searches: Mapping[str, GaitSearch]) -> dict[str
 
 
 def numbers_of(gait: RigidGait) -> dict[str, Label]:
-    """What is stored and printed of a gait, with or without knees."""
+    """Return the labels of a gait's quantities, with or without knees."""
     return NUMBERS if gait.knee_strike is None else NUMBERS | OF_KNEES
 
 
 def gait_summary(gait: RigidGait) -> dict[str, Any]:
-    """One gait in SI units."""
+    """Describe one gait in SI units."""
     return {
         "state": list(gait.state),
         "multipliers": [[value.real, value.imag] for value in gait.multipliers],
-        **printed(gait, numbers_of(gait)),
+        **values_by_column(gait, numbers_of(gait)),
         "work_per_step_J": gait.work,
         "found_by": list(gait.found_by),
     }
 
 
 def gaits_group(search: GaitSearch, config: RigidConfig) -> Group:
-    """Every gait found, one row each."""
+    """Build the group of all gaits, one row each."""
     gaits = search.gaits
     multipliers = [gait.multipliers for gait in gaits]
     found_by = np.array(["; ".join(gait.found_by) for gait in gaits])

@@ -1,4 +1,4 @@
-"""The numerical error of a walk: how much its numbers change when it is walked again at tighter tolerances."""
+"""Numerical error of a walk: the change of its quantities at tighter tolerances."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -9,12 +9,12 @@ import numpy as np
 from walkerlab.labels import ERROR_OF_EACH_STEP
 from walkerlab.solvers.registry import ENDLESS, Tolerances
 
-LEAST_RTOL: Final = 1e-14  # that the schema allows
+LEAST_RTOL: Final = 1e-14  # minimum in the schema
 TIGHTER: Final = {100.0: "a hundred times tighter tolerances", 10.0: "ten times tighter tolerances"}
-MORE_WORK: Final = 10  # that tighter tolerances may take
-SAMPLE: Final = 16  # of many walks, so many are taken again
+MORE_WORK: Final = 10  # factor on the evaluation budget at tighter tolerances
+SAMPLE: Final = 16  # number of many walks to repeat
 USUAL: Final = TIGHTER[100.0]
-ROUNDING: Final = 1e-6  # of a tolerance that was divided
+ROUNDING: Final = 1e-6  # relative, of a divided tolerance
 
 Summary = Mapping[str, Any]
 
@@ -35,9 +35,9 @@ def numerical_error(walked: Summary, tolerances: Tolerances, walk: Callable[[Tol
 
 
 def tightened(tolerances: Tolerances) -> tuple[Tolerances, str]:
-    """Tolerances that err less, with room for the work that this takes, and what sets them apart, in words.
+    """Return tighter tolerances with a larger budget, and a description of the change.
 
-    At the tightest that there are it is another method.
+    At the tightest tolerances the method changes instead.
     """
     tolerances = replace(tolerances, budget=min(MORE_WORK * tolerances.budget, ENDLESS))
     for factor, by in TIGHTER.items():
@@ -49,15 +49,15 @@ def tightened(tolerances: Tolerances) -> tuple[Tolerances, str]:
 
 
 def change(walked: Summary, again: Summary, by: str = USUAL) -> dict[str, Any]:
-    """The largest changes from one summary of a walk to another one, as `numerical_error` returns them."""
+    """Return the largest changes between two summaries of a walk, as `numerical_error` does."""
     if (walked["outcome"], walked["steps"]) != (again["outcome"], again["steps"]):
         steps = f"{again['steps']} step{'' if again['steps'] == 1 else 's'}"
         return {"reason": f"with {by} the walk ends otherwise: {again['outcome']} after {steps}"}
     changes = {}
     for key, name in ERROR_OF_EACH_STEP.items():
-        both = zip(walked.get(key) or (), again.get(key) or (), strict=False)  # a last foot may not have lifted in one
+        both = zip(walked.get(key) or (), again.get(key) or (), strict=False)  # the last foot may still stand
         apart = [abs(one - other) for one, other in both if one is not None and other is not None]
-        if apart and any(walked[key]):  # points do not roll
+        if apart and any(walked[key]):  # point feet do not roll
             changes[name] = max(apart)
     changes["end_time_s"] = abs(walked["end_time_s"] - again["end_time_s"])
     # a passive walk's cost is the slope's sine, however large the walk's error
@@ -67,5 +67,5 @@ def change(walked: Summary, again: Summary, by: str = USUAL) -> dict[str, Any]:
 
 
 def evenly_spread(count: int, wanted: int) -> list[int]:
-    """Places of at most so many things among `count`, both ends among them."""
+    """Return at most `wanted` evenly spaced indices below `count`, both ends included."""
     return sorted({round(place) for place in np.linspace(0, count - 1, min(count, wanted)).tolist()})

@@ -1,4 +1,4 @@
-"""What a gait withstands, in both models, and which numbers of the config move it; walks are kept as they are taken."""
+"""Robustness of a gait in both models: the disturbances it survives, and the parameters that affect it."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from walkerlab.orbits.robustness import (
     steps_on_rough_ground,
 )
 from walkerlab.orbits.shooting import EXACT, RigidMap
-from walkerlab.pipeline.progress import Progress, each_told
+from walkerlab.pipeline.progress import Progress, track
 from walkerlab.pipeline.work import WorkUnit, complete
 from walkerlab.scene.families import not_read, reads
 from walkerlab.scene.parameter import SLOPE, SLOPE_DEG, SLOPE_RAD, parameter_of, why_no_parameter
@@ -50,9 +50,9 @@ Rows = list[dict[str, Any]]
 WALKS_AT_ONCE: Final = 25
 STEPS_DRAWN: Final = 8
 MAX_STEPS: Final = {RIGID: 2_000_000, CONTACT: 40_000}
-"""On one rough ground, all walks together."""
+"""Maximum number of steps on one rough ground, all walks together."""
 GIVEN: Final = ("normal_impulse_N_s", "min_normal_force_N")
-"""What the ground gives in a push and after it, as `RigidMap.ground_after_push` returns it."""
+"""Ground reactions during and after a push, as `RigidMap.ground_after_push` returns them."""
 UNITS: Final = {"floor-drop": "m", "hip-push": "N s"}
 OF: Final = dict(zip(INDICATORS, ("s", "m", "m/s"), strict=True))
 MODEL: Final = {"model": Label("", "which model walks")}
@@ -94,7 +94,7 @@ LABELS: Final[dict[str, dict[str, Label]]] = {
         "value": Label("SI", "derivative, in the units of both"),
     },
 }
-"""What is stored, row by row, of each part of the answer, beside the model."""
+"""Labels of the rows of each part of the answer, besides the model."""
 
 
 def run(
@@ -105,9 +105,9 @@ def run(
     checkpoint: Checkpoint,
     jobs: int = 1,
 ) -> Content:
-    """Ask each model; raises NoAnswer, with what there is, for an unstable gait, which has no norm.
+    """Study each model; raises NoAnswer with partial results for an unstable gait, which has no norm.
 
-    checkpoint  walks that an earlier run has left, and where new ones are kept
+    checkpoint  walks of an earlier run
     jobs        processes
 
     Raises ConfigError for a question that cannot be meant.
@@ -117,7 +117,7 @@ def run(
     unstable, steps = [], {}
     for subject in subjects(config, inputs, progress):
         here = subject.at()
-        # the rigid model's gradients and largest disturbances take less time than starting another process
+        # the rigid model's gradients and largest disturbances are faster than starting a process
         jobs_but_for_walks = jobs if subject.model == CONTACT else 1
         numbers = gait_numbers(here)
         assert numbers is not None, "a gait that was found walks"
@@ -129,7 +129,7 @@ def run(
         found["gait_sensitivity_norm"] += norms(subject.model, here)
         rough_walks, label = [*rough(subject, config)], f"robustness: {subject.model} model"
         units, processes = [*single(subject, config), *rough_walks], jobs if rough_walks else jobs_but_for_walks
-        # with the gait's own numbers all kernels are there
+        # the gait's own quantities have compiled all kernels
         done, _ = complete(units, checkpoint, label, progress, processes, compiled=True)
         (down,), (up,), (forward, *ahead), (backward, *behind), *walks = done
         of, wanted = {"model": subject.model}, {"steps": config.robustness.steps}
@@ -154,7 +154,7 @@ def run(
 
 
 def refuse(config: RobustnessConfig) -> None:
-    """Raise ConfigError for what cannot be meant."""
+    """Raise ConfigError for an invalid question."""
     asked = config.robustness
     if asked.model in (CONTACT, "both") and config.contact is None:
         raise without_contact(f"robustness.model: {asked.model}", config.walker, "Add one, or ask for rigid.")
@@ -172,7 +172,7 @@ def refuse(config: RobustnessConfig) -> None:
 
 
 def subjects(config: RobustnessConfig, inputs: Mapping[str, Content], progress: Progress) -> Iterator[Subject]:
-    """The models that are asked for, with their gaits."""
+    """Return the requested models with their gaits."""
     progress.start("robustness: gaits")
     gait = inputs["fixedpoint"].summary
     for model in models_of(config):
@@ -180,13 +180,13 @@ def subjects(config: RobustnessConfig, inputs: Mapping[str, Content], progress: 
 
 
 def models_of(config: RobustnessConfig) -> tuple[str, ...]:
-    """The models that are asked for."""
+    """Return the requested models."""
     asked = config.robustness.model or (RIGID if config.contact is None else "both")
     return (RIGID, CONTACT) if asked == "both" else (asked,)
 
 
 def norms(model: str, here: Standpoint) -> Iterator[dict[str, Any]]:
-    """Rows of sensitivity norms, one for each indicator of a disturbance."""
+    """Return rows of sensitivity norms, one for each disturbance and indicator."""
     for disturbance in DISTURBANCES:
         answer, units, of = sensitivity(here, disturbance), here.units, UNITS[disturbance]
         if answer is None:
@@ -206,7 +206,7 @@ def norms(model: str, here: Standpoint) -> Iterator[dict[str, Any]]:
 
 
 def single(subject: Subject, config: RobustnessConfig) -> Iterator[WorkUnit]:
-    """The search for the largest drop and push of either sign."""
+    """Return the searches for the largest drop and push of either sign."""
     for disturbance in DISTURBANCES:
         for sign in (1.0, -1.0):
             run = partial(single_of, subject, disturbance, sign, config.robustness.steps)
@@ -214,7 +214,7 @@ def single(subject: Subject, config: RobustnessConfig) -> Iterator[WorkUnit]:
 
 
 def single_of(subject: Subject, disturbance: Any, sign: float, steps: int) -> list[float]:
-    """The largest disturbance of a sign; behind a push what the rigid model's ground must give, as `GIVEN` names it."""
+    """Find the largest disturbance of a sign; after a push also the ground reactions, as `GIVEN` names them."""
     size = largest_disturbance(subject.at(exact=False), disturbance, sign, steps)
     if disturbance == "hip-push" and isinstance(rigid := subject.at().step_map, RigidMap):
         return [size, *rigid.ground_after_push(subject.z, SLOPE.value_in(subject.config), sign * size, steps)]
@@ -222,7 +222,7 @@ def single_of(subject: Subject, disturbance: Any, sign: float, steps: int) -> li
 
 
 def rough(subject: Subject, config: RobustnessConfig) -> Iterator[WorkUnit]:
-    """The walks on rough ground, some at a time."""
+    """Iterate over batches of walks on rough ground."""
     asked, most = config.robustness, cap(subject.model, config)
     for roughness in asked.roughness_m:
         for first in range(0, asked.walks, WALKS_AT_ONCE):
@@ -232,18 +232,18 @@ def rough(subject: Subject, config: RobustnessConfig) -> Iterator[WorkUnit]:
 
 
 def cap(model: str, config: RobustnessConfig) -> int:
-    """Steps after which a walk on rough ground is cut off."""
+    """Return the maximum number of steps of a walk on rough ground."""
     return min(config.robustness.max_steps, max(1, MAX_STEPS[model] // config.robustness.walks))
 
 
 def rough_of(subject: Subject, roughness: float, seed: int, walks: range, most: int) -> list[float]:
-    """Steps of some of the walks; each has a ground of its own, whoever walks it."""
+    """Count steps of some walks; each has its own ground, independent of the process."""
     here = subject.at(exact=False)
     return [float(steps_on_rough_ground(here, roughness, (seed, walk), most)) for walk in walks]
 
 
 def rough_steps(config: RobustnessConfig, steps: Mapping[str, Floats]) -> Group:
-    """The steps of every walk, as they are stored."""
+    """Build the group of the steps of every walk."""
     roughness, caps = np.array(config.robustness.roughness_m), np.array([cap(model, config) for model in steps])
     about = "steps that a walk took; one that went on to the last step that was looked at has as many"
     return Group(
@@ -257,7 +257,7 @@ def rough_steps(config: RobustnessConfig, steps: Mapping[str, Floats]) -> Group:
 
 
 def rough_walk(config: RobustnessConfig, inputs: Mapping[str, Content]) -> dict[str, Group]:
-    """The beginning of the first walk on the roughest ground, as the rigid model takes it, to be drawn."""
+    """Sample the beginning of the rigid model's first walk on the roughest ground, for a figure."""
     gait = inputs["fixedpoint"].summary
     _, *heights = rough_heights(max(config.robustness.roughness_m), (config.seed, 0), STEPS_DRAWN).tolist()
     scene = rigid_scene(config, Footholds(heights_m=tuple(heights)), ("states",))
@@ -268,7 +268,7 @@ def rough_walk(config: RobustnessConfig, inputs: Mapping[str, Content]) -> dict[
 
 
 def rough_rows(model: str, config: RobustnessConfig, steps: Floats) -> Rows:
-    """How long walks last, of so many steps (roughness, walk), on each rough ground."""
+    """Summarise the numbers of steps (roughness, walk) on each rough ground."""
     most, rows = cap(model, config), []
     for roughness, taken in zip(config.robustness.roughness_m, steps, strict=True):
         seen = asdict(rough_walks(taken, most))
@@ -280,11 +280,11 @@ def rough_rows(model: str, config: RobustnessConfig, steps: Floats) -> Rows:
 def sensitivities(
     subject: Subject, wanted: tuple[str, ...], numbers: Mapping[str, float], progress: Progress, jobs: int
 ) -> Rows:
-    """Rows of derivatives, the largest relative effect first, numbers that are 0 behind those that are not."""
+    """Return rows of derivatives by decreasing relative effect; parameters that are 0 come last."""
     keys = numbers_read(subject, wanted)
     label, rows = f"robustness: gradients of the {subject.model} model", list[dict[str, Any]]()
     found = in_order([partial(gradients_of, subject, key) for key in keys], jobs)
-    for key, of_key in each_told(progress, label, len(keys), zip(keys, found, strict=True)):
+    for key, of_key in track(progress, label, len(keys), zip(keys, found, strict=True)):
         parameter = parameter_of(key, subject.config)
         value = parameter.value_in(subject.config)
         for name, gradient in (of_key or dict.fromkeys(numbers, NONE_BESIDE)).items():
@@ -301,14 +301,14 @@ def sensitivities(
 
 
 def gradients_of(subject: Subject, key: str) -> dict[str, Gradient]:
-    """Derivatives by one key; the cost of transport of a passive walker is its slope's sine."""
+    """Return derivatives by one key; a passive walker's cost of transport is the sine of the slope."""
     known = () if drives_of(subject.config) else ("cost_of_transport",)
     wanted = [name for name in QUANTITIES if name not in known]
     return subject.gradients(parameter_of(key, subject.config), wanted)
 
 
 def numbers_read(subject: Subject, wanted: tuple[str, ...] = ()) -> tuple[str, ...]:
-    """Those of some parameters of the config, or of all, that the model reads, dotted, as the config writes them."""
+    """Return the requested parameters, or all, that the model reads, by dotted key."""
     own = {".".join(path): field for path, field in leaves(Config, held=subject.config)}
     in_degrees = slope_in_degrees(subject.config.slope_rad) is not None
     written = {SLOPE_RAD: SLOPE_DEG} if in_degrees else {}

@@ -1,4 +1,4 @@
-"""A walk of the rigid model from its fixed point or from a given start."""
+"""Walk of the rigid model from its fixed point or a given start."""
 
 from collections.abc import Mapping
 from functools import partial
@@ -16,9 +16,9 @@ from walkerlab.store.content import Content
 
 
 def run(config: SimulateConfig, inputs: Mapping[str, Content], progress: Progress, again: bool = True) -> Content:
-    """Walk `config.strides` strides, and again for the numerical error; raises NoAnswer if the integrator gives none.
+    """Walk `config.strides` strides; raises NoAnswer if the integrator fails.
 
-    again  whether the second walk, which takes about as long as two, is wanted
+    again  whether to repeat the walk for its numerical error, which takes about twice as long
     """
     scene, settings = rigid_scene(config, config.ground, config.outputs), config.solver.rigid
     tolerances = Tolerances(settings.method, settings.rtol, settings.atol, ENDLESS)
@@ -34,7 +34,7 @@ def run(config: SimulateConfig, inputs: Mapping[str, Content], progress: Progres
 
 
 def summary(config: SimulateConfig, walk: RigidWalkResult) -> dict[str, Any]:
-    """What the command prints."""
+    """Summarise the walk."""
     return {
         **numbers_of(walk),
         **pace_of(config, walk),

@@ -1,4 +1,4 @@
-"""What the stages that walk share: where a walk starts, what is stored and printed of it, and its numerical error.
+"""Common parts of stages that walk: the start, stored groups, the summary and the numerical error.
 
 Both models store a walk under the same names, in the same shapes, with the same meanings; what a model has not is
 absent. Of a long walk's samples all of its beginning and end are stored, and between them what shows each step.
@@ -28,9 +28,9 @@ from walkerlab.store.content import Content, Group, Variable
 from walkerlab.store.footholds import UNEVEN
 
 FIRST_STEPS, LAST_STEPS = 200, 20
-"""Steps of which every sample is stored."""
+"""Number of steps up to which every sample is stored."""
 MAX_BETWEEN = 50_000
-"""Samples of the steps between them, at most, beside both sides of every heel strike."""
+"""Maximum number of samples of the other steps, besides both sides of every heel strike."""
 STEP, TIME, LEG, COORDINATE = "step", "time", "leg", "coordinate"
 OF_STEPS: Final = {
     "touch_time_s": Label("s", "time of the touch that ends the step"),
@@ -71,17 +71,17 @@ OVER_TIME: Final = {
     "residual_J": Label("J", "total energy plus what was lost less what was given, less the start's"),
 }
 OUTCOMES: Final = ", ".join(f"{outcome.value} {outcome.label}" for outcome in Outcome)
-"""What the numbers of outcomes on a map mean."""
+"""Meanings of the outcome codes on a map."""
 
 
-def counted(outcomes: NDArray[np.int64]) -> dict[str, int]:
-    """How many of a map's walks ended how."""
+def count_outcomes(outcomes: NDArray[np.int64]) -> dict[str, int]:
+    """Count a map's walks by outcome."""
     numbers, counts = np.unique(outcomes, return_counts=True)
     return {Outcome(int(number)).label: int(count) for number, count in zip(numbers, counts, strict=True)}
 
 
 def rigid_start(config: SimulateConfig | SceneConfig, inputs: Mapping[str, Content]) -> tuple[float, State]:
-    """Step length (m) that pads and steps are measured by, and the rigid start state: the config's, or the gait's."""
+    """Return the reference step length (m) and the rigid start state of the config or the gait."""
     if "fixedpoint" in inputs:
         gait = inputs["fixedpoint"].summary
         state = gait["state"] if config.start == "fixed-point" else config.start
@@ -101,7 +101,7 @@ def content_of_walk(
     progress: Progress,
     again: bool,
 ) -> Content:
-    """Take a walk and store it, long ones thinned; and take it again for the numerical error.
+    """Walk, store samples (thinned for long walks), and repeat the walk for the numerical error.
 
     walk     takes it with tolerances, sampled if that is asked for, and returns a `WalkRecord` with `samples`
     groups   the datasets of a walk
@@ -123,7 +123,7 @@ def content_of_walk(
 
 
 def thinned(samples: Any, ends: NDArray[np.float64], progress: Progress) -> Any:
-    """The samples that are stored; those of an ordinary walk themselves.
+    """Return the samples to store: all of an ordinary walk.
 
     samples  a NamedTuple of arrays whose first axis is time, `time_s` among them
     ends     (steps,) s, times at which steps ended
@@ -145,17 +145,17 @@ def thinned(samples: Any, ends: NDArray[np.float64], progress: Progress) -> Any:
 
 
 def only_at(samples: Any, kept: NDArray[Any]) -> Any:
-    """Samples of a walk at some of their times."""
+    """Select samples of a walk."""
     return type(samples)(*(each[kept] for each in samples))
 
 
 def over_time(**values: ArrayLike) -> dict[str, Variable]:
-    """What the samples of a walk have, by names in `OVER_TIME`: numbers (samples,), or (samples, 2) of each leg."""
+    """Build variables over time, named as in `OVER_TIME`, from values (samples,) or (samples, 2) by leg."""
     return {name: labelled(found, OVER_TIME[name], *(TIME, LEG)[: np.ndim(found)]) for name, found in values.items()}
 
 
-def of_body(name: str, angle: ArrayLike, velocity: ArrayLike) -> dict[str, Variable]:
-    """How a body beside the legs' own turns (samples,), or one of each leg (samples, 2): a torso, shanks."""
+def turning(name: str, angle: ArrayLike, velocity: ArrayLike) -> dict[str, Variable]:
+    """Build angle and velocity of a torso (samples,) or of shanks (samples, 2)."""
     labels = Label("rad", f"angle of the {name} from the vertical"), Label("rad/s", f"angular velocity of the {name}")
     dims = (TIME, LEG)[: np.ndim(angle)]
     return {
@@ -165,12 +165,12 @@ def of_body(name: str, angle: ArrayLike, velocity: ArrayLike) -> dict[str, Varia
 
 
 def legs() -> dict[str, Variable]:
-    """The legs, 1 and 2, which keep their numbers when they change roles."""
+    """Build the coordinate of the legs, numbered 1 and 2 whatever their role."""
     return {LEG: Variable(np.array([1, 2]), (LEG,), "1", "leg: 1 swings first, 2 stands first")}
 
 
 def of_steps(touch_time_s: ArrayLike, **values: ArrayLike | None) -> dict[str, Variable]:
-    """What the steps of a walk have, by names in `OF_STEPS`, a row a step; nothing of a walk without a step.
+    """Build variables over steps, named as in `OF_STEPS`; empty for a walk without a step.
 
     None is left out; nan, and what the last steps do not have, is a gap.
     """
@@ -187,7 +187,7 @@ def of_steps(touch_time_s: ArrayLike, **values: ArrayLike | None) -> dict[str, V
 
 
 def steps_of(walk: WalkRecord, **values: ArrayLike | None) -> dict[str, Variable]:
-    """The steps of a walk as columns: what both models know of them, and what one of them adds."""
+    """Build columns of a walk's steps: those common to both models, and additional ones."""
     known = {
         "period_s": walk.periods_s,
         "length_m": walk.lengths_m,
@@ -199,7 +199,7 @@ def steps_of(walk: WalkRecord, **values: ArrayLike | None) -> dict[str, Variable
 
 
 def pace_of(config: SceneConfig | SimulateConfig, walk: WalkRecord) -> dict[str, float]:
-    """Mean speed (m/s) from the first foothold to the last touch, and over sqrt(g L); nothing of a walk without a step.
+    """Return mean speed (m/s) from the first foothold to the last touch, and its Froude number; empty without a step.
 
     config  of which leg length L and gravity g are
     """
@@ -210,7 +210,7 @@ def pace_of(config: SceneConfig | SimulateConfig, walk: WalkRecord) -> dict[str,
 
 
 def driven_by(walk: WalkRecord) -> dict[str, Any]:
-    """Work of what drives a walk, and its cost of transport; of a walk that came nowhere nothing is known."""
+    """Return the work of each drive per step and the cost of transport; empty for a walk that covers no distance."""
     distance = float(walk.touch_along_m[-1]) if walk.steps else 0.0
     if distance <= 0.0:
         return {}
@@ -219,7 +219,7 @@ def driven_by(walk: WalkRecord) -> dict[str, Any]:
 
 
 def numbers_of(walk: WalkRecord) -> dict[str, Any]:
-    """What `--json` says of a walk of either model; of legs without knees it says nothing about knees."""
+    """Summarise a walk of either model; knee quantities only for walkers with knees."""
     strikes = walk.knee_strike_time_s
     known = {} if strikes is None else {"knee_strike_times_s": [None if np.isnan(t) else t for t in strikes.tolist()]}
     return {
@@ -239,7 +239,7 @@ def numbers_of(walk: WalkRecord) -> dict[str, Any]:
 
 
 def last_step(walk: Mapping[str, Any]) -> dict[str, Any]:
-    """Period (s) and length (m) of a walk's last step and how long into it a knee locked (s); None if it took none.
+    """Return period (s), length (m) and knee strike time (s) of a walk's last step; None without a step.
 
     walk  its numbers, as `numbers_of`
     """

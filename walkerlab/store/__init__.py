@@ -1,1 +1,1 @@
-"""Results as files: what is stored, under which key, by whom and when, and under whose lock."""
+"""Results as files: contents, keys, provenance and locks."""

@@ -1,4 +1,4 @@
-"""A stage's result as one HDF5 file: written whole or not at all, accepted only if it is what it says it is."""
+"""Artifacts: results of stages as HDF5 files, written atomically and verified on reading."""
 
 import hashlib
 import json
@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 from walkerlab.config.canonical import canonical_json
-from walkerlab.errors import NoAnswer
 from walkerlab.store import hdf5
 from walkerlab.store.content import Attribute, Content, Digest, Group, Variable
 from walkerlab.store.files import file_digest, read_bounded, refuse_full_disk, replacing, write_atomically
@@ -17,57 +16,36 @@ from walkerlab.store.key import SCHEMA_VERSION, Identity
 from walkerlab.store.provenance import Provenance
 
 NOT_THERE = "not there yet"
-"""Why a result is made that never was."""
+"""Reason for running a stage without a stored result."""
 
 LIMIT_BYTES = 1 << 30
-"""No artifact is larger; a file that is, is not read."""
+"""Maximum size of an artifact; larger files are not read."""
 
-# At the end of the file, after all that HDF5 knows of: a damaged file must be found out before the HDF5 library sees
-# it, which frees memory twice on some of them.
+# Appended after the HDF5 data: damaged files must be detected before the HDF5 library reads them, since it frees memory
+# twice on some.
 SEAL = re.compile(rb"\nwalkerlab sha256 ([0-9a-f]{64})\n")
 SEAL_BYTES = 83
 
 
 NESTED = ("config_slice", "input_keys", "library_versions", "input_digests")
-"""What of an identity and a provenance is a mapping, which an attribute holds as JSON."""
+"""Fields of an identity and a provenance that are stored as JSON."""
 ROOT_ATTRIBUTES = frozenset(one.name for one in (*fields(Identity), *fields(Provenance))) | {
     "title", "Conventions", "stage_key", "summary_json", "summary_timed", "content_digest", "complete"
 }  # fmt: skip
-"""What every artifact says of itself; a content with arrays at the root may say more there."""
+"""Attributes of every artifact's root; a content with arrays at the root may add some."""
 
 
 class Damaged(Exception):  # noqa: N818 - a finding about a file, not a failure of this program
-    """A file is not an artifact that can be trusted; the text says why."""
+    """A file is not a trustworthy artifact; the message says why."""
 
 
 class OtherLayout(Damaged):
-    """A file is an artifact of another version of this program, which nobody need be warned of."""
+    """A file is an artifact of another version of this program; needs no warning."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class StageAnswer(Content):
-    """Answer of a stage, in memory or stored.
-
-    complete  False for the partial results of a stage that found no answer; the summary then says why
-    """
-
-    complete: bool = True
-
-    @property
-    def no_answer(self) -> NoAnswer | None:
-        """Why there is no answer, with advice; None if there is one."""
-        said = self.summary.get("no_answer", {})
-        return None if self.complete else NoAnswer(said.get("message", "no answer"), said.get("advice", ""))
-
-    @property
-    def findings(self) -> dict[str, Any]:
-        """The summary of what was computed, without the reason why there is no answer."""
-        return {key: value for key, value in self.summary.items() if self.complete or key != "no_answer"}
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Stored(StageAnswer):
-    """The content of an artifact as read back, with what it was determined by and where it comes from.
+class Stored(Content):
+    """Content of an artifact with its identity and provenance.
 
     seal  sha256 of the file, provenance and timings included
     """
@@ -79,11 +57,11 @@ class Stored(StageAnswer):
 
 @dataclass(frozen=True)
 class Verdict:
-    """Whether a file is the artifact that a key asks for.
+    """Whether a file is the artifact of a key.
 
-    reason    in words; empty if accepted
-    artifact  what was read, also when it belongs to another key; None if missing or damaged
-    damaged   there is a file, and it is not to be trusted
+    reason    for rejecting it; empty if accepted
+    artifact  as read, also if it has another key; None if missing or damaged
+    damaged   whether the file exists but cannot be trusted
     """
 
     accepted: bool
@@ -92,12 +70,12 @@ class Verdict:
     damaged: bool = False
 
 
-def write(path: Path, content: Content, identity: Identity, provenance: Provenance, complete: bool = True) -> Stored:
-    """Store a result at `path`, replacing what is there in one step.
+def write(path: Path, content: Content, identity: Identity, provenance: Provenance) -> Stored:
+    """Store a result at `path`, atomically replacing the old one.
 
-    Raises StorageError if the system refuses; what was there before is then intact, and nothing else is left.
+    Raises StorageError if the system refuses; the old file is then intact.
     """
-    root = root_attributes(content, identity, provenance, complete, content.digest())
+    root = root_attributes(content, identity, provenance, content.complete, content.digest())
     own = content.groups[""].attrs if "" in content.groups else {}
     if not own.keys().isdisjoint(ROOT_ATTRIBUTES):
         raise ValueError(f"attributes of the root that say something else: {sorted(own)}")
@@ -105,16 +83,16 @@ def write(path: Path, content: Content, identity: Identity, provenance: Provenan
     seal = hashlib.sha256(image).hexdigest()
     write_atomically(path, image, f"\nwalkerlab sha256 {seal}\n".encode())
     parts = content.groups, content.summary, content.timed
-    return Stored(*parts, identity=identity, provenance=provenance, complete=complete, seal=seal)
+    return Stored(*parts, complete=content.complete, identity=identity, provenance=provenance, seal=seal)
 
 
 @dataclass(frozen=True)
 class InTurn:
-    """A content with one group whose variables are made one by one, so that they are never in memory together.
+    """A content with one group whose variables are made one by one, to save memory.
 
-    coordinates  those of the variables that are dimensions' coordinates
-    variables    all of them in the order of their names
-    size         about how many bytes they take
+    coordinates  variables that are coordinates of dimensions
+    variables    all of them, ordered by name
+    size         approximate total, bytes
     """
 
     summary: Mapping[str, Any]
@@ -127,9 +105,9 @@ class InTurn:
 def write_in_turn(
     path: Path, content: InTurn, identity: Identity, provenance: Provenance, complete: bool = True
 ) -> None:
-    """Store what `write` would, but for the order of things in the file, with the memory that one variable takes.
+    """Store as `write`, but one variable at a time.
 
-    Raises StorageError if the system refuses; what was there before is then intact, and nothing else is left.
+    Raises StorageError if the system refuses; the old file is then intact.
     """
     labelled = Content({}, content.summary)
     digest = Digest(labelled.summary, labelled.timed)
@@ -143,7 +121,7 @@ def write_in_turn(
                 yield name, variable
 
     with replacing(path) as temporary:
-        # Where the disk is full an ordinary call has to say so: the HDF5 library cannot close what it cannot write.
+        # check for space first: the HDF5 library cannot close a file that it cannot write
         refuse_full_disk(temporary, content.size)
         hdf5.write_in_turn(
             temporary,
@@ -156,9 +134,9 @@ def write_in_turn(
 
 
 def read(path: Path) -> Stored:
-    """The artifact at `path`.
+    """Read and verify the artifact at `path`.
 
-    Raises FileNotFoundError if there is none, and Damaged for whatever is not intact: cut short, altered, hostile.
+    Raises FileNotFoundError if there is none, and Damaged if it is truncated, altered or hostile.
     """
     try:
         data = read_bounded(path, LIMIT_BYTES)
@@ -175,12 +153,12 @@ def read(path: Path) -> Stored:
     except OSError as error:
         raise Damaged(f"it cannot be read: {error.strerror or error}") from error
     except Exception as error:
-        # Whatever a library makes of bytes that nobody vouches for is a finding about the file.
+        # any error of a library on untrusted bytes means that the file is damaged
         raise Damaged(f"it is not an artifact: {error or type(error).__name__}") from error
 
 
 def check(path: Path, key: str | None = None, stage: str | None = None) -> Verdict:
-    """Whether the file at `path` is intact, of `stage` and made for `key`, if these are given; never raises."""
+    """Check that the file at `path` is intact and belongs to `key` and `stage`, if given; never raises."""
     try:
         artifact = read(path)
     except (FileNotFoundError, NotADirectoryError):
@@ -199,7 +177,7 @@ def check(path: Path, key: str | None = None, stage: str | None = None) -> Verdi
 def root_attributes(
     content: Content, identity: Identity, provenance: Provenance, complete: bool, digest: str
 ) -> dict[str, Attribute]:
-    """What stands at the root of the file: all but the arrays."""
+    """Return the attributes at the root of the file."""
     facts = {name: value for name, value in {**vars(identity), **vars(provenance)}.items() if value is not None}
     return {
         "title": f"walkerlab {identity.stage}",
@@ -214,7 +192,7 @@ def root_attributes(
 
 
 def assembled(groups: Mapping[str, Group], root: Mapping[str, Any], seal: str) -> Stored:
-    """The artifact made of a file's parts; Damaged if they do not agree with its content digest and key."""
+    """Build an artifact from a file's parts; raises Damaged if digest or key do not match."""
     if root.get("schema_version") != SCHEMA_VERSION:
         raise OtherLayout(f"its layout is version {root.get('schema_version')}, this program's is {SCHEMA_VERSION}")
     own = {name: value for name, value in root.items() if name not in ROOT_ATTRIBUTES}

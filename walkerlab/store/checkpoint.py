@@ -1,7 +1,7 @@
-"""Checkpoint of a result that takes long to compute: an interrupted run goes on where it stopped.
+"""Checkpoint of a long computation, from which an interrupted run resumes.
 
-A journal beside the artifact: a line for each unit of work, each with a checksum, the first line with the key of the
-result they belong to. Lines are only ever added; a last one that was cut short is dropped.
+A journal beside the artifact: first the key of the result, then a line for each unit of work, each with a checksum.
+Lines are only appended; an incomplete last line is dropped.
 """
 
 import contextlib
@@ -16,7 +16,7 @@ Numbers = list[float]
 
 
 class Checkpoint:
-    """Numbers of the units of work that one result is made of, by name."""
+    """Numbers of the completed units of one result, by name."""
 
     def __init__(self, path: Path | None, key: str) -> None:
         """Resume from the journal at `path` if its key matches; otherwise start over with the first unit.
@@ -25,8 +25,8 @@ class Checkpoint:
         """
         self.path, self.key = path, key
         self.kept: dict[str, Numbers] = {}
-        self._intact = 0  # bytes of the file that are to be kept
-        with contextlib.suppress(OSError, ValueError, TypeError):  # of a last line that was cut short
+        self._intact = 0  # valid bytes of the file
+        with contextlib.suppress(OSError, ValueError, TypeError):  # an incomplete last line
             lines = [] if path is None else path.read_bytes().splitlines(keepends=True)
             for text in lines if lines[:1] == [line([key])] else []:
                 held = json.loads(text.partition(b" ")[2])
@@ -38,7 +38,7 @@ class Checkpoint:
                 self._intact += len(text)
 
     def keep(self, name: str, numbers: Numbers) -> None:
-        """Add the numbers of a unit; StorageError if the system refuses."""
+        """Add the numbers of a unit; raises StorageError if the system refuses."""
         self.kept[name] = numbers
         if self.path is None:
             return
@@ -53,7 +53,7 @@ class Checkpoint:
             self._intact = file.tell()
 
     def forget(self) -> None:
-        """Remove all that was kept; StorageError if the system refuses."""
+        """Remove all units; raises StorageError if the system refuses."""
         self.kept, self._intact = {}, 0
         if self.path is not None:
             with storing(self.path):
@@ -61,6 +61,6 @@ class Checkpoint:
 
 
 def line(value: object) -> bytes:
-    """A value as a line with its checksum; numbers read back as they were."""
+    """Encode a value as a line with its checksum; numbers are restored exactly."""
     text = json.dumps(value, allow_nan=False).encode()
     return b"%08x %s\n" % (zlib.crc32(text), text)

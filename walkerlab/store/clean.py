@@ -1,4 +1,4 @@
-"""Which files of a run folder are this program's, and their removal; nothing else in it is touched."""
+"""Find and remove this program's files in a run folder; other files stay."""
 
 import contextlib
 from collections.abc import Iterable
@@ -10,7 +10,7 @@ from walkerlab.store.index import indexed_files
 from walkerlab.store.runfolder import LOCK, RECORD, RunFolder
 
 DRAWN = ("figures/figure-*.svg", "figures/figure-*.png", "report.html", "report-*.html")
-"""What the drawing stages write, for the case that the index of it is gone."""
+"""Files that drawing stages write, in case their index is lost."""
 CHUNKS, FIGURES = "sweep-chunks", "figures"
 SWEPT = ("sweep-*.h5", "sweep-*.csv", f"{CHUNKS}/*.h5", "sweep.html", "figures/sweep-*.svg", "figures/sweep-*.png")
 STATE_ENDINGS = (".h5", ".parts")
@@ -18,7 +18,7 @@ COMPARED = ("figures/diff-*.svg", "figures/diff-*.png")
 
 
 def files_of(folder: RunFolder, stages: Iterable[str]) -> list[Path]:
-    """What there is: artifacts of these stages, the files in the folder that they list, what killed writers left."""
+    """Return existing files: artifacts of these stages, files that they list, and leftovers of killed writers."""
     found = {path for pattern in (*DRAWN, *SWEPT, *COMPARED, f"**/{TEMPORARY}") for path in folder.path.glob(pattern)}
     inside = folder.path.resolve()
     for stage in stages:
@@ -30,7 +30,7 @@ def files_of(folder: RunFolder, stages: Iterable[str]) -> list[Path]:
 
 
 def owner_of(path: Path, stages: Iterable[str]) -> RunFolder | None:
-    """The run that a file belongs to: a result, what a result lists, or a record; None for a file of the user's own."""
+    """Return the run whose result, listed file or record a file is; None for the user's own files."""
     whole = path.resolve()
     for place in (whole.parent, whole.parent.parent):
         folder = RunFolder.at(place)
@@ -43,7 +43,7 @@ def owner_of(path: Path, stages: Iterable[str]) -> RunFolder | None:
 
 
 def remove(folder: RunFolder, files: Iterable[Path]) -> None:
-    """Remove files of a run folder, its record, and its inner folders if they are empty; to be called under its lock.
+    """Remove files of a run folder, its record and its empty subfolders; call it under the lock.
 
     Raises StorageError if the system refuses.
     """
@@ -56,7 +56,7 @@ def remove(folder: RunFolder, files: Iterable[Path]) -> None:
 
 
 def remove_if_empty(folder: RunFolder) -> None:
-    """Remove a run folder that has nothing in it but its lock; to be called after its lock was given back."""
+    """Remove a run folder that holds only its lock; call it after releasing the lock."""
     lock = folder.path / LOCK
     if list(folder.path.iterdir()) == [lock]:
         with contextlib.suppress(OSError):

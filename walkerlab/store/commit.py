@@ -1,6 +1,6 @@
-"""Which commit code is from: of a checkout as git says, of an installed package as its build wrote down.
+"""Find the commit of a checkout (from git) or of an installed package (recorded by its build).
 
-Nothing but the standard library is needed: the build, which runs before anything is installed, loads this file too.
+Uses the standard library alone: the build loads this file before anything is installed.
 """
 
 import importlib.metadata
@@ -8,15 +8,15 @@ import subprocess
 from pathlib import Path
 
 FILE = "commit.txt"
-"""At the root of a source distribution, and in the metadata of an installed package."""
+"""Name at the root of a source distribution and in the metadata of an installed package."""
 IN_METADATA = f"extra_metadata/{FILE}"
 SHIPPED = ("walkerlab", "configs")
-"""What of a checkout an installed package is made of."""
+"""Parts of a checkout that an installed package contains."""
 
 
 def commit_of_checkout(root: Path) -> str | None:
-    """The commit of a source tree, '-dirty' if what a package has of it was changed; None if it is no checkout."""
-    # Only the package's own repository: an environment inside somebody's checkout says nothing about this code.
+    """Return the commit of a source tree, '-dirty' appended if its package files changed; None if it is no checkout."""
+    # only the package's own repository: an environment may lie inside another checkout
     if not (root / ".git").exists():
         return None
     commit = git(root, "rev-parse", "HEAD")
@@ -26,7 +26,7 @@ def commit_of_checkout(root: Path) -> str | None:
 
 
 def commit_of_installation(package: Path) -> str | None:
-    """The commit that an installed package was built from; None if `package` is no installed one, or nobody knew."""
+    """Return the commit that an installed package was built from; None if unknown or not installed."""
     try:
         installed = importlib.metadata.distribution(package.name)
     except importlib.metadata.PackageNotFoundError:
@@ -37,18 +37,18 @@ def commit_of_installation(package: Path) -> str | None:
 
 
 def commit_of_package(package: Path) -> str | None:
-    """The commit that the package in a folder is run from, or was built from; None if nobody knows."""
+    """Return the commit that the package in a folder runs from or was built from; None if unknown."""
     return commit_of_checkout(package.parent) or commit_of_installation(package)
 
 
 def commit_of_source(root: Path) -> str | None:
-    """The commit of a source tree that is to be built: a checkout, or an unpacked source distribution."""
+    """Return the commit of a source tree to build: a checkout or an unpacked source distribution."""
     written = root / FILE
     return commit_of_checkout(root) or (written.read_text().strip() if written.exists() else None)
 
 
 def git(root: Path, *arguments: str) -> str | None:
-    """What a git command prints, or None if it cannot be had."""
+    """Return the output of a git command; None if it fails."""
     try:
         done = subprocess.run(
             ["git", "-C", str(root), *arguments], capture_output=True, text=True, timeout=10, check=True

@@ -1,4 +1,4 @@
-"""What a stage hands over to be stored: labelled arrays in groups, and a summary; no file, no HDF5."""
+"""Content of results: labelled arrays in groups, and a summary; independent of files and HDF5."""
 
 import hashlib
 import math
@@ -11,15 +11,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from walkerlab.config.canonical import canonical_json
+from walkerlab.errors import NoAnswer
 
 Attribute = str | int | float | bool
 
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_.+-]*")
-"""Names of groups, variables, dimensions and attributes: what HDF5, netCDF and xarray all take unquoted."""
+"""Names of groups, variables, dimensions and attributes that HDF5, netCDF and xarray accept unquoted."""
 
 
 STORED_AS: dict[str, type] = {"f": np.float64, "i": np.int64, "u": np.int64, "b": np.bool_}
-"""By the kinds of NumPy's numbers."""
+"""Stored types by NumPy kind."""
 TIMING = re.compile(r"(.*_)?wall_s", re.DOTALL)
 """Keys of summaries that name measured run times."""
 
@@ -31,7 +32,7 @@ class Variable:
     values     float, integer, bool or text; copied, widened to 64 bits and frozen; refused if not finite
     dims       one name for each axis; a variable named like its only dimension is that dimension's coordinate
     units      'rad', 'N', ...; '1' for a pure number, '' for text
-    long_name  what it is, in words, for axes and tables
+    long_name  meaning, for axes and tables
     timing     measured run times, or what shows them: stored, but no part of the content's digest
     missing    NaN is allowed, and marks a gap
 
@@ -46,7 +47,7 @@ class Variable:
     missing: bool = False
 
     def __post_init__(self) -> None:
-        """Bring the values to one of the four types there are, and check the labels against them."""
+        """Convert the values to one of the four stored types and check the labels."""
         values = canonical(self.values)
         object.__setattr__(self, "values", values)
         object.__setattr__(self, "dims", tuple(self.dims))
@@ -61,13 +62,13 @@ class Variable:
 
 @dataclass(frozen=True, eq=False)
 class Group:
-    """Variables that share dimensions, with plain attributes; one dataset for xarray."""
+    """Variables that share dimensions, with attributes; one dataset for xarray."""
 
     variables: Mapping[str, Variable]
     attrs: Mapping[str, Attribute] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Check the names and attributes, and that a dimension has one length."""
+        """Check names, attributes and the lengths of dimensions."""
         object.__setattr__(self, "attrs", {name: plain(value) for name, value in self.attrs.items()})
         sizes = self.sizes
         for name in (*self.variables, *self.attrs, *sizes):
@@ -81,7 +82,7 @@ class Group:
 
     @property
     def sizes(self) -> dict[str, int]:
-        """Length of each dimension; ValueError if two variables differ on it."""
+        """Length of each dimension; raises ValueError if two variables disagree."""
         sizes: dict[str, int] = {}
         for name, variable in self.variables.items():
             for dim, size in zip(variable.dims, variable.values.shape, strict=True):
@@ -96,11 +97,12 @@ class Group:
 
 @dataclass(frozen=True, eq=False)
 class Content:
-    """Everything that a stage stores.
+    """Result of a stage.
 
-    groups   by path, such as 'corrected/gaits', '' for the file's root; groups above one are there too, if only empty
+    groups   by path, such as 'corrected/gaits', '' for the file's root; missing parent groups are added
     summary  what `--json` prints of it: JSON, SI units; 'wall_s' and keys that end in '_wall_s' count as timings
     timed    further top-level keys of the summary that follow from timings, such as 'best'
+    complete False for the partial results of a stage that found no answer; `no_answer` of the summary says why
 
     Raises ValueError or TypeError for a summary that is not JSON or not finite, and for clashing names.
     """
@@ -108,9 +110,10 @@ class Content:
     groups: Mapping[str, Group] = field(default_factory=dict)
     summary: Mapping[str, Any] = field(default_factory=dict)
     timed: tuple[str, ...] = ()
+    complete: bool = field(default=True, kw_only=True)
 
     def __post_init__(self) -> None:
-        """Bring the summary to plain JSON types and check the paths."""
+        """Convert the summary to plain JSON types and check the paths."""
         object.__setattr__(self, "summary", {key: plain(value) for key, value in self.summary.items()})
         object.__setattr__(self, "timed", tuple(sorted(self.timed)))
         check_text(*self.summary, *self.timed)
@@ -129,8 +132,19 @@ class Content:
         """The group at a path."""
         return self.groups[path]
 
+    @property
+    def no_answer(self) -> NoAnswer | None:
+        """The reason why there is no answer, with advice; None if there is one."""
+        why = self.summary.get("no_answer", {})
+        return None if self.complete else NoAnswer(why.get("message", "no answer"), why.get("advice", ""))
+
+    @property
+    def findings(self) -> dict[str, Any]:
+        """The summary without the reason why there is no answer."""
+        return {key: value for key, value in self.summary.items() if self.complete or key != "no_answer"}
+
     def digest(self) -> str:
-        """The sha256 of all that is determined by the inputs: timings are left out."""
+        """Return the sha256 of everything except timings."""
         digest = Digest(self.summary, self.timed)
         for path, group in sorted(self.groups.items()):
             digest.enter(path, group.attrs)
@@ -140,19 +154,19 @@ class Content:
 
 
 class Digest:
-    """The digest of a content whose groups, and in each the variables, come one by one, in the order of their names."""
+    """Digest of a content that is added group by group and variable by variable, ordered by name."""
 
     def __init__(self, summary: Mapping[str, Any], timed: tuple[str, ...]) -> None:
-        """Begin with the summary."""
+        """Start with the summary."""
         self._sha256 = hashlib.sha256()
         self._take(canonical_json([untimed(summary, timed), timed]).encode())
 
     def enter(self, path: str, attrs: Mapping[str, Attribute]) -> None:
-        """Go on with a group."""
+        """Start a group."""
         self._take(canonical_json([path, dict(attrs)]).encode())
 
     def add(self, name: str, variable: Variable) -> None:
-        """Take a variable of the group: its labels, then its values in C order, little-endian."""
+        """Add a variable: its labels, then its values in C order, little-endian."""
         if variable.timing:
             return
         values = variable.values
@@ -164,7 +178,7 @@ class Digest:
             self._take(values.astype(values.dtype.newbyteorder("<"), copy=False).tobytes())
 
     def hex(self) -> str:
-        """The digest of what has come."""
+        """Return the digest."""
         return self._sha256.hexdigest()
 
     def _take(self, part: bytes) -> None:
@@ -173,7 +187,7 @@ class Digest:
 
 
 def canonical(values: ArrayLike) -> NDArray[Any]:
-    """A frozen copy as float64, int64, bool or an object array of str; TypeError for any other type."""
+    """Return a read-only copy as float64, int64, bool or an object array of str; raises TypeError for other types."""
     array: NDArray[Any] = np.asarray(values)
     result: NDArray[Any]
     kind = array.dtype.kind
@@ -189,7 +203,7 @@ def canonical(values: ArrayLike) -> NDArray[Any]:
 
 
 def check_text(*texts: str) -> None:
-    """Raise ValueError for text that HDF5 would cut short or cannot encode."""
+    """Raise ValueError for text that HDF5 would truncate or cannot encode."""
     for text in texts:
         if "\0" in text:
             raise ValueError(f"text with a NUL character cannot be stored: {text[:40]!r}")
@@ -197,13 +211,13 @@ def check_text(*texts: str) -> None:
 
 
 def check_name(name: str) -> None:
-    """Raise ValueError for a name that not every reader of the file would take."""
+    """Raise ValueError for a name that some readers of the file would reject."""
     if not NAME.fullmatch(name):
         raise ValueError(f"not a name that can be stored: {name!r}")
 
 
 def plain(value: Any) -> Any:
-    """The value in JSON's own types; ValueError if a number is not finite, TypeError if it is no JSON."""
+    """Convert a value to JSON types; raises ValueError for a number that is not finite, TypeError if impossible."""
     if isinstance(value, float):
         if not math.isfinite(value):
             raise ValueError(f"not a finite number: {value}")
@@ -224,7 +238,7 @@ def plain(value: Any) -> Any:
 
 
 def untimed(summary: Mapping[str, Any], timed: tuple[str, ...] = ()) -> dict[str, Any]:
-    """The summary without its timings, at any depth."""
+    """Return the summary without timings at any depth."""
 
     def inner(value: Any) -> Any:
         if isinstance(value, Mapping):

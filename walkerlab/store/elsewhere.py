@@ -1,4 +1,4 @@
-"""Results in other run folders: a stage key names a result wherever it lies."""
+"""Reuse of results from other run folders, which are identified by their stage key."""
 
 import mmap
 import os
@@ -12,7 +12,7 @@ from walkerlab.store.runfolder import RunFolder
 
 
 def find_elsewhere(folder: RunFolder, stage: str, key: str) -> tuple[Path, Stored] | None:
-    """File and result for a key in another run folder beside this one, or None; never raises for what files may be."""
+    """Find the file and result for a key in another run folder; None if there is none. Damaged files are ignored."""
     try:
         names = sorted(entry.name for entry in os.scandir(folder.runs_dir) if entry.is_dir())
     except OSError:
@@ -26,7 +26,7 @@ def find_elsewhere(folder: RunFolder, stage: str, key: str) -> tuple[Path, Store
 
 
 def mentions(path: Path, key: str) -> bool:
-    """Whether a file has a key in it: most have another, and need not be read and verified to know that."""
+    """Whether a file contains a key; a cheap test before a file is read and verified."""
     try:
         with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
             return data.find(key.encode()) >= 0
@@ -35,10 +35,9 @@ def mentions(path: Path, key: str) -> bool:
 
 
 def take_over(found: Path, target: Path) -> None:
-    """Put a result's file in place under `target` too: a hard link, or a copy where the system has none.
+    """Link or copy a result's file to `target`.
 
-    Artifacts are only ever replaced, so that a shared file is as safe as one's own. Raises StorageError if the system
-    refuses.
+    Sharing is safe, since artifacts are replaced but never modified. Raises StorageError if the system refuses.
     """
     with replacing(target) as temporary:
         try:

@@ -1,4 +1,4 @@
-"""Whole files, replaced in one step or not at all."""
+"""Atomic writing of files, and errors of the file system."""
 
 import contextlib
 import errno
@@ -12,7 +12,7 @@ from pathlib import Path
 from walkerlab.errors import StorageError
 
 TEMPORARY = ".*.tmp"
-"""What the temporary files of writers look like; those found under the run folder's lock have no owner any more."""
+"""Pattern of temporary files; those found under the run folder's lock have no owner any more."""
 
 ADVICE = {
     errno.ENOSPC: "Free some space, or choose another folder with --runs.",
@@ -32,7 +32,7 @@ ADVICE = {
 
 @contextlib.contextmanager
 def storing(path: Path) -> Iterator[None]:
-    """Turn whatever the operating system refuses while `path` is stored into StorageError."""
+    """Turn an OSError while `path` is stored into StorageError."""
     try:
         yield
     except OSError as error:
@@ -41,7 +41,7 @@ def storing(path: Path) -> Iterator[None]:
 
 @contextlib.contextmanager
 def drawing_into(folder: Path) -> Iterator[None]:
-    """Turn the system's refusals to store into StorageError, around code that may fail in other ways: those pass."""
+    """Turn storage errors of the system into StorageError; other errors of the code inside pass."""
     try:
         yield
     except OSError as error:
@@ -51,15 +51,15 @@ def drawing_into(folder: Path) -> Iterator[None]:
 
 
 def refused(path: Path, error: OSError) -> StorageError:
-    """What the system refused, and what to do about it."""
+    """Build the error for a refusal of the system, with advice."""
     advice = ADVICE.get(error.errno or 0, "Choose another folder with --runs.")
     return StorageError(f"{path} could not be stored: {error.strerror or error}.", advice)
 
 
 def write_atomically(path: Path, *parts: bytes) -> None:
-    """Put a file in place, complete and on the disk, or leave what was there untouched.
+    """Write a file completely, or leave the old one untouched.
 
-    parts  of its content, one after another
+    parts  of the content, in order
 
     Raises StorageError if the system refuses (full disk, read-only folder, ...).
     """
@@ -68,14 +68,14 @@ def write_atomically(path: Path, *parts: bytes) -> None:
 
 
 def as_text(name: str) -> str:
-    """A name from the command line as text that can be stored: bytes that are not UTF-8 are escaped."""
+    """Convert a name from the command line to text that can be stored, escaping bytes that are not UTF-8."""
     return os.fsencode(name).decode(errors="backslashreplace")
 
 
 def write_through(path: Path, data: bytes) -> None:
-    """Write to a file that a user names: whole or not at all if it is a regular one, into it if it is a device or pipe.
+    """Write to a file that a user names: a regular file atomically, a device or pipe directly.
 
-    A link is followed, never replaced. Raises StorageError if the system refuses.
+    Links are followed, never replaced. Raises StorageError if the system refuses.
     """
     with storing(path):
         special = path.exists() and not stat.S_ISREG(path.stat().st_mode)
@@ -87,7 +87,7 @@ def write_through(path: Path, data: bytes) -> None:
 
 @contextlib.contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """A temporary file to be written, then put in place, complete and on the disk; if that fails nothing is changed.
+    """Give a temporary file that replaces `path` afterwards; on failure `path` is unchanged.
 
     Raises StorageError if the system refuses.
     """
@@ -101,7 +101,7 @@ def replacing(path: Path) -> Iterator[Path]:
                 os.fsync(file.fileno())
             temporary.replace(path)
         finally:
-            # there after a failure, and where it was a link to the very file that it was to replace
+            # it remains after a failure, or if it was a hard link to `path` itself
             with contextlib.suppress(OSError):
                 temporary.unlink()
         if hasattr(os, "O_DIRECTORY"):  # elsewhere the system has no call for a folder's entries
@@ -113,7 +113,7 @@ def replacing(path: Path) -> Iterator[Path]:
 
 
 def refuse_full_disk(path: Path, size: int) -> None:
-    """Raise OSError if the system has no room for a new file of so many bytes; none is left."""
+    """Raise OSError if the disk has no room for a new file of `size` bytes; leaves no file."""
     with path.open("xb") as file:
         try:
             if hasattr(os, "posix_fallocate"):
@@ -123,13 +123,13 @@ def refuse_full_disk(path: Path, size: int) -> None:
 
 
 def make_folder(path: Path) -> None:
-    """Create a folder and its parents; StorageError if the system refuses."""
+    """Create a folder and its parents; raises StorageError if the system refuses."""
     with storing(path):
         path.mkdir(parents=True, exist_ok=True)
 
 
 def read_bounded(path: Path, limit: int) -> bytes:
-    """The bytes of a regular file of at most `limit` bytes; ValueError for anything else, OSError if unreadable."""
+    """Read a regular file of at most `limit` bytes; raises ValueError for other files, OSError if unreadable."""
     descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
     with os.fdopen(descriptor, "rb") as file:
         status = os.fstat(descriptor)
@@ -137,12 +137,12 @@ def read_bounded(path: Path, limit: int) -> bytes:
             raise ValueError("not a regular file")
         if status.st_size > limit:
             raise ValueError(f"{status.st_size} bytes, more than the {limit} that an artifact may have")
-        # The size it has, not the limit: reading sets the memory aside at once.
+        # reading allocates the memory at once, so pass the actual size
         return file.read(status.st_size)
 
 
 def file_digest(path: Path) -> str | None:
-    """The sha256 of a file's bytes, or None if there is no such file to read."""
+    """Return the sha256 of a file; None if it cannot be read."""
     try:
         with path.open("rb") as file:
             return hashlib.file_digest(file, "sha256").hexdigest()
@@ -151,7 +151,7 @@ def file_digest(path: Path) -> str | None:
 
 
 def remove_leftovers(folder: Path) -> list[Path]:
-    """Remove temporary files whose writers died, in a folder and below; to be called under its lock only."""
+    """Remove temporary files of dead writers in a folder and below; call it only under the lock."""
     leftovers = sorted(path for path in folder.rglob(TEMPORARY) if path.is_file())
     for path in leftovers:
         with storing(path):

@@ -12,7 +12,7 @@ FAR = 1e6  # m, before everything that is drawn
 
 
 def ground_levels(steps: Group) -> tuple[Array, Array] | None:
-    """Where along the slope each level of a walk's ground begins, midway between two footholds, and its height (m).
+    """Return where each level of a walk's ground begins along the slope, midway between footholds, and its height (m).
 
     steps  as both models store them
 

@@ -1,4 +1,4 @@
-"""Content as the bytes of an HDF5 file that xarray opens, and back; made and read in memory."""
+"""Conversion of contents to and from the bytes of an HDF5 file that xarray opens."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import lru_cache
@@ -14,12 +14,12 @@ from walkerlab.store.content import Attribute, Group, Variable
 # What netCDF readers take for a dimension without a coordinate; the number is its length, by their convention.
 BARE_DIMENSION = "This is a netCDF dimension but not a netCDF variable."
 CONVENTIONS = "CF-1.11"
-"""Metadata conventions that the files follow, as netCDF readers look for them."""
+"""Metadata conventions of the files, for netCDF readers."""
 TEXT = h5py.string_dtype()
 MAX_LEVELS = 16
 STRINGS_AT_ONCE = 64
 LEAST_BYTES = 32
-"""What a member of a group takes in a file at least: a bound on how many there can be, links in circles included."""
+"""Minimum size of a group's member in a file; bounds their number, circular links included."""
 
 
 def image(content: Mapping[str, Group], root: Mapping[str, Attribute]) -> bytes:
@@ -51,10 +51,10 @@ def write_in_turn(
 
 
 class GroupOnDisk(Group):
-    """The variables at the root of an intact file; each is read when it is asked for."""
+    """Variables at the root of an intact file, each read on access."""
 
     def __init__(self, file: Path) -> None:
-        """Read nothing yet but the names."""
+        """Read the names."""
         object.__setattr__(self, "variables", VariablesOnDisk(file))
         object.__setattr__(self, "attrs", {})
 
@@ -63,7 +63,7 @@ class VariablesOnDisk(Mapping[str, Variable]):
     """Variables at the root of a file, by name."""
 
     def __init__(self, file: Path) -> None:
-        """Read the names, and where in the file each is."""
+        """Read the names and positions."""
         self.file = file
         with h5py.File(file) as opened:
             members = dict(opened)
@@ -74,15 +74,15 @@ class VariablesOnDisk(Mapping[str, Variable]):
         self._read = lru_cache(maxsize=8)(self._read_anew)
 
     def __getitem__(self, name: str) -> Variable:
-        """A variable; KeyError if there is none of that name."""
+        """Read a variable."""
         return self._read(name)
 
     def __iter__(self) -> Iterator[str]:
-        """The names."""
+        """Iterate over the names."""
         return iter(self._names)
 
     def __len__(self) -> int:
-        """How many there are."""
+        """Return the number of variables."""
         return len(self._names)
 
     def _read_anew(self, name: str) -> Variable:
@@ -91,7 +91,7 @@ class VariablesOnDisk(Mapping[str, Variable]):
 
 
 def write_variables(target: Any, variables: Iterable[tuple[str, Variable]]) -> None:
-    """Write variables one by one, coordinates first; a dimension that has none stands for its length only."""
+    """Write variables one by one, coordinates first; a dimension without one is stored as a bare length."""
     for name, variable in variables:
         dataset = write_variable(target, name, variable)
         if variable.dims == (name,):
@@ -106,7 +106,7 @@ def write_variables(target: Any, variables: Iterable[tuple[str, Variable]]) -> N
 def write_variable(target: Any, name: str, variable: Variable) -> Any:
     """Write one array with its labels."""
     kind = variable.values.dtype.kind
-    # Truth values as bytes, marked as xarray marks them: netCDF has no such type.
+    # booleans as bytes, marked as xarray does: netCDF has no such type
     dtype = {"O": TEXT, "f": "<f8", "i": "<i8", "b": "i1"}[kind]
     dataset = target.create_dataset(name, data=variable.values, dtype=dtype)
     marks = {mark: 1 for mark in ("timing", "missing") if getattr(variable, mark)}
@@ -126,21 +126,21 @@ def parse(data: bytes) -> tuple[dict[str, Group], dict[str, Attribute]]:
 
 
 class Budget:
-    """How many more bytes a file of this size can hold."""
+    """Remaining bytes that a file of a given size can declare."""
 
     def __init__(self, size: int) -> None:
         """Start with the size of the file, in bytes."""
         self.left = size
 
     def spend(self, size: int) -> None:
-        """Raise ValueError once more is declared than there is."""
+        """Raise ValueError if more is declared than the file holds."""
         self.left -= size
         if self.left < 0:
             raise ValueError("it declares more data than the file holds")
 
 
 def walk_groups(parent: Any, path: str, budget: Budget) -> Iterator[tuple[str, Group]]:
-    """Every group below a group, by path, after those below it."""
+    """Iterate over all groups below a group by path, children first."""
     if path.count("/") >= MAX_LEVELS:
         raise ValueError("its groups are nested too deeply")
     variables: dict[str, Variable] = {}
@@ -163,17 +163,17 @@ def walk_groups(parent: Any, path: str, budget: Budget) -> Iterator[tuple[str, G
 
 
 def is_bare_dimension(dataset: Any) -> bool:
-    """Whether a dataset stands for a dimension's length only."""
+    """Whether a dataset is a bare dimension."""
     return "NAME" in dataset.attrs and read_text(dataset, "NAME").startswith(BARE_DIMENSION)
 
 
 def names_of(members: Mapping[str, Any]) -> dict[int, str]:
-    """Names by address: a scale is reached by reference, and HDF5 would search the whole file for its name."""
+    """Map addresses to names; looking up the name of a referenced scale would search the whole file."""
     return {h5py.h5o.get_info(member.id).addr: name for name, member in members.items()}
 
 
 def read_variable(name: str, dataset: Any, names: Mapping[int, str], budget: Budget) -> Variable:
-    """One array with its labels; `names` are those of its group's members, by address."""
+    """Read one array with its labels; `names` of the group's members by address."""
     values = read_values(name, dataset, budget)
     if read_text(dataset, "dtype", "") == "bool":
         values = values.astype(np.bool_)
@@ -191,7 +191,7 @@ def read_variable(name: str, dataset: Any, names: Mapping[int, str], budget: Bud
 
 
 def read_values(name: str, dataset: Any, budget: Budget) -> NDArray[Any]:
-    """The values of a dataset, once its declared size is known to be in the file."""
+    """Read the values of a dataset after checking its declared size."""
     layout = dataset.id.get_create_plist()
     if layout.get_layout() not in (h5py.h5d.CONTIGUOUS, h5py.h5d.COMPACT) or layout.get_external_count():
         raise ValueError(f"the layout of {name!r} is not one that is written here")
@@ -207,7 +207,7 @@ def read_values(name: str, dataset: Any, budget: Budget) -> NDArray[Any]:
 
 
 def read_strings(dataset: Any, budget: Budget) -> NDArray[Any]:
-    """The strings of a dataset, a few at a time: many may point to one long text."""
+    """Read the strings of a dataset, a few at a time: many may point to one long text."""
     if dataset.ndim == 0:
         return np.array(dataset[()].decode(), dtype=object)
     values = np.empty(dataset.shape, dtype=object)
@@ -222,7 +222,7 @@ def read_strings(dataset: Any, budget: Budget) -> NDArray[Any]:
 
 
 def read_attributes(holder: Any) -> dict[str, Attribute]:
-    """The attributes of a group in Python's own types; ValueError if one is not a text or number as written here."""
+    """Read the attributes of a group as Python types; raises ValueError for other types."""
     found: dict[str, Attribute] = {}
     for name in holder.attrs:
         declared = holder.attrs.get_id(name)
@@ -235,7 +235,7 @@ def read_attributes(holder: Any) -> dict[str, Attribute]:
 
 
 def read_text(holder: Any, name: str, default: str | None = None) -> str:
-    """A text attribute; `default`, if there is one, where it is absent."""
+    """Read a text attribute; `default` if it is absent."""
     if default is not None and name not in holder.attrs:
         return default
     value = holder.attrs[name]
@@ -247,6 +247,6 @@ def read_text(holder: Any, name: str, default: str | None = None) -> str:
 
 
 def is_text(dtype: Any) -> bool:
-    """Whether a type in a file is text of any length."""
+    """Whether a type in a file is variable-length text."""
     text = h5py.check_string_dtype(dtype)
     return text is not None and text.length is None

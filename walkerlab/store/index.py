@@ -1,4 +1,4 @@
-"""The files that a drawing stage has written, as a group of its artifact: names and digests."""
+"""Index of the files that a drawing stage wrote, with their digests, as a group of its artifact."""
 
 import hashlib
 from collections.abc import Iterable
@@ -13,9 +13,9 @@ GROUP = "files"
 
 
 def index(folder: Path, files: Iterable[Path]) -> Group:
-    """The group that lists files below a run folder, to be stored at `GROUP`.
+    """Build the group that lists files below a run folder, to be stored at `GROUP`.
 
-    Raises ValueError for a file outside the folder and FileNotFoundError for one that is not there.
+    Raises ValueError for a file outside the folder and FileNotFoundError for a missing one.
     """
     listed = sorted(files)
     names = [path.relative_to(folder).as_posix() for path in listed]
@@ -23,20 +23,20 @@ def index(folder: Path, files: Iterable[Path]) -> Group:
     return Group(
         {
             "file": Variable(np.array(names, dtype=object), ("file",), "", "path in the run folder"),
-            # what is drawn of run times differs from run to run, and so do the drawings
+            # drawings of run times differ from run to run
             "sha256": Variable(np.array(digests, dtype=object), ("file",), "", "sha256 of the file", timing=True),
         }
     )
 
 
 def indexed_files(content: Content) -> dict[str, str]:
-    """Digest of each listed file, by its path in the run folder; empty for a content without a list."""
+    """Return the digest of each listed file by its path in the run folder; empty without a list."""
     group = content.groups.get(GROUP)
     return dict(zip(group["file"].tolist(), group["sha256"].tolist(), strict=True)) if group is not None else {}
 
 
 def broken_file(folder: Path, content: Content) -> str | None:
-    """What is wrong with the first listed file that is not as it was written, in words; None if all are."""
+    """Describe the first listed file that is missing or altered; None if all are intact."""
     for name, digest in indexed_files(content).items():
         found = file_digest(folder / PurePosixPath(name))
         if found is None:

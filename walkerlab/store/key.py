@@ -1,4 +1,4 @@
-"""What a result is determined by, as a key: config slice, inputs, code."""
+"""Identity and key of a result: config slice, inputs and code."""
 
 import hashlib
 from collections.abc import Iterator, Mapping
@@ -8,16 +8,16 @@ from typing import Any
 from walkerlab.config.canonical import canonical_json
 
 SCHEMA_VERSION = 2
-"""Of the artifacts' layout: raise it when files written before must not be read any more."""
+"""Version of the artifacts' layout; raise it when older files must not be read any more."""
 
 
 @dataclass(frozen=True)
 class Identity:
-    """All that a stage's result is determined by.
+    """Everything that determines a stage's result.
 
     stage           name
-    config_slice    the keys of the config that the stage reads, with their values
-    input_keys      the stage keys of its inputs, by stage
+    config_slice    keys of the config that the stage reads, with their values
+    input_keys      stage keys of its inputs, by stage
     code_digest     see `sources`
     schema_version  of the artifact's layout
     """
@@ -30,13 +30,13 @@ class Identity:
 
     @property
     def key(self) -> str:
-        """The stage key: the sha256 of it all but the name; equal for equal values, whatever their order."""
+        """Stage key: sha256 of all fields except the name, independent of the order of keys."""
         parts = [self.schema_version, dict(self.config_slice), dict(self.input_keys), self.code_digest]
         return hashlib.sha256(canonical_json(parts).encode()).hexdigest()
 
 
 def changed_parts(old: Identity, new: Identity) -> list[str]:
-    """What differs between two identities, in words; empty if their keys are equal."""
+    """Describe the differences of two identities; empty if their keys are equal."""
     changes = list(differences("", old.config_slice, new.config_slice))
     for name in sorted({*old.input_keys, *new.input_keys}):
         if old.input_keys.get(name) != new.input_keys.get(name):
@@ -50,16 +50,16 @@ def changed_parts(old: Identity, new: Identity) -> list[str]:
 
 
 def differences(where: str, old: Any, new: Any) -> Iterator[str]:
-    """The leaves in which two config slices differ, as 'walker.leg_mass_kg 5.0 -> 6.0'."""
+    """Iterate over differing leaves of two config slices, e.g. 'walker.leg_mass_kg 5.0 -> 6.0'."""
     if isinstance(old, Mapping) and isinstance(new, Mapping):
         for name in sorted({*old, *new}):
             yield from differences(f"{where}.{name}" if where else name, old.get(name), new.get(name))
     elif canonical_json(old) != canonical_json(new):
-        yield f"{where} {shown(old)} -> {shown(new)}"
+        yield f"{where} {brief(old)} -> {brief(new)}"
 
 
-def shown(value: Any) -> str:
-    """A config value in few words."""
+def brief(value: Any) -> str:
+    """Format a config value briefly."""
     if value is None:
         return "none"
     return "{...}" if isinstance(value, Mapping) else str(value)

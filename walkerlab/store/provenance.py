@@ -1,4 +1,4 @@
-"""Where a result comes from: software, machine, time, command; recorded, and no part of what determines it."""
+"""Provenance of results: software, machine, time and command; recorded, but not part of the key."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from walkerlab.store.commit import commit_of_package
 from walkerlab.store.files import as_text
 
 LIBRARIES = ("numpy", "scipy", "numba", "llvmlite", "h5py", "pydantic", "ruamel.yaml", "matplotlib", "jinja2")
-"""The libraries whose versions are recorded: those that numbers and figures may depend on."""
+"""Libraries that numbers and figures may depend on."""
 
 
 @dataclass(frozen=True)
 class Provenance:
-    """How a result came about.
+    """Origin of a result.
 
     config         the resolved config, as YAML text
     command_line   as typed
@@ -48,17 +48,17 @@ class Provenance:
 
     @property
     def took_s(self) -> float:
-        """How long it took, s."""
+        """Run time, s."""
         begun, ended = map(datetime.datetime.fromisoformat, (self.started_utc, self.ended_utc))
         return (ended - begun).total_seconds()
 
     def until_now(self) -> Provenance:
-        """The same, ended now."""
+        """Return the same, ended now."""
         return replace(self, ended_utc=utc_now())
 
 
 def begin(config: Config, input_digests: Mapping[str, str]) -> Provenance:
-    """The provenance of a stage that starts now, in this process."""
+    """Begin the provenance of a stage that starts now in this process."""
     program = Path(sys.argv[0]).name
     now = utc_now()
     return Provenance(
@@ -77,12 +77,12 @@ def begin(config: Config, input_digests: Mapping[str, str]) -> Provenance:
 
 
 def utc_now() -> str:
-    """The time, in ISO 8601 to the millisecond."""
+    """Return the time in ISO 8601 to the millisecond."""
     return datetime.datetime.now(datetime.UTC).isoformat(timespec="milliseconds")
 
 
 def library_versions() -> dict[str, str]:
-    """Versions of the libraries that are installed, from their metadata: none is imported."""
+    """Return versions of the installed libraries from their metadata, importing none."""
     versions = {}
     for name in LIBRARIES:
         try:
@@ -93,5 +93,5 @@ def library_versions() -> dict[str, str]:
 
 
 def git_commit() -> str | None:
-    """The commit of the source tree that the package is run from, or was built from; None if nobody knows."""
+    """Return the commit that this package runs from or was built from; None if unknown."""
     return commit_of_package(Path(walkerlab.__file__).parent)

@@ -1,4 +1,4 @@
-"""The folder of a run: where its files are, and the lock under which they are written."""
+"""Folder of a run: its files and the lock under which they are written."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from walkerlab.store.files import make_folder, read_bounded, remove_leftovers, s
 
 RECORD, LOCK = ".run.json", ".lock"
 RECORD_BYTES = 1 << 20
-"""No record is larger."""
+"""Maximum size of a record."""
 
 
 @dataclass(frozen=True)
 class Record:
-    """What a run folder says of its results; a result that was taken over names the run that it was made in.
+    """Record of the config of a run folder's results; results reused from another run name that run.
 
     run      the folder's name when it was written
-    source   where the config is from, as in `RunFolder`
-    config   that they were asked for with, resolved, as YAML text
+    source   origin of the config, as in `RunFolder`
+    config   resolved config of the results, as YAML text
     changes  as in `RunFolder`
     """
 
@@ -40,8 +40,8 @@ class RunFolder:
 
     runs_dir  the folder of all runs
     name      of the run; path-safe
-    source    where its config is from: a file as seen from `runs_dir`, or a built-in one; empty if unknown
-    changes   KEY=VALUE of each key in which the config differs from that file
+    source    of its config: a path relative to `runs_dir`, or a built-in config; empty if unknown
+    changes   KEY=VALUE of each key in which the config differs from its source
     """
 
     runs_dir: Path
@@ -51,7 +51,7 @@ class RunFolder:
 
     @classmethod
     def at(cls, path: Path) -> RunFolder:
-        """The run in a folder; source and changes are those that it was written with."""
+        """Return the run in a folder, with recorded source and changes."""
         whole = path if path.name not in ("", "..") else path.resolve()
         record = cls(whole.parent, whole.name).record()
         if record is None:
@@ -65,13 +65,13 @@ class RunFolder:
 
     @property
     def given(self) -> str:
-        """The folder as a path that is not taken for a name."""
+        """The folder as a path that cannot be mistaken for a name."""
         text = str(self.path)
         return text if os.sep in text else f".{os.sep}{text}"
 
     @property
     def typed(self) -> str:
-        """The same as it is typed in a shell."""
+        """The folder, quoted for a shell."""
         return shlex.quote(self.given)
 
     @property
@@ -80,15 +80,15 @@ class RunFolder:
         return self.path / "figures"
 
     def artifact(self, stage: str) -> Path:
-        """The file of a stage's result."""
+        """Return the file of a stage's result."""
         return self.path / f"{stage}.h5"
 
     def checkpoint(self, stage: str) -> Path:
-        """The file of what was computed of a stage's result until it is complete."""
+        """Return the checkpoint file of an incomplete result."""
         return self.path / f"{stage}.parts"
 
     def record(self) -> Record | None:
-        """What the folder says of its results; None if it says nothing that can be read."""
+        """Read the run record; None if it is missing or unreadable."""
         try:
             said = json.loads(read_bounded(self.path / RECORD, RECORD_BYTES))
             run, changes = str(said["run"]), said.get("changes")
@@ -98,19 +98,19 @@ class RunFolder:
             return None
 
     def write_record(self, record: Record) -> None:
-        """Have the folder say this of its results from now on; StorageError if the system refuses."""
+        """Write the run record; raises StorageError if the system refuses."""
         write_atomically(self.path / RECORD, json.dumps(asdict(record), indent=1).encode())
 
     @contextlib.contextmanager
     def locked(self, wait: bool = True, say: Callable[[str], None] | None = None) -> Iterator[None]:
-        """Hold the folder's lock, which the system takes back when this process ends, in whatever way.
+        """Hold the folder's lock, which the system releases when this process ends.
 
-        The folder is made if need be, and cleared of what killed writers left.
+        Creates the folder if needed and removes leftovers of killed writers.
 
-        wait  whether to wait for another process; if so, `say` is told what is being waited for
+        wait  whether to wait for another process; `say` is then called with a message
 
         Raises LockedError if another process holds the lock and `wait` is false, StorageError if the folder or
-        the lock's file cannot be made.
+        the lock file cannot be created.
         """
         # Imported here: a run that reuses everything takes no lock.
         from filelock import FileLock, Timeout
@@ -135,5 +135,5 @@ class RunFolder:
 
 
 def changes_in(name: str) -> tuple[str, ...]:
-    """The changes that a folder's name shows: all there is to tell where no record lists them."""
+    """Return the changes in a folder's name, for folders without a record."""
     return tuple(filter(None, name.partition("@")[2].split(",")))

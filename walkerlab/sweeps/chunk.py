@@ -1,4 +1,4 @@
-"""Points of a sweep: computed anywhere, and kept in chunks, each a file named by what is in it."""
+"""Points of a sweep: computed in any process and stored in chunks, files named by their content."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import re
 import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache, partial
+from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
@@ -17,11 +17,10 @@ from walkerlab.config.schema import Config
 from walkerlab.errors import WalkerlabError
 from walkerlab.labels import Label, labels_of
 from walkerlab.pipeline.executor import answer_in_memory
-from walkerlab.pipeline.graph import Graph
+from walkerlab.pipeline.graph import STRIDES, Graph
 from walkerlab.pipeline.results import MemoryResults
-from walkerlab.pipeline.work import WorkUnit
 from walkerlab.store import artifact
-from walkerlab.store.artifact import Damaged, OtherLayout, StageAnswer
+from walkerlab.store.artifact import Damaged, OtherLayout
 from walkerlab.store.columns import rows_group
 from walkerlab.store.content import Content, untimed
 from walkerlab.store.key import Identity
@@ -33,12 +32,14 @@ Labels = Mapping[str, tuple[str, str]]
 
 FOLDER: Final = "sweep-chunks"
 NOT_OF_THE_POINT: Final = ("left_out", "no_answer")
+MEMORIES: Final = 2
+"""Number of memories that a process keeps."""
 UNFIT: Final = re.compile(r"[^A-Za-z0-9_.+-]")
 
 
 @dataclass(frozen=True)
 class PointResult:
-    """What became of one point."""
+    """Result of one point."""
 
     key: Annotated[str, Label("", "key of the stage's result, hex")]
     status: Annotated[
@@ -48,41 +49,37 @@ class PointResult:
     numbers: Annotated[str, Label("", "the stage's summary by name, as JSON and without run times")] = "{}"
     wall_s: Annotated[float, Label("s", "time it took", timing=True)] = 0.0
     bug: str = ""
-    """The traceback of the bug that stopped it; empty if none did."""
+    """Traceback of a bug that stopped the computation; empty without one."""
 
 
 @dataclass(frozen=True)
 class Chunk:
-    """Some points' rows, with unit and meaning of the numbers that the stage itself has labelled."""
+    """Rows of some points, with unit and meaning of quantities that the stage labels."""
 
     rows: tuple[PointResult, ...]
     labels: Labels
 
 
-def unit_of(config: Config, key: str, graph: str, target: str, again: bool) -> WorkUnit:
-    """The computation of one point, which may be done anywhere.
-
-    key    of the result
-    graph  where the pipeline is, as module:NAME
-    again  whether its walk is taken a second time for its numerical error
-    """
-    return WorkUnit(key, 1, partial(compute_point, config, key, graph, target, again))
-
-
-@cache
-def memory_for(graph: str) -> MemoryResults:
-    """Return this process's memory of what points need, kept from chunk to chunk; `graph` as in `unit_of`."""
+@lru_cache(maxsize=MEMORIES)
+def memory_for(graph: str, forced: str) -> MemoryResults:  # noqa: ARG001 - one memory for each forced sweep
+    """Return this process's memory of inputs, kept from chunk to chunk; arguments as in `compute_point`."""
     module, _, name = graph.partition(":")
     return MemoryResults(getattr(importlib.import_module(module), name))
 
 
-def compute_point(config: Config, key: str, graph: str, target: str, again: bool) -> Chunk:
-    """Compute one point in this process; what goes wrong with it does not end the others."""
-    memory = memory_for(graph)
+def compute_point(config: Config, key: str, graph: str, target: str, again: bool, forced: str = "") -> Chunk:
+    """Compute one point in this process; a failure becomes its result.
+
+    key     of the result
+    graph   import path of the pipeline, module:NAME
+    again   whether its walk is repeated for the numerical error
+    forced  identifies a sweep that reuses no earlier result; empty for others
+    """
+    memory = memory_for(graph, forced)
     stages = memory.keys.graph
     try:
         config = without_outputs(config, target, stages)
-        answer = answer_in_memory(config, target, memory, again=again or not stages[target].walks)
+        answer = answer_in_memory(config, target, memory, again=again or STRIDES not in stages[target].options)
     except WalkerlabError as error:
         return Chunk((PointResult(key, "failed", error.message),), {})
     except Exception as error:
@@ -91,14 +88,14 @@ def compute_point(config: Config, key: str, graph: str, target: str, again: bool
     return chunk_of(key, answer)
 
 
-def joined(points: Sequence[tuple[Chunk, float]]) -> Chunk:
-    """Join chunks of a point each, with the time (s) that each took."""
+def join_points(points: Sequence[tuple[Chunk, float]]) -> Chunk:
+    """Join chunks of one point each, adding their run times (s)."""
     rows = tuple(replace(row, wall_s=wall_s) for point, wall_s in points for row in point.rows)
     return Chunk(rows, {name: label for point, _ in points for name, label in point.labels.items()})
 
 
-def chunk_of(key: str, answer: StageAnswer) -> Chunk:
-    """A stage's answer as a chunk of one point."""
+def chunk_of(key: str, answer: Content) -> Chunk:
+    """Convert a stage's answer to a chunk of one point."""
     numbers = json.dumps(by_name(untimed(answer.summary, answer.timed)), allow_nan=False, separators=(",", ":"))
     status: Status = "answered" if answer.no_answer is None else "no-answer"
     reason = "" if answer.no_answer is None else answer.no_answer.message
@@ -106,9 +103,9 @@ def chunk_of(key: str, answer: StageAnswer) -> Chunk:
 
 
 def by_name(summary: Mapping[str, Any]) -> dict[str, Any]:
-    """Everything in a summary on one level: numbers, texts, and lists of numbers in a regular shape.
+    """Flatten a summary to numbers, texts and regular lists of numbers.
 
-    What is nested has the names above it in front, with points between: `dissipated_J.friction`, `gaits.0.period_s`.
+    Nested values get dotted names: `dissipated_J.friction`, `gaits.0.period_s`.
     """
     found: dict[str, Any] = {}
 
@@ -133,7 +130,7 @@ def by_name(summary: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def is_regular(value: list[Any]) -> bool:
-    """Whether a list holds numbers, or lists of them that are equally long."""
+    """Whether a list is a regular array of numbers."""
     if all(isinstance(item, bool | int | float) for item in value):
         return True
     lists = [item for item in value if isinstance(item, list) and item]
@@ -141,16 +138,16 @@ def is_regular(value: list[Any]) -> bool:
 
 
 def without_outputs(config: Config, target: str, graph: Graph) -> Config:
-    """The config without the arrays in time that a walk is stored with: a row is the summary, which is the same.
+    """Return the config without time series of the target's walk; its summary does not depend on them.
 
-    A stage that draws on another's arrays is left them.
+    They stay if another stage needs them.
     """
     asking = [stage.name for stage in graph.needed_for(target, config) if "outputs" in stage.reads]
     return config.model_copy(update={"outputs": ()}) if asking == [target] else config
 
 
 def labels_in(content: Content) -> dict[str, tuple[str, str]]:
-    """Unit and meaning of the summary's numbers that are a variable in a group as well."""
+    """Return unit and meaning of the summary's quantities that are also a variable in a group."""
     found = {}
     for group in content.groups.values():
         for name in content.summary.keys() & group.variables.keys():
@@ -159,7 +156,7 @@ def labels_in(content: Content) -> dict[str, tuple[str, str]]:
 
 
 def store(folder: RunFolder, stage: str, code_digest: str, chunk: Chunk, begun: Provenance) -> None:
-    """Keep what was computed of a chunk; what failed is not kept. StorageError if the system refuses."""
+    """Store a chunk without its failed points; raises StorageError if the system refuses."""
     rows = [row for row in chunk.rows if row.status != "failed"]
     if not rows:
         return
@@ -176,10 +173,10 @@ def store(folder: RunFolder, stage: str, code_digest: str, chunk: Chunk, begun: 
 def stored_chunks(
     runs_dir: Path, stage: str, code_digest: str, wanted: Mapping[str, Any], warn: Callable[[str], None]
 ) -> Iterator[Chunk]:
-    """What is stored of a stage under its present code, in all run folders: chunks of sweeps, and single runs.
+    """Iterate over the stored results of a stage under its present code, in all run folders.
 
-    wanted  keys that single runs are looked for of
-    warn    is told of damaged chunks
+    wanted  keys of single runs to include; chunks are included whole
+    warn    called for damaged chunks
     """
     for path in sorted(runs_dir.glob(f"*/{FOLDER}/{stage}-{code_digest[:8]}-*.h5")):
         try:

@@ -1,4 +1,4 @@
-"""The figure and the page of a sweep, beside its file."""
+"""Draw the figure and write the page of a sweep."""
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
@@ -28,7 +28,7 @@ MAX_ROWS = 200
 
 @dataclass(frozen=True)
 class Files:
-    """What was drawn."""
+    """Files of a drawn sweep."""
 
     page: Path
     figures: tuple[Path, ...]
@@ -37,10 +37,10 @@ class Files:
 def draw(swept: Swept, folder: RunFolder, names: Sequence[str] = (), against: str = "") -> Files:
     """Draw a sweep and write its page.
 
-    names    the quantities to draw; without any those that say most
-    against  the quantity to draw them over; without one the parameters
+    names    quantities to draw; by default the headline quantities
+    against  quantity on the horizontal axis; by default the parameters
 
-    Raises ConfigError for a quantity that is not there, StorageError if the system refuses.
+    Raises ConfigError for an unknown quantity, StorageError if the system refuses.
     """
     group, question = swept.group, swept.question
     refuse_unknown(group, question.dims, names)
@@ -67,7 +67,7 @@ def draw(swept: Swept, folder: RunFolder, names: Sequence[str] = (), against: st
 
 
 def refuse_unknown(group: Group, dims: tuple[str, ...], names: Sequence[str], option: str = "--show") -> None:
-    """Raise ConfigError for a name that is no quantity of the result."""
+    """Raise ConfigError for an unknown quantity of the result."""
     for name in names:
         if not is_number(group, name, dims):
             there = ", ".join(one for one in group.variables if is_number(group, one, dims) and "." not in one)
@@ -75,9 +75,9 @@ def refuse_unknown(group: Group, dims: tuple[str, ...], names: Sequence[str], op
 
 
 def refuse_unheard(stage: str, names: Mapping[str, str], there: Collection[str]) -> None:
-    """Raise ConfigError for a name that the first results do not have; others may have more nested quantities.
+    """Raise ConfigError for a quantity missing in the first results; later results may add nested ones only.
 
-    names  by the option that asks for each, as it was typed
+    names  by option, as typed
     """
     known = sorted({*there, *HEADLINES.get(stage, ())} - {"outcome"})
     for asked, name in names.items():
@@ -90,15 +90,16 @@ PARAMETER_COLUMNS = (Column("name"), Column("key"), Column("unit"), Column("valu
 
 
 def page_of(swept: Swept, pictures: Sequence[Picture], shown: Sequence[str]) -> Page:
-    """What the page says: the figure, the parameters, and the first points."""
+    """Build the page: the figure, the parameters and the first points."""
     summary, question, group = swept.summary, swept.question, swept.group
     outcomes = ", ".join(f"{count} {name}" for name, count in summary["outcomes"].items())
     parameters = [
-        (name, f"`{axis.key}`", group.variables[name].units, spoken(axis.values), group.variables[name].long_name)
+        (name, f"`{axis.key}`", variable.units, values_summary(axis.values), variable.long_name)
         for name, axis in zip(question.names, question.axes, strict=True)
+        for variable in [group.variables[name]]
     ]
     columns = [
-        *(Column(name, written=in_words, numeric=True) for name in (*question.names, *shown)),
+        *(Column(name, written=format_value, numeric=True) for name in (*question.names, *shown)),
         *(Column("outcome"), Column("reason", wide=True)),
     ]
     listed = f"Of the {len(question)} points the first {MAX_ROWS} are listed. " if len(question) > MAX_ROWS else ""
@@ -108,25 +109,25 @@ def page_of(swept: Swept, pictures: Sequence[Picture], shown: Sequence[str]) -> 
         table("Points", columns, rows(group, question, shown), note=f"{listed}{where}"),
     )
     section = Section("points", "Numbers", (*([Gallery(tuple(pictures))] if pictures else []), *tables))
-    lead = (f"{summary['points']} points: {outcomes}.", *said_of(summary))
+    lead = (f"{summary['points']} points: {outcomes}.", *summary_lines(summary))
     return Page(f"{question.stage} over {', '.join(question.names)}", (section,), lead, PAGE)
 
 
-def said_of(summary: Mapping[str, Any]) -> list[str]:
-    """What a sweep says beside its numbers: what ended its walks, and how far their numbers are off."""
+def summary_lines(summary: Mapping[str, Any]) -> list[str]:
+    """Describe how a sweep's walks ended and their numerical error."""
     ended = [str(one["said"]) for one in summary.get("endings", ())]
     error = summary.get("numerical_error")
     return ended if error is None else [*ended, words("error.of_sample", error, "points")]
 
 
-def spoken(values: Sequence[object]) -> str:
-    """Values in few words."""
+def values_summary(values: Sequence[object]) -> str:
+    """Summarise values in one phrase."""
     listed = [f"{value:.6g}" if isinstance(value, float) else str(value) for value in values]
     return ", ".join(listed) if len(listed) <= 8 else f"{len(listed)} values, {listed[0]} to {listed[-1]}"
 
 
 def rows(group: Group, question: SweptStage, shown: Sequence[str]) -> list[tuple[Any, ...]]:
-    """The first points: parameters, numbers, outcome, and the reason where there is no answer."""
+    """Return table rows of the first points: parameters, quantities, outcome and reason."""
     count = min(len(question), MAX_ROWS)
     places = [question.places(index) for index in range(count)]
     columns: list[list[Any]] = [[axis.values[at[k]] for at in places] for k, axis in enumerate(question.axes)]
@@ -134,6 +135,6 @@ def rows(group: Group, question: SweptStage, shown: Sequence[str]) -> list[tuple
     return list(zip(*columns, strict=True))
 
 
-def in_words(value: Any) -> str:
-    """A value in a table."""
+def format_value(value: Any) -> str:
+    """Format a value for a table."""
     return number(value, 6) if isinstance(value, float) else str(value)

@@ -1,4 +1,4 @@
-"""Where chunks are computed: each engine is a factory of a concurrent.futures executor; none schedules itself."""
+"""Engines that compute chunks: each makes a concurrent.futures executor."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ ONE_THREAD = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "M
 
 @dataclass(frozen=True)
 class Order:
-    """What an engine is asked for.
+    """Options of an engine.
 
-    workers  processes; 0 leaves it to the engine
-    address  of a scheduler that runs already; empty to have one made
+    workers  processes; 0 for the engine's default
+    address  of a running scheduler; empty to start one
     modules  that workers will need
-    folder   for an engine's own files
-    options  an engine's own, by name
+    folder   for the engine's files
+    options  specific to the engine, by name
     """
 
     workers: int = 0
@@ -41,9 +41,9 @@ class Order:
 
 @dataclass(frozen=True)
 class Pool:
-    """An executor that is ready.
+    """A running executor.
 
-    workers  chunks that it computes at once
+    workers  number of chunks that it computes at once
     """
 
     executor: Executor
@@ -52,10 +52,10 @@ class Pool:
 
 @dataclass(frozen=True)
 class SweepEngine:
-    """One way to compute.
+    """An engine.
 
-    opened   a context that gives a pool and closes it
-    chunk_s  how long a chunk is to take, s: long against what a chunk costs the engine
+    opened   context that gives a pool and closes it
+    chunk_s  target duration of a chunk, s: long compared with the engine's overhead
     """
 
     opened: Callable[[Order], contextlib.AbstractContextManager[Pool]]
@@ -63,7 +63,7 @@ class SweepEngine:
 
     @contextlib.contextmanager
     def begun(self, order: Order) -> Iterator[SweepEngine]:
-        """The engine for one sweep; on this machine its workers load what they need while points are still made."""
+        """Return the engine for one sweep; local workers already import their modules while points are prepared."""
         if self.opened is not local:
             yield self
             return
@@ -74,7 +74,7 @@ class SweepEngine:
 
 @contextlib.contextmanager
 def local(order: Order) -> Iterator[Pool]:
-    """Processes of this machine, one thread each."""
+    """Run workers on this machine, one thread each."""
     refuse_address("local", order)
     workers = order.workers or os.cpu_count() or 1
     modules = ("walkerlab.sweeps.chunk", *order.modules)
@@ -84,7 +84,7 @@ def local(order: Order) -> Iterator[Pool]:
 
 @contextlib.contextmanager
 def one_thread_each() -> Iterator[None]:
-    """Have processes that are started meanwhile compute in one thread."""
+    """Let processes started inside compute in one thread."""
     before = {name: os.environ.get(name) for name in ONE_THREAD}
     os.environ.update(dict.fromkeys(ONE_THREAD, "1"))
     try:
@@ -99,9 +99,9 @@ def one_thread_each() -> Iterator[None]:
 
 @contextlib.contextmanager
 def dask(order: Order) -> Iterator[Pool]:
-    """Workers of a Dask cluster that runs at an address, or of one that is made on this machine."""
+    """Use a Dask cluster at an address, or start one on this machine."""
     distributed = extra("distributed", "dask")
-    # Dask writes these into this process's environment whenever it starts a worker, also in place of one that died.
+    # Dask copies these variables into this process's environment whenever it starts or replaces a worker.
     with one_thread_each(), contextlib.ExitStack() as stack:
         if order.address:
             client = stack.enter_context(distributed.Client(order.address))
@@ -115,8 +115,8 @@ def dask(order: Order) -> Iterator[Pool]:
                 raise ConfigError(f"--engine dask: its processes did not start: {error}", GUARD) from error
             stack.enter_context(cluster)
             client = stack.enter_context(distributed.Client(cluster))
-        # A worker's death is dealt with chunk by chunk, here as in every engine. Dask's own executor mistakes a result
-        # whose worker dies before it is handed over for an error.
+        # Worker deaths are handled chunk by chunk, as in every engine; Dask's own executor reports an error for a
+        # result whose worker dies before handing it over.
         executor = JobExecutor(functools.partial(client.submit, retries=0, pure=False))
         try:
             yield Pool(executor, order.workers or max(1, len(client.scheduler_info()["workers"])))
@@ -126,7 +126,7 @@ def dask(order: Order) -> Iterator[Pool]:
 
 @contextlib.contextmanager
 def slurm(order: Order) -> Iterator[Pool]:
-    """Jobs of Slurm, one for each chunk; `cluster=local` runs them on this machine, to try a sweep out."""
+    """Submit a Slurm job for each chunk; `cluster=local` runs them on this machine, for trials."""
     submitit = extra("submitit", "slurm")
     refuse_address("slurm", order)
     options: dict[str, Any] = {name: int(text) if text.isdigit() else text for name, text in order.options.items()}
@@ -144,16 +144,16 @@ def slurm(order: Order) -> Iterator[Pool]:
         yield Pool(executor, order.workers or 16)
     finally:
         for job in list(executor.jobs):
-            with contextlib.suppress(OSError):  # a job that has ended meanwhile
+            with contextlib.suppress(OSError):  # the job may have ended meanwhile
                 if not job.done():
                     job.cancel(check=False)
 
 
 class JobExecutor(Executor):
-    """A library's jobs as futures, each waited for by a thread."""
+    """Executor over a library's jobs; a thread waits for each."""
 
     def __init__(self, start: Callable[..., Any]) -> None:
-        """Nothing is submitted yet.
+        """Store how to start a job.
 
         start  called with a function and its arguments, returns a job whose `result()` waits
         """
@@ -169,7 +169,7 @@ class JobExecutor(Executor):
         def wait() -> None:
             try:
                 result = job.result()
-            except BaseException as error:  # a cancelled job's is no Exception
+            except BaseException as error:  # a cancelled job raises no Exception
                 future.set_exception(error)
             else:
                 future.set_result(result)
@@ -180,13 +180,13 @@ class JobExecutor(Executor):
 
 
 def refuse_address(name: str, order: Order) -> None:
-    """Raise ConfigError for an address that an engine has no use for."""
+    """Raise ConfigError if an engine that takes no address got one."""
     if order.address:
         raise ConfigError(f"--engine {name}={order.address}: {name} takes no address.", "Only dask does.")
 
 
 def extra(module: str, name: str) -> Any:
-    """A library that comes with one of the package's extras; ConfigError if it is not installed."""
+    """Import a library of one of the package's extras; raises ConfigError if it is not installed."""
     try:
         return importlib.import_module(module)
     except ImportError as error:
@@ -203,11 +203,11 @@ ENGINES: dict[str, SweepEngine] = {
 
 
 def engine_named(text: str) -> tuple[SweepEngine, str]:
-    """The engine, and the address if there is one, of NAME or NAME=ADDRESS; ConfigError if there is none."""
+    """Return the engine and the address of NAME or NAME=ADDRESS; raises ConfigError for an unknown name."""
     name, _, address = text.partition("=")
     if name not in ENGINES:
         raise ConfigError(f"--engine {text}: no such engine; there are {', '.join(ENGINES)}.")
-    # what multiprocessing itself goes by: a process that it starts runs the script first
+    # the test that multiprocessing itself uses: a process that it starts runs the script first
     if text == "dask" and getattr(current_process(), "_inheriting", False):
         raise ConfigError(
             "--engine dask: the processes that Dask starts run the calling script, which would sweep once more.", GUARD

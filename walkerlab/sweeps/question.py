@@ -1,4 +1,4 @@
-"""What a sweep asks: a stage, parameters with their values, and how they are combined."""
+"""The points of a sweep: a stage, parameters with their values, and how these are combined."""
 
 import math
 import re
@@ -25,7 +25,7 @@ Layout = Literal["grid", "list"]
 
 POINT: Final = "point"
 MAX_POINTS: Final = 10_000_000
-"""In one sweep, however they are asked for."""
+"""Maximum number of points in a sweep."""
 FORMS: Final = "FROM:TO:N, FROM:TO:N:log, or a list [a, b, ...]; for --sample also FROM:TO"
 EXAMPLE: Final = "For example: `walkerlab sweep --over slope_deg=0.5:5:10 --stage fixedpoint`"
 SAMPLERS: Final = ("latin-hypercube", "sobol", "random")
@@ -36,9 +36,9 @@ class Axis:
     """One parameter.
 
     key     dotted, as in a config
-    values  in order; of a list of points one for each point
-    source  what messages name as the values' origin
-    ends    least and largest value of an interval that is to be sampled; None if the values are given
+    values  in order; for a list of points one for each point
+    source  origin of the values, for messages
+    ends    bounds of an interval to sample; None if the values are given
     """
 
     key: str
@@ -47,7 +47,7 @@ class Axis:
     ends: tuple[float, float] | None = None
 
     def setting(self, index: int) -> ConfigSetting:
-        """The `--set` of one value."""
+        """Return one value as a `--set` option."""
         value = self.values[index]
         place = Position(self.source, 0, 0)
         return ConfigSetting(tuple(self.key.split(".")), Scalar(place, value, str(value)), place)
@@ -55,10 +55,10 @@ class Axis:
 
 @dataclass(frozen=True)
 class SweptStage:
-    """A stage over parameters.
+    """A stage over values of parameters.
 
-    names   of the parameters in results: the last part of the key, with more parts where two would be the same
-    layout  grid: every value with every other; list: the n-th value of each makes the n-th point
+    names   of the parameters in results: the last part of the key, or more parts where two would be equal
+    layout  grid: all combinations; list: the n-th values form the n-th point
     """
 
     stage: str
@@ -83,11 +83,11 @@ class SweptStage:
         return (POINT,) if self.layout == "list" else self.names
 
     def __len__(self) -> int:
-        """How many points there are."""
+        """Return the number of points."""
         return math.prod(self.shape)
 
     def places(self, index: int) -> tuple[int, ...]:
-        """Which value of each parameter a point has; the last parameter changes fastest."""
+        """Return the index of each parameter's value at a point; the last parameter changes fastest."""
         if self.layout == "list":
             return (index,) * len(self.axes)
         import numpy as np
@@ -95,17 +95,17 @@ class SweptStage:
         return tuple(int(place) for place in np.unravel_index(index, self.shape))
 
     def settings(self, index: int) -> list[ConfigSetting]:
-        """The `--set` options of one point."""
+        """Return one point as `--set` options."""
         return [axis.setting(place) for axis, place in zip(self.axes, self.places(index), strict=True)]
 
     def said(self, index: int) -> str:
-        """One point in words."""
+        """Describe one point."""
         settings = self.settings(index)
         return ", ".join(f"{axis.key}={plain(one.value)}" for axis, one in zip(self.axes, settings, strict=True))
 
 
 def distinct_ends(keys: Sequence[str]) -> tuple[str, ...]:
-    """The fewest last parts of dotted keys that tell them apart."""
+    """Return the shortest endings of dotted keys that distinguish them."""
     found = []
     for key in keys:
         parts = key.split(".")
@@ -115,19 +115,19 @@ def distinct_ends(keys: Sequence[str]) -> tuple[str, ...]:
     return tuple(found)
 
 
-def asked(
+def build_sweep(
     stage: str,
     over: Sequence[tuple[str, Any, str]],
     zip: bool = False,
     sample: str = "",
     seed: int = 1,
 ) -> SweptStage:
-    """The question of command-line options or of a `sweep` block.
+    """Build a sweep from command-line options or a `sweep` block.
 
-    over    for each parameter its key, its values (a list, or FROM:TO:N), and where that stands
+    over    for each parameter its key, its values (a list, or FROM:TO:N) and their origin
     sample  e.g. latin-hypercube:500; empty for the values themselves
 
-    Raises ConfigError for what cannot be meant.
+    Raises ConfigError for invalid options.
     """
     axes: tuple[Axis, ...] = ()
     for key, values, source in over:
@@ -150,13 +150,13 @@ def asked(
 
 
 def refuse_too_many(what: str, count: int) -> None:
-    """Raise ConfigError if a sweep has more points than there may be; `what` asks for them."""
+    """Raise ConfigError for more than MAX_POINTS points, requested by `what`."""
     if count > MAX_POINTS:
         raise refused(None, f"{what}: {count} points", f"up to {MAX_POINTS} in one sweep")
 
 
 def axis_of_text(text: str) -> tuple[str, Any, str]:
-    """Key, values and origin of one `--over KEY=VALUES`; ConfigError if it is not of that form."""
+    """Parse one `--over KEY=VALUES` into key, values and origin; raises ConfigError for another form."""
     key, equals, values = text.partition("=")
     source = f"--over {text}"
     key = key.strip()
@@ -170,18 +170,18 @@ def axis_of_text(text: str) -> tuple[str, Any, str]:
 
 
 def bad(source: str, text: str, allowed: str = "", near: str = "") -> ConfigError:
-    """What to raise for something wrong with a parameter, an option or a key, which is its place."""
+    """Build the error for an invalid parameter, option or key, which is its position."""
     return refused(Position(source, 0, 0), text, allowed, near)
 
 
 @cache
 def known_keys() -> dict[str, FieldInfo]:
-    """The keys of a config that have a value, dotted."""
+    """Return the fields of all keys of a config that hold a value, by dotted key."""
     return {".".join(path): field for path, field in leaves(Config)} | dict(SlopeInDegrees.model_fields)
 
 
 def axis(key: str, values: Any, source: str) -> Axis:
-    """One parameter; ConfigError for an unknown key and for values of no known form."""
+    """Build one parameter; raises ConfigError for an unknown key or invalid values."""
     known = known_keys()
     if key not in known and not any(key.startswith(f"{one}.") for one in known):
         if any(one.startswith(f"{key}.") for one in known):
@@ -210,7 +210,7 @@ def axis(key: str, values: Any, source: str) -> Axis:
 
 
 def as_the_key_has_it(key: str, values: Sequence[float]) -> tuple[Value, ...]:
-    """Whole numbers as integers where a key takes nothing else; what is not whole is left for the schema to refuse."""
+    """Convert whole numbers to integers for an integer key; the schema rejects other numbers."""
     field = known_keys().get(key)
     if field is None or field.annotation is not int:
         return tuple(values)
@@ -218,7 +218,7 @@ def as_the_key_has_it(key: str, values: Sequence[float]) -> tuple[Value, ...]:
 
 
 def spaced(low: float, high: float, count: int, logarithmic: bool) -> tuple[float, ...]:
-    """`count` values from one end to the other, both included; one value is the first end."""
+    """Return `count` values from `low` to `high`, both included; a single value is `low`."""
     import numpy as np
 
     space = np.geomspace if logarithmic else np.linspace
@@ -226,7 +226,7 @@ def spaced(low: float, high: float, count: int, logarithmic: bool) -> tuple[floa
 
 
 def sampled(axes: Sequence[Axis], sample: str, seed: int) -> tuple[Axis, ...]:
-    """Points drawn from the intervals, or from the lists, of all parameters at once; ConfigError for no such sampler.
+    """Draw points from the intervals or lists of all parameters; raises ConfigError for an unknown sampler.
 
     sample  SAMPLER:N
     """
@@ -244,15 +244,16 @@ def sampled(axes: Sequence[Axis], sample: str, seed: int) -> tuple[Axis, ...]:
         from scipy.stats import qmc
 
         if name == "sobol":
-            # In full powers of two, where the sequence is balanced; its first points are then a prefix of more.
+            # drawn in full powers of two, where the sequence is balanced; fewer points are a prefix of more
             unit = qmc.Sobol(dimensions, seed=generator).random_base2(math.ceil(math.log2(count)))[:count]
         else:
             unit = qmc.LatinHypercube(dimensions, seed=generator).random(count)
-    return tuple(Axis(one.key, tuple(drawn(one, column)), one.source) for one, column in zip(axes, unit.T, strict=True))
+    pairs = zip(axes, unit.T, strict=True)
+    return tuple(Axis(axis.key, tuple(values_at(axis, column)), axis.source) for axis, column in pairs)
 
 
-def drawn(one: Axis, column: Any) -> Iterator[Value]:
-    """The values of one parameter for numbers from 0 to 1."""
+def values_at(one: Axis, column: Any) -> Iterator[Value]:
+    """Map numbers from 0 to 1 to values of one parameter."""
     for share in column.tolist():
         if one.ends is not None:
             yield from as_the_key_has_it(one.key, [one.ends[0] + share * (one.ends[1] - one.ends[0])])
@@ -261,7 +262,7 @@ def drawn(one: Axis, column: Any) -> Iterator[Value]:
 
 
 def described(config: Config, key: str) -> tuple[str, str]:
-    """Unit and meaning of a config's key; a unit that depends on the block's is that of this config."""
+    """Return unit and meaning of a key; a unit that depends on the config is that of this config."""
     *above, last = key.split(".")
     block = held(config, above)
     # the config's own blocks, which may be of a type that the schema only allows
@@ -273,14 +274,14 @@ def described(config: Config, key: str) -> tuple[str, str]:
 
 
 def refuse_unrecorded(question: SweptStage, names: Mapping[str, str]) -> None:
-    """Raise ConfigError for a name that the stage never has, before anything is computed.
+    """Raise ConfigError, before anything is computed, for a quantity that the stage never has.
 
-    names  by the option that asks for each, as it was typed
+    names  by option, as typed
     """
-    for asked, name in names.items():
+    for option, name in names.items():
         if name not in question.names and not has_quantity(question.stage, name):
             known = QUANTITIES[question.stage]
             near = nearest(name, (*known, *question.names))
             listed = ", ".join(one + "…" if one.endswith(".") else one for one in known if one != "outcome")
             meant = f" Did you mean {near}?" if near else ""
-            raise ConfigError(f"{asked}: {question.stage} has no such quantity.{meant}", f"There are {listed}.")
+            raise ConfigError(f"{option}: {question.stage} has no such quantity.{meant}", f"There are {listed}.")

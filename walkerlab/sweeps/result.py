@@ -1,4 +1,4 @@
-"""A sweep's one file: parameters as coordinates, the stage's numbers as variables over them."""
+"""Content of a sweep's file: parameters as coordinates, the stage's quantities as variables over them."""
 
 import json
 import sys
@@ -28,25 +28,25 @@ OWN: Final = {
     "status": "answered, no-answer, or failed: not computed",
     "reason": "why there is no answer",
 }
-"""What is told of every result, beside what its stage says."""
+"""Columns of every point, besides the stage's quantities."""
 STATES: Final = ("state", "start_state", "final_state")
 TEXT_BYTES: Final = 6
-"""What a text of some words takes in a file, in units of what it takes here."""
+"""Size of a short text in a file relative to its size in memory."""
 
 
 class SweepVariable:
-    """One variable: a number, a list of numbers, or a text, for each of `size` results."""
+    """Column of a number, a list of numbers or a text for each of `size` results."""
 
     def __init__(self, size: int, shape: tuple[int, ...], text: bool) -> None:
-        """Nothing is known of any result; `shape` is that of one value."""
+        """Start empty; `shape` is that of one value."""
         self.kinds: set[type] = set()
         self.text = text
         self.values: NDArray[Any] = np.full((size, *shape), "" if text else np.nan, object if text else float)
 
     def put(self, places: Integers, values: Sequence[Any]) -> None:
-        """Take some results' values; those that have another shape than others make room for themselves."""
+        """Store values of some results; the column grows for a value of a larger shape."""
         if self.text:
-            # of many equal texts one is kept
+            # equal texts share one object
             self.values[places] = [sys.intern(value) for value in values]
             return
         try:
@@ -56,7 +56,7 @@ class SweepVariable:
                 self.put(places[k : k + 1], [value])
             return
         if array.ndim != self.values.ndim:
-            return  # a list where others have a number says something else
+            return  # a list where others have a number cannot be stored
         self.kinds.update(types_in(values) if array.dtype.kind == "i" else {array.dtype.type})
         shape = tuple(max(old, new) for old, new in zip(self.values.shape[1:], array.shape[1:], strict=True))
         if shape != self.values.shape[1:]:
@@ -67,7 +67,7 @@ class SweepVariable:
         self.values[own] = array
 
     def typed(self) -> NDArray[Any]:
-        """The values in the type that they had, where every result has one; else numbers with gaps."""
+        """Return the values in their own type if there are no gaps, otherwise as floats with gaps."""
         if self.text or np.isnan(self.values).any():
             return self.values
         if self.kinds == {np.bool_}:
@@ -76,28 +76,28 @@ class SweepVariable:
 
 
 def types_in(values: Sequence[Any]) -> set[type]:
-    """The types of the numbers in a list, or in lists in it."""
+    """Return the types of the numbers in a nested list."""
     inner = [item for value in values if isinstance(value, list) for item in value]
     own = {type(value) for value in values if not isinstance(value, list)}
     return own | types_in(inner) if inner else own
 
 
 class Merge:
-    """The rows of a sweep's results put together, as one variable for each thing that they say.
+    """Merges the rows of a sweep's results into one column per quantity.
 
     config   the one that is varied
     inverse  which result each point has
     """
 
     def __init__(self, question: SweptStage, config: Config, inverse: Integers) -> None:
-        """There are no rows yet."""
+        """Start without rows."""
         self.question, self.config, self.inverse = question, config, inverse
         self.there = np.zeros(int(inverse.max()) + 1, bool)
         self.labels: dict[str, tuple[str, str]] = {}
         self.columns: dict[str, SweepVariable] = {}
 
     def put(self, chunk: Chunk, places: Mapping[str, int]) -> None:
-        """Take the rows of a chunk that have a place."""
+        """Store the rows of a chunk that belong to this sweep."""
         self.labels.update(chunk.labels)
         wanted = [row for row in chunk.rows if row.key in places]
         at = [places[row.key] for row in wanted]
@@ -120,15 +120,15 @@ class Merge:
 
     @property
     def numbers(self) -> Collection[str]:
-        """Of the variables those that are one number for each result."""
+        """Names of quantities with one number per result."""
         return [name for name, column in self.columns.items() if not column.text and column.values.ndim == 1]
 
     def of(self, name: str) -> NDArray[Any] | None:
-        """What the points have under a name, nan or an empty text for a gap; None if none of them has it."""
+        """Return the points' values of a quantity, NaN or '' for a gap; None if no point has it."""
         return self.columns[name].values[self.inverse] if name in self.columns else None
 
     def content(self) -> InTurn:
-        """What is stored of the sweep; to be asked for once."""
+        """Return the content to store; call it once."""
         question = self.question
         parameters = dict(coordinates(question, self.config))
         statuses = self.columns["status"].values[self.inverse]
@@ -139,7 +139,7 @@ class Merge:
             "points": len(question),
             "done": int(np.sum(statuses != "failed")),
             "failed": int(np.sum(statuses == "failed")),
-            "outcomes": counted(self.columns["outcome"].values[self.inverse]),
+            "outcomes": count_texts(self.columns["outcome"].values[self.inverse]),
             **self.numerical_error(),
         }
         ended = self.endings()
@@ -147,13 +147,13 @@ class Merge:
         attrs = {"coordinates": " ".join(question.names)} if question.layout == "list" else {}
         scales = {name: one for name, one in parameters.items() if one.dims == (name,)}
         size = sum(one.values.nbytes * (TEXT_BYTES if one.text else 1) for one in self.columns.values())
-        # a number that is a parameter as well is its coordinate
+        # a quantity that is also a parameter is stored as its coordinate
         names = sorted({*parameters, *self.columns})
         variables = ((name, parameters[name] if name in parameters else self.variable(name)) for name in names)
         return InTurn(summary, attrs, scales, variables, size)
 
     def endings(self) -> list[dict[str, Any]]:
-        """What ended the walks and what the ground has to do with it; nothing of a stage that does not walk."""
+        """Describe how the walks ended and the role of the ground; empty for a stage that does not walk."""
         question, config = self.question, self.config
         outcomes = self.columns["outcome"].values[self.inverse]
         pads, pitch = None, self.of("pitch_m")
@@ -164,7 +164,7 @@ class Merge:
             varied = PAD_PITCH in (axis.key for axis in question.axes)
             laid = "" if config.contact is None or varied else config.contact.pad_pitch
             pads = Pads(ends_of(pitch[off]), ends_of(steps) if steps.size else None, str(laid))
-        return endings(counted(outcomes), config, question.stage == CONTACT, pads)
+        return endings(count_texts(outcomes), config, question.stage == CONTACT, pads)
 
     def numerical_error(self) -> dict[str, Any]:
         """The largest numerical errors of the walks that were taken again, how many those are, and of how many.
@@ -183,7 +183,7 @@ class Merge:
         return {"numerical_error": told}
 
     def variable(self, name: str) -> Variable:
-        """A variable over the points; it is handed over, so that no two copies are held of all."""
+        """Remove and return a variable over the points, so that no two copies exist."""
         column = self.columns.pop(name)
         values = column.typed()[self.inverse]
         extra = values.shape[1:]
@@ -202,19 +202,19 @@ class Merge:
 
 
 def last_of_each(rows: NDArray[Any]) -> NDArray[Any]:
-    """The last number of each row (..., numbers), gaps at its end; a gap of a row without any."""
+    """Return the last number of each row (..., numbers), ignoring trailing gaps; NaN for an empty row."""
     known = np.isfinite(rows).sum(axis=-1, keepdims=True)
     last = np.take_along_axis(rows, np.maximum(known - 1, 0), axis=-1)
     return np.asarray(np.where(known > 0, last, np.nan)[..., 0])
 
 
 def ends_of(values: NDArray[Any]) -> tuple[float, float]:
-    """The least and the largest."""
+    """Return minimum and maximum."""
     return float(values.min()), float(values.max())
 
 
 def coordinates(question: SweptStage, config: Any) -> Iterable[tuple[str, Variable]]:
-    """The parameters as variables."""
+    """Build the parameters' variables."""
     for name, axis in zip(question.names, question.axes, strict=True):
         unit, text = described(config, axis.key)
         values = axis.values
@@ -224,14 +224,14 @@ def coordinates(question: SweptStage, config: Any) -> Iterable[tuple[str, Variab
         yield name, Variable(array, dims, unit if numbers else "", text)
 
 
-def counted(texts: NDArray[Any]) -> dict[str, int]:
-    """How often each text occurs."""
+def count_texts(texts: NDArray[Any]) -> dict[str, int]:
+    """Count equal texts."""
     names, counts = np.unique(texts.astype(str), return_counts=True)
     return {str(name): int(count) for name, count in zip(names, counts, strict=True)}
 
 
 def as_csv(content: Content, question: SweptStage, every: bool = False) -> str:
-    """A table with a row for each point: its parameters, how it ended, and the stage's headline numbers.
+    """Format a CSV table of the points: parameters, outcome and headline quantities.
 
     every  all numbers and texts instead; lists take columns
     """
@@ -250,7 +250,7 @@ def as_csv(content: Content, question: SweptStage, every: bool = False) -> str:
 
 
 def flat_columns(name: str, variable: Variable, dimensions: int) -> Iterable[tuple[str, list[Any]]]:
-    """A variable as columns, one for each place of a list; a gap is empty."""
+    """Format a variable as columns, one for each entry of a list; gaps are empty."""
     values = variable.values
     points, own = values.shape[:dimensions], values.shape[dimensions:]
     rows = values.reshape((int(np.prod(points)), *own))

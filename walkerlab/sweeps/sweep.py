@@ -1,11 +1,13 @@
-"""A sweep from its question to its file: take over what is there, compute the rest, put it together."""
+"""Run a sweep: reuse stored points, compute the others and write one file."""
 
 import contextlib
 import hashlib
 import time
 from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
+from secrets import token_hex
 from typing import Any
 
 import numpy as np
@@ -27,7 +29,7 @@ from walkerlab.store.files import make_folder
 from walkerlab.store.hdf5 import GroupOnDisk
 from walkerlab.store.key import Identity
 from walkerlab.store.runfolder import RunFolder
-from walkerlab.sweeps.chunk import Chunk, PointResult, joined, store, stored_chunks, unit_of
+from walkerlab.sweeps.chunk import Chunk, PointResult, compute_point, join_points, store, stored_chunks
 from walkerlab.sweeps.engines import ENGINES, Order, SweepEngine
 from walkerlab.sweeps.question import SweptStage
 from walkerlab.sweeps.result import Merge
@@ -37,15 +39,15 @@ PIPELINE_AT = "walkerlab.pipeline.graph:PIPELINE"
 
 @dataclass(frozen=True)
 class SweepWork:
-    """How a sweep is to be computed.
+    """Options of computing a sweep.
 
-    engine   where
-    order    what the engine is asked for
-    chunk_s  how long a chunk is to take, s; None is the engine's own
-    wait     for another process that works in the folder
-    force    compute every point, there or not
-    graph    where the pipeline is, as module:NAME
-    check    is told the names of the numbers there are once a point has an answer, and may raise
+    engine   that computes the points
+    order    options of the engine
+    chunk_s  target duration of a chunk, s; None for the engine's default
+    wait     wait for another process that works in the folder
+    force    compute every point, stored or not
+    graph    import path of the pipeline, module:NAME
+    check    called with the names of quantities once a point has an answer; may raise
     """
 
     engine: SweepEngine = ENGINES["local"]
@@ -59,12 +61,12 @@ class SweepWork:
 
 @dataclass(frozen=True)
 class Swept:
-    """How a sweep went.
+    """Result of a sweep.
 
     path     its file
     summary  of the file
-    reused   points whose result was there
-    wall_s   time of the whole
+    reused   number of points whose result existed
+    wall_s   total time
     bugs     tracebacks of bugs that stopped points
     """
 
@@ -77,26 +79,26 @@ class Swept:
 
     @property
     def content(self) -> Content:
-        """All that is in the file."""
+        """Content of the file."""
         return artifact.read(self.path)
 
     @property
     def group(self) -> Group:
-        """The points' numbers, read from the file as they are asked for."""
+        """Variables over the points, each read from the file on access."""
         return GroupOnDisk(self.path)
 
     @property
     def done(self) -> int:
-        """Points with a result, be it that there is no answer."""
+        """Number of points with a result, answered or not."""
         return int(self.summary["done"])
 
     @property
     def failed(self) -> int:
-        """Points whose computation was not completed."""
+        """Number of points whose computation failed."""
         return int(self.summary["failed"])
 
     def error(self) -> WalkerlabError:
-        """What is to be raised at the edge if points were not computed; the others are stored."""
+        """Return the error for points that were not computed; the others are stored."""
         said = f"{self.failed} of {len(self.question)} points were not computed"
         why = f"`reason` in {self.path} says why."
         if not self.bugs:
@@ -111,12 +113,12 @@ class Swept:
 
 @dataclass(frozen=True)
 class Foreseen:
-    """What a sweep would do.
+    """Plan of a sweep.
 
-    points     in words, the first of them
-    count      how many points there are
-    there      of these, how many have a result already
-    estimate_s time for the rest, s; None if nothing is known of such points
+    points     descriptions of the first points
+    count      number of points
+    there      number of points with a stored result
+    estimate_s time for the rest, s; None if no such point was timed
     """
 
     path: Path
@@ -127,7 +129,7 @@ class Foreseen:
 
 
 class SweepRun:
-    """One question, its points checked."""
+    """A sweep whose points are all valid."""
 
     def __init__(self, question: SweptStage, loaded: LoadedConfig, folder: RunFolder, graph: Graph = PIPELINE) -> None:
         """Check every point by the schema.
@@ -140,7 +142,7 @@ class SweepRun:
         keys = np.frombuffer(b"".join(self.checked_keys()), dtype="S32")
         unique, self.inverse = np.unique(keys, return_inverse=True)
         self.places = {key.ljust(32, b"\0").hex(): place for place, key in enumerate(unique.tolist())}
-        # any one of the points that have a result will do to compute it
+        # first of the points that share a key
         self.first = np.full(len(unique), len(keys))
         np.minimum.at(self.first, self.inverse, np.arange(len(keys)))
         over = {axis.key: list(axis.values) for axis in question.axes}
@@ -150,13 +152,13 @@ class SweepRun:
         self.path = folder.path / f"sweep-{question.stage}-{'-'.join(question.names)[:60]}-{digest}.h5"
 
     def config(self, index: int) -> Config:
-        """One point's config, made when it is asked for: a million are never held at once; ConfigError if none."""
+        """Build one point's config, on demand since a sweep may have a million points."""
         return self.loaded.variant(self.question.settings(index))
 
     def checked_keys(self) -> list[bytes]:
-        """The stage key of every point (32 bytes each), in order.
+        """Return the stage key of every point (32 bytes each), in order.
 
-        Raises ConfigError that names the points that are no configs, with their values, each reason once.
+        Raises ConfigError that names the invalid points with their values, each reason once.
         """
         found: list[bytes] = []
         problems: dict[str, str] = {}
@@ -174,18 +176,18 @@ class SweepRun:
         return found
 
     def unread(self) -> Iterator[str]:
-        """The parameters that the stage and what it needs do not read: all of their values give one result."""
+        """Iterate over parameters that neither the stage nor its inputs read."""
         base = self.keys.of(self.config(0), self.question.stage)
         for number, axis in enumerate(self.question.axes):
             settings = self.question.settings(0)
             settings[number] = axis.setting(len(axis.values) - 1)
             if axis.values[-1] != axis.values[0]:
-                with contextlib.suppress(ConfigError):  # that corner is no config
+                with contextlib.suppress(ConfigError):  # that corner is invalid
                     if self.keys.of(self.loaded.variant(settings), self.question.stage) == base:
                         yield axis.key
 
     def foresee(self, workers: int, shown: int) -> Foreseen:
-        """What would be done; touches nothing. Raises ConfigError as `run` would."""
+        """Return the plan without changing a file; raises ConfigError as `run` does."""
         refuse_another_config(self.folder, self.loaded.config)
         there = np.zeros(len(self.places), bool)
         rows: list[PointResult] = []
@@ -202,7 +204,7 @@ class SweepRun:
         return Foreseen(self.path, said, count, int(there[self.inverse].sum()), estimate)
 
     def run(self, work: SweepWork, reporter: Reporter | None = None) -> Swept:
-        """Have the sweep's file, computing the points that have no result yet.
+        """Compute the points without a stored result and write the sweep's file.
 
         Raises ConfigError if the folder holds results of another config, LockedError (only without `wait`),
         StorageError, and NoAnswer if no worker lives.
@@ -240,17 +242,16 @@ class SweepRun:
 
     @property
     def code_digest(self) -> str:
-        """The digest of the stage's code."""
+        """Digest of the stage's code."""
         return self.keys.code_digest(self.question.stage)
 
     def _stored(self, warn: Callable[[str], None]) -> Iterator[Chunk]:
-        """What is stored of the wanted results under the same folder of runs."""
         return stored_chunks(self.folder.runs_dir, self.question.stage, self.code_digest, self.places, warn)
 
     def _compute(
         self, merge: Merge, work: SweepWork, reporter: Reporter, progress: Progress, begun: provenance.Provenance
     ) -> tuple[str, ...]:
-        """Compute what is missing; the tracebacks of bugs, one for each place in the code, which are told at once."""
+        """Compute the missing points; return tracebacks of bugs, one for each place in the code."""
         missing = np.sort(self.first[~merge.there])
         if not missing.size:
             return ()
@@ -264,7 +265,7 @@ class SweepRun:
             if any(row.status == "answered" for row in chunk.rows):
                 work.check(merge.numbers)
             for bug in (row.bug for row in chunk.rows if row.bug):
-                place = bug.rpartition("\n  ")[0]  # without what it says there, which differs from point to point
+                place = bug.rpartition("\n  ")[0]  # without the message, which differs from point to point
                 if place not in bugs:
                     reporter.warn(f"a bug stopped a point of the sweep; the others go on.\n{bug}")
                     bugs[place] = bug
@@ -274,19 +275,20 @@ class SweepRun:
             why = f"its worker died: {type(error).__name__}: {error}"
             keep(Chunk((PointResult(unit.name, "failed", why),), {}))
 
-        todo, chunk_s = self._units(missing.tolist(), work.graph), work.chunk_s or work.engine.chunk_s
-        spread = Spread(todo, int(missing.size), lambda _units, points: keep(joined(points)), give_up, chunk_s)
+        todo, chunk_s = self._units(missing.tolist(), work), work.chunk_s or work.engine.chunk_s
+        spread = Spread(todo, int(missing.size), lambda _units, points: keep(join_points(points)), give_up, chunk_s)
         with work.engine.opened(work.order) as pool:
             spread.run(pool.executor, pool.workers)
         return tuple(bugs.values())
 
-    def _units(self, indices: list[int], graph: str) -> Iterator[WorkUnit]:
-        """Points to compute; of a sample of all points walks are taken again."""
-        stage = self.question.stage
+    def _units(self, indices: list[int], work: SweepWork) -> Iterator[WorkUnit]:
+        """Iterate over the points to compute; walks of a sample are repeated for their numerical error."""
+        stage, forced = self.question.stage, token_hex() if work.force else ""
         sample = set(np.sort(self.first)[evenly_spread(self.first.size, SAMPLE)].tolist())
         for index in indices:
             config = self.config(index)
-            yield unit_of(config, self.keys.of(config, stage)[stage], graph, stage, index in sample)
+            key = self.keys.of(config, stage)[stage]
+            yield WorkUnit(key, 1, partial(compute_point, config, key, work.graph, stage, index in sample, forced))
 
 
 def refuse_unknown_stage(name: str, graph: Graph) -> None:
@@ -297,6 +299,6 @@ def refuse_unknown_stage(name: str, graph: Graph) -> None:
 
 
 def modules_of(stage: str, config: Any, graph: Graph) -> tuple[str, ...]:
-    """The modules that computing a stage takes; ConfigError for a stage that cannot be swept."""
+    """Return the modules needed to compute a stage; raises ConfigError for a stage that cannot be swept."""
     refuse_unknown_stage(stage, graph)
     return tuple(one.module for one in graph.needed_for(stage, config))

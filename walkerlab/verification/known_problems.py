@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import asdict
 
 from walkerlab.labels import labels_of
-from walkerlab.pipeline.progress import Progress, each_told
+from walkerlab.pipeline.progress import Progress, track
 from walkerlab.store.columns import rows_group
 from walkerlab.store.content import Content
 from walkerlab.verification.known import PROBLEMS, Known
@@ -13,7 +13,7 @@ from walkerlab.verification.known import PROBLEMS, Known
 def run(_config: object, _inputs: Mapping[str, Content], progress: Progress) -> Content:
     """Answer every problem; an answer that is wrong is kept, and `stability` tells."""
     rows = []
-    for problem in each_told(progress, "known problems", len(PROBLEMS), PROBLEMS):
+    for problem in track(progress, "known problems", len(PROBLEMS), PROBLEMS):
         known = problem()
         rows.append({**asdict(known), "error": known.error, "ok": known.ok})
     right = sum(row["ok"] for row in rows)

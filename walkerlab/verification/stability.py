@@ -7,7 +7,7 @@ from typing import Any, TypeGuard
 from walkerlab.config.reads import CompassCasesConfig, SceneCasesConfig, WalksConfig, keys_of
 from walkerlab.config.schema import Config
 from walkerlab.labels import labels_of
-from walkerlab.pipeline.progress import Progress, each_told
+from walkerlab.pipeline.progress import Progress, track
 from walkerlab.scene.contact import scene_on_pads
 from walkerlab.scene.studies import is_studied
 from walkerlab.stages.walk import rigid_start
@@ -37,7 +37,7 @@ def run(
         cells = [*(CaseCell(*case) for case in own), *map(CaseCell, config.stability.cases)]
     else:
         cells = [*map(CaseCell, judged(config.stability.cases))]
-    every = each_told(progress, "stability", len(cells), run_cells(cells, jobs))
+    every = track(progress, "stability", len(cells), run_cells(cells, jobs))
     found: list[CaseResult | Choice] = [result for results in every for result in results]
     cases = [item for item in found if isinstance(item, CaseResult)]
     known = inputs["known-problems"]

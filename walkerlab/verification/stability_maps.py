@@ -9,7 +9,7 @@ from walkerlab.config.reads import MapsConfig
 from walkerlab.outcome import Outcome
 from walkerlab.pipeline.progress import Progress
 from walkerlab.pipeline.work import WorkUnit, complete
-from walkerlab.stages.walk import OUTCOMES, counted
+from walkerlab.stages.walk import OUTCOMES, count_outcomes
 from walkerlab.store.checkpoint import Checkpoint
 from walkerlab.store.content import Content, Group, Variable
 from walkerlab.verification import maps
@@ -89,7 +89,7 @@ def summary_of(stiction: Group, step: Group) -> dict[str, Any]:
     verdicts, times = np.unique(step["verdict"], return_counts=True)
     return {
         "cells": int(stiction["outcome"].size + step["verdict"].size),
-        "outcomes": counted(stiction["outcome"]),
+        "outcomes": count_outcomes(stiction["outcome"]),
         "ends_otherwise_sharper": int(np.count_nonzero(stiction["outcome"] != stiction["sharper_outcome"])),
         "largest_error": float(errors.max()) if errors.size else None,
         "median_error": float(np.median(errors)) if errors.size else None,

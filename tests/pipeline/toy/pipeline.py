@@ -1,6 +1,6 @@
 """The graph."""
 
-from walkerlab.pipeline.graph import Graph, Stage, results_of
+from walkerlab.pipeline.graph import STRIDES, Graph, Stage, results_of
 
 
 def keys(*names):
@@ -15,10 +15,10 @@ def drop_unless_start_is_given(config):
 ROLLS = keys("gravity_m_s2", "start", "strides")
 GRAPH = Graph(
     Stage("drop", "toy.drop", "Drop a stone.", keys("gravity_m_s2", "slope_rad")),
-    Stage("roll", "toy.roll", "Roll on.", ROLLS, drop_unless_start_is_given, walks=True),
-    Stage("bounce", "toy.bounce", "Bounce.", keys("contact"), results_of("drop"), needs_contact=True),
+    Stage("roll", "toy.roll", "Roll on.", ROLLS, drop_unless_start_is_given, options=(STRIDES,)),
+    Stage("bounce", "toy.bounce", "Bounce.", keys("contact"), results_of("drop"), requires=("contact",)),
     Stage("survey", "toy.survey", "Time it.", keys("seed")),
-    Stage("census", "toy.census", "Count the stones.", keys("seed"), campaign_of="survey"),
+    Stage("census", "toy.census", "Count the stones.", keys("seed"), only_by="survey --full"),
     Stage(
         "picture",
         "toy.picture",
@@ -26,7 +26,7 @@ GRAPH = Graph(
         keys("name"),
         results_of("drop", "roll", "bounce"),
         if_current=("survey",),
-        draws=True,
+        work="draws",
     ),
     Stage(
         "page",
@@ -35,6 +35,6 @@ GRAPH = Graph(
         keys("name"),
         results_of("drop", "roll", "bounce", "survey", "picture"),
         if_current=("census",),
-        draws=True,
+        work="draws",
     ),
 )

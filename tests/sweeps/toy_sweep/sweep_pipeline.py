@@ -1,6 +1,6 @@
 """The graph."""
 
-from walkerlab.pipeline.graph import Graph, Stage, results_of
+from walkerlab.pipeline.graph import STRIDES, Graph, Stage, results_of
 
 
 def keys(*names):
@@ -10,8 +10,8 @@ def keys(*names):
 
 GRAPH = Graph(
     Stage("drop", "toy_sweep.falling_stone", "Drop a stone.", keys("gravity_m_s2", "slope_rad", "walker")),
-    Stage("roll", "toy_sweep.rolling_stone", "Roll on.", keys("strides"), results_of("drop"), walks=True),
+    Stage("roll", "toy_sweep.rolling_stone", "Roll on.", keys("strides"), results_of("drop"), options=(STRIDES,)),
     Stage("deadly", "toy_sweep.deadly", "End the worker.", keys("seed")),
     Stage("count", "toy_sweep.counting", "Count in parts.", keys("seed")),
-    Stage("picture", "toy_sweep.falling_stone", "Draw it.", keys("name"), draws=True),
+    Stage("picture", "toy_sweep.falling_stone", "Draw it.", keys("name"), work="draws"),
 )
