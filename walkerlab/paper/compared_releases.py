@@ -1,7 +1,7 @@
-"""What the release of the trailing knee decides: two contact walks from one gait that differ in its instant alone.
+"""Contact walks from one gait that differ only in when the trailing knee is released.
 
-Beside each the rigid model with the rule that it stands for: released in the compression the trailing knee is rigid in
-the impact, released at first touch it is free.
+Each is compared with the corresponding rigid model: released during compression the trailing knee is rigid in the
+impact, released at first touch it is free.
 """
 
 from dataclasses import replace
@@ -33,10 +33,10 @@ LEFT_OUT = (
 
 
 def compare_releases(config: ContactConfig, state: State, pitch_m: float) -> dict[str, Any] | None:
-    """Up to 20 steps from a gait with each instant of release; None without knees, or where these wait for a push-off.
+    """Walk up to 20 steps from a gait with each release; None without knees, or if they wait for a push-off.
 
     state    of the rigid model
-    pitch_m  what lengths are measured by
+    pitch_m  unit of lengths
     """
     scene = contact_scene(config, pitch_m, pitch_m)
     if not scene.walker.kneed or config.push_off.impulse_N_s != 0.0:
@@ -54,7 +54,7 @@ def compare_releases(config: ContactConfig, state: State, pitch_m: float) -> dic
 
 
 def told(scene: ContactScene, walk: ContactWalkResult) -> dict[str, Any]:
-    """How a walk ended, its last step, how long into it the knee locked, and what a step dissipates by channel."""
+    """Summarise a walk: outcome, last step, knee strike, and dissipation per step by channel."""
     steps, lost = walk.steps, by_channel(scene.walker, walk.dissipated_J)
     return {
         "outcome": walk.outcome.label,

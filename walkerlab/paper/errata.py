@@ -1,4 +1,4 @@
-"""The errata of the paper, each with its evidence and what was measured for it; see `study` for the measuring."""
+"""Errata of the paper, with evidence and measurements (made in `study`)."""
 
 import re
 from dataclasses import dataclass, fields
@@ -26,5 +26,5 @@ ERRATUM = re.compile(" ".join(rf"{name}: (?P<{name}>.*?)" for name in PARTS) + r
 
 
 def errata(study: PaperStudy) -> tuple[Erratum, ...]:
-    """All of them, in the order of the paper's sections within each theme."""
+    """All errata, by theme and then in the order of the paper's sections."""
     return tuple(Erratum(**found.groupdict()) for found in ERRATUM.finditer(prose("errata.errata", study)))

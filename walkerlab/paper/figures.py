@@ -1,4 +1,4 @@
-"""Figures that show the paper's claim: 8, how far both models' walks are apart, and 12, the rigid limit."""
+"""Figures on the paper's claim: 8, the difference between both models' walks, and 12, the rigid limit."""
 
 from __future__ import annotations
 
@@ -46,9 +46,9 @@ ALIGNED_ERRORS = Need(
 
 
 def draw_differences(results: Results) -> Drawn:
-    """A row for each leg's angle and angular velocity, on logarithmic scales, over the rigid walk's steps.
+    """Plot the errors of each leg's angle and angular velocity over the rigid walk's steps, on logarithmic scales.
 
-    Caption: the largest errors of all that was compared, in both ways, and the paper's.
+    The caption gets the largest errors in time and in phase, and the paper's.
     """
     (rigid,), _ = shown([walk_of(results[RIGID_STAGE], RIGID)])
     raw, aligned = (results[COMPARE_STAGE][need.group] for need in (RAW_ERRORS, ALIGNED_ERRORS))
@@ -95,9 +95,9 @@ LEAST = 1e-14
 
 
 def draw_limit(results: Results) -> Drawn:
-    """Errors over run time, one setting a point, from the config's contact to the most rigid one.
+    """Plot errors over run time, one point per setting, from the config's contact to the most rigid one.
 
-    Caption: what both amount to, with point feet besides, the paper's claim, and whether the walker pushes off.
+    The caption gets the totals, also with point feet, the paper's claim, and whether the walker pushes off.
     """
     figure, claimed = blank(3.6), bool(claims_in(results))
     # feet that roll in both models too are not made points as well

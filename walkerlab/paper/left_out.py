@@ -1,4 +1,4 @@
-"""What the paper's adjustment does without under a config; known before anything is loaded or run."""
+"""Parts of the paper's adjustment that a config leaves out, known before anything is loaded or run."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ PAPERS = "it is the paper's procedure with its compass"
 
 
 def of_adjustment(config: RigidConfig) -> tuple[Entry, ...]:
-    """Return what the adjustment of another walker than the paper's compass does without."""
+    """Return the omissions for a walker other than the paper's compass."""
     entries = []
     if not is_passive_compass(config):
         entries.append(left_out("the first step with a hinged stance foot", PAPERS, "two walks"))

@@ -1,4 +1,4 @@
-"""What the rigid limit takes, and which part of the contact makes which part of the difference: of `tune`."""
+"""Part of `tune`: the approach to the rigid limit, and the share of each contact property in the difference."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -73,7 +73,7 @@ OF_WALKS = {
 class LimitFindings:
     """Distances by series, and the limit without creep.
 
-    walked  the series of which whole walks are compared too
+    walked  series in which whole walks are compared too
     """
 
     walked: tuple[str, ...]
@@ -91,7 +91,7 @@ def limit_findings(
     walk: RigidWalkResult,
     progress: Progress,
 ) -> LimitFindings | None:
-    """Lead the contact towards the rigid limit; None if the rigid start's walk has no samples or no step.
+    """Take the contact to the rigid limit; None if the rigid walk has no samples or no step.
 
     rigid_gait  summary of `fixedpoint`
     walk        of the rigid model from the start
@@ -136,7 +136,7 @@ def limit_findings(
 
 
 def limit_summary(found: LimitFindings) -> dict[str, Any]:
-    """Orders of convergence, what the paper's claim of 1e-4 rad takes, and what each cause amounts to."""
+    """Orders of convergence, the settings that reach the paper's 1e-4 rad, and the share of each cause."""
     reaches = {}
     for name in found.walked:
         walked = [one for one in found.series[name] if one.angle is not None]
@@ -151,16 +151,16 @@ def limit_summary(found: LimitFindings) -> dict[str, Any]:
 
 
 def setting(one: Distance) -> dict[str, Any]:
-    """A setting and how far it is from the rigid walk."""
+    """A setting and its distance from the rigid walk."""
     differences = ("period_error", "angle", "velocity", "raw_angle", "numerical_time")
     labels = {name: (DISTANCES | OF_WALKS)[name] for name in differences}
     return {**printed(one.setting, FACTORS), **printed(one, labels), "run_wall_s": one.wall_s}
 
 
 def causes(found: LimitFindings) -> dict[str, Any]:
-    """Parts of the difference in period, each from switching one thing off while the others stay.
+    """Difference in period by cause, each found by switching off one property while the others stay.
 
-    What is left is what they do together, and creep too where its limit was not reached.
+    The rest is their joint effect, and also that of creep where its limit was not reached.
     """
     total = found.contact_period - found.rigid_period
     farthest = found.series[found.walked[-1]]
@@ -181,7 +181,7 @@ def causes(found: LimitFindings) -> dict[str, Any]:
 
 
 def limit_groups(found: LimitFindings) -> dict[str, Group]:
-    """One group a series: its settings and distances, and those of whole walks if any were compared."""
+    """One group per series: its settings and distances, and those of whole walks where compared."""
     groups = {}
     for name, rows in found.series.items():
         whole = [one for one in rows if one.angle is not None and name in found.walked]

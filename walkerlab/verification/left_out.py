@@ -1,4 +1,4 @@
-"""What the verification does without under a config; known before anything is loaded or run."""
+"""Parts of the verification that a config leaves out, known before anything is loaded or run."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 def of_verification(config: CompassCasesConfig | SceneCasesConfig) -> tuple[Entry, ...]:
-    """Return what the verification of another walker than the paper's compass does without."""
+    """Return the omissions for a walker other than the paper's compass."""
     if is_studied(config):
         return ()
     return (

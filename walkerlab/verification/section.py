@@ -1,4 +1,4 @@
-"""How extreme cases end, what known problems come to, and what ordinary methods make of the same scenes."""
+"""Report section on extreme cases, known problems and ordinary methods."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -21,7 +21,7 @@ Rows = Sequence[Row]
 
 @of_stage("stability")
 def section(results: Results, summary: Row) -> Section | None:
-    """The stability table; None if the stage did not run."""
+    """Build the section; None if the stage did not run."""
     cases, known = summary["cases"], summary["known"]
     unanswered = [{**row, "why": row["second_tried"]} for row in cases if row["second_tried"]]
     missed = [{**row, "why": f"{one['measure']}: {one['why']}"} for row in cases for one in row["not_measured"]]
@@ -42,29 +42,28 @@ def section(results: Results, summary: Row) -> Section | None:
 
 
 def finding(summary: Row) -> str:
-    """How many came out as expected, and how many of these have no answer."""
+    """State how many cases ended as expected, and how many of these have no answer."""
     return words("stability.finding", summary, len([row for row in summary["cases"] if row["ok"] and gave_up(row)]))
 
 
 def gave_up(row: Row) -> bool:
-    """Whether a case ended without an answer."""
     outcome = outcome_of(row["outcome"])
     return outcome is not None and not outcome.answered
 
 
 def ending(row: Row) -> Cell:
-    """How a case ended: green only for an answer that came out as expected."""
+    """Outcome of a case, green only for an expected answer."""
     return Cell(row["outcome"], ("fair" if gave_up(row) else "good") if row["ok"] else "bad")
 
 
 def failures(summary: Row) -> list[str]:
-    """What did not, a paragraph each."""
+    """Describe each failure in a paragraph."""
     failed = [words("stability.failed_case", one) for one in summary["cases"] if not one["ok"]]
     return failed + [words("stability.failed_problem", one) for one in summary["known"] if not one["ok"]]
 
 
 def worst_measure(row: Row) -> float | None:
-    """The largest of a case's measures but its use of the budget, each over its limit."""
+    """Largest ratio of a measure to its limit, apart from the budget's."""
     judged = [one for one in row["measures"] if one["limit"] > 0.0 and one["measure"] != BUDGET_USED]
     return max((one["value"] / one["limit"] for one in judged), default=None)
 
@@ -82,12 +81,12 @@ CASE_COLUMNS = (
 
 
 def by_reason(cases: Rows) -> str:
-    """Each reason once, with the cases that it holds for."""
+    """List each reason with the cases that share it."""
     return "; ".join(f"{why} ({', '.join(row['name'] for row in rows)})" for why, rows in grouped(cases, "why").items())
 
 
 def family_table(cases: Rows) -> Table:
-    """How many cases of each family ended how."""
+    """Count the outcomes in each family of cases."""
     counted = Counter((case["family"], case["outcome"]) for case in cases)
     return table("", [Column("family"), Column("outcome"), Column("cases")], [(*key, n) for key, n in counted.items()])
 
@@ -103,7 +102,7 @@ KNOWN_COLUMNS = (
 
 
 def ordinary_table(summary: Row) -> Table:
-    """What ordinary methods do with the cases: one row a case, one column a method."""
+    """Table of ordinary methods: one row per case, one column per method."""
     methods = [
         Column(method.removeprefix("SciPy ").removeprefix("semi-implicit "), method, ordinary_cell)
         for method in grouped(summary["ordinary"], "method")
@@ -115,7 +114,6 @@ def ordinary_table(summary: Row) -> Table:
 
 
 def ordinary_cell(row: Row | None) -> Cell:
-    """A method's verdict with error and run time."""
     if row is None:
         return Cell("")
     error = f" {number(row['error'], 2)}," if "error" in row else ""
@@ -123,5 +121,5 @@ def ordinary_cell(row: Row | None) -> Cell:
 
 
 def answer(summary: Row) -> list[str | Table]:
-    """Answer how many cases ended as they should, and which did not."""
+    """Report how many cases ended as expected, and which did not."""
     return [finding(summary), family_table(summary["cases"]), *failures(summary)]
