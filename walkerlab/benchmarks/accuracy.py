@@ -24,8 +24,8 @@ LEVELS = (1e-3, 1e-6, 1e-9)
 RIGID_STEPS, CONTACT_STEPS, NEAR_RIGID_STEPS = 10, 10, 4
 OTHERS_CONTACT_STEPS = 4  # of other walkers than the compass, whose right-hand side is several times as long
 LESS = (
-    {"what": "accuracy of the scene contact-near-rigid", "why": "it is measured on the compass", "saves": "a minute"},
-    {"what": "libraries' longest runs on the contact model", "why": "they are in Python", "saves": "minutes"},
+    {"what": "accuracy of the scene contact-near-rigid", "why": "only the compass has it", "saves": "a minute"},
+    {"what": "libraries' longest runs on the contact model", "why": "they run in Python", "saves": "minutes"},
 )
 OFF_THE_GAIT = 0.98  # of the gait's angular velocities, so that no step repeats the one before
 
@@ -72,7 +72,7 @@ def run(config: SceneConfig, inputs: Mapping[str, Content], progress: Progress, 
 
 
 def without(trial: Trial, why: WalkEndsError) -> dict[str, Any]:
-    start = f"from {OFF_THE_GAIT} of the start's velocities " if isinstance(trial, RigidTrial) else ""
+    start = f"started with velocities scaled by {OFF_THE_GAIT}, " if isinstance(trial, RigidTrial) else ""
     return {"what": f"accuracy of the scene {trial.name}", "why": f"{start}{why}"}
 
 

@@ -11,7 +11,7 @@ def hinge_left_out(config: ContactConfig, measured: str) -> list[dict[str, str]]
     """Return an omission entry if the config hinges the first step: measured walks are free from the start."""
     if config.contact is None or config.contact.stance != "pinned":
         return []
-    return [{"what": "hinged first step", "why": f"{measured} are measured on a walk that is free from its start"}]
+    return [{"what": "hinged first step", "why": f"{measured} are measured on a walk without a hinge"}]
 
 
 def environment() -> dict[str, Any]:

@@ -125,7 +125,7 @@ def entries(every: Sequence[Series], floor: float) -> list[Line2D]:
     found = [one.key for one in every]
     if not all(one.runs["reached"].all() for one in every):
         found.append(entry("end not reached", color=BLACK, linestyle="none", marker="x", markersize=5.0))
-    return [*found, entry(f"reference unsure, {floor:.0e}", color=PALE, linewidth=6.0)]
+    return [*found, entry(f"reference uncertainty {floor:.0e}", color=PALE, linewidth=6.0)]
 
 
 ENGINES_STAGE, ENGINE_RUNS = "engines", "rows"
@@ -202,11 +202,11 @@ def draw_periods(scene: str, results: Results) -> Drawn:
 
 SCENES = ("rigid", "contact", "contact-near-rigid")
 MEASURED = {
-    scene: Need("accuracy", f"{scene}/rows", METHOD_VARIABLES, f"it did not measure the scene {scene}")
+    scene: Need("accuracy", f"{scene}/rows", METHOD_VARIABLES, f"the scene {scene} was not measured")
     for scene in SCENES
 }
 WALKED = {
-    scene: Need(ENGINES_STAGE, ENGINE_RUNS, ENGINE_VARIABLES, f"it did not walk the scene {scene}", scene)
+    scene: Need(ENGINES_STAGE, ENGINE_RUNS, ENGINE_VARIABLES, f"the scene {scene} was not walked", scene)
     for scene in ("compass", "kneed")
 }
 FIGURES = tuple(

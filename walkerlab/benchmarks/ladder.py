@@ -164,7 +164,7 @@ def left_of(one: Ascent) -> list[dict[str, Any]]:
         why = f"more than {SHORT} right-hand sides, each in Python"
     else:
         last = one.runs[-1]
-        why = f"{last.result.outcome} with {last.result.rhs_evaluations} right-hand sides at {last.tolerance:g} already"
+        why = f"already {last.result.outcome} with {last.result.rhs_evaluations} right-hand sides at {last.tolerance:g}"
     return [
         {"scene": one.trial.name, "method": one.method, "tolerance": rtol, "why": why}
         for rtol in one.ladder[len(one.runs) :]

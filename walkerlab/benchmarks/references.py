@@ -111,8 +111,8 @@ def tightest(trial: Trial, method: str) -> End:
     tolerances = TIGHTEST_RIGID if isinstance(trial, RigidTrial) else TIGHTEST
     result = trial.prepare(method, tolerances[method], BUDGET)()
     if result.outcome == Outcome.BUDGET_EXHAUSTED.label:
-        why = f"{method} at {tolerances[method]:g} does not reach its end within {BUDGET // 1_000_000} million"
-        raise WalkEndsError(f"{why} right-hand sides, so that nothing tells how well its end is known")
+        why = f"{method} at {tolerances[method]:g} does not reach the end within {BUDGET // 1_000_000} million"
+        raise WalkEndsError(f"{why} right-hand sides, so the reference has no error estimate")
     if not result.state.size:
-        raise WalkEndsError(f"the walk ends early ({result.outcome}), so that there is no end state to compare")
+        raise WalkEndsError(f"the walk ends early ({result.outcome}), without an end state to compare")
     return End(method, result.state, tolerances[method], result.rhs_evaluations)

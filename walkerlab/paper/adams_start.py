@@ -19,7 +19,7 @@ from walkerlab.paper.printed import adams_start_as_printed
 from walkerlab.paper.prose import prose
 from walkerlab.solvers.system import State
 
-FALLING = 4  # samples, between which a falling hip's height is a cubic
+FALLING = 4  # samples through which a falling hip's height is fitted as a cubic
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,7 @@ def adams_start(walker: Standing, state: State) -> AdamsStart:
     assert walk.samples is not None
     time, states, start = walk.samples.time_s, walk.samples.state, np.array([state])
     end = float(time[-1])
-    if walk.outcome is Outcome.FELL:  # a fall lies behind the last sample, and is found by inverse interpolation
+    if walk.outcome is Outcome.FELL:  # the fall comes after the last sample, so extrapolate
         hip = np.cos(states[-FALLING:, 1] + walker.slope) - FALLEN_HIP
         end = float(np.polynomial.Polynomial.fit(hip, time[-FALLING:], FALLING - 1)(0.0))
     return AdamsStart(

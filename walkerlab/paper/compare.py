@@ -42,7 +42,7 @@ MOVED = 1e-6  # rad and rad/s: a start this far from the fixed point is another 
 EQUATION_SETS: tuple[Equations, ...] = ("as-printed", "corrected")
 NOT_THE_PAPERS = {
     "what": "the paper's numbers, tables and errata",
-    "why": "they are of the paper's own walker, on even ground",
+    "why": "they apply only to the paper's walker on even ground",
 }
 WAYS = ("raw", "aligned", "between_impacts", "settled")
 LARGEST: dict[str, comparison.Quantity] = {"max_angle_error_rad": "angle", "max_velocity_error_rad_s": "velocity"}
@@ -54,10 +54,10 @@ MODELS = {
 }
 MEANINGS = {
     **MODELS,
-    "quantity": "what it is",
-    "unit": "unit of the row's numbers",
-    "where": "where the paper has it",
-    "paper": "as the paper has it",
+    "quantity": "quantity",
+    "unit": "unit of the row's values",
+    "where": "location in the paper",
+    "paper": "in the paper",
     "used": "as used here",
     "paper_matlab": "the paper's MATLAB model",
     "paper_adams": "the paper's MSC ADAMS model",
@@ -69,9 +69,9 @@ MEANINGS = {
     "percent_of_adams": "difference in percent of the ADAMS value",
     "printed": "as printed",
     "verdict": ", ".join(NumberVerdict),
-    "evidence": "why",
+    "evidence": "evidence",
 }
-"""Columns of the paper's numbers and tables."""
+"""Long names of the columns in the paper's numbers and tables."""
 
 
 def run(config: CompareConfig, inputs: Mapping[str, Content], progress: Progress) -> Content:
@@ -187,15 +187,15 @@ class Comparison:
 def compare_motion(rigid: comparison.Motion | None, contact: comparison.Motion | None) -> Comparison:
     """Subtract the rigid walk from the contact walk: in time, in phase, and as orbits."""
     if rigid is None or contact is None:
-        why = "no record of both walks: outputs does not ask for states, or a walk ended at once"
+        why = "there are no states of both walks: outputs omits them, or a walk ended at once"
         return Comparison({}, left_out=({"what": "differences of the walks", "why": why},))
     steps, orbit = min(rigid.steps, contact.steps), None
     time, raw = comparison.difference_in_time(contact, rigid)
     found = {"raw": raw}
     groups = {"errors": Group({**over_time(time=time), **legs(), **differences("raw", raw, (TIME, LEG), "time")})}
-    missing = ("differences in phase, and of the orbits", "step")
+    missing = ("differences in phase and between the orbits", "step")
     if steps:
-        missing = ("difference of the last stride, and of the orbits", "stride")
+        missing = ("differences of the last stride and between the orbits", "stride")
         phases = np.linspace(0.0, 1.0, comparison.PHASES)
         aligned = comparison.difference_in_phase(contact, rigid, phases)
         smooth = comparison.between_impacts(contact, rigid, phases)
@@ -290,10 +290,10 @@ def left_out(inputs: Mapping[str, Content], measured: Measured) -> list[dict[str
     ]
     contact = measured.contact
     if contact.table_3.t_cycle is None:
-        why = f"the walk ended after {contact.steps} of the two steps it takes ({contact.outcome})"
+        why = f"a stride takes two steps, but the walk ended after {contact.steps} ({contact.outcome})"
         missing.append({"what": "a stride of the contact model in Table 3", "why": why})
     if contact.table_3.E_avg is None:
-        why = "no step was completed" if contact.steps == 0 else "outputs does not ask for energies"
+        why = "no step was completed" if contact.steps == 0 else "outputs omits energies"
         missing.append({"what": "energy of the contact model", "why": why})
     return missing
 

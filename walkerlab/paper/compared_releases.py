@@ -19,14 +19,14 @@ from walkerlab.solvers.system import State
 from walkerlab.stages.walk import last_step, numbers_of
 
 RELEASES = {"compression": False, "touch": True}
-"""Instants of release, as the config names them, and whether that is the leading foot's first touch."""
-STEPS = 20  # enough for what starts at a gait to come to rest at another one, or to fall
+"""Whether the knee is released at the leading foot's first touch, by the config's name for the release."""
+STEPS = 20  # enough to settle on another gait, or to fall
 RIGID_STEPS = 200
 RIGID, CONTACT = Tolerances("dop853", 1e-8, 1e-10, 2_000_000), Tolerances("radau5", 1e-8, 1e-10, 2_000_000)
 LEFT_OUT = (
     {
         "what": "ideal against compliant lock",
-        "why": "a walk has one of them; `walkerlab contact-sim --set walker.knee.lock=compliant` walks the other",
+        "why": "a walk has one lock; try the other by `walkerlab contact-sim --set walker.knee.lock=compliant`",
         "saves": "compiling the contact walk a second time",
     },
 )

@@ -14,9 +14,9 @@ from walkerlab.paper.printed import X_P, slope_of
 
 PHYSICAL_MODEL_ONLY: Final = ("foot_radius_m",)
 IN_SI: Final = ("stiffness", "damping", *BOUNDS_SI)
-"""Keys of the contact block whose numbers are of either units."""
+"""Keys of the contact block whose values depend on its units."""
 PURE: Final = tuple(name for name in Contact.model_fields if name not in (*IN_SI, "units", "stance"))
-"""Its other keys; a pinned first stance is the paper's too (section 4)."""
+"""Its other keys except `stance`: the paper also has a pinned first stance (section 4)."""
 
 
 def departures(config: CompareConfig, start_moved: bool) -> Departures:

@@ -22,7 +22,7 @@ class Erratum:
 
 PARTS = [field.name for field in fields(Erratum)]
 ERRATUM = re.compile(" ".join(rf"{name}: (?P<{name}>.*?)" for name in PARTS) + r"(?= where: |$)")
-"""An erratum in the text of the template, its parts in their order."""
+"""Matches an erratum in the rendered template."""
 
 
 def errata(study: PaperStudy) -> tuple[Erratum, ...]:

@@ -25,4 +25,4 @@ def as_printed(model: Standing) -> Standing:
 
 
 LAWS: Mapping[str, Callable[[Standing], Standing]] = {"as-printed": as_printed}
-"""By the config's name for a set of equations, what makes a walker move by it."""
+"""Changes of a walker's model, by the config's name for a set of equations."""

@@ -11,7 +11,7 @@ from walkerlab.scene.left_out import Entry, left_out
 if TYPE_CHECKING:
     from walkerlab.config.reads import RigidConfig
 
-PAPERS = "it is the paper's procedure with its compass"
+PAPERS = "the paper uses it for its compass only"
 
 
 def of_adjustment(config: RigidConfig) -> tuple[Entry, ...]:
@@ -20,5 +20,7 @@ def of_adjustment(config: RigidConfig) -> tuple[Entry, ...]:
     if not is_passive_compass(config):
         entries.append(left_out("the first step with a hinged stance foot", PAPERS, "two walks"))
     if not is_own_walker(config):
-        entries.append(left_out("the paper's start of its ADAMS model", "it is of the paper's own compass", "a walk"))
+        entries.append(
+            left_out("the paper's start of its ADAMS model", "only that compass has it", "a walk")
+        )
     return tuple(entries)

@@ -15,7 +15,7 @@ from walkerlab.solvers.registry import ENDLESS, Tolerances
 from walkerlab.solvers.system import State
 
 TIGHT = Tolerances("dop853", 1e-12, 1e-14, ENDLESS)
-"""The error is far below any printed digit."""
+"""Errors are far below any printed digit."""
 CYCLES = 5  # walked in the paper
 ENERGY_STEPS = 5  # over which the paper averages the energy
 
@@ -141,12 +141,12 @@ class ContactModel:
 
 
 Errors = Mapping[str, WalkDifference]
-"""Differences between the contact model and the rigid one, in each way in which there is something to compare:
+"""Differences between the contact and the rigid model, by alignment:
 
 raw              at the same time
 aligned          at the same phase of each step
-between_impacts  of that without the first instants of every step, in which a compliant impact is still under way
-settled          of that the last completed stride only
+between_impacts  the same without the start of each step, while a compliant impact is still in progress
+settled          the same for the last completed stride only
 """
 
 
@@ -164,8 +164,8 @@ class Measured:
 
     walker: RigidWalker
     equations: str
-    models: Mapping[str, RigidModel]  # by set of equations; a set without a gait is absent
-    spectral_radii: Mapping[str, float]  # of the same gaits: largest magnitude of a multiplier
+    models: Mapping[str, RigidModel]  # by set of equations, if it has a gait
+    spectral_radii: Mapping[str, float]  # of the same gaits
     contact: ContactModel
     errors: Errors
     departures: Departures

@@ -118,7 +118,7 @@ TABLE_2: Final = tuple(
         ("dtheta_2", X_P[3], "-3.20", "Table 2, section 4", "+74%"),
     )
 )
-"""Its MATLAB column is x_p; section 4 repeats the percentages of the velocities."""
+"""The MATLAB column is x_p; section 4 repeats the percentages of the velocities."""
 
 
 TABLE_3: Final = tuple(
@@ -147,7 +147,7 @@ DYNAMIC_FRICTION: Final = Printed("section 4, Fig. 4b", "dynamic friction", "1",
 LOST_BALANCE: Final = Printed("section 4", "steps until balance was lost, from MATLAB's initial conditions", "1", "one")
 STRIDES: Final = Printed("section 5, Fig. 7", "gait cycles walked", "1", "five")
 LARGEST_ERROR: Final = Printed("section 5, Fig. 8", "largest error, angles and velocities", "rad, rad/s", "10^-4")
-"""Printed once, for both."""
+"""One value for angles and velocities."""
 STEP_LENGTH: Final = Printed("section 5", "length of one complete step", "m", "0.0342")
 VELOCITY_DIFFERENCE: Final = Printed("section 5", "difference of the average velocities", "%", "less than 1%")
 

@@ -23,11 +23,11 @@ WALKER_PARAMETERS = ("leg_length", "leg_mass", "hip_mass", "gravity")
 class NumberVerdict(StrEnum):
     """Verdict on a printed value; each value has one."""
 
-    INPUT = "input"  # it is used as given
-    REPRODUCED = "reproduced"  # it comes out to the printed digits
-    EXPLAINED = "explained"  # it does not, or not by itself, and what was measured says why
-    CONTRADICTED = "contradicted"  # other values of the paper contradict it, which wins over all other classes
-    NOT_REPRODUCED = "not-reproduced"  # it does not come out; values of ADAMS, which was not run, are among these
+    INPUT = "input"  # used as given
+    REPRODUCED = "reproduced"  # agrees to the printed digits
+    EXPLAINED = "explained"  # does not agree, or not alone, for a measured reason
+    CONTRADICTED = "contradicted"  # by other values of the paper; overrides all other verdicts
+    NOT_REPRODUCED = "not-reproduced"  # does not agree; includes values of ADAMS, which was not run
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class JudgedNumber:
 
 INPUT, REPRODUCED, EXPLAINED, CONTRADICTED, NOT_REPRODUCED = NumberVerdict
 Scene = Literal["rigid", "contact", "any"]
-"""Whose scene has to be the paper's if a mismatch is to count: any, for what the paper's own values decide."""
+"""The model whose scene must be the paper's for a mismatch to count; "any" if the paper's own values decide."""
 
 
 def counted(rows: Iterable[JudgedNumber]) -> dict[str, int]:
@@ -108,7 +108,7 @@ class Judge:
         if (contradiction := contradictions().get(entry)) is not None:
             verdict, scene, evidence = CONTRADICTED, "any", f"{contradiction}. {evidence[:1].upper()}{evidence[1:]}"
         if differs and scene == "any":
-            evidence += f" The verdict is about the paper's own numbers, not about this scene ({differs})."
+            evidence += f" The verdict refers to the paper's own numbers, not to this scene ({differs})."
         elif differs and verdict not in (INPUT, REPRODUCED):
             verdict, evidence = EXPLAINED, f"Not the paper's scene ({differs}): {evidence}"
         about, (as_printed, corrected) = (entry.where, entry.quantity, entry.unit, entry.text), map(rigid.get, SETS)
@@ -220,11 +220,11 @@ class Judge:
         found = {name: getattr(model.table_3, row.name) for name, model in measured.models.items()}
         rigid = {name: value for name, value in found.items() if value is not None}
         contact: float | None = getattr(measured.contact.table_3, row.name)
-        # of the step periods both are told, as they have one cause
+        # both step periods share one cause, so the evidence has both
         names = ("t_left", "t_right") if row in (printed.T_LEFT, printed.T_RIGHT) else (row.name,)
         means = {"five": study.five_steps_energy, "ten": study.from_x_p.E_avg} if row is printed.E_AVG else {}
         taken = [steps for steps, mean in means.items() if row.matlab.agreement(mean)]
-        # an energy that is the mean over another number of steps is explained by the misprint, which does not keep it
+        # an energy that is a mean over another number of steps follows from the misprint, which does not conserve it
         verdict = EXPLAINED if taken else NOT_REPRODUCED
         text = prose("evidence.matlab", row, measured, names, study, taken)
         agrees = any(row.matlab.agreement(value) for value in rigid.values())
@@ -238,7 +238,7 @@ def came_out(agrees: bool) -> NumberVerdict:
 
 
 Table = dict[str, dict[str, Any]]
-"""Rows by name, each with its columns; None where a model has no such value."""
+"""Rows by name, as columns; None where a model has no such value."""
 
 MIDDLE = "section 2: 'in the middle of the legs'"
 

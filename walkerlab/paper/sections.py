@@ -24,12 +24,12 @@ TONES: dict[str, Tone] = {
     "contradicted": "bad",
     "not-reproduced": "plain",
 }
-"""The verdicts on printed values, each of which counts once, and how they are set."""
+"""Verdicts on printed values, and their appearance."""
 
 TEXT = "_text"
-"""Ends the key of a printed number's text."""
+"""Suffix of the key of a printed number's text."""
 BESIDE = {"as_printed": "as printed", "corrected": "corrected", "contact": "contact model"}
-"""What a number of the paper is compared with."""
+"""Columns compared with the paper's numbers."""
 
 
 def numbers(results: Results) -> Section | None:
@@ -116,14 +116,14 @@ def paper_table(caption: str, rows: Mapping[str, Row], note: str) -> Table:
 
 
 PARTS = {"where": "where", "printed": "printed", "right": "right", "evidence": "evidence", "measured": "measured here"}
-"""Variables of the stored errata, and their heads."""
+"""Column heads of the stored errata."""
 ERRATUM_COLUMNS = [Column(head, name, in_signs, wide=name != "where") for name, head in PARTS.items()]
 
 
 def errors(results: Results) -> Section | None:
     rows = errata(results)
     found = table("What is printed, and what is right", ERRATUM_COLUMNS, rows, wordy=True)
-    finding = f"{count(len(rows), 'error')} and gaps of the paper, each with its evidence."
+    finding = f"{count(len(rows), 'error')} and gaps of the paper, with evidence."
     return Section.of("errata", "Errata of the paper", (found,), finding, PAPER)
 
 

@@ -50,17 +50,17 @@ from walkerlab.workers import in_order
 
 RIGID = Tolerances("dop853", 1e-10, 1e-12, ENDLESS)
 AS_IT_STANDS = (1.0, 1.0)
-# walks with knees or rolling feet take several times as long as the compass's: their map and margins are coarser
+# knees or rolling feet make walks several times slower than the compass's, so their map and margins are coarser
 COMPASS_CELLS, CELLS, COARSE = 61, 21, {"step": 0.05, "largest": 2.0}
-WIDER = "Search further: tune.swing_factors, tune.stance_factors, tune.cells; or choose another contact."
+WIDER = "Widen the search (tune.swing_factors, tune.stance_factors, tune.cells) or choose another contact."
 OF_WALK = ("outcome", "advice", "steps", "step_periods_s", "step_lengths_m", "end_time_s")
-"""What is printed of each of the procedure's walks."""
+"""Quantities reported of each walk of the procedure."""
 
 
 def run(config: TuneConfig, inputs: Mapping[str, Content], progress: Progress, jobs: int = 1) -> Content:
     """Adjust the start; that none walks is a result. Raises NoAnswer if the pads need a gait that does not exist."""
     rigid_step, rigid_state = rigid_start(config, inputs)
-    rigid_gait = inputs["fixedpoint"].summary  # the start itself may be far from any gait
+    rigid_gait = inputs["fixedpoint"].summary  # the start may be far from any gait
     gait = contact_gait(config, rigid_step, as_state(rigid_gait["state"]))
     scene = replace(scene_on_pads(config, rigid_step, rigid_state, gait), pinned=False)
     found = TuneRun(config, scene, rigid_state, gait)
@@ -97,7 +97,7 @@ class TuneRun:
         self.printed: dict[str, dict[str, Any]] = {}
         self.margins: list[scaled_starts.Margin] = []
         self.adjusted_state: State | None = None
-        self.paper: AdamsWalk | None = None  # None for another walker than the paper's compass
+        self.paper: AdamsWalk | None = None  # only for the paper's compass
 
     def find(self, progress: Progress, jobs: int) -> None:
         """Walk the procedure, compute map, adjustment and margins, and walk from the paper's start."""
@@ -253,7 +253,7 @@ def gait_summary(found: TuneRun) -> dict[str, Any]:
         **said,
         "state": gait.z.tolist(),
         "state_is": [f"{text} ({unit})" for text, unit in section_coordinates(found.scene)],
-        "section": "the swing foot passes the stance foot: no foot is touching or lifting there",
+        "section": "the swing foot passes the stance foot, where no foot touches or lifts",
         "period_s": step.period_s,
         "step_length_m": step.length_m,
         "multipliers": [[float(value.real), float(value.imag)] for value in gait.multipliers],
@@ -348,11 +348,11 @@ def map_group(found: TuneRun) -> Group:
     """Outcome and steps of both models over the two factors."""
     cells, rigid, swing, stance = found.contact_map, found.rigid_map, "swing_factor", "stance_factor"
     over = {
-        "outcome": (cells.outcome, "how the contact model's walk ended, see attribute outcomes"),
-        "steps": (cells.steps, "steps that the contact model walked"),
+        "outcome": (cells.outcome, "outcome of the contact model's walk, see attribute outcomes"),
+        "steps": (cells.steps, "steps of the contact model"),
         "settled": (cells.settled, "1 if the last step is the contact gait's within two percent"),
-        "rigid_outcome": (rigid.outcome, "how the rigid model's walk ended"),
-        "rigid_steps": (rigid.steps, "steps that the rigid model walked"),
+        "rigid_outcome": (rigid.outcome, "outcome of the rigid model's walk"),
+        "rigid_steps": (rigid.steps, "steps of the rigid model"),
     }
     factor = "factor on the {} leg's initial angular velocity"
     attrs: dict[str, Any] = {"outcomes": OUTCOMES, "steps_wanted": found.steps}

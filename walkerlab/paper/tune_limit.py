@@ -34,9 +34,9 @@ from walkerlab.stages.rigid_groups import leg_variables
 from walkerlab.store.columns import columns, printed, rows_group
 from walkerlab.store.content import Group
 
-FINER = 4  # samples, as many times as contact-sim takes: what is left between them is far below the model error
+FINER = 4  # times the sampling of contact-sim, so that interpolation errors stay far below the model error
 COMPASS_GAITS, GAITS = (STICTION, STIFFNESS, DAMPING, NORMAL), (STICTION, NORMAL)
-OTHERS_EVERY = 3  # of the settings, for other walkers than the compass: their walks take several times as long
+OTHERS_EVERY = 3  # stride through the settings for slower walkers than the compass
 SETTING = "setting"
 FACTORS = {
     "stiffness": Label("1", "factor on the stiffness", name="stiffness_factor"),
@@ -45,13 +45,11 @@ FACTORS = {
 }
 DISTANCES = {
     "period": Label("s", "period of the contact gait", name="period_s"),
-    "length": Label("m", "its step length", name="step_length_m"),
-    "slip": Label("m", "its slip a step", name="slip_m"),
-    "period_error": Label("s", "its period less the rigid gait's", name="period_error_s"),
-    "length_error": Label("m", "its step length less the rigid gait's", name="length_error_m"),
-    "numerical_period": Label(
-        "s", "change of the period with a tolerance ten times tighter", name="numerical_period_s"
-    ),
+    "length": Label("m", "step length of the contact gait", name="step_length_m"),
+    "slip": Label("m", "slip per step of the contact gait", name="slip_m"),
+    "period_error": Label("s", "period of the contact gait minus the rigid gait's", name="period_error_s"),
+    "length_error": Label("m", "step length of the contact gait minus the rigid gait's", name="length_error_m"),
+    "numerical_period": Label("s", "change of the period at a ten times tighter tolerance", name="numerical_period_s"),
 }
 IN_PHASE = "in phase, between impacts"
 OF_WALKS = {
@@ -62,7 +60,7 @@ OF_WALKS = {
         "rad/s", "largest difference of an angular velocity at the same time", name="raw_velocity_error_rad_s"
     ),
     "numerical_time": Label(
-        "s", "change of the last touch with a tolerance a hundred times tighter", name="numerical_time_s"
+        "s", "change of the last touch at a hundred times tighter tolerance", name="numerical_time_s"
     ),
     "evaluations": Label("1", "right-hand sides of the walk", name="rhs_evaluations"),
     "wall_s": Label("s", "processor time of the walk", timing=True),
@@ -112,7 +110,7 @@ def limit_findings(
         scene.ground.frame.pendulum_time / (FINER * SAMPLES_PER_PENDULUM_TIME),
         1 if compass else OTHERS_EVERY,
     )
-    walked = (ALL, ALL_POINT) if isinstance(config.walker, CompassWalker) else (ALL,)  # others roll in both models
+    walked = (ALL, ALL_POINT) if isinstance(config.walker, CompassWalker) else (ALL,)  # other feet roll in both models
     gaits = COMPASS_GAITS if compass else GAITS
     progress.start("tune: rigid limit", len(walked) + len(gaits))
 
@@ -122,7 +120,7 @@ def limit_findings(
     found: dict[str, list[Distance]] = {}
     for name in walked:
         walker = scene.walker
-        if name != ALL:  # points for feet, as the rigid model has them
+        if name != ALL:  # point feet, as in the rigid model
             points, rules = config.walker.model_copy(update={"foot_radius_m": 0.0}), knee_rules(config.walker)
             laws = walker.normal, walker.friction
             walker = contact_walker(assembly_of(points), *laws, config.gravity_m_s2, config.slope_rad, rules)

@@ -16,7 +16,7 @@ def compass(config: RigidConfig, equations: Equations) -> RigidWalker:
     """Return a config's passive compass as a walker of Appendix A; raise ValueError for another walker."""
     walker = config.walker
     if not isinstance(walker, CompassWalker) or walker.torso is not None:
-        raise ValueError(f"a walker of type {walker.type} is none of Appendix A")
+        raise ValueError(f"Appendix A does not describe walkers of type {walker.type}")
     return RigidWalker(
         leg_length=walker.leg_length_m,
         foot_to_mass=walker.foot_to_mass_m,

@@ -18,7 +18,7 @@ from walkerlab.config.walkers import has_knees
 from walkerlab.errors import ConfigError
 
 CATALOGUE: Final = Path(__file__).parent / "catalogue.yaml"
-NAME_OF_ITS_OWN: Final = "Give yours a name of its own."
+NAME_OF_ITS_OWN: Final = "Give each case a unique name."
 SCENE_CATALOGUE: Final = Path(__file__).with_name("scene_catalogue.yaml")
 ENDS: tuple[Fate, ...] = tuple(fate for fate in FATES if fate not in ("budget-exhausted", "solver-failed", "rejected"))
 """The ends that physics may have: where nobody knows which, a case passes by its measures alone."""
@@ -50,7 +50,7 @@ def judged(own: Sequence[Case], catalogue: Sequence[Case] | None = None) -> tupl
     catalogue = shipped() if catalogue is None else catalogue
     taken = {case.name for case in catalogue} & {case.name for case in own}
     if taken:
-        raise ConfigError(f"The catalogue has cases named {', '.join(sorted(taken))}.", NAME_OF_ITS_OWN)
+        raise ConfigError(f"The catalogue already has cases named {', '.join(sorted(taken))}.", NAME_OF_ITS_OWN)
     return (*catalogue, *without_doubles(own))
 
 
@@ -59,7 +59,7 @@ def without_doubles(cases: Sequence[Case]) -> tuple[Case, ...]:
     names = [case.name for case in cases]
     doubled = sorted({name for name in names if names.count(name) > 1})
     if doubled:
-        raise ConfigError(f"More than one case is named {', '.join(doubled)}.", NAME_OF_ITS_OWN)
+        raise ConfigError(f"Several cases are named {', '.join(doubled)}.", NAME_OF_ITS_OWN)
     return tuple(cases)
 
 

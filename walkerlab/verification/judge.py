@@ -66,19 +66,19 @@ def judge(case: Case, config: Config) -> CaseResult:
     about = case.name, case.family, case.model, case.reason, case.expected
     start = prepared(config, case)
     if start is None:
-        return CaseResult(*about, Outcome.REJECTED.label, 0, 0.0, 0, 0.0, (), second_tried="there is no start")
+        return CaseResult(*about, Outcome.REJECTED.label, 0, 0.0, 0, 0.0, (), second_tried="no start exists")
     methods = configured(start, case)
     began = time.perf_counter()
     walk = start.walk(case, methods, sampled=case.steps <= SAMPLED_STEPS)
     wall_s = time.perf_counter() - began
     found: list[Measure | NotMeasured] = [
-        Measure("numbers that are not finite", float(np.count_nonzero(~np.isfinite(walk.numbers))), 0.0),
+        Measure("values that are not finite", float(np.count_nonzero(~np.isfinite(walk.numbers))), 0.0),
         Measure(f"{start.kept} over energy", finite(walk.residual_J / start.energy), case.balance),
         Measure(BUDGET_USED, walk.rhs_evaluations / case.budget, 1.0 + 20.0 / case.budget),
         *start.measures(walk, case),
     ]
     remarks: list[str] = []
-    second = Second("", None, f"the walk itself ended {walk.outcome.label}")
+    second = Second("", None, f"the walk itself ended as {walk.outcome.label}")
     if walk.outcome.answered:
         short = start.again(case)
         second = second_walk(
@@ -124,7 +124,7 @@ def time_difference(what: str, one: JudgedWalk, other: JudgedWalk, case: Case, r
     else:
         apart = abs(one.end - other.end)
     limit = promised(case, rtol, one.accepted + other.accepted)
-    return [Measure(f"time apart from {what}, in pendulum times", finite(apart), limit)]
+    return [Measure(f"difference in time from {what}, in pendulum times", finite(apart), limit)]
 
 
 def others(configured: str) -> tuple[Method, ...]:

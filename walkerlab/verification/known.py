@@ -225,42 +225,42 @@ def painleve_growth_rate() -> float:
 
 PROBLEMS: Final = (
     partial(
-        answered, "bouncing ball", "time from landing to landing, s", bouncing_ball_period,
+        answered, "bouncing ball", "time between landings, s", bouncing_ball_period,
         partial(references.linear_bounce_period, 1.0, SPRING.stiffness, DROP, GRAVITY),
-        "closed form: free flight and half a turn of the spring", 1e-7, "the tolerance asked for, over five bounces",
+        "closed form: free flight and half a period of the spring", 1e-7, "the tolerance, over five bounces",
     ),
     partial(
         answered, "ball dropped on the IMPACT law", "restitution at 0.5 m/s, a hundredth of the paper's damping",
         partial(restitution, LIGHT_LAW, 0.5),
         partial(references.restitution, BLOCK_MASS, 0.5, LIGHT_LAW, GRAVITY),
-        "SciPy DOP853 on the law as its manual writes it", 1e-6, "the tolerance asked for, a thousandfold",
+        "SciPy DOP853 on the law as written in its manual", 1e-6, "a thousand times the tolerance",
     ),
     partial(
         answered, "ball dropped on thicker ground", "restitution at 0.5 m/s, a tenth of the paper's damping",
         partial(restitution, THICK_LAW, 0.5),
         partial(references.restitution, BLOCK_MASS, 0.5, THICK_LAW, GRAVITY),
-        "SciPy DOP853 on the law as its manual writes it", 1e-6, "the tolerance asked for, a thousandfold",
+        "SciPy DOP853 on the law as written in its manual", 1e-6, "a thousand times the tolerance",
     ),
     partial(
         answered, "block on an incline that holds it", "creep speed at 0.2 rad, m/s", partial(block_speed, 0.2, 0.0),
         partial(references.creep_speed, 0.2, PAPER_FRICTION.static, PAPER_FRICTION.stiction_velocity),
-        "root of the friction law's cubic, SciPy brentq", 1e-7, "the tolerance asked for",
+        "root of the friction law's cubic, SciPy brentq", 1e-7, "the tolerance",
     ),
     partial(
-        answered, "block on an incline too steep", "speed at 0.8 rad a second after 2 m/s, m/s",
+        answered, "block on too steep an incline", "speed at 0.8 rad a second after 2 m/s, m/s",
         partial(block_speed, 0.8, 2.0),
         lambda: 2.0 + references.sliding_acceleration(0.8, PAPER_FRICTION.dynamic, GRAVITY),
-        "closed form: g (sin - mu cos)", 1e-7, "the tolerance asked for",
+        "closed form: g (sin - mu cos)", 1e-7, "the tolerance",
     ),
     partial(
         answered, "rimless wheel of eight spokes", "steady speed with a spoke upright at 0.08 rad, rad/s",
         rimless_wheel_speed,
         partial(references.wheel_upright_speed, SPOKES, WHEEL_SLOPE, GRAVITY, HUB_INERTIA),
-        "McGeer 1990: closed form for rigid spokes", 1e-3, "the spokes' ground gives way and creeps a little",
+        "McGeer 1990: closed form for rigid spokes", 1e-3, "the ground under the spokes yields and creeps a little",
     ),
     partial(
-        answered, "Painleve's rod", "rate at which its end digs itself in at friction 4, 1/s", painleve_growth_rate,
+        answered, "Painleve's rod", "rate at which its end digs in at friction 4, 1/s", painleve_growth_rate,
         partial(references.painleve_growth_rate, ROD_ANGLE, ROD_FRICTION, 1.0, ROD_STIFFNESS),
-        "closed form, linearised", 1e-3, "the rod turns a little while it digs",
+        "closed form, linearised", 1e-3, "the rod turns a little as it digs in",
     ),
 )  # fmt: skip

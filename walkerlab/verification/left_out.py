@@ -18,8 +18,8 @@ def of_verification(config: CompassCasesConfig | SceneCasesConfig) -> tuple[Entr
     return (
         left_out(
             "the named extreme cases",
-            "they are the paper's compass's; this walker has its own",
+            "they are cases of the paper's compass; this walker has cases of its own",
             "about a hundred cases",
         ),
-        left_out("ordinary methods on the extreme cases", "they are shown on the paper's compass", "8 runs a case"),
+        left_out("ordinary methods on the extreme cases", "they are tested on the paper's compass", "8 runs per case"),
     )

@@ -25,7 +25,7 @@ from walkerlab.verification.masses import Masses
 from walkerlab.verification.scaling import pendulum_time
 from walkerlab.verification.verdict import MAGNIFIED, Measure, NotMeasured, finite, promised
 
-MEASURE: Final = "momentum not given by ground and gravity, over the walker's"
+MEASURE: Final = "momentum not from ground and gravity, over the walker's"
 STEPS: Final = 2  # so that there is an impact, and what comes of it
 INTERVALS: Final = 256  # to begin with
 PASSES: Final = 9  # each looks four times as closely where it is needed
@@ -56,13 +56,13 @@ def momentum_finding(config: WalksConfig, scene: ContactScene, start: State, cas
     Errors of single steps are not magnified by the walk: the balance holds along the computed path.
     """
     if scene.pinned:
-        return NotMeasured(MEASURE, "the hinge pushes too")
+        return NotMeasured(MEASURE, "the hinge transmits forces as well")
     found = momentum_balance(config, scene, start, case)
     unknown = found.unsure + found.unresolved
     if unknown > MAX_UNKNOWN:
         shares = {
-            "the impulses' sums do not settle": found.unsure,
-            "friction hangs on slip velocities below the tolerance": found.unresolved,
+            "the impulse sums do not settle": found.unsure,
+            "friction depends on slip velocities below the tolerance": found.unresolved,
         }
         why = " and ".join(reason for reason, share in shares.items() if share > 0.5 * MAX_UNKNOWN)
         return NotMeasured(MEASURE, why)

@@ -32,7 +32,7 @@ def section(results: Results, summary: Row) -> Section | None:
         Paragraph(words("stability.judgement")),
         table("Extreme cases", CASE_COLUMNS, grouped(cases, "family"), wordy=True, note=note),
         table("Problems with known answers, run through the contact code", KNOWN_COLUMNS, known, wordy=True),
-        Paragraph("What no case covers:"),
+        Paragraph("Not covered:"),
         Statements(tuple(Statement(f"{what}:", why) for what, why in words.terms("stability.not_covered").items())),
         ordinary_table(summary),
         Paragraph(words("stability.maps", planes) if planes else words("stability.how_to_map")),
@@ -73,10 +73,10 @@ CASE_COLUMNS = (
     Column("ended as", ending),
     Column("steps", "steps", whole, numeric=True),
     Column("other method", "second_method", lambda name: name or "none"),
-    Column("worst measure over its limit", worst_measure, partial(number, digits=2), numeric=True),
+    Column("worst measure / limit", worst_measure, partial(number, digits=2), numeric=True),
     Column("right-hand sides", "rhs_evaluations", whole, numeric=True),
     measured("time", "wall_s", partial(number, digits=3), prefix="m"),
-    Column("why that is to be expected", "reason", wide=True),
+    Column("why expected", "reason", wide=True),
 )
 
 
@@ -94,10 +94,10 @@ def family_table(cases: Rows) -> Table:
 KNOWN_COLUMNS = (
     Column("problem", "name"),
     Column("quantity", "quantity"),
-    Column("by the contact code", "value", partial(number, digits=7), numeric=True),
+    Column("contact code", "value", partial(number, digits=7), numeric=True),
     Column("reference", "reference", partial(number, digits=7), numeric=True),
     Column("relative error", lambda row: Cell(number(row["error"], 2), "good" if row["ok"] else "bad"), numeric=True),
-    Column("the reference’s route", "source", wide=True),
+    Column("reference method", "source", wide=True),
 )
 
 
@@ -110,7 +110,7 @@ def ordinary_table(summary: Row) -> Table:
     tried = grouped(summary["ordinary"], "case").items()
     records = [{"case": case, **{row["method"]: row for row in rows}} for case, rows in tried]
     note = words("stability.ordinary", summary)
-    return table("What an ordinary choice of method does", [Column("case", "case"), *methods], records, note=note)
+    return table("Ordinary methods", [Column("case", "case"), *methods], records, note=note)
 
 
 def ordinary_cell(row: Row | None) -> Cell:

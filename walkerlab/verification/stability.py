@@ -81,7 +81,7 @@ def summary_of(
     }
     if failed:
         message = f"{len(failed)} of {of} did not end as expected: {', '.join(failed)}"
-        advice = "`walkerlab report` says in red which and why; `walkerlab stability --json` has every measure."
+        advice = "`walkerlab report` explains failures in red; `walkerlab stability --json` has every measure."
         said["no_answer"] = {"message": message, "advice": advice}
     return said
 

@@ -18,7 +18,7 @@ from walkerlab.verification.ordinary import FINE, STEPS
 OF_STICTION = {
     "outcome": "how the walk ended, see attribute outcomes",
     "steps": "steps walked",
-    "sharper_outcome": "how it ended at a ten times tighter tolerance",
+    "sharper_outcome": "outcome at a ten times tighter tolerance",
     "error": "between both runs, in legs, radians, pendulum times, where they are compared",
     "rhs_evaluations": "right-hand sides evaluated",
 }
@@ -51,7 +51,7 @@ def stiction_group(cells: int, kept: Mapping[str, maps.Numbers]) -> Group:
     variables |= {
         **axis("stiction_velocity", maps.STICTION_VELOCITY, cells, "m/s", "stiction velocity"),
         **axis("stiffness", maps.STIFFNESS, cells, "N/m^2.2", "stiffness of the ground"),
-        "compared": whole(compared, dims, "1 if both runs have an answer and end alike after as many steps"),
+        "compared": whole(compared, dims, "1 if both runs have an answer, with the same outcome and step count"),
         "error": Variable(errors, dims, "1", OF_STICTION["error"], missing=True),
     }
     return Group(variables, {"outcomes": OUTCOMES, "steps_wanted": maps.WALK_STEPS, "budget": maps.BUDGET})
@@ -66,7 +66,7 @@ def step_group(cells: int, kept: Mapping[str, maps.Numbers]) -> Group:
     variables = {
         **axis("step_size", maps.STEP, cells, "s", "step size"),
         **axis("stiffness", maps.STIFFNESS, cells, "N/m^2.2", "stiffness of the ground"),
-        "verdict": whole(verdicts, dims, "what became of it, see attribute verdicts"),
+        "verdict": whole(verdicts, dims, "verdict, see attribute verdicts"),
         "error": Variable(np.where(errors == maps.NONE, np.nan, errors), dims, "1", text, missing=True),
     }
     legend = ", ".join(f"{number} {verdict}" for number, verdict in enumerate(maps.VERDICTS))

@@ -92,9 +92,9 @@ class RigidStart(CaseStart):
         changed = strikes.momentum_change(record.before, record.after, push)
         won = 0.0 if push else strikes.energy_won(record.before, record.after) / self.energy
         return [
-            Measure("distance of the feet from the slope at heel strike, over the leg", finite(off), ROUNDING),
+            Measure("distance of the feet from the slope at heel strike, in leg lengths", finite(off), ROUNDING),
             Measure("momentum changed by a heel strike", changed, ROUNDING),
-            Measure("energy won at a heel strike", finite(won), ROUNDING),
+            Measure("energy gained at a heel strike", finite(won), ROUNDING),
         ]
 
 
@@ -123,7 +123,7 @@ class ContactStart(CaseStart):
             return []
         falls = -np.diff(record.samples.dissipated_J[:, :2], axis=0)
         back = finite(max(0.0, float(np.max(falls))) / self.energy)
-        return [Measure("energy won back from friction and damping", back, NEVER_LESS * case.balance)]
+        return [Measure("energy regained from friction and damping", back, NEVER_LESS * case.balance)]
 
     def momentum(self, walk: JudgedWalk, case: Case) -> Measure | NotMeasured:
         """Momentum balance of a walk that has an answer and a duration."""

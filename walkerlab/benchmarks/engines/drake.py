@@ -24,15 +24,15 @@ INTEGRATORS = {
     "runge_kutta3 adaptive": adapter.Integrator(3, 60_000, adapts=True),
     "discrete": adapter.Integrator(1, 45_000, for_contact_only=True),
 }
-EMBEDDED = ("runge_kutta3",)  # they adapt their steps unless told not to
+EMBEDDED = ("runge_kutta3",)  # adaptive by default
 CONTACTS = {"sap": "discrete", "lagged": "discrete", "hunt-crossley": "runge_kutta3 adaptive"}
 APPROXIMATIONS = {"sap": "kSap", "lagged": "kLagged"}
 CANNOT_EXPRESS = (
-    "a force that grows with a power of the penetration: point contact is linear in it",
-    "damping that rises over the first 0.1 mm: it grows with the force, or (SAP) is linear",
-    "friction that rises linearly from rest in continuous time: its law is flat at zero slip",
-    "static above dynamic friction in discrete time: one coefficient is used",
-    "a knee that locks by an impact: a joint that it locks stops alone, so another model takes over there",
+    "a force that grows with a power of the penetration: point contact is linear",
+    "damping that rises over the first 0.1 mm: damping grows with the force, or (SAP) is linear",
+    "friction that rises linearly from rest in continuous time: Drake's law is flat at zero slip",
+    "static above dynamic friction in discrete time: only one coefficient is used",
+    "a knee that locks by an impact: locking stops only the joint itself, so the walk continues in another model",
 )
 
 
@@ -72,7 +72,7 @@ class DrakeRun(adapter.Simulation):
         self._plant, self._scene_graph = AddMultibodyPlantSceneGraph(builder, self._h if self._discrete else 0.0)
         joints, self._feet, self._floor = assembled(self._plant, model, own)
         if self._discrete:
-            self._plant.SetUseSampledOutputPorts(False)  # nobody reads them, and they copy all that there is
+            self._plant.SetUseSampledOutputPorts(False)  # unused, and each copies the whole state
         if self._discrete and own is not None:
             approximation = getattr(DiscreteContactApproximation, APPROXIMATIONS[own.model])
             self._plant.set_discrete_contact_approximation(approximation)
@@ -208,7 +208,7 @@ def material(own: adapter.OwnContact) -> Any:
         friction=CoulombFriction(settings["friction"], settings["friction"]),
     )
     if "relaxation_time" in settings:
-        # times of two surfaces add up
+        # the times of both surfaces add up
         properties.AddProperty("material", "relaxation_time", 0.5 * settings["relaxation_time"])
     return properties
 

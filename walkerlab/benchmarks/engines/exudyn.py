@@ -24,11 +24,11 @@ INTEGRATORS = {
 }
 CONTACTS = {"sphere-triangle": "RK44", "sphere-triangle implicit": "TrapezoidalIndex2"}
 CANNOT_EXPRESS = (
-    "damping that rises over the first 0.1 mm: it acts in full from first touch",
-    "a ground that never pulls: damping acts on a foot that leaves, too, and holds the trailing foot back",
-    "friction that rises as a cubic, or static above dynamic friction: it rises linearly to one coefficient",
-    "an endless plane: a triangle of a kilometre stands in for it",
-    "a knee that locks: its explicit integrators take no constraints, so another model takes over there",
+    "damping that rises over the first 0.1 mm: damping acts in full from first touch",
+    "a ground that never pulls: damping also acts on a lifting foot, and holds the trailing foot back",
+    "friction that rises as a cubic, or static above dynamic friction: friction rises linearly to one coefficient",
+    "an endless plane: a triangle of a kilometre replaces it",
+    "a knee that locks: the explicit integrators allow no constraints, so the walk continues in another model",
 )
 PLANE_M = 1000.0
 NO_ROTATION = np.eye(3)
@@ -90,8 +90,8 @@ class ExudynRun(adapter.Simulation):
         stepping.endTime = min(until_s, steps * h) if not adaptive else until_s
         stepping.numberOfSteps = max(1, math.ceil(stepping.endTime / h - 1e-9))
         stepping.verboseMode = 0
-        stepping.adaptiveStep = name not in EXPLICIT  # explicit ones are to step as they are told
-        # contact that closes or opens within a step is noticed at its end, as by any explicit method
+        stepping.adaptiveStep = name not in EXPLICIT  # explicit methods keep their step
+        # detect contact at the end of a step, without iterating, as any explicit method does
         stepping.discontinuous.ignoreMaxIterations = True
         stepping.discontinuous.iterationTolerance = NO_ITERATION
         settings.solution.file.write = False
@@ -130,7 +130,7 @@ def assembled(system: Any, model: PlanarModel, node: Any, forces: adapter.Forces
         places.append(len(joints) - 1)
 
     def applied(_system: Any, time_s: float, _item: Any, q: Any, v: Any) -> Any:
-        assert forces is not None, "it is only called with a law"
+        assert forces is not None, "only called with forces"
         return forces(time_s, np.asarray(q), np.asarray(v)).tolist()
 
     tree = ObjectKinematicTree(

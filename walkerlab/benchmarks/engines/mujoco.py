@@ -18,14 +18,14 @@ from walkerlab.solvers.system import Floats
 INTEGRATORS = {"Euler": adapter.Integrator(1, 120_000), "RK4": adapter.Integrator(4, 120_000)}
 CONTACTS = {"soft": "Euler", "soft-rk4": "RK4"}
 CANNOT_EXPRESS = (
-    "a force that grows with a power of the penetration, or damping that does: its contact is linear",
-    "stiffness in N/m: it is scaled by the contact's own effective mass",
-    "two coefficients of friction: static and dynamic are one",
-    "point feet: a ball of half a millimetre stands in for one",
-    "a knee that locks rigidly at an instant: its equality constraint is soft, so another model takes over there",
+    "a force or damping that grows with a power of the penetration: contact is linear",
+    "stiffness in N/m: stiffness is scaled by the contact's effective mass",
+    "static above dynamic friction: there is one coefficient",
+    "point feet: a ball of half a millimetre replaces each",
+    "a knee that locks rigidly at an instant: equality constraints are soft, so the walk continues in another model",
 )
-LEAST_INERTIA = 2e-15  # kg m^2, twice what MuJoCo asks for
-IMPEDANCE = 0.1  # small: close to a spring and damper that the load acts on in full
+LEAST_INERTIA = 2e-15  # kg m^2, twice MuJoCo's minimum
+IMPEDANCE = 0.1  # small, for a contact close to an ordinary spring and damper
 AXES = {"along": ("slide", "1 0 0"), "height": ("slide", "0 0 1"), "turn": ("hinge", "0 -1 0")}
 MODES = {"Euler": "mjINT_EULER", "RK4": "mjINT_RK4"}
 
@@ -51,7 +51,7 @@ class MujocoRun(adapter.Simulation):
     def build(self, model: PlanarModel, q: Floats, v: Floats) -> None:
         import mujoco
 
-        mujoco.set_mjcb_passive(None)  # one for the whole process, and the last run's may still be there
+        mujoco.set_mjcb_passive(None)  # it is global; remove the last run's
         self._advance = mujoco.mj_step
         self._model = mujoco.MjModel.from_xml_string(described(model, self.own))
         self._model.opt.timestep = self.stepping.step_s

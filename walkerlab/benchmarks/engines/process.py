@@ -44,7 +44,7 @@ class OwnProcess:
     def do(self, task: Callable[[], R], timeout_s: float) -> R | TaskLost:
         """Run a picklable task; returns its result or why it was lost. Raises RuntimeError after `abandon`."""
         if self._abandoned:
-            raise RuntimeError("nobody waits for this process any more")
+            raise RuntimeError("the process was abandoned")
         if self._worker is None:
             self._worker = Worker(folder=Path(self._folder.name), quiet=True)
             timeout_s += START_UP_S
@@ -52,7 +52,7 @@ class OwnProcess:
             return self._worker.do(task, timeout_s=timeout_s)
         except WorkerTimeoutError:
             self._end()
-            return TaskLost(f"no answer within {timeout_s:.0f} s", timed_out=True)
+            return TaskLost(f"no result within {timeout_s:.0f} s", timed_out=True)
         except WorkerDiedError as died:
             self._end()
             return TaskLost(f"the engine's process ended with code {died.exit_code_of_worker}")

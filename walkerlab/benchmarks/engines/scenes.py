@@ -112,12 +112,12 @@ def scenes(config: ContactConfig, rigid_step_length_m: float, rigid_state: State
     assembly = assembly_of(config.walker)
     if assembly.couplings:
         raise ConfigError(
-            "engines: a torso held on the bisector is a constraint that is not taken to other engines.",
+            "engines: a torso held on the bisector is a constraint that the engine models do not support.",
             "Choose a walker without a torso.",
         )
     if assembly.knees and not isinstance(knee_rules(config.walker).stop, IdealLock):
         raise ConfigError(
-            "engines: the compliant stop of a knee is not taken to other engines.", "Choose walker.knee.lock: ideal."
+            "engines: the engine models do not support a knee's compliant stop.", "Choose walker.knee.lock: ideal."
         )
     scene = replace(contact_scene(config, rigid_step_length_m, rigid_step_length_m), pinned=False)
     assembly, start = scene.assembly, start_state(scene, rigid_state)

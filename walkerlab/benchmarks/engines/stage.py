@@ -50,12 +50,12 @@ def run(config: SceneConfig, inputs: Mapping[str, Content], progress: Progress, 
     engines = installed()
     found = EngineFindings(left_out=[*not_installed(), *hinge_left_out(config, "engines")])
     if not engines:
-        raise NoAnswer("engines: none of the engines is installed", f"Install them: {EXTRA}")
+        raise NoAnswer("engines: no engine is installed", f"Install them: {EXTRA}")
     rigid = inputs["fixedpoint"].summary if "fixedpoint" in inputs else None
     for scene in scenes(config, *rigid_start(config, inputs)):
         truth = experiments.truth_of(scene)
         if truth is None:
-            why = "the walk under ADAMS's law ends before there is anything to compare"
+            why = "the walk under ADAMS's law ends too early to be compared"
             found.left_out.append({"what": f"engines on the scene {scene.name}", "why": why})
             continue
         found.truths[scene.name] = truth
@@ -67,7 +67,7 @@ def run(config: SceneConfig, inputs: Mapping[str, Content], progress: Progress, 
             found.add(measured)
             progress.advance()
     if not found.truths:
-        raise NoAnswer("engines: no scene walks under ADAMS's law", "Start nearer to a gait (start: fixed-point).")
+        raise NoAnswer("engines: no scene walks under ADAMS's law", "Start closer to a gait (start: fixed-point).")
     return content(found, rigid)
 
 
