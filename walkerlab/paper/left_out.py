@@ -20,7 +20,5 @@ def of_adjustment(config: RigidConfig) -> tuple[Entry, ...]:
     if not is_passive_compass(config):
         entries.append(left_out("the first step with a hinged stance foot", PAPERS, "two walks"))
     if not is_own_walker(config):
-        entries.append(
-            left_out("the paper's start of its ADAMS model", "only that compass has it", "a walk")
-        )
+        entries.append(left_out("the paper's start of its ADAMS model", "only that compass has it", "a walk"))
     return tuple(entries)
