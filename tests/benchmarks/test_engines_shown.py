@@ -90,7 +90,7 @@ def test_a_run_without_the_stage_has_neither_figure_nor_section():
 
 def test_a_scene_that_was_not_walked_has_no_figure(results):
     reasons = {figure.name: figure.why_left_out(results, {}) for figure in FIGURES if figure.name.startswith("engines")}
-    unwalked = "engines: it did not walk the scene kneed"
+    unwalked = "engines: the scene kneed was not walked"
     assert reasons == {
         "engines-errors-compass": None,
         "engines-errors-kneed": unwalked,

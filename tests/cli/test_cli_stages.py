@@ -132,7 +132,7 @@ def test_a_case_named_as_one_of_the_catalogue_is_refused_before_anything_runs(to
     )
     done = toy("drop", "-c", "own.yaml")
     assert done.returncode == 3
-    assert "The catalogue has cases named moon." in done.stderr
+    assert "The catalogue already has cases named moon." in done.stderr
     assert not (toy.folder / "runs").exists()
 
 

@@ -79,5 +79,5 @@ def test_every_method_of_the_registry_has_a_look_of_its_own():
 def test_a_scene_that_was_not_measured_is_left_out_and_says_so(scene):
     others = measured_methods([other for other in SCENES if other != scene])
     figure = FIGURES[SCENES.index(scene)]
-    assert figure.why_left_out(others, {}) == f"accuracy: it did not measure the scene {scene}"
+    assert figure.why_left_out(others, {}) == f"accuracy: the scene {scene} was not measured"
     assert figure.why_left_out({}, {}) == "it needs accuracy"

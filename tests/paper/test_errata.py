@@ -183,7 +183,7 @@ def test_every_erratum_has_what_is_printed_what_is_right_and_numbers(found, wher
 
 def test_errata_say_the_measured_numbers(found):
     assert "0.1286 J as printed" in found["A.5 row 2, A.29"].measured
-    assert "13 numbers" in found["Appendix A"].measured
+    assert "13 equation numbers" in found["Appendix A"].measured
     assert "1.36 s" in found["Table 3, cycle of MSC ADAMS"].measured
     assert "-0.202216, 0.167416, -0.600581, -0.846575" in found["eq. 11, x_p"].measured
     assert "cut off" in found["eq. 11, x_p"].measured

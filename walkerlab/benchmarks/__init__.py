@@ -1,1 +1,1 @@
-"""What methods are measured by: walks, references, ladders of tolerances, a user's own script."""
+"""Benchmarks of methods and engines: walks, references and ladders of tolerances."""

@@ -1,4 +1,4 @@
-"""Error against run time: every method on every scene of the config, over a ladder of tolerances."""
+"""Error against run time of every method on every scene of the config, over a ladder of tolerances."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
@@ -24,8 +24,8 @@ LEVELS = (1e-3, 1e-6, 1e-9)
 RIGID_STEPS, CONTACT_STEPS, NEAR_RIGID_STEPS = 10, 10, 4
 OTHERS_CONTACT_STEPS = 4  # of other walkers than the compass, whose right-hand side is several times as long
 LESS = (
-    {"what": "accuracy of the scene contact-near-rigid", "why": "it is measured on the compass", "saves": "a minute"},
-    {"what": "libraries' longest runs on the contact model", "why": "they are in Python", "saves": "minutes"},
+    {"what": "accuracy of the scene contact-near-rigid", "why": "only the compass has it", "saves": "a minute"},
+    {"what": "libraries' longest runs on the contact model", "why": "they run in Python", "saves": "minutes"},
 )
 OFF_THE_GAIT = 0.98  # of the gait's angular velocities, so that no step repeats the one before
 
@@ -33,8 +33,8 @@ OFF_THE_GAIT = 0.98  # of the gait's angular velocities, so that no step repeats
 def run(config: SceneConfig, inputs: Mapping[str, Content], progress: Progress, jobs: int = 1) -> Content:
     """Measure every method on every scene.
 
-    jobs  processes for what takes long: first ends of references, and runs of libraries that do not get on. All other
-          runs are measured one after the other, with nothing beside them.
+    jobs  processes for reference solutions and for postponed library runs; all other runs are timed one after the
+          other, with nothing else running
     """
     trials: list[Trial] = []
     seconds: list[End] = []
@@ -72,13 +72,12 @@ def run(config: SceneConfig, inputs: Mapping[str, Content], progress: Progress, 
 
 
 def without(trial: Trial, why: WalkEndsError) -> dict[str, Any]:
-    """A scene that nothing can be measured on."""
-    start = f"from {OFF_THE_GAIT} of the start's velocities " if isinstance(trial, RigidTrial) else ""
+    start = f"started with velocities scaled by {OFF_THE_GAIT}, " if isinstance(trial, RigidTrial) else ""
     return {"what": f"accuracy of the scene {trial.name}", "why": f"{start}{why}"}
 
 
 def scenes(config: SceneConfig, inputs: Mapping[str, Content]) -> Iterator[Trial]:
-    """The walks to measure by: rigid, with a contact block on its ground, and a compass also near the rigid limit."""
+    """Yield the walks to measure on: rigid, on compliant ground, and for the compass also near the rigid limit."""
     length, state = rigid_start(config, inputs)
     walker = rigid_walker(config)
     start = with_scaled_rates(walker, state, OFF_THE_GAIT, OFF_THE_GAIT)
@@ -98,7 +97,6 @@ def scenes(config: SceneConfig, inputs: Mapping[str, Content]) -> Iterator[Trial
 def summary_of(
     rows: Sequence[MethodRow], not_run: list[dict[str, Any]], references: Mapping[str, Reference], jobs: int
 ) -> dict[str, Any]:
-    """What the command prints."""
     parts = ("method", "second_method", "agreement", "state", "from_outside", "tolerance", "rhs_evaluations")
     return {
         "rows": [asdict(row) for row in rows],
@@ -114,7 +112,7 @@ def summary_of(
 
 
 def good_enough(rows: Sequence[MethodRow], scene: str, level: float) -> list[MethodRow]:
-    """Of each method that reaches an error of `level` on a scene its fastest run that does, the fastest first."""
+    """Fastest run of each method that reaches an error of `level` on a scene, fastest method first."""
     fastest: dict[str, MethodRow] = {}
     for row in sorted(rows, key=lambda one: one.wall_s):
         if row.scene == scene and row.error is not None and row.error <= level:
@@ -123,13 +121,13 @@ def good_enough(rows: Sequence[MethodRow], scene: str, level: float) -> list[Met
 
 
 def best_methods(rows: Sequence[MethodRow], scene: str) -> dict[str, str]:
-    """The fastest method for each level of error that some method reaches."""
+    """Fastest method for each error level that some method reaches."""
     found = {plain_power(level): good_enough(rows, scene, level) for level in LEVELS}
     return {level: runs[0].method for level, runs in found.items() if runs}
 
 
 def conclusion(rows: Sequence[MethodRow], scene: str) -> str:
-    """One sentence: which method is fastest at which error, and by how much over the best library's."""
+    """Describe in one sentence which method is fastest at which error, and by what factor over the best library."""
     levels = []
     for level in LEVELS:
         runs = good_enough(rows, scene, level)

@@ -1,4 +1,4 @@
-"""Walks on compliant ground to measure methods by: the config's contact, and one near the rigid limit."""
+"""Contact walks on which methods are measured: the config's contact, and one near the rigid limit."""
 
 from dataclasses import replace
 
@@ -11,13 +11,13 @@ STIFFER, SLOWER = 100.0, 0.01  # the near-rigid contact: stiffness and damping t
 
 
 def contact_trial(config: ContactConfig, state: State, length_m: float, steps: int) -> ContactTrial:
-    """Steps with the config's own contact, on pads of the rigid step length, or of the start's own without a gait."""
+    """Walk on the config's contact, with pads of length `length_m` (m)."""
     scene = contact_scene(config, length_m, own_pitch_m=length_m)
     return ContactTrial(scene.walker, scene.ground, start_state(scene, state), steps, "contact")
 
 
 def near_rigid_trial(config: ContactConfig, state: State, length_m: float, steps: int) -> ContactTrial:
-    """Steps on stiffer ground that creeps less, where integrators have a harder life."""
+    """Walk on much stiffer ground that creeps less, which is harder for integrators."""
     trial = contact_trial(config, state, length_m, steps)
     law, friction = trial.walker.normal, trial.walker.friction.with_creep(SLOWER)
     normal = law._replace(stiffness=STIFFER * law.stiffness, damping=STIFFER * law.damping)

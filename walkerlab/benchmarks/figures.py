@@ -1,4 +1,4 @@
-"""What exactness costs: errors of methods and of other engines against run time."""
+"""Figures of error against run time, for methods and for other engines."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ DASHED, DOTTED = (0.0, (3.2, 1.4)), (0.0, (1.0, 1.2))
 
 @dataclass(frozen=True)
 class Series:
-    """The runs of a method, or of an integrator or contact of an engine, from loose or coarse to tight or fine.
+    """Runs of a method, or of an integrator or contact model of an engine, from coarse to fine.
 
-    runs    what is stored of them; gaps are NaN
-    filled  whether its marks are
-    engine  whose runs they are; methods have none
+    runs    stored columns; gaps are NaN
+    filled  whether the markers are filled
+    engine  empty for methods
     """
 
     look: Look
@@ -40,18 +40,17 @@ class Series:
 
     @property
     def line(self) -> dict[str, Any]:
-        """What matplotlib is told of its line."""
         marked = {"marker": self.look.marker, "markersize": 4.0}
         return {**self.look.line, **marked, "markerfacecolor": self.look.colour if self.filled else "none"}
 
     @property
     def key(self) -> Line2D:
-        """Its legend entry."""
+        """Legend entry."""
         return entry(self.look.label, **self.line)
 
     @property
     def walked(self) -> NDArray[np.bool_]:
-        """Which of the runs walked to the end."""
+        """Whether each run reached the end of its walk."""
         return np.asarray(self.runs["outcome"] == "walked")
 
 
@@ -77,7 +76,7 @@ FAILED = 30.0  # where failures are drawn, in terms of the largest error
 
 
 def series_of(scene: str, results: Results) -> Iterator[Series]:
-    """The methods in the order in which they were measured; those compiled as a whole have filled marks."""
+    """Yield the methods in the order measured; fully compiled methods have filled markers."""
     rows = results["accuracy"].groups[f"{scene}/rows"]
     methods = rows["method"].astype(str)
     for name in dict.fromkeys(methods.tolist()):
@@ -86,9 +85,9 @@ def series_of(scene: str, results: Results) -> Iterator[Series]:
 
 
 def draw_methods(scene: str, results: Results) -> Drawn:
-    """Run time on the left, right-hand sides on the right, a line for each method, crosses where it gave up.
+    """Plot error over run time (left) and over right-hand sides (right), with crosses for failed runs.
 
-    Caption: the conclusion, the reference, whether it is measured too, and what did not reach the end.
+    The caption gets the conclusion, the reference, whether its method is measured too, and the failed runs.
     """
     every, summary = list(series_of(scene, results)), results["accuracy"].summary
     reference = summary["reference"][scene]
@@ -122,11 +121,11 @@ def draw_methods(scene: str, results: Results) -> Drawn:
 
 
 def entries(every: Sequence[Series], floor: float) -> list[Line2D]:
-    """The legend: methods, failures, and what is below the reference's own uncertainty."""
+    """Legend entries of the methods, of failures and of the reference uncertainty."""
     found = [one.key for one in every]
     if not all(one.runs["reached"].all() for one in every):
         found.append(entry("end not reached", color=BLACK, linestyle="none", marker="x", markersize=5.0))
-    return [*found, entry(f"reference unsure, {floor:.0e}", color=PALE, linewidth=6.0)]
+    return [*found, entry(f"reference uncertainty {floor:.0e}", color=PALE, linewidth=6.0)]
 
 
 ENGINES_STAGE, ENGINE_RUNS = "engines", "rows"
@@ -138,7 +137,7 @@ DASHES: tuple[LineStyleType, ...] = ("-", DASHED, DOTTED, (0.0, (5.0, 1.2, 1.0, 
 
 
 def engines_of(scene: str, experiment: str, results: Results) -> Iterator[Series]:
-    """The series in the order in which they were measured, each from the gait; an engine's first has filled marks."""
+    """Yield an experiment's series, started on the gait, in the order measured; the first of each engine is filled."""
     rows = results[ENGINES_STAGE].groups[ENGINE_RUNS]
     engines, names = rows["engine"].astype(str), rows["integrator"].astype(str)
     here = (rows["scene"] == scene) & (rows["experiment"] == experiment)
@@ -152,9 +151,9 @@ def engines_of(scene: str, experiment: str, results: Results) -> Iterator[Series
 
 
 def draw_errors(scene: str, results: Results) -> Drawn:
-    """Same law on the left, own law on the right, each with its legend: the same look means something else there.
+    """Plot the same law (left) and each engine's own contact (right), with a legend each, since looks are reused.
 
-    Caption: the reference, and the conclusion on the same law.
+    The caption gets the reference and the conclusion on the same law.
     """
     figure, both = panels(4.6, 1, 2)
     experiments = (
@@ -176,15 +175,14 @@ def draw_errors(scene: str, results: Results) -> Drawn:
 
 
 def draw_engine(axes: Axes, one: Series, cost: str, values: Array) -> None:
-    """A series without its gaps."""
     there = np.isfinite(one.runs[cost]) & np.isfinite(values) & (values > 0.0)
     axes.plot(one.runs[cost][there], values[there], **one.line)
 
 
 def draw_periods(scene: str, results: Results) -> Drawn:
-    """Period of the last step over step size, own contact, with ADAMS's law and the rigid gait as levels.
+    """Plot the last step's period over step size on own contact, with ADAMS's law and the rigid gait as levels.
 
-    Caption: the conclusion, and the steps of what did not walk to the end.
+    The caption gets the conclusion and the step sizes of runs that failed.
     """
     figure, axes = panels(4.2)
     every, summary = list(engines_of(scene, OWN_LAW, results)), results[ENGINES_STAGE].summary
@@ -204,11 +202,11 @@ def draw_periods(scene: str, results: Results) -> Drawn:
 
 SCENES = ("rigid", "contact", "contact-near-rigid")
 MEASURED = {
-    scene: Need("accuracy", f"{scene}/rows", METHOD_VARIABLES, f"it did not measure the scene {scene}")
+    scene: Need("accuracy", f"{scene}/rows", METHOD_VARIABLES, f"the scene {scene} was not measured")
     for scene in SCENES
 }
 WALKED = {
-    scene: Need(ENGINES_STAGE, ENGINE_RUNS, ENGINE_VARIABLES, f"it did not walk the scene {scene}", scene)
+    scene: Need(ENGINES_STAGE, ENGINE_RUNS, ENGINE_VARIABLES, f"the scene {scene} was not walked", scene)
     for scene in ("compass", "kneed")
 }
 FIGURES = tuple(

@@ -1,4 +1,4 @@
-"""One method on one scene, tolerance by tolerance: what is run, how it is timed, and when it is given up."""
+"""Runs of one method on one scene, tolerance by tolerance: timing, budgets and when to stop."""
 
 import time
 from collections.abc import Callable, Sequence
@@ -27,8 +27,6 @@ ERROR = Label("1", "largest difference of the end state from the reference, SI u
 
 @dataclass(frozen=True)
 class MethodRun:
-    """One tolerance: what it gave, and the times that it took."""
-
     tolerance: float
     result: TrialRun
     walls_s: tuple[float, ...]
@@ -36,11 +34,9 @@ class MethodRun:
 
 @dataclass(frozen=True)
 class Ascent:
-    """One method on its ladder.
+    """Runs of one method up its ladder of tolerances.
 
-    runs        so far
-    ladder      all tolerances
-    unfinished  whether the next one takes long and is yet to be run
+    unfinished  whether the next tolerance takes long and is postponed
     """
 
     trial: Trial
@@ -52,8 +48,6 @@ class Ascent:
 
 @dataclass(frozen=True)
 class MethodRow:
-    """One method at one tolerance."""
-
     scene: str
     method: Annotated[str, Label("1", "method")]
     tolerance: Annotated[float, Label("1", "relative tolerance")]
@@ -71,12 +65,12 @@ class MethodRow:
 
     @property
     def reached(self) -> Annotated[int, Label("1", "whether the end state was reached")]:
-        """1 if there is an error, else 0."""
+        """1 if the run has an error, 0 otherwise."""
         return int(self.error is not None)
 
 
 def ascend(trial: Trial, method: str) -> Ascent:
-    """Run one tolerance after the other until a run takes too much."""
+    """Run one tolerance after the other until a run is too expensive."""
     own = method in METHODS and METHODS[method].compiled
     ladder, short, last = (OWN_LADDER, BUDGET, BUDGET) if own else (LIBRARY_LADDER, min(SHORT, BUDGET), LAST)
     trial.prepare(method, ladder[0], WARM_UP)()
@@ -94,9 +88,11 @@ def ascend(trial: Trial, method: str) -> Ascent:
 def finished(
     trials: Sequence[Trial], ascents: Sequence[Ascent], jobs: int, long_runs: bool = True
 ) -> tuple[list[End | WalkEndsError], list[Ascent]]:
-    """The first ends of the references, or why there is none, and the ascents with the run that was put off.
+    """Compute the references' first ends and the postponed runs, in `jobs` processes.
 
-    long_runs  whether what was put off is run at all
+    long_runs  whether to make the postponed runs
+
+    Returns an end, or the reason for its absence, for each trial; and the completed ascents.
     """
     # longest first: near the rigid limit ground is the stiffest for the explicit method that references are made with
     ends = [partial(end_or_reason, trial) for trial in reversed(trials)]
@@ -112,7 +108,6 @@ def finished(
 
 
 def end_or_reason(trial: Trial) -> End | WalkEndsError:
-    """The first end of a trial's reference, or why there is none."""
     try:
         return first_end(trial)
     except WalkEndsError as problem:
@@ -120,13 +115,13 @@ def end_or_reason(trial: Trial) -> End | WalkEndsError:
 
 
 def long_run(trial: Trial, method: str, tolerance: float) -> MethodRun:
-    """A run that takes long, perhaps in a process of its own that has to warm up."""
+    """Make a postponed run; it may be in a fresh process, so it warms up first."""
     trial.prepare(method, tolerance, WARM_UP)()
     return measure(trial, method, tolerance, BUDGET)
 
 
 def measure(trial: Trial, method: str, tolerance: float, budget: int) -> MethodRun:
-    """Run once to warm up, then as often as time allows."""
+    """Time a walk up to `REPEATS` times within `REPEAT_TIME_S`."""
     walk = trial.prepare(method, tolerance, budget)
     first_s, result = timed(walk)
     walls = [first_s] if first_s > REPEAT_TIME_S else []
@@ -136,14 +131,12 @@ def measure(trial: Trial, method: str, tolerance: float, budget: int) -> MethodR
 
 
 def timed(walk: Callable[[], TrialRun]) -> tuple[float, TrialRun]:
-    """Seconds that a walk takes, and its result."""
     start = time.perf_counter()
     result = walk()
     return time.perf_counter() - start, result
 
 
 def row_of(one: Ascent, run: MethodRun, reference: Reference) -> MethodRow:
-    """A run with its error."""
     end, result = reference.for_method(one.method), run.result
     error = float(np.max(np.abs(result.state - end.state))) if result.state.size else None
     known = error is not None and error <= reference.agreement
@@ -166,12 +159,12 @@ def row_of(one: Ascent, run: MethodRun, reference: Reference) -> MethodRow:
 
 
 def left_of(one: Ascent) -> list[dict[str, Any]]:
-    """The tolerances that were not run, and why."""
+    """List the tolerances that were not run, with reasons."""
     if one.unfinished:
         why = f"more than {SHORT} right-hand sides, each in Python"
     else:
         last = one.runs[-1]
-        why = f"{last.result.outcome} with {last.result.rhs_evaluations} right-hand sides at {last.tolerance:g} already"
+        why = f"already {last.result.outcome} with {last.result.rhs_evaluations} right-hand sides at {last.tolerance:g}"
     return [
         {"scene": one.trial.name, "method": one.method, "tolerance": rtol, "why": why}
         for rtol in one.ladder[len(one.runs) :]

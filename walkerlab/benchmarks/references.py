@@ -1,4 +1,4 @@
-"""The truth that methods are measured by, and how well it is known."""
+"""Reference end states that methods are compared with, and their uncertainty."""
 
 from dataclasses import dataclass
 
@@ -18,10 +18,10 @@ TIGHTEST_RIGID = {"dop853": 1e-14, "radau5": 1e-12}
 
 @dataclass(frozen=True)
 class End:
-    """Where a walk ends, by which method.
+    """End state of a walk by one method.
 
     tolerance        relative; 0 for Taylor series at machine precision
-    rhs_evaluations  that it took; 0 where they are not counted
+    rhs_evaluations  0 where they are not counted
     """
 
     method: str
@@ -32,65 +32,59 @@ class End:
 
 @dataclass(frozen=True)
 class Reference:
-    """The end of a walk by two different methods: their difference is what the end is known to."""
+    """End of a walk by two different methods; their difference is its uncertainty."""
 
     first: End
     second: End
 
     @property
     def method(self) -> str:
-        """The method of the end that others are measured by."""
         return self.first.method
 
     @property
     def state(self) -> Floats:
-        """That end."""
         return self.first.state
 
     @property
     def second_method(self) -> str:
-        """The other method."""
         return self.second.method
 
     @property
     def from_outside(self) -> bool:
-        """Whether the first end comes from another program: not our solvers, event search or equations."""
+        """Whether the first end is independent of this project's solvers, event search and equations."""
         return self.method == taylor_reference.NAME
 
     @property
     def tolerance(self) -> float:
-        """Relative tolerance of the first end."""
         return self.first.tolerance
 
     @property
     def rhs_evaluations(self) -> int:
-        """Right-hand sides that the first end took."""
         return self.first.rhs_evaluations
 
     @property
     def agreement(self) -> float:
-        """Largest difference of the two."""
+        """Largest difference between the two ends."""
         return float(np.max(np.abs(self.first.state - self.second.state)))
 
     def for_method(self, method: str) -> End:
-        """The end to measure a method by: never its own."""
+        """End to compare a method with, never computed by that method itself."""
         return self.second if method == self.first.method else self.first
 
 
 class WalkEndsError(Exception):
-    """The walk does not reach its last step, or not at a bearable cost, so that there is no end state to compare."""
+    """The walk does not reach its last step within the budget, so there is no end state to compare."""
 
 
 def reference_for(trial: Trial) -> Reference:
-    """The reference of a trial; WalkEndsError if the walk does not reach its end."""
     by_second = second_end(trial)
     return Reference(first_end(trial), by_second)
 
 
 def first_end(trial: Trial) -> End:
-    """The end that all methods but one are measured by: Taylor series where they are installed and the scene is rigid.
+    """Compute the end by Taylor series for a rigid compass where heyoka is installed, otherwise by dop853.
 
-    Else the explicit method, which shares nothing with those that are good at contact, and takes a million steps there.
+    dop853 shares nothing with the implicit methods, but takes a million steps on stiff ground.
 
     Raises WalkEndsError if the walk does not reach its end.
     """
@@ -100,25 +94,25 @@ def first_end(trial: Trial) -> End:
 
 
 def second_end(trial: Trial) -> End:
-    """The end by another method: quick, so that it also tells whether the walk has one.
+    """Compute the end by a second, quick method.
 
-    Raises WalkEndsError if it has not.
+    Raises WalkEndsError if the walk does not reach its end.
     """
     return tightest(trial, "radau5" if compass_of(trial) is None else "dop853")
 
 
 def compass_of(trial: Trial) -> RigidWalker | None:
-    """The walker in closed form, if Taylor series are there to walk it."""
+    """Closed-form walker of a trial, if heyoka can walk it."""
     return trial.compass if isinstance(trial, RigidTrial) and taylor_reference.is_installed() else None
 
 
 def tightest(trial: Trial, method: str) -> End:
-    """The end by one of our methods at its tightest tolerance."""
+    """Compute the end by one of our methods at its tightest useful tolerance."""
     tolerances = TIGHTEST_RIGID if isinstance(trial, RigidTrial) else TIGHTEST
     result = trial.prepare(method, tolerances[method], BUDGET)()
     if result.outcome == Outcome.BUDGET_EXHAUSTED.label:
-        why = f"{method} at {tolerances[method]:g} does not reach its end within {BUDGET // 1_000_000} million"
-        raise WalkEndsError(f"{why} right-hand sides, so that nothing tells how well its end is known")
+        why = f"{method} at {tolerances[method]:g} does not reach the end within {BUDGET // 1_000_000} million"
+        raise WalkEndsError(f"{why} right-hand sides, so the reference has no error estimate")
     if not result.state.size:
-        raise WalkEndsError(f"the walk ends early ({result.outcome}), so that there is no end state to compare")
+        raise WalkEndsError(f"the walk ends early ({result.outcome}), without an end state to compare")
     return End(method, result.state, tolerances[method], result.rhs_evaluations)

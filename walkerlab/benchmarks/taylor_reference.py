@@ -1,4 +1,4 @@
-"""The rigid walk by Taylor series at machine precision, with heyoka: a reference that shares nothing with our solvers.
+"""Rigid walk by heyoka's Taylor series at machine precision, independent of our solvers.
 
 Optional (extra `reference`). Biscani, Izzo: Revisiting high-order Taylor methods for astrodynamics and celestial
 mechanics, MNRAS 504 (2021).
@@ -16,12 +16,11 @@ NAME = "heyoka-taylor"
 
 
 def is_installed() -> bool:
-    """Whether heyoka can be imported."""
     return importlib.util.find_spec("heyoka") is not None
 
 
 def walk_by_taylor(walker: RigidWalker, start: tuple[float, ...], steps: int) -> Floats:
-    """State after the last of `steps` heel strikes; ValueError if one does not come."""
+    """Return the state after `steps` heel strikes; raise ValueError if one does not occur."""
     limit = 10.0 * np.sqrt(walker.leg_length / walker.gravity)
     passing, striking = integrators(walker)
     state = np.array(start)
@@ -39,7 +38,7 @@ def walk_by_taylor(walker: RigidWalker, start: tuple[float, ...], steps: int) ->
 
 
 def integrators(walker: RigidWalker) -> tuple[Any, Any]:
-    """Taylor integrators of the swing phase that stop when the legs pass, and at the heel strike."""
+    """Taylor integrators of the swing phase that stop when the legs pass and at heel strike."""
     import heyoka as hy
 
     th1, th2, w1, w2 = hy.make_vars("th1", "th2", "w1", "w2")

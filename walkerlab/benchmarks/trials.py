@@ -1,4 +1,4 @@
-"""Walks that methods are measured by: the same start, the same number of steps, one end state to compare."""
+"""Walks on which methods are measured: fixed start and step count, and one end state to compare."""
 
 from __future__ import annotations
 
@@ -30,8 +30,6 @@ ATOL_PER_RTOL = 1e-2
 
 @dataclass(frozen=True)
 class TrialRun:
-    """What one run gave and cost."""
-
     outcome: str
     state: Floats  # at the end, empty if it was not reached
     rhs_evaluations: int
@@ -41,7 +39,7 @@ class TrialRun:
 
 @dataclass(frozen=True)
 class RigidTrial:
-    """Steps of the rigid model; the end state is that after the last impact."""
+    """Walk of the rigid model; its end state follows the last impact."""
 
     walker: Standing
     start: tuple[float, ...]
@@ -51,14 +49,11 @@ class RigidTrial:
 
     @property
     def methods(self) -> tuple[str, ...]:
-        """Every method, and what a user would write."""
+        """All methods of the registry, and a user's script where there is one."""
         return (*METHODS, USER_SCRIPT) if self.compass is not None else tuple(METHODS)
 
     def prepare(self, method: str, rtol: float, budget: int) -> Callable[[], TrialRun]:
-        """A function that does the walk with a method, ready to be timed.
-
-        Its runs share their memory, as a program that walks often would have it.
-        """
+        """Return a function that walks with a method, ready to be timed; its calls share their memory."""
         atol = rtol * ATOL_PER_RTOL
         if method == USER_SCRIPT:
             assert self.compass is not None, "the script is not among this walker's methods"
@@ -88,7 +83,7 @@ class RigidTrial:
 
 @dataclass(frozen=True)
 class ContactTrial:
-    """Steps on compliant ground; the end state is that at the last touch."""
+    """Walk on compliant ground; its end state is that of the last touch."""
 
     walker: ContactWalker
     ground: JudgedGround
@@ -98,11 +93,9 @@ class ContactTrial:
 
     @property
     def methods(self) -> tuple[str, ...]:
-        """Every method of the registry."""
         return tuple(METHODS)
 
     def prepare(self, method: str, rtol: float, budget: int) -> Callable[[], TrialRun]:
-        """A function that does the walk with a method, ready to be timed."""
         from walkerlab.ground.terrain import STANCE_FOOT
         from walkerlab.hybrid.contact_result import walk_contact
 
@@ -121,6 +114,6 @@ Trial = RigidTrial | ContactTrial
 
 
 def finished(outcome: Outcome, state: Floats, counts: Any) -> TrialRun:
-    """The run of a walk that ended; one that did not walk all its steps has no end state."""
+    """Build a run's record; without `Outcome.WALKED` it has no end state."""
     end = state.copy() if outcome is Outcome.WALKED else np.zeros(0)
     return TrialRun(outcome.label, end, int(counts[RHS]), int(counts[ACCEPTED]), int(counts[REJECTED]))

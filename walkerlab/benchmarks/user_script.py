@@ -1,6 +1,6 @@
-"""The rigid walk as a user would script it with NumPy and SciPy: matrices, a linear solve, an event function.
+"""Rigid walk as a user would script it with NumPy and SciPy: matrices, a linear solve, an event function.
 
-A peer to measure by; nothing else uses it.
+Serves only as a comparison.
 """
 
 from typing import Any
@@ -12,7 +12,7 @@ from walkerlab.solvers.system import Floats
 
 
 class ScriptBudgetError(Exception):
-    """Ends a run that has used up its right-hand sides."""
+    """The script has used up its right-hand sides."""
 
 
 def walk_as_a_script(
@@ -25,11 +25,11 @@ def walk_as_a_script(
     method: str = "DOP853",
     ends: tuple[Any, ...] = (),
 ) -> tuple[Floats | None, int]:
-    """Walk `steps` steps with SciPy's solve_ivp, a NumPy right-hand side and its terminal events.
+    """Walk with SciPy's solve_ivp, a NumPy right-hand side and terminal events.
 
     ends  further terminal events, which end the walk
 
-    Returns the state after the last impact (None if it was not reached) and the right-hand sides used.
+    Returns the state after the last impact (None if not reached) and the number of right-hand sides.
     """
     from scipy.integrate import solve_ivp
 

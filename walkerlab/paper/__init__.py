@@ -1,1 +1,1 @@
-"""The study that is redone: its equations as printed, its numbers, its errata, and what is to be said of them."""
+"""The paper's numbers, tables and errata, compared with measurements."""

@@ -1,4 +1,4 @@
-"""The start that the paper gives its ADAMS model (Table 2), in both models, and why it ends as it does."""
+"""The paper's ADAMS start (Table 2) in both models, and why that walk ends."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -19,21 +19,22 @@ from walkerlab.paper.printed import adams_start_as_printed
 from walkerlab.paper.prose import prose
 from walkerlab.solvers.system import State
 
-FALLING = 4  # samples, between which a falling hip's height is a cubic
+FALLING = 4  # samples through which a falling hip's height is fitted as a cubic
 
 
 @dataclass(frozen=True)
 class AdamsStart:
-    """What the rigid model says of it.
+    """The ADAMS start in the rigid model.
 
     state         rad and rad/s
     slope         rad
     energy        J, kinetic and potential, from the stance foot
     weight        N
     normal_force  N, of the ground at the start
-    pull_from     s, from when on the ground would have to pull; None if it never has to
-    heel_strikes  that come
-    end           how and when the walk ends, s
+    pull_from     s, time from which the ground would have to pull; None if never
+    heel_strikes  number
+    end           outcome of the walk
+    end_time      s
     """
 
     state: State
@@ -49,12 +50,12 @@ class AdamsStart:
 
 @dataclass(frozen=True)
 class AdamsWalk:
-    """The walk of the contact model from there, and what explains it.
+    """The ADAMS start in the contact model.
 
     terrain             of the contact model's ground
     rigid               the same start in the rigid model, both feet on the config's slope
-    airborne_from       s, from when on no foot of the contact model is in contact; None if one always is
-    later_normal_force  N, the most that the contact model's ground carries once the rigid one's would have to pull
+    airborne_from       s, time from which no foot of the contact model touches; None if never
+    later_normal_force  N, largest one of the contact model once the rigid model's ground would have to pull
     normal              (samples, leg) N, normal forces of the contact model
     mechanical          (samples,) J, kinetic and potential energy of the contact model
     """
@@ -69,7 +70,7 @@ class AdamsWalk:
 
     @property
     def reason(self) -> str:
-        """Why it ends as it does, in words with numbers."""
+        """Why the walk ends, with numbers."""
         return prose("adams_start.reason", self, int(self.walk.touch_time_s.size))
 
 
@@ -79,7 +80,7 @@ def adams_start(walker: Standing, state: State) -> AdamsStart:
     assert walk.samples is not None
     time, states, start = walk.samples.time_s, walk.samples.state, np.array([state])
     end = float(time[-1])
-    if walk.outcome is Outcome.FELL:  # a fall lies behind the last sample, and is found by inverse interpolation
+    if walk.outcome is Outcome.FELL:  # the fall comes after the last sample, so extrapolate
         hip = np.cos(states[-FALLING:, 1] + walker.slope) - FALLEN_HIP
         end = float(np.polynomial.Polynomial.fit(hip, time[-FALLING:], FALLING - 1)(0.0))
     return AdamsStart(
@@ -98,10 +99,10 @@ def adams_start(walker: Standing, state: State) -> AdamsStart:
 def adams_walk(
     walker: Standing, walk: Callable[[State], ContactWalkResult], contact: ContactWalker, terrain: str
 ) -> AdamsWalk:
-    """Run Table 2's ADAMS start in the contact model: the printed stance angle and velocities on the walker's slope.
+    """Walk the contact model from Table 2's ADAMS start: the printed stance angle and velocities on the walker's slope.
 
     walk     walks the contact model from a rigid start state, with samples
-    terrain  what it walks on, as configs name it
+    terrain  config name of its ground
     """
     _, theta_2, omega_1, omega_2 = adams_start_as_printed()
     rigid = adams_start(walker, (-2.0 * walker.slope - theta_2, theta_2, omega_1, omega_2))
@@ -123,7 +124,7 @@ def adams_walk(
 
 
 def first_below_zero(time: Array, values: Array) -> float | None:
-    """When sampled values first fall below zero, by interpolation; None if they do not."""
+    """Time at which sampled values first cross zero downwards, interpolated; None if they do not."""
     below = np.flatnonzero(values < 0.0)
     if below.size == 0:
         return None

@@ -1,7 +1,7 @@
-"""Appendix A of the paper: the compass walker's equations as they are printed there, and with C_21 corrected.
+"""Appendix A of the paper: the compass walker's equations as printed, and with C_21 corrected.
 
-The rigid model is assembled from parts (mechanics/); these equations are what it is checked against (energies, forces
-and the foot's height stand in the tests), and `as-printed` walks by the sign of theirs.
+The rigid model, assembled from parts (mechanics/), is checked against these equations (energies, forces and the foot's
+height are in the tests); `as-printed` uses their sign.
 
 State (theta_1 swing, theta_2 stance, dtheta_1, dtheta_2): absolute angles from the vertical, counter-clockwise
 positive, rad and rad/s. The walker walks in +x, downhill for a positive slope.
@@ -35,7 +35,7 @@ class RigidWalker(NamedTuple):
 
 
 class Swing(NamedTuple):
-    """The constants that (A.4) to (A.8) are made of."""
+    """Constants of (A.4) to (A.8)."""
 
     d11: float  # kg m^2, (A.9)
     d22: float  # kg m^2, (A.14)
@@ -46,7 +46,6 @@ class Swing(NamedTuple):
 
 
 def swing_constants(walker: RigidWalker) -> Swing:
-    """The constant factors of the swing equations of `walker`."""
     L, a, m, M_H, J = walker.leg_length, walker.foot_to_mass, walker.leg_mass, walker.hip_mass, walker.leg_inertia
     b = L - a
     return Swing(
@@ -97,7 +96,7 @@ def impact_matrices(walker: RigidWalker, cos_d: float) -> tuple[float, float, fl
 def impact(
     walker: RigidWalker, theta_1: float, theta_2: float, omega_1: float, omega_2: float
 ) -> tuple[float, float, float, float]:
-    """State after the heel strike, roles changed: the leg that was swinging is theta_2 now."""
+    """State after the heel strike, with roles changed: the former swing leg is theta_2."""
     s1, c1 = sine_cosine(theta_1)
     s2, c2 = sine_cosine(theta_2)
     A_11, A_12, A_22, B_11, B_12, B_22 = impact_matrices(walker, c1 * c2 + s1 * s2)
@@ -108,7 +107,7 @@ def impact(
 
 
 def assembled(walker: RigidWalker) -> Standing:
-    """The walker's rigid model, assembled from its parts."""
+    """Assemble the walker's rigid model from its parts."""
     below_hip = walker.leg_length - walker.foot_to_mass
     leg = Limb(walker.leg_length, walker.leg_mass, below_hip, inertia_kg_m2=walker.leg_inertia)
     model = standing(straight_legs(leg, walker.hip_mass, Arc()), walker.gravity, walker.slope)

@@ -1,4 +1,4 @@
-"""Both models compared with each other and, if the walker is the paper's, with every number that it prints."""
+"""Stage `compare`: both models compared with each other and, for the paper's walker, with every number it prints."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ MOVED = 1e-6  # rad and rad/s: a start this far from the fixed point is another 
 EQUATION_SETS: tuple[Equations, ...] = ("as-printed", "corrected")
 NOT_THE_PAPERS = {
     "what": "the paper's numbers, tables and errata",
-    "why": "they are of the paper's own walker, on even ground",
+    "why": "they apply only to the paper's walker on even ground",
 }
 WAYS = ("raw", "aligned", "between_impacts", "settled")
 LARGEST: dict[str, comparison.Quantity] = {"max_angle_error_rad": "angle", "max_velocity_error_rad_s": "velocity"}
@@ -54,10 +54,10 @@ MODELS = {
 }
 MEANINGS = {
     **MODELS,
-    "quantity": "what it is",
-    "unit": "unit of the row's numbers",
-    "where": "where the paper has it",
-    "paper": "as the paper has it",
+    "quantity": "quantity",
+    "unit": "unit of the row's values",
+    "where": "location in the paper",
+    "paper": "in the paper",
     "used": "as used here",
     "paper_matlab": "the paper's MATLAB model",
     "paper_adams": "the paper's MSC ADAMS model",
@@ -69,13 +69,13 @@ MEANINGS = {
     "percent_of_adams": "difference in percent of the ADAMS value",
     "printed": "as printed",
     "verdict": ", ".join(NumberVerdict),
-    "evidence": "why",
+    "evidence": "evidence",
 }
-"""Columns of the paper's numbers and tables."""
+"""Long names of the columns in the paper's numbers and tables."""
 
 
 def run(config: CompareConfig, inputs: Mapping[str, Content], progress: Progress) -> Content:
-    """Compare the walks of both models and, if walker and ground are the paper's, hold both against the paper."""
+    """Compare the walks of both models and, if walker and ground are the paper's, both models with the paper."""
     papers = is_own_walker(config) and config.ground.even
     progress.start("compare", 3 if papers else 2)
     motion = compare_motion(motion_of(inputs["simulate"]), motion_of(inputs["contact-sim"]))
@@ -95,7 +95,7 @@ def run(config: CompareConfig, inputs: Mapping[str, Content], progress: Progress
 def against_the_paper(
     config: CompareConfig, inputs: Mapping[str, Content], motion: Comparison, progress: Progress
 ) -> tuple[dict[str, Group], dict[str, Any]]:
-    """Groups and summary of both models against the paper's numbers, tables and errata."""
+    """Compare both models with the paper's numbers, tables and errata; returns groups and summary."""
     study = study_the_paper()
     progress.advance()
     measured = measure(config, inputs, motion)
@@ -115,7 +115,7 @@ def against_the_paper(
 
 
 def models_compared(config: CompareConfig, inputs: Mapping[str, Content]) -> dict[str, Any]:
-    """Summary of the walks of both models alone, and of a walker with knees of both instants of their release."""
+    """Summarise the walks of both models, and for knees the walks with either release."""
     gait, rigid, contact = (inputs[name].summary for name in ("fixedpoint", "simulate", "contact-sim"))
     releases = compare_releases(config, as_state(gait["state"]), float(contact["pitch_m"]))
     return {
@@ -137,19 +137,19 @@ def models_compared(config: CompareConfig, inputs: Mapping[str, Content]) -> dic
 
 
 def recorded(walk: Content, group: str, name: str) -> comparison.Array | None:
-    """A variable of a stored walk; None if it is not there."""
+    """Variable of a stored walk, or None."""
     found = walk.groups.get(group, Group({}))
     return found[name] if name in found.variables else None
 
 
 def times_of_steps(walk: Content, name: str) -> comparison.Array:
-    """Times (s) that a stored walk has of its steps; none of a walk without a step, and of what the walker has not."""
+    """Times (s) stored per step of a walk; empty if there are none."""
     found = recorded(walk, "steps", name)
     return np.zeros(0) if found is None else found
 
 
 def motion_of(walk: Content) -> comparison.Motion | None:
-    """The legs of a stored walk in time; None if states were not stored, or the walk ended at once."""
+    """Motion of the legs in a stored walk; None if states were not stored or the walk ended at once."""
     angle = recorded(walk, "trajectory", "angle")
     if angle is None or len(angle) < 2:
         return None
@@ -161,12 +161,11 @@ def motion_of(walk: Content) -> comparison.Motion | None:
 
 @dataclass(frozen=True)
 class Comparison:
-    """How the contact model's walk differs from the rigid one's.
+    """Difference between the walks of both models.
 
-    errors    in each way in which there was something to compare
-    orbit     distance of each leg's orbits; None if there is none
-    groups    of the artifact
-    left_out  what could not be compared, and why
+    errors    by alignment, where there is something to compare
+    orbit     distance between each leg's orbits, or None
+    left_out  comparisons left out, and why
     """
 
     errors: Errors
@@ -176,7 +175,7 @@ class Comparison:
 
     @property
     def summary(self) -> dict[str, Any]:
-        """What the command prints: the larger leg's error and both legs' in every way, None where there is none."""
+        """Largest errors of both legs by alignment; None where there is nothing to compare."""
         said: dict[str, Any] = {}
         for name, quantity in LARGEST.items():
             per_leg = {way: self.errors[way].largest(quantity) if way in self.errors else None for way in WAYS}
@@ -186,17 +185,17 @@ class Comparison:
 
 
 def compare_motion(rigid: comparison.Motion | None, contact: comparison.Motion | None) -> Comparison:
-    """The contact model's walk less the rigid one's, in time, in phase, and as orbits."""
+    """Subtract the rigid walk from the contact walk: in time, in phase, and as orbits."""
     if rigid is None or contact is None:
-        why = "no record of both walks: outputs does not ask for states, or a walk ended at once"
+        why = "there are no states of both walks: outputs omits them, or a walk ended at once"
         return Comparison({}, left_out=({"what": "differences of the walks", "why": why},))
     steps, orbit = min(rigid.steps, contact.steps), None
     time, raw = comparison.difference_in_time(contact, rigid)
     found = {"raw": raw}
     groups = {"errors": Group({**over_time(time=time), **legs(), **differences("raw", raw, (TIME, LEG), "time")})}
-    missing = ("differences in phase, and of the orbits", "step")
+    missing = ("differences in phase and between the orbits", "step")
     if steps:
-        missing = ("difference of the last stride, and of the orbits", "stride")
+        missing = ("differences of the last stride and between the orbits", "stride")
         phases = np.linspace(0.0, 1.0, comparison.PHASES)
         aligned = comparison.difference_in_phase(contact, rigid, phases)
         smooth = comparison.between_impacts(contact, rigid, phases)
@@ -221,7 +220,6 @@ def compare_motion(rigid: comparison.Motion | None, contact: comparison.Motion |
 
 
 def part(difference: comparison.WalkDifference, where: Any) -> comparison.WalkDifference:
-    """A difference at some of its steps and phases."""
     return comparison.WalkDifference(difference.angle[where], difference.velocity[where])
 
 
@@ -235,7 +233,7 @@ def differences(way: str, found: comparison.WalkDifference, dims: tuple[str, ...
 
 
 def measure(config: CompareConfig, inputs: Mapping[str, Content], motion: Comparison) -> Measured:
-    """Everything that the paper's numbers are held against."""
+    """Measure everything that the paper's numbers are compared with."""
     sets = inputs["fixedpoint"].summary["equation_sets"]
     found = {name: sets[name] for name in EQUATION_SETS if "state" in sets.get(name, {})}
     models: dict[str, RigidModel] = {
@@ -257,7 +255,7 @@ def measure(config: CompareConfig, inputs: Mapping[str, Content], motion: Compar
 
 
 def contact_model(config: CompareConfig, walk: Content) -> ContactModel:
-    """What is held against the paper's ADAMS model."""
+    """Measure what is compared with the paper's ADAMS model."""
     summary, pitch = walk.summary, float(walk.summary["pitch_m"])
     periods, lengths = np.array(summary["step_periods_s"]), np.array(summary["step_lengths_m"])
     stride = STRIDE * (lengths.size // STRIDE)
@@ -283,7 +281,7 @@ def contact_model(config: CompareConfig, walk: Content) -> ContactModel:
 
 
 def left_out(inputs: Mapping[str, Content], measured: Measured) -> list[dict[str, str]]:
-    """What could not be compared with the paper, and why."""
+    """List the comparisons with the paper that could not be made, with reasons."""
     sets = inputs["fixedpoint"].summary["equation_sets"]
     missing = [
         {"what": f"columns of the {name} equations", "why": str(sets.get(name, {}).get("reason", "no gait was found"))}
@@ -292,19 +290,18 @@ def left_out(inputs: Mapping[str, Content], measured: Measured) -> list[dict[str
     ]
     contact = measured.contact
     if contact.table_3.t_cycle is None:
-        why = f"the walk ended after {contact.steps} of the two steps it takes ({contact.outcome})"
+        why = f"a stride takes two steps, but the walk ended after {contact.steps} ({contact.outcome})"
         missing.append({"what": "a stride of the contact model in Table 3", "why": why})
     if contact.table_3.E_avg is None:
-        why = "no step was completed" if contact.steps == 0 else "outputs does not ask for energies"
+        why = "no step was completed" if contact.steps == 0 else "outputs omits energies"
         missing.append({"what": "energy of the contact model", "why": why})
     return missing
 
 
 def numbers_group(rows: Sequence[Mapping[str, Any]], names: Sequence[str] | Mapping[str, Any] = ()) -> Group:
-    """Numbers of the paper beside those of the models, as the command prints them.
+    """Build a group with the paper's numbers and those of the models.
 
-    Where a model has no value there is none: a model's column has a dimension of its own, whose coordinate says which
-    rows its numbers stand in. Beside it a column of texts has all the rows.
+    A model's column holds only the rows with a value; its own coordinate lists these rows. Texts cover all rows.
 
     names  symbols of the rows, if they have any
     """
@@ -329,5 +326,4 @@ def numbers_group(rows: Sequence[Mapping[str, Any]], names: Sequence[str] | Mapp
 
 
 def texts(values: Sequence[str], long_name: str) -> Variable:
-    """A column of texts."""
     return Variable(np.array(values, dtype=object), (ROW,), "", long_name)

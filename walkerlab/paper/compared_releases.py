@@ -1,7 +1,7 @@
-"""What the release of the trailing knee decides: two contact walks from one gait that differ in its instant alone.
+"""Contact walks from one gait that differ only in when the trailing knee is released.
 
-Beside each the rigid model with the rule that it stands for: released in the compression the trailing knee is rigid in
-the impact, released at first touch it is free.
+Each is compared with the corresponding rigid model: released during compression the trailing knee is rigid in the
+impact, released at first touch it is free.
 """
 
 from dataclasses import replace
@@ -19,24 +19,24 @@ from walkerlab.solvers.system import State
 from walkerlab.stages.walk import last_step, numbers_of
 
 RELEASES = {"compression": False, "touch": True}
-"""Instants of release, as the config names them, and whether that is the leading foot's first touch."""
-STEPS = 20  # enough for what starts at a gait to come to rest at another one, or to fall
+"""Whether the knee is released at the leading foot's first touch, by the config's name for the release."""
+STEPS = 20  # enough to settle on another gait, or to fall
 RIGID_STEPS = 200
 RIGID, CONTACT = Tolerances("dop853", 1e-8, 1e-10, 2_000_000), Tolerances("radau5", 1e-8, 1e-10, 2_000_000)
 LEFT_OUT = (
     {
         "what": "ideal against compliant lock",
-        "why": "a walk has one of them; `walkerlab contact-sim --set walker.knee.lock=compliant` walks the other",
+        "why": "a walk has one lock; try the other by `walkerlab contact-sim --set walker.knee.lock=compliant`",
         "saves": "compiling the contact walk a second time",
     },
 )
 
 
 def compare_releases(config: ContactConfig, state: State, pitch_m: float) -> dict[str, Any] | None:
-    """Up to 20 steps from a gait with each instant of release; None without knees, or where these wait for a push-off.
+    """Walk up to 20 steps from a gait with each release; None without knees, or if they wait for a push-off.
 
     state    of the rigid model
-    pitch_m  what lengths are measured by
+    pitch_m  unit of lengths
     """
     scene = contact_scene(config, pitch_m, pitch_m)
     if not scene.walker.kneed or config.push_off.impulse_N_s != 0.0:
@@ -54,7 +54,7 @@ def compare_releases(config: ContactConfig, state: State, pitch_m: float) -> dic
 
 
 def told(scene: ContactScene, walk: ContactWalkResult) -> dict[str, Any]:
-    """How a walk ended, its last step, how long into it the knee locked, and what a step dissipates by channel."""
+    """Summarise a walk: outcome, last step, knee strike, and dissipation per step by channel."""
     steps, lost = walk.steps, by_channel(scene.walker, walk.dissipated_J)
     return {
         "outcome": walk.outcome.label,

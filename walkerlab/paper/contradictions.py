@@ -1,4 +1,4 @@
-"""Where the paper's printed values contradict one another: computed from them alone, with their rounding left open."""
+"""Contradictions between the paper's printed values, allowing for their rounding."""
 
 from collections.abc import Callable, Iterator
 from functools import cache
@@ -27,23 +27,22 @@ Interval = tuple[float, float]
 
 @cache
 def contradictions() -> MappingProxyType[Printed, str]:
-    """Printed values that others of the paper contradict, each with the computation in words."""
+    """Printed values that other values of the paper contradict, each with the computation."""
     return MappingProxyType(dict([*percentages(), *steps_of_a_cycle(), *lengths_and_speeds(), error_at_the_start()]))
 
 
 def interval(function: Callable[..., float], *entries: Printed) -> Interval:
-    """Smallest and largest value of a function of printed values, monotonic in each, over what rounds to them."""
+    """Range of a function, monotonic in each argument, over all values that round to the printed ones."""
     values = [function(*corner) for corner in product(*(entry.rounding for entry in entries))]
     return min(values), max(values)
 
 
 def apart(one: Interval, other: Interval) -> bool:
-    """Whether two intervals have no value in common."""
     return one[1] < other[0] or other[1] < one[0]
 
 
 def percentages() -> Iterator[tuple[Printed, str]]:
-    """Percentages of Table 2 that its two columns do not give, of the MATLAB value."""
+    """Percentages of Table 2 that are not relative to the MATLAB column."""
     for row in TABLE_2:
         low, high = percent_left_open(row)
         # the signs of the column follow no rule, so sizes are compared
@@ -54,12 +53,12 @@ def percentages() -> Iterator[tuple[Printed, str]]:
 
 
 def percent_left_open(row: StartRow) -> Interval:
-    """Change in size from MATLAB's to ADAMS's value (%) that the rounding of both leaves open."""
+    """Range of the change in magnitude from MATLAB's to ADAMS's value (%), given the rounding of both."""
     return interval(lambda adams, matlab: 100.0 * (abs(adams) / abs(matlab) - 1.0), row.adams, row.matlab)
 
 
 def steps_of_a_cycle() -> Iterator[tuple[Printed, str]]:
-    """Unequal steps of a gait whose fixed point is that of one step, and a cycle that is not the sum of its steps."""
+    """Unequal steps of a period-one gait, and a cycle that is not the sum of its steps."""
     left, right = T_LEFT.matlab, T_RIGHT.matlab
     if apart(left.rounding, right.rounding):
         equal = "x_p is a fixed point of one step (eq. 10 and 11), so its steps are equal"
@@ -75,7 +74,7 @@ def steps_of_a_cycle() -> Iterator[tuple[Printed, str]]:
 
 
 def lengths_and_speeds() -> Iterator[tuple[Printed, str]]:
-    """A step length, and speeds, that the legs' length and angles do not give."""
+    """A step length, and speeds, that do not follow from the legs' length and angles."""
     leg = TABLE_1[0]
     for column, source in (("matlab", "x_p and Table 1"), ("adams", "Tables 1 and 2")):
         angles = [getattr(row, column) for row in TABLE_2[:2]]
@@ -94,7 +93,7 @@ def lengths_and_speeds() -> Iterator[tuple[Printed, str]]:
 
 
 def error_at_the_start() -> tuple[Printed, str]:
-    """The largest error, which is at least the difference of the two starts."""
+    """The largest error, which cannot be below the difference between the two starts."""
     angle, rate = (max(abs(row.adams.value - row.matlab.value) for row in rows) for rows in (TABLE_2[:2], TABLE_2[2:]))
     return LARGEST_ERROR, (
         f"the two starts of Table 2 alone differ by {angle:.4f} rad and {rate:.2f} rad/s, "

@@ -1,4 +1,4 @@
-"""In what a config's scene is not the one of the paper: then its numbers neither confirm nor refute the paper's."""
+"""Differences from the paper's scene; with any, a config's numbers neither confirm nor refute the paper's."""
 
 from collections.abc import Iterable, Iterator
 from typing import Any, Final
@@ -14,15 +14,15 @@ from walkerlab.paper.printed import X_P, slope_of
 
 PHYSICAL_MODEL_ONLY: Final = ("foot_radius_m",)
 IN_SI: Final = ("stiffness", "damping", *BOUNDS_SI)
-"""Keys of the contact block whose numbers are of either units."""
+"""Keys of the contact block whose values depend on its units."""
 PURE: Final = tuple(name for name in Contact.model_fields if name not in (*IN_SI, "units", "stance"))
-"""Its other keys; a pinned first stance is the paper's too (section 4)."""
+"""Its other keys except `stance`: the paper also has a pinned first stance (section 4)."""
 
 
 def departures(config: CompareConfig, start_moved: bool) -> Departures:
-    """What differs from the paper's scene, in words; the slope is known to the digits of x_p.
+    """Describe the differences from the paper's scene; the slope is compared to the digits of x_p.
 
-    start_moved  the walk did not start from the rigid model's fixed point
+    start_moved  whether the walk started away from the rigid model's fixed point
     """
     walker, contact, paper = config.walker, config.contact, CompassWalker()
     rigid: list[str] = []
@@ -49,13 +49,12 @@ def departures(config: CompareConfig, start_moved: bool) -> Departures:
 
 
 def different(used: Any, paper: Any, names: Iterable[str], called: str = "{}") -> Iterator[str]:
-    """The names by which the two have different values, with these, as they are called."""
+    """Describe each key whose values differ."""
     for name in names:
         if not same(getattr(used, name), getattr(paper, name)):
             yield said(called.format(name), getattr(used, name), getattr(paper, name))
 
 
 def said(name: str, *values: Any) -> str:
-    """A difference in words."""
     used, paper = (f"{value:.6g}" if isinstance(value, float) else str(value) for value in values)
     return f"{name} {used} instead of {paper}"

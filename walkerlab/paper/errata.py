@@ -1,4 +1,4 @@
-"""The errata of the paper, each with its evidence and what was measured for it; see `study` for the measuring."""
+"""Errata of the paper, with evidence and measurements (made in `study`)."""
 
 import re
 from dataclasses import dataclass, fields
@@ -22,9 +22,9 @@ class Erratum:
 
 PARTS = [field.name for field in fields(Erratum)]
 ERRATUM = re.compile(" ".join(rf"{name}: (?P<{name}>.*?)" for name in PARTS) + r"(?= where: |$)")
-"""An erratum in the text of the template, its parts in their order."""
+"""Matches an erratum in the rendered template."""
 
 
 def errata(study: PaperStudy) -> tuple[Erratum, ...]:
-    """All of them, in the order of the paper's sections within each theme."""
+    """All errata, by theme and then in the order of the paper's sections."""
     return tuple(Erratum(**found.groupdict()) for found in ERRATUM.finditer(prose("errata.errata", study)))

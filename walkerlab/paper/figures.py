@@ -1,4 +1,4 @@
-"""Figures that show the paper's claim: 8, how far both models' walks are apart, and 12, the rigid limit."""
+"""Figures on the paper's claim: 8, the difference between both models' walks, and 12, the rigid limit."""
 
 from __future__ import annotations
 
@@ -28,14 +28,14 @@ AT_SAME_TIME: Final = Look("difference at the same time", VERMILLION, (0.0, (3.2
 IN_PHASE: Final = Look("at the same phase of a step", BLACK, "-", 1.2, "", order=4)
 PAPER: Final = Look("largest error in the paper", GREY, ":", 1.6, "", order=2)
 ROOM = 3.0
-"""Factor between what is shown of errors and the axis's ends."""
+"""Factor between the extreme errors and the ends of the axis."""
 ZERO_CROSSING = 1e-3
-"""Part of the largest error below which nothing is shown: where a difference changes its sign it is nothing."""
+"""Smallest error shown, as a share of the largest: errors vanish where the difference changes sign."""
 QUANTITIES = (
     ("a", "angle", "angle_error_rad"),
     ("b", "angular velocity", "velocity_error_rad_s"),
 )
-"""What of the legs is compared: letter, words, variable of the errors (stored raw and aligned)."""
+"""Compared quantities: letter, name, variable of the errors (stored raw and aligned)."""
 RAW_ERRORS = Need(COMPARE_STAGE, "errors", ("time", *(f"raw_{name}" for _, _, name in QUANTITIES)), NO_STATES)
 ALIGNED_ERRORS = Need(
     COMPARE_STAGE,
@@ -46,9 +46,9 @@ ALIGNED_ERRORS = Need(
 
 
 def draw_differences(results: Results) -> Drawn:
-    """A row for each leg's angle and angular velocity, on logarithmic scales, over the rigid walk's steps.
+    """Plot the errors of each leg's angle and angular velocity over the rigid walk's steps, on logarithmic scales.
 
-    Caption: the largest errors of all that was compared, in both ways, and the paper's.
+    The caption gets the largest errors in time and in phase, and the paper's.
     """
     (rigid,), _ = shown([walk_of(results[RIGID_STAGE], RIGID)])
     raw, aligned = (results[COMPARE_STAGE][need.group] for need in (RAW_ERRORS, ALIGNED_ERRORS))
@@ -87,20 +87,20 @@ ERRORS: Final = {
     "velocity_error_rad_s": Look("angular velocity in phase (rad/s)", ORANGE, "--", 1.4, "s"),
     NUMERICAL: Look("numerical error, last touch (s)", GREY, "-.", 1.0, "x"),
 }
-LIMIT = Need(TUNE_STAGE, LIMITS[0][0], (WALL, *ERRORS), "no gait to lead towards the rigid limit")
+LIMIT = Need(TUNE_STAGE, LIMITS[0][0], (WALL, *ERRORS), "there is no gait to take to the rigid limit")
 CLAIM: Final[dict[str, Any]] = {"color": BLACK, "linestyle": (0.0, (1.0, 2.0)), "linewidth": 1.0}
 CONFIGS: Final[dict[str, Any]] = {"color": BLACK, "linestyle": "", "marker": "o", "markersize": 9, "fillstyle": "none"}
 LEAST = 1e-14
-"""Shown in place of a numerical error of nothing, which has no place on a logarithmic axis."""
+"""Shown for a numerical error of zero, which a logarithmic axis cannot show."""
 
 
 def draw_limit(results: Results) -> Drawn:
-    """Errors over run time, one setting a point, from the config's contact to the most rigid one.
+    """Plot errors over run time, one point per setting, from the config's contact to the most rigid one.
 
-    Caption: what both amount to, with point feet besides, the paper's claim, and whether the walker pushes off.
+    The caption gets the totals, also with point feet, the paper's claim, and whether the walker pushes off.
     """
     figure, claimed = blank(3.6), bool(claims_in(results))
-    # feet that roll in both models too are not made points as well
+    # the series with point feet is absent for walkers whose feet roll in both models
     stored = results[TUNE_STAGE].groups
     found = [(stored[name], title) for name, title in LIMITS if name in stored and ALIGNED in stored[name].variables]
     both = figure.subplots(1, len(found), sharex=True, sharey=True, squeeze=False)[0]

@@ -1,6 +1,6 @@
-"""What the study brings to scenes (see scene/studies.py): its own walker, and the sign error of Appendix A as a torque.
+"""The study's contribution to scenes (see scene/studies.py): its walker, and Appendix A's sign error as a torque.
 
-Every result of the rigid model is made with this file: what else the study has stands in others.
+Every result of the rigid model depends on this file, so the rest of the study is kept in others.
 """
 
 from collections.abc import Callable, Mapping
@@ -12,7 +12,7 @@ from walkerlab.mechanics.standing import STANCE, SWING, Standing
 
 
 def is_own_walker(config: Any) -> bool:
-    """Whether a config has the paper's own walker, up to rounding of its values."""
+    """Whether a config has the paper's walker, up to rounding of its values."""
     walker, paper = config.walker, CompassWalker()
     return is_passive_compass(config) and all(
         same(getattr(walker, name), getattr(paper, name)) for name in CompassWalker.model_fields
@@ -20,9 +20,9 @@ def is_own_walker(config: Any) -> bool:
 
 
 def as_printed(model: Standing) -> Standing:
-    """Return a compass whose centrifugal torque on the stance leg, C_21 dtheta_1, has the sign that (A.5) prints."""
+    """Return a compass whose centrifugal torque on the stance leg, C_21 dtheta_1, has the sign printed in (A.5)."""
     return model.changed(unpaired=-2.0 * model.A[STANCE, SWING])
 
 
 LAWS: Mapping[str, Callable[[Standing], Standing]] = {"as-printed": as_printed}
-"""By the config's name for a set of equations, what makes a walker move by it."""
+"""Changes of a walker's model, by the config's name for a set of equations."""

@@ -1,4 +1,4 @@
-"""What the paper's adjustment does without under a config; known before anything is loaded or run."""
+"""Parts of the paper's adjustment that a config leaves out, known before anything is loaded or run."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from walkerlab.scene.left_out import Entry, left_out
 if TYPE_CHECKING:
     from walkerlab.config.reads import RigidConfig
 
-PAPERS = "it is the paper's procedure with its compass"
+PAPERS = "the paper uses it for its compass only"
 
 
 def of_adjustment(config: RigidConfig) -> tuple[Entry, ...]:
-    """Return what the adjustment of another walker than the paper's compass does without."""
+    """Return the omissions for a walker other than the paper's compass."""
     entries = []
     if not is_passive_compass(config):
         entries.append(left_out("the first step with a hinged stance foot", PAPERS, "two walks"))
     if not is_own_walker(config):
-        entries.append(left_out("the paper's start of its ADAMS model", "it is of the paper's own compass", "a walk"))
+        entries.append(left_out("the paper's start of its ADAMS model", "only that compass has it", "a walk"))
     return tuple(entries)

@@ -1,4 +1,4 @@
-"""What the printed numbers are held against: the rigid model with either set of equations, and the contact model."""
+"""Measurements to compare with the printed numbers: both sets of rigid equations, and the contact model."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -15,20 +15,20 @@ from walkerlab.solvers.registry import ENDLESS, Tolerances
 from walkerlab.solvers.system import State
 
 TIGHT = Tolerances("dop853", 1e-12, 1e-14, ENDLESS)
-"""The error is far below any printed digit."""
+"""Errors are far below any printed digit."""
 CYCLES = 5  # walked in the paper
 ENERGY_STEPS = 5  # over which the paper averages the energy
 
 
 @dataclass(frozen=True)
 class Characteristics:
-    """The quantities of Table 3, SI units; None where the walk or its record is too short for one.
+    """Quantities of Table 3, SI units; None where the walk or its record is too short.
 
     t_left   period of the first step of the last completed stride
     t_right  period of its second step
     t_cycle  their sum
     v_com    length of the stride along the slope over t_cycle
-    E_avg    time mean of kinetic and potential energy, from the current stance foot, over five steps or more
+    E_avg    time mean of kinetic and potential energy, from the current stance foot, over at least five steps
     """
 
     t_left: float | None
@@ -39,7 +39,7 @@ class Characteristics:
 
 
 def characteristics(periods: Array, lengths: Array, mean_energy: float | None) -> Characteristics:
-    """The quantities of Table 3 from the periods (s) and lengths (m) of a walk's steps."""
+    """Compute Table 3 from the periods (s) and lengths (m) of a walk's steps."""
     strides = len(periods) // 2
     if strides == 0:
         first = float(periods[0]) if len(periods) else None
@@ -60,7 +60,7 @@ class EnergyRecord:
 
 
 def over_last_steps(time: Array, energy: Array, step_ends: Array) -> EnergyRecord | None:
-    """A sampled energy over the last five completed steps, or as many as there are; None if there are none."""
+    """Average a sampled energy over the last five completed steps, or fewer; None without a step."""
     if step_ends.size == 0:
         return None
     start = step_ends[-1 - ENERGY_STEPS] if step_ends.size > ENERGY_STEPS else time[0]
@@ -74,12 +74,12 @@ def over_last_steps(time: Array, energy: Array, step_ends: Array) -> EnergyRecor
 
 @dataclass(frozen=True)
 class RigidModel:
-    """The gait of one set of equations, and a walk on it.
+    """Gait of one set of equations, and a walk from it.
 
-    state          the fixed point, rad and rad/s
-    steps          that were walked, of ten
+    state          fixed point, rad and rad/s
+    steps          completed, of ten
     step_length    m, between the feet at that state
-    energy_least   J, least and largest energy during the walk
+    energy_least   J, minimum and maximum energy during the walk
     energy_drift   J, largest spread within a swing
     """
 
@@ -93,7 +93,7 @@ class RigidModel:
 
 
 def rigid_model(walker: RigidWalker, state: State) -> RigidModel:
-    """Walk five cycles from a gait's fixed point, and measure; the energy is that from the current stance foot."""
+    """Walk five cycles from a gait's fixed point; energy is measured from the current stance foot."""
     model = assembled(walker)
     walk = take_walk(model, TIGHT, state, 2 * CYCLES, sampled=True)
     assert walk.samples is not None
@@ -111,15 +111,15 @@ def rigid_model(walker: RigidWalker, state: State) -> RigidModel:
 
 @dataclass(frozen=True)
 class ContactModel:
-    """A walk of the contact model beside the paper's ADAMS model.
+    """Walk of the contact model, to compare with the paper's ADAMS model.
 
     law          the contact block of its config
     foot_radius  m
-    summary      what was stored of the walk: outcome, steps, static penetration (m) and damping ratio are read here
-    start        rad and rad/s, the rigid state it was started from; None if states were not stored
+    summary      stored summary of the walk
+    start        initial rigid state, rad and rad/s; None if states were not stored
     step_length  m, mean over the last completed stride; None without one
     energy       over the last five steps; None if energies were not stored
-    from_x_p     steps that it takes from x_p with its printed digits, of ten, and how that walk ends
+    from_x_p     steps from x_p with its printed digits, of ten, and the outcome of that walk
     """
 
     law: Contact
@@ -133,28 +133,26 @@ class ContactModel:
 
     @property
     def steps(self) -> int:
-        """Steps that it walked."""
         return int(self.summary["steps"])
 
     @property
     def outcome(self) -> str:
-        """How its walk ended."""
         return str(self.summary["outcome"])
 
 
 Errors = Mapping[str, WalkDifference]
-"""Differences between the contact model and the rigid one, in each way in which there is something to compare:
+"""Differences between the contact and the rigid model, by alignment:
 
 raw              at the same time
 aligned          at the same phase of each step
-between_impacts  of that without the first instants of every step, in which a compliant impact is still under way
-settled          of that the last completed stride only
+between_impacts  the same without the start of each step, while a compliant impact is still in progress
+settled          the same for the last completed stride only
 """
 
 
 @dataclass(frozen=True)
 class Departures:
-    """How a scene differs from the paper's, in words; empty if it does not."""
+    """Descriptions of a scene's differences from the paper's."""
 
     rigid: tuple[str, ...]  # of the rigid model
     contact: tuple[str, ...]  # of the contact model, those of the rigid model included
@@ -162,12 +160,12 @@ class Departures:
 
 @dataclass(frozen=True)
 class Measured:
-    """All that was measured of a config's scene."""
+    """All measurements on a config's scene."""
 
     walker: RigidWalker
     equations: str
-    models: Mapping[str, RigidModel]  # by set of equations; a set without a gait is absent
-    spectral_radii: Mapping[str, float]  # of the same gaits: largest magnitude of a multiplier
+    models: Mapping[str, RigidModel]  # by set of equations, if it has a gait
+    spectral_radii: Mapping[str, float]  # of the same gaits
     contact: ContactModel
     errors: Errors
     departures: Departures

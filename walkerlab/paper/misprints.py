@@ -1,4 +1,4 @@
-"""What the misprints of Appendix A do, with the heel strike solved as (A.57) has it: six equations, entry by entry."""
+"""Effects of Appendix A's misprints; the heel strike solves the six equations of (A.57) as printed."""
 
 import math
 
@@ -41,7 +41,7 @@ def swing_foot(walker: RigidWalker, theta_1: float, theta_2: float, row_2: float
 
 
 def height_over_slope(walker: RigidWalker, theta_1: float, theta_2: float, row_2: float) -> float:
-    """How high over the slope P puts the swing foot (m)."""
+    """Height (m) over the slope at which P places the swing foot."""
     along, up = swing_foot(walker, theta_1, theta_2, row_2)
     return float(along * math.sin(walker.slope) + up * math.cos(walker.slope))
 
@@ -67,13 +67,13 @@ def velocities_after_impact(walker: RigidWalker, before: State, row_2: float) ->
 
 
 def foothold_speed_after_impact(walker: RigidWalker, before: State, row_2: float) -> float:
-    """Speed (m/s) of the new stance foot right after the impact: (7) wants zero."""
+    """Speed (m/s) of the new stance foot after the impact, which (7) requires to be zero."""
     after = velocities_after_impact(walker, before, row_2)
     return float(np.linalg.norm(swing_foot_gradient(walker, before[0], before[1], RIGHT) @ after))
 
 
 def step(walker: RigidWalker, start: State, row_2: float) -> State | None:
-    """One step with the impact of (A.57): the state after it; None if there is no heel strike."""
+    """State after one step with the impact of (A.57); None without a heel strike."""
     walk = take_walk(assembled(walker), TIGHT, start, 1)
     if walk.steps == 0:
         return None
@@ -83,7 +83,7 @@ def step(walker: RigidWalker, start: State, row_2: float) -> State | None:
 
 
 def fixed_point(walker: RigidWalker, guess: State, row_2: float) -> State | None:
-    """The fixed point of the step map with the impact of (A.57) near `guess`; None if the search fails."""
+    """Fixed point, near `guess`, of the step map with the impact of (A.57); None if the search fails."""
 
     def state(z: Array) -> State:
         return -2.0 * walker.slope - float(z[0]), float(z[0]), float(z[1]), float(z[2])

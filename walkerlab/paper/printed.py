@@ -1,4 +1,4 @@
-"""What the paper prints, as it prints it: every number with where it stands, and the walker that it is about."""
+"""Numbers that the paper prints, with their sources, and the walker they describe."""
 
 from dataclasses import dataclass
 from decimal import ROUND_DOWN, ROUND_HALF_UP, Decimal
@@ -17,7 +17,7 @@ class Printed:
     """A number of the paper.
 
     where    equation, table, figure or section
-    text     as printed, so that its last digit is known
+    text     as printed, which shows its last digit
     """
 
     where: str
@@ -27,12 +27,12 @@ class Printed:
 
     @property
     def value(self) -> float:
-        """The number itself, in the unit it is printed in."""
+        """Value in the printed unit."""
         return float(number(self.text))
 
     @property
     def last_digit(self) -> float:
-        """Worth of its last digit."""
+        """One unit in the last printed digit."""
         exponent = number(self.text).as_tuple().exponent
         return 10.0 ** int(exponent)
 
@@ -43,7 +43,7 @@ class Printed:
         return self.value - half, self.value + half
 
     def agreement(self, value: float | None) -> str:
-        """How a value agrees with it to its digits: 'rounded', 'cut off', or '' if it does not."""
+        """How a value agrees to the printed digits: 'rounded', 'cut off', or '' if it does not."""
         if value is None:
             return ""
         expected, found = number(self.text), Decimal(repr(float(value)))
@@ -57,7 +57,7 @@ WORDS: Final = {"one": "1", "five": "5", "zero": "0"}
 
 
 def number(text: str) -> Decimal:
-    """The number in a text such as '-0.60', '+41%', '< 1 %', '10^5', '1e-4' or 'five'."""
+    """Parse a text such as '-0.60', '+41%', '< 1 %', '10^5', '1e-4' or 'five'."""
     plain = text.replace("less than", "").strip("<+% ")
     return Decimal(WORDS.get(plain, plain.replace("10^", "1e")))
 
@@ -77,8 +77,6 @@ TABLE_1: Final = (
 
 @dataclass(frozen=True)
 class PrintedRow:
-    """A row of Table 3."""
-
     name: str
     matlab: Printed
     adams: Printed
@@ -86,23 +84,20 @@ class PrintedRow:
 
 @dataclass(frozen=True)
 class StartRow(PrintedRow):
-    """A row of Table 2."""
-
     percent: Printed
 
     @property
     def raised(self) -> float:
-        """The ADAMS value over the MATLAB one."""
         return self.adams.value / self.matlab.value
 
     @property
     def percent_of_matlab(self) -> float:
-        """How much larger in magnitude the ADAMS value is, in percent of the MATLAB one."""
+        """Increase in magnitude from MATLAB to ADAMS, relative to the MATLAB value, in percent."""
         return self._percent_of(self.matlab)
 
     @property
     def percent_of_adams(self) -> float:
-        """The same in percent of itself."""
+        """The same, relative to the ADAMS value, in percent."""
         return self._percent_of(self.adams)
 
     def _percent_of(self, base: Printed) -> float:
@@ -123,7 +118,7 @@ TABLE_2: Final = tuple(
         ("dtheta_2", X_P[3], "-3.20", "Table 2, section 4", "+74%"),
     )
 )
-"""Its MATLAB column is x_p; section 4 repeats the percentages of the velocities."""
+"""The MATLAB column is x_p; section 4 repeats the percentages of the velocities."""
 
 
 TABLE_3: Final = tuple(
@@ -152,7 +147,7 @@ DYNAMIC_FRICTION: Final = Printed("section 4, Fig. 4b", "dynamic friction", "1",
 LOST_BALANCE: Final = Printed("section 4", "steps until balance was lost, from MATLAB's initial conditions", "1", "one")
 STRIDES: Final = Printed("section 5, Fig. 7", "gait cycles walked", "1", "five")
 LARGEST_ERROR: Final = Printed("section 5, Fig. 8", "largest error, angles and velocities", "rad, rad/s", "10^-4")
-"""Printed once, for both."""
+"""One value for angles and velocities."""
 STEP_LENGTH: Final = Printed("section 5", "length of one complete step", "m", "0.0342")
 VELOCITY_DIFFERENCE: Final = Printed("section 5", "difference of the average velocities", "%", "less than 1%")
 
@@ -173,12 +168,12 @@ def adams_start_as_printed() -> tuple[float, float, float, float]:
 
 
 def slope_of(theta_1: Printed, theta_2: Printed) -> tuple[float, float]:
-    """The slope (rad) on which both feet of a printed state stand, and how far rounding leaves it open."""
+    """Slope (rad) on which both feet of a printed state stand, and its uncertainty due to rounding."""
     return -0.5 * (theta_1.value + theta_2.value), 0.25 * (theta_1.last_digit + theta_2.last_digit)
 
 
 def walker_of_the_paper(c21_sign: float) -> RigidWalker:
-    """The walker of Table 1, its masses in the middle of the legs, on the slope of x_p.
+    """Walker of Table 1 on the slope of x_p, with the masses at mid-leg.
 
     c21_sign  CORRECTED or AS_PRINTED
     """
@@ -187,18 +182,18 @@ def walker_of_the_paper(c21_sign: float) -> RigidWalker:
 
 
 def printed_speed(cycle: float) -> float:
-    """The printed step length over a cycle's time (s), as section 5 has it (m/s)."""
+    """Printed step length over the time (s) of a cycle, as in section 5 (m/s)."""
     return STEP_LENGTH.value / cycle
 
 
 def speed_difference(matlab_cycle: float, adams_cycle: float) -> float:
-    """Difference of the two speeds (%) that follow from cycles of these times (s)."""
+    """Relative difference (%) of the speeds that follow from cycles of these times (s)."""
     matlab, adams = printed_speed(matlab_cycle), printed_speed(adams_cycle)
     return 100.0 * abs(adams - matlab) / matlab
 
 
 def readings_of_fig_4b() -> tuple[RestingFoot, RestingFoot]:
-    """How the paper's walker stands on its contact by its numbers without units: read in N, mm and s, and in SI."""
+    """Rest of the paper's walker on its contact parameters, read in N, mm and s, and in SI."""
     _, leg, hip, gravity = (entry.value for entry in TABLE_1)
     mass, adams = hip + 2.0 * leg, Contact(stiffness=STIFFNESS.value, damping=DAMPING.value).in_si()
     in_adams = resting_foot(mass * gravity, mass, adams.stiffness, adams.exponent, adams.damping)

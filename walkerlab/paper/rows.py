@@ -1,4 +1,4 @@
-"""The paper's numbers, each with its verdict, in their order; then its three tables beside what was measured."""
+"""The paper's numbers with verdicts, in order, and its three tables next to our measurements."""
 
 import math
 from collections import Counter
@@ -21,18 +21,18 @@ WALKER_PARAMETERS = ("leg_length", "leg_mass", "hip_mass", "gravity")
 
 
 class NumberVerdict(StrEnum):
-    """How a printed value fares; each counts once."""
+    """Verdict on a printed value; each value has one."""
 
-    INPUT = "input"  # it is used as given
-    REPRODUCED = "reproduced"  # it comes out to the printed digits
-    EXPLAINED = "explained"  # it does not, or not by itself, and what was measured says why
-    CONTRADICTED = "contradicted"  # other values of the paper contradict it, which wins over all other classes
-    NOT_REPRODUCED = "not-reproduced"  # it does not come out; values of ADAMS, which was not run, are among these
+    INPUT = "input"  # used as given
+    REPRODUCED = "reproduced"  # agrees to the printed digits
+    EXPLAINED = "explained"  # does not agree, or not alone, for a measured reason
+    CONTRADICTED = "contradicted"  # by other values of the paper; overrides all other verdicts
+    NOT_REPRODUCED = "not-reproduced"  # does not agree; includes values of ADAMS, which was not run
 
 
 @dataclass(frozen=True)
 class JudgedNumber:
-    """A printed number beside the measured ones, in the unit it is printed in; None where a model has none."""
+    """A printed number and the measured ones, in the printed unit; None where a model has no such value."""
 
     where: str
     quantity: str
@@ -47,18 +47,18 @@ class JudgedNumber:
 
 INPUT, REPRODUCED, EXPLAINED, CONTRADICTED, NOT_REPRODUCED = NumberVerdict
 Scene = Literal["rigid", "contact", "any"]
-"""Whose scene has to be the paper's if a mismatch is to count: any, for what the paper's own values decide."""
+"""The model whose scene must be the paper's for a mismatch to count; "any" if the paper's own values decide."""
 
 
 def counted(rows: Iterable[JudgedNumber]) -> dict[str, int]:
-    """Values by verdict, and `refuted`, which repeats the last two of them until 0.3 is released."""
+    """Values by verdict, and `refuted`, which repeats the last two until 0.3 is released."""
     verdicts = Counter(row.verdict for row in rows)
     by_class = {verdict.value: verdicts[verdict] for verdict in NumberVerdict}
     return {**by_class, "refuted": verdicts[CONTRADICTED] + verdicts[NOT_REPRODUCED]}
 
 
 def paper_rows(measured: Measured, study: PaperStudy) -> Iterator[JudgedNumber]:
-    """All rows, in the paper's order."""
+    """Yield all rows in the paper's order."""
     judge, contact, walker = Judge(measured, study), measured.contact, measured.walker
     for entry, parameter in zip(printed.TABLE_1, WALKER_PARAMETERS, strict=True):
         yield judge.input(entry, float(getattr(walker, parameter)), "rigid")
@@ -85,7 +85,7 @@ def paper_rows(measured: Measured, study: PaperStudy) -> Iterator[JudgedNumber]:
 
 @dataclass(frozen=True)
 class Judge:
-    """Holds what the paper prints against what was measured of a config's scene, and of the paper's own."""
+    """Judges the paper's numbers by measurements on a config's scene and on the paper's own."""
 
     measured: Measured
     study: PaperStudy
@@ -99,16 +99,16 @@ class Judge:
         scene: Scene,
         evidence: str,
     ) -> JudgedNumber:
-        """A printed value beside those of the rigid model, by set of equations, and of the contact model.
+        """Build a row from a printed value and those of the rigid model, by set of equations, and of the contact model.
 
-        verdict  of the paper's own scene, if no other value of the paper contradicts this one
+        verdict  on the paper's own scene, unless another value of the paper contradicts this one
         """
         departures = self.measured.departures
         differs = "; ".join(departures.rigid if scene == "rigid" else departures.contact)
         if (contradiction := contradictions().get(entry)) is not None:
             verdict, scene, evidence = CONTRADICTED, "any", f"{contradiction}. {evidence[:1].upper()}{evidence[1:]}"
         if differs and scene == "any":
-            evidence += f" The verdict is about the paper's own numbers, not about this scene ({differs})."
+            evidence += f" The verdict refers to the paper's own numbers, not to this scene ({differs})."
         elif differs and verdict not in (INPUT, REPRODUCED):
             verdict, evidence = EXPLAINED, f"Not the paper's scene ({differs}): {evidence}"
         about, (as_printed, corrected) = (entry.where, entry.quantity, entry.unit, entry.text), map(rigid.get, SETS)
@@ -116,7 +116,7 @@ class Judge:
 
     @property
     def raised(self) -> list[float | None]:
-        """How much larger in magnitude each coordinate of the contact model's start is than the rigid gait's (%)."""
+        """Increase in magnitude (%) of each coordinate of the contact model's start over the rigid gait's."""
         gait, start = self.measured.models.get(self.measured.equations), self.measured.contact.start
         if gait is None or start is None:
             return [None] * len(printed.COORDINATES)
@@ -124,26 +124,24 @@ class Judge:
         return [None if ours == 0.0 else 100.0 * (begun / ours - 1.0) for begun, ours in pairs]
 
     def input(self, entry: Printed, value: float, scene: Scene, evidence: str = "") -> JudgedNumber:
-        """A parameter of both models, or of the contact model alone."""
+        """Judge a parameter of both models, or of the contact model alone."""
         rigid = dict.fromkeys(SETS, value) if scene == "rigid" else {}
         verdict = INPUT if math.isclose(value, entry.value, rel_tol=1e-12) else EXPLAINED
         return self.row(entry, rigid, value, verdict, scene, evidence or prose("evidence.input", value, entry.unit))
 
     def fixed_point(self, entry: Printed, coordinate: int) -> JudgedNumber:
-        """A coordinate of x_p."""
         values = {name: model.state[coordinate] for name, model in self.measured.models.items()}
         found = {name: entry.agreement(value) for name, value in values.items()}
         text = prose("evidence.fixed_point", values, found)
         return self.row(entry, values, None, came_out(any(found.values())), "rigid", text)
 
     def eigenvalue(self) -> JudgedNumber:
-        """Whether the gait is stable."""
         entry, radii = printed.EIGENVALUES, self.measured.spectral_radii
         stable = bool(radii) and max(radii.values()) < entry.value
         return self.row(entry, radii, None, came_out(stable), "rigid", prose("evidence.eigenvalue", radii))
 
     def lost_balance(self) -> JudgedNumber:
-        """The failure from MATLAB's initial conditions."""
+        """Judge the loss of balance from MATLAB's initial conditions."""
         steps, outcome = self.measured.contact.from_x_p
         right = None if self.measured.departures.rigid else self.measured.models.get("corrected")
         short = None if right is None else 100.0 * (1.0 - printed.X_P[3].value / right.state[3])
@@ -152,7 +150,7 @@ class Judge:
         return self.row(printed.LOST_BALANCE, {}, float(steps), came_out(agrees), "contact", text)
 
     def percent(self, row: printed.StartRow, coordinate: int) -> JudgedNumber:
-        """A percentage of Table 2: arithmetic, whatever the config."""
+        """Judge a percentage of Table 2, which is arithmetic, whatever the config."""
         entry = row.percent
         verdict = REPRODUCED if entry.agreement(row.percent_of_matlab) else EXPLAINED
         left_open = None if entry in contradictions() else percent_left_open(row)
@@ -160,7 +158,7 @@ class Judge:
         return self.row(entry, {}, self.raised[coordinate], verdict, "any", text)
 
     def adams_start(self, entry: Printed, coordinate: int) -> JudgedNumber:
-        """A coordinate of the ADAMS start, and what ours was: an input where the contact model starts from it."""
+        """Judge a coordinate of the ADAMS start: an input where the contact model starts from it."""
         contact = self.measured.contact
         value = None if contact.start is None else contact.start[coordinate]
         verdict = INPUT if entry.agreement(value) else NOT_REPRODUCED
@@ -168,7 +166,7 @@ class Judge:
         return self.row(entry, {}, value, verdict, "contact", text)
 
     def strides(self) -> JudgedNumber:
-        """Five gait cycles, which the rigid models are walked for as well."""
+        """Judge the five gait cycles, which the rigid models walk as well."""
         entry, contact = printed.STRIDES, self.measured.contact
         rigid = {name: float(model.steps // 2) for name, model in self.measured.models.items()}
         done = contact.steps // 2
@@ -176,7 +174,7 @@ class Judge:
         return self.row(entry, rigid, float(done), INPUT, "contact", text)
 
     def error(self) -> JudgedNumber:
-        """The largest error of Fig. 8, for angles and angular velocities alike."""
+        """Judge the largest error of Fig. 8, for angles and angular velocities together."""
         entry, study, differences = printed.LARGEST_ERROR, self.study, self.measured.errors
         late = abs(printed.T_LEFT.matlab.value - printed.T_LEFT.adams.value)
         quantities: tuple[tuple[Quantity, float, str], ...] = (
@@ -193,7 +191,6 @@ class Judge:
         return self.row(entry, {}, largest, NOT_REPRODUCED, "any", text)
 
     def step_length(self) -> JudgedNumber:
-        """The step length of section 5."""
         entry, contact = printed.STEP_LENGTH, self.measured.contact.step_length
         lengths = {name: model.step_length for name, model in self.measured.models.items()}
         longest = max((*lengths.values(), *(() if contact is None else (contact,))), default=None)
@@ -202,7 +199,7 @@ class Judge:
         return self.row(entry, lengths, contact, came_out(agrees), "rigid", text)
 
     def velocity_difference(self) -> JudgedNumber:
-        """The difference of the average velocities: ours in the columns, the paper's own arithmetic in words."""
+        """Judge the difference of the average velocities; the paper's own arithmetic is in the evidence."""
         entry, contact = printed.VELOCITY_DIFFERENCE, self.measured.contact.table_3.v_com
         speeds = {name: model.table_3.v_com for name, model in self.measured.models.items()}
         found = {
@@ -218,16 +215,16 @@ class Judge:
         return self.row(entry, found, None, came_out(agrees), "contact", text)
 
     def table_3(self, row: printed.PrintedRow) -> Iterator[JudgedNumber]:
-        """A row of Table 3: MATLAB's number against the rigid model, and that of ADAMS against the contact model."""
+        """Judge a row of Table 3: MATLAB by the rigid model, ADAMS by the contact model."""
         measured, study = self.measured, self.study
         found = {name: getattr(model.table_3, row.name) for name, model in measured.models.items()}
         rigid = {name: value for name, value in found.items() if value is not None}
         contact: float | None = getattr(measured.contact.table_3, row.name)
-        # of the step periods both are told, as they have one cause
+        # both step periods share one cause, so the evidence has both
         names = ("t_left", "t_right") if row in (printed.T_LEFT, printed.T_RIGHT) else (row.name,)
         means = {"five": study.five_steps_energy, "ten": study.from_x_p.E_avg} if row is printed.E_AVG else {}
         taken = [steps for steps, mean in means.items() if row.matlab.agreement(mean)]
-        # an energy that is the mean over another number of steps is explained by the misprint, which does not keep it
+        # an energy that is a mean over another number of steps follows from the misprint, which does not conserve it
         verdict = EXPLAINED if taken else NOT_REPRODUCED
         text = prose("evidence.matlab", row, measured, names, study, taken)
         agrees = any(row.matlab.agreement(value) for value in rigid.values())
@@ -237,18 +234,17 @@ class Judge:
 
 
 def came_out(agrees: bool) -> NumberVerdict:
-    """The verdict on a value that is measured here."""
     return REPRODUCED if agrees else NOT_REPRODUCED
 
 
 Table = dict[str, dict[str, Any]]
-"""Rows by name, each with its columns; None where a model has no such value."""
+"""Rows by name, as columns; None where a model has no such value."""
 
 MIDDLE = "section 2: 'in the middle of the legs'"
 
 
 def table_1(measured: Measured, study: PaperStudy) -> Table:
-    """The parameters: as printed (`paper`), where, and as used."""
+    """Parameters as printed, with their source, and as used."""
     walker, inertia, radius = measured.walker, printed.LEG_INERTIA, printed.FOOT_RADIUS
     length, mass, hip, gravity = printed.TABLE_1
     rows = (
@@ -268,7 +264,7 @@ def table_1(measured: Measured, study: PaperStudy) -> Table:
 
 
 def table_2(measured: Measured) -> Table:
-    """The initial values, and the percentages on both bases."""
+    """Initial values, and the percentages relative to either column."""
     table, start = {}, measured.contact.start
     for place, (coordinate, row) in enumerate(zip(printed.COORDINATES, printed.TABLE_2, strict=True)):
         states = {name: model.state[place] for name, model in measured.models.items()}
@@ -283,7 +279,7 @@ def table_2(measured: Measured) -> Table:
 
 
 def table_3(measured: Measured) -> Table:
-    """The characteristics of both models."""
+    """Characteristics of both models."""
     table = {}
     for row in printed.TABLE_3:
         rigid = {name: getattr(model.table_3, row.name) for name, model in measured.models.items()}
@@ -292,7 +288,7 @@ def table_3(measured: Measured) -> Table:
 
 
 def beside(row: printed.PrintedRow, rigid: Mapping[str, float | None], contact: float | None) -> dict[str, Any]:
-    """Both printed numbers of a row beside those of the rigid model, by set of equations, and of the contact model."""
+    """Columns of both printed numbers, of the rigid model by set of equations, and of the contact model."""
     return {
         "unit": row.matlab.unit,
         "paper_matlab": row.matlab.value,

@@ -1,4 +1,4 @@
-"""Sections on the paper: every value that it prints next to what is computed here, its tables and its errata."""
+"""Report sections on the paper: each printed value and our own, its tables and its errata."""
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -24,16 +24,15 @@ TONES: dict[str, Tone] = {
     "contradicted": "bad",
     "not-reproduced": "plain",
 }
-"""The verdicts on printed values, each of which counts once, and how they are set."""
+"""Verdicts on printed values, and their appearance."""
 
 TEXT = "_text"
-"""Ends the key of a printed number's text."""
+"""Suffix of the key of a printed number's text."""
 BESIDE = {"as_printed": "as printed", "corrected": "corrected", "contact": "contact model"}
-"""What a number of the paper is compared with."""
+"""Columns compared with the paper's numbers."""
 
 
 def numbers(results: Results) -> Section | None:
-    """All the paper's numbers with their verdicts."""
     rows = paper_numbers(results)
     if not rows:
         return None
@@ -46,7 +45,7 @@ def numbers(results: Results) -> Section | None:
 
 
 def numbers_table(rows: Sequence[Row]) -> Table:
-    """The paper's numbers by where they stand, beside those of the models that have any."""
+    """Table of the paper's numbers by location, with columns for the models that have values."""
     models = [key for key in BESIDE if any(row.get(key) is not None for row in rows)]
     columns = (
         Column("quantity", lambda row: named(row["quantity"], row.get("unit"))),
@@ -60,36 +59,32 @@ def numbers_table(rows: Sequence[Row]) -> Table:
 
 
 def by_verdict(verdicts: Iterable[str]) -> dict[str, int]:
-    """How many values of the paper have each verdict."""
     counts = Counter(verdicts)
     return {name: counts[name] for name in TONES}
 
 
 def spelled(verdict: str) -> str:
-    """A verdict as it is written in a sentence."""
     return verdict.replace("-", " ")
 
 
 def named(name: str, unit: str | None) -> str:
-    """A quantity's name with its unit."""
     return in_signs(with_unit(name, "unit not given" if unit == "not given" else unit or ""))
 
 
 def paper_numbers(results: Results) -> Sequence[Row]:
-    """The rows that `compare` made; none without it."""
+    """Rows from `compare`; empty if it did not run."""
     rows: Sequence[Row] = results.summary("compare").get("paper_numbers", ())
     return rows
 
 
 def tables(results: Results) -> Section | None:
-    """The tables that there are."""
     summary = results.summary("compare")
     shown = (table_of(key, summary.get(key) or {}) for key in words.terms("paper.tables"))
     return Section.of("tables", "The paper’s tables", shown, page=PAPER)
 
 
 def table_of(key: str, rows: Any) -> Table:
-    """The paper's numbers, or one of its tables, by its key in the summary of `compare`."""
+    """Table of the paper's numbers, or one of its tables, by its key in the summary of `compare`."""
     captions = words.terms("paper.tables")
     if key not in captions:
         return numbers_table(rows)
@@ -97,9 +92,9 @@ def table_of(key: str, rows: Any) -> Table:
 
 
 def paper_table(caption: str, rows: Mapping[str, Row], note: str) -> Table:
-    """One table; its rows are named by their symbol and unit, and columns without any value are left away.
+    """Build a table with symbols and units as row names; columns without values are omitted.
 
-    Where a row has the text of a number as the paper prints it, that is shown, to its digits.
+    Printed numbers are shown as the paper's text, to its digits.
     """
     has_quantities = any("quantity" in row for row in rows.values())
     columns, heads = [Column("symbol" if has_quantities else "quantity", "row")], words.terms("paper.heads")
@@ -121,26 +116,25 @@ def paper_table(caption: str, rows: Mapping[str, Row], note: str) -> Table:
 
 
 PARTS = {"where": "where", "printed": "printed", "right": "right", "evidence": "evidence", "measured": "measured here"}
-"""Variables of the stored errata, and their heads."""
+"""Column heads of the stored errata."""
 ERRATUM_COLUMNS = [Column(head, name, in_signs, wide=name != "where") for name, head in PARTS.items()]
 
 
 def errors(results: Results) -> Section | None:
-    """The errata, each with what it was measured by."""
     rows = errata(results)
     found = table("What is printed, and what is right", ERRATUM_COLUMNS, rows, wordy=True)
-    finding = f"{count(len(rows), 'error')} and gaps of the paper, each with its evidence."
+    finding = f"{count(len(rows), 'error')} and gaps of the paper, with evidence."
     return Section.of("errata", "Errata of the paper", (found,), finding, PAPER)
 
 
 def errata(results: Results) -> Sequence[Row]:
-    """The errata that `compare` found, by the names of their parts; none without it."""
+    """Errata from `compare`; empty if it did not run."""
     found: Sequence[Row] = results.summary("compare").get("errata", ())
     return found
 
 
 def printed(results: Results) -> Section | None:
-    """Show how the values that the paper prints fared, and its gravest errors; None for another scene."""
+    """Show verdicts on the paper's values and its gravest errors; None for another scene."""
     rows = results.claims
     if not rows:
         return None
@@ -149,7 +143,7 @@ def printed(results: Results) -> Section | None:
 
 
 def fates(results: Results, rows: Sequence[Row]) -> Iterator[PageBlock]:
-    """Yield how the paper's values fared, by verdict and by where they stand, and its gravest errors."""
+    """Yield the paper's values by verdict and location, and its gravest errors."""
     found = errata(results)
     places = {name: Counter(row["where"] for row in rows if row["verdict"] == name) for name in TONES}
     parts = tuple((spelled(name), here.total(), TONES[name]) for name, here in places.items() if here)
@@ -173,7 +167,7 @@ def fates(results: Results, rows: Sequence[Row]) -> Iterator[PageBlock]:
 
 
 def answer(summary: Row) -> list[str | Table]:
-    """Answer how the values that the paper prints fare or, for another walker, how the models differ."""
+    """Report the verdicts on the paper's values or, for another walker, how the models differ."""
     errors = summary.get("numerical_error", {})
     told = [f"numerical error of the {model} walk: {off_by(error)}." for model, error in errors.items()]
     if "verdicts" in summary:

@@ -1,4 +1,4 @@
-"""Measurements on the paper's own walker and slope, whatever the config: what its errata are shown with."""
+"""Measurements on the paper's own walker and slope, for its errata; independent of the config."""
 
 import math
 from collections.abc import Mapping
@@ -25,16 +25,16 @@ FOOT_VELOCITY = (0.3, -0.2)  # m/s, of the foot in the check of (A.9) to (A.24)
 
 @dataclass(frozen=True)
 class PaperStudy:
-    """All of it, in SI units.
+    """Measurements, in SI units.
 
-    as_printed, corrected  the gaits that x_p settles to
+    as_printed, corrected  gaits to which walks from x_p converge
     from_x_p               Table 3 of five gait cycles from x_p with its printed digits, equations as printed
-    five_steps_energy      J, time mean over the first five steps of these ten
+    five_steps_energy      J, time mean over the first five of these ten steps
     fastest                rad/s, largest angular velocity of the gait as printed
     largest_jump           rad/s, largest change of an angular velocity at its heel strike
-    swing_foot_height      m, over the slope, where (A.55) as printed puts the swing foot of x_p
+    swing_foot_height      m, over the slope, where (A.55) as printed places the swing foot of x_p
     foothold_speed         m/s, of the new stance foot after the impact of (A.55) as printed, on the gait as printed
-    both_misprints         the fixed point with those of (A.5) and (A.55); None if there is none nearby
+    both_misprints         fixed point with those of (A.5) and (A.55); None if there is none nearby
     kinetic_energy         J, of one state: from the masses' velocities, and from D_e with either order of coordinates
     """
 
@@ -82,7 +82,7 @@ def study_the_paper() -> PaperStudy:
 
 
 def settled(walker: RigidWalker) -> State:
-    """The stable gait that walking from x_p leads to."""
+    """Stable gait to which walks from x_p converge."""
     walk = take_walk(assembled(walker), measured.TIGHT, printed.fixed_point_as_printed(), SETTLING_STEPS)
     if walk.steps < SETTLING_STEPS:
         raise ArithmeticError(f"x_p does not walk: {walk.outcome.label} after {walk.steps} steps")

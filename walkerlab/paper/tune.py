@@ -1,4 +1,4 @@
-"""The paper's parameter adjustment as a method for any walker: is it needed, how large is it, what lies behind it."""
+"""Stage `tune`: the paper's parameter adjustment for any walker; whether it is needed, how large it is, and why."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -50,17 +50,17 @@ from walkerlab.workers import in_order
 
 RIGID = Tolerances("dop853", 1e-10, 1e-12, ENDLESS)
 AS_IT_STANDS = (1.0, 1.0)
-# walks with knees or rolling feet take several times as long as the compass's: their map and margins are coarser
+# knees or rolling feet make walks several times slower than the compass's, so their map and margins are coarser
 COMPASS_CELLS, CELLS, COARSE = 61, 21, {"step": 0.05, "largest": 2.0}
-WIDER = "Search further: tune.swing_factors, tune.stance_factors, tune.cells; or choose another contact."
+WIDER = "Widen the search (tune.swing_factors, tune.stance_factors, tune.cells) or choose another contact."
 OF_WALK = ("outcome", "advice", "steps", "step_periods_s", "step_lengths_m", "end_time_s")
-"""What is printed of each of the procedure's walks."""
+"""Quantities reported of each walk of the procedure."""
 
 
 def run(config: TuneConfig, inputs: Mapping[str, Content], progress: Progress, jobs: int = 1) -> Content:
-    """Adjust the start; that none walks is an answer. Raises NoAnswer if the pads are to fit a gait there is not."""
+    """Adjust the start; that none walks is a result. Raises NoAnswer if the pads need a gait that does not exist."""
     rigid_step, rigid_state = rigid_start(config, inputs)
-    rigid_gait = inputs["fixedpoint"].summary  # the start itself may be far from any gait
+    rigid_gait = inputs["fixedpoint"].summary  # the start may be far from any gait
     gait = contact_gait(config, rigid_step, as_state(rigid_gait["state"]))
     scene = replace(scene_on_pads(config, rigid_step, rigid_state, gait), pinned=False)
     found = TuneRun(config, scene, rigid_state, gait)
@@ -75,19 +75,18 @@ def run(config: TuneConfig, inputs: Mapping[str, Content], progress: Progress, j
 
 
 class TuneRun:
-    """What the parts of the stage share, and all that they find.
+    """State and results of the stage.
 
-    names       of the rigid start's numbers
-    steps       asked for
-    hinge       whether the paper's procedure has a hinged first step, as its compass
-    walks       of that procedure: `hinged`, whose first step has a revolute joint at its stance foot; `released`,
-                without it; and `adjusted`, from the adjusted start, if there is one
-    printed     of these walks
-    adjustment  the smallest change of the velocities that walks; None if none does
+    names       of the rigid start's coordinates
+    steps       per walk
+    hinge       whether the paper's procedure hinges the first step, as for its compass
+    walks       of the procedure: `hinged`, with a revolute joint at the first stance foot; `released`, without it;
+                and `adjusted`, from the adjusted start, if any
+    printed     summaries of these walks
+    adjustment  smallest change of the velocities that walks, or None
     """
 
     def __init__(self, config: TuneConfig, scene: ContactScene, rigid_state: State, gait: GaitAnswer) -> None:
-        """Nothing is walked yet."""
         self.config, self.scene, self.rigid_state, self.gait = config, scene, rigid_state, gait
         self.names, self.steps = coordinates(config), 2 * config.strides
         self.tolerances = tolerances_of(config, self.steps)
@@ -98,10 +97,10 @@ class TuneRun:
         self.printed: dict[str, dict[str, Any]] = {}
         self.margins: list[scaled_starts.Margin] = []
         self.adjusted_state: State | None = None
-        self.paper: AdamsWalk | None = None  # None for another walker than the paper's compass
+        self.paper: AdamsWalk | None = None  # only for the paper's compass
 
     def find(self, progress: Progress, jobs: int) -> None:
-        """Procedure, margins, map, adjustment and the paper's own start."""
+        """Walk the procedure, compute map, adjustment and margins, and walk from the paper's start."""
         settings = self.config.tune
         cells = settings.cells or (COMPASS_CELLS if self.hinge else CELLS)
         swing, stance = (np.linspace(*ends, cells) for ends in (settings.swing_factors, settings.stance_factors))
@@ -128,7 +127,7 @@ class TuneRun:
             self.paper = adams_walk(self.rigid, self.walk, self.scene.walker, terrain)
 
     def adjusted(self, quick: scaled_starts.ScaledStarts) -> scaled_starts.Adjustment | None:
-        """The smallest change of the velocities that walks; None if none does."""
+        """Smallest change of the velocities that walks; None if no change does."""
         cells = self.contact_map
         if self.as_it_stands.walks:
             return scaled_starts.Adjustment(*AS_IT_STANDS, self.as_it_stands)
@@ -139,9 +138,9 @@ class TuneRun:
 
     @property
     def gait_factors(self) -> tuple[float, float] | None:
-        """Where the gait lies on the map, from the adjusted walk's end; None if that does not tell.
+        """Position of the gait on the map, from the end of the adjusted walk; None if it cannot be determined.
 
-        Velocities of its last step, once the foot behind has lifted, over those of the rigid start.
+        Velocities of the last step, once the rear foot has lifted, over those of the rigid start.
         """
         walk, n = self.walks.get("adjusted"), len(self.rigid_state) // 2
         first = self.rigid_state[n + SWING], self.rigid_state[n + STANCE]
@@ -157,13 +156,13 @@ class TuneRun:
         return float(rates[swing] / first[0]), float(rates[landed] / first[1])
 
     def walk(self, state: State, pinned: bool = False, tolerances: Tolerances | None = None) -> ContactWalkResult:
-        """Walk the contact model from a rigid state, as contact-sim does, with samples; at the config's tolerances."""
+        """Walk the contact model from a rigid state as contact-sim does, by default at the config's tolerances."""
         scene = replace(self.scene, pinned=pinned)
         interval = scene.ground.frame.pendulum_time / SAMPLES_PER_PENDULUM_TIME
         return scene.walk(start_state(scene, state), self.steps, tolerances or self.tolerances, interval)
 
     def take(self, name: str, state: State) -> None:
-        """Take one of the procedure's walks, and again for its numerical error if it has an answer."""
+        """Record a walk of the procedure, and its numerical error if it has an answer."""
         walk = self.walks[name] = self.walk(state, name == "hinged")
         said = self.printed[name] = walk_summary(walk)
         if walk.outcome.answered:
@@ -173,13 +172,11 @@ class TuneRun:
 
 
 def walk_summary(walk: ContactWalkResult) -> dict[str, Any]:
-    """How one walk went."""
     said = numbers_of(walk)
     return {key: said[key] for key in OF_WALK}
 
 
 def summary(found: TuneRun) -> dict[str, Any]:
-    """What the command prints."""
     paper, pitch, ends = found.paper, found.scene.pitch_m, count_outcomes(found.contact_map.outcome)
     pads = Pads((pitch, pitch), laid=str(with_contact(found.config).pad_pitch))
     return {
@@ -201,7 +198,7 @@ def summary(found: TuneRun) -> dict[str, Any]:
 
 
 def papers_start(paper: AdamsWalk) -> dict[str, Any]:
-    """How the walk from the paper's own start went, and what the rigid model says of that start."""
+    """Summarise the walk from the paper's start, and that start in the rigid model."""
     return {
         "outcome": paper.walk.outcome.label,
         "reason": paper.reason,
@@ -217,7 +214,7 @@ def papers_start(paper: AdamsWalk) -> dict[str, Any]:
 
 
 def table_2(found: TuneRun) -> dict[str, dict[str, Any]]:
-    """The start before and after the adjustment, of the paper's compass beside the paper's two, each on either base."""
+    """The start before and after adjustment with percentages and, for the paper's compass, the printed values."""
     rows, adjusted = {}, found.adjusted_state
     for k, (name, value) in enumerate(zip(found.names, found.rigid_state, strict=True)):
         row: dict[str, Any] = {"unit": "rad" if k < len(found.names) // 2 else "rad/s"}
@@ -241,12 +238,12 @@ def table_2(found: TuneRun) -> dict[str, dict[str, Any]]:
 
 
 def percent(value: float, other: float, base: float) -> float | None:
-    """How much larger in magnitude a value is than the other, in percent of a base; None for a base of zero."""
+    """Increase in magnitude over `other`, in percent of `base`; None for a base of zero."""
     return 100.0 * (abs(value) - abs(other)) / abs(base) if base else None
 
 
 def gait_summary(found: TuneRun) -> dict[str, Any]:
-    """The contact model's own gait, or why there is none."""
+    """Gait of the contact model, or why there is none."""
     gait = found.gait.gait
     said = {"found": gait is not None, "reason": found.gait.reason, "advice": found.gait.advice}
     if gait is None:
@@ -256,7 +253,7 @@ def gait_summary(found: TuneRun) -> dict[str, Any]:
         **said,
         "state": gait.z.tolist(),
         "state_is": [f"{text} ({unit})" for text, unit in section_coordinates(found.scene)],
-        "section": "the swing foot passes the stance foot: no foot is touching or lifting there",
+        "section": "the swing foot passes the stance foot, where no foot touches or lifts",
         "period_s": step.period_s,
         "step_length_m": step.length_m,
         "multipliers": [[float(value.real), float(value.imag)] for value in gait.multipliers],
@@ -273,7 +270,7 @@ def gait_summary(found: TuneRun) -> dict[str, Any]:
 
 
 def section_coordinates(scene: ContactScene) -> list[tuple[str, str]]:
-    """What the numbers of a gait on its section are, and their units."""
+    """Descriptions and units of a gait's coordinates on its section."""
     walker, names = scene.walker, [body.name for body in scene.assembly.bodies]
 
     def of(quantity: str, unit: str, bodies: tuple[int, ...]) -> list[tuple[str, str]]:
@@ -291,7 +288,7 @@ def section_coordinates(scene: ContactScene) -> list[tuple[str, str]]:
 
 
 def adjustment_summary(found: TuneRun) -> dict[str, Any]:
-    """The smallest change that walks, whether any is needed, and the margins around it."""
+    """Smallest change that walks, whether any is needed, and the margins around it."""
     change = found.adjustment
     said: dict[str, Any] = {"needed": not found.as_it_stands.walks, "found": change is not None}
     if change is None:
@@ -319,7 +316,6 @@ def adjustment_summary(found: TuneRun) -> dict[str, Any]:
 
 
 def groups(found: TuneRun) -> dict[str, Group]:
-    """The datasets of the artifact."""
     stored, walker = {"map": map_group(found)}, found.scene.walker
     if found.margins:
         labels = {"name": Label("", "what is scaled"), "factor": Label("1", "the last that walks")}
@@ -341,7 +337,7 @@ def groups(found: TuneRun) -> dict[str, Group]:
 
 
 def legs_in_time(walk: ContactWalkResult, walker: ContactWalker) -> dict[str, Variable]:
-    """Angles and velocities of the legs of the contact model; nothing if nothing was sampled."""
+    """Angles and velocities of the legs; empty without samples."""
     if walk.samples is None:
         return {}
     angle, velocity = motion_of_legs(walk.samples.states, walker)
@@ -352,11 +348,11 @@ def map_group(found: TuneRun) -> Group:
     """Outcome and steps of both models over the two factors."""
     cells, rigid, swing, stance = found.contact_map, found.rigid_map, "swing_factor", "stance_factor"
     over = {
-        "outcome": (cells.outcome, "how the contact model's walk ended, see attribute outcomes"),
-        "steps": (cells.steps, "steps that the contact model walked"),
+        "outcome": (cells.outcome, "outcome of the contact model's walk, see attribute outcomes"),
+        "steps": (cells.steps, "steps of the contact model"),
         "settled": (cells.settled, "1 if the last step is the contact gait's within two percent"),
-        "rigid_outcome": (rigid.outcome, "how the rigid model's walk ended"),
-        "rigid_steps": (rigid.steps, "steps that the rigid model walked"),
+        "rigid_outcome": (rigid.outcome, "outcome of the rigid model's walk"),
+        "rigid_steps": (rigid.steps, "steps of the rigid model"),
     }
     factor = "factor on the {} leg's initial angular velocity"
     attrs: dict[str, Any] = {"outcomes": OUTCOMES, "steps_wanted": found.steps}
@@ -377,7 +373,6 @@ def map_group(found: TuneRun) -> Group:
 
 
 def gait_group(gait: Cycle, scene: ContactScene) -> Group:
-    """The contact gait on its section."""
     coordinates = section_coordinates(scene)
     names = np.array([f"{text} ({unit})" for text, unit in coordinates], dtype=object)
     units = ", ".join(unit for _, unit in coordinates)

@@ -1,4 +1,4 @@
-"""What the rigid limit takes, and which part of the contact makes which part of the difference: of `tune`."""
+"""Part of `tune`: the approach to the rigid limit, and the share of each contact property in the difference."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -34,9 +34,9 @@ from walkerlab.stages.rigid_groups import leg_variables
 from walkerlab.store.columns import columns, rows_group, values_by_column
 from walkerlab.store.content import Group
 
-FINER = 4  # samples, as many times as contact-sim takes: what is left between them is far below the model error
+FINER = 4  # times the sampling of contact-sim, so that interpolation errors stay far below the model error
 COMPASS_GAITS, GAITS = (STICTION, STIFFNESS, DAMPING, NORMAL), (STICTION, NORMAL)
-OTHERS_EVERY = 3  # of the settings, for other walkers than the compass: their walks take several times as long
+OTHERS_EVERY = 3  # stride through the settings for slower walkers than the compass
 SETTING = "setting"
 FACTORS = {
     "stiffness": Label("1", "factor on the stiffness", name="stiffness_factor"),
@@ -45,13 +45,11 @@ FACTORS = {
 }
 DISTANCES = {
     "period": Label("s", "period of the contact gait", name="period_s"),
-    "length": Label("m", "its step length", name="step_length_m"),
-    "slip": Label("m", "its slip a step", name="slip_m"),
-    "period_error": Label("s", "its period less the rigid gait's", name="period_error_s"),
-    "length_error": Label("m", "its step length less the rigid gait's", name="length_error_m"),
-    "numerical_period": Label(
-        "s", "change of the period with a tolerance ten times tighter", name="numerical_period_s"
-    ),
+    "length": Label("m", "step length of the contact gait", name="step_length_m"),
+    "slip": Label("m", "slip per step of the contact gait", name="slip_m"),
+    "period_error": Label("s", "period of the contact gait minus the rigid gait's", name="period_error_s"),
+    "length_error": Label("m", "step length of the contact gait minus the rigid gait's", name="length_error_m"),
+    "numerical_period": Label("s", "change of the period at a ten times tighter tolerance", name="numerical_period_s"),
 }
 IN_PHASE = "in phase, between impacts"
 OF_WALKS = {
@@ -62,7 +60,7 @@ OF_WALKS = {
         "rad/s", "largest difference of an angular velocity at the same time", name="raw_velocity_error_rad_s"
     ),
     "numerical_time": Label(
-        "s", "change of the last touch with a tolerance a hundred times tighter", name="numerical_time_s"
+        "s", "change of the last touch at a hundred times tighter tolerance", name="numerical_time_s"
     ),
     "evaluations": Label("1", "right-hand sides of the walk", name="rhs_evaluations"),
     "wall_s": Label("s", "processor time of the walk", timing=True),
@@ -73,7 +71,7 @@ OF_WALKS = {
 class LimitFindings:
     """Distances by series, and the limit without creep.
 
-    walked  the series of which whole walks are compared too
+    walked  series in which whole walks are compared too
     """
 
     walked: tuple[str, ...]
@@ -91,7 +89,7 @@ def limit_findings(
     walk: RigidWalkResult,
     progress: Progress,
 ) -> LimitFindings | None:
-    """Lead the contact towards the rigid limit; None if the rigid start's walk has no samples or no step.
+    """Take the contact to the rigid limit; None if the rigid walk has no samples or no step.
 
     rigid_gait  summary of `fixedpoint`
     walk        of the rigid model from the start
@@ -112,7 +110,7 @@ def limit_findings(
         scene.ground.frame.pendulum_time / (FINER * SAMPLES_PER_PENDULUM_TIME),
         1 if compass else OTHERS_EVERY,
     )
-    walked = (ALL, ALL_POINT) if isinstance(config.walker, CompassWalker) else (ALL,)  # others roll in both models
+    walked = (ALL, ALL_POINT) if isinstance(config.walker, CompassWalker) else (ALL,)  # other feet roll in both models
     gaits = COMPASS_GAITS if compass else GAITS
     progress.start("tune: rigid limit", len(walked) + len(gaits))
 
@@ -122,7 +120,7 @@ def limit_findings(
     found: dict[str, list[Distance]] = {}
     for name in walked:
         walker = scene.walker
-        if name != ALL:  # points for feet, as the rigid model has them
+        if name != ALL:  # point feet, as in the rigid model
             points, rules = config.walker.model_copy(update={"foot_radius_m": 0.0}), knee_rules(config.walker)
             laws = walker.normal, walker.friction
             walker = contact_walker(assembly_of(points), *laws, config.gravity_m_s2, config.slope_rad, rules)
@@ -136,7 +134,7 @@ def limit_findings(
 
 
 def limit_summary(found: LimitFindings) -> dict[str, Any]:
-    """Orders of convergence, what the paper's claim of 1e-4 rad takes, and what each cause amounts to."""
+    """Orders of convergence, the settings that reach the paper's 1e-4 rad, and the share of each cause."""
     reaches = {}
     for name in found.walked:
         walked = [one for one in found.series[name] if one.angle is not None]
@@ -151,16 +149,16 @@ def limit_summary(found: LimitFindings) -> dict[str, Any]:
 
 
 def setting(one: Distance) -> dict[str, Any]:
-    """A setting and how far it is from the rigid walk."""
+    """A setting and its distance from the rigid walk."""
     differences = ("period_error", "angle", "velocity", "raw_angle", "numerical_time")
     labels = {name: (DISTANCES | OF_WALKS)[name] for name in differences}
     return {**values_by_column(one.setting, FACTORS), **values_by_column(one, labels), "run_wall_s": one.wall_s}
 
 
 def causes(found: LimitFindings) -> dict[str, Any]:
-    """Parts of the difference in period, each from switching one thing off while the others stay.
+    """Difference in period by cause, each found by switching off one property while the others stay.
 
-    What is left is what they do together, and creep too where its limit was not reached.
+    The rest is their joint effect, and also that of creep where its limit was not reached.
     """
     total = found.contact_period - found.rigid_period
     farthest = found.series[found.walked[-1]]
@@ -181,7 +179,7 @@ def causes(found: LimitFindings) -> dict[str, Any]:
 
 
 def limit_groups(found: LimitFindings) -> dict[str, Group]:
-    """One group a series: its settings and distances, and those of whole walks if any were compared."""
+    """One group per series: its settings and distances, and those of whole walks where compared."""
     groups = {}
     for name, rows in found.series.items():
         whole = [one for one in rows if one.angle is not None and name in found.walked]

@@ -1,4 +1,4 @@
-"""The walker of Appendix A that a config describes."""
+"""A config's walker in the form of Appendix A."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ if TYPE_CHECKING:
 
 
 def compass(config: RigidConfig, equations: Equations) -> RigidWalker:
-    """Return the walker of Appendix A that a config's passive compass is; ValueError for another walker."""
+    """Return a config's passive compass as a walker of Appendix A; raise ValueError for another walker."""
     walker = config.walker
     if not isinstance(walker, CompassWalker) or walker.torso is not None:
-        raise ValueError(f"a walker of type {walker.type} is none of Appendix A")
+        raise ValueError(f"Appendix A does not describe walkers of type {walker.type}")
     return RigidWalker(
         leg_length=walker.leg_length_m,
         foot_to_mass=walker.foot_to_mass_m,
@@ -30,5 +30,4 @@ def compass(config: RigidConfig, equations: Equations) -> RigidWalker:
 
 
 def compass_or_none(config: RigidConfig, equations: Equations) -> RigidWalker | None:
-    """Return `compass` of a config, or None for another walker."""
     return compass(config, equations) if is_passive_compass(config) else None

@@ -1,1 +1,1 @@
-"""Extreme cases, problems with known answers, and the measures they are judged by."""
+"""Tests of the solvers on extreme cases and on problems with known answers."""

@@ -1,6 +1,6 @@
-"""Two catalogues of cases, read, typed by the schema and turned into configs: of the paper's compass, and of any scene.
+"""Catalogues of extreme cases: named ones of the paper's compass, and variations of any scene.
 
-A scene's own extremes are its walker on harder and softer ground, on other slopes, from other starts.
+A scene's variations walk on harder and softer ground, on other slopes and from other starts.
 """
 
 from collections.abc import Mapping, Sequence
@@ -18,7 +18,7 @@ from walkerlab.config.walkers import has_knees
 from walkerlab.errors import ConfigError
 
 CATALOGUE: Final = Path(__file__).parent / "catalogue.yaml"
-NAME_OF_ITS_OWN: Final = "Give yours a name of its own."
+NAME_OF_ITS_OWN: Final = "Give each case a unique name."
 SCENE_CATALOGUE: Final = Path(__file__).with_name("scene_catalogue.yaml")
 ENDS: tuple[Fate, ...] = tuple(fate for fate in FATES if fate not in ("budget-exhausted", "solver-failed", "rejected"))
 """The ends that physics may have: where nobody knows which, a case passes by its measures alone."""
@@ -30,45 +30,48 @@ B = TypeVar("B", bound=Block)
 
 
 def shipped() -> tuple[Case, ...]:
-    """The cases that come with the package."""
+    """Cases that come with the package."""
     families = listed(CATALOGUE).items()
     return without_doubles([Case.model_validate({"family": name, **one}) for name, cases in families for one in cases])
 
 
 def listed(path: Path) -> Any:
-    """What a catalogue says, in plain values."""
+    """Plain values of a catalogue file."""
     root = read(path.read_text(encoding="utf-8"), path.name)
     assert root is not None, "a catalogue is not empty"
     return plain(root)
 
 
 def judged(own: Sequence[Case], catalogue: Sequence[Case] | None = None) -> tuple[Case, ...]:
-    """The cases of a catalogue, the package's unless told, and those of a config; ConfigError if two have one name."""
+    """Cases of a catalogue, by default the package's, followed by those of a config.
+
+    Raises ConfigError if two cases share a name.
+    """
     catalogue = shipped() if catalogue is None else catalogue
     taken = {case.name for case in catalogue} & {case.name for case in own}
     if taken:
-        raise ConfigError(f"The catalogue has cases named {', '.join(sorted(taken))}.", NAME_OF_ITS_OWN)
+        raise ConfigError(f"The catalogue already has cases named {', '.join(sorted(taken))}.", NAME_OF_ITS_OWN)
     return (*catalogue, *without_doubles(own))
 
 
 def without_doubles(cases: Sequence[Case]) -> tuple[Case, ...]:
-    """The cases; ConfigError if two have one name."""
+    """Check that the names of cases differ; raises ConfigError otherwise."""
     names = [case.name for case in cases]
     doubled = sorted({name for name in names if names.count(name) > 1})
     if doubled:
-        raise ConfigError(f"More than one case is named {', '.join(doubled)}.", NAME_OF_ITS_OWN)
+        raise ConfigError(f"Several cases are named {', '.join(doubled)}.", NAME_OF_ITS_OWN)
     return tuple(cases)
 
 
 def config_of(case: Case) -> Config:
-    """The paper's config with the case's lines over it; ConfigError if they are no config."""
+    """Apply a case's lines to the paper's config; raises ConfigError if the result is no valid config."""
     return over_paper(case.config, f"case {case.name}")
 
 
 def scene_cases(config: Config) -> list[tuple[Case, Config]]:
-    """The cases of a scene, each with its config: of the rigid model, and of the contact model where there is ground.
+    """Cases of a scene with their configs, for the rigid model and, on compliant ground, the contact model.
 
-    config  with the start spelled out in numbers, and the pads' pitch if there are pads
+    config  with start, and pitch of pads if there are any, given as numbers
     """
     there, found = features(config), []
     for entry in listed(SCENE_CATALOGUE):
@@ -83,7 +86,7 @@ def scene_cases(config: Config) -> list[tuple[Case, Config]]:
 
 
 def features(config: Config) -> set[str]:
-    """What a scene has of that which cases need."""
+    """Features of a scene that cases may require."""
     walker, found = config.walker, {"rigid"}
     if config.contact is not None:
         found |= {"contact", "friction"} if config.contact.has_friction else {"contact"}
@@ -93,7 +96,7 @@ def features(config: Config) -> set[str]:
 
 
 def changed(config: Config, changes: Mapping[str, Any]) -> Config:
-    """A scene with what a case of the catalogue changes in it; on another slope both feet stand on that."""
+    """Apply a case's changes to a scene; on another slope, the angles are turned so that both feet stand on it."""
     start, slope = changes.get("start", 1.0), changes.get("slope", 1.0) * config.slope_rad
     values = dict(changes.get("set", {}))
     values |= {path: factor * attrgetter(path)(config) for path, factor in changes.get("times", {}).items()}
@@ -109,6 +112,6 @@ def changed(config: Config, changes: Mapping[str, Any]) -> Config:
 
 
 def with_key(block: B, path: str, value: Any) -> B:
-    """A block with a key of it, or of a block inside it, set anew, by its dotted path."""
+    """Copy of a block in which the value at a dotted path is replaced."""
     name, _, rest = path.partition(".")
     return block.model_copy(update={name: with_key(getattr(block, name), rest, value) if rest else value})

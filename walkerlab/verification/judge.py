@@ -1,4 +1,4 @@
-"""Cases, each walked, again at a ten times tighter tolerance and by another method, and as its twin."""
+"""Judging of cases: each is walked, at a ten times tighter tolerance again, by another method and as its twin."""
 
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -27,11 +27,10 @@ LIBRARY_BUDGET: Final = 30_000  # right-hand sides; a library's walks run in Pyt
 
 @dataclass(frozen=True)
 class Second:
-    """A case walked by another method.
+    """A case walked by a second method.
 
-    method  that reached an answer; empty if none did
-    walk    of it
-    tried   what became of those asked before, in words; empty if the first answered
+    method  empty if none reached an answer
+    tried   methods that failed before, with their outcomes
     """
 
     method: str
@@ -41,45 +40,45 @@ class Second:
 
 @dataclass(frozen=True)
 class CaseCell:
-    """A case to be judged, and tried with ordinary methods; here or in another process.
+    """A case to judge and to try with ordinary methods, in any process.
 
-    config  of a scene's own case; None for a few lines over the paper's config
+    config  of a scene's case; None for a case of the paper's compass
     """
 
     case: Case
     config: Config | None = None
 
     def run(self) -> tuple[CaseResult | Choice, ...]:
-        """The verdict, then the ordinary methods."""
+        """Return the verdict, then the ordinary methods' results."""
         config = self.config or config_of(self.case)
         return (judge(self.case, config), *choices(self.case, config))
 
 
 def run_cells(cells: Sequence[CaseCell], jobs: int) -> Iterator[tuple[CaseResult | Choice, ...]]:
-    """Results in the order of the cases, whoever ran them: one of each model first, then by what they may take."""
+    """Yield results in case order. One case per model runs first to compile; the rest run longest first."""
     models = [cell.case.model for cell in cells]
     first = [models.index(model) for model in ("contact", "rigid") if model in models]
     return in_order([cell.run for cell in cells], jobs, first, lambda place: -cells[place].case.budget)
 
 
 def judge(case: Case, config: Config) -> CaseResult:
-    """Run a case of either model and judge it; a walk on the ground is sampled unless it is long."""
+    """Walk a case and judge it; walks of more than `SAMPLED_STEPS` steps are not sampled."""
     about = case.name, case.family, case.model, case.reason, case.expected
     start = prepared(config, case)
     if start is None:
-        return CaseResult(*about, Outcome.REJECTED.label, 0, 0.0, 0, 0.0, (), second_tried="there is no start")
+        return CaseResult(*about, Outcome.REJECTED.label, 0, 0.0, 0, 0.0, (), second_tried="no start exists")
     methods = configured(start, case)
     began = time.perf_counter()
     walk = start.walk(case, methods, sampled=case.steps <= SAMPLED_STEPS)
     wall_s = time.perf_counter() - began
     found: list[Measure | NotMeasured] = [
-        Measure("numbers that are not finite", float(np.count_nonzero(~np.isfinite(walk.numbers))), 0.0),
+        Measure("values that are not finite", float(np.count_nonzero(~np.isfinite(walk.numbers))), 0.0),
         Measure(f"{start.kept} over energy", finite(walk.residual_J / start.energy), case.balance),
         Measure(BUDGET_USED, walk.rhs_evaluations / case.budget, 1.0 + 20.0 / case.budget),
         *start.measures(walk, case),
     ]
     remarks: list[str] = []
-    second = Second("", None, f"the walk itself ended {walk.outcome.label}")
+    second = Second("", None, f"the walk itself ended as {walk.outcome.label}")
     if walk.outcome.answered:
         short = start.again(case)
         second = second_walk(
@@ -102,7 +101,7 @@ def judge(case: Case, config: Config) -> CaseResult:
 
 
 def walked_again(start: Start, config: Config, case: Case, second: Second) -> list[tuple[str, JudgedWalk]]:
-    """The walks that must do the same, and what they are."""
+    """Walks that must agree with the first, with their descriptions."""
     again = [("ten times tighter tolerance", start.walk(case, configured(start, case, TIGHTER)))]
     if second.walk is not None:
         again.append((second.method, second.walk))
@@ -116,7 +115,7 @@ def walked_again(start: Start, config: Config, case: Case, second: Second) -> li
 
 
 def time_difference(what: str, one: JudgedWalk, other: JudgedWalk, case: Case, rtol: float) -> list[Measure]:
-    """How far two walks' touches are apart; their ends if there are none; nothing where they have none either."""
+    """Difference of two walks' touch times, or of their end times if they have no touches; empty if there are none."""
     steps = min(one.touches.size, other.touches.size, case.compared_steps)
     if steps:
         apart = float(np.max(np.abs(one.touches[:steps] - other.touches[:steps])))
@@ -125,17 +124,17 @@ def time_difference(what: str, one: JudgedWalk, other: JudgedWalk, case: Case, r
     else:
         apart = abs(one.end - other.end)
     limit = promised(case, rtol, one.accepted + other.accepted)
-    return [Measure(f"time apart from {what}, in pendulum times", finite(apart), limit)]
+    return [Measure(f"difference in time from {what}, in pendulum times", finite(apart), limit)]
 
 
 def others(configured: str) -> tuple[Method, ...]:
-    """Whom to ask besides the configured method: our own first, then the libraries'."""
+    """Methods besides the configured one: ours first, then the libraries'."""
     own = [name for name, method in METHODS.items() if method.compiled]
     return tuple(method_named(name) for name in dict.fromkeys((*own, *LIBRARY)) if name != configured)
 
 
 def second_walk(configured: str, budget: int, walk: Callable[[Method, int], JudgedWalk]) -> Second:
-    """The first other method's walk that answers.
+    """Walk with other methods until one reaches an answer.
 
     budget  right-hand sides of our own methods
     walk    walks the case with a method and a budget

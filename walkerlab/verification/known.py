@@ -1,7 +1,7 @@
-"""Problems whose answers are known, run through the contact code; each reference takes a route without that code.
+"""Problems with known answers, run through the contact code; their references do not use that code.
 
-Balls, blocks, rods and wheels are two bodies and two feet, as walkers are, with a second body or foot that takes no
-part, driven by the walkers' own code. The rules by which walks end are put out of reach; a run ends at a given time.
+Balls, blocks, rods and wheels are modelled as walkers of two bodies and two feet, of which the second body and
+possibly a foot take no part. The rules that end walks are disabled; a run ends at a given time.
 """
 
 import math
@@ -46,7 +46,7 @@ PAPER_FRICTION: Final = Coulomb(0.9, 0.7, 0.1, 1.0)
 
 @dataclass(frozen=True)
 class ParticleRun:
-    """What it did."""
+    """Sampled trajectory of the first body."""
 
     times: Floats  # (samples,) s
     states: Floats  # (samples, 8)
@@ -62,9 +62,9 @@ def rig(
     feet: tuple[Position, Position] = (CENTRE, OUT_OF_REACH),
     slope: float = 0.0,
 ) -> ContactWalker:
-    """One body whose centre of mass is its frame's origin, with point feet fixed to it.
+    """Build one body, with its centre of mass at its frame's origin and point feet fixed to it.
 
-    The second body is hinged at that centre, has the same inertia, no mass, and nothing to do.
+    The idle second body is hinged at that centre and has the same inertia but no mass.
     """
     assembly = Assembly(
         bodies=(Body("body", mass, CENTRE, inertia), Body("idle", 0.0, CENTRE, inertia)),
@@ -75,14 +75,14 @@ def rig(
 
 
 def state(at: Position, velocity: Position, angle: float = 0.0, rate: float = 0.0) -> State:
-    """A state of the rig: where its centre of mass is along and over the slope, and how it moves and turns."""
+    """State of the rig from the position and velocity of its centre of mass in the slope's frame."""
     return (*at, angle, 0.0, *velocity, rate, 0.0)
 
 
 def run_until(
     walker: ContactWalker, start: State, duration_s: float, rtol: float = 1e-9, atol: float = 1e-12
 ) -> ParticleRun:
-    """Let it move for a time; samples evenly spaced. Raises ArithmeticError if the budget does not suffice."""
+    """Simulate for a time with evenly spaced samples; raises ArithmeticError if the run ends early."""
     frame = Frame(-ENDLESS, 2.0 * duration_s / LONGEST_FLIGHT, True)
     ground = JudgedGround(checkerboard(ENDLESS, (0.0, 0.0)), frame)
     walk_state = new_walk_state(walker, ground.terrain, 1, 1, start)
@@ -99,10 +99,9 @@ def run_until(
 
 @dataclass(frozen=True)
 class Known:
-    """A quantity beside its reference.
+    """Computed quantity and its reference.
 
-    error  of the value, relative to the reference
-    limit  up to which it is right; by `why_limit`
+    limit  largest relative error, justified by `why_limit`
     """
 
     name: Annotated[str, Label("", "name of the problem")]
@@ -121,17 +120,16 @@ class Known:
 
     @property
     def ok(self) -> bool:
-        """Whether it is right."""
         return bool(math.isfinite(self.error) and self.error <= self.limit)
 
 
 def answered(
     name: str, quantity: str, run: Callable[[], float], other: Callable[[], float], source: str, limit: float, why: str
 ) -> Known:
-    """Both numbers of a problem; a run that gives none has an error that fails.
+    """Solve a problem by both routes; a run that fails gets an error that fails.
 
     run    through the contact code
-    other  answers it otherwise; see `Known` for the rest
+    other  reference; for the other arguments see `Known`
     """
     started = time.perf_counter()
     reference = other()
@@ -150,7 +148,7 @@ BLOCK_MASS = 20.0
 
 
 def bouncing_ball_period() -> float:
-    """Mean time from landing to landing over five bounces on a linear spring without damping (s)."""
+    """Mean time (s) between landings over five bounces on an undamped linear spring."""
     ball = rig(1.0, 0.1, SPRING)
     first = math.sqrt(2.0 * DROP / GRAVITY)
     period = references.linear_bounce_period(1.0, SPRING.stiffness, DROP, GRAVITY)
@@ -161,7 +159,7 @@ def bouncing_ball_period() -> float:
 
 
 def restitution(law: NormalLaw, speed: float) -> float:
-    """Speed after over speed before a ball of the walker's mass meets ground at `speed` (m/s)."""
+    """Restitution of a ball with the walker's mass that lands at `speed` (m/s)."""
     ball = rig(BLOCK_MASS, 1.0, law)
     height = 1e-3
     start = state((0.0, height), (0.0, -math.sqrt(speed**2 - 2.0 * GRAVITY * height)))
@@ -173,7 +171,7 @@ def restitution(law: NormalLaw, speed: float) -> float:
 
 
 def block_speed(slope: float, start_speed: float) -> float:
-    """Speed (m/s) of a block on a slope a second after it had `start_speed`."""
+    """Speed (m/s) of a block on a slope one second after it had `start_speed`."""
     law = PAPER_LAW
     foot = resting_foot(BLOCK_MASS * GRAVITY * math.cos(slope), BLOCK_MASS, law.stiffness, law.exponent, law.damping)
     block = rig(BLOCK_MASS, 1.0, law, slope=slope)
@@ -187,9 +185,9 @@ ROUNDS = 14
 
 
 def rimless_wheel_speed() -> float:
-    """Angular speed (rad/s) with a spoke normal to the slope, of a wheel that has come to roll steadily.
+    """Angular speed (rad/s) with a spoke normal to the slope, of a steadily rolling wheel.
 
-    Two spokes at a time: from one spoke upright to the next; then the wheel is the same again, a spoke further on.
+    Two spokes at a time, from one upright spoke to the next; then the wheel is in the same position, one spoke further.
     """
     turn = 2.0 * math.pi / SPOKES
     ahead = (math.sin(turn), -math.cos(turn))
@@ -208,9 +206,9 @@ ROD_ANGLE, ROD_FRICTION, ROD_STIFFNESS = 1.0, 4.0, 1.0e8
 
 
 def painleve_growth_rate() -> float:
-    """Rate (1/s) at which the end of a sliding rod digs itself in, from evenly spaced penetrations.
+    """Rate (1/s) at which the end of a sliding rod digs in, from evenly spaced penetrations.
 
-    Of d = a + b cosh(s t) the differences D over equal times tau obey D(t + tau) + D(t - tau) = 2 cosh(s tau) D(t).
+    For d = a + b cosh(s t), the differences D over equal times tau obey D(t + tau) + D(t - tau) = 2 cosh(s tau) D(t).
     """
     end = (math.cos(ROD_ANGLE), -math.sin(ROD_ANGLE))
     ground, friction = NormalLaw(ROD_STIFFNESS, 1.0, 0.0, 1.0e-4), Coulomb(ROD_FRICTION, ROD_FRICTION, 0.1, 1.0)
@@ -227,42 +225,42 @@ def painleve_growth_rate() -> float:
 
 PROBLEMS: Final = (
     partial(
-        answered, "bouncing ball", "time from landing to landing, s", bouncing_ball_period,
+        answered, "bouncing ball", "time between landings, s", bouncing_ball_period,
         partial(references.linear_bounce_period, 1.0, SPRING.stiffness, DROP, GRAVITY),
-        "closed form: free flight and half a turn of the spring", 1e-7, "the tolerance asked for, over five bounces",
+        "closed form: free flight and half a period of the spring", 1e-7, "the tolerance, over five bounces",
     ),
     partial(
         answered, "ball dropped on the IMPACT law", "restitution at 0.5 m/s, a hundredth of the paper's damping",
         partial(restitution, LIGHT_LAW, 0.5),
         partial(references.restitution, BLOCK_MASS, 0.5, LIGHT_LAW, GRAVITY),
-        "SciPy DOP853 on the law as its manual writes it", 1e-6, "the tolerance asked for, a thousandfold",
+        "SciPy DOP853 on the law as written in its manual", 1e-6, "a thousand times the tolerance",
     ),
     partial(
         answered, "ball dropped on thicker ground", "restitution at 0.5 m/s, a tenth of the paper's damping",
         partial(restitution, THICK_LAW, 0.5),
         partial(references.restitution, BLOCK_MASS, 0.5, THICK_LAW, GRAVITY),
-        "SciPy DOP853 on the law as its manual writes it", 1e-6, "the tolerance asked for, a thousandfold",
+        "SciPy DOP853 on the law as written in its manual", 1e-6, "a thousand times the tolerance",
     ),
     partial(
         answered, "block on an incline that holds it", "creep speed at 0.2 rad, m/s", partial(block_speed, 0.2, 0.0),
         partial(references.creep_speed, 0.2, PAPER_FRICTION.static, PAPER_FRICTION.stiction_velocity),
-        "root of the friction law's cubic, SciPy brentq", 1e-7, "the tolerance asked for",
+        "root of the friction law's cubic, SciPy brentq", 1e-7, "the tolerance",
     ),
     partial(
-        answered, "block on an incline too steep", "speed at 0.8 rad a second after 2 m/s, m/s",
+        answered, "block on too steep an incline", "speed at 0.8 rad a second after 2 m/s, m/s",
         partial(block_speed, 0.8, 2.0),
         lambda: 2.0 + references.sliding_acceleration(0.8, PAPER_FRICTION.dynamic, GRAVITY),
-        "closed form: g (sin - mu cos)", 1e-7, "the tolerance asked for",
+        "closed form: g (sin - mu cos)", 1e-7, "the tolerance",
     ),
     partial(
         answered, "rimless wheel of eight spokes", "steady speed with a spoke upright at 0.08 rad, rad/s",
         rimless_wheel_speed,
         partial(references.wheel_upright_speed, SPOKES, WHEEL_SLOPE, GRAVITY, HUB_INERTIA),
-        "McGeer 1990: closed form for rigid spokes", 1e-3, "the spokes' ground gives way and creeps a little",
+        "McGeer 1990: closed form for rigid spokes", 1e-3, "the ground under the spokes yields and creeps a little",
     ),
     partial(
-        answered, "Painleve's rod", "rate at which its end digs itself in at friction 4, 1/s", painleve_growth_rate,
+        answered, "Painleve's rod", "rate at which its end digs in at friction 4, 1/s", painleve_growth_rate,
         partial(references.painleve_growth_rate, ROD_ANGLE, ROD_FRICTION, 1.0, ROD_STIFFNESS),
-        "closed form, linearised", 1e-3, "the rod turns a little while it digs",
+        "closed form, linearised", 1e-3, "the rod turns a little as it digs in",
     ),
 )  # fmt: skip

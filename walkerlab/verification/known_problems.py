@@ -1,4 +1,4 @@
-"""Problems with known answers, run through the contact code: the same for every scene, so answered once for all."""
+"""Stage `known-problems`: problems with known answers, run through the contact code; independent of the scene."""
 
 from collections.abc import Mapping
 from dataclasses import asdict
@@ -11,7 +11,7 @@ from walkerlab.verification.known import PROBLEMS, Known
 
 
 def run(_config: object, _inputs: Mapping[str, Content], progress: Progress) -> Content:
-    """Answer every problem; an answer that is wrong is kept, and `stability` tells."""
+    """Solve every problem; wrong answers are stored, and reported by `stability`."""
     rows = []
     for problem in track(progress, "known problems", len(PROBLEMS), PROBLEMS):
         known = problem()

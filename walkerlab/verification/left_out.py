@@ -1,4 +1,4 @@
-"""What the verification does without under a config; known before anything is loaded or run."""
+"""Parts of the verification that a config leaves out, known before anything is loaded or run."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ if TYPE_CHECKING:
 
 
 def of_verification(config: CompassCasesConfig | SceneCasesConfig) -> tuple[Entry, ...]:
-    """Return what the verification of another walker than the paper's compass does without."""
+    """Return the omissions for a walker other than the paper's compass."""
     if is_studied(config):
         return ()
     return (
         left_out(
             "the named extreme cases",
-            "they are the paper's compass's; this walker has its own",
+            "they are cases of the paper's compass; this walker has cases of its own",
             "about a hundred cases",
         ),
-        left_out("ordinary methods on the extreme cases", "they are shown on the paper's compass", "8 runs a case"),
+        left_out("ordinary methods on the extreme cases", "they are tested on the paper's compass", "8 runs per case"),
     )

@@ -1,7 +1,6 @@
-"""Whole planes of parameters: where our default method and where a game engine's fixed step can be trusted.
+"""Maps of where our default method and a game engine's fixed step can be trusted.
 
-The paper's walk over stiffness and stiction velocity, and over stiffness and the step of semi-implicit Euler; all else
-is the paper's.
+The paper's walk over stiffness and stiction velocity, and over stiffness and the step of semi-implicit Euler.
 """
 
 from collections.abc import Callable, Iterator
@@ -37,7 +36,7 @@ Numbers = list[float]
 def prepared_on_ground(
     stiffness: float, stiction_velocity: float | None, steps: int, budget: int
 ) -> tuple[Case, Config, ContactStart]:
-    """The paper's walk on ground of another stiffness (N/m^e), and with another stiction velocity (m/s) if given."""
+    """The paper's walk at a stiffness (N/m^e) and, if given, a stiction velocity (m/s)."""
     contact: dict[str, object] = {"units": "si", "stiffness": stiffness}
     if stiction_velocity is not None:
         contact |= {"stiction_velocity": stiction_velocity, "friction_velocity": PER_STICTION * stiction_velocity}
@@ -51,10 +50,10 @@ def prepared_on_ground(
 
 
 def stiction_cell(stiffness: float, stiction_velocity: float) -> Numbers:
-    """The paper's walk with one stiffness and stiction velocity, by the default method.
+    """Walk with the default method at one stiffness and stiction velocity.
 
-    Returns outcome, steps, outcome at a ten times tighter tolerance, error between both in legs, radians and pendulum
-    times (`NONE` if they end unlike), right-hand sides.
+    Returns outcome, steps, outcome at a ten times tighter tolerance, difference of both walks in legs, radians and
+    pendulum times (`NONE` if they end differently), right-hand sides.
     """
     case, config, start = prepared_on_ground(stiffness, stiction_velocity, WALK_STEPS, BUDGET)
     walk = again = start.walk(case, configured(start, case))
@@ -70,9 +69,9 @@ def stiction_cell(stiffness: float, stiction_velocity: float) -> Numbers:
 
 
 def step_column(stiffness: float, steps_s: tuple[float, ...]) -> Numbers:
-    """Two steps of the paper's walk with one stiffness: semi-implicit Euler with each step, against a tight tolerance.
+    """Walk two steps at one stiffness by semi-implicit Euler with each step size, and by a tight reference.
 
-    Returns verdict and error of each step.
+    Returns verdict and error for each step size.
     """
     case, config, start = prepared_on_ground(stiffness, None, STEPS, REFERENCE_BUDGET)
     walk = start.walk(case, Tolerances(*REFERENCE, case.budget))
@@ -87,7 +86,7 @@ def step_column(stiffness: float, steps_s: tuple[float, ...]) -> Numbers:
 
 
 def units_of(cells: int) -> Iterator[tuple[str, int, Callable[[], Numbers]]]:
-    """Yield all units of work for maps of `cells` cells along each axis: name, number of cells, and call."""
+    """Yield the work units of maps with `cells` cells along each axis: name, number of cells, and call."""
     stiffness = np.geomspace(*STIFFNESS, cells)
     steps = tuple(float(h) for h in np.geomspace(*STEP, cells))
     for i, k in enumerate(stiffness):

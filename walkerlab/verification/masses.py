@@ -1,4 +1,4 @@
-"""Momentum and energy of walkers from their masses, place by place: not from their equations of motion."""
+"""Momentum and energy of walkers computed from their point masses, independently of the equations of motion."""
 
 from dataclasses import dataclass
 
@@ -13,7 +13,7 @@ from walkerlab.verification.verdict import finite
 
 
 class Masses:
-    """A walker's masses about a point that moves with it: the centre of mass unless told.
+    """A walker's masses, relative to a point that moves with it: by default the centre of mass.
 
     mass     (masses,) kg
     levers   (masses, bodies, 2) m, from the point
@@ -21,7 +21,6 @@ class Masses:
     """
 
     def __init__(self, assembly: Assembly, about: Anchor | None = None) -> None:
-        """Sum up the levers."""
         found = list(masses(assembly))
         root = about or found[0][1]
         self.mass = np.array([mass for mass, _ in found])
@@ -31,29 +30,29 @@ class Masses:
         self.inertia = np.array([body.inertia_kg_m2 for body in assembly.bodies])
 
     def moving(self, psi: Floats, rate: Floats) -> tuple[Floats, Floats]:
-        """Places and velocities (..., masses, 2) against the point, at angles and rates (..., bodies)."""
+        """Positions and velocities (..., masses, 2) relative to the point, at angles and rates (..., bodies)."""
         arms = turned(self.levers, psi[..., None, :])
         swept = np.stack([-arms[..., 1], arms[..., 0]], axis=-1) * rate[..., None, :, None]
         return arms.sum(axis=-2), swept.sum(axis=-2)
 
 
 def turned(d: Floats, psi: Floats) -> Floats:
-    """Levers (..., bodies, 2) turned with their bodies."""
+    """Rotate levers (..., bodies, 2) with their bodies."""
     s, c = np.sin(psi), np.cos(psi)
     return np.stack([c * d[..., 0] - s * d[..., 1], s * d[..., 0] + c * d[..., 1]], axis=-1)
 
 
 @dataclass(frozen=True)
 class Moving:
-    """Every mass and body of a walker at an instant; the point on the ground under the stance foot is the origin.
+    """Masses and bodies of a walker at an instant; the origin is on the ground under the stance foot.
 
     mass      (masses,) kg
     place     (masses, 2) m
     velocity  (masses, 2) m/s
-    inertia   (bodies,) kg m^2, of the bodies about their own centres of mass
+    inertia   (bodies,) kg m^2, about the bodies' own centres of mass
     rate      (bodies,) rad/s
     hip       (2,) m
-    contact   (2,) m, of the swing foot the point that would touch
+    contact   (2,) m, point of the swing foot that would touch
     """
 
     mass: Floats
@@ -70,17 +69,17 @@ class Moving:
         return float(0.5 * self.mass @ (self.velocity**2).sum(axis=1) + 0.5 * self.inertia @ self.rate**2)
 
     def about(self, point: Floats, on_masses: Floats, on_bodies: Floats) -> float:
-        """Angular momentum about a point (kg m^2/s), of masses and bodies by their share in what is meant."""
+        """Angular momentum about a point (kg m^2/s), with the weights of masses and bodies."""
         arm = self.place - point
         orbital = self.mass * (arm[:, 0] * self.velocity[:, 1] - arm[:, 1] * self.velocity[:, 0])
         return float(on_masses @ orbital + on_bodies @ (self.inertia * self.rate))
 
 
 class RigidMasses:
-    """A walker's masses, and where states of the rigid model put them."""
+    """A walker's masses in states of the rigid model."""
 
     def __init__(self, assembly: Assembly, slope: float) -> None:
-        """About the centre of the stance foot's arc; slope in rad."""
+        """Take levers from the centre of the stance foot's arc; slope in rad."""
         foot, other, hip = assembly.feet[STANCE], assembly.feet[SWING], hip_of(assembly)
         root = Anchor(foot.body, foot.centre_m)
         self.assembly, self.slope, self.radius = assembly, slope, foot.radius_m
@@ -91,7 +90,7 @@ class RigidMasses:
         self.to_foot = levers(assembly, root, Anchor(other.body, other.centre_m))
 
     def at(self, state: Floats) -> Moving:
-        """The masses in a state of the rigid model (2 n)."""
+        """Masses in a state of the rigid model (2 n)."""
         n = self.members.shape[1]
         psi, rate = self.members @ state[:n] + self.slope, self.members @ state[n:]
         centre, rolling = np.array([0.0, self.radius]), np.array([-self.radius * state[n + STANCE], 0.0])
@@ -101,12 +100,12 @@ class RigidMasses:
         return Moving(mass, centre + place, rolling + velocity, inertia, rate, hip, contact)
 
     def momenta(self, state: Floats, new: bool) -> tuple[float, float]:
-        """The angular momenta that a heel strike keeps (kg m^2/s).
+        """Angular momenta conserved by a heel strike (kg m^2/s).
 
-        The whole walker's about the new foothold; that of the leg that lifts, and of what turns along with it in part,
-        about the hip.
+        The whole walker's about the new foothold; and that of the lifting leg, with its share of coupled bodies, about
+        the hip.
 
-        new  whether the walker stands on the new foothold already
+        new  whether the state is after the change of stance foot
         """
         moving, leg = self.at(state), self.assembly.legs[SWING if new else STANCE]
         names = [body.name for body in self.assembly.bodies]
@@ -119,15 +118,15 @@ class RigidMasses:
         return whole, moving.about(moving.hip, share[self.owner], share)
 
     def moment_of(self, push_off: float, state: Floats) -> float:
-        """Of a push-off (N s) about the new foothold (kg m^2/s): it acts from the contact behind towards the hip."""
+        """Angular impulse (kg m^2/s) about the new foothold of a push-off (N s) from the rear contact to the hip."""
         moving = self.at(state)
         along, up = push_off * moving.hip / np.hypot(*moving.hip)
         return float(moving.contact[1] * along - moving.contact[0] * up)
 
     def momentum_change(self, before: Floats, after: Floats, push_off: float = 0.0) -> float:
-        """Largest change of these momenta in heel strikes, as a share of their size; states (strikes, 2 n).
+        """Largest relative change of these momenta in heel strikes; states (strikes, 2 n).
 
-        A push-off's moment (N s) is no change.
+        The angular impulse of a push-off (N s) is accounted for.
         """
         change, size = 0.0, 1e-300
         for old, new in zip(before, after, strict=True):
@@ -137,10 +136,10 @@ class RigidMasses:
         return finite(change / size)
 
     def energy_won(self, before: Floats, after: Floats) -> float:
-        """Largest gain of kinetic energy (J) in heel strikes; 0 if each loses some."""
+        """Largest gain of kinetic energy (J) in heel strikes; 0 if all lose energy."""
         gains = [self.at(new).kinetic - self.at(old).kinetic for old, new in zip(before, after, strict=True)]
         return max(0.0, *gains)
 
     def feet_off_the_slope(self, before: Floats) -> float:
-        """Largest distance of the foot that comes down from the slope (m)."""
+        """Largest distance (m) of the landing foot from the slope."""
         return float(max(abs(self.at(state).contact[1]) for state in before))

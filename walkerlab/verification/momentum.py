@@ -1,8 +1,8 @@
-"""Momentum on compliant ground: what a walk gains is what ground and gravity give, from foot to foot through impacts.
+"""Momentum balance on compliant ground: a walk's change of momentum against the impulse of ground and gravity.
 
-The momenta are computed from positions and velocities of the masses, not from the assembled equations of motion; the
-impulses from the forces of the ground at states that the walk passes. Where forces vary quickly, as at a touch that is
-over within milliseconds, the walk is looked at again and again at closer times, until the sums settle.
+Momenta are computed from positions and velocities of the masses, not from the equations of motion; impulses from the
+ground's forces at sampled states. Where forces vary quickly, as in a touch of milliseconds, sampling is refined until
+the sums settle.
 """
 
 from dataclasses import dataclass
@@ -25,7 +25,7 @@ from walkerlab.verification.masses import Masses
 from walkerlab.verification.scaling import pendulum_time
 from walkerlab.verification.verdict import MAGNIFIED, Measure, NotMeasured, finite, promised
 
-MEASURE: Final = "momentum not given by ground and gravity, over the walker's"
+MEASURE: Final = "momentum not from ground and gravity, over the walker's"
 STEPS: Final = 2  # so that there is an impact, and what comes of it
 INTERVALS: Final = 256  # to begin with
 PASSES: Final = 9  # each looks four times as closely where it is needed
@@ -36,11 +36,11 @@ MAX_UNKNOWN: Final = 1e-3  # of the walker's momentum, beyond which a balance sa
 
 @dataclass(frozen=True)
 class Balance:
-    """Momentum against impulse.
+    """Momentum against impulse, each as a share of the walker's momentum.
 
-    residual    largest over time and over both directions and the turning, as a share of the walker's momentum
-    unsure      how far the sums of the impulses may be off, as such a share
-    unresolved  what of friction's impulse hangs on slips below the tolerance, as such a share
+    residual    largest over time, both directions and the angular part
+    unsure      error bound of the impulses' sums
+    unresolved  friction's impulse that depends on slips below the tolerance
     steps       of the solver
     """
 
@@ -51,18 +51,18 @@ class Balance:
 
 
 def momentum_finding(config: WalksConfig, scene: ContactScene, start: State, case: Case) -> Measure | NotMeasured:
-    """Momentum against impulse, or why it cannot be judged.
+    """Compare momentum with impulse, or state why it cannot be judged.
 
-    Errors of single steps are not magnified by the walk here: the balance holds along the path that was walked.
+    Errors of single steps are not magnified by the walk: the balance holds along the computed path.
     """
     if scene.pinned:
-        return NotMeasured(MEASURE, "the hinge pushes too")
+        return NotMeasured(MEASURE, "the hinge transmits forces as well")
     found = momentum_balance(config, scene, start, case)
     unknown = found.unsure + found.unresolved
     if unknown > MAX_UNKNOWN:
         shares = {
-            "the impulses' sums do not settle": found.unsure,
-            "friction hangs on slip velocities below the tolerance": found.unresolved,
+            "the impulse sums do not settle": found.unsure,
+            "friction depends on slip velocities below the tolerance": found.unresolved,
         }
         why = " and ".join(reason for reason, share in shares.items() if share > 0.5 * MAX_UNKNOWN)
         return NotMeasured(MEASURE, why)
@@ -71,7 +71,7 @@ def momentum_finding(config: WalksConfig, scene: ContactScene, start: State, cas
 
 
 def momentum_balance(config: WalksConfig, scene: ContactScene, start: State, case: Case) -> Balance:
-    """Momentum against impulse over the first steps of a case."""
+    """Compare momentum with impulse over the first steps of a case."""
     mass, leg = config.walker.total_mass_kg, config.walker.leg_length_m
     rates = np.abs(start[len(start) // 2 :])
     speed = max(leg / pendulum_time(config), *rates[:2], leg * float(rates[2:].max()))
@@ -104,35 +104,35 @@ def momentum_balance(config: WalksConfig, scene: ContactScene, start: State, cas
 
 
 def with_middles(grid: Floats) -> Floats:
-    """The ends and middles of intervals."""
+    """Ends and midpoints of intervals."""
     return np.sort(np.concatenate([grid, 0.5 * (grid[1:] + grid[:-1])]))
 
 
 def split(times: Floats, wanting: NDArray[np.bool_]) -> Floats:
-    """The ends of intervals, given with their middles, once those that want it are cut into four."""
+    """Ends of intervals, given with their midpoints, after those marked by `wanting` are cut into four."""
     first, middle, last = times[:-1:2], times[1::2], times[2::2]
     halves = np.concatenate([middle, 0.5 * (first + middle), 0.5 * (middle + last)])
     return np.sort(np.concatenate([times[::2], halves[np.tile(wanting, 3)]]))
 
 
 def impulse(times: Floats, rate: Floats) -> Floats:
-    """Sums (times, components) of a rate up to each interval's end, by Simpson's rule on ends and middles."""
+    """Integrate a rate by Simpson's rule up to each interval's end: (times, components)."""
     widths = np.diff(times[::2])[:, None]
     pieces = widths / 6.0 * (rate[:-1:2] + 4.0 * rate[1::2] + rate[2::2])
     return np.concatenate([np.zeros((1, rate.shape[1])), np.cumsum(pieces, axis=0)])
 
 
 def unsettled(times: Floats, rate: Floats) -> Floats:
-    """How much each interval's sum changes by looking at its middle, in the worst component."""
+    """Change of each interval's integral when its midpoint is included, in the worst component."""
     widths = np.diff(times[::2])[:, None]
     change = widths / 6.0 * (rate[:-1:2] - 2.0 * rate[1::2] + rate[2::2])
     return np.asarray(np.abs(change).max(axis=1))
 
 
 def impulse_rate(samples: ContactSamples, scene: ContactScene, config: RigidConfig, touches: Floats) -> Floats:
-    """Force along and up from the slope (N), and torque about a point of the slope (N m).
+    """Force along and normal to the slope (N), and torque about a point of the slope (N m).
 
-    They are those of ground and gravity and, from the times of touches (steps,) on, of push-offs.
+    Sums ground, gravity and, from the times of touches (steps,) on, push-offs.
     """
     along, height, normal, friction, _ = np.moveaxis(sampled_feet(scene.walker, samples), 2, 0)
     slope = config.slope_rad
@@ -154,7 +154,7 @@ def impulse_rate(samples: ContactSamples, scene: ContactScene, config: RigidConf
 
 
 def momentum(samples: ContactSamples, config: RigidConfig) -> Floats:
-    """Momentum along and up from the slope (kg m/s) and about a point of the slope (kg m^2/s), at intervals' ends."""
+    """Momentum along and normal to the slope (kg m/s) and about a point of it (kg m^2/s), at intervals' ends."""
     y = samples.states[::2]
     n, found = y.shape[1] // 2 - 2, Masses(assembly_of(config.walker))
     rate = y[:, 4 + n :]
@@ -164,5 +164,5 @@ def momentum(samples: ContactSamples, config: RigidConfig) -> Floats:
 
 
 def cross(r: Floats, v: Floats) -> Floats:
-    """The turning parts of moments (..., 2) in the plane."""
+    """Planar cross product, (...)."""
     return np.asarray(r[..., 0] * v[..., 1] - r[..., 1] * v[..., 0])

@@ -1,8 +1,8 @@
-"""What an ordinary choice does with the same scenes: SciPy at its default tolerance, a game engine's fixed step.
+"""Ordinary methods on the same scenes: SciPy at its default tolerance, and a game engine's fixed step.
 
-The contact scene as one ordinary differential equation without events, as one writes it down who knows nothing of
-switching points and pads' flanks, integrated to where the walk of this project ends, and compared with that walk at a
-sharp tolerance, whatever the case asks for. The rigid scene as a script of one's own, with an event function.
+The contact scene is one differential equation without events, as written without knowledge of switching points and
+pad edges. It is integrated to the end of this project's walk and compared with that walk at a tight tolerance, whatever
+the case specifies. The rigid scene is a user's script with an event function.
 """
 
 import time
@@ -50,7 +50,7 @@ class Choice:
     """One method on one case.
 
     verdict  fine, wrong silently, gives up, diverges
-    error    of the state at the end; None if it did not get there
+    error    of the final state; None if it was not reached
     """
 
     case: str
@@ -62,10 +62,10 @@ class Choice:
 
 
 def choices(case: Case, config: WalksConfig) -> tuple[Choice, ...]:
-    """Every ordinary method on a case: on the ground with equations alone, in the rigid model in a script that walks.
+    """Run every ordinary method on a case.
 
-    None if the case has no start or moves nowhere, if no equation without events describes its ground, or for another
-    walker than a compass: a script without events describes no knee that locks, and Appendix A no other walker.
+    Empty if the case has no start or does not move, if no equation without events describes its ground, or for another
+    walker than a compass: a script without events has no knee that locks, and Appendix A no other walker.
     """
     if not is_passive_compass(config):
         return ()
@@ -91,9 +91,9 @@ def choices(case: Case, config: WalksConfig) -> tuple[Choice, ...]:
 
 @dataclass(frozen=True)
 class Arrival:
-    """Where a case's walk arrives, by which methods are judged.
+    """End of a case's walk, to judge methods by.
 
-    units  what each number of the state is measured in
+    units  of each component of the state
     """
 
     case: str
@@ -102,7 +102,7 @@ class Arrival:
     units: Floats
 
     def judged(self, method: str, y: Floats | None, count: int, wall_s: float) -> Choice:
-        """What is to be said of where a method arrived, None if it did not; it says none of that itself."""
+        """Judge the end state of a method; None if it was not reached."""
         if y is None:
             return Choice(self.case, method, "gives up", None, count, wall_s)
         error = finite(float(np.max(np.abs((y - self.state) / self.units))))
@@ -113,19 +113,18 @@ class Arrival:
 
 
 def arrival_of(case: str, walk: ContactWalkResult, units: Floats) -> Arrival:
-    """Where a walk on the ground arrives."""
     return Arrival(case, walk.end_time_s, np.array(walk.end_state), units)
 
 
 def natural_units(config: RigidConfig) -> Floats:
-    """What each number of the state is measured in: legs, radians, and these in pendulum times."""
+    """Units of the state's components: legs, radians, and these per pendulum time."""
     lengths = np.array([config.walker.leg_length_m] * 2 + [1.0] * 2)
     return np.concatenate([lengths, lengths / pendulum_time(config)])
 
 
 @contextmanager
 def in_silence() -> Iterator[None]:
-    """What libraries warn of is not listened to; what they raise where they give up ends the block."""
+    """Suppress libraries' warnings, and leave the block on exceptions with which they give up."""
     with (
         warnings.catch_warnings(),
         np.errstate(all="ignore"),
@@ -136,7 +135,7 @@ def in_silence() -> Iterator[None]:
 
 
 def script(arrival: Arrival, compass: RigidWalker, walk: RigidWalkResult, method: str) -> Choice:
-    """A method of SciPy's solve_ivp with nothing but its name given, its event function at every heel strike."""
+    """Walk with a method of SciPy's solve_ivp at default settings, with an event function for heel strikes."""
     began = time.perf_counter()
     y, count = None, CAP
     with in_silence():
@@ -145,7 +144,7 @@ def script(arrival: Arrival, compass: RigidWalker, walk: RigidWalkResult, method
 
 
 def library(arrival: Arrival, ready: ContactStart, method: str) -> Choice:
-    """A method of SciPy's solve_ivp with nothing but its name given."""
+    """Walk with a method of SciPy's solve_ivp at default settings."""
     from scipy.integrate import solve_ivp
 
     system = OnPads(on_ground(ready.scene.walker, (True, True)), ready.scene.ground.terrain)
@@ -163,7 +162,7 @@ def library(arrival: Arrival, ready: ContactStart, method: str) -> Choice:
 
 
 def fixed(arrival: Arrival, ready: ContactStart, h: float, cap: int = CAP) -> Choice:
-    """Semi-implicit Euler with a fixed step, at most `cap` of them."""
+    """Walk by semi-implicit Euler with at most `cap` steps of h (s)."""
     system = OnPads(on_ground(ready.scene.walker, (True, True)), ready.scene.ground.terrain)
     y = np.array(ready.start)
     began = time.perf_counter()

@@ -1,14 +1,14 @@
-"""Answers to the known problems that use nothing of the contact code: closed forms, and SciPy on laws written anew."""
+"""References for the known problems without the contact code: closed forms, and SciPy on separately coded laws."""
 
 import math
 from typing import Any
 
 
 def linear_bounce_period(mass: float, stiffness: float, drop: float, gravity: float) -> float:
-    """Time (s) from landing to landing of a ball on a linear spring without damping, in closed form.
+    """Time (s) between landings of a ball on an undamped linear spring, in closed form.
 
-    Flight takes 2 v / g. In contact x'' = g - w^2 x from x = 0, x' = v: half a turn and twice the angle by which
-    gravity shifts the middle.
+    Flight takes 2 v / g. Contact obeys x'' = g - w^2 x from x = 0, x' = v and takes half a period plus twice the phase
+    shift due to gravity.
     """
     speed = math.sqrt(2.0 * gravity * drop)
     omega = math.sqrt(stiffness / mass)
@@ -26,7 +26,7 @@ def impact_force(depth: float, rate: float, law: tuple[float, float, float, floa
 
 
 def restitution(mass: float, speed: float, law: tuple[float, float, float, float], gravity: float) -> float:
-    """Speed at which a ball leaves the ground that it meets at `speed` (m/s), over that speed: SciPy's DOP853."""
+    """Restitution of a ball that lands at `speed` (m/s), by SciPy's DOP853."""
     from scipy.integrate import solve_ivp
 
     def motion(_t: float, y: Any) -> tuple[float, float]:
@@ -72,19 +72,19 @@ def wheel_speed(spokes: int, slope: float, gravity: float, inertia: float = 0.0)
 
 
 def wheel_upright_speed(spokes: int, slope: float, gravity: float, inertia: float = 0.0) -> float:
-    """The same when a spoke is normal to the slope: energy is kept from the impact until then."""
+    """Angular speed (rad/s) when a spoke is normal to the slope; energy is conserved since the impact."""
     half = math.pi / spokes
     climbed = 2.0 * gravity * (math.cos(slope) - math.cos(half - slope)) / (1.0 + inertia)
     return math.sqrt(wheel_speed(spokes, slope, gravity, inertia) ** 2 - climbed)
 
 
 def painleve_growth_rate(angle: float, friction: float, mass: float, stiffness: float) -> float:
-    """Rate (1/s) at which a sliding rod's end digs itself into a linear spring, beyond the critical friction.
+    """Rate (1/s) at which a sliding rod's end digs into a linear spring, beyond the critical friction.
 
     angle  between rod and ground (rad)
 
     A normal force N with friction mu N accelerates the end by A N, m A = 1 + 3 cos(angle) (cos(angle) - mu sin(angle));
-    where A is negative the ground's push pulls the end in, and penetration grows as exp(sqrt(-A k) t).
+    for negative A the ground's push pulls the end in, and penetration grows as exp(sqrt(-A k) t).
 
     Source: Painleve (1895); Champneys, Varkonyi, The Painleve paradox in contact mechanics (2016).
     """

@@ -1,4 +1,4 @@
-"""Walkers of another size, mass and gravity that must do the same, in their own units (dimensional analysis)."""
+"""Twins of walkers: dimensionally similar, with another size, mass and gravity, and so the same walk."""
 
 import math
 from typing import Any, TypeVar
@@ -14,18 +14,18 @@ TWIN_LEG, TWIN_MASS, TWIN_GRAVITY = 1.37, 11.3, 7.43
 
 
 def pendulum_time(config: RigidConfig) -> float:
-    """sqrt(L/g) of a config's walker (s)."""
+    """Time sqrt(L/g) (s) of a config's walker."""
     return math.sqrt(config.walker.leg_length_m / config.gravity_m_s2)
 
 
 def to_twin(config: RigidConfig) -> Units:
-    """How many times larger the measures of a config's walker are in its twin of ordinary size."""
+    """Scale factors from a config's walker to its twin of ordinary size."""
     length, mass = TWIN_LEG / config.walker.leg_length_m, TWIN_MASS / config.walker.total_mass_kg
     return Units(length, mass, math.sqrt(length * config.gravity_m_s2 / TWIN_GRAVITY))
 
 
 def scaled_block(block: B, by: Units) -> B:
-    """A block of measures scaled, each by its key's unit."""
+    """Scale each value of a block by the unit of its key."""
 
     def value(given: Any, unit: float) -> Any:
         if isinstance(given, Block):
@@ -41,7 +41,7 @@ def scaled_block(block: B, by: Units) -> B:
 
 
 def scaled(config: Config, by: Units) -> Config:
-    """The config of the similar walker: every quantity with a unit scaled, angles and pure numbers as they are."""
+    """Config of the similar walker: quantities with a unit are scaled, angles and pure numbers are not."""
     walker = scaled_block(config.walker, by)
     changes: dict[str, object] = {
         "walker": walker,

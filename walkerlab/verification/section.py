@@ -1,4 +1,4 @@
-"""How extreme cases end, what known problems come to, and what ordinary methods make of the same scenes."""
+"""Report section on extreme cases, known problems and ordinary methods."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -21,7 +21,7 @@ Rows = Sequence[Row]
 
 @of_stage("stability")
 def section(results: Results, summary: Row) -> Section | None:
-    """The stability table; None if the stage did not run."""
+    """Build the section; None if the stage did not run."""
     cases, known = summary["cases"], summary["known"]
     unanswered = [{**row, "why": row["second_tried"]} for row in cases if row["second_tried"]]
     missed = [{**row, "why": f"{one['measure']}: {one['why']}"} for row in cases for one in row["not_measured"]]
@@ -32,7 +32,7 @@ def section(results: Results, summary: Row) -> Section | None:
         Paragraph(words("stability.judgement")),
         table("Extreme cases", CASE_COLUMNS, grouped(cases, "family"), wordy=True, note=note),
         table("Problems with known answers, run through the contact code", KNOWN_COLUMNS, known, wordy=True),
-        Paragraph("What no case covers:"),
+        Paragraph("Not covered:"),
         Statements(tuple(Statement(f"{what}:", why) for what, why in words.terms("stability.not_covered").items())),
         ordinary_table(summary),
         Paragraph(words("stability.maps", planes) if planes else words("stability.how_to_map")),
@@ -42,29 +42,28 @@ def section(results: Results, summary: Row) -> Section | None:
 
 
 def finding(summary: Row) -> str:
-    """How many came out as expected, and how many of these have no answer."""
+    """State how many cases ended as expected, and how many of these have no answer."""
     return words("stability.finding", summary, len([row for row in summary["cases"] if row["ok"] and gave_up(row)]))
 
 
 def gave_up(row: Row) -> bool:
-    """Whether a case ended without an answer."""
     outcome = outcome_of(row["outcome"])
     return outcome is not None and not outcome.answered
 
 
 def ending(row: Row) -> Cell:
-    """How a case ended: green only for an answer that came out as expected."""
+    """Outcome of a case, green only for an expected answer."""
     return Cell(row["outcome"], ("fair" if gave_up(row) else "good") if row["ok"] else "bad")
 
 
 def failures(summary: Row) -> list[str]:
-    """What did not, a paragraph each."""
+    """Describe each failure in a paragraph."""
     failed = [words("stability.failed_case", one) for one in summary["cases"] if not one["ok"]]
     return failed + [words("stability.failed_problem", one) for one in summary["known"] if not one["ok"]]
 
 
 def worst_measure(row: Row) -> float | None:
-    """The largest of a case's measures but its use of the budget, each over its limit."""
+    """Largest ratio of a measure to its limit, apart from the budget's."""
     judged = [one for one in row["measures"] if one["limit"] > 0.0 and one["measure"] != BUDGET_USED]
     return max((one["value"] / one["limit"] for one in judged), default=None)
 
@@ -74,20 +73,20 @@ CASE_COLUMNS = (
     Column("ended as", ending),
     Column("steps", "steps", whole, numeric=True),
     Column("other method", "second_method", lambda name: name or "none"),
-    Column("worst measure over its limit", worst_measure, partial(number, digits=2), numeric=True),
+    Column("worst measure / limit", worst_measure, partial(number, digits=2), numeric=True),
     Column("right-hand sides", "rhs_evaluations", whole, numeric=True),
     measured("time", "wall_s", partial(number, digits=3), prefix="m"),
-    Column("why that is to be expected", "reason", wide=True),
+    Column("why expected", "reason", wide=True),
 )
 
 
 def by_reason(cases: Rows) -> str:
-    """Each reason once, with the cases that it holds for."""
+    """List each reason with the cases that share it."""
     return "; ".join(f"{why} ({', '.join(row['name'] for row in rows)})" for why, rows in grouped(cases, "why").items())
 
 
 def family_table(cases: Rows) -> Table:
-    """How many cases of each family ended how."""
+    """Count the outcomes in each family of cases."""
     counted = Counter((case["family"], case["outcome"]) for case in cases)
     return table("", [Column("family"), Column("outcome"), Column("cases")], [(*key, n) for key, n in counted.items()])
 
@@ -95,15 +94,15 @@ def family_table(cases: Rows) -> Table:
 KNOWN_COLUMNS = (
     Column("problem", "name"),
     Column("quantity", "quantity"),
-    Column("by the contact code", "value", partial(number, digits=7), numeric=True),
+    Column("contact code", "value", partial(number, digits=7), numeric=True),
     Column("reference", "reference", partial(number, digits=7), numeric=True),
     Column("relative error", lambda row: Cell(number(row["error"], 2), "good" if row["ok"] else "bad"), numeric=True),
-    Column("the reference’s route", "source", wide=True),
+    Column("reference method", "source", wide=True),
 )
 
 
 def ordinary_table(summary: Row) -> Table:
-    """What ordinary methods do with the cases: one row a case, one column a method."""
+    """Table of ordinary methods: one row per case, one column per method."""
     methods = [
         Column(method.removeprefix("SciPy ").removeprefix("semi-implicit "), method, ordinary_cell)
         for method in grouped(summary["ordinary"], "method")
@@ -111,11 +110,10 @@ def ordinary_table(summary: Row) -> Table:
     tried = grouped(summary["ordinary"], "case").items()
     records = [{"case": case, **{row["method"]: row for row in rows}} for case, rows in tried]
     note = words("stability.ordinary", summary)
-    return table("What an ordinary choice of method does", [Column("case", "case"), *methods], records, note=note)
+    return table("Ordinary methods", [Column("case", "case"), *methods], records, note=note)
 
 
 def ordinary_cell(row: Row | None) -> Cell:
-    """A method's verdict with error and run time."""
     if row is None:
         return Cell("")
     error = f" {number(row['error'], 2)}," if "error" in row else ""
@@ -123,5 +121,5 @@ def ordinary_cell(row: Row | None) -> Cell:
 
 
 def answer(summary: Row) -> list[str | Table]:
-    """Answer how many cases ended as they should, and which did not."""
+    """Report how many cases ended as expected, and which did not."""
     return [finding(summary), family_table(summary["cases"]), *failures(summary)]

@@ -1,4 +1,4 @@
-"""Extreme cases and known problems: every one judged by measures that the walk itself does not use."""
+"""Stage `stability`: extreme cases and known problems, judged by measures that the walk itself does not use."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
@@ -23,13 +23,11 @@ from walkerlab.verification.verdict import CaseResult
 def run(
     config: CompassCasesConfig | SceneCasesConfig, inputs: Mapping[str, Content], progress: Progress, jobs: int = 1
 ) -> Content:
-    """Judge the catalogue and the config's own cases, try ordinary methods, and tell of the known problems.
+    """Judge the catalogue and the config's own cases, try ordinary methods, and report the known problems.
 
-    The paper's compass has a catalogue of named cases; of any other walker it is the scene's own extremes.
+    For a walker other than the paper's compass the catalogue consists of variations of the scene.
 
-    jobs  processes
-
-    Raises ConfigError if a case has the name of another.
+    Raises ConfigError if two cases share a name.
     """
     if judged_in_its_scene(config):
         own = scene_cases(spelled_out(config, inputs))
@@ -47,12 +45,12 @@ def run(
 
 
 def judged_in_its_scene(config: CompassCasesConfig | SceneCasesConfig) -> TypeGuard[SceneCasesConfig]:
-    """Whether the walker is another one than the paper's compass."""
+    """Whether the walker is not the paper's compass."""
     return not is_studied(config)
 
 
 def spelled_out(config: WalksConfig, inputs: Mapping[str, Content]) -> Config:
-    """The scene with the start, and the pitch of pads, in numbers, so that its cases share them."""
+    """Scene with start and pitch of pads given as numbers, shared by its cases."""
     step, start = rigid_start(config, inputs)
     scene = Config().model_copy(update={key: getattr(config, key) for key in keys_of(WalksConfig)} | {"start": start})
     contact = config.contact
@@ -65,9 +63,9 @@ def spelled_out(config: WalksConfig, inputs: Mapping[str, Content]) -> Config:
 def summary_of(
     cases: Sequence[CaseResult], known: Sequence[Mapping[str, Any]], ordinary: Sequence[Choice]
 ) -> dict[str, Any]:
-    """What the command prints, and, if something is not as it should be, that there is no answer.
+    """Build the summary; a failure adds `no_answer`.
 
-    known  the known problems as their stage prints them
+    known  the known problems, as stored by their stage
     """
     failed = [*(case.name for case in cases if not case.ok), *(one["name"] for one in known if not one["ok"])]
     of = len(cases) + len(known)
@@ -83,13 +81,12 @@ def summary_of(
     }
     if failed:
         message = f"{len(failed)} of {of} did not end as expected: {', '.join(failed)}"
-        advice = "`walkerlab report` says in red which and why; `walkerlab stability --json` has every measure."
+        advice = "`walkerlab report` explains failures in red; `walkerlab stability --json` has every measure."
         said["no_answer"] = {"message": message, "advice": advice}
     return said
 
 
 def case_row(case: CaseResult) -> dict[str, Any]:
-    """A case with every measure that was taken."""
     told = {name: value for name, value in asdict(case).items() if name not in ("findings", "remarks")}
     told |= {name: list(told[name]) for name in ("expected", "not_measured")}
     measures = [{"measure": one.measure, "value": one.value, "limit": one.limit, "ok": one.ok} for one in case.findings]

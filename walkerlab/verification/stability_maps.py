@@ -1,4 +1,4 @@
-"""Maps of stability over stiffness, stiction velocity and step size; an interrupted run goes on."""
+"""Stage `stability-maps`: maps over stiffness, stiction velocity and step size, resumed after an interruption."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -18,7 +18,7 @@ from walkerlab.verification.ordinary import FINE, STEPS
 OF_STICTION = {
     "outcome": "how the walk ended, see attribute outcomes",
     "steps": "steps walked",
-    "sharper_outcome": "how it ended at a ten times tighter tolerance",
+    "sharper_outcome": "outcome at a ten times tighter tolerance",
     "error": "between both runs, in legs, radians, pendulum times, where they are compared",
     "rhs_evaluations": "right-hand sides evaluated",
 }
@@ -28,9 +28,9 @@ OF_STICTION = {
 def run(
     config: MapsConfig, _inputs: Mapping[str, Content], progress: Progress, *, checkpoint: Checkpoint, jobs: int = 1
 ) -> Content:
-    """Compute what is not there yet of both maps.
+    """Compute the missing cells of both maps.
 
-    checkpoint  cells that an earlier run has left, and where new ones are kept
+    checkpoint  holds cells of earlier runs, and receives new ones
     jobs        processes
     """
     cells = config.stability.map_cells
@@ -40,7 +40,7 @@ def run(
 
 
 def stiction_group(cells: int, kept: Mapping[str, maps.Numbers]) -> Group:
-    """How the default method's walks end, over stiction velocity and stiffness."""
+    """Outcomes of the default method over stiction velocity and stiffness."""
     found = np.array([[kept[f"stiction {i} {j}"] for j in range(cells)] for i in range(cells)])
     columns = dict(zip(OF_STICTION, np.moveaxis(found, 2, 0), strict=True))
     dims = ("stiction_velocity", "stiffness")
@@ -51,14 +51,14 @@ def stiction_group(cells: int, kept: Mapping[str, maps.Numbers]) -> Group:
     variables |= {
         **axis("stiction_velocity", maps.STICTION_VELOCITY, cells, "m/s", "stiction velocity"),
         **axis("stiffness", maps.STIFFNESS, cells, "N/m^2.2", "stiffness of the ground"),
-        "compared": whole(compared, dims, "1 if both runs have an answer and end alike after as many steps"),
+        "compared": whole(compared, dims, "1 if both runs have an answer, with the same outcome and step count"),
         "error": Variable(errors, dims, "1", OF_STICTION["error"], missing=True),
     }
     return Group(variables, {"outcomes": OUTCOMES, "steps_wanted": maps.WALK_STEPS, "budget": maps.BUDGET})
 
 
 def step_group(cells: int, kept: Mapping[str, maps.Numbers]) -> Group:
-    """What semi-implicit Euler makes of the walk, over step size and stiffness."""
+    """Results of semi-implicit Euler over step size and stiffness."""
     found = np.array([np.reshape(kept[f"step {j}"], (cells, 2)) for j in range(cells)])  # stiffness, step, of each
     verdicts, errors = found.transpose(2, 1, 0)
     dims = ("step_size", "stiffness")
@@ -66,7 +66,7 @@ def step_group(cells: int, kept: Mapping[str, maps.Numbers]) -> Group:
     variables = {
         **axis("step_size", maps.STEP, cells, "s", "step size"),
         **axis("stiffness", maps.STIFFNESS, cells, "N/m^2.2", "stiffness of the ground"),
-        "verdict": whole(verdicts, dims, "what became of it, see attribute verdicts"),
+        "verdict": whole(verdicts, dims, "verdict, see attribute verdicts"),
         "error": Variable(np.where(errors == maps.NONE, np.nan, errors), dims, "1", text, missing=True),
     }
     legend = ", ".join(f"{number} {verdict}" for number, verdict in enumerate(maps.VERDICTS))
@@ -74,17 +74,16 @@ def step_group(cells: int, kept: Mapping[str, maps.Numbers]) -> Group:
 
 
 def axis(name: str, ends: tuple[float, float], cells: int, unit: str, text: str) -> dict[str, Variable]:
-    """The coordinate of an axis."""
     return {name: Variable(np.geomspace(*ends, cells), (name,), unit, text)}
 
 
 def whole(values: Any, dims: tuple[str, ...], text: str) -> Variable:
-    """A variable of whole numbers."""
+    """Integer variable."""
     return Variable(np.asarray(values).astype(np.int64), dims, "1", text)
 
 
 def summary_of(stiction: Group, step: Group) -> dict[str, Any]:
-    """How many cells came out how."""
+    """Cell counts by outcome."""
     errors = stiction["error"][stiction["compared"] == 1]
     verdicts, times = np.unique(step["verdict"], return_counts=True)
     return {

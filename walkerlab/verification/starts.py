@@ -1,4 +1,4 @@
-"""Walkers in the states that cases start from: how either model walks from there, and what its walk must keep."""
+"""Starts of cases: a walker in its initial state, how it walks in either model, and what its walk must conserve."""
 
 from dataclasses import dataclass
 from functools import cache
@@ -32,11 +32,11 @@ NEVER_LESS = 1e-3  # of the balance asked for: by how much what was dissipated m
 
 @dataclass(frozen=True)
 class JudgedWalk:
-    """A walk of either model as cases are judged by it, times in pendulum times of its walker.
+    """A walk of either model to be judged, with times in pendulum times of its walker.
 
-    end         when it was over; None in the rigid model, whose walks are over at a heel strike
-    residual_J  of the energy balance, or the drift of the energy within a swing
-    numbers     everything that must be finite
+    end         end time; None in the rigid model, whose walks end at a heel strike
+    residual_J  of the energy balance, or energy drift within a swing
+    numbers     values that must be finite
     """
 
     outcome: Outcome
@@ -51,10 +51,10 @@ class JudgedWalk:
 
 @dataclass(frozen=True)
 class CaseStart:
-    """A walker in the state that a case starts from.
+    """A walker in the initial state of a case.
 
-    energy  m g L and the energy of the start (J): what residuals are measured by
-    kept    what its residual is of, in words
+    energy  m g L and the initial energy (J), the scale of residuals
+    kept    name of the residual
     """
 
     kept: ClassVar[str]
@@ -65,17 +65,15 @@ class CaseStart:
 
 @dataclass(frozen=True)
 class RigidStart(CaseStart):
-    """A walker of the rigid model."""
-
     kept: ClassVar[str] = "energy drift within a swing"
     walker: Standing
 
     def again(self, case: Case) -> Case:
-        """As far as a case is walked again: no further than times are compared."""
+        """Shorten a repeated walk to the steps whose times are compared."""
         return case.model_copy(update={"steps": min(case.steps, max(case.compared_steps, 1))})
 
     def walk(self, case: Case, tolerances: Tolerances, sampled: bool = False) -> JudgedWalk:  # noqa: ARG002
-        """Walk a case by a method; heel strikes are all that is judged, so that there is nothing to sample."""
+        """Walk a case; only heel strikes are judged, so nothing is sampled."""
         walk = take_walk(self.walker, tolerances, self.start, case.steps)
         numbers = np.concatenate([walk.touch_time_s, walk.before.ravel(), walk.after.ravel()])
         touches, work = walk.touch_time_s / pendulum_time(self.config), walk.work
@@ -84,7 +82,7 @@ class RigidStart(CaseStart):
         return JudgedWalk(walk.outcome, touches, None, off, *cost, numbers, walk)
 
     def measures(self, walk: JudgedWalk, _case: Case) -> list[Measure]:
-        """What heel strikes must keep."""
+        """Measure what heel strikes must conserve."""
         record: RigidWalkResult = walk.record
         if not record.steps:
             return []
@@ -94,25 +92,22 @@ class RigidStart(CaseStart):
         changed = strikes.momentum_change(record.before, record.after, push)
         won = 0.0 if push else strikes.energy_won(record.before, record.after) / self.energy
         return [
-            Measure("distance of the feet from the slope at heel strike, over the leg", finite(off), ROUNDING),
+            Measure("distance of the feet from the slope at heel strike, in leg lengths", finite(off), ROUNDING),
             Measure("momentum changed by a heel strike", changed, ROUNDING),
-            Measure("energy won at a heel strike", finite(won), ROUNDING),
+            Measure("energy gained at a heel strike", finite(won), ROUNDING),
         ]
 
 
 @dataclass(frozen=True)
 class ContactStart(CaseStart):
-    """A walker on its ground."""
-
     kept: ClassVar[str] = "energy balance residual"
     scene: ContactScene
 
     def again(self, case: Case) -> Case:
-        """As far as a case is walked again: all the way, since how it ends is compared too."""
+        """Repeat the whole walk, since outcomes are compared too."""
         return case
 
     def walk(self, case: Case, tolerances: Tolerances, sampled: bool = False) -> JudgedWalk:
-        """Walk a case by a method."""
         scene, unit = self.scene, pendulum_time(self.config)
         interval = scene.ground.frame.pendulum_time / SAMPLES_PER_PENDULUM_TIME if sampled else None
         walk = scene.walk(self.start, case.steps, tolerances, interval)
@@ -122,16 +117,16 @@ class ContactStart(CaseStart):
         return JudgedWalk(walk.outcome, touches, end, walk.energy_balance_residual_J, *cost, numbers, walk)
 
     def measures(self, walk: JudgedWalk, case: Case) -> list[Measure]:
-        """That friction and damping give nothing back, of a walk that was sampled."""
+        """Measure, on a sampled walk, whether friction and damping return energy."""
         record: ContactWalkResult = walk.record
         if record.samples is None or record.samples.dissipated_J.shape[0] < 2:
             return []
         falls = -np.diff(record.samples.dissipated_J[:, :2], axis=0)
         back = finite(max(0.0, float(np.max(falls))) / self.energy)
-        return [Measure("energy won back from friction and damping", back, NEVER_LESS * case.balance)]
+        return [Measure("energy regained from friction and damping", back, NEVER_LESS * case.balance)]
 
     def momentum(self, walk: JudgedWalk, case: Case) -> Measure | NotMeasured:
-        """The momentum's balance of a walk that has an outcome and a length."""
+        """Momentum balance of a walk that has an answer and a duration."""
         if not walk.outcome.answered or walk.record.end_time_s <= 0.0:
             return NotMeasured(MEASURE, f"the walk ended as {walk.outcome.label}")
         return momentum_finding(self.config, self.scene, self.start, case)
@@ -141,7 +136,7 @@ Start = RigidStart | ContactStart
 
 
 def configured(start: Start, case: Case, tighter: float = 1.0) -> Tolerances:
-    """The config's method, at tolerances so many times its own, within the case's budget."""
+    """The config's method, with its tolerances multiplied by `tighter`, within the case's budget."""
     solver = start.config.solver
     settings = solver.rigid if isinstance(start, RigidStart) else solver.contact
     return Tolerances(settings.method, tighter * settings.rtol, tighter * settings.atol, case.budget)
@@ -149,12 +144,12 @@ def configured(start: Start, case: Case, tighter: float = 1.0) -> Tolerances:
 
 @cache
 def gait_of(walker: Standing, seed: int) -> RigidGait | None:
-    """The gait that a search finds, once: most cases of a catalogue are one walker on other ground."""
+    """Find a walker's gait; cached, since most cases of a catalogue are one walker on other ground."""
     return find_gaits(walker, seed).gait
 
 
 def prepared(config: WalksConfig, case: Case) -> Start | None:
-    """The start of a case; None if it starts from a gait that there is not, or its pads are laid for one."""
+    """Prepare the start of a case; None if it, or the pads' pitch, depends on a gait that does not exist."""
     walker = rigid_walker(config)
     if isinstance(config.start, str):
         gait = gait_of(walker, config.seed)

@@ -1,4 +1,4 @@
-"""What is found about a case, and what follows from it."""
+"""Measures and verdict of a case."""
 
 import math
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ MAGNIFIED: Final = 10.0  # by how much a walk may magnify the errors of its step
 
 @dataclass(frozen=True)
 class Measure:
-    """One independent measure of a run, a pure number."""
+    """One independent measure of a run, dimensionless."""
 
     measure: str
     value: float
@@ -23,11 +23,10 @@ class Measure:
 
     @property
     def ok(self) -> bool:
-        """Whether the run passes; NaN fails."""
+        """Whether the value is finite and within its limit."""
         return bool(math.isfinite(self.value) and self.value <= self.limit)
 
     def __str__(self) -> str:
-        """In words."""
         return f"{self.measure} {self.value:.3g} above {self.limit:.3g}"
 
 
@@ -41,13 +40,13 @@ class NotMeasured:
 
 @dataclass(frozen=True)
 class CaseResult:
-    """How a case ended and how it is judged.
+    """Outcome of a case and its judgement.
 
-    findings       every measure that was taken
-    remarks        what is wrong besides, in words
-    not_measured   what could not be measured
-    second_method  the other method that it was compared with; empty if none could walk it
-    second_tried   what became of those asked before, or why none was asked
+    findings       measures taken
+    remarks        further faults
+    not_measured   measures that could not be taken
+    second_method  method compared with; empty if none could walk the case
+    second_tried   methods that failed, or why none was tried
     """
 
     name: Annotated[str, Label("", "name of the case")]
@@ -68,27 +67,26 @@ class CaseResult:
 
     @property
     def failures(self) -> tuple[str, ...]:
-        """What is not as it should be, in words; empty if all is."""
+        """Descriptions of all faults; empty if the case passed."""
         failed = [] if self.outcome in self.expected else [f"ended as {self.outcome}, not {' or '.join(self.expected)}"]
         return (*failed, *self.remarks, *(str(finding) for finding in self.findings if not finding.ok))
 
     @property
     def ok(self) -> Annotated[bool, Label("1", "whether it ended as expected and passed every measure")]:
-        """Whether the case ended as expected and passed every measure."""
         return not self.failures
 
 
 def finite(value: float) -> float:
-    """The value, or a large number in the place of one that is not finite: results hold no NaN."""
+    """The value, or 1e300 in place of one that is not finite: results hold no NaN."""
     return float(value) if math.isfinite(value) else 1e300
 
 
 def promised(case: Case, rtol: float, steps: int) -> float:
-    """How far two walks' times may be apart, in pendulum times.
+    """Largest expected difference of two walks' times, in pendulum times.
 
-    rtol   the looser of their tolerances
-    steps  of the solver, both together
+    rtol   larger of their tolerances
+    steps  of the solver, in both walks
 
-    Each step may err by rtol times numbers of order one.
+    Each step may err by rtol times values of order one.
     """
     return min(case.agreement, MAGNIFIED * rtol * steps)

@@ -1,1 +1,1 @@
-"""The walker in other engines: one adapter a file, one registry, one signature."""
+"""The walker in other engines: one adapter module per engine, all with the same interface."""

@@ -1,4 +1,4 @@
-"""What an adapter is: a module that builds a planar model in its engine and steps it."""
+"""Interface of an engine's adapter: a module that builds a planar model in its engine and steps it."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
@@ -14,16 +14,16 @@ Forces = Callable[[float, Floats, Floats], Floats]
 
 @dataclass(frozen=True)
 class EngineContact:
-    """What an engine's own contact is to be tuned to, by closed forms, SI.
+    """Target to which an engine's own contact is tuned in closed form, SI.
 
-    mass             that stands on one foot (kg)
+    mass             resting on one foot (kg)
     gravity          towards the ground (m/s^2)
-    penetration      under that weight at rest (m)
-    exponent         of the penetration that the force grows with
-    damping_ratio    c / (2 sqrt(k m)) there
-    friction         tangential over normal force of a foot that slides
-    creep_load       tangential over normal force of a foot that stands
-    creep_velocity   at which it creeps under that load (m/s)
+    penetration      at rest under that weight (m)
+    exponent         of the penetration in the normal force
+    damping_ratio    c / (2 sqrt(k m)) at rest
+    friction         tangential over normal force of a sliding foot
+    creep_load       tangential over normal force of a standing foot
+    creep_velocity   creep under that load (m/s)
     """
 
     mass: float
@@ -38,12 +38,12 @@ class EngineContact:
 
 @dataclass(frozen=True)
 class Integrator:
-    """One of an engine's integrators.
+    """An engine's integrator.
 
-    order       that it promises
-    most_steps  of a run: what takes longer is not run
-    adapts      its steps to a tolerance
-    for_contact_only  without contact it is one of the others
+    order             nominal
+    most_steps        budget of a run
+    adapts            whether steps follow a tolerance
+    for_contact_only  whether it equals another integrator in the absence of contact
     """
 
     order: int
@@ -54,7 +54,7 @@ class Integrator:
 
 @dataclass(frozen=True)
 class OwnContact:
-    """An engine's own contact with the settings that it was tuned to."""
+    """Contact model of an engine, with tuned settings."""
 
     model: str
     settings: Mapping[str, float]
@@ -66,11 +66,10 @@ OnStep = Callable[[float, Floats, Floats], bool]
 
 @dataclass(frozen=True)
 class Stepping:
-    """How an engine is to step.
+    """Integrator and step control of an engine's run.
 
-    integrator  one of its own
-    step_s      size of its steps; where they are adapted, the largest
-    tolerance   where they are adapted, else None
+    step_s     step size, or the largest one where steps are adaptive
+    tolerance  None for fixed steps
     """
 
     integrator: str
@@ -79,7 +78,7 @@ class Stepping:
 
 
 class Simulation(ABC):
-    """A model in its start state."""
+    """Model in an engine, in its start state."""
 
     def __init__(
         self,
@@ -90,33 +89,33 @@ class Simulation(ABC):
         forces: Forces | None = None,
         own: OwnContact | None = None,
     ) -> None:
-        """The model at coordinates q (of the root's freedoms, then of the hinges; m, rad) with velocities v.
+        """Build the model at coordinates q (root freedoms, then hinges; m, rad) and velocities v.
 
-        forces  on the walker from outside the engine
-        own     the engine's own contact with the ground
+        forces  external forces on the walker
+        own     the engine's own ground contact
         """
         self.stepping, self.forces, self.own = stepping, forces, own
         self.build(model, q, v)
 
     @abstractmethod
     def build(self, model: PlanarModel, q: Floats, v: Floats) -> None:
-        """Build the model in the engine, with its own contact if it has one, under the forces if there are any."""
+        """Build the model in the engine, with `self.own` and `self.forces` where they are not None."""
 
     @abstractmethod
     def run(self, steps: int, until_s: float, on_step: OnStep) -> None:
-        """Step until a time, or for a number of steps, or until it is told to stop."""
+        """Advance until a time, for at most `steps` steps, or until `on_step` returns False."""
 
     @abstractmethod
     def carry(self, ball: int, has_ground: bool) -> None:
-        """Put ground under a foot or take it away; means nothing without the engine's own contact."""
+        """Enable or disable a foot's ground; has no effect without the engine's own contact."""
 
 
 class Adapter(Protocol):
-    """A module of this package that drives one engine; it imports the engine when it is first asked for something.
+    """A module that drives one engine, and imports it only when a model is built.
 
     INTEGRATORS     by name
-    CONTACTS        its contact models, each with the integrator that it runs with
-    CANNOT_EXPRESS  what it cannot, in words
+    CONTACTS        integrator of each contact model
+    CANNOT_EXPRESS  limitations, for the report
     """
 
     INTEGRATORS: Mapping[str, Integrator]
@@ -124,4 +123,4 @@ class Adapter(Protocol):
     CANNOT_EXPRESS: tuple[str, ...]
 
     def tuned(self, model: str, target: EngineContact) -> OwnContact:
-        """The settings by which a contact model does what the target says, as far as it can."""
+        """Settings with which a contact model comes closest to the target."""

@@ -1,9 +1,9 @@
-"""Drake: point contact with Hunt and Crossley's damping, continuous or discrete (SAP, Similar, Lagged, TAMSI).
+"""Drake: point contact with Hunt-Crossley damping, continuous or discrete (SAP, Similar, Lagged, TAMSI).
 
-The plane of the walk is Drake's x-y plane. With stiffness k and dissipation d the normal force is k x (1 + d x'), so
-under the weight m g at rest x = m g / k and damping there is m g d. SAP's own model is linear: damping is k times the
-relaxation time. Friction rises over a stiction tolerance v_s in the continuous model as 10 s^3 - 15 s^4 + 6 s^5,
-s = v / v_s, in Lagged as s / sqrt(1 + s^2); SAP regularises it by itself.
+The walk takes place in Drake's x-y plane. With stiffness k and dissipation d the normal force is k x (1 + d x'), so
+at rest under the weight m g, x = m g / k and the damping is m g d. SAP is linear: its damping is k times the relaxation
+time. Friction rises with s = v / v_s, v_s the stiction tolerance, as 10 s^3 - 15 s^4 + 6 s^5 in the continuous model
+and as s / sqrt(1 + s^2) in Lagged; SAP regularises it internally.
 
 Source: Drake documentation, Multibody: contact modeling; Castro, Permenter, Han (2022).
 """
@@ -24,20 +24,20 @@ INTEGRATORS = {
     "runge_kutta3 adaptive": adapter.Integrator(3, 60_000, adapts=True),
     "discrete": adapter.Integrator(1, 45_000, for_contact_only=True),
 }
-EMBEDDED = ("runge_kutta3",)  # they adapt their steps unless told not to
+EMBEDDED = ("runge_kutta3",)  # adaptive by default
 CONTACTS = {"sap": "discrete", "lagged": "discrete", "hunt-crossley": "runge_kutta3 adaptive"}
 APPROXIMATIONS = {"sap": "kSap", "lagged": "kLagged"}
 CANNOT_EXPRESS = (
-    "a force that grows with a power of the penetration: point contact is linear in it",
-    "damping that rises over the first 0.1 mm: it grows with the force, or (SAP) is linear",
-    "friction that rises linearly from rest in continuous time: its law is flat at zero slip",
-    "static above dynamic friction in discrete time: one coefficient is used",
-    "a knee that locks by an impact: a joint that it locks stops alone, so another model takes over there",
+    "a force that grows with a power of the penetration: point contact is linear",
+    "damping that rises over the first 0.1 mm: damping grows with the force, or (SAP) is linear",
+    "friction that rises linearly from rest in continuous time: Drake's law is flat at zero slip",
+    "static above dynamic friction in discrete time: only one coefficient is used",
+    "a knee that locks by an impact: locking stops only the joint itself, so the walk continues in another model",
 )
 
 
 def tuned(model: str, target: adapter.EngineContact) -> adapter.OwnContact:
-    """The closed forms above, solved for what the target says."""
+    """Solve the closed forms above for the target."""
     from scipy.optimize import brentq
 
     stiffness = target.mass * target.gravity / target.penetration
@@ -57,10 +57,9 @@ def tuned(model: str, target: adapter.EngineContact) -> adapter.OwnContact:
 
 
 class DrakeRun(adapter.Simulation):
-    """A diagram, its simulator and its context."""
+    """A Drake simulator with its diagram and context."""
 
     def build(self, model: PlanarModel, q: Floats, v: Floats) -> None:
-        """Build the diagram and put it into its start state."""
         from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, DiscreteContactApproximation
         from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
         from pydrake.systems.framework import DiagramBuilder
@@ -73,7 +72,7 @@ class DrakeRun(adapter.Simulation):
         self._plant, self._scene_graph = AddMultibodyPlantSceneGraph(builder, self._h if self._discrete else 0.0)
         joints, self._feet, self._floor = assembled(self._plant, model, own)
         if self._discrete:
-            self._plant.SetUseSampledOutputPorts(False)  # nobody reads them, and they copy all that there is
+            self._plant.SetUseSampledOutputPorts(False)  # unused, and each copies the whole state
         if self._discrete and own is not None:
             approximation = getattr(DiscreteContactApproximation, APPROXIMATIONS[own.model])
             self._plant.set_discrete_contact_approximation(approximation)
@@ -105,7 +104,6 @@ class DrakeRun(adapter.Simulation):
         self._simulator.Initialize()
 
     def run(self, steps: int, until_s: float, on_step: adapter.OnStep) -> None:
-        """Step until a time, or for a number of steps, or until it is told to stop."""
         from pydrake.systems.framework import EventStatus
 
         if self._discrete:
@@ -128,12 +126,11 @@ class DrakeRun(adapter.Simulation):
         self._simulator.AdvanceTo(until_s)
 
     def _state(self) -> tuple[Floats, Floats]:
-        """Coordinates and velocities."""
         x = self._plant.GetPositionsAndVelocities(self._at)
         return x[self._order], x[self._rates]
 
     def carry(self, ball: int, has_ground: bool) -> None:
-        """Let a foot's ball collide or not, by a filter of its own."""
+        """Allow or exclude a ball's collisions, by a filter of its own."""
         from pydrake.geometry import CollisionFilterDeclaration, GeometrySet
 
         if not self._feet or has_ground == (ball not in self._declared):
@@ -149,7 +146,7 @@ class DrakeRun(adapter.Simulation):
 
 
 def assembled(plant: Any, model: PlanarModel, own: adapter.OwnContact | None) -> tuple[list[Any], list[Any], Any]:
-    """Build bodies, joints and feet; the joints in the order of the coordinates, the feet's geometries, the floor's."""
+    """Add bodies, joints and feet; returns joints in coordinate order, the feet's geometries and the floor's."""
     from pydrake.geometry import HalfSpace, Sphere
     from pydrake.math import RigidTransform
     from pydrake.multibody.plant import ContactModel
@@ -178,7 +175,7 @@ def assembled(plant: Any, model: PlanarModel, own: adapter.OwnContact | None) ->
 
 
 def joined(plant: Any, model: PlanarModel, link: Link, parent: Any, body: Any) -> list[Any]:
-    """Join a link to its parent by one joint, or by a slide for each direction."""
+    """Hinge a link to its parent, or give the base its freedoms."""
     from pydrake.math import RigidTransform
     from pydrake.multibody.tree import FixedOffsetFrame, PlanarJoint, PrismaticJoint, RevoluteJoint, SpatialInertia
 
@@ -199,7 +196,7 @@ def joined(plant: Any, model: PlanarModel, link: Link, parent: Any, body: Any) -
 
 
 def material(own: adapter.OwnContact) -> Any:
-    """Surface of a foot and of the floor alike: half of the compliance each."""
+    """Surface properties of feet and floor alike: each contributes half of the compliance."""
     from pydrake.geometry import AddContactMaterial, ProximityProperties
     from pydrake.multibody.plant import CoulombFriction
 
@@ -211,15 +208,15 @@ def material(own: adapter.OwnContact) -> Any:
         friction=CoulombFriction(settings["friction"], settings["friction"]),
     )
     if "relaxation_time" in settings:
-        # times of two surfaces add up
+        # the times of both surfaces add up
         properties.AddProperty("material", "relaxation_time", 0.5 * settings["relaxation_time"])
     return properties
 
 
 def apply(builder: Any, plant: Any, forces: adapter.Forces, place: Any) -> None:
-    """A system that computes the ground's forces from the plant's state at every evaluation.
+    """Add a system that computes the ground's forces from the plant's state at every evaluation.
 
-    place  where each coordinate is among Drake's
+    place  index of each coordinate in Drake's order
     """
     from pydrake.systems.framework import LeafSystem
 

@@ -1,4 +1,4 @@
-"""The three experiments: same law, own law, no contact; each engine against our own walk, run after run."""
+"""The three experiments in other engines: same law, own law, no contact; each compared with our own walk."""
 
 import math
 import time
@@ -55,7 +55,7 @@ class Truth:
     """Our walk of a scene at tight tolerance, by two methods.
 
     end        state at `until_s`
-    agreement  largest difference of the two methods there
+    agreement  largest difference between the two methods
     walk       ten steps, for periods
     """
 
@@ -67,13 +67,13 @@ class Truth:
 
 
 def walked(scene: EngineScene, method: str, rtol: float, steps: int, until_s: float | None = None) -> ContactWalkResult:
-    """Our walk; with `until_s` also the state then."""
+    """Walk the scene with this project's solver; with `until_s` the state at that time is sampled."""
     tolerances = Tolerances(method, rtol, 1e-2 * rtol, ENDLESS, track_energy=False)
     return walk_contact(scene.ours, scene.ground, False, STANCE_FOOT, scene.start, tolerances, steps, until_s)
 
 
 def truth_of(scene: EngineScene) -> Truth | None:
-    """The reference of a scene; None if the walk ends before states can be compared."""
+    """Compute the reference of a scene; None if the walk ends before states can be compared."""
     walk = walked(scene, *REFERENCES[0], OWN_TOUCHES)
     if walk.touch_time_s.size <= TOUCHES:
         return None
@@ -87,14 +87,14 @@ def truth_of(scene: EngineScene) -> Truth | None:
 
 
 def end_of(result: ContactWalkResult) -> Floats | None:
-    """The state at the second of a walk's samples, the first being its start; None if it was not reached."""
+    """State at a walk's second sample, the first being its start; None if not reached."""
     there = result.samples is not None and len(result.samples.states) > 1
     return np.asarray(result.samples.states[1]) if result.samples is not None and there else None
 
 
 @dataclass(frozen=True)
 class EngineExperiment:
-    """One engine, or this project beside it, in one experiment on one scene."""
+    """One engine, or this project, in one experiment on one scene."""
 
     scene: EngineScene
     engine: str
@@ -105,10 +105,10 @@ class EngineExperiment:
     def row(
         self, integrator: str, stepping: Stepping, answer: runs.WalkAnswer | TaskLost, start: float = 1.0
     ) -> EngineRow:
-        """A run with its errors, or that it was lost with its process or refused by the engine.
+        """Evaluate a run, or record why it was lost.
 
-        There is an error of the end state and of the touches; on an engine's own law, where only a walk to the end from
-        the gait itself is compared, of the last period.
+        On the same law the errors are those of the end state and of touch times. On own contact the error is that of
+        the last period, of completed walks from the gait itself.
 
         integrator  or contact model on an engine's own law
         start       velocities of the start over those of the gait
@@ -142,7 +142,7 @@ class EngineExperiment:
 def our_walk(
     scene: EngineScene, rtol: float, touches: int, until_s: float | None = None, repeats: int = 1
 ) -> runs.WalkAnswer:
-    """Our own walk of so many touches, or until a time within the next step, as an engine would have answered."""
+    """Time our own walk over `touches` steps, or until a time within the next step."""
     walls = []
     for _ in range(repeats):
         begun = time.process_time()
@@ -154,7 +154,7 @@ def our_walk(
 
 
 def our_rows(scene: EngineScene, truth: Truth, version: str) -> Iterator[EngineRow]:
-    """Our own method over its ladder of tolerances on the same walk, then ADAMS's law on the starts of own contact."""
+    """Yield our runs over a ladder of tolerances, then walks under ADAMS's law from the starts of own contact."""
     same_law = EngineExperiment(scene, OURS, version, SAME_LAW, truth)
     our_walk(scene, OUR_LADDER[0], TOUCHES, truth.until_s)
     for rtol in OUR_LADDER:
@@ -167,14 +167,14 @@ def our_rows(scene: EngineScene, truth: Truth, version: str) -> Iterator[EngineR
 
 
 def steppings(name: str, integrator: Integrator, steps_s: Sequence[float]) -> list[Stepping]:
-    """How an integrator is to step, from coarse to fine: by these steps, or where it adapts them by its tolerance."""
+    """An integrator's step sizes, or tolerances where it adapts them, from coarse to fine."""
     if integrator.adapts:
         return [Stepping(name, LARGEST_STEP_S, tolerance) for tolerance in TOLERANCES]
     return [Stepping(name, h) for h in steps_s]
 
 
 def target_of(scene: EngineScene) -> EngineContact | None:
-    """What the walker's own contact is, linearised under its weight on one foot; None on frictionless ground."""
+    """Linearise the walker's contact under its weight on one foot; None on frictionless ground."""
     from scipy.optimize import brentq
 
     walker = scene.ours
@@ -190,7 +190,7 @@ def target_of(scene: EngineScene) -> EngineContact | None:
 
 @dataclass(frozen=True)
 class EngineOnScene:
-    """One engine on one scene, in a process of its own, beside our own walk."""
+    """One engine on one scene, in a process of its own."""
 
     engine: Engine
     scene: EngineScene
@@ -200,10 +200,10 @@ class EngineOnScene:
     def walk(
         self, called: str, stepping: Stepping, most: int, own: OwnContact | None = None, start: float = 1.0
     ) -> tuple[EngineRow, runs.WalkAnswer | TaskLost]:
-        """A walk on our law, or on the engine's own contact, with its row.
+        """Walk on our law, or on the engine's own contact.
 
-        called  the integrator, or the contact that is its own
-        most    steps
+        called  integrator or contact model, as the row names it
+        most    step budget
         start   velocities over those of the gait
         """
         law, until_s = (SAME_LAW, self.truth.until_s) if own is None else (OWN_LAW, ENDLESS_S)
@@ -214,7 +214,7 @@ class EngineOnScene:
         return experiment.row(called, stepping, answer, start), answer
 
     def same_law(self) -> Iterator[EngineRow]:
-        """Its integrators on our law, each over its ladder of step sizes or tolerances."""
+        """Yield runs of each integrator on our law, from coarse to fine."""
         for name, integrator in self.engine.adapter().INTEGRATORS.items():
             if integrator.for_contact_only:
                 continue
@@ -228,7 +228,7 @@ class EngineOnScene:
                     break
 
     def tuned(self, contact: str, target: EngineContact) -> tuple[OwnContact, list[TuningRow]] | TaskLost:
-        """A contact model tuned to the scene's, and how far a ball and a block are from it."""
+        """Tune a contact model to the scene's contact and measure how close it comes."""
         name, sliding = self.engine.name, 1.5 * self.scene.ours.friction.sliding_from
         answer = self.process.do(runs.TuningTask(name, contact, target, TUNING_STEP_S, sliding).run, PATIENCE_S)
         if isinstance(answer, TaskLost):
@@ -243,10 +243,9 @@ class EngineOnScene:
         return answer.own, [TuningRow(*about, *numbers) for numbers in measured]
 
     def own_law(self, contact: str, own: OwnContact) -> Iterator[EngineRow]:
-        """Its own contact over step sizes from the gait, then from other starts at the finest but one.
+        """Yield runs on own contact over step sizes from the gait, then from other starts at the second finest step.
 
-        Where steps are adapted, all walks from the gait share the steps that the integrator is given; another walk that
-        would take more is not begun.
+        Adaptive walks from the gait share one step budget; no walk is begun that would exceed it.
         """
         name = self.engine.adapter().CONTACTS[contact]
         integrator = self.engine.adapter().INTEGRATORS[name]
@@ -268,7 +267,7 @@ class EngineOnScene:
             yield from (self.walk(contact, stepping, most, own, factor)[0] for factor in STARTS)
 
     def swings(self) -> tuple[list[SwingRow], list[TaskLost]]:
-        """The hinged walker's swing, without drives, over step sizes, by each of its integrators."""
+        """Simulate the hinged walker's passive swing with each integrator."""
         scene, engine, model = self.scene, self.engine, runs.pinned_model(self.scene)
         n = len(model.chain)
         start = np.array((*scene.start[2 : 2 + n], *scene.start[4 + n :]))
@@ -293,14 +292,14 @@ class EngineOnScene:
 
 
 def has_settled(coarse: EngineRow, fine: EngineRow) -> bool:
-    """Whether two walks to the end have one period."""
+    """Whether two completed walks agree in period."""
     if coarse.error is None or fine.error is None or coarse.period_s is None or fine.period_s is None:
         return False
     return abs(fine.period_s / coarse.period_s - 1.0) <= SETTLED
 
 
 def swing_truth(scene: EngineScene, start: Floats, until_s: float = SWING_S) -> tuple[Floats, Any]:
-    """The end of the swing by our equations and SciPy's method, and the mechanical energy of a state."""
+    """Swing by our equations with SciPy's DOP853: its end, and a function for the mechanical energy of a state."""
     from scipy.integrate import solve_ivp
 
     knee = knees_at_start(scene.ours, STANCE_FOOT, scene.start)
@@ -322,6 +321,6 @@ def swing_truth(scene: EngineScene, start: Floats, until_s: float = SWING_S) -> 
 
 
 def least_wall(rows: Sequence[EngineRow], error: float) -> float | None:
-    """Run time (s) of the quickest run with at most this error."""
+    """Shortest run time (s) among runs with at most this error."""
     good = [row for row in rows if row.error is not None and row.error <= error]
     return min((row.wall_s for row in good if row.wall_s is not None), default=None)

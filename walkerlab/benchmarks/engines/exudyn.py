@@ -1,7 +1,7 @@
 """Exudyn: a kinematic tree in minimal coordinates, explicit and implicit integrators, a ball on a triangle as contact.
 
-The plane of the walk is Exudyn's x-y plane. Its contact force is k d^e + c d', with friction that rises linearly to
-full friction over a zone of slip; so the exponent is ADAMS's own, and so is the stiffness.
+The walk takes place in Exudyn's x-y plane. The contact force is k d^e + c d', and friction rises linearly to full
+friction over a zone of slip; exponent and stiffness are those of ADAMS.
 
 Source: Exudyn documentation, ObjectKinematicTree and ObjectContactSphereTriangle.
 """
@@ -24,11 +24,11 @@ INTEGRATORS = {
 }
 CONTACTS = {"sphere-triangle": "RK44", "sphere-triangle implicit": "TrapezoidalIndex2"}
 CANNOT_EXPRESS = (
-    "damping that rises over the first 0.1 mm: it acts in full from first touch",
-    "a ground that never pulls: damping acts on a foot that leaves, too, and holds the trailing foot back",
-    "friction that rises as a cubic, or static above dynamic friction: it rises linearly to one coefficient",
-    "an endless plane: a triangle of a kilometre stands in for it",
-    "a knee that locks: its explicit integrators take no constraints, so another model takes over there",
+    "damping that rises over the first 0.1 mm: damping acts in full from first touch",
+    "a ground that never pulls: damping also acts on a lifting foot, and holds the trailing foot back",
+    "friction that rises as a cubic, or static above dynamic friction: friction rises linearly to one coefficient",
+    "an endless plane: a triangle of a kilometre replaces it",
+    "a knee that locks: the explicit integrators allow no constraints, so the walk continues in another model",
 )
 PLANE_M = 1000.0
 NO_ROTATION = np.eye(3)
@@ -38,7 +38,7 @@ EXPLICIT = ("ExplicitEuler", "RK44")
 
 
 def tuned(model: str, target: adapter.EngineContact) -> adapter.OwnContact:
-    """The target's own parameters, and the zone over which friction rises."""
+    """Use the target's own parameters, and derive the zone over which friction rises."""
     stiffness = target.exponent * target.mass * target.gravity / target.penetration
     settings = {
         "contact_stiffness": target.mass * target.gravity / target.penetration**target.exponent,
@@ -51,10 +51,9 @@ def tuned(model: str, target: adapter.EngineContact) -> adapter.OwnContact:
 
 
 class ExudynRun(adapter.Simulation):
-    """A system of one tree, and its contacts."""
+    """An Exudyn system with one tree and its contacts."""
 
     def build(self, model: PlanarModel, q: Floats, v: Floats) -> None:
-        """Build the system in its start state."""
         import exudyn as exu
         from exudyn.itemInterface import NodeGenericODE2
 
@@ -73,7 +72,6 @@ class ExudynRun(adapter.Simulation):
         self._system.Assemble()
 
     def run(self, steps: int, until_s: float, on_step: adapter.OnStep) -> None:
-        """Step until a time, or for a number of steps, or until it is told to stop."""
         import exudyn as exu
 
         data = self._system.systemData
@@ -92,8 +90,8 @@ class ExudynRun(adapter.Simulation):
         stepping.endTime = min(until_s, steps * h) if not adaptive else until_s
         stepping.numberOfSteps = max(1, math.ceil(stepping.endTime / h - 1e-9))
         stepping.verboseMode = 0
-        stepping.adaptiveStep = name not in EXPLICIT  # explicit ones are to step as they are told
-        # contact that closes or opens within a step is noticed at its end, as by any explicit method
+        stepping.adaptiveStep = name not in EXPLICIT  # explicit methods keep their step
+        # detect contact at the end of a step, without iterating, as any explicit method does
         stepping.discontinuous.ignoreMaxIterations = True
         stepping.discontinuous.iterationTolerance = NO_ITERATION
         settings.solution.file.write = False
@@ -104,13 +102,12 @@ class ExudynRun(adapter.Simulation):
         self._system.SolveDynamic(settings, solverType=getattr(exu.DynamicSolverType, name))
 
     def carry(self, ball: int, has_ground: bool) -> None:
-        """Switch a foot's contact on or off."""
         if self._contacts:
             self._system.SetObjectParameter(self._contacts[ball], "activeConnector", has_ground)
 
 
 def assembled(system: Any, model: PlanarModel, node: Any, forces: adapter.Forces | None) -> tuple[Any, list[int]]:
-    """Add the tree; its number, and where each link is among its joints."""
+    """Add the tree; returns its object number and each link's joint index."""
     import exudyn as exu
     from exudyn.itemInterface import ObjectKinematicTree
 
@@ -133,7 +130,7 @@ def assembled(system: Any, model: PlanarModel, node: Any, forces: adapter.Forces
         places.append(len(joints) - 1)
 
     def applied(_system: Any, time_s: float, _item: Any, q: Any, v: Any) -> Any:
-        assert forces is not None, "it is only called with a law"
+        assert forces is not None, "only called with forces"
         return forces(time_s, np.asarray(q), np.asarray(v)).tolist()
 
     tree = ObjectKinematicTree(
@@ -152,7 +149,7 @@ def assembled(system: Any, model: PlanarModel, node: Any, forces: adapter.Forces
 
 
 def contacts(system: Any, model: PlanarModel, tree: Any, places: list[int], own: adapter.OwnContact) -> Iterator[Any]:
-    """A ball on a large triangle for each foot; the numbers of these objects."""
+    """Add a ball on a large triangle for each foot; yields the object numbers."""
     import exudyn as exu
     from exudyn import itemInterface
 

@@ -1,7 +1,7 @@
-"""Judging a walk from outside: an engine steps, and this project's rules say what touched, on what ground, and when.
+"""Apply the walking rules to an engine's walk from outside: touches, lifts, pads, knees and outcome.
 
-An engine gives states at the ends of its steps only. Between two of them a foot's height is taken as the cubic through
-its values and velocities, so that a touch is located to the fourth order in the step.
+An engine yields states at the ends of its steps only. Within a step a foot's height is taken as the cubic through its
+values and velocities, so a touch is located to fourth order in the step.
 """
 
 import math
@@ -31,26 +31,26 @@ FAR_AWAY = 1e4  # m: where only the feet of a run that has lost its numbers get 
 
 @dataclass(frozen=True, order=True)
 class Turn:
-    """A knee locks or is released: at what share of a step, and by which event function of a walk."""
+    """A knee's lock or release: at which share of a step, and by which event function."""
 
     share: float
     event: int
 
 
 class RuleFollower:
-    """The rules of a walk, kept up to date step by step.
+    """State of a walk under the walking rules, updated after each step of the engine.
 
-    scene       with the knees locked that are now
-    walk_state  what the walk remembers
-    outcome     how it ended; None while it goes on
-    turn        a knee that locks or is released in the step that was just seen, which then counts for nothing
-    watches     whether knees are watched
+    scene       with the currently locked knees
+    walk_state  memory of the walk
+    outcome     None while the walk continues
+    turn        lock or release within the last step, which is then discarded
+    watches     whether knees are monitored
     """
 
     def __init__(self, scene: EngineScene, steps: int, q: Floats, v: Floats, *, carries: bool = True) -> None:
-        """At the start of a walk of at most `steps` steps, both feet on the ground.
+        """Start a walk of at most `steps` steps with both feet on the ground.
 
-        carries  whether the ground's forces are ours; else the engine has its own, and only drives are
+        carries  whether our contact law acts; otherwise the engine has its own, and only drives act
         """
         self.walk_state = new_walk_state(scene.ours, scene.ground.terrain, STANCE_FOOT, steps, scene.start)
         self._ground = self.walk_state.has_ground if carries else np.zeros(2, np.int8)
@@ -66,7 +66,7 @@ class RuleFollower:
         self._edges = [self._edges_of(foot) for foot in range(2)]
 
     def _see(self, scene: EngineScene, q: Floats, v: Floats) -> None:
-        """Look at a scene's model in a state, by the compiled function with what stays the same in its calls."""
+        """Bind the compiled function to a scene's model, with the arguments that stay the same, and evaluate it."""
         size, state = scene.model.size, self.walk_state
         # what it reads of them is the walk state's own and changes with it
         system = on_ground(scene.walker, self._ground, progress=state.progress)
@@ -78,29 +78,29 @@ class RuleFollower:
         self._feet, self._bends = self.feet(q, v), self._bends_in(q, v)
 
     def feet(self, q: Floats, v: Floats) -> Feet:
-        """How the feet move; coordinates and velocities are contiguous arrays."""
+        """Motion of both feet; q and v are contiguous arrays."""
         self._call(*self._fixed, 0.0, q, v, self._motion, self._none)
         first, second = self._motion.tolist()
         return FootMotion(*first), FootMotion(*second)
 
     def forces(self, time_s: float, q: Floats, v: Floats) -> Floats:
-        """The generalised forces on the walker, in memory that the next call overwrites."""
+        """Generalised forces on the walker, in memory that the next call overwrites."""
         self._call(*self._fixed, time_s, q, v, self._motion, self._forces)
         return self._forces
 
     def _bends_in(self, q: Floats, v: Floats) -> list[tuple[float, float]]:
-        """Extension (rad) and its rate (rad/s) of each knee, zero of a locked one."""
+        """Extension (rad) and its rate (rad/s) of each knee, zero for a locked knee."""
         return [(float(q[place]), float(v[place])) if place >= 0 else (0.0, 0.0) for place in self.scene.knee_places]
 
     def _edges_of(self, foot: int) -> tuple[float, float]:
-        """Where the pad or gap that a foot is over begins and ends (m); ordinary ground does nowhere."""
+        """Edges (m) of the pad or gap under a foot; infinite on ordinary ground."""
         terrain = self.scene.ground.terrain
         if not terrain.has_pads:
             return -math.inf, math.inf
         return cell_edges(terrain, foot, int(self.walk_state.cells[foot]))
 
     def follow(self, time_s: float, q: Floats, v: Floats) -> bool:
-        """Take in the state at the end of a step; whether the ground under a foot may have changed."""
+        """Update with the state at a step's end; returns whether the ground under a foot may have changed."""
         before, now = self._feet, self.feet(q, v)
         if not all(-FAR_AWAY < place < FAR_AWAY for foot in now for place in (foot.along, foot.height)):
             self._end(int(Outcome.SOLVER_FAILED))
@@ -124,7 +124,6 @@ class RuleFollower:
         return happened
 
     def _apply_events(self, time_s: float, before: Feet, now: Feet, q: Floats, v: Floats) -> None:
-        """Apply every event between two states."""
         walk_state, terrain, form = self.walk_state, self.scene.ground.terrain, self.scene.ours.whole
         for foot in range(2) if terrain.has_pads else ():
             cell = cell_at(terrain, foot, now[foot].along)
@@ -157,7 +156,7 @@ class RuleFollower:
             self._end(int(Outcome.WALKED))
 
     def _turning(self, h: float, now: Feet, bends: list[tuple[float, float]]) -> Turn | None:
-        """The first knee to lock or to be released within a step of h (s), if there is one."""
+        """First lock or release of a knee within a step of h (s), or None."""
         walk_state, found = self.walk_state, []
         stance = walk_state.progress.stance
         pushing_s = pulse_left(self._fixed[0], self.time_s)
@@ -179,13 +178,13 @@ class RuleFollower:
 
     @property
     def is_outdated(self) -> bool:
-        """Whether a knee was released by a touch itself: the engine's model has it locked."""
+        """Whether a touch has released a knee that the engine's model still has locked."""
         return int(np.count_nonzero(self.walk_state.knee == LOCKED)) != len(self.scene.locked)
 
     def go_on(self, q: Floats, v: Floats) -> tuple[Floats, Floats]:
-        """Let the knee that turns, if one does, lock or be released in this state.
+        """Apply the pending lock or release of a knee to this state.
 
-        Returns coordinates and velocities of the walker from there on, with its knees as they are now.
+        Returns coordinates and velocities for a model with the present locks.
         """
         walker, walk_state, y = self.scene.ours, self.walk_state, self.scene.about_centre(q, v)
         if self.turn is not None and contact_events.EXTENSION <= self.turn.event < contact_events.PULSE_END:
@@ -200,12 +199,11 @@ class RuleFollower:
         return q, v
 
     def _end(self, outcome: int) -> None:
-        """End the walk with the first outcome there is."""
+        """Record an outcome unless there already is one."""
         if outcome != GOES_ON and self.outcome is None:
             self.outcome = Outcome(outcome)
 
     def _judge(self, now: Feet, q: Floats, v: Floats) -> None:
-        """End the walk that has fallen, slid, flown or taken too long."""
         ground, has_ground = self.scene.ground, self.walk_state.has_ground
         tau, t = ground.frame.pendulum_time, self.time_s
         inside = (now[0].height < 0.0 and has_ground[0] != 0, now[1].height < 0.0 and has_ground[1] != 0)
@@ -227,7 +225,7 @@ class RuleFollower:
 
 
 def crossing(x0: float, v0: float, x1: float, v1: float, h: float) -> float:
-    """Share of a step of h (s) at which a cubic through values and rates at its ends goes through zero."""
+    """Share of a step of h (s) at which the cubic through values and rates at its ends crosses zero."""
     low, high = 0.0, 1.0
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
@@ -239,13 +237,13 @@ def crossing(x0: float, v0: float, x1: float, v1: float, h: float) -> float:
 
 
 def within(old: FootMotion, new: FootMotion, share: float, h: float) -> FootMotion:
-    """A foot within a step: its height as a cubic, all else by its mean rate."""
+    """Foot at a share of a step: height by the cubic, all other values interpolated linearly."""
     straight = FootMotion(*(a + share * (b - a) for a, b in zip(old, new, strict=True)))
     height = cubic(old.height, old.vertical_velocity, new.height, new.vertical_velocity, h, share)
     return straight._replace(height=height)
 
 
 def cubic(x0: float, v0: float, x1: float, v1: float, h: float, s: float) -> float:
-    """The cubic through values and slopes at both ends of a step, at the share s of it."""
+    """Value at share s of the cubic through values and slopes at both ends of a step."""
     r = 1.0 - s
     return r * r * ((1.0 + 2.0 * s) * x0 + s * h * v0) + s * s * ((3.0 - 2.0 * s) * x1 - r * h * v1)

@@ -1,8 +1,8 @@
 """MuJoCo: soft convex contact in constraint space, fixed steps.
 
-Its contact is mass-normalised. With constant impedance d and a reference of stiffness K and damping B (solref -K, -B),
-a loaded contact accelerates by a = (1 - d) a_0 - B v - K r, where a_0 is the acceleration without it; so a ball rests
-at (1 - d) g / K whatever its mass, and a foot creeps at (1 - d) a_0 / (impratio B).
+Contact is normalised by mass. With constant impedance d and a reference of stiffness K and damping B (solref -K, -B),
+a loaded contact accelerates by a = (1 - d) a_0 - B v - K r, where a_0 is the acceleration without contact; so any ball
+rests at (1 - d) g / K, and a foot creeps at (1 - d) a_0 / (impratio B).
 
 Source: MuJoCo documentation, Computation: constraint model, and Modeling: solver parameters.
 """
@@ -18,20 +18,20 @@ from walkerlab.solvers.system import Floats
 INTEGRATORS = {"Euler": adapter.Integrator(1, 120_000), "RK4": adapter.Integrator(4, 120_000)}
 CONTACTS = {"soft": "Euler", "soft-rk4": "RK4"}
 CANNOT_EXPRESS = (
-    "a force that grows with a power of the penetration, or damping that does: its contact is linear",
-    "stiffness in N/m: it is scaled by the contact's own effective mass",
-    "two coefficients of friction: static and dynamic are one",
-    "point feet: a ball of half a millimetre stands in for one",
-    "a knee that locks rigidly at an instant: its equality constraint is soft, so another model takes over there",
+    "a force or damping that grows with a power of the penetration: contact is linear",
+    "stiffness in N/m: stiffness is scaled by the contact's effective mass",
+    "static above dynamic friction: there is one coefficient",
+    "point feet: a ball of half a millimetre replaces each",
+    "a knee that locks rigidly at an instant: equality constraints are soft, so the walk continues in another model",
 )
-LEAST_INERTIA = 2e-15  # kg m^2, twice what MuJoCo asks for
-IMPEDANCE = 0.1  # small: close to a spring and damper that the load acts on in full
+LEAST_INERTIA = 2e-15  # kg m^2, twice MuJoCo's minimum
+IMPEDANCE = 0.1  # small, for a contact close to an ordinary spring and damper
 AXES = {"along": ("slide", "1 0 0"), "height": ("slide", "0 0 1"), "turn": ("hinge", "0 -1 0")}
 MODES = {"Euler": "mjINT_EULER", "RK4": "mjINT_RK4"}
 
 
 def tuned(model: str, target: adapter.EngineContact) -> adapter.OwnContact:
-    """The closed forms above, solved for what the target says."""
+    """Solve the closed forms above for the target."""
     stiffness = (1.0 - IMPEDANCE) * target.gravity / target.penetration
     damping = 2.0 * target.damping_ratio * math.sqrt(stiffness)
     creep = (1.0 - IMPEDANCE) * target.creep_load * target.gravity / damping
@@ -46,13 +46,12 @@ def tuned(model: str, target: adapter.EngineContact) -> adapter.OwnContact:
 
 
 class MujocoRun(adapter.Simulation):
-    """A model and its data."""
+    """A MuJoCo model and its data."""
 
     def build(self, model: PlanarModel, q: Floats, v: Floats) -> None:
-        """Compile the model and put it into its start state."""
         import mujoco
 
-        mujoco.set_mjcb_passive(None)  # one for the whole process, and the last run's may still be there
+        mujoco.set_mjcb_passive(None)  # it is global; remove the last run's
         self._advance = mujoco.mj_step
         self._model = mujoco.MjModel.from_xml_string(described(model, self.own))
         self._model.opt.timestep = self.stepping.step_s
@@ -62,7 +61,6 @@ class MujocoRun(adapter.Simulation):
         mujoco.set_mjcb_passive(None if self.forces is None else applied(self.forces, self._data))
 
     def run(self, steps: int, until_s: float, on_step: adapter.OnStep) -> None:
-        """Step until a time, or for a number of steps, or until it is told to stop."""
         model, data, advance = self._model, self._data, self._advance
         q, v, h = data.qpos, data.qvel, float(model.opt.timestep)
         for count in range(1, min(steps, round(until_s / h)) + 1):
@@ -71,13 +69,12 @@ class MujocoRun(adapter.Simulation):
                 return
 
     def carry(self, ball: int, has_ground: bool) -> None:
-        """Let a foot's ball collide or not."""
         if self._model.ngeom:
             self._model.geom_contype[self._model.geom(f"foot {ball}").id] = int(has_ground)
 
 
 def applied(forces: adapter.Forces, data: Any) -> Any:
-    """The callback for passive forces, which every stage of every integrator asks."""
+    """Callback for passive forces; MuJoCo calls it in every stage of every integrator."""
     q, v, passive_forces = data.qpos, data.qvel, data.qfrc_passive
 
     def passive(_model: Any, _data: Any) -> None:
@@ -87,7 +84,7 @@ def applied(forces: adapter.Forces, data: Any) -> Any:
 
 
 def described(model: PlanarModel, own: adapter.OwnContact | None) -> str:
-    """The model in MuJoCo's own language."""
+    """Write the model as MJCF."""
     ratio, world = "", body(model, 0, own)
     if own is not None:
         ratio = f'cone="elliptic" impratio="{own.settings["impratio"]!r}"'
@@ -101,7 +98,7 @@ def described(model: PlanarModel, own: adapter.OwnContact | None) -> str:
 
 
 def body(model: PlanarModel, place: int, own: adapter.OwnContact | None) -> str:
-    """A link with its hinge, its feet and the links that hang from it."""
+    """MJCF of a link with its hinge, feet and child links."""
     link = model.links[place]
     (px, pz), (x, z), (cx, cz) = link.parent_point_m, link.point_m, link.centre_m
     inside = ""
@@ -116,7 +113,6 @@ def body(model: PlanarModel, place: int, own: adapter.OwnContact | None) -> str:
 
 
 def foot(number: int, ball: Ball, contact: Mapping[str, float]) -> str:
-    """A foot's ball with the contact's settings."""
     (x, z), d = ball.centre_m, contact["solimp_d"]
     return (
         f'<geom name="foot {number}" type="sphere" size="{ball.radius_m!r}" pos="{x!r} 0 {z!r}" contype="1" '

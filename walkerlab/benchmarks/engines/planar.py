@@ -1,4 +1,4 @@
-"""What an engine is told of a walker: a tree of rigid bodies in a plane, hung from its base, under tilted gravity."""
+"""Engine-independent model of a walker: a tree of rigid bodies in a plane, under tilted gravity."""
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
@@ -20,11 +20,11 @@ SMALLEST_BALL_M = 5e-4  # for point feet, which engines do not have; larger than
 
 @dataclass(frozen=True)
 class Link:
-    """One rigid body, lumped from bodies that move as one and the particles on them.
+    """Rigid link, lumped from bodies that move together and the particles on them.
 
-    parent        place of the body it is hinged to in `links`; -1 for the base
-    parent_point  the hinge in the parent's frame (m); for the base the point that the root's freedoms move
-    point         the hinge in its own frame (m)
+    parent        index of its parent in `links`; -1 for the base
+    parent_point  hinge in the parent's frame (m); for the base the point moved by the root's freedoms
+    point         hinge in the link's own frame (m)
     """
 
     name: str
@@ -38,7 +38,7 @@ class Link:
 
 @dataclass(frozen=True)
 class Ball:
-    """A foot: a ball on a link, with the height of the ground that it is to meet."""
+    """A foot: a ball on a link, and the height of its ground."""
 
     link: int
     centre_m: Position
@@ -48,13 +48,13 @@ class Ball:
 
 @dataclass(frozen=True)
 class PlanarModel:
-    """A tree of links.
+    """Tree of links.
 
-    links    the base first, every link after its parent
-    freedoms of the base against the world
-    balls    the feet
-    gravity  m/s^2, along the slope and towards it
-    chain    (bodies, links) which relative angles, base first, add up to each body's absolute one (assembly's order)
+    links     base first, every link after its parent
+    freedoms  of the base relative to the world
+    balls     feet
+    gravity   m/s^2, along the slope and towards it
+    chain     (bodies, links) maps relative angles, base first, to each body's absolute one (assembly's order)
     """
 
     links: tuple[Link, ...]
@@ -66,12 +66,10 @@ class PlanarModel:
 
     @property
     def size(self) -> int:
-        """Number of coordinates."""
         return len(self.freedoms) + len(self.links) - 1
 
 
 def moved(point: Position, shift: Position) -> Position:
-    """A point in a frame whose origin is shifted."""
     return (point[0] + shift[0], point[1] + shift[1])
 
 
@@ -82,10 +80,10 @@ def planar_model(
     gravity: tuple[float, float],
     welds: Collection[Knee] = (),
 ) -> PlanarModel:
-    """The assembly hung from a point of its base, from there outwards, depth first.
+    """Build the tree of an assembly from a point of its base outwards, depth first.
 
     gravity  along the slope and towards it, m/s^2
-    welds    knees whose shank and thigh are one link
+    welds    locked knees, whose shank and thigh form one link
     """
     root = base.body
     one = [{knee.thigh, knee.shank} for knee in welds]
@@ -128,7 +126,7 @@ def ball_and_ground(radius_m: float) -> tuple[float, float]:
 
 
 def lumped(assembly: Assembly, members: Sequence[tuple[str, Position]], hinge: tuple[int, Position, Position]) -> Link:
-    """Bodies that move as one, and the particles on them, as a link."""
+    """Combine bodies that move together, and the particles on them, into a link."""
     parent, parent_point, point = hinge
     every = [
         (mass, moved(at.at_m, shift))

@@ -1,4 +1,4 @@
-"""The engines there are: what they are called, what has to be installed for them, and which module drives them."""
+"""Registry of the supported engines: name, package and adapter module."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ EXTRA = "pip install 'walkerlab[engines]'"
 
 @dataclass(frozen=True)
 class Engine:
-    """One engine.
+    """An engine.
 
-    name     on the command line's output and of its adapter's module
-    module   that its package is imported as
-    package  as it is installed
+    name     in output, and of its adapter module
+    module   import name of its package
+    package  distribution name
     """
 
     name: str
@@ -29,29 +29,27 @@ class Engine:
 
     @property
     def is_installed(self) -> bool:
-        """Whether it can be imported; nothing of it is."""
+        """Whether the engine can be imported; does not import it."""
         return importlib.util.find_spec(self.module) is not None
 
     @property
     def install_line(self) -> str:
-        """What to type to have it."""
+        """Shell command that installs it."""
         return f"pip install {self.package}"
 
     @property
     def version(self) -> str:
-        """Of the package that is installed; "unknown" of a module that came without one."""
+        """Version of the installed package; "unknown" for a module without a distribution."""
         try:
             return importlib.metadata.version(self.package)
         except importlib.metadata.PackageNotFoundError:
             return "unknown"
 
     def adapter(self) -> Adapter:
-        """The module that drives it."""
         return cast("Adapter", importlib.import_module(f"walkerlab.benchmarks.engines.{self.name}"))
 
     @property
     def simulation(self) -> type[Simulation]:
-        """A model in it."""
         return cast("type[Simulation]", getattr(self.adapter(), f"{self.name.capitalize()}Run"))
 
 
@@ -66,10 +64,9 @@ ENGINES = {
 
 
 def installed() -> tuple[Engine, ...]:
-    """Those that are there."""
     return tuple(engine for engine in ENGINES.values() if engine.is_installed)
 
 
 def installed_versions() -> dict[str, str]:
-    """Return the versions of the engines that are installed, by engine."""
+    """Return the version of each installed engine."""
     return {engine.name: engine.version for engine in installed()}

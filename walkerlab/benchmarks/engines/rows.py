@@ -1,4 +1,4 @@
-"""What is found of the walk in other engines, row by row."""
+"""Rows of results in other engines."""
 
 from dataclasses import dataclass
 from typing import Annotated
@@ -14,12 +14,12 @@ FROM_REFERENCE = "difference of the end state (SI), or of the last period (s) on
 
 @dataclass(frozen=True)
 class EngineRow:
-    """One run of one engine, or of this project beside it.
+    """A run of one engine, or of this project for comparison.
 
-    step_s  of a run of adapted steps that did not come to an end, the largest
-    error   on its own law, from the period of ADAMS's law
-    wall_s  of its loop; an engine has a process of its own, whose processor time it is; None if that was lost
-    why     how a run ended that has no outcome of its own
+    step_s  largest step, for an adaptive run that did not finish
+    error   on own contact, of the period relative to ADAMS's law
+    wall_s  processor time of the loop; None if the process was lost
+    why     error message of a run without an outcome
     """
 
     scene: Annotated[str, Label("1", "scene")]
@@ -43,7 +43,7 @@ class EngineRow:
 
 @dataclass(frozen=True)
 class SwingRow:
-    """A swing without ground; there is no order of the first run."""
+    """A swing without ground; the first run has no order."""
 
     scene: Annotated[str, Label("1", "scene")]
     engine: Annotated[str, Label("1", "engine")]
@@ -59,7 +59,7 @@ class SwingRow:
 
 @dataclass(frozen=True)
 class TuningRow:
-    """An engine's contact model after tuning, against what it was tuned to."""
+    """Property of a tuned contact model, and its target."""
 
     scene: Annotated[str, Label("1", "scene")]
     engine: Annotated[str, Label("1", "engine")]
@@ -72,5 +72,5 @@ class TuningRow:
 
     @property
     def residual(self) -> float:
-        """Relative difference."""
+        """Relative difference from the target."""
         return self.reached / self.target - 1.0

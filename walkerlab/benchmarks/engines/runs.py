@@ -1,4 +1,4 @@
-"""What is done in an engine's process: a walk, a swing without ground, a ball and a block on its own contact."""
+"""Tasks for an engine's process: a walk, a swing without ground, and a ball and a block on its own contact."""
 
 import math
 import time
@@ -27,11 +27,11 @@ STEADY = 5  # so many times longer steps serve where only a steady end counts
 class WalkAnswer:
     """A walk in an engine.
 
-    end      state of the free walker when it was over; None if it ended otherwise
+    end      final state of the free walker; None unless the walk was completed
     touches  (steps,) s; along: (steps,) m; slips: (steps,) m, without the last step if its foot did not lift
     steps    of the engine
-    time_s   when it was over
-    wall_s   processor time of its loop: it has a process of its own, and others may be running
+    time_s   simulated
+    wall_s   processor time of the loop, in a process of its own
     """
 
     outcome: str
@@ -46,12 +46,12 @@ class WalkAnswer:
 
 @dataclass(frozen=True)
 class WalkTask:
-    """A walk with an engine's integrator, on the ground of our law or its own.
+    """A walk with an engine's integrator, on our contact law or the engine's.
 
-    touches  after which it is over
-    until_s  when it is over at the latest, s
-    own      the engine's own contact, tuned; None for our law
-    most     steps of the engine
+    touches  after which the walk ends
+    until_s  latest end, s
+    own      the engine's tuned contact; None for our law
+    most     step budget of the engine
     """
 
     engine: str
@@ -63,7 +63,6 @@ class WalkTask:
     most: int
 
     def run(self) -> WalkAnswer:
-        """Walk."""
         walk = EngineWalk(self)
         walk.go()
         rules, walk_state = walk.rules, walk.rules.walk_state
@@ -78,10 +77,9 @@ class WalkTask:
 
 
 class EngineWalk:
-    """A walk in an engine: one model after another, each for as long as no knee locks or is released."""
+    """Walk in an engine as a sequence of models, one between each lock or release of a knee and the next."""
 
     def __init__(self, task: WalkTask) -> None:
-        """At the start."""
         self.task, self.engine = task, ENGINES[task.engine]
         self.q, self.v = task.scene.from_base(task.scene.start)
         self.rules = RuleFollower(task.scene, task.touches, self.q, self.v, carries=task.own is None)
@@ -89,11 +87,11 @@ class EngineWalk:
 
     @property
     def is_over(self) -> bool:
-        """Whether its time is."""
+        """Whether the end time is reached."""
         return self.time_s >= (1.0 - ROUNDING) * self.task.until_s
 
     def go(self) -> None:
-        """Walk to the end; a step within which a knee turns is taken again, up to there."""
+        """Walk to the end; a step in which a knee locks or is released is repeated up to that instant."""
         rules = self.rules
         while rules.outcome is None and not self.is_over and self.steps < self.task.most:
             self._simulate(self.task.until_s)
@@ -107,7 +105,7 @@ class EngineWalk:
                 self.q, self.v = rules.go_on(self.q, self.v)
 
     def _simulate(self, until_s: float) -> None:
-        """Let the engine go on from the present state, by a whole number of steps."""
+        """Simulate from the present state to `until_s`, by a whole number of steps where they are fixed."""
         task, rules, span = self.task, self.rules, until_s - self.time_s
         stepping = task.stepping
         if not self.engine.adapter().INTEGRATORS[stepping.integrator].adapts:
@@ -144,15 +142,13 @@ class EngineWalk:
 
 @dataclass(frozen=True)
 class SwingAnswer:
-    """A swing without ground: the angles and velocities at its end."""
-
     end: Floats  # (2 n) absolute angles and velocities
     wall_s: float
 
 
 @dataclass(frozen=True)
 class SwingTask:
-    """The walker hinged to the ground at its stance foot, in free swing."""
+    """Free swing of the walker hinged to the ground at its stance foot."""
 
     engine: str
     stepping: Stepping
@@ -163,7 +159,6 @@ class SwingTask:
     most: int
 
     def run(self) -> SwingAnswer:
-        """Swing."""
         chain = self.model.chain
         absolute = np.column_stack((self.start[: len(chain)] + self.slope, self.start[len(chain) :]))
         q, v = np.linalg.lstsq(chain, absolute, rcond=None)[0].T
@@ -184,7 +179,7 @@ class EngineMotion(NamedTuple):
 
 
 def recorded(engine: Simulation, steps: int, until_s: float) -> EngineMotion:
-    """What an engine goes through."""
+    """Simulate, recording the state at the end of each step."""
     seen: list[tuple[float, Floats, Floats]] = []
 
     def on_step(time_s: float, q: Floats, v: Floats) -> bool:
@@ -196,7 +191,7 @@ def recorded(engine: Simulation, steps: int, until_s: float) -> EngineMotion:
 
 
 def pinned_model(scene: EngineScene) -> planar.PlanarModel:
-    """The scene's walker hinged at the centre of its stance foot."""
+    """Model of the scene's walker hinged at the centre of its stance foot."""
     foot = scene.assembly.feet[STANCE_FOOT]
     base = Anchor(foot.body, foot.centre_m)
     return planar.planar_model(scene.assembly, base, planar.HINGED, scene.gravity, scene.locked)
@@ -204,7 +199,7 @@ def pinned_model(scene: EngineScene) -> planar.PlanarModel:
 
 @dataclass(frozen=True)
 class TuningAnswer:
-    """What a ball and a block do on an engine's own contact, in the target's terms."""
+    """Measured properties of an engine's own contact, to compare with the target."""
 
     own: OwnContact
     penetration: float  # m, of the ball at rest
@@ -215,9 +210,9 @@ class TuningAnswer:
 
 @dataclass(frozen=True)
 class TuningTask:
-    """A ball dropped and a block slid on an engine's own contact.
+    """Tune an engine's own contact and measure it with a dropped ball and a sliding block.
 
-    step_s  of a motion that is watched
+    step_s  of recorded motions
     """
 
     engine: str
@@ -227,7 +222,6 @@ class TuningTask:
     sliding_velocity: float  # m/s
 
     def run(self) -> TuningAnswer:
-        """Tune by closed forms, then measure."""
         bench = Bench(self, ENGINES[self.engine].adapter().tuned(self.contact, self.target))
         depth = bench.at_rest()
         ratio = bench.damping_ratio(depth)
@@ -238,14 +232,14 @@ class Bench:
     """A heavy ball that cannot turn, on level or inclined ground: bouncing ball and sliding block in one."""
 
     def __init__(self, task: TuningTask, own: OwnContact) -> None:
-        """Keep what its runs share: `omega` and `settling_s`, several times the slower time constant, of the target."""
+        """Derive from the target `omega` and `settling_s`, several times the slower time constant."""
         self.task, self.own, self.target = task, own, task.target
         self.omega, ratio = math.sqrt(self.target.gravity / self.target.penetration), self.target.damping_ratio
         slow = self.omega * (ratio - math.sqrt(ratio * ratio - 1.0)) if ratio > 1.0 else self.omega * ratio
         self.settling_s = 8.0 / slow
 
     def after(self, time_s: float, h: float, along: float, depth: float, velocity: tuple[float, float]) -> EngineMotion:
-        """How the ball moves for a time from `depth` (m) inside the ground, pulled by `along` times its weight.
+        """Simulate the ball for `time_s` from `depth` (m) inside the ground, pulled by `along` times its weight.
 
         h  step (s)
         """
@@ -262,11 +256,11 @@ class Bench:
         return recorded(engine, MANY, max(2, round(time_s / h)) * h)
 
     def at_rest(self) -> float:
-        """Penetration (m) of a ball that was dropped from the surface."""
+        """Penetration (m) at rest of a ball dropped from the surface."""
         return -float(self.after(self.settling_s, STEADY * self.task.step_s, 0.0, 0.0, (0.0, 0.0)).q[-1, 1])
 
     def damping_ratio(self, depth: float) -> float:
-        """Of the oscillator that fits the ball's motion about its rest (least squares of accelerations)."""
+        """Damping ratio of the oscillator fitted to the ball's accelerations about rest."""
         omega = self.omega
         motion = self.after(self.settling_s / 4.0, self.task.step_s, 0.0, depth, (0.0, -0.02 * depth * omega))
         x, v = (motion.q[:, 1] + depth) / depth, motion.v[:, 1] / (depth * omega)
@@ -277,7 +271,7 @@ class Bench:
         return float(damping / (2.0 * math.sqrt(stiffness))) if stiffness > 0.0 else 0.0
 
     def friction(self, depth: float) -> float:
-        """Deceleration over gravity of a block that slides, once its penetration has settled."""
+        """Deceleration over gravity of a sliding block, once its penetration has settled."""
         target, settled = self.target, self.settling_s
         start = self.task.sliding_velocity + target.friction * target.gravity * 1.25 * settled
         motion = self.after(1.25 * settled, self.task.step_s, 0.0, depth, (start, 0.0))
@@ -286,6 +280,6 @@ class Bench:
         return float(fall / ((motion.t[-1] - motion.t[watched]) * target.gravity))
 
     def creep(self, depth: float) -> float:
-        """Velocity (m/s) at which a block that stands on an incline creeps down."""
+        """Creep velocity (m/s) of a block standing on an incline."""
         target, h = self.target, STEADY * self.task.step_s
         return float(self.after(self.settling_s, h, target.creep_load, depth, (target.creep_velocity, 0.0)).v[-1, 0])

@@ -1,4 +1,4 @@
-"""The walks that engines are given: the walker's parts, its ground, its start, and our own walk beside it."""
+"""Walks taken to other engines: the walker's parts, its ground and its start."""
 
 from __future__ import annotations
 
@@ -26,15 +26,15 @@ from walkerlab.solvers.system import Floats, State
 
 @dataclass(frozen=True)
 class EngineScene:
-    """A walker on its ground, as an engine and as the rules of a walk see it.
+    """A walker on its ground, for an engine and for the walking rules.
 
     assembly  the parts
-    base      the point that the engine's tree hangs from: the hip, on the first stance leg
+    base      root of the engine's tree: the hip, on the first stance leg
     ours      the walker as this project walks it
-    walker    the same with its levers of feet and hip from the base
+    walker    the same with foot and hip levers taken from the base
     ground    terrain, and the measures that a walk is judged by
     start     state of the free walker on the gait
-    locked    the knees that are: what an engine builds has no hinge there
+    locked    locked knees, which have no hinge in the engine
     """
 
     assembly: Assembly
@@ -47,12 +47,10 @@ class EngineScene:
 
     @cached_property
     def model(self) -> PlanarModel:
-        """What an engine builds."""
         return planar_model(self.assembly, self.base, FLOATING, self.gravity, self.locked)
 
     @property
     def name(self) -> str:
-        """What results call it."""
         return "kneed" if self.assembly.knees else "compass"
 
     @property
@@ -62,24 +60,24 @@ class EngineScene:
 
     @cached_property
     def knee_places(self) -> tuple[int, ...]:
-        """Where each knee's angle is among an engine's coordinates; a locked one is at none, -1."""
+        """Index of each knee's angle among the engine's coordinates; -1 for a locked knee."""
         ends = [(self.assembly.index(knee.shank), self.assembly.index(knee.thigh)) for knee in self.assembly.knees]
         bends = [self.model.chain[shank] - self.model.chain[thigh] for shank, thigh in ends]
         return tuple(2 + int(np.argmax(bend)) if bend.any() else -1 for bend in bends)
 
     def with_knees_locked(self, doing: NDArray[np.int8]) -> EngineScene:
-        """The scene with those knees locked that are LOCKED."""
+        """Scene whose locked knees are those in state LOCKED."""
         locked = (knee for knee, state in zip(self.assembly.knees, doing, strict=False) if state == LOCKED)
         return replace(self, locked=tuple(locked))
 
     @cached_property
     def centre_levers(self) -> Floats:
-        """Levers (n, 2) in m from the base's point to the centre of mass."""
+        """Levers (n, 2) in m from the base to the centre of mass."""
         every = [mass * levers(self.assembly, self.base, at) for mass, at in masses(self.assembly)]
         return np.asarray(sum(every) / total_mass(self.assembly))
 
     def from_base(self, y: State) -> tuple[Floats, Floats]:
-        """Coordinates and velocities of the engine from the state of the free walker."""
+        """Engine's coordinates and velocities from the state of the free walker."""
         n = len(self.model.chain)
         angles, rates = np.array(y[2 : 2 + n]) + self.ours.slope, np.array(y[4 + n :])
         shift, drift = self._centre(angles, rates)
@@ -94,32 +92,32 @@ class EngineScene:
         return np.concatenate((q[:2] + shift, angles - self.ours.slope, v[:2] + drift, rates))
 
     def _centre(self, angles: Floats, rates: Floats) -> tuple[Floats, Floats]:
-        """Where the centre of mass is from the base's point (m), and how it moves against it (m/s)."""
+        """Position (m) and velocity (m/s) of the centre of mass relative to the base."""
         s, c = np.sin(angles), np.cos(angles)
         d = self.centre_levers
         forward, upward = c * d[:, 0] - s * d[:, 1], s * d[:, 0] + c * d[:, 1]
         return np.array((forward.sum(), upward.sum())), np.array((-rates @ upward, rates @ forward))
 
     def started(self, factor: float) -> EngineScene:
-        """The scene with the start's velocities times a factor; the stance foot stays at rest in the ground's eyes."""
+        """Scene with the start's velocities scaled; the walk's rules still see the stance foot at rest."""
         n = len(self.model.chain)
         return replace(self, start=(*self.start[: 2 + n], *(factor * x for x in self.start[2 + n :])))
 
 
 def scenes(config: ContactConfig, rigid_step_length_m: float, rigid_state: State) -> tuple[EngineScene, ...]:
-    """The walks of a config: its walker on its own ground, free from its start.
+    """Walks of a config: its walker on its own ground, not hinged at the start.
 
-    Raises ConfigError for a walker that other engines cannot be told of.
+    Raises ConfigError for a walker that other engines do not support.
     """
     assembly = assembly_of(config.walker)
     if assembly.couplings:
         raise ConfigError(
-            "engines: a torso held on the bisector is a constraint that is not taken to other engines.",
+            "engines: a torso held on the bisector is a constraint that the engine models do not support.",
             "Choose a walker without a torso.",
         )
     if assembly.knees and not isinstance(knee_rules(config.walker).stop, IdealLock):
         raise ConfigError(
-            "engines: the compliant stop of a knee is not taken to other engines.", "Choose walker.knee.lock: ideal."
+            "engines: the engine models do not support a knee's compliant stop.", "Choose walker.knee.lock: ideal."
         )
     scene = replace(contact_scene(config, rigid_step_length_m, rigid_step_length_m), pinned=False)
     assembly, start = scene.assembly, start_state(scene, rigid_state)

@@ -1,4 +1,4 @@
-"""What other engines make of the same walk: their integrators on our law, and their own contact."""
+"""Report section on other engines: their integrators under our law, and their own contact."""
 
 from collections.abc import Mapping, Sequence
 from functools import partial
@@ -18,7 +18,7 @@ Row = Mapping[str, Any]
 
 @of_stage("engines", "rows")
 def section(_results: Results, summary: Row) -> Section | None:
-    """Conclusions in words, then a table for each experiment; None if the stage did not run."""
+    """Build the conclusions and a table for each experiment; None if the stage did not run."""
     concluded = [
         Statement(f"{scene}, {ABOUT[experiment]}", text)
         for scene, told in summary["conclusions"].items()
@@ -48,7 +48,6 @@ def section(_results: Results, summary: Row) -> Section | None:
 
 
 def engine_and_integrator(row: Row) -> str:
-    """Which engine, and by what it integrates or touches."""
     return f"{row['engine']} {row['integrator']}"
 
 
@@ -100,7 +99,7 @@ LIMIT_COLUMNS = (Column("engine"), Column("cannot express", wide=True))
 
 
 def swings(runs: Sequence[Row]) -> Table:
-    """The hinged walker's swing: of each integrator the finest run, with the orders observed on the way to it."""
+    """Table of the hinged swing: each integrator's finest run, and the orders observed on the way to it."""
     finest = []
     for swung in grouped(runs, "scene", "engine", "integrator").values():
         orders = ", ".join(number(run["order"], 3) for run in swung if run["order"] is not None)

@@ -1,4 +1,4 @@
-"""The walk in other engines: our law in their integrators, then their own contact, error against run time."""
+"""Stage `engines`: our law in other engines' integrators, then their own contact; error against run time."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ THREE_DIGITS = 5e-4  # relative
 
 @dataclass
 class EngineFindings:
-    """All that the stage found, growing row by row."""
+    """Results of the stage, collected row by row."""
 
     rows: list[EngineRow] = field(default_factory=list)
     swings: list[SwingRow] = field(default_factory=list)
@@ -41,22 +41,21 @@ class EngineFindings:
     left_out: list[dict[str, str]] = field(default_factory=list)
 
     def add(self, other: EngineFindings) -> None:
-        """Take in the rows that were found elsewhere, and what was left out there."""
         for name in ("rows", "swings", "tuning", "left_out"):
             getattr(self, name).extend(getattr(other, name))
 
 
 def run(config: SceneConfig, inputs: Mapping[str, Content], progress: Progress, jobs: int = 1) -> Content:
-    """Measure every engine that is installed on every scene, `jobs` of them at a time; raises NoAnswer if none is."""
+    """Measure every installed engine on every scene, `jobs` at a time; raises NoAnswer if none is installed."""
     engines = installed()
     found = EngineFindings(left_out=[*not_installed(), *hinge_left_out(config, "engines")])
     if not engines:
-        raise NoAnswer("engines: none of the engines is installed", f"Install them: {EXTRA}")
+        raise NoAnswer("engines: no engine is installed", f"Install them: {EXTRA}")
     rigid = inputs["fixedpoint"].summary if "fixedpoint" in inputs else None
     for scene in scenes(config, *rigid_start(config, inputs)):
         truth = experiments.truth_of(scene)
         if truth is None:
-            why = "the walk under ADAMS's law ends before there is anything to compare"
+            why = "the walk under ADAMS's law ends too early to be compared"
             found.left_out.append({"what": f"engines on the scene {scene.name}", "why": why})
             continue
         found.truths[scene.name] = truth
@@ -68,12 +67,12 @@ def run(config: SceneConfig, inputs: Mapping[str, Content], progress: Progress, 
             found.add(measured)
             progress.advance()
     if not found.truths:
-        raise NoAnswer("engines: no scene walks under ADAMS's law", "Start nearer to a gait (start: fixed-point).")
+        raise NoAnswer("engines: no scene walks under ADAMS's law", "Start closer to a gait (start: fixed-point).")
     return content(found, rigid)
 
 
 def side_by_side(each: Sequence[EngineOnScene], jobs: int) -> Iterator[EngineFindings]:
-    """What is found of each engine, `jobs` of them at a time; who stops waiting ends those that run."""
+    """Yield each engine's results, `jobs` engines at a time; an interruption kills the running engines."""
     with ThreadPoolExecutor(max(1, jobs)) as pool:
         try:
             yield from pool.map(measure, each)
@@ -84,7 +83,7 @@ def side_by_side(each: Sequence[EngineOnScene], jobs: int) -> Iterator[EngineFin
 
 
 def not_installed() -> list[dict[str, str]]:
-    """The engines that are not there, with the line that installs them."""
+    """List missing engines, with the command that installs each."""
     return [
         {"what": f"engine {engine.name}", "why": f"not installed: {engine.install_line}"}
         for engine in ENGINES.values()
@@ -93,7 +92,6 @@ def not_installed() -> list[dict[str, str]]:
 
 
 def measure(one: EngineOnScene) -> EngineFindings:
-    """All experiments of one engine on one scene."""
     found, name = EngineFindings(), one.engine.name
     target = experiments.target_of(one.scene)
     with one.process:
@@ -115,9 +113,9 @@ def measure(one: EngineOnScene) -> EngineFindings:
 
 
 def content(found: EngineFindings, rigid: Mapping[str, Any] | None) -> Content:
-    """What is stored and printed.
+    """Build groups and summary.
 
-    rigid  summary of `fixedpoint`, if the start or the pads are taken from it
+    rigid  summary of `fixedpoint`, if the start or the pads depend on it
     """
     rows, truths = found.rows, found.truths
     stored = (("rows", EngineRow, rows), ("swings", SwingRow, found.swings), ("tuning", TuningRow, found.tuning))
@@ -158,10 +156,7 @@ def content(found: EngineFindings, rigid: Mapping[str, Any] | None) -> Content:
 
 
 def series_of(rows: Sequence[EngineRow], scene: str, experiment: str) -> dict[str, list[EngineRow]]:
-    """The engines' rows of one experiment, from the gait, by integrator or contact, each from coarse to fine.
-
-    Their names are their engine's and their own.
-    """
+    """Rows of an experiment started on the gait, by engine and integrator (or contact), from coarse to fine."""
     series: dict[str, list[EngineRow]] = {}
     for row in rows:
         if row.scene == scene and row.experiment == experiment and row.engine != OURS and row.start == 1.0:
@@ -170,7 +165,7 @@ def series_of(rows: Sequence[EngineRow], scene: str, experiment: str) -> dict[st
 
 
 def ratios(rows: Sequence[EngineRow], scene: str) -> dict[str, dict[str, float]]:
-    """How many times longer each engine takes than this project, for each error that it reaches on the same law."""
+    """Run time of each engine over ours on the same law, for each error level that both reach."""
     ours = [row for row in rows if row.scene == scene and row.experiment == SAME_LAW and row.engine == OURS]
     by_engine: dict[str, list[EngineRow]] = {}
     for series in series_of(rows, scene, SAME_LAW).values():
@@ -186,7 +181,7 @@ def ratios(rows: Sequence[EngineRow], scene: str) -> dict[str, dict[str, float]]
 
 
 def closest(rows: Sequence[EngineRow], scene: str) -> dict[str, Any] | None:
-    """The contact whose walk at its smallest step comes closest to ADAMS's law; None if none walks to the end."""
+    """Contact whose finest walk comes closest to ADAMS's law; None if no walk reaches the end."""
     finest = [series[-1] for series in series_of(rows, scene, OWN_LAW).values()]
     reached = [row for row in finest if row.error is not None and row.steps == experiments.OWN_TOUCHES]
     if not reached:
@@ -196,9 +191,9 @@ def closest(rows: Sequence[EngineRow], scene: str) -> dict[str, Any] | None:
 
 
 def three_digits(rows: Sequence[EngineRow], scene: str, truth: experiments.Truth) -> dict[str, dict[str, float]]:
-    """The largest step (s) from which on an engine's last period has three correct digits, by experiment and name.
+    """Largest step (s) with three correct digits of the last period, by experiment and name.
 
-    On the same law they are digits of the reference; on an engine's own, of what it gives at its finest.
+    Digits are relative to the reference on the same law, and to the finest run on an engine's own.
     """
     found: dict[str, dict[str, float]] = {SAME_LAW: {}, OWN_LAW: {}}
     exact = float(np.diff(truth.touches_s)[-1])
@@ -212,7 +207,7 @@ def three_digits(rows: Sequence[EngineRow], scene: str, truth: experiments.Truth
 
 
 def largest_good_step(mine: Sequence[EngineRow], experiment: str, wanted: float | None) -> float | None:
-    """The largest step, going up from the finest, with three correct digits; None if the finest has not."""
+    """Largest step, going up from the finest, with three correct digits; None without a coarser step to confirm it."""
     good = None
     if wanted is None:
         return None
@@ -225,9 +220,9 @@ def largest_good_step(mine: Sequence[EngineRow], experiment: str, wanted: float 
 
 
 def convergence(rows: Sequence[EngineRow], scene: str) -> dict[str, dict[str, float]]:
-    """What the last refinement does, by experiment and name.
+    """Effect of the last refinement, by experiment and name.
 
-    On the same law, what it divides the error by; on an engine's own, what it changes the period by (s).
+    On the same law the factor by which the error shrinks, on own contact the change of the period (s).
     """
     found: dict[str, dict[str, float]] = {SAME_LAW: {}, OWN_LAW: {}}
     for experiment, by_name in found.items():
@@ -242,7 +237,7 @@ def convergence(rows: Sequence[EngineRow], scene: str) -> dict[str, dict[str, fl
 
 
 def conclusions(rows: Sequence[EngineRow], scene: str, truth: experiments.Truth) -> dict[str, str]:
-    """What was found, a paragraph for each experiment."""
+    """A paragraph for each experiment."""
     same, own = (series_of(rows, scene, experiment) for experiment in (SAME_LAW, OWN_LAW))
     sizes, changes, shares = three_digits(rows, scene, truth), convergence(rows, scene), ratios(rows, scene)
     reached = {label: shares.get(label, {}) for label in map(plain_power, LEVELS)}

@@ -1,4 +1,4 @@
-"""What measured run times and errors say, as templates: a file for each stage."""
+"""Templates for the conclusions on run times and errors, one file per stage."""
 
 from pathlib import Path
 
@@ -6,7 +6,7 @@ from walkerlab.prose import Prose, f
 
 
 def plainly(number: float) -> str:
-    """Three digits without a power of ten."""
+    """Format three digits without a power of ten."""
     return f"{float(f'{number:.3g}'):g}"
 
 

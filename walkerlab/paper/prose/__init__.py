@@ -1,4 +1,4 @@
-"""What is said of the paper: templates with numbers, which know what it prints and what follows from that alone.
+"""Templates for texts about the paper, with its printed values and their direct consequences at hand.
 
 A package of its own: only results of modules that import it depend on its words.
 """

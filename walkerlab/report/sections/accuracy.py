@@ -48,12 +48,12 @@ def costs(summary: Row) -> Table:
         Column("method", "method"),
         *(Column(f"ms for {power_of_ten(at, 1)}", f"{at}", with_spread, numeric=True) for at in levels),
         Column("smallest error", "smallest_error", numeric=True),
-        Column("its right-hand sides", "rhs_evaluations", whole, numeric=True),
-        Column("ended otherwise", "failures", wide=True),
+        Column("right-hand sides there", "rhs_evaluations", whole, numeric=True),
+        Column("end not reached", "failures", wide=True),
     )
     methods = {scene: list(methods_of(summary, scene, levels)) for scene in summary["reference"]}
     note = words("accuracy.costs", summary)
-    return table("Least run time for an error, method by method", columns, methods, note=note)
+    return table("Shortest run time for each error, by method", columns, methods, note=note)
 
 
 def methods_of(summary: Row, scene: str, levels: Sequence[float]) -> Iterator[Row]:
@@ -115,7 +115,7 @@ REFERENCE_COLUMNS = (
     Column("reference", "method"),
     Column("by", whose),
     Column("second method", "second_method"),
-    Column("they differ by", "agreement", partial(number, digits=2), numeric=True),
+    Column("difference", "agreement", partial(number, digits=2), numeric=True),
 )
 
 
