@@ -8,12 +8,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from real_results import real
 from synthetic_results import (
     COORDINATES,
     EVERYTHING,
-    LENGTH,
     PAPER_ROWS,
-    PERIOD,
     SLOPE,
     compare,
     config,
@@ -390,9 +389,10 @@ def test_stick_figures_stand_where_the_walker_stood():
         reach = np.hypot(found["hx"] - found[f"fx{leg}"], found["hy"] - found[f"fy{leg}"])
         assert np.allclose(reach, 1.0, atol=1e-6)
     # The first leg swings from a step behind the foothold to a step ahead, where it then stands.
-    assert found["fx0"][0] == pytest.approx(-LENGTH, abs=1e-6)
-    second = np.abs(found["t"] - 1.5 * PERIOD).argmin()
-    assert (found["fx0"][second], found["fy0"][second]) == pytest.approx((LENGTH, 0.0), abs=2e-3)
+    gait = real("fixedpoint").summary
+    assert found["fx0"][0] == pytest.approx(-gait["step_length_m"], abs=1e-6)
+    second = np.abs(found["t"] - 1.5 * gait["period_s"]).argmin()
+    assert (found["fx0"][second], found["fy0"][second]) == pytest.approx((gait["step_length_m"], 0.0), abs=2e-3)
     assert (found["fx1"][0], found["fy1"][0]) == pytest.approx((0.0, 0.0), abs=1e-6)
 
 
