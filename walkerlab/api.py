@@ -12,14 +12,14 @@ from typing import Any, TypedDict, Unpack, cast
 
 from walkerlab.config.contact import Contact
 from walkerlab.config.fields import Block, block_of, kinds_of
-from walkerlab.config.files import DEFAULT, builtin, read_layers
-from walkerlab.config.layers import stacked
-from walkerlab.config.loader import doubts
+from walkerlab.config.files import DEFAULT, builtin_config, read_layers
+from walkerlab.config.layers import merge_layers
+from walkerlab.config.loader import suspicious_values
 from walkerlab.config.overlay import tree_of
 from walkerlab.config.schema import Config
 from walkerlab.config.sweep import Sweep as SweepBlock
 from walkerlab.config.tree import NOWHERE
-from walkerlab.config.validation import on_the_slope, typed
+from walkerlab.config.validation import align_start, validate_tree
 from walkerlab.errors import ConfigError, NoAnswer, StaleError
 from walkerlab.pipeline.executor import answer_in_memory
 from walkerlab.pipeline.graph import PIPELINE
@@ -195,7 +195,7 @@ def run(
     True
     """
     refuse_unknown_stage(stage)
-    asked = resolve(str(config), settings(set), strides, folder_of(runs), name)
+    asked = resolve(str(config), set_options(set), strides, folder_of(runs), name)
     warn(asked.loaded.warnings)
     report = execute(asked.loaded.config, stage, asked.folder, Options(force=force, jobs=jobs))
     content = artifact.read(report.artifact) if report.artifact is not None else Content()
@@ -245,11 +245,11 @@ def sweep(
     from walkerlab.sweeps.sweep import SweepRun, SweepWork, modules_of
 
     xarray_here()  # the answer is a Dataset
-    found = resolve(str(config), settings(set), runs=folder_of(runs), name=name)
+    found = resolve(str(config), set_options(set), runs=folder_of(runs), name=name)
     warn(found.loaded.warnings)
     if not isinstance(over, Mapping):
         raise ConfigError(f"over: {over!r} is not a mapping of keys to values.", 'For example {"slope_deg": [1, 2]}.')
-    listed = [(key, values_of(key, value), f"over {key}") for key, value in over.items()]
+    listed = [(key, sweep_values(key, value), f"over {key}") for key, value in over.items()]
     block = found.loaded.config.sweep or SweepBlock()
     said: dict[str, Any] = {key: value for key, value in combined.items() if value is not None}
     question = asked(stage, listed, **{"seed": block.seed, **said})
@@ -266,7 +266,7 @@ def walker(type: str, **keys: Any) -> Any:
 
     Raises ConfigError for a key or value that the type does not have.
     """
-    return typed(tree_of({"walker": {"type": type, **keys}}, NOWHERE)).walker
+    return validate_tree(tree_of({"walker": {"type": type, **keys}}, NOWHERE)).walker
 
 
 def compass(**keys: Any) -> Any:
@@ -293,7 +293,7 @@ def contact(**keys: Any) -> Contact:
     >>> contact(static_friction=0.6, dynamic_friction=0.5).stiffness
     100000.0
     """
-    made = typed(tree_of({"contact": keys}, NOWHERE)).contact
+    made = validate_tree(tree_of({"contact": keys}, NOWHERE)).contact
     assert made is not None, "a block that is given is there"
     return made
 
@@ -356,7 +356,7 @@ def continue_gait(
     keys       others of the block `continuation`, such as model; other keys of a config, such as contact, seed
     """
     ends = {} if span is None else dict(zip(("from", "to"), two_numbers("span", plain(span)), strict=True))
-    given = {"slope_deg": slope_deg, **question("continuation", keys, over=over, **ends)}
+    given = {"slope_deg": slope_deg, **stage_block("continuation", keys, over=over, **ends)}
     return in_memory("continuation", config_of_scene(walker, given, keys))
 
 
@@ -370,7 +370,7 @@ def basin(
     cells      along either axis of the window
     keys       others of the block `basin`, such as model; other keys of a config, such as seed
     """
-    given = {"slope_deg": slope_deg, **question("basin", keys, cells=cells)}
+    given = {"slope_deg": slope_deg, **stage_block("basin", keys, cells=cells)}
     return in_memory("basin", config_of_scene(walker, given, keys))
 
 
@@ -385,7 +385,7 @@ def robustness(
     walks      on each rough ground
     keys       model, steps, roughness_m and max_steps of the block `robustness`; other keys of a config
     """
-    given = {"slope_deg": slope_deg, **question("robustness", keys, to=to or None, walks=walks)}
+    given = {"slope_deg": slope_deg, **stage_block("robustness", keys, to=to or None, walks=walks)}
     return in_memory("robustness", config_of_scene(walker, given, keys))
 
 
@@ -420,10 +420,10 @@ def design(walker: Any = None, over: Mapping[str, Any] | None = None, **keys: An
     over    bounds (low, high) of numbers of the config, in the key's unit
     keys    minimise or maximise, keep (bounds of other numbers of the gait), model, starts; other keys of a config
     """
-    return in_memory("design", config_of_scene(walker, question("design", keys, over=over or {}), keys))
+    return in_memory("design", config_of_scene(walker, stage_block("design", keys, over=over or {}), keys))
 
 
-def question(stage: str, keys: dict[str, Any], **given: Any) -> dict[str, Any]:
+def stage_block(stage: str, keys: dict[str, Any], **given: Any) -> dict[str, Any]:
     """What is asked of a stage, as its block of the config: the block's own keys, out of `keys`, and those given."""
     block = block_of(Config.model_fields[stage])
     assert block is not None, "a stage that is asked something has a block"
@@ -476,9 +476,9 @@ def config_of_scene(walker: Any, given: Mapping[str, Any], keys: Mapping[str, An
     lines = {key: plain(value) for key, value in {"name": "memory", **keys, **named}.items()}
     replaced = {"source", "contact", *({"walker"} & lines.keys())}
     upper = tree_of(lines, NOWHERE)
-    tree = stacked([*(layer.without(*replaced) for layer in read_layers(builtin(DEFAULT))), upper])
-    config, moved = on_the_slope(typed(tree), tree)
-    warn([*doubts(config, tree), *moved], inside=1)
+    tree = merge_layers([*(layer.without(*replaced) for layer in read_layers(builtin_config(DEFAULT))), upper])
+    config, moved = align_start(validate_tree(tree), tree)
+    warn([*suspicious_values(config, tree), *moved], inside=1)
     return config
 
 
@@ -502,7 +502,7 @@ def two_numbers(name: str, values: Any) -> Sequence[Any]:
     return values
 
 
-def settings(values: Mapping[str, Any] | None) -> list[str]:
+def set_options(values: Mapping[str, Any] | None) -> list[str]:
     """Values of keys as `--set` options; ConfigError if they are no mapping of keys to values."""
     if not isinstance(values, Mapping | NoneType):
         raise ConfigError(f"set: {values!r} is not a mapping of keys to values.", 'For example set={"slope_deg": 3}.')
@@ -516,7 +516,7 @@ def folder_of(runs: Any) -> Path:
     return Path(runs)
 
 
-def values_of(key: str, given: Any) -> str | list[Any]:
+def sweep_values(key: str, given: Any) -> str | list[Any]:
     """The values of a parameter of a sweep, or the text of a range; ConfigError for what is neither."""
     # Imported here: few callers sweep.
     from walkerlab.sweeps.question import MAX_POINTS

@@ -3,16 +3,16 @@
 import re
 from typing import Any, ClassVar, Final
 
-ADVISED: Final = re.compile(r"`(walkerlab (?!schema|open|init)[a-z-]+(?: [A-Za-z0-9-]+)*)`")
+COMMAND_PATTERN: Final = re.compile(r"`(walkerlab (?!schema|open|init)[a-z-]+(?: [A-Za-z0-9-]+)*)`")
 """A command in a text, unless it is about no run."""
 
 
-def to_type_back(text: str, typed: str) -> str:
+def add_run_options(text: str, typed: str) -> str:
     """A text with the options that say which run it is about in the commands that it advises.
 
     typed  these options, with a blank in front
     """
-    return ADVISED.sub(lambda found: f"`{found[1]}{typed}`", text) if typed else text
+    return COMMAND_PATTERN.sub(lambda found: f"`{found[1]}{typed}`", text) if typed else text
 
 
 class WalkerlabError(Exception):

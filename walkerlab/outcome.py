@@ -42,7 +42,7 @@ class Outcome(IntEnum):
     @property
     def advice_on_uneven_ground(self) -> str:
         """The same over footholds of different heights, which may end the walk of the best start."""
-        return UNEVEN.get(self, self.advice)
+        return ADVICE_ON_UNEVEN_GROUND.get(self, self.advice)
 
 
 def outcome_of(label: str) -> Outcome | None:
@@ -144,15 +144,15 @@ TOLD = {
         "try contact.terrain: after-mid-swing.",
     ),
 }
-ON_EVEN_GROUND = (
+TRY_EVEN_GROUND = (
     "lower the footholds (ground.heights_m, ground.roughness_m). On even ground (ground.roughness_m: 0) the same start "
     "shows whether it walks at all, and `walkerlab robustness` shows how rough a ground the gait survives."
 )
-UNEVEN = {
+ADVICE_ON_UNEVEN_GROUND = {
     Outcome.FELL: "On this uneven ground the hip came below half a leg above the slope or, in the rigid model, a foot "
-    f"landed less than a quarter of a step ahead; {ON_EVEN_GROUND}",
+    f"landed less than a quarter of a step ahead; {TRY_EVEN_GROUND}",
     Outcome.NO_HEEL_STRIKE: "On this uneven ground the swing foot did not come down within ten pendulum times; "
-    f"{ON_EVEN_GROUND}",
-    Outcome.BENT_KNEE: f"On this uneven ground a foot came down on a knee that had not locked; {ON_EVEN_GROUND}",
+    f"{TRY_EVEN_GROUND}",
+    Outcome.BENT_KNEE: f"On this uneven ground a foot came down on a knee that had not locked; {TRY_EVEN_GROUND}",
 }
 """What the outcome of a walk over footholds of different heights means and what to try next, where that differs."""

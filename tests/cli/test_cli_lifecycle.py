@@ -12,7 +12,7 @@ import pytest
 
 from walkerlab.cli.request import Request
 from walkerlab.config.loader import load, safe_name
-from walkerlab.errors import to_type_back
+from walkerlab.errors import add_run_options
 
 
 def test_a_config_that_init_wrote_is_accepted_and_names_its_schema(walker):
@@ -187,7 +187,7 @@ def test_advice_can_be_typed_back(toy):
     done = toy("show", "roll", "--strides", "3", "--set", "slope_deg=2")
     assert "advice: `walkerlab roll --set slope_deg=2 --set strides=3` creates it." in done.stderr
     typed = Request("simulate", sets=["start=[0, 1, 2, 3]"]).typed
-    assert to_type_back("`walkerlab status` or `walkerlab schema`", typed) == (
+    assert add_run_options("`walkerlab status` or `walkerlab schema`", typed) == (
         "`walkerlab status --set 'start=[0, 1, 2, 3]'` or `walkerlab schema`"
     )
 

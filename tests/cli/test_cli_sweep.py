@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from walkerlab.cli.clean import listed
+from walkerlab.cli.clean import file_lines
 from walkerlab.cli.runs import lines, percent
 from walkerlab.pipeline.headlines import MOST
 from walkerlab.pipeline.runs import Pair, difference
@@ -96,7 +96,7 @@ def test_clean_says_of_a_sweep_s_chunks_how_many_there_are_and_not_which(swept):
 
 def test_many_files_of_a_kind_are_told_in_one_line_with_their_size():
     files = [Path(f"runs/a/sweep-chunks/drop-1234-{n}.h5") for n in range(300)] + [Path("runs/a/drop.h5")]
-    assert listed(files, dict.fromkeys(files, 10_000)) == [
+    assert file_lines(files, dict.fromkeys(files, 10_000)) == [
         "runs/a/sweep-chunks/drop-1234-* (300 files, 3.0 MB)",
         "runs/a/drop.h5",
     ]

@@ -40,11 +40,11 @@ def clean_folders(request: Request, every: bool, stages: Sequence[str], yes: boo
                     remove(folder, paths)
                 remove_if_empty(folder)
     said = "would be removed" if request.dry_run else "removed"
-    lines = [f"{said}: {one}" for one in listed(files, sizes)] or [f"{where}: nothing {said}"]
+    lines = [f"{said}: {one}" for one in file_lines(files, sizes)] or [f"{where}: nothing {said}"]
     tell(request, {"run_dir": str(where), "removed": [*map(str, files)], "dry_run": request.dry_run}, lines)
 
 
-def listed(files: Sequence[Path], sizes: Mapping[Path, int]) -> list[str]:
+def file_lines(files: Sequence[Path], sizes: Mapping[Path, int]) -> list[str]:
     """Files for people: a line for each, one for all figures of a run, and one for the chunks of each sweep."""
     lines: dict[str, list[Path]] = {}
     for path in files:

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from walkerlab.cli.console import Console
-from walkerlab.config.problems import meant
+from walkerlab.config.problems import suggestion
 from walkerlab.config.schema import Config
 from walkerlab.errors import ConfigError, StaleError, StorageError
 from walkerlab.labels import with_unit
@@ -94,7 +94,7 @@ class Target:
             raise ConfigError(f"{path} belongs to the results of the run {owner.path}.", another)
 
 
-def put(path: Path, data: bytes, console: Console) -> Path:
+def write_file(path: Path, data: bytes, console: Console) -> Path:
     """Write a file, and say so if that replaces another one; StorageError if the system refuses."""
     replaced = path.is_file() and path.read_bytes() != data
     try:
@@ -124,37 +124,37 @@ def export_from(
         stem, kinds, make = f"{model}-{what}", TRAJECTORY_KINDS, lambda kind: trajectory(folder, model, kind, console)
     elif what in TABLES:
         stem, kinds, make = what, tuple(WRITERS), lambda kind: WRITERS[kind](table(folder, what, kind, console))
-    elif isinstance(found := named_in(folder, what), Table):
-        stem, kinds, make = hyphened(what), tuple(WRITERS), lambda kind: WRITERS[kind](found)
+    elif isinstance(found := find_item(folder, what), Table):
+        stem, kinds, make = hyphenate(what), tuple(WRITERS), lambda kind: WRITERS[kind](found)
     else:
         stem, kinds, make = what, FIGURE_KINDS, lambda kind: figure(folder, found, kind, (width, dpi), console)
     path, kind = target.of(what, f"{folder.name}-{stem}", kinds)
-    return put(path, make(kind), console)
+    return write_file(path, make(kind), console)
 
 
 def draw_walker(config: Path, target: Target, console: Console) -> Path:
     """Draw the walker of a config with its measures; ConfigError for a bad config or format."""
     # Imported here: other exports draw no walker.
-    from walkerlab.config.files import files_read, find
+    from walkerlab.config.files import files_read, find_config
     from walkerlab.config.loader import load
     from walkerlab.figures.measures import drawn
 
     loaded = load(config, ())
     for warning in loaded.warnings:
         console.warn(warning)
-    target = replace(target, inputs=tuple(files_read(find(config))))
+    target = replace(target, inputs=tuple(files_read(find_config(config))))
     path, kind = target.of("a walker", f"{loaded.run_name}-walker", DRAWING_KINDS)
-    return put(path, drawn(loaded.config.walker, as_text(path.stem), kind), console)
+    return write_file(path, drawn(loaded.config.walker, as_text(path.stem), kind), console)
 
 
-def hyphened(words: str) -> str:
+def hyphenate(words: str) -> str:
     """Words as a name of a file: small letters and figures, hyphens between."""
     return NOT_IN_NAMES.sub("-", words.lower().replace("'", "").replace("’", "")).strip("-")
 
 
-def shortened(caption: str) -> str:
+def caption_name(caption: str) -> str:
     """The same of a caption's first words, up to a comma or colon."""
-    return hyphened(re.split("[,:]", caption)[0])
+    return hyphenate(re.split("[,:]", caption)[0])
 
 
 def page_tables(folder: RunFolder) -> dict[str, Table]:
@@ -163,18 +163,18 @@ def page_tables(folder: RunFolder) -> dict[str, Table]:
     from walkerlab.report.registry import pages_of
     from walkerlab.report.results import Results
 
-    planner, report = planned(folder), PIPELINE["report"]
+    planner, report = plan_run(folder), PIPELINE["report"]
     results = Results(planner.config, planner.inputs(report), (), planner.missing_inputs(report))
     sections = [section for page in pages_of(results, folder.name) for section in page.sections]
     tables = [block for section in sections for block in section.blocks if isinstance(block, Table)]
-    short = [shortened(one.caption) for one in tables]
+    short = [caption_name(one.caption) for one in tables]
     unique = [name not in TABLES and short.count(name) == 1 for name in short]
     return {
-        name if alone else hyphened(one.caption): one for name, alone, one in zip(short, unique, tables, strict=True)
+        name if alone else hyphenate(one.caption): one for name, alone, one in zip(short, unique, tables, strict=True)
     }
 
 
-def named_in(folder: RunFolder, name: str) -> Illustration | Table:
+def find_item(folder: RunFolder, name: str) -> Illustration | Table:
     """The figure or the page's table of a name; ConfigError with what the run has if there is none."""
     # Imported here: a table needs no drawing.
     from walkerlab.figures.registry import FIGURES
@@ -183,7 +183,7 @@ def named_in(folder: RunFolder, name: str) -> Illustration | Table:
     if name in named:
         return named[name]
     tables = page_tables(folder)
-    for called in (hyphened(name), shortened(name)):
+    for called in (hyphenate(name), caption_name(name)):
         if called in tables:
             return tables[called]
     stored, _ = read_all(folder, (stage.name for stage in PIPELINE.stages))
@@ -194,11 +194,11 @@ def named_in(folder: RunFolder, name: str) -> Illustration | Table:
     there += [TRAJECTORY] * any(TRAJECTORY in result.groups for result in stored.values())
     nothing = f"{folder.path} has nothing yet: {makes(folder, PIPELINE['report'])} makes it all."
     advice = "\n  ".join([f"{folder.path} has", *there]) if there else nothing
-    near = meant(name, (*named, *TABLES, TRAJECTORY, *tables))
+    near = suggestion(name, (*named, *TABLES, TRAJECTORY, *tables))
     raise ConfigError(f"nothing is called {name}.{near}", advice)
 
 
-def planned(folder: RunFolder) -> Executor:
+def plan_run(folder: RunFolder) -> Executor:
     """Executor of a run that holds its current results; without any if the run's config is not valid any more."""
     config = config_of(folder)
     stages = () if config is None else PIPELINE.stages
@@ -217,7 +217,7 @@ def figure(
     Where what it needs is outdated, so may be all that is there, and the console is told.
     """
     stored = results_in(folder, illustration.stages)
-    run, plot = planned(folder), PIPELINE["plot"]
+    run, plot = plan_run(folder), PIPELINE["plot"]
     taken = {name: result for name, result in run.inputs(plot).items() if isinstance(result, Stored)}
     known = taken.keys() | run.left_out.keys()
     outdated, _ = read_all(folder, (name for name in plot.results(run.config) if name not in known))
@@ -346,7 +346,7 @@ def write_film(folder: RunFolder, target: Target, film: Film, console: Console) 
 
         data = gif(told(), film.rate) if kind == "gif" else mp4(told(), film.rate, str(ffmpeg))
         line.end("")
-    return put(path, data, console)
+    return write_file(path, data, console)
 
 
 def gif(drawn: Iterable[Any], rate: int) -> bytes:

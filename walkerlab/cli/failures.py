@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from walkerlab.errors import StoppedError, StorageError, WalkerlabError, to_type_back
+from walkerlab.errors import StoppedError, StorageError, WalkerlabError, add_run_options
 from walkerlab.stopping import raise_on
 
 if TYPE_CHECKING:
     from walkerlab.cli.request import Request
 
-FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
+FULL_DISK_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 
 
 @contextlib.contextmanager
@@ -44,7 +44,7 @@ def exit_on_failure(request: Request) -> Iterator[None]:
         sys.stdout.flush()
     except WalkerlabError as error:
         print_failed(error)
-        say(error, request.typed)
+        print_error(error, request.typed)
         raise typer.Exit(error.exit_code) from None
     except KeyboardInterrupt:
         stopped = StoppedError("interrupted", "What is finished is kept; the same command does the rest.")
@@ -52,17 +52,19 @@ def exit_on_failure(request: Request) -> Iterator[None]:
         print(f"{stopped.message}\nadvice: {stopped.advice}", file=sys.stderr)
         raise typer.Exit(stopped.exit_code) from None
     except BrokenPipeError:
-        nobody_listens()
+        discard_output()
         raise typer.Exit(0) from None
     except OSError as error:
-        if error.errno not in FULL or error.filename is not None:
+        if error.errno not in FULL_DISK_ERRORS or error.filename is not None:
             raise
-        nobody_listens()
-        say(StorageError(f"the output could not be written: {error.strerror}.", "The results themselves are stored."))
+        discard_output()
+        print_error(
+            StorageError(f"the output could not be written: {error.strerror}.", "The results themselves are stored.")
+        )
         raise typer.Exit(StorageError.exit_code) from None
 
 
-def nobody_listens() -> None:
+def discard_output() -> None:
     """Have what is still to be printed go nowhere, instead of failing once more when the process ends."""
     nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, sys.stdout.fileno())
@@ -80,15 +82,15 @@ def tell(request: Request, value: dict[str, Any], lines: Iterable[str], error: W
     else:
         sys.stdout.writelines(f"{line}\n" for line in lines)
     if error is not None:
-        say(error, request.typed)
+        print_error(error, request.typed)
         raise typer.Exit(error.exit_code)
 
 
-def say(error: WalkerlabError, typed: str = "") -> None:
+def print_error(error: WalkerlabError, typed: str = "") -> None:
     """Print a failure and what to do about it on stderr."""
     print(f"error: {error.message}", file=sys.stderr)
     if error.advice:
-        print(f"advice: {to_type_back(error.advice, typed)}", file=sys.stderr)
+        print(f"advice: {add_run_options(error.advice, typed)}", file=sys.stderr)
 
 
 def print_json(value: dict[str, Any]) -> None:

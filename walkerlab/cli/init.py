@@ -6,10 +6,10 @@ from pathlib import Path
 
 from walkerlab.config.files import DEFAULT, builtin_names
 from walkerlab.config.loader import load, safe_name
-from walkerlab.config.problems import beyond_scope, meant
+from walkerlab.config.problems import beyond_scope, suggestion
 from walkerlab.config.reference import as_json_schema
 from walkerlab.config.schema import QUESTIONS, Config
-from walkerlab.config.writer import commented
+from walkerlab.config.writer import to_commented_yaml
 from walkerlab.errors import ConfigError, StorageError
 from walkerlab.store.files import make_folder, write_atomically
 
@@ -27,7 +27,7 @@ def write_config(file: Path, walker: str) -> str:
     default = Config()
     untouched = [name for name in QUESTIONS if getattr(config, name) == getattr(default, name)]
     named = config.model_copy(update={"name": safe_name(file.stem), "source": None})
-    text = f"# yaml-language-server: $schema={SCHEMA}\n{commented(named, untouched)}"
+    text = f"# yaml-language-server: $schema={SCHEMA}\n{to_commented_yaml(named, untouched)}"
     try:
         make_folder(file.parent)
         write_atomically(file.parent / SCHEMA, json.dumps(as_json_schema(), indent=1).encode() + b"\n")
@@ -48,6 +48,6 @@ def template(walker: str) -> str:
     named = types | {name: name for name in builtin_names()}
     if walker not in named:
         beyond = beyond_scope(walker)
-        said = f"; {beyond}." if beyond else f".{meant(walker, named)}"
+        said = f"; {beyond}." if beyond else f".{suggestion(walker, named)}"
         raise ConfigError(f"there is no type of walker {walker!r}{said}", f"There are {', '.join(named)}.")
     return named[walker]

@@ -17,13 +17,13 @@ if TYPE_CHECKING:
     from walkerlab.pipeline.runs import Pair, RunDifference
     from walkerlab.store.runfolder import RunFolder
 
-SAME = 1e-12
+SAME_CHANGE = 1e-12
 """Relative change below which two numbers are shown as the same."""
 DIGITS = 6
 """Significant digits of a headline number."""
 IS_ERROR = re.compile(r"residual|drift|error|balance|uncertainty")
 """In the names of numbers that are errors: a relative change of one says nothing."""
-ROUNDING = 1e-9
+ROUNDING_SI = 1e-9
 """Numbers (SI) below it are at rounding or at the solver's tolerance."""
 
 
@@ -55,7 +55,7 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
         tell(request, as_object(folders, found_difference, figures), shown)
 
 
-def told_apart(folders: tuple[RunFolder, RunFolder]) -> tuple[str, str]:
+def run_labels(folders: tuple[RunFolder, RunFolder]) -> tuple[str, str]:
     """What two runs are called: their names, or their folders where both have one name."""
     first, second = folders
     return (first.name, second.name) if first.name != second.name else (str(first.path), str(second.path))
@@ -66,7 +66,7 @@ def draw(folders: tuple[RunFolder, RunFolder], results: list[dict[str, Any]]) ->
     from walkerlab.figures.walks import overlaid
     from walkerlab.store.files import make_folder, write_atomically
 
-    drawn = overlaid(results[0], results[1], told_apart(folders))
+    drawn = overlaid(results[0], results[1], run_labels(folders))
     if drawn is None:
         return []
     make_folder(folders[0].figures)
@@ -101,7 +101,7 @@ def lines(folders: tuple[RunFolder, RunFolder], found: RunDifference, figures: l
     def told(value: Any) -> str:
         return number(value, DIGITS) if isinstance(value, float) and not every else in_words(value)
 
-    names = told_apart(folders)
+    names = run_labels(folders)
     result = ["config", *aligned([["", *names], *([key, in_words(a), in_words(b)] for key, a, b in found.config)])]
     if not found.config:
         result[1:] = ["  the same"]
@@ -123,12 +123,12 @@ def lines(folders: tuple[RunFolder, RunFolder], found: RunDifference, figures: l
 def differs(pair: Pair) -> bool:
     """Whether two values are worth showing beside one another."""
     if pair.change is not None:
-        return abs(pair.change) > SAME
+        return abs(pair.change) > SAME_CHANGE
     return bool(pair.first != pair.second)
 
 
 def percent(pair: Pair) -> str:
     """A relative change in per cent; nothing for what is an error itself, or is at rounding in both runs."""
-    if pair.change is None or IS_ERROR.search(pair.name) or max(abs(pair.first), abs(pair.second)) < ROUNDING:
+    if pair.change is None or IS_ERROR.search(pair.name) or max(abs(pair.first), abs(pair.second)) < ROUNDING_SI:
         return ""
     return f"{100.0 * pair.change:+.3g} %" if differs(pair) else "the same"

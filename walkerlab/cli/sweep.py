@@ -19,9 +19,9 @@ from walkerlab.report.text import paragraph
 if TYPE_CHECKING:
     from walkerlab.sweeps.sweep import Foreseen, Swept
 
-TOLD = ("of", "parameters", "points", "done", "failed", "outcomes", "endings", "numerical_error")
+SUMMARY_KEYS = ("of", "parameters", "points", "done", "failed", "outcomes", "endings", "numerical_error")
 """Keys of a sweep's summary that `--json` has."""
-SHOWN = 20
+LISTED_POINTS = 20
 """Points that a dry run lists."""
 
 
@@ -97,7 +97,7 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
         )
         if request.dry_run:
             foreseen = SweepRun(question, loaded, request.folder, graph)
-            show_plan(request, foreseen.foresee(request.at_once or os.cpu_count() or 1, SHOWN))
+            show_plan(request, foreseen.foresee(request.at_once or os.cpu_count() or 1, LISTED_POINTS))
             return
         with chosen.begun(order) as begun:
             run = SweepRun(question, loaded, request.folder, graph)
@@ -142,12 +142,12 @@ def show_plan(request: Request, foreseen: "Foreseen") -> None:
     more = foreseen.count - len(foreseen.points)
     lines = [f"  {point}" for point in foreseen.points] + ([f"  and {more} more"] if more else [])
     known = foreseen.estimate_s
-    time = "no such point has been timed yet" if known is None else f"about {in_time(known)}"
+    time = "no such point has been timed yet" if known is None else f"about {format_duration(known)}"
     counts = f"{foreseen.count} points, {foreseen.there} computed already, {missing} to compute: {time}"
     tell(request, value, [f"in {foreseen.path}:", *lines, counts])
 
 
-def in_time(seconds: float) -> str:
+def format_duration(seconds: float) -> str:
     """A time for people."""
     if seconds < 120.0:
         return f"{seconds:.0f} s"
@@ -177,11 +177,11 @@ def show_result(request: SweepRequest, swept: "Swept") -> None:
     value = {
         **common(request, swept.path, swept.wall_s),
         "reused": swept.reused,
-        **{name: summary[name] for name in TOLD if name in summary},
+        **{name: summary[name] for name in SUMMARY_KEYS if name in summary},
         "figures": [str(path) for path in drawn.figures],
         "html": str(drawn.page),
     }
-    lines = printed(swept, drawn.page)
+    lines = result_lines(swept, drawn.page)
     if request.as_csv:
         table = table_of(swept.content, swept.question, request.every)
         beside = swept.path.with_suffix(".csv")
@@ -190,7 +190,7 @@ def show_result(request: SweepRequest, swept: "Swept") -> None:
     tell(request, value, lines, swept.error() if swept.failed else None)
 
 
-def printed(swept: "Swept", page: Path) -> list[str]:
+def result_lines(swept: "Swept", page: Path) -> list[str]:
     """The result for people."""
     from walkerlab.sweeps.drawing import said_of
 

@@ -5,15 +5,15 @@ from typing import Annotated, Final, Literal, get_args
 
 from pydantic import Field, ValidationInfo, field_validator
 
-from walkerlab.config.fields import Block, against, key, wrong
+from walkerlab.config.fields import Block, check_against, key, meaning_error
 
 Coordinate = Literal["theta_2", "dtheta_1", "dtheta_2"]
 COORDINATES: Final[tuple[Coordinate, ...]] = get_args(Coordinate)
-LARGEST: Final = 1e6  # of a window's bounds
+MAX_BOUND: Final = 1e6  # of a window's bounds
 
 _UNIT: Final = "rad, rad/s"
 _WIDTH: Final = "the gait's own, 0.15 rad and 0.25 sqrt(g/L) away"
-_Bound = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
+_Bound = Annotated[float, Field(ge=-MAX_BOUND, le=MAX_BOUND)]
 _Bounds = tuple[_Bound, ...]  # empty: the usual window
 
 
@@ -51,7 +51,7 @@ class Basin(Block):
     @classmethod
     def _two_or_three_coordinates(cls, value: tuple[Coordinate, ...]) -> tuple[Coordinate, ...]:
         if len(value) not in (2, 3) or len(set(value)) != len(value):
-            raise wrong("must be two or three coordinates, each once")
+            raise meaning_error("must be two or three coordinates, each once")
         return value
 
     @field_validator("cells", "lower", "upper")
@@ -59,9 +59,9 @@ class Basin(Block):
     def _one_for_each_coordinate(cls, value: tuple[float, ...], info: ValidationInfo) -> tuple[float, ...]:
         plane, usual = info.data.get("plane"), not value and info.field_name != "cells"
         if plane is not None and not usual and len(value) != len(plane):
-            raise wrong(f"must have {len(plane)} numbers, one for each of plane")
+            raise meaning_error(f"must have {len(plane)} numbers, one for each of plane")
         return value
 
-    _above = against(
+    _above = check_against(
         "upper", "lower", lambda upper, lower: "must be above lower" if any(map(operator.le, upper, lower)) else ""
     )

@@ -23,12 +23,12 @@ def slice_of(config: Config, takes: type | None) -> dict[str, Any]:
     return found
 
 
-def flattened(block: Mapping[str, Any], lists: bool = False, prefix: str = "") -> Iterator[tuple[str, Any]]:
+def flatten(block: Mapping[str, Any], lists: bool = False, prefix: str = "") -> Iterator[tuple[str, Any]]:
     """Dotted names and values of nested objects; of lists, too, with the places among the names, or as values."""
     for name, value in block.items():
         inner = {str(place): item for place, item in enumerate(value)} if lists and isinstance(value, list) else value
         if isinstance(inner, Mapping):
-            yield from flattened(inner, lists, f"{prefix}{name}.")
+            yield from flatten(inner, lists, f"{prefix}{name}.")
         else:
             yield f"{prefix}{name}", value
 

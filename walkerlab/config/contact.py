@@ -5,7 +5,7 @@ from typing import Annotated, Any, Final, Literal, Self
 
 from pydantic import Discriminator, Field, Tag, ValidationInfo, field_validator, model_validator
 
-from walkerlab.config.fields import Block, against, key, wrong
+from walkerlab.config.fields import Block, check_against, key, meaning_error
 
 MM_PER_M: Final = 1000.0
 
@@ -108,12 +108,12 @@ class Contact(Block):
         defaults = {name: field.default for name, field in cls.model_fields.items()}
         return from_mm(defaults, power) | data
 
-    _above = against(
+    _above = check_against(
         "friction_velocity",
         "stiction_velocity",
         lambda value, least: "" if value > least else f"must exceed stiction_velocity, {least:g}",
     )
-    _below = against(
+    _below = check_against(
         "dynamic_friction",
         "static_friction",
         lambda value, most: "" if value <= most else f"must not exceed static_friction, {most:g}",
@@ -128,7 +128,9 @@ class Contact(Block):
         least, most, unit = BOUNDS_SI[str(info.field_name)]
         if least * scale <= value <= most * scale:
             return value
-        raise wrong(f"must be from {least * scale:g} to {most * scale:g} {prefix}{unit}, as `units: {units}` has it")
+        raise meaning_error(
+            f"must be from {least * scale:g} to {most * scale:g} {prefix}{unit}, as `units: {units}` has it"
+        )
 
     @property
     def has_friction(self) -> bool:

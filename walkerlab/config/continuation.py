@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 
 from pydantic import create_model
 
-from walkerlab.config.fields import Block, against, key
+from walkerlab.config.fields import Block, check_against, key
 
 FollowedModel = Literal["rigid", "contact", "both"]
 _UNIT: Final = "that of the key"
@@ -23,7 +23,9 @@ else:
         "_Span",
         __base__=Block,
         __validators__={
-            "above": against("to", "from", lambda to, least: "" if to > least else f"must be above `from`, {least:g}")
+            "above": check_against(
+                "to", "from", lambda to, least: "" if to > least else f"must be above `from`, {least:g}"
+            )
         },
         **{
             "from": (float, key(1.0e-4, _UNIT, "where the span begins", bounds="a number below `to`")),

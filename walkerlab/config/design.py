@@ -4,7 +4,7 @@ from typing import Final, Literal, get_args
 
 from pydantic import field_validator
 
-from walkerlab.config.fields import Block, against, key, wrong
+from walkerlab.config.fields import Block, check_against, key, meaning_error
 
 Quantity = Literal[
     "period_s",
@@ -34,7 +34,7 @@ class Design(Block):
     model: Literal["rigid", "contact"] = key("rigid", "", "whose gait is designed")
     starts: int = key(5, "1", "starts of the search: the config's own numbers, and drawn ones", ge=1, le=1000)
 
-    _one = against(
+    _one = check_against(
         "maximise", "minimise", lambda value, _: "cannot be combined with minimise: remove one of them" if value else ""
     )
 
@@ -44,7 +44,9 @@ class Design(Block):
         for name, bounds in value.items():
             if len(bounds) != 2 or bounds[0] >= bounds[1]:
                 text = ", ".join(f"{bound:g}" for bound in bounds)
-                raise wrong(f"has bounds for {name}, [{text}], that are not two numbers, the first below the second")
+                raise meaning_error(
+                    f"has bounds for {name}, [{text}], that are not two numbers, the first below the second"
+                )
         return value
 
     @field_validator("keep")
@@ -52,5 +54,5 @@ class Design(Block):
     def _numbers_of_a_gait(cls, value: Bounds) -> Bounds:
         for name in value:
             if name not in get_args(Quantity):
-                raise wrong(f"names {name}, which is not a number of a gait; choose from {_NAMES}")
+                raise meaning_error(f"names {name}, which is not a number of a gait; choose from {_NAMES}")
         return value

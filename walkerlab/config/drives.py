@@ -44,19 +44,19 @@ class PushOff(Block):
 def drives_of(config: Any) -> tuple[str, ...]:
     """What gives the walker of a config energy besides gravity, in words."""
     push, torque = config.push_off.impulse_N_s, config.walker.hip.torque_N_m
-    return present({f"a push-off of {short(push)} N s": push, f"a hip torque of {short(torque)} N m": torque})
+    return nonzero_words({f"a push-off of {short(push)} N s": push, f"a hip torque of {short(torque)} N m": torque})
 
 
 def springs_of(config: Any) -> tuple[str, ...]:
     """What acts between the legs and gives no energy of its own, in words: a spring gives back, a damper takes."""
     stiffness, damping = config.walker.hip.spring_N_m_per_rad, config.walker.hip.damping_N_m_s_per_rad
-    return present({
+    return nonzero_words({
         f"a hip spring of {short(stiffness)} N m/rad": stiffness,
         f"a hip damper of {short(damping)} N m s/rad": damping,
     })  # fmt: skip
 
 
-def present(acting: Mapping[str, float]) -> tuple[str, ...]:
+def nonzero_words(acting: Mapping[str, float]) -> tuple[str, ...]:
     """Words of what is not zero."""
     return tuple(words for words, value in acting.items() if value != 0.0)
 

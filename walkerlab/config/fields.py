@@ -50,19 +50,19 @@ def key(
     )
 
 
-def wrong(reason: str) -> PydanticCustomError:
+def meaning_error(reason: str) -> PydanticCustomError:
     """What a validator raises, with the reason, for what cannot be meant."""
     return PydanticCustomError("meaning", reason)
 
 
-def against(name: str, other: str, why: Callable[[Any, Any], str]) -> Any:
+def check_against(name: str, other: str, why: Callable[[Any, Any], str]) -> Any:
     """A check of a key against one above it: `why` its value is not allowed beside the other's, empty if it is."""
 
     def check(value: Any, info: ValidationInfo) -> Any:
         beside = info.data.get(other)  # None where that is wrong itself, which is told
         reason = "" if beside is None else why(value, beside)
         if reason:
-            raise wrong(reason)
+            raise meaning_error(reason)
         return value
 
     return field_validator(name)(check)
@@ -108,12 +108,12 @@ def leaves_of_other_kinds(block: type[Block]) -> Iterator[tuple[tuple[str, ...],
             yield from leaves(kind, (f"{name}({tag})",))
 
 
-def held(config: Any, path: Iterable[str]) -> Any:
+def value_at(config: Any, path: Iterable[str]) -> Any:
     """The value at a path of keys; None if the config has no such block."""
     return reduce(lambda block, name: getattr(block, name, None), path, config)
 
 
-def extra(field: FieldInfo, name: str) -> str:
+def annotation_of(field: FieldInfo, name: str) -> str:
     """`unit`, `source`, `bounds` or `default_in_words` of a key as `key` was given it; empty if it was not."""
     held = field.json_schema_extra
     return str(held.get(name, "")) if isinstance(held, dict) else ""
@@ -123,19 +123,21 @@ _KINDS: Final[dict[Any, str]] = {float: "number", int: "integer", str: "text", b
 _SIGNS: Final = (("ge", "from"), ("gt", "above"), ("le", "up to"), ("lt", "below"))
 
 
-def kind(annotation: Any) -> str:
+def type_words(annotation: Any) -> str:
     """Type of a value in words: number, integer, text, word, list or a choice of them."""
     if annotation in _KINDS:
         return _KINDS[annotation]
     origin = get_origin(annotation)
     if origin is Annotated:
-        return kind(get_args(annotation)[0])
+        return type_words(get_args(annotation)[0])
     if origin is Literal:
         return "word"
     if origin is tuple:
         return "list"
     if origin in (Union, types.UnionType):
-        return " or ".join(dict.fromkeys(kind(part) for part in get_args(annotation) if part is not types.NoneType))
+        return " or ".join(
+            dict.fromkeys(type_words(part) for part in get_args(annotation) if part is not types.NoneType)
+        )
     return "block"
 
 
@@ -149,7 +151,7 @@ def words_of(annotation: Any) -> tuple[str, ...]:
 
 def bounds_of(field: FieldInfo) -> str:
     """What a key allows, in words and without its unit, e.g. `from 0.001 to 1000`; empty if there are no bounds."""
-    spoken, what = extra(field, "bounds"), kind(field.annotation)
+    spoken, what = annotation_of(field, "bounds"), type_words(field.annotation)
     if spoken:
         return spoken
     if what in ("word", _KINDS[bool]):
@@ -160,12 +162,12 @@ def bounds_of(field: FieldInfo) -> str:
     return ", ".join(f"{word} {short(limits[sign])}" for sign, word in _SIGNS if sign in limits)
 
 
-def allowed(field: FieldInfo) -> str:
+def describe_allowed(field: FieldInfo) -> str:
     """What a key allows, with kind and unit, for a message."""
     if block_of(field) is not None:
         optional = type(None) in get_args(field.annotation)
         return "a block of keys, or null to leave it out" if optional else "a block of keys"
-    bounds, unit, what = bounds_of(field), extra(field, "unit"), kind(field.annotation)
+    bounds, unit, what = bounds_of(field), annotation_of(field, "unit"), type_words(field.annotation)
     if what == "word":
         return f"one of {bounds}" if "," in bounds else bounds
     if what in _KINDS.values():

@@ -2,7 +2,7 @@
 
 from pydantic import field_validator
 
-from walkerlab.config.fields import Block, against, key, wrong
+from walkerlab.config.fields import Block, check_against, key, meaning_error
 
 
 class Footholds(Block):
@@ -19,7 +19,7 @@ class Footholds(Block):
         bounds="a list of numbers from -1e3 to 1e3, in place of roughness_m",
     )
 
-    _listed = against(
+    _listed = check_against(
         "heights_m",
         "roughness_m",
         lambda heights, roughness: (
@@ -31,7 +31,7 @@ class Footholds(Block):
     @classmethod
     def _near_the_slope(cls, value: tuple[float, ...]) -> tuple[float, ...]:
         if any(abs(height) > 1e3 for height in value):
-            raise wrong("must be numbers from -1e3 to 1e3")
+            raise meaning_error("must be numbers from -1e3 to 1e3")
         return value
 
     @property

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from walkerlab.config.problems import refused, shown
+from walkerlab.config.problems import printable, problem_error
 from walkerlab.config.reader import MAX_DEPTH, read
 from walkerlab.config.tree import Mapping, Node, Position, Scalar
 
@@ -25,7 +25,7 @@ class ConfigSetting:
     position: Position
 
 
-def stacked(layers: Sequence[Mapping]) -> Mapping:
+def merge_layers(layers: Sequence[Mapping]) -> Mapping:
     """One block of several, later ones over earlier ones; the name is the last layer's own.
 
     Raises ConfigError if a layer has more than one slope key.
@@ -57,22 +57,22 @@ def _refuse_two_slopes(given: dict[str, Position]) -> None:
     if len(slopes) == len(SLOPE_KEYS):
         (first, there), (second, here) = slopes
         where = f" at {there}" if there else ""
-        raise refused(here, f"{second}: the slope is given already, as {first}{where}", "one of both")
+        raise problem_error(here, f"{second}: the slope is given already, as {first}{where}", "one of both")
 
 
-def setting_of(text: str) -> ConfigSetting:
+def parse_setting(text: str) -> ConfigSetting:
     """One `--set` option; ConfigError if it is not KEY=VALUE with a YAML value.
 
     text  with a `source` where another option stands for it
     """
     key, equals, value = text.partition("=")
-    source = shown(getattr(text, "source", "")) or f"--set {shown(text)}"
+    source = printable(getattr(text, "source", "")) or f"--set {printable(text)}"
     start = Position(source, 1, 1)
     path = tuple(part.strip() for part in key.split("."))
     if not equals or not all(path):
-        raise refused(start, "is not of the form KEY=VALUE", "e.g. --set slope_deg=3")
+        raise problem_error(start, "is not of the form KEY=VALUE", "e.g. --set slope_deg=3")
     if len(path) > MAX_DEPTH:
-        raise refused(start, f"nested deeper than {MAX_DEPTH} levels")
+        raise problem_error(start, f"nested deeper than {MAX_DEPTH} levels")
     column = len(key) + 2
     node = read(value, source, column)
     return ConfigSetting(path, node or Scalar(Position(source, 1, column), None, ""), start)
@@ -80,11 +80,11 @@ def setting_of(text: str) -> ConfigSetting:
 
 def option_setting(key: str, value: int | str) -> ConfigSetting:
     """An option that is a key of its own, as `--strides`."""
-    position = Position(f"--{key} {shown(str(value))}", 1, 1)
+    position = Position(f"--{key} {printable(str(value))}", 1, 1)
     return ConfigSetting((key,), Scalar(position, value, str(value)), position)
 
 
-def with_settings(tree: Mapping, settings: Sequence[ConfigSetting]) -> Mapping:
+def apply_settings(tree: Mapping, settings: Sequence[ConfigSetting]) -> Mapping:
     """`tree` with each setting in its place, in order; a list or a block is replaced whole.
 
     Raises ConfigError if a setting goes into something that is no block.
@@ -108,6 +108,6 @@ def _placed(block: Mapping, setting: ConfigSetting, depth: int) -> Mapping:
         inner = Mapping(setting.position)
     if not isinstance(inner, Mapping):
         above, whole = ".".join(setting.path[: depth + 1]), ".".join(setting.path)
-        raise refused(setting.position, f"{shown(whole)}: {shown(above)} is a value, not a block of keys")
+        raise problem_error(setting.position, f"{printable(whole)}: {printable(above)} is a value, not a block of keys")
     result.put(name, _placed(inner, setting, depth + 1), block.keys.get(name, setting.position))
     return result

@@ -13,16 +13,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from walkerlab.config.canonical import flattened
+from walkerlab.config.canonical import flatten
 from walkerlab.config.fields import block_of
-from walkerlab.config.files import DEFAULT, ConfigFile, builtin, find, read_layers, with_cases
-from walkerlab.config.layers import ConfigSetting, option_setting, setting_of, stacked, with_settings
+from walkerlab.config.files import DEFAULT, ConfigFile, builtin_config, find_config, read_layers, with_cases
+from walkerlab.config.layers import ConfigSetting, apply_settings, merge_layers, option_setting, parse_setting
 from walkerlab.config.numbers import short
-from walkerlab.config.overlay import refuse_bad_cases
+from walkerlab.config.overlay import check_cases
 from walkerlab.config.problems import Problem
 from walkerlab.config.schema import QUESTIONS, Config
 from walkerlab.config.tree import Mapping, Position, Scalar
-from walkerlab.config.validation import Location, key_at, node_at, on_the_slope, typed
+from walkerlab.config.validation import Location, align_start, key_at, node_at, validate_tree
 from walkerlab.config.walkers import CompassWalker
 from walkerlab.errors import ConfigError
 
@@ -62,8 +62,8 @@ class LoadedConfig:
 
     def variant(self, settings: Sequence[ConfigSetting]) -> Config:
         """The config with some keys set, checked by the schema; ConfigError with the places of what is wrong."""
-        tree = with_settings(self.tree, settings)
-        return on_the_slope(typed(tree), tree)[0]
+        tree = apply_settings(self.tree, settings)
+        return align_start(validate_tree(tree), tree)[0]
 
 
 def load(
@@ -82,21 +82,21 @@ def load(
 
     Raises ConfigError with file, line, column, value, what is allowed and the nearest key of every problem.
     """
-    file = path if isinstance(path, ConfigFile) else builtin(DEFAULT) if path is None else find(path)
-    tree = stacked(read_layers(file))
+    file = path if isinstance(path, ConfigFile) else builtin_config(DEFAULT) if path is None else find_config(path)
+    tree = merge_layers(read_layers(file))
     start = Position(file.label, 1, 1)
     if "name" not in tree.entries:
         safe = safe_name(file.path.stem)
         tree = tree.without()
         tree.put("name", Scalar(start, safe, safe), start)
-    settings = [setting_of(text) for text in sets]
+    settings = [parse_setting(text) for text in sets]
     options = {"strides": strides, "name": name}
     settings += [option_setting(key, value) for key, value in options.items() if value is not None]
-    changed_tree = with_cases(with_settings(tree, settings), Path())
-    changed = typed(changed_tree)
-    base = typed(tree) if settings else changed
-    refuse_bad_cases(changed, changed_tree)
-    config, moved = on_the_slope(changed, changed_tree)
+    changed_tree = with_cases(apply_settings(tree, settings), Path())
+    changed = validate_tree(changed_tree)
+    base = validate_tree(tree) if settings else changed
+    check_cases(changed, changed_tree)
+    config, moved = align_start(changed, changed_tree)
     slope = changed_tree.entries.get("slope_deg")
     degrees = float(slope.value) if isinstance(slope, Scalar) and isinstance(slope.value, int | float) else None
     new = changes_of(base, changed, degrees)
@@ -109,7 +109,7 @@ def load(
     else:
         folder = run_name(base.name if file.text is None else file.path.name.partition("@")[0], changes)
     named = tree.entries["name"]
-    warnings = [*doubts(config, changed_tree), *moved]
+    warnings = [*suspicious_values(config, changed_tree), *moved]
     if isinstance(named, Scalar) and named.position == start and named.value != file.path.stem:
         cannot = "since a run folder cannot be named as the file is"
         warnings.insert(0, f"{file.label}: the run is named {named.value}, {cannot}")
@@ -122,7 +122,7 @@ def safe_name(text: str) -> str:
     return re.sub(r"[^A-Za-z0-9._-]+", "-", plain).strip("-.")[:64].rstrip(".") or "run"
 
 
-def doubts(config: Config, tree: Mapping) -> Iterator[str]:
+def suspicious_values(config: Config, tree: Mapping) -> Iterator[str]:
     """Warn of what is perhaps meant otherwise: a leg whose mass stays, wrong units, a pitch without pads."""
     walker, block = config.walker, tree.entries.get("walker")
     places = block.keys if isinstance(block, Mapping) else {}
@@ -147,7 +147,7 @@ def doubts(config: Config, tree: Mapping) -> Iterator[str]:
     if contact is not None and contact.terrain != "checkerboard" and not isinstance(contact.pad_pitch, str):
         text = f"contact.pad_pitch has no effect on {contact.terrain}, which has no pads"
         yield str(Problem(key_at(tree, ("contact", "pad_pitch")), f"{text}; only checkerboard has some"))
-    for path, value in numbers(("walker",), walker.model_dump(mode="json")):
+    for path, value in numbers_in(("walker",), walker.model_dump(mode="json")):
         key, text = str(path[-1]), f"{'.'.join(map(str, path))} is {short(value)}"
         if key.endswith("length_m") and value > LONG_M:
             yield str(Problem(key_at(tree, path), f"{text} m; lengths are in m, not in mm"))
@@ -155,11 +155,11 @@ def doubts(config: Config, tree: Mapping) -> Iterator[str]:
             yield str(Problem(key_at(tree, path), f"{text} kg on legs of {length} m; masses are in kg, not in g"))
 
 
-def numbers(path: Location, value: Any) -> Iterator[tuple[Location, float]]:
+def numbers_in(path: Location, value: Any) -> Iterator[tuple[Location, float]]:
     """The numbers in a block or list, with where they are."""
     if isinstance(value, dict | list):
         for name, inner in value.items() if isinstance(value, dict) else enumerate(value):
-            yield from numbers((*path, name), inner)
+            yield from numbers_in((*path, name), inner)
     elif isinstance(value, int | float):
         yield path, float(value)
 
@@ -181,8 +181,8 @@ def changes_of(base: Config, changed: Config, slope_deg: float | None = None) ->
         if block is not None and before[name] is None and after[name] is not None:
             before[name] = block().model_dump(mode="json")
             added.append(f"{name}=added")
-    known = dict(flattened(before))
-    differing = {key: value for key, value in flattened(after) if key not in known or known[key] != value}
+    known = dict(flatten(before))
+    differing = {key: value for key, value in flatten(after) if key not in known or known[key] != value}
     if slope_deg is not None and "slope_rad" in differing:
         differing = {"slope_deg" if key == "slope_rad" else key: value for key, value in differing.items()}
         differing["slope_deg"] = slope_deg

@@ -31,9 +31,9 @@ class Problem:
     def __str__(self) -> str:
         """On one line."""
         where = f"{self.position}: " if self.position else ""
-        meant = f"; did you mean {self.nearest}?" if self.nearest else ""
-        allowed = f"{' Allowed' if meant else '; allowed'}: {self.allowed}" if self.allowed else ""
-        return f"{where}{self.text}{meant}{allowed}"
+        near = f"; did you mean {self.nearest}?" if self.nearest else ""
+        allowed = f"{' Allowed' if near else '; allowed'}: {self.allowed}" if self.allowed else ""
+        return f"{where}{self.text}{near}{allowed}"
 
 
 BEYOND_SCOPE: Final = {
@@ -46,7 +46,7 @@ BEYOND_SCOPE: Final = {
 KEYS_ARE_LISTED = "`walkerlab schema` lists every key with its unit, bounds and default"
 
 
-def refusal(problems: Sequence[Problem], advice: str = KEYS_ARE_LISTED) -> ConfigError:
+def problems_error(problems: Sequence[Problem], advice: str = KEYS_ARE_LISTED) -> ConfigError:
     """One error for all `problems`, one a line."""
     lines = list(dict.fromkeys(str(problem) for problem in problems))
     if len(lines) > SHOWN_PROBLEMS:
@@ -54,11 +54,11 @@ def refusal(problems: Sequence[Problem], advice: str = KEYS_ARE_LISTED) -> Confi
     return ConfigError("\n".join(lines), advice)
 
 
-def refused(
+def problem_error(
     position: Position | None, text: str, allowed: str = "", near: str = "", advice: str = KEYS_ARE_LISTED
 ) -> ConfigError:
     """One error for one problem; see `Problem`."""
-    return refusal([Problem(position, text, allowed, near)], advice)
+    return problems_error([Problem(position, text, allowed, near)], advice)
 
 
 def beyond_scope(word: str) -> str:
@@ -73,24 +73,24 @@ def nearest(word: str, candidates: Iterable[str]) -> str:
     return spelled[found[0]] if found else ""
 
 
-def meant(word: str, candidates: Iterable[str]) -> str:
+def suggestion(word: str, candidates: Iterable[str]) -> str:
     """What was perhaps meant, as a sentence after another one; empty if nothing is like the word."""
     near = nearest(word, candidates)
     return f" Did you mean {near}?" if near else ""
 
 
-def shown(text: str, length: int = SHOWN_LENGTH) -> str:
+def printable(text: str, length: int = SHOWN_LENGTH) -> str:
     """A text from outside, short and safe to print: control characters and lone surrogates are escaped."""
     cut = text if len(text) <= length else f"{text[: length - 1]}…"
     return "".join(letter if letter.isprintable() else ascii(letter)[1:-1] for letter in cut)
 
 
-def shown_value(node: Node) -> str:
+def format_node(node: Node) -> str:
     """A value as the config has it, quoted if it is a text."""
     if isinstance(node, Mapping):
         return "a block" if node.entries else "an empty block"
     if not isinstance(node, Scalar):
-        return f"[{', '.join(shown_value(item) for item in node.items[:6])}{', …' if len(node.items) > 6 else ''}]"
+        return f"[{', '.join(format_node(item) for item in node.items[:6])}{', …' if len(node.items) > 6 else ''}]"
     if node.value is None:
-        return "nothing" if not node.text else shown(node.text)
-    return f"'{shown(node.text)}'" if isinstance(node.value, str) else shown(node.text)
+        return "nothing" if not node.text else printable(node.text)
+    return f"'{printable(node.text)}'" if isinstance(node.value, str) else printable(node.text)

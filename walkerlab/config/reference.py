@@ -10,10 +10,10 @@ from typing import Any, Final
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
-from walkerlab.config.fields import bounds_of, extra, kind, leaves, leaves_of_other_kinds
+from walkerlab.config.fields import annotation_of, bounds_of, leaves, leaves_of_other_kinds, type_words
 from walkerlab.config.files import builtin_names
 from walkerlab.config.numbers import short
-from walkerlab.config.problems import meant
+from walkerlab.config.problems import suggestion
 from walkerlab.config.schema import Config, SlopeInDegrees
 from walkerlab.errors import ConfigError
 
@@ -50,17 +50,17 @@ def keys() -> Iterator[KeyReference]:
 
 
 def _reference(path: tuple[str, ...], field: FieldInfo) -> KeyReference:
-    default = extra(field, "default_in_words") or _spelled(
+    default = annotation_of(field, "default_in_words") or _spelled(
         field.get_default(call_default_factory=True, validated_data={})
     )
     return KeyReference(
         key=".".join(path),
-        type=kind(field.annotation),
-        unit=extra(field, "unit"),
+        type=type_words(field.annotation),
+        unit=annotation_of(field, "unit"),
         bounds=bounds_of(field),
-        default=extra(field, "default_in_words") or _spelled(default),
+        default=annotation_of(field, "default_in_words") or _spelled(default),
         meaning=field.description or "",
-        source=extra(field, "source"),
+        source=annotation_of(field, "source"),
     )
 
 
@@ -78,7 +78,7 @@ def as_paragraphs(asked: str = "") -> str:
     Raises ConfigError with the nearest key if there is no such block or key.
     """
     paragraphs = []
-    for key in asked_for(asked):
+    for key in select_keys(asked):
         what = [key.type, f"in {key.unit}" if key.unit not in ("", "1") else "", key.bounds]
         facts = [", ".join(filter(None, what)), f"default: {key.default}", key.meaning, f"source: {key.source}"]
         wrapped = [textwrap.fill(fact, COLUMNS, initial_indent="    ", subsequent_indent="      ") for fact in facts]
@@ -86,7 +86,7 @@ def as_paragraphs(asked: str = "") -> str:
     return "\n\n".join(paragraphs)
 
 
-def asked_for(asked: str) -> list[KeyReference]:
+def select_keys(asked: str) -> list[KeyReference]:
     """The keys of a block, the key of that name, or all keys; ConfigError with the nearest key if there is none.
 
     A key that is the same in every kind of a block is listed once.
@@ -97,7 +97,7 @@ def asked_for(asked: str) -> list[KeyReference]:
     ]
     if not found:
         names = {".".join(name.split(".")[:depth]) for name in plain.values() for depth in (1, 2, 3)}
-        near = meant(asked, names) or meant(asked, {name.split(".")[-1] for name in names})
+        near = suggestion(asked, names) or suggestion(asked, {name.split(".")[-1] for name in names})
         raise ConfigError(f"the config has no key {asked}.{near}", "`walkerlab schema` lists every key")
     everywhere = {key for key in found if key.key == plain[key]}
     return [key for key in found if key in everywhere or replace(key, key=plain[key]) not in everywhere]
@@ -119,7 +119,7 @@ def as_json_schema(asked: str = "") -> dict[str, Any]:
 
 def part_of(schema: dict[str, Any], asked: str) -> dict[str, Any]:
     """The part of a JSON schema that describes a block or key, with the definitions that it refers to."""
-    asked_for(asked)
+    select_keys(asked)
     definitions = schema["$defs"]
     parts = [schema]
     for name in asked.split("."):

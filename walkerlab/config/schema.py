@@ -12,7 +12,7 @@ from walkerlab.config.contact import Contact
 from walkerlab.config.continuation import Continuation
 from walkerlab.config.design import Design
 from walkerlab.config.drives import PushOff, acting_on
-from walkerlab.config.fields import Block, against, key, wrong
+from walkerlab.config.fields import Block, check_against, key, meaning_error
 from walkerlab.config.ground import Footholds
 from walkerlab.config.robustness import Robustness
 from walkerlab.config.stability import Stability
@@ -111,7 +111,7 @@ class SolverSettings(Block):
     @classmethod
     def _is_installed(cls, value: Method) -> Method:
         if value.startswith("cvode") and find_spec(CVODE_PACKAGE) is None:
-            raise wrong("needs CVODE, which is not installed: pip install scikit-sundae")
+            raise meaning_error("needs CVODE, which is not installed: pip install scikit-sundae")
         return value
 
 
@@ -159,7 +159,7 @@ class Tune(Block):
     @classmethod
     def _rising(cls, value: tuple[float, float]) -> tuple[float, float]:
         if value[0] >= value[1]:
-            raise wrong("the first must be below the second")
+            raise meaning_error("the first must be below the second")
         return value
 
 
@@ -234,9 +234,11 @@ class Config(Block):
     outputs: tuple[Output, ...] = key(OUTPUTS, "", "what is stored", bounds="a list of states, energies, forces")
     seed: int = key(0, "1", "seed of everything that is drawn at random", ge=0, le=2**32 - 1)
 
-    _fits = against("start", "walker", why_no_state)
-    _pushes = against("push_off", "walker", lambda value, walker: why_no_push_off(walker) if value.impulse_N_s else "")
-    _stands = against("contact", "walker", lambda value, walker: why_no_contact(walker) if value else "")
+    _fits = check_against("start", "walker", why_no_state)
+    _pushes = check_against(
+        "push_off", "walker", lambda value, walker: why_no_push_off(walker) if value.impulse_N_s else ""
+    )
+    _stands = check_against("contact", "walker", lambda value, walker: why_no_contact(walker) if value else "")
 
     @field_validator("equations")
     @classmethod
@@ -244,9 +246,9 @@ class Config(Block):
         if value == "as-printed" and {"walker", "push_off"} <= info.data.keys():
             given = SimpleNamespace(**info.data)
             if acting := acting_on(given):
-                raise wrong(f"is for a passive compass, and this walker has {', '.join(acting)}")
+                raise meaning_error(f"is for a passive compass, and this walker has {', '.join(acting)}")
             if not is_passive_compass(given):
-                raise wrong("is for a compass; this walker is another")
+                raise meaning_error("is for a compass; this walker is another")
         return value
 
     @field_validator("outputs")

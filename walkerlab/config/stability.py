@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 
 from pydantic import field_validator
 
-from walkerlab.config.fields import Block, key, wrong
+from walkerlab.config.fields import Block, key, meaning_error
 from walkerlab.outcome import Outcome
 
 FATES: Final = tuple(outcome.label for outcome in Outcome)
@@ -40,7 +40,7 @@ class Case(Block):
     @classmethod
     def _some_outcome_is_right(cls, value: tuple[Fate, ...]) -> tuple[Fate, ...]:
         if not value:
-            raise wrong("must name an outcome")
+            raise meaning_error("must name an outcome")
         return value
 
 

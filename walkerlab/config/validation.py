@@ -9,11 +9,11 @@ from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
 from walkerlab.config.contact import BOUNDS_SI
-from walkerlab.config.fields import Block, allowed, block_of, kinds_of, leaves, words_of
-from walkerlab.config.files import DEFAULT, builtin, builtin_names, read_layers
-from walkerlab.config.layers import stacked
+from walkerlab.config.fields import Block, block_of, describe_allowed, kinds_of, leaves, words_of
+from walkerlab.config.files import DEFAULT, builtin_config, builtin_names, read_layers
+from walkerlab.config.layers import merge_layers
 from walkerlab.config.numbers import short
-from walkerlab.config.problems import Problem, beyond_scope, nearest, refusal, shown, shown_value
+from walkerlab.config.problems import Problem, beyond_scope, format_node, nearest, printable, problems_error
 from walkerlab.config.schema import Config, SlopeInDegrees
 from walkerlab.config.tree import Mapping, Node, Position, Scalar, plain
 from walkerlab.config.tree import Sequence as Listed
@@ -58,7 +58,7 @@ JUDGED_BY: Final = {
 _FOLLOWS_FROM_ANOTHER: Final = "default_factory_not_called"
 
 
-def typed(tree: Mapping) -> Config:
+def validate_tree(tree: Mapping) -> Config:
     """The config that a tree describes.
 
     Raises ConfigError with every problem found.
@@ -76,12 +76,12 @@ def typed(tree: Mapping) -> Config:
     except ValidationError as error:
         problems += _problems(error, tree, Config)
     if problems:
-        raise refusal(sorted(problems, key=_place))
-    refuse_unknown_bodies(config, tree)
+        raise problems_error(sorted(problems, key=_place))
+    check_bodies(config, tree)
     return config
 
 
-def on_the_slope(config: Config, tree: Mapping) -> tuple[Config, tuple[str, ...]]:
+def align_start(config: Config, tree: Mapping) -> tuple[Config, tuple[str, ...]]:
     """`config` with a start that its constraints allow, and what was moved for that, in words.
 
     Both feet stand on the slope, theta_1 + theta_2 = -2 phi; legs with knees are straight; what follows other bodies,
@@ -111,7 +111,7 @@ def on_the_slope(config: Config, tree: Mapping) -> tuple[Config, tuple[str, ...]
     return config.model_copy(update={"start": tuple(start)}), tuple(str(Problem(where, text)) for text in moved)
 
 
-def refuse_unknown_bodies(config: Config, tree: Mapping) -> None:
+def check_bodies(config: Config, tree: Mapping) -> None:
     """Raise ConfigError with their places for parts that are on bodies that the walker has not, or on the wrong leg."""
     walker = config.walker
     if not isinstance(walker, PartsWalker):
@@ -123,18 +123,18 @@ def refuse_unknown_bodies(config: Config, tree: Mapping) -> None:
         text = f"{'.'.join(map(str, place))}: {why}"
         problems.append(Problem(node_at(tree, place)[1], text, ", ".join(allowed), near))
 
-    for place, name in bodies_named(walker):
+    for place, name in body_references(walker):
         if name not in bodies:
-            refuse(("walker", *place), f"{shown(name)} is not a body", bodies, nearest(name, bodies))
+            refuse(("walker", *place), f"{printable(name)} is not a body", bodies, nearest(name, bodies))
     for k, (foot, leg) in enumerate(zip(walker.feet, walker.legs, strict=True)):
         if foot.body in bodies and foot.body not in leg:
-            why = f"{shown(foot.body)} is not of leg {k + 1}, whose foot this is"
+            why = f"{printable(foot.body)} is not of leg {k + 1}, whose foot this is"
             refuse(("walker", "feet", k, "body"), why, leg)
     if problems:
-        raise refusal(sorted(problems, key=_place), "docs/walkers.md shows a walker described by its parts.")
+        raise problems_error(sorted(problems, key=_place), "docs/walkers.md shows a walker described by its parts.")
 
 
-def bodies_named(walker: PartsWalker) -> Iterator[tuple[Location, str]]:
+def body_references(walker: PartsWalker) -> Iterator[tuple[Location, str]]:
     """Where parts name a body, and which."""
     for key, names in NAMES_OF_BODIES.items():
         for k, part in enumerate(getattr(walker, key)):
@@ -162,7 +162,7 @@ def _problem(detail: ErrorDetails, tree: Mapping, model: type[Block]) -> Problem
         node, position = node_at(tree, (*location, "type"))
         word = str(node.value) if isinstance(node, Scalar) else ""
         beyond = beyond_scope(word)
-        text = f"{location[0]}.type: {shown(word)} is of no known type{f'; {beyond}' if beyond else ''}"
+        text = f"{location[0]}.type: {printable(word)} is of no known type{f'; {beyond}' if beyond else ''}"
         return Problem(position, text, f"one of {', '.join(kinds)}", "" if beyond else nearest(word, kinds))
     if len(location) > 1 and location[1] in kinds:  # pydantic's word for the kind that it tried
         location = (location[0], *location[2:])
@@ -173,8 +173,8 @@ def _problem(detail: ErrorDetails, tree: Mapping, model: type[Block]) -> Problem
     key = ".".join(path)
     node, position = node_at(tree, location)
     if node is None and what == "missing":
-        return Problem(position, f"{key}: is missing", allowed(field))
-    value = shown_value(node) if node else f"{detail['input']} (its default)"
+        return Problem(position, f"{key}: is missing", describe_allowed(field))
+    value = format_node(node) if node else f"{detail['input']} (its default)"
     reason = _REASONS.get(what, detail["msg"])
     for judge, instead in JUDGED_BY.get(path[-1], {}).items() if what not in _REASONS and path[0] == "contact" else ():
         given, where = node_at(tree, ("contact", judge))
@@ -185,7 +185,7 @@ def _problem(detail: ErrorDetails, tree: Mapping, model: type[Block]) -> Problem
             return Problem(where, text, instead)
     word = node.value if isinstance(node, Scalar) and isinstance(node.value, str) else ""
     meant = nearest(word, words_of(field.annotation)) if word else ""
-    right = allowed(field) if what in _REASONS else ""
+    right = describe_allowed(field) if what in _REASONS else ""
     return Problem(position, f"{key}: {value} {reason}", right, meant if meant != word else "")
 
 
@@ -229,7 +229,7 @@ def _unknown_key(location: Location, tree: Mapping) -> Problem:
     if location == ("extends",):
         return Problem(parent.keys[name], "extends: belongs in a file, not in --set", "-c FILE with `extends` in it")
     siblings = [*block.model_fields, *(("slope_deg", "extends") if block is Config else ())]
-    text = f"{shown('.'.join((*above, name)))}: unknown key ({shown_value(parent.entries[name])})"
+    text = f"{printable('.'.join((*above, name)))}: unknown key ({format_node(parent.entries[name])})"
     value = parent.entries[name]
     beyond = beyond_scope(name) or (beyond_scope(value.text) if name == "type" and isinstance(value, Scalar) else "")
     if beyond:
@@ -252,9 +252,9 @@ def _keys_of_another_kind(
     other = next(kind for kind, one in kinds.items() if next(iter(strange)) in one.model_fields)
     type_at = given.keys.get("type", where)
     has_no = f"has no {', '.join(strange)} (of type {other})"
-    if source.startswith("--") or type_at.source in (source, builtin(DEFAULT).label):
+    if source.startswith("--") or type_at.source in (source, builtin_config(DEFAULT).label):
         return Problem(where, f"{above}.type is {chosen}, which {has_no}", ", ".join(block.model_fields))
-    layers = {name: stacked(read_layers(builtin(name))) for name in (DEFAULT, *builtin_names())}
+    layers = {name: merge_layers(read_layers(builtin_config(name))) for name in (DEFAULT, *builtin_names())}
     types = {name: node_at(tree, (above, "type"))[0] for name, tree in layers.items()}
     begin = next(name for name, node in types.items() if isinstance(node, Scalar) and node.value == chosen)
     instead = f"`-c {begin}`, in a file `extends: {begin}`; or the whole {above} block in a file without `extends`"

@@ -11,36 +11,36 @@ from pydantic import Discriminator, Field, Tag, ValidationInfo, field_validator
 
 from walkerlab.config.contact import Contact
 from walkerlab.config.drives import QUICKEST, Hip, acting_on
-from walkerlab.config.fields import Block, against, key, wrong
+from walkerlab.config.fields import Block, check_against, key, meaning_error
 from walkerlab.config.numbers import short
 from walkerlab.errors import ConfigError
 
 WISSE: Final = "Wisse, Schwab, Int. J. Robotics Research 24 (2005): arc feet"
 MCGEER: Final = "McGeer, Passive walking with knees, IEEE Int. Conf. Robotics and Automation (1990)"
 HSU_CHEN: Final = "Hsu Chen, Passive dynamic walking with knees, MIT (2007)"
-LONGEST: Final = 1e3  # m
+MAX_LENGTH_M: Final = 1e3  # m
 LEG_LENGTH_DIGITS: Final = 1e-6  # relative, to which a leg's length agrees with its parts
-HEAVIEST: Final = 1e6  # kg
+MAX_MASS_KG: Final = 1e6  # kg
 LIGHTEST_CONTACT: Final = 1e-9  # of the walker's mass: what a foot on compliant ground must carry along
 
-Metres = Annotated[float, Field(ge=-LONGEST, le=LONGEST)]
+Metres = Annotated[float, Field(ge=-MAX_LENGTH_M, le=MAX_LENGTH_M)]
 Point = tuple[Metres, Metres]
 LegBodies = Annotated[tuple[str, ...], Field(strict=False)]
 
 
 def length(default: Any, meaning: str, source: str = "this project") -> Any:
     """A length."""
-    return key(default, "m", meaning, source, ge=1e-3, le=LONGEST)
+    return key(default, "m", meaning, source, ge=1e-3, le=MAX_LENGTH_M)
 
 
 def mass(default: Any, meaning: str, source: str = "this project", least: float = 1e-12) -> Any:
     """A mass."""
-    return key(default, "kg", meaning, source, ge=least, le=HEAVIEST)
+    return key(default, "kg", meaning, source, ge=least, le=MAX_MASS_KG)
 
 
 def offset(default: Any, meaning: str, source: str) -> Any:
     """A place beside another one."""
-    return key(default, "m", meaning, source, ge=-LONGEST, le=LONGEST)
+    return key(default, "m", meaning, source, ge=-MAX_LENGTH_M, le=MAX_LENGTH_M)
 
 
 def inertia(default: Any, of: str, source: str = "a point mass") -> Any:
@@ -53,7 +53,7 @@ def point(meaning: str) -> Any:
     return key(..., "m", meaning, bounds="two numbers, ahead and up", sequence=True)
 
 
-def named(meaning: str) -> Any:
+def name_key(meaning: str) -> Any:
     """A name of a part."""
     return key(..., "", meaning, bounds="any text")
 
@@ -64,19 +64,19 @@ def parts(of: type[Block], meaning: str, default: Any = ..., number: str = "") -
     return key(default, "", meaning, bounds=bounds, sequence=True)
 
 
-def below(name: str, of: str, limit: Callable[[Any], float] = float) -> Any:
+def check_arc(name: str, of: str, limit: Callable[[Any], float] = float) -> Any:
     """A check that a foot's arc is smaller than what it belongs to, called `name`, which the key `of` says."""
-    return against(
+    return check_against(
         "foot_radius_m", of, lambda arc, owner: "" if arc < limit(owner) else f"must be below {name}, {limit(owner):g}"
     )
 
 
-def turns(inertia: str, why: str, *places: str) -> Any:
+def check_inertia(inertia: str, why: str, *places: str) -> Any:
     """A check that a part with its mass on the hinge above it, as the keys of `places` say, has an inertia."""
 
     def some(value: float, info: ValidationInfo) -> float:
         if value == 0.0 and all(info.data.get(place) == 0.0 for place in places):
-            raise wrong(f"is 0 with {why} would be massless")
+            raise meaning_error(f"is 0 with {why} would be massless")
         return value
 
     return field_validator(inertia)(some)
@@ -86,7 +86,7 @@ class Torso(Block):
     """An upper body at the hip, kept on the bisector of the legs."""
 
     mass_kg: float = mass(..., "mass of the torso")
-    above_hip_m: float = key(..., "m", "its centre of mass above the hip", ge=0.0, le=LONGEST)
+    above_hip_m: float = key(..., "m", "its centre of mass above the hip", ge=0.0, le=MAX_LENGTH_M)
     inertia_kg_m2: float = inertia(0.0, "the torso")
     held: Literal["bisecting"] = key(
         "bisecting", "", "what holds it", "Wisse, Schwab, van der Helm, Robotica 22 (2004)"
@@ -114,7 +114,7 @@ class _Legged(Block):
             inertia = leg_inertia(SimpleNamespace(**info.data))
             if value.too_quick_for(inertia):
                 most = f"at most {QUICKEST**2 * inertia:.3g} (torque, spring) and {QUICKEST * inertia:.3g} (damper)"
-                raise wrong(
+                raise meaning_error(
                     f"whose torques would swing the legs faster than {QUICKEST:g} rad/s: with their inertia about the "
                     f"hip, {inertia:.3g} kg m^2, it may have {most}"
                 )
@@ -149,9 +149,9 @@ class CompassWalker(_Legged):
     torso: Torso | None = None
     hip: Hip = Hip()
 
-    _arc = below("half of leg_length_m", "leg_length_m", lambda length: length / 2)
+    _arc = check_arc("half of leg_length_m", "leg_length_m", lambda length: length / 2)
 
-    _mass = against("foot_to_mass_m", "leg_length_m", lambda mass, length: why_off_the_leg(mass, length))
+    _mass = check_against("foot_to_mass_m", "leg_length_m", lambda mass, length: why_off_the_leg(mass, length))
 
     @property
     def mass_to_hip_m(self) -> float:
@@ -176,8 +176,8 @@ class StraightLegs(_Legged):
     torso: Torso | None = None
     hip: Hip = Hip()
 
-    _arc = below("leg_length_m", "leg_length_m")
-    _inertia = turns(
+    _arc = check_arc("leg_length_m", "leg_length_m")
+    _inertia = check_inertia(
         "leg_inertia_kg_m2", "the leg's mass at the hip: the swing leg", "leg_mass_below_hip_m", "leg_mass_ahead_m"
     )
 
@@ -201,7 +201,9 @@ class Shank(Block):
     mass_ahead_m: float = offset(0.0, "its centre of mass ahead", HSU_CHEN)
     inertia_kg_m2: float = inertia(0.0, "one shank")
 
-    _inertia = turns("inertia_kg_m2", "the shank's mass at the knee: the shank", "mass_below_knee_m", "mass_ahead_m")
+    _inertia = check_inertia(
+        "inertia_kg_m2", "the shank's mass at the knee: the shank", "mass_below_knee_m", "mass_ahead_m"
+    )
 
 
 class KneeJoint(Block):
@@ -240,7 +242,7 @@ class Kneed(_Legged):
     torso: Torso | None = None
     hip: Hip = Hip()
 
-    _arc = below("shank.length_m", "shank", lambda shank: shank.length_m)
+    _arc = check_arc("shank.length_m", "shank", lambda shank: shank.length_m)
 
     @property
     def leg_length_m(self) -> float:
@@ -256,7 +258,7 @@ class Kneed(_Legged):
 class PartBody(Block):
     """A rigid body with a frame of its own, upright as the walker stands."""
 
-    name: str = named("name of the body")
+    name: str = name_key("name of the body")
     mass_kg: float = mass(..., "its mass", least=0.0)
     centre_m: Point = point("its centre of mass")
     inertia_kg_m2: float = inertia(0.0, "the body")
@@ -265,10 +267,10 @@ class PartBody(Block):
 class PartHinge(Block):
     """A frictionless hinge between points of two bodies."""
 
-    name: str = named("name of the hinge")
-    parent: str = named("one body")
+    name: str = name_key("name of the hinge")
+    parent: str = name_key("one body")
     parent_point_m: Point = point("the hinge in its frame")
-    child: str = named("the other body")
+    child: str = name_key("the other body")
     child_point_m: Point = point("the hinge in its frame")
     locks: bool = key(False, "", "whether it is a knee, parent the thigh and child the shank")
 
@@ -276,24 +278,24 @@ class PartHinge(Block):
 class PartParticle(Block):
     """A point mass fixed to a body."""
 
-    name: str = named("name of the particle")
+    name: str = name_key("name of the particle")
     mass_kg: float = mass(..., "its mass", least=0.0)
-    body: str = named("the body it is fixed to")
+    body: str = name_key("the body it is fixed to")
     at_m: Point = point("where, in its frame")
 
 
 class PartFoot(Block):
     """A foot: an arc about a point of a body."""
 
-    body: str = named("the body it belongs to")
+    body: str = name_key("the body it belongs to")
     centre_m: Point = point("the arc's centre in its frame")
-    radius_m: float = key(0.0, "m", "radius of the arc, 0 is a point", ge=0.0, le=LONGEST)
+    radius_m: float = key(0.0, "m", "radius of the arc, 0 is a point", ge=0.0, le=MAX_LENGTH_M)
 
 
 class PartCoupling(Block):
     """A body whose angle is a weighted sum of others' angles."""
 
-    body: str = named("the body that follows")
+    body: str = name_key("the body that follows")
     of: tuple[str, ...] = key(..., "", "the bodies that it follows", bounds="a list of names", sequence=True)
     weights: tuple[float, ...] = key(..., "1", "their weights", bounds="a list of numbers", sequence=True)
 
@@ -324,7 +326,7 @@ class PartsWalker(_Legged):
         if found is None or math.isclose(value, found, rel_tol=LEG_LENGTH_DIGITS):
             return value
         upright = f"upright, from the hip's hinge to the first leg's sole, it is {found:.9g} m"
-        raise wrong(f"is not what the parts have: {upright}")
+        raise meaning_error(f"is not what the parts have: {upright}")
 
     @property
     def foot_radius_m(self) -> float:
@@ -477,7 +479,7 @@ def why_rigid_alone(walker: Any) -> str:
     return f"The contact model was not asked: {too_light_for_contact(walker) or 'the config has no contact block'}."
 
 
-def without_contact(asked: str, walker: Any, instead: str) -> ConfigError:
+def contact_required_error(asked: str, walker: Any, instead: str) -> ConfigError:
     """What to say where what is asked for needs contact, and the config has none.
 
     instead  what to do about a block that is missing

@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from pydantic.fields import FieldInfo
 
-from walkerlab.config.fields import Block, allowed, block_of
+from walkerlab.config.fields import Block, block_of, describe_allowed
 from walkerlab.config.reader import value_of
 from walkerlab.config.schema import Config, Source
 
@@ -24,7 +24,7 @@ def to_yaml(config: Config) -> str:
     return "".join(f"{line}\n" for line in _lines(config.model_dump(mode="json"), ""))
 
 
-def extending(start: str, base: Config, changed: Config, name: str) -> str:
+def to_extending_yaml(start: str, base: Config, changed: Config, name: str) -> str:
     """YAML text of a config that extends another one, `base` by the name `start`, and says only what differs."""
     different = _different(base.model_dump(mode="json"), changed.model_dump(mode="json"))
     blocks = {"extends": start, "name": name, **{key: value for key, value in different.items() if key != "name"}}
@@ -53,7 +53,7 @@ def _different(base: dict[str, Any], changed: dict[str, Any]) -> dict[str, Any]:
     return found
 
 
-def commented(config: Config, left_alone: Collection[str] = ()) -> str:
+def to_commented_yaml(config: Config, left_alone: Collection[str] = ()) -> str:
     """YAML text of `config` with meaning, bounds and unit of each key above it.
 
     left_alone  keys of the config that are not written: they have their defaults
@@ -89,7 +89,7 @@ def _commented(block: Block, values: dict[str, Any], indent: str, path: str = ""
 
 def _meaning(field: FieldInfo) -> str:
     """What a key is, and what it allows."""
-    return ": ".join(part for part in (field.description, allowed(field)) if part)
+    return ": ".join(part for part in (field.description, describe_allowed(field)) if part)
 
 
 def _comment(text: str, indent: str) -> Iterator[str]:

@@ -122,12 +122,17 @@ class Stage:
 
     def refuse_unsuited(self, asked: str, config: Config) -> None:
         """Raise ConfigError if it means nothing under a config, being what is asked for or what this needs."""
-        from walkerlab.config.walkers import contact_to_add, without_contact  # not for the help of the command line
+        from walkerlab.config.walkers import (  # not for the help of the command line
+            contact_required_error,
+            contact_to_add,
+        )
 
         if self.why_unsuited(config) is not None:
             block = f"`{contact_to_add(config.walker)}`"
             instead = f"Add one to the config, such as the paper's by this walker's mass: {block}."
-            raise without_contact(asked, config.walker, f"{instead} `walkerlab schema contact` explains its keys.")
+            raise contact_required_error(
+                asked, config.walker, f"{instead} `walkerlab schema contact` explains its keys."
+            )
 
     def refuse_question(self, config: Config) -> None:
         """Raise ConfigError, before anything runs, for what `refuse` of its module refuses: of stages on demand."""

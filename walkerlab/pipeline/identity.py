@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from walkerlab.config.canonical import slice_of
-from walkerlab.config.overlay import over_paper
+from walkerlab.config.overlay import paper_config_with
 from walkerlab.config.schema import Config
 from walkerlab.pipeline.graph import PIPELINE, Graph, Stage
 from walkerlab.sources import Sources
@@ -39,7 +39,7 @@ class Keys:
             # as `paper` what its own cases take of the built-in config, as `programs` the versions of those it drives
             fixed = self._fixed[stage.name] = {}
             if stage.takes_of_paper is not None:
-                fixed["paper"] = slice_of(over_paper({}), stage.takes_of_paper)
+                fixed["paper"] = slice_of(paper_config_with({}), stage.takes_of_paper)
             if stage.programs is not None:
                 fixed["programs"] = dict(stage.programs())
         once = {} if again or not (stage.walks or stage.follows) else {"again": False}

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from walkerlab.config.canonical import flattened
-from walkerlab.config.problems import meant
+from walkerlab.config.canonical import flatten
+from walkerlab.config.problems import suggestion
 from walkerlab.config.reader import read as read_text
 from walkerlab.config.schema import Config
 from walkerlab.config.tree import Mapping as Tree
-from walkerlab.config.validation import typed
+from walkerlab.config.validation import validate_tree
 from walkerlab.config.writer import to_yaml
 from walkerlab.errors import ConfigError, StaleError
 from walkerlab.pipeline.executor import survey
@@ -87,7 +87,7 @@ def config_of(folder: RunFolder) -> Config | None:
     """The config of a run; None if nothing tells it, or this program's schema does not take it any more."""
     try:
         tree = read_text(config_text(folder) or "", "stored config")
-        return typed(tree) if isinstance(tree, Tree) else None
+        return validate_tree(tree) if isinstance(tree, Tree) else None
     except ConfigError:
         return None
 
@@ -185,7 +185,7 @@ def run_named(text: str, runs_dir: Path) -> RunFolder:
     if found is not None:
         return found
     there = sorted(path.name for path in runs_dir.glob("*/"))
-    near = meant(Path(text).name, there) or (f" There are {', '.join(there)}." if there else "")
+    near = suggestion(Path(text).name, there) or (f" There are {', '.join(there)}." if there else "")
     raise ConfigError(f"there is no run {text}.{near}", "`walkerlab report` creates the run of the paper config.")
 
 
@@ -265,10 +265,10 @@ def difference(
 ) -> RunDifference:
     """How the results of two runs differ, and the configs of both; nothing is said of a config that is not known."""
     both = [name for name in first if name in second]
-    one, other = ({} if config is None else dict(flattened(config.model_dump(mode="json"))) for config in configs)
+    one, other = ({} if config is None else dict(flatten(config.model_dump(mode="json"))) for config in configs)
     return RunDifference(
         tuple((key, one.get(key), other.get(key)) for key in {**one, **other} if one.get(key) != other.get(key)),
-        {name: pairs(*(dict(flattened(run[name].summary, lists=True)) for run in (first, second))) for name in both},
+        {name: pairs(*(dict(flatten(run[name].summary, lists=True)) for run in (first, second))) for name in both},
         {name: pairs(*(headline_values(name, run[name].summary) for run in (first, second))) for name in both},
         tuple(name for name in first if name not in second),
         tuple(name for name in second if name not in first),
@@ -284,7 +284,7 @@ def pairs(first: Mapping[str, Any], second: Mapping[str, Any]) -> tuple[Pair, ..
 def headline_values(stage: str, summary: Mapping[str, Any]) -> dict[str, Any]:
     """The numbers of a stage's summary that say most, by name."""
     last = {name: summary[whole][-1] for name, whole in LAST_OF.items() if summary.get(whole)}
-    every = dict(flattened(summary, lists=True)) | last
+    every = dict(flatten(summary, lists=True)) | last
     return {name: every[name] for name in headlines(stage, every)}
 
 

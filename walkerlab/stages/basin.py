@@ -13,7 +13,7 @@ import numpy as np
 
 from walkerlab.config.basin import COORDINATES, Basin
 from walkerlab.config.reads import BasinConfig, RigidConfig
-from walkerlab.config.walkers import without_contact
+from walkerlab.config.walkers import contact_required_error
 from walkerlab.errors import ConfigError
 from walkerlab.hybrid.recorded_walk import as_state
 from walkerlab.hybrid.rigid_lanes import two_legs
@@ -147,7 +147,7 @@ def question_of(config: BasinConfig, inputs: Mapping[str, Content], window: Wind
 def contact_question(config: BasinConfig, inputs: Mapping[str, Content], rigid: Standing) -> ContactQuestion:
     """The contact model at the tolerances of `tune`'s map."""
     if config.contact is None:
-        raise without_contact("basin.model: contact", config.walker, "Add one.")
+        raise contact_required_error("basin.model: contact", config.walker, "Add one.")
     # Imported here: it brings interpolation along, which the rigid model's basin does without.
     from walkerlab.scene.scaled import for_a_map, starts_of
 

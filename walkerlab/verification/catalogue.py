@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, Final, TypeVar
 
 from walkerlab.config.fields import Block
-from walkerlab.config.overlay import over_paper
+from walkerlab.config.overlay import paper_config_with
 from walkerlab.config.reader import read
 from walkerlab.config.schema import Config
 from walkerlab.config.stability import FATES, Case, Fate
@@ -62,7 +62,7 @@ def without_doubles(cases: Sequence[Case]) -> tuple[Case, ...]:
 
 def config_of(case: Case) -> Config:
     """The paper's config with the case's lines over it; ConfigError if they are no config."""
-    return over_paper(case.config, f"case {case.name}")
+    return paper_config_with(case.config, f"case {case.name}")
 
 
 def scene_cases(config: Config) -> list[tuple[Case, Config]]:
