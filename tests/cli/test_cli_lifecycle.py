@@ -109,7 +109,7 @@ def test_rerun_says_whether_a_result_comes_out_again(toy):
     artifact = "runs/paper/roll.h5"
     done = toy("rerun", artifact)
     assert done.returncode == 0
-    assert "is reproduced to the last bit" in done.stdout
+    assert "is reproduced bit for bit" in done.stdout
     source = toy.folder.parent / "source" / "toy" / "physics.py"
     source.write_text(source.read_text().replace("math.sqrt(2", "math.sqrt(3"))
     done = toy("rerun", artifact, "--json")
@@ -266,8 +266,8 @@ def test_a_link_is_followed_and_not_replaced(walker):
 @pytest.mark.parametrize(
     ("target", "said"),
     [
-        ("mine.yaml", "mine.yaml is what this command reads"),
-        ("base.yaml", "base.yaml is what this command reads"),
+        ("mine.yaml", "mine.yaml is an input of this command"),
+        ("base.yaml", "base.yaml is an input of this command"),
         (".", ". is a folder"),
     ],
 )

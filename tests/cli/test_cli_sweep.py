@@ -56,7 +56,7 @@ def test_a_dry_run_lists_points_and_touches_nothing(swept):
     before = sorted(toy.folder.rglob("*"))
     text = toy(*SWEEP, "--over", "gravity_m_s2=1:9:5", "--set", "slope_rad=0.1", "--dry-run").stdout
     assert "  gravity_m_s2=3.0" in text
-    assert "5 points, 3 computed already, 2 to compute" in text
+    assert "5 points, 3 already computed, 2 to compute" in text
     assert sorted(toy.folder.rglob("*")) == before
 
 
@@ -140,7 +140,7 @@ def test_diff_of_unequal_walks_prints_few_lines_and_all_on_request():
         ["last_step_period_s", "0.7", "0.8", "+14.3", "%"]
     ]
     assert len(short) <= 2 + 2 + MOST + 1
-    assert short[-1] == "500 other numbers and words differ; --all shows them"
+    assert short[-1] == "500 other values differ; list them with --all"
     assert len(whole) > 500
 
 

@@ -92,11 +92,11 @@ def test_without_contact_the_lead_alone_says_that_it_was_not_asked():
     spoken = " ".join(texts(found[name]) for name in found if name != "provenance").lower()
     assert "contact" not in spoken
     said = lead(config("contact=null"), "rigid-only")
-    assert said.endswith("alone. The contact model was not asked: the config has no contact block.")
+    assert said.endswith("alone. The contact model was not used: the config has no contact block.")
     assert said.lower().count("contact") == 2
     assert lead(config(), "paper").endswith("as a rigid model and as one with contact.")
     simplest = load(Path("simplest")).config
-    assert "not asked: the walker's feet have next to no mass" in lead(simplest, "simplest")
+    assert "not used: the walker's feet have next to no mass" in lead(simplest, "simplest")
 
 
 def test_a_slope_without_a_gait_is_said_in_words_first():

@@ -1,4 +1,4 @@
-"""`walkerlab init`: a commented config to begin with."""
+"""`walkerlab init`: write a commented config to start from."""
 
 import json
 import shlex
@@ -17,13 +17,13 @@ SCHEMA = ".walkerlab-schema.json"
 
 
 def write_config(file: Path, walker: str) -> str:
-    """Write the built-in config of a type of walker as one of the user's own, each key explained, and its schema.
+    """Write the built-in config of a walker type as a user's config with comments, and its schema.
 
     Raises ConfigError if there is no such type, StorageError if the file exists or cannot be written.
     """
     config = load(Path(template(walker))).config
     if file.exists():
-        raise StorageError(f"{file} exists already.", "Choose another name; nothing was overwritten.")
+        raise StorageError(f"{file} already exists.", "Choose another name; nothing was overwritten.")
     default = Config()
     untouched = [name for name in QUESTIONS if getattr(config, name) == getattr(default, name)]
     named = config.model_copy(update={"name": safe_name(file.stem), "source": None})
@@ -35,13 +35,13 @@ def write_config(file: Path, walker: str) -> str:
     except StorageError as error:
         reason = getattr(error.__cause__, "strerror", None) or error.message
         raise StorageError(
-            f"{file} could not be written: {reason}.", "Choose a file in a folder that can be written and has room."
+            f"{file} could not be written: {reason}.", "Choose a file in a writable folder with free space."
         ) from error
-    return f"{file} written, with its schema beside it; next: `walkerlab report -c {shlex.quote(str(file))}`"
+    return f"wrote {file}, with its schema next to it; next: `walkerlab report -c {shlex.quote(str(file))}`"
 
 
 def template(walker: str) -> str:
-    """The built-in config of a type of walker, the paper's before others, or of its own name; ConfigError if none."""
+    """Return the built-in config of that name or walker type, the paper's first; ConfigError if there is none."""
     types: dict[str, str] = {}
     for name in (DEFAULT, *builtin_names()):
         types.setdefault(load(Path(name)).config.walker.type, name)

@@ -1,4 +1,4 @@
-"""The design block: which number of the gait is made least or largest, over which numbers of the config."""
+"""The design block: the gait quantity to optimise and the parameters to vary."""
 
 from typing import Final, Literal, get_args
 
@@ -20,19 +20,21 @@ Bounds = dict[str, list[float]]
 
 
 class Design(Block):
-    """What `walkerlab design` looks for."""
+    """Optimisation problem of `walkerlab design`."""
 
-    minimise: Quantity | None = key(None, "", "number of the gait that is made least")
-    maximise: Quantity | None = key(None, "", "number of the gait that is made largest")
+    minimise: Quantity | None = key(None, "", "gait quantity to minimise")
+    maximise: Quantity | None = key(None, "", "gait quantity to maximise")
     over: Bounds = key(
         dict,
         "",
-        "numbers of the config that may change, with their bounds, in the key's unit",
+        "parameters that may vary, with their bounds, in the key's unit",
         bounds="[A, B] for each key, A below B",
     )
-    keep: Bounds = key(dict, "", "numbers of the gait that stay within bounds", bounds=f"[A, B] for each of {_NAMES}")
-    model: Literal["rigid", "contact"] = key("rigid", "", "whose gait is designed")
-    starts: int = key(5, "1", "starts of the search: the config's own numbers, and drawn ones", ge=1, le=1000)
+    keep: Bounds = key(dict, "", "gait quantities to constrain", bounds=f"[A, B] for each of {_NAMES}")
+    model: Literal["rigid", "contact"] = key("rigid", "", "model whose gait is optimised")
+    starts: int = key(
+        5, "1", "starting points of the search: the config's own values, the rest at random", ge=1, le=1000
+    )
 
     _one = check_against(
         "maximise", "minimise", lambda value, _: "cannot be combined with minimise: remove one of them" if value else ""
@@ -54,5 +56,5 @@ class Design(Block):
     def _numbers_of_a_gait(cls, value: Bounds) -> Bounds:
         for name in value:
             if name not in get_args(Quantity):
-                raise meaning_error(f"names {name}, which is not a number of a gait; choose from {_NAMES}")
+                raise meaning_error(f"names {name}, which is not a gait quantity; choose from {_NAMES}")
         return value

@@ -1,4 +1,4 @@
-"""Config files: where they are, what they hold, and the built-in ones."""
+"""Config files, user-written and built in: finding and reading them."""
 
 import contextlib
 import stat
@@ -25,12 +25,12 @@ read_cached = lru_cache(maxsize=32)(read)  # trees of texts that were read alrea
 
 @dataclass(frozen=True, slots=True)
 class ConfigFile:
-    """One config file.
+    """A config file, or the config of a stored run.
 
-    path     of the file; of a run its folder's name
-    label    as messages name it
-    text     of the config that a run or an artifact holds; None if it is the file's own
-    changes  KEY=VALUE that made the run's config from its file
+    path     of the file; for a run, the name of its folder
+    label    name in messages
+    text     config stored with a run or artifact; None to read the file
+    changes  KEY=VALUE settings that made the run's config from its file
     """
 
     path: Path
@@ -40,45 +40,42 @@ class ConfigFile:
 
 
 def builtin_names() -> tuple[str, ...]:
-    """Names of the configs that come with the package."""
     return tuple(sorted(path.stem for path in BUILTIN_FOLDER.glob("*.yaml")))
 
 
 def config_to_extend(typed: str | None) -> str:
-    """What a config may extend that starts from the one that was typed: for a run, which has no file, the paper's."""
+    """Return the config that a new one may extend: that of the command line, or the paper's for a run."""
     named = typed is not None and (typed in builtin_names() or (Path(typed).is_file() and Path(typed).suffix != ".h5"))
     return str(typed) if named else DEFAULT
 
 
 def builtin_config(name: str) -> ConfigFile:
-    """The config `name` that comes with the package."""
     return ConfigFile(BUILTIN_FOLDER / f"{name}.yaml", f"built-in {name}.yaml")
 
 
 def find_config(path: Path) -> ConfigFile:
-    """The file of `--config`: a path, or else the name of a built-in config."""
+    """Resolve `--config`: an existing path, otherwise the name of a built-in config."""
     if str(path) in builtin_names() and not path.is_file():
         return builtin_config(str(path))
     return file_at(path)
 
 
 def file_at(path: Path) -> ConfigFile:
-    """The file of a path."""
     return ConfigFile(path, printable(str(path), SHOWN_PATH))
 
 
 def read_layers(file: ConfigFile) -> list[Mapping]:
-    """The blocks of a file and of all it extends, the furthest ancestor first.
+    """Read a file and all it extends, the furthest ancestor first.
 
-    Raises ConfigError if one of them cannot be read, is not a block of keys, or extends itself, and for a stored config
-    that names a file: it is complete.
+    Raises ConfigError if a file cannot be read, is not a block of keys, or extends itself, and if a stored config
+    refers to another file.
     """
     layers = [with_cases(root.without("extends"), one.path.parent) for one, root in files_and_blocks(file)]
     return layers[::-1]
 
 
 def files_read(file: ConfigFile) -> list[Path]:
-    """The files that a config is read from: its own, those that it extends, and lists of cases."""
+    """List the files a config is read from: its own, those it extends, and lists of cases."""
     found = []
     for one, root in files_and_blocks(file):
         cases = cases_file(root, one.path.parent)
@@ -87,7 +84,7 @@ def files_read(file: ConfigFile) -> list[Path]:
 
 
 def files_and_blocks(file: ConfigFile) -> Iterator[tuple[ConfigFile, Mapping]]:
-    """A config's file with its block of keys, then the file that it extends, and so on; raises as `read_layers`."""
+    """Yield a config's file with its block of keys, then the file it extends, and so on; raises as `read_layers`."""
     seen: list[str] = []
     asked: Position | None = None  # where the file's name stands
     while True:
@@ -121,9 +118,7 @@ def _refuse_named_files(root: Mapping) -> None:
     places = [root.entries["extends"].position] if "extends" in root.entries else []
     places += [] if cases is None else [cases[1]]
     if places:
-        raise problem_error(
-            places[0], "a config that is stored with a result names a file to be read", STORED_IS_COMPLETE
-        )
+        raise problem_error(places[0], "a stored config refers to a file", STORED_IS_COMPLETE)
 
 
 def cases_file(layer: Mapping, folder: Path) -> tuple[ConfigFile, Position] | None:
@@ -139,9 +134,9 @@ def cases_file(layer: Mapping, folder: Path) -> tuple[ConfigFile, Position] | No
 
 
 def with_cases(layer: Mapping, folder: Path) -> Mapping:
-    """The layer with the list of a file in the place of that file's name, under stability.cases.
+    """Replace the name of a file under stability.cases by the list in that file.
 
-    folder  which relative names start from
+    folder  base of relative names
 
     Raises ConfigError if the file cannot be read or holds no list.
     """
@@ -198,7 +193,7 @@ def _text_of(file: ConfigFile, asked: Position | None, wanted: str = "") -> str:
 
 
 def _near(file: ConfigFile) -> str:
-    """What was perhaps meant by the name of a file that is not there."""
+    """Suggest an existing file or built-in config for a missing one."""
     beside: list[str] = []
     with contextlib.suppress(OSError, ValueError):
         beside = [path.name for path in file.path.parent.iterdir() if path.suffix in SUFFIXES]

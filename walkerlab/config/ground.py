@@ -1,4 +1,4 @@
-"""The ground block: heights of footholds over the slope."""
+"""The ground block: heights of footholds above the slope."""
 
 from pydantic import field_validator
 
@@ -6,7 +6,7 @@ from walkerlab.config.fields import Block, check_against, key, meaning_error
 
 
 class Footholds(Block):
-    """Uneven ground: each foothold of a walk at its own height; without these keys it is even."""
+    """Uneven ground, with a height for each foothold; even by default."""
 
     roughness_m: float = key(
         0.0, "m", "standard deviation of the footholds' heights, which are drawn independently", ge=0.0, le=1e3
@@ -36,5 +36,4 @@ class Footholds(Block):
 
     @property
     def even(self) -> bool:
-        """Whether all footholds lie on the slope."""
         return self.roughness_m == 0.0 and not any(self.heights_m)

@@ -1,4 +1,4 @@
-"""Layers of a config: a file over what it extends, and `--set` over both."""
+"""Layers of a config: a file on top of the file it extends, and `--set` on top of both."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ SLOPE_KEYS: Final = ("slope_rad", "slope_deg")
 
 @dataclass(frozen=True, slots=True)
 class ConfigSetting:
-    """One `--set KEY=VALUE`.
+    """A `--set KEY=VALUE` option.
 
     path      parts of the dotted key
     value     tree of the value
@@ -26,7 +26,7 @@ class ConfigSetting:
 
 
 def merge_layers(layers: Sequence[Mapping]) -> Mapping:
-    """One block of several, later ones over earlier ones; the name is the last layer's own.
+    """Merge layers into one block, later over earlier; the name comes from the last layer alone.
 
     Raises ConfigError if a layer has more than one slope key.
     """
@@ -52,7 +52,6 @@ def _merged(lower: Mapping, upper: Mapping) -> Mapping:
 
 
 def _refuse_two_slopes(given: dict[str, Position]) -> None:
-    """Raise ConfigError if the slope is given in radians and in degrees; keys in the order in which they stand."""
     slopes = [(name, place) for name, place in given.items() if name in SLOPE_KEYS]
     if len(slopes) == len(SLOPE_KEYS):
         (first, there), (second, here) = slopes
@@ -61,9 +60,9 @@ def _refuse_two_slopes(given: dict[str, Position]) -> None:
 
 
 def parse_setting(text: str) -> ConfigSetting:
-    """One `--set` option; ConfigError if it is not KEY=VALUE with a YAML value.
+    """Parse a `--set` option; ConfigError if it is not KEY=VALUE with a YAML value.
 
-    text  with a `source` where another option stands for it
+    text  its attribute `source`, if any, names the option in messages
     """
     key, equals, value = text.partition("=")
     source = printable(getattr(text, "source", "")) or f"--set {printable(text)}"
@@ -79,15 +78,15 @@ def parse_setting(text: str) -> ConfigSetting:
 
 
 def option_setting(key: str, value: int | str) -> ConfigSetting:
-    """An option that is a key of its own, as `--strides`."""
+    """Build the setting of an option with the name of a key, such as `--strides`."""
     position = Position(f"--{key} {printable(str(value))}", 1, 1)
     return ConfigSetting((key,), Scalar(position, value, str(value)), position)
 
 
 def apply_settings(tree: Mapping, settings: Sequence[ConfigSetting]) -> Mapping:
-    """`tree` with each setting in its place, in order; a list or a block is replaced whole.
+    """Apply settings to `tree` in order; a list or block is replaced whole.
 
-    Raises ConfigError if a setting goes into something that is no block.
+    Raises ConfigError if a setting addresses a key below a value.
     """
     _refuse_two_slopes({setting.path[0]: setting.position for setting in settings})
     for setting in settings:

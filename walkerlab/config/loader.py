@@ -1,7 +1,7 @@
-"""From a file, `--set` and `--strides` to one typed config, its warnings and the name of its run.
+"""Loading a config: a file, `--set` and `--strides` become a typed config with warnings and a run name.
 
-A config changed by `--set` runs beside the unchanged one, in a folder named after the change. The name follows from
-what differs and not from how the change was typed: one experiment, one folder.
+A config changed by `--set` runs in a folder of its own, named after the change. The name follows from the values that
+differ, however they were typed: one experiment, one folder.
 """
 
 import hashlib
@@ -38,14 +38,14 @@ HEAVY_KG_M3: Final = 1000.0
 
 @dataclass(frozen=True, slots=True)
 class LoadedConfig:
-    """A config that is ready to run, and to be varied.
+    """A valid config with its origin.
 
     config    resolved, in the schema's types
     run_name  name of its folder below the runs folder
-    changes   KEY=VALUE of each key in which it differs from its file; for a run's config, those of the run come first
-    warnings  what was changed in it, in words
-    source    the file it is from
-    tree      what it was typed from
+    changes   KEY=VALUE of each key that differs from its file; for a run's config, the run's changes come first
+    warnings  adjustments and suspicious values, as sentences
+    source    its file
+    tree      its untyped tree, with positions
     """
 
     config: Config
@@ -56,12 +56,12 @@ class LoadedConfig:
     tree: Mapping
 
     def placed(self, error: ConfigError) -> ConfigError:
-        """The error with the place of the key that it is about, where the config's text has one."""
+        """Add the position of the key at fault to an error, where the config's text has one."""
         where = node_at(self.tree, error.key)[1] if error.key and self.tree.entries.get(str(error.key[0])) else None
         return ConfigError(f"{where}: {error.message}", error.advice) if where else error
 
     def variant(self, settings: Sequence[ConfigSetting]) -> Config:
-        """The config with some keys set, checked by the schema; ConfigError with the places of what is wrong."""
+        """Set some keys and validate the result; ConfigError with positions if it is invalid."""
         tree = apply_settings(self.tree, settings)
         return align_start(validate_tree(tree), tree)[0]
 
@@ -74,13 +74,12 @@ def load(
 ) -> LoadedConfig:
     """Load a config.
 
-    path     of a YAML file, or the name of a built-in config; None is the built-in paper config; a `ConfigFile` with a
-             text is a run's config, named as the run's folder
+    path     YAML file, name of a built-in config, or a `ConfigFile` with the text of a run's config; default: paper
     sets     `--set` options, KEY=VALUE, in order
-    strides  `--strides`, over everything else
-    name     `--name`, over the config's own; None leaves that
+    strides  `--strides`, which overrides everything else
+    name     `--name`; None keeps the config's own
 
-    Raises ConfigError with file, line, column, value, what is allowed and the nearest key of every problem.
+    Raises ConfigError that lists every problem with file, line, column, value, allowed values and the nearest key.
     """
     file = path if isinstance(path, ConfigFile) else builtin_config(DEFAULT) if path is None else find_config(path)
     tree = merge_layers(read_layers(file))
@@ -111,19 +110,19 @@ def load(
     named = tree.entries["name"]
     warnings = [*suspicious_values(config, changed_tree), *moved]
     if isinstance(named, Scalar) and named.position == start and named.value != file.path.stem:
-        cannot = "since a run folder cannot be named as the file is"
+        cannot = "since a run folder cannot have the file's name"
         warnings.insert(0, f"{file.label}: the run is named {named.value}, {cannot}")
     return LoadedConfig(config, name or folder, changes, tuple(warnings), file.label, changed_tree)
 
 
 def safe_name(text: str) -> str:
-    """A text as the name of a run folder: accents, blanks and what else such a name cannot have replaced."""
+    """Turn a text into a valid name of a run folder."""
     plain = unicodedata.normalize("NFKD", text).encode("ascii", "ignore").decode()
     return re.sub(r"[^A-Za-z0-9._-]+", "-", plain).strip("-.")[:64].rstrip(".") or "run"
 
 
 def suspicious_values(config: Config, tree: Mapping) -> Iterator[str]:
-    """Warn of what is perhaps meant otherwise: a leg whose mass stays, wrong units, a pitch without pads."""
+    """Yield warnings about likely mistakes: a leg mass left in place, wrong units, a pitch without pads."""
     walker, block = config.walker, tree.entries.get("walker")
     places = block.keys if isinstance(block, Mapping) else {}
     length = short(walker.leg_length_m)
@@ -146,7 +145,7 @@ def suspicious_values(config: Config, tree: Mapping) -> Iterator[str]:
     contact = config.contact
     if contact is not None and contact.terrain != "checkerboard" and not isinstance(contact.pad_pitch, str):
         text = f"contact.pad_pitch has no effect on {contact.terrain}, which has no pads"
-        yield str(Problem(key_at(tree, ("contact", "pad_pitch")), f"{text}; only checkerboard has some"))
+        yield str(Problem(key_at(tree, ("contact", "pad_pitch")), f"{text}; only checkerboard has pads"))
     for path, value in numbers_in(("walker",), walker.model_dump(mode="json")):
         key, text = str(path[-1]), f"{'.'.join(map(str, path))} is {short(value)}"
         if key.endswith("length_m") and value > LONG_M:
@@ -156,7 +155,6 @@ def suspicious_values(config: Config, tree: Mapping) -> Iterator[str]:
 
 
 def numbers_in(path: Location, value: Any) -> Iterator[tuple[Location, float]]:
-    """The numbers in a block or list, with where they are."""
     if isinstance(value, dict | list):
         for name, inner in value.items() if isinstance(value, dict) else enumerate(value):
             yield from numbers_in((*path, name), inner)
@@ -170,9 +168,9 @@ UNSAFE: Final = re.compile(r"[^A-Za-z0-9._,@=+-]")
 
 
 def changes_of(base: Config, changed: Config, slope_deg: float | None = None) -> tuple[str, ...]:
-    """KEY=VALUE of each key in which `--set` changed `base`, in the schema's order, however that was typed.
+    """List KEY=VALUE of each key in which `changed` differs from `base`, in the schema's order.
 
-    slope_deg  the slope as the user gave it, if in degrees
+    slope_deg  the slope as given by the user, if in degrees
     """
     before, after = base.model_dump(mode="json", exclude={"name"}), changed.model_dump(mode="json", exclude={"name"})
     added = []
@@ -190,9 +188,9 @@ def changes_of(base: Config, changed: Config, slope_deg: float | None = None) ->
 
 
 def run_name(name: str, changes: Sequence[str]) -> str:
-    """Name of a run folder: `name@key=value,...` if that is short, otherwise `name@label-` and 8 hex digits.
+    """Name a run folder `name@key=value,...` if that is short, otherwise `name@label-` and 8 hex digits.
 
-    The label is the stage whose question was changed, if there is one, and otherwise the first key.
+    The label is the first changed block of a stage, otherwise the first key.
     """
     change = ",".join(changes)
     whole = f"{name}@{change}" if change else name
@@ -204,7 +202,6 @@ def run_name(name: str, changes: Sequence[str]) -> str:
 
 
 def key_of(change: str) -> str:
-    """The key of KEY=VALUE."""
     return change.partition("=")[0]
 
 

@@ -1,4 +1,4 @@
-"""A few lines over the paper config: how cases of a catalogue are written."""
+"""Configs given as a few changes of the paper config, such as stability cases."""
 
 from collections.abc import Mapping as Keys
 from typing import Any
@@ -13,20 +13,20 @@ from walkerlab.config.validation import align_start, validate_tree
 
 
 def paper_config_with(lines: Keys[str, Any], source: str = "the paper's") -> Config:
-    """The built-in paper config with `lines` over it.
+    """Build the paper config with changes.
 
     lines   keys of a config, nested, as plain values
-    source  what messages name as their origin
+    source  origin named in messages
 
-    Raises ConfigError if they are no config; theta_1 of a start is put on the slope without a word.
+    Raises ConfigError if the result is invalid; theta_1 of a start is moved onto the slope without a warning.
     """
     return paper_config_with_tree(tree_of(lines, Position(source, 1, 1)))
 
 
 def paper_config_with_tree(upper: Mapping) -> Config:
-    """The built-in paper config with a block of keys over it; ConfigError with their places if they are no config.
+    """Build the paper config with a block of keys on top; ConfigError with positions if the result is invalid.
 
-    What a contact block in SI leaves out has the paper's physical value, not its number in N, mm, s.
+    With SI units, keys missing in the contact block keep the paper's physical value rather than its value in N, mm, s.
     """
     layers = read_layers(builtin_config(DEFAULT))
     contact = upper.entries.get("contact")
@@ -39,9 +39,9 @@ def paper_config_with_tree(upper: Mapping) -> Config:
 
 
 def check_cases(config: Config, tree: Mapping) -> None:
-    """Raise ConfigError with the place of what is wrong with the lines of a config's own stability cases.
+    """Raise ConfigError with positions if a config's stability cases are invalid or share a name.
 
-    tree  that the config was typed from
+    tree  source of the config
     """
     if not config.stability.cases:
         return
@@ -62,7 +62,7 @@ def check_cases(config: Config, tree: Mapping) -> None:
 
 
 def check_ground(case: Case, config: Config, lines: Mapping) -> None:
-    """Raise ConfigError if a case of the contact model has no ground, or pads as long as a step of no length."""
+    """Raise ConfigError if a contact case has no ground, or pads of zero length."""
     if config.contact is None:
         where = lines.keys.get("contact", lines.position)
         raise problem_error(where, f"contact: case {case.name} walks on the ground and has none", "model: rigid")
@@ -77,7 +77,7 @@ def check_ground(case: Case, config: Config, lines: Mapping) -> None:
 
 
 def tree_of(block: Keys[str, Any], position: Position) -> Mapping:
-    """Plain values, or NumPy's, by key as a tree, all of it at one position."""
+    """Convert plain (or NumPy) values by key to a tree, all at one position."""
 
     def node(value: Any) -> Node:
         if isinstance(value, Keys):

@@ -1,8 +1,8 @@
-"""YAML text to a tree with positions.
+"""Parser of YAML texts to trees with positions.
 
-ruamel.yaml splits the text; what plain scalars mean is the core schema of YAML 1.2 (section 10.3.2): 1e7 is a number,
-`no` is a text. A config is a small, plain tree: anchors, aliases, tags, duplicate keys, deep nesting and large texts
-are refused, so that no text can cost more than its own length.
+ruamel.yaml splits the text; plain scalars follow the core schema of YAML 1.2 (section 10.3.2): 1e7 is a number, `no` is
+a text. Anchors, aliases, tags, duplicate keys, deep nesting and large texts are errors, so that parsing costs no more
+than the length of a text.
 """
 
 import math
@@ -31,7 +31,7 @@ _FLOAT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
 
 
 def value_of(text: str) -> str | int | float | bool | None:
-    """What a plain scalar means in YAML 1.2."""
+    """Interpret a plain scalar by YAML 1.2."""
     if text in _WORDS:
         return _WORDS[text]
     if _INTEGER.fullmatch(text) and len(text) <= MAX_DIGITS:
@@ -44,10 +44,10 @@ def value_of(text: str) -> str | int | float | bool | None:
 
 
 def read(text: str, source: str, column: int = 1) -> Node | None:
-    """Tree of a YAML text, or None if there is nothing in it.
+    """Parse a YAML text to a tree; None if it is empty.
 
-    text    of one document
-    source  file or option it is from, for positions
+    text    a single document
+    source  its file or option, for positions
     column  of its first character, for a text inside a longer one
 
     Raises ConfigError with the position of whatever is not a plain YAML tree.
@@ -81,14 +81,13 @@ def _position(mark: Any, source: str, column: int) -> Position:
 
 
 class _Composer:
-    """Builds the tree from a parser's events, as deep as a config may be and no deeper."""
+    """Builds a tree of limited depth from parser events."""
 
     def __init__(self, source: str, column: int, events: Iterator[Any]) -> None:
         self._source, self._column, self._events = source, column, events
         self._twice: list[Problem] = []
 
     def document(self) -> Node | None:
-        """The tree of the only document, None if there is nothing in it."""
         root, documents = None, 0
         for event in self._events:
             name = type(event).__name__
@@ -105,7 +104,6 @@ class _Composer:
         return root
 
     def _node(self, event: Any, depth: int) -> Node:
-        """What begins with an event."""
         name, at = type(event).__name__, _position(event.start_mark, self._source, self._column)
         if name == "AliasEvent":
             self._refuse(

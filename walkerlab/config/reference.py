@@ -1,4 +1,4 @@
-"""The reference of all config keys, made from the schema: a table for people, a JSON schema for editors."""
+"""Reference of all config keys, generated from the schema: paragraphs, and a JSON schema for editors."""
 
 import json
 import re
@@ -26,7 +26,7 @@ EXTENDS_MEANING: Final = "config this one inherits from: a file, from this file'
 
 @dataclass(frozen=True, slots=True)
 class KeyReference:
-    """What there is to know about one key; every entry is a text."""
+    """Facts about one key, as texts."""
 
     key: str
     type: str
@@ -38,7 +38,7 @@ class KeyReference:
 
 
 def keys() -> Iterator[KeyReference]:
-    """Every key of a config file, in the order of the schema."""
+    """Yield every key of a config file, in the schema's order."""
     builtins = ", ".join(builtin_names())
     yield KeyReference("extends", "text", "", f"a file, {builtins}", "none", EXTENDS_MEANING, "this project")
     for path, field in leaves(Config):
@@ -73,7 +73,7 @@ def _spelled(value: Any) -> str:
 
 
 def as_paragraphs(asked: str = "") -> str:
-    """The keys for a terminal, each as a short paragraph; only those of a block or key, if one is asked for.
+    """Describe the keys for a terminal, one paragraph each; by default all, otherwise those of a block or key.
 
     Raises ConfigError with the nearest key if there is no such block or key.
     """
@@ -87,9 +87,9 @@ def as_paragraphs(asked: str = "") -> str:
 
 
 def select_keys(asked: str) -> list[KeyReference]:
-    """The keys of a block, the key of that name, or all keys; ConfigError with the nearest key if there is none.
+    """Select the keys of a block, or the key of that name, or all keys; ConfigError with the nearest key if none match.
 
-    A key that is the same in every kind of a block is listed once.
+    Keys that are equal in every kind of a block are listed once.
     """
     plain = {key: OF_A_KIND.sub("", key.key) for key in keys()}
     found = [
@@ -104,7 +104,7 @@ def select_keys(asked: str) -> list[KeyReference]:
 
 
 def as_json_schema(asked: str = "") -> dict[str, Any]:
-    """JSON schema of a config file; only of a block or key, if one is asked for.
+    """Return the JSON schema of a config file, or of one block or key.
 
     Raises ConfigError with the nearest key if there is no such block or key.
     """
@@ -118,7 +118,7 @@ def as_json_schema(asked: str = "") -> dict[str, Any]:
 
 
 def part_of(schema: dict[str, Any], asked: str) -> dict[str, Any]:
-    """The part of a JSON schema that describes a block or key, with the definitions that it refers to."""
+    """Return the part of a JSON schema that describes a block or key, with the definitions it refers to."""
     select_keys(asked)
     definitions = schema["$defs"]
     parts = [schema]
@@ -138,7 +138,6 @@ def part_of(schema: dict[str, Any], asked: str) -> dict[str, Any]:
 
 
 def blocks_of(part: dict[str, Any], definitions: dict[str, Any]) -> Iterator[dict[str, Any]]:
-    """The blocks of keys that a part of a JSON schema allows."""
     if "properties" in part:
         yield part
     choices = [*part.get("anyOf", ()), *part.get("oneOf", ())]

@@ -1,4 +1,4 @@
-"""The kinds of walkers and their measures: keys of the block `walker`."""
+"""Types of walkers and their dimensions: keys of the block `walker`."""
 
 import math
 from collections.abc import Callable
@@ -29,50 +29,43 @@ LegBodies = Annotated[tuple[str, ...], Field(strict=False)]
 
 
 def length(default: Any, meaning: str, source: str = "this project") -> Any:
-    """A length."""
     return key(default, "m", meaning, source, ge=1e-3, le=MAX_LENGTH_M)
 
 
 def mass(default: Any, meaning: str, source: str = "this project", least: float = 1e-12) -> Any:
-    """A mass."""
     return key(default, "kg", meaning, source, ge=least, le=MAX_MASS_KG)
 
 
 def offset(default: Any, meaning: str, source: str) -> Any:
-    """A place beside another one."""
     return key(default, "m", meaning, source, ge=-MAX_LENGTH_M, le=MAX_LENGTH_M)
 
 
 def inertia(default: Any, of: str, source: str = "a point mass") -> Any:
-    """An inertia."""
     return key(default, "kg m^2", f"inertia of {of} about its own centre of mass", source, ge=0.0, le=1e9)
 
 
 def point(meaning: str) -> Any:
-    """A point in a body's frame."""
     return key(..., "m", meaning, bounds="two numbers, ahead and up", sequence=True)
 
 
 def name_key(meaning: str) -> Any:
-    """A name of a part."""
     return key(..., "", meaning, bounds="any text")
 
 
 def parts(of: type[Block], meaning: str, default: Any = ..., number: str = "") -> Any:
-    """A list of blocks."""
     bounds = f"blocks of {number}{', '.join(of.model_fields)}"
     return key(default, "", meaning, bounds=bounds, sequence=True)
 
 
 def check_arc(name: str, of: str, limit: Callable[[Any], float] = float) -> Any:
-    """A check that a foot's arc is smaller than what it belongs to, called `name`, which the key `of` says."""
+    """Validate that a foot's arc is smaller than `limit` of key `of`, which messages call `name`."""
     return check_against(
         "foot_radius_m", of, lambda arc, owner: "" if arc < limit(owner) else f"must be below {name}, {limit(owner):g}"
     )
 
 
 def check_inertia(inertia: str, why: str, *places: str) -> Any:
-    """A check that a part with its mass on the hinge above it, as the keys of `places` say, has an inertia."""
+    """Validate that a part whose mass lies on its upper hinge (keys `places` are 0) has an inertia."""
 
     def some(value: float, info: ValidationInfo) -> float:
         if value == 0.0 and all(info.data.get(place) == 0.0 for place in places):
@@ -94,17 +87,17 @@ class Torso(Block):
 
 
 class _Legged(Block):
-    """What walkers have in common."""
+    """Properties and checks that all walkers share."""
 
     @property
     def lean_rad(self: Any) -> float:
-        """Angle of the line from hip to foot centre in an upright leg; 0 for parts, whose start is taken as given."""
+        """Angle of the line from hip to foot centre in an upright leg; 0 for walkers of parts."""
         ahead = getattr(self, "foot_centre_ahead_m", 0.0)
         return math.atan2(ahead, self.leg_length_m - self.foot_radius_m)
 
     @property
     def total_mass_kg(self: Any) -> float:
-        """Two legs, the hip and a torso, kg."""
+        """Mass of the whole walker, kg."""
         return float(2 * self.leg_mass_kg + self.hip_mass_kg + torso_mass(self.torso))
 
     @field_validator("hip", check_fields=False)
@@ -160,7 +153,7 @@ class CompassWalker(_Legged):
 
 
 class StraightLegs(_Legged):
-    """Two straight legs of any distribution of mass, whose feet are arcs that roll in both models."""
+    """Two straight legs of any mass distribution, whose arc feet roll in both models."""
 
     type: Literal["straight-legs"] = key("straight-legs", "", "kind of walker", WISSE)
     leg_length_m: float = length(0.4, "hip to sole, foot included", WISSE)
@@ -312,7 +305,7 @@ class PartsWalker(_Legged):
     legs: tuple[LegBodies, LegBodies] = key(
         ..., "", "bodies of either leg, hip down", bounds="two lists of names", sequence=True
     )
-    leg_length_m: float = length(..., "hip to sole as the parts have it: what lengths and falls are measured by")
+    leg_length_m: float = length(..., "hip to sole, as follows from the parts; the unit of lengths and falls")
     knee: KneeJoint = KneeJoint()
     torso: Torso | None = None
     hip: Hip = Hip()
@@ -326,16 +319,15 @@ class PartsWalker(_Legged):
         if found is None or math.isclose(value, found, rel_tol=LEG_LENGTH_DIGITS):
             return value
         upright = f"upright, from the hip's hinge to the first leg's sole, it is {found:.9g} m"
-        raise meaning_error(f"is not what the parts have: {upright}")
+        raise meaning_error(f"disagrees with the parts: {upright}")
 
     @property
     def foot_radius_m(self) -> float:
-        """Radius of the feet, m."""
         return self.feet[0].radius_m
 
     @property
     def total_mass_kg(self) -> float:
-        """Everything, kg."""
+        """Mass of the whole walker, kg."""
         masses = [body.mass_kg for body in self.bodies] + [particle.mass_kg for particle in self.particles]
         return sum(masses) + torso_mass(self.torso)
 
@@ -343,9 +335,9 @@ class PartsWalker(_Legged):
 def hip_to_sole(
     hinges: tuple[PartHinge, ...], feet: tuple[PartFoot, PartFoot], legs: tuple[LegBodies, LegBodies]
 ) -> float | None:
-    """How far the first leg's sole lies below the hip while all bodies are upright, m.
+    """Depth of the first leg's sole below the hip with all bodies upright, m.
 
-    None where no hinges lead from the other leg to the foot's body: parts that make no walker.
+    None if no hinges lead from the other leg to the foot's body.
     """
     places = {(hinge.parent, hinge.child): (hinge.parent_point_m, hinge.child_point_m) for hinge in hinges}
     places |= {(hinge.child, hinge.parent): (hinge.child_point_m, hinge.parent_point_m) for hinge in hinges}
@@ -363,7 +355,7 @@ def hip_to_sole(
 
 
 def why_off_the_leg(mass_m: float, length_m: float) -> str:
-    """Why a mass so far from the foot is on no leg of a length; empty if it is."""
+    """Explain why a mass at that distance from the foot is not on the leg; empty if it is."""
     if mass_m < length_m:
         return ""
     massless = "equals leg_length_m, so b = 0: the leg's mass sits at the hip and the swing leg is massless; "
@@ -371,18 +363,17 @@ def why_off_the_leg(mass_m: float, length_m: float) -> str:
 
 
 def torso_mass(torso: Torso | None) -> float:
-    """Mass of a torso, if there is one (kg)."""
     return 0.0 if torso is None else torso.mass_kg
 
 
 def rigid_bodies(walker: Any) -> int:
-    """How many angles the rigid model's state has: swing leg, stance leg, what else swings, a torso."""
+    """Number of angles in the rigid model's state: swing leg, stance leg, further swinging bodies, torso."""
     bodies = len(walker.bodies) - len(walker.legs[1]) + 1 if isinstance(walker, PartsWalker) else 2
     return bodies + int(isinstance(walker, Kneed)) + int(walker.torso is not None)
 
 
 def followers(walker: Any) -> dict[int, tuple[str, dict[int, float]]]:
-    """Angles of the rigid model's state that others give: by place, the body's name and weights of others by place."""
+    """Return the coupled angles of the rigid model's state: index to body name and weights by index."""
     found = {}
     if isinstance(walker, PartsWalker):
         swinging, stance = walker.legs
@@ -397,12 +388,12 @@ def followers(walker: Any) -> dict[int, tuple[str, dict[int, float]]]:
 
 
 def is_passive_compass(config: Any) -> bool:
-    """Whether a config has a compass without a torso on which nothing but gravity acts: Appendix A describes these."""
+    """Whether the walker is a passive compass without torso, as in Appendix A."""
     return bool(config.walker.type == "compass" and config.walker.torso is None and not acting_on(config))
 
 
 def leg_inertia(walker: Any) -> float:
-    """Inertia (kg m^2) of one leg about the hip; of parts no less than that."""
+    """Inertia of one leg about the hip (kg m^2); for walkers of parts an upper bound."""
     if walker.type == "compass":
         below = walker.leg_length_m - walker.foot_to_mass_m
         return float(walker.leg_mass_kg * below**2 + walker.leg_inertia_kg_m2)
@@ -421,7 +412,7 @@ def leg_inertia(walker: Any) -> float:
 
 
 def why_no_push_off(walker: Any) -> str:
-    """Why nothing can push a walker off along its trailing leg; empty if something can."""
+    """Explain why a walker cannot push off along its trailing leg; empty if it can."""
     if not isinstance(walker, CompassWalker | StraightLegs):
         free = walker.knee.at_heel_strike == "free"
         return (
@@ -434,11 +425,11 @@ def why_no_push_off(walker: Any) -> str:
     leading = walker.leg_mass_kg * (above**2 + ahead**2) + walker.leg_inertia_kg_m2
     if walker.hip_mass_kg + torso_mass(walker.torso) + leading > 0.0:
         return ""
-    return "whose impulse has nothing to push: the hip has no mass, and the leading leg's rests on its foot"
+    return "whose impulse pushes no mass: the hip has none, and the leading leg's mass is at its foot"
 
 
 def too_light_for_contact(walker: Any) -> str:
-    """Why a walker cannot stand on compliant ground; empty if it can."""
+    """Explain why a walker cannot stand on compliant ground; empty if it can."""
     share = walker.leg_mass_kg / walker.total_mass_kg if isinstance(walker, CompassWalker) else 1.0
     if share >= LIGHTEST_CONTACT:
         return ""
@@ -449,20 +440,20 @@ def too_light_for_contact(walker: Any) -> str:
 
 
 def why_no_contact(walker: Any) -> str:
-    """Why a walker cannot have a contact block, with what to do; empty if it can."""
+    """Explain why a walker cannot have a contact block, with advice; empty if it can."""
     why = too_light_for_contact(walker)
     return f"{why}; leave the contact block out, or give the legs mass" if why else ""
 
 
 def why_no_state(start: Any, walker: Any) -> str:
-    """Why a start is no state of a walker; empty if it is, or the fixed point."""
+    """Explain why a start is not a state of a walker; empty if it is, or `fixed-point`."""
     numbers = 2 * rigid_bodies(walker)
     fits = isinstance(start, str) or len(start) == numbers
     return "" if fits else f"has {len(start)} numbers, and this walker's state has {numbers}"
 
 
 def contact_to_add(walker: Any) -> str:
-    """A contact block for a walker, in YAML: the paper's numbers by mass, and ground that its legs can walk on."""
+    """Suggest a contact block in YAML: the paper's values scaled by mass, on terrain that suits the legs."""
     share, paper = walker.total_mass_kg / CompassWalker().total_mass_kg, Contact()
     stiffness, damping = (short(float(f"{share * one:.3g}")) for one in (paper.stiffness, paper.damping))
     numbers = f"stiffness: {stiffness}, damping: {damping}"
@@ -470,19 +461,18 @@ def contact_to_add(walker: Any) -> str:
 
 
 def has_knees(walker: Any) -> TypeGuard["Kneed | PartsWalker"]:
-    """Whether a walker's swing leg shortens, so that it clears plain ground."""
+    """Whether the swing leg shortens and so clears plain ground."""
     return isinstance(walker, Kneed) or (isinstance(walker, PartsWalker) and any(one.locks for one in walker.hinges))
 
 
 def why_rigid_alone(walker: Any) -> str:
-    """Why the contact model is not asked about a walker without a contact block, as a sentence."""
-    return f"The contact model was not asked: {too_light_for_contact(walker) or 'the config has no contact block'}."
+    return f"The contact model was not used: {too_light_for_contact(walker) or 'the config has no contact block'}."
 
 
 def contact_required_error(asked: str, walker: Any, instead: str) -> ConfigError:
-    """What to say where what is asked for needs contact, and the config has none.
+    """Build the error for a request that needs contact, which the config lacks.
 
-    instead  what to do about a block that is missing
+    instead  advice if only the block is missing
     """
     why = too_light_for_contact(walker)
     if why:
