@@ -343,7 +343,7 @@ def test_a_leg_length_that_the_parts_have_not_is_refused_with_the_one_they_have(
     arcs = [f"{{body: shank {leg}, centre_m: [0.02, -0.45], radius_m: 0.1}}" for leg in (1, 2)]
     assert "it is 1.05 m" in refused("extends: parts\n", [f"walker.feet=[{', '.join(arcs)}]"])
     own_frames = (BUILTIN_FOLDER / "parts.yaml").read_text().replace("centre_m: [0.0, -0.5]", "centre_m: [0.0, -0.4]")
-    assert "5:17: walker.leg_length_m: 1.0 is not what" in refused(own_frames.split("\n", 2)[2])
+    assert "5:17: walker.leg_length_m: 1.0 disagrees with" in refused(own_frames.split("\n", 2)[2])
 
 
 @pytest.mark.parametrize(
