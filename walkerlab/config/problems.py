@@ -37,7 +37,7 @@ class Problem:
 
 BEYOND_SCOPE: Final = {
     r"control|feedback|\bpid\b|\blqr\b": "walkerlab has no controllers; push_off and walker.hip drive a walker",
-    r"runner|running|hopp|jump": "walkerlab has no running: one foot of its walkers is always on the ground",
+    r"runner|running|hopp|jump": "walkerlab has no running: its walkers always have a foot on the ground",
     r"3-?d\b|three-?d|spatial|lateral": "walkerlab is planar: its walkers move in one vertical plane",
     r"quadruped|four-?leg|hexapod|monoped": "walkerlab's walkers have two legs",
 }
