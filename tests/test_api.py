@@ -125,7 +125,7 @@ def test_what_cannot_be_meant_is_refused():
         (lambda: walkerlab.find_gait(5), "walker: 5 is not a walker block"),
         (lambda: walkerlab.simulate(contact={"stiffness": 1e5}), "is not a contact block"),
         (lambda: walkerlab.basin(cells=50), r"basin\.cells: 50 is not a list"),
-        (lambda: walkerlab.continue_gait(span=0.1), r"span: 0\.1 is not two numbers"),
+        (lambda: walkerlab.continue_gait(span=0.1), r"span: 0\.1 is not a pair of numbers"),
         (lambda: walkerlab.find_gait(slope_deg="steep"), "'steep' is not a number"),
         (lambda: walkerlab.find_gait(slope_deg=3, slope_rad=0.05), "the slope is given already"),
     ],

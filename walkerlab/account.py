@@ -1,4 +1,4 @@
-"""The energy account of a walk on compliant ground: what takes energy and what gives it, with words and colours."""
+"""Energy account of a walk on compliant ground: losses and inputs with their texts and colours."""
 
 from typing import NamedTuple
 
@@ -9,7 +9,7 @@ LOST, GIVEN = slice(DAMPING, PUSH_OFF), slice(PUSH_OFF, TORQUE)
 
 
 class Loss(NamedTuple):
-    """What is said of a way to lose energy."""
+    """A way of losing energy."""
 
     key: str  # under which a walk's loss is stored
     where: str  # energy is lost

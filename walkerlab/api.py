@@ -1,4 +1,4 @@
-"""The package from Python: runs that are stored as the command line stores them, and plain objects in memory."""
+"""Python interface: runs stored as by the command line, and plain objects in memory."""
 
 import itertools
 import json
@@ -12,14 +12,14 @@ from typing import Any, TypedDict, Unpack, cast
 
 from walkerlab.config.contact import Contact
 from walkerlab.config.fields import Block, block_of, kinds_of
-from walkerlab.config.files import DEFAULT, builtin, read_layers
-from walkerlab.config.layers import stacked
-from walkerlab.config.loader import doubts
+from walkerlab.config.files import DEFAULT, builtin_config, read_layers
+from walkerlab.config.layers import merge_layers
+from walkerlab.config.loader import suspicious_values
 from walkerlab.config.overlay import tree_of
 from walkerlab.config.schema import Config
 from walkerlab.config.sweep import Sweep as SweepBlock
 from walkerlab.config.tree import NOWHERE
-from walkerlab.config.validation import on_the_slope, typed
+from walkerlab.config.validation import align_start, validate_tree
 from walkerlab.errors import ConfigError, NoAnswer, StaleError
 from walkerlab.pipeline.executor import answer_in_memory
 from walkerlab.pipeline.graph import PIPELINE
@@ -45,11 +45,11 @@ MADE_HERE: dict[str, tuple[tuple[type[Block], ...], str]] = {
 
 
 class Combined(TypedDict, total=False):
-    """How the values of a sweep's parameters are combined; what is left out is as the config has it.
+    """How a sweep combines the values of its parameters; by default as in the config.
 
-    zip     the n-th values of all keys make the n-th point
-    sample  points drawn from the intervals instead, as "sobol:64"
-    seed    of that drawing
+    zip     combine the n-th values into the n-th point
+    sample  sample points from the intervals instead, as "sobol:64"
+    seed    seed of the sampled points
     """
 
     zip: bool
@@ -59,12 +59,12 @@ class Combined(TypedDict, total=False):
 
 @dataclass(frozen=True, repr=False)
 class Result:
-    """What a stage found; printed, its headline numbers.
+    """Result of a stage; its repr shows the headline values.
 
-    stage      its name
+    stage      name of the stage
     summary    the keys that `--json` prints, SI units
     content    all labelled arrays, in groups
-    no_answer  why there is no answer, in words; None if there is one
+    no_answer  why there is no answer; None if there is one
     artifact   its file; None if it was computed in memory
     """
 
@@ -75,7 +75,6 @@ class Result:
     artifact: Path | None = None
 
     def __repr__(self) -> str:
-        """The headline numbers, and where the rest is."""
         found = headline_values(self.stage, self.summary)
         said = [f"no answer: {self.no_answer}"] if self.no_answer is not None else []
         said += [f"  {name:<{max(map(len, found))}}  {in_words(value)}" for name, value in found.items()]
@@ -84,13 +83,13 @@ class Result:
 
     @property
     def groups(self) -> tuple[str, ...]:
-        """The groups that `dataset` gives."""
+        """Names of the groups for `dataset`."""
         return tuple(path for path, group in self.content.groups.items() if group.variables)
 
     def dataset(self, group: str) -> Any:
-        """One group as an xarray Dataset, with units and long names.
+        """Return a group as an xarray Dataset with units and long names.
 
-        Raises KeyError for a group that is not there.
+        Raises KeyError for an unknown group.
         """
         if group not in self.groups:
             raise KeyError(f"{self.stage} has no group {group!r}; there are {', '.join(self.groups) or 'none'}")
@@ -99,11 +98,11 @@ class Result:
 
 @dataclass(frozen=True, repr=False)
 class Gait(Result):
-    """What `fixedpoint` found."""
+    """Result of `fixedpoint`."""
 
     @property
     def multipliers(self) -> tuple[complex, ...]:
-        """Of the chosen gait, the largest first; none if there is no gait.
+        """Multipliers of the chosen gait, largest first; empty if there is no gait.
 
         >>> gait = find_gait()
         >>> max(abs(one) for one in gait.multipliers) == gait.summary["spectral_radius"]
@@ -123,30 +122,29 @@ class Run:
     folder: RunFolder
 
     def __repr__(self) -> str:
-        """The folder, and what is in it."""
         there = [*self.stages, *self.sweeps]
         return f"Run in {self.folder.path}: {', '.join(there) or 'no results'}"
 
     @property
     def config(self) -> Config:
-        """The config that its results are of; StaleError if it cannot be told."""
+        """Config of the run's results; StaleError if it cannot be determined."""
         config = config_of(self.folder)
         if config is None:
-            raise StaleError(f"{self.folder.path} has no result that tells its config.")
+            raise StaleError(f"{self.folder.path} has no result with a readable config.")
         return config
 
     @property
     def stages(self) -> tuple[str, ...]:
-        """The stages that it has results of."""
+        """Stages with a stored result."""
         return tuple(stage.name for stage in PIPELINE.stages if self.folder.artifact(stage.name).is_file())
 
     @property
     def sweeps(self) -> tuple[str, ...]:
-        """The sweeps that it has, as `sweep` takes them."""
+        """Names of the stored sweeps, for `sweep`."""
         return tuple(sorted(path.stem for path in self.folder.path.glob("sweep-*.h5")))
 
     def result(self, stage: str) -> Result:
-        """The stored result of a stage, whether or not it is up to date; StaleError if there is none to be read."""
+        """Return the stored result of a stage, up to date or not; StaleError if it cannot be read."""
         refuse_unknown_stage(stage)
         found = result_in(self.folder, stage)
         said = found.summary.get("no_answer")
@@ -154,7 +152,7 @@ class Run:
         return result_of(stage, found.summary, found, no_answer, self.folder.artifact(stage))
 
     def sweep(self, name: str = "") -> Any:
-        """A sweep as one xarray Dataset; without a name the only one there is. StaleError if it cannot be read."""
+        """Return a sweep as an xarray Dataset; by default the only one. StaleError if it cannot be read."""
         names = self.sweeps
         if not name and len(names) != 1:
             raise StaleError(f"{self.folder.path} has {len(names)} sweeps: {', '.join(names) or 'none'}.")
@@ -195,7 +193,7 @@ def run(
     True
     """
     refuse_unknown_stage(stage)
-    resolved = resolve(str(config), settings(set), strides, folder_of(runs), name)
+    resolved = resolve(str(config), set_options(set), strides, folder_of(runs), name)
     warn(resolved.loaded.warnings)
     report = execute(resolved.loaded.config, stage, resolved.folder, Options(force=force, jobs=jobs))
     content = artifact.read(report.artifact) if report.artifact is not None else Content()
@@ -203,7 +201,7 @@ def run(
 
 
 def open_run(name: str | Path, runs: str | Path = RUNS) -> Run:
-    """A run that is stored: by its name in the folder of all runs, or by its own folder.
+    """Open a stored run by its name in the folder of all runs, or by its own folder.
 
     Raises ConfigError if there is none.
 
@@ -245,11 +243,11 @@ def sweep(
     from walkerlab.sweeps.sweep import SweepRun, SweepWork, modules_of
 
     xarray_here()  # the answer is a Dataset
-    found = resolve(str(config), settings(set), runs=folder_of(runs), name=name)
+    found = resolve(str(config), set_options(set), runs=folder_of(runs), name=name)
     warn(found.loaded.warnings)
     if not isinstance(over, Mapping):
         raise ConfigError(f"over: {over!r} is not a mapping of keys to values.", 'For example {"slope_deg": [1, 2]}.')
-    listed = [(key, values_of(key, value), f"over {key}") for key, value in over.items()]
+    listed = [(key, sweep_values(key, value), f"over {key}") for key, value in over.items()]
     block = found.loaded.config.sweep or SweepBlock()
     said: dict[str, Any] = {key: value for key, value in combined.items() if value is not None}
     question = build_sweep(stage, listed, **{"seed": block.seed, **said})
@@ -262,11 +260,11 @@ def sweep(
 
 
 def walker(type: str, **keys: Any) -> Any:
-    """A walker of any type, as a block of a config: keys that are left out have their defaults.
+    """Build a walker of any type, as a block of a config; missing keys have their defaults.
 
-    Raises ConfigError for a key or value that the type does not have.
+    Raises ConfigError for a key or value that the type does not allow.
     """
-    return typed(tree_of({"walker": {"type": type, **keys}}, NOWHERE)).walker
+    return validate_tree(tree_of({"walker": {"type": type, **keys}}, NOWHERE)).walker
 
 
 def compass(**keys: Any) -> Any:
@@ -293,7 +291,7 @@ def contact(**keys: Any) -> Contact:
     >>> contact(static_friction=0.6, dynamic_friction=0.5).stiffness
     100000.0
     """
-    made = typed(tree_of({"contact": keys}, NOWHERE)).contact
+    made = validate_tree(tree_of({"contact": keys}, NOWHERE)).contact
     assert made is not None, "a block that is given is there"
     return made
 
@@ -356,7 +354,7 @@ def continue_gait(
     keys       others of the block `continuation`, such as model; other keys of a config, such as contact, seed
     """
     ends = {} if span is None else dict(zip(("from", "to"), two_numbers("span", plain(span)), strict=True))
-    given = {"slope_deg": slope_deg, **question("continuation", keys, over=over, **ends)}
+    given = {"slope_deg": slope_deg, **stage_block("continuation", keys, over=over, **ends)}
     return in_memory("continuation", config_of_scene(walker, given, keys))
 
 
@@ -370,7 +368,7 @@ def basin(
     cells      along either axis of the window
     keys       others of the block `basin`, such as model; other keys of a config, such as seed
     """
-    given = {"slope_deg": slope_deg, **question("basin", keys, cells=cells)}
+    given = {"slope_deg": slope_deg, **stage_block("basin", keys, cells=cells)}
     return in_memory("basin", config_of_scene(walker, given, keys))
 
 
@@ -385,7 +383,7 @@ def robustness(
     walks      on each rough ground
     keys       model, steps, roughness_m and max_steps of the block `robustness`; other keys of a config
     """
-    given = {"slope_deg": slope_deg, **question("robustness", keys, to=to or None, walks=walks)}
+    given = {"slope_deg": slope_deg, **stage_block("robustness", keys, to=to or None, walks=walks)}
     return in_memory("robustness", config_of_scene(walker, given, keys))
 
 
@@ -420,11 +418,10 @@ def design(walker: Any = None, over: Mapping[str, Any] | None = None, **keys: An
     over    bounds (low, high) of numbers of the config, in the key's unit
     keys    minimise or maximise, keep (bounds of other numbers of the gait), model, starts; other keys of a config
     """
-    return in_memory("design", config_of_scene(walker, question("design", keys, over=over or {}), keys))
+    return in_memory("design", config_of_scene(walker, stage_block("design", keys, over=over or {}), keys))
 
 
-def question(stage: str, keys: dict[str, Any], **given: Any) -> dict[str, Any]:
-    """What is asked of a stage, as its block of the config: the block's own keys, out of `keys`, and those given."""
+def stage_block(stage: str, keys: dict[str, Any], **given: Any) -> dict[str, Any]:
     block = block_of(Config.model_fields[stage])
     assert block is not None, "a stage that is asked something has a block"
     own = {name: keys.pop(name) for name in block.model_fields if name in keys}
@@ -452,7 +449,7 @@ def xarray_here() -> Any:
 
 
 def in_memory(stage: str, config: Config) -> Result:
-    """A stage's result, with what it needs, without files; ConfigError if the config has not what it needs."""
+    """Compute a stage and its inputs without files; ConfigError if the config lacks a block it needs."""
     refuse_unknown_stage(stage)
     PIPELINE[stage].refuse_question(config)
     answer = answer_in_memory(config, stage, MemoryResults())
@@ -460,13 +457,13 @@ def in_memory(stage: str, config: Config) -> Result:
 
 
 def config_of_scene(walker: Any, given: Mapping[str, Any], keys: Mapping[str, Any]) -> Config:
-    """The built-in paper config with another scene and question, and with contact only if it is given.
+    """Build the paper config with another scene; contact only if `given` has it.
 
     walker  its block, or None
-    given   keys of the config with their values, blocks among them; None is left out
+    given   values and blocks by key; None is left out
     keys    further keys
 
-    Raises ConfigError for keys and values that configs do not have.
+    Raises ConfigError for unknown keys and invalid values.
     """
     named = {key: value for key, value in {"walker": walker, **given}.items() if value is not None}
     for name in named.keys() & MADE_HERE.keys():
@@ -476,48 +473,45 @@ def config_of_scene(walker: Any, given: Mapping[str, Any], keys: Mapping[str, An
     lines = {key: plain(value) for key, value in {"name": "memory", **keys, **named}.items()}
     replaced = {"source", "contact", *({"walker"} & lines.keys())}
     upper = tree_of(lines, NOWHERE)
-    tree = stacked([*(layer.without(*replaced) for layer in read_layers(builtin(DEFAULT))), upper])
-    config, moved = on_the_slope(typed(tree), tree)
-    warn([*doubts(config, tree), *moved], inside=1)
+    tree = merge_layers([*(layer.without(*replaced) for layer in read_layers(builtin_config(DEFAULT))), upper])
+    config, moved = align_start(validate_tree(tree), tree)
+    warn([*suspicious_values(config, tree), *moved], inside=1)
     return config
 
 
 def warn(said: Iterable[str], inside: int = 0) -> None:
-    """Warn at the line of who called a function of this module; `inside`: how many of its functions lie between."""
+    """Warn at the line of the caller of this module's function, `inside` functions further out."""
     for text in said:
         warnings.warn(text, stacklevel=3 + inside)
 
 
 def plain(value: Any) -> Any:
-    """A block, or NumPy's numbers, as plain values."""
     if isinstance(value, Block):
         return value.model_dump(mode="json")
     return value.tolist() if hasattr(value, "tolist") else value
 
 
 def two_numbers(name: str, values: Any) -> Sequence[Any]:
-    """The two of them; ConfigError if there are not two."""
     if not isinstance(values, Sequence) or len(values) != 2:
-        raise ConfigError(f"{name}: {values!r} is not two numbers.", f"For example {name}=(0.001, 0.09).")
+        raise ConfigError(f"{name}: {values!r} is not a pair of numbers.", f"For example {name}=(0.001, 0.09).")
     return values
 
 
-def settings(values: Mapping[str, Any] | None) -> list[str]:
-    """Values of keys as `--set` options; ConfigError if they are no mapping of keys to values."""
+def set_options(values: Mapping[str, Any] | None) -> list[str]:
+    """Convert values of keys to `--set` options; ConfigError if they are not a mapping."""
     if not isinstance(values, Mapping | NoneType):
         raise ConfigError(f"set: {values!r} is not a mapping of keys to values.", 'For example set={"slope_deg": 3}.')
     return [f"{key}={json.dumps(value)}" for key, value in (values or {}).items()]
 
 
 def folder_of(runs: Any) -> Path:
-    """The folder of all runs; ConfigError for what is no path."""
     if not isinstance(runs, str | os.PathLike):
         raise ConfigError(f"runs: {runs!r} is not a folder.", 'For example runs="runs".')
     return Path(runs)
 
 
-def values_of(key: str, given: Any) -> str | list[Any]:
-    """The values of a parameter of a sweep, or the text of a range; ConfigError for what is neither."""
+def sweep_values(key: str, given: Any) -> str | list[Any]:
+    """Return the values of a sweep's parameter, or the text of a range; ConfigError for anything else."""
     # Imported here: few callers sweep.
     from walkerlab.sweeps.question import MAX_POINTS
 
@@ -532,7 +526,6 @@ def values_of(key: str, given: Any) -> str | list[Any]:
 
 
 def refuse_unknown_stage(stage: str) -> None:
-    """Raise ConfigError for a stage that there is not."""
     names = [one.name for one in PIPELINE.stages]
     if stage not in names:
         raise ConfigError(f"{stage}: no such stage.", f"There are {', '.join(names)}.")
@@ -541,6 +534,5 @@ def refuse_unknown_stage(stage: str) -> None:
 def result_of(
     stage: str, summary: Mapping[str, Any], content: Content, no_answer: NoAnswer | None, path: Path | None = None
 ) -> Result:
-    """A result, of the type that the stage has."""
     said = None if no_answer is None else no_answer.message
     return RESULTS.get(stage, Result)(stage, summary, content, said, path)

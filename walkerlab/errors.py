@@ -1,25 +1,25 @@
-"""What can go wrong for a user, each with the exit code of the command line; everything else is a bug."""
+"""Failures that a user can act on, each with its exit code; any other exception is a bug."""
 
 import re
 from typing import Any, ClassVar, Final
 
-ADVISED: Final = re.compile(r"`(walkerlab (?!schema|open|init)[a-z-]+(?: [A-Za-z0-9-]+)*)`")
+COMMAND_PATTERN: Final = re.compile(r"`(walkerlab (?!schema|open|init)[a-z-]+(?: [A-Za-z0-9-]+)*)`")
 """A command in a text, unless it is about no run."""
 
 
-def to_type_back(text: str, typed: str) -> str:
-    """A text with the options that say which run it is about in the commands that it advises.
+def add_run_options(text: str, typed: str) -> str:
+    """Add options to the commands that a text advises.
 
-    typed  these options, with a blank in front
+    typed  options that select the run, with a blank in front
     """
-    return ADVISED.sub(lambda found: f"`{found[1]}{typed}`", text) if typed else text
+    return COMMAND_PATTERN.sub(lambda found: f"`{found[1]}{typed}`", text) if typed else text
 
 
 class WalkerlabError(Exception):
     """A failure that the user can act on.
 
-    message  what happened, in words
-    advice   what to do next; empty if there is nothing to advise
+    message  what happened
+    advice   what to do next; may be empty
     """
 
     exit_code: ClassVar[int] = 1
@@ -31,14 +31,14 @@ class WalkerlabError(Exception):
         self.advice = advice
 
     def as_json(self) -> dict[str, Any]:
-        """What `--json` has of it."""
+        """Return the error as `--json` prints it."""
         return {"message": self.message, "advice": self.advice, "exit_code": self.exit_code}
 
 
 class ConfigError(WalkerlabError):
-    """The config (file, `extends`, `--set`) is not usable; nothing was run.
+    """The config (file, `extends`, `--set`) is invalid; nothing was run.
 
-    key  path of the key that is wrong; empty where the message says where it is, or it is no key's fault
+    key  path of the key at fault; empty if the message locates the problem or no key is at fault
     """
 
     exit_code = 3
@@ -52,7 +52,7 @@ class ConfigError(WalkerlabError):
 class NoAnswer(WalkerlabError):  # noqa: N818 (no answer is a result, not an error)
     """The computation has no answer: no gait found, solver failed, budget exhausted.
 
-    partial  what was computed until then (a `store.content.Content`), or None
+    partial  results so far (a `store.content.Content`), or None
     """
 
     exit_code = 4
@@ -76,12 +76,12 @@ class StaleError(WalkerlabError):
 
 
 class LockedError(WalkerlabError):
-    """Another process holds the run folder (`--no-wait`)."""
+    """Another process holds the run folder (with `--no-wait`)."""
 
     exit_code = 6
 
 
 class StoppedError(WalkerlabError):
-    """The user stopped it (Ctrl-C)."""
+    """The user interrupted the command (Ctrl-C)."""
 
     exit_code = 130

@@ -1,4 +1,4 @@
-"""What the columns of a result are: unit and meaning, typed once, beside the field that holds the values."""
+"""Labels of a result's columns: unit and meaning, declared next to the field that holds the values."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -23,14 +23,14 @@ ERROR_OF_EACH_STEP: Final = {
 
 @dataclass(frozen=True)
 class Label:
-    """Unit and meaning of a field or property of a row, to be put into `Annotated`; without one it is not stored.
+    """Unit and meaning of a field or property of a row, used in `Annotated`; unlabelled fields are not stored.
 
     unit    "1" for a pure number, "" for text
-    text    what it is, in words
-    dims    of a row's values; () where there is one
-    timing  a measured run time, or what shows one
-    absent  stands where there is no value; None leaves a gap
-    name    under which it is stored, where that is not the field's
+    text    meaning
+    dims    dimensions of a row's value; () for a scalar
+    timing  whether it is a measured run time or derived from one
+    absent  substitute for a missing value; None leaves a gap
+    name    stored name, if not the field's
     """
 
     unit: str
@@ -43,7 +43,7 @@ class Label:
 
 @cache
 def labels_of(row: type) -> Mapping[str, Label]:
-    """The labels of a class of rows, by field and property."""
+    """Return the labels of a row class by field and property."""
     properties = [(name, one.fget) for name, one in vars(row).items() if isinstance(one, property)]
     returned = {name: get_type_hints(getter, include_extras=True)["return"] for name, getter in properties}
     hints = get_type_hints(row, include_extras=True) | returned
@@ -51,21 +51,21 @@ def labels_of(row: type) -> Mapping[str, Label]:
 
 
 def unit_ending(name: str) -> str:
-    """What tells the unit at the end of a name, as m_s of velocity_m_s; empty if nothing does."""
+    """Return the unit suffix of a name, as m_s of velocity_m_s; may be empty."""
     return max((ending for ending in UNITS if name.endswith(f"_{ending}")), key=len, default="")
 
 
 def unit_by_name(name: str) -> str:
-    """The unit that a name ends in; '1' for none."""
+    """Return the unit in a name's suffix; '1' if there is none."""
     return UNITS.get(unit_ending(name), "1")
 
 
 def in_words(key: str) -> str:
-    """A key or a name without its unit, as an axis says it: thigh mass of walker.thigh.mass_kg."""
+    """Turn a key into an axis label without unit: thigh mass for walker.thigh.mass_kg."""
     ending = unit_ending(key)
     return key.removeprefix("walker.").removesuffix(f"_{ending}" if ending else "").replace("_", " ").replace(".", " ")
 
 
 def with_unit(words: str, unit: str) -> str:
-    """Words with a unit in brackets; a pure number, and text, have none."""
+    """Append a unit in parentheses, unless it is '' or '1'."""
     return words if unit in ("", "1") else f"{words} ({unit})"

@@ -1,11 +1,11 @@
-"""How a walk ends: a value with its words, advice and colour, never an exception."""
+"""Outcomes of walks: values with texts, advice and colour, never exceptions."""
 
 from enum import IntEnum
 from typing import NamedTuple
 
 
 class Outcome(IntEnum):
-    """Fate of a walk; the number is what kernels return, and TOLD what is said of it."""
+    """How a walk ends; kernels return the integer."""
 
     WALKED = 0
     FELL = 1
@@ -21,37 +21,37 @@ class Outcome(IntEnum):
 
     @property
     def label(self) -> str:
-        """The outcome as it is written in tables and JSON."""
+        """Name in tables and JSON."""
         return self.name.lower().replace("_", "-")
 
     @property
     def answered(self) -> bool:
-        """Whether the question was answered: a walker that falls is an answer, a failed solver is not."""
+        """Whether the walk gives an answer: a fall does, a failed solver does not."""
         return self not in (Outcome.BUDGET_EXHAUSTED, Outcome.SOLVER_FAILED)
 
     @property
     def stumbled(self) -> bool:
-        """Whether the walker itself could not go on."""
+        """Whether the walker itself could not continue."""
         return self.answered and self not in (Outcome.WALKED, Outcome.REJECTED)
 
     @property
     def advice(self) -> str:
-        """What the outcome means and what to try next."""
+        """Meaning of the outcome and what to try next."""
         return TOLD[self].advice
 
     @property
     def advice_on_uneven_ground(self) -> str:
-        """The same over footholds of different heights, which may end the walk of the best start."""
-        return UNEVEN.get(self, self.advice)
+        """Advice for uneven ground, which may stop a walk from any start."""
+        return ADVICE_ON_UNEVEN_GROUND.get(self, self.advice)
 
 
 def outcome_of(label: str) -> Outcome | None:
-    """The outcome of a label; None if this version knows none."""
+    """Return the outcome with a label; None if it is unknown."""
     return next((one for one in Outcome if one.label == label), None)
 
 
 class OutcomeWords(NamedTuple):
-    """What is said of an outcome."""
+    """Texts and colour of an outcome."""
 
     does: str  # what a walker does in the end
     did: str  # what walks did, behind how many
@@ -66,7 +66,7 @@ TOLD = {
         "walked on",
         "",
         "#56B4E9",
-        "The walker took every step it was asked for.",
+        "The walker took every requested step.",
     ),
     Outcome.FELL: OutcomeWords(
         "falls",
@@ -108,7 +108,7 @@ TOLD = {
     Outcome.BUDGET_EXHAUSTED: OutcomeWords(
         "exhausts its evaluation budget",
         "ran out of function evaluations",
-        "a step takes more function evaluations than it may",
+        "a step exceeds its evaluation budget",
         "#000000",
         "The run exhausted its evaluation budget; loosen solver.*.rtol, soften the contact, or ask for fewer strides.",
     ),
@@ -125,7 +125,7 @@ TOLD = {
         "began in a state that is not allowed",
         "its push-off is not over when the feet pass each other",
         "#FFFFFF",
-        "The start is not a state this walker can be in.",
+        "The start is not a possible state of this walker.",
     ),
     Outcome.BENT_KNEE: OutcomeWords(
         "lands on a bent knee",
@@ -144,15 +144,15 @@ TOLD = {
         "try contact.terrain: after-mid-swing.",
     ),
 }
-ON_EVEN_GROUND = (
+TRY_EVEN_GROUND = (
     "lower the footholds (ground.heights_m, ground.roughness_m). On even ground (ground.roughness_m: 0) the same start "
     "shows whether it walks at all, and `walkerlab robustness` shows how rough a ground the gait survives."
 )
-UNEVEN = {
+ADVICE_ON_UNEVEN_GROUND = {
     Outcome.FELL: "On this uneven ground the hip came below half a leg above the slope or, in the rigid model, a foot "
-    f"landed less than a quarter of a step ahead; {ON_EVEN_GROUND}",
+    f"landed less than a quarter of a step ahead; {TRY_EVEN_GROUND}",
     Outcome.NO_HEEL_STRIKE: "On this uneven ground the swing foot did not come down within ten pendulum times; "
-    f"{ON_EVEN_GROUND}",
-    Outcome.BENT_KNEE: f"On this uneven ground a foot came down on a knee that had not locked; {ON_EVEN_GROUND}",
+    f"{TRY_EVEN_GROUND}",
+    Outcome.BENT_KNEE: f"On this uneven ground a foot came down on a knee that had not locked; {TRY_EVEN_GROUND}",
 }
 """What the outcome of a walk over footholds of different heights means and what to try next, where that differs."""

@@ -1,4 +1,4 @@
-"""Sentences as templates with numbers: a file for each subject, and in it a macro for each paragraph."""
+"""Texts as Jinja templates: a file per subject with a macro per paragraph."""
 
 from __future__ import annotations
 
@@ -19,32 +19,31 @@ BETWEEN_PARTS = re.compile(r"(?:^|[ \n])\|(?=[ \n]|$)")
 
 
 def parts(text: str) -> list[str]:
-    """The parts of a text, those that say something."""
+    """Split a text at its | marks, dropping empty parts."""
     return [said for part in BETWEEN_PARTS.split(text) if (said := part.strip(" \n"))]
 
 
 def f(value: float, spec: str) -> str:
-    """A number in a format of Python's, such as .4f."""
+    """Format a number by a format specification, such as .4f."""
     return format(value, spec)
 
 
 def percent(share: float, digits: int = 3) -> str:
-    """A share in percent."""
     return f"{100.0 * share:.{digits}g} %"
 
 
 def listed(parts: Iterable[str]) -> str:
-    """Join words in a row: 'a', 'a and b', 'a, b and c'."""
+    """Join words: 'a', 'a and b', 'a, b and c'."""
     words = list(parts)
     return " and ".join([", ".join(words[:-1]), words[-1]]) if len(words) > 1 else "".join(words)
 
 
 @dataclass(frozen=True)
 class Prose:
-    """The paragraphs of a folder, as plain text.
+    """The paragraphs in a folder of templates, as plain text.
 
-    filters  what templates may call, by its name; an unknown name is an error
-    known    what they know besides what they are given
+    filters  functions that templates may call by name; an unknown name is an error
+    known    global values of the templates
     """
 
     folder: Path
@@ -53,7 +52,6 @@ class Prose:
 
     @cached_property
     def templates(self) -> Environment:
-        """Its templates."""
         # Imported here: what says nothing needs no templates.
         from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
@@ -63,19 +61,19 @@ class Prose:
         return made
 
     def __call__(self, name: str, *values: Any) -> str:
-        """A paragraph on one line.
+        """Render a paragraph on one line.
 
         name    file.macro
-        values  what the macro takes
+        values  arguments of the macro
         """
         file, _, macro = name.partition(".")
         said = getattr(self.templates.get_template(f"{file}.j2").module, macro)(*values)
         return BLANKS.sub(" ", said).strip()
 
     def parts(self, name: str, *values: Any) -> list[str]:
-        """The paragraphs, or words, that a macro sets apart by |."""
+        """Split a text at its | marks, dropping empty parts."""
         return parts(self(name, *values))
 
     def terms(self, name: str, *values: Any) -> dict[str, str]:
-        """Words and what they mean, which a macro has as parts of the form 'word: meaning'."""
+        """Return words and meanings of a macro whose parts have the form 'word: meaning'."""
         return {word: meaning for word, _, meaning in (part.partition(": ") for part in self.parts(name, *values))}

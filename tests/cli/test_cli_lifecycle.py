@@ -12,7 +12,7 @@ import pytest
 
 from walkerlab.cli.request import Request
 from walkerlab.config.loader import load, safe_name
-from walkerlab.errors import to_type_back
+from walkerlab.errors import add_run_options
 
 
 def test_a_config_that_init_wrote_is_accepted_and_names_its_schema(walker):
@@ -109,7 +109,7 @@ def test_rerun_says_whether_a_result_comes_out_again(toy):
     artifact = "runs/paper/roll.h5"
     done = toy("rerun", artifact)
     assert done.returncode == 0
-    assert "is reproduced to the last bit" in done.stdout
+    assert "is reproduced bit for bit" in done.stdout
     source = toy.folder.parent / "source" / "toy" / "physics.py"
     source.write_text(source.read_text().replace("math.sqrt(2", "math.sqrt(3"))
     done = toy("rerun", artifact, "--json")
@@ -187,7 +187,7 @@ def test_advice_can_be_typed_back(toy):
     done = toy("show", "roll", "--strides", "3", "--set", "slope_deg=2")
     assert "advice: `walkerlab roll --set slope_deg=2 --set strides=3` creates it." in done.stderr
     typed = Request("simulate", sets=["start=[0, 1, 2, 3]"]).typed
-    assert to_type_back("`walkerlab status` or `walkerlab schema`", typed) == (
+    assert add_run_options("`walkerlab status` or `walkerlab schema`", typed) == (
         "`walkerlab status --set 'start=[0, 1, 2, 3]'` or `walkerlab schema`"
     )
 
@@ -266,8 +266,8 @@ def test_a_link_is_followed_and_not_replaced(walker):
 @pytest.mark.parametrize(
     ("target", "said"),
     [
-        ("mine.yaml", "mine.yaml is what this command reads"),
-        ("base.yaml", "base.yaml is what this command reads"),
+        ("mine.yaml", "mine.yaml is an input of this command"),
+        ("base.yaml", "base.yaml is an input of this command"),
         (".", ". is a folder"),
     ],
 )

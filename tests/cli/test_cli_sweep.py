@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from walkerlab.cli.clean import listed
+from walkerlab.cli.clean import file_lines
 from walkerlab.cli.runs import lines, percent
 from walkerlab.pipeline.headlines import MOST
 from walkerlab.pipeline.runs import Pair, difference
@@ -56,7 +56,7 @@ def test_a_dry_run_lists_points_and_touches_nothing(swept):
     before = sorted(toy.folder.rglob("*"))
     text = toy(*SWEEP, "--over", "gravity_m_s2=1:9:5", "--set", "slope_rad=0.1", "--dry-run").stdout
     assert "  gravity_m_s2=3.0" in text
-    assert "5 points, 3 computed already, 2 to compute" in text
+    assert "5 points, 3 already computed, 2 to compute" in text
     assert sorted(toy.folder.rglob("*")) == before
 
 
@@ -96,7 +96,7 @@ def test_clean_says_of_a_sweep_s_chunks_how_many_there_are_and_not_which(swept):
 
 def test_many_files_of_a_kind_are_told_in_one_line_with_their_size():
     files = [Path(f"runs/a/sweep-chunks/drop-1234-{n}.h5") for n in range(300)] + [Path("runs/a/drop.h5")]
-    assert listed(files, dict.fromkeys(files, 10_000)) == [
+    assert file_lines(files, dict.fromkeys(files, 10_000)) == [
         "runs/a/sweep-chunks/drop-1234-* (300 files, 3.0 MB)",
         "runs/a/drop.h5",
     ]
@@ -140,7 +140,7 @@ def test_diff_of_unequal_walks_prints_few_lines_and_all_on_request():
         ["last_step_period_s", "0.7", "0.8", "+14.3", "%"]
     ]
     assert len(short) <= 2 + 2 + MOST + 1
-    assert short[-1] == "500 other numbers and words differ; --all shows them"
+    assert short[-1] == "500 other values differ; list them with --all"
     assert len(whole) > 500
 
 

@@ -321,7 +321,7 @@ def test_a_config_that_a_stranger_stored_with_a_result_opens_no_file(toy, config
     artifact.write(path, stored, stored.identity, replace(stored.provenance, config=config))
     done = toy("drop", "-c", "runs/paper/drop.h5")
     assert done.returncode == 3
-    assert "a config that is stored with a result names a file to be read" in done.stderr
+    assert "a stored config refers to a file" in done.stderr
     assert "hostname" not in done.stderr
 
 

@@ -210,7 +210,7 @@ def test_a_resolved_start_resolves_to_itself(loaded: Loaded) -> None:
         (
             "extends: paper\ncontact:\n  static_friction: 0.5\n",
             r"mine.yaml:3:20: contact.static_friction: contact.dynamic_friction stays 0.7, as built-in paper.yaml has "
-            r"it, and must not exceed static_friction, 0.5; allowed: dynamic_friction set as well",
+            r"it, and must not exceed static_friction, 0.5; allowed: set contact.dynamic_friction too",
         ),
         (
             "extends: paper\ncontact:\n  stiction_velocity: 2000\n",
@@ -260,7 +260,7 @@ def test_a_resolved_start_resolves_to_itself(loaded: Loaded) -> None:
             "contact:\n  stiffness: 1e5\n  static_friction: 0.5\n",
             r"mine.yaml:3:20: contact.dynamic_friction: 0.7 \(its default\) must not exceed static_friction, 0.5",
         ),
-        ("contact: {units: si, stiction_velocity: 100}\n", r"must be from 1e-07 to 10 m/s, as `units: si` has it"),
+        ("contact: {units: si, stiction_velocity: 100}\n", r"must be from 1e-07 to 10 m/s, with `units: si`"),
         ("slope_deg: 90\n", r"1:12: slope_deg: 90 is out of bounds; allowed: number, between -90 and 90"),
         ("slope_deg: steep\n", r"slope_deg: 'steep' is not a number"),
         (
@@ -338,12 +338,12 @@ def test_a_key_of_another_type_is_told_with_those_of_its_own(refused: Refused) -
 
 def test_a_leg_length_that_the_parts_have_not_is_refused_with_the_one_they_have(refused: Refused) -> None:
     message = refused("extends: parts\n", ["walker.leg_length_m=1.2"])
-    assert "--set walker.leg_length_m=1.2: walker.leg_length_m: 1.2 is not what the parts have" in message
+    assert "--set walker.leg_length_m=1.2: walker.leg_length_m: 1.2 disagrees with the parts" in message
     assert "it is 1 m" in message
     arcs = [f"{{body: shank {leg}, centre_m: [0.02, -0.45], radius_m: 0.1}}" for leg in (1, 2)]
     assert "it is 1.05 m" in refused("extends: parts\n", [f"walker.feet=[{', '.join(arcs)}]"])
     own_frames = (BUILTIN_FOLDER / "parts.yaml").read_text().replace("centre_m: [0.0, -0.5]", "centre_m: [0.0, -0.4]")
-    assert "5:17: walker.leg_length_m: 1.0 is not what" in refused(own_frames.split("\n", 2)[2])
+    assert "5:17: walker.leg_length_m: 1.0 disagrees with" in refused(own_frames.split("\n", 2)[2])
 
 
 @pytest.mark.parametrize(

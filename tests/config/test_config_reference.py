@@ -6,7 +6,7 @@ from pathlib import Path
 
 from walkerlab.config.drives import Hip
 from walkerlab.config.fields import leaves, leaves_of_other_kinds
-from walkerlab.config.reference import as_json_schema, asked_for, keys
+from walkerlab.config.reference import as_json_schema, keys, select_keys
 from walkerlab.config.schema import METHODS, Config
 
 
@@ -19,11 +19,11 @@ def test_every_key_is_in_the_reference_and_so_are_the_two_of_files() -> None:
 
 
 def test_a_key_that_every_type_of_walker_has_is_listed_once() -> None:
-    assert [row.key.rpartition(".")[2] for row in asked_for("walker.hip")] == [*Hip.model_fields]
-    assert [row.key for row in asked_for("walker.foot_centre_ahead_m")] == [
+    assert [row.key.rpartition(".")[2] for row in select_keys("walker.hip")] == [*Hip.model_fields]
+    assert [row.key for row in select_keys("walker.foot_centre_ahead_m")] == [
         "walker(straight-legs).foot_centre_ahead_m", "walker(kneed).foot_centre_ahead_m",
     ]  # fmt: skip
-    assert [row.key for row in asked_for("walker(kneed).hip.torque_N_m")] == ["walker(kneed).hip.torque_N_m"]
+    assert [row.key for row in select_keys("walker(kneed).hip.torque_N_m")] == ["walker(kneed).hip.torque_N_m"]
 
 
 def test_each_row_has_type_bounds_default_meaning_and_source() -> None:

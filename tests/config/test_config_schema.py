@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from walkerlab.config import schema
-from walkerlab.config.fields import Block, extra, leaves
+from walkerlab.config.fields import Block, annotation_of, leaves
 from walkerlab.config.loader import load
 from walkerlab.config.schema import METHODS, CompassWalker, Config, Contact, SolverSettings
 from walkerlab.errors import ConfigError
@@ -57,9 +57,9 @@ def test_a_config_cannot_be_changed_and_can_be_a_key() -> None:
 @pytest.mark.parametrize("field", [pytest.param(field, id=".".join(path)) for path, field in leaves(Config)])
 def test_every_key_has_a_meaning_a_source_and_a_unit_if_it_is_a_number(field: Any) -> None:
     assert field.description
-    assert extra(field, "source")
+    assert annotation_of(field, "source")
     if field.annotation in (float, int):
-        assert extra(field, "unit")
+        assert annotation_of(field, "unit")
 
 
 @pytest.mark.parametrize(

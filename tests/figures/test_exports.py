@@ -114,7 +114,7 @@ def test_format_and_file_mean_the_same_everywhere(run, tmp_path):
 
 def test_nothing_is_overwritten_in_silence(run, capsys):
     target = Target("csv", Path("walk.csv"))
-    for model, told in (("simulate", ""), ("simulate", ""), ("contact-sim", "walk.csv was there and is replaced.")):
+    for model, told in (("simulate", ""), ("simulate", ""), ("contact-sim", "walk.csv existed and was replaced.")):
         export_from(run, "trajectory", target, 252.0, model, Console())
         assert told in capsys.readouterr().err
 

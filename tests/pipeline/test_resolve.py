@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from walkerlab.config.files import builtin
+from walkerlab.config.files import builtin_config
 from walkerlab.errors import ConfigError
 from walkerlab.pipeline.resolve import resolve
 
@@ -17,7 +17,7 @@ from walkerlab.pipeline.resolve import resolve
     ],
 )
 def test_parts_that_make_no_walker_are_refused_with_their_place(tmp_path, old, new, said):
-    whole = builtin("parts").path.read_text()
+    whole = builtin_config("parts").path.read_text()
     assert old in whole
     file = tmp_path / "mine.yaml"
     file.write_text(whole.replace(old, new, 1))

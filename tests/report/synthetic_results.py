@@ -1,6 +1,5 @@
-"""A small run as the report gets it: results made by hand, in the layout that the stages store."""
+"""A small run as the report gets it: a real walk, with summaries of round values, in the layout that stages store."""
 
-import math
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -10,12 +9,12 @@ import numpy as np
 from walkerlab.config.loader import load
 from walkerlab.figures.registry import FIGURES
 from walkerlab.paper.errata import Erratum
-from walkerlab.stages.walk import legs, over_time
 from walkerlab.store.artifact import Stored
 from walkerlab.store.content import Group, Variable
 from walkerlab.store.key import Identity
 
 sys.path.append(str(Path(__file__).parent.parent / "figures"))
+from real_results import first_steps
 from synthetic_families import families
 from synthetic_maps import stability_maps
 from synthetic_methods import measured_methods
@@ -81,37 +80,17 @@ def simulate(outcome="walked", steps=STEPS, **changed):
         "max_friction_ratio": 0.19,
         "max_scuff_depth_m": 0.00037,
     }
-    return stored("simulate", {"trajectory": rigid_trajectory(steps)}, walk(outcome, steps, **(checked | changed)))
+    trajectory = {"trajectory": first_steps("simulate", steps)}
+    return stored("simulate", trajectory, walk(outcome, steps, **(checked | changed)))
 
 
-def rigid_trajectory(steps):
-    """Legs that swing like clockwork, feet together at the heel strikes."""
-    time = np.linspace(0.0, max(steps, 1) * PERIOD, 40 * max(steps, 1) + 1)
-    step = np.minimum((time / PERIOD).astype(int), max(steps, 1) - 1)
-    spread = math.asin(LENGTH / 2) * np.cos(np.pi * (time / PERIOD))
-    angle = np.column_stack((-spread, spread)) - SLOPE
-    stance = 1 - step % 2
-    tilted = angle + SLOPE
-    leg = np.stack((np.sin(tilted), -np.cos(tilted)), axis=-1)
-    hip = np.column_stack((LENGTH * step, 0.0 * step)) - leg[np.arange(step.size), stance]
-    feet = hip[:, None] + leg
-    places = {"hip_along_m": hip[:, 0], "hip_height_m": hip[:, 1], "foot_along_m": feet[..., 0]}
-    places |= {"foot_height_m": feet[..., 1]}
-    seen = over_time(time=time, stance_leg=stance + 1, angle=angle, **places)
-    return Group({**seen, **legs(), "step": column(step, "time")})
-
-
-def contact_sim(outcome="walked", steps=STEPS, hip=0.98, **changed):
-    time = np.linspace(0.0, max(steps, 1) * PERIOD, 60)
-    feet = np.column_stack((0.5 * time - 0.1, 0.5 * time + 0.1))
-    seen = over_time(
-        time=time,
-        angle=np.zeros((60, 2)),
-        hip_along_m=0.5 * time,
-        hip_height_m=np.linspace(0.98, hip, 60),
-        foot_along_m=feet,
-        foot_height_m=np.zeros((60, 2)),
-    )
+def contact_sim(outcome="walked", steps=STEPS, hip=None, **changed):
+    """The walk on compliant ground; `hip` the height at which the hip ends instead."""
+    trajectory = first_steps("contact-sim", steps)
+    if hip is not None:
+        ends = trajectory.variables["hip_height_m"]
+        lowered = replace(ends, values=np.append(ends.values[:-1], hip))
+        trajectory = Group({**trajectory.variables, "hip_height_m": lowered}, trajectory.attrs)
     numbers = {
         "end_time_s": max(steps, 1) * PERIOD,
         "max_penetration_m": 1.2e-4,
@@ -125,45 +104,15 @@ def contact_sim(outcome="walked", steps=STEPS, hip=0.98, **changed):
         "pitch_m": LENGTH,
         "friction": "creeping friction of its own kind",
     }
-    return stored("contact-sim", {"trajectory": Group({**seen, **legs()})}, walk(outcome, steps, **(numbers | changed)))
-
-
-def with_motion(result):
-    """The same result, whose trajectory also has what the player's other views show: velocities, energies, forces."""
-    trajectory = result.groups["trajectory"]
-    time = trajectory["time"]
-    wave = np.sin(9.0 * time)
-    both = np.column_stack((wave, -wave))
-    more = over_time(
-        velocity=both, kinetic_J=4.0 + wave, potential_J=146.0 - wave, mechanical_J=np.full_like(wave, 150.0)
-    )
-    if result.identity.stage == "contact-sim":
-        loaded = np.column_stack((wave > 0.0, wave <= 0.0))
-        more |= over_time(
-            angle=0.2 * both,
-            normal_force_N=196.0 * loaded,
-            friction_force_N=10.0 * both * loaded,
-            penetration_m=6e-5 * np.abs(both) * loaded,
-            slip_velocity_m_s=1e-3 * both,
-        )
-    groups = {**result.groups, "trajectory": Group({**trajectory.variables, **more})}
-    return stored(result.identity.stage, groups, result.summary)
+    return stored("contact-sim", {"trajectory": trajectory}, walk(outcome, steps, **(numbers | changed)))
 
 
 def families_that_move(walk):
     """A family of gaits, two of which move as a walk does."""
     family = families()["continuation"]
     seen = walk.groups["trajectory"].variables
-    time = seen["time"].values
-    feet = np.column_stack((0.6 * time, 0.5 * time))
-    joints = over_time(
-        hip_along_m=0.5 * time,
-        hip_height_m=np.full_like(time, 0.98),
-        foot_along_m=feet,
-        foot_height_m=np.zeros_like(feet),
-    )
     two = {
-        f"rigid/branch_0/motion_{place}": Group({**seen, **joints}, {"value": value, "slope_rad": slope, "steps": 1})
+        f"rigid/branch_0/motion_{place}": Group(seen, {"value": value, "slope_rad": slope, "steps": 1})
         for place, value, slope in ((0, 1.0, 0.02), (3, 5.0, 0.09))
     }
     return stored("continuation", {**family.groups, **two}, family.summary)

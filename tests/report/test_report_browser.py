@@ -9,12 +9,10 @@ from browser import Browser, executable
 from synthetic_results import (
     EVERYTHING,
     config,
-    contact_sim,
     families_that_move,
     plotted,
     simulate,
     stored,
-    with_motion,
 )
 
 from walkerlab.config.schema import Source
@@ -41,7 +39,6 @@ SCRUB = "(() => {{ const s = document.querySelector('.time'); s.value = {}; s.di
 def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("paper")
     made = {name: make() for name, make in EVERYTHING.items()}
-    made |= {"simulate": with_motion(simulate()), "contact-sim": with_motion(contact_sim())}
     figure = {"title": "Legs", "caption": "Both.", "number": 7, "alt": "Two lines.", "svg": "a.svg", "png": "a.png"}
     (folder / "a.svg").write_text(
         '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 9 9"><path d="M0 0L9 9"/></svg>'
@@ -100,7 +97,7 @@ def hostile_folder(tmp_path_factory):
     }
     asked = config().model_copy(update={"name": HOSTILE, "source": Source(**source)})
     fallen = simulate("fell", advice=HOSTILE)
-    made = {"fixedpoint": EVERYTHING["fixedpoint"](), "simulate": with_motion(fallen)}
+    made = {"fixedpoint": EVERYTHING["fixedpoint"](), "simulate": fallen}
     made = {name: replace(one, provenance=replace(one.provenance, command_line=HOSTILE)) for name, one in made.items()}
     figure = {"title": HOSTILE, "caption": HOSTILE, "alt": HOSTILE, "number": 7, "svg": "a.svg", "png": "a.png"}
     (folder / "a.svg").write_text(DRAWING)
@@ -209,7 +206,6 @@ def folder_with_figures(tmp_path_factory):
     """The same report with figures as they are drawn."""
     folder = tmp_path_factory.mktemp("drawn")
     made = {name: make() for name, make in EVERYTHING.items()}
-    made |= {"simulate": with_motion(simulate()), "contact-sim": with_motion(contact_sim())}
     made["continuation"] = families_that_move(made["simulate"])
     made["plot"] = plotted(folder)
     write_pages(config(), made, folder)

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from synthetic_results import config, families, families_that_move, simulate, with_motion
+from synthetic_results import config, families, families_that_move, simulate
 
 from walkerlab.config.loader import load
 from walkerlab.report.results import Results
@@ -40,7 +40,7 @@ def test_what_the_ground_ends_is_told_of_gaits_of_one_step_and_of_basins():
 
 
 def test_the_diagram_marks_gaits_whose_motion_is_stored():
-    walk = with_motion(simulate())
+    walk = simulate()
     made = gait_diagram(Results(config(), {"continuation": families_that_move(walk)}))
     first, second = made.gaits
     assert (first.stable, second.stable) == (True, False)
@@ -51,7 +51,7 @@ def test_the_diagram_marks_gaits_whose_motion_is_stored():
 
 
 def test_no_mark_covers_another_and_stable_gaits_keep_theirs():
-    walk = with_motion(simulate())
+    walk = simulate()
     (mark, _) = gait_diagram(Results(config(), {"continuation": families_that_move(walk)})).gaits
     near, far = replace(mark, x=mark.x + 0.9 * CLEAR), replace(mark, x=mark.x + CLEAR)
     assert apart([mark, near, far]) == (mark, far)

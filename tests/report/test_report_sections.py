@@ -8,12 +8,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from real_results import real
 from synthetic_results import (
     COORDINATES,
     EVERYTHING,
-    LENGTH,
     PAPER_ROWS,
-    PERIOD,
     SLOPE,
     compare,
     config,
@@ -93,11 +92,11 @@ def test_without_contact_the_lead_alone_says_that_it_was_not_asked():
     spoken = " ".join(texts(found[name]) for name in found if name != "provenance").lower()
     assert "contact" not in spoken
     said = lead(config("contact=null"), "rigid-only")
-    assert said.endswith("alone. The contact model was not asked: the config has no contact block.")
+    assert said.endswith("alone. The contact model was not used: the config has no contact block.")
     assert said.lower().count("contact") == 2
     assert lead(config(), "paper").endswith("as a rigid model and as one with contact.")
     simplest = load(Path("simplest")).config
-    assert "not asked: the walker's feet have next to no mass" in lead(simplest, "simplest")
+    assert "not used: the walker's feet have next to no mass" in lead(simplest, "simplest")
 
 
 def test_a_slope_without_a_gait_is_said_in_words_first():
@@ -390,9 +389,10 @@ def test_stick_figures_stand_where_the_walker_stood():
         reach = np.hypot(found["hx"] - found[f"fx{leg}"], found["hy"] - found[f"fy{leg}"])
         assert np.allclose(reach, 1.0, atol=1e-6)
     # The first leg swings from a step behind the foothold to a step ahead, where it then stands.
-    assert found["fx0"][0] == pytest.approx(-LENGTH, abs=1e-6)
-    second = np.abs(found["t"] - 1.5 * PERIOD).argmin()
-    assert (found["fx0"][second], found["fy0"][second]) == pytest.approx((LENGTH, 0.0), abs=2e-3)
+    gait = real("fixedpoint").summary
+    assert found["fx0"][0] == pytest.approx(-gait["step_length_m"], abs=1e-6)
+    second = np.abs(found["t"] - 1.5 * gait["period_s"]).argmin()
+    assert (found["fx0"][second], found["fy0"][second]) == pytest.approx((gait["step_length_m"], 0.0), abs=2e-3)
     assert (found["fx1"][0], found["fy1"][0]) == pytest.approx((0.0, 0.0), abs=1e-6)
 
 

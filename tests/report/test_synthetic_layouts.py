@@ -6,25 +6,9 @@ import pytest
 import synthetic_results
 import synthetic_tune
 import synthetic_walks
+from real_results import real
 from synthetic_families import families
 
-from walkerlab.config.loader import load
-from walkerlab.orbits import plane
-from walkerlab.pipeline.executor import answer_in_memory
-from walkerlab.pipeline.results import MemoryResults
-
-SMALL = {
-    "fixedpoint": (),
-    "simulate": (),
-    "contact-sim": (),
-    "compare": (),
-    "tune": ("tune.cells=3", "tune.rigid_limit=false"),
-    "continuation": (
-        "continuation.over=slope_deg", "continuation.from=4.3", "continuation.to=5.05", "continuation.periods=2",
-        "continuation.points=10", "continuation.model=rigid",
-        "continuation.second={over: walker.hip_mass_kg, from: 9.5, to: 10.5}",
-    ),
-}  # fmt: skip
 MADE = {
     "walks that the report gets": {
         name: one() for name, one in synthetic_results.EVERYTHING.items() if name != "compare"
@@ -37,22 +21,6 @@ MADE = {
 }
 CASES = [(title, stage) for title, results in MADE.items() for stage in results]
 NO_LIMIT = "limit"  # takes seconds: its columns are asked for by paper/figures.py
-
-
-@pytest.fixture(scope="module")
-def real():
-    """What stages store of small runs of the paper's walker, computed as they are asked for."""
-    memory, known = MemoryResults(), {}
-
-    def stored(stage):
-        if stage not in known:
-            config = load(None, ["strides=1", *SMALL[stage]]).config
-            with pytest.MonkeyPatch.context() as patch:
-                patch.setattr(plane, "CELLS", (3, 2))
-                known[stage] = answer_in_memory(config, stage, memory)
-        return known[stage]
-
-    return stored
 
 
 def kinds(groups):
@@ -73,7 +41,7 @@ def keys(summary):
 
 
 @pytest.mark.parametrize(("title", "stage"), CASES)
-def test_what_is_made_by_hand_is_laid_out_as_it_is_stored(real, title, stage):
+def test_what_is_made_by_hand_is_laid_out_as_it_is_stored(title, stage):
     made, stored = MADE[title][stage], real(stage)
     there = kinds(stored.groups)
     for path, variables in kinds(made.groups).items():

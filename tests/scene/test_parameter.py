@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from walkerlab.config.fields import kind, leaves, leaves_of_other_kinds
+from walkerlab.config.fields import leaves, leaves_of_other_kinds, type_words
 from walkerlab.config.loader import load
 from walkerlab.config.schema import Config
 from walkerlab.errors import ConfigError
@@ -44,7 +44,7 @@ def numbers_of(config):
         held = config
         for name in path:
             held = getattr(held, name, None)
-        if path[0] in PHYSICAL and "number" in kind(field.annotation) and isinstance(held, int | float):
+        if path[0] in PHYSICAL and "number" in type_words(field.annotation) and isinstance(held, int | float):
             yield ".".join(path)
 
 

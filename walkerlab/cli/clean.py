@@ -13,11 +13,11 @@ from walkerlab.store.runfolder import RunFolder
 
 
 def clean_folders(request: Request, every: bool, stages: Sequence[str], yes: bool) -> None:
-    """Remove the files of these stages from run folders, once the user agrees, and folders with nothing else in them.
+    """Delete the files of these stages from run folders, once confirmed, and folders left empty.
 
-    every  all runs in the folder of all runs, instead of the one that is meant
+    every  clean all runs instead of the request's
 
-    Raises typer.BadParameter if nobody can be asked, LockedError (only with `--no-wait`) and StorageError.
+    Raises typer.BadParameter without a terminal to confirm on, LockedError (with `--no-wait`) and StorageError.
     """
     if every:
         there = sorted(path.name for path in request.runs.iterdir() if path.is_dir()) if request.runs.is_dir() else []
@@ -30,7 +30,7 @@ def clean_folders(request: Request, every: bool, stages: Sequence[str], yes: boo
     where = folders[0].path if len(folders) == 1 else request.runs
     if files and not (yes or request.dry_run):
         if not sys.stdin.isatty():
-            raise typer.BadParameter("there is no terminal to ask on; say --yes", param_hint="--yes")
+            raise typer.BadParameter("cannot ask for confirmation without a terminal; give --yes", param_hint="--yes")
         if not typer.confirm(f"Remove {len(files)} files from {where}?", err=True):
             found, files = {}, []
     if not request.dry_run:
@@ -40,12 +40,12 @@ def clean_folders(request: Request, every: bool, stages: Sequence[str], yes: boo
                     remove(folder, paths)
                 remove_if_empty(folder)
     said = "would be removed" if request.dry_run else "removed"
-    lines = [f"{said}: {one}" for one in listed(files, sizes)] or [f"{where}: nothing {said}"]
+    lines = [f"{said}: {one}" for one in file_lines(files, sizes)] or [f"{where}: nothing {said}"]
     tell(request, {"run_dir": str(where), "removed": [*map(str, files)], "dry_run": request.dry_run}, lines)
 
 
-def listed(files: Sequence[Path], sizes: Mapping[Path, int]) -> list[str]:
-    """Files for people: a line for each, one for all figures of a run, and one for the chunks of each sweep."""
+def file_lines(files: Sequence[Path], sizes: Mapping[Path, int]) -> list[str]:
+    """Describe files, one line each, with one line for a run's figures and one for the chunks of each sweep."""
     lines: dict[str, list[Path]] = {}
     for path in files:
         stem = {CHUNKS: f"{path.stem.rpartition('-')[0]}-*", FIGURES: "*"}.get(path.parent.name, path.name)

@@ -1,4 +1,4 @@
-"""Messages and progress on stderr: moving bars on a terminal, elsewhere a line now and then."""
+"""Messages and progress on stderr: bars on a terminal, otherwise occasional lines."""
 
 from __future__ import annotations
 
@@ -16,17 +16,16 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 SILENCE_S = 8.0
-"""Off a terminal, something is said of what runs at least as often."""
+"""Longest silence without a terminal while a stage runs."""
 
 ENOUGH_DONE, ENOUGH_S = 0.1, 3.0
-"""Share of the parts and time after which their rate tells the time that is left: the first parts are no sample."""
+"""Share of the parts and time before their rate predicts the remaining time: the first parts are not typical."""
 
 
 class Console:
-    """The reporter of the command line: a `pipeline.progress.Progress`."""
+    """Reporter of the command line: a `pipeline.progress.Progress`."""
 
     def __init__(self, quiet: bool = False, verbose: bool = False, open_page: bool = False) -> None:
-        """Say nothing but warnings if `quiet`, and details too if `verbose`; show the first page with `open_page`."""
         self.quiet = quiet
         self.verbose = verbose
         self.open_page = open_page
@@ -39,7 +38,6 @@ class Console:
         self._lock = threading.RLock()
 
     def begin(self, stage: str, place: str, expected_s: float | None = None) -> StageLine:
-        """Begin a stage: a bar on a terminal, elsewhere a line."""
         line = StageLine(self, stage, place, expected_s)
         with self._lock:
             self.running.append(line)
@@ -54,7 +52,6 @@ class Console:
         return line
 
     def ended(self, line: StageLine, said: str) -> None:
-        """A stage has ended."""
         with self._lock:
             if line in self.running:
                 self.running.remove(line)
@@ -68,7 +65,7 @@ class Console:
             self.note(said)
 
     def drawn(self, summary: Mapping[str, Any], folder: Path) -> None:
-        """Tell once of a page that is there while the rest is being computed, and show it if that was asked for."""
+        """Announce a partial page once, and open it if requested."""
         page = summary.get("html")
         if page is None or self._drawn:
             return
@@ -79,7 +76,7 @@ class Console:
             self.shown = self.show(path)
 
     def show(self, page: Path | str) -> bool:
-        """Open a file or an address in the user's browser; whether one took it, and a note if there is none."""
+        """Open a file or address in a browser; return whether one was found."""
         # Imported here: few pages are shown.
         import webbrowser
 
@@ -90,22 +87,18 @@ class Console:
         return opened
 
     def refresh(self) -> None:
-        """Draw the bars anew, where there are any."""
         if self._live is not None:
             self._live.refresh()
 
     def note(self, text: str) -> None:
-        """Say one line, unless quiet."""
         if not self.quiet:
             self._say(text)
 
     def detail(self, text: str) -> None:
-        """Say one line if verbose."""
         if self.verbose and not self.quiet:
             self._say(text)
 
     def warn(self, text: str) -> None:
-        """Say one line, quiet or not."""
         self._say(f"warning: {text}")
 
     def _say(self, text: str) -> None:
@@ -117,7 +110,7 @@ class Console:
                 print(text, file=sys.stderr, flush=True)
 
     def _talk(self, end: threading.Event) -> None:
-        """Say how far the running stages are whenever nothing was said for a while."""
+        """Report the running stages whenever nothing was printed for a while."""
         while not end.wait(0.5):
             if time.monotonic() - self._said_at >= SILENCE_S:
                 self._say("; ".join(line.said() for line in self._lines()))
@@ -149,16 +142,15 @@ class Console:
 
 
 class StageLine:
-    """One stage that runs: what it is at, and how far."""
+    """A running stage: its current work and progress."""
 
     def __init__(self, console: Console, stage: str, place: str, expected_s: float | None) -> None:
-        """It has begun."""
         self.console, self.stage, self.place, self.expected_s = console, stage, place, expected_s
         self.label, self.kernel = stage, ""
         self.total: int | None = None
         self.done = 0
-        self.progress: list[tuple[int, float]] = []  # parts done, and when: s of computing
-        self.compiled_s = 0.0  # of the piece of work that runs
+        self.progress: list[tuple[int, float]] = []  # parts done, and computing time then (s)
+        self.compiled_s = 0.0  # in the current piece of work
         self.compiling_since = 0.0
         self.began = self.work_began = time.monotonic()
 
@@ -170,16 +162,14 @@ class StageLine:
         self.console.refresh()
 
     def advance(self, n: int = 1) -> None:
-        """Count parts as done."""
         self.done += n
         self.progress.append((self.done, self.computed_s()))
 
     def note(self, text: str) -> None:
-        """Say one line."""
         self.console.note(text)
 
     def compiling(self, kernel: str) -> None:
-        """Tell compiling from computing."""
+        """Exclude compiling from the computing time; `kernel` is empty when it ends."""
         now = time.monotonic()
         if self.kernel and not kernel:
             self.compiled_s += now - self.compiling_since
@@ -188,16 +178,13 @@ class StageLine:
         self.console.refresh()
 
     def end(self, said: str) -> None:
-        """The stage has ended."""
         self.console.ended(self, said)
 
     def work(self) -> str:
-        """What the stage is at."""
         label = self.label if self.label.startswith(self.stage) else f"{self.stage}: {self.label}"
-        return f"{label}: compiling {self.kernel}, kept for later runs" if self.kernel else label
+        return f"{label}: compiling {self.kernel}, cached for later runs" if self.kernel else label
 
     def pace(self) -> str:
-        """How far it is, and how long it will take."""
         elapsed = time.monotonic() - self.began
         parts = [f"{self.done} of {self.total}"] if self.total is not None and self.total > 1 else []
         left = self.seconds_left()
@@ -206,15 +193,15 @@ class StageLine:
         return ", ".join(parts)
 
     def computed_s(self) -> float:
-        """How long the piece of work has run, compiling left out."""
+        """Duration of the current piece of work without compiling (s)."""
         now = time.monotonic()
         compiled = self.compiled_s + (now - self.compiling_since if self.kernel else 0.0)
         return now - self.work_began - compiled
 
     def seconds_left(self) -> float | None:
-        """By the rate of the later half of what is done, or by how long the stage took the last time.
+        """Predict the remaining time from the rate of the later half of the work, or from the stage's last duration.
 
-        It comes down while a part is at work. None until enough is known, and where it takes longer than that.
+        None until enough is known, and once the prediction has passed.
         """
         computed = self.computed_s()
         if self.total and self.done >= ENOUGH_DONE * self.total and computed >= ENOUGH_S:
@@ -227,5 +214,4 @@ class StageLine:
         return left if left > 0.0 else None
 
     def said(self) -> str:
-        """All of it on one line."""
         return f"{self.work()} ({self.pace()})"

@@ -1,4 +1,4 @@
-"""What is in a run as files for use elsewhere: figures, tables and trajectories, and walks as GIF or MP4."""
+"""Exports for use elsewhere: figures, tables and trajectories as files, and walks as GIF or MP4."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from walkerlab.cli.console import Console
-from walkerlab.config.problems import meant
+from walkerlab.config.problems import suggestion
 from walkerlab.config.schema import Config
 from walkerlab.errors import ConfigError, StaleError, StorageError
 from walkerlab.labels import with_unit
@@ -51,19 +51,19 @@ TRAJECTORY = "trajectory"
 COLUMNS = {1: 252.0, 2: 516.0}
 """Width of one or two columns of a journal, pt."""
 DPI = 300
-"""Of a journal's pictures."""
-STORED_WITH = "outputs: [states, energies, forces] has it."
-"""What a walk without a trajectory lacks in its config."""
+"""Resolution that journals ask of pictures."""
+STORED_WITH = "Run it with outputs: [states, energies, forces]."
+"""Advice for a walk that was stored without a trajectory."""
 NUMBERED = re.compile(r"(?:fig(?:ure)?[- .]*)?0*(\d+)")
 
 
 @dataclass(frozen=True)
 class Target:
-    """Where something is written to.
+    """Destination of an export.
 
-    to      a format or, as long as there is no other file, a file whose name ends in one; None for what the file says
-    output  the file; None for one in this folder that is named after the run and what it is
-    inputs  files that the command reads, which are not written over
+    to      a format, or a file name with that ending if `output` is None
+    output  the file; None derives its name from the run
+    inputs  files that the command reads, which must not be overwritten
     """
 
     to: str | None
@@ -71,9 +71,9 @@ class Target:
     inputs: tuple[Path, ...] = ()
 
     def of(self, what: str, stem: str, kinds: Sequence[str]) -> tuple[Path, str]:
-        """File and format; the first of the formats if none is named.
+        """Return file and format; the first of `kinds` by default.
 
-        Raises ConfigError for an unknown format, for two at once, and for a file that must not be written over.
+        Raises ConfigError for an unknown format, for two at once, and for a file that must not be overwritten.
         """
         a_file = self.to is not None and self.output is None and "." in self.to
         output = Path(str(self.to)) if a_file else self.output
@@ -91,38 +91,38 @@ class Target:
         return path, kind
 
     def refuse(self, path: Path, kind: str) -> None:
-        """Raise ConfigError if the file is a folder, what the command reads, or a result of a run."""
+        """Raise ConfigError if the file is a folder, an input of the command, or a result of a run."""
         another = "Nothing was written; name another file with -o."
         if path.is_dir():
             raise ConfigError(f"{path} is a folder.", f"Name a file in it: -o {shlex.quote(f'{path}/NAME.{kind}')}")
         if path.exists() and any(one.exists() and path.samefile(one) for one in self.inputs):
-            raise ConfigError(f"{path} is what this command reads.", another)
+            raise ConfigError(f"{path} is an input of this command.", another)
         owner = owner_of(path, (stage.name for stage in PIPELINE.stages))
         if owner is not None:
             raise ConfigError(f"{path} belongs to the results of the run {owner.path}.", another)
 
 
-def put(path: Path, data: bytes, console: Console) -> Path:
-    """Write a file, and say so if that replaces another one; StorageError if the system refuses."""
+def write_file(path: Path, data: bytes, console: Console) -> Path:
+    """Write a file, with a warning if that changes an existing one; StorageError if the system refuses."""
     replaced = path.is_file() and path.read_bytes() != data
     try:
         write_through(path, data)
     except StorageError as error:
         raise StorageError(error.message, "Name another file with -o.") from error
     if replaced:
-        console.warn(f"{path} was there and is replaced.")
+        console.warn(f"{path} existed and was replaced.")
     return path
 
 
 def export_from(
     folder: RunFolder, what: str, target: Target, width: float, model: str, console: Console, dpi: int = DPI
 ) -> Path:
-    """Write one thing of a run as a file, and say where it is.
+    """Write one item of a run to a file, and return its path.
 
-    width  of a figure, pt; of a picture of pixels, it has `dpi` an inch
-    model  the stage whose trajectory is meant
+    width  of a figure, pt; `dpi` pixels per inch for pixel formats
+    model  stage whose trajectory is exported
 
-    Raises ConfigError for what or a kind that there is not, StaleError for a result that is not there.
+    Raises ConfigError for an unknown item or format, StaleError for a missing result.
     """
     if numbered := NUMBERED.fullmatch(what):
         what = f"figure-{int(numbered[1]):02d}"
@@ -132,58 +132,58 @@ def export_from(
         stem, kinds, make = f"{model}-{what}", TRAJECTORY_KINDS, lambda kind: trajectory(folder, model, kind, console)
     elif what in TABLES:
         stem, kinds, make = what, tuple(WRITERS), lambda kind: WRITERS[kind](table(folder, what, kind, console))
-    elif isinstance(found := named_in(folder, what), Table):
-        stem, kinds, make = hyphened(what), tuple(WRITERS), lambda kind: WRITERS[kind](found)
+    elif isinstance(found := find_item(folder, what), Table):
+        stem, kinds, make = hyphenate(what), tuple(WRITERS), lambda kind: WRITERS[kind](found)
     else:
         stem, kinds, make = what, FIGURE_KINDS, lambda kind: figure(folder, found, kind, (width, dpi), console)
     path, kind = target.of(what, f"{folder.name}-{stem}", kinds)
-    return put(path, make(kind), console)
+    return write_file(path, make(kind), console)
 
 
 def draw_walker(config: Path, target: Target, console: Console) -> Path:
-    """Draw the walker of a config with its measures; ConfigError for a bad config or format."""
+    """Draw the walker of a config with its dimensions; ConfigError for a bad config or format."""
     # Imported here: other exports draw no walker.
-    from walkerlab.config.files import files_read, find
+    from walkerlab.config.files import files_read, find_config
     from walkerlab.config.loader import load
     from walkerlab.figures.measures import drawn
 
     loaded = load(config, ())
     for warning in loaded.warnings:
         console.warn(warning)
-    target = replace(target, inputs=tuple(files_read(find(config))))
+    target = replace(target, inputs=tuple(files_read(find_config(config))))
     path, kind = target.of("a walker", f"{loaded.run_name}-walker", DRAWING_KINDS)
-    return put(path, drawn(loaded.config.walker, as_text(path.stem), kind), console)
+    return write_file(path, drawn(loaded.config.walker, as_text(path.stem), kind), console)
 
 
-def hyphened(words: str) -> str:
-    """Words as a name of a file: small letters and figures, hyphens between."""
+def hyphenate(words: str) -> str:
+    """Turn words into a file name: lower case, with hyphens."""
     return NOT_IN_NAMES.sub("-", words.lower().replace("'", "").replace("’", "")).strip("-")
 
 
-def shortened(caption: str) -> str:
-    """The same of a caption's first words, up to a comma or colon."""
-    return hyphened(re.split("[,:]", caption)[0])
+def caption_name(caption: str) -> str:
+    """Turn a caption's first words, up to a comma or colon, into a file name."""
+    return hyphenate(re.split("[,:]", caption)[0])
 
 
 def page_tables(folder: RunFolder) -> dict[str, Table]:
-    """Every table of a run's page, by its caption's first words if they tell it from others."""
+    """Return every table of a run's page by its short caption, or by its whole one where that is ambiguous."""
     # Imported here: figures need no page.
     from walkerlab.report.registry import pages_of
     from walkerlab.report.results import Results
 
-    planner, report = planned(folder), PIPELINE["report"]
+    planner, report = plan_run(folder), PIPELINE["report"]
     results = Results(planner.config, planner.inputs(report), (), planner.missing_inputs(report))
     sections = [section for page in pages_of(results, folder.name) for section in page.sections]
     tables = [block for section in sections for block in section.blocks if isinstance(block, Table)]
-    short = [shortened(one.caption) for one in tables]
+    short = [caption_name(one.caption) for one in tables]
     unique = [name not in TABLES and short.count(name) == 1 for name in short]
     return {
-        name if alone else hyphened(one.caption): one for name, alone, one in zip(short, unique, tables, strict=True)
+        name if alone else hyphenate(one.caption): one for name, alone, one in zip(short, unique, tables, strict=True)
     }
 
 
-def named_in(folder: RunFolder, name: str) -> Illustration | Table:
-    """The figure or the page's table of a name; ConfigError with what the run has if there is none."""
+def find_item(folder: RunFolder, name: str) -> Illustration | Table:
+    """Return the figure or table of a name; ConfigError that lists the run's items if there is none."""
     # Imported here: a table needs no drawing.
     from walkerlab.figures.registry import FIGURES
 
@@ -191,7 +191,7 @@ def named_in(folder: RunFolder, name: str) -> Illustration | Table:
     if name in named:
         return named[name]
     tables = page_tables(folder)
-    for called in (hyphened(name), shortened(name)):
+    for called in (hyphenate(name), caption_name(name)):
         if called in tables:
             return tables[called]
     stored, _ = read_all(folder, (stage.name for stage in PIPELINE.stages))
@@ -200,14 +200,14 @@ def named_in(folder: RunFolder, name: str) -> Illustration | Table:
     there += [table for table, key in TABLES.items() if key in compared]
     there += tables
     there += [TRAJECTORY] * any(TRAJECTORY in result.groups for result in stored.values())
-    nothing = f"{folder.path} has nothing yet: {command(folder, PIPELINE['report'])} makes it all."
+    nothing = f"{folder.path} has no results yet: {command(folder, PIPELINE['report'])} computes them all."
     advice = "\n  ".join([f"{folder.path} has", *there]) if there else nothing
-    near = meant(name, (*named, *TABLES, TRAJECTORY, *tables))
+    near = suggestion(name, (*named, *TABLES, TRAJECTORY, *tables))
     raise ConfigError(f"nothing is called {name}.{near}", advice)
 
 
-def planned(folder: RunFolder) -> Executor:
-    """Executor of a run that holds its current results; without any if the run's config is not valid any more."""
+def plan_run(folder: RunFolder) -> Executor:
+    """Return an executor with the run's current results; without any if its config is no longer valid."""
     config = config_of(folder)
     stages = () if config is None else PIPELINE.stages
     executor = Executor(config or Config(), FolderResults(folder, elsewhere=False), stages)
@@ -218,14 +218,14 @@ def planned(folder: RunFolder) -> Executor:
 def figure(
     folder: RunFolder, illustration: Illustration, kind: str, size: tuple[float, int], console: Console
 ) -> bytes:
-    """A figure as the page has it, drawn again; StaleError if the run lacks what it needs.
+    """Draw a figure as on the page; StaleError if the run lacks a result that it needs.
 
-    size  width in pt, and pixels an inch
+    size  width in pt, and pixels per inch
 
-    Where what it needs is outdated, so may be all that is there, and the console is told.
+    If its results are outdated it is drawn from them, with a warning.
     """
     stored = results_in(folder, illustration.stages)
-    run, plot = planned(folder), PIPELINE["plot"]
+    run, plot = plan_run(folder), PIPELINE["plot"]
     taken = {name: result for name, result in run.inputs(plot).items() if isinstance(result, Stored)}
     known = taken.keys() | run.left_out.keys()
     outdated, _ = read_all(folder, (name for name in plot.results(run.config) if name not in known))
@@ -248,9 +248,9 @@ def figure(
 
 
 def table(folder: RunFolder, name: str, kind: str, console: Console) -> Table:
-    """A table of the paper's numbers; ConfigError if the walker is another than the paper's.
+    """Return a table of the paper's values; ConfigError if the walker is not the paper's.
 
-    kind  csv, for programs: records by their keys; tex, for readers: as the page has it
+    kind  csv: records by key; tex: as on the page
     """
     with results_to_show(folder, ["compare"], console.warn) as results:
         summary = the_result(results, folder, "compare").summary
@@ -271,7 +271,7 @@ def table(folder: RunFolder, name: str, kind: str, console: Console) -> Table:
 
 
 def trajectory(folder: RunFolder, model: str, kind: str, console: Console) -> bytes:
-    """A walk in time: a column for each variable and leg, or a netCDF file."""
+    """Write a walk over time: a column per variable and leg (CSV), or a netCDF file."""
     with results_to_show(folder, [model], console.warn) as results:
         stored = the_result(results, folder, model)
     group = stored.groups.get(TRAJECTORY)
@@ -299,12 +299,12 @@ def trajectory(folder: RunFolder, model: str, kind: str, console: Console) -> by
 
 @dataclass(frozen=True)
 class Film:
-    """What is shown.
+    """Options of an animation.
 
-    model   the stage whose walk it is
-    steps   how many of its first steps; None for those that `film_times` chooses
-    rate    pictures a second
-    slower  so many times slower than life
+    model   stage whose walk is shown
+    steps   number of steps from the first; None lets `film_times` choose
+    rate    pictures per second
+    slower  slow-motion factor
     """
 
     model: str
@@ -314,9 +314,9 @@ class Film:
 
 
 def walk_in(folder: RunFolder, model: str | None = None) -> str:
-    """The stage whose walk is meant: if none is named the contact model's before the rigid model's.
+    """Return the stage to show: by default the contact model's walk, if there is one.
 
-    Raises ConfigError if the one that is named does not walk.
+    Raises ConfigError if `model` is not a walk.
     """
     if model is not None and model not in MODELS:
         raise ConfigError(f"--model {model}: not a walk.", f"There are {', '.join(MODELS)}.")
@@ -326,9 +326,9 @@ def walk_in(folder: RunFolder, model: str | None = None) -> str:
 
 
 def write_film(folder: RunFolder, target: Target, film: Film, console: Console) -> Path:
-    """Draw a run's walk, picture by picture, and write the film.
+    """Draw a run's walk and write the animation.
 
-    Raises ConfigError for a format that there is not, StaleError if there is no walk to draw, StorageError.
+    Raises ConfigError for an unknown format, StaleError if there is no walk to draw, StorageError.
     """
     path, kind = target.of("an animation", f"{folder.name}-{film.model}", FILM_KINDS)
     ffmpeg = shutil.which("ffmpeg")
@@ -347,29 +347,29 @@ def write_film(folder: RunFolder, target: Target, film: Film, console: Console) 
         line = console.begin("animate", f"{at.size} pictures")
         line.start("drawing", int(at.size))
 
-        def told() -> Iterator[Any]:
+        def count_pictures() -> Iterator[Any]:
             for picture in pictures(sticks, at, walk.groups.get("terrain")):
                 yield picture
                 line.advance()
 
-        data = gif(told(), film.rate) if kind == "gif" else mp4(told(), film.rate, str(ffmpeg))
+        data = gif(count_pictures(), film.rate) if kind == "gif" else mp4(count_pictures(), film.rate, str(ffmpeg))
         line.end("")
-    return put(path, data, console)
+    return write_file(path, data, console)
 
 
-def gif(drawn: Iterable[Any], rate: int) -> bytes:
-    """The pictures as a GIF that goes round and round."""
+def gif(pictures: Iterable[Any], rate: int) -> bytes:
+    """Encode the pictures as an endlessly repeating GIF."""
     from PIL import Image
 
-    frames = [Image.fromarray(picture).quantize(64) for picture in drawn]
+    frames = [Image.fromarray(picture).quantize(64) for picture in pictures]
     file = io.BytesIO()
     frames[0].save(file, format="GIF", save_all=True, append_images=frames[1:], duration=round(1000 / rate), loop=0)
     return file.getvalue()
 
 
-def mp4(drawn: Iterable[Any], rate: int, ffmpeg: str) -> bytes:
-    """The pictures as an MP4 that browsers and slides play; StorageError if ffmpeg fails."""
-    frames = list(drawn)
+def mp4(pictures: Iterable[Any], rate: int, ffmpeg: str) -> bytes:
+    """Encode the pictures as an MP4 for browsers and slides; StorageError if ffmpeg fails."""
+    frames = list(pictures)
     height, width, _ = frames[0].shape
     raw = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}", "-r", str(rate), "-i", "-"]
     coded = ["-pix_fmt", "yuv420p", "-movflags", "frag_keyframe+empty_moov", "-f", "mp4", "-"]

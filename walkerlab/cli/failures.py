@@ -1,4 +1,4 @@
-"""Failures at the edge: one message, one advice, one exit code; a bug keeps its traceback."""
+"""Failures at the edge: one message, one advice, one exit code; bugs keep their traceback."""
 
 from __future__ import annotations
 
@@ -13,27 +13,27 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from walkerlab.errors import StoppedError, StorageError, WalkerlabError, to_type_back
+from walkerlab.errors import StoppedError, StorageError, WalkerlabError, add_run_options
 from walkerlab.stopping import raise_on
 
 if TYPE_CHECKING:
     from walkerlab.cli.request import Request
 
-FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
+FULL_DISK_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 
 
 @contextlib.contextmanager
 def exit_on_failure(request: Request) -> Iterator[None]:
-    """Turn what a user can act on into words on stderr and an exit code, and with `--json` into an object too.
+    """Turn expected failures into a message on stderr and an exit code, and with `--json` into an object.
 
-    request  what a command is asked; advice has the options that say which run that is about
+    request  the command's request, whose run options complete the advised commands
     """
     raise_on(signal.SIGTERM, KeyboardInterrupt)
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # a script's background job is to ignore it
         raise_on(signal.SIGINT, KeyboardInterrupt)
 
     def print_failed(error: WalkerlabError) -> None:
-        """With `--json`, the object of a command that failed: the keys there always are, and the error."""
+        """With `--json`, print the object of a failed command."""
         if request.as_json:
             run_dir = None if request.run_dir is None else str(request.run_dir)
             nothing: dict[str, Any] = {"artifact": None, "reused": False, "wall_s": 0.0, "left_out": []}
@@ -44,53 +44,53 @@ def exit_on_failure(request: Request) -> Iterator[None]:
         sys.stdout.flush()
     except WalkerlabError as error:
         print_failed(error)
-        say(error, request.typed)
+        print_error(error, request.typed)
         raise typer.Exit(error.exit_code) from None
     except KeyboardInterrupt:
-        stopped = StoppedError("interrupted", "What is finished is kept; the same command does the rest.")
+        stopped = StoppedError("interrupted", "Finished results are kept; the same command computes the rest.")
         print_failed(stopped)
         print(f"{stopped.message}\nadvice: {stopped.advice}", file=sys.stderr)
         raise typer.Exit(stopped.exit_code) from None
     except BrokenPipeError:
-        nobody_listens()
+        discard_output()
         raise typer.Exit(0) from None
     except OSError as error:
-        if error.errno not in FULL or error.filename is not None:
+        if error.errno not in FULL_DISK_ERRORS or error.filename is not None:
             raise
-        nobody_listens()
-        say(StorageError(f"the output could not be written: {error.strerror}.", "The results themselves are stored."))
+        discard_output()
+        print_error(
+            StorageError(f"the output could not be written: {error.strerror}.", "The results themselves are stored.")
+        )
         raise typer.Exit(StorageError.exit_code) from None
 
 
-def nobody_listens() -> None:
-    """Have what is still to be printed go nowhere, instead of failing once more when the process ends."""
+def discard_output() -> None:
+    """Redirect stdout to nowhere, so that flushing at exit does not fail again."""
     nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, sys.stdout.fileno())
     os.close(nowhere)
 
 
 def tell(request: Request, value: dict[str, Any], lines: Iterable[str], error: WalkerlabError | None = None) -> None:
-    """Print a result in the way that was asked for; if there is an error in it, say that and raise typer.Exit.
+    """Print a result as text or JSON; exit non-zero if it holds an error.
 
-    value  what `--json` prints
-    lines  for people
+    value  object for `--json`
+    lines  text for people
     """
     if request.as_json:
         print_json(value if error is None else value | {"error": error.as_json()})
     else:
         sys.stdout.writelines(f"{line}\n" for line in lines)
     if error is not None:
-        say(error, request.typed)
+        print_error(error, request.typed)
         raise typer.Exit(error.exit_code)
 
 
-def say(error: WalkerlabError, typed: str = "") -> None:
-    """Print a failure and what to do about it on stderr."""
+def print_error(error: WalkerlabError, typed: str = "") -> None:
     print(f"error: {error.message}", file=sys.stderr)
     if error.advice:
-        print(f"advice: {to_type_back(error.advice, typed)}", file=sys.stderr)
+        print(f"advice: {add_run_options(error.advice, typed)}", file=sys.stderr)
 
 
 def print_json(value: dict[str, Any]) -> None:
-    """Print one JSON object on stdout."""
     print(json.dumps(value, indent=2, allow_nan=False))

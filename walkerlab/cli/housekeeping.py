@@ -1,4 +1,4 @@
-"""The commands around the pipeline: status, show, schema, clean."""
+"""Commands on stored results and configs: status, show, schema, clean."""
 
 from dataclasses import replace
 from typing import Annotated
@@ -11,7 +11,6 @@ from walkerlab.pipeline.graph import Graph
 
 
 def add_to(app: typer.Typer, graph: Graph) -> None:
-    """Add the commands to a program for a pipeline."""
     names = [stage.name for stage in graph.stages]
 
     @command(app, *OF_A_RUN, *OF_TALK)
@@ -20,7 +19,7 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
         run: Annotated[str | None, typer.Argument(metavar="[RUN]", help="Name or folder of a run.")] = None,
         check: Annotated[bool, typer.Option("--check", help="Exit with 5 if a result is stale or missing.")] = False,
     ) -> None:
-        """Show whether each stage's result is up to date, and if not, why; and list all runs."""
+        """Show which results are up to date, why others are not, and all runs."""
         from walkerlab.cli.stored import print_status
 
         print_status(request, graph, check, run)
@@ -37,10 +36,10 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
             ),
         ],
     ) -> None:
-        """Print a stage's stored result: summary, arrays, and where it comes from."""
+        """Print a stage's stored result: summary, arrays and provenance."""
         *runs, stage = words
         if stage not in names:
-            raise typer.BadParameter(f"there is no stage {stage!r}; there are {', '.join(names)}", param_hint="STAGE")
+            raise typer.BadParameter(f"there is no stage {stage!r}; choose from {', '.join(names)}", param_hint="STAGE")
         if len(runs) > 1 or (runs and request.config is not None):
             raise typer.BadParameter("one run at a time", param_hint="RUN")
         asked = replace(request, command=stage, config=runs[0] if runs else request.config)
@@ -48,8 +47,8 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
             from walkerlab.cli.stored import print_stored
             from walkerlab.pipeline.runs import run_named
 
-            of_run = replace(asked, config=run_named(runs[0], asked.runs).given) if runs else asked
-            print_stored(of_run, graph, stage)
+            located = replace(asked, config=run_named(runs[0], asked.runs).given) if runs else asked
+            print_stored(located, graph, stage)
 
     @command(app, "as_json")
     def schema(
@@ -64,10 +63,10 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
     @command(app, *OF_A_RUN, "dry_run", "no_wait", *OF_TALK)
     def clean(
         request: Request,
-        all_runs: Annotated[bool, typer.Option("--all", help="Every run in the folder of all runs.")] = False,
-        yes: Annotated[bool, typer.Option("--yes", "-y", help="Do not ask.")] = False,
+        all_runs: Annotated[bool, typer.Option("--all", help="Clean every run in the folder of all runs.")] = False,
+        yes: Annotated[bool, typer.Option("--yes", "-y", help="Do not ask for confirmation.")] = False,
     ) -> None:
-        """Remove the results of a run and what killed runs left behind; other files stay."""
+        """Delete a run's results and leftovers of killed runs; keep all other files."""
         from walkerlab.cli.clean import clean_folders
 
         clean_folders(request, all_runs, names, yes)

@@ -1,4 +1,4 @@
-"""Commands that begin, show and repeat runs: init, open, rerun, export, animate."""
+"""Commands that start, show and repeat runs: init, open, rerun, export, draw, explore, animate."""
 
 import signal
 from pathlib import Path
@@ -14,7 +14,7 @@ from walkerlab.stopping import raise_on
 RunArgument = Annotated[
     str, typer.Argument(metavar="RUN", help="A run's folder, or its name in the folder of all runs.")
 ]
-FIGURES = "figure-07 and so on, or its number; trajectory; a table by its caption; any other word lists them"
+FIGURES = "figure-07 or 7, trajectory, or a table by its caption; any other word lists what there is"
 Output = Annotated[
     Path | None,
     typer.Option(
@@ -28,8 +28,6 @@ FIRST_WALK = "default: contact-sim, or simulate where that has not run"
 
 
 def add_to(app: typer.Typer, graph: Graph) -> None:
-    """Add the commands to a program for a pipeline."""
-
     @command(app, "quiet")
     def init(
         request: Request,
@@ -41,12 +39,12 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
             str, typer.Option("--type", metavar="TYPE", help="Type of walker, or name of a built-in config.")
         ] = "compass",
     ) -> None:
-        """Write a commented config to begin with, and a schema that editors check it against."""
+        """Write a commented config to start from, and a schema for checks in editors."""
         from walkerlab.cli.init import write_config
 
-        said = write_config(file or Path(f"my-{walker}.yaml"), walker)
+        message = write_config(file or Path(f"my-{walker}.yaml"), walker)
         if not request.quiet:
-            print(said)
+            print(message)
 
     @command(app, "runs", "quiet", "verbose", name="open")
     def open_run(request: Request, run: RunArgument = "paper") -> None:
@@ -67,7 +65,7 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
         request: Request,
         artifact: Annotated[Path, typer.Argument(metavar="ARTIFACT", help="A stage's result, such as simulate.h5.")],
     ) -> None:
-        """Recompute a stored result from scratch, and say whether it is the same."""
+        """Recompute a stored result from scratch and check that it is the same."""
         from walkerlab.cli.rerun import rerun_artifact
 
         rerun_artifact(artifact, graph, request)
@@ -81,12 +79,12 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
             str | None, typer.Option("--to", metavar="FORMAT", help="pdf, svg, png, eps, tiff, csv, tex or nc.")
         ] = None,
         output: Output = None,
-        columns: Annotated[int, typer.Option(min=1, max=2, help="Columns of a journal that a figure fills.")] = 1,
+        columns: Annotated[int, typer.Option(min=1, max=2, help="Journal columns that a figure spans.")] = 1,
         width: Annotated[
             float | None,
-            typer.Option(min=72.0, max=7200.0, metavar="PT", help="Width of a figure in points; a column has 252."),
+            typer.Option(min=72.0, max=7200.0, metavar="PT", help="Width of a figure in points; one column has 252."),
         ] = None,
-        dpi: Annotated[int, typer.Option(min=30, max=2400, help="Pixels an inch, of PNG and TIFF.")] = 300,
+        dpi: Annotated[int, typer.Option(min=30, max=2400, help="Pixels per inch of PNG and TIFF.")] = 300,
         model: Annotated[str | None, typer.Option(metavar="STAGE", help=f"Whose trajectory; {FIRST_WALK}.")] = None,
     ) -> None:
         """Write a figure, a table or a trajectory of a run for use elsewhere."""
@@ -104,7 +102,7 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
         to: Annotated[str | None, typer.Option("--to", metavar="FORMAT", help="svg, pdf or png.")] = None,
         output: Output = None,
     ) -> None:
-        """Draw a config's walker to scale, with its measures named as the config names them."""
+        """Draw a config's walker to scale, with dimensions labelled by their config keys."""
         from walkerlab.cli.exports import Target, draw_walker
 
         print(draw_walker(file, Target(to, output), request.console))
@@ -112,15 +110,15 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
     @command(app, "config", "sets", "runs")
     def explore(
         request: Request,
-        port: Annotated[int, typer.Option("--port", min=0, max=65535, help="0 is any that is free.")] = 0,
+        port: Annotated[int, typer.Option("--port", min=0, max=65535, help="Port to serve on; 0: any free one.")] = 0,
         no_browser: Annotated[bool, typer.Option("--no-browser", help="Open no browser.")] = False,
     ) -> None:
-        """Serve a page on which every number is a slider and the walker walks with it, until Ctrl-C."""
+        """Serve an interactive page with a slider for every parameter (Ctrl-C stops it)."""
         from walkerlab.explorer.server import Server
         from walkerlab.explorer.walks import ExploredConfig
 
         assert request.resolved
-        if signal.getsignal(signal.SIGHUP) is signal.SIG_DFL:  # its terminal is closed
+        if signal.getsignal(signal.SIGHUP) is signal.SIG_DFL:  # sent when the terminal closes
             raise_on(signal.SIGHUP, KeyboardInterrupt)
         try:
             server = Server(port, ExploredConfig(request.config, tuple(request.sets or ()), request.runs, {}))
@@ -131,7 +129,7 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
             if not no_browser:
                 request.console.show(server.url)
             server.serve_forever()
-        except KeyboardInterrupt:  # how it is meant to end
+        except KeyboardInterrupt:  # the intended way to stop
             raise typer.Exit(StoppedError.exit_code) from None
         finally:
             server.close()
@@ -142,13 +140,13 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
         run: RunArgument,
         to: Annotated[
             str | None,
-            typer.Option("--to", metavar="FORMAT", help="gif, or mp4 where ffmpeg is found; a file name works too."),
+            typer.Option("--to", metavar="FORMAT", help="gif, or mp4 if ffmpeg is installed; or a file name."),
         ] = None,
         output: Output = None,
         model: Annotated[str | None, typer.Option(metavar="STAGE", help=f"Whose walk; {FIRST_WALK}.")] = None,
         steps: Annotated[
             int | None,
-            typer.Option(min=1, help="First steps to show. Default: 4; of a walk that falls the last 4 and the fall."),
+            typer.Option(min=1, help="Steps to show, from the first. Default: 4; for a fall, the last 4 and the fall."),
         ] = None,
         rate: Annotated[int, typer.Option(min=1, max=60, help="Frames per second.")] = 25,
         slower: Annotated[float, typer.Option(min=0.01, help="Slow motion: 2 is half speed.")] = 1.0,

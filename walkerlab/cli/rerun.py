@@ -1,4 +1,4 @@
-"""`walkerlab rerun`: a stored result computed again from its own config."""
+"""`walkerlab rerun`: recompute a stored result from its own config."""
 
 import tempfile
 from pathlib import Path
@@ -17,9 +17,9 @@ SHORT = 12
 
 
 def rerun_artifact(path: Path, graph: Graph, request: Request) -> None:
-    """Run an artifact's stage and all it needs in an empty folder, and say whether its content is the same.
+    """Run an artifact's stage and its inputs in an empty folder, and compare the content.
 
-    Raises ConfigError if there is no such artifact, StaleError if it cannot be read or is not the same.
+    Raises ConfigError if there is no such artifact, StaleError if it cannot be read or differs.
     """
     try:
         stored = read(path)
@@ -45,11 +45,11 @@ def rerun_artifact(path: Path, graph: Graph, request: Request) -> None:
         "same_code": same_code,
     }
     if before == after:
-        tell(request, value, [f"{path} is reproduced to the last bit: content {before[:SHORT]}."])
+        tell(request, value, [f"{path} is reproduced bit for bit: content {before[:SHORT]}."])
         return
     why = "the code is the same" if same_code else "the code has changed since"
     another = StaleError(
         f"{path} is not reproduced: {before[:SHORT]} then, {(after or 'no result')[:SHORT]} now; {why}.",
-        "Results are the same to the last bit on one platform with the same versions; `walkerlab show` lists them.",
+        "Results agree bit for bit only on the same platform with the same versions; `walkerlab show` lists both.",
     )
     tell(request, value, [], another)

@@ -1,4 +1,4 @@
-"""Commands over whole runs: `walkerlab diff`, and the list that `walkerlab status` ends with."""
+"""`walkerlab diff`: compare two runs."""
 
 from __future__ import annotations
 
@@ -17,26 +17,24 @@ if TYPE_CHECKING:
     from walkerlab.pipeline.runs import Pair, RunDifference
     from walkerlab.store.runfolder import RunFolder
 
-SAME = 1e-12
+SAME_CHANGE = 1e-12
 """Relative change below which two numbers are shown as the same."""
 DIGITS = 6
 """Significant digits of a headline number."""
 IS_ERROR = re.compile(r"residual|drift|error|balance|uncertainty")
 """In the names of numbers that are errors: a relative change of one says nothing."""
-ROUNDING = 1e-9
+ROUNDING_SI = 1e-9
 """Numbers (SI) below it are at rounding or at the solver's tolerance."""
 
 
 def add_to(app: typer.Typer, graph: Graph) -> None:
-    """Add the commands to a program for a pipeline."""
-
     @command(app, "runs", "every", "as_json")
     def diff(
         request: Request,
         first: Annotated[str, typer.Argument(metavar="RUN_A", help="Name or folder of a run.")],
-        second: Annotated[str, typer.Argument(metavar="RUN_B", help="Another one.")],
+        second: Annotated[str, typer.Argument(metavar="RUN_B", help="Name or folder of another run.")],
     ) -> None:
-        """Say how two runs differ: configs, headline numbers with relative change, walks over one another."""
+        """Compare two runs: configs, headline values with relative change, both walks overlaid."""
         from walkerlab.errors import StaleError
         from walkerlab.pipeline.runs import config_of, difference, results_to_show, run_named
 
@@ -55,18 +53,18 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
         tell(request, as_object(folders, found_difference, figures), shown)
 
 
-def told_apart(folders: tuple[RunFolder, RunFolder]) -> tuple[str, str]:
-    """What two runs are called: their names, or their folders where both have one name."""
+def run_labels(folders: tuple[RunFolder, RunFolder]) -> tuple[str, str]:
+    """Name two runs: by their names, or by their folders if the names are equal."""
     first, second = folders
     return (first.name, second.name) if first.name != second.name else (str(first.path), str(second.path))
 
 
 def draw(folders: tuple[RunFolder, RunFolder], results: list[dict[str, Any]]) -> list[Path]:
-    """The figure of both walks, in the first run's folder of figures."""
+    """Draw both walks into the first run's folder of figures."""
     from walkerlab.figures.walks import overlaid
     from walkerlab.store.files import make_folder, write_atomically
 
-    drawn = overlaid(results[0], results[1], told_apart(folders))
+    drawn = overlaid(results[0], results[1], run_labels(folders))
     if drawn is None:
         return []
     make_folder(folders[0].figures)
@@ -77,7 +75,6 @@ def draw(folders: tuple[RunFolder, RunFolder], results: list[dict[str, Any]]) ->
 
 
 def as_object(folders: tuple[RunFolder, RunFolder], found: RunDifference, figures: list[Path]) -> dict[str, Any]:
-    """A difference as JSON, with every number."""
     return {
         "stage": "diff",
         "runs": [str(folder.path) for folder in folders],
@@ -90,18 +87,18 @@ def as_object(folders: tuple[RunFolder, RunFolder], found: RunDifference, figure
 
 
 def lines(folders: tuple[RunFolder, RunFolder], found: RunDifference, figures: list[Path], every: bool) -> list[str]:
-    """A difference for people: keys of the config, and of each stage its headline numbers.
+    """Describe a difference: keys of the config, and headline values of each stage.
 
-    every  all numbers that differ instead
+    every  show all differing values instead
     """
     from walkerlab.report.numbers import number
     from walkerlab.report.tables import aligned
     from walkerlab.report.text import in_words
 
-    def told(value: Any) -> str:
+    def as_text(value: Any) -> str:
         return number(value, DIGITS) if isinstance(value, float) and not every else in_words(value)
 
-    names = told_apart(folders)
+    names = run_labels(folders)
     result = ["config", *aligned([["", *names], *([key, in_words(a), in_words(b)] for key, a, b in found.config)])]
     if not found.config:
         result[1:] = ["  the same"]
@@ -110,25 +107,24 @@ def lines(folders: tuple[RunFolder, RunFolder], found: RunDifference, figures: l
         differing = [pair for pair in pairs if differs(pair)]
         shown = differing if every else list(found.headlines[stage]) if differing else []
         left += 0 if every else len(differing) - sum(pair in differing for pair in shown)
-        rows = [[pair.name, told(pair.first), told(pair.second), percent(pair)] for pair in shown]
+        rows = [[pair.name, as_text(pair.first), as_text(pair.second), percent(pair)] for pair in shown]
         if rows or not differing:
             result += [stage, *(aligned([["", *names, "change"], *rows]) if rows else ["  the same"])]
     for name, only in zip(names, (found.only_first, found.only_second), strict=True):
         if only:
             result.append(f"only in {name}: {', '.join(only)}")
-    more = [f"{left} other numbers and words differ; --all shows them"] if left else []
+    more = [f"{left} other values differ; list them with --all"] if left else []
     return [*result, *more, *(f"figure: {path}" for path in figures[1:])]
 
 
 def differs(pair: Pair) -> bool:
-    """Whether two values are worth showing beside one another."""
     if pair.change is not None:
-        return abs(pair.change) > SAME
+        return abs(pair.change) > SAME_CHANGE
     return bool(pair.first != pair.second)
 
 
 def percent(pair: Pair) -> str:
-    """A relative change in per cent; nothing for what is an error itself, or is at rounding in both runs."""
-    if pair.change is None or IS_ERROR.search(pair.name) or max(abs(pair.first), abs(pair.second)) < ROUNDING:
+    """Format a relative change in percent; empty for error measures and for values at rounding."""
+    if pair.change is None or IS_ERROR.search(pair.name) or max(abs(pair.first), abs(pair.second)) < ROUNDING_SI:
         return ""
     return f"{100.0 * pair.change:+.3g} %" if differs(pair) else "the same"

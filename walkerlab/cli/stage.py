@@ -8,11 +8,11 @@ from pathlib import Path
 
 from walkerlab.cli.failures import tell
 from walkerlab.cli.request import Request
-from walkerlab.config.files import builtin_names, extendable
-from walkerlab.config.layers import setting_of
+from walkerlab.config.files import builtin_names, config_to_extend
+from walkerlab.config.layers import parse_setting
 from walkerlab.config.loader import load
 from walkerlab.config.walkers import why_rigid_alone
-from walkerlab.config.writer import extending
+from walkerlab.config.writer import to_extending_yaml
 from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.pipeline.executor import short_reason
 from walkerlab.pipeline.graph import PIPELINE, Graph, Stage
@@ -68,12 +68,12 @@ def write_optimum(request: Request, report: StageReport) -> Path:
 
     Raises StorageError if the system refuses.
     """
-    start = extendable(request.config)
+    start = config_to_extend(request.config)
     base = load(Path(start)).config
     typed = start if start in builtin_names() else os.path.relpath(start, report.run_dir)
-    settings = [setting_of(f"{key}={value!r}") for key, value in report.summary["best"].items()]
+    settings = [parse_setting(f"{key}={value!r}") for key, value in report.summary["best"].items()]
     best = request.loaded.variant(settings).model_copy(update={"design": base.design})
-    text = extending(typed, base, best, f"{base.name}-optimum")
+    text = to_extending_yaml(typed, base, best, f"{base.name}-optimum")
     for number in itertools.count(1):
         path = report.run_dir / ("optimum.yaml" if number == 1 else f"optimum-{number}.yaml")
         with storing(path):

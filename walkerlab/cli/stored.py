@@ -1,4 +1,4 @@
-"""What is stored: `walkerlab status`, which results are current, and `walkerlab show STAGE`, what is in one."""
+"""`walkerlab status` and `walkerlab show STAGE`: which results are current, and their content."""
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -23,17 +23,17 @@ NOT_CURRENT = ("stale", "missing", "damaged")
 
 
 def print_status(request: Request, graph: Graph, check: bool, run: str | None) -> None:
-    """Print the state of each stage, and all runs unless one was asked about.
+    """Print the state of each stage, and of all runs unless one was selected.
 
-    run  name or folder of a run, told under the config that its results are of; None is the one that is meant
+    run  name or folder of a run, judged by the config of its results; None for the request's run
 
-    With `check`, typer.Exit(5) if a stage's result is stale, missing or damaged. Raises ConfigError if there is no such
-    run, StaleError if nothing tells its config.
+    With `check`, typer.Exit(5) if a result is stale, missing or damaged. Raises ConfigError if there is no such run,
+    StaleError if its config is unknown.
     """
     folder = request.folder if run is None else run_named(run, request.runs)
     config = request.resolved if run is None else config_of(folder)
     if config is None:
-        raise StaleError(f"{folder.path} has no result that tells its config.", "`walkerlab status` lists all runs.")
+        raise StaleError(f"{folder.path} has no result with a readable config.", "`walkerlab status` lists all runs.")
     asked = run is not None or request.config is not None or request.settings or request.strides is not None
     listed = None if asked else list(runs_in(request.runs, graph))
     steps = survey(config, folder, graph)
@@ -66,7 +66,6 @@ def print_status(request: Request, graph: Graph, check: bool, run: str | None) -
 
 
 def row_of(run: RunSummary) -> list[str]:
-    """One run as a table's row."""
     unknown = "unknown config" if run.stages else "0"
     current = unknown if run.current is None else str(len([s for s in run.stages if s in run.current]))
     counts = [str(len(run.stages)), current, str(len(run.sweeps))]
@@ -74,7 +73,6 @@ def row_of(run: RunSummary) -> list[str]:
 
 
 def state_of(step: Step) -> str:
-    """The state of a stage's result, in a word or two."""
     if step.action == "leave out":
         return "left out"
     if step.action == "reuse":
@@ -87,12 +85,12 @@ def state_of(step: Step) -> str:
 
 
 def why(step: Step) -> str:
-    """Why a stage's result is in its state; nothing where the state says it."""
+    """Explain a result's state; empty where the state says enough."""
     return "" if step.reason in (NOT_THERE, UP_TO_DATE) else step.reason.removeprefix(f"{state_of(step)}: ")
 
 
 def whys(steps: Sequence[Step]) -> Iterator[str]:
-    """The same of each stage in full once; of a later stage with the same reason, which stage has it."""
+    """Explain each stage's state; a repeated reason refers to the first stage that has it."""
     first: dict[str, str] = {}
     for step in steps:
         reason = short_reason(why(step)) if step.action == "leave out" else why(step)
@@ -102,7 +100,7 @@ def whys(steps: Sequence[Step]) -> Iterator[str]:
 
 
 def failing(steps: tuple[Step, ...], last: str) -> StaleError | None:
-    """What `--check` fails with, if it does."""
+    """Return the error of `--check`, or None if every result is current."""
     counts = Counter(state for step in steps if (state := state_of(step)) in NOT_CURRENT)
     if not counts:
         return None
@@ -111,7 +109,7 @@ def failing(steps: tuple[Step, ...], last: str) -> StaleError | None:
 
 
 def print_stored(request: Request, graph: Graph, stage: str) -> None:
-    """Print a stage's artifact, current or not; StaleError if there is none that can be read."""
+    """Print a stage's artifact, current or not; StaleError if it cannot be read."""
     path = request.folder.artifact(stage)
     step = next(step for step in survey(request.resolved, request.folder, graph) if step.stage.name == stage)
     if not request.folder.path.is_dir():
@@ -126,7 +124,7 @@ def print_stored(request: Request, graph: Graph, stage: str) -> None:
 
 
 def as_json(stored: Stored) -> dict[str, Any]:
-    """All but the arrays' values."""
+    """Describe an artifact without the arrays' values."""
 
     def labels(variable: Variable) -> dict[str, Any]:
         shape = list(variable.values.shape)
@@ -150,7 +148,7 @@ def as_json(stored: Stored) -> dict[str, Any]:
 
 
 def lines(stored: Stored) -> list[str]:
-    """Summary, arrays and provenance for people."""
+    """Format summary, arrays and provenance."""
     result = ["summary", *described_summary(stored.summary)]
     for path, group in stored.groups.items():
         result.append(path)
@@ -171,6 +169,5 @@ def lines(stored: Stored) -> list[str]:
 
 
 def row(name: str, variable: Variable) -> list[str]:
-    """A variable as a row: name, dimensions with lengths, unit, what it is."""
     sizes = ", ".join(f"{dim} {size}" for dim, size in zip(variable.dims, variable.values.shape, strict=True))
     return [name, f"({sizes})", variable.units, variable.long_name]

@@ -1,4 +1,4 @@
-"""`walkerlab sweep`: one question over many configs."""
+"""`walkerlab sweep`: run a stage over many configs."""
 
 import importlib
 import os
@@ -19,25 +19,27 @@ from walkerlab.report.text import paragraph
 if TYPE_CHECKING:
     from walkerlab.sweeps.sweep import Foreseen, Swept
 
-TOLD = ("of", "parameters", "points", "done", "failed", "outcomes", "endings", "numerical_error")
-"""Keys of a sweep's summary that `--json` has."""
-SHOWN = 20
+SUMMARY_KEYS = ("of", "parameters", "points", "done", "failed", "outcomes", "endings", "numerical_error")
+"""Keys of a sweep's summary that `--json` prints."""
+LISTED_POINTS = 20
 """Points that a dry run lists."""
 
 
 @dataclass(frozen=True)
 class SweepRequest(Request):
-    """What a sweep is asked."""
+    """Options of a sweep."""
 
     over: list[str] | None = option(
         "--over", metavar="KEY=VALUES", help="A parameter: FROM:TO:N, FROM:TO:N:log or [a, b, ...]; may be repeated."
     )
     stage: str | None = option("--stage", metavar="NAME", help="The stage to run.")
     zipped: bool = option(
-        "--zip", default=False, help="Combine the n-th values into the n-th point, instead of each with each."
+        "--zip", default=False, help="Combine the n-th values into the n-th point, instead of forming the full grid."
     )
-    sample: str | None = option("--sample", metavar="SAMPLER:N", help="Draw points: latin-hypercube:500, sobol:512.")
-    seed: int | None = option("--seed", metavar="N", min=0, help="Seed of the drawn points; default 1.")
+    sample: str | None = option(
+        "--sample", metavar="SAMPLER:N", help="Sample points instead: latin-hypercube:500, sobol:512."
+    )
+    seed: int | None = option("--seed", metavar="N", min=0, help="Seed of the sampled points; default: 1.")
     engine: str = option(
         "--engine", default="local", metavar="NAME", help="Where to compute: local, dask[=ADDRESS] or slurm."
     )
@@ -48,12 +50,14 @@ class SweepRequest(Request):
         "--jobs", default=0, metavar="N", min=0, help="Chunks computed at once; 0: all cores, on Slurm 16."
     )
     chunk_seconds: float | None = option(
-        "--chunk-seconds", metavar="S", help="Target duration of a chunk; default by engine."
+        "--chunk-seconds", metavar="S", help="Target duration of a chunk; default: depends on the engine."
     )
     show: list[str] | None = option("--show", metavar="NAME", help="Quantity to plot; may be repeated.")
     against: str | None = option("--against", metavar="NAME", help="Quantity to plot it over; default: the parameters.")
     as_csv: bool = option(
-        "--csv", default=False, help="Print the points with the headline numbers as a table, kept beside the result."
+        "--csv",
+        default=False,
+        help="Print the points with their headline values as CSV, and store that next to the result.",
     )
 
 
@@ -61,11 +65,9 @@ OWN = [one.name for one in fields(SweepRequest) if one not in fields(Request)]
 
 
 def add_to(app: typer.Typer, graph: Graph) -> None:
-    """Add the command to a program for a pipeline."""
-
     @command(app, *OWN, *OF_A_RUN, "force", "dry_run", "no_wait", "every", *OF_TALK, asks=SweepRequest)
     def sweep(request: SweepRequest) -> None:
-        """Run a stage over many values of parameters; results that exist are reused."""
+        """Run a stage over a range of parameters, reusing results that exist."""
         from walkerlab.config.sweep import Sweep
         from walkerlab.sweeps.engines import Order, engine_named
         from walkerlab.sweeps.question import axis_of_text, build_sweep, refuse_unrecorded
@@ -97,7 +99,7 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
         )
         if request.dry_run:
             foreseen = SweepRun(question, loaded, request.folder, graph)
-            show_plan(request, foreseen.foresee(request.at_once or os.cpu_count() or 1, SHOWN))
+            show_plan(request, foreseen.foresee(request.at_once or os.cpu_count() or 1, LISTED_POINTS))
             return
         with chosen.begun(order) as begun:
             run = SweepRun(question, loaded, request.folder, graph)
@@ -117,7 +119,7 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
 
 
 def where(graph: Graph) -> str:
-    """Where a worker finds the pipeline, as module:NAME."""
+    """Return the import path of the pipeline for workers, as module:NAME."""
     from walkerlab.sweeps.sweep import PIPELINE_AT
 
     if graph is PIPELINE:
@@ -128,7 +130,6 @@ def where(graph: Graph) -> str:
 
 
 def show_plan(request: Request, foreseen: "Foreseen") -> None:
-    """Say what would be done."""
     missing = foreseen.count - foreseen.there
     value = {
         **common(request, foreseen.path, 0.0),
@@ -142,20 +143,19 @@ def show_plan(request: Request, foreseen: "Foreseen") -> None:
     more = foreseen.count - len(foreseen.points)
     lines = [f"  {point}" for point in foreseen.points] + ([f"  and {more} more"] if more else [])
     known = foreseen.estimate_s
-    time = "no such point has been timed yet" if known is None else f"about {in_time(known)}"
-    counts = f"{foreseen.count} points, {foreseen.there} computed already, {missing} to compute: {time}"
+    time = "no point of this kind has been timed yet" if known is None else f"about {format_duration(known)}"
+    counts = f"{foreseen.count} points, {foreseen.there} already computed, {missing} to compute: {time}"
     tell(request, value, [f"in {foreseen.path}:", *lines, counts])
 
 
-def in_time(seconds: float) -> str:
-    """A time for people."""
+def format_duration(seconds: float) -> str:
     if seconds < 120.0:
         return f"{seconds:.0f} s"
     return f"{seconds / 60:.0f} min" if seconds < 7200.0 else f"{seconds / 3600:.1f} h"
 
 
 def common(request: Request, path: Path, wall_s: float) -> dict[str, Any]:
-    """The keys that every command's object has."""
+    """Return the keys that every command's JSON object has."""
     return {
         "stage": "sweep",
         "run_dir": str(request.folder.path),
@@ -167,7 +167,7 @@ def common(request: Request, path: Path, wall_s: float) -> dict[str, Any]:
 
 
 def show_result(request: SweepRequest, swept: "Swept") -> None:
-    """Draw and print a sweep; typer.Exit if points were not computed."""
+    """Draw and print a sweep; typer.Exit if points are missing."""
     from walkerlab.store.files import write_atomically
     from walkerlab.sweeps.drawing import draw
     from walkerlab.sweeps.result import as_csv as table_of
@@ -177,11 +177,11 @@ def show_result(request: SweepRequest, swept: "Swept") -> None:
     value = {
         **common(request, swept.path, swept.wall_s),
         "reused": swept.reused,
-        **{name: summary[name] for name in TOLD if name in summary},
+        **{name: summary[name] for name in SUMMARY_KEYS if name in summary},
         "figures": [str(path) for path in drawn.figures],
         "html": str(drawn.page),
     }
-    lines = printed(swept, drawn.page)
+    lines = result_lines(swept, drawn.page)
     if request.as_csv:
         table = table_of(swept.content, swept.question, request.every)
         beside = swept.path.with_suffix(".csv")
@@ -190,8 +190,7 @@ def show_result(request: SweepRequest, swept: "Swept") -> None:
     tell(request, value, lines, swept.error() if swept.failed else None)
 
 
-def printed(swept: "Swept", page: Path) -> list[str]:
-    """The result for people."""
+def result_lines(swept: "Swept", page: Path) -> list[str]:
     from walkerlab.sweeps.drawing import summary_lines
 
     summary = swept.summary
@@ -199,7 +198,7 @@ def printed(swept: "Swept", page: Path) -> list[str]:
     over = ", ".join(f"{name} ({len(set(values))})" for name, values in summary["parameters"].items())
     return [
         f"sweep of {summary['of']} over {over}: {summary['points']} points, {outcomes}",
-        *([f"  {swept.reused} of them existed already"] if swept.reused else []),
+        *([f"  {swept.reused} of them already existed"] if swept.reused else []),
         *(line for said in summary_lines(summary) for line in paragraph(said)),
         f"  numbers  {swept.path}",
         f"  page     {page}",

@@ -1,19 +1,19 @@
-"""The basin block: which starts are led to an attractor or a fall."""
+"""The basin block: a grid of starts, each of which is followed to an attractor or a fall."""
 
 import operator
 from typing import Annotated, Final, Literal, get_args
 
 from pydantic import Field, ValidationInfo, field_validator
 
-from walkerlab.config.fields import Block, against, key, wrong
+from walkerlab.config.fields import Block, check_against, key, meaning_error
 
 Coordinate = Literal["theta_2", "dtheta_1", "dtheta_2"]
 COORDINATES: Final[tuple[Coordinate, ...]] = get_args(Coordinate)
-LARGEST: Final = 1e6  # of a window's bounds
+MAX_BOUND: Final = 1e6  # of a window's bounds
 
 _UNIT: Final = "rad, rad/s"
-_WIDTH: Final = "the gait's own, 0.15 rad and 0.25 sqrt(g/L) away"
-_Bound = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
+_WIDTH: Final = "the gait by 0.15 rad and 0.25 sqrt(g/L)"
+_Bound = Annotated[float, Field(ge=-MAX_BOUND, le=MAX_BOUND)]
 _Bounds = tuple[_Bound, ...]  # empty: the usual window
 
 
@@ -29,20 +29,20 @@ class Basin(Block):
         bounds=f"two or three of {', '.join(COORDINATES)}, each once",
     )
     cells: tuple[Annotated[int, Field(ge=2, le=4000)], ...] = key(
-        (400, 400), "1", "cells along each of them", bounds="a number from 2 to 4000 for each coordinate"
+        (400, 400), "1", "cells along each coordinate", bounds="a number from 2 to 4000 for each coordinate"
     )
     lower: _Bounds = key(
-        (), _UNIT, "where the window begins", bounds="a number for each", default_in_words=f"below {_WIDTH}"
+        (), _UNIT, "lower bounds of the window", bounds="a number for each", default_in_words=f"below {_WIDTH}"
     )
     upper: _Bounds = key(
         (),
         _UNIT,
-        "where the window ends",
+        "upper bounds of the window",
         bounds="a number for each, above `lower`",
         default_in_words=f"above {_WIDTH}",
     )
     refine: int = key(
-        4, "1", "parts along each axis that cells at edges of basins are divided into; 1: none", ge=1, le=32
+        4, "1", "parts along each axis into which cells at edges of basins are divided; 1: no refinement", ge=1, le=32
     )
     steps: int = key(300, "1", "steps of the rigid model after which a walk is called unsettled", ge=1, le=1_000_000)
     contact_steps: int = key(12, "1", "steps that the contact model walks", ge=2, le=10_000)
@@ -51,7 +51,7 @@ class Basin(Block):
     @classmethod
     def _two_or_three_coordinates(cls, value: tuple[Coordinate, ...]) -> tuple[Coordinate, ...]:
         if len(value) not in (2, 3) or len(set(value)) != len(value):
-            raise wrong("must be two or three coordinates, each once")
+            raise meaning_error("must be two or three coordinates, each once")
         return value
 
     @field_validator("cells", "lower", "upper")
@@ -59,9 +59,9 @@ class Basin(Block):
     def _one_for_each_coordinate(cls, value: tuple[float, ...], info: ValidationInfo) -> tuple[float, ...]:
         plane, usual = info.data.get("plane"), not value and info.field_name != "cells"
         if plane is not None and not usual and len(value) != len(plane):
-            raise wrong(f"must have {len(plane)} numbers, one for each of plane")
+            raise meaning_error(f"must have {len(plane)} numbers, one for each of plane")
         return value
 
-    _above = against(
+    _above = check_against(
         "upper", "lower", lambda upper, lower: "must be above lower" if any(map(operator.le, upper, lower)) else ""
     )

@@ -1,4 +1,4 @@
-"""The part of a config that a type names, and one text for one content: what keys of results are made of."""
+"""Part of a config that a type names, and canonical JSON for the keys of results."""
 
 import json
 from collections.abc import Iterator, Mapping
@@ -9,9 +9,9 @@ from walkerlab.config.schema import Config
 
 
 def slice_of(config: Config, takes: type | None) -> dict[str, Any]:
-    """The part of `config` that a type of `config.reads` names, nested as in the config, of JSON types only.
+    """Select the part of `config` that a type of `config.reads` names, nested as in the config, of JSON types only.
 
-    takes  None for all of it
+    takes  None for the whole config
 
     Raises KeyError if a key is not in the schema.
     """
@@ -23,18 +23,18 @@ def slice_of(config: Config, takes: type | None) -> dict[str, Any]:
     return found
 
 
-def flattened(block: Mapping[str, Any], lists: bool = False, prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """Dotted names and values of nested objects; of lists, too, with the places among the names, or as values."""
+def flatten(block: Mapping[str, Any], lists: bool = False, prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield dotted names and values of nested objects; with `lists`, of list items too, named by index."""
     for name, value in block.items():
         inner = {str(place): item for place, item in enumerate(value)} if lists and isinstance(value, list) else value
         if isinstance(inner, Mapping):
-            yield from flattened(inner, lists, f"{prefix}{name}.")
+            yield from flatten(inner, lists, f"{prefix}{name}.")
         else:
             yield f"{prefix}{name}", value
 
 
 def canonical_json(data: Any) -> str:
-    """One text for one content: sorted keys, no blanks, ASCII; floats as the shortest text that reads back the same.
+    """Serialise to JSON so that equal content gives equal text: sorted keys, no blanks, ASCII, shortest floats.
 
     Raises ValueError if a number is not finite.
     """

@@ -1,11 +1,11 @@
-"""The contact block: numbers as ADAMS dialogs show them (N, mm, s) or in SI, and their conversion."""
+"""The contact block: values in N, mm, s as in ADAMS dialogs or in SI, and their conversion."""
 
 from collections.abc import Mapping
 from typing import Annotated, Any, Final, Literal, Self
 
 from pydantic import Discriminator, Field, Tag, ValidationInfo, field_validator, model_validator
 
-from walkerlab.config.fields import Block, against, key, wrong
+from walkerlab.config.fields import Block, check_against, key, meaning_error
 
 MM_PER_M: Final = 1000.0
 
@@ -21,7 +21,7 @@ _SECTION_4 = "section 4"
 
 
 def from_mm(numbers: Mapping[str, Any], exponent: float) -> dict[str, Any]:
-    """The units `si`, and in them the numbers whose unit has mm in it."""
+    """Convert the quantities with mm in their unit to SI."""
     return {
         "units": "si",
         "stiffness": numbers["stiffness"] * MM_PER_M**exponent,
@@ -37,25 +37,25 @@ PadPitch = Annotated[
 
 
 class Contact(Block):
-    """Contact of feet and ground: normal force, friction, terrain."""
+    """Contact between feet and ground: normal force, friction, terrain."""
 
     units: Literal["adams", "si"] = key(
         "adams",
         "",
-        "adams: numbers of this block in N, mm, s as ADAMS dialogs show them; si: in N, m, s",
+        "adams: values of this block in N, mm, s as in ADAMS dialogs; si: in N, m, s",
         _SECTION_4,
     )
     stiffness: float = key(1.0e5, "N/mm^e or N/m^e", "k of the normal force k d^e + c(d) d'", _FIG_4B, ge=1e-6, le=1e20)
     exponent: float = key(2.2, "1", "e of the normal force, 1 is a linear spring", _ADAMS, ge=1.0, le=3.0)
     damping: float = key(90.0, "N s/mm or N s/m", "c from full_damping_penetration on", _FIG_4B, ge=0.0, le=1e12)
     full_damping_penetration: float = key(
-        0.1, "mm or m", "penetration at which the damping is fully there", _ADAMS, bounds="1e-12 to 10 m", gt=0.0
+        0.1, "mm or m", "penetration at which damping reaches its full value", _ADAMS, bounds="1e-12 to 10 m", gt=0.0
     )
     friction: Literal["coulomb", "none"] = key(
-        "coulomb", "", "coulomb: creeping Coulomb friction as ADAMS has it; none: smooth ground", _SECTION_4
+        "coulomb", "", "coulomb: creeping Coulomb friction as in ADAMS; none: frictionless ground", _SECTION_4
     )
     static_friction: float = key(
-        0.9, "1", "coefficient at stiction_velocity, the largest", _SECTION_4, ge=0.0, le=100.0
+        0.9, "1", "coefficient at stiction_velocity, where friction is largest", _SECTION_4, ge=0.0, le=100.0
     )
     dynamic_friction: float = key(
         0.7,
@@ -67,12 +67,12 @@ class Contact(Block):
         le=100.0,
     )
     stiction_velocity: float = key(
-        100.0, "mm/s or m/s", "slip velocity of the largest friction", _ADAMS, bounds="1e-7 to 10 m/s", gt=0.0
+        100.0, "mm/s or m/s", "slip velocity at which friction is largest", _ADAMS, bounds="1e-7 to 10 m/s", gt=0.0
     )
     friction_velocity: float = key(
         1000.0,
         "mm/s or m/s",
-        "slip velocity from which on friction is dynamic",
+        "slip velocity above which friction is dynamic",
         _ADAMS,
         bounds="above stiction_velocity, up to 1000 m/s",
         gt=0.0,
@@ -88,8 +88,8 @@ class Contact(Block):
     pad_pitch: PadPitch = key(
         "rigid",
         "m",
-        "pitch of the checkerboard's pads: step length of the rigid or the contact (own) gait, or a number, in m in "
-        "any units; without effect on other terrains",
+        "pitch of the checkerboard's pads: step length of the rigid or the contact (own) gait, or a length in m "
+        "whatever the units; no effect on other terrains",
         _SECTION_4,
         bounds="rigid, own, or 1e-6 to 1e4",
     )
@@ -108,12 +108,12 @@ class Contact(Block):
         defaults = {name: field.default for name, field in cls.model_fields.items()}
         return from_mm(defaults, power) | data
 
-    _above = against(
+    _above = check_against(
         "friction_velocity",
         "stiction_velocity",
         lambda value, least: "" if value > least else f"must exceed stiction_velocity, {least:g}",
     )
-    _below = against(
+    _below = check_against(
         "dynamic_friction",
         "static_friction",
         lambda value, most: "" if value <= most else f"must not exceed static_friction, {most:g}",
@@ -122,23 +122,23 @@ class Contact(Block):
     @field_validator(*BOUNDS_SI)
     @classmethod
     def _within_bounds(cls, value: float, info: ValidationInfo) -> float:
-        """Refuse a length or velocity outside its bounds, which are the same physical ones in either units."""
+        """Check a length or velocity against its bounds, which are converted to the block's units."""
         units = info.data.get("units", "adams")
         scale, prefix = (MM_PER_M, "m") if units == "adams" else (1.0, "")
         least, most, unit = BOUNDS_SI[str(info.field_name)]
         if least * scale <= value <= most * scale:
             return value
-        raise wrong(f"must be from {least * scale:g} to {most * scale:g} {prefix}{unit}, as `units: {units}` has it")
+        raise meaning_error(f"must be from {least * scale:g} to {most * scale:g} {prefix}{unit}, with `units: {units}`")
 
     @property
     def has_friction(self) -> bool:
-        """Whether the ground holds feet back, by whatever law."""
+        """Whether the ground has friction."""
         return self.friction != "none"
 
     def unit_of(self, either: str) -> str:
-        """The unit of a key, of those that its text names for either units."""
+        """Choose the unit in use from a key's units, such as `mm or m`."""
         return either.split(" or ")[-1 if self.units == "si" else 0]
 
     def in_si(self) -> Self:
-        """The same ground with its numbers in SI units."""
+        """Convert to SI units."""
         return self if self.units == "si" else self.model_copy(update=from_mm(vars(self), self.exponent))

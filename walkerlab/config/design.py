@@ -1,10 +1,10 @@
-"""The design block: which number of the gait is made least or largest, over which numbers of the config."""
+"""The design block: the gait quantity to optimise and the parameters to vary."""
 
 from typing import Final, Literal, get_args
 
 from pydantic import field_validator
 
-from walkerlab.config.fields import Block, against, key, wrong
+from walkerlab.config.fields import Block, check_against, key, meaning_error
 
 Quantity = Literal[
     "period_s",
@@ -20,21 +20,23 @@ Bounds = dict[str, list[float]]
 
 
 class Design(Block):
-    """What `walkerlab design` looks for."""
+    """Optimisation problem of `walkerlab design`."""
 
-    minimise: Quantity | None = key(None, "", "number of the gait that is made least")
-    maximise: Quantity | None = key(None, "", "number of the gait that is made largest")
+    minimise: Quantity | None = key(None, "", "gait quantity to minimise")
+    maximise: Quantity | None = key(None, "", "gait quantity to maximise")
     over: Bounds = key(
         dict,
         "",
-        "numbers of the config that may change, with their bounds, in the key's unit",
+        "parameters that may vary, with their bounds, in the key's unit",
         bounds="[A, B] for each key, A below B",
     )
-    keep: Bounds = key(dict, "", "numbers of the gait that stay within bounds", bounds=f"[A, B] for each of {_NAMES}")
-    model: Literal["rigid", "contact"] = key("rigid", "", "whose gait is designed")
-    starts: int = key(5, "1", "starts of the search: the config's own numbers, and drawn ones", ge=1, le=1000)
+    keep: Bounds = key(dict, "", "gait quantities to constrain", bounds=f"[A, B] for each of {_NAMES}")
+    model: Literal["rigid", "contact"] = key("rigid", "", "model whose gait is optimised")
+    starts: int = key(
+        5, "1", "starting points of the search: the config's own values, the rest at random", ge=1, le=1000
+    )
 
-    _one = against(
+    _one = check_against(
         "maximise", "minimise", lambda value, _: "cannot be combined with minimise: remove one of them" if value else ""
     )
 
@@ -44,7 +46,9 @@ class Design(Block):
         for name, bounds in value.items():
             if len(bounds) != 2 or bounds[0] >= bounds[1]:
                 text = ", ".join(f"{bound:g}" for bound in bounds)
-                raise wrong(f"has bounds for {name}, [{text}], that are not two numbers, the first below the second")
+                raise meaning_error(
+                    f"has bounds for {name}, [{text}], that are not two numbers, the first below the second"
+                )
         return value
 
     @field_validator("keep")
@@ -52,5 +56,5 @@ class Design(Block):
     def _numbers_of_a_gait(cls, value: Bounds) -> Bounds:
         for name in value:
             if name not in get_args(Quantity):
-                raise wrong(f"names {name}, which is not a number of a gait; choose from {_NAMES}")
+                raise meaning_error(f"names {name}, which is not a gait quantity; choose from {_NAMES}")
         return value

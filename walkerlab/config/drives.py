@@ -1,4 +1,4 @@
-"""What drives a walker: keys of the blocks `walker.hip` and `push_off`."""
+"""Drives of a walker: keys of the blocks `walker.hip` and `push_off`."""
 
 from collections.abc import Mapping
 from typing import Any, Final
@@ -12,7 +12,7 @@ QUICKEST: Final = 1e4  # rad/s, of a leg at its spring: legs with next to no ine
 
 
 class Hip(Block):
-    """Torques between the legs, of legs with knees between the thighs."""
+    """Torques between the legs; for kneed legs, between the thighs."""
 
     spring_N_m_per_rad: float = key(
         0.0, "N m/rad", "stiffness of a spring that pulls the legs together", KUO, ge=0.0, le=STRONGEST
@@ -27,7 +27,7 @@ class Hip(Block):
     )
 
     def too_quick_for(self, inertia: float) -> bool:
-        """Whether it would swing legs of an inertia about the hip (kg m^2) faster than anything can follow."""
+        """Whether it would swing legs with an inertia about the hip (kg m^2) too fast to integrate."""
         steady = max(self.spring_N_m_per_rad, abs(self.torque_N_m))
         return steady > QUICKEST**2 * inertia or self.damping_N_m_s_per_rad > QUICKEST * inertia
 
@@ -42,25 +42,24 @@ class PushOff(Block):
 
 
 def drives_of(config: Any) -> tuple[str, ...]:
-    """What gives the walker of a config energy besides gravity, in words."""
+    """Describe what supplies energy to a config's walker besides gravity."""
     push, torque = config.push_off.impulse_N_s, config.walker.hip.torque_N_m
-    return present({f"a push-off of {short(push)} N s": push, f"a hip torque of {short(torque)} N m": torque})
+    return nonzero_words({f"a push-off of {short(push)} N s": push, f"a hip torque of {short(torque)} N m": torque})
 
 
 def springs_of(config: Any) -> tuple[str, ...]:
-    """What acts between the legs and gives no energy of its own, in words: a spring gives back, a damper takes."""
+    """Describe the spring and damper between a walker's legs, which supply no energy."""
     stiffness, damping = config.walker.hip.spring_N_m_per_rad, config.walker.hip.damping_N_m_s_per_rad
-    return present({
+    return nonzero_words({
         f"a hip spring of {short(stiffness)} N m/rad": stiffness,
         f"a hip damper of {short(damping)} N m s/rad": damping,
     })  # fmt: skip
 
 
-def present(acting: Mapping[str, float]) -> tuple[str, ...]:
-    """Words of what is not zero."""
+def nonzero_words(acting: Mapping[str, float]) -> tuple[str, ...]:
     return tuple(words for words, value in acting.items() if value != 0.0)
 
 
 def acting_on(config: Any) -> tuple[str, ...]:
-    """What acts on the walker of a config besides gravity and ground, in words."""
+    """Describe what acts on a config's walker besides gravity and ground."""
     return drives_of(config) + springs_of(config)

@@ -1,4 +1,4 @@
-"""Annotations of config keys: every key carries unit, bounds, meaning and source, and says in words what it allows."""
+"""Annotations of config keys: unit, bounds, meaning and source of each, and texts that describe them."""
 
 import types
 from collections.abc import Callable, Iterable, Iterator
@@ -15,7 +15,7 @@ from walkerlab.labels import with_unit
 
 
 class Block(BaseModel):
-    """A block of the config: frozen, typed strictly, unknown keys refused, no NaN and no infinity."""
+    """Base of all config blocks: frozen and strictly typed; unknown keys, NaN and infinity are errors."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False, validate_default=True)
 
@@ -31,16 +31,16 @@ def key(
     sequence: bool = False,
     **limits: Any,
 ) -> Any:
-    """One key of a block.
+    """Declare a key of a block.
 
-    default           its value, or what makes one; `...` where the config must have the key
-    unit              as it is printed, "1" for pure numbers, "" where there is none
+    default           its value or a factory; `...` for a required key
+    unit              as printed; "1" for pure numbers, "" for none
     meaning           one sentence
-    source            where the default comes from
-    bounds            what is allowed in words, where `limits` cannot say it
-    default_in_words  where it follows from another key
-    sequence          a YAML list is accepted for a tuple, as always where the default is one
-    limits            gt, ge, lt, le, pattern and so on, as pydantic has them
+    source            origin of the default
+    bounds            description of the allowed values, where `limits` cannot express them
+    default_in_words  description of a default that depends on another key
+    sequence          whether YAML lists become tuples, as for keys whose default is a tuple
+    limits            pydantic's constraints: gt, ge, lt, le, pattern, ...
     """
     words = {"unit": unit, "source": source, "bounds": bounds, "default_in_words": default_in_words}
     settings: dict[str, Any] = {"default_factory" if callable(default) else "default": default, **limits}
@@ -50,26 +50,26 @@ def key(
     )
 
 
-def wrong(reason: str) -> PydanticCustomError:
-    """What a validator raises, with the reason, for what cannot be meant."""
+def meaning_error(reason: str) -> PydanticCustomError:
+    """Build the error that a validator raises for a value that is well-typed but wrong."""
     return PydanticCustomError("meaning", reason)
 
 
-def against(name: str, other: str, why: Callable[[Any, Any], str]) -> Any:
-    """A check of a key against one above it: `why` its value is not allowed beside the other's, empty if it is."""
+def check_against(name: str, other: str, why: Callable[[Any, Any], str]) -> Any:
+    """Validate key `name` by the value of key `other` above it; `why` returns the reason or an empty text."""
 
     def check(value: Any, info: ValidationInfo) -> Any:
         beside = info.data.get(other)  # None where that is wrong itself, which is told
         reason = "" if beside is None else why(value, beside)
         if reason:
-            raise wrong(reason)
+            raise meaning_error(reason)
         return value
 
     return field_validator(name)(check)
 
 
 def block_of(field: FieldInfo) -> type[Block] | None:
-    """The block that a key holds, the first of several kinds; None if it holds a value."""
+    """Return the block that a key holds (the first of several kinds), or None for a value."""
     for candidate in (field.annotation, *get_args(field.annotation)):
         if isinstance(candidate, type) and issubclass(candidate, Block):
             return candidate
@@ -77,7 +77,7 @@ def block_of(field: FieldInfo) -> type[Block] | None:
 
 
 def kinds_of(field: FieldInfo) -> dict[str, type[Block]]:
-    """The blocks that a key may hold, by the word that tells them apart; empty if there is at most one."""
+    """Return the blocks that a key may hold, by their `type`; empty if there is at most one."""
     found = {}
     for candidate in get_args(field.annotation):
         for tag in get_args(candidate)[1:]:
@@ -89,9 +89,9 @@ def kinds_of(field: FieldInfo) -> dict[str, type[Block]]:
 def leaves(
     block: type[Block], prefix: tuple[str, ...] = (), held: Any = None
 ) -> Iterator[tuple[tuple[str, ...], FieldInfo]]:
-    """Path and field of every value in `block`, in the order of the schema.
+    """Yield path and field of every value in `block`, in the schema's order.
 
-    held  a config's own block of that type: of several kinds of a block it has those of its own, else the first's
+    held  a config's block of that type, which selects the kind of each inner block; by default the first kind
     """
     for name, field in block.model_fields.items():
         inner, own = block_of(field), getattr(held, name, None)
@@ -102,19 +102,19 @@ def leaves(
 
 
 def leaves_of_other_kinds(block: type[Block]) -> Iterator[tuple[tuple[str, ...], FieldInfo]]:
-    """The same for the other kinds of blocks: `walker(kneed).thigh.length_m`."""
+    """Yield path and field of values in the other kinds of blocks: `walker(kneed).thigh.length_m`."""
     for name, field in block.model_fields.items():
         for tag, kind in list(kinds_of(field).items())[1:]:
             yield from leaves(kind, (f"{name}({tag})",))
 
 
-def held(config: Any, path: Iterable[str]) -> Any:
-    """The value at a path of keys; None if the config has no such block."""
+def value_at(config: Any, path: Iterable[str]) -> Any:
+    """Return the value at a path of keys; None if the config lacks a block on the path."""
     return reduce(lambda block, name: getattr(block, name, None), path, config)
 
 
-def extra(field: FieldInfo, name: str) -> str:
-    """`unit`, `source`, `bounds` or `default_in_words` of a key as `key` was given it; empty if it was not."""
+def annotation_of(field: FieldInfo, name: str) -> str:
+    """Return a key's `unit`, `source`, `bounds` or `default_in_words`; empty if it has none."""
     held = field.json_schema_extra
     return str(held.get(name, "")) if isinstance(held, dict) else ""
 
@@ -123,24 +123,26 @@ _KINDS: Final[dict[Any, str]] = {float: "number", int: "integer", str: "text", b
 _SIGNS: Final = (("ge", "from"), ("gt", "above"), ("le", "up to"), ("lt", "below"))
 
 
-def kind(annotation: Any) -> str:
-    """Type of a value in words: number, integer, text, word, list or a choice of them."""
+def type_words(annotation: Any) -> str:
+    """Describe a type: number, integer, text, word, list, or a choice of these."""
     if annotation in _KINDS:
         return _KINDS[annotation]
     origin = get_origin(annotation)
     if origin is Annotated:
-        return kind(get_args(annotation)[0])
+        return type_words(get_args(annotation)[0])
     if origin is Literal:
         return "word"
     if origin is tuple:
         return "list"
     if origin in (Union, types.UnionType):
-        return " or ".join(dict.fromkeys(kind(part) for part in get_args(annotation) if part is not types.NoneType))
+        return " or ".join(
+            dict.fromkeys(type_words(part) for part in get_args(annotation) if part is not types.NoneType)
+        )
     return "block"
 
 
 def words_of(annotation: Any) -> tuple[str, ...]:
-    """The words that a value may be, also inside a list or beside numbers; empty if there are none."""
+    """Return the words that a value may be, also inside a list or union."""
     parts = get_args(annotation)
     if get_origin(annotation) is Literal:
         return tuple(word for word in parts if isinstance(word, str))
@@ -148,8 +150,8 @@ def words_of(annotation: Any) -> tuple[str, ...]:
 
 
 def bounds_of(field: FieldInfo) -> str:
-    """What a key allows, in words and without its unit, e.g. `from 0.001 to 1000`; empty if there are no bounds."""
-    spoken, what = extra(field, "bounds"), kind(field.annotation)
+    """Describe a key's bounds without unit, e.g. `from 0.001 to 1000`; empty if it has none."""
+    spoken, what = annotation_of(field, "bounds"), type_words(field.annotation)
     if spoken:
         return spoken
     if what in ("word", _KINDS[bool]):
@@ -160,12 +162,12 @@ def bounds_of(field: FieldInfo) -> str:
     return ", ".join(f"{word} {short(limits[sign])}" for sign, word in _SIGNS if sign in limits)
 
 
-def allowed(field: FieldInfo) -> str:
-    """What a key allows, with kind and unit, for a message."""
+def describe_allowed(field: FieldInfo) -> str:
+    """Describe the values that a key accepts, with type and unit, for a message."""
     if block_of(field) is not None:
         optional = type(None) in get_args(field.annotation)
         return "a block of keys, or null to leave it out" if optional else "a block of keys"
-    bounds, unit, what = bounds_of(field), extra(field, "unit"), kind(field.annotation)
+    bounds, unit, what = bounds_of(field), annotation_of(field, "unit"), type_words(field.annotation)
     if what == "word":
         return f"one of {bounds}" if "," in bounds else bounds
     if what in _KINDS.values():

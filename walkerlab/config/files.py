@@ -1,4 +1,4 @@
-"""Config files: where they are, what they hold, and the built-in ones."""
+"""Config files, user-written and built in: finding and reading them."""
 
 import contextlib
 import stat
@@ -8,7 +8,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Final
 
-from walkerlab.config.problems import KEYS_ARE_LISTED, beyond_scope, nearest, refused, shown
+from walkerlab.config.problems import KEYS_ARE_LISTED, beyond_scope, nearest, printable, problem_error
 from walkerlab.config.reader import MAX_CHARACTERS, read
 from walkerlab.config.tree import Mapping, Position, Scalar, Sequence
 
@@ -20,17 +20,17 @@ SUFFIXES: Final = (".yaml", ".yml")
 MAX_EXTENDS: Final = 16
 SHOWN_PATH: Final = 240
 STORED_IS_COMPLETE: Final = "every key with its value; a stored config extends nothing"
-parsed = lru_cache(maxsize=32)(read)  # trees of texts that were read already: they are changed in copies alone
+read_cached = lru_cache(maxsize=32)(read)  # trees of texts that were read already: they are changed in copies alone
 
 
 @dataclass(frozen=True, slots=True)
 class ConfigFile:
-    """One config file.
+    """A config file, or the config of a stored run.
 
-    path     of the file; of a run its folder's name
-    label    as messages name it
-    text     of the config that a run or an artifact holds; None if it is the file's own
-    changes  KEY=VALUE that made the run's config from its file
+    path     of the file; for a run, the name of its folder
+    label    name in messages
+    text     config stored with a run or artifact; None to read the file
+    changes  KEY=VALUE settings that made the run's config from its file
     """
 
     path: Path
@@ -40,45 +40,42 @@ class ConfigFile:
 
 
 def builtin_names() -> tuple[str, ...]:
-    """Names of the configs that come with the package."""
     return tuple(sorted(path.stem for path in BUILTIN_FOLDER.glob("*.yaml")))
 
 
-def extendable(typed: str | None) -> str:
-    """What a config may extend that starts from the one that was typed: for a run, which has no file, the paper's."""
+def config_to_extend(typed: str | None) -> str:
+    """Return the config that a new one may extend: that of the command line, or the paper's for a run."""
     named = typed is not None and (typed in builtin_names() or (Path(typed).is_file() and Path(typed).suffix != ".h5"))
     return str(typed) if named else DEFAULT
 
 
-def builtin(name: str) -> ConfigFile:
-    """The config `name` that comes with the package."""
+def builtin_config(name: str) -> ConfigFile:
     return ConfigFile(BUILTIN_FOLDER / f"{name}.yaml", f"built-in {name}.yaml")
 
 
-def find(path: Path) -> ConfigFile:
-    """The file of `--config`: a path, or else the name of a built-in config."""
+def find_config(path: Path) -> ConfigFile:
+    """Resolve `--config`: an existing path, otherwise the name of a built-in config."""
     if str(path) in builtin_names() and not path.is_file():
-        return builtin(str(path))
+        return builtin_config(str(path))
     return file_at(path)
 
 
 def file_at(path: Path) -> ConfigFile:
-    """The file of a path."""
-    return ConfigFile(path, shown(str(path), SHOWN_PATH))
+    return ConfigFile(path, printable(str(path), SHOWN_PATH))
 
 
 def read_layers(file: ConfigFile) -> list[Mapping]:
-    """The blocks of a file and of all it extends, the furthest ancestor first.
+    """Read a file and all it extends, the furthest ancestor first.
 
-    Raises ConfigError if one of them cannot be read, is not a block of keys, or extends itself, and for a stored config
-    that names a file: it is complete.
+    Raises ConfigError if a file cannot be read, is not a block of keys, or extends itself, and if a stored config
+    refers to another file.
     """
     layers = [with_cases(root.without("extends"), one.path.parent) for one, root in files_and_blocks(file)]
     return layers[::-1]
 
 
 def files_read(file: ConfigFile) -> list[Path]:
-    """The files that a config is read from: its own, those that it extends, and lists of cases."""
+    """List the files a config is read from: its own, those it extends, and lists of cases."""
     found = []
     for one, root in files_and_blocks(file):
         cases = cases_file(root, one.path.parent)
@@ -87,21 +84,21 @@ def files_read(file: ConfigFile) -> list[Path]:
 
 
 def files_and_blocks(file: ConfigFile) -> Iterator[tuple[ConfigFile, Mapping]]:
-    """A config's file with its block of keys, then the file that it extends, and so on; raises as `read_layers`."""
+    """Yield a config's file with its block of keys, then the file it extends, and so on; raises as `read_layers`."""
     seen: list[str] = []
     asked: Position | None = None  # where the file's name stands
     while True:
-        root = parsed(_text_of(file, asked), file.label)
+        root = read_cached(_text_of(file, asked), file.label)
         if str(file.path.resolve()) in seen:
-            raise refused(asked, f"extends: {file.label} extends itself")
+            raise problem_error(asked, f"extends: {file.label} extends itself")
         if len(seen) == MAX_EXTENDS:
-            raise refused(asked, f"extends: more than {MAX_EXTENDS} files deep")
+            raise problem_error(asked, f"extends: more than {MAX_EXTENDS} files deep")
         seen.append(str(file.path.resolve()))
         if not isinstance(root, Mapping):
             empty = root is None or (isinstance(root, Scalar) and root.value is None)
             held = "is empty" if empty else f"holds a {'single value' if isinstance(root, Scalar) else 'list'}"
             start = root.position if root else Position(file.label, 1, 1)
-            raise refused(start, f"the file {held}", "a block of keys, e.g. `extends: paper`")
+            raise problem_error(start, f"the file {held}", "a block of keys, e.g. `extends: paper`")
         if file.text is not None:
             _refuse_named_files(root)
         yield file, root
@@ -110,9 +107,9 @@ def files_and_blocks(file: ConfigFile) -> Iterator[tuple[ConfigFile, Mapping]]:
             return
         asked = extends.position
         if not isinstance(extends, Scalar) or not isinstance(extends.value, str) or not extends.value:
-            raise refused(asked, "extends: is not the name of a config", _what_there_is())
+            raise problem_error(asked, "extends: is not the name of a config", _what_there_is())
         named = extends.value in builtin_names()  # else a path from the file's folder
-        file = builtin(extends.value) if named else file_at(file.path.parent / extends.value)
+        file = builtin_config(extends.value) if named else file_at(file.path.parent / extends.value)
 
 
 def _refuse_named_files(root: Mapping) -> None:
@@ -121,7 +118,7 @@ def _refuse_named_files(root: Mapping) -> None:
     places = [root.entries["extends"].position] if "extends" in root.entries else []
     places += [] if cases is None else [cases[1]]
     if places:
-        raise refused(places[0], "a config that is stored with a result names a file to be read", STORED_IS_COMPLETE)
+        raise problem_error(places[0], "a stored config refers to a file", STORED_IS_COMPLETE)
 
 
 def cases_file(layer: Mapping, folder: Path) -> tuple[ConfigFile, Position] | None:
@@ -137,9 +134,9 @@ def cases_file(layer: Mapping, folder: Path) -> tuple[ConfigFile, Position] | No
 
 
 def with_cases(layer: Mapping, folder: Path) -> Mapping:
-    """The layer with the list of a file in the place of that file's name, under stability.cases.
+    """Replace the name of a file under stability.cases by the list in that file.
 
-    folder  which relative names start from
+    folder  base of relative names
 
     Raises ConfigError if the file cannot be read or holds no list.
     """
@@ -149,7 +146,7 @@ def with_cases(layer: Mapping, folder: Path) -> Mapping:
     file, position = named
     cases = read(_text_of(file, position, "a file that holds a list of cases"), file.label)
     if not isinstance(cases, Sequence):
-        raise refused(Position(file.label, 1, 1), "the file does not hold a list", "a list of stability cases")
+        raise problem_error(Position(file.label, 1, 1), "the file does not hold a list", "a list of stability cases")
     whole, inner = layer.without(), block.without()
     inner.put("cases", cases, block.keys["cases"])
     whole.put("stability", inner, layer.keys["stability"])
@@ -173,7 +170,7 @@ def _text_of(file: ConfigFile, asked: Position | None, wanted: str = "") -> str:
         mode = file.path.stat().st_mode
         if not stat.S_ISREG(mode):
             what = "a folder" if stat.S_ISDIR(mode) else "not a regular file"
-            raise refused(asked, f"{kind} {file.label} is {what}", "a YAML file")
+            raise problem_error(asked, f"{kind} {file.label} is {what}", "a YAML file")
         with file.path.open("rb") as stream:
             data = stream.read(4 * MAX_CHARACTERS + 1)
     except FileNotFoundError:
@@ -181,24 +178,24 @@ def _text_of(file: ConfigFile, asked: Position | None, wanted: str = "") -> str:
         advice = KEYS_ARE_LISTED if wanted else "`walkerlab init` writes a config to begin with"
         beyond = "" if wanted or file.path.suffix else beyond_scope(file.path.name)
         text = f"there is no {kind} {file.label}{f'; {beyond}' if beyond else ''}"
-        raise refused(asked, text, there_is, "" if beyond else _near(file), advice) from None
+        raise problem_error(asked, text, there_is, "" if beyond else _near(file), advice) from None
     except (OSError, ValueError, RuntimeError) as error:  # ValueError: a null byte in the name; RuntimeError: a loop
         reason = (error.strerror if isinstance(error, OSError) else None) or str(error)
-        raise refused(asked, f"{kind} {file.label} cannot be read: {reason.lower()}") from None
+        raise problem_error(asked, f"{kind} {file.label} cannot be read: {reason.lower()}") from None
     if len(data) > 4 * MAX_CHARACTERS:
-        raise refused(Position(file.label, 1, 1), f"longer than {MAX_CHARACTERS} characters: not a config")
+        raise problem_error(Position(file.label, 1, 1), f"longer than {MAX_CHARACTERS} characters: not a config")
     try:
         return data.decode("utf-8")
     except UnicodeDecodeError as error:
         lines = data[: error.start].split(b"\n")
         where = Position(file.label, len(lines), len(lines[-1].decode("utf-8")) + 1)
-        raise refused(where, f"byte 0x{data[error.start]:02x} is not UTF-8: is it a text file?") from None
+        raise problem_error(where, f"byte 0x{data[error.start]:02x} is not UTF-8: is it a text file?") from None
 
 
 def _near(file: ConfigFile) -> str:
-    """What was perhaps meant by the name of a file that is not there."""
+    """Suggest an existing file or built-in config for a missing one."""
     beside: list[str] = []
     with contextlib.suppress(OSError, ValueError):
         beside = [path.name for path in file.path.parent.iterdir() if path.suffix in SUFFIXES]
     found = nearest(file.path.name, beside)
-    return shown(str(file.path.with_name(found)), SHOWN_PATH) if found else nearest(file.path.stem, builtin_names())
+    return printable(str(file.path.with_name(found)), SHOWN_PATH) if found else nearest(file.path.stem, builtin_names())

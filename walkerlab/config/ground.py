@@ -1,12 +1,12 @@
-"""The ground block: heights of footholds over the slope."""
+"""The ground block: heights of footholds above the slope."""
 
 from pydantic import field_validator
 
-from walkerlab.config.fields import Block, against, key, wrong
+from walkerlab.config.fields import Block, check_against, key, meaning_error
 
 
 class Footholds(Block):
-    """Uneven ground: each foothold of a walk at its own height; without these keys it is even."""
+    """Uneven ground, with a height for each foothold; even by default."""
 
     roughness_m: float = key(
         0.0, "m", "standard deviation of the footholds' heights, which are drawn independently", ge=0.0, le=1e3
@@ -19,7 +19,7 @@ class Footholds(Block):
         bounds="a list of numbers from -1e3 to 1e3, in place of roughness_m",
     )
 
-    _listed = against(
+    _listed = check_against(
         "heights_m",
         "roughness_m",
         lambda heights, roughness: (
@@ -31,10 +31,9 @@ class Footholds(Block):
     @classmethod
     def _near_the_slope(cls, value: tuple[float, ...]) -> tuple[float, ...]:
         if any(abs(height) > 1e3 for height in value):
-            raise wrong("must be numbers from -1e3 to 1e3")
+            raise meaning_error("must be numbers from -1e3 to 1e3")
         return value
 
     @property
     def even(self) -> bool:
-        """Whether all footholds lie on the slope."""
         return self.roughness_m == 0.0 and not any(self.heights_m)

@@ -1,10 +1,10 @@
-"""Layers of a config: a file over what it extends, and `--set` over both."""
+"""Layers of a config: a file on top of the file it extends, and `--set` on top of both."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from walkerlab.config.problems import refused, shown
+from walkerlab.config.problems import printable, problem_error
 from walkerlab.config.reader import MAX_DEPTH, read
 from walkerlab.config.tree import Mapping, Node, Position, Scalar
 
@@ -13,7 +13,7 @@ SLOPE_KEYS: Final = ("slope_rad", "slope_deg")
 
 @dataclass(frozen=True, slots=True)
 class ConfigSetting:
-    """One `--set KEY=VALUE`.
+    """A `--set KEY=VALUE` option.
 
     path      parts of the dotted key
     value     tree of the value
@@ -25,8 +25,8 @@ class ConfigSetting:
     position: Position
 
 
-def stacked(layers: Sequence[Mapping]) -> Mapping:
-    """One block of several, later ones over earlier ones; the name is the last layer's own.
+def merge_layers(layers: Sequence[Mapping]) -> Mapping:
+    """Merge layers into one block, later over earlier; the name comes from the last layer alone.
 
     Raises ConfigError if a layer has more than one slope key.
     """
@@ -52,42 +52,41 @@ def _merged(lower: Mapping, upper: Mapping) -> Mapping:
 
 
 def _refuse_two_slopes(given: dict[str, Position]) -> None:
-    """Raise ConfigError if the slope is given in radians and in degrees; keys in the order in which they stand."""
     slopes = [(name, place) for name, place in given.items() if name in SLOPE_KEYS]
     if len(slopes) == len(SLOPE_KEYS):
         (first, there), (second, here) = slopes
         where = f" at {there}" if there else ""
-        raise refused(here, f"{second}: the slope is given already, as {first}{where}", "one of both")
+        raise problem_error(here, f"{second}: the slope is given already, as {first}{where}", "one of both")
 
 
-def setting_of(text: str) -> ConfigSetting:
-    """One `--set` option; ConfigError if it is not KEY=VALUE with a YAML value.
+def parse_setting(text: str) -> ConfigSetting:
+    """Parse a `--set` option; ConfigError if it is not KEY=VALUE with a YAML value.
 
-    text  with a `source` where another option stands for it
+    text  its attribute `source`, if any, names the option in messages
     """
     key, equals, value = text.partition("=")
-    source = shown(getattr(text, "source", "")) or f"--set {shown(text)}"
+    source = printable(getattr(text, "source", "")) or f"--set {printable(text)}"
     start = Position(source, 1, 1)
     path = tuple(part.strip() for part in key.split("."))
     if not equals or not all(path):
-        raise refused(start, "is not of the form KEY=VALUE", "e.g. --set slope_deg=3")
+        raise problem_error(start, "is not of the form KEY=VALUE", "e.g. --set slope_deg=3")
     if len(path) > MAX_DEPTH:
-        raise refused(start, f"nested deeper than {MAX_DEPTH} levels")
+        raise problem_error(start, f"nested deeper than {MAX_DEPTH} levels")
     column = len(key) + 2
     node = read(value, source, column)
     return ConfigSetting(path, node or Scalar(Position(source, 1, column), None, ""), start)
 
 
 def option_setting(key: str, value: int | str) -> ConfigSetting:
-    """An option that is a key of its own, as `--strides`."""
-    position = Position(f"--{key} {shown(str(value))}", 1, 1)
+    """Build the setting of an option with the name of a key, such as `--strides`."""
+    position = Position(f"--{key} {printable(str(value))}", 1, 1)
     return ConfigSetting((key,), Scalar(position, value, str(value)), position)
 
 
-def with_settings(tree: Mapping, settings: Sequence[ConfigSetting]) -> Mapping:
-    """`tree` with each setting in its place, in order; a list or a block is replaced whole.
+def apply_settings(tree: Mapping, settings: Sequence[ConfigSetting]) -> Mapping:
+    """Apply settings to `tree` in order; a list or block is replaced whole.
 
-    Raises ConfigError if a setting goes into something that is no block.
+    Raises ConfigError if a setting addresses a key below a value.
     """
     _refuse_two_slopes({setting.path[0]: setting.position for setting in settings})
     for setting in settings:
@@ -108,6 +107,6 @@ def _placed(block: Mapping, setting: ConfigSetting, depth: int) -> Mapping:
         inner = Mapping(setting.position)
     if not isinstance(inner, Mapping):
         above, whole = ".".join(setting.path[: depth + 1]), ".".join(setting.path)
-        raise refused(setting.position, f"{shown(whole)}: {shown(above)} is a value, not a block of keys")
+        raise problem_error(setting.position, f"{printable(whole)}: {printable(above)} is a value, not a block of keys")
     result.put(name, _placed(inner, setting, depth + 1), block.keys.get(name, setting.position))
     return result

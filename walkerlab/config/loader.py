@@ -1,7 +1,7 @@
-"""From a file, `--set` and `--strides` to one typed config, its warnings and the name of its run.
+"""Loading a config: a file, `--set` and `--strides` become a typed config with warnings and a run name.
 
-A config changed by `--set` runs beside the unchanged one, in a folder named after the change. The name follows from
-what differs and not from how the change was typed: one experiment, one folder.
+A config changed by `--set` runs in a folder of its own, named after the change. The name follows from the values that
+differ, however they were typed: one experiment, one folder.
 """
 
 import hashlib
@@ -13,16 +13,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from walkerlab.config.canonical import flattened
+from walkerlab.config.canonical import flatten
 from walkerlab.config.fields import block_of
-from walkerlab.config.files import DEFAULT, ConfigFile, builtin, find, read_layers, with_cases
-from walkerlab.config.layers import ConfigSetting, option_setting, setting_of, stacked, with_settings
+from walkerlab.config.files import DEFAULT, ConfigFile, builtin_config, find_config, read_layers, with_cases
+from walkerlab.config.layers import ConfigSetting, apply_settings, merge_layers, option_setting, parse_setting
 from walkerlab.config.numbers import short
-from walkerlab.config.overlay import refuse_bad_cases
+from walkerlab.config.overlay import check_cases
 from walkerlab.config.problems import Problem
 from walkerlab.config.schema import QUESTIONS, Config
 from walkerlab.config.tree import Mapping, Position, Scalar
-from walkerlab.config.validation import Location, key_at, node_at, on_the_slope, typed
+from walkerlab.config.validation import Location, align_start, key_at, node_at, validate_tree
 from walkerlab.config.walkers import CompassWalker
 from walkerlab.errors import ConfigError
 
@@ -38,14 +38,14 @@ HEAVY_KG_M3: Final = 1000.0
 
 @dataclass(frozen=True, slots=True)
 class LoadedConfig:
-    """A config that is ready to run, and to be varied.
+    """A valid config with its origin.
 
     config    resolved, in the schema's types
     run_name  name of its folder below the runs folder
-    changes   KEY=VALUE of each key in which it differs from its file; for a run's config, those of the run come first
-    warnings  what was changed in it, in words
-    source    the file it is from
-    tree      what it was typed from
+    changes   KEY=VALUE of each key that differs from its file; for a run's config, the run's changes come first
+    warnings  adjustments and suspicious values, as sentences
+    source    its file
+    tree      its untyped tree, with positions
     """
 
     config: Config
@@ -56,14 +56,14 @@ class LoadedConfig:
     tree: Mapping
 
     def placed(self, error: ConfigError) -> ConfigError:
-        """The error with the place of the key that it is about, where the config's text has one."""
+        """Add the position of the key at fault to an error, where the config's text has one."""
         where = node_at(self.tree, error.key)[1] if error.key and self.tree.entries.get(str(error.key[0])) else None
         return ConfigError(f"{where}: {error.message}", error.advice) if where else error
 
     def variant(self, settings: Sequence[ConfigSetting]) -> Config:
-        """The config with some keys set, checked by the schema; ConfigError with the places of what is wrong."""
-        tree = with_settings(self.tree, settings)
-        return on_the_slope(typed(tree), tree)[0]
+        """Set some keys and validate the result; ConfigError with positions if it is invalid."""
+        tree = apply_settings(self.tree, settings)
+        return align_start(validate_tree(tree), tree)[0]
 
 
 def load(
@@ -74,29 +74,28 @@ def load(
 ) -> LoadedConfig:
     """Load a config.
 
-    path     of a YAML file, or the name of a built-in config; None is the built-in paper config; a `ConfigFile` with a
-             text is a run's config, named as the run's folder
+    path     YAML file, name of a built-in config, or a `ConfigFile` with the text of a run's config; default: paper
     sets     `--set` options, KEY=VALUE, in order
-    strides  `--strides`, over everything else
-    name     `--name`, over the config's own; None leaves that
+    strides  `--strides`, which overrides everything else
+    name     `--name`; None keeps the config's own
 
-    Raises ConfigError with file, line, column, value, what is allowed and the nearest key of every problem.
+    Raises ConfigError that lists every problem with file, line, column, value, allowed values and the nearest key.
     """
-    file = path if isinstance(path, ConfigFile) else builtin(DEFAULT) if path is None else find(path)
-    tree = stacked(read_layers(file))
+    file = path if isinstance(path, ConfigFile) else builtin_config(DEFAULT) if path is None else find_config(path)
+    tree = merge_layers(read_layers(file))
     start = Position(file.label, 1, 1)
     if "name" not in tree.entries:
         safe = safe_name(file.path.stem)
         tree = tree.without()
         tree.put("name", Scalar(start, safe, safe), start)
-    settings = [setting_of(text) for text in sets]
+    settings = [parse_setting(text) for text in sets]
     options = {"strides": strides, "name": name}
     settings += [option_setting(key, value) for key, value in options.items() if value is not None]
-    changed_tree = with_cases(with_settings(tree, settings), Path())
-    changed = typed(changed_tree)
-    base = typed(tree) if settings else changed
-    refuse_bad_cases(changed, changed_tree)
-    config, moved = on_the_slope(changed, changed_tree)
+    changed_tree = with_cases(apply_settings(tree, settings), Path())
+    changed = validate_tree(changed_tree)
+    base = validate_tree(tree) if settings else changed
+    check_cases(changed, changed_tree)
+    config, moved = align_start(changed, changed_tree)
     slope = changed_tree.entries.get("slope_deg")
     degrees = float(slope.value) if isinstance(slope, Scalar) and isinstance(slope.value, int | float) else None
     new = changes_of(base, changed, degrees)
@@ -109,21 +108,21 @@ def load(
     else:
         folder = run_name(base.name if file.text is None else file.path.name.partition("@")[0], changes)
     named = tree.entries["name"]
-    warnings = [*doubts(config, changed_tree), *moved]
+    warnings = [*suspicious_values(config, changed_tree), *moved]
     if isinstance(named, Scalar) and named.position == start and named.value != file.path.stem:
-        cannot = "since a run folder cannot be named as the file is"
+        cannot = "since a run folder cannot have the file's name"
         warnings.insert(0, f"{file.label}: the run is named {named.value}, {cannot}")
     return LoadedConfig(config, name or folder, changes, tuple(warnings), file.label, changed_tree)
 
 
 def safe_name(text: str) -> str:
-    """A text as the name of a run folder: accents, blanks and what else such a name cannot have replaced."""
+    """Turn a text into a valid name of a run folder."""
     plain = unicodedata.normalize("NFKD", text).encode("ascii", "ignore").decode()
     return re.sub(r"[^A-Za-z0-9._-]+", "-", plain).strip("-.")[:64].rstrip(".") or "run"
 
 
-def doubts(config: Config, tree: Mapping) -> Iterator[str]:
-    """Warn of what is perhaps meant otherwise: a leg whose mass stays, wrong units, a pitch without pads."""
+def suspicious_values(config: Config, tree: Mapping) -> Iterator[str]:
+    """Yield warnings about likely mistakes: a leg mass left in place, wrong units, a pitch without pads."""
     walker, block = config.walker, tree.entries.get("walker")
     places = block.keys if isinstance(block, Mapping) else {}
     length = short(walker.leg_length_m)
@@ -146,8 +145,8 @@ def doubts(config: Config, tree: Mapping) -> Iterator[str]:
     contact = config.contact
     if contact is not None and contact.terrain != "checkerboard" and not isinstance(contact.pad_pitch, str):
         text = f"contact.pad_pitch has no effect on {contact.terrain}, which has no pads"
-        yield str(Problem(key_at(tree, ("contact", "pad_pitch")), f"{text}; only checkerboard has some"))
-    for path, value in numbers(("walker",), walker.model_dump(mode="json")):
+        yield str(Problem(key_at(tree, ("contact", "pad_pitch")), f"{text}; only checkerboard has pads"))
+    for path, value in numbers_in(("walker",), walker.model_dump(mode="json")):
         key, text = str(path[-1]), f"{'.'.join(map(str, path))} is {short(value)}"
         if key.endswith("length_m") and value > LONG_M:
             yield str(Problem(key_at(tree, path), f"{text} m; lengths are in m, not in mm"))
@@ -155,11 +154,10 @@ def doubts(config: Config, tree: Mapping) -> Iterator[str]:
             yield str(Problem(key_at(tree, path), f"{text} kg on legs of {length} m; masses are in kg, not in g"))
 
 
-def numbers(path: Location, value: Any) -> Iterator[tuple[Location, float]]:
-    """The numbers in a block or list, with where they are."""
+def numbers_in(path: Location, value: Any) -> Iterator[tuple[Location, float]]:
     if isinstance(value, dict | list):
         for name, inner in value.items() if isinstance(value, dict) else enumerate(value):
-            yield from numbers((*path, name), inner)
+            yield from numbers_in((*path, name), inner)
     elif isinstance(value, int | float):
         yield path, float(value)
 
@@ -170,9 +168,9 @@ UNSAFE: Final = re.compile(r"[^A-Za-z0-9._,@=+-]")
 
 
 def changes_of(base: Config, changed: Config, slope_deg: float | None = None) -> tuple[str, ...]:
-    """KEY=VALUE of each key in which `--set` changed `base`, in the schema's order, however that was typed.
+    """List KEY=VALUE of each key in which `changed` differs from `base`, in the schema's order.
 
-    slope_deg  the slope as the user gave it, if in degrees
+    slope_deg  the slope as given by the user, if in degrees
     """
     before, after = base.model_dump(mode="json", exclude={"name"}), changed.model_dump(mode="json", exclude={"name"})
     added = []
@@ -181,8 +179,8 @@ def changes_of(base: Config, changed: Config, slope_deg: float | None = None) ->
         if block is not None and before[name] is None and after[name] is not None:
             before[name] = block().model_dump(mode="json")
             added.append(f"{name}=added")
-    known = dict(flattened(before))
-    differing = {key: value for key, value in flattened(after) if key not in known or known[key] != value}
+    known = dict(flatten(before))
+    differing = {key: value for key, value in flatten(after) if key not in known or known[key] != value}
     if slope_deg is not None and "slope_rad" in differing:
         differing = {"slope_deg" if key == "slope_rad" else key: value for key, value in differing.items()}
         differing["slope_deg"] = slope_deg
@@ -190,9 +188,9 @@ def changes_of(base: Config, changed: Config, slope_deg: float | None = None) ->
 
 
 def run_name(name: str, changes: Sequence[str]) -> str:
-    """Name of a run folder: `name@key=value,...` if that is short, otherwise `name@label-` and 8 hex digits.
+    """Name a run folder `name@key=value,...` if that is short, otherwise `name@label-` and 8 hex digits.
 
-    The label is the stage whose question was changed, if there is one, and otherwise the first key.
+    The label is the first changed block of a stage, otherwise the first key.
     """
     change = ",".join(changes)
     whole = f"{name}@{change}" if change else name
@@ -204,7 +202,6 @@ def run_name(name: str, changes: Sequence[str]) -> str:
 
 
 def key_of(change: str) -> str:
-    """The key of KEY=VALUE."""
     return change.partition("=")[0]
 
 

@@ -1,4 +1,4 @@
-"""Numbers as short texts that read back as the same number, and when two are the same."""
+"""Shortest exact texts of numbers, and comparison up to rounding."""
 
 import math
 from decimal import Decimal
@@ -9,10 +9,7 @@ SAME: Final = 1e-9
 
 
 def short(number: float) -> str:
-    """The shortest of the texts that read back as `number`, e.g. 3, 0.0174, 1e6.
-
-    number  finite; an int is printed in full
-    """
+    """Return the shortest text that reads back as `number` (finite), e.g. 3, 0.0174, 1e6; integers in full."""
     if isinstance(number, int):
         return str(number)
     plain = repr(number).removesuffix(".0")
@@ -23,7 +20,7 @@ def short(number: float) -> str:
 
 
 def same(one: Any, other: Any) -> bool:
-    """Whether two values are the same, numbers up to their rounding."""
+    """Whether two values are equal, numbers up to rounding."""
     if isinstance(one, float | int) and isinstance(other, float | int):
         return math.isclose(one, other, rel_tol=SAME)
     return bool(one == other)

@@ -1,47 +1,47 @@
-"""A few lines over the paper config: how cases of a catalogue are written."""
+"""Configs given as a few changes of the paper config, such as stability cases."""
 
 from collections.abc import Mapping as Keys
 from typing import Any
 
-from walkerlab.config.files import DEFAULT, builtin, read_layers
-from walkerlab.config.layers import stacked
-from walkerlab.config.problems import refused
+from walkerlab.config.files import DEFAULT, builtin_config, read_layers
+from walkerlab.config.layers import merge_layers
+from walkerlab.config.problems import problem_error
 from walkerlab.config.schema import Config
 from walkerlab.config.stability import Case
 from walkerlab.config.tree import Mapping, Node, Position, Scalar, Sequence
-from walkerlab.config.validation import on_the_slope, typed
+from walkerlab.config.validation import align_start, validate_tree
 
 
-def over_paper(lines: Keys[str, Any], source: str = "the paper's") -> Config:
-    """The built-in paper config with `lines` over it.
+def paper_config_with(lines: Keys[str, Any], source: str = "the paper's") -> Config:
+    """Build the paper config with changes.
 
     lines   keys of a config, nested, as plain values
-    source  what messages name as their origin
+    source  origin named in messages
 
-    Raises ConfigError if they are no config; theta_1 of a start is put on the slope without a word.
+    Raises ConfigError if the result is invalid; theta_1 of a start is moved onto the slope without a warning.
     """
-    return block_over_paper(tree_of(lines, Position(source, 1, 1)))
+    return paper_config_with_tree(tree_of(lines, Position(source, 1, 1)))
 
 
-def block_over_paper(upper: Mapping) -> Config:
-    """The built-in paper config with a block of keys over it; ConfigError with their places if they are no config.
+def paper_config_with_tree(upper: Mapping) -> Config:
+    """Build the paper config with a block of keys on top; ConfigError with positions if the result is invalid.
 
-    What a contact block in SI leaves out has the paper's physical value, not its number in N, mm, s.
+    With SI units, keys missing in the contact block keep the paper's physical value rather than its value in N, mm, s.
     """
-    layers = read_layers(builtin(DEFAULT))
+    layers = read_layers(builtin_config(DEFAULT))
     contact = upper.entries.get("contact")
     units = contact.entries.get("units") if isinstance(contact, Mapping) else None
     if isinstance(units, Scalar) and units.value == "si":
         layers = [layer.without("contact") for layer in layers]
-    tree = stacked([*layers, upper])
+    tree = merge_layers([*layers, upper])
     tree.put("name", Scalar(upper.position, DEFAULT, DEFAULT), upper.position)
-    return on_the_slope(typed(tree), tree)[0]
+    return align_start(validate_tree(tree), tree)[0]
 
 
-def refuse_bad_cases(config: Config, tree: Mapping) -> None:
-    """Raise ConfigError with the place of what is wrong with the lines of a config's own stability cases.
+def check_cases(config: Config, tree: Mapping) -> None:
+    """Raise ConfigError with positions if a config's stability cases are invalid or share a name.
 
-    tree  that the config was typed from
+    tree  source of the config
     """
     if not config.stability.cases:
         return
@@ -52,20 +52,20 @@ def refuse_bad_cases(config: Config, tree: Mapping) -> None:
     for case, node in zip(config.stability.cases, listed.items, strict=True):
         assert isinstance(node, Mapping), "a case that is typed is a block"
         if case.name in places:
-            raise refused(node.keys["name"], f"name: {case.name} is a case at {places[case.name]} already")
+            raise problem_error(node.keys["name"], f"name: {case.name} is a case at {places[case.name]} already")
         places[case.name] = node.keys["name"]
         lines = node.entries.get("config", Mapping(node.position))
         assert isinstance(lines, Mapping), "lines that are typed are a block"
-        over = block_over_paper(lines)
+        over = paper_config_with_tree(lines)
         if case.model == "contact":
-            refuse_without_ground(case, over, lines)
+            check_ground(case, over, lines)
 
 
-def refuse_without_ground(case: Case, config: Config, lines: Mapping) -> None:
-    """Raise ConfigError if a case of the contact model has no ground, or pads as long as a step of no length."""
+def check_ground(case: Case, config: Config, lines: Mapping) -> None:
+    """Raise ConfigError if a contact case has no ground, or pads of zero length."""
     if config.contact is None:
         where = lines.keys.get("contact", lines.position)
-        raise refused(where, f"contact: case {case.name} walks on the ground and has none", "model: rigid")
+        raise problem_error(where, f"contact: case {case.name} walks on the ground and has none", "model: rigid")
     if isinstance(config.start, str):
         return
     # a step of no length leaves steps nothing to be judged by on other terrains too
@@ -73,11 +73,11 @@ def refuse_without_ground(case: Case, config: Config, lines: Mapping) -> None:
     if by_start and config.start[0] == config.start[1]:
         where = lines.keys.get("start", lines.position)
         text = f"start: case {case.name} starts with its feet together, and so pads of its step have no length"
-        raise refused(where, text, "legs apart, or on a checkerboard contact.pad_pitch: a number")
+        raise problem_error(where, text, "legs apart, or on a checkerboard contact.pad_pitch: a number")
 
 
 def tree_of(block: Keys[str, Any], position: Position) -> Mapping:
-    """Plain values, or NumPy's, by key as a tree, all of it at one position."""
+    """Convert plain (or NumPy) values by key to a tree, all at one position."""
 
     def node(value: Any) -> Node:
         if isinstance(value, Keys):

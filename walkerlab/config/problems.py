@@ -1,4 +1,4 @@
-"""Problems with a config: where, which value, what is allowed, and the nearest key."""
+"""Problems with a config: position, value, allowed values and nearest key."""
 
 import difflib
 import re
@@ -15,12 +15,12 @@ SHOWN_PROBLEMS = 20
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """One thing wrong with a config.
+    """A problem with a config.
 
-    position  where; None if it is nowhere in a text
-    text      what is wrong, with key and value
-    allowed   what would be right; empty if `text` says it
-    nearest   what was perhaps meant; empty if nothing is near
+    position  None if it is in no text
+    text      description with key and value
+    allowed   valid values; empty if `text` names them
+    nearest   likely intention; empty if nothing is similar
     """
 
     position: Position | None
@@ -29,11 +29,10 @@ class Problem:
     nearest: str = ""
 
     def __str__(self) -> str:
-        """On one line."""
         where = f"{self.position}: " if self.position else ""
-        meant = f"; did you mean {self.nearest}?" if self.nearest else ""
-        allowed = f"{' Allowed' if meant else '; allowed'}: {self.allowed}" if self.allowed else ""
-        return f"{where}{self.text}{meant}{allowed}"
+        near = f"; did you mean {self.nearest}?" if self.nearest else ""
+        allowed = f"{' Allowed' if near else '; allowed'}: {self.allowed}" if self.allowed else ""
+        return f"{where}{self.text}{near}{allowed}"
 
 
 BEYOND_SCOPE: Final = {
@@ -46,51 +45,51 @@ BEYOND_SCOPE: Final = {
 KEYS_ARE_LISTED = "`walkerlab schema` lists every key with its unit, bounds and default"
 
 
-def refusal(problems: Sequence[Problem], advice: str = KEYS_ARE_LISTED) -> ConfigError:
-    """One error for all `problems`, one a line."""
+def problems_error(problems: Sequence[Problem], advice: str = KEYS_ARE_LISTED) -> ConfigError:
+    """Build one error that lists all `problems`, one per line."""
     lines = list(dict.fromkeys(str(problem) for problem in problems))
     if len(lines) > SHOWN_PROBLEMS:
         lines[SHOWN_PROBLEMS:] = [f"and {len(lines) - SHOWN_PROBLEMS} more"]
     return ConfigError("\n".join(lines), advice)
 
 
-def refused(
+def problem_error(
     position: Position | None, text: str, allowed: str = "", near: str = "", advice: str = KEYS_ARE_LISTED
 ) -> ConfigError:
-    """One error for one problem; see `Problem`."""
-    return refusal([Problem(position, text, allowed, near)], advice)
+    """Build the error for a single problem; see `Problem`."""
+    return problems_error([Problem(position, text, allowed, near)], advice)
 
 
 def beyond_scope(word: str) -> str:
-    """Why walkerlab has nothing of a name, in a sentence; empty if it is not beyond what walkerlab is for."""
+    """Explain why walkerlab has nothing of a name, as a sentence; empty if the name is within its scope."""
     return next((why for pattern, why in BEYOND_SCOPE.items() if re.search(pattern, word.lower())), "")
 
 
 def nearest(word: str, candidates: Iterable[str]) -> str:
-    """The candidate most like `word`, empty if none is like it."""
+    """Return the candidate most similar to `word`; empty if none is similar."""
     spelled = {candidate.lower(): candidate for candidate in candidates}
     found = difflib.get_close_matches(word[:SHOWN_LENGTH].lower(), spelled, n=1, cutoff=0.5)
     return spelled[found[0]] if found else ""
 
 
-def meant(word: str, candidates: Iterable[str]) -> str:
-    """What was perhaps meant, as a sentence after another one; empty if nothing is like the word."""
+def suggestion(word: str, candidates: Iterable[str]) -> str:
+    """Return ` Did you mean X?` for the nearest candidate; empty if none is similar."""
     near = nearest(word, candidates)
     return f" Did you mean {near}?" if near else ""
 
 
-def shown(text: str, length: int = SHOWN_LENGTH) -> str:
-    """A text from outside, short and safe to print: control characters and lone surrogates are escaped."""
+def printable(text: str, length: int = SHOWN_LENGTH) -> str:
+    """Shorten an untrusted text and escape control characters and lone surrogates."""
     cut = text if len(text) <= length else f"{text[: length - 1]}…"
     return "".join(letter if letter.isprintable() else ascii(letter)[1:-1] for letter in cut)
 
 
-def shown_value(node: Node) -> str:
-    """A value as the config has it, quoted if it is a text."""
+def format_node(node: Node) -> str:
+    """Format a value as in the config, quoted if it is text."""
     if isinstance(node, Mapping):
         return "a block" if node.entries else "an empty block"
     if not isinstance(node, Scalar):
-        return f"[{', '.join(shown_value(item) for item in node.items[:6])}{', …' if len(node.items) > 6 else ''}]"
+        return f"[{', '.join(format_node(item) for item in node.items[:6])}{', …' if len(node.items) > 6 else ''}]"
     if node.value is None:
-        return "nothing" if not node.text else shown(node.text)
-    return f"'{shown(node.text)}'" if isinstance(node.value, str) else shown(node.text)
+        return "nothing" if not node.text else printable(node.text)
+    return f"'{printable(node.text)}'" if isinstance(node.value, str) else printable(node.text)

@@ -1,8 +1,8 @@
-"""YAML text to a tree with positions.
+"""Parser of YAML texts to trees with positions.
 
-ruamel.yaml splits the text; what plain scalars mean is the core schema of YAML 1.2 (section 10.3.2): 1e7 is a number,
-`no` is a text. A config is a small, plain tree: anchors, aliases, tags, duplicate keys, deep nesting and large texts
-are refused, so that no text can cost more than its own length.
+ruamel.yaml splits the text; plain scalars follow the core schema of YAML 1.2 (section 10.3.2): 1e7 is a number, `no` is
+a text. Anchors, aliases, tags, duplicate keys, deep nesting and large texts are errors, so that parsing costs no more
+than the length of a text.
 """
 
 import math
@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from itertools import takewhile
 from typing import Any, Final, NoReturn
 
-from walkerlab.config.problems import Problem, refusal, refused, shown
+from walkerlab.config.problems import Problem, printable, problem_error, problems_error
 from walkerlab.config.tree import Mapping, Node, Position, Scalar, Sequence
 
 MAX_CHARACTERS: Final = 64 * 1024
@@ -31,7 +31,7 @@ _FLOAT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
 
 
 def value_of(text: str) -> str | int | float | bool | None:
-    """What a plain scalar means in YAML 1.2."""
+    """Interpret a plain scalar by YAML 1.2."""
     if text in _WORDS:
         return _WORDS[text]
     if _INTEGER.fullmatch(text) and len(text) <= MAX_DIGITS:
@@ -44,21 +44,21 @@ def value_of(text: str) -> str | int | float | bool | None:
 
 
 def read(text: str, source: str, column: int = 1) -> Node | None:
-    """Tree of a YAML text, or None if there is nothing in it.
+    """Parse a YAML text to a tree; None if it is empty.
 
-    text    of one document
-    source  file or option it is from, for positions
+    text    a single document
+    source  its file or option, for positions
     column  of its first character, for a text inside a longer one
 
     Raises ConfigError with the position of whatever is not a plain YAML tree.
     """
     if len(text) > MAX_CHARACTERS:
-        raise refused(Position(source, 1, column), f"longer than {MAX_CHARACTERS} characters: not a config")
+        raise problem_error(Position(source, 1, column), f"longer than {MAX_CHARACTERS} characters: not a config")
     strange = _NOT_YAML.search(text)
     if strange:
         lines = text[: strange.start()].split("\n")
         where = Position(source, len(lines), len(lines[-1]) + (column if len(lines) == 1 else 1))
-        raise refused(where, f"character {shown(strange.group())} cannot be in a config, which is text")
+        raise problem_error(where, f"character {printable(strange.group())} cannot be in a config, which is text")
     return _Composer(source, column, _events(text, source, column)).document()
 
 
@@ -72,8 +72,8 @@ def _events(text: str, source: str, column: int) -> Iterator[Any]:
         where = _position(mark, source, column) if mark else Position(source, 1, column)
         reason = getattr(error, "problem", None) or getattr(error, "context", None) or type(error).__name__
         if r"'\t'" in str(reason):
-            raise refused(where, "a tab: YAML is indented by spaces", advice="Replace tabs by spaces.") from None
-        raise refused(where, f"not YAML: {shown(str(reason))}") from None
+            raise problem_error(where, "a tab: YAML is indented by spaces", advice="Replace tabs by spaces.") from None
+        raise problem_error(where, f"not YAML: {printable(str(reason))}") from None
 
 
 def _position(mark: Any, source: str, column: int) -> Position:
@@ -81,14 +81,13 @@ def _position(mark: Any, source: str, column: int) -> Position:
 
 
 class _Composer:
-    """Builds the tree from a parser's events, as deep as a config may be and no deeper."""
+    """Builds a tree of limited depth from parser events."""
 
     def __init__(self, source: str, column: int, events: Iterator[Any]) -> None:
         self._source, self._column, self._events = source, column, events
         self._twice: list[Problem] = []
 
     def document(self) -> Node | None:
-        """The tree of the only document, None if there is nothing in it."""
         root, documents = None, 0
         for event in self._events:
             name = type(event).__name__
@@ -101,18 +100,19 @@ class _Composer:
             elif name not in ("StreamStartEvent", "StreamEndEvent", "DocumentEndEvent"):
                 root = self._node(event, 0)
         if self._twice:
-            raise refusal(self._twice)
+            raise problems_error(self._twice)
         return root
 
     def _node(self, event: Any, depth: int) -> Node:
-        """What begins with an event."""
         name, at = type(event).__name__, _position(event.start_mark, self._source, self._column)
         if name == "AliasEvent":
-            self._refuse(event, f"alias *{shown(event.anchor)}: a config has none; write the value out, or use extends")
+            self._refuse(
+                event, f"alias *{printable(event.anchor)}: a config has none; write the value out, or use extends"
+            )
         if event.anchor is not None:
-            self._refuse(event, f"anchor &{shown(event.anchor)}: a config has none; use extends to share values")
+            self._refuse(event, f"anchor &{printable(event.anchor)}: a config has none; use extends to share values")
         if event.tag is not None:
-            self._refuse(event, f"tag {shown(event.tag)}: a config has none; types are known from the keys")
+            self._refuse(event, f"tag {printable(event.tag)}: a config has none; types are known from the keys")
         if name == "ScalarEvent":
             return Scalar(at, value_of(event.value) if event.implicit[0] else event.value, event.value)
         if depth == MAX_DEPTH:
@@ -127,7 +127,9 @@ class _Composer:
             assert isinstance(key, Scalar), "whatever else begins there is refused"
             if key.text in block.keys:
                 first = block.keys[key.text]
-                self._twice.append(Problem(key.position, f"{shown(key.text)}: given a second time, first at {first}"))
+                self._twice.append(
+                    Problem(key.position, f"{printable(key.text)}: given a second time, first at {first}")
+                )
             else:
                 block.put(key.text, value, key.position)
         return block
@@ -136,4 +138,4 @@ class _Composer:
         return takewhile(lambda event: type(event).__name__ != end, self._events)
 
     def _refuse(self, event: Any, reason: str) -> NoReturn:
-        raise refusal([*self._twice, Problem(_position(event.start_mark, self._source, self._column), reason)])
+        raise problems_error([*self._twice, Problem(_position(event.start_mark, self._source, self._column), reason)])

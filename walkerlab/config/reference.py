@@ -1,4 +1,4 @@
-"""The reference of all config keys, made from the schema: a table for people, a JSON schema for editors."""
+"""Reference of all config keys, generated from the schema: paragraphs, and a JSON schema for editors."""
 
 import json
 import re
@@ -10,10 +10,10 @@ from typing import Any, Final
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
-from walkerlab.config.fields import bounds_of, extra, kind, leaves, leaves_of_other_kinds
+from walkerlab.config.fields import annotation_of, bounds_of, leaves, leaves_of_other_kinds, type_words
 from walkerlab.config.files import builtin_names
 from walkerlab.config.numbers import short
-from walkerlab.config.problems import meant
+from walkerlab.config.problems import suggestion
 from walkerlab.config.schema import Config, SlopeInDegrees
 from walkerlab.errors import ConfigError
 
@@ -26,7 +26,7 @@ EXTENDS_MEANING: Final = "config this one inherits from: a file, from this file'
 
 @dataclass(frozen=True, slots=True)
 class KeyReference:
-    """What there is to know about one key; every entry is a text."""
+    """Facts about one key, as texts."""
 
     key: str
     type: str
@@ -38,7 +38,7 @@ class KeyReference:
 
 
 def keys() -> Iterator[KeyReference]:
-    """Every key of a config file, in the order of the schema."""
+    """Yield every key of a config file, in the schema's order."""
     builtins = ", ".join(builtin_names())
     yield KeyReference("extends", "text", "", f"a file, {builtins}", "none", EXTENDS_MEANING, "this project")
     for path, field in leaves(Config):
@@ -50,17 +50,17 @@ def keys() -> Iterator[KeyReference]:
 
 
 def _reference(path: tuple[str, ...], field: FieldInfo) -> KeyReference:
-    default = extra(field, "default_in_words") or _spelled(
+    default = annotation_of(field, "default_in_words") or _spelled(
         field.get_default(call_default_factory=True, validated_data={})
     )
     return KeyReference(
         key=".".join(path),
-        type=kind(field.annotation),
-        unit=extra(field, "unit"),
+        type=type_words(field.annotation),
+        unit=annotation_of(field, "unit"),
         bounds=bounds_of(field),
-        default=extra(field, "default_in_words") or _spelled(default),
+        default=annotation_of(field, "default_in_words") or _spelled(default),
         meaning=field.description or "",
-        source=extra(field, "source"),
+        source=annotation_of(field, "source"),
     )
 
 
@@ -73,12 +73,12 @@ def _spelled(value: Any) -> str:
 
 
 def as_paragraphs(asked: str = "") -> str:
-    """The keys for a terminal, each as a short paragraph; only those of a block or key, if one is asked for.
+    """Describe the keys for a terminal, one paragraph each; by default all, otherwise those of a block or key.
 
     Raises ConfigError with the nearest key if there is no such block or key.
     """
     paragraphs = []
-    for key in asked_for(asked):
+    for key in select_keys(asked):
         what = [key.type, f"in {key.unit}" if key.unit not in ("", "1") else "", key.bounds]
         facts = [", ".join(filter(None, what)), f"default: {key.default}", key.meaning, f"source: {key.source}"]
         wrapped = [textwrap.fill(fact, COLUMNS, initial_indent="    ", subsequent_indent="      ") for fact in facts]
@@ -86,10 +86,10 @@ def as_paragraphs(asked: str = "") -> str:
     return "\n\n".join(paragraphs)
 
 
-def asked_for(asked: str) -> list[KeyReference]:
-    """The keys of a block, the key of that name, or all keys; ConfigError with the nearest key if there is none.
+def select_keys(asked: str) -> list[KeyReference]:
+    """Select the keys of a block, or the key of that name, or all keys; ConfigError with the nearest key if none match.
 
-    A key that is the same in every kind of a block is listed once.
+    Keys that are equal in every kind of a block are listed once.
     """
     plain = {key: OF_A_KIND.sub("", key.key) for key in keys()}
     found = [
@@ -97,14 +97,14 @@ def asked_for(asked: str) -> list[KeyReference]:
     ]
     if not found:
         names = {".".join(name.split(".")[:depth]) for name in plain.values() for depth in (1, 2, 3)}
-        near = meant(asked, names) or meant(asked, {name.split(".")[-1] for name in names})
+        near = suggestion(asked, names) or suggestion(asked, {name.split(".")[-1] for name in names})
         raise ConfigError(f"the config has no key {asked}.{near}", "`walkerlab schema` lists every key")
     everywhere = {key for key in found if key.key == plain[key]}
     return [key for key in found if key in everywhere or replace(key, key=plain[key]) not in everywhere]
 
 
 def as_json_schema(asked: str = "") -> dict[str, Any]:
-    """JSON schema of a config file; only of a block or key, if one is asked for.
+    """Return the JSON schema of a config file, or of one block or key.
 
     Raises ConfigError with the nearest key if there is no such block or key.
     """
@@ -118,8 +118,8 @@ def as_json_schema(asked: str = "") -> dict[str, Any]:
 
 
 def part_of(schema: dict[str, Any], asked: str) -> dict[str, Any]:
-    """The part of a JSON schema that describes a block or key, with the definitions that it refers to."""
-    asked_for(asked)
+    """Return the part of a JSON schema that describes a block or key, with the definitions it refers to."""
+    select_keys(asked)
     definitions = schema["$defs"]
     parts = [schema]
     for name in asked.split("."):
@@ -138,7 +138,6 @@ def part_of(schema: dict[str, Any], asked: str) -> dict[str, Any]:
 
 
 def blocks_of(part: dict[str, Any], definitions: dict[str, Any]) -> Iterator[dict[str, Any]]:
-    """The blocks of keys that a part of a JSON schema allows."""
     if "properties" in part:
         yield part
     choices = [*part.get("anyOf", ()), *part.get("oneOf", ())]

@@ -1,4 +1,4 @@
-"""The robustness block: what a gait is disturbed by, and what it is differentiated by."""
+"""The robustness block: disturbances of a gait, and parameters it is differentiated by."""
 
 from typing import Annotated, Final, Literal
 
@@ -6,12 +6,12 @@ from pydantic import Field
 
 from walkerlab.config.fields import Block, key
 
-_USUAL: Final = (0.0005, 0.001, 0.002)
+_DEFAULT_ROUGHNESS_M: Final = (0.0005, 0.001, 0.002)
 Roughness = Annotated[float, Field(gt=0.0, le=1e3)]
 
 
 class Robustness(Block):
-    """What `walkerlab robustness` asks of a gait."""
+    """Disturbances and parameters of `walkerlab robustness`."""
 
     model: Literal["rigid", "contact", "both"] | None = key(
         None, "", "which model walks", default_in_words="both, rigid where there is no contact block"
@@ -19,15 +19,15 @@ class Robustness(Block):
     to: tuple[str, ...] = key(
         (),
         "",
-        "numbers of the config that the gait is differentiated by",
+        "parameters with respect to which the gait is differentiated",
         bounds="a list of keys, dotted",
-        default_in_words="every number that the model reads",
+        default_in_words="every parameter that the model reads",
     )
     steps: int = key(50, "1", "steps that a walk must take after a single disturbance", ge=1, le=10_000)
     roughness_m: tuple[Roughness, ...] = key(
-        _USUAL,
+        _DEFAULT_ROUGHNESS_M,
         "m",
-        "standard deviations of the footholds' heights; none leaves rough ground out",
+        "standard deviations of the footholds' heights; an empty list leaves rough ground out",
         bounds="a list of numbers above 0",
     )
     walks: int = key(400, "1", "walks on each rough ground", ge=2, le=1_000_000)

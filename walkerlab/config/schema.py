@@ -1,4 +1,4 @@
-"""The config's keys: types, units, bounds, defaults, meaning and source. The defaults are the paper's."""
+"""All config keys with type, unit, bounds, default, meaning and source; the defaults are the paper's values."""
 
 import math
 from importlib.util import find_spec
@@ -12,7 +12,7 @@ from walkerlab.config.contact import Contact
 from walkerlab.config.continuation import Continuation
 from walkerlab.config.design import Design
 from walkerlab.config.drives import PushOff, acting_on
-from walkerlab.config.fields import Block, against, key, wrong
+from walkerlab.config.fields import Block, check_against, key, meaning_error
 from walkerlab.config.ground import Footholds
 from walkerlab.config.robustness import Robustness
 from walkerlab.config.stability import Stability
@@ -111,7 +111,7 @@ class SolverSettings(Block):
     @classmethod
     def _is_installed(cls, value: Method) -> Method:
         if value.startswith("cvode") and find_spec(CVODE_PACKAGE) is None:
-            raise wrong("needs CVODE, which is not installed: pip install scikit-sundae")
+            raise meaning_error("needs CVODE, which is not installed: pip install scikit-sundae")
         return value
 
 
@@ -137,11 +137,11 @@ class Solvers(Block):
 def factors(least: float, most: float, velocity: str) -> Any:
     """A range of factors on a velocity."""
     bounds = "two numbers from -10 to 10, the first below the second"
-    return key((least, most), "1", f"least and largest factor on the {velocity}", bounds=bounds)
+    return key((least, most), "1", f"smallest and largest factor on the {velocity}", bounds=bounds)
 
 
 class Tune(Block):
-    """Which starts the adjustment of the two initial angular velocities looks at."""
+    """Starts among which the two initial angular velocities are adjusted."""
 
     cells: int | None = key(
         None,
@@ -153,22 +153,26 @@ class Tune(Block):
     )
     swing_factors: Factors = factors(0.0, 2.0, "swing leg's initial angular velocity dtheta_1")
     stance_factors: Factors = factors(0.85, 1.3, "stance leg's initial angular velocity dtheta_2")
-    rigid_limit: bool = key(True, "", "whether the contact is also led towards the rigid limit, to see what 1e-4 takes")
+    rigid_limit: bool = key(
+        True,
+        "",
+        "whether to also stiffen the contact towards the rigid limit, to find out when deviations fall to 1e-4",
+    )
 
     @field_validator("swing_factors", "stance_factors")
     @classmethod
     def _rising(cls, value: tuple[float, float]) -> tuple[float, float]:
         if value[0] >= value[1]:
-            raise wrong("the first must be below the second")
+            raise meaning_error("the first must be below the second")
         return value
 
 
 QUESTIONS: Final = ("stability", "tune", "continuation", "basin", "robustness", "design", "sweep")
-"""Blocks that say what a stage or a sweep is asked, not what walks."""
+"""Blocks that configure a stage or a sweep rather than the scene."""
 
 
 class Source(Block):
-    """The study that a config redoes, as the report names it."""
+    """Study that a config reproduces, as named in the report."""
 
     title: str = key(..., "", "title of the study", bounds="any text, not empty", min_length=1)
     authors: str | None = key(None, "", "its authors", bounds="any text")
@@ -183,7 +187,7 @@ class Source(Block):
 
 
 class Config(Block):
-    """A scene and what is to be computed of it."""
+    """A scene and the computations on it."""
 
     name: str = key(
         "paper",
@@ -231,12 +235,14 @@ class Config(Block):
     robustness: Robustness = Robustness()
     design: Design | None = None
     sweep: Sweep | None = None
-    outputs: tuple[Output, ...] = key(OUTPUTS, "", "what is stored", bounds="a list of states, energies, forces")
-    seed: int = key(0, "1", "seed of everything that is drawn at random", ge=0, le=2**32 - 1)
+    outputs: tuple[Output, ...] = key(OUTPUTS, "", "arrays to store", bounds="a list of states, energies, forces")
+    seed: int = key(0, "1", "seed of everything random", ge=0, le=2**32 - 1)
 
-    _fits = against("start", "walker", why_no_state)
-    _pushes = against("push_off", "walker", lambda value, walker: why_no_push_off(walker) if value.impulse_N_s else "")
-    _stands = against("contact", "walker", lambda value, walker: why_no_contact(walker) if value else "")
+    _fits = check_against("start", "walker", why_no_state)
+    _pushes = check_against(
+        "push_off", "walker", lambda value, walker: why_no_push_off(walker) if value.impulse_N_s else ""
+    )
+    _stands = check_against("contact", "walker", lambda value, walker: why_no_contact(walker) if value else "")
 
     @field_validator("equations")
     @classmethod
@@ -244,9 +250,9 @@ class Config(Block):
         if value == "as-printed" and {"walker", "push_off"} <= info.data.keys():
             given = SimpleNamespace(**info.data)
             if acting := acting_on(given):
-                raise wrong(f"is for a passive compass, and this walker has {', '.join(acting)}")
+                raise meaning_error(f"is for a passive compass, and this walker has {', '.join(acting)}")
             if not is_passive_compass(given):
-                raise wrong("is for a compass; this walker is another")
+                raise meaning_error("is for a compass, and this walker is not one")
         return value
 
     @field_validator("outputs")

@@ -1,10 +1,10 @@
-"""The stability block: cases of one's own, beside the catalogue that comes with the package."""
+"""The stability block: user-defined cases in addition to the package's catalogue."""
 
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 from pydantic import field_validator
 
-from walkerlab.config.fields import Block, key, wrong
+from walkerlab.config.fields import Block, key, meaning_error
 from walkerlab.outcome import Outcome
 
 FATES: Final = tuple(outcome.label for outcome in Outcome)
@@ -16,7 +16,7 @@ NAME: Final = r"^[A-Za-z0-9][A-Za-z0-9._+-]{0,63}$"
 
 
 class Case(Block):
-    """One case: a few lines over the paper config, and what must become of it."""
+    """A case: changes of the paper config, and the expected outcome."""
 
     name: str = key(..., "", "name of the case", bounds="up to 64 letters, digits, '.', '_', '+' or '-'", pattern=NAME)
     family: str = key("own", "", "what it belongs to, for tables", bounds="as a name", pattern=NAME)
@@ -25,29 +25,32 @@ class Case(Block):
     steps: int = key(4, "1", "steps to walk", ge=1, le=2_000_000)
     lowered_m: float = key(0.0, "m", "how far the start is sunk into the ground; negative lifts it", ge=-1e3, le=1e3)
     expected: tuple[Fate, ...] = key(
-        ..., "", "outcomes that are right", bounds=f"a list of {', '.join(FATES)}", sequence=True
+        ..., "", "expected outcomes", bounds=f"a list of {', '.join(FATES)}", sequence=True
     )
-    reason: str = key(..., "", "why that is to be expected", bounds="a sentence")
-    budget: int = key(400_000, "1", "right-hand sides it may evaluate", ge=1, le=100_000_000)
+    reason: str = key(..., "", "why these outcomes are expected", bounds="a sentence")
+    budget: int = key(400_000, "1", "right-hand sides that the walk may evaluate", ge=1, le=100_000_000)
     balance: float = key(1e-6, "1", "largest residual of the energy balance, as a share of the walker's energy", gt=0.0)
     agreement: float = key(
-        1e-4, "1", "largest change of times at a ten times tighter tolerance, in pendulum times; for a twin too", gt=0.0
+        1e-4,
+        "1",
+        "largest change of times at a ten times tighter tolerance, in pendulum times; also for a twin",
+        gt=0.0,
     )
-    compared_steps: int = key(20, "1", "steps of which the times are compared: fewer where small errors grow", ge=1)
+    compared_steps: int = key(20, "1", "steps whose times are compared; use fewer where small errors grow", ge=1)
     twin: bool = key(False, "", "whether a walker of another size must do the same")
 
     @field_validator("expected")
     @classmethod
     def _some_outcome_is_right(cls, value: tuple[Fate, ...]) -> tuple[Fate, ...]:
         if not value:
-            raise wrong("must name an outcome")
+            raise meaning_error("must name an outcome")
         return value
 
 
 class Stability(Block):
-    """What `walkerlab stability` judges besides the catalogue."""
+    """Cases that `walkerlab stability` judges in addition to the catalogue."""
 
     cases: tuple[Case, ...] = key(
-        (), "", "cases of your own; a file that holds such a list may stand for it", bounds="a list of cases, or a file"
+        (), "", "your own cases, as a list or as a file that holds the list", bounds="a list of cases, or a file"
     )
     map_cells: int = key(25, "1", "cells along each axis of the maps that --full makes", ge=2, le=201)

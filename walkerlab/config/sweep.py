@@ -1,4 +1,4 @@
-"""The sweep block: one question over many configs."""
+"""The sweep block: one stage over many configs."""
 
 from walkerlab.config.fields import Block, key
 
@@ -6,21 +6,21 @@ Values = str | list[float | int | bool | str]
 
 
 class Sweep(Block):
-    """What `walkerlab sweep` asks, unless its options say otherwise."""
+    """Defaults of the options of `walkerlab sweep`."""
 
-    stage: str = key("fixedpoint", "", "stage whose numbers are wanted", bounds="a stage that draws nothing")
+    stage: str = key("fixedpoint", "", "stage to run", bounds="a stage that draws nothing")
     over: dict[str, Values] = key(
         dict,
         "",
         "keys of a config with their values, in the key's unit; the last key changes fastest",
         bounds="FROM:TO:N, FROM:TO:N:log or a list, for each key",
     )
-    zip: bool = key(False, "", "the n-th values of all keys make the n-th point, not each with each")
+    zip: bool = key(False, "", "the n-th values of all keys make the n-th point, instead of the full grid")
     sample: str = key(
         "",
         "",
-        "points drawn from the intervals instead",
+        "sample points from the intervals instead",
         bounds="latin-hypercube:N, sobol:N, random:N, or empty",
         default_in_words="empty",
     )
-    seed: int = key(1, "1", "seed of that drawing", ge=0, le=2**32 - 1)
+    seed: int = key(1, "1", "seed of the sampled points", ge=0, le=2**32 - 1)

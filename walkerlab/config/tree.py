@@ -1,4 +1,4 @@
-"""What a config text says before it is typed: scalars, lists and blocks, each with its position."""
+"""Untyped tree of a config text: scalars, lists and blocks, each with its position."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ from typing import TypeAlias
 
 @dataclass(frozen=True, slots=True)
 class Position:
-    """A place in a config text: its file or option, line and column, counted from 1; line 0 for the whole source."""
+    """Place in a config text: file or option, line and column from 1; line 0 for the whole source."""
 
     source: str
     line: int
     column: int
 
     def __bool__(self) -> bool:
-        """Whether it says anything: an argument of a function has no place in a text."""
+        """Whether there is a place: arguments of functions have none."""
         return bool(self.source)
 
     def __str__(self) -> str:
-        """As editors and terminals understand it: source:line:column; an option is short enough to stand for itself."""
+        """Format as source:line:column, which editors understand; options without line and column."""
         whole = not self.line or self.source.startswith("--")
         return self.source if whole else f"{self.source}:{self.line}:{self.column}"
 
@@ -30,7 +30,7 @@ NOWHERE = Position("", 0, 0)
 
 @dataclass(frozen=True, slots=True)
 class Scalar:
-    """A single value with its text as written."""
+    """A single value, and its text as written."""
 
     position: Position
     value: str | int | float | bool | None
@@ -39,8 +39,6 @@ class Scalar:
 
 @dataclass(frozen=True, slots=True)
 class Sequence:
-    """A list."""
-
     position: Position
     items: list[Node] = field(default_factory=list)
 
@@ -54,12 +52,11 @@ class Mapping:
     keys: dict[str, Position] = field(default_factory=dict)
 
     def put(self, name: str, node: Node, position: Position) -> None:
-        """Set a key; a later value takes the place of an earlier one."""
         self.entries[name] = node
         self.keys[name] = position
 
     def without(self, *names: str) -> Mapping:
-        """The same block without some keys."""
+        """Copy the block without some keys."""
         kept = {name: node for name, node in self.entries.items() if name not in names}
         return Mapping(self.position, kept, {name: self.keys[name] for name in kept})
 
@@ -69,7 +66,6 @@ Data: TypeAlias = "str | int | float | bool | list[Data] | dict[str, Data] | Non
 
 
 def plain(node: Node) -> Data:
-    """The values of a tree without their positions."""
     if isinstance(node, Scalar):
         return node.value
     if isinstance(node, Sequence):

@@ -1,4 +1,4 @@
-"""A tree typed by the schema; whatever does not fit is reported with its position, all at once."""
+"""Validation of a config tree against the schema, which reports all problems at once with positions."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -9,11 +9,11 @@ from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
 from walkerlab.config.contact import BOUNDS_SI
-from walkerlab.config.fields import Block, allowed, block_of, kinds_of, leaves, words_of
-from walkerlab.config.files import DEFAULT, builtin, builtin_names, read_layers
-from walkerlab.config.layers import stacked
+from walkerlab.config.fields import Block, block_of, describe_allowed, kinds_of, leaves, words_of
+from walkerlab.config.files import DEFAULT, builtin_config, builtin_names, read_layers
+from walkerlab.config.layers import merge_layers
 from walkerlab.config.numbers import short
-from walkerlab.config.problems import Problem, beyond_scope, nearest, refusal, shown, shown_value
+from walkerlab.config.problems import Problem, beyond_scope, format_node, nearest, printable, problems_error
 from walkerlab.config.schema import Config, SlopeInDegrees
 from walkerlab.config.tree import Mapping, Node, Position, Scalar, plain
 from walkerlab.config.tree import Sequence as Listed
@@ -38,7 +38,7 @@ _REASONS: Final = {
     "missing": "has too few values",
     "too_long": "has too many values",
     "string_pattern_mismatch": "is not safe as a name",
-    "union_tag_invalid": "is of no known type",
+    "union_tag_invalid": "is not a known type",
 }
 MAX_PROBLEMS: Final = 100
 NAMES_OF_BODIES: Final = {
@@ -48,18 +48,18 @@ NAMES_OF_BODIES: Final = {
     "couplings": ("body",),
 }
 MOVED_RAD: Final = 1e-12
-BY_UNITS: Final = {"units": "si with the numbers of the block set as well"}
+BY_UNITS: Final = {"units": "si, and set the other values of the block too"}
 JUDGED_BY: Final = {
     **dict.fromkeys(BOUNDS_SI, BY_UNITS),
-    "dynamic_friction": {"static_friction": "dynamic_friction set as well"},
-    "friction_velocity": {"stiction_velocity": "friction_velocity set as well", **BY_UNITS},
+    "dynamic_friction": {"static_friction": "set contact.dynamic_friction too"},
+    "friction_velocity": {"stiction_velocity": "set contact.friction_velocity too", **BY_UNITS},
 }
 """Other keys of the contact block that its keys are judged by, and what to do where one of those was changed alone."""
 _FOLLOWS_FROM_ANOTHER: Final = "default_factory_not_called"
 
 
-def typed(tree: Mapping) -> Config:
-    """The config that a tree describes.
+def validate_tree(tree: Mapping) -> Config:
+    """Convert a tree to a typed config.
 
     Raises ConfigError with every problem found.
     """
@@ -76,16 +76,16 @@ def typed(tree: Mapping) -> Config:
     except ValidationError as error:
         problems += _problems(error, tree, Config)
     if problems:
-        raise refusal(sorted(problems, key=_place))
-    refuse_unknown_bodies(config, tree)
+        raise problems_error(sorted(problems, key=_place))
+    check_bodies(config, tree)
     return config
 
 
-def on_the_slope(config: Config, tree: Mapping) -> tuple[Config, tuple[str, ...]]:
-    """`config` with a start that its constraints allow, and what was moved for that, in words.
+def align_start(config: Config, tree: Mapping) -> tuple[Config, tuple[str, ...]]:
+    """Move the start onto its constraints, and describe what was moved.
 
-    Both feet stand on the slope, theta_1 + theta_2 = -2 phi; legs with knees are straight; what follows other bodies,
-    such as a torso on the legs' bisector, does so at their rates, too. Of parts only the latter is known here.
+    Both feet stand on the slope (theta_1 + theta_2 = -2 phi), knees are straight, and coupled bodies, such as a torso
+    on the legs' bisector, have the angles and rates of their coupling. For walkers of parts only couplings are applied.
     """
     if isinstance(config.start, str):
         return config, ()
@@ -111,8 +111,8 @@ def on_the_slope(config: Config, tree: Mapping) -> tuple[Config, tuple[str, ...]
     return config.model_copy(update={"start": tuple(start)}), tuple(str(Problem(where, text)) for text in moved)
 
 
-def refuse_unknown_bodies(config: Config, tree: Mapping) -> None:
-    """Raise ConfigError with their places for parts that are on bodies that the walker has not, or on the wrong leg."""
+def check_bodies(config: Config, tree: Mapping) -> None:
+    """Raise ConfigError with positions for parts on unknown bodies or on the wrong leg."""
     walker = config.walker
     if not isinstance(walker, PartsWalker):
         return
@@ -123,19 +123,19 @@ def refuse_unknown_bodies(config: Config, tree: Mapping) -> None:
         text = f"{'.'.join(map(str, place))}: {why}"
         problems.append(Problem(node_at(tree, place)[1], text, ", ".join(allowed), near))
 
-    for place, name in bodies_named(walker):
+    for place, name in body_references(walker):
         if name not in bodies:
-            refuse(("walker", *place), f"{shown(name)} is not a body", bodies, nearest(name, bodies))
+            refuse(("walker", *place), f"{printable(name)} is not a body", bodies, nearest(name, bodies))
     for k, (foot, leg) in enumerate(zip(walker.feet, walker.legs, strict=True)):
         if foot.body in bodies and foot.body not in leg:
-            why = f"{shown(foot.body)} is not of leg {k + 1}, whose foot this is"
+            why = f"{printable(foot.body)} is not of leg {k + 1}, whose foot this is"
             refuse(("walker", "feet", k, "body"), why, leg)
     if problems:
-        raise refusal(sorted(problems, key=_place), "docs/walkers.md shows a walker described by its parts.")
+        raise problems_error(sorted(problems, key=_place), "docs/walkers.md shows a walker described by its parts.")
 
 
-def bodies_named(walker: PartsWalker) -> Iterator[tuple[Location, str]]:
-    """Where parts name a body, and which."""
+def body_references(walker: PartsWalker) -> Iterator[tuple[Location, str]]:
+    """Yield position and name of each reference to a body."""
     for key, names in NAMES_OF_BODIES.items():
         for k, part in enumerate(getattr(walker, key)):
             yield from (((key, k, name), getattr(part, name)) for name in names)
@@ -162,7 +162,7 @@ def _problem(detail: ErrorDetails, tree: Mapping, model: type[Block]) -> Problem
         node, position = node_at(tree, (*location, "type"))
         word = str(node.value) if isinstance(node, Scalar) else ""
         beyond = beyond_scope(word)
-        text = f"{location[0]}.type: {shown(word)} is of no known type{f'; {beyond}' if beyond else ''}"
+        text = f"{location[0]}.type: {printable(word)} is not a known type{f'; {beyond}' if beyond else ''}"
         return Problem(position, text, f"one of {', '.join(kinds)}", "" if beyond else nearest(word, kinds))
     if len(location) > 1 and location[1] in kinds:  # pydantic's word for the kind that it tried
         location = (location[0], *location[2:])
@@ -173,8 +173,8 @@ def _problem(detail: ErrorDetails, tree: Mapping, model: type[Block]) -> Problem
     key = ".".join(path)
     node, position = node_at(tree, location)
     if node is None and what == "missing":
-        return Problem(position, f"{key}: is missing", allowed(field))
-    value = shown_value(node) if node else f"{detail['input']} (its default)"
+        return Problem(position, f"{key}: is missing", describe_allowed(field))
+    value = format_node(node) if node else f"{detail['input']} (its default)"
     reason = _REASONS.get(what, detail["msg"])
     for judge, instead in JUDGED_BY.get(path[-1], {}).items() if what not in _REASONS and path[0] == "contact" else ():
         given, where = node_at(tree, ("contact", judge))
@@ -185,21 +185,21 @@ def _problem(detail: ErrorDetails, tree: Mapping, model: type[Block]) -> Problem
             return Problem(where, text, instead)
     word = node.value if isinstance(node, Scalar) and isinstance(node.value, str) else ""
     meant = nearest(word, words_of(field.annotation)) if word else ""
-    right = allowed(field) if what in _REASONS else ""
+    right = describe_allowed(field) if what in _REASONS else ""
     return Problem(position, f"{key}: {value} {reason}", right, meant if meant != word else "")
 
 
 def _is_later(one: Position, other: Position) -> bool:
-    """Whether a place is one's own and the other is what it changes: an option's, or a file's over a built-in one."""
+    """Whether `one` belongs to a user's change of the config at `other`."""
     return one.source.startswith("--") or (bool(one) and other.source.startswith("built-in"))
 
 
 def _along(
     model: type[Block], location: Location, tree: Mapping
 ) -> tuple[list[str], FieldInfo | None, type[Block] | None]:
-    """Key and field that a location is in, and the block that it holds in this tree, by the block's `type`.
+    """Follow a location to its key and field, and to the block that it holds in this tree, selected by `type`.
 
-    What lies deeper (an item of a list, a kind of value) is left away.
+    Deeper parts (a list item, a kind of value) are ignored.
     """
     path: list[str] = []
     field: FieldInfo | None = None
@@ -229,7 +229,7 @@ def _unknown_key(location: Location, tree: Mapping) -> Problem:
     if location == ("extends",):
         return Problem(parent.keys[name], "extends: belongs in a file, not in --set", "-c FILE with `extends` in it")
     siblings = [*block.model_fields, *(("slope_deg", "extends") if block is Config else ())]
-    text = f"{shown('.'.join((*above, name)))}: unknown key ({shown_value(parent.entries[name])})"
+    text = f"{printable('.'.join((*above, name)))}: unknown key ({format_node(parent.entries[name])})"
     value = parent.entries[name]
     beyond = beyond_scope(name) or (beyond_scope(value.text) if name == "type" and isinstance(value, Scalar) else "")
     if beyond:
@@ -244,7 +244,7 @@ def _unknown_key(location: Location, tree: Mapping) -> Problem:
 def _keys_of_another_kind(
     above: str, given: Mapping, source: str, block: type[Block], kinds: dict[str, type[Block]]
 ) -> Problem:
-    """What to say of keys that another type of a block has; the same for all such keys of one source."""
+    """Describe all keys from one source that belong to another type of the block."""
     others = {key for one in kinds.values() for key in one.model_fields} - {*block.model_fields}
     strange = {key: place for key, place in given.keys.items() if key in others and place.source == source}
     where = next(iter(strange.values()))
@@ -252,9 +252,9 @@ def _keys_of_another_kind(
     other = next(kind for kind, one in kinds.items() if next(iter(strange)) in one.model_fields)
     type_at = given.keys.get("type", where)
     has_no = f"has no {', '.join(strange)} (of type {other})"
-    if source.startswith("--") or type_at.source in (source, builtin(DEFAULT).label):
+    if source.startswith("--") or type_at.source in (source, builtin_config(DEFAULT).label):
         return Problem(where, f"{above}.type is {chosen}, which {has_no}", ", ".join(block.model_fields))
-    layers = {name: stacked(read_layers(builtin(name))) for name in (DEFAULT, *builtin_names())}
+    layers = {name: merge_layers(read_layers(builtin_config(name))) for name in (DEFAULT, *builtin_names())}
     types = {name: node_at(tree, (above, "type"))[0] for name, tree in layers.items()}
     begin = next(name for name, node in types.items() if isinstance(node, Scalar) and node.value == chosen)
     instead = f"`-c {begin}`, in a file `extends: {begin}`; or the whole {above} block in a file without `extends`"
@@ -262,7 +262,7 @@ def _keys_of_another_kind(
 
 
 def _elsewhere(name: str, exactly: bool) -> str:
-    """A key of another block that is like `name`, with its path; of the very same name, if `exactly`."""
+    """Find a similar key of another block (`exactly`: of the same name) and return its path."""
     paths = {path[-1]: ".".join(path) for path, _ in reversed(list(leaves(Config)))}
     if "." in name:
         *blocks, last = nearest(name, paths.values()).split(".")
@@ -272,9 +272,9 @@ def _elsewhere(name: str, exactly: bool) -> str:
 
 
 def node_at(tree: Mapping, location: Location) -> tuple[Node | None, Position]:
-    """The value at a location and its position; for a key that is not in the tree None and the block it is missing in.
+    """Return the value at a location and its position; for a missing key None and the position of its block.
 
-    Parts of the location that are not in the tree, such as the kind of value pydantic tried, are passed over.
+    Parts of the location that are not in the tree, such as the kind of value that pydantic tried, are skipped.
     """
     node: Node = tree
     position = tree.position
@@ -290,6 +290,6 @@ def node_at(tree: Mapping, location: Location) -> tuple[Node | None, Position]:
 
 
 def key_at(tree: Mapping, location: Location) -> Position:
-    """Where a key is written; if it is not in the tree, the block that it is missing in."""
+    """Return the position of a key, or of its block if the key is missing."""
     block, position = node_at(tree, location[:-1])
     return block.keys.get(str(location[-1]), position) if isinstance(block, Mapping) else position

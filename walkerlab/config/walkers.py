@@ -1,4 +1,4 @@
-"""The kinds of walkers and their measures: keys of the block `walker`."""
+"""Types of walkers and their dimensions: keys of the block `walker`."""
 
 import math
 from collections.abc import Callable
@@ -11,72 +11,65 @@ from pydantic import Discriminator, Field, Tag, ValidationInfo, field_validator
 
 from walkerlab.config.contact import Contact
 from walkerlab.config.drives import QUICKEST, Hip, acting_on
-from walkerlab.config.fields import Block, against, key, wrong
+from walkerlab.config.fields import Block, check_against, key, meaning_error
 from walkerlab.config.numbers import short
 from walkerlab.errors import ConfigError
 
 WISSE: Final = "Wisse, Schwab, Int. J. Robotics Research 24 (2005): arc feet"
 MCGEER: Final = "McGeer, Passive walking with knees, IEEE Int. Conf. Robotics and Automation (1990)"
 HSU_CHEN: Final = "Hsu Chen, Passive dynamic walking with knees, MIT (2007)"
-LONGEST: Final = 1e3  # m
+MAX_LENGTH_M: Final = 1e3  # m
 LEG_LENGTH_DIGITS: Final = 1e-6  # relative, to which a leg's length agrees with its parts
-HEAVIEST: Final = 1e6  # kg
+MAX_MASS_KG: Final = 1e6  # kg
 LIGHTEST_CONTACT: Final = 1e-9  # of the walker's mass: what a foot on compliant ground must carry along
 
-Metres = Annotated[float, Field(ge=-LONGEST, le=LONGEST)]
+Metres = Annotated[float, Field(ge=-MAX_LENGTH_M, le=MAX_LENGTH_M)]
 Point = tuple[Metres, Metres]
 LegBodies = Annotated[tuple[str, ...], Field(strict=False)]
 
 
 def length(default: Any, meaning: str, source: str = "this project") -> Any:
-    """A length."""
-    return key(default, "m", meaning, source, ge=1e-3, le=LONGEST)
+    return key(default, "m", meaning, source, ge=1e-3, le=MAX_LENGTH_M)
 
 
 def mass(default: Any, meaning: str, source: str = "this project", least: float = 1e-12) -> Any:
-    """A mass."""
-    return key(default, "kg", meaning, source, ge=least, le=HEAVIEST)
+    return key(default, "kg", meaning, source, ge=least, le=MAX_MASS_KG)
 
 
 def offset(default: Any, meaning: str, source: str) -> Any:
-    """A place beside another one."""
-    return key(default, "m", meaning, source, ge=-LONGEST, le=LONGEST)
+    return key(default, "m", meaning, source, ge=-MAX_LENGTH_M, le=MAX_LENGTH_M)
 
 
 def inertia(default: Any, of: str, source: str = "a point mass") -> Any:
-    """An inertia."""
     return key(default, "kg m^2", f"inertia of {of} about its own centre of mass", source, ge=0.0, le=1e9)
 
 
 def point(meaning: str) -> Any:
-    """A point in a body's frame."""
     return key(..., "m", meaning, bounds="two numbers, ahead and up", sequence=True)
 
 
-def named(meaning: str) -> Any:
-    """A name of a part."""
+def name_key(meaning: str) -> Any:
     return key(..., "", meaning, bounds="any text")
 
 
 def parts(of: type[Block], meaning: str, default: Any = ..., number: str = "") -> Any:
-    """A list of blocks."""
     bounds = f"blocks of {number}{', '.join(of.model_fields)}"
     return key(default, "", meaning, bounds=bounds, sequence=True)
 
 
-def below(name: str, of: str, limit: Callable[[Any], float] = float) -> Any:
-    """A check that a foot's arc is smaller than what it belongs to, called `name`, which the key `of` says."""
-    return against(
+def check_arc(name: str, of: str, limit: Callable[[Any], float] = float) -> Any:
+    """Validate that a foot's arc is smaller than `limit` of key `of`, which messages call `name`."""
+    return check_against(
         "foot_radius_m", of, lambda arc, owner: "" if arc < limit(owner) else f"must be below {name}, {limit(owner):g}"
     )
 
 
-def turns(inertia: str, why: str, *places: str) -> Any:
-    """A check that a part with its mass on the hinge above it, as the keys of `places` say, has an inertia."""
+def check_inertia(inertia: str, why: str, *places: str) -> Any:
+    """Validate that a part whose mass lies on its upper hinge (keys `places` are 0) has an inertia."""
 
     def some(value: float, info: ValidationInfo) -> float:
         if value == 0.0 and all(info.data.get(place) == 0.0 for place in places):
-            raise wrong(f"is 0 with {why} would be massless")
+            raise meaning_error(f"is 0 with {why} would be massless")
         return value
 
     return field_validator(inertia)(some)
@@ -86,7 +79,7 @@ class Torso(Block):
     """An upper body at the hip, kept on the bisector of the legs."""
 
     mass_kg: float = mass(..., "mass of the torso")
-    above_hip_m: float = key(..., "m", "its centre of mass above the hip", ge=0.0, le=LONGEST)
+    above_hip_m: float = key(..., "m", "its centre of mass above the hip", ge=0.0, le=MAX_LENGTH_M)
     inertia_kg_m2: float = inertia(0.0, "the torso")
     held: Literal["bisecting"] = key(
         "bisecting", "", "what holds it", "Wisse, Schwab, van der Helm, Robotica 22 (2004)"
@@ -94,17 +87,17 @@ class Torso(Block):
 
 
 class _Legged(Block):
-    """What walkers have in common."""
+    """Properties and checks that all walkers share."""
 
     @property
     def lean_rad(self: Any) -> float:
-        """Angle of the line from hip to foot centre in an upright leg; 0 for parts, whose start is taken as given."""
+        """Angle of the line from hip to foot centre in an upright leg; 0 for walkers of parts."""
         ahead = getattr(self, "foot_centre_ahead_m", 0.0)
         return math.atan2(ahead, self.leg_length_m - self.foot_radius_m)
 
     @property
     def total_mass_kg(self: Any) -> float:
-        """Two legs, the hip and a torso, kg."""
+        """Mass of the whole walker, kg."""
         return float(2 * self.leg_mass_kg + self.hip_mass_kg + torso_mass(self.torso))
 
     @field_validator("hip", check_fields=False)
@@ -114,7 +107,7 @@ class _Legged(Block):
             inertia = leg_inertia(SimpleNamespace(**info.data))
             if value.too_quick_for(inertia):
                 most = f"at most {QUICKEST**2 * inertia:.3g} (torque, spring) and {QUICKEST * inertia:.3g} (damper)"
-                raise wrong(
+                raise meaning_error(
                     f"whose torques would swing the legs faster than {QUICKEST:g} rad/s: with their inertia about the "
                     f"hip, {inertia:.3g} kg m^2, it may have {most}"
                 )
@@ -149,9 +142,9 @@ class CompassWalker(_Legged):
     torso: Torso | None = None
     hip: Hip = Hip()
 
-    _arc = below("half of leg_length_m", "leg_length_m", lambda length: length / 2)
+    _arc = check_arc("half of leg_length_m", "leg_length_m", lambda length: length / 2)
 
-    _mass = against("foot_to_mass_m", "leg_length_m", lambda mass, length: why_off_the_leg(mass, length))
+    _mass = check_against("foot_to_mass_m", "leg_length_m", lambda mass, length: why_off_the_leg(mass, length))
 
     @property
     def mass_to_hip_m(self) -> float:
@@ -160,7 +153,7 @@ class CompassWalker(_Legged):
 
 
 class StraightLegs(_Legged):
-    """Two straight legs of any distribution of mass, whose feet are arcs that roll in both models."""
+    """Two straight legs of any mass distribution, whose arc feet roll in both models."""
 
     type: Literal["straight-legs"] = key("straight-legs", "", "kind of walker", WISSE)
     leg_length_m: float = length(0.4, "hip to sole, foot included", WISSE)
@@ -176,8 +169,8 @@ class StraightLegs(_Legged):
     torso: Torso | None = None
     hip: Hip = Hip()
 
-    _arc = below("leg_length_m", "leg_length_m")
-    _inertia = turns(
+    _arc = check_arc("leg_length_m", "leg_length_m")
+    _inertia = check_inertia(
         "leg_inertia_kg_m2", "the leg's mass at the hip: the swing leg", "leg_mass_below_hip_m", "leg_mass_ahead_m"
     )
 
@@ -201,7 +194,9 @@ class Shank(Block):
     mass_ahead_m: float = offset(0.0, "its centre of mass ahead", HSU_CHEN)
     inertia_kg_m2: float = inertia(0.0, "one shank")
 
-    _inertia = turns("inertia_kg_m2", "the shank's mass at the knee: the shank", "mass_below_knee_m", "mass_ahead_m")
+    _inertia = check_inertia(
+        "inertia_kg_m2", "the shank's mass at the knee: the shank", "mass_below_knee_m", "mass_ahead_m"
+    )
 
 
 class KneeJoint(Block):
@@ -240,7 +235,7 @@ class Kneed(_Legged):
     torso: Torso | None = None
     hip: Hip = Hip()
 
-    _arc = below("shank.length_m", "shank", lambda shank: shank.length_m)
+    _arc = check_arc("shank.length_m", "shank", lambda shank: shank.length_m)
 
     @property
     def leg_length_m(self) -> float:
@@ -256,7 +251,7 @@ class Kneed(_Legged):
 class PartBody(Block):
     """A rigid body with a frame of its own, upright as the walker stands."""
 
-    name: str = named("name of the body")
+    name: str = name_key("name of the body")
     mass_kg: float = mass(..., "its mass", least=0.0)
     centre_m: Point = point("its centre of mass")
     inertia_kg_m2: float = inertia(0.0, "the body")
@@ -265,10 +260,10 @@ class PartBody(Block):
 class PartHinge(Block):
     """A frictionless hinge between points of two bodies."""
 
-    name: str = named("name of the hinge")
-    parent: str = named("one body")
+    name: str = name_key("name of the hinge")
+    parent: str = name_key("one body")
     parent_point_m: Point = point("the hinge in its frame")
-    child: str = named("the other body")
+    child: str = name_key("the other body")
     child_point_m: Point = point("the hinge in its frame")
     locks: bool = key(False, "", "whether it is a knee, parent the thigh and child the shank")
 
@@ -276,24 +271,24 @@ class PartHinge(Block):
 class PartParticle(Block):
     """A point mass fixed to a body."""
 
-    name: str = named("name of the particle")
+    name: str = name_key("name of the particle")
     mass_kg: float = mass(..., "its mass", least=0.0)
-    body: str = named("the body it is fixed to")
+    body: str = name_key("the body it is fixed to")
     at_m: Point = point("where, in its frame")
 
 
 class PartFoot(Block):
     """A foot: an arc about a point of a body."""
 
-    body: str = named("the body it belongs to")
+    body: str = name_key("the body it belongs to")
     centre_m: Point = point("the arc's centre in its frame")
-    radius_m: float = key(0.0, "m", "radius of the arc, 0 is a point", ge=0.0, le=LONGEST)
+    radius_m: float = key(0.0, "m", "radius of the arc, 0 is a point", ge=0.0, le=MAX_LENGTH_M)
 
 
 class PartCoupling(Block):
     """A body whose angle is a weighted sum of others' angles."""
 
-    body: str = named("the body that follows")
+    body: str = name_key("the body that follows")
     of: tuple[str, ...] = key(..., "", "the bodies that it follows", bounds="a list of names", sequence=True)
     weights: tuple[float, ...] = key(..., "1", "their weights", bounds="a list of numbers", sequence=True)
 
@@ -310,7 +305,7 @@ class PartsWalker(_Legged):
     legs: tuple[LegBodies, LegBodies] = key(
         ..., "", "bodies of either leg, hip down", bounds="two lists of names", sequence=True
     )
-    leg_length_m: float = length(..., "hip to sole as the parts have it: what lengths and falls are measured by")
+    leg_length_m: float = length(..., "hip to sole, as follows from the parts; the unit of lengths and falls")
     knee: KneeJoint = KneeJoint()
     torso: Torso | None = None
     hip: Hip = Hip()
@@ -324,16 +319,15 @@ class PartsWalker(_Legged):
         if found is None or math.isclose(value, found, rel_tol=LEG_LENGTH_DIGITS):
             return value
         upright = f"upright, from the hip's hinge to the first leg's sole, it is {found:.9g} m"
-        raise wrong(f"is not what the parts have: {upright}")
+        raise meaning_error(f"disagrees with the parts: {upright}")
 
     @property
     def foot_radius_m(self) -> float:
-        """Radius of the feet, m."""
         return self.feet[0].radius_m
 
     @property
     def total_mass_kg(self) -> float:
-        """Everything, kg."""
+        """Mass of the whole walker, kg."""
         masses = [body.mass_kg for body in self.bodies] + [particle.mass_kg for particle in self.particles]
         return sum(masses) + torso_mass(self.torso)
 
@@ -341,9 +335,9 @@ class PartsWalker(_Legged):
 def hip_to_sole(
     hinges: tuple[PartHinge, ...], feet: tuple[PartFoot, PartFoot], legs: tuple[LegBodies, LegBodies]
 ) -> float | None:
-    """How far the first leg's sole lies below the hip while all bodies are upright, m.
+    """Depth of the first leg's sole below the hip with all bodies upright, m.
 
-    None where no hinges lead from the other leg to the foot's body: parts that make no walker.
+    None if no hinges lead from the other leg to the foot's body.
     """
     places = {(hinge.parent, hinge.child): (hinge.parent_point_m, hinge.child_point_m) for hinge in hinges}
     places |= {(hinge.child, hinge.parent): (hinge.child_point_m, hinge.parent_point_m) for hinge in hinges}
@@ -361,7 +355,7 @@ def hip_to_sole(
 
 
 def why_off_the_leg(mass_m: float, length_m: float) -> str:
-    """Why a mass so far from the foot is on no leg of a length; empty if it is."""
+    """Explain why a mass at that distance from the foot is not on the leg; empty if it is."""
     if mass_m < length_m:
         return ""
     massless = "equals leg_length_m, so b = 0: the leg's mass sits at the hip and the swing leg is massless; "
@@ -369,18 +363,17 @@ def why_off_the_leg(mass_m: float, length_m: float) -> str:
 
 
 def torso_mass(torso: Torso | None) -> float:
-    """Mass of a torso, if there is one (kg)."""
     return 0.0 if torso is None else torso.mass_kg
 
 
 def rigid_bodies(walker: Any) -> int:
-    """How many angles the rigid model's state has: swing leg, stance leg, what else swings, a torso."""
+    """Number of angles in the rigid model's state: swing leg, stance leg, further swinging bodies, torso."""
     bodies = len(walker.bodies) - len(walker.legs[1]) + 1 if isinstance(walker, PartsWalker) else 2
     return bodies + int(isinstance(walker, Kneed)) + int(walker.torso is not None)
 
 
 def followers(walker: Any) -> dict[int, tuple[str, dict[int, float]]]:
-    """Angles of the rigid model's state that others give: by place, the body's name and weights of others by place."""
+    """Return the coupled angles of the rigid model's state: index to body name and weights by index."""
     found = {}
     if isinstance(walker, PartsWalker):
         swinging, stance = walker.legs
@@ -395,12 +388,12 @@ def followers(walker: Any) -> dict[int, tuple[str, dict[int, float]]]:
 
 
 def is_passive_compass(config: Any) -> bool:
-    """Whether a config has a compass without a torso on which nothing but gravity acts: Appendix A describes these."""
+    """Whether the walker is a passive compass without torso, as in Appendix A."""
     return bool(config.walker.type == "compass" and config.walker.torso is None and not acting_on(config))
 
 
 def leg_inertia(walker: Any) -> float:
-    """Inertia (kg m^2) of one leg about the hip; of parts no less than that."""
+    """Inertia of one leg about the hip (kg m^2); for walkers of parts an upper bound."""
     if walker.type == "compass":
         below = walker.leg_length_m - walker.foot_to_mass_m
         return float(walker.leg_mass_kg * below**2 + walker.leg_inertia_kg_m2)
@@ -419,7 +412,7 @@ def leg_inertia(walker: Any) -> float:
 
 
 def why_no_push_off(walker: Any) -> str:
-    """Why nothing can push a walker off along its trailing leg; empty if something can."""
+    """Explain why a walker cannot push off along its trailing leg; empty if it can."""
     if not isinstance(walker, CompassWalker | StraightLegs):
         free = walker.knee.at_heel_strike == "free"
         return (
@@ -432,11 +425,11 @@ def why_no_push_off(walker: Any) -> str:
     leading = walker.leg_mass_kg * (above**2 + ahead**2) + walker.leg_inertia_kg_m2
     if walker.hip_mass_kg + torso_mass(walker.torso) + leading > 0.0:
         return ""
-    return "whose impulse has nothing to push: the hip has no mass, and the leading leg's rests on its foot"
+    return "whose impulse pushes no mass: the hip has none, and the leading leg's mass is at its foot"
 
 
 def too_light_for_contact(walker: Any) -> str:
-    """Why a walker cannot stand on compliant ground; empty if it can."""
+    """Explain why a walker cannot stand on compliant ground; empty if it can."""
     share = walker.leg_mass_kg / walker.total_mass_kg if isinstance(walker, CompassWalker) else 1.0
     if share >= LIGHTEST_CONTACT:
         return ""
@@ -447,20 +440,20 @@ def too_light_for_contact(walker: Any) -> str:
 
 
 def why_no_contact(walker: Any) -> str:
-    """Why a walker cannot have a contact block, with what to do; empty if it can."""
+    """Explain why a walker cannot have a contact block, with advice; empty if it can."""
     why = too_light_for_contact(walker)
     return f"{why}; leave the contact block out, or give the legs mass" if why else ""
 
 
 def why_no_state(start: Any, walker: Any) -> str:
-    """Why a start is no state of a walker; empty if it is, or the fixed point."""
+    """Explain why a start is not a state of a walker; empty if it is, or `fixed-point`."""
     numbers = 2 * rigid_bodies(walker)
     fits = isinstance(start, str) or len(start) == numbers
     return "" if fits else f"has {len(start)} numbers, and this walker's state has {numbers}"
 
 
 def contact_to_add(walker: Any) -> str:
-    """A contact block for a walker, in YAML: the paper's numbers by mass, and ground that its legs can walk on."""
+    """Suggest a contact block in YAML: the paper's values scaled by mass, on terrain that suits the legs."""
     share, paper = walker.total_mass_kg / CompassWalker().total_mass_kg, Contact()
     stiffness, damping = (short(float(f"{share * one:.3g}")) for one in (paper.stiffness, paper.damping))
     numbers = f"stiffness: {stiffness}, damping: {damping}"
@@ -468,19 +461,18 @@ def contact_to_add(walker: Any) -> str:
 
 
 def has_knees(walker: Any) -> TypeGuard["Kneed | PartsWalker"]:
-    """Whether a walker's swing leg shortens, so that it clears plain ground."""
+    """Whether the swing leg shortens and so clears plain ground."""
     return isinstance(walker, Kneed) or (isinstance(walker, PartsWalker) and any(one.locks for one in walker.hinges))
 
 
 def why_rigid_alone(walker: Any) -> str:
-    """Why the contact model is not asked about a walker without a contact block, as a sentence."""
-    return f"The contact model was not asked: {too_light_for_contact(walker) or 'the config has no contact block'}."
+    return f"The contact model was not used: {too_light_for_contact(walker) or 'the config has no contact block'}."
 
 
-def without_contact(asked: str, walker: Any, instead: str) -> ConfigError:
-    """What to say where what is asked for needs contact, and the config has none.
+def contact_required_error(asked: str, walker: Any, instead: str) -> ConfigError:
+    """Build the error for a request that needs contact, which the config lacks.
 
-    instead  what to do about a block that is missing
+    instead  advice if only the block is missing
     """
     why = too_light_for_contact(walker)
     if why:

@@ -1,4 +1,4 @@
-"""A config as YAML text that loads back to the same: bare, as artifacts carry it, or with a comment on each key."""
+"""Writing a config as YAML that loads back to an equal config, plain or commented."""
 
 import json
 import math
@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from pydantic.fields import FieldInfo
 
-from walkerlab.config.fields import Block, allowed, block_of
+from walkerlab.config.fields import Block, block_of, describe_allowed
 from walkerlab.config.reader import value_of
 from walkerlab.config.schema import Config, Source
 
@@ -20,12 +20,12 @@ ELSEWHERE: Final = "left out; `walkerlab schema {}` has its keys"
 
 
 def to_yaml(config: Config) -> str:
-    """YAML text of every key of `config`, defaults included."""
+    """Write every key of `config` as YAML, defaults included."""
     return "".join(f"{line}\n" for line in _lines(config.model_dump(mode="json"), ""))
 
 
-def extending(start: str, base: Config, changed: Config, name: str) -> str:
-    """YAML text of a config that extends another one, `base` by the name `start`, and says only what differs."""
+def to_extending_yaml(start: str, base: Config, changed: Config, name: str) -> str:
+    """Write a config as YAML that extends `base`, named `start`, with only the keys that differ."""
     different = _different(base.model_dump(mode="json"), changed.model_dump(mode="json"))
     blocks = {"extends": start, "name": name, **{key: value for key, value in different.items() if key != "name"}}
     degrees = slope_in_degrees(changed.slope_rad)
@@ -36,7 +36,7 @@ def extending(start: str, base: Config, changed: Config, name: str) -> str:
 
 
 def slope_in_degrees(slope_rad: float) -> float | None:
-    """The degrees that a slope was written as; None for one that was written in radians."""
+    """Return the slope in degrees if it was written in degrees, otherwise None."""
     degrees = float(f"{math.degrees(slope_rad):.12g}")
     return degrees if math.radians(degrees) == slope_rad else None
 
@@ -53,10 +53,10 @@ def _different(base: dict[str, Any], changed: dict[str, Any]) -> dict[str, Any]:
     return found
 
 
-def commented(config: Config, left_alone: Collection[str] = ()) -> str:
-    """YAML text of `config` with meaning, bounds and unit of each key above it.
+def to_commented_yaml(config: Config, left_alone: Collection[str] = ()) -> str:
+    """Write `config` as YAML with meaning, bounds and unit above each key.
 
-    left_alone  keys of the config that are not written: they have their defaults
+    left_alone  keys to leave out, which have their defaults
     """
     values = config.model_dump(mode="json", exclude=set(left_alone))
     lines = [*_commented(config, values, ""), *(f"# {name}: {ELSEWHERE.format(name)}" for name in left_alone)]
@@ -88,8 +88,7 @@ def _commented(block: Block, values: dict[str, Any], indent: str, path: str = ""
 
 
 def _meaning(field: FieldInfo) -> str:
-    """What a key is, and what it allows."""
-    return ": ".join(part for part in (field.description, allowed(field)) if part)
+    return ": ".join(part for part in (field.description, describe_allowed(field)) if part)
 
 
 def _comment(text: str, indent: str) -> Iterator[str]:
@@ -120,6 +119,6 @@ def _value(value: Any) -> str:
 
 
 def _number(value: float) -> str:
-    """With a point even before an exponent, so that readers of YAML 1.1 see a number too."""
+    """Write a point even before an exponent, so that YAML 1.1 readers also see a number."""
     text = repr(value)
     return text if "." in text else text.replace("e", ".0e")

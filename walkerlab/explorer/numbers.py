@@ -6,7 +6,7 @@ from typing import Any, Final
 
 from pydantic.fields import FieldInfo
 
-from walkerlab.config.fields import bounds_of, held, kind, leaves, words_of
+from walkerlab.config.fields import bounds_of, leaves, type_words, value_at, words_of
 from walkerlab.config.schema import Config
 from walkerlab.errors import ConfigError
 from walkerlab.scene.parameter import Parameter, parameter_of
@@ -44,7 +44,7 @@ def adjustable(start: Config, config: Config) -> Iterator[dict[str, Any]]:
         key = ".".join(path)
         if path[0] in OF_OTHERS or key in ("walker.type", "contact.units"):
             continue
-        value, first = held(config, path), held(start, path)
+        value, first = value_at(config, path), value_at(start, path)
         if path == ("slope_rad",):
             key, value, first = "slope_deg", math.degrees(value), math.degrees(first)
         if value is not None:
@@ -68,7 +68,7 @@ def reach(key: str, first: Any, unit: str, field: FieldInfo, start: Config) -> d
     if isinstance(first, bool):
         return {"words": [True, False]}
     words = words_of(field.annotation)
-    if kind(field.annotation) == "word" and len(words) > 1:
+    if type_words(field.annotation) == "word" and len(words) > 1:
         return {"words": words}
     if not isinstance(first, int | float):
         return {}

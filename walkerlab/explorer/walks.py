@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import Any, Final
 
 from walkerlab import kernel_cache
-from walkerlab.config.files import extendable
+from walkerlab.config.files import config_to_extend
 from walkerlab.config.loader import LoadedConfig, load
 from walkerlab.config.schema import Config
-from walkerlab.config.writer import extending, to_yaml
+from walkerlab.config.writer import to_extending_yaml, to_yaml
 from walkerlab.errors import ConfigError, WalkerlabError
 from walkerlab.explorer.numbers import adjustable
 from walkerlab.pipeline.executor import answer_in_memory
@@ -195,6 +195,8 @@ def as_file(question: ExploredConfig, name: str) -> str:
 
     It says all where nothing can be extended: for a walker of another type than the paper's that no file holds.
     """
-    start, named = extendable(question.config), replace(question, changes={**question.changes, "name": name})
+    start, named = config_to_extend(question.config), replace(question, changes={**question.changes, "name": name})
     base, changed = load(Path(start)).config, named.loaded.config
-    return extending(start, base, changed, name) if base.walker.type == changed.walker.type else to_yaml(changed)
+    return (
+        to_extending_yaml(start, base, changed, name) if base.walker.type == changed.walker.type else to_yaml(changed)
+    )

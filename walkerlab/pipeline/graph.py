@@ -140,12 +140,14 @@ class Stage:
 
     def refuse_unsuited(self, target: str, config: Config) -> None:
         """Raise ConfigError if it cannot run under a config, although `target` needs it."""
-        from walkerlab.config.walkers import contact_to_add, without_contact  # not for the help of the command line
+        # Imported here: the help of the command line needs neither.
+        from walkerlab.config.walkers import contact_required_error, contact_to_add
 
         if self.why_unsuited(config) is not None:
             block = f"`{contact_to_add(config.walker)}`"
             instead = f"Add one to the config, such as the paper's by this walker's mass: {block}."
-            raise without_contact(target, config.walker, f"{instead} `walkerlab schema contact` explains its keys.")
+            advice = f"{instead} `walkerlab schema contact` explains its keys."
+            raise contact_required_error(target, config.walker, advice)
 
     def refuse_question(self, config: Config) -> None:
         """Raise ConfigError for a question that `refuse` of its module rejects; only for stages on demand."""

@@ -6,7 +6,7 @@ from inspect import signature
 from typing import Any
 
 from walkerlab.config.canonical import slice_of
-from walkerlab.config.overlay import over_paper
+from walkerlab.config.overlay import paper_config_with
 from walkerlab.config.schema import Config
 from walkerlab.pipeline.graph import PIPELINE, Graph, Stage
 from walkerlab.sources import Sources
@@ -45,7 +45,7 @@ class Keys:
         if stage.name not in self._fixed:
             fixed = self._fixed[stage.name] = {}
             if stage.takes_of_paper is not None:
-                fixed["paper"] = slice_of(over_paper({}), stage.takes_of_paper)
+                fixed["paper"] = slice_of(paper_config_with({}), stage.takes_of_paper)
             if stage.programs is not None:
                 fixed["programs"] = dict(stage.programs())
         once = {} if again or not takes_again(stage) else {"again": False}

@@ -5,9 +5,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from walkerlab.config.files import BUILTIN_FOLDER, DEFAULT, ConfigFile, builtin, builtin_names, find
+from walkerlab.config.files import BUILTIN_FOLDER, DEFAULT, ConfigFile, builtin_config, builtin_names, find_config
 from walkerlab.config.loader import LoadedConfig, load
-from walkerlab.config.problems import refused
+from walkerlab.config.problems import problem_error
 from walkerlab.config.walkers import PartsWalker
 from walkerlab.errors import ConfigError
 from walkerlab.pipeline.runs import config_text, find_run, read_all, stored_in
@@ -69,7 +69,7 @@ def refuse_what_makes_no_walker(read: LoadedConfig) -> None:
     try:
         level_walker(config.walker, config.gravity_m_s2)
     except ConfigError as error:
-        raise refused(read.tree.entries["walker"].position, error.message, advice=error.advice) from None
+        raise problem_error(read.tree.entries["walker"].position, error.message, advice=error.advice) from None
 
 
 def artifact_at(path: Path) -> tuple[RunFolder, ConfigFile] | None:
@@ -106,7 +106,7 @@ def source_of(path: Path | None, runs: Path) -> str:
 
     Relative, so that a project can be moved with its runs.
     """
-    file = (builtin(DEFAULT) if path is None else find(path)).path.resolve()
+    file = (builtin_config(DEFAULT) if path is None else find_config(path)).path.resolve()
     if file.parent == BUILTIN_FOLDER.resolve():
         return f"built-in {file.name}"
     return os.path.relpath(file, runs.resolve())

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from walkerlab.config.canonical import flattened
-from walkerlab.config.problems import meant
+from walkerlab.config.canonical import flatten
+from walkerlab.config.problems import suggestion
 from walkerlab.config.reader import read as read_text
 from walkerlab.config.schema import Config
 from walkerlab.config.tree import Mapping as Tree
-from walkerlab.config.validation import typed
+from walkerlab.config.validation import validate_tree
 from walkerlab.config.writer import to_yaml
 from walkerlab.errors import ConfigError, StaleError
 from walkerlab.pipeline.executor import survey
@@ -87,7 +87,7 @@ def config_of(folder: RunFolder) -> Config | None:
     """Return the config of a run; None if it is unknown or this version's schema rejects it."""
     try:
         tree = read_text(config_text(folder) or "", "stored config")
-        return typed(tree) if isinstance(tree, Tree) else None
+        return validate_tree(tree) if isinstance(tree, Tree) else None
     except ConfigError:
         return None
 
@@ -186,7 +186,7 @@ def run_named(text: str, runs_dir: Path) -> RunFolder:
     if found is not None:
         return found
     there = sorted(path.name for path in runs_dir.glob("*/"))
-    near = meant(Path(text).name, there) or (f" There are {', '.join(there)}." if there else "")
+    near = suggestion(Path(text).name, there) or (f" There are {', '.join(there)}." if there else "")
     raise ConfigError(f"there is no run {text}.{near}", "`walkerlab report` creates the run of the paper config.")
 
 
@@ -266,10 +266,10 @@ def difference(
 ) -> RunDifference:
     """Compare the results and configs of two runs; an unknown config counts as empty."""
     both = [name for name in first if name in second]
-    one, other = ({} if config is None else dict(flattened(config.model_dump(mode="json"))) for config in configs)
+    one, other = ({} if config is None else dict(flatten(config.model_dump(mode="json"))) for config in configs)
     return RunDifference(
         tuple((key, one.get(key), other.get(key)) for key in {**one, **other} if one.get(key) != other.get(key)),
-        {name: pairs(*(dict(flattened(run[name].summary, lists=True)) for run in (first, second))) for name in both},
+        {name: pairs(*(dict(flatten(run[name].summary, lists=True)) for run in (first, second))) for name in both},
         {name: pairs(*(headline_values(name, run[name].summary) for run in (first, second))) for name in both},
         tuple(name for name in first if name not in second),
         tuple(name for name in second if name not in first),
@@ -285,7 +285,7 @@ def pairs(first: Mapping[str, Any], second: Mapping[str, Any]) -> tuple[Pair, ..
 def headline_values(stage: str, summary: Mapping[str, Any]) -> dict[str, Any]:
     """Return the headline quantities of a stage's summary, by name."""
     last = {name: summary[whole][-1] for name, whole in LAST_OF.items() if summary.get(whole)}
-    every = dict(flattened(summary, lists=True)) | last
+    every = dict(flatten(summary, lists=True)) | last
     return {name: every[name] for name in headlines(stage, every)}
 
 

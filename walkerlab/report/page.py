@@ -11,7 +11,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup, escape
 
 from walkerlab.config.schema import Source
-from walkerlab.errors import to_type_back
+from walkerlab.errors import add_run_options
 from walkerlab.report.blocks import MAIN, Section
 from walkerlab.report.symbols import CARET, POWER, power, raised
 
@@ -72,7 +72,7 @@ def environment(run: str = "") -> Environment:
         lstrip_blocks=True,
     )
     options = f" -c {shlex.quote(run)}" if run else ""
-    made.filters["said"] = lambda text: said(to_type_back(text, options))
+    made.filters["said"] = lambda text: said(add_run_options(text, options))
     return made
 
 

@@ -8,8 +8,8 @@ from typing import Any, TypeVar
 from pydantic import ValidationError
 from pydantic.fields import FieldInfo
 
-from walkerlab.config.fields import Block, block_of, extra, held, kind, leaves, leaves_of_other_kinds
-from walkerlab.config.problems import nearest, shown
+from walkerlab.config.fields import Block, annotation_of, block_of, leaves, leaves_of_other_kinds, type_words, value_at
+from walkerlab.config.problems import nearest, printable
 from walkerlab.config.reads import ContactConfig, keys_of
 from walkerlab.config.schema import Config
 from walkerlab.errors import ConfigError
@@ -35,7 +35,7 @@ class Parameter:
 
     def value_in(self, config: ContactConfig) -> float:
         """What the config has there."""
-        found = held(config, self.path)
+        found = value_at(config, self.path)
         return math.degrees(found) if self.key == SLOPE_DEG else float(found)
 
     def config_at(self, config: ContactConfig, value: float) -> Config | None:
@@ -107,8 +107,8 @@ def parameter_of(key: str, config: ContactConfig, asker: Key = ()) -> Parameter:
     own = {".".join(path): field for path, field in leaves(Config, held=config)}
     why = why_no_parameter(key, config, own)
     if why:
-        raise ConfigError(f"{f'{dotted(asker)}: ' if asker else ''}{shown(key)} {why}", _ADVICE, asker)
-    unit = extra(own[key], "unit") or "1"
+        raise ConfigError(f"{f'{dotted(asker)}: ' if asker else ''}{printable(key)} {why}", _ADVICE, asker)
+    unit = annotation_of(own[key], "unit") or "1"
     return Parameter(key, config.contact.unit_of(unit) if config.contact else unit, tuple(key.split(".")))
 
 
@@ -130,10 +130,10 @@ def why_no_parameter(key: str, config: ContactConfig, own: Mapping[str, FieldInf
     path = key.split(".")
     if path[0] not in PHYSICAL:
         return "touches no model"
-    if "number" not in kind(own[key].annotation):
+    if "number" not in type_words(own[key].annotation):
         return "is not a number"
     for depth in range(1, len(path) + 1):
-        found, block = held(config, path[:depth]), ".".join(path[:depth])
+        found, block = value_at(config, path[:depth]), ".".join(path[:depth])
         if found is None:
             return f"is not there: the config has no {block}; give it one first"
         if isinstance(found, tuple):
@@ -146,7 +146,7 @@ def likely(key: str, own: Mapping[str, FieldInfo]) -> str:
     numbers = [
         name
         for name, field in own.items()
-        if name.split(".")[0] in PHYSICAL and block_of(field) is None and "number" in kind(field.annotation)
+        if name.split(".")[0] in PHYSICAL and block_of(field) is None and "number" in type_words(field.annotation)
     ]
     meant = nearest(key, [*numbers, SLOPE_DEG])
     return f"; did you mean {meant}?" if meant else ""

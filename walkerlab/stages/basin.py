@@ -13,7 +13,7 @@ import numpy as np
 
 from walkerlab.config.basin import COORDINATES, Basin
 from walkerlab.config.reads import BasinConfig, RigidConfig
-from walkerlab.config.walkers import without_contact
+from walkerlab.config.walkers import contact_required_error
 from walkerlab.errors import ConfigError
 from walkerlab.hybrid.recorded_walk import as_state
 from walkerlab.hybrid.rigid_lanes import two_legs
@@ -147,8 +147,8 @@ def question_of(config: BasinConfig, inputs: Mapping[str, Content], window: Wind
 def contact_question(config: BasinConfig, inputs: Mapping[str, Content], rigid: Standing) -> ContactQuestion:
     """Build the same for the contact model, at the tolerances of `tune`'s map."""
     if config.contact is None:
-        raise without_contact("basin.model: contact", config.walker, "Add one.")
-    # imported here: it loads interpolation code, which the rigid model does not need
+        raise contact_required_error("basin.model: contact", config.walker, "Add one.")
+    # Imported here: it loads interpolation code, which the rigid model does not need.
     from walkerlab.scene.scaled import for_a_map, starts_of
 
     gait, steps = inputs["fixedpoint"].summary, config.basin.contact_steps

@@ -12,7 +12,7 @@ import numpy as np
 
 from walkerlab.config.continuation import Span
 from walkerlab.config.reads import ContactConfig, ContinuationConfig
-from walkerlab.config.walkers import without_contact
+from walkerlab.config.walkers import contact_required_error
 from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.orbits.attractors import feigenbaum_ratios, may_part
 from walkerlab.orbits.bifurcations import Bifurcation
@@ -130,7 +130,7 @@ def models_of(asked: FamilyQuestion) -> tuple[str, ...]:
     """
     config, second = asked.config, asked.second
     if asked.models != (RIGID,) and config.contact is None:
-        raise without_contact("the contact model", config.walker, "Use --model rigid.")
+        raise contact_required_error("the contact model", config.walker, "Use --model rigid.")
     asked.refuse_ends("continuation")
     if second is not None:
         second.refuse_ends("continuation", "second")

@@ -11,7 +11,7 @@ import numpy as np
 from walkerlab.config.design import Design
 from walkerlab.config.reads import DesignConfig
 from walkerlab.config.schema import Config
-from walkerlab.config.walkers import without_contact
+from walkerlab.config.walkers import contact_required_error
 from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.labels import Label
 from walkerlab.orbits.design import ON_BOUND, Aim, Descent, Point, optima, searched, sought
@@ -122,7 +122,7 @@ def refuse(config: DesignConfig) -> None:
             "For example --minimise gait_sensitivity_norm --over walker.hip_mass_kg=5:15.",
         )
     if asked.model == "contact" and config.contact is None:
-        raise without_contact("design.model: contact", config.walker, "Add one.")
+        raise contact_required_error("design.model: contact", config.walker, "Add one.")
     parameters = [parameter_of(key, config, ("design", "over")) for key in asked.over]
     for key in asked.over:
         if not reads(asked.model, config, key):

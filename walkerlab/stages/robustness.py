@@ -14,7 +14,7 @@ from walkerlab.config.fields import leaves
 from walkerlab.config.ground import Footholds
 from walkerlab.config.reads import RobustnessConfig
 from walkerlab.config.schema import Config
-from walkerlab.config.walkers import without_contact
+from walkerlab.config.walkers import contact_required_error
 from walkerlab.config.writer import slope_in_degrees
 from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.hybrid.recorded_walk import as_state
@@ -157,7 +157,7 @@ def refuse(config: RobustnessConfig) -> None:
     """Raise ConfigError for an invalid question."""
     asked = config.robustness
     if asked.model in (CONTACT, "both") and config.contact is None:
-        raise without_contact(f"robustness.model: {asked.model}", config.walker, "Add one, or ask for rigid.")
+        raise contact_required_error(f"robustness.model: {asked.model}", config.walker, "Add one, or ask for rigid.")
     for place, key in enumerate(asked.to):
         parameter_of(key, config, ("robustness", "to", place))
         if not any(reads(model, config, key) for model in models_of(config)):

@@ -10,9 +10,9 @@ from typing import Any, Final, Literal
 from pydantic.fields import FieldInfo
 
 from walkerlab.config.contact import Contact
-from walkerlab.config.fields import extra, held, leaves
+from walkerlab.config.fields import annotation_of, leaves, value_at
 from walkerlab.config.layers import ConfigSetting
-from walkerlab.config.problems import nearest, refused
+from walkerlab.config.problems import nearest, problem_error
 from walkerlab.config.reader import read
 from walkerlab.config.schema import Config, SlopeInDegrees
 from walkerlab.config.tree import Position, Scalar, plain
@@ -137,7 +137,7 @@ def build_sweep(
     repeated = {one.key for one in axes if sum(other.key == one.key for other in axes) > 1}
     if not axes or repeated:
         text = f"{min(repeated)}: given twice" if repeated else "no parameter is given"
-        raise refused(None, f"sweep: {text}", "--over KEY=VALUES, each key once", advice=EXAMPLE)
+        raise problem_error(None, f"sweep: {text}", "--over KEY=VALUES, each key once", advice=EXAMPLE)
     if sample:
         return SweptStage(stage, sampled(axes, sample, seed), "list")
     for one in axes:
@@ -145,14 +145,14 @@ def build_sweep(
             raise bad(one.source, f"{one.key}: it is not said how many values", FORMS)
     if zip and len({len(one.values) for one in axes}) > 1:
         lengths = ", ".join(f"{one.key} {len(one.values)}" for one in axes)
-        raise refused(None, f"--zip: the parameters have different numbers of values: {lengths}")
+        raise problem_error(None, f"--zip: the parameters have different numbers of values: {lengths}")
     return SweptStage(stage, axes, "list" if zip else "grid")
 
 
 def refuse_too_many(what: str, count: int) -> None:
     """Raise ConfigError for more than MAX_POINTS points, requested by `what`."""
     if count > MAX_POINTS:
-        raise refused(None, f"{what}: {count} points", f"up to {MAX_POINTS} in one sweep")
+        raise problem_error(None, f"{what}: {count} points", f"up to {MAX_POINTS} in one sweep")
 
 
 def axis_of_text(text: str) -> tuple[str, Any, str]:
@@ -171,7 +171,7 @@ def axis_of_text(text: str) -> tuple[str, Any, str]:
 
 def bad(source: str, text: str, allowed: str = "", near: str = "") -> ConfigError:
     """Build the error for an invalid parameter, option or key, which is its position."""
-    return refused(Position(source, 0, 0), text, allowed, near)
+    return problem_error(Position(source, 0, 0), text, allowed, near)
 
 
 @cache
@@ -233,7 +233,7 @@ def sampled(axes: Sequence[Axis], sample: str, seed: int) -> tuple[Axis, ...]:
     name, _, number = sample.partition(":")
     if name not in SAMPLERS or not re.fullmatch("[0-9]{1,18}", number) or int(number) < 1:
         allowed = ", ".join(f"{known}:N" for known in SAMPLERS)
-        raise refused(Position(f"--sample {sample}", 1, 1), "is not a sampler with a number", allowed)
+        raise problem_error(Position(f"--sample {sample}", 1, 1), "is not a sampler with a number", allowed)
     refuse_too_many(f"--sample {sample}", int(number))
     import numpy as np
 
@@ -264,12 +264,12 @@ def values_at(one: Axis, column: Any) -> Iterator[Value]:
 def described(config: Config, key: str) -> tuple[str, str]:
     """Return unit and meaning of a key; a unit that depends on the config is that of this config."""
     *above, last = key.split(".")
-    block = held(config, above)
+    block = value_at(config, above)
     # the config's own blocks, which may be of a type that the schema only allows
     field = known_keys().get(key) or getattr(type(block), "model_fields", {}).get(last)
     if field is None:
         return "1", key
-    unit = extra(field, "unit")
+    unit = annotation_of(field, "unit")
     return (config.contact or Contact()).unit_of(unit), field.description or key
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, Final, TypeVar
 
 from walkerlab.config.fields import Block
-from walkerlab.config.overlay import over_paper
+from walkerlab.config.overlay import paper_config_with
 from walkerlab.config.reader import read
 from walkerlab.config.schema import Config
 from walkerlab.config.stability import FATES, Case, Fate
@@ -65,7 +65,7 @@ def without_doubles(cases: Sequence[Case]) -> tuple[Case, ...]:
 
 def config_of(case: Case) -> Config:
     """Apply a case's lines to the paper's config; raises ConfigError if the result is no valid config."""
-    return over_paper(case.config, f"case {case.name}")
+    return paper_config_with(case.config, f"case {case.name}")
 
 
 def scene_cases(config: Config) -> list[tuple[Case, Config]]:

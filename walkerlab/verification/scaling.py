@@ -3,7 +3,7 @@
 import math
 from typing import Any, TypeVar
 
-from walkerlab.config.fields import Block, extra
+from walkerlab.config.fields import Block, annotation_of
 from walkerlab.config.reads import RigidConfig
 from walkerlab.config.schema import Config
 from walkerlab.orbits.similarity import Units
@@ -36,7 +36,7 @@ def scaled_block(block: B, by: Units) -> B:
 
     changed: dict[str, Any] = {}
     for name, field in type(block).model_fields.items():
-        changed[name] = value(getattr(block, name), by.of(extra(field, "unit")))
+        changed[name] = value(getattr(block, name), by.of(annotation_of(field, "unit")))
     return block.model_copy(update=changed)
 
 

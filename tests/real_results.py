@@ -1,0 +1,47 @@
+"""What stages store of a small run of the paper's walker: the results that other tests' results derive from."""
+
+import functools
+
+import pytest
+
+from walkerlab.config.loader import load
+from walkerlab.orbits import plane
+from walkerlab.pipeline.executor import answer_in_memory
+from walkerlab.pipeline.results import MemoryResults
+from walkerlab.store.content import Group, Variable
+
+SMALL = {
+    "fixedpoint": (),
+    "simulate": (),
+    "contact-sim": (),
+    "compare": (),
+    "tune": ("tune.cells=3", "tune.rigid_limit=false"),
+    "continuation": (
+        "continuation.over=slope_deg", "continuation.from=4.3", "continuation.to=5.05", "continuation.periods=2",
+        "continuation.points=10", "continuation.model=rigid",
+        "continuation.second={over: walker.hip_mass_kg, from: 9.5, to: 10.5}",
+    ),
+}  # fmt: skip
+MEMORY = MemoryResults()
+
+
+@functools.cache
+def real(stage):
+    """The result of a stage on a walk of two strides, computed once a session."""
+    config = load(None, ["strides=2", *SMALL[stage]]).config
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(plane, "CELLS", (3, 2))
+        return answer_in_memory(config, stage, MEMORY)
+
+
+def first_steps(stage, steps):
+    """The trajectory of a walk up to the end of one of its steps."""
+    result = real(stage)
+    trajectory = result.groups["trajectory"]
+    end = result.summary["touch_times_s"][min(max(steps, 1), result.summary["steps"]) - 1]
+    keep = trajectory["time"] <= end
+    cut = {
+        name: Variable(one.values[keep], one.dims, one.units, one.long_name) if one.dims[0] == "time" else one
+        for name, one in trajectory.variables.items()
+    }
+    return Group(cut, trajectory.attrs)
