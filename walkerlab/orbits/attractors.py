@@ -1,9 +1,8 @@
-"""Where walks settle: the attractor of a step map over a parameter, and how fast neighbours on it part.
+"""Attractors of a step map over a parameter, and their largest Lyapunov exponents.
 
-The largest Lyapunov exponent is the mean growth of a tangent vector led along by the step map's exact derivative, per
-step. Its uncertainty is the standard error of the means of blocks, each several times as long as correlations last; a
-walk with too few of these is walked again, twice as long. It is at least one over the walk's steps, which cannot tell
-slower growth from none.
+The largest Lyapunov exponent is the mean logarithmic growth per step of a tangent vector under the step map's exact
+derivative. Its uncertainty is the standard error of block means, each block several correlation times long; a walk with
+too few blocks is repeated at twice the length. The uncertainty is at least 1/steps: slower growth cannot be resolved.
 
 Source: Benettin, Galgani, Giorgilli, Strelcyn, Meccanica 15 (1980).
 """
@@ -35,9 +34,9 @@ CANDIDATES = 4  # near returns that are tried, of one number of steps
 
 @dataclass(frozen=True, eq=False)
 class Attractor:
-    """Where walks settle at a value of the parameter.
+    """The attractor of a walk at a value of the parameter.
 
-    period     steps after which it repeats itself; 0 if it does not
+    period     steps after which it repeats; 0 if aperiodic
     periods_s, angles  (kept,) of the steps on it
     last       (d,) a point on it
     """
@@ -51,7 +50,7 @@ class Attractor:
 
 @dataclass(frozen=True)
 class Lyapunov:
-    """Largest Lyapunov exponent, per step, with its standard error."""
+    """Largest Lyapunov exponent per step, with its standard error."""
 
     value: float
     exponent: float
@@ -59,7 +58,7 @@ class Lyapunov:
 
 
 def may_part(exponents: Sequence[Lyapunov], value: float) -> bool:
-    """Whether neighbours may part at a value: not if the exponents measured around it, in order, say that they meet."""
+    """Whether neighbours may diverge at a value: false if the nearest measured exponents are not positive."""
     below = [one for one in exponents if one.value <= value][-1:]
     above = [one for one in exponents if one.value >= value][:1]
     return not exponents or any(one.exponent > one.uncertainty for one in (*below, *above))
@@ -67,9 +66,9 @@ def may_part(exponents: Sequence[Lyapunov], value: float) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class AttractorBranch:
-    """The attractor over values of the parameter, up to where it is lost.
+    """Attractors at successive values of the parameter, until the walk fails.
 
-    lost_at, reason  the first value at which the walk did not go on, and how it ended; None if it always did
+    lost_at, reason  first value at which the walk failed, and its outcome; None if it never did
     """
 
     found: tuple[Attractor, ...] = ()
@@ -78,7 +77,7 @@ class AttractorBranch:
 
 
 def period_of(points: Floats) -> int:
-    """After how many steps points (steps, d) repeat themselves, or come closer and closer to it; 0 if they do not."""
+    """Return after how many steps points (steps, d) repeat or converge to a cycle; 0 if they do neither."""
     for period in range(1, min(LONGEST_PERIOD, points.shape[0] // 2) + 1):
         apart = np.max(np.abs(points[period:] - points[:-period]), axis=1)
         third = apart.size // 3
@@ -89,7 +88,7 @@ def period_of(points: Floats) -> int:
 
 
 def settled(step_map: StepMap, z: Floats, value: float, transient: int, kept: int) -> Attractor | Outcome:
-    """Where a walk from z settles; the outcome if it does not go on for `transient + kept` steps."""
+    """Return the attractor of a walk from z, or the outcome if it fails within `transient + kept` steps."""
     walk = step_map.iterate(z, value, transient + kept, None)
     if walk.outcome is not Outcome.WALKED:
         return walk.outcome
@@ -105,10 +104,10 @@ def swept(
     kept: int,
     advance: Callable[[], None] = lambda: None,
 ) -> AttractorBranch:
-    """The attractor that contains z at the first value, followed from value to value.
+    """Follow the attractor that contains z at the first value from value to value.
 
-    Where a walk from one value's attractor does not settle at the next, it is led there in smaller steps; where it is
-    lost on the way, that is narrowed down by halving, so that it does not hang on the values.
+    If a walk from one attractor does not settle at the next value, smaller steps are tried. The value at which the
+    attractor is lost is narrowed by halving, so that it does not depend on the grid of values.
     """
     found: list[Attractor] = []
     for value in values:
@@ -136,20 +135,20 @@ def swept(
 
 
 def left_by_flip(step_map: StepMap, gait: Cycle, transient: int, kept: int) -> Attractor | Outcome:
-    """Where walks settle that leave an unstable gait along the direction in which every step changes sides."""
+    """Return the attractor of a walk that leaves an unstable gait along its flip direction."""
     flipping = min(gait.multipliers.real)
     aside = ASIDE * np.max(np.abs(gait.z)) * eigenvector(gait.DP, flipping)
     return settled(step_map, gait.z + aside, gait.value, transient, kept)
 
 
 def largest_exponent(step_map: StepMap, z: Floats, value: float, transient: int, steps: int) -> Lyapunov | None:
-    """The largest Lyapunov exponent of the attractor that a walk from z comes to; None if the walk ends.
+    """Return the largest Lyapunov exponent of the attractor of a walk from z; None if the walk fails.
 
     transient  steps that turn the tangent into the direction of fastest growth
-    steps      that are averaged over
+    steps      to average over
 
-    Just beyond a flip walks leave the gait that has become unstable as slowly as their tangents grow there. A walk that
-    repeats itself while its tangent grows is pushed off that gait, and one whose halves differ is walked on.
+    Just beyond a flip a walk leaves the unstable gait as slowly as its tangent grows. A walk that repeats while its
+    tangent grows is therefore pushed off the gait, and one whose halves differ is continued.
     """
     for _ in range(MAX_WALKS):
         walk = step_map.iterate(z, value, transient + steps, np.full(z.size, 1.0 / math.sqrt(z.size)))
@@ -171,9 +170,9 @@ def largest_exponent(step_map: StepMap, z: Floats, value: float, transient: int,
 
 
 def independent_blocks(series: Floats) -> int:
-    """How many blocks a series (n,) has that are several times as long as its correlations last.
+    """Return how many blocks of several correlation times a series (n,) holds.
 
-    These last for the sum of the autocorrelation over all lags, up to the first one at which it is not positive.
+    The correlation time sums the autocorrelation over all lags before the first that is not positive.
     """
     off = series - series.mean()
     spectrum = np.abs(np.fft.rfft(off, 2 * off.size)) ** 2
@@ -184,21 +183,21 @@ def independent_blocks(series: Floats) -> int:
 
 
 def standard_error(series: Floats, blocks: int) -> float:
-    """Standard error of the mean of a series, by the means of so many blocks of it."""
+    """Return the standard error of a series' mean, from the means of its blocks."""
     means = np.array([block.mean() for block in np.array_split(series, blocks)])
     return float(means.std(ddof=1)) / math.sqrt(blocks)
 
 
 def feigenbaum_ratios(flips: list[float]) -> list[float]:
-    """Ratios of successive distances between the flips of a cascade; they tend to 4.669."""
+    """Return ratios of successive distances between the flips of a cascade; they tend to 4.669."""
     gaps = np.diff(np.array(flips))
     return [float(one / other) for one, other in pairwise(gaps)]
 
 
 def close_returns(step_map: StepMap, attractor: Attractor, periods: Iterable[int], steps: int) -> list[Seed]:
-    """Points of an attractor that nearly return after so many steps: near unstable gaits of as many, a few each.
+    """Return points of an attractor that nearly repeat after given periods, as seeds of unstable gaits.
 
-    steps  that are walked to look for them
+    steps  length of the walk to search
     """
     walk = step_map.iterate(attractor.last, attractor.value, steps, None)
     points, found = walk.points, []
@@ -216,10 +215,10 @@ def close_returns(step_map: StepMap, attractor: Attractor, periods: Iterable[int
 def settled_elsewhere(
     step_map: StepMap, attractor: Attractor, starts: int, spread: float, transient: int, generator: np.random.Generator
 ) -> list[Seed]:
-    """Periodic gaits that walks from starts scattered about an attractor settle on, other than itself.
+    """Return other periodic gaits that walks from scattered starts near an attractor settle on.
 
-    starts  walks
-    spread  standard deviation of the starts' coordinates, as a share of the largest
+    starts  number of walks
+    spread  standard deviation of the starts' coordinates, as a share of the largest coordinate
     """
     found: list[Seed] = []
     periods = {attractor.period}

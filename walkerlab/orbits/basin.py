@@ -1,8 +1,8 @@
-"""Basins of attraction of the rigid walker: which attractor a start comes to, in how many steps, or how it fails.
+"""Basins of attraction of the rigid walker: the attractor that each start reaches, in how many steps, or how it fails.
 
-All of it happens with the similar walker of unit size, on the section just after a heel strike, whose coordinates are
-z = (theta_2, dtheta_1, dtheta_2). Attractors are found by walking: long walks from many starts, and what they repeat. A
-walk has reached an attractor once it is so near that everything around there stays near, which is tried out too.
+All walks are of the similar walker of unit size, on the section just after heel strike, z = (theta_2, dtheta_1,
+dtheta_2). Attractors are found by long walks from many starts. A walk has reached an attractor once it is within a
+distance from which, as tested, every walk returns to it.
 """
 
 from collections.abc import Sequence
@@ -42,7 +42,7 @@ Walker = TwoLegs | Standing
 
 
 class Capture(NamedTuple):
-    """An observer that ends walks that come near to an attractor, or that have taken so many steps."""
+    """An observer that ends walks near an attractor, or after their maximum number of steps."""
 
     points: Any  # (m, 3) points of attractors
     owner: Any  # (m,) which attractor each belongs to
@@ -54,7 +54,6 @@ class Capture(NamedTuple):
 
 @struck.case(Capture)
 def captured(observer: Capture, walk: int, step: int, t: float, y: Any) -> int:
-    """Whether the walk is near to an attractor now."""
     for i in range(3):
         observer.last[walk, i] = y[i + 1]
     for k in range(observer.owner.size):
@@ -67,10 +66,10 @@ def captured(observer: Capture, walk: int, step: int, t: float, y: Any) -> int:
 
 @dataclass(frozen=True, eq=False)
 class PeriodicAttractor:
-    """An attractor that repeats itself.
+    """A periodic attractor.
 
-    points  (period, 3) of the section, as one walk meets them, the one with the smallest angle first
-    reach   distance from which all walks come to it; zero if none was found
+    points  (period, 3) on the section in the order of a walk, beginning with the smallest angle
+    reach   distance from which all walks return to it; zero if none was found
     """
 
     points: Floats
@@ -78,23 +77,22 @@ class PeriodicAttractor:
 
     @property
     def period(self) -> int:
-        """Steps after which it repeats itself."""
         return len(self.points)
 
 
 @dataclass(frozen=True, eq=False)
 class Attractors:
-    """Where walks from some starts settle.
+    """Attractors of walks from a set of starts.
 
-    cycles     in order of their periods
-    aperiodic  whether walks also go on for ever without repeating themselves
+    cycles     ordered by period
+    aperiodic  whether some walks continue without repeating
     """
 
     cycles: tuple[PeriodicAttractor, ...] = ()
     aperiodic: bool = False
 
     def capture(self, n: int, most: int, share: float = 1.0) -> Capture:
-        """An observer for n walks of at most so many steps; `share` of the distance counts as reached."""
+        """Return an observer of n walks of at most `most` steps; `share` scales the distances of capture."""
         points = np.concatenate([np.zeros((0, COORDINATES)), *(cycle.points for cycle in self.cycles)])
         owner = np.repeat(np.arange(len(self.cycles)), [cycle.period for cycle in self.cycles])
         reach = np.array([(share * self.cycles[one].reach) ** 2 for one in owner])
@@ -103,7 +101,7 @@ class Attractors:
 
 @dataclass(frozen=True, eq=False)
 class WalkEnds:
-    """How walks from many starts ended: (n,) each; `attractor` is NONE where none was reached, else after `steps`."""
+    """Ends of walks, (n,) each: outcome, attractor or NO_ATTRACTOR_REACHED, and the number of steps."""
 
     outcome: Integers
     attractor: Integers
@@ -112,7 +110,7 @@ class WalkEnds:
 
 @dataclass(frozen=True, eq=False)
 class Arrivals(WalkEnds):
-    """How and where walks on the section ended."""
+    """Ends of walks with their last points on the section."""
 
     last: Floats  # (n, 3) where they were last
 
@@ -138,7 +136,7 @@ def arrivals(
 def walk_one_by_one(
     walker: Standing, capture: Capture, z: Floats, fates: Fates, tolerances: tuple[float, float]
 ) -> None:
-    """`walk_lanes` for any walker; a walk is looked at every so many steps."""
+    """Do the same as `walk_lanes` for any walker, checking for capture after each batch of steps."""
     shooting, section = Shooting(walker, Tolerances("dop853", *tolerances, BUDGET)), section_of(walker)
     for number, start in enumerate(z):
         here, steps = start, 0
@@ -160,12 +158,12 @@ def walk_one_by_one(
 
 
 def find_attractors(walker: Walker, starts: Floats, seed: int) -> Attractors:
-    """The attractors that walks from section coordinates `starts` (n, 3) come to.
+    """Find the attractors of walks from section coordinates `starts` (n, 3).
 
-    The first few starts walk long; of the others only those that do not come to an attractor known by then.
+    The first starts walk the full length; later ones only if they do not reach an attractor known by then.
 
     walker  the unit walker
-    seed    of the starts around attractors
+    seed    of the random starts around attractors
     """
 
     def with_reaches(cycles: Sequence[Floats]) -> tuple[PeriodicAttractor, ...]:
@@ -182,7 +180,7 @@ def find_attractors(walker: Walker, starts: Floats, seed: int) -> Attractors:
 
 
 def settled_cycles(walker: Walker, starts: Floats, known: Attractors) -> tuple[list[Floats], bool]:
-    """The cycles that walks settle on which come to none that is known; whether any settles on no cycle."""
+    """Return the new cycles that walks settle on, and whether any walk settles on none."""
     tight = (FOUND_RTOL, FOUND_ATOL)
     rough = arrivals(walker, known, starts, SETTLING)
     elsewhere = np.flatnonzero((rough.outcome == Outcome.WALKED) & (rough.attractor == NONE))
@@ -202,12 +200,11 @@ def settled_cycles(walker: Walker, starts: Floats, known: Attractors) -> tuple[l
 
 
 def in_order(cycles: Sequence[Floats]) -> list[Floats]:
-    """Short ones first."""
     return sorted(cycles, key=lambda points: (len(points), *points[0]))
 
 
 def cycle_through(walker: Walker, point: Floats) -> Floats | None:
-    """The cycle (period, 3) that a walk from a point (3,) is on, rotated to begin with its smallest angle."""
+    """Return the cycle (period, 3) of a walk from a point (3,), smallest angle first; None if aperiodic."""
     orbit = [point]
     for _ in range(LONGEST_PERIOD):
         step = arrivals(walker, Attractors(), orbit[-1][None, :], 1, tolerances=(FOUND_RTOL, FOUND_ATOL))
@@ -221,14 +218,13 @@ def cycle_through(walker: Walker, point: Floats) -> Floats | None:
 
 
 def same_cycle(one: Floats, other: Floats) -> bool:
-    """Whether two cycles are the same."""
     return len(one) == len(other) and bool(np.abs(one - other).max() < 100.0 * REPEATS)
 
 
 def reach_of(walker: Walker, points: Floats, cycles: Sequence[Floats], generator: np.random.Generator) -> float:
-    """Distance from a cycle within which walks from all sides came back to it; zero if not even the nearest did.
+    """Return a distance from a cycle within which walks from all directions returned to it; zero if there is none.
 
-    It also stays clear of the other cycles.
+    It is well below the distance to other cycles.
     """
     others = [other for other in cycles if other is not points]
     gap = min((float(np.linalg.norm(p - other, axis=1).min()) for other in others for p in points), default=np.inf)
@@ -246,12 +242,12 @@ def reach_of(walker: Walker, points: Floats, cycles: Sequence[Floats], generator
 
 @dataclass(frozen=True)
 class Window:
-    """Starts on a grid over some coordinates of the section, SI units.
+    """A grid of starts over some coordinates of the section, SI units.
 
-    axes          which coordinates, numbers into (theta_2, dtheta_1, dtheta_2)
-    lower, upper  of each
-    cells         along each
-    rest          (3) the section's coordinates; those of the axes are replaced
+    axes          indices into (theta_2, dtheta_1, dtheta_2)
+    lower, upper  bounds along each axis
+    cells         number along each axis
+    rest          (3,) the section's coordinates; those of the axes are replaced
     """
 
     axes: tuple[int, ...]
@@ -262,19 +258,19 @@ class Window:
 
     @property
     def size(self) -> int:
-        """Cells in all."""
+        """Total number of cells."""
         return int(np.prod(self.cells))
 
     def along(self, axis: int) -> Floats:
-        """Middles of the cells along an axis, by its place in `axes`."""
+        """Return the cell centres along an axis, given by its index in `axes`."""
         width = (self.upper[axis] - self.lower[axis]) / self.cells[axis]
         middles: Floats = np.arange(self.cells[axis], dtype=np.float64) + 0.5
         return self.lower[axis] + width * middles
 
     def starts(self, cells: Integers, inside: Floats | None = None) -> Floats:
-        """Section coordinates (n, 3) of cells by their number, the last axis running fastest.
+        """Return section coordinates (n, 3) of cells by flat index, the last axis fastest.
 
-        inside  (n, axes) where in each cell, from -1/2 to 1/2; None is the middle
+        inside  (n, axes) position within each cell, from -1/2 to 1/2; centres by default
         """
         z = np.tile(np.array(self.rest), (len(cells), 1))
         for place, (axis, index) in enumerate(zip(self.axes, np.unravel_index(cells, self.cells), strict=True)):
@@ -284,14 +280,14 @@ class Window:
         return z
 
     def drawn(self, n: int, generator: np.random.Generator) -> Floats:
-        """Section coordinates (n, 3) drawn from the window."""
+        """Draw section coordinates (n, 3) uniformly from the window."""
         z = np.tile(np.array(self.rest), (n, 1))
         z[:, list(self.axes)] = generator.uniform(self.lower, self.upper, (n, len(self.axes)))
         return z
 
 
 def edge_cells(classes: NDArray[Any]) -> Integers:
-    """Numbers of the cells of a grid that have another class beside them along an axis."""
+    """Return the flat indices of cells that have a neighbour of another class along an axis."""
     from scipy import ndimage  # which nothing else needs
 
     beside = ndimage.generate_binary_structure(classes.ndim, 1)
@@ -300,6 +296,6 @@ def edge_cells(classes: NDArray[Any]) -> Integers:
 
 
 def inside_cell(refine: int, axes: int) -> Floats:
-    """Middles (refine^axes, axes) of the parts of a cell, from -1/2 to 1/2."""
+    """Return the centres (refine^axes, axes) of a cell's subcells, from -1/2 to 1/2."""
     middles = (np.arange(refine) + 0.5) / refine - 0.5
     return np.stack(np.meshgrid(*[middles] * axes, indexing="ij"), axis=-1).reshape(-1, axes)

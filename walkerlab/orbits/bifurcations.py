@@ -1,8 +1,8 @@
-"""Where a family of gaits changes: folds, flips and tori as zeros of test functions, and the branch beyond a flip.
+"""Bifurcations of gaits: folds, flips and tori as zeros of test functions, and the branch beyond a flip.
 
 Test functions of the derivative DP of n steps: det(DP - 1) for a fold, det(DP + 1) for a flip, and for a torus
-det(DP ^ DP - 1), where DP ^ DP acts on pairs of directions and has the products of pairs of multipliers as its
-eigenvalues (the bialternate product). Each is smooth along a branch, so that zeros are found by fast iterations.
+det(DP ^ DP - 1), where the bialternate product DP ^ DP acts on pairs of directions and has products of pairs of
+multipliers as eigenvalues. Each is smooth along a branch, so fast root finders converge.
 
 Source: Kuznetsov, Elements of applied bifurcation theory, sections 5.4 (normal form of the flip), 10.2 and 10.3.
 """
@@ -31,22 +31,21 @@ class GaitEquations:
     """P^n(z) - z = 0 over x = (z, p / scale)."""
 
     def __init__(self, step_map: StepMap, period: int, scale: float) -> None:
-        """Gaits of `period` steps; `scale` makes the parameter of magnitude one."""
         self.step_map, self.period, self.scale = step_map, period, scale
 
     def __call__(self, x: Floats) -> Evaluated[Cycle]:
-        """Residual and its derivative at x (d + 1,)."""
+        """Evaluate the residual and its derivative at x (d + 1,)."""
         cycle = walk_steps(self.step_map, x[:-1], self.value(x), self.period)
         here = with_parameter(self.step_map, cycle).returning()
         return here._replace(jacobian=np.column_stack((here.jacobian, self.scale * here.data.Dp)))
 
     def value(self, x: Floats) -> float:
-        """The parameter at x."""
+        """Return the parameter at x."""
         return self.scale * float(x[-1])
 
 
 def on_pairs(DP: Floats) -> Floats:
-    """Action of DP (d, d) on pairs of directions: (d (d-1) / 2, same), eigenvalues the products of pairs of DP's."""
+    """Return the action of DP (d, d) on pairs of directions, a square matrix of size d (d - 1) / 2."""
     first, second = np.triu_indices(DP.shape[0], 1)
     straight = DP[np.ix_(first, first)] * DP[np.ix_(second, second)]
     crossed = DP[np.ix_(first, second)] * DP[np.ix_(second, first)]
@@ -54,7 +53,7 @@ def on_pairs(DP: Floats) -> Floats:
 
 
 def critical_value(kind: Kind, DP: Floats) -> float:
-    """The test function of a kind of bifurcation."""
+    """Evaluate the test function of a kind of bifurcation."""
     acting = on_pairs(DP) if kind == "torus" else DP
     return float(np.linalg.det(acting + (1.0 if kind == "flip" else -1.0) * np.eye(len(acting))))
 
@@ -71,17 +70,16 @@ class Bifurcation:
 
     @property
     def gait(self) -> Cycle:
-        """The gait there."""
         return self.point.evaluated.data
 
     def lies_between(self, one: Cycle, other: Cycle) -> bool:
-        """Whether these two neighbours on the branch are its segment's ends."""
+        """Whether the bifurcation lies between these two neighbours on the branch."""
         ends = (self.segment.first, self.segment.second)
         return {id(end.evaluated.data.z) for end in ends} == {id(one.z), id(other.z)}
 
 
 def bifurcation_in(segment: Segment[Cycle], kind: Kind, scale: float) -> Bifurcation | None:
-    """The bifurcation of a kind between two neighbours of a branch; None if there is none."""
+    """Locate the bifurcation of a kind between two neighbours on a branch; None if there is none."""
     tests = [critical_value(kind, end.evaluated.data.DP) for end in (segment.first, segment.second)]
     if tests[0] * tests[1] >= 0.0:
         return None
@@ -117,18 +115,18 @@ class FlipForm:
 
     @property
     def amplitude(self) -> float:
-        """At which the new gait's multiplier, 1 - 4 cubic xi^2, has left 1 by FIRST_FALL."""
+        """Amplitude xi at which the new gait's multiplier, 1 - 4 cubic xi^2, is FIRST_FALL below 1."""
         return math.sqrt(0.25 * FIRST_FALL / abs(self.cubic))
 
 
 def eigenvector(A: Floats, value: float) -> Floats:
-    """Unit right null vector of A - value."""
+    """Return the unit right null vector of A - value."""
     _, _, rows = np.linalg.svd(A - value * np.eye(A.shape[0]))
     return np.asarray(rows[-1])
 
 
 def flip_form(equations: GaitEquations, flip: Bifurcation) -> FlipForm | None:
-    """The normal form at a flip, by differences of exact maps and derivatives; None if a probe cannot be walked."""
+    """Compute the normal form at a flip by differences of exact steps; None if a probe fails."""
     A = flip.point.evaluated.data.DP
     v, w = eigenvector(A, -1.0), eigenvector(A.T, -1.0)
     w = w / (w @ v)
@@ -152,7 +150,7 @@ def flip_form(equations: GaitEquations, flip: Bifurcation) -> FlipForm | None:
 
 
 def _cubic(equations: GaitEquations, flip: Bifurcation, v: Floats, w: Floats, h: float) -> tuple[Floats, float] | None:
-    """`bend` and `cubic` of the normal form, by differences that reach h."""
+    """Compute `bend` and `cubic` of the normal form by differences of size h."""
     z, p = flip.point.x[:-1], equations.value(flip.point.x)
     A = flip.point.evaluated.data.DP
 
@@ -178,7 +176,7 @@ def _cubic(equations: GaitEquations, flip: Bifurcation, v: Floats, w: Floats, h:
 
 
 def onto_doubled(flip: Bifurcation, form: FlipForm, share: float = 1.0) -> tuple[Floats, Floats, float]:
-    """Where the branch of twice the period is expected near a flip, for `corrected`.
+    """Predict the branch of twice the period near a flip, for `correct`.
 
     share  of the normal form's amplitude
 

@@ -1,7 +1,7 @@
-"""The contact model's own gait, found from a rigid start: walk to the section, then Newton.
+"""Search for the contact model's own gait: walk from a rigid start to the section, then Newton's method.
 
-Where a walk from the start leads nowhere, the gait is followed from nearly rigid ground, which the rigid gait nearly
-walks on: the force laws are led to the wanted ones in steps as large as Newton's method allows.
+If that fails, the gait is followed from nearly rigid ground, where the rigid gait is a good guess, to the actual force
+laws, in steps as large as Newton's method allows.
 """
 
 import math
@@ -42,9 +42,9 @@ class GaitAnswer:
 
 
 def find_gait_from(walker: ContactWalker, ground: JudgedGround, tolerances: Tolerances, start: State) -> GaitAnswer:
-    """The contact gait near a start with both feet on the ground, a state of the free walker.
+    """Find the contact gait near a state of the free walker with both feet on the ground.
 
-    Never raises for want of a gait: the answer says why there is none and what to try.
+    Never raises if there is no gait: the answer states the reason and advice.
     """
     hopeless = why_there_is_none(walker)
     if hopeless:
@@ -63,7 +63,7 @@ def find_gait_from(walker: ContactWalker, ground: JudgedGround, tolerances: Tole
 
 
 def why_there_is_none(walker: ContactWalker) -> tuple[str, str] | None:
-    """Why no gait can exist on this ground, by the balance of momentum and of energy alone, and what to change."""
+    """Return why conservation of momentum and energy exclude a gait on this ground, and advice; None if they do not."""
     if walker.slope <= 0.0 and not walker.driven:
         return "a walker that does not descend loses energy with every step", "Let the slope descend: slope_deg > 0."
     friction, wanted = walker.friction.largest, abs(math.tan(walker.slope))
@@ -84,7 +84,7 @@ def why_there_is_none(walker: ContactWalker) -> tuple[str, str] | None:
 def section_points(
     walker: ContactWalker, ground: JudgedGround, tolerances: Tolerances, start: State
 ) -> Iterator[tuple[int, Floats]]:
-    """Points of the section that walks from the start pass through, and after how many steps each."""
+    """Yield points of the section on a walk from the start, each with its number of steps."""
     for steps in WARM_UP:
         walk_state = new_walk_state(walker, ground.terrain, STANCE_FOOT, steps + 1, start)
         observer = new_observer(walker, walk_state, start)
@@ -97,7 +97,7 @@ def section_points(
 
 
 def gait_on(pads: OwnPads, z: Floats, rigidity: float = 0.0) -> Cycle | str:
-    """Newton's method from section coordinates z: the gait, or what came in its way."""
+    """Run Newton's method from section coordinates z; return the gait, or why it failed."""
     found = gait_near(pads, z, rigidity, EFFORT)
     if isinstance(found, NotConverged):
         if found.singular:
@@ -113,9 +113,9 @@ def gait_on(pads: OwnPads, z: Floats, rigidity: float = 0.0) -> Cycle | str:
 
 
 def with_scaled_laws(walker: ContactWalker, stiffness: float, damping: float, creep: float) -> ContactWalker:
-    """The walker on ground whose stiffness, damping and velocities of friction are multiplied by these factors.
+    """Return the walker with stiffness, damping and friction velocities of the ground scaled by these factors.
 
-    The penetration at which damping is full shrinks with the static penetration, so that the ground damps alike.
+    The penetration of full damping shrinks with the static penetration, so that the damping ratio is unchanged.
     """
     normal = walker.normal
     changed = normal._replace(
@@ -127,13 +127,13 @@ def with_scaled_laws(walker: ContactWalker, stiffness: float, damping: float, cr
 
 
 def with_rigidity(walker: ContactWalker, rigidity: float) -> ContactWalker:
-    """The walker on ground that is the more rigid the larger `rigidity`: 0 as it is, 1 nearly rigid."""
+    """Return the walker on ground of a rigidity from 0, its own, to 1, nearly rigid."""
     stiffer = STIFFER**rigidity
     return with_scaled_laws(walker, stiffer, math.sqrt(stiffer), STICKIER**-rigidity)
 
 
 def follow_from_rigid(walker: ContactWalker, ground: JudgedGround, tolerances: Tolerances, start: State) -> GaitAnswer:
-    """Lead the force laws from nearly rigid ones to the wanted ones, the gait along with them."""
+    """Follow the gait from nearly rigid force laws to the actual ones."""
 
     def gait_at(rigidity: float, z: Floats, pitch_m: float) -> Cycle | str:
         return gait_on(OwnPads(partial(with_rigidity, walker), ground, tolerances, pitch_m), z, rigidity)
@@ -151,7 +151,7 @@ def follow_from_rigid(walker: ContactWalker, ground: JudgedGround, tolerances: T
     gaits = {0.0: last}
 
     def softer(way: float, expected: Floats) -> Floats | None:
-        """Section coordinates and step length after a part of the way from nearly rigid to the wanted ground."""
+        """Solve for the gait a given part of the way to the actual ground: section coordinates, then step length."""
         near = gait_at(1.0 - way, expected[:-1], expected[-1])
         if not isinstance(near, Cycle):
             return None
@@ -171,5 +171,4 @@ def follow_from_rigid(walker: ContactWalker, ground: JudgedGround, tolerances: T
 
 
 def with_length(gait: Cycle) -> Floats:
-    """Section coordinates of a gait, and its step length behind them."""
     return np.append(gait.z, gait.lengths_m)

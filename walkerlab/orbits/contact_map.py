@@ -1,11 +1,11 @@
-"""The step map of the contact model, on a section where nothing is touching or lifting.
+"""Step map of the contact model, on a section where no foot is touching down or lifting off.
 
-Section: the swing foot passes the stance foot. One foot then stands, the transients of its touch have died away, and
-the other swings freely; just after a touch the state is still in motion on the contact's own time scale, which makes
-touch-down a poor section. Coordinates by role: height of the centre of mass, the angles of the legs' bodies but the
-uppermost of the swing leg, which follows from the section, velocity along and normal to the slope, and the angular
-velocities of all bodies that turn on their own; of two straight legs these are six numbers. A knee of the stance leg is
-locked, that of the swing leg is not. Where along the slope it happens does not matter.
+On the section the swing foot passes the stance foot: one foot stands, the transients of its touch-down have decayed,
+and the other swings freely. Just after touch-down the state still moves on the fast time scale of the contact, which
+makes a poor section. Coordinates, ordered by the legs' roles: height of the centre of mass, angles of the legs' bodies
+except the uppermost of the swing leg, which the section determines, velocity along and normal to the slope, and the
+rates of all bodies that turn independently; six for two straight legs. The stance knee is locked, the swing knee free.
+The position along the slope is not a coordinate.
 
 One step maps the section to itself with the legs' roles exchanged.
 """
@@ -52,7 +52,7 @@ NEWTON_STEPS = 20
 
 @dataclass(frozen=True)
 class SectionStep(MappedStep):
-    """One step from the section to the section, in SI."""
+    """One step from section to section, in SI."""
 
     slip_m: float  # net, from touch to lift: of the foot that lands up to here, and of the other from here on
     rolling_m: float  # likewise
@@ -62,13 +62,13 @@ class SectionStep(MappedStep):
 
 
 def turning_bodies(walker: ContactWalker, stance: int) -> tuple[int, ...]:
-    """Bodies that turn on their own, the swing leg's first; the shank below the stance leg's locked knee does not."""
+    """Bodies that turn independently, the swing leg's first; the shank below the locked stance knee does not."""
     locked = walker.whole.shanks[stance] if walker.kneed else None
     return (*walker.legs[1 - stance], *(body for body in walker.legs[stance] if body != locked))
 
 
 def angled_bodies(walker: ContactWalker, stance: int) -> tuple[int, ...]:
-    """Bodies whose angles are coordinates; a stop that has latched keeps an angle of its own in the stance knee."""
+    """Bodies whose angles are coordinates; a latched compliant stop gives the stance knee an angle of its own."""
     free = turning_bodies(walker, stance)[1:]
     if walker.kneed and not isinstance(walker.stop, IdealLock):
         return (*free, int(walker.whole.shanks[stance]))
@@ -76,7 +76,7 @@ def angled_bodies(walker: ContactWalker, stance: int) -> tuple[int, ...]:
 
 
 def with_followers(walker: ContactWalker, stance: int, angles: Floats, given: tuple[int, ...]) -> Floats:
-    """Angles (n), or changes of them, with those of bodies that follow others and are not `given`."""
+    """Fill in the angles (n), or changes of angles, of coupled bodies that are not `given`."""
     whole, n = walker.whole, angles.size
     if walker.kneed and whole.shanks[stance] not in given:
         angles[whole.shanks[stance]] = angles[whole.thighs[stance]]
@@ -87,14 +87,14 @@ def with_followers(walker: ContactWalker, stance: int, angles: Floats, given: tu
 
 
 def feet_apart(walker: ContactWalker, angles: Floats) -> tuple[float, Floats]:
-    """How far foot 0 is ahead of foot 1 (m), and its derivatives by the bodies' angles (n)."""
+    """Return how far foot 0 is ahead of foot 1 (m), and the derivatives by the bodies' angles (n)."""
     s, c = np.sin(angles + walker.slope), np.cos(angles + walker.slope)
     x, y = ((lever[0] - lever[1])[: angles.size] for lever in (walker.whole.foot_x, walker.whole.foot_y))
     return float(c @ x - s @ y), -(s * x + c * y)
 
 
 def state_on_section(walker: ContactWalker, z: Floats, stance: int) -> State:
-    """The walker's state of section coordinates, with `stance` the standing leg, at along = 0."""
+    """Return the walker's state at section coordinates, standing on leg `stance` at along = 0."""
     n = int(walker.whole.bodies)
     turning, angled = turning_bodies(walker, stance), angled_bodies(walker, stance)
     state = np.zeros(4 + 2 * n)
@@ -118,7 +118,7 @@ def state_on_section(walker: ContactWalker, z: Floats, stance: int) -> State:
 
 
 def coordinates_of(walker: ContactWalker, state: Floats, stance: int) -> Floats:
-    """Section coordinates of a state whose standing leg is `stance`."""
+    """Return the section coordinates of a state standing on leg `stance`."""
     n = int(walker.whole.bodies)
     angles = [ANGLES + body for body in angled_bodies(walker, stance)]
     rates = [4 + n + body for body in turning_bodies(walker, stance)]
@@ -126,7 +126,7 @@ def coordinates_of(walker: ContactWalker, state: Floats, stance: int) -> Floats:
 
 
 def directions(walker: ContactWalker, state: State, stance: int) -> Floats:
-    """Derivative (4 + 2 n, coordinates) of `state_on_section`, at the state it gave."""
+    """Derivative (4 + 2 n, coordinates) of `state_on_section` at the state that it returned."""
     n = int(walker.whole.bodies)
     turning, angled = turning_bodies(walker, stance), angled_bodies(walker, stance)
     along = np.zeros((4 + 2 * n, 3 + len(angled) + len(turning)))
@@ -151,11 +151,11 @@ def step_from_section(
     pitch_m: float,
     derived: bool = True,
 ) -> SectionStep:
-    """Walk from the section to the section; REJECTED if a push-off is not over there, which begins without one.
+    """Walk from section to section; REJECTED if a push-off lasts beyond the section.
 
-    z        section coordinates, the height over the present foothold
-    pitch_m  what the pads are laid for
-    derived  whether the derivative is wanted
+    z        section coordinates, the height measured from the current foothold
+    pitch_m  pad pitch
+    derived  whether to compute the derivative
     """
     stance, laid = STANCE_FOOT, ground
     start = state_on_section(walker, z, stance)
@@ -204,9 +204,9 @@ def step_from_section(
 def walk_from_section(
     walker: ContactWalker, ground: JudgedGround, tolerances: Tolerances, z: Floats, heights: Floats, push: float
 ) -> DisturbedWalk:
-    """Walk from the section to touches of footholds at some heights, with an impulse at the hip at the first of them.
+    """Walk from the section over footholds of given heights, with a push at the hip at the first touch-down.
 
-    heights  (steps + 1,) m, the first that of the foothold on which it stands, too
+    heights  (steps + 1,) m, beginning with the current foothold
     push     N s, along the slope
     """
     start, steps = state_on_section(walker, z, STANCE_FOOT), heights.size - 1
@@ -235,13 +235,13 @@ def walk_from_section(
 
 
 def cut_to(walk_state: WalkState, steps: int) -> WalkState:
-    """The walk state with room for fewer steps, in the same memory."""
+    """Return the walk state with room for fewer steps, sharing its memory."""
     of_steps = ("touch_time", "touch_along", "touch_height", "slip", "rolling")
     return walk_state._replace(**{name: getattr(walk_state, name)[:steps] for name in of_steps})
 
 
 def pushed_at_hip(system: OnGround, walker: ContactWalker, state: State, impulse: float) -> State:
-    """A state of the free walker, its velocities changed by an impulse (N s) at the hip along the slope."""
+    """Apply an impulse (N s) at the hip along the slope to a state of the free walker."""
     form, new = system.form, np.array(state)
     y = folded(form, new)
     n, half = int(form.bodies), int(form.places + form.bodies)
@@ -259,7 +259,7 @@ def pushed_at_hip(system: OnGround, walker: ContactWalker, state: State, impulse
 
 
 def walk_state_on_section(walker: ContactWalker, ground: JudgedGround, start: State, steps: int) -> WalkState:
-    """The walk state of a walk of `steps` touches: one foot stands, and the other swings past it."""
+    """Return the walk state for `steps` touch-downs: one foot stands, and the other swings past it."""
     stance, swing = STANCE_FOOT, 1 - STANCE_FOOT
     walk_state = new_walk_state(walker, ground.terrain, stance, steps, start)
     feet = feet_motion(walker.whole, start)
@@ -276,17 +276,15 @@ def walk_state_on_section(walker: ContactWalker, ground: JudgedGround, start: St
 
 @dataclass(frozen=True)
 class WalkerOnGround:
-    """A walker, and the ground it walks on and is judged by."""
-
     walker: ContactWalker
     ground: JudgedGround
 
 
 class ContactMap(StepMap):
-    """A walker on compliant ground, its coordinates where the feet pass, in units of leg length and pendulum time.
+    """Step map of a walker on compliant ground, scaled by leg length and pendulum time.
 
-    Pads let the swing foot of straight legs through, so that a family is followed where it touches only ahead of the
-    stance foot; `watch` says where pads of the gait's own step length would trip it.
+    Pads let the swing foot of straight legs through; families are therefore followed on ground that the swing foot
+    touches only ahead of the stance foot. `watch` reports where pads of the gait's own step length would trip it.
     """
 
     monitors = (
@@ -303,13 +301,13 @@ class ContactMap(StepMap):
         step_length_m: float,
         like: WalkerOnGround,
     ) -> None:
-        """A family of walkers.
+        """Prepare the step map of a family of walkers.
 
-        walker_at      walker and ground at a value of the parameter; None where it makes no walker
-        scale          magnitude of changes of the parameter that matter
-        tolerances     how to integrate a step
-        step_length_m  that steps are judged by
-        like           one of the walkers, whose leg and pendulum measure all
+        walker_at      walker and ground at a value of the parameter; None where the value makes no walker
+        scale          magnitude of significant changes of the parameter
+        tolerances     solver settings of a step
+        step_length_m  reference step length of the terrain
+        like           any one of the walkers; its leg length and pendulum time are the units
         """
         self._at = lru_cache(REMEMBERED)(walker_at)
         self.scale, self.tolerances, self._measure = scale, tolerances, step_length_m
@@ -321,7 +319,7 @@ class ContactMap(StepMap):
         self._units = np.array([L, *[1.0] * len(angled), L / tau, L / tau, *[1.0 / tau] * len(turning)])
 
     def of_section(self, z: Floats) -> Floats:
-        """Coordinates of a point of the section in SI."""
+        """Return the scaled coordinates of a section point in SI."""
         return np.asarray(z / self._units)
 
     def _terrain(self, here: WalkerOnGround) -> Terrain:
@@ -334,7 +332,6 @@ class ContactMap(StepMap):
         return step_from_section(here.walker, ground, self.tolerances, z * self._units, terrain.stride_measure, derived)
 
     def step(self, z: Floats, p: float, derived: bool = True) -> MappedStep:
-        """One step, with its exact derivative along the section."""
         here = self._at(p)
         if here is None:
             return no_step(None, z.size)
@@ -345,7 +342,7 @@ class ContactMap(StepMap):
         return replace(step, z=step.z / self._units, DP=DP)
 
     def watch(self, z: Floats, p: float, steps: int) -> Floats:
-        """Largest slip, and whether pads would trip a gait of one step."""
+        """Return the maximum slip, and whether pads would trip a gait of one step."""
         here = self._at(p)
         assert here is not None, "what is watched was walked"
         slip, tripped, at = 0.0, 0.0, z
@@ -358,7 +355,7 @@ class ContactMap(StepMap):
         return np.array([slip, tripped])
 
     def disturbed(self, z: Floats, p: float, heights_m: Floats, push_N_s: float = 0.0) -> DisturbedWalk:
-        """Walk over footholds (m) from the touch on that follows z, with which a push comes."""
+        """Walk over footholds (m) from the touch-down after z, where a push is applied."""
         here = self._at(p)
         assert here is not None, "what is disturbed has a gait"
         ground = here.ground._replace(terrain=self._terrain(here))
@@ -367,34 +364,29 @@ class ContactMap(StepMap):
         return replace(walk, z=walk.z / self._units)
 
     def cost_of_transport(self, z: Floats, p: float) -> float | None:
-        """Work given over weight and distance of a step from z (d,); None where it ends."""
         step = self.step(z, p, derived=False)
         return step.driven.cost_of_transport(step.length_m) if isinstance(step, SectionStep) else None
 
     def leg_and_pendulum(self, p: float) -> tuple[float, float]:
-        """Units of the walker at p."""
         here = self._at(p)
         assert here is not None, "what is measured has a gait"
         return here.ground.frame.leg_length, here.ground.frame.pendulum_time
 
     def at(self, tolerances: Tolerances) -> ContactMap:
-        """The same map, its steps integrated otherwise."""
         other = copy(self)
         other.tolerances = tolerances
         return other
 
 
 class OwnPads(Stepper):
-    """A walker on compliant ground in SI, whose pads are laid for the step that was taken last."""
+    """Stepper of a walker on compliant ground, in SI, whose pads are re-laid for the length of the last step."""
 
     def __init__(
         self, walker_at: Callable[[float], ContactWalker], ground: JudgedGround, tolerances: Tolerances, pitch_m: float
     ) -> None:
-        """A family of walkers on one ground; `pitch_m` is the pads' to begin with."""
         self.walker_at, self.ground, self.tolerances, self.pitch_m = walker_at, ground, tolerances, pitch_m
 
     def step(self, z: Floats, p: float, derived: bool = True) -> MappedStep:
-        """One step, with its exact derivative along the section."""
         step = step_from_section(self.walker_at(p), self.ground, self.tolerances, z, self.pitch_m, derived)
         if step.outcome is Outcome.WALKED:
             self.pitch_m = step.length_m
@@ -402,6 +394,6 @@ class OwnPads(Stepper):
 
 
 def step_of(gait: Cycle) -> SectionStep:
-    """The step of a gait of one step of the contact model, with what only that model has."""
+    """Return the step of a period-1 gait of the contact model, typed as that model's."""
     assert isinstance(gait.step, SectionStep), "a gait of the contact model"
     return gait.step

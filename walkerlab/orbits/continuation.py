@@ -1,8 +1,8 @@
-"""Following solutions over a parameter: from value to value, or along their curve through its folds.
+"""Continuation of solutions over a parameter: from value to value, or along their curve through its folds.
 
-Both foretell the next solution and correct it by Newton's method. From value to value a polynomial through the last
-ones foretells. A curve is where `m` equations in `m + 1` unknowns hold: one step predicts along the tangent and
-corrects on the plane normal to it, so that a fold, where the parameter turns back, is a point like any other.
+Both predict the next solution and correct it by Newton's method. From value to value the predictor is a polynomial
+through the last solutions. A curve is the set of solutions of `m` equations in `m + 1` unknowns: the predictor follows
+the tangent and the corrector stays on the plane normal to it, so that a fold is a regular point.
 
 Source: Keller, Numerical solution of bifurcation and nonlinear eigenvalue problems (1977); Kuznetsov, Elements of
 applied bifurcation theory, chapter 10.
@@ -26,7 +26,7 @@ Points = tuple[tuple[float, Floats], ...]
 
 
 class Strides(NamedTuple):
-    """How far one stride goes over the parameter, and how many points foretell where it leads."""
+    """Limits of the stride over the parameter, and how many points the predictor uses."""
 
     widest: float
     narrowest: float
@@ -34,7 +34,7 @@ class Strides(NamedTuple):
 
 
 class Way(NamedTuple):
-    """How far a solution was followed, and how it goes on from there."""
+    """How far a solution has been followed, and the state from which it continues."""
 
     at: float
     stride: float
@@ -42,7 +42,7 @@ class Way(NamedTuple):
 
 
 class Follower:
-    """Follows a solution from value to value of a rising parameter; the way is walked once and remembered."""
+    """Follows a solution over a rising parameter; earlier progress is cached."""
 
     def __init__(
         self,
@@ -51,17 +51,17 @@ class Follower:
         strides: Strides,
         abscissa: Callable[[float], float] = float,
     ) -> None:
-        """Begin where `first` has come.
+        """Begin with the solution `first`.
 
-        solve     the solution (m,) at a value near where it is expected; None if it is not found
-        abscissa  what it is a smooth function of
+        solve     return the solution (m,) at a value, given a prediction; None if it fails
+        abscissa  variable in which the solution is smooth, as a function of the parameter
         """
         self._solve, self._strides, self._abscissa, self._ways = solve, strides, abscissa, [first]
 
     def to(self, target: float) -> Way:
-        """The way to the parameter's value `target`, or to where the solution is lost before.
+        """Follow the solution to the parameter's value `target`, or to where it is lost.
 
-        It begins as the way to any value further on does.
+        Strides do not depend on the target until the last, so the cached ones serve every target.
         """
         way = self._ways[0]
         for way in self._ways:  # grows on the way
@@ -75,7 +75,7 @@ class Follower:
         return way
 
     def _onward(self, way: Way, ahead: float) -> Way:
-        """On to a value with a wider stride; with a narrower one where it was, if the solution is not found there."""
+        """Advance with a wider next stride or, if the solution fails, stay with half the stride."""
         abscissa = self._abscissa(ahead)
         found = self._solve(ahead, interpolated(way.points, abscissa))
         if found is None:
@@ -85,7 +85,7 @@ class Follower:
 
 
 def interpolated(points: Points, x: float) -> Floats:
-    """Value at x of the polynomial through `points` (Lagrange)."""
+    """Evaluate at x the polynomial through `points` (Lagrange)."""
     total = np.zeros_like(points[0][1])
     for i, (x_i, y_i) in enumerate(points):
         weight = 1.0
@@ -98,7 +98,7 @@ def interpolated(points: Points, x: float) -> Floats:
 
 @dataclass(frozen=True)
 class Solved(Generic[D]):
-    """A point of a curve."""
+    """A point of a curve, with its unit tangent."""
 
     x: Floats
     tangent: Floats  # of unit length
@@ -109,7 +109,7 @@ class Solved(Generic[D]):
 def corrected(
     equations: Equations[D], guess: Floats, normal: Floats, tolerance: float, most: int = MAX_EVALUATIONS
 ) -> Solved[D] | NotConverged:
-    """The point of a curve on the plane through `guess` with that normal, by Newton's method from there."""
+    """Solve for the point of a curve on the plane through `guess` with that normal."""
 
     def on_plane(x: Floats) -> Evaluated[D]:
         here = equations(x)
@@ -128,7 +128,7 @@ def corrected(
 
 @dataclass(frozen=True)
 class StepControl:
-    """How far one step may go.
+    """Limits of one step.
 
     first, shortest, longest  arclengths
     turn       cosine of the largest angle between tangents of neighbours
@@ -150,10 +150,10 @@ def stepped(
     acceptable: Callable[[Solved[D]], bool] = lambda _: True,
     before: Solved[D] | None = None,
 ) -> tuple[Solved[D], float] | NotConverged:
-    """The next point of a curve after `last`, and how far to look for the one after it.
+    """Return the next point of a curve after `last`, and the length of the step after it.
 
-    acceptable  a caller's own wish for smaller steps
-    before      the point before the last, if there is one: it tells how the curve bends
+    acceptable  additional condition of the caller on the new point
+    before      point before `last`, if any: it gives the curvature
     """
     lost = NotConverged(Outcome.WALKED)
     bend = np.zeros_like(last.x)  # how fast the tangent turns, per unit of arclength
@@ -188,7 +188,7 @@ class Segment(Generic[D]):
         return float(self.first.tangent @ (self.second.x - self.first.x))
 
     def at(self, s: float) -> Solved[D] | NotConverged:
-        """The point at distance s, which may lie a little outside."""
+        """Solve for the point at distance s, which may lie slightly outside."""
         share = s / self.length
         bend = self.second.x - self.first.x - self.length * self.first.tangent
         guess = self.first.x + s * self.first.tangent + share * share * bend
@@ -200,9 +200,9 @@ class _OffTheCurve(Exception):  # noqa: N818 (the end of one search, not an erro
 
 
 def root_along(segment: Segment[D], measure: Callable[[Solved[D]], float]) -> Solved[D] | None:
-    """The point of a segment where `measure` vanishes, whose signs at both ends differ; None if it is lost.
+    """Return the point of a segment where `measure` changes sign; None if the curve is lost.
 
-    Brent's method on the corrected curve: secant and inverse quadratic steps, safe by their bracket.
+    Brent's method on the corrected curve.
     """
     # Imported here: what follows no curve does without.
     from scipy.optimize import brentq

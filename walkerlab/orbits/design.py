@@ -1,7 +1,7 @@
-"""The least or largest of a gait's numbers over some of a walker's, others kept within bounds.
+"""Minimum or maximum of a gait quantity over walker parameters, with bounds on other quantities.
 
-SciPy's SLSQP on numbers scaled to their bounds, with gradients from exact steps, from several starts. Where there is
-no gait the function is continued by a slope back to the last point that had one, so that a search goes round it.
+SciPy's SLSQP on parameters scaled to their bounds, with exact gradients, from several starts. Where there is no gait
+the function rises with distance from the last point that had one, so that the search avoids the gap.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ STEEP = 10.0  # slope of the continuation, in the quantity's own size per range
 
 @dataclass(frozen=True)
 class Point:
-    """Numbers of a gait at some numbers of the walker, with their gradients by these (variables,)."""
+    """Gait quantities at given walker parameters, with their gradients (variables,)."""
 
     numbers: Mapping[str, float]
     gradients: Mapping[str, Floats]
@@ -31,12 +31,12 @@ class Point:
 
 @dataclass(frozen=True)
 class Aim:
-    """What is looked for.
+    """The optimisation problem.
 
-    quantity  the number that is made least, or largest with `sign` -1
+    quantity  to minimise, or to maximise with `sign` -1
     lower, upper  (variables,) bounds
-    keep      bounds of other numbers
-    at        the gait at some numbers (variables,); None where there is none
+    keep      bounds on other quantities
+    at        evaluate the gait at parameters (variables,); None if there is none
     """
 
     quantity: str
@@ -49,7 +49,7 @@ class Aim:
 
 @dataclass
 class Descent:
-    """One search: where it ended."""
+    """The end of one search."""
 
     x: Floats
     point: Point | None
@@ -57,7 +57,7 @@ class Descent:
 
 
 def sought(question: Aim, start: Floats) -> Descent:
-    """The optimum that a search from `start` (variables,) comes to."""
+    """Minimise from `start` (variables,)."""
     from scipy.optimize import NonlinearConstraint, minimize  # a tenth of a second that nothing else needs
 
     span = question.upper - question.lower
@@ -107,7 +107,7 @@ def sought(question: Aim, start: Floats) -> Descent:
 
 
 def kept(question: Aim, point: Point) -> bool:
-    """Whether other numbers are within their bounds, up to what rounding leaves."""
+    """Whether the other quantities are within their bounds, up to rounding."""
     slack = {name: 1e-6 * max(abs(low), abs(high)) for name, (low, high) in question.keep.items()}
     return all(
         name in point.numbers and low - slack[name] <= point.numbers[name] <= high + slack[name]
@@ -118,9 +118,9 @@ def kept(question: Aim, point: Point) -> bool:
 def searched(
     question: Aim, own: Floats, starts: int, seed: int, search: Callable[[int, Floats], Descent] | None = None
 ) -> list[Descent]:
-    """Searches from the walker's own numbers and from drawn ones, the best first, those that keep bounds in front.
+    """Search from the walker's own parameters and from random ones; return the best first, feasible ones before others.
 
-    search  does one, by its number and start (variables,); `sought` without
+    search  runs one search from its index and start (variables,); `minimise` by default
     """
     search = search or (lambda _, start: sought(question, start))
     drawn = np.random.default_rng(seed).uniform(question.lower, question.upper, (starts - 1, own.size))
@@ -136,7 +136,7 @@ def searched(
 
 
 def optima(question: Aim, searches: list[Descent]) -> int:
-    """How many different optima searches came to, of those that keep the bounds."""
+    """Count the distinct optima among the feasible searches."""
     span, ends = question.upper - question.lower, list[Floats]()
     for one in searches:
         if one.point is not None and kept(question, one.point):

@@ -1,7 +1,7 @@
-"""Families of gaits over a parameter: every branch from some seeds, its bifurcations, and the cascade beyond its flips.
+"""Families of gaits over a parameter: branches, their bifurcations, and the cascades beyond their flips.
 
-A branch is followed from a gait both ways until it leaves the span or cannot go on. At each flip the branch of twice
-the period is entered along the eigenvector to -1, as far as the flip's normal form says, and followed alike.
+A branch is followed from a gait in both directions until it leaves the span or is lost. At each flip the branch of
+twice the period is entered along the eigenvector to -1, at the amplitude given by the flip's normal form.
 """
 
 from collections.abc import Callable, Iterable
@@ -42,22 +42,20 @@ POINTS, GROWTH = 400, 1e4  # of one branch; of a disturbance over a cycle, beyon
 
 @dataclass(frozen=True)
 class ValueSpan:
-    """The values of the parameter that are asked for."""
+    """Range of the parameter to cover."""
 
     least: float
     most: float
 
     @property
     def size(self) -> float:
-        """From end to end."""
         return self.most - self.least
 
     def __contains__(self, value: float) -> bool:
-        """Whether a value lies inside."""
         return self.least <= value <= self.most
 
     def nearest(self, value: float) -> float:
-        """The value inside that is nearest to another one."""
+        """Clamp a value to the span."""
         return min(max(value, self.least), self.most)
 
 
@@ -74,7 +72,7 @@ class BranchEnd:
 
 @dataclass(frozen=True)
 class Crossing:
-    """Where on a branch an assumption of the model begins or ceases to hold."""
+    """Value on a branch at which a monitored assumption begins or ceases to hold."""
 
     monitor: Monitor
     value: float
@@ -82,7 +80,7 @@ class Crossing:
 
 @dataclass(frozen=True, eq=False)
 class GaitBranch:
-    """Gaits of one number of steps along a curve."""
+    """Gaits of one period along a curve."""
 
     period: int
     points: tuple[Cycle, ...]
@@ -92,17 +90,17 @@ class GaitBranch:
 
     @property
     def closed(self) -> bool:
-        """Whether it comes round to where it begins."""
+        """Whether the branch is a closed loop."""
         return self.ends[1].reason == ROUND
 
     @cached_property
     def values(self) -> Floats:
-        """(points,) of the parameter."""
+        """Parameter values (points,)."""
         return np.array([point.value for point in self.points])
 
     @property
     def stable_ranges(self) -> tuple[tuple[float, float], ...]:
-        """Ranges of the parameter over which the branch is stable, bounded by its bifurcations and its ends."""
+        """Parameter ranges over which the branch is stable, bounded by bifurcations and ends."""
         found: list[list[float]] = []
         values = [self.ends[0].value]  # of the stable stretch being passed through
         stable = self.points[0].stable
@@ -120,7 +118,7 @@ class GaitBranch:
         return tuple((min(stretch), max(stretch)) for stretch in found)
 
     def closes_on(self, flip: Bifurcation) -> list[bool]:
-        """Of either end, whether it is this flip of another branch."""
+        """Return for each end whether it is this flip of another branch."""
         reach = (2.0 * np.ptp(values) + 1e-12 for values in (self.values[:2], self.values[-2:]))
         near = [bool(abs(end.value - flip.value) <= far) for end, far in zip(self.ends, reach, strict=True)]
         closing = (flip.kind == "flip" and end.reason.startswith("closes") for end in self.ends)
@@ -128,13 +126,13 @@ class GaitBranch:
 
     @property
     def flipped_outside(self) -> bool:
-        """Whether all of it lies beyond a flip that is not on it: an odd number of multipliers below -1 throughout."""
+        """Whether the whole branch lies beyond a flip that is not on it: one multiplier below -1 throughout."""
         on_it = any(one.kind == "flip" for one in self.bifurcations)
         return not on_it and critical_value("flip", self.points[0].DP) < 0.0
 
 
 class Seed(NamedTuple):
-    """Section coordinates z (d,) near a gait of so many steps at a value of the parameter."""
+    """Section coordinates z (d,) near a gait of `steps` steps at a value of the parameter."""
 
     z: Floats
     value: float
@@ -143,10 +141,10 @@ class Seed(NamedTuple):
 
 @dataclass(frozen=True)
 class BranchFollower:
-    """Follows branches of one model over one span.
+    """Follows the branches of one model over one span.
 
-    most     points of a branch
-    advance  told of each point
+    most     maximum number of points on a branch
+    advance  called after each point
     """
 
     step_map: StepMap
@@ -156,9 +154,9 @@ class BranchFollower:
     advance: Callable[[], None] = lambda: None
 
     def family(self, seeds: Iterable[Seed], periods: int, known: tuple[GaitBranch, ...] = ()) -> tuple[GaitBranch, ...]:
-        """Every branch that the seeds lie on, and the cascades beyond their flips, after those that are known.
+        """Return `known`, every other branch through the seeds, and the cascades beyond their flips.
 
-        periods  steps of the longest gaits wanted
+        periods  maximum number of steps of a gait
         """
         branches = list(known)
         for seed in seeds:
@@ -190,17 +188,16 @@ class BranchFollower:
         return tuple(closed_on(branch, branches) for branch in branches)
 
     def equations(self, period: int) -> GaitEquations:
-        """Of gaits of so many steps."""
         return GaitEquations(self.step_map, period, self.span.size)
 
     def solved_at(self, z: Floats, value: float, period: int) -> Solved[Cycle] | None:
-        """The point of the curve of gaits near z at a value of the parameter; None if Newton's method finds none."""
+        """Solve for the point of the curve of gaits near z at a value; None if Newton's method fails."""
         x, tolerance = np.append(z, value / self.span.size), self.control.tolerance
         found = corrected(self.equations(period), x, np.eye(x.size)[-1], tolerance, EVALUATIONS)
         return None if isinstance(found, NotConverged) else found
 
     def lies_on(self, branch: GaitBranch, gait: Cycle) -> bool:
-        """Whether a gait is on a branch already, at whichever of its steps it is looked at."""
+        """Whether a gait is on a branch already, starting at any of its steps."""
         value, effort = gait.value, Effort(self.control.tolerance, EVALUATIONS)
         starts = [gait.z, *(step.z for step in gait.steps)]
         for one, other in pairwise(branch.points):
@@ -214,7 +211,7 @@ class BranchFollower:
         return False
 
     def doubled(self, parent: GaitBranch, known: Iterable[GaitBranch]) -> list[GaitBranch]:
-        """The branches of twice the period that begin at the flips of a branch."""
+        """Follow the branches of twice the period from the flips of a branch."""
         found: list[GaitBranch] = []
         for flip in parent.bifurcations:
             like = [branch for branch in (*known, *found) if branch.period == 2 * parent.period]
@@ -229,9 +226,9 @@ class BranchFollower:
         return found
 
     def beyond(self, flip: Bifurcation, form: FlipForm, period: int) -> Solved[Cycle] | None:
-        """The first gait of twice the period, at the amplitude that the normal form asks for, pointing away.
+        """Return the first gait of twice the period, at the normal form's amplitude; None if it is lost.
 
-        Its tangent is turned so that the halves of its cycle part further.
+        Its tangent points away from the flip: the halves of the cycle move apart along it.
         """
         for halving in range(HALVINGS):
             guess, normal, xi = onto_doubled(flip, form, 0.5**halving)
@@ -243,7 +240,7 @@ class BranchFollower:
         return None
 
     def trace(self, start: Solved[Cycle], period: int) -> GaitBranch:
-        """The branch from a gait along its tangent until it ends."""
+        """Follow a branch from a gait along its tangent until it ends."""
         equations = self.equations(period)
         points, before, last, end = [self.point(start)], None, start, None
         bifurcations, crossings = list[Bifurcation](), list[Crossing]()
@@ -284,7 +281,7 @@ class BranchFollower:
         return GaitBranch(period, tuple(points), (first, end), tuple(bifurcations), tuple(crossings))
 
     def near_enough(self, last: Solved[Cycle]) -> Callable[[Solved[Cycle]], bool]:
-        """Whether the multipliers near the unit circle moved little, so that no two crossings hide in between."""
+        """Return a check that multipliers near the unit circle moved little, so that no two crossings are missed."""
         critical = [one for one in last.evaluated.data.multipliers if 1.0 / NEAR_CIRCLE < abs(one) < NEAR_CIRCLE]
 
         def near(found: Solved[Cycle]) -> bool:
@@ -296,10 +293,10 @@ class BranchFollower:
     def onward(
         self, equations: GaitEquations, last: Solved[Cycle], step: float, before: Solved[Cycle] | None
     ) -> tuple[Solved[Cycle], float, BranchEnd | None] | BranchEnd:
-        """The next point, how far to look for the one after it, and the branch's end if that is there.
+        """Return the next point, the next step length, and the branch's end if it is reached.
 
-        A step that leads out of the span goes to the span's end: beyond it there may be no walker. Returns the end
-        alone where there is no further point.
+        A step that leaves the span is cut at its edge, since beyond it there may be no walker. Returns only the end if
+        there is no further point.
         """
         ahead, acceptable = last.x + step * last.tangent, self.near_enough(last)
         edge = self.span.nearest(equations.value(ahead))
@@ -322,7 +319,7 @@ class BranchFollower:
         return at_edge, step, BranchEnd(self.span.nearest(value), END_OF_SPAN)
 
     def at_edge(self, equations: GaitEquations, last: Solved[Cycle], beyond: Floats) -> Solved[Cycle] | None:
-        """The gait at the end of the span, between the last one and a point (d + 1,) beyond; None if it is lost."""
+        """Solve for the gait at the edge of the span, on the way from `last` to a point (d + 1,) beyond."""
         start, value = equations.value(last.x), equations.value(beyond)
         edge = self.span.nearest(value)
         guess = last.x + (edge - start) / (value - start) * (beyond - last.x)
@@ -333,14 +330,14 @@ class BranchFollower:
         return found if found.tangent @ last.tangent > 0.0 else replace(found, tangent=-found.tangent)
 
     def point(self, solved: Solved[Cycle]) -> Cycle:
-        """The gait at a point of the curve, watched."""
+        """Return the gait at a point of the curve, with its monitors."""
         self.advance()
         gait = solved.evaluated.data
         return replace(gait, monitors=self.step_map.watch(gait.z, gait.value, len(gait.steps)))
 
 
 def passes(segment: Segment[Cycle], gait: Solved[Cycle], turn: float) -> bool:
-    """Whether a gait lies between two neighbours on a curve, which runs there as the gait's tangent does.
+    """Whether a gait lies between two neighbours on a curve with the same direction.
 
     turn  cosine of the largest angle between the tangents
     """
@@ -353,23 +350,22 @@ def passes(segment: Segment[Cycle], gait: Solved[Cycle], turn: float) -> bool:
 
 
 def steps_word(n: int) -> str:
-    """Step or steps."""
     return "step" if n == 1 else "steps"
 
 
 def apart(gait: Cycle) -> Floats:
-    """From a gait's first state to that half a cycle on: zero where it is a gait of half as many steps."""
+    """Return the difference between a gait's states half a cycle apart; zero for a gait of half as many steps."""
     return np.asarray(gait.steps[len(gait.steps) // 2 - 1].z - gait.z)
 
 
 def halves_meet(last: Cycle, gait: Cycle) -> bool:
-    """Whether a branch has come to the gait of half as many steps: its cycle's halves are one, or changed places."""
+    """Whether a branch has reached the gait of half as many steps: the cycle's halves coincide or have swapped."""
     parted = apart(gait)
     return bool(np.abs(parted).max() < SAME or apart(last) @ parted < 0.0)
 
 
 def closed_on(branch: GaitBranch, branches: Iterable[GaitBranch]) -> GaitBranch:
-    """The branch with ends that close on another's flip put there."""
+    """Return the branch with each end that closes on another's flip moved to that flip."""
     flips = [one for parent in branches for one in parent.bifurcations if 2 * parent.period == branch.period]
     ends = []
     for place, end in enumerate(branch.ends):
@@ -379,7 +375,7 @@ def closed_on(branch: GaitBranch, branches: Iterable[GaitBranch]) -> GaitBranch:
 
 
 def why_lost(lost: NotConverged) -> str:
-    """Why a branch goes no further, in words."""
+    """Describe why a branch is lost."""
     if lost.outcome is Outcome.WALKED:
         return "Newton's method finds no further gait"
     if lost.outcome is None:

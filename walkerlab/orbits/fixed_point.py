@@ -1,9 +1,9 @@
-"""The periodic gaits of a rigid walker: sought in two ways, solved to rounding, judged and compared.
+"""Search for the periodic gaits of a rigid walker; each gait is solved to rounding and measured.
 
-Followed: the two gaits of the small-slope theory are followed to the walker's slope. Drawn: the step map is solved from
-random starting values, the paper's way (section 3.3), and from many more where those find nothing: of some walkers few
-starts reach a heel strike at all. Led: where none is drawn of a driven walker, gaits of the passive one are followed as
-its drive grows. All of it happens with the similar walker of unit size.
+Three searches, all on the similar walker of unit size. The two gaits of the small-slope theory are followed to the
+walker's slope. The step map is solved from random starting values, as in the paper (section 3.3), and from more of them
+if that finds nothing: for some walkers few starts reach a heel strike. If a driven walker still has no gait, gaits of
+the passive walker are followed as the drive grows.
 """
 
 import math
@@ -45,7 +45,7 @@ DRAWN_FROM = f"legs up to {MAX_START[0]:g} rad apart, rates up to {MAX_START[1]:
 
 @dataclass(frozen=True)
 class RigidGait:
-    """What a step of a gait shows, SI units."""
+    """A gait and the quantities of one of its steps, SI units."""
 
     state: State  # just after the heel strike
     period: float  # s
@@ -71,7 +71,6 @@ class RigidGait:
 
     @property
     def speed(self) -> float:
-        """Step length over period (m/s)."""
         return self.step_length / self.period
 
     @property
@@ -81,12 +80,11 @@ class RigidGait:
 
     @property
     def stable(self) -> bool:
-        """Whether small disturbances die out."""
         return self.spectral_radius < 1.0
 
     @property
     def objections(self) -> tuple[str, ...]:
-        """What no ground can give, so that this gait is not physical; else empty. An unstable gait is a gait."""
+        """Reasons why no ground can support this gait; empty for a physical gait, stable or not."""
         found = []
         if self.min_normal_force < 0.0:
             found.append(f"the ground would have to pull with {-self.min_normal_force:.3g} N")
@@ -100,9 +98,9 @@ class RigidGait:
 
 
 def feet_meet(walker: Standing, swing: Floats) -> bool:
-    """Whether the swing foot comes down just where the stance foot stands, so that the step map jumps at this gait.
+    """Whether the swing foot comes down exactly at the stance foot, where the step map is discontinuous.
 
-    A foot that came down any further ahead would strike.
+    Any further ahead, it would strike.
 
     swing  (samples, 2 n) states with both legs straight
     """
@@ -113,10 +111,7 @@ def feet_meet(walker: Standing, swing: Floats) -> bool:
 
 
 def measured(walker: Standing, units: Units, gait: Cycle) -> RigidGait | None:
-    """The gait after walking one step of it; None if that step does not end.
-
-    walker  the unit walker, whose units are `units`
-    """
+    """Walk one step of a gait of the unit walker and measure it in SI; None if the step fails."""
     start = on_section(walker, gait.z)
     step = take_walk(walker, EXACT, start, 1, sampled=True)
     if step.steps == 0 or step.samples is None:
@@ -150,10 +145,10 @@ def measured(walker: Standing, units: Units, gait: Cycle) -> RigidGait | None:
 
 @dataclass(frozen=True)
 class SearchSettings:
-    """How hard to look.
+    """Effort of a search.
 
     random_starts   starting values to draw
-    further_starts  to draw where nothing is found
+    further_starts  more to draw if no gait is found
     """
 
     random_starts: int = 100
@@ -167,15 +162,15 @@ LED = f"led from passive gaits where nothing else finds one (slopes of {', '.joi
 
 @dataclass(frozen=True)
 class GaitSearch:
-    """What was found.
+    """Result of a search.
 
-    gaits          every period-1 gait, shortest period first
-    chosen         index of the gait to walk; None if there is none that can be walked
-    reason         why this one, or why none
-    random_hits    for each gait, how many random starts led to it
-    random_starts  how many were drawn
-    lost           what became of the gaits that were followed and do not reach this walker
-    followed       from where, in words
+    gaits          every period-1 gait, by period
+    chosen         index of the gait to walk; None if no gait is physical
+    reason         for the choice, or why there is none
+    random_hits    for each gait, the number of random starts that led to it
+    random_starts  number drawn
+    lost           why gaits that were followed did not reach this walker
+    followed       where they were followed from
     """
 
     gaits: tuple[RigidGait, ...]
@@ -188,7 +183,7 @@ class GaitSearch:
 
     @property
     def sought(self) -> str:
-        """How gaits were looked for, in words; a very unstable one may be missed by all of it."""
+        """Describe the search; it may miss a very unstable gait."""
         starts = f"{self.random_starts} random starts ({DRAWN_FROM}, steps of at most {LONGEST_SWING:g} sqrt(L/g))"
         return f"{self.followed}, and by Newton's method from {starts}"
 
@@ -199,7 +194,7 @@ class GaitSearch:
 
 
 def find_gaits(walker: Standing, seed: int = 0, settings: SearchSettings = SearchSettings()) -> GaitSearch:
-    """Every period-1 gait of `walker` that the searches find.
+    """Find the period-1 gaits of `walker`.
 
     seed  of the random starting values
     """
@@ -230,15 +225,14 @@ POINTS_OF_A_LEAD = 60
 class SlopeBranch:
     """A gait as a function of the slope: y = (theta_2 + phi, dtheta_1, dtheta_2) / s and T over s^2, s = phi^(1/3).
 
-    In s^2 both gaits of the small-slope theory are smooth, and polynomials through the last points foretell the next.
+    Both gaits of the small-slope theory are smooth in s^2, so polynomials through the last points predict the next.
     """
 
     def __init__(self, step_map: Stepper, seed: SmallSlopeSeed) -> None:
-        """Start from a seed of the walker that has this step map over the slope (rad)."""
         self.step_map, self.seed = step_map, seed
 
     def follow(self, slope: float) -> tuple[float, Floats | None]:
-        """How far the gait can be followed (rad), and z (3,) at `slope` > 0 (rad); None if it is lost before."""
+        """Return how far (rad) the gait can be followed towards `slope` > 0, and z (3,) there; None if it is lost."""
         s = float(np.cbrt(slope))
         follower = self.from_seed if s > np.cbrt(self.seed.slope) else self.begun(s)
         if follower is None:
@@ -250,11 +244,11 @@ class SlopeBranch:
 
     @cached_property
     def from_seed(self) -> Follower | None:
-        """The way that all steeper slopes have in common; None if it has no start."""
+        """Follower shared by all slopes steeper than the seed; None if it has no start."""
         return self.begun(float(np.cbrt(self.seed.slope)))
 
     def begun(self, s: float) -> Follower | None:
-        """The way from the first gait at s or, where the seed is too rough for that, nearer to its limit."""
+        """Return a follower from the gait at s or, if the seed is too inaccurate there, closer to the limit."""
         seed, s_seed = self.seed, float(np.cbrt(self.seed.slope))
         limit = (0.0, np.array([*seed.limit, seed.period]))
         rough = (limit, (s_seed**2, scaled(s_seed, seed.z, seed.period)))
@@ -267,7 +261,7 @@ class SlopeBranch:
         return None
 
     def gait_at(self, log_s: float, expected: Floats) -> Floats | None:
-        """(y, T) near where it is expected; None if Newton's method finds no gait there."""
+        """Solve for (y, T) near the prediction; None if there is no such gait."""
         s = math.exp(log_s)
         effort = Effort(LOOSE * s, EVALUATIONS_ON_THE_WAY, SHORTEST_MOVE)
         gait = gait_near(self.step_map, state_at(s, expected), s**3, effort)
@@ -280,29 +274,32 @@ class SlopeBranch:
 
 
 def state_at(s: float, y: Floats) -> Floats:
-    """Section coordinates (3,) of a scaled gait."""
+    """Return section coordinates (3,) of a scaled gait."""
     return np.array([s * y[0] - s**3, s * y[1], s * y[2]])
 
 
 def scaled(s: float, z: Floats, period: float) -> Floats:
-    """(y, T) of a gait at s."""
+    """Return (y, T) of a gait at s."""
     return np.array([(z[0] + s**3) / s, z[1] / s, z[2] / s, period])
 
 
 @lru_cache(maxsize=16)
 def branches(walker: Standing) -> tuple[SlopeBranch, ...]:
-    """The gaits of the small-slope theory, for all searches of one walker on whatever slope; `walker` on none."""
+    """Return the gaits of small-slope theory, cached for all slopes of one walker; `walker` on level ground."""
     looking = over_slope(walker, LOOKING)
     return tuple(SlopeBranch(looking, seed) for seed in seeds(walker))
 
 
 def over_slope(walker: Standing, tolerances: Tolerances) -> RigidMap:
-    """The step map of a unit walker over the slope (rad)."""
+    """Return the step map of a unit walker over the slope (rad)."""
     return RigidMap(partial(on_slope, walker), 1.0, walker, tolerances)
 
 
 def partly_driven(walker: Standing, slope: float, share: float) -> Standing:
-    """The walker with a share of what drives it, on a slope (rad) as much nearer to its own; passive at 0."""
+    """Return the walker with a share of its drive, on a slope (rad) interpolated to its own.
+
+    It is passive and on `slope` for a share of 0.
+    """
     parts = {name: share * walker[name] for name in ("hip", "push_off")}
     driven_hip = walker.driven_hip and share > 0.0
     return on_slope(walker.changed(**parts, driven_hip=driven_hip), slope + share * (walker.slope - slope))
@@ -310,7 +307,7 @@ def partly_driven(walker: Standing, slope: float, share: float) -> Standing:
 
 @dataclass
 class FoundGait:
-    """A gait of the unit walker, what it is in SI, and what led to it."""
+    """A gait of the unit walker, its SI quantities, and the searches that led to it."""
 
     cycle: Cycle
     gait: RigidGait
@@ -318,10 +315,9 @@ class FoundGait:
 
 
 class Search:
-    """A search in progress."""
+    """State of one search."""
 
     def __init__(self, walker: Standing) -> None:
-        """Nothing is found yet."""
         self.walker, self.units = unit_walker(walker)
         self.found: list[FoundGait] = []
         self.lost: list[str] = []
@@ -331,7 +327,7 @@ class Search:
         self.step_map = over_slope(self.walker, EXACT)
 
     def follow_seeds(self) -> None:
-        """Follow the gaits of the small-slope theory, which is of passive walkers, to the walker's slope."""
+        """Follow the gaits of small-slope theory to the slope of a passive walker."""
         if self.walker.slope <= 0.0 or not self.walker.passive:
             return
         for branch in branches(on_slope(self.walker, 0.0)):
@@ -342,7 +338,7 @@ class Search:
                 self.lost.append(f"the gait from the {name} cannot be solved to rounding")
 
     def lead(self, generator: np.random.Generator, starts: int) -> None:
-        """Follow gaits of the passive walker on slopes that it may walk down to this one, as what drives it grows."""
+        """Follow gaits of the passive walker to this walker's slope and drive, as the drive grows."""
         # Imported here: gaits that are found otherwise do without.
         from walkerlab.orbits.families import BranchFollower, Seed, ValueSpan
 
@@ -366,7 +362,7 @@ class Search:
                 return
 
     def draw(self, generator: np.random.Generator, count: int) -> None:
-        """Solve the step map from random starting values, unless they lead to a gait that was found before."""
+        """Solve the step map from random starting values, skipping those that lead to known gaits."""
         d = int(self.walker.coordinates)
         self.drawn += count
         starts = generator.uniform(MIN_START[:d], MAX_START[:d], (count, d))
@@ -384,7 +380,7 @@ class Search:
         return bool(abs(feet_on_slope(self.walker, z[0], z[0])) < 2.0 * SMALLEST_ANGLE)
 
     def keep(self, z: Floats, by: str) -> bool:
-        """Solve for the gait near z to rounding and take it among those found; False if there is none."""
+        """Solve for the gait near z to rounding and add it to the results; False if there is none."""
         if self.known(z, by):
             return True
         effort = Effort(SOLVED, MAX_EVALUATIONS, SHORTEST_MOVE, rounding=ENOUGH / SOLVED)
@@ -400,7 +396,7 @@ class Search:
         return True
 
     def known(self, z: Floats, by: str) -> bool:
-        """Whether z is one of the gaits found, which is then noted to be found again."""
+        """Whether z is a gait that was found before; if so, record the search that found it again."""
         for found in self.found:
             if np.abs(found.cycle.z - z).max() < SAME * np.abs(z).max():
                 found.by.append(by)
@@ -408,7 +404,6 @@ class Search:
         return False
 
     def result(self) -> GaitSearch:
-        """The gaits in order, and which one to walk."""
         found = sorted(self.found, key=lambda each: each.gait.period)
         gaits = tuple(replace(each.gait, found_by=tuple(dict.fromkeys(each.by))) for each in found)
         hits = tuple(each.by.count(RANDOM_START) for each in found)
@@ -421,15 +416,15 @@ class Search:
 
 
 def preference(gait: RigidGait) -> tuple[bool, int, float]:
-    """Smallest of the gait to walk: a stable one, whose leg does not swing back and forth, soonest rid of disturbances.
+    """Sort key, smallest for the gait to walk: stable, without back-and-forth swings, fastest decay.
 
-    A leg that swings back passes its foot through the ground, which the model does not see.
+    A leg that swings back passes its foot through the ground, which the model ignores.
     """
     return not gait.stable, gait.swings, gait.spectral_radius
 
 
 def choice(gaits: tuple[RigidGait, ...]) -> tuple[int | None, str]:
-    """Which gait to walk of those that the ground can carry, by `preference`; and why."""
+    """Choose the gait to walk among the physical ones by `preference`; return its index and the reason."""
     walkable = [index for index, gait in enumerate(gaits) if not gait.objections]
     if not walkable:
         objections = dict.fromkeys(objection for gait in gaits for objection in gait.objections)

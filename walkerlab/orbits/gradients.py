@@ -1,9 +1,9 @@
-"""How a gait's numbers answer a number of the walker: by the implicit function theorem.
+"""Derivatives of gait quantities with respect to a walker parameter, by the implicit function theorem.
 
-With z the section's coordinates and P the step map, dz/dp = (I - A)^-1 dP/dp; all that follows from the gait changes
-along (dz/dp, 1). The derivatives by p are difference quotients of exact steps along the family as far as it is known;
-that of a multiplier comes from A's by its left and right eigenvectors. The difference between two step sizes is the
-error, and the steps are halved as long as that makes errors smaller which are no small part of their derivatives.
+With z the section's coordinates and P the step map, dz/dp = (I - A)^-1 dP/dp; every quantity of the gait then changes
+along (dz/dp, 1). Derivatives by p are difference quotients of exact steps along this direction; that of a multiplier
+follows from A's by its left and right eigenvectors. The difference between two step sizes estimates the error, and the
+step is halved while that reduces errors that are not yet small.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ LOST = 0.1  # error, relative to a derivative, from which rounding has eaten it
 
 @dataclass(frozen=True)
 class Gradient:
-    """A derivative; `why` says in words why there is none, or that it is lost."""
+    """A derivative; `why` states why there is none, or that rounding dominates it."""
 
     value: float | None
     error: float | None
@@ -51,7 +51,7 @@ class Gradient:
 
     @property
     def small(self) -> bool:
-        """Whether no smaller step is needed, or would help."""
+        """Whether a smaller step is unnecessary or would not help."""
         return self.value is None or self.error is None or self.error <= SMALL * abs(self.value)
 
     def halves(self, other: Gradient | None) -> bool:
@@ -60,9 +60,9 @@ class Gradient:
 
 
 def gait_numbers(at: Standpoint, wanted: Collection[str] = QUANTITIES) -> dict[str, float] | None:
-    """The numbers of a gait, by name; no norm of an unstable one; None where its step ends.
+    """Compute the quantities of a gait by name, without norms if it is unstable; None if its step fails.
 
-    wanted  those that are: what a step itself does not tell takes more steps
+    wanted  quantities to compute; those that a single step does not give cost more steps
     """
     step = at.step_map.step(at.z, at.p)
     if step.outcome is not Outcome.WALKED:
@@ -76,12 +76,12 @@ def gait_numbers(at: Standpoint, wanted: Collection[str] = QUANTITIES) -> dict[s
 
 
 def own_numbers(step: MappedStep) -> tuple[float, float, float]:
-    """What a step itself tells: period, length and speed."""
+    """Return period, length and speed of a step."""
     return step.period_s, step.length_m, step.length_m / step.period_s
 
 
 def norms_of(at: Standpoint) -> tuple[float, float] | None:
-    """The norm of the step period for a drop of the floor, and the scaled one; None of an unstable gait."""
+    """Return the norm of the step period for a floor drop, in SI and scaled; None for an unstable gait."""
     answer = response(at, "floor-drop")
     if answer is None:
         return None
@@ -90,7 +90,6 @@ def norms_of(at: Standpoint) -> tuple[float, float] | None:
 
 
 def cost_of(at: Standpoint) -> tuple[float] | None:
-    """The cost of transport; None where the step ends."""
     cost = at.step_map.cost_of_transport(at.z, at.p)
     return None if cost is None else (cost,)
 
@@ -103,10 +102,10 @@ OTHERS: Final[Mapping[tuple[str, ...], Callable[[Standpoint], tuple[float, ...] 
 
 
 def gradients(at: Standpoint, scale: float, wanted: Collection[str] = QUANTITIES) -> dict[str, Gradient]:
-    """Derivatives of a gait's numbers by the parameter of its step map; empty where steps beside it end.
+    """Differentiate a gait's quantities by the parameter of its step map; empty if neighbouring steps fail.
 
-    scale   magnitude of changes of the parameter that matter
-    wanted  the numbers, see `gait_numbers`
+    scale   magnitude of significant changes of the parameter
+    wanted  the quantities, see `gait_quantities`
     """
     h, along = STEP * at.step_map.tolerances.rtol**0.2 * scale, np.zeros(at.z.size)
     for part in APPROACH:
@@ -127,7 +126,7 @@ def gradients(at: Standpoint, scale: float, wanted: Collection[str] = QUANTITIES
 
 
 def pair(A: Floats, fine: Changes, coarse: Changes) -> dict[str, Gradient]:
-    """The derivatives by the finer of two steps, with the errors that the coarser one shows."""
+    """Combine the derivatives at two step sizes: values of the finer one, errors from the difference."""
     found = {
         name: told(value, abs(value - coarse.numbers[name]))
         for name, value in fine.numbers.items()
@@ -137,17 +136,17 @@ def pair(A: Floats, fine: Changes, coarse: Changes) -> dict[str, Gradient]:
 
 
 class Changes(NamedTuple):
-    """Of a gait's numbers and of A (d, d), by the parameter."""
+    """Derivatives of gait quantities and of A (d, d) by the parameter."""
 
     numbers: dict[str, float]
     A: Floats
 
 
 def along_family(at: Standpoint, h: float, guess: Floats) -> Floats | None:
-    """How the gait's z (d,) changes with the parameter, by steps from beside it, along a guess of that.
+    """Return the derivative of the gait's z (d,) by the parameter, from steps near z along a guess of it.
 
-    On compliant ground a step from z itself would be none of a walker of other measures: its foot would be in the air,
-    or deep in the ground.
+    On compliant ground a step from z itself would not do for a walker of other dimensions: its foot would be in the
+    air, or deep in the ground.
     """
 
     def led(off: float) -> Floats | None:
@@ -159,7 +158,7 @@ def along_family(at: Standpoint, h: float, guess: Floats) -> Floats | None:
 
 
 def changes(at: Standpoint, h: float, guess: Floats, wanted: Collection[str]) -> Changes | None:
-    """By difference quotients of a step h along the family; None where steps beside the gait end."""
+    """Compute difference quotients of step h along the family; None if neighbouring steps fail."""
     along = along_family(at, h, guess)
     if along is None:
         return None
@@ -189,13 +188,13 @@ def changes(at: Standpoint, h: float, guess: Floats, wanted: Collection[str]) ->
 
 
 def told(value: float, error: float) -> Gradient:
-    """A derivative, said to be lost if its error is no small part of it."""
+    """Return a derivative, marked as lost if its error is comparable to its value."""
     lost = error > LOST * abs(value) and value != 0.0
     return Gradient(float(value), float(error), "lost in rounding" if lost else "")
 
 
 def of_radius(A: Floats, change: Floats, error: Floats) -> Gradient:
-    """The derivative of the spectral radius, by that of A (d, d)."""
+    """Differentiate the spectral radius, given the derivative of A (d, d)."""
     values, right = np.linalg.eig(A)
     left = np.linalg.inv(right) if np.linalg.cond(right) < 1.0 / APART else None
     largest = int(np.argmax(np.abs(values)))
@@ -213,5 +212,5 @@ def of_radius(A: Floats, change: Floats, error: Floats) -> Gradient:
 
 
 def relative(value: float, parameter: float, quantity: float) -> float | None:
-    """By how much of itself a quantity changes as the parameter changes by all of itself; None of one at 0."""
+    """Return the relative change of a quantity per relative change of the parameter; None if either is zero."""
     return None if parameter == 0.0 or math.isclose(quantity, 0.0, abs_tol=1e-300) else value * parameter / quantity

@@ -1,4 +1,4 @@
-"""Newton's method, for gaits of either model and for the points of their branches alike."""
+"""Newton's method for gaits of either model and for points on their branches."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -15,12 +15,12 @@ ROUNDING = 100.0  # a residual at most this many tolerances large that a move do
 
 
 class Evaluated(NamedTuple, Generic[D]):
-    """The equations at a point.
+    """Value and derivative of the equations at a point.
 
     outcome   WALKED if there is a value
     value     (m,)
-    jacobian  (m, m), or a column more for a curve
-    data      what the caller wants to keep of it
+    jacobian  (m, m), or (m, m + 1) for a curve
+    data      the caller's own data
     """
 
     outcome: Outcome | None
@@ -30,7 +30,7 @@ class Evaluated(NamedTuple, Generic[D]):
 
     @property
     def residual(self) -> float:
-        """Largest component of the value; infinite where there is none."""
+        """Largest component of the value; infinite without a value."""
         return max(map(abs, self.value.tolist())) if self.outcome is Outcome.WALKED else np.inf
 
 
@@ -40,8 +40,6 @@ Equations = Callable[[Floats], Evaluated[D]]
 
 @dataclass(frozen=True)
 class Solution(Generic[D]):
-    """Where the equations hold."""
-
     x: Floats
     evaluated: Evaluated[D]
     corrections: int
@@ -49,10 +47,10 @@ class Solution(Generic[D]):
 
 @dataclass(frozen=True)
 class NotConverged:
-    """Why Newton's method found nothing.
+    """Why Newton's method failed.
 
     outcome   WALKED if the equations could be evaluated; None where the parameter makes no walker
-    singular  whether the matrix of a move was: a multiplier is 1
+    singular  whether the Jacobian was singular, i.e. a multiplier is 1
     """
 
     outcome: Outcome | None
@@ -60,13 +58,13 @@ class NotConverged:
 
 
 class Effort(NamedTuple):
-    """How closely something is solved, and how hard.
+    """Accuracy of a solution and the limits of its search.
 
     tolerance  on the residual
     most       evaluations of the equations
-    shortest   share of a move that is not halved any more
-    growth     of the residual from which on a move is
-    rounding   tolerances that a residual may be large which a move does not halve
+    shortest   share of a move below which it is not halved
+    growth     ratio of residuals from which on a move is halved
+    rounding   residuals up to this many tolerances count as rounding if a move does not halve them
     """
 
     tolerance: float
@@ -79,7 +77,7 @@ class Effort(NamedTuple):
 def newton(equations: Equations[D], guess: Floats, effort: Effort) -> Solution[D] | NotConverged:
     """Solve m equations in m unknowns from a guess (m,).
 
-    Returns the point, or with which outcome the equations could not be evaluated or did not converge.
+    Returns the solution, or the outcome with which the equations failed or did not converge.
     """
     tolerance, most, shortest, growth, rounding = effort
     x, here, corrections, evaluations = guess, equations(guess), 0, 1

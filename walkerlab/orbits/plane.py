@@ -1,11 +1,11 @@
-"""Gaits over a plane of two parameters: curves of folds and flips, and what walks settle on, cell by cell.
+"""Gaits over two parameters: curves of folds and flips, and the periods of attractors cell by cell.
 
-A bifurcation is a gait whose test function vanishes: P^n(z) = z and det(DP -+ 1) = 0, one equation more than for a
-gait, in one unknown more, the second parameter. The curve is continued by arclength like a branch.
+A bifurcation is a gait at which a test function vanishes: P^n(z) = z and det(DP -+ 1) = 0, one more equation than for a
+gait, with the second parameter as one more unknown. The curve is continued by arclength like a branch.
 
-The cells: row by row of the second parameter, from the row that the branches are known on, the gait of one step is
-corrected from its neighbours' by Newton's method. Where it is stable walks settle on it; where it is not, or there is
-none, a walk from the attractor of a neighbouring cell, or from beside the gait, tells what they settle on.
+The cells are computed row by row of the second parameter, from the row of the known branches outwards. Newton's method
+corrects the period-1 gait of each cell from its neighbours. A stable gait is the attractor; otherwise a walk from a
+neighbouring cell's attractor, or from near the unstable gait, finds the attractor.
 
 Source: Kuznetsov, Elements of applied bifurcation theory, section 10.3.
 """
@@ -42,7 +42,7 @@ MapAt = Callable[[float], StepMap | None]
 
 
 class Plane(NamedTuple):
-    """A second parameter: step maps over the first by its values, those asked for, and the family's own."""
+    """A second parameter: step maps over the first by its values, the span to cover, and the family's own value."""
 
     map_at: MapAt
     span: ValueSpan
@@ -50,7 +50,7 @@ class Plane(NamedTuple):
 
 
 def critical_gaits(map_at: MapAt, kind: Kind, period: int, scales: tuple[float, float]) -> Equations[Cycle | None]:
-    """P^n(z) - z = 0 and a test function, over x = (z, first / its scale, second / its scale), for gaits of n steps."""
+    """Return P^n(z) - z = 0 and a test function over x = (z, first / its scale, second / its scale)."""
     maps = lru_cache(MAPS)(map_at)
 
     def gait(x: Floats) -> Evaluated[Cycle] | None:
@@ -59,7 +59,7 @@ def critical_gaits(map_at: MapAt, kind: Kind, period: int, scales: tuple[float, 
         return None if found is None or found.outcome is not Outcome.WALKED else found
 
     def equations(x: Floats) -> Evaluated[Cycle | None]:
-        """Residual and derivative at x (d + 2,); of the gait exact but along the second parameter."""
+        """Evaluate residual and derivative at x (d + 2,), by differences along the second parameter only."""
         d, reach = x.size - 2, REACH * np.eye(x.size)
         beside = (gait(x + sign * unit) for unit in reach for sign in (1.0, -1.0))
         walked = [one for one in (gait(x), *beside) if one is not None]
@@ -76,10 +76,10 @@ def critical_gaits(map_at: MapAt, kind: Kind, period: int, scales: tuple[float, 
 
 @dataclass(frozen=True, eq=False)
 class BifurcationCurve:
-    """A curve of bifurcations over the plane.
+    """A curve of bifurcations over two parameters.
 
     first, second  (points,) values of the parameters along it
-    ends           where and why it ends; `value` is that of the second parameter
+    ends           where and why it ends; `value` is the second parameter's
     """
 
     kind: Kind
@@ -93,10 +93,10 @@ def curve_through(
     bifurcation: Bifurcation, period: int, first: ValueSpan, plane: Plane, points: int,
     advance: Callable[[], None], control: StepControl,
 ) -> BifurcationCurve | None:  # fmt: skip
-    """The curve through a bifurcation that was located at the plane's own value; None if it is lost there.
+    """Follow the curve through a bifurcation located at the family's own second parameter; None if it is lost there.
 
-    first   values of the first parameter: the curve is followed inside these and the plane's
-    points  at most, each way
+    first   span of the first parameter; the curve is followed within it and the plane's
+    points  maximum number in each direction
     """
     spans = (first, plane.span)
     scales = (spans[0].size, spans[1].size)
@@ -118,7 +118,7 @@ def traced(
     equations: Equations[Cycle | None], start: Solved[Cycle | None], spans: tuple[ValueSpan, ValueSpan],
     points: int, advance: Callable[[], None], control: StepControl,
 ) -> tuple[Floats, BranchEnd]:  # fmt: skip
-    """Values (points, 2) of both parameters from a point along its tangent, and why they end."""
+    """Return values (points, 2) of both parameters from a point along its tangent, and why the curve ends."""
     scales = np.array([span.size for span in spans])
     values, before, last, length = [start.x[-2:] * scales], None, start, control.first
     while len(values) < points:
@@ -137,7 +137,7 @@ def traced(
 
 
 def clipped(inside: Floats, outside: Floats, spans: tuple[ValueSpan, ValueSpan]) -> Floats:
-    """The last point on the way out of the plane."""
+    """Return the last point inside the plane on a segment that leaves it."""
     share = 1.0
     for k, span in enumerate(spans):
         edge = span.least if outside[k] < span.least else span.most
@@ -151,10 +151,10 @@ def clipped(inside: Floats, outside: Floats, spans: tuple[ValueSpan, ValueSpan])
 
 @dataclass(frozen=True, eq=False)
 class Regions:
-    """The plane in cells.
+    """Attractors over the plane, cell by cell.
 
-    first, second  (n,), (m,) middles of the cells
-    period         (n, m) steps after which walks that settled repeat themselves; 0 never, NOTHING if none goes on
+    first, second  (n,), (m,) centres of the cells
+    period         (n, m) steps after which the attractor repeats; 0 if never, NO_ATTRACTOR if every walk fails
     """
 
     first: Floats
@@ -168,7 +168,7 @@ Points = list[Floats | None]
 
 
 def regions_of(branches: Sequence[GaitBranch], span: ValueSpan, plane: Plane, advance: Callable[[], None]) -> Regions:
-    """The regions of the plane around branches that were followed over a span of the first parameter."""
+    """Find the attractors over the plane, starting from branches known over a span of the first parameter."""
     sides = zip((span, plane.span), CELLS, strict=True)
     first, second = (side.least + side.size * (np.arange(cells) + 0.5) / cells for side, cells in sides)
     period = np.full(CELLS, NOTHING, np.int64)
@@ -188,7 +188,7 @@ def regions_of(branches: Sequence[GaitBranch], span: ValueSpan, plane: Plane, ad
 
 
 def known_gaits(branches: Sequence[GaitBranch], values: Floats) -> Points:
-    """Near each value a gait of one step from the branches, a stable one if there is one."""
+    """Return for each value a period-1 gait interpolated from the branches, preferring stable ones."""
     found, stable = list[Floats | None]([None] * len(values)), np.zeros(len(values), bool)
     for branch in branches:
         if branch.period > 1:
@@ -203,7 +203,7 @@ def known_gaits(branches: Sequence[GaitBranch], values: Floats) -> Points:
 
 
 def corrected_row(step_map: StepMap, values: Floats, before: Points) -> Row:
-    """The gaits at the cells of a row, from those of the row before and from neighbours in the row itself."""
+    """Solve for the gaits of a row of cells, from the previous row and from neighbours in the row."""
     row: Row = [None] * len(values)
     places = list(range(len(values)))
     for order, step in ((places, -1), (places[::-1], 1)):
@@ -221,10 +221,7 @@ def corrected_row(step_map: StepMap, values: Floats, before: Points) -> Row:
 
 
 def settled_row(step_map: StepMap, values: Floats, gaits: Row, before: Points) -> tuple[Integers, Points]:
-    """The periods of a row's cells, and a point of the attractor in each.
-
-    before  those of the row before
-    """
+    """Return the periods of a row's attractors and a point on each; `before` holds the previous row's points."""
     periods, points = np.full(len(values), NOTHING, np.int64), list[Floats | None]()
     for place, gait in enumerate(gaits):
         if gait is not None and gait.stable:

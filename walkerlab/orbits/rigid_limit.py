@@ -1,7 +1,7 @@
-"""What separates the contact model from the rigid one: its contact led towards the rigid limit, knob by knob.
+"""Convergence of the contact model to the rigid one as parameters of its contact approach the rigid limit.
 
-Stiffness k, damping c and stiction velocity v_s are the knobs. With k the penetration d_max of full damping shrinks as
-the static penetration does, and with v_s the friction velocity v_d. A push-off is shortened as all three are turned.
+The parameters are stiffness k, damping c and stiction velocity v_s. The penetration d_max of full damping shrinks with
+the static penetration as k grows, and the friction velocity v_d with v_s. A push-off is shortened if all three vary.
 """
 
 import math
@@ -40,7 +40,7 @@ BRIEF = 0.1  # of sqrt(d / g), d the static penetration: a push-off as short is 
 
 
 class ContactFactors(NamedTuple):
-    """A contact: by which factors its numbers differ from the config's."""
+    """Factors on the contact parameters of the config."""
 
     series: str
     rigidity: float  # how far the series has gone towards the limit
@@ -64,16 +64,16 @@ SERIES = {
 
 
 def series_of(name: str, every: int = 1) -> list[ContactFactors]:
-    """The settings of a series, from the config's contact towards the limit; of these every first, second or so on."""
+    """Return contact settings from the config's towards the rigid limit, every `every`-th of them."""
     count, ratio, powers = SERIES[name]
     rigidities = [ratio**step for step in range(0, count, every)]
     return [ContactFactors(name, rigidity, *(rigidity**power for power in powers)) for rigidity in rigidities]
 
 
 def with_setting(walker: ContactWalker, setting: ContactFactors) -> ContactWalker:
-    """The walker on the ground of a setting, its push-off brief on the way to the limit.
+    """Return the walker on the ground of a setting, with a brief push-off in series towards the rigid limit.
 
-    A longer one lifts the leading foot off again, however rigid the ground is, and leads to another limit.
+    A longer push-off lifts the leading foot again, however rigid the ground, and leads to another limit.
     """
     changed, law = with_scaled_laws(walker, *setting[2:]), walker.normal
     if setting.series not in (ALL, ALL_POINT) or setting.rigidity == 1.0:
@@ -85,14 +85,14 @@ def with_setting(walker: ContactWalker, setting: ContactFactors) -> ContactWalke
 
 @dataclass(frozen=True)
 class Distance:
-    """How far a setting's walk is from the rigid one's, and how well that is known.
+    """Differences of a setting's gait and walk from the rigid ones, with their numerical errors.
 
-    numerical_period  s, change of the period when the tolerance is ten times tighter
-    angle, velocity   largest difference in phase over the walk, between impacts; raw at the same time
-    numerical_time    s, change of the last touch's time with the tolerance a hundred times tighter
-    wall_s            s, processor time of the walk, the least of several
+    numerical_period  s, change of the period at a ten times tighter tolerance
+    angle, velocity   largest difference in phase over the walk, between impacts; `raw_`: at equal times
+    numerical_time    s, change of the last touch-down's time at a hundred times tighter tolerance
+    wall_s            s, processor time of the walk, minimum of several
 
-    What is of walks is None where no walk is compared.
+    Quantities of the walk are None where no walk is compared.
     """
 
     setting: ContactFactors
@@ -113,11 +113,11 @@ class Distance:
 
 @dataclass(frozen=True)
 class Limit:
-    """A scene, and what its distances are measured from: the rigid gait and the walk from the rigid start.
+    """Ground and rigid reference of a series: the rigid gait and the walk from the rigid start.
 
     steps     of that walk
     sampling  s
-    every     of a series' settings which are taken
+    every     take every n-th setting of a series
     """
 
     ground: JudgedGround
@@ -131,9 +131,9 @@ class Limit:
     def series(
         self, name: str, walker: ContactWalker, gait: Cycle, start: Callable[[ContactWalker], State] | None = None
     ) -> list[Distance]:
-        """The distances along a series, each gait searched from the one before; ends where a gait is lost.
+        """Return the distances along a series, until a gait is lost; each gait is solved for from the one before.
 
-        start  the walk's start, if whole walks are to be compared too
+        start  start of the walk for a walker, to compare whole walks as well
         """
         found: list[Distance] = []
         for setting in series_of(name, self.every):
@@ -156,13 +156,13 @@ class Limit:
         return found
 
     def gait(self, walker: ContactWalker, near: Cycle, tolerance: float) -> Cycle | None:
-        """The gait on this ground near another one's; None if it is not found."""
+        """Solve for the gait on this ground near that of another setting; None if it fails."""
         pads = OwnPads(lambda _: walker, self.ground, settings(tolerance), near.step.length_m)
         found = gait_near(pads, near.z, 0.0, SEARCH)
         return found if isinstance(found, Cycle) else None
 
     def walked(self, distance: Distance, walker: ContactWalker, start: State) -> Distance:
-        """With the whole walk from the rigid start beside."""
+        """Add the comparison of the whole walk from the rigid start."""
 
         def walk(tolerance: float, sampling: float | None) -> ContactWalkResult:
             how = settings(tolerance)
@@ -196,18 +196,18 @@ class Limit:
 
 
 def motion_of_legs(states: Floats, walker: ContactWalker) -> tuple[Floats, Floats]:
-    """Angles and angular velocities, each (samples, leg), of the legs in states; of legs with knees the thighs'."""
+    """Return angles and angular velocities (samples, leg) of the legs; for kneed legs, of the thighs."""
     upper, half = walker.legs[:, 0], states.shape[1] // 2
     return states[:, 2 + upper], states[:, half + 2 + upper]
 
 
 def settings(tolerance: float) -> Tolerances:
-    """The method at a relative tolerance."""
+    """Return solver settings for a relative tolerance."""
     return Tolerances(METHOD, tolerance, ABSOLUTE * tolerance, BUDGET)
 
 
 def observed_orders(distances: list[Distance]) -> list[float]:
-    """Order with which the period converges along a series, from each three settings in a row."""
+    """Return the order of convergence of the period from each three successive settings."""
     if len(distances) < 3:
         return []
     ratio = distances[1].setting.rigidity / distances[0].setting.rigidity
@@ -219,16 +219,16 @@ def observed_orders(distances: list[Distance]) -> list[float]:
 
 @dataclass(frozen=True)
 class Extrapolation:
-    """The limit of a series' periods, and how far the last two estimates differ (s)."""
+    """Extrapolated limit of the period, and the difference between the last two estimates (s)."""
 
     period: float
     uncertainty: float
 
 
 def extrapolated(distances: list[Distance]) -> Extrapolation | None:
-    """The limit by Aitken's method on the last settings that still tell; None if they do not converge.
+    """Extrapolate the period by Aitken's method from the last resolved settings; None if they do not converge.
 
-    A change of the period below its numerical error tells nothing, and neither does what follows.
+    Settings from the first change of the period below its numerical error on are ignored.
     """
     periods = np.array([one.period for one in distances])
     errors = np.array([one.numerical_period for one in distances])

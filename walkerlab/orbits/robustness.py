@@ -1,11 +1,11 @@
-"""What a gait withstands: its sensitivity to a drop of the floor and to a push, the largest of both, and rough ground.
+"""Robustness of a gait: sensitivity to a floor drop and a push, the largest survivable ones, and rough ground.
 
-Gait sensitivity norm: with z the section's coordinates after a step and e a measure of it, less the gait's,
+Gait sensitivity norm: with z the section's coordinates after a step and e an indicator of it, minus the gait's,
 
     z' = A z + B d,  e' = C z + D d,  norm = sqrt(D^2 + sum over k >= 0 of (C A^k B)^2)
 
-for a disturbance d of one step. A drop leads off the even section for two steps; so the first steps of the sum are
-difference quotients of exact walks, and from the even section on its own derivative carries the rest.
+for a disturbance d of one step. A drop leaves the even section for two steps; the first terms of the sum are therefore
+difference quotients of exact walks, and the even section's derivative gives the rest.
 
 Source: Hobbelen and Wisse, A disturbance rejection measure for limit cycle walkers: the gait sensitivity norm, IEEE
 Transactions on Robotics 23 (2007).
@@ -39,7 +39,7 @@ MOST = 0.5  # of a disturbance, in its unit
 
 
 class Standpoint(NamedTuple):
-    """A gait of one step: its step map at a value, its section coordinates and the derivative there, its units."""
+    """A gait of one step: its step map and parameter, section coordinates, the derivative there, and its units."""
 
     step_map: StepMap
     p: float
@@ -48,12 +48,12 @@ class Standpoint(NamedTuple):
     units: Units
 
     def unit_of(self, disturbance: Disturbance) -> float:
-        """Of a drop (m) or of a push (N s)."""
+        """Return the unit of a drop (m) or of a push (N s)."""
         return self.units.length if disturbance == "floor-drop" else self.units.impulse
 
 
 def slope_of(function: Callable[[float], Floats | None], step: float) -> Floats | None:
-    """The derivative at 0 of a function, to fourth order; one-sided where one side has no value, or else None."""
+    """Differentiate a function at 0 to fourth order; one-sided if one side has no value, None if neither has."""
     for formula in FORMULAS:
         values = [value for offset, _ in formula if (value := function(offset * step)) is not None]
         if len(values) == len(formula):
@@ -62,12 +62,12 @@ def slope_of(function: Callable[[float], Floats | None], step: float) -> Floats 
 
 
 def sensitivity_norm(A: Floats, B: Floats, C: Floats, D: Floats) -> Floats | None:
-    """Norms (indicators,) of e' = C z + D d, z' = A z + B d; None of an unstable gait, whose sum has no end.
+    """Return norms (indicators,) of e' = C z + D d, z' = A z + B d; None for an unstable gait.
 
     A  (d, d)
     B  (d,)
     C  (indicators, d)
-    D  (steps, indicators) changes of the steps before the section carries the rest
+    D  (steps, indicators) changes of the steps before the section's derivative applies
     """
     if np.abs(multipliers_of(A)).max() >= 1.0:
         return None
@@ -80,10 +80,10 @@ def sensitivity_norm(A: Floats, B: Floats, C: Floats, D: Floats) -> Floats | Non
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """How period, length and speed answer a disturbance, SI: (3,) each.
+    """Responses of period, length and speed to a disturbance, SI: (3,) each.
 
     direct  of the disturbed step itself
-    error   of the norm, from difference quotients of two steps
+    error   of the norm, from two step sizes
     """
 
     norm: Floats
@@ -92,25 +92,25 @@ class Sensitivity:
 
 
 def indicators(walk: DisturbedWalk) -> Floats:
-    """(steps, 3) period, length and speed."""
+    """Return period, length and speed (steps, 3)."""
     return np.column_stack((walk.durations_s, walk.lengths_m, walk.lengths_m / walk.durations_s))
 
 
 def disturbed(at: Standpoint, disturbance: Disturbance, size: float, steps: int) -> DisturbedWalk:
-    """A walk from the gait, disturbed in its first step; a drop (m) is down for the rest, a push in N s."""
+    """Walk from the gait with a disturbed first step: a drop (m) that persists, or a push (N s)."""
     if disturbance == "hip-push":
         return at.step_map.disturbed(at.z, at.p, np.zeros(steps + 1), size)
     return at.step_map.disturbed(at.z, at.p, np.append(0.0, np.full(steps, -size)))
 
 
 def sensitivity(at: Standpoint, disturbance: Disturbance) -> Sensitivity | None:
-    """Norms of a gait for a disturbance; None if it is unstable, or steps near it end."""
+    """Return the norms of a gait for a disturbance; None if it is unstable, or neighbouring steps fail."""
     fine, coarse = (response(at, disturbance, times) for times in (1.0, 2.0))
     return None if fine is None or coarse is None else Sensitivity(*fine, np.abs(fine[0] - coarse[0]))
 
 
 def response(at: Standpoint, disturbance: Disturbance, times: float = 1.0) -> tuple[Floats, Floats] | None:
-    """Norms, and what of them is of the disturbed step itself, by difference quotients of `times` the usual step."""
+    """Return the norms and the response of the disturbed step, by differences of `times` the usual step size."""
     d, h = at.z.size, times * at.step_map.probe
 
     def after(size: float) -> Floats | None:
@@ -131,9 +131,9 @@ def response(at: Standpoint, disturbance: Disturbance, times: float = 1.0) -> tu
 
 
 def largest(stands: Callable[[float], bool], unit: float) -> float:
-    """The largest disturbance that is stood with every smaller one.
+    """Return the largest disturbance up to which all smaller ones are survived.
 
-    unit  of the disturbance: the grid is a part of it, and it is not sought beyond half of it
+    unit  of the disturbance: the grid is a fraction of it, and the search stops at half of it
     """
     steps = round(MOST / GRID)
     low = next((k - 1 for k in range(1, steps + 1) if not stands(k * GRID * unit)), steps)
@@ -147,7 +147,7 @@ def largest(stands: Callable[[float], bool], unit: float) -> float:
 
 
 def largest_disturbance(at: Standpoint, disturbance: Disturbance, sign: float, steps: int) -> float:
-    """The largest drop (m) or push (N s) of one sign after which so many more steps are taken; see `largest`."""
+    """Return the largest drop (m) or push (N s) of one sign that is followed by `steps` steps."""
 
     def stands(size: float) -> bool:
         return disturbed(at, disturbance, sign * size, steps + 1).outcome is Outcome.WALKED
@@ -156,16 +156,16 @@ def largest_disturbance(at: Standpoint, disturbance: Disturbance, sign: float, s
 
 
 def steps_on_rough_ground(at: Standpoint, roughness_m: float, seed: tuple[int, ...], most: int) -> int:
-    """Steps of a walk from the gait over footholds of normal heights, `most` if it goes on."""
+    """Count the steps of a walk from the gait over normally distributed heights, at most `most`."""
     return int(at.step_map.disturbed(at.z, at.p, rough_heights(roughness_m, seed, most)).durations_s.size)
 
 
 @dataclass(frozen=True)
 class RoughWalks:
-    """How long walks on rough ground last.
+    """Mean length of walks on rough ground.
 
-    mean_steps, standard_error  as far as they can be told
-    capped                      walks that went on to the last step that was looked at
+    mean_steps, standard_error  as far as the sample allows
+    capped                      walks that reached the maximum number of steps
     method                      all-failed: the mean of all; censored: steps over failures; lower-bound: none failed
     """
 
@@ -177,7 +177,7 @@ class RoughWalks:
 
 
 def rough_walks(steps: Floats, most: int) -> RoughWalks:
-    """What walks of so many steps (walks,) say, those of `most` steps having been cut off."""
+    """Estimate the mean number of steps from walks (walks,) that were stopped at `most` steps."""
     capped = int(np.count_nonzero(steps >= most))
     failed, total = steps.size - capped, float(steps.sum())
     if failed == 0:

@@ -1,7 +1,7 @@
-"""Walks from a start whose two angular velocities are scaled: how far each may change, and the least that walks.
+"""Starts with scaled angular velocities: how far they may change, and the smallest change that walks.
 
-The paper raised both velocities by hand until its contact model walked. Here a start is the pair of factors
-(s_1, s_2) on the velocities of the swing and the stance leg, and (1, 1) is the rigid start as it stands.
+In the paper both velocities were raised by hand until the contact model walked. Here a start is a pair of factors
+(s_1, s_2) on the velocities of swing and stance leg; (1, 1) is the unchanged rigid start.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ OFFSETS = np.array(list(product(range(-ZOOM_CELLS, ZOOM_CELLS + 1), repeat=2)))
 
 
 class StartTrial(NamedTuple):
-    """How a walk from a scaled start went."""
+    """Result of a walk from a scaled start."""
 
     outcome: int
     steps: int
@@ -45,13 +45,13 @@ class StartTrial(NamedTuple):
 
     @property
     def walks(self) -> bool:
-        """Whether it took every step and settled."""
+        """Whether the walk completed and settled."""
         return self.outcome == Outcome.WALKED and self.settled
 
 
 @dataclass(frozen=True)
 class ScaledStarts:
-    """One scene, walked from its start with scaled velocities."""
+    """A scene and its start with scalable velocities."""
 
     walker: ContactWalker
     ground: JudgedGround
@@ -63,22 +63,20 @@ class ScaledStarts:
     tolerances: Tolerances = TOLERANCES
 
     def start(self, swing: float, stance: float) -> State:
-        """The free walker's state with the velocities scaled by these factors."""
+        """Return the free walker's state with velocities scaled by these factors."""
         rates = (swing * a + stance * b for a, b in zip(self.by_swing, self.by_stance, strict=True))
         return (*self.place, *rates)
 
     def walk(self, swing: float, stance: float) -> StartTrial:
-        """Walk from a scaled start."""
         walk = self.walked_from(self.start(swing, stance))
         settled = walk.outcome is Outcome.WALKED and (self.gait is None or self.settled_after(walk) is not None)
         return StartTrial(walk.outcome, walk.touch_time_s.size, settled, int(walk.work[RHS]))
 
     def walked_from(self, start: State) -> ContactWalkResult:
-        """Walk from a state of the free walker."""
         return walk_contact(self.walker, self.ground, False, STANCE_FOOT, start, self.tolerances, self.steps, None)
 
     def settled_after(self, walk: ContactWalkResult) -> int | None:
-        """Steps after which all periods and lengths are the gait's; None if the last step's are not, or without one."""
+        """Return the steps after which all periods and lengths match the gait; None if the last do not."""
         if self.gait is None:
             return None
         period, length = self.gait
@@ -88,7 +86,7 @@ class ScaledStarts:
         return first if first < walk.periods_s.size else None
 
     def coarser(self, rtol: float, atol: float, budget: int) -> ScaledStarts:
-        """The same with other tolerances and no switching points located: what a map can afford."""
+        """Return the same starts at the lower accuracy of a map, without locating switching points."""
         quick = JudgedGround(self.ground.terrain, self.ground.frame._replace(locate_switching=False))
         return replace(self, ground=quick, tolerances=Tolerances(self.tolerances.method, rtol, atol, budget))
 
@@ -100,9 +98,9 @@ def scaled_starts(
     steps: int,
     gait: tuple[float, float] | None,
 ) -> ScaledStarts:
-    """The scaled starts of a scene.
+    """Build the scaled starts of a scene.
 
-    start_of  the free walker's start for the two angular velocities' factors; linear in them
+    start_of  the free walker's start for factors on the two angular velocities; linear in them
     """
     still, swing, stance = start_of(0.0, 0.0), start_of(1.0, 0.0), start_of(0.0, 1.0)
     half = len(still) // 2
@@ -111,7 +109,7 @@ def scaled_starts(
 
 @dataclass(frozen=True)
 class Margin:
-    """How far a start may be scaled one way before it fails."""
+    """How far a start may be scaled in one direction before it fails."""
 
     name: str  # which velocities are scaled, and whether down or up
     factor: float  # the last that walks
@@ -134,10 +132,10 @@ def margins(
     step: float = MARGIN_STEP,
     largest: float = LARGEST_FACTOR,
 ) -> list[Margin]:
-    """How far the velocities of a start that walks may be scaled before it fails, alone and together.
+    """Return how far the velocities of a start that walks may be scaled, alone and together, before it fails.
 
-    step     how far apart factors are tried until one fails; then the last interval is halved
-    largest  factor that is tried
+    step     spacing of factors until one fails; then the last interval is halved
+    largest  maximum factor
     """
     found = []
     for name, *way in DIRECTIONS:
@@ -158,7 +156,7 @@ def margins(
 
 @dataclass(frozen=True)
 class Adjustment:
-    """The smallest change of the two velocities that was found to walk."""
+    """The smallest change of the two velocities found to walk."""
 
     swing: float
     stance: float
@@ -173,10 +171,10 @@ class Adjustment:
 def smallest_change(
     starts: ScaledStarts, quick: ScaledStarts, candidates: np.ndarray, cell: tuple[float, float]
 ) -> Adjustment | None:
-    """The start nearest to (1, 1) that walks, from ever finer grids around the nearest that a map found.
+    """Find the walking start nearest to (1, 1), on successively finer grids around the nearest in a map.
 
-    starts      walks at the config's tolerance: what is returned has walked there
-    quick       starts at the map's
+    starts      at the config's tolerances, which the result satisfies
+    quick       at the map's tolerances
     candidates  (n, 2) factors that walk according to the map
     cell        spacing of the map
     """
@@ -202,7 +200,7 @@ def smallest_change(
 
 @dataclass(frozen=True)
 class StartMap:
-    """Cells over the factors of both velocities; rows are those of the stance leg."""
+    """Results over factors of both velocities; rows are factors of the stance leg."""
 
     swing: Floats  # (columns,) factors on the swing leg's velocity
     stance: Floats  # (rows,) factors on the stance leg's velocity
@@ -212,23 +210,23 @@ class StartMap:
 
     @property
     def walking(self) -> Floats:
-        """(n, 2) factors of the cells that walk and settle."""
+        """Factors (n, 2) of the cells that walk and settle."""
         rows, columns = np.nonzero((self.outcome == Outcome.WALKED) & (self.settled == 1))
         return np.column_stack((self.swing[columns], self.stance[rows]))
 
     def share(self) -> float:
-        """Part of the cells that walk and settle."""
+        """Return the share of cells that walk and settle."""
         return float(self.walking.shape[0]) / self.outcome.size
 
 
 def contact_row(starts: ScaledStarts, swing: Floats, stance: float) -> Integers:
-    """(columns, 3) outcome, steps and whether settled of one row of cells."""
+    """Return outcome, steps and whether settled (columns, 3) for a row of cells."""
     trials = [starts.walk(float(factor), float(stance)) for factor in swing]
     return np.array([(trial.outcome, trial.steps, trial.settled) for trial in trials], np.int64)
 
 
 def rigid_map(walker: Standing, state: State, swing: Floats, stance: Floats, steps: int) -> StartMap:
-    """The same starts in the rigid model, whose ground may also pull: then the outcome is `lifted-off`."""
+    """Compute the same map for the rigid model; where its ground would have to pull, the outcome is `lifted-off`."""
 
     def cell(factor_1: float, factor_2: float) -> tuple[int, int, bool]:
         walk = take_walk(walker, RIGID, with_scaled_rates(walker, state, factor_1, factor_2), steps)
@@ -239,5 +237,5 @@ def rigid_map(walker: Standing, state: State, swing: Floats, stance: Floats, ste
 
 
 def as_map(swing: Floats, stance: Floats, rows: Sequence[Integers]) -> StartMap:
-    """The map of its rows (columns, 3)."""
+    """Assemble the map from its rows (columns, 3)."""
     return StartMap(swing, stance, *np.moveaxis(np.stack(rows), 2, 0))

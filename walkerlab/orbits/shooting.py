@@ -1,8 +1,8 @@
-"""The rigid model's step map, with its exact derivative: steps of the similar walker of unit size.
+"""Step map of the rigid model with its exact derivative, computed on the similar walker of unit size.
 
 A gait's state lies on the section 'both feet on the slope, just after heel strike'. Its coordinates z are the stance
-leg's angle, which the swing leg's follows from, and the velocities of all bodies that turn by themselves then: swing
-leg, stance leg, and a shank whose knee was free during the impact. A compass has (theta_2, dtheta_1, dtheta_2).
+leg's angle, which determines the swing leg's, and the rates of all bodies that turn independently: swing leg, stance
+leg, and a shank whose knee was free during the impact. A compass has (theta_2, dtheta_1, dtheta_2).
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ NEW, NOWHERE = -1, -2  # where a start leads, beside the number of a known gait
 
 
 class StrikeSection(NamedTuple):
-    """The states of a walker just after a heel strike, y = start + z basis, with short directions to be led along."""
+    """States of a walker just after heel strike, y = start + z basis, with scaled-down variational columns."""
 
     walker: Any  # (), the walker as compiled code takes it
     start: Any  # (2 n (1 + d),) the state at z = 0, with its columns
@@ -70,7 +70,7 @@ class StrikeSection(NamedTuple):
 
 @lru_cache(REMEMBERED)
 def section_of(walker: Standing) -> StrikeSection:
-    """The section of a walker, whose legs are straight there."""
+    """Return the section of a walker (its legs are straight there)."""
     straight, at_strike, d = walker.E[STRAIGHT], walker.E[AT_STRIKE], int(walker.coordinates)
     n, places = len(straight), walker.section[:d]
     origin, basis = np.zeros(2 * n), np.zeros((d, 2 * n))
@@ -87,29 +87,29 @@ def section_of(walker: Standing) -> StrikeSection:
 
 
 def on_section(walker: Standing, z: Any) -> State:
-    """The state (2 n) of section coordinates z (d,)."""
+    """Return the state (2 n) at section coordinates z (d,)."""
     return tuple(states_on_section(walker, z).tolist())
 
 
 def states_on_section(walker: Standing, z: Any) -> Floats:
-    """States (n, 2 n) of section coordinates z (n, d), or that of one."""
+    """Return the states (n, 2 n) at section coordinates z (n, d); also takes a single z (d,)."""
     section = section_of(walker)
     return np.asarray(section.start[: len(walker.zero_state)] + np.asarray(z) @ section.basis)
 
 
 def coordinates_of(walker: Standing, y: Any) -> Floats:
-    """The section coordinates (d,) of a state (2 n) just after heel strike."""
+    """Return the section coordinates (d,) of a state (2 n) just after heel strike."""
     return np.asarray(y, float)[walker.section[: walker.coordinates]]
 
 
 class Steps(NamedTuple):
-    """Steps from the section on, those that were taken.
+    """Completed steps from a point of the section.
 
-    outcome  of the last one
+    outcome  of the last step attempted
     time     (steps,) of the heel strikes, in units of the walker
-    z        (steps, d) where each led
-    DP       (steps, d, d) derivatives with respect to where the first began; none if they were not wanted
-    strikes  the heel strikes themselves
+    z        (steps, d) section coordinates after each
+    DP       (steps, d, d) derivatives with respect to the start; empty unless requested
+    strikes  the heel strikes
     """
 
     outcome: Outcome
@@ -120,7 +120,7 @@ class Steps(NamedTuple):
 
 
 class Memory(NamedTuple):
-    """What steps are computed in, with their derivatives."""
+    """Work arrays for steps with their derivatives."""
 
     varied: Any  # method for the equations with a column for each coordinate
     finder: CrossingFinder
@@ -131,10 +131,9 @@ class Memory(NamedTuple):
 
 
 class Shooting(local):
-    """The step map of walkers that are alike, with the memory to evaluate it: each thread has its own."""
+    """Step map of walkers of one kind, with the memory to evaluate it; each thread has its own."""
 
     def __init__(self, like: Standing, tolerances: Tolerances) -> None:
-        """Steps at these tolerances."""
         size, d = len(like.zero_state), int(like.coordinates)
         self.plain, varied = tolerances.new(size), tolerances.new(size * (1 + d))
         finder = finder_for(self.plain, EVENTS, size)
@@ -152,10 +151,10 @@ class Shooting(local):
         nearest: float = 0.0,
         start: Floats | None = None,
     ) -> Steps:
-        """Walk from z (d,), with the derivative if it is wanted: without, it is two thirds of the work.
+        """Walk from z (d,), with the derivative unless `derived` is false, which saves a third of the work.
 
-        rises, nearest  as HeelStrikes has them, in units of the walker; even ground without
-        start           (2 n,) state off the section from which to walk instead, without a derivative
+        rises, nearest  see HeelStrikes, in units of the walker; even ground by default
+        start           (2 n,) state off the section to walk from instead, without a derivative
         """
         memory = self.memory
         method = memory.varied if derived else self.plain
@@ -171,11 +170,11 @@ class Shooting(local):
         return Steps(Outcome(status), strikes.time[:taken], ahead[:, :d], DP, strikes)
 
     def lead(self, section: StrikeSection, gaits: list[tuple[Floats, Floats]], starts: Floats) -> Integers:
-        """Follow starts (starts, d) to where they lead; they are overwritten with the last states tried.
+        """Run Newton's method from starts (starts, d), overwritten with the last states tried.
 
-        gaits  known ones, by state (d,) and derivative (d, d) of the step map there
+        gaits  known gaits, as state (d,) and derivative (d, d) of the step map
 
-        Returns (starts,) the number of the gait that each leads to, NEW for another solution, or NOWHERE.
+        Returns (starts,) the index of the known gait that each converges to, NEW_GAIT for another solution, or NO_GAIT.
         """
         d = starts.shape[1]
         z, DP = np.zeros((len(gaits), d)), np.zeros((len(gaits), d, d))
@@ -187,7 +186,7 @@ class Shooting(local):
 
 
 class KnownGaits(NamedTuple):
-    """Gaits that need not be found again."""
+    """Gaits that the search recognises without solving for them again."""
 
     z: Any  # (gaits, d)
     inverse: Any  # (gaits, d, d) of I - DP there
@@ -195,18 +194,17 @@ class KnownGaits(NamedTuple):
 
 @kernel
 def follow_starts(section: StrikeSection, memory: Memory, known: KnownGaits, starts: Any, led: Any) -> None:
-    """Where Newton's method leads from starts (starts, d), into led (starts,); see `Shooting.lead`."""
+    """Run Newton's method from starts (starts, d), results into `led` (starts,); see `RigidStepper.solve_starts`."""
     for k in range(len(starts)):
         led[k] = follow(section.walker[()], section, memory, known, starts[k])
 
 
 @inlined
 def follow(model: Standing, section: StrikeSection, memory: Memory, known: KnownGaits, z: Any) -> int:
-    """Where Newton's method leads from z (d,), which is overwritten with the last state tried.
+    """Run Newton's method from z (d,), overwritten with the last state tried.
 
-    A move is halved until it makes the residual smaller. A start that does not walk to a heel strike, or comes to
-    stand, is given up. It leads to a known gait if the way there is short and one move with the derivative at that gait
-    leaves a small part of it.
+    A move is halved until it reduces the residual. A start that reaches no heel strike, or stands still, is given up. A
+    known gait is recognised if it is close and one move with its derivative removes most of the distance.
     """
     method, y, places = memory.varied, memory.y, section.places
     (d, size), like = section.basis.shape, model.section
@@ -258,7 +256,7 @@ def follow(model: Standing, section: StrikeSection, memory: Memory, known: Known
 
 
 class RigidMap(StepMap):
-    """The rigid model: its coordinates just after the heel strike, of the similar walker of unit size."""
+    """Step map of the rigid model in section coordinates of the similar walker of unit size."""
 
     monitors = (
         Monitor("min_normal_force_N", "N", "least normal force on the stance foot", 0.0),
@@ -272,12 +270,12 @@ class RigidMap(StepMap):
     def __init__(
         self, walker_at: Callable[[float], Standing | None], scale: float, like: Standing, exact: Tolerances = EXACT
     ) -> None:
-        """A family of walkers.
+        """Prepare the step map of a family of walkers.
 
-        like       one of them
-        exact      tolerances of its steps
-        walker_at  the walker at a value of the parameter; None where it makes no walker
-        scale      magnitude of changes of the parameter that matter
+        walker_at  the walker at a value of the parameter; None where the value makes no walker
+        scale      magnitude of significant changes of the parameter
+        like       any one of the walkers
+        exact      solver settings of a step
         """
 
         @lru_cache(REMEMBERED)
@@ -300,7 +298,6 @@ class RigidMap(StepMap):
         return Shooting(self._like, QUICK)
 
     def step(self, z: Floats, p: float, derived: bool = True) -> MappedStep:
-        """One step, with its exact derivative along the section."""
         unit = self._unit_at(p)
         if unit is None:
             return no_step(None, z.size)
@@ -314,7 +311,7 @@ class RigidMap(StepMap):
         return MappedStep(Outcome.WALKED, ahead, DP, period_s, length_m, angle, period_s)
 
     def watch(self, z: Floats, p: float, steps: int) -> Floats:
-        """Least normal force, largest friction ratio, deepest scuff."""
+        """Return minimum normal force, maximum friction ratio and maximum scuff depth."""
         unit = self._unit_at(p)
         assert unit is not None, "what is watched was walked"
         walker, units = unit.walker, unit.units
@@ -323,7 +320,7 @@ class RigidMap(StepMap):
         return np.array(extremes) * (units.force, 1.0, units.length)
 
     def disturbed(self, z: Floats, p: float, heights_m: Floats, push_N_s: float = 0.0) -> DisturbedWalk:
-        """Walk over footholds (m) from a gait z, after a push just after the heel strike that z is."""
+        """Walk from a gait z over footholds (m), after a push just after the heel strike at z."""
         unit = self._unit_at(p)
         assert unit is not None, "what is disturbed has a gait"
         walker, units, section, start = unit.walker, unit.units, unit.section, np.array(on_section(unit.walker, z))
@@ -338,7 +335,6 @@ class RigidMap(StepMap):
         return DisturbedWalk(walked.outcome, durations, lengths * units.length, walked.z[-1] if walked.z.size else z)
 
     def cost_of_transport(self, z: Floats, p: float) -> float | None:
-        """Of a step of the unit walker, which is that of the walker; None where it ends."""
         unit = self._unit_at(p)
         if unit is None:
             return None
@@ -346,9 +342,10 @@ class RigidMap(StepMap):
         return float(taken.driven.cost_of_transport(taken.lengths_m[0])) if taken.steps else None
 
     def ground_after_push(self, z: Floats, p: float, push_N_s: float, steps: int) -> tuple[float, float]:
-        """What the ground must give for a push at the hip, negative where it would have to pull.
+        """Return the ground's response to a push at the hip; negative values mean that it would have to pull.
 
-        Returns its normal impulse (N s) in the push itself, and the minimum of its normal force (N) in the steps after.
+        The first is its normal impulse (N s) in the push, the second its minimum normal force (N) in the steps after
+        it.
         """
         unit = self._unit_at(p)
         assert unit is not None, "what is pushed has a gait"
@@ -359,19 +356,17 @@ class RigidMap(StepMap):
         return impulse * units.impulse, walked.min_normal_force * units.force
 
     def leg_and_pendulum(self, p: float) -> tuple[float, float]:
-        """Units of the walker at p."""
         unit = self._unit_at(p)
         assert unit is not None, "what is measured has a gait"
         return unit.units.length, unit.units.time
 
     def at(self, tolerances: Tolerances) -> RigidMap:
-        """The same map, its steps integrated otherwise."""
         other = copy(self)
         other.tolerances, other._exact = tolerances, Shooting(self._like, tolerances)
         return other
 
     def iterate(self, z: Floats, p: float, steps: int, tangent: Floats | None) -> Iterates:
-        """A walk of ordinary accuracy, since errors grow on a chaotic attractor whatever they are."""
+        """Walk at moderate accuracy: on a chaotic attractor errors grow whatever the tolerance."""
         unit, none = self._unit_at(p), np.zeros(0)
         if unit is None:
             return Iterates(Outcome.REJECTED, np.zeros((0, z.size)), none, none, none)
@@ -396,7 +391,7 @@ class RigidMap(StepMap):
 
 
 class Similar(NamedTuple):
-    """The unit walker that a walker is similar to, the units, its section, and its feet there."""
+    """The similar unit walker, the units, its section, and its feet there."""
 
     walker: Standing
     units: Units
@@ -406,7 +401,7 @@ class Similar(NamedTuple):
     apart: float  # rad, less the sum of the legs' angles with both feet on the slope
 
     def step_length(self, before: float, after: float) -> float:
-        """Length of a step, by the stance leg's angles just after the heel strikes that begin and end it."""
+        """Return the length of a step from the stance leg's angles just after its first and last heel strike."""
         behind = 0.0  # from the foot that stood to the one that landed
         for start, turning, x, y in self.feet:
             psi = start + after * turning

@@ -1,14 +1,14 @@
-"""The two gaits of a compass walker in the limit of a vanishing slope: where searches for gaits start from.
+"""The two gaits of a compass walker in the limit of a vanishing slope, used as seeds of the search for gaits.
 
 At small angles the swing phase is linear, D(0) ddq = diag(-m b g, K g) q, with one oscillating and one growing mode,
-and the heel strike's map is constant. Two kinds of period-1 motion remain as the slope phi goes to zero.
+and the heel strike is a constant linear map. Two kinds of period-1 motion remain as the slope phi goes to zero.
 
-Long period: the step is symmetric about mid-swing, and both legs turn alike at heel strike, which then changes nothing
-at leading order. What it does lose, M (L omega alpha)^2 / 2 at an angle alpha between the legs, is what the step
-descends, M g L alpha phi; with omega proportional to alpha that makes phi = kappa alpha^3.
+Long period: the step is symmetric about mid-swing, and both legs turn at the same rate at heel strike, which to leading
+order changes nothing. The energy it does lose, M (L omega alpha)^2 / 2 at an angle alpha between the legs, equals the
+descent of a step, M g L alpha phi; omega is proportional to alpha, hence phi = kappa alpha^3.
 
-Short period: the swing foot comes down still moving forward, and all of the motion is proportional to phi. The factor
-grows without bound as the feet's mass vanishes; then this gait, too, loses alpha^2 and grows as the cube root of phi.
+Short period: the swing foot comes down while still moving forward, and the whole motion is proportional to phi. The
+factor grows without bound as the feet's mass vanishes; then this gait also grows as the cube root of phi.
 
 Source: Garcia, Chatterjee, Ruina, Coleman, The simplest walking model: stability, complexity, and scaling, J. Biomech.
 Eng. 120 (1998), section 4 and appendix, here with legs that have mass.
@@ -64,7 +64,7 @@ class Modes(NamedTuple):
 
 
 def linear_modes(walker: Standing) -> Modes | None:
-    """Modes of the swing phase about both legs upright; None if the legs have too little inertia to tell them."""
+    """Return the modes of the swing phase about upright legs; None if the legs have too little inertia."""
     legs, n, level = leg_columns(walker), len(walker.arm_x), on_slope(walker, 0.0)
     inertias, (s, c, F, U, r) = np.empty((n, n)), np.empty((5, n))
     equations(level, level.zero_state, s, c, F, U, inertias, r)
@@ -82,14 +82,14 @@ def linear_modes(walker: Standing) -> Modes | None:
 
 
 def leg_columns(walker: Standing) -> Floats:
-    """Angles (n, 2) of all bodies for a unit angle of the swing leg, and of the stance leg."""
+    """Return the angles (n, 2) of all bodies for a unit angle of the swing leg, and of the stance leg."""
     return np.array([linked(walker, STRAIGHT, unit) for unit in np.eye(len(walker.arm_x))[:2]]).T
 
 
 def seeds(walker: Standing) -> tuple[SmallSlopeSeed, ...]:
-    """The small-slope gaits that `walker` has; its own slope plays no part.
+    """Return the small-slope gaits of `walker`, whatever its own slope.
 
-    Gaits shrink with the slope if upright legs balance.
+    There are none unless upright legs balance, so that gaits shrink with the slope.
     """
     modes = None if walker.kneed or walker.lean != 0.0 or walker.arm_x.any() else linear_modes(walker)
     try:
@@ -103,7 +103,7 @@ def seeds(walker: Standing) -> tuple[SmallSlopeSeed, ...]:
 
 
 def long_period_seed(walker: Standing, modes: Modes) -> SmallSlopeSeed | None:
-    """The symmetric gait at LONG_AMPLITUDE; None if the legs do not come together again before the walker falls."""
+    """Return the symmetric gait at LONG_AMPLITUDE; None if the walker falls before its legs meet again."""
     half = symmetric_half_period(modes)
     if half is None or modes.fall * half > MAX_GROWTH:
         return None
@@ -118,9 +118,9 @@ def long_period_seed(walker: Standing, modes: Modes) -> SmallSlopeSeed | None:
 
 
 def cube_root_seed(name: str, walker: Standing, per_angle: Floats, period: float) -> SmallSlopeSeed:
-    """The gait at LONG_AMPLITUDE whose motion grows as the cube root of the slope.
+    """Return the gait at LONG_AMPLITUDE that grows as the cube root of the slope.
 
-    per_angle  (3,) theta_2 + phi, dtheta_1, dtheta_2 after the heel strike for a unit angle between the legs
+    per_angle  (3,) theta_2 + phi, dtheta_1, dtheta_2 after heel strike per unit angle between the legs
     period     duration of a step, s
     """
     kappa = loss(walker, per_angle)
@@ -131,10 +131,9 @@ def cube_root_seed(name: str, walker: Standing, per_angle: Floats, period: float
 
 @np.errstate(divide="raise", invalid="raise")
 def loss(walker: Standing, per_angle: Floats) -> float:
-    """The slope that makes up for the heel strike's loss, over the cube of the angle between the legs.
+    """Return the slope that balances the heel strike's loss, divided by the cube of the angle between the legs.
 
-    A gait of the limit comes down as it set out, with both legs at the same rates: what its heel strike takes is what
-    descending by a step gives, in the units of the cube of a small angle.
+    In the limit the gait ends a step as it began, with both legs at the same rates.
     """
     flat, angle = on_slope(walker, 0.0), LOSS_ANGLE
     omega = angle * float(per_angle[2])
@@ -147,20 +146,19 @@ def loss(walker: Standing, per_angle: Floats) -> float:
 
 @np.errstate(divide="raise", invalid="raise")
 def after_strike(walker: Standing, state: State) -> Floats:
-    """The state (2 n,) after a heel strike."""
     after = np.zeros(len(state))
     heel_strike(walker, np.array(state), after)
     return after
 
 
 def leg_state(walker: Standing, theta: tuple[float, float], omega: tuple[float, float]) -> State:
-    """The state of straight legs: angles and rates of swing and stance leg, and of what follows them."""
+    """Return the state of straight legs from angles and rates of swing and stance leg."""
     legs = leg_columns(walker)
     return tuple(float(x) for x in (*(legs @ theta), *(legs @ omega)))
 
 
 def symmetric_half_period(modes: Modes) -> float | None:
-    """The first time h > 0 after mid-swing, theta = 0, at which theta_1 + theta_2 = 0 and dtheta_1 = dtheta_2 (s)."""
+    """Return the first time h > 0 (s) after mid-swing with theta_1 + theta_2 = 0 and dtheta_1 = dtheta_2."""
     total, apart = modes.V[0] + modes.V[1], modes.V[0] - modes.V[1]
 
     def mismatch(h: Floats) -> Floats:
@@ -173,7 +171,7 @@ def symmetric_half_period(modes: Modes) -> float | None:
 
 
 def short_period_seed(walker: Standing, modes: Modes, longest: float) -> SmallSlopeSeed | None:
-    """The gait of less than `longest` (s) that is proportional to the slope, or would be; None if there is none."""
+    """Return the gait of period below `longest` (s) proportional to the slope; None if there is none."""
     try:
         conditions = step_conditions(walker, modes)
         period = first_root(lambda t: np.asarray(np.linalg.det(conditions(t)) / t), longest)
@@ -193,10 +191,10 @@ def short_period_seed(walker: Standing, modes: Modes, longest: float) -> SmallSl
 
 
 def step_conditions(walker: Standing, modes: Modes) -> Callable[[Floats], Floats]:
-    """One step of the linearised walker on a slope of one radian, for many durations at once.
+    """Linearise one step on a slope of one radian, for many durations at once.
 
-    Returns a function of durations t (s) that gives matrices (..., 4, 4) on (z, 1): three rows say that t later z is
-    back, one that both feet are down. Their determinant vanishes where they have a solution.
+    Returns a function of durations t (s) that gives matrices (..., 4, 4) on (z, 1): three rows require that z repeats
+    after t, one that both feet are down. A solution exists where the determinant vanishes.
     """
     flat, n = on_slope(walker, 0.0), len(walker.arm_x)
     swing, fall, inverse = modes.swing, modes.fall, np.linalg.inv(modes.V)
@@ -232,7 +230,7 @@ def step_conditions(walker: Standing, modes: Modes) -> Callable[[Floats], Floats
 
 
 def first_root(f: Callable[[Floats], Floats], longest: float) -> float | None:
-    """The smallest root of f in (0, longest), bracketed by samples ever closer; None if f keeps its sign."""
+    """Return the smallest root of f in (0, longest) by successively finer samples; None if f keeps its sign."""
     # the end itself is left out: there the short gait's conditions degenerate into the long one's
     samples = longest * np.arange(1, SCAN) / SCAN
     while True:

@@ -1,4 +1,4 @@
-"""From a config to the least that can walk it on compliant ground."""
+"""Build the contact model of a config, leaving out everything that the config does not need."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ FULL_STOP_DAMPING = 1e-5  # rad into a compliant knee stop from which on its dam
 
 @dataclass(frozen=True)
 class ContactScene(WalkerOnGround):
-    """A walker on the ground, ready to walk."""
+    """A walker on compliant ground, ready to walk."""
 
     pinned: bool  # whether the stance foot of the first step is hinged
     pitch_m: float
@@ -56,7 +56,7 @@ class ContactScene(WalkerOnGround):
     ) -> ContactWalkResult:
         """Walk up to `steps` steps from a state (4 + 2 n) of the free walker, see `walk_contact`.
 
-        heights  (footholds,) m over the slope, the start's first; even ground without
+        heights  (footholds,) m over the slope, beginning with the start's; even ground by default
         """
         even = self.ground.terrain
         ground = self.ground if heights is None else self.ground._replace(terrain=even._replace(heights=heights))
@@ -64,9 +64,9 @@ class ContactScene(WalkerOnGround):
 
 
 def contact_scene(config: ContactConfig, rigid_step_length_m: float, own_pitch_m: float | None = None) -> ContactScene:
-    """The scene of a config with a contact block.
+    """Build the scene of a config with a contact block.
 
-    rigid_step_length_m  step length of the rigid gait: what pads and steps are measured by
+    rigid_step_length_m  step length of the rigid gait, the reference length of pads and terrain
     own_pitch_m          step length of the contact gait, for `pad_pitch: own`
     """
     contact = with_contact(config)
@@ -80,7 +80,7 @@ def contact_scene(config: ContactConfig, rigid_step_length_m: float, own_pitch_m
 
 
 def tolerances_of(config: GroundConfig, steps: int) -> Tolerances:
-    """Return the config's tolerances for a walk of at most `steps` steps."""
+    """Return the config's solver settings for a walk of at most `steps` steps."""
     settings = config.solver.contact
     return Tolerances(settings.method, settings.rtol, settings.atol, steps * BUDGET_PER_STEP)
 
@@ -88,9 +88,9 @@ def tolerances_of(config: GroundConfig, steps: int) -> Tolerances:
 def scene_on_pads(
     config: ContactConfig, rigid_step: float, rigid_state: State, answer: GaitAnswer | None = None
 ) -> ContactScene:
-    """Return the config's scene with its pads laid; raises NoAnswer if they follow a contact gait and there is none.
+    """Build the config's scene with pads laid; raises NoAnswer if they need a contact gait and there is none.
 
-    answer  of a search for that gait; None to search here
+    answer  of a search for that gait; by default it is searched for
     """
     own = None
     if wants_own_pitch(with_contact(config)):
@@ -102,13 +102,13 @@ def scene_on_pads(
 
 
 def with_drives(walker: ContactWalker, config: ContactConfig) -> ContactWalker:
-    """The walker with what drives it in a config."""
+    """Return the walker with the drives of a config."""
     pulse = {"push_off_duration": config.push_off.duration_s} if config.push_off.impulse_N_s != 0.0 else {}
     return changed_forms(walker, **drive_numbers(config), **pulse)
 
 
 def knee_rules(walker: AnyWalker) -> KneeRules:
-    """How the knees of a walker lock and are released; straight legs have none."""
+    """Return how a walker's knees lock and release; straight legs have no such rules."""
     if not isinstance(walker, Kneed | PartsWalker):
         return KneeRules()
     knee = walker.knee
@@ -127,23 +127,23 @@ TERRAINS: dict[str, Callable[[float], Terrain]] = {
 
 
 def with_contact(config: ContactConfig) -> Contact:
-    """The contact block; ValueError if there is none."""
+    """Return the contact block; raises ValueError without one."""
     if config.contact is None:
         raise ValueError("this config has no contact block")
     return config.contact
 
 
 def contact_gait(config: ContactConfig, rigid_step_length_m: float, rigid_state: State) -> GaitAnswer:
-    """The contact model's own gait on pads of its own step length, searched for from a rigid start state.
+    """Find the contact model's gait on pads of its own step length, from a rigid start state.
 
-    rigid_step_length_m  what the pads are laid for to begin with
+    rigid_step_length_m  initial pad pitch
     """
     scene = replace(contact_scene(config, rigid_step_length_m, rigid_step_length_m), pinned=False)
     return find_gait_from(scene.walker, scene.ground, GAIT, start_state(scene, rigid_state))
 
 
 def gait_off_pads(config: Config, rigid_step_length_m: float, rigid_state: State) -> GaitAnswer:
-    """`contact_gait` on a plane that lets scuffing feet through where the config has pads."""
+    """Find `contact_gait` on a plane that lets scuffing feet through, in place of pads."""
     contact = with_contact(config)
     if contact.terrain == "checkerboard":
         config = config.model_copy(update={"contact": contact.model_copy(update={"terrain": "after-mid-swing"})})
@@ -151,12 +151,12 @@ def gait_off_pads(config: Config, rigid_step_length_m: float, rigid_state: State
 
 
 def wants_own_pitch(contact: Contact) -> bool:
-    """Whether there are pads, to be laid for the contact gait's own step length."""
+    """Whether pads must be laid for the contact gait's own step length."""
     return contact.terrain == "checkerboard" and contact.pad_pitch == "own"
 
 
 def pads_pitch(contact: Contact, rigid_step_length_m: float, own_pitch_m: float | None) -> float:
-    """Pitch of the pads (m); on a plane the rigid step length, by which steps are judged."""
+    """Return the pad pitch (m); on a plane the rigid step length, the reference length of the terrain."""
     if contact.terrain != "checkerboard" or contact.pad_pitch == "rigid":
         return rigid_step_length_m
     if contact.pad_pitch == "own":
@@ -167,15 +167,14 @@ def pads_pitch(contact: Contact, rigid_step_length_m: float, own_pitch_m: float 
 
 
 def normal_law(contact: Contact) -> NormalLaw:
-    """The normal force in SI."""
     si = contact.in_si()
     return NormalLaw(si.stiffness, si.exponent, si.damping, si.full_damping_penetration)
 
 
 def friction_law(contact: Contact) -> FrictionLaw:
-    """The friction in SI; no friction is a law of its own, not a coefficient of zero.
+    """Return the friction law in SI; frictionless contact is a law of its own, not a zero coefficient.
 
-    Raises ConfigError for a law that somebody has added and left incomplete.
+    Raises ConfigError for a law added by a user that is incomplete.
     """
     try:
         return law_named(contact.friction, contact.in_si())
@@ -184,12 +183,12 @@ def friction_law(contact: Contact) -> FrictionLaw:
 
 
 def start_state(scene: ContactScene, rigid_state: State) -> State:
-    """The walker with the rigid start state, its stance foot just touching at along = 0, at rest and rolling.
+    """Return the walker in the rigid start state, its stance foot just touching at along = 0 and rolling.
 
-    rigid_state  of the rigid model, both feet on the slope; of a compass (theta_1 swing, theta_2 stance, dtheta_1,
+    rigid_state  of the rigid model, both feet on the slope; for a compass (theta_1 swing, theta_2 stance, dtheta_1,
                  dtheta_2)
 
-    The hinge at the ball's centre gives position and velocity; then the ball rolls without slip instead of turning
+    The hinge at the ball's centre gives position and velocity; the ball then rolls without slip instead of turning
     about its centre.
     """
     walker = scene.walker
@@ -205,13 +204,13 @@ def start_state(scene: ContactScene, rigid_state: State) -> State:
 
 
 def resting(scene: ContactScene) -> RestingFoot:
-    """How the walker stands on one foot."""
+    """Return the equilibrium of the walker standing on one foot."""
     walker, law = scene.walker, scene.walker.normal
     return resting_foot(walker.mass * walker.gravity, walker.mass, law.stiffness, law.exponent, law.damping)
 
 
 def scene_measures(scene: ContactScene) -> dict[str, Any]:
-    """What the scene derives from the config, SI, for summaries."""
+    """Return derived quantities of the scene, SI, for summaries."""
     foot = resting(scene)
     return {
         "static_penetration_m": foot.depth,

@@ -1,4 +1,4 @@
-"""What ended walks and what that has to do with the ground, in words: pads that end them are no limit of a walker's."""
+"""Describe how walks ended and whether the ground is the cause: pads that end a walk do not limit the walker."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ Range = tuple[float, float]
 class Pads:
     """Pads on which walks ended.
 
-    pitch_m  least and largest of the walks, m
-    step_m   least and largest length of the last steps that they took, m; None if unknown
+    pitch_m  minimum and maximum over the walks, m
+    step_m   minimum and maximum length of their last steps, m; None if unknown
     laid     the config's `contact.pad_pitch`, if all have the same
     """
 
@@ -43,13 +43,14 @@ class Pads:
 def endings(
     outcomes: Mapping[str, int], config: ContactConfig, contact: bool, pads: Pads | None = None
 ) -> list[dict[str, Any]]:
-    """How many walks ended how, the most frequent first, those that walked aside.
+    """Count and describe the walks that ended early, the most frequent outcome first.
 
-    outcomes  how many walks ended in each way; what is no walk's outcome does not count
-    contact   whether they were the contact model's
+    outcomes  number of walks by outcome; other keys are ignored
+    contact   whether the contact model walked
     pads      on which walks ended off-pad
 
-    Returns for each `outcome`, `walks`, `of`, whether the `ground` has to do with it, and all that in words: `said`.
+    Returns rows of `outcome`, `walks`, `of` (their total), `ground` (whether it is a cause) and `said` (the
+    description).
     """
     total = sum(walks for outcome, walks in outcomes.items() if outcome_of(outcome) is not None)
     rows = []
@@ -64,7 +65,7 @@ def endings(
 
 
 def causes(outcome: str, config: ContactConfig, contact: bool, pads: Pads | None = None) -> list[str]:
-    """What the ground has to do with an outcome, in sentences; none where it has nothing to do with it."""
+    """Return sentences on how the ground caused an outcome; empty if it did not."""
     if not contact or config.contact is None:
         return []
     if outcome != "off-pad":
@@ -78,11 +79,10 @@ def causes(outcome: str, config: ContactConfig, contact: bool, pads: Pads | None
 
 
 def without_pads(config: ContactConfig) -> str:
-    """The setting for ground on which no pad ends a walk: legs with knees clear a plane."""
+    """Return the setting for ground without pads; kneed legs clear a plane."""
     return f"contact.terrain={'plane' if isinstance(config.walker, Kneed) else 'after-mid-swing'}"
 
 
 def metres(lengths: Range) -> str:
-    """Lengths in words."""
     least, most = (f"{one:.3g}" for one in lengths)
     return f"{least} m" if least == most else f"{least} to {most} m"

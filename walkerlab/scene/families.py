@@ -1,4 +1,4 @@
-"""From a config and a parameter to the step maps that its families of gaits are followed on."""
+"""Build the step maps of a config over a parameter, on which families of gaits are followed."""
 
 from __future__ import annotations
 
@@ -26,26 +26,25 @@ NEARBY = 1e-3  # of a number: another value at which a model that reads it is an
 
 
 def rigid_walkers(config: ContactConfig, parameter: Parameter) -> Callable[[float], Standing | None]:
-    """The rigid walker at a value of the parameter; None where the config refuses the value."""
+    """Return the rigid walker as a function of the parameter; None where the config refuses the value."""
     return parameter.over(config, rigid_walker)
 
 
 def rigid_map(config: ContactConfig, parameter: Parameter, scale: float) -> RigidMap:
-    """The rigid model's step map over the parameter."""
     return RigidMap(rigid_walkers(config, parameter), scale, rigid_walker(config))
 
 
 def walkers_on_ground(
     config: ContactConfig, parameter: Parameter, step_length_m: float
 ) -> Callable[[float], WalkerOnGround | None]:
-    """The contact model at a value of the parameter, steps judged by a length; None where the config refuses it."""
+    """Return the contact model as a function of the parameter, for a reference step length."""
     from walkerlab.scene.contact import contact_scene
 
     return parameter.over(config, lambda changed: contact_scene(changed, step_length_m, step_length_m))
 
 
 def contact_map(config: ContactConfig, parameter: Parameter, scale: float, step_length_m: float) -> ContactMap:
-    """The contact model's step map over the parameter; steps are judged by a length (m)."""
+    """Return the contact model's step map over the parameter, for a reference step length (m)."""
     from walkerlab.orbits.contact_map import ContactMap
     from walkerlab.scene.contact import contact_scene
 
@@ -55,7 +54,7 @@ def contact_map(config: ContactConfig, parameter: Parameter, scale: float, step_
 
 
 def differs(model: str, config: ContactConfig, parameter: Parameter, values: tuple[float, float]) -> bool:
-    """Whether a model, rigid or contact, is another one at another value of the parameter."""
+    """Whether a model, rigid or contact, differs between two values of the parameter."""
     walkers: Callable[..., Callable[[float], Any]] = (
         rigid_walkers if model == "rigid" else partial(walkers_on_ground, step_length_m=1.0)
     )
@@ -64,7 +63,7 @@ def differs(model: str, config: ContactConfig, parameter: Parameter, values: tup
 
 
 def numbers_in(value: Any) -> Iterator[Any]:
-    """All that a record and the records in it are made of."""
+    """Yield the leaves of a record and its nested records."""
     if isinstance(value, tuple) or is_dataclass(value):
         for one in value if isinstance(value, tuple) else vars(value).values():
             yield from numbers_in(one)
@@ -73,7 +72,7 @@ def numbers_in(value: Any) -> Iterator[Any]:
 
 
 def reads(model: str, config: ContactConfig, key: str) -> bool:
-    """Whether a number of the config makes a difference to a model, as far as the config allows another value."""
+    """Whether a config parameter affects a model, as far as the config allows other values."""
     parameter = parameter_of(key, config)
     value = parameter.value_in(config)
     beside = (value + sign * NEARBY * (abs(value) or 1.0) for sign in (1.0, -1.0))
@@ -82,7 +81,7 @@ def reads(model: str, config: ContactConfig, key: str) -> bool:
 
 
 def not_read(where: str, key: str, models: Sequence[str]) -> ConfigError:
-    """The error of a question, asked by some key of the config, about a number that none of the models reads."""
+    """Return the error for a request, made by the config key `where`, about a parameter that no model uses."""
     return ConfigError(
         f"{where}: {key} does not touch the {' or the '.join(models)} model",
         "Choose a key that the model is made of, or another model (--model).",

@@ -1,7 +1,7 @@
-"""What the scene of a config does without: what, why, and what that saves.
+"""List what the scene of a config does not compute, why, and what that saves.
 
-Known from the config alone, so that it can be said before anything is loaded or run. How much each saves in time and
-bytes is measured by scripts/benchmark.py (docs/performance.md).
+The list follows from the config alone, so it is available before anything is loaded or run. scripts/benchmark.py
+measures the savings in time and bytes (docs/performance.md).
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ STILL_COMPUTED = "still being computed"
 
 @dataclass(frozen=True)
 class LeftOut:
-    """Something that was not computed, why, and what that saves, if anything but the work itself."""
+    """Something that was not computed, why, and what that saves besides the work itself."""
 
     what: str
     why: str
@@ -40,7 +40,7 @@ CONTACT_NUMBERS: Mapping[Output, int] = {"states": 10, "energies": 8, "forces": 
 
 
 def of_rigid_walk(config: SimulateConfig) -> tuple[Entry, ...]:
-    """What the rigid model's walk does without."""
+    """List omissions of the rigid walk."""
     return (
         of_stance(config),
         *of_legs(config),
@@ -49,7 +49,7 @@ def of_rigid_walk(config: SimulateConfig) -> tuple[Entry, ...]:
 
 
 def of_stance(config: RigidConfig) -> Entry:
-    """What the rigid model's stance foot does without: a compass stands on a point, other walkers may roll."""
+    """Return the omission at the rigid stance foot: a compass pivots on a point, other walkers may roll."""
     if config.walker.type == "compass":
         return left_out(
             "floating base, stance contact and foot radius of the rigid walk",
@@ -64,7 +64,7 @@ def of_stance(config: RigidConfig) -> Entry:
 
 
 def of_contact_walk(config: ContactSimConfig) -> tuple[Entry, ...]:
-    """What the contact model's walk does without."""
+    """List omissions of the contact walk."""
     contact = config.contact
     found = [left_out("force law of a foot out of reach", "no ground touches it", "one of two while a foot swings")]
     if contact is not None and not contact.has_friction:
@@ -82,21 +82,20 @@ def of_contact_walk(config: ContactSimConfig) -> tuple[Entry, ...]:
 
 
 def angles_of_a_step(walker: Walker) -> int:
-    """How many angles a step's motion has; a stop that has latched keeps the stance shank's."""
+    """Return the number of angles during a step; with a compliant knee stop the stance shank has its own."""
     from walkerlab.config.walkers import rigid_bodies  # not for the help of the command line
 
     return rigid_bodies(walker) + int(walker.type == "kneed" and walker.knee.lock == "compliant")
 
 
 def of_legs(config: RigidConfig) -> Iterator[Entry]:
-    """What legs without inertia do without."""
     if getattr(config.walker, "leg_inertia_kg_m2", None) == 0.0:
         saved = "nothing: it is summed into constants before anything runs"
         yield left_out("leg inertia", "walker.leg_inertia_kg_m2 is 0", saved)
 
 
 def of_outputs(wanted: tuple[Output, ...], model: str, numbers: Mapping[Output, int]) -> Iterator[Entry]:
-    """What is not computed along the walk since nobody asks for it."""
+    """Yield the outputs that were not requested."""
     for output, count in numbers.items():
         if output not in wanted:
             what, why = f"{output} of the {model} walk in time", f"outputs does not ask for {output}"
@@ -106,5 +105,4 @@ def of_outputs(wanted: tuple[Output, ...], model: str, numbers: Mapping[Output, 
 
 
 def left_out(what: str, why: str, saves: str) -> Entry:
-    """An entry as `--json` prints it."""
     return {"what": what, "why": why, "saves": saves}

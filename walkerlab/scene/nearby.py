@@ -1,7 +1,7 @@
-"""Where a walker without a gait has one: with its feet ahead of its shanks, and on other slopes.
+"""Suggest changes that give a walker a gait: its feet ahead of its shanks, or another slope.
 
-A kneed walker is tried with its feet a little ahead, where those of real ones are. On a few slopes a gait is sought,
-and its branch followed over the slope.
+A kneed walker is tried with its feet slightly ahead of the shanks, as in real machines. On a few slopes a gait is
+searched for, and its branch is followed over the slope.
 """
 
 import math
@@ -35,20 +35,20 @@ FEET_AHEAD = (0.02, 0.03, 0.04, 0.05)  # of a kneed walker, in leg lengths
 
 @dataclass(frozen=True)
 class Met:
-    """Gaits that were met: over which values they go on, and over which they are stable too; None if nowhere."""
+    """A range of slopes with gaits, and the part of it where they are stable; None if nowhere."""
 
     whole: tuple[float, float]
     stable: tuple[float, float] | None
 
     def value_towards(self, wanted: float) -> float:
-        """One of the values, of stable gaits if there are any: a little inside of the end that is nearer."""
+        """Return a slope slightly inside the nearer end of the range, of stable gaits if there are any."""
         low, high = self.stable or self.whole
         near, far = (low, high) if abs(low - wanted) < abs(high - wanted) else (high, low)
         return near + INSIDE * (far - near)
 
 
 def gaits_on_other_slopes(config: Config) -> Met | None:
-    """The range of slopes (rad) nearest to the config's own on which it has a gait, stable ones before others."""
+    """Return the nearest range of slopes (rad) with gaits, stable ones first; None if none is found."""
     own = config.slope_rad
     span = ValueSpan(0.02 * own, min(STEEPEST, max(3.0 * own, STEEP)))
     found: list[Met] = []
@@ -59,12 +59,11 @@ def gaits_on_other_slopes(config: Config) -> Met | None:
 
 
 def distance(span: tuple[float, float], value: float) -> float:
-    """How far a value is from a range."""
     return max(span[0] - value, value - span[1], 0.0)
 
 
 def followed(walker_at: Callable[[float], Standing | None], span: ValueSpan, value: float) -> tuple[GaitBranch, ...]:
-    """The branches over a span of the gaits that a walker has at a value."""
+    """Return the branches over a span through the gaits of a walker at a value."""
     walker = walker_at(value)
     if walker is None:
         return ()
@@ -74,7 +73,7 @@ def followed(walker_at: Callable[[float], Standing | None], span: ValueSpan, val
 
 
 def walkable(branches: tuple[GaitBranch, ...]) -> Iterator[Met]:
-    """Stretches of branches on which the ground need not pull, and where on them gaits are stable."""
+    """Yield ranges of branches where the ground need not pull, and where gaits on them are stable."""
     for branch in branches:
         good = [point for point in branch.points if point.monitors[0] >= 0.0]
         if len(good) < 2:
@@ -86,9 +85,9 @@ def walkable(branches: tuple[GaitBranch, ...]) -> Iterator[Met]:
 
 
 def nearby(config: Config, typed: str = "") -> str:
-    """Where gaits exist near a config that has none, with the commands that show them: in words.
+    """Describe where gaits exist near a config without one, with the commands that show them.
 
-    typed  the options that say which config it is, with a blank in front
+    typed  command-line options that select the config, with a leading space
     """
     if config.slope_rad <= 0.0:
         return ""
@@ -112,7 +111,7 @@ def nearby(config: Config, typed: str = "") -> str:
 
 
 def gait_with_feet_ahead(config: Config) -> tuple[float, RigidGait] | None:
-    """The stablest gait of a kneed walker with its feet ahead of the shanks, and how far (m); None without one."""
+    """Return the most stable gait of a kneed walker with its feet ahead, and how far ahead (m); None without one."""
     found = []
     for ahead_m in feet_ahead(config):
         walker = walker_or_none(Parameter(f"walker.{AHEAD}", "m", ("walker", AHEAD)).config_at(config, ahead_m))
@@ -122,20 +121,20 @@ def gait_with_feet_ahead(config: Config) -> tuple[float, RigidGait] | None:
 
 
 def feet_ahead(config: Config) -> tuple[float, ...]:
-    """How far ahead (m) feet are tried: those of a kneed walker, whose feet belong ahead of its shanks."""
+    """Return the foot positions (m ahead of the shank) to try; none for straight legs."""
     if not isinstance(config.walker, Kneed):
         return ()
     return tuple(float(f"{share * config.walker.leg_length_m:.3g}") for share in FEET_AHEAD)
 
 
 def with_feet_ahead(config: Config) -> str:
-    """The feet that were tried, as the end of a sentence; empty if there are none."""
+    """Describe the foot positions tried, as the end of a sentence; empty for straight legs."""
     tried = feet_ahead(config)
     return f", nor with feet {tried[0]:g} to {tried[-1]:g} m ahead of the shanks (walker.{AHEAD})" if tried else ""
 
 
 def begin_with(config: Config) -> str:
-    """Which built-in walkers of the same type to begin with, as a sentence; empty without one."""
+    """Suggest built-in walkers of the same type; empty without one."""
     alike = [name for name in builtin_names() if load(Path(name)).config.walker.type == config.walker.type]
     if not alike:
         return ""

@@ -1,4 +1,4 @@
-"""A number of the config as the parameter of a family of walkers: its key, its unit, and the config at a value."""
+"""A config key as the parameter of a family of walkers: its unit, its value, and the config at other values."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -23,9 +23,9 @@ PHYSICAL = tuple(keys_of(ContactConfig))
 
 @dataclass(frozen=True)
 class Parameter:
-    """A key of the config that changes.
+    """A config key that varies.
 
-    key   dotted, as it was asked for
+    key   dotted, as requested
     unit  of its values
     """
 
@@ -34,19 +34,18 @@ class Parameter:
     path: tuple[str, ...]
 
     def value_in(self, config: ContactConfig) -> float:
-        """What the config has there."""
         found = held(config, self.path)
         return math.degrees(found) if self.key == SLOPE_DEG else float(found)
 
     def config_at(self, config: ContactConfig, value: float) -> Config | None:
-        """The config with another value there and all that follows from it; None if the schema refuses it."""
+        """Return the config at another value, with everything that follows from it; None if the schema refuses it."""
         try:
             return self._changed(config, value)
         except ValidationError:
             return None
 
     def refusal(self, config: ContactConfig, value: float, key: Key) -> ConfigError:
-        """What to raise where a key of the config asks for a value that the schema refuses: with its reason."""
+        """Return the error for a value that the schema refuses, requested by the config key `key`, with the reason."""
         why = ""
         try:
             self._changed(config, value)
@@ -72,7 +71,7 @@ class Parameter:
         return Config.model_validate(data)
 
     def over(self, config: ContactConfig, make: Callable[[Config], R]) -> Callable[[float], R | None]:
-        """What is made of the config, at a value of the parameter; None where the schema refuses the value."""
+        """Return `make(config)` as a function of the parameter's value; None where the schema refuses the value."""
 
         def at(value: float) -> R | None:
             changed = self.config_at(config, value)
@@ -85,7 +84,7 @@ SLOPE = Parameter(SLOPE_RAD, "rad", (SLOPE_RAD,))
 
 
 def _as_given(value: Any) -> Any:
-    """A block as the keys that were given, so that defaults which follow from others are made anew."""
+    """Return only the keys set in a block, so that defaults that depend on others are recomputed."""
     if not isinstance(value, Block):
         return value
     given = value.model_dump(exclude_unset=True)
@@ -93,14 +92,14 @@ def _as_given(value: Any) -> Any:
 
 
 def dotted(key: Key) -> str:
-    """A key's path as messages have it; an item of a list belongs to the list's key."""
+    """Join a key's path as messages show it; an item of a list belongs to the list's key."""
     return ".".join(part for part in key if isinstance(part, str))
 
 
 def parameter_of(key: str, config: ContactConfig, asker: Key = ()) -> Parameter:
-    """The parameter of a key of the config's own walker; ConfigError if it is no number that a model is made of.
+    """Return the parameter of a key of the config; raises ConfigError if it is not a number that a model uses.
 
-    asker  the key of the config that names it, if one does
+    asker  the config key that names it, if any
     """
     if key == SLOPE_DEG:
         return Parameter(key, "deg", (SLOPE_RAD,))
@@ -116,7 +115,7 @@ _ADVICE = "Name a number that the walker, its slope or its ground is made of; `w
 
 
 def why_no_parameter(key: str, config: ContactConfig, own: Mapping[str, FieldInfo]) -> str:
-    """Why a key is no number that a model of the config is made of; empty if it is.
+    """Return why a key is not a number that a model of the config uses; empty if it is.
 
     own  the keys of the config, of its own walker's type
     """
@@ -142,7 +141,7 @@ def why_no_parameter(key: str, config: ContactConfig, own: Mapping[str, FieldInf
 
 
 def likely(key: str, own: Mapping[str, FieldInfo]) -> str:
-    """A guess at the key that is meant, in words."""
+    """Suggest the key that was probably meant."""
     numbers = [
         name
         for name, field in own.items()

@@ -1,4 +1,4 @@
-"""From the walker of a config to the parts that both models are made of."""
+"""Build the parts of a config's walker, shared by both models."""
 
 from typing import Any
 
@@ -14,11 +14,9 @@ AnyWalker = CompassWalker | StraightLegs | Kneed | PartsWalker
 
 
 def assembly_of(walker: AnyWalker, rigid: bool = False) -> Assembly:
-    """The parts of a walker.
+    """Return the parts of a walker; raises ConfigError if they make no walker.
 
     rigid  for the rigid model, where a compass has point feet
-
-    Raises ConfigError for parts that make no walker.
     """
     if isinstance(walker, CompassWalker):
         leg = Limb(walker.leg_length_m, walker.leg_mass_kg, walker.mass_to_hip_m, 0.0, walker.leg_inertia_kg_m2)
@@ -39,10 +37,10 @@ def assembly_of(walker: AnyWalker, rigid: bool = False) -> Assembly:
 
 
 def hip_mass(walker: CompassWalker | StraightLegs, rigid: bool) -> float:
-    """The mass at the hip of straight legs (kg).
+    """Return the mass at the hip of straight legs (kg).
 
-    On compliant ground legs that are point masses need some there: side by side they turn about their masses and take a
-    hip without mass along at no cost, so that no acceleration follows from the forces as they pass each other.
+    On compliant ground, legs that are point masses need a hip mass: when side by side they turn about their masses and
+    move a massless hip freely, so that the forces do not determine its acceleration.
     """
     if rigid:
         return walker.hip_mass_kg
@@ -51,7 +49,7 @@ def hip_mass(walker: CompassWalker | StraightLegs, rigid: bool) -> float:
 
 
 def own_parts(walker: PartsWalker) -> Assembly:
-    """The parts that a config lists; ConfigError, in words, if they do not fit together."""
+    """Return the parts listed in a config; raises ConfigError if they do not fit together."""
     try:
         return Assembly(
             bodies=tuple(Body(**dict(body)) for body in walker.bodies),
@@ -67,12 +65,12 @@ def own_parts(walker: PartsWalker) -> Assembly:
 
 
 def drive_numbers(config: RigidConfig) -> dict[str, Any]:
-    """What drives the walker of a config, by the names that both models have for it."""
+    """Return the drive parameters of a config, by the names that both models use."""
     hip = config.walker.hip
     numbers = tuple(dict(hip).values())
     return {"driven_hip": hip != Hip(), "hip": numbers, "push_off": config.push_off.impulse_N_s}
 
 
 def knee_locked_at_strike(walker: AnyWalker) -> bool:
-    """Whether the trailing knee is rigid during the heel strike."""
+    """Whether the trailing knee is rigid during heel strike."""
     return not isinstance(walker, Kneed | PartsWalker) or walker.knee.at_heel_strike == "locked"

@@ -1,4 +1,4 @@
-"""From a config to the least that can walk the rigid model."""
+"""Build the rigid model of a config, leaving out everything that the config does not need."""
 
 from __future__ import annotations
 
@@ -45,13 +45,13 @@ class RigidScene:
         advance: Callable[[int], None] | None = None,
         step_length: float | None = None,
     ) -> RigidWalkResult:
-        """Walk up to `steps` steps from a state (2 n); `sampled` if anything in time is wanted. See `take_walk`."""
+        """Walk up to `steps` steps from a state (2 n); `sampled` to record the requested outputs. See `take_walk`."""
         heights, sampled = foothold_heights(self.ground, steps), sampled and bool(self.outputs)
         return take_walk(self.walker, tolerances, start, steps, sampled, advance, heights, step_length)
 
 
 def rigid_scene(config: RigidConfig, ground: Footholds, outputs: tuple[Output, ...]) -> RigidScene:
-    """The walker of a config on a ground, with what in time is wanted."""
+    """Build the scene of a config on a ground, with the outputs to record."""
     return RigidScene(
         walker=rigid_walker(config),
         names=coordinates(config),
@@ -62,19 +62,18 @@ def rigid_scene(config: RigidConfig, ground: Footholds, outputs: tuple[Output, .
 
 
 def rigid_walker(config: RigidConfig, equations: Equations | None = None) -> Standing:
-    """Return the walker of a config, moving by its own set of equations or by another one."""
+    """Return the walker of a config, with its own set of equations or another one."""
     passive = on_slope(level_walker(config.walker, config.gravity_m_s2), config.slope_rad)
     return moved_by(passive.changed(**drive_numbers(config)), equations or config.equations)
 
 
 def walker_or_none(config: RigidConfig | None) -> Standing | None:
-    """The walker of a config; None where there is no config."""
     return None if config is None else rigid_walker(config)
 
 
 @lru_cache(REMEMBERED)
 def level_walker(walker: Walker, gravity: float) -> Standing:
-    """A described walker on level ground; gravity in m/s^2. ConfigError for parts that make no walker."""
+    """Return a walker on level ground (gravity in m/s^2); raises ConfigError for parts that make no walker."""
     try:
         return on_level_ground(assembly_of(walker, rigid=True), gravity, knee_locked_at_strike(walker))
     except ValueError as error:
@@ -82,6 +81,6 @@ def level_walker(walker: Walker, gravity: float) -> Standing:
 
 
 def coordinates(config: RigidConfig) -> tuple[str, ...]:
-    """Names of the numbers of the rigid model's state."""
+    """Return the names of the rigid model's state variables."""
     angles = tuple(f"theta_{name}" for name in places_of(assembly_of(config.walker, rigid=True)).names)
     return (*angles, *(f"d{name}" for name in angles))

@@ -1,7 +1,7 @@
-"""Where the study that is redone registers what a scene needs of it: its own walker, and equations besides Lagrange's.
+"""Registration of the reproduced study's walker and of its equations besides Lagrange's.
 
-It is named in quotes and imported late: nothing here depends on it, yet its law is part of the code that results are
-made of (see sources.py).
+The study is named by a string and imported late: nothing here depends on it, yet its law is part of the code that
+results are made of (see sources.py).
 """
 
 from __future__ import annotations
@@ -30,5 +30,5 @@ def moved_by(model: Standing, equations: Equations) -> Standing:
 
 
 def equation_sets(config: Any) -> tuple[Equations, ...]:
-    """Return the sets of equations that gaits are sought with: the config's, and every set for the study's walker."""
+    """Return the sets of equations to search gaits with: the config's, and every set for the study's walker."""
     return (LAGRANGES, *registered(STUDY, "LAWS")) if is_studied(config) else (config.equations,)

@@ -1,4 +1,4 @@
-"""A model with its gait, ready to be disturbed or differentiated by a parameter of its config."""
+"""A model with its gait, ready to be disturbed or differentiated."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ QUICK: Final = {RIGID: Tolerances("dop853", 1e-7, 1e-9, ENDLESS), CONTACT: Toler
 
 @dataclass(frozen=True, eq=False)
 class Subject:
-    """A model whose gait is disturbed, as other processes are handed it.
+    """A model and its gait, in a form that other processes can receive.
 
-    config    whose scene it walks in
+    config    of its scene
     z         (d,) the gait on the section
-    length_m  of its steps
+    length_m  step length
     """
 
     model: str
@@ -43,7 +43,7 @@ class Subject:
     length_m: float
 
     def at(self, parameter: Parameter = SLOPE, exact: bool = True) -> Standpoint:
-        """The gait on the step map over a parameter."""
+        """Return the gait on the step map over a parameter."""
         p = parameter.value_in(self.config)
         step_map: StepMap = (
             rigid_map(self.config, parameter, 1.0)
@@ -55,12 +55,12 @@ class Subject:
         return Standpoint(step_map, p, self.z, step_map.step(self.z, p).DP, units)
 
     def gradients(self, parameter: Parameter, wanted: Collection[str]) -> dict[str, Gradient]:
-        """Derivatives of the gait's numbers by a parameter."""
+        """Differentiate gait quantities by a parameter."""
         return gradients(self.at(parameter), abs(parameter.value_in(self.config)) or 1e-2, wanted)
 
 
 def section_coordinates(walker: Standing, state: Sequence[float]) -> Floats:
-    """Where a state (SI) lies on the section of the unit walker."""
+    """Return the section coordinates of the unit walker for a state (SI)."""
     _, units = unit_walker(walker)
     z = coordinates_of(walker, state)
     z[1:] *= units.time
@@ -68,10 +68,10 @@ def section_coordinates(walker: Standing, state: Sequence[float]) -> Floats:
 
 
 def subject_of(model: str, config: ContactConfig, gait: Mapping[str, Any], note: Callable[[str], None]) -> Subject:
-    """Return a model with its gait, the contact model off its pads; raises NoAnswer if it has none.
+    """Return a model with its gait, the contact model off its pads; raises NoAnswer without a gait.
 
     gait  summary of `fixedpoint`
-    note  receives what differs from the config's scene
+    note  receives differences from the config's scene
     """
     length = float(gait["step_length_m"])
     if model == RIGID:
