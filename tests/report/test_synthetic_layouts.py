@@ -9,7 +9,7 @@ import synthetic_walks
 from synthetic_families import families
 
 from walkerlab.config.loader import load
-from walkerlab.orbits import plane
+from walkerlab.orbits import two_parameters
 from walkerlab.pipeline.executor import answer_in_memory
 from walkerlab.pipeline.results import MemoryResults
 
@@ -48,7 +48,7 @@ def real():
         if stage not in known:
             config = load(None, ["strides=1", *SMALL[stage]]).config
             with pytest.MonkeyPatch.context() as patch:
-                patch.setattr(plane, "CELLS", (3, 2))
+                patch.setattr(two_parameters, "PLANE_CELLS", (3, 2))
                 known[stage] = answer_in_memory(config, stage, memory)
         return known[stage]
 

@@ -13,18 +13,18 @@ from typing import Literal
 
 import numpy as np
 
-from walkerlab.orbits.continuation import Segment, Solved, root_along
+from walkerlab.orbits.continuation import CurvePoint, Segment, root_along
 from walkerlab.orbits.newton import Evaluated
-from walkerlab.orbits.step_map import Cycle, StepMap, walk_steps, with_parameter
+from walkerlab.orbits.step_map import Cycle, StepMap, add_parameter_derivative, walk_steps
 from walkerlab.outcome import Outcome
 from walkerlab.solvers.system import Floats
 
 Kind = Literal["fold", "flip", "torus"]
-KINDS: tuple[Kind, ...] = ("fold", "flip", "torus")
-PROBE = 1e-3  # how far the differences of the normal form reach, coordinates being of magnitude one
-REFINEMENTS = 4
-FIRST_FALL = 0.2  # by how much the multiplier of a new branch's first point has left 1
-TOUCHING = 1e-4  # a product of multipliers this close to one is that of a pair
+BIFURCATION_KINDS: tuple[Kind, ...] = ("fold", "flip", "torus")
+NORMAL_FORM_STEP = 1e-3  # step of the normal form's differences; coordinates are of magnitude one
+FORM_REFINEMENTS = 4
+FIRST_MULTIPLIER_DROP = 0.2  # by which the multiplier of a new branch's first point is below 1
+PAIR_TOLERANCE = 1e-4  # distance from the unit circle within which multipliers form a critical pair
 
 
 class GaitEquations:
@@ -34,13 +34,11 @@ class GaitEquations:
         self.step_map, self.period, self.scale = step_map, period, scale
 
     def __call__(self, x: Floats) -> Evaluated[Cycle]:
-        """Evaluate the residual and its derivative at x (d + 1,)."""
         cycle = walk_steps(self.step_map, x[:-1], self.value(x), self.period)
-        here = with_parameter(self.step_map, cycle).returning()
-        return here._replace(jacobian=np.column_stack((here.jacobian, self.scale * here.data.Dp)))
+        evaluated = add_parameter_derivative(self.step_map, cycle).mismatch()
+        return evaluated._replace(jacobian=np.column_stack((evaluated.jacobian, self.scale * evaluated.data.Dp)))
 
     def value(self, x: Floats) -> float:
-        """Return the parameter at x."""
         return self.scale * float(x[-1])
 
 
@@ -53,7 +51,6 @@ def on_pairs(DP: Floats) -> Floats:
 
 
 def critical_value(kind: Kind, DP: Floats) -> float:
-    """Evaluate the test function of a kind of bifurcation."""
     acting = on_pairs(DP) if kind == "torus" else DP
     return float(np.linalg.det(acting + (1.0 if kind == "flip" else -1.0) * np.eye(len(acting))))
 
@@ -65,21 +62,20 @@ class Bifurcation:
     kind: Kind
     value: float  # of the parameter
     multiplier: complex
-    point: Solved[Cycle]
-    segment: Segment[Cycle] = field(repr=False)  # of the branch, that it lies on
+    point: CurvePoint[Cycle]
+    segment: Segment[Cycle] = field(repr=False)  # of the branch
 
     @property
     def gait(self) -> Cycle:
         return self.point.evaluated.data
 
-    def lies_between(self, one: Cycle, other: Cycle) -> bool:
+    def lies_between(self, first: Cycle, second: Cycle) -> bool:
         """Whether the bifurcation lies between these two neighbours on the branch."""
         ends = (self.segment.first, self.segment.second)
-        return {id(end.evaluated.data.z) for end in ends} == {id(one.z), id(other.z)}
+        return {id(end.evaluated.data.z) for end in ends} == {id(first.z), id(second.z)}
 
 
-def bifurcation_in(segment: Segment[Cycle], kind: Kind, scale: float) -> Bifurcation | None:
-    """Locate the bifurcation of a kind between two neighbours on a branch; None if there is none."""
+def locate_bifurcation(segment: Segment[Cycle], kind: Kind, scale: float) -> Bifurcation | None:
     tests = [critical_value(kind, end.evaluated.data.DP) for end in (segment.first, segment.second)]
     if tests[0] * tests[1] >= 0.0:
         return None
@@ -88,8 +84,8 @@ def bifurcation_in(segment: Segment[Cycle], kind: Kind, scale: float) -> Bifurca
         return None
     multipliers = point.evaluated.data.multipliers
     if kind == "torus":
-        on_circle = [m for m in multipliers if m.imag > 0.0 and abs(abs(m) - 1.0) < TOUCHING]
-        if not on_circle:  # two real multipliers whose product is one: a saddle, and no bifurcation
+        on_circle = [m for m in multipliers if m.imag > 0.0 and abs(abs(m) - 1.0) < PAIR_TOLERANCE]
+        if not on_circle:  # two real multipliers with product one: a saddle, not a bifurcation
             return None
         multiplier = complex(on_circle[0])
     else:
@@ -100,27 +96,21 @@ def bifurcation_in(segment: Segment[Cycle], kind: Kind, scale: float) -> Bifurca
 
 @dataclass(frozen=True)
 class FlipForm:
-    """The flip on its centre manifold: xi -> -(1 + rate s) xi + cubic xi^3, s the branch's arclength.
+    """The flip on its centre manifold: xi -> -(1 + rate s) xi + cubic xi^3, s the branch's arclength."""
 
-    direction  (d,) eigenvector to -1, of unit length
-    adjoint    (d,) left eigenvector, adjoint . direction = 1
-    bend       (d,) second-order part of the centre manifold: z = z* + xi direction + xi^2 bend
-    """
-
-    direction: Floats
-    adjoint: Floats
-    bend: Floats
+    direction: Floats  # (d,) eigenvector to -1, of unit length
+    adjoint: Floats  # (d,) left eigenvector, adjoint . direction = 1
+    bend: Floats  # (d,) second-order part of the centre manifold: z = z* + xi direction + xi^2 bend
     cubic: float
     rate: float
 
     @property
     def amplitude(self) -> float:
-        """Amplitude xi at which the new gait's multiplier, 1 - 4 cubic xi^2, is FIRST_FALL below 1."""
-        return math.sqrt(0.25 * FIRST_FALL / abs(self.cubic))
+        """Amplitude xi at which the new gait's multiplier, 1 - 4 cubic xi^2, is FIRST_MULTIPLIER_DROP below 1."""
+        return math.sqrt(0.25 * FIRST_MULTIPLIER_DROP / abs(self.cubic))
 
 
 def eigenvector(A: Floats, value: float) -> Floats:
-    """Return the unit right null vector of A - value."""
     _, _, rows = np.linalg.svd(A - value * np.eye(A.shape[0]))
     return np.asarray(rows[-1])
 
@@ -132,17 +122,17 @@ def flip_form(equations: GaitEquations, flip: Bifurcation) -> FlipForm | None:
     w = w / (w @ v)
     segment = flip.segment
     s, gap = float(segment.first.tangent @ (flip.point.x - segment.first.x)), 1e-3 * segment.length
-    beside = [segment.at(s + h) for h in (-gap, gap)]
-    passing = [float(w @ point.evaluated.data.DP @ v) for point in beside if isinstance(point, Solved)]
+    neighbours = [segment.at(s + h) for h in (-gap, gap)]
+    passing = [float(w @ point.evaluated.data.DP @ v) for point in neighbours if isinstance(point, CurvePoint)]
     if len(passing) < 2:
         return None
-    rate = (passing[0] - passing[1]) / (2.0 * gap)  # at which the multiplier passes -1 along the branch
-    form, probe = None, PROBE
-    for _ in range(REFINEMENTS):
-        found = _cubic(equations, flip, v, w, probe)
-        if found is None:
+    rate = (passing[0] - passing[1]) / (2.0 * gap)  # at which the multiplier crosses -1 along the branch
+    form, probe = None, NORMAL_FORM_STEP
+    for _ in range(FORM_REFINEMENTS):
+        terms = _cubic(equations, flip, v, w, probe)
+        if terms is None:
             return form
-        form = FlipForm(v, w, *found, rate)
+        form = FlipForm(v, w, *terms, rate)
         if probe <= 0.5 * form.amplitude:
             break
         probe = 0.2 * form.amplitude
@@ -150,24 +140,23 @@ def flip_form(equations: GaitEquations, flip: Bifurcation) -> FlipForm | None:
 
 
 def _cubic(equations: GaitEquations, flip: Bifurcation, v: Floats, w: Floats, h: float) -> tuple[Floats, float] | None:
-    """Compute `bend` and `cubic` of the normal form by differences of size h."""
     z, p = flip.point.x[:-1], equations.value(flip.point.x)
     A = flip.point.evaluated.data.DP
 
-    def beside(direction: Floats) -> tuple[Floats, Floats] | None:
+    def probe(direction: Floats) -> tuple[Floats, Floats] | None:
         cycles = [walk_steps(equations.step_map, z + sign * h * direction, p, equations.period) for sign in (1, -1)]
         if any(cycle.outcome is not Outcome.WALKED for cycle in cycles):
             return None
         return cycles[0].DP @ v, cycles[1].DP @ v
 
-    along = beside(v)
+    along = probe(v)
     if along is None:
         return None
     B_vv = (along[0] - along[1]) / (2.0 * h)
     C_vvv = (along[0] - 2.0 * (A @ v) + along[1]) / h**2
     inner = np.asarray(np.linalg.solve(np.eye(v.size) - A, B_vv), np.float64)
     size = float(np.linalg.norm(inner))
-    across = beside(inner / size)
+    across = probe(inner / size)
     if across is None:
         return None
     B_inner = size * (across[0] - across[1]) / (2.0 * h)
@@ -175,7 +164,7 @@ def _cubic(equations: GaitEquations, flip: Bifurcation, v: Floats, w: Floats, h:
     return (0.5 * inner, cubic) if cubic != 0.0 else None
 
 
-def onto_doubled(flip: Bifurcation, form: FlipForm, share: float = 1.0) -> tuple[Floats, Floats, float]:
+def predict_doubled(flip: Bifurcation, form: FlipForm, share: float = 1.0) -> tuple[Floats, Floats, float]:
     """Predict the branch of twice the period near a flip, for `correct`.
 
     share  of the normal form's amplitude

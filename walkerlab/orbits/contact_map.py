@@ -23,13 +23,7 @@ from numpy.typing import NDArray
 
 from walkerlab.account import LOST
 from walkerlab.ground.knees import IdealLock
-from walkerlab.ground.terrain import (
-    STANCE_FOOT,
-    Terrain,
-    after_mid_swing,
-    checkerboard,
-    has_ground_in_air,
-)
+from walkerlab.ground.terrain import STANCE_FOOT, Terrain, after_mid_swing, checkerboard, has_ground_in_air
 from walkerlab.ground.walker import ContactWalker, OnGround, feet_motion, folded, on_ground, sines_cosines, unfolded
 from walkerlab.hybrid.contact_events import PASSING, JudgedGround
 from walkerlab.hybrid.contact_jumps import rate_of
@@ -39,24 +33,30 @@ from walkerlab.hybrid.contact_state import WalkState, material_along, new_walk_s
 from walkerlab.hybrid.walk_record import DrivenWork
 from walkerlab.mechanics.links import Counted, factor_linked, solve_linked
 from walkerlab.mechanics.tree import add_inertia
-from walkerlab.orbits.step_map import REMEMBERED, Cycle, DisturbedWalk, MappedStep, Monitor, StepMap, Stepper, no_step
+from walkerlab.orbits.step_map import (
+    CACHE_SIZE,
+    Cycle,
+    DisturbedWalk,
+    MappedStep,
+    Monitor,
+    StepMap,
+    Stepper,
+    failed_step,
+)
 from walkerlab.outcome import Outcome
 from walkerlab.solvers.registry import Tolerances
 from walkerlab.solvers.system import Floats, State
 
-# places in the state: along, height, the bodies' angles, and the velocities of these
+# indices into the state: position along the slope, height, bodies' angles; velocities follow in the same order
 ALONG, HEIGHT, ANGLES = 0, 1, 2
-COORDINATES = 6  # of a walker with two straight legs
 NEWTON_STEPS = 20
 
 
 @dataclass(frozen=True)
 class SectionStep(MappedStep):
-    """One step from section to section, in SI."""
-
-    slip_m: float  # net, from touch to lift: of the foot that lands up to here, and of the other from here on
+    slip_m: float  # net, from touch-down to lift-off: the landing foot's so far plus the other foot's from here on
     rolling_m: float  # likewise
-    dissipated_J: Floats  # (5,) dissipated by damping, by friction, at edges, at knees' strikes, in their stops
+    dissipated_J: Floats  # (5,) by damping, friction, edges, knee strikes and knee stops
     driven: DrivenWork
     work: NDArray[np.int64]  # right-hand sides, accepted, rejected, Jacobians
 
@@ -75,13 +75,13 @@ def angled_bodies(walker: ContactWalker, stance: int) -> tuple[int, ...]:
     return free
 
 
-def with_followers(walker: ContactWalker, stance: int, angles: Floats, given: tuple[int, ...]) -> Floats:
-    """Fill in the angles (n), or changes of angles, of coupled bodies that are not `given`."""
+def fill_followers(walker: ContactWalker, stance: int, angles: Floats, fixed: tuple[int, ...]) -> Floats:
+    """Fill in the angles (n), or changes of angles, of coupled bodies that are not `fixed`."""
     whole, n = walker.whole, angles.size
-    if walker.kneed and whole.shanks[stance] not in given:
+    if walker.kneed and whole.shanks[stance] not in fixed:
         angles[whole.shanks[stance]] = angles[whole.thighs[stance]]
     for body in range(n):
-        if whole.E[0, body, body] == 0.0 and body not in given:
+        if whole.E[0, body, body] == 0.0 and body not in fixed:
             angles[body] = whole.E[0, body, :n] @ angles
     return angles
 
@@ -101,55 +101,49 @@ def state_on_section(walker: ContactWalker, z: Floats, stance: int) -> State:
     state[HEIGHT], (state[2 + n], state[3 + n]) = z[0], z[1 + len(angled) : 3 + len(angled)]
     rates = np.zeros(n)
     rates[list(turning)] = z[3 + len(angled) :]
-    state[4 + n :] = with_followers(walker, stance, rates, turning)
+    state[4 + n :] = fill_followers(walker, stance, rates, turning)
     angles, upper = np.zeros(n), turning[0]
     angles[list(angled)] = z[1 : 1 + len(angled)]
     angles[upper] = angles[walker.legs[stance][0]]
-    turned = with_followers(walker, stance, np.eye(n)[upper], (upper, *angled))
-    for _ in range(NEWTON_STEPS):  # the swing leg's uppermost body is turned until the feet pass each other
-        angles = with_followers(walker, stance, angles, (upper, *angled))
+    turned = fill_followers(walker, stance, np.eye(n)[upper], (upper, *angled))
+    for _ in range(NEWTON_STEPS):  # turn the swing leg's uppermost body until the feet pass each other
+        angles = fill_followers(walker, stance, angles, (upper, *angled))
         apart, gradient = feet_apart(walker, angles)
         move = -apart / float(gradient @ turned)
         angles[upper] += move
         if abs(move) < 1e-15:
             break
-    state[ANGLES : ANGLES + n] = with_followers(walker, stance, angles, (upper, *angled))
+    state[ANGLES : ANGLES + n] = fill_followers(walker, stance, angles, (upper, *angled))
     return tuple(float(x) for x in state)
 
 
 def coordinates_of(walker: ContactWalker, state: Floats, stance: int) -> Floats:
-    """Return the section coordinates of a state standing on leg `stance`."""
     n = int(walker.whole.bodies)
     angles = [ANGLES + body for body in angled_bodies(walker, stance)]
     rates = [4 + n + body for body in turning_bodies(walker, stance)]
     return np.asarray(state)[[HEIGHT, *angles, 2 + n, 3 + n, *rates]]
 
 
-def directions(walker: ContactWalker, state: State, stance: int) -> Floats:
+def section_tangents(walker: ContactWalker, state: State, stance: int) -> Floats:
     """Derivative (4 + 2 n, coordinates) of `state_on_section` at the state that it returned."""
     n = int(walker.whole.bodies)
     turning, angled = turning_bodies(walker, stance), angled_bodies(walker, stance)
     along = np.zeros((4 + 2 * n, 3 + len(angled) + len(turning)))
     _, gradient = feet_apart(walker, np.array(state[ANGLES : ANGLES + n]))
-    given = (turning[0], *angled)
-    upper = with_followers(walker, stance, np.eye(n)[turning[0]], given)
+    fixed = (turning[0], *angled)
+    upper = fill_followers(walker, stance, np.eye(n)[turning[0]], fixed)
     along[HEIGHT, 0] = 1.0
     for column, body in enumerate(angled, 1):
-        turned = with_followers(walker, stance, np.eye(n)[body], given)
+        turned = fill_followers(walker, stance, np.eye(n)[body], fixed)
         along[ANGLES : ANGLES + n, column] = turned - upper * (gradient @ turned) / (gradient @ upper)
     along[2 + n, 1 + len(angled)] = along[3 + n, 2 + len(angled)] = 1.0
     for column, body in enumerate(turning, 3 + len(angled)):
-        along[4 + n :, column] = with_followers(walker, stance, np.eye(n)[body], turning)
+        along[4 + n :, column] = fill_followers(walker, stance, np.eye(n)[body], turning)
     return along
 
 
 def step_from_section(
-    walker: ContactWalker,
-    ground: JudgedGround,
-    tolerances: Tolerances,
-    z: Floats,
-    pitch_m: float,
-    derived: bool = True,
+    walker: ContactWalker, ground: JudgedGround, tolerances: Tolerances, z: Floats, pitch_m: float, derived: bool = True
 ) -> SectionStep:
     """Walk from section to section; REJECTED if a push-off lasts beyond the section.
 
@@ -159,20 +153,20 @@ def step_from_section(
     """
     stance, laid = STANCE_FOOT, ground
     start = state_on_section(walker, z, stance)
-    if ground.terrain.has_pads:  # the standing foot in the middle of one
+    if ground.terrain.has_pads:  # with the standing foot in the middle of a pad
         foothold = feet_motion(walker.whole, start)[stance].along
         laid = JudgedGround(checkerboard(pitch_m, (foothold + pitch_m, foothold)), ground.frame)
     walk_state = walk_state_on_section(walker, laid, start, 2)
     observer = new_observer(walker, walk_state, start, directions=z.size if derived else 0)
     if derived:
-        observer.tangent.Phi[:, :] = directions(walker, start, stance)
+        observer.tangent.Phi[:, :] = section_tangents(walker, start, stance)
     stopped = walk_on(walker, laid, tolerances, walk_state, observer, start, 1)
     end, landed = np.array(stopped.state), 1 - stance
     along = feet_motion(walker.whole, stopped.state)[landed].along
     slipped = material_along(walker.whole, landed, along, stopped.state) - float(walk_state.touched[landed])
     rolled = along - float(walk_state.foothold[landed]) - slipped
     DP = np.zeros((z.size, 0))
-    if derived:  # the flow's, less how it shifts the moment at which the feet pass
+    if derived:  # project the flow's derivative onto the section, along the flow
         system = in_walk(walker, walk_state)
         rate = rate_of(system, folded(system.form, end), end.size, stopped.time_s)
         gradient, n = np.zeros(end.size), int(walker.whole.bodies)
@@ -180,7 +174,7 @@ def step_from_section(
         Phi = observer.tangent.Phi
         on_section = Phi - np.outer(rate, gradient @ Phi) / (gradient @ rate)
         DP = np.column_stack([coordinates_of(walker, column, landed) for column in on_section.T])
-    way, rose = (float(end[place] - start[place]) for place in (ALONG, HEIGHT))
+    advance, rose = (float(end[place] - start[place]) for place in (ALONG, HEIGHT))
     spacing = float(walk_state.touch_along[0] - walk_state.foothold[stance] - walk_state.slip[0])
     half = min(1.0, max(-1.0, 0.5 * spacing / ground.frame.leg_length))
     pulse = walker.whole.push_off_duration if walker.whole.push_off != 0.0 else 0.0
@@ -190,13 +184,13 @@ def step_from_section(
         coordinates_of(walker, end, landed),
         DP,
         stopped.time_s,
-        way,
+        advance,
         math.asin(half) - walker.slope,
         float(walk_state.touch_time[0]),
         float(walk_state.slip[0] + slipped),
         float(walk_state.rolling[0] + rolled),
         observer.account[LOST].copy(),
-        driven_work(walker, way, rose, observer.account),
+        driven_work(walker, advance, rose, observer.account),
         stopped.work,
     )
 
@@ -219,7 +213,7 @@ def walk_from_section(
 
     stopped = Stopped(Outcome.WALKED, 0.0, start, np.zeros(4, np.int64))
     if push != 0.0:
-        stopped = go_on(cut_to(walk_state, 1), start)
+        stopped = go_on(shorten(walk_state, 1), start)
         pushed = pushed_at_hip(on_ground(walker, walk_state.has_ground, walk_state.knee), walker, stopped.state, push)
         stopped = replace(stopped, state=pushed)
     if stopped.outcome is Outcome.WALKED:
@@ -234,10 +228,9 @@ def walk_from_section(
     return DisturbedWalk(stopped.outcome, np.diff(times), np.diff(places), z)
 
 
-def cut_to(walk_state: WalkState, steps: int) -> WalkState:
-    """Return the walk state with room for fewer steps, sharing its memory."""
-    of_steps = ("touch_time", "touch_along", "touch_height", "slip", "rolling")
-    return walk_state._replace(**{name: getattr(walk_state, name)[:steps] for name in of_steps})
+def shorten(walk_state: WalkState, steps: int) -> WalkState:
+    fields = ("touch_time", "touch_along", "touch_height", "slip", "rolling")
+    return walk_state._replace(**{name: getattr(walk_state, name)[:steps] for name in fields})
 
 
 def pushed_at_hip(system: OnGround, walker: ContactWalker, state: State, impulse: float) -> State:
@@ -291,7 +284,7 @@ class ContactMap(StepMap):
         Monitor("slip_m", "m", "largest net slip of a foot from touch to lift"),
         Monitor("tripped", "1", "whether pads of its own step length trip the swing foot", 0.5),
     )
-    probe = 1e-6  # stiff ground gives way to less than a hundredth of a millimetre
+    probe = 1e-6  # stiff ground yields by less than 0.01 mm
 
     def __init__(
         self,
@@ -309,7 +302,7 @@ class ContactMap(StepMap):
         step_length_m  reference step length of the terrain
         like           any one of the walkers; its leg length and pendulum time are the units
         """
-        self._at = lru_cache(REMEMBERED)(walker_at)
+        self._at = lru_cache(CACHE_SIZE)(walker_at)
         self.scale, self.tolerances, self._measure = scale, tolerances, step_length_m
         self._on_pads = like.ground.terrain.has_pads
         angled, turning = angled_bodies(like.walker, STANCE_FOOT), turning_bodies(like.walker, STANCE_FOOT)
@@ -318,49 +311,47 @@ class ContactMap(StepMap):
         L, tau = like.ground.frame.leg_length, like.ground.frame.pendulum_time
         self._units = np.array([L, *[1.0] * len(angled), L / tau, L / tau, *[1.0 / tau] * len(turning)])
 
-    def of_section(self, z: Floats) -> Floats:
-        """Return the scaled coordinates of a section point in SI."""
+    def scale_section(self, z: Floats) -> Floats:
         return np.asarray(z / self._units)
 
-    def _terrain(self, here: WalkerOnGround) -> Terrain:
-        own = here.ground.terrain
+    def _terrain(self, site: WalkerOnGround) -> Terrain:
+        own = site.ground.terrain
         return after_mid_swing(self._measure) if own.has_pads else own
 
-    def _walk(self, here: WalkerOnGround, z: Floats, derived: bool, terrain: Terrain | None = None) -> SectionStep:
-        terrain = terrain or self._terrain(here)
-        ground = here.ground._replace(terrain=terrain)
-        return step_from_section(here.walker, ground, self.tolerances, z * self._units, terrain.stride_measure, derived)
+    def _walk(self, site: WalkerOnGround, z: Floats, derived: bool, terrain: Terrain | None = None) -> SectionStep:
+        terrain = terrain or self._terrain(site)
+        ground = site.ground._replace(terrain=terrain)
+        return step_from_section(site.walker, ground, self.tolerances, z * self._units, terrain.stride_measure, derived)
 
     def step(self, z: Floats, p: float, derived: bool = True) -> MappedStep:
-        here = self._at(p)
-        if here is None:
-            return no_step(None, z.size)
-        step = self._walk(here, z, derived)
+        site = self._at(p)
+        if site is None:
+            return failed_step(None, z.size)
+        step = self._walk(site, z, derived)
         if step.outcome is not Outcome.WALKED:
-            return no_step(step.outcome, z.size)
+            return failed_step(step.outcome, z.size)
         DP = step.DP * self._units / self._units[:, None] if derived else step.DP
         return replace(step, z=step.z / self._units, DP=DP)
 
     def watch(self, z: Floats, p: float, steps: int) -> Floats:
-        """Return the maximum slip, and whether pads would trip a gait of one step."""
-        here = self._at(p)
-        assert here is not None, "what is watched was walked"
-        slip, tripped, at = 0.0, 0.0, z
+        site = self._at(p)
+        assert site is not None, "what is watched was walked"
+        slip, tripped, start = 0.0, 0.0, z
         for _ in range(steps):
-            step = self._walk(here, at, False)
-            slip, at = max(slip, abs(step.slip_m)), step.z / self._units
+            step = self._walk(site, start, False)
+            slip, start = max(slip, abs(step.slip_m)), step.z / self._units
             if self._on_pads and steps == 1:
-                on_pads = self._walk(here, z, False, checkerboard(step.length_m, (0.0, 0.0)))
+                on_pads = self._walk(site, z, False, checkerboard(step.length_m, (0.0, 0.0)))
                 tripped = float(on_pads.outcome is not Outcome.WALKED)
         return np.array([slip, tripped])
 
     def disturbed(self, z: Floats, p: float, heights_m: Floats, push_N_s: float = 0.0) -> DisturbedWalk:
         """Walk over footholds (m) from the touch-down after z, where a push is applied."""
-        here = self._at(p)
-        assert here is not None, "what is disturbed has a gait"
-        ground = here.ground._replace(terrain=self._terrain(here))
+        site = self._at(p)
+        assert site is not None, "what is disturbed has a gait"
+        ground = site.ground._replace(terrain=self._terrain(site))
         endless = replace(self.tolerances, budget=self.tolerances.budget * heights_m.size)
-        walk = walk_from_section(here.walker, ground, endless, z * self._units, heights_m, push_N_s)
+        walk = walk_from_section(site.walker, ground, endless, z * self._units, heights_m, push_N_s)
         return replace(walk, z=walk.z / self._units)
 
     def cost_of_transport(self, z: Floats, p: float) -> float | None:
@@ -368,14 +359,14 @@ class ContactMap(StepMap):
         return step.driven.cost_of_transport(step.length_m) if isinstance(step, SectionStep) else None
 
     def leg_and_pendulum(self, p: float) -> tuple[float, float]:
-        here = self._at(p)
-        assert here is not None, "what is measured has a gait"
-        return here.ground.frame.leg_length, here.ground.frame.pendulum_time
+        site = self._at(p)
+        assert site is not None, "what is measured has a gait"
+        return site.ground.frame.leg_length, site.ground.frame.pendulum_time
 
     def at(self, tolerances: Tolerances) -> ContactMap:
-        other = copy(self)
-        other.tolerances = tolerances
-        return other
+        changed = copy(self)
+        changed.tolerances = tolerances
+        return changed
 
 
 class OwnPads(Stepper):
@@ -393,7 +384,6 @@ class OwnPads(Stepper):
         return step
 
 
-def step_of(gait: Cycle) -> SectionStep:
-    """Return the step of a period-1 gait of the contact model, typed as that model's."""
+def contact_step(gait: Cycle) -> SectionStep:
     assert isinstance(gait.step, SectionStep), "a gait of the contact model"
     return gait.step

@@ -25,63 +25,57 @@ from walkerlab.solvers.registry import ENDLESS, Tolerances
 from walkerlab.solvers.stepping import RHS
 from walkerlab.solvers.system import Floats, Integers, State
 
-TOLERANCES = Tolerances("radau5", 1e-7, 1e-9, 10_000_000)
-RIGID = Tolerances("dop853", 1e-7, 1e-9, ENDLESS)
-SETTLED = 0.02  # of the gait's period and step length
-MARGIN_STEP = 0.02  # how far apart factors are tried until one fails
+START_TOLERANCES = Tolerances("radau5", 1e-7, 1e-9, 10_000_000)
+RIGID_TOLERANCES = Tolerances("dop853", 1e-7, 1e-9, ENDLESS)
+SETTLED_SHARE = 0.02  # of the gait's period and step length
+MARGIN_STEP = 0.02  # spacing of factors until one fails
 SMALLEST_FACTOR, LARGEST_FACTOR = 0.0, 4.0
-HALVINGS = 14
-ZOOMS, ZOOM_CELLS = 4, 4  # grids ever finer around the best start, each so many cells to either side
-OFFSETS = np.array(list(product(range(-ZOOM_CELLS, ZOOM_CELLS + 1), repeat=2)))
+MARGIN_HALVINGS = 14
+ZOOMS, ZOOM_CELLS = 4, 4  # successively finer grids around the best start, and cells to either side
+ZOOM_OFFSETS = np.array(list(product(range(-ZOOM_CELLS, ZOOM_CELLS + 1), repeat=2)))
 
 
 class StartTrial(NamedTuple):
-    """Result of a walk from a scaled start."""
-
     outcome: int
     steps: int
-    settled: bool  # whether its last step is the gait's, within two percent in period and length
+    settled: bool  # whether its last step matches the gait's period and length within 2 %
     evaluations: int  # right-hand sides
 
     @property
     def walks(self) -> bool:
-        """Whether the walk completed and settled."""
         return self.outcome == Outcome.WALKED and self.settled
 
 
 @dataclass(frozen=True)
 class ScaledStarts:
-    """A scene and its start with scalable velocities."""
-
     walker: ContactWalker
     ground: JudgedGround
     place: State  # (2 + n) position and angles of the start
-    by_swing: State  # (2 + n) velocities that the swing leg's angular velocity brings along
-    by_stance: State  # (2 + n) and the stance leg's
+    by_swing: State  # (2 + n) velocities due to the swing leg's angular velocity
+    by_stance: State  # (2 + n) velocities due to the stance leg's
     steps: int
-    gait: tuple[float, float] | None  # period (s) and step length (m) to settle on; None if that is not asked
-    tolerances: Tolerances = TOLERANCES
+    gait: tuple[float, float] | None  # period (s) and step length (m) to settle on; None if not required
+    tolerances: Tolerances = START_TOLERANCES
 
     def start(self, swing: float, stance: float) -> State:
-        """Return the free walker's state with velocities scaled by these factors."""
         rates = (swing * a + stance * b for a, b in zip(self.by_swing, self.by_stance, strict=True))
         return (*self.place, *rates)
 
     def walk(self, swing: float, stance: float) -> StartTrial:
-        walk = self.walked_from(self.start(swing, stance))
-        settled = walk.outcome is Outcome.WALKED and (self.gait is None or self.settled_after(walk) is not None)
+        walk = self.walk_from(self.start(swing, stance))
+        settled = walk.outcome is Outcome.WALKED and (self.gait is None or self.settling_steps(walk) is not None)
         return StartTrial(walk.outcome, walk.touch_time_s.size, settled, int(walk.work[RHS]))
 
-    def walked_from(self, start: State) -> ContactWalkResult:
+    def walk_from(self, start: State) -> ContactWalkResult:
         return walk_contact(self.walker, self.ground, False, STANCE_FOOT, start, self.tolerances, self.steps, None)
 
-    def settled_after(self, walk: ContactWalkResult) -> int | None:
+    def settling_steps(self, walk: ContactWalkResult) -> int | None:
         """Return the steps after which all periods and lengths match the gait; None if the last do not."""
         if self.gait is None:
             return None
         period, length = self.gait
         off_period, off_length = np.abs(walk.periods_s - period), np.abs(walk.lengths_m - length)
-        off = np.flatnonzero((off_period > SETTLED * period) | (off_length > SETTLED * abs(length)))
+        off = np.flatnonzero((off_period > SETTLED_SHARE * period) | (off_length > SETTLED_SHARE * abs(length)))
         first = int(off[-1]) + 1 if off.size else 0
         return first if first < walk.periods_s.size else None
 
@@ -109,14 +103,12 @@ def scaled_starts(
 
 @dataclass(frozen=True)
 class Margin:
-    """How far a start may be scaled in one direction before it fails."""
-
-    name: str  # which velocities are scaled, and whether down or up
-    factor: float  # the last that walks
-    fails: StartTrial | None  # what happens beyond; None if nothing fails up to the limit
+    name: str  # velocities that are scaled, down or up
+    factor: float  # last one that walks
+    fails: StartTrial | None  # first failure beyond; None up to the limit
 
 
-DIRECTIONS = (
+SCALING_DIRECTIONS = (
     ("dtheta_1 down", -1.0, 0.0),
     ("dtheta_1 up", 1.0, 0.0),
     ("dtheta_2 down", 0.0, -1.0),
@@ -137,27 +129,25 @@ def margins(
     step     spacing of factors until one fails; then the last interval is halved
     largest  maximum factor
     """
-    found = []
-    for name, *way in DIRECTIONS:
-        sign = 1.0 if max(way) > 0.0 else -1.0
+    results = []
+    for name, *direction in SCALING_DIRECTIONS:
+        sign = 1.0 if max(direction) > 0.0 else -1.0
         limit = largest - 1.0 if sign > 0.0 else 1.0 - SMALLEST_FACTOR
         good, bad, failure, halvings = 0.0, limit, None, 0
-        while good < limit and halvings <= HALVINGS:
+        while good < limit and halvings <= MARGIN_HALVINGS:
             change = min(good + step, limit) if failure is None else 0.5 * (good + bad)
-            tried = starts.walk(around[0] * (1.0 + change * way[0]), around[1] * (1.0 + change * way[1]))
-            if tried.walks:
+            trial = starts.walk(around[0] * (1.0 + change * direction[0]), around[1] * (1.0 + change * direction[1]))
+            if trial.walks:
                 good = change
             else:
-                bad, failure = change, tried
+                bad, failure = change, trial
             halvings += failure is not None
-        found.append(Margin(name, 1.0 + sign * good, failure))
-    return found
+        results.append(Margin(name, 1.0 + sign * good, failure))
+    return results
 
 
 @dataclass(frozen=True)
 class Adjustment:
-    """The smallest change of the two velocities found to walk."""
-
     swing: float
     stance: float
     trial: StartTrial
@@ -185,7 +175,7 @@ def smallest_change(
         best, spacing = (float(swing), float(stance)), np.array(cell)
         for _ in range(ZOOMS):
             spacing = spacing / ZOOM_CELLS
-            grid = np.array(best) + spacing * OFFSETS
+            grid = np.array(best) + spacing * ZOOM_OFFSETS
             distance = np.hypot(*(grid - 1.0).T)
             nearer = np.flatnonzero(distance < math.hypot(best[0] - 1.0, best[1] - 1.0) - 1e-12)
             nearest_first = grid[nearer[np.argsort(distance[nearer], kind="stable")]].tolist()
@@ -195,7 +185,7 @@ def smallest_change(
     return None
 
 
-# ---- the map behind it: which scaled starts walk, on the ground and in the rigid model -------------------------------
+# ---- map of scaled starts, in the contact model and in the rigid model -----------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -206,7 +196,7 @@ class StartMap:
     stance: Floats  # (rows,) factors on the stance leg's velocity
     outcome: Integers  # (rows, columns)
     steps: Integers  # (rows, columns)
-    settled: Integers  # (rows, columns) 1 if the last step is the gait's
+    settled: Integers  # (rows, columns) 1 if the last step matches the gait
 
     @property
     def walking(self) -> Floats:
@@ -215,12 +205,10 @@ class StartMap:
         return np.column_stack((self.swing[columns], self.stance[rows]))
 
     def share(self) -> float:
-        """Return the share of cells that walk and settle."""
         return float(self.walking.shape[0]) / self.outcome.size
 
 
 def contact_row(starts: ScaledStarts, swing: Floats, stance: float) -> Integers:
-    """Return outcome, steps and whether settled (columns, 3) for a row of cells."""
     trials = [starts.walk(float(factor), float(stance)) for factor in swing]
     return np.array([(trial.outcome, trial.steps, trial.settled) for trial in trials], np.int64)
 
@@ -229,13 +217,12 @@ def rigid_map(walker: Standing, state: State, swing: Floats, stance: Floats, ste
     """Compute the same map for the rigid model; where its ground would have to pull, the outcome is `lifted-off`."""
 
     def cell(factor_1: float, factor_2: float) -> tuple[int, int, bool]:
-        walk = take_walk(walker, RIGID, with_scaled_rates(walker, state, factor_1, factor_2), steps)
+        walk = take_walk(walker, RIGID_TOLERANCES, with_scaled_rates(walker, state, factor_1, factor_2), steps)
         return int(walk.outcome), walk.steps, walk.steps == steps
 
-    rows = [[cell(one, other) for one in swing.tolist()] for other in stance.tolist()]
+    rows = [[cell(swing_factor, stance_factor) for swing_factor in swing.tolist()] for stance_factor in stance.tolist()]
     return as_map(swing, stance, list(np.array(rows, np.int64)))
 
 
 def as_map(swing: Floats, stance: Floats, rows: Sequence[Integers]) -> StartMap:
-    """Assemble the map from its rows (columns, 3)."""
     return StartMap(swing, stance, *np.moveaxis(np.stack(rows), 2, 0))

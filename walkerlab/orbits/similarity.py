@@ -13,8 +13,6 @@ from walkerlab.mechanics.standing import Standing, on_slope
 
 
 class Units(NamedTuple):
-    """SI values of the unit walker's units."""
-
     length: float  # m
     mass: float  # kg
     time: float  # s, sqrt(L / g)

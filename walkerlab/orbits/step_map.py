@@ -20,13 +20,13 @@ from walkerlab.outcome import Outcome
 from walkerlab.solvers.registry import Tolerances
 from walkerlab.solvers.system import Floats
 
-SPREAD = 1e-3  # of the parameter, between the points of the difference formula
-REMEMBERED = 4096  # walkers built so far
-CENTRAL: tuple[tuple[int, float], ...] = ((-1, -0.5), (1, 0.5))
-FORWARD: tuple[tuple[int, float], ...] = ((0, -1.5), (1, 2.0), (2, -0.5))
-"""Offsets and weights of formulas of second order for a first derivative."""
-unity = lru_cache(np.eye)  # shared: never written to
-nothing = partial(np.zeros, 0)
+PARAMETER_STEP = 1e-3  # of the parameter, in difference formulas
+CACHE_SIZE = 4096  # per step map
+CENTRAL_2ND: tuple[tuple[int, float], ...] = ((-1, -0.5), (1, 0.5))
+# Offsets and weights of second-order formulas for a first derivative.
+FORWARD_2ND: tuple[tuple[int, float], ...] = ((0, -1.5), (1, 2.0), (2, -0.5))
+identity = lru_cache(np.eye)  # shared: never written to
+no_values = partial(np.zeros, 0)
 
 
 @dataclass(frozen=True)
@@ -41,79 +41,51 @@ class Monitor:
 
 @dataclass(frozen=True)
 class MappedStep:
-    """One step from section to section.
-
-    z         (d,) section coordinates at the end
-    DP        (d, d) derivative with respect to the start, if requested
-    period_s, length_m  duration and distance walked
-    angle     rad, stance leg just after the step's heel strike
-    strike_s  time of that heel strike, from the start of the step
-    """
+    """One step from section to section."""
 
     outcome: Outcome | None
-    z: Floats
-    DP: Floats
+    z: Floats  # (d,) section coordinates at the end
+    DP: Floats  # (d, d) derivative with respect to the start, if requested
     period_s: float
-    length_m: float
-    angle: float
-    strike_s: float
+    length_m: float  # distance walked
+    angle: float  # rad, stance leg just after the step's heel strike
+    strike_s: float  # time of that heel strike, from the start of the step
 
 
 @dataclass(frozen=True)
 class Iterates:
-    """A walk on the section with a tangent vector.
-
-    points     (steps, d) section coordinates after each step
-    lengths    (steps,) factor by which each step stretches the tangent; empty without a tangent
-    periods_s  (steps,)
-    angles     (steps,) rad, as in `MappedStep`
-    """
+    """A walk on the section with a tangent vector."""
 
     outcome: Outcome
-    points: Floats
-    lengths: Floats
-    periods_s: Floats
-    angles: Floats
+    points: Floats  # (steps, d) section coordinates after each step
+    lengths: Floats  # (steps,) factor by which each step stretches the tangent; empty without a tangent
+    periods_s: Floats  # (steps,) durations
+    angles: Floats  # (steps,) rad, as in `MappedStep`
 
 
 @dataclass(frozen=True)
 class DisturbedWalk:
-    """A walk from the section over uneven ground, or after a push.
+    """A walk from the section over uneven ground, or after a push."""
 
-    outcome      WALKED if every step was completed
-    durations_s  (steps,) between heel strikes
-    lengths_m    (steps,)
-    z            (d,) last point on the section
-    """
-
-    outcome: Outcome
-    durations_s: Floats
-    lengths_m: Floats
-    z: Floats
+    outcome: Outcome  # WALKED if every step was completed
+    durations_s: Floats  # (steps,) between heel strikes
+    lengths_m: Floats  # (steps,) distances
+    z: Floats  # (d,) last point on the section
 
 
 class Stepper(Protocol):
-    """A walker's step from section to section over one parameter."""
-
     def step(self, z: Floats, p: float, derived: bool = True) -> MappedStep:
         """Take a step from z (d,) at parameter p, with its derivative; the outcome is None where p makes no walker."""
 
 
 class StepMap(Stepper, Protocol):
-    """A walker's step from section to section, with everything that following its families needs.
+    """A walker's step from section to section, with everything that following its families needs."""
 
-    names       section coordinates, all of magnitude one
-    monitors    quantities that `watch` measures
-    scale       magnitude of significant changes of the parameter
-    tolerances  solver settings of a step
-    probe       disturbance, in units of the walker, small enough for a linear response
-    """
-
-    names: tuple[str, ...]
-    monitors: tuple[Monitor, ...]
-    scale: float
-    tolerances: Tolerances
-    probe: float
+    names: tuple[str, ...]  # section coordinates, all of magnitude one
+    monitors: tuple[Monitor, ...]  # quantities that `watch` measures
+    scale: float  # magnitude of significant changes of the parameter
+    tolerances: Tolerances  # solver settings of a step
+    probe: float  # disturbance, in units of the walker, small enough for a linear response
 
     def watch(self, z: Floats, p: float, steps: int) -> Floats:
         """Return the worst value of each monitor (monitors,) over some steps."""
@@ -130,87 +102,76 @@ class StepMap(Stepper, Protocol):
     def leg_and_pendulum(self, p: float) -> tuple[float, float]:
         """Return leg length (m) and pendulum time (s) of the walker at p."""
 
-    def at(self, tolerances: Tolerances) -> StepMap:
-        """Return the same map with other solver settings."""
+    def at(self, tolerances: Tolerances) -> StepMap: ...
 
     def iterate(self, z: Floats, p: float, steps: int, tangent: Floats | None) -> Iterates:
         """Walk up to `steps` steps, transporting a tangent (d,) if there is one."""
-        taken, lengths, outcome = list[MappedStep](), list[float](), Outcome.WALKED
+        completed, lengths, outcome = list[MappedStep](), list[float](), Outcome.WALKED
         for _ in range(steps):
             step = self.step(z, p, tangent is not None)
             outcome = Outcome.REJECTED if step.outcome is None else step.outcome
             if outcome is not Outcome.WALKED:
                 break
             z = step.z
-            taken.append(step)
+            completed.append(step)
             if tangent is not None:
                 image = step.DP @ tangent
                 lengths.append(float(np.linalg.norm(image)))
                 tangent = image / lengths[-1]
-        waits = [0.0, *(step.period_s - step.strike_s for step in taken)]
+        waits = [0.0, *(step.period_s - step.strike_s for step in completed)]
         return Iterates(
             outcome,
-            np.array([step.z for step in taken]).reshape(-1, z.size),
+            np.array([step.z for step in completed]).reshape(-1, z.size),
             np.array(lengths),
-            np.array([wait + step.strike_s for wait, step in zip(waits, taken, strict=False)]),
-            np.array([step.angle for step in taken]),
+            np.array([wait + step.strike_s for wait, step in zip(waits, completed, strict=False)]),
+            np.array([step.angle for step in completed]),
         )
 
 
-def along_parameter(step_map: StepMap, z: Floats, p: float) -> tuple[Outcome | None, Floats]:
+def differentiate_by_parameter(step_map: StepMap, z: Floats, p: float) -> tuple[Outcome | None, Floats]:
     """Return the outcome of steps from z (d,) near p, and the derivative (d,) of the step with respect to p.
 
     A second-order difference of exact steps, one-sided at the parameter's limits. It only steers predictors and
     Newton's method and enters no result.
     """
-    h = SPREAD * (min(step_map.scale, abs(p)) if p != 0.0 else step_map.scale)
-    for formula in (CENTRAL, FORWARD, tuple((-offset, -weight) for offset, weight in FORWARD)):
+    h = PARAMETER_STEP * (min(step_map.scale, abs(p)) if p != 0.0 else step_map.scale)
+    for formula in (CENTRAL_2ND, FORWARD_2ND, tuple((-offset, -weight) for offset, weight in FORWARD_2ND)):
         steps = [step_map.step(z, p + offset * h, derived=False) for offset, _ in formula]
         outcomes = [step.outcome for step in steps]
         if None in outcomes or Outcome.REJECTED in outcomes:
             continue
-        ended = next((outcome for outcome in outcomes if outcome is not Outcome.WALKED), Outcome.WALKED)
-        return ended, sum((weight / h * step.z for step, (_, weight) in zip(steps, formula, strict=True)), 0.0 * z)
+        outcome = next((outcome for outcome in outcomes if outcome is not Outcome.WALKED), Outcome.WALKED)
+        return outcome, sum((weight / h * step.z for step, (_, weight) in zip(steps, formula, strict=True)), 0.0 * z)
     return None, 0.0 * z
 
 
-def no_step(outcome: Outcome | None, d: int) -> MappedStep:
-    """Return the result of a step that failed."""
+def failed_step(outcome: Outcome | None, d: int) -> MappedStep:
     return MappedStep(outcome, np.zeros(d), np.eye(d), 0.0, 0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
 class Cycle:
-    """Consecutive steps; for a gait they return to their start.
+    """Consecutive steps; for a gait they return to their start."""
 
-    outcome   of the last step
-    value     of the parameter
-    z         (d,) start
-    steps     completed steps
-    DP, Dp    derivatives of the end with respect to z and to the parameter; Dp only if requested
-    monitors  worst values over the steps; only on a branch
-    """
+    outcome: Outcome | None  # of the last step
+    value: float  # of the parameter
+    z: Floats  # (d,) start
+    steps: tuple[MappedStep, ...]  # completed steps
+    DP: Floats  # (d, d) derivative of the end by z
+    Dp: Floats = field(default_factory=no_values)  # (d,) derivative of the end by the parameter, if requested
+    monitors: Floats = field(default_factory=no_values)  # worst values over the steps; only on a branch
 
-    outcome: Outcome | None
-    value: float
-    z: Floats
-    steps: tuple[MappedStep, ...]
-    DP: Floats
-    Dp: Floats = field(default_factory=nothing)
-    monitors: Floats = field(default_factory=nothing)
-
-    def returning(self) -> Evaluated[Cycle]:
+    def mismatch(self) -> Evaluated[Cycle]:
         """Return P^n(z) - z, which a gait makes zero, with its derivative by z."""
         off = self.steps[-1].z - self.z if self.outcome is Outcome.WALKED else self.z
-        return Evaluated(self.outcome, off, self.DP - unity(self.z.size), self)
+        return Evaluated(self.outcome, off, self.DP - identity(self.z.size), self)
 
     @property
     def residual(self) -> float:
-        return self.returning().residual
+        return self.mismatch().residual
 
     @cached_property
     def multipliers(self) -> NDArray[np.complex128]:
-        """Multipliers (d,) of the cycle, largest first."""
         return multipliers_of(self.DP)
 
     @property
@@ -219,13 +180,11 @@ class Cycle:
 
     @property
     def step(self) -> MappedStep:
-        """The only step of a period-1 gait."""
         (step,) = self.steps
         return step
 
     @property
     def period_s(self) -> float:
-        """Duration of the whole cycle."""
         return math.fsum(step.period_s for step in self.steps)
 
     @property
@@ -245,32 +204,31 @@ class Cycle:
 
 
 def walk_steps(step_map: Stepper, z: Floats, p: float, n: int) -> Cycle:
-    """Walk n steps from z (d,) at p, with their derivative by z."""
     steps: list[MappedStep] = []
-    at, DP = z, unity(z.size)
+    position, DP = z, identity(z.size)
     for _ in range(n):
-        step = step_map.step(at, p)
+        step = step_map.step(position, p)
         if step.outcome is not Outcome.WALKED:
             return Cycle(step.outcome, p, z, tuple(steps), DP)
-        at, DP = step.z, step.DP @ DP if steps else step.DP
+        position, DP = step.z, step.DP @ DP if steps else step.DP
         steps.append(step)
     return Cycle(Outcome.WALKED, p, z, tuple(steps), DP)
 
 
-def with_parameter(step_map: StepMap, cycle: Cycle) -> Cycle:
+def add_parameter_derivative(step_map: StepMap, cycle: Cycle) -> Cycle:
     """Return the cycle with its derivative by the parameter, or with the outcome of a neighbouring step that fails."""
-    at, Dp = cycle.z, 0.0 * cycle.z
+    position, Dp = cycle.z, 0.0 * cycle.z
     for step in cycle.steps:
-        outcome, beside = along_parameter(step_map, at, cycle.value)
+        outcome, by_parameter = differentiate_by_parameter(step_map, position, cycle.value)
         if outcome is not Outcome.WALKED:
             return replace(cycle, outcome=outcome, Dp=Dp)
-        at, Dp = step.z, step.DP @ Dp + beside
+        position, Dp = step.z, step.DP @ Dp + by_parameter
     return replace(cycle, Dp=Dp)
 
 
 def gait_near(step_map: Stepper, z: Floats, p: float, effort: Effort, n: int = 1) -> Cycle | NotConverged:
     """Solve for the gait of n steps near z (d,) at p by Newton's method."""
-    solved = newton(lambda z: walk_steps(step_map, z, p, n).returning(), z, effort)
+    solved = newton(lambda z: walk_steps(step_map, z, p, n).mismatch(), z, effort)
     return solved if isinstance(solved, NotConverged) else solved.evaluated.data
 
 

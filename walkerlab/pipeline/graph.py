@@ -11,7 +11,7 @@ from walkerlab.config import reads
 from walkerlab.config.reads import RigidConfig, SceneConfig, StartConfig
 from walkerlab.errors import ConfigError
 from walkerlab.registration import later
-from walkerlab.scene.left_out import of_contact_walk, of_rigid_walk
+from walkerlab.scene.omissions import contact_walk_omissions, rigid_walk_omissions
 from walkerlab.scene.studies import is_studied
 
 # The table is also what the command line's help is made of, which loads no config and no pydantic.
@@ -193,12 +193,12 @@ PIPELINE = Graph(
     ),
     Stage(
         "simulate", "walkerlab.stages.simulate", "Walk the rigid model.", reads.SimulateConfig,
-        gait_unless_start_is_given, walks=True, does_without=of_rigid_walk,
+        gait_unless_start_is_given, walks=True, does_without=rigid_walk_omissions,
     ),
     Stage(
         "contact-sim", "walkerlab.stages.contact_sim", "Walk the contact model, its contact forces as in ADAMS.",
         reads.ContactSimConfig, gait_for_start_or_pads, needs_contact=True, walks=True, compiles_long=True,
-        does_without=of_contact_walk,
+        does_without=contact_walk_omissions,
     ),
     Stage(
         "tune", "walkerlab.paper.tune",

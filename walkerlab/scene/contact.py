@@ -23,7 +23,7 @@ from walkerlab.mechanics.parts import Assembly
 from walkerlab.mechanics.rigid import places_of
 from walkerlab.orbits.contact_gait import GaitAnswer, find_gait_from
 from walkerlab.orbits.contact_map import WalkerOnGround
-from walkerlab.scene.parts import AnyWalker, assembly_of, drive_numbers
+from walkerlab.scene.parts import AnyWalker, assembly_of, drive_parameters
 from walkerlab.solvers.registry import Tolerances
 from walkerlab.solvers.system import Floats, State
 
@@ -33,15 +33,13 @@ if TYPE_CHECKING:
     from walkerlab.config.schema import Config
 
 BUDGET_PER_STEP = 1_000_000  # right-hand sides
-SAMPLES_PER_PENDULUM_TIME = 200  # of a walk that is stored
-GAIT = Tolerances("radau5", 1e-10, 1e-12, 10_000_000)  # the tangent is exact for this method
-FULL_STOP_DAMPING = 1e-5  # rad into a compliant knee stop from which on its damping is full
+SAMPLES_PER_PENDULUM_TIME = 200  # of stored walks
+GAIT_TOLERANCES = Tolerances("radau5", 1e-10, 1e-12, 10_000_000)  # the tangent is exact for this method
+FULL_STOP_DAMPING = 1e-5  # rad, penetration of full damping in a compliant knee stop
 
 
 @dataclass(frozen=True)
 class ContactScene(WalkerOnGround):
-    """A walker on compliant ground, ready to walk."""
-
     pinned: bool  # whether the stance foot of the first step is hinged
     pitch_m: float
     assembly: Assembly
@@ -69,18 +67,17 @@ def contact_scene(config: ContactConfig, rigid_step_length_m: float, own_pitch_m
     rigid_step_length_m  step length of the rigid gait, the reference length of pads and terrain
     own_pitch_m          step length of the contact gait, for `pad_pitch: own`
     """
-    contact = with_contact(config)
+    contact = require_contact(config)
     pitch = pads_pitch(contact, rigid_step_length_m, own_pitch_m)
     assembly, leg, gravity = assembly_of(config.walker), config.walker.leg_length_m, config.gravity_m_s2
     laws, rules = (normal_law(contact), friction_law(contact)), knee_rules(config.walker)
-    walker = with_drives(contact_walker(assembly, *laws, gravity, config.slope_rad, rules), config)
+    walker = apply_drives(contact_walker(assembly, *laws, gravity, config.slope_rad, rules), config)
     frame = Frame(leg, math.sqrt(leg / gravity), locate_switching=True)
     ground = JudgedGround(TERRAINS[contact.terrain](pitch), frame)
     return ContactScene(walker, ground, contact.stance == "pinned", pitch, assembly)
 
 
 def tolerances_of(config: GroundConfig, steps: int) -> Tolerances:
-    """Return the config's solver settings for a walk of at most `steps` steps."""
     settings = config.solver.contact
     return Tolerances(settings.method, settings.rtol, settings.atol, steps * BUDGET_PER_STEP)
 
@@ -93,7 +90,7 @@ def scene_on_pads(
     answer  of a search for that gait; by default it is searched for
     """
     own = None
-    if wants_own_pitch(with_contact(config)):
+    if wants_own_pitch(require_contact(config)):
         answer = answer or contact_gait(config, rigid_step, rigid_state)
         if answer.gait is None:
             raise NoAnswer(f"no contact gait to lay the pads for: {answer.reason}", answer.advice)
@@ -101,21 +98,19 @@ def scene_on_pads(
     return contact_scene(config, rigid_step, own)
 
 
-def with_drives(walker: ContactWalker, config: ContactConfig) -> ContactWalker:
-    """Return the walker with the drives of a config."""
+def apply_drives(walker: ContactWalker, config: ContactConfig) -> ContactWalker:
     pulse = {"push_off_duration": config.push_off.duration_s} if config.push_off.impulse_N_s != 0.0 else {}
-    return changed_forms(walker, **drive_numbers(config), **pulse)
+    return changed_forms(walker, **drive_parameters(config), **pulse)
 
 
 def knee_rules(walker: AnyWalker) -> KneeRules:
-    """Return how a walker's knees lock and release; straight legs have no such rules."""
     if not isinstance(walker, Kneed | PartsWalker):
         return KneeRules()
     knee = walker.knee
     at_touch = knee.release == "touch" or knee.at_heel_strike == "free"
     if knee.lock == "ideal":
         return KneeRules(release_at_touch=at_touch)
-    # damped from the first hundredth of a milliradian on
+    # full damping from 0.01 mrad on
     return KneeRules(NormalLaw(knee.stop_stiffness, 1.0, knee.stop_damping, FULL_STOP_DAMPING), at_touch)
 
 
@@ -126,8 +121,7 @@ TERRAINS: dict[str, Callable[[float], Terrain]] = {
 }
 
 
-def with_contact(config: ContactConfig) -> Contact:
-    """Return the contact block; raises ValueError without one."""
+def require_contact(config: ContactConfig) -> Contact:
     if config.contact is None:
         raise ValueError("this config has no contact block")
     return config.contact
@@ -139,19 +133,18 @@ def contact_gait(config: ContactConfig, rigid_step_length_m: float, rigid_state:
     rigid_step_length_m  initial pad pitch
     """
     scene = replace(contact_scene(config, rigid_step_length_m, rigid_step_length_m), pinned=False)
-    return find_gait_from(scene.walker, scene.ground, GAIT, start_state(scene, rigid_state))
+    return find_gait_from(scene.walker, scene.ground, GAIT_TOLERANCES, start_state(scene, rigid_state))
 
 
 def gait_off_pads(config: Config, rigid_step_length_m: float, rigid_state: State) -> GaitAnswer:
     """Find `contact_gait` on a plane that lets scuffing feet through, in place of pads."""
-    contact = with_contact(config)
+    contact = require_contact(config)
     if contact.terrain == "checkerboard":
         config = config.model_copy(update={"contact": contact.model_copy(update={"terrain": "after-mid-swing"})})
     return contact_gait(config, rigid_step_length_m, rigid_state)
 
 
 def wants_own_pitch(contact: Contact) -> bool:
-    """Whether pads must be laid for the contact gait's own step length."""
     return contact.terrain == "checkerboard" and contact.pad_pitch == "own"
 
 
@@ -179,7 +172,7 @@ def friction_law(contact: Contact) -> FrictionLaw:
     try:
         return law_named(contact.friction, contact.in_si())
     except TypeError as error:
-        raise ConfigError(f"{error}.", "docs/adding.md says what a law has.") from error
+        raise ConfigError(f"{error}.", "docs/adding.md lists the parts of a law.") from error
 
 
 def start_state(scene: ContactScene, rigid_state: State) -> State:
@@ -203,15 +196,13 @@ def start_state(scene: ContactScene, rigid_state: State) -> State:
     return (*hinged[: 2 + n], hinged[2 + n] - rolled, *hinged[3 + n :])
 
 
-def resting(scene: ContactScene) -> RestingFoot:
-    """Return the equilibrium of the walker standing on one foot."""
+def stance_equilibrium(scene: ContactScene) -> RestingFoot:
     walker, law = scene.walker, scene.walker.normal
     return resting_foot(walker.mass * walker.gravity, walker.mass, law.stiffness, law.exponent, law.damping)
 
 
 def scene_measures(scene: ContactScene) -> dict[str, Any]:
-    """Return derived quantities of the scene, SI, for summaries."""
-    foot = resting(scene)
+    foot = stance_equilibrium(scene)
     return {
         "static_penetration_m": foot.depth,
         "damping_ratio": foot.damping_ratio,

@@ -9,7 +9,7 @@ from walkerlab.errors import ConfigError
 from walkerlab.mechanics.parts import Assembly, BallFoot, Body, Coupling, Knee, Particle, Revolute
 from walkerlab.mechanics.walkers import Arc, Limb, kneed_legs, straight_legs, with_torso
 
-SHOWN_IN = "docs/walkers.md shows a walker described by its parts."
+PARTS_DOCS = "docs/walkers.md shows a walker described by its parts."
 AnyWalker = CompassWalker | StraightLegs | Kneed | PartsWalker
 
 
@@ -44,12 +44,11 @@ def hip_mass(walker: CompassWalker | StraightLegs, rigid: bool) -> float:
     """
     if rigid:
         return walker.hip_mass_kg
-    there = torso_mass(walker.torso) + walker.leg_inertia_kg_m2 / walker.leg_length_m**2
-    return max(walker.hip_mass_kg, LIGHTEST_CONTACT * walker.total_mass_kg - there)
+    present = torso_mass(walker.torso) + walker.leg_inertia_kg_m2 / walker.leg_length_m**2
+    return max(walker.hip_mass_kg, LIGHTEST_CONTACT * walker.total_mass_kg - present)
 
 
 def own_parts(walker: PartsWalker) -> Assembly:
-    """Return the parts listed in a config; raises ConfigError if they do not fit together."""
     try:
         return Assembly(
             bodies=tuple(Body(**dict(body)) for body in walker.bodies),
@@ -61,11 +60,10 @@ def own_parts(walker: PartsWalker) -> Assembly:
             legs=walker.legs,
         )
     except (KeyError, ValueError) as error:
-        raise ConfigError(f"walker: {error.args[0]}", SHOWN_IN) from None
+        raise ConfigError(f"walker: {error.args[0]}", PARTS_DOCS) from None
 
 
-def drive_numbers(config: RigidConfig) -> dict[str, Any]:
-    """Return the drive parameters of a config, by the names that both models use."""
+def drive_parameters(config: RigidConfig) -> dict[str, Any]:
     hip = config.walker.hip
     numbers = tuple(dict(hip).values())
     return {"driven_hip": hip != Hip(), "hip": numbers, "push_off": config.push_off.impulse_N_s}

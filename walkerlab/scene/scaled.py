@@ -10,9 +10,9 @@ from walkerlab.scene.contact import ContactScene, start_state
 from walkerlab.solvers.registry import Tolerances
 from walkerlab.solvers.system import State
 
-# tolerances of a map: away from edges its outcomes are those of the config's (docs/adjustment.md)
+# away from edges, a map has the same outcomes as with the config's tolerances (docs/adjustment.md)
 MAP_RTOL, MAP_ATOL = 1e-4, 1e-6
-LEAST_BUDGET, BUDGET_FACTOR = 60_000, 4  # right-hand sides of a cell: at least, and of the rigid start's walk
+LEAST_BUDGET, BUDGET_FACTOR = 60_000, 4  # right-hand sides of a cell: minimum, and multiple of the unchanged start's
 
 
 def starts_of(
@@ -25,7 +25,7 @@ def starts_of(
         return start_state(scene, with_scaled_rates(rigid, state, swing, stance))
 
     starts = scaled_starts.scaled_starts(scene.walker, scene.ground, start, steps, own)
-    return replace(starts, tolerances=replace(tolerances, method=scaled_starts.TOLERANCES.method))
+    return replace(starts, tolerances=replace(tolerances, method=scaled_starts.START_TOLERANCES.method))
 
 
 def for_a_map(starts: scaled_starts.ScaledStarts, evaluations: int) -> scaled_starts.ScaledStarts:

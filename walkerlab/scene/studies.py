@@ -15,20 +15,18 @@ if TYPE_CHECKING:
     from walkerlab.mechanics.standing import Standing
 
 STUDY = "walkerlab.paper.law"
-LAGRANGES: Equations = "corrected"
+LAGRANGE_EQUATIONS: Equations = "corrected"
 
 
 def is_studied(config: Any) -> bool:
-    """Whether a config has the study's own walker."""
     return bool(registered(STUDY, "is_own_walker")(config))
 
 
-def moved_by(model: Standing, equations: Equations) -> Standing:
-    """Return a walker that moves by a set of equations, Lagrange's or one of the study's."""
-    moved: Standing = model if equations == LAGRANGES else registered(STUDY, "LAWS")[equations](model)
+def with_equations(model: Standing, equations: Equations) -> Standing:
+    moved: Standing = model if equations == LAGRANGE_EQUATIONS else registered(STUDY, "LAWS")[equations](model)
     return moved
 
 
 def equation_sets(config: Any) -> tuple[Equations, ...]:
     """Return the sets of equations to search gaits with: the config's, and every set for the study's walker."""
-    return (LAGRANGES, *registered(STUDY, "LAWS")) if is_studied(config) else (config.equations,)
+    return (LAGRANGE_EQUATIONS, *registered(STUDY, "LAWS")) if is_studied(config) else (config.equations,)

@@ -12,35 +12,27 @@ from walkerlab.outcome import TOLD, Outcome, outcome_of
 if TYPE_CHECKING:
     from walkerlab.config.reads import ContactConfig
 
-GROUNDS: Final = {
+# How the contact model's ground causes an outcome; pads are treated separately.
+GROUND_CAUSES: Final = {
     "slid": "The ground's friction ends them: contact.static_friction, contact.dynamic_friction, "
     "contact.stiction_velocity.",
     "lifted-off": "The ground throws them off, or they start too fast: contact.stiffness, contact.damping.",
 }
-"""What of the contact model's ground has to do with an outcome, beside pads."""
-LAID: Final = {
-    "rigid": ", the rigid gait's step length",
-    "own": ", the contact gait's step length",
-}
-"""What `contact.pad_pitch` lays the pads for."""
+# Meaning of the values of `contact.pad_pitch`.
+PITCH_SOURCES: Final = {"rigid": ", the rigid gait's step length", "own": ", the contact gait's step length"}
 Range = tuple[float, float]
 
 
 @dataclass(frozen=True)
 class Pads:
-    """Pads on which walks ended.
+    """Pads on which walks ended."""
 
-    pitch_m  minimum and maximum over the walks, m
-    step_m   minimum and maximum length of their last steps, m; None if unknown
-    laid     the config's `contact.pad_pitch`, if all have the same
-    """
-
-    pitch_m: Range
-    step_m: Range | None = None
-    laid: str = ""
+    pitch_m: Range  # minimum and maximum over the walks, m
+    step_m: Range | None = None  # minimum and maximum length of their last steps, m; None if unknown
+    laid: str = ""  # the config's `contact.pad_pitch`, if all have the same
 
 
-def endings(
+def describe_endings(
     outcomes: Mapping[str, int], config: ContactConfig, contact: bool, pads: Pads | None = None
 ) -> list[dict[str, Any]]:
     """Count and describe the walks that ended early, the most frequent outcome first.
@@ -54,28 +46,27 @@ def endings(
     """
     total = sum(walks for outcome, walks in outcomes.items() if outcome_of(outcome) is not None)
     rows = []
-    for outcome, walks in sorted(outcomes.items(), key=lambda one: -one[1]):
-        known = outcome_of(outcome)
-        if known is not None and known is not Outcome.WALKED:
-            why = causes(outcome, config, contact, pads)
-            aside = "" if TOLD[known].did == outcome else f" ({outcome})"
-            said = " ".join([f"{walks:,} of {total:,} walks {TOLD[known].did}{aside}.", *why])
-            rows.append({"outcome": outcome, "walks": walks, "of": total, "ground": bool(why), "said": said})
+    for outcome, walks in sorted(outcomes.items(), key=lambda item: -item[1]):
+        ending = outcome_of(outcome)
+        if ending is not None and ending is not Outcome.WALKED:
+            why = ground_causes(outcome, config, contact, pads)
+            aside = "" if TOLD[ending].did == outcome else f" ({outcome})"
+            description = " ".join([f"{walks:,} of {total:,} walks {TOLD[ending].did}{aside}.", *why])
+            rows.append({"outcome": outcome, "walks": walks, "of": total, "ground": bool(why), "said": description})
     return rows
 
 
-def causes(outcome: str, config: ContactConfig, contact: bool, pads: Pads | None = None) -> list[str]:
-    """Return sentences on how the ground caused an outcome; empty if it did not."""
+def ground_causes(outcome: str, config: ContactConfig, contact: bool, pads: Pads | None = None) -> list[str]:
     if not contact or config.contact is None:
         return []
     if outcome != "off-pad":
-        return [GROUNDS[outcome]] if outcome in GROUNDS else []
-    told = ["The pads end them, not the walker."]
+        return [GROUND_CAUSES[outcome]] if outcome in GROUND_CAUSES else []
+    sentences = ["The pads end them, not the walker."]
     if pads is not None:
-        steps = "" if pads.step_m is None else f"; their last steps were {metres(pads.step_m)} long"
-        told.append(f"The pads' pitch is {metres(pads.pitch_m)}{LAID.get(pads.laid, '')}{steps}.")
+        steps = "" if pads.step_m is None else f"; their last steps were {format_range(pads.step_m)} long"
+        sentences.append(f"The pads' pitch is {format_range(pads.pitch_m)}{PITCH_SOURCES.get(pads.laid, '')}{steps}.")
     own = "" if config.contact.pad_pitch == "own" else " or contact.pad_pitch=own"
-    return [*told, f"Try {without_pads(config)}{own}."]
+    return [*sentences, f"Try {without_pads(config)}{own}."]
 
 
 def without_pads(config: ContactConfig) -> str:
@@ -83,6 +74,6 @@ def without_pads(config: ContactConfig) -> str:
     return f"contact.terrain={'plane' if isinstance(config.walker, Kneed) else 'after-mid-swing'}"
 
 
-def metres(lengths: Range) -> str:
-    least, most = (f"{one:.3g}" for one in lengths)
+def format_range(lengths: Range) -> str:
+    least, most = (f"{length:.3g}" for length in lengths)
     return f"{least} m" if least == most else f"{least} to {most} m"
