@@ -40,9 +40,9 @@ from walkerlab.hybrid.recorded_walk import with_scaled_rates
 from walkerlab.hybrid.rigid_lanes import new_fates, new_lane_memory, two_legs, walk_lanes
 from walkerlab.orbits.basin import ATOL, RTOL, Attractors
 from walkerlab.orbits.families import ValueSpan
-from walkerlab.orbits.fixed_point import LOOKING, RigidGait, Search, SlopeBranch, find_gaits, over_slope
+from walkerlab.orbits.fixed_point import SEARCH_TOLERANCES, RigidGait, Search, SlopeBranch, find_gaits, over_slope
 from walkerlab.orbits.newton import Effort
-from walkerlab.orbits.shooting import on_section
+from walkerlab.orbits.rigid_map import state_on_section
 from walkerlab.orbits.small_slope import seeds
 from walkerlab.orbits.step_map import Cycle, gait_near
 from walkerlab.paper.walker import compass, compass_or_none
@@ -227,7 +227,7 @@ def newton_lines(watch: Stopwatch) -> Iterator[Line]:
     """From the small-slope seed to the fixed point at 1 degree."""
     search = Search(rigid_walker(ONE_DEGREE, "corrected"))
     seed, slope = seeds(search.walker)[0], float(search.walker.slope)
-    looking = over_slope(search.walker, LOOKING)
+    looking = over_slope(search.walker, SEARCH_TOLERANCES)
 
     def solve() -> None:
         _, z = SlopeBranch(looking, seed).follow(slope)
@@ -311,7 +311,7 @@ def peer_walks_per_s(config: Config, basin: dict[str, Any]) -> float:
     began = time.perf_counter()
     for _ in range(PEER_STARTS):
         drawn = {name: float(generator.uniform(*sides)) for name, sides in basin["window"].items()} | basin["held"]
-        start = on_section(walker, [drawn[name] for name in COORDINATES])
+        start = state_on_section(walker, [drawn[name] for name in COORDINATES])
         if basin["model"] == "rigid":
             walk_as_a_script(script, start, PEER_STEPS, RTOL, ATOL, BUDGET, ends=(ending,))
         else:

@@ -45,7 +45,7 @@ from walkerlab.mechanics.parts import Assembly
 from walkerlab.mechanics.rigid import standing
 from walkerlab.mechanics.standing import Standing
 from walkerlab.orbits.fixed_point import MAX_START, MIN_START, GaitSearch, RigidGait, Search, SearchSettings, find_gaits
-from walkerlab.orbits.shooting import SHORTEST_STEP, coordinates_of, on_section, section_of
+from walkerlab.orbits.rigid_map import SHORTEST_STEP, coordinates_of, state_on_section, strike_section
 from walkerlab.orbits.similarity import unit_walker
 from walkerlab.orbits.small_slope import LONG_PERIOD, SHORT_PERIOD
 from walkerlab.outcome import Outcome
@@ -254,7 +254,7 @@ def overlooks(walker: Standing) -> bool:
     """Whether another method finds a gait of a walker of which a search finds none."""
     search = Search(walker)
     looking, still = search.looking, search.walker.slope + search.walker.lean
-    section = section_of(search.walker)
+    section = strike_section(search.walker)
     d = len(search.walker.section_indices)
     starts = np.random.default_rng(7).uniform(MIN_START[:d], MAX_START[:d], (OTHER_STARTS, d))
     starts[:, 0] = 0.5 * starts[:, 0] - still
@@ -379,7 +379,8 @@ def walked(walker: Standing, z: NDArray[np.float64]) -> list[Any]:
     """Section coordinates after each of ten steps from z."""
     tolerances = Tolerances("dop853", RTOL, ATOL, BUDGET)
     return [
-        coordinates_of(walker, y) for y in take_walk(walker, tolerances, on_section(walker, z.tolist()), STEPS).after
+        coordinates_of(walker, y)
+        for y in take_walk(walker, tolerances, state_on_section(walker, z.tolist()), STEPS).after
     ]
 
 

@@ -5,7 +5,7 @@ import functools
 import pytest
 
 from walkerlab.config.loader import load
-from walkerlab.orbits import plane
+from walkerlab.orbits import two_parameters
 from walkerlab.pipeline.executor import answer_in_memory
 from walkerlab.pipeline.results import MemoryResults
 from walkerlab.store.content import Group, Variable
@@ -30,7 +30,7 @@ def real(stage):
     """The result of a stage on a walk of two strides, computed once a session."""
     config = load(None, ["strides=2", *SMALL[stage]]).config
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(plane, "CELLS", (3, 2))
+        patch.setattr(two_parameters, "PLANE_CELLS", (3, 2))
         return answer_in_memory(config, stage, MEMORY)
 
 

@@ -229,9 +229,9 @@ def test_a_key_to_follow_gaits_over_goes_with_its_span(walker):
 @pytest.mark.parametrize(
     ("asked", "refused"),
     {
-        "continuation --over strides --from 1 --to 2": "strides touches no model",
-        "robustness --set robustness.to=[strides]": "strides touches no model",
-        "design --minimise period_s --over contact.damping=1:2": "does not touch the rigid model",
+        "continuation --over strides --from 1 --to 2": "strides affects no model",
+        "robustness --set robustness.to=[strides]": "strides affects no model",
+        "design --minimise period_s --over contact.damping=1:2": "does not affect the rigid model",
     }.items(),
 )
 def test_a_question_that_cannot_be_meant_stops_before_anything_runs(walker, asked, refused):

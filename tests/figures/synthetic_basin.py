@@ -4,7 +4,7 @@ import numpy as np
 from synthetic_walks import stored
 
 from walkerlab.config.loader import load
-from walkerlab.orbits.basin import NONE
+from walkerlab.orbits.basin import UNREACHED
 from walkerlab.outcome import Outcome
 from walkerlab.stages.basin import WalkEnds, group_of, summary, window_of
 
@@ -16,9 +16,9 @@ def basin(attractor, aperiodic=False, config=CONFIG, steps=7):
     """Cells walk where they have an attractor or -2, for none; the others fall."""
     window = window_of(config, Z)
     attractor = np.resize(attractor, window.size)
-    walks = attractor != NONE
+    walks = attractor != UNREACHED
     found = WalkEnds(
-        np.where(walks, Outcome.WALKED, Outcome.FELL), np.maximum(attractor, NONE), np.where(walks, steps, 1)
+        np.where(walks, Outcome.WALKED, Outcome.FELL), np.maximum(attractor, UNREACHED), np.where(walks, steps, 1)
     )
     attractors = [{"period": 1}, {"period": 2}]
     said = summary(config.basin, window, found, walks.astype(float).reshape(window.cells), attractors, aperiodic)

@@ -8,7 +8,7 @@ from walkerlab.config.loader import load
 from walkerlab.figures import stage as plot
 from walkerlab.figures.maps import FIGURE_15 as FIGURE
 from walkerlab.figures.maps import attractor_name, sides_of
-from walkerlab.orbits.basin import NONE
+from walkerlab.orbits.basin import UNREACHED
 from walkerlab.report.results import Results
 from walkerlab.report.sections.families import basin as section
 from walkerlab.store import artifact
@@ -16,11 +16,11 @@ from walkerlab.store.content import Content
 
 
 def test_walks_that_have_settled_from_their_first_step_on_are_drawn():
-    assert FIGURE.drawn(basin([0, NONE], steps=0)).png.startswith(b"\x89PNG")
+    assert FIGURE.drawn(basin([0, UNREACHED], steps=0)).png.startswith(b"\x89PNG")
 
 
 def test_it_says_how_much_of_the_window_walks_and_where_to():
-    results = basin([0, 0, 1, NONE])
+    results = basin([0, 0, 1, UNREACHED])
     drawing = FIGURE.drawn(results)
     assert drawing.png.startswith(b"\x89PNG")
     assert "75 % of the window walk" in drawing.caption
@@ -31,7 +31,7 @@ def test_it_says_how_much_of_the_window_walks_and_where_to():
 
 
 def test_walks_that_settle_nowhere_are_told_apart():
-    drawing = FIGURE.drawn(basin([-2, NONE], aperiodic=True))
+    drawing = FIGURE.drawn(basin([-2, UNREACHED], aperiodic=True))
     assert "never repeats itself" in drawing.svg.decode()
     assert "no walk settles on a gait" in drawing.svg.decode()
     assert "6 cells still walk after 300 steps" in drawing.caption
@@ -39,7 +39,7 @@ def test_walks_that_settle_nowhere_are_told_apart():
 
 def test_of_three_coordinates_the_middle_plane_is_drawn():
     config = load(None, ["basin.plane=[theta_2,dtheta_1,dtheta_2]", "basin.cells=[3,3,3]"]).config
-    assert "of which the middle plane is shown" in FIGURE.drawn(basin([0, NONE], config=config)).caption
+    assert "of which the middle plane is shown" in FIGURE.drawn(basin([0, UNREACHED], config=config)).caption
 
 
 def test_attractors_of_one_period_have_letters():
@@ -61,7 +61,7 @@ def test_without_a_basin_it_says_how_to_make_one():
 
 
 def test_the_report_has_its_shares_and_attractors():
-    made = section(Results(CONFIG, basin([0, 0, 1, NONE]), (), ()))
+    made = section(Results(CONFIG, basin([0, 0, 1, UNREACHED]), (), ()))
     assert "75 % of the window walk" in made.blocks[0].text
     assert [row[1].text for row in next(iter(made.blocks[1].groups.values()))] == ["6", "3"]
     assert section(Results(CONFIG, {}, (), ())) is None
@@ -75,7 +75,7 @@ def test_drawings_take_it_in_once_it_is_there(stage):
 
 
 def test_its_own_command_draws_it_at_once(tmp_path):
-    made = basin([0, 0, 1, NONE])["basin"]
+    made = basin([0, 0, 1, UNREACHED])["basin"]
     artifact.write(tmp_path / "basin.h5", Content(made.groups, made.summary), made.identity, made.provenance)
     (path,) = plot.draw_at_once("basin", tmp_path, anew=True)
     assert path == tmp_path / "figures" / "figure-15.svg"

@@ -9,7 +9,7 @@ from walkerlab.config.reads import only
 from walkerlab.config.schema import Config
 from walkerlab.figures import stage as plot
 from walkerlab.pipeline.graph import PIPELINE
-from walkerlab.scene.left_out import LeftOut
+from walkerlab.scene.omissions import LeftOut
 from walkerlab.store import index
 
 WITHOUT_CONTACT = [LeftOut(name, "the config has no contact block") for name in ("contact-sim", "compare")]

@@ -11,7 +11,7 @@ from walkerlab.config.loader import load
 from walkerlab.hybrid.recorded_walk import take_walk
 from walkerlab.mechanics.standing import STANCE, SWING
 from walkerlab.orbits.fixed_point import find_gaits
-from walkerlab.orbits.shooting import EXACT, SMALL, Shooting, coordinates_of, section_of
+from walkerlab.orbits.rigid_map import EXACT_STEPS, TANGENT_SCALE, RigidStepper, coordinates_of, strike_section
 from walkerlab.outcome import Outcome
 from walkerlab.scene.contact import contact_scene, start_state
 from walkerlab.scene.footholds import foothold_heights
@@ -100,7 +100,7 @@ def test_a_walk_on_even_ground_has_no_shortest_landing():
 @pytest.mark.parametrize("name", ["slope-3deg", "kneed", "round-feet"])
 def test_columns_change_over_steps_up_and_down_as_differences_say(name):
     _, walker, gait = gait_of(name)
-    shooting, section = Shooting(walker, EXACT), section_of(walker)
+    shooting, section = RigidStepper(walker, EXACT_STEPS), strike_section(walker)
     z, d = coordinates_of(walker, gait.state), int(walker.coordinates)
     rises = np.array([0.0, 6e-4, -9e-4, 3e-4]) * walker.leg_length  # the last foothold is level with the first
 
@@ -108,7 +108,7 @@ def test_columns_change_over_steps_up_and_down_as_differences_say(name):
         return shooting.walk(section, z, 3, derived, rises)
 
     n = len(walker.arm_x)
-    columns = end(z, derived=True).strikes.after[-1].reshape(1 + d, 2 * n)[1:].T / SMALL
+    columns = end(z, derived=True).strikes.after[-1].reshape(1 + d, 2 * n)[1:].T / TANGENT_SCALE
     for j in range(d):
         h = 1e-4 * np.eye(d)[j]
         ends = {k: end(z + k * h).strikes.after[-1][: 2 * n] for k in (-2, -1, 1, 2)}

@@ -7,16 +7,16 @@ from walkerlab.hybrid.recorded_walk import take_walk
 from walkerlab.hybrid.rigid_lanes import two_legs
 from walkerlab.orbits.basin import (
     CAPTURE,
-    NONE,
+    UNREACHED,
     Attractors,
     PeriodicAttractor,
     Window,
-    arrivals,
     edge_cells,
     find_attractors,
-    inside_cell,
+    subcell_centres,
+    walk_to_attractor,
 )
-from walkerlab.orbits.shooting import on_section
+from walkerlab.orbits.rigid_map import state_on_section
 from walkerlab.outcome import Outcome
 from walkerlab.paper.appendix_a import CORRECTED, RigidWalker, assembled
 from walkerlab.solvers.registry import Tolerances
@@ -45,7 +45,7 @@ def gentle():
 
 def walked(walker, z, steps):
     tolerances = Tolerances("dop853", 1e-12, 1e-14, 10**7)
-    return take_walk(walker.model, tolerances, on_section(walker.model, z), steps)
+    return take_walk(walker.model, tolerances, state_on_section(walker.model, z), steps)
 
 
 def test_the_only_attractor_of_a_gentle_slope_is_its_gait(gentle):
@@ -72,7 +72,7 @@ def test_where_steps_never_repeat_there_is_no_cycle():
 def test_walks_one_by_one_fare_as_those_in_lanes_do_but_at_edges(gentle):
     window = Window((0, 2), (0.15, -0.33), (0.2, -0.25), (12, 12), tuple(GAIT))
     starts = window.starts(np.arange(window.size))
-    lanes, alone = (arrivals(walker, gentle, starts, 40) for walker in (UNIT, UNIT.model))
+    lanes, alone = (walk_to_attractor(walker, gentle, starts, 40) for walker in (UNIT, UNIT.model))
     inner = np.setdiff1d(np.arange(window.size), edge_cells(lanes.outcome.reshape(window.cells)))
     for name in ("outcome", "attractor"):
         np.testing.assert_array_equal(getattr(alone, name)[inner], getattr(lanes, name)[inner])
@@ -83,13 +83,13 @@ def test_walks_one_by_one_fare_as_those_in_lanes_do_but_at_edges(gentle):
 
 def test_cells_fare_as_their_walks_do_but_at_edges(gentle):
     window = Window((0, 2), (0.15, -0.33), (0.2, -0.25), (32, 32), tuple(GAIT))
-    found = arrivals(UNIT, gentle, window.starts(np.arange(window.size)), 100)
+    found = walk_to_attractor(UNIT, gentle, window.starts(np.arange(window.size)), 100)
     inner = np.setdiff1d(np.arange(window.size), edge_cells(found.outcome.reshape(window.cells)))
     chosen = np.random.default_rng(1).choice(inner, 60, replace=False)
     near = gentle.cycles[0].points[0]
     for cell in chosen:
         walk = walked(UNIT, window.starts(np.array([cell]))[0], 30)
-        if found.attractor[cell] == NONE:
+        if found.attractor[cell] == UNREACHED:
             assert (walk.outcome, walk.steps) == (found.outcome[cell], found.steps[cell])
         else:
             assert walk.steps == 30
@@ -99,14 +99,14 @@ def test_cells_fare_as_their_walks_do_but_at_edges(gentle):
 
 
 def test_a_walk_that_reaches_nothing_ends_after_the_most_steps():
-    found = arrivals(UNIT, Attractors(), GAIT[None, :], 7)
-    assert (found.outcome[0], found.steps[0], found.attractor[0]) == (Outcome.WALKED, 7, NONE)
+    found = walk_to_attractor(UNIT, Attractors(), GAIT[None, :], 7)
+    assert (found.outcome[0], found.steps[0], found.attractor[0]) == (Outcome.WALKED, 7, UNREACHED)
     assert found.last[0] == pytest.approx(GAIT, abs=1e-6)
 
 
 def test_the_nearest_attractor_counts():
     far, near = PeriodicAttractor(np.array([[1.0, 0.0, 0.0]]), 0.5), PeriodicAttractor(GAIT[None, :], 1e-3)
-    found = arrivals(UNIT, Attractors((far, near)), GAIT[None, :], 7)
+    found = walk_to_attractor(UNIT, Attractors((far, near)), GAIT[None, :], 7)
     assert (found.steps[0], found.attractor[0]) == (1, 1)
 
 
@@ -116,7 +116,7 @@ def test_a_window_has_its_cells_in_rows_and_their_middles_inside():
     assert z[:, 1].tolist() == [8.0] * 8
     assert z[:, 2].tolist() == [0.25] * 4 + [0.75] * 4
     assert z[:4, 0].tolist() == window.along(1).tolist() == [10.5, 11.5, 12.5, 13.5]
-    parts = window.starts(np.zeros(4, int), inside_cell(2, 2))
+    parts = window.starts(np.zeros(4, int), subcell_centres(2, 2))
     assert parts[:, [2, 0]].tolist() == [[0.125, 10.25], [0.125, 10.75], [0.375, 10.25], [0.375, 10.75]]
 
 

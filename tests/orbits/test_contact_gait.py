@@ -8,7 +8,7 @@ import pytest
 
 from walkerlab.config import loader
 from walkerlab.orbits import contact_gait as search
-from walkerlab.orbits.contact_gait import GaitAnswer, gait_on
+from walkerlab.orbits.contact_gait import GaitAnswer, solve_gait_on
 from walkerlab.orbits.fixed_point import find_gaits
 from walkerlab.orbits.newton import NotConverged
 from walkerlab.outcome import Outcome
@@ -86,7 +86,7 @@ def test_ground_without_a_gait_is_said_in_words(sets, word):
 def test_a_search_that_fails_says_what_came_in_its_way(gait, monkeypatch):
     backward = replace(gait, steps=(replace(gait.step, length_m=-0.1),))
     monkeypatch.setattr(search, "gait_near", lambda *_: backward)
-    said = gait_on(None, None)
+    said = solve_gait_on(None, None)
     assert said == "it led to a walk that does not advance, with steps of -0.1 m"
     singular = NotConverged(Outcome.WALKED, singular=True)
     monkeypatch.setattr(search, "gait_near", lambda *_: singular)

@@ -16,8 +16,8 @@ from walkerlab.mechanics.standing import STANCE, STRAIGHT, SWING, kinetic_energy
 from walkerlab.orbits.fixed_point import find_gaits
 from walkerlab.orbits.gradients import gradients
 from walkerlab.orbits.newton import Effort
-from walkerlab.orbits.robustness import Standpoint
-from walkerlab.orbits.shooting import EXACT, RigidMap, Shooting, coordinates_of, section_of
+from walkerlab.orbits.rigid_map import EXACT_STEPS, RigidMap, RigidStepper, coordinates_of, strike_section
+from walkerlab.orbits.robustness import GaitOnMap
 from walkerlab.orbits.similarity import unit_walker
 from walkerlab.orbits.step_map import gait_near
 from walkerlab.scene.contact import contact_scene
@@ -88,7 +88,7 @@ DRIVEN = {
 def test_a_driven_step_maps_derivative_is_its_slope(name):
     walker, _ = unit_walker(on_slope(walker_of(name, **DRIVEN[name]), 0.0))
     gait = find_gaits(walker).gait
-    shooting, section = Shooting(walker, EXACT), section_of(walker)
+    shooting, section = RigidStepper(walker, EXACT_STEPS), strike_section(walker)
     z = coordinates_of(walker, gait.state)
     DP = shooting.walk(section, z).DP[0]
     differences = slope_of(lambda z: shooting.walk(section, z).z[0], z, [5e-4] * z.size)
@@ -150,7 +150,7 @@ def test_kuos_walker_spends_half_the_square_of_its_push_off_over_its_mass():
 
 def test_uphill_what_gravity_takes_is_no_income():
     walker = on_slope(walker_of("paper", push_off=4.0), -0.005)
-    walk = take_walk(walker, EXACT, find_gaits(walker).gait.state, 2)
+    walk = take_walk(walker, EXACT_STEPS, find_gaits(walker).gait.state, 2)
     assert walk.driven.gravity < 0.0
     spent = walk.driven.push_off / (walk.driven.weight * walk.touch_along_m[-1])
     assert walk.driven.cost_of_transport(walk.touch_along_m[-1]) == pytest.approx(spent, rel=1e-12)
@@ -166,16 +166,16 @@ def test_the_energies_of_a_driven_walk_balance(name):
     walker = on_slope(walker_of(name, **DRIVES[name]), 0.0)
     gait = find_gaits(walker).gait
     weight = walker.mass * walker.gravity * walker.leg_length
-    walk = take_walk(walker, EXACT, gait.state, 4)
+    walk = take_walk(walker, EXACT_STEPS, gait.state, 4)
     assert walk.energy_balance_residual < 1e-11 * weight
     assert sum(gait.work[name] for name in GIVERS) == pytest.approx(walk.lost_in_strikes / 4, rel=1e-9)
     off = with_scaled_rates(walker, gait.state, 1.01, 1.02)
-    assert take_walk(walker, EXACT, off, 2).energy_balance_residual < 1e-11 * weight
+    assert take_walk(walker, EXACT_STEPS, off, 2).energy_balance_residual < 1e-11 * weight
 
 
 def test_a_hips_damper_takes_the_integral_of_its_power():
     walker = on_slope(walker_of("paper", push_off=4.0, driven_hip=True, hip=(10.0, 0.1, 0.0)), 0.0)
-    walk = take_walk(walker, EXACT, LEVEL, 1, sampled=True)
+    walk = take_walk(walker, EXACT_STEPS, LEVEL, 1, sampled=True)
     y, t = walk.samples.state[:-1], walk.samples.time_s[:-1]
     spring = 5.0 * float(np.diff((y[[-1, 0], 0] - y[[-1, 0], 1]) ** 2)[0])
     damper = -np.trapezoid(0.1 * (y[:, 2] - y[:, 3]) ** 2, t)
@@ -194,10 +194,10 @@ def test_a_hip_torques_positive_work_is_the_integral_of_its_positive_power(name)
     """Late in the swing the legs turn back; with knees the knee strike reverses the rate between the thighs at once."""
     walker = on_slope(walker_of(name, **TURNED[name]), 0.0)
     start = find_gaits(walker).gait.state
-    net, positive = torque_work_of_a_step(walker, start, take_walk(walker, EXACT, start, 1))
+    net, positive = torque_work_of_a_step(walker, start, take_walk(walker, EXACT_STEPS, start, 1))
     assert positive > net + 1e-3 * abs(net)
     for steps in (1, 2, 4, 10):
-        driven = take_walk(walker, EXACT, start, steps).driven
+        driven = take_walk(walker, EXACT_STEPS, start, steps).driven
         assert driven.hip_torque / steps == pytest.approx(net, rel=1e-8)
         assert driven.hip_torque_positive / steps == pytest.approx(positive, rel=1e-7)
     assert driven.hip_torque == pytest.approx(driven.hip, rel=1e-9)
@@ -212,13 +212,13 @@ def test_a_costs_derivative_across_a_knee_strike_is_the_slope_of_independent_cos
     def cost(spring):
         walker = driven(spring)
         start = find_gaits(walker).gait.state
-        step = take_walk(walker, EXACT, start, 1)
+        step = take_walk(walker, EXACT_STEPS, start, 1)
         _, positive = torque_work_of_a_step(walker, start, step)
         return (push_off_work(walker, step.before)[0] + positive) / (walker.mass * walker.gravity * step.lengths_m[0])
 
     step_map = RigidMap(driven, 1.0, driven(2.0))
     gait = gait_near(step_map, np.array(find_gaits(driven(2.0)).gait.z), 2.0, Effort(1e-13))
-    at = Standpoint(step_map, 2.0, gait.z, gait.DP, unit_walker(driven(2.0))[1])
+    at = GaitOnMap(step_map, 2.0, gait.z, gait.DP, unit_walker(driven(2.0))[1])
     found = gradients(at, 2.0, ["cost_of_transport"])["cost_of_transport"]
     slope = (cost(2.02) - cost(1.98)) / 0.04
     assert found.value == pytest.approx(slope, rel=1e-3)

@@ -13,23 +13,23 @@ from walkerlab.orbits.attractors import (
     Lyapunov,
     close_returns,
     feigenbaum_ratios,
+    find_period,
     independent_blocks,
     largest_exponent,
-    may_part,
-    period_of,
-    settled,
+    may_diverge,
+    settle,
     standard_error,
-    swept,
+    sweep_attractor,
 )
 from walkerlab.orbits.bifurcations import GaitEquations, on_pairs
-from walkerlab.orbits.continuation import Segment, Solved, StepControl, corrected, root_along, stepped
-from walkerlab.orbits.families import NO_WALKER, BranchFollower, Seed, ValueSpan, apart, why_lost
+from walkerlab.orbits.continuation import CurvePoint, Segment, StepControl, correct, root_along, step_along
+from walkerlab.orbits.families import NO_WALKER, BranchFollower, Seed, ValueSpan, describe_loss, half_cycle_difference
 from walkerlab.orbits.fixed_point import find_gaits
 from walkerlab.orbits.newton import Effort, Evaluated, NotConverged
-from walkerlab.orbits.plane import CONTROL, Plane, curve_through
-from walkerlab.orbits.shooting import RigidMap, coordinates_of
+from walkerlab.orbits.rigid_map import RigidMap, coordinates_of
 from walkerlab.orbits.similarity import unit_walker
 from walkerlab.orbits.step_map import Cycle, gait_near, multipliers_of, walk_steps
+from walkerlab.orbits.two_parameters import CURVE_CONTROL, Plane, follow_curve
 from walkerlab.outcome import Outcome
 from walkerlab.paper.appendix_a import CORRECTED, RigidWalker, assembled
 
@@ -65,7 +65,7 @@ def period_three_start(follower):
     """A nearly returning point of the chaotic attractor."""
     one = next(b for b in compass_family() if b.period == 1 and b.stable_ranges)
     for slope in np.radians(np.linspace(5.06, 5.19, 8)):
-        chaotic = settled(follower.step_map, one.points[-1].z, slope, 400, 200)
+        chaotic = settle(follower.step_map, one.points[-1].z, slope, 400, 200)
         if not isinstance(chaotic, Outcome):
             for seed in close_returns(follower.step_map, chaotic, (3,), 3000):
                 gait = gait_near(follower.step_map, seed.z, slope, Effort(1e-12, 20), 3)
@@ -257,7 +257,7 @@ def test_branches_are_stable_between_their_bifurcations_and_end_where_the_span_d
 def test_a_doubled_branch_is_followed_away_from_its_flip():
     for branch in compass_family():
         if branch.period > 1:
-            parted = [np.linalg.norm(apart(point)) for point in branch.points[:3]]
+            parted = [np.linalg.norm(half_cycle_difference(point)) for point in branch.points[:3]]
             assert 0.0 < parted[0] < parted[1] < parted[2]
 
 
@@ -274,7 +274,7 @@ def between_the_first_flip_and_the_branch_beyond_it():
     two = next(branch for branch in compass_family() if branch.period == 2)
     slope = 0.5 * (two.ends[0].value + two.points[0].value)
     follower = BranchFollower(map_of(paper_walker, 0.1 - 1e-4), ValueSpan(1e-4, 0.1), most=12)
-    walked = settled(follower.step_map, one.points[-1].z, slope, 400, 2)
+    walked = settle(follower.step_map, one.points[-1].z, slope, 400, 2)
     return follower, Seed(walked.last, slope, 2)
 
 
@@ -293,7 +293,7 @@ def test_a_branch_that_was_entered_elsewhere_begins_at_its_flip_and_has_no_gait_
     begin = min(again.ends, key=lambda end: end.value)
     assert begin.reason == "closes on the gait of 1 step"
     assert begin.value == flip.value
-    assert min(np.abs(apart(point)).max() for point in again.points) > 1e-6
+    assert min(np.abs(half_cycle_difference(point)).max() for point in again.points) > 1e-6
 
 
 def test_no_branch_is_followed_from_a_flip_that_another_one_has_closed_on():
@@ -308,7 +308,7 @@ def test_a_walk_beyond_the_first_flip_settles_on_the_branch_that_was_switched_to
     one, two = (next(b for b in compass_family() if b.period == n and b.stable_ranges) for n in (1, 2))
     slope = float(np.mean(two.stable_ranges[0]))
     nearest = min(one.points, key=lambda point: abs(point.value - slope))
-    there = settled(step_map, nearest.z, slope, 300, 40)
+    there = settle(step_map, nearest.z, slope, 300, 40)
     assert there.period == 2
     follower = BranchFollower(step_map, ValueSpan(1e-4, 0.1))
     assert follower.lies_on(two, gait_near(step_map, there.last, slope, Effort(1e-12), 2))
@@ -320,7 +320,7 @@ def test_neighbours_part_on_the_chaotic_attractor_and_meet_on_a_stable_gait():
     gait = next(point for point in one.points if point.value > 0.03)
     calm = largest_exponent(step_map, gait.z, gait.value, 50, 300)
     assert calm.exponent == pytest.approx(np.log(abs(gait.multipliers[0])), abs=5e-3)
-    chaotic = settled(step_map, one.points[-1].z, np.radians(5.15), 400, 200)
+    chaotic = settle(step_map, one.points[-1].z, np.radians(5.15), 400, 200)
     assert chaotic.period == 0
     wild = largest_exponent(step_map, chaotic.last, chaotic.value, 50, 600)
     assert wild.exponent > 5.0 * wild.uncertainty > 0.0
@@ -342,7 +342,7 @@ def test_a_standard_error_covers_the_error_whether_or_not_steps_are_correlated(l
 def test_the_exponent_of_chaos_agrees_with_that_of_a_walk_fifty_times_as_long():
     follower = BranchFollower(map_of(paper_walker, 0.01), ValueSpan(0.0, 0.1))
     start = seeds_at(paper_walker, 0.07)[-1].z  # the longer gait, stable there
-    attractor = swept(follower.step_map, start, np.linspace(0.07, np.radians(5.1856), 60), 300, 50).found[-1]
+    attractor = sweep_attractor(follower.step_map, start, np.linspace(0.07, np.radians(5.1856), 60), 300, 50).found[-1]
     short, long = (largest_exponent(follower.step_map, attractor.last, attractor.value, 96, n) for n in (1500, 75_000))
     assert abs(short.exponent - long.exponent) < 2.5 * short.uncertainty
     assert long.uncertainty < 0.3 * short.uncertainty
@@ -374,8 +374,8 @@ def test_curves_of_flips_pass_through_flips_located_for_other_masses():
 
     branch = next(b for b in compass_family() if b.period == 1 and b.stable_ranges)
     (flip,) = branch.bifurcations
-    curve = curve_through(
-        flip, 1, ValueSpan(1e-4, 0.1), Plane(map_at, ValueSpan(9.0, 12.0), 10.0), 40, lambda: None, CONTROL
+    curve = follow_curve(
+        flip, 1, ValueSpan(1e-4, 0.1), Plane(map_at, ValueSpan(9.0, 12.0), 10.0), 40, lambda: None, CURVE_CONTROL
     )
     index = int(np.argmax(curve.second))
     heavy = curve.second[index]
@@ -408,8 +408,8 @@ def test_a_span_that_begins_where_the_walkers_do_is_followed_to_its_end(first):
 
 
 def test_a_branch_that_ends_in_a_push_off_that_lasts_too_long_says_so():
-    assert why_lost(NotConverged(Outcome.REJECTED)) == "its push-off is not over when the feet pass each other"
-    assert why_lost(NotConverged(Outcome.FELL)).startswith("fell: ")
+    assert describe_loss(NotConverged(Outcome.REJECTED)) == "its push-off is not over when the feet pass each other"
+    assert describe_loss(NotConverged(Outcome.FELL)).startswith("fell: ")
 
 
 def test_a_branch_that_uses_up_its_points_says_so():
@@ -447,15 +447,15 @@ class Circle:
 
 def test_continuation_goes_round_a_circle_and_finds_where_it_folds():
     control = StepControl(first=0.1, longest=0.3, turn=0.9)
-    point = corrected(Circle(), np.array([0.6, 0.8]), np.array([0.8, -0.6]), 1e-14)
+    point = correct(Circle(), np.array([0.6, 0.8]), np.array([0.8, -0.6]), 1e-14)
     folds, gone, length = [], 0.0, control.first
     while gone < 2.0 * np.pi:
-        following, length = stepped(Circle(), point, length, control)
+        following, length = step_along(Circle(), point, length, control)
         gone += np.arccos(np.clip(point.x @ following.x, -1.0, 1.0))
         if point.x[1] * following.x[1] < 0.0:
             folds.append(root_along(Segment(Circle(), point, following, 1e-14), lambda solved: solved.x[1]).x)
         point = following
-    assert isinstance(point, Solved)
+    assert isinstance(point, CurvePoint)
     assert np.sort([fold[0] for fold in folds])[[0, -1]] == pytest.approx([-1.0, 1.0], abs=1e-14)
 
 
@@ -470,24 +470,24 @@ def test_the_action_on_pairs_has_products_of_multipliers_as_its_own():
 
 def test_what_repeats_itself_has_a_period_and_what_does_not_has_none():
     cycle = np.tile([[0.1, 0.2], [0.3, 0.1], [0.2, 0.5]], (8, 1))
-    assert period_of(cycle) == 3
-    assert period_of(np.random.default_rng(0).standard_normal((30, 2))) == 0
+    assert find_period(cycle) == 3
+    assert find_period(np.random.default_rng(0).standard_normal((30, 2))) == 0
 
 
 def test_neighbours_may_part_where_an_exponent_beside_is_positive():
     exponents = [Lyapunov(4.0, -0.2, 0.01), Lyapunov(5.0, -0.1, 0.01), Lyapunov(6.0, 0.3, 0.01)]
-    assert not may_part(exponents, 4.5)
-    assert not may_part(exponents, 4.0)
-    assert may_part(exponents, 5.2)
-    assert may_part(exponents, 7.0)
-    assert may_part([], 4.0)
+    assert not may_diverge(exponents, 4.5)
+    assert not may_diverge(exponents, 4.0)
+    assert may_diverge(exponents, 5.2)
+    assert may_diverge(exponents, 7.0)
+    assert may_diverge([], 4.0)
 
 
 def test_what_still_settles_has_the_period_that_it_comes_to():
     settling = np.tile([[0.1, 0.2], [0.3, 0.1]], (48, 1)) + 5e-4 * 0.99 ** np.arange(96)[:, None]
-    assert period_of(settling) == 2
+    assert find_period(settling) == 2
     drifting = np.tile([[0.1, 0.2], [0.3, 0.1]], (48, 1)) + 1e-4 * 1.05 ** np.arange(96)[:, None]
-    assert period_of(drifting) == 0
+    assert find_period(drifting) == 0
 
 
 class LostBeyond:
@@ -504,7 +504,7 @@ class LostBeyond:
 
 @pytest.mark.parametrize("values", [11, 14])
 def test_where_an_attractor_is_lost_does_not_hang_on_the_values_that_are_looked_at(values):
-    found = swept(LostBeyond(7.13), np.zeros(1), np.linspace(2.0, 8.0, values), 4, 8)
+    found = sweep_attractor(LostBeyond(7.13), np.zeros(1), np.linspace(2.0, 8.0, values), 4, 8)
     spacing = 6.0 / (values - 1)
     assert 0.0 < found.lost_at - 7.13 <= spacing / 2**6
     assert 0.0 <= 7.13 - found.found[-1].value <= spacing / 2**6
@@ -512,5 +512,5 @@ def test_where_an_attractor_is_lost_does_not_hang_on_the_values_that_are_looked_
 
 
 def test_an_attractor_that_is_not_there_at_the_first_value_is_lost_there():
-    found = swept(LostBeyond(1.0), np.zeros(1), [2.0, 3.0], 4, 8)
+    found = sweep_attractor(LostBeyond(1.0), np.zeros(1), [2.0, 3.0], 4, 8)
     assert (found.found, found.lost_at) == ((), 2.0)

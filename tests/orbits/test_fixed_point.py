@@ -15,19 +15,19 @@ from walkerlab.config.walkers import StraightLegs, Torso
 from walkerlab.hybrid.recorded_walk import take_walk
 from walkerlab.mechanics.rigid import standing
 from walkerlab.orbits.fixed_point import (
-    LOOKING,
     RANDOM_START,
+    SEARCH_TOLERANCES,
     SHORTEST_MOVE,
     RigidGait,
     Search,
     SlopeBranch,
-    branches,
-    choice,
+    choose_gait,
     over_slope,
+    slope_branches,
 )
 from walkerlab.orbits.fixed_point import find_gaits as find_gaits_of_model
 from walkerlab.orbits.newton import Effort, Evaluated, NotConverged, newton
-from walkerlab.orbits.shooting import NEW, NOWHERE, Shooting, section_of
+from walkerlab.orbits.rigid_map import NEW_GAIT, NO_GAIT, RigidStepper, strike_section
 from walkerlab.orbits.small_slope import LONG_PERIOD, SHORT_PERIOD, seeds
 from walkerlab.outcome import Outcome
 from walkerlab.paper.appendix_a import AS_PRINTED, CORRECTED, RigidWalker, assembled
@@ -52,7 +52,7 @@ def on_slope(degrees, walker=PAPER):
 TIGHT = Tolerances("dop853", 1e-13, 1e-15, 10**5)
 
 
-class Counted(Shooting):
+class Counted(RigidStepper):
     """A step map that counts what it costs."""
 
     def __init__(self, like, tolerances):
@@ -72,15 +72,15 @@ def shooting(walker):
 
 def solve(shooting, walker, z, tolerance):
     """By Newton's method for a walker in its own units, so that a step counts what it costs."""
-    section = section_of(assembled(walker))
+    section = strike_section(assembled(walker))
 
-    def returning(z):
+    def mismatch(z):
         step = shooting.walk(section, z)
         if step.outcome is not Outcome.WALKED:
             return Evaluated(step.outcome, z, np.eye(z.size), step)
         return Evaluated(step.outcome, step.z[0] - z, step.DP[0] - np.eye(z.size), step)
 
-    return newton(returning, np.array(z), Effort(tolerance, 60, SHORTEST_MOVE))
+    return newton(mismatch, np.array(z), Effort(tolerance, 60, SHORTEST_MOVE))
 
 
 # from two other integrations of the same equations
@@ -162,8 +162,8 @@ def test_the_same_seed_draws_the_same_starts():
 
 def test_following_a_seed_costs_as_much_as_a_few_dozen_steps():
     walker = Search(assembled(PAPER)).walker
-    step_map = over_slope(walker, LOOKING)
-    counted = step_map._exact = Counted(walker, LOOKING)
+    step_map = over_slope(walker, SEARCH_TOLERANCES)
+    counted = step_map._exact = Counted(walker, SEARCH_TOLERANCES)
     assert SlopeBranch(step_map, seeds(walker)[0]).follow(walker.slope)[1] is not None
     # one step of walking takes about 200 right-hand sides
     assert counted.steps <= 30
@@ -245,7 +245,7 @@ def test_however_unstable_a_gait_is_it_can_be_walked():
     assert search.gait.spectral_radius > 10.0
     assert "least unstable" in search.reason
     rejected = next(gait for gait in search.gaits if gait.objections)
-    assert rejected.objections == ("the foot behind would have to leave through the ground",)
+    assert rejected.objections == ("the trailing foot would have to pass through the ground",)
 
 
 # hip of mass 1, next to nothing in the feet, g = L = 1, slope 0.009 (Garcia et al. 1998), recomputed by two other
@@ -323,10 +323,10 @@ def gait_with(radius, pull=0.0):
 
 
 def test_the_stable_gait_is_chosen_and_one_that_cannot_be_walked_never():
-    assert choice((gait_with(2.0), gait_with(0.5)))[0] == 1
-    assert choice((gait_with(2.0), gait_with(0.5, pull=200.0)))[0] == 0
-    assert choice((gait_with(0.5, pull=200.0),))[0] is None
-    assert choice(())[0] is None
+    assert choose_gait((gait_with(2.0), gait_with(0.5)))[0] == 1
+    assert choose_gait((gait_with(2.0), gait_with(0.5, pull=200.0)))[0] == 0
+    assert choose_gait((gait_with(0.5, pull=200.0),))[0] is None
+    assert choose_gait(())[0] is None
 
 
 @settings(max_examples=10)
@@ -358,7 +358,7 @@ def test_gaits_of_other_walkers_repeat_themselves(fraction, hip, inertia, degree
     walker = RigidWalker(1.0, fraction, 5.0, 5.0 * hip, 5.0 * inertia, 9.81, np.deg2rad(degrees), sign)
     for gait in find_gaits(walker).gaits:
         z = np.array(gait.state[1:])
-        step = shooting(walker).walk(section_of(assembled(walker)), z)
+        step = shooting(walker).walk(strike_section(assembled(walker)), z)
         assert step.outcome is Outcome.WALKED
         assert step.time[0] == pytest.approx(gait.period, rel=1e-10)
         assert np.abs(step.z[0] - z).max() < 1e-11 * np.sqrt(9.81)
@@ -385,16 +385,16 @@ def test_a_gait_is_the_same_whatever_slopes_were_asked_before():
         search.follow_seeds()
         return [found.cycle.z.tolist() for found in search.found], search.lost
 
-    branches.cache_clear()
+    slope_branches.cache_clear()
     after_others = [starts_from_seeds(degrees) for degrees in (4.0, 0.3, 7.0, 2.0)][-1]
-    branches.cache_clear()
+    slope_branches.cache_clear()
     assert starts_from_seeds(2.0) == after_others
 
 
 def test_gaits_sought_in_threads_at_once_are_those_sought_one_after_the_other():
     walkers = [on_slope(degrees) for degrees in np.linspace(0.5, 4.0, 24)]
     alone = [find_gaits(walker) for walker in walkers]
-    branches.cache_clear()
+    slope_branches.cache_clear()
     interval = sys.getswitchinterval()
     sys.setswitchinterval(1e-6)
     try:
@@ -405,7 +405,7 @@ def test_gaits_sought_in_threads_at_once_are_those_sought_one_after_the_other():
 
 
 def led(map_, walker, starts, gaits=()):
-    return map_.lead(section_of(assembled(walker)), list(gaits), starts).tolist()
+    return map_.solve_starts(strike_section(assembled(walker)), list(gaits), starts).tolist()
 
 
 @pytest.mark.parametrize("walker", [PAPER, PRINTED, on_slope(4.0)])
@@ -414,7 +414,7 @@ def test_a_start_is_followed_by_the_moves_of_newtons_method(walker):
     gait = np.array(find_gaits(walker).gait.state)[[1, 2, 3]]
     near = gait * [[1.02, 0.96, 1.03]]
     solved = solve(map_, walker, near[0], 1e-6).x
-    assert led(map_, walker, near) == [NEW]
+    assert led(map_, walker, near) == [NEW_GAIT]
     np.testing.assert_allclose([solved, near[0]], [gait, gait], atol=1e-5)
     assert int(map_.memory.varied.counts[RHS]) == map_.evaluations
 
@@ -422,7 +422,7 @@ def test_a_start_is_followed_by_the_moves_of_newtons_method(walker):
 def test_a_start_near_a_known_gait_is_followed_no_further():
     map_ = shooting(PAPER)
     gaits = [np.array(gait.state)[[1, 2, 3]] for gait in find_gaits(PAPER).gaits]
-    derivatives = [map_.walk(section_of(assembled(PAPER)), gait).DP[0] for gait in gaits]
+    derivatives = [map_.walk(strike_section(assembled(PAPER)), gait).DP[0] for gait in gaits]
     starts = np.array(gaits) * [1.001, 0.999, 1.001]
     before = starts.copy()
     assert led(map_, PAPER, starts, zip(gaits, derivatives, strict=True)) == [0, 1]
@@ -431,7 +431,7 @@ def test_a_start_near_a_known_gait_is_followed_no_further():
 
 def test_a_start_that_does_not_walk_or_comes_to_stand_leads_nowhere():
     together = -PAPER.slope + 1e-4
-    assert led(shooting(PAPER), PAPER, np.array([[0.17, 3.0, 3.0], [together, 0.0, -1e-4]])) == [NOWHERE, NOWHERE]
+    assert led(shooting(PAPER), PAPER, np.array([[0.17, 3.0, 3.0], [together, 0.0, -1e-4]])) == [NO_GAIT, NO_GAIT]
 
 
 @pytest.mark.parametrize("degrees", [0.5445378151260504, 2.7453781512605043, 7.147058823529412])

@@ -10,7 +10,7 @@ from walkerlab.mechanics.rigid import standing
 from walkerlab.mechanics.walkers import Arc, Limb, kneed_legs, straight_legs, with_torso
 from walkerlab.orbits.fixed_point import find_gaits
 from walkerlab.orbits.newton import Effort
-from walkerlab.orbits.shooting import RigidMap, Shooting, on_section, section_of
+from walkerlab.orbits.rigid_map import RigidMap, RigidStepper, state_on_section, strike_section
 from walkerlab.orbits.similarity import unit_walker
 from walkerlab.orbits.step_map import gait_near
 from walkerlab.outcome import Outcome
@@ -70,7 +70,7 @@ def test_the_knee_strikes_when_the_published_one_does():
     parts, slope, gravity, (angle, stance, swing), *_ = PUBLISHED["kneed"]
     model = standing(parts, gravity, slope)
     z, _ = solved(model, np.array([angle - slope, swing, stance]))
-    walk = take_walk(model, Tolerances("dop853", 1e-12, 1e-14, 10**6), on_section(model, z), 3, sampled=True)
+    walk = take_walk(model, Tolerances("dop853", 1e-12, 1e-14, 10**6), state_on_section(model, z), 3, sampled=True)
     assert walk.outcome is Outcome.WALKED
     assert walk.knee_strike_time_s[0] == pytest.approx(0.348612, abs=1e-6)
     assert walk.energy_drift < 1e-10
@@ -82,12 +82,12 @@ def test_the_knee_strikes_when_the_published_one_does():
 @pytest.mark.parametrize("at_strike", ["locked", "free"])
 def test_the_step_maps_derivative_is_its_slope_through_the_knee_strike(at_strike):
     model = standing(HSU_CHEN, 9.81, 0.0504, at_strike == "locked")
-    shooting = Shooting(model, TIGHT)
+    shooting = RigidStepper(model, TIGHT)
     z = np.array([0.1881, -0.06, -1.11, -0.06])[: len(model.section_indices)]
-    DP, h = shooting.walk(section_of(model), z).DP[0], 1e-4
+    DP, h = shooting.walk(strike_section(model), z).DP[0], 1e-4
 
     def ahead(offset):
-        return shooting.walk(section_of(model), z + offset).z[0]
+        return shooting.walk(strike_section(model), z + offset).z[0]
 
     for j, e in enumerate(np.eye(z.size)):
         slope = (8 * (ahead(h * e) - ahead(-h * e)) - (ahead(2 * h * e) - ahead(-2 * h * e))) / (12 * h)

@@ -10,8 +10,8 @@ from scipy.optimize import fsolve
 from walkerlab.config.walkers import Kneed, Torso
 from walkerlab.hybrid.recorded_walk import take_walk
 from walkerlab.mechanics.rigid import standing
-from walkerlab.orbits.fixed_point import LOOKING, MAX_START, MIN_START, SearchSettings, find_gaits
-from walkerlab.orbits.shooting import on_section
+from walkerlab.orbits.fixed_point import MAX_START, MIN_START, SEARCH_TOLERANCES, SearchSettings, find_gaits
+from walkerlab.orbits.rigid_map import state_on_section
 from walkerlab.orbits.similarity import unit_walker
 from walkerlab.scene.parts import assembly_of
 
@@ -99,7 +99,7 @@ def test_a_knee_that_is_released_into_extension_is_not_caught_by_rounding(found)
     starts[:, 0] = 0.5 * starts[:, 0] - walker.slope
     walked = 0
     for z in starts:
-        walk = take_walk(walker, LOOKING, on_section(walker, z), 1)
+        walk = take_walk(walker, SEARCH_TOLERANCES, state_on_section(walker, z), 1)
         if walk.steps:
             walked += 1
             # a swing takes the time of a pendulum, of which rounding is a 1e-13th

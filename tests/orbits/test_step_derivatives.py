@@ -10,7 +10,7 @@ from walkerlab.config import loader
 from walkerlab.orbits.contact_map import OwnPads, step_from_section
 from walkerlab.orbits.fixed_point import find_gaits as find_gaits_of_model
 from walkerlab.orbits.newton import Effort, newton
-from walkerlab.orbits.shooting import RigidMap
+from walkerlab.orbits.rigid_map import RigidMap
 from walkerlab.orbits.similarity import unit_walker
 from walkerlab.orbits.step_map import gait_near, walk_steps
 from walkerlab.outcome import Outcome
@@ -138,7 +138,7 @@ def test_newton_converges_quadratically_on_the_contact_step_map(scene):
 
     def moves(tolerance):
         pads = OwnPads(lambda _: scene.walker, scene.ground, tolerances, PITCH)
-        found = newton(lambda z: walk_steps(pads, z, 0.0, 1).returning(), NEAR_THE_GAIT + ASIDE, Effort(tolerance))
+        found = newton(lambda z: walk_steps(pads, z, 0.0, 1).mismatch(), NEAR_THE_GAIT + ASIDE, Effort(tolerance))
         return found.corrections, found.evaluated.residual
 
     # a tolerance between two residuals shows each of them

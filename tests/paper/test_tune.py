@@ -10,7 +10,7 @@ import pytest
 from walkerlab.config.loader import load
 from walkerlab.config.reads import only
 from walkerlab.errors import NoAnswer
-from walkerlab.orbits.rigid_limit import ALL, NORMAL, ContactFactors, Distance, Extrapolation
+from walkerlab.orbits.rigid_limit import ALL_SERIES, NORMAL_SERIES, ContactFactors, Distance, Extrapolation
 from walkerlab.paper import tune
 from walkerlab.paper.tune_limit import LimitFindings, causes
 from walkerlab.pipeline.graph import PIPELINE
@@ -225,7 +225,7 @@ def test_the_page_names_what_swings_beside_the_legs_and_no_joint_that_was_not_th
 
 
 def test_what_could_not_be_told_apart_is_not_put_down_to_what_causes_do_together():
-    limit = LimitFindings((ALL,), 0.7, 0.71, {ALL: [], NORMAL: [at_period(0.712)]}, None)
+    limit = LimitFindings((ALL_SERIES,), 0.7, 0.71, {ALL_SERIES: [], NORMAL_SERIES: [at_period(0.712)]}, None)
     told = causes(limit)
     assert "together_s" not in told
     assert told["rest_s"] == pytest.approx(0.012)
@@ -239,7 +239,7 @@ def test_what_could_not_be_told_apart_is_not_put_down_to_what_causes_do_together
 
 
 def at_period(period):
-    return Distance(ContactFactors(NORMAL, 1.0, 1.0, 1.0, 1.0), period, 0.37, 0.0, period - 0.7, 0.0, 0.0)
+    return Distance(ContactFactors(NORMAL_SERIES, 1.0, 1.0, 1.0, 1.0), period, 0.37, 0.0, period - 0.7, 0.0, 0.0)
 
 
 def test_of_a_compass_that_is_not_the_papers_nothing_of_the_paper_is_told():

@@ -10,7 +10,7 @@ from process_table import workers_below
 from walkerlab.pipeline.executor import any_side_by_side
 from walkerlab.pipeline.graph import Graph
 from walkerlab.pipeline.runner import Options, execute
-from walkerlab.scene.left_out import STILL_COMPUTED
+from walkerlab.scene.omissions import STILL_COMPUTED
 from walkerlab.store.artifact import read
 from walkerlab.workers import WorkerDiedError
 

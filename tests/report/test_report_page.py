@@ -19,7 +19,7 @@ from walkerlab.report.registry import pages_of
 from walkerlab.report.results import Results
 from walkerlab.report.tables import Cell, Column, table
 from walkerlab.report.words import in_row, words
-from walkerlab.scene.left_out import LeftOut
+from walkerlab.scene.omissions import LeftOut
 
 NASTY = "<script>alert('x')</script><b title=\"y\">&amp;"
 PIXELS = "data:image/png;base64,"

@@ -35,7 +35,7 @@ from walkerlab.report.sections.walks import assumptions
 from walkerlab.report.tables import Table
 from walkerlab.report.tracks import Track, slip_since_touch
 from walkerlab.report.words import words
-from walkerlab.scene.left_out import LeftOut
+from walkerlab.scene.omissions import LeftOut
 
 SHARES = "0 are inputs, 1 is reproduced, 1 explained, 2 contradicted by its own other values and 0 not reproduced"
 NO_GAIT = "no gait at a slope of 0.2 rad: nothing repeats itself"

@@ -13,7 +13,7 @@ from walkerlab.pipeline.progress import Silent
 from walkerlab.report import stage as report
 from walkerlab.report.pictures import fitting
 from walkerlab.report.stage import write_pages
-from walkerlab.scene.left_out import STILL_COMPUTED, LeftOut
+from walkerlab.scene.omissions import STILL_COMPUTED, LeftOut
 from walkerlab.store.index import broken_file, indexed_files
 
 SVG = b"""<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 518.4 396" onload="alert(1)"><script>alert(1)</script>

@@ -15,8 +15,8 @@ from walkerlab.ground.friction import Coulomb, Frictionless
 from walkerlab.ground.terrain import after_mid_swing, checkerboard
 from walkerlab.ground.walker import feet_motion
 from walkerlab.hybrid.contact_crossings import hip_height
-from walkerlab.scene.contact import contact_scene, resting, start_state
-from walkerlab.scene.left_out import of_contact_walk
+from walkerlab.scene.contact import contact_scene, stance_equilibrium, start_state
+from walkerlab.scene.omissions import contact_walk_omissions
 from walkerlab.scene.rigid import rigid_walker
 
 STEP = 0.3714
@@ -68,7 +68,7 @@ def test_static_penetration_and_damping_are_those_of_the_whole_weight_on_one_foo
     """0.059 mm and over-damped, against the same two numbers worked out in N and mm."""
     scene = scene_of()
     depth_mm = (20.0 * 9.81 / 1e5) ** (1 / 2.2)
-    foot = resting(scene)
+    foot = stance_equilibrium(scene)
     assert foot.depth == pytest.approx(depth_mm / 1000.0)
     assert depth_mm == pytest.approx(0.059, abs=5e-4)
     stiffness_N_per_m = 2.2 * 1e5 * depth_mm**1.2 * 1000.0
@@ -80,7 +80,7 @@ def test_a_scene_without_friction_has_another_law_not_a_zero():
     config = load(None, ("contact.friction=none",)).config
     scene = contact_scene(config, STEP)
     assert isinstance(scene.walker.friction, Frictionless)
-    assert any("friction" in row["why"] for row in of_contact_walk(config))
+    assert any("friction" in row["why"] for row in contact_walk_omissions(config))
 
 
 def test_pads_are_laid_by_the_step_that_the_config_asks_for():

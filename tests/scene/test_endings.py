@@ -4,7 +4,7 @@ from pathlib import Path
 
 from walkerlab.config.loader import load
 from walkerlab.outcome import TOLD, Outcome
-from walkerlab.scene.endings import Pads, causes, endings
+from walkerlab.scene.walk_outcomes import Pads, describe_endings, ground_causes
 
 PAPER = load().config
 COUNTS = {"walked": 150, "off-pad": 178, "fell": 32, "no-answer": 7}
@@ -18,7 +18,7 @@ def test_every_outcome_has_its_words_and_its_colour():
 
 def test_walks_that_pads_end_are_told_from_limits_of_the_walker():
     pads = Pads((0.15, 0.15), (0.31, 0.36), "rigid")
-    first, second = endings(COUNTS, PAPER, contact=True, pads=pads)
+    first, second = describe_endings(COUNTS, PAPER, contact=True, pads=pads)
     assert (first["outcome"], first["walks"], first["of"], first["ground"]) == ("off-pad", 178, 360, True)
     assert first["said"] == (
         "178 of 360 walks met the flank of a pad or tripped over the pad they had left (off-pad). The pads end them, "
@@ -29,16 +29,16 @@ def test_walks_that_pads_end_are_told_from_limits_of_the_walker():
 
 
 def test_what_did_not_walk_does_not_count_and_what_walked_did_not_end():
-    assert endings({"answered": 3, "no-answer": 1}, PAPER, contact=False) == []
-    assert endings({"walked": 3}, PAPER, contact=True) == []
+    assert describe_endings({"answered": 3, "no-answer": 1}, PAPER, contact=False) == []
+    assert describe_endings({"walked": 3}, PAPER, contact=True) == []
 
 
 def test_legs_with_knees_are_sent_to_a_plane_and_pads_at_their_own_pitch_are_not_advised_again():
     kneed = load(Path("kneed"), ("contact.terrain=checkerboard", "contact.pad_pitch=own")).config
-    assert causes("off-pad", kneed, contact=True)[-1] == "Try contact.terrain=plane."
+    assert ground_causes("off-pad", kneed, contact=True)[-1] == "Try contact.terrain=plane."
 
 
 def test_the_rigid_model_has_no_ground_that_ends_a_walk():
-    assert causes("lifted-off", PAPER, contact=False) == []
-    assert "contact.stiffness" in causes("lifted-off", PAPER, contact=True)[0]
-    assert "contact.static_friction" in causes("slid", PAPER, contact=True)[0]
+    assert ground_causes("lifted-off", PAPER, contact=False) == []
+    assert "contact.stiffness" in ground_causes("lifted-off", PAPER, contact=True)[0]
+    assert "contact.static_friction" in ground_causes("slid", PAPER, contact=True)[0]

@@ -18,7 +18,7 @@ from walkerlab.hybrid.contact_events import FRICTION_SWITCHES, MATERIAL
 from walkerlab.mechanics.parts import Assembly, Body, Particle
 from walkerlab.pipeline.progress import Silent
 from walkerlab.pipeline.runner import Options, execute
-from walkerlab.scene import left_out
+from walkerlab.scene import omissions
 from walkerlab.scene.contact import contact_scene, start_state
 from walkerlab.scene.rigid import rigid_scene
 from walkerlab.solvers.registry import Tolerances
@@ -167,7 +167,7 @@ def test_outputs_that_are_asked_for_are_those_of_the_full_result(walks, stage):
 
 @pytest.mark.parametrize(
     ("stage", "numbers"),
-    [(simulate, left_out.RIGID_NUMBERS), (contact_sim, left_out.CONTACT_NUMBERS)],
+    [(simulate, omissions.RIGID_NUMBERS), (contact_sim, omissions.CONTACT_NUMBERS)],
     ids=["simulate", "contact_sim"],
 )
 @pytest.mark.parametrize("output", ["states", "energies", "forces"])
@@ -179,7 +179,9 @@ def test_what_an_output_is_said_to_take_is_what_it_takes(walks, stage, numbers, 
 
 
 def test_what_a_scene_is_said_to_save_is_what_it_saves():
-    said = left_out.of_contact_walk(load(None, ("contact.friction=none", "contact.stance=pinned", "outputs=[]")).config)
+    said = omissions.contact_walk_omissions(
+        load(None, ("contact.friction=none", "contact.stance=pinned", "outputs=[]")).config
+    )
     saved = {entry["what"]: entry["saves"] for entry in said}
     assert saved["tangential velocity and friction force"].startswith(
         f"{MATERIAL - FRICTION_SWITCHES} of the {MATERIAL} "
@@ -188,7 +190,10 @@ def test_what_a_scene_is_said_to_save_is_what_it_saves():
     free, hinged = scene.walker.size, 2 * int(scene.walker.forms[1, 0].bodies)
     assert saved["floating base and stance contact in the first step"].startswith(f"{free - hinged} of {free} ")
     config = load(None, ("outputs=[]",)).config
-    rigid, angles = left_out.of_rigid_walk(config), len(rigid_scene(config, config.ground, ()).walker.zero_state)
+    rigid, angles = (
+        omissions.rigid_walk_omissions(config),
+        len(rigid_scene(config, config.ground, ()).walker.zero_state),
+    )
     assert rigid[0]["saves"].startswith(f"{free - angles} of {free} ")
     assert all(entry["what"] and entry["why"] and entry["saves"] for entry in (*said, *rigid))
 
@@ -211,6 +216,6 @@ def test_the_angles_of_a_hinged_step_are_those_that_it_is_integrated_in(name, se
     config = load(Path(name), (*sets, "contact.stance=pinned")).config
     scene = contact_scene(config, 0.4)
     assert scene.walker.forms[1, 2 if scene.walker.kneed else 0].bodies == angles  # the stance knee is locked
-    said = next(one for one in left_out.of_contact_walk(config) if "pinned" in one["why"])
+    said = next(one for one in omissions.contact_walk_omissions(config) if "pinned" in one["why"])
     assert f"{angles} angles suffice" in said["why"]
     assert said["saves"].startswith(f"4 of {2 * angles + 4} equations")

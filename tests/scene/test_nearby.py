@@ -9,7 +9,7 @@ import pytest
 
 from walkerlab.config.loader import load
 from walkerlab.orbits.fixed_point import find_gaits
-from walkerlab.scene.nearby import gaits_on_other_slopes, nearby
+from walkerlab.scene.gait_suggestions import find_slopes_with_gaits, suggest_gaits
 from walkerlab.scene.rigid import rigid_walker
 
 KNEED = (
@@ -36,7 +36,7 @@ def gait_of(found):
 def test_a_kneed_walker_is_told_of_its_steeper_slopes(degrees):
     one = config(KNEED, f"slope_deg={degrees}", base=Path("kneed"))
     assert gait_of(one) is None
-    low, high = (math.degrees(value) for value in gaits_on_other_slopes(one).stable)
+    low, high = (math.degrees(value) for value in find_slopes_with_gaits(one).stable)
     for inside in (low + 0.05, high - 0.05):
         assert gait_of(config(KNEED, f"slope_deg={inside}", base=Path("kneed"))).stable
     beyond = gait_of(config(KNEED, f"slope_deg={low - 0.05}", base=Path("kneed")))
@@ -45,7 +45,7 @@ def test_a_kneed_walker_is_told_of_its_steeper_slopes(degrees):
 
 @pytest.mark.parametrize("slope", ["slope_deg=40", "slope_rad=0.7"])
 def test_the_command_that_is_told_finds_a_stable_gait(slope):
-    said = nearby(config(slope), f" --set {slope}")
+    said = suggest_gaits(config(slope), f" --set {slope}")
     command = re.search("`(.*)`", said)[1]
     sets = [word for word in shlex.split(command) if "=" in word]
     assert said.startswith("A stable gait exists from ")
@@ -56,7 +56,7 @@ def test_the_command_that_is_told_finds_a_stable_gait(slope):
 def test_a_kneed_walker_without_a_gait_is_told_to_put_its_feet_ahead(degrees):
     sets = (MCGEER, f"slope_deg={degrees}")
     assert gait_of(config(*sets, base=Path("kneed"))) is None
-    advice = nearby(config(*sets, base=Path("kneed")), " -c mcgeer.yaml")
+    advice = suggest_gaits(config(*sets, base=Path("kneed")), " -c mcgeer.yaml")
     command = re.search("`walkerlab fixedpoint -c mcgeer.yaml --set (walker.foot_centre_ahead_m=[0-9.]+)`", advice)[1]
     assert gait_of(config(*sets, command, base=Path("kneed"))).stable
     assert advice.count("--set") <= 2
@@ -64,11 +64,11 @@ def test_a_kneed_walker_without_a_gait_is_told_to_put_its_feet_ahead(degrees):
 
 def test_where_nothing_near_has_a_gait_no_long_command_is_advised():
     one = config(MCGEER, "slope_deg=3", "walker.shank.mass_kg=100", "walker.thigh.mass_kg=0.001", base=Path("kneed"))
-    advice = nearby(one)
+    advice = suggest_gaits(one)
     assert "walker.foot_centre_ahead_m" in advice
     assert "kneed-round-feet" in advice
     assert "--set" not in advice
 
 
 def test_uphill_nothing_is_sought():
-    assert nearby(config("slope_deg=0")) == ""
+    assert suggest_gaits(config("slope_deg=0")) == ""

@@ -15,8 +15,8 @@ from walkerlab.config.schema import Contact
 from walkerlab.errors import ConfigError
 from walkerlab.ground import friction
 from walkerlab.ground.friction import FRICTION_LAWS, Frictionless, friction_coefficient, steepest_change
-from walkerlab.orbits.contact_gait import why_there_is_none, with_rigidity, with_scaled_laws
-from walkerlab.orbits.rigid_limit import STICTION, series_of
+from walkerlab.orbits.contact_gait import why_no_gait, with_rigidity, with_scaled_laws
+from walkerlab.orbits.rigid_limit import STICTION_SERIES, series_settings
 from walkerlab.pipeline.runner import execute
 from walkerlab.scene.contact import contact_scene, friction_law, scene_measures, start_state
 from walkerlab.solvers.registry import Tolerances
@@ -137,17 +137,17 @@ def test_a_result_names_the_law_that_walked(own):
 def test_creep_of_any_law_is_led_towards_the_rigid_limit(own):
     stiff = with_rigidity(own.walker, 1.0).friction.v_0
     assert stiff < 0.1
-    setting = series_of(STICTION)[-1]
+    setting = series_settings(STICTION_SERIES)[-1]
     assert with_scaled_laws(own.walker, *setting[2:]).friction.v_0 == pytest.approx(0.1 * setting.stiction)
     trial = near_rigid_trial(load().config, START, 0.3714, 2)
     assert trial.walker.friction.v_0 == pytest.approx(0.1 * SLOWER)
 
 
 def test_any_law_can_be_too_weak_for_the_slope(own):
-    assert why_there_is_none(own.walker) is None
+    assert why_no_gait(own.walker) is None
     weak = own.walker._replace(friction=Regularised(0.01, 0.1))
-    assert "0.01 is below the slope's 0.0174" in why_there_is_none(weak)[0]
-    assert "without friction" in why_there_is_none(own.walker._replace(friction=Frictionless()))[0]
+    assert "0.01 is below the slope's 0.0174" in why_no_gait(weak)[0]
+    assert "without friction" in why_no_gait(own.walker._replace(friction=Frictionless()))[0]
 
 
 def test_an_unresolved_slip_of_any_law_is_told(own):

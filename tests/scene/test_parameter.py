@@ -9,7 +9,7 @@ from walkerlab.config.loader import load
 from walkerlab.config.schema import Config
 from walkerlab.errors import ConfigError
 from walkerlab.scene.contact import contact_scene
-from walkerlab.scene.parameter import PHYSICAL, parameter_of
+from walkerlab.scene.parameter import MODEL_KEYS, parameter_of
 from walkerlab.scene.rigid import rigid_walker
 from walkerlab.sweeps.question import axis, described
 
@@ -44,7 +44,7 @@ def numbers_of(config):
         held = config
         for name in path:
             held = getattr(held, name, None)
-        if path[0] in PHYSICAL and "number" in type_words(field.annotation) and isinstance(held, int | float):
+        if path[0] in MODEL_KEYS and "number" in type_words(field.annotation) and isinstance(held, int | float):
             yield ".".join(path)
 
 
@@ -94,10 +94,10 @@ def test_at_its_own_value_the_config_is_itself(config):
             "is not a key of this walker, whose type is compass; did you mean walker.hip_mass_kg",
         ),
         ("kneed", "walker.foot_to_mass_m", "is not a key of this walker, whose type is kneed"),
-        ("parts", "walker.bodies.mass_kg", "is a number of each of the walker.bodies, not one number"),
+        ("parts", "walker.bodies.mass_kg", "has a value for each of the walker.bodies, not a single one"),
         ("rigid-only", "contact.stiffness", "is not there: the config has no contact; give it one first"),
         ("paper", "walker.torso", "is a block of keys, not a number"),
-        ("paper", "strides", "touches no model"),
+        ("paper", "strides", "affects no model"),
         ("paper", "contact.terrain", "is not a number"),
     ],
 )

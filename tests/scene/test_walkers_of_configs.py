@@ -12,9 +12,9 @@ from walkerlab.errors import ConfigError
 from walkerlab.mechanics.standing import Standing
 from walkerlab.orbits.fixed_point import find_gaits
 from walkerlab.scene.contact import contact_scene
-from walkerlab.scene.families import numbers_in
+from walkerlab.scene.families import iterate_values
 from walkerlab.scene.parts import assembly_of
-from walkerlab.scene.rigid import coordinates, rigid_walker
+from walkerlab.scene.rigid import rigid_walker, state_names
 from walkerlab.scene.studies import equation_sets
 
 DOCS = Path(__file__).parents[2] / "docs" / "walkers.md"
@@ -31,7 +31,7 @@ def test_the_kneed_walker_described_by_its_parts_is_the_kneed_walker(tmp_path):
     path.write_text(text)
     own, kneed = load(path).config, load(Path("kneed")).config
     assert own.walker == load(Path("parts")).config.walker
-    assert coordinates(own) == coordinates(kneed)
+    assert state_names(own) == state_names(kneed)
     one, other = rigid_walker(own, "corrected"), rigid_walker(kneed, "corrected")
     assert one.dtype == other.dtype
     assert numbers_of(one) == pytest.approx(numbers_of(other), rel=1e-15)
@@ -87,7 +87,7 @@ def test_a_kneed_walker_with_its_feet_ahead_is_the_one_put_together_from_its_par
     assert own.walker.lean_rad == one.lean
     assert numbers_of(one) == pytest.approx(numbers_of(other), rel=1e-14, abs=1e-16)
     on_ground = [contact_scene(config, 0.67, 0.67).walker for config in (own, parts)]
-    for number, same in zip(*map(numbers_in, on_ground), strict=True):
+    for number, same in zip(*map(iterate_values, on_ground), strict=True):
         if getattr(number, "dtype", np.dtype("O")).names:
             number, same = numbers_of(number), numbers_of(same)
         if isinstance(number, (float, np.ndarray)):
@@ -122,7 +122,7 @@ def test_a_built_in_walker_has_its_mass_and_its_state(name, mass, numbers):
     model = rigid_walker(config, "corrected")
     assert model.mass == pytest.approx(mass, rel=1e-11)
     assert config.walker.total_mass_kg == pytest.approx(mass, rel=1e-11)
-    assert len(coordinates(config)) == len(model.zero_state) == numbers
+    assert len(state_names(config)) == len(model.zero_state) == numbers
     assert len(assembly_of(config.walker).feet) == 2
 
 

@@ -13,7 +13,7 @@ from walkerlab.config.loader import load
 from walkerlab.config.reads import only
 from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.orbits import family_search
-from walkerlab.orbits import plane as plane_of_gaits
+from walkerlab.orbits import two_parameters as plane_of_gaits
 from walkerlab.orbits.families import ValueSpan
 from walkerlab.orbits.family_search import THOROUGHNESS
 from walkerlab.orbits.newton import Effort
@@ -184,7 +184,7 @@ def test_the_doubled_branch_begins_at_its_parents_flip_in_the_artifact_too(in_de
 
 
 def test_curves_over_a_second_key_pass_through_the_flip_at_the_configs_own_value(monkeypatch):
-    monkeypatch.setattr(plane_of_gaits, "CELLS", (2, 2))  # the plane beside them is not looked at
+    monkeypatch.setattr(plane_of_gaits, "PLANE_CELLS", (2, 2))  # the plane beside them is not looked at
     found = follow(
         "over=slope_deg", "from=4", "to=4.8", "periods=1",
         "second.over=walker.hip_mass_kg", "second.from=9.5", "second.to=10.5",
@@ -196,7 +196,7 @@ def test_curves_over_a_second_key_pass_through_the_flip_at_the_configs_own_value
 
 
 def test_regions_of_the_plane_meet_at_the_curve_of_the_flip(monkeypatch):
-    monkeypatch.setattr(plane_of_gaits, "CELLS", (10, 3))
+    monkeypatch.setattr(plane_of_gaits, "PLANE_CELLS", (10, 3))
     found = follow(
         "over=slope_deg", "from=4", "to=4.8", "periods=1",
         "second.over=walker.hip_mass_kg", "second.from=8", "second.to=12",
@@ -245,12 +245,12 @@ def test_a_key_touches_the_models_that_change_with_it(over, models):
     [
         (["over=walker.type"], "not a number"),
         (["over=walker"], "is a block of keys"),
-        (["over=strides"], "touches no model"),
+        (["over=strides"], "affects no model"),
         (["over=slope_dge"], "did you mean slope_deg?"),
-        (["over=contact.stiffness", "from=1e5", "to=2e5"], "does not touch the rigid model"),
+        (["over=contact.stiffness", "from=1e5", "to=2e5"], "does not affect the rigid model"),
         (
             ["over=push_off.duration_s", "from=0.001", "to=0.01", "model=contact", "walker.hip.torque_N_m=1"],
-            "does not touch the contact model",
+            "does not affect the contact model",
         ),
         (["over=walker.hip_mass_kg", "from=-1", "to=2"], "cannot be -1 kg"),
         (["contact=null", "model=contact"], "needs a contact block"),
@@ -258,7 +258,7 @@ def test_a_key_touches_the_models_that_change_with_it(over, models):
         (["second.over=walker.hip_mass_kg", "second.from=1", "second.to=2"], "outside 1 to 2"),
         (["second.over=walker.hip_mass_kg", "second.from=-1", "second.to=20"], "second.from: walker.hip_mass_kg can"),
         (["second.over=slope_deg", "second.from=0.1", "second.to=5"], "is already the number that gaits are followed"),
-        (["second.over=contact.stiffness", "second.from=1", "second.to=1e6"], "does not touch the rigid model"),
+        (["second.over=contact.stiffness", "second.from=1", "second.to=1e6"], "does not affect the rigid model"),
     ],
 )  # fmt: skip
 def test_bad_questions_end_in_words(sets, said):
@@ -272,7 +272,7 @@ def follow_coarsely(*sets):
     with pytest.MonkeyPatch.context() as patch:
         patch.setitem(THOROUGHNESS, "rigid", replace(THOROUGHNESS["rigid"], values=36, exponents=12, averaged=400))
         patch.setattr(family_search, "OTHER_PERIODS", ())
-        patch.setattr(family_search, "STARTS", 0)
+        patch.setattr(family_search, "SCATTERED", 0)
         return follow(*sets, "periods=4").summary
 
 

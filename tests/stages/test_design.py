@@ -9,15 +9,15 @@ import pytest
 from walkerlab.config.loader import load
 from walkerlab.config.reads import only
 from walkerlab.errors import ConfigError, NoAnswer
-from walkerlab.orbits.design import Aim, Point, optima, searched
+from walkerlab.orbits.design import DesignProblem, Point, count_optima, search_from_starts
 from walkerlab.orbits.fixed_point import find_gaits
-from walkerlab.orbits.gradients import gait_numbers
+from walkerlab.orbits.gradients import gait_quantities
 from walkerlab.pipeline.graph import PIPELINE
 from walkerlab.pipeline.progress import Silent
 from walkerlab.report.answers import answer
 from walkerlab.scene.contact import contact_scene, gait_off_pads, start_state
 from walkerlab.scene.rigid import rigid_walker
-from walkerlab.scene.subject import subject_of
+from walkerlab.scene.subject import find_model_gait
 from walkerlab.solvers.registry import Tolerances
 from walkerlab.stages import design, fixedpoint
 from walkerlab.store.checkpoint import Checkpoint
@@ -111,12 +111,12 @@ def bowls(x):
 
 
 def test_searches_go_round_places_without_a_gait_and_tell_how_many_optima_there_are():
-    question = Aim("f", 1.0, np.array([0.0]), np.array([1.0]), {}, bowls)
-    found = searched(question, np.array([0.1]), 12, seed=1)
+    question = DesignProblem("f", 1.0, np.array([0.0]), np.array([1.0]), {}, bowls)
+    found = search_from_starts(question, np.array([0.1]), 12, seed=1)
     assert found[0].x[0] == pytest.approx(0.8, abs=1e-6)
-    assert optima(question, found) == 2
-    within = Aim("f", 1.0, np.array([0.0]), np.array([1.0]), {"g": (0.0, 0.3)}, bowls)
-    assert searched(within, np.array([0.1]), 4, seed=1)[0].x[0] == pytest.approx(0.2, abs=1e-5)
+    assert count_optima(question, found) == 2
+    within = DesignProblem("f", 1.0, np.array([0.0]), np.array([1.0]), {"g": (0.0, 0.3)}, bowls)
+    assert search_from_starts(within, np.array([0.1]), 4, seed=1)[0].x[0] == pytest.approx(0.2, abs=1e-5)
 
 
 @pytest.mark.parametrize(
@@ -147,7 +147,7 @@ def test_numbers_that_the_config_refuses_are_places_without_a_gait():
 @pytest.mark.parametrize("key", ["contact.damping", "push_off.duration_s"])
 def test_a_number_that_the_model_does_not_read_is_refused_in_words(key):
     """Every value of it is as good as any other."""
-    with pytest.raises(ConfigError, match=f"{key} does not touch the rigid model"):
+    with pytest.raises(ConfigError, match=f"{key} does not affect the rigid model"):
         run("paper", "design.minimise=period_s", f"design.over={{{key}: [1, 2]}}")
 
 
@@ -166,9 +166,9 @@ def contact_gait(name):
     walker = rigid_walker(config, config.equations)
     gait = find_gaits(walker).gait
     told = {"state": gait.state, "step_length_m": gait.step_length}
-    here = subject_of("contact", config, told, Silent().note).at()
+    here = find_model_gait("contact", config, told, Silent().note).at()
     found = gait_off_pads(config, gait.step_length, gait.state).gait
-    return config, gait, found.step, gait_numbers(here, ["cost_of_transport"])["cost_of_transport"]
+    return config, gait, found.step, gait_quantities(here, ["cost_of_transport"])["cost_of_transport"]
 
 
 @pytest.mark.parametrize("name", ["slope-3deg", "level"])

@@ -20,7 +20,7 @@ from walkerlab.pipeline.executor import answer_in_memory
 from walkerlab.pipeline.graph import PIPELINE
 from walkerlab.pipeline.progress import Silent
 from walkerlab.pipeline.results import MemoryResults
-from walkerlab.scene.parameter import PHYSICAL, parameter_of
+from walkerlab.scene.parameter import MODEL_KEYS, parameter_of
 from walkerlab.stages import robustness
 from walkerlab.stages.continuation import FamilyQuestion, models_of
 from walkerlab.stages.design import Gaits
@@ -36,13 +36,13 @@ PULSED = ("level", "kneed-level")
 RIGID_ONLY = ("kuo", "rigid-only", "simplest")
 IDEAL_KNEES = ("kneed", "kneed-level", "kneed-round-feet", "parts")
 REFUSED = (
-    ("continuation", sorted({*WALKERS} - {*PULSED}), "push_off.duration_s", "does not touch the rigid"),
-    ("continuation", RIGID_ONLY, "walker.foot_radius_m", "does not touch the rigid model"),
-    ("continuation", IDEAL_KNEES, "walker.knee.stop_*", "does not touch the rigid or the contact model"),
-    ("second", WALKERS, "contact.*", "does not touch the rigid model"),
-    ("second", WALKERS, "push_off.duration_s", "does not touch the rigid model"),
-    ("second", WALKERS, "walker.foot_radius_m", "does not touch the rigid model"),
-    ("second", WALKERS, "walker.knee.stop_*", "does not touch the rigid model"),
+    ("continuation", sorted({*WALKERS} - {*PULSED}), "push_off.duration_s", "does not affect the rigid"),
+    ("continuation", RIGID_ONLY, "walker.foot_radius_m", "does not affect the rigid model"),
+    ("continuation", IDEAL_KNEES, "walker.knee.stop_*", "does not affect the rigid or the contact model"),
+    ("second", WALKERS, "contact.*", "does not affect the rigid model"),
+    ("second", WALKERS, "push_off.duration_s", "does not affect the rigid model"),
+    ("second", WALKERS, "walker.foot_radius_m", "does not affect the rigid model"),
+    ("second", WALKERS, "walker.knee.stop_*", "does not affect the rigid model"),
     ("second", WALKERS, "gravity_m_s2", "is already the number that gaits are followed over"),
     ("*", ("paper-as-printed",), "walker.hip.*", "cannot be 1e-15"),
     ("*", ("paper-as-printed",), "push_off.impulse_N_s", "cannot be 1e-15"),
@@ -80,7 +80,7 @@ def keys(config):
         held = config
         for name in path:
             held = getattr(held, name, None)
-        if path[0] in PHYSICAL and "number" in type_words(field.annotation) and isinstance(held, int | float):
+        if path[0] in MODEL_KEYS and "number" in type_words(field.annotation) and isinstance(held, int | float):
             found.append(".".join(path))
     return found
 

@@ -12,7 +12,7 @@ from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.hybrid.recorded_walk import take_walk
 from walkerlab.hybrid.rigid_measures import reactions
 from walkerlab.mechanics.impact import pushed_at_hip
-from walkerlab.orbits.shooting import EXACT
+from walkerlab.orbits.rigid_map import EXACT_STEPS
 from walkerlab.pipeline.graph import PIPELINE
 from walkerlab.pipeline.progress import Silent
 from walkerlab.report.answers import answer
@@ -140,7 +140,7 @@ def test_a_push_says_whether_the_ground_then_pushes(rigid, both):
     config = load(Path("slope-3deg")).config
     walker, gait = rigid_walker(config), fixedpoint.run(config, {}, Silent()).summary["state"]
     pushed = pushed_at_hip(walker, np.array(gait), -push["backward_N_s"])
-    walk = take_walk(walker, EXACT, tuple(pushed), 50, sampled=True)
+    walk = take_walk(walker, EXACT_STEPS, tuple(pushed), 50, sampled=True)
     lowest = reactions(walker, walk.samples.state)[:, 1].min()
     assert push["backward_min_normal_force_N"] == pytest.approx(lowest, abs=0.05)
     assert {value for key, value in both.summary["largest_push"][1].items() if "normal" in key} == {None}
@@ -210,9 +210,9 @@ def test_a_derivative_that_does_not_exist_is_a_gap():
     [
         (("robustness.roughness_m=[0.7]",), "more than half a leg"),
         (("robustness.to=[walker.thigh.mass_kg]",), "walker.thigh.mass_kg"),
-        (("robustness.to=[strides]",), "touches no model"),
-        (("robustness.to=[contact.stiffness]", "robustness.model=rigid"), "does not touch the rigid model"),
-        (("robustness.to=[push_off.duration_s]",), "does not touch the rigid or the contact model"),
+        (("robustness.to=[strides]",), "affects no model"),
+        (("robustness.to=[contact.stiffness]", "robustness.model=rigid"), "does not affect the rigid model"),
+        (("robustness.to=[push_off.duration_s]",), "does not affect the rigid or the contact model"),
     ],
 )
 def test_bad_questions_end_in_words(changes, said):

@@ -57,9 +57,9 @@ def with_nearby_gaits(report: StageReport, request: Request) -> StageReport:
     if said is None or report.stage not in SEARCHING or "no gait" not in said.message:
         return report
     # Imported here: most commands find their gait.
-    from walkerlab.scene.nearby import nearby
+    from walkerlab.scene.gait_suggestions import suggest_gaits
 
-    met = nearby(request.resolved, request.typed)
+    met = suggest_gaits(request.resolved, request.typed)
     return replace(report, no_answer=NoAnswer(said.message, f"{met} {said.advice}".strip()))
 
 

@@ -8,7 +8,7 @@ from walkerlab.figures.illustration import Illustration
 from walkerlab.figures.registry import FIGURES
 from walkerlab.pipeline.graph import PIPELINE
 from walkerlab.pipeline.progress import Progress
-from walkerlab.scene.left_out import LeftOut
+from walkerlab.scene.omissions import LeftOut
 from walkerlab.store import artifact, index
 from walkerlab.store.artifact import Stored
 from walkerlab.store.content import Content

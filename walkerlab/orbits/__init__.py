@@ -1,1 +1,1 @@
-"""The step map of either model, its periodic gaits, and how they change."""
+"""Step maps of both models, their periodic gaits, and how gaits change with parameters."""

@@ -1,7 +1,7 @@
-"""The contact model's own gait, found from a rigid start: walk to the section, then Newton.
+"""Search for the contact model's own gait: walk from a rigid start to the section, then Newton's method.
 
-Where a walk from the start leads nowhere, the gait is followed from nearly rigid ground, which the rigid gait nearly
-walks on: the force laws are led to the wanted ones in steps as large as Newton's method allows.
+If that fails, the gait is followed from nearly rigid ground, where the rigid gait is a good guess, to the actual force
+laws, in steps as large as Newton's method allows.
 """
 
 import math
@@ -17,64 +17,63 @@ from walkerlab.hybrid.contact_events import PASSING, JudgedGround
 from walkerlab.hybrid.contact_result import new_observer, walk_on
 from walkerlab.hybrid.contact_state import new_walk_state
 from walkerlab.orbits.contact_map import OwnPads, coordinates_of
-from walkerlab.orbits.continuation import Follower, Strides, Way
+from walkerlab.orbits.continuation import Follower, FollowerState, Strides
 from walkerlab.orbits.newton import Effort, NotConverged
 from walkerlab.orbits.step_map import Cycle, gait_near
 from walkerlab.outcome import Outcome
 from walkerlab.solvers.registry import Tolerances
 from walkerlab.solvers.system import Floats, State
 
-WARM_UP = (4, 2, 0)  # steps walked from the start before Newton's method takes over
-BUDGET_OF_A_STEP = 40_000  # right-hand sides
-EFFORT = Effort(1e-10, most=10, shortest=1e-3, growth=2.0, rounding=1.0)
-# nearly rigid ground, by which factor its laws differ from the wanted ones
-STIFFER, STICKIER = 100.0, 30.0
-FIRST_STRIDE, STRIDES = 0.25, Strides(1.0, 0.02, 2)  # of the way from nearly rigid to the wanted ground
+WARM_UP_STEPS = (4, 2, 0)  # steps to walk before Newton's method
+SEARCH_STEP_BUDGET = 40_000  # right-hand sides
+CONTACT_EFFORT = Effort(1e-10, most=10, shortest=1e-3, growth=2.0, rounding=1.0)
+# factors between nearly rigid ground and the actual one
+MAX_STIFFENING, MAX_CREEP_FACTOR = 100.0, 30.0
+# fractions of the way from nearly rigid to actual ground
+FIRST_STRIDE, RIGIDITY_STRIDES = 0.25, Strides(1.0, 0.02, 2)
 
 
 @dataclass(frozen=True)
 class GaitAnswer:
-    """The contact model's gait, or why there is none."""
-
     gait: Cycle | None
-    reason: str  # how it was found, or why not
+    reason: str  # how it was found, or why there is none
     advice: str = ""
 
 
 def find_gait_from(walker: ContactWalker, ground: JudgedGround, tolerances: Tolerances, start: State) -> GaitAnswer:
-    """The contact gait near a start with both feet on the ground, a state of the free walker.
+    """Find the contact gait near a state of the free walker with both feet on the ground.
 
-    Never raises for want of a gait: the answer says why there is none and what to try.
+    Never raises if there is no gait: the answer states the reason and advice.
     """
-    hopeless = why_there_is_none(walker)
-    if hopeless:
-        return GaitAnswer(None, *hopeless)
-    tolerances = replace(tolerances, budget=BUDGET_OF_A_STEP)
-    said = "the start does not even let the feet pass each other"
+    excluded = why_no_gait(walker)
+    if excluded:
+        return GaitAnswer(None, *excluded)
+    tolerances = replace(tolerances, budget=SEARCH_STEP_BUDGET)
+    failure = "the start does not even let the feet pass each other"
     for steps, z in section_points(walker, ground, tolerances, start):
-        gait = gait_on(OwnPads(lambda _: walker, ground, tolerances, ground.terrain.stride_measure), z)
+        gait = solve_gait_on(OwnPads(lambda _: walker, ground, tolerances, ground.terrain.stride_measure), z)
         if isinstance(gait, Cycle):
             return GaitAnswer(gait, f"Newton's method after {steps} steps from the start")
-        said = f"Newton's method found none after {steps} steps from the start: {gait}"
+        failure = f"Newton's method found none after {steps} steps from the start: {gait}"
     followed = follow_from_rigid(walker, ground, tolerances, start)
     if followed.gait is not None:
         return followed
-    return GaitAnswer(None, f"{said}; {followed.reason}", followed.advice)
+    return GaitAnswer(None, f"{failure}; {followed.reason}", followed.advice)
 
 
-def why_there_is_none(walker: ContactWalker) -> tuple[str, str] | None:
-    """Why no gait can exist on this ground, by the balance of momentum and of energy alone, and what to change."""
+def why_no_gait(walker: ContactWalker) -> tuple[str, str] | None:
+    """Return why conservation of momentum and energy exclude a gait on this ground, and advice; None if they do not."""
     if walker.slope <= 0.0 and not walker.driven:
         return "a walker that does not descend loses energy with every step", "Let the slope descend: slope_deg > 0."
-    friction, wanted = walker.friction.largest, abs(math.tan(walker.slope))
+    friction, required = walker.friction.largest, abs(math.tan(walker.slope))
     if friction == 0.0 and not walker.driven:
         return (
             "without friction nothing holds the walker back: it gathers speed along the slope",
-            f"Give the feet friction: contact.friction: coulomb, contact.static_friction above {wanted:.3g}.",
+            f"Give the feet friction: contact.friction: coulomb, contact.static_friction above {required:.3g}.",
         )
-    if friction < wanted:
+    if friction < required:
         return (
-            f"static friction {friction:.3g} is below the slope's {wanted:.3g}: "
+            f"static friction {friction:.3g} is below the slope's {required:.3g}: "
             "on average the ground cannot hold the walker's weight along the slope",
             "Raise contact.static_friction, or choose a gentler slope.",
         )
@@ -84,8 +83,8 @@ def why_there_is_none(walker: ContactWalker) -> tuple[str, str] | None:
 def section_points(
     walker: ContactWalker, ground: JudgedGround, tolerances: Tolerances, start: State
 ) -> Iterator[tuple[int, Floats]]:
-    """Points of the section that walks from the start pass through, and after how many steps each."""
-    for steps in WARM_UP:
+    """Yield points of the section on a walk from the start, each with its number of steps."""
+    for steps in WARM_UP_STEPS:
         walk_state = new_walk_state(walker, ground.terrain, STANCE_FOOT, steps + 1, start)
         observer = new_observer(walker, walk_state, start)
         enough = replace(tolerances, budget=(steps + 1) * tolerances.budget)
@@ -96,26 +95,25 @@ def section_points(
             return
 
 
-def gait_on(pads: OwnPads, z: Floats, rigidity: float = 0.0) -> Cycle | str:
-    """Newton's method from section coordinates z: the gait, or what came in its way."""
-    found = gait_near(pads, z, rigidity, EFFORT)
-    if isinstance(found, NotConverged):
-        if found.singular:
+def solve_gait_on(pads: OwnPads, z: Floats, rigidity: float = 0.0) -> Cycle | str:
+    gait = gait_near(pads, z, rigidity, CONTACT_EFFORT)
+    if isinstance(gait, NotConverged):
+        if gait.singular:
             return "its matrix is singular, since a multiplier is 1"
-        if found.outcome is None or found.outcome is Outcome.WALKED:
+        if gait.outcome is None or gait.outcome is Outcome.WALKED:
             return "it did not converge"
-        if found.outcome is Outcome.REJECTED:
+        if gait.outcome is Outcome.REJECTED:
             return "its push-off lasts until the feet pass each other, or longer"
-        return f"a step ended as {found.outcome.label}"
-    if found.step.length_m <= 0.0:
-        return f"it led to a walk that does not advance, with steps of {found.step.length_m:.3g} m"
-    return found
+        return f"a step ended as {gait.outcome.label}"
+    if gait.step.length_m <= 0.0:
+        return f"it led to a walk that does not advance, with steps of {gait.step.length_m:.3g} m"
+    return gait
 
 
 def with_scaled_laws(walker: ContactWalker, stiffness: float, damping: float, creep: float) -> ContactWalker:
-    """The walker on ground whose stiffness, damping and velocities of friction are multiplied by these factors.
+    """Return the walker with stiffness, damping and friction velocities of the ground scaled by these factors.
 
-    The penetration at which damping is full shrinks with the static penetration, so that the ground damps alike.
+    The penetration of full damping shrinks with the static penetration, so that the damping ratio is unchanged.
     """
     normal = walker.normal
     changed = normal._replace(
@@ -127,21 +125,19 @@ def with_scaled_laws(walker: ContactWalker, stiffness: float, damping: float, cr
 
 
 def with_rigidity(walker: ContactWalker, rigidity: float) -> ContactWalker:
-    """The walker on ground that is the more rigid the larger `rigidity`: 0 as it is, 1 nearly rigid."""
-    stiffer = STIFFER**rigidity
-    return with_scaled_laws(walker, stiffer, math.sqrt(stiffer), STICKIER**-rigidity)
+    """Return the walker on ground of a rigidity from 0, its own, to 1, nearly rigid."""
+    stiffer = MAX_STIFFENING**rigidity
+    return with_scaled_laws(walker, stiffer, math.sqrt(stiffer), MAX_CREEP_FACTOR**-rigidity)
 
 
 def follow_from_rigid(walker: ContactWalker, ground: JudgedGround, tolerances: Tolerances, start: State) -> GaitAnswer:
-    """Lead the force laws from nearly rigid ones to the wanted ones, the gait along with them."""
-
     def gait_at(rigidity: float, z: Floats, pitch_m: float) -> Cycle | str:
-        return gait_on(OwnPads(partial(with_rigidity, walker), ground, tolerances, pitch_m), z, rigidity)
+        return solve_gait_on(OwnPads(partial(with_rigidity, walker), ground, tolerances, pitch_m), z, rigidity)
 
     points = section_points(with_rigidity(walker, 1.0), ground, tolerances, start)
     hint = "" if walker.whole.push_off == 0.0 else "Shorten the push-off (push_off.duration_s). "
     tried = (gait_at(1.0, z, ground.terrain.stride_measure) for _, z in points)
-    last = next((found for found in tried if isinstance(found, Cycle)), None)
+    last = next((gait for gait in tried if isinstance(gait, Cycle)), None)
     if last is None:
         return GaitAnswer(
             None,
@@ -150,26 +146,24 @@ def follow_from_rigid(walker: ContactWalker, ground: JudgedGround, tolerances: T
         )
     gaits = {0.0: last}
 
-    def softer(way: float, expected: Floats) -> Floats | None:
-        """Section coordinates and step length after a part of the way from nearly rigid to the wanted ground."""
-        near = gait_at(1.0 - way, expected[:-1], expected[-1])
+    def softer(state: float, expected: Floats) -> Floats | None:
+        near = gait_at(1.0 - state, expected[:-1], expected[-1])
         if not isinstance(near, Cycle):
             return None
-        gaits[way] = near
-        return with_length(near)
+        gaits[state] = near
+        return append_length(near)
 
-    way = Follower(softer, Way(0.0, FIRST_STRIDE, ((0.0, with_length(last)),)), STRIDES).to(1.0)
-    if way.at == 1.0:
+    state = Follower(softer, FollowerState(0.0, FIRST_STRIDE, ((0.0, append_length(last)),)), RIGIDITY_STRIDES).to(1.0)
+    if state.at == 1.0:
         return GaitAnswer(gaits[1.0], "followed from nearly rigid ground")
-    rigidity = 1.0 - way.at
+    rigidity = 1.0 - state.at
     return GaitAnswer(
         None,
-        f"followed from nearly rigid ground the gait is lost where that is {STIFFER**rigidity:.3g} times as stiff "
-        f"and creep {STICKIER**rigidity:.3g} times as slow as wanted",
+        f"followed from nearly rigid ground the gait is lost at {MAX_STIFFENING**rigidity:.3g} times the stiffness "
+        f"and creep {MAX_CREEP_FACTOR**rigidity:.3g} times slower than requested",
         f"{hint}Stiffen or damp the contact, lower its stiction velocity, or choose a gentler slope.",
     )
 
 
-def with_length(gait: Cycle) -> Floats:
-    """Section coordinates of a gait, and its step length behind them."""
+def append_length(gait: Cycle) -> Floats:
     return np.append(gait.z, gait.lengths_m)

@@ -1,11 +1,11 @@
-"""The step map of the contact model, on a section where nothing is touching or lifting.
+"""Step map of the contact model, on a section where no foot is touching down or lifting off.
 
-Section: the swing foot passes the stance foot. One foot then stands, the transients of its touch have died away, and
-the other swings freely; just after a touch the state is still in motion on the contact's own time scale, which makes
-touch-down a poor section. Coordinates by role: height of the centre of mass, the angles of the legs' bodies but the
-uppermost of the swing leg, which follows from the section, velocity along and normal to the slope, and the angular
-velocities of all bodies that turn on their own; of two straight legs these are six numbers. A knee of the stance leg is
-locked, that of the swing leg is not. Where along the slope it happens does not matter.
+On the section the swing foot passes the stance foot: one foot stands, the transients of its touch-down have decayed,
+and the other swings freely. Just after touch-down the state still moves on the fast time scale of the contact, which
+makes a poor section. Coordinates, ordered by the legs' roles: height of the centre of mass, angles of the legs' bodies
+except the uppermost of the swing leg, which the section determines, velocity along and normal to the slope, and the
+rates of all bodies that turn independently; six for two straight legs. The stance knee is locked, the swing knee free.
+The position along the slope is not a coordinate.
 
 One step maps the section to itself with the legs' roles exchanged.
 """
@@ -23,13 +23,7 @@ from numpy.typing import NDArray
 
 from walkerlab.account import LOST
 from walkerlab.ground.knees import IdealLock
-from walkerlab.ground.terrain import (
-    STANCE_FOOT,
-    Terrain,
-    after_mid_swing,
-    checkerboard,
-    has_ground_in_air,
-)
+from walkerlab.ground.terrain import STANCE_FOOT, Terrain, after_mid_swing, checkerboard, has_ground_in_air
 from walkerlab.ground.walker import ContactWalker, OnGround, feet_motion, folded, on_ground, sines_cosines, unfolded
 from walkerlab.hybrid.contact_events import PASSING, JudgedGround
 from walkerlab.hybrid.contact_jumps import rate_of
@@ -39,140 +33,140 @@ from walkerlab.hybrid.contact_state import WalkState, material_along, new_walk_s
 from walkerlab.hybrid.walk_record import DrivenWork
 from walkerlab.mechanics.links import Counted, factor_linked, solve_linked
 from walkerlab.mechanics.tree import add_inertia
-from walkerlab.orbits.step_map import REMEMBERED, Cycle, DisturbedWalk, MappedStep, Monitor, StepMap, Stepper, no_step
+from walkerlab.orbits.step_map import (
+    CACHE_SIZE,
+    Cycle,
+    DisturbedWalk,
+    MappedStep,
+    Monitor,
+    StepMap,
+    Stepper,
+    failed_step,
+)
 from walkerlab.outcome import Outcome
 from walkerlab.solvers.registry import Tolerances
 from walkerlab.solvers.system import Floats, State
 
-# places in the state: along, height, the bodies' angles, and the velocities of these
+# indices into the state: position along the slope, height, bodies' angles; velocities follow in the same order
 ALONG, HEIGHT, ANGLES = 0, 1, 2
-COORDINATES = 6  # of a walker with two straight legs
 NEWTON_STEPS = 20
 
 
 @dataclass(frozen=True)
 class SectionStep(MappedStep):
-    """One step from the section to the section, in SI."""
-
-    slip_m: float  # net, from touch to lift: of the foot that lands up to here, and of the other from here on
+    slip_m: float  # net, from touch-down to lift-off: the landing foot's so far plus the other foot's from here on
     rolling_m: float  # likewise
-    dissipated_J: Floats  # (5,) dissipated by damping, by friction, at edges, at knees' strikes, in their stops
+    dissipated_J: Floats  # (5,) by damping, friction, edges, knee strikes and knee stops
     driven: DrivenWork
     work: NDArray[np.int64]  # right-hand sides, accepted, rejected, Jacobians
 
 
 def turning_bodies(walker: ContactWalker, stance: int) -> tuple[int, ...]:
-    """Bodies that turn on their own, the swing leg's first; the shank below the stance leg's locked knee does not."""
+    """Bodies that turn independently, the swing leg's first; the shank below the locked stance knee does not."""
     locked = walker.whole.shanks[stance] if walker.kneed else None
     return (*walker.legs[1 - stance], *(body for body in walker.legs[stance] if body != locked))
 
 
 def angled_bodies(walker: ContactWalker, stance: int) -> tuple[int, ...]:
-    """Bodies whose angles are coordinates; a stop that has latched keeps an angle of its own in the stance knee."""
+    """Bodies whose angles are coordinates; a latched compliant stop gives the stance knee an angle of its own."""
     free = turning_bodies(walker, stance)[1:]
     if walker.kneed and not isinstance(walker.stop, IdealLock):
         return (*free, int(walker.whole.shanks[stance]))
     return free
 
 
-def with_followers(walker: ContactWalker, stance: int, angles: Floats, given: tuple[int, ...]) -> Floats:
-    """Angles (n), or changes of them, with those of bodies that follow others and are not `given`."""
+def fill_followers(walker: ContactWalker, stance: int, angles: Floats, fixed: tuple[int, ...]) -> Floats:
+    """Fill in the angles (n), or changes of angles, of coupled bodies that are not `fixed`."""
     whole, n = walker.whole, angles.size
-    if walker.kneed and whole.shanks[stance] not in given:
+    if walker.kneed and whole.shanks[stance] not in fixed:
         angles[whole.shanks[stance]] = angles[whole.thighs[stance]]
     for body in range(n):
-        if whole.E[0, body, body] == 0.0 and body not in given:
+        if whole.E[0, body, body] == 0.0 and body not in fixed:
             angles[body] = whole.E[0, body, :n] @ angles
     return angles
 
 
 def feet_apart(walker: ContactWalker, angles: Floats) -> tuple[float, Floats]:
-    """How far foot 0 is ahead of foot 1 (m), and its derivatives by the bodies' angles (n)."""
+    """Return how far foot 0 is ahead of foot 1 (m), and the derivatives by the bodies' angles (n)."""
     s, c = np.sin(angles + walker.slope), np.cos(angles + walker.slope)
     x, y = ((lever[0] - lever[1])[: angles.size] for lever in (walker.whole.foot_x, walker.whole.foot_y))
     return float(c @ x - s @ y), -(s * x + c * y)
 
 
 def state_on_section(walker: ContactWalker, z: Floats, stance: int) -> State:
-    """The walker's state of section coordinates, with `stance` the standing leg, at along = 0."""
+    """Return the walker's state at section coordinates, standing on leg `stance` at along = 0."""
     n = int(walker.whole.bodies)
     turning, angled = turning_bodies(walker, stance), angled_bodies(walker, stance)
     state = np.zeros(4 + 2 * n)
     state[HEIGHT], (state[2 + n], state[3 + n]) = z[0], z[1 + len(angled) : 3 + len(angled)]
     rates = np.zeros(n)
     rates[list(turning)] = z[3 + len(angled) :]
-    state[4 + n :] = with_followers(walker, stance, rates, turning)
+    state[4 + n :] = fill_followers(walker, stance, rates, turning)
     angles, upper = np.zeros(n), turning[0]
     angles[list(angled)] = z[1 : 1 + len(angled)]
     angles[upper] = angles[walker.legs[stance][0]]
-    turned = with_followers(walker, stance, np.eye(n)[upper], (upper, *angled))
-    for _ in range(NEWTON_STEPS):  # the swing leg's uppermost body is turned until the feet pass each other
-        angles = with_followers(walker, stance, angles, (upper, *angled))
+    turned = fill_followers(walker, stance, np.eye(n)[upper], (upper, *angled))
+    for _ in range(NEWTON_STEPS):  # turn the swing leg's uppermost body until the feet pass each other
+        angles = fill_followers(walker, stance, angles, (upper, *angled))
         apart, gradient = feet_apart(walker, angles)
         move = -apart / float(gradient @ turned)
         angles[upper] += move
         if abs(move) < 1e-15:
             break
-    state[ANGLES : ANGLES + n] = with_followers(walker, stance, angles, (upper, *angled))
+    state[ANGLES : ANGLES + n] = fill_followers(walker, stance, angles, (upper, *angled))
     return tuple(float(x) for x in state)
 
 
 def coordinates_of(walker: ContactWalker, state: Floats, stance: int) -> Floats:
-    """Section coordinates of a state whose standing leg is `stance`."""
     n = int(walker.whole.bodies)
     angles = [ANGLES + body for body in angled_bodies(walker, stance)]
     rates = [4 + n + body for body in turning_bodies(walker, stance)]
     return np.asarray(state)[[HEIGHT, *angles, 2 + n, 3 + n, *rates]]
 
 
-def directions(walker: ContactWalker, state: State, stance: int) -> Floats:
-    """Derivative (4 + 2 n, coordinates) of `state_on_section`, at the state it gave."""
+def section_tangents(walker: ContactWalker, state: State, stance: int) -> Floats:
+    """Derivative (4 + 2 n, coordinates) of `state_on_section` at the state that it returned."""
     n = int(walker.whole.bodies)
     turning, angled = turning_bodies(walker, stance), angled_bodies(walker, stance)
     along = np.zeros((4 + 2 * n, 3 + len(angled) + len(turning)))
     _, gradient = feet_apart(walker, np.array(state[ANGLES : ANGLES + n]))
-    given = (turning[0], *angled)
-    upper = with_followers(walker, stance, np.eye(n)[turning[0]], given)
+    fixed = (turning[0], *angled)
+    upper = fill_followers(walker, stance, np.eye(n)[turning[0]], fixed)
     along[HEIGHT, 0] = 1.0
     for column, body in enumerate(angled, 1):
-        turned = with_followers(walker, stance, np.eye(n)[body], given)
+        turned = fill_followers(walker, stance, np.eye(n)[body], fixed)
         along[ANGLES : ANGLES + n, column] = turned - upper * (gradient @ turned) / (gradient @ upper)
     along[2 + n, 1 + len(angled)] = along[3 + n, 2 + len(angled)] = 1.0
     for column, body in enumerate(turning, 3 + len(angled)):
-        along[4 + n :, column] = with_followers(walker, stance, np.eye(n)[body], turning)
+        along[4 + n :, column] = fill_followers(walker, stance, np.eye(n)[body], turning)
     return along
 
 
 def step_from_section(
-    walker: ContactWalker,
-    ground: JudgedGround,
-    tolerances: Tolerances,
-    z: Floats,
-    pitch_m: float,
-    derived: bool = True,
+    walker: ContactWalker, ground: JudgedGround, tolerances: Tolerances, z: Floats, pitch_m: float, derived: bool = True
 ) -> SectionStep:
-    """Walk from the section to the section; REJECTED if a push-off is not over there, which begins without one.
+    """Walk from section to section; REJECTED if a push-off lasts beyond the section.
 
-    z        section coordinates, the height over the present foothold
-    pitch_m  what the pads are laid for
-    derived  whether the derivative is wanted
+    z        section coordinates, the height measured from the current foothold
+    pitch_m  pad pitch
+    derived  whether to compute the derivative
     """
     stance, laid = STANCE_FOOT, ground
     start = state_on_section(walker, z, stance)
-    if ground.terrain.has_pads:  # the standing foot in the middle of one
+    if ground.terrain.has_pads:  # with the standing foot in the middle of a pad
         foothold = feet_motion(walker.whole, start)[stance].along
         laid = JudgedGround(checkerboard(pitch_m, (foothold + pitch_m, foothold)), ground.frame)
     walk_state = walk_state_on_section(walker, laid, start, 2)
     observer = new_observer(walker, walk_state, start, directions=z.size if derived else 0)
     if derived:
-        observer.tangent.Phi[:, :] = directions(walker, start, stance)
+        observer.tangent.Phi[:, :] = section_tangents(walker, start, stance)
     stopped = walk_on(walker, laid, tolerances, walk_state, observer, start, 1)
     end, landed = np.array(stopped.state), 1 - stance
     along = feet_motion(walker.whole, stopped.state)[landed].along
     slipped = material_along(walker.whole, landed, along, stopped.state) - float(walk_state.touched[landed])
     rolled = along - float(walk_state.foothold[landed]) - slipped
     DP = np.zeros((z.size, 0))
-    if derived:  # the flow's, less how it shifts the moment at which the feet pass
+    if derived:  # project the flow's derivative onto the section, along the flow
         system = in_walk(walker, walk_state)
         rate = rate_of(system, folded(system.form, end), end.size, stopped.time_s)
         gradient, n = np.zeros(end.size), int(walker.whole.bodies)
@@ -180,7 +174,7 @@ def step_from_section(
         Phi = observer.tangent.Phi
         on_section = Phi - np.outer(rate, gradient @ Phi) / (gradient @ rate)
         DP = np.column_stack([coordinates_of(walker, column, landed) for column in on_section.T])
-    way, rose = (float(end[place] - start[place]) for place in (ALONG, HEIGHT))
+    advance, rose = (float(end[place] - start[place]) for place in (ALONG, HEIGHT))
     spacing = float(walk_state.touch_along[0] - walk_state.foothold[stance] - walk_state.slip[0])
     half = min(1.0, max(-1.0, 0.5 * spacing / ground.frame.leg_length))
     pulse = walker.whole.push_off_duration if walker.whole.push_off != 0.0 else 0.0
@@ -190,13 +184,13 @@ def step_from_section(
         coordinates_of(walker, end, landed),
         DP,
         stopped.time_s,
-        way,
+        advance,
         math.asin(half) - walker.slope,
         float(walk_state.touch_time[0]),
         float(walk_state.slip[0] + slipped),
         float(walk_state.rolling[0] + rolled),
         observer.account[LOST].copy(),
-        driven_work(walker, way, rose, observer.account),
+        driven_work(walker, advance, rose, observer.account),
         stopped.work,
     )
 
@@ -204,9 +198,9 @@ def step_from_section(
 def walk_from_section(
     walker: ContactWalker, ground: JudgedGround, tolerances: Tolerances, z: Floats, heights: Floats, push: float
 ) -> DisturbedWalk:
-    """Walk from the section to touches of footholds at some heights, with an impulse at the hip at the first of them.
+    """Walk from the section over footholds of given heights, with a push at the hip at the first touch-down.
 
-    heights  (steps + 1,) m, the first that of the foothold on which it stands, too
+    heights  (steps + 1,) m, beginning with the current foothold
     push     N s, along the slope
     """
     start, steps = state_on_section(walker, z, STANCE_FOOT), heights.size - 1
@@ -219,7 +213,7 @@ def walk_from_section(
 
     stopped = Stopped(Outcome.WALKED, 0.0, start, np.zeros(4, np.int64))
     if push != 0.0:
-        stopped = go_on(cut_to(walk_state, 1), start)
+        stopped = go_on(shorten(walk_state, 1), start)
         pushed = pushed_at_hip(on_ground(walker, walk_state.has_ground, walk_state.knee), walker, stopped.state, push)
         stopped = replace(stopped, state=pushed)
     if stopped.outcome is Outcome.WALKED:
@@ -234,14 +228,13 @@ def walk_from_section(
     return DisturbedWalk(stopped.outcome, np.diff(times), np.diff(places), z)
 
 
-def cut_to(walk_state: WalkState, steps: int) -> WalkState:
-    """The walk state with room for fewer steps, in the same memory."""
-    of_steps = ("touch_time", "touch_along", "touch_height", "slip", "rolling")
-    return walk_state._replace(**{name: getattr(walk_state, name)[:steps] for name in of_steps})
+def shorten(walk_state: WalkState, steps: int) -> WalkState:
+    fields = ("touch_time", "touch_along", "touch_height", "slip", "rolling")
+    return walk_state._replace(**{name: getattr(walk_state, name)[:steps] for name in fields})
 
 
 def pushed_at_hip(system: OnGround, walker: ContactWalker, state: State, impulse: float) -> State:
-    """A state of the free walker, its velocities changed by an impulse (N s) at the hip along the slope."""
+    """Apply an impulse (N s) at the hip along the slope to a state of the free walker."""
     form, new = system.form, np.array(state)
     y = folded(form, new)
     n, half = int(form.bodies), int(form.places + form.bodies)
@@ -259,7 +252,7 @@ def pushed_at_hip(system: OnGround, walker: ContactWalker, state: State, impulse
 
 
 def walk_state_on_section(walker: ContactWalker, ground: JudgedGround, start: State, steps: int) -> WalkState:
-    """The walk state of a walk of `steps` touches: one foot stands, and the other swings past it."""
+    """Return the walk state for `steps` touch-downs: one foot stands, and the other swings past it."""
     stance, swing = STANCE_FOOT, 1 - STANCE_FOOT
     walk_state = new_walk_state(walker, ground.terrain, stance, steps, start)
     feet = feet_motion(walker.whole, start)
@@ -276,24 +269,22 @@ def walk_state_on_section(walker: ContactWalker, ground: JudgedGround, start: St
 
 @dataclass(frozen=True)
 class WalkerOnGround:
-    """A walker, and the ground it walks on and is judged by."""
-
     walker: ContactWalker
     ground: JudgedGround
 
 
 class ContactMap(StepMap):
-    """A walker on compliant ground, its coordinates where the feet pass, in units of leg length and pendulum time.
+    """Step map of a walker on compliant ground, scaled by leg length and pendulum time.
 
-    Pads let the swing foot of straight legs through, so that a family is followed where it touches only ahead of the
-    stance foot; `watch` says where pads of the gait's own step length would trip it.
+    Pads let the swing foot of straight legs through; families are therefore followed on ground that the swing foot
+    touches only ahead of the stance foot. `watch` reports where pads of the gait's own step length would trip it.
     """
 
     monitors = (
         Monitor("slip_m", "m", "largest net slip of a foot from touch to lift"),
         Monitor("tripped", "1", "whether pads of its own step length trip the swing foot", 0.5),
     )
-    probe = 1e-6  # stiff ground gives way to less than a hundredth of a millimetre
+    probe = 1e-6  # stiff ground yields by less than 0.01 mm
 
     def __init__(
         self,
@@ -303,15 +294,15 @@ class ContactMap(StepMap):
         step_length_m: float,
         like: WalkerOnGround,
     ) -> None:
-        """A family of walkers.
+        """Prepare the step map of a family of walkers.
 
-        walker_at      walker and ground at a value of the parameter; None where it makes no walker
-        scale          magnitude of changes of the parameter that matter
-        tolerances     how to integrate a step
-        step_length_m  that steps are judged by
-        like           one of the walkers, whose leg and pendulum measure all
+        walker_at      walker and ground at a value of the parameter; None where the value makes no walker
+        scale          magnitude of significant changes of the parameter
+        tolerances     solver settings of a step
+        step_length_m  reference step length of the terrain
+        like           any one of the walkers; its leg length and pendulum time are the units
         """
-        self._at = lru_cache(REMEMBERED)(walker_at)
+        self._at = lru_cache(CACHE_SIZE)(walker_at)
         self.scale, self.tolerances, self._measure = scale, tolerances, step_length_m
         self._on_pads = like.ground.terrain.has_pads
         angled, turning = angled_bodies(like.walker, STANCE_FOOT), turning_bodies(like.walker, STANCE_FOOT)
@@ -320,88 +311,79 @@ class ContactMap(StepMap):
         L, tau = like.ground.frame.leg_length, like.ground.frame.pendulum_time
         self._units = np.array([L, *[1.0] * len(angled), L / tau, L / tau, *[1.0 / tau] * len(turning)])
 
-    def of_section(self, z: Floats) -> Floats:
-        """Coordinates of a point of the section in SI."""
+    def scale_section(self, z: Floats) -> Floats:
         return np.asarray(z / self._units)
 
-    def _terrain(self, here: WalkerOnGround) -> Terrain:
-        own = here.ground.terrain
+    def _terrain(self, site: WalkerOnGround) -> Terrain:
+        own = site.ground.terrain
         return after_mid_swing(self._measure) if own.has_pads else own
 
-    def _walk(self, here: WalkerOnGround, z: Floats, derived: bool, terrain: Terrain | None = None) -> SectionStep:
-        terrain = terrain or self._terrain(here)
-        ground = here.ground._replace(terrain=terrain)
-        return step_from_section(here.walker, ground, self.tolerances, z * self._units, terrain.stride_measure, derived)
+    def _walk(self, site: WalkerOnGround, z: Floats, derived: bool, terrain: Terrain | None = None) -> SectionStep:
+        terrain = terrain or self._terrain(site)
+        ground = site.ground._replace(terrain=terrain)
+        return step_from_section(site.walker, ground, self.tolerances, z * self._units, terrain.stride_measure, derived)
 
     def step(self, z: Floats, p: float, derived: bool = True) -> MappedStep:
-        """One step, with its exact derivative along the section."""
-        here = self._at(p)
-        if here is None:
-            return no_step(None, z.size)
-        step = self._walk(here, z, derived)
+        site = self._at(p)
+        if site is None:
+            return failed_step(None, z.size)
+        step = self._walk(site, z, derived)
         if step.outcome is not Outcome.WALKED:
-            return no_step(step.outcome, z.size)
+            return failed_step(step.outcome, z.size)
         DP = step.DP * self._units / self._units[:, None] if derived else step.DP
         return replace(step, z=step.z / self._units, DP=DP)
 
     def watch(self, z: Floats, p: float, steps: int) -> Floats:
-        """Largest slip, and whether pads would trip a gait of one step."""
-        here = self._at(p)
-        assert here is not None, "what is watched was walked"
-        slip, tripped, at = 0.0, 0.0, z
+        site = self._at(p)
+        assert site is not None, "what is watched was walked"
+        slip, tripped, start = 0.0, 0.0, z
         for _ in range(steps):
-            step = self._walk(here, at, False)
-            slip, at = max(slip, abs(step.slip_m)), step.z / self._units
+            step = self._walk(site, start, False)
+            slip, start = max(slip, abs(step.slip_m)), step.z / self._units
             if self._on_pads and steps == 1:
-                on_pads = self._walk(here, z, False, checkerboard(step.length_m, (0.0, 0.0)))
+                on_pads = self._walk(site, z, False, checkerboard(step.length_m, (0.0, 0.0)))
                 tripped = float(on_pads.outcome is not Outcome.WALKED)
         return np.array([slip, tripped])
 
     def disturbed(self, z: Floats, p: float, heights_m: Floats, push_N_s: float = 0.0) -> DisturbedWalk:
-        """Walk over footholds (m) from the touch on that follows z, with which a push comes."""
-        here = self._at(p)
-        assert here is not None, "what is disturbed has a gait"
-        ground = here.ground._replace(terrain=self._terrain(here))
+        """Walk over footholds (m) from the touch-down after z, where a push is applied."""
+        site = self._at(p)
+        assert site is not None, "what is disturbed has a gait"
+        ground = site.ground._replace(terrain=self._terrain(site))
         endless = replace(self.tolerances, budget=self.tolerances.budget * heights_m.size)
-        walk = walk_from_section(here.walker, ground, endless, z * self._units, heights_m, push_N_s)
+        walk = walk_from_section(site.walker, ground, endless, z * self._units, heights_m, push_N_s)
         return replace(walk, z=walk.z / self._units)
 
     def cost_of_transport(self, z: Floats, p: float) -> float | None:
-        """Work given over weight and distance of a step from z (d,); None where it ends."""
         step = self.step(z, p, derived=False)
         return step.driven.cost_of_transport(step.length_m) if isinstance(step, SectionStep) else None
 
     def leg_and_pendulum(self, p: float) -> tuple[float, float]:
-        """Units of the walker at p."""
-        here = self._at(p)
-        assert here is not None, "what is measured has a gait"
-        return here.ground.frame.leg_length, here.ground.frame.pendulum_time
+        site = self._at(p)
+        assert site is not None, "what is measured has a gait"
+        return site.ground.frame.leg_length, site.ground.frame.pendulum_time
 
     def at(self, tolerances: Tolerances) -> ContactMap:
-        """The same map, its steps integrated otherwise."""
-        other = copy(self)
-        other.tolerances = tolerances
-        return other
+        changed = copy(self)
+        changed.tolerances = tolerances
+        return changed
 
 
 class OwnPads(Stepper):
-    """A walker on compliant ground in SI, whose pads are laid for the step that was taken last."""
+    """Stepper of a walker on compliant ground, in SI, whose pads are re-laid for the length of the last step."""
 
     def __init__(
         self, walker_at: Callable[[float], ContactWalker], ground: JudgedGround, tolerances: Tolerances, pitch_m: float
     ) -> None:
-        """A family of walkers on one ground; `pitch_m` is the pads' to begin with."""
         self.walker_at, self.ground, self.tolerances, self.pitch_m = walker_at, ground, tolerances, pitch_m
 
     def step(self, z: Floats, p: float, derived: bool = True) -> MappedStep:
-        """One step, with its exact derivative along the section."""
         step = step_from_section(self.walker_at(p), self.ground, self.tolerances, z, self.pitch_m, derived)
         if step.outcome is Outcome.WALKED:
             self.pitch_m = step.length_m
         return step
 
 
-def step_of(gait: Cycle) -> SectionStep:
-    """The step of a gait of one step of the contact model, with what only that model has."""
+def contact_step(gait: Cycle) -> SectionStep:
     assert isinstance(gait.step, SectionStep), "a gait of the contact model"
     return gait.step

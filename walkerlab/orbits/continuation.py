@@ -1,8 +1,8 @@
-"""Following solutions over a parameter: from value to value, or along their curve through its folds.
+"""Continuation of solutions over a parameter: from value to value, or along their curve through its folds.
 
-Both foretell the next solution and correct it by Newton's method. From value to value a polynomial through the last
-ones foretells. A curve is where `m` equations in `m + 1` unknowns hold: one step predicts along the tangent and
-corrects on the plane normal to it, so that a fold, where the parameter turns back, is a point like any other.
+Both predict the next solution and correct it by Newton's method. From value to value the predictor is a polynomial
+through the last solutions. A curve is the set of solutions of `m` equations in `m + 1` unknowns: the predictor follows
+the tangent and the corrector stays on the plane normal to it, so that a fold is a regular point.
 
 Source: Keller, Numerical solution of bifurcation and nonlinear eigenvalue problems (1977); Kuznetsov, Elements of
 applied bifurcation theory, chapter 10.
@@ -10,31 +10,30 @@ applied bifurcation theory, chapter 10.
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Generic, NamedTuple, TypeVar
+from typing import Generic, NamedTuple
 
 import numpy as np
 
-from walkerlab.orbits.newton import MAX_EVALUATIONS, Effort, Equations, Evaluated, NotConverged, newton
+from walkerlab.orbits.newton import MAX_NEWTON_EVALUATIONS, Data, Effort, Equations, Evaluated, NotConverged, newton
 from walkerlab.outcome import Outcome
 from walkerlab.solvers.system import Floats
 
-D = TypeVar("D")
 FEW_CORRECTIONS = 3
 RESOLUTION = 1e-14  # of arclength
+# (abscissa, solution) pairs, latest last.
 Points = tuple[tuple[float, Floats], ...]
-"""Solutions by abscissa, the latest last."""
 
 
 class Strides(NamedTuple):
-    """How far one stride goes over the parameter, and how many points foretell where it leads."""
+    """Limits of the stride over the parameter, and how many points the predictor uses."""
 
     widest: float
     narrowest: float
     remembered: int
 
 
-class Way(NamedTuple):
-    """How far a solution was followed, and how it goes on from there."""
+class FollowerState(NamedTuple):
+    """How far a solution has been followed, and the state from which it continues."""
 
     at: float
     stride: float
@@ -42,50 +41,48 @@ class Way(NamedTuple):
 
 
 class Follower:
-    """Follows a solution from value to value of a rising parameter; the way is walked once and remembered."""
+    """Follows a solution over a rising parameter; earlier progress is cached."""
 
     def __init__(
         self,
         solve: Callable[[float, Floats], Floats | None],
-        first: Way,
+        first: FollowerState,
         strides: Strides,
         abscissa: Callable[[float], float] = float,
     ) -> None:
-        """Begin where `first` has come.
+        """Begin with the solution `first`.
 
-        solve     the solution (m,) at a value near where it is expected; None if it is not found
-        abscissa  what it is a smooth function of
+        solve     return the solution (m,) at a value, given a prediction; None if it fails
+        abscissa  variable in which the solution is smooth, as a function of the parameter
         """
         self._solve, self._strides, self._abscissa, self._ways = solve, strides, abscissa, [first]
 
-    def to(self, target: float) -> Way:
-        """The way to the parameter's value `target`, or to where the solution is lost before.
+    def to(self, target: float) -> FollowerState:
+        """Follow the solution to the parameter's value `target`, or to where it is lost.
 
-        It begins as the way to any value further on does.
+        Strides do not depend on the target until the last, so the cached ones serve every target.
         """
-        way = self._ways[0]
-        for way in self._ways:  # grows on the way
-            following = way.at + way.stride
-            if following >= target or way.stride < self._strides.narrowest:
+        state = self._ways[0]
+        for state in self._ways:  # grows during the loop
+            following = state.at + state.stride
+            if following >= target or state.stride < self._strides.narrowest:
                 break
-            if way is self._ways[-1]:
-                self._ways.append(self._onward(way, following))
-        while way.at < target and way.stride >= self._strides.narrowest:
-            way = self._onward(way, min(target, way.at + way.stride))
-        return way
+            if state is self._ways[-1]:
+                self._ways.append(self._advance(state, following))
+        while state.at < target and state.stride >= self._strides.narrowest:
+            state = self._advance(state, min(target, state.at + state.stride))
+        return state
 
-    def _onward(self, way: Way, ahead: float) -> Way:
-        """On to a value with a wider stride; with a narrower one where it was, if the solution is not found there."""
+    def _advance(self, state: FollowerState, ahead: float) -> FollowerState:
         abscissa = self._abscissa(ahead)
-        found = self._solve(ahead, interpolated(way.points, abscissa))
-        if found is None:
-            return way._replace(stride=0.5 * way.stride)
-        points = (*way.points, (abscissa, found))[-self._strides.remembered :]
-        return Way(ahead, min(self._strides.widest, 1.2 * way.stride), points)
+        solution = self._solve(ahead, interpolate(state.points, abscissa))
+        if solution is None:
+            return state._replace(stride=0.5 * state.stride)
+        points = (*state.points, (abscissa, solution))[-self._strides.remembered :]
+        return FollowerState(ahead, min(self._strides.widest, 1.2 * state.stride), points)
 
 
-def interpolated(points: Points, x: float) -> Floats:
-    """Value at x of the polynomial through `points` (Lagrange)."""
+def interpolate(points: Points, x: float) -> Floats:
     total = np.zeros_like(points[0][1])
     for i, (x_i, y_i) in enumerate(points):
         weight = 1.0
@@ -97,129 +94,120 @@ def interpolated(points: Points, x: float) -> Floats:
 
 
 @dataclass(frozen=True)
-class Solved(Generic[D]):
-    """A point of a curve."""
-
+class CurvePoint(Generic[Data]):
     x: Floats
     tangent: Floats  # of unit length
-    evaluated: Evaluated[D]
+    evaluated: Evaluated[Data]
     corrections: int
 
 
-def corrected(
-    equations: Equations[D], guess: Floats, normal: Floats, tolerance: float, most: int = MAX_EVALUATIONS
-) -> Solved[D] | NotConverged:
-    """The point of a curve on the plane through `guess` with that normal, by Newton's method from there."""
+def correct(
+    equations: Equations[Data], guess: Floats, normal: Floats, tolerance: float, most: int = MAX_NEWTON_EVALUATIONS
+) -> CurvePoint[Data] | NotConverged:
+    """Solve for the point of a curve on the plane through `guess` with that normal."""
 
-    def on_plane(x: Floats) -> Evaluated[D]:
-        here = equations(x)
-        value = np.append(here.value, normal @ (x - guess))
-        return here._replace(value=value, jacobian=np.vstack((here.jacobian, normal)))
+    def on_plane(x: Floats) -> Evaluated[Data]:
+        evaluated = equations(x)
+        value = np.append(evaluated.value, normal @ (x - guess))
+        return evaluated._replace(value=value, jacobian=np.vstack((evaluated.jacobian, normal)))
 
-    found = newton(on_plane, guess, Effort(tolerance, most))
-    if isinstance(found, NotConverged):
-        return found
+    solution = newton(on_plane, guess, Effort(tolerance, most))
+    if isinstance(solution, NotConverged):
+        return solution
     try:
-        direction = np.linalg.solve(found.evaluated.jacobian, np.eye(guess.size)[-1])
+        direction = np.linalg.solve(solution.evaluated.jacobian, np.eye(guess.size)[-1])
     except np.linalg.LinAlgError:
         return NotConverged(Outcome.WALKED, singular=True)
-    return Solved(found.x, direction / np.linalg.norm(direction), found.evaluated, found.corrections)
+    return CurvePoint(solution.x, direction / np.linalg.norm(direction), solution.evaluated, solution.corrections)
 
 
 @dataclass(frozen=True)
 class StepControl:
-    """How far one step may go.
+    """Limits of one step."""
 
-    first, shortest, longest  arclengths
-    turn       cosine of the largest angle between tangents of neighbours
-    tolerance  on the equations
-    """
-
-    first: float = 0.01
+    first: float = 0.01  # arclength, also of the next two
     shortest: float = 1e-8
     longest: float = 0.05
-    turn: float = 0.97
-    tolerance: float = 1e-12
+    turn: float = 0.97  # cosine of the largest angle between tangents of neighbours
+    tolerance: float = 1e-12  # on the equations
 
 
-def stepped(
-    equations: Equations[D],
-    last: Solved[D],
+def step_along(
+    equations: Equations[Data],
+    last: CurvePoint[Data],
     length: float,
     control: StepControl,
-    acceptable: Callable[[Solved[D]], bool] = lambda _: True,
-    before: Solved[D] | None = None,
-) -> tuple[Solved[D], float] | NotConverged:
-    """The next point of a curve after `last`, and how far to look for the one after it.
+    acceptable: Callable[[CurvePoint[Data]], bool] = lambda _: True,
+    before: CurvePoint[Data] | None = None,
+) -> tuple[CurvePoint[Data], float] | NotConverged:
+    """Return the next point of a curve after `last`, and the length of the step after it.
 
-    acceptable  a caller's own wish for smaller steps
-    before      the point before the last, if there is one: it tells how the curve bends
+    acceptable  additional condition of the caller on the new point
+    before      point before `last`, if any: it gives the curvature
     """
     lost = NotConverged(Outcome.WALKED)
-    bend = np.zeros_like(last.x)  # how fast the tangent turns, per unit of arclength
+    bend = np.zeros_like(last.x)  # curvature: change of the tangent per arclength
     if before is not None:
         bend = np.asarray((last.tangent - before.tangent) / np.linalg.norm(last.x - before.x))
     while length >= control.shortest:
         guess = last.x + length * last.tangent + 0.5 * length**2 * bend
-        found = corrected(equations, guess, last.tangent, control.tolerance)
-        if isinstance(found, Solved):
-            gone = float(np.linalg.norm(found.x - guess))
-            if found.tangent @ last.tangent > control.turn and gone < 0.5 * length and acceptable(found):
-                longer = 1.6 if found.corrections <= FEW_CORRECTIONS else 1.0
-                return found, min(control.longest, longer * length)
+        point = correct(equations, guess, last.tangent, control.tolerance)
+        if isinstance(point, CurvePoint):
+            correction = float(np.linalg.norm(point.x - guess))
+            if point.tangent @ last.tangent > control.turn and correction < 0.5 * length and acceptable(point):
+                longer = 1.6 if point.corrections <= FEW_CORRECTIONS else 1.0
+                return point, min(control.longest, longer * length)
         else:
-            lost = found
+            lost = point
         length *= 0.5
     return lost
 
 
 @dataclass(frozen=True)
-class Segment(Generic[D]):
+class Segment(Generic[Data]):
     """The curve between two neighbours, as a function of the distance along the first one's tangent."""
 
-    equations: Equations[D]
-    first: Solved[D]
-    second: Solved[D]
+    equations: Equations[Data]
+    first: CurvePoint[Data]
+    second: CurvePoint[Data]
     tolerance: float
 
     @property
     def length(self) -> float:
-        """Distance of the second point along the first one's tangent."""
         return float(self.first.tangent @ (self.second.x - self.first.x))
 
-    def at(self, s: float) -> Solved[D] | NotConverged:
-        """The point at distance s, which may lie a little outside."""
+    def at(self, s: float) -> CurvePoint[Data] | NotConverged:
         share = s / self.length
         bend = self.second.x - self.first.x - self.length * self.first.tangent
         guess = self.first.x + s * self.first.tangent + share * share * bend
-        return corrected(self.equations, guess, self.first.tangent, self.tolerance, 2 * MAX_EVALUATIONS)
+        return correct(self.equations, guess, self.first.tangent, self.tolerance, 2 * MAX_NEWTON_EVALUATIONS)
 
 
 class _OffTheCurve(Exception):  # noqa: N818 (the end of one search, not an error)
     """The corrector found no point between two neighbours."""
 
 
-def root_along(segment: Segment[D], measure: Callable[[Solved[D]], float]) -> Solved[D] | None:
-    """The point of a segment where `measure` vanishes, whose signs at both ends differ; None if it is lost.
+def root_along(segment: Segment[Data], measure: Callable[[CurvePoint[Data]], float]) -> CurvePoint[Data] | None:
+    """Return the point of a segment where `measure` changes sign; None if the curve is lost.
 
-    Brent's method on the corrected curve: secant and inverse quadratic steps, safe by their bracket.
+    Brent's method on the corrected curve.
     """
-    # Imported here: what follows no curve does without.
+    # Imported late: only curves need it.
     from scipy.optimize import brentq
 
-    found: dict[float, Solved[D]] = {0.0: segment.first, segment.length: segment.second}
+    points: dict[float, CurvePoint[Data]] = {0.0: segment.first, segment.length: segment.second}
 
-    def at(s: float) -> float:
-        if s not in found:
+    def measure_at(s: float) -> float:
+        if s not in points:
             point = segment.at(s)
             if isinstance(point, NotConverged):
                 raise _OffTheCurve
-            found[s] = point
-        return measure(found[s])
+            points[s] = point
+        return measure(points[s])
 
     try:
-        root = brentq(at, 0.0, segment.length, xtol=RESOLUTION, rtol=4.0 * np.finfo(float).eps)
-        at(root)
+        root = brentq(measure_at, 0.0, segment.length, xtol=RESOLUTION, rtol=4.0 * np.finfo(float).eps)
+        measure_at(root)
     except (_OffTheCurve, ValueError):
         return None
-    return found[root]
+    return points[root]

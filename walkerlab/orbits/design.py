@@ -1,7 +1,7 @@
-"""The least or largest of a gait's numbers over some of a walker's, others kept within bounds.
+"""Minimum or maximum of a gait quantity over walker parameters, with bounds on other quantities.
 
-SciPy's SLSQP on numbers scaled to their bounds, with gradients from exact steps, from several starts. Where there is
-no gait the function is continued by a slope back to the last point that had one, so that a search goes round it.
+SciPy's SLSQP on parameters scaled to their bounds, with exact gradients, from several starts. Where there is no gait
+the function rises with distance from the last point that had one, so that the search avoids the gap.
 """
 
 from __future__ import annotations
@@ -13,134 +13,124 @@ import numpy as np
 
 from walkerlab.solvers.system import Floats
 
-PRECISION = 1e-9  # of the quantity over its start's
-MAX_ITERATIONS = 60
-ON_BOUND = 1e-6  # of the range
-SAME = 1e-4  # of the range: ends of searches that are one optimum
-STEEP = 10.0  # slope of the continuation, in the quantity's own size per range
+PRECISION = 1e-9  # of the quantity, relative to its initial value
+MAX_DESIGN_ITERATIONS = 60
+BOUND_TOLERANCE = 1e-6  # of the range
+SAME_OPTIMUM = 1e-4  # of the range, between ends of searches at one optimum
+PENALTY_SLOPE = 10.0  # where there is no gait, in initial values per range
 
 
 @dataclass(frozen=True)
 class Point:
-    """Numbers of a gait at some numbers of the walker, with their gradients by these (variables,)."""
-
     numbers: Mapping[str, float]
     gradients: Mapping[str, Floats]
-    apart: float = 1.0  # between the magnitudes of its two largest multipliers
+    apart: float = 1.0  # gap between the magnitudes of the two largest multipliers
 
 
 @dataclass(frozen=True)
-class Aim:
-    """What is looked for.
+class DesignProblem:
+    """The optimisation problem."""
 
-    quantity  the number that is made least, or largest with `sign` -1
-    lower, upper  (variables,) bounds
-    keep      bounds of other numbers
-    at        the gait at some numbers (variables,); None where there is none
-    """
-
-    quantity: str
+    quantity: str  # to minimise, or to maximise with `sign` -1
     sign: float
-    lower: Floats
-    upper: Floats
-    keep: Mapping[str, tuple[float, float]]
-    at: Callable[[Floats], Point | None]
+    lower: Floats  # (variables,) bounds
+    upper: Floats  # (variables,) bounds
+    keep: Mapping[str, tuple[float, float]]  # bounds on other quantities
+    at: Callable[[Floats], Point | None]  # evaluate the gait at parameters (variables,); None if there is none
 
 
 @dataclass
-class Descent:
-    """One search: where it ended."""
-
+class DesignSearch:
     x: Floats
     point: Point | None
     gradient_norm: float = 0.0
 
 
-def sought(question: Aim, start: Floats) -> Descent:
-    """The optimum that a search from `start` (variables,) comes to."""
-    from scipy.optimize import NonlinearConstraint, minimize  # a tenth of a second that nothing else needs
+Searcher = Callable[[int, Floats], DesignSearch]
 
-    span = question.upper - question.lower
-    search, seen = Descent(start, None), dict[bytes, Point | None]()
 
-    def at(u: Floats) -> Point | None:
-        x = question.lower + np.clip(u, 0.0, 1.0) * span
+def minimise(problem: DesignProblem, start: Floats) -> DesignSearch:
+    from scipy.optimize import NonlinearConstraint, minimize  # takes a tenth of a second, only needed here
+
+    span = problem.upper - problem.lower
+    search, seen = DesignSearch(start, None), dict[bytes, Point | None]()
+
+    def point_at(u: Floats) -> Point | None:
+        x = problem.lower + np.clip(u, 0.0, 1.0) * span
         if x.tobytes() not in seen:
-            seen[x.tobytes()] = question.at(x)
+            seen[x.tobytes()] = problem.at(x)
         point = seen[x.tobytes()]
         if point is not None:
             search.x, search.point = x, point
         return point
 
-    first = at((start - question.lower) / span)
+    first = point_at((start - problem.lower) / span)
     if first is None:
         return search
-    size = max(abs(first.numbers[question.quantity]), 1e-300)
-    good = [((search.x - question.lower) / span, first)]
+    size = max(abs(first.numbers[problem.quantity]), 1e-300)
+    last_good = [((search.x - problem.lower) / span, first)]
 
     def value_of(name: str, scale: float) -> Callable[[Floats], tuple[float, Floats]]:
-        def found(u: Floats) -> tuple[float, Floats]:
-            point = at(u)
+        def evaluate(u: Floats) -> tuple[float, Floats]:
+            point = point_at(u)
             if point is not None and name in point.numbers:
-                good[0] = (u.copy(), point)
+                last_good[0] = (u.copy(), point)
                 return scale * point.numbers[name], scale * point.gradients[name] * span
-            last, known = good[0]
+            last, last_point = last_good[0]
             back = u - last
-            way = float(np.linalg.norm(back)) or 1.0
-            return scale * known.numbers[name] + STEEP * way * way, 2.0 * STEEP * back
+            distance = float(np.linalg.norm(back)) or 1.0
+            return scale * last_point.numbers[name] + PENALTY_SLOPE * distance * distance, 2.0 * PENALTY_SLOPE * back
 
-        return found
+        return evaluate
 
-    objective = value_of(question.quantity, question.sign / size)
+    objective = value_of(problem.quantity, problem.sign / size)
     constraints = [
         NonlinearConstraint(lambda u, of=of: of(u)[0], *bounds, lambda u, of=of: of(u)[1])
-        for bounds, of in ((bounds, value_of(name, 1.0)) for name, bounds in question.keep.items())
+        for bounds, of in ((bounds, value_of(name, 1.0)) for name, bounds in problem.keep.items())
     ]
-    ended = minimize(
-        objective, good[0][0], jac=True, method="SLSQP", bounds=[(0.0, 1.0)] * span.size, constraints=constraints,
-        options={"ftol": PRECISION, "maxiter": MAX_ITERATIONS},
+    result = minimize(
+        objective, last_good[0][0], jac=True, method="SLSQP", bounds=[(0.0, 1.0)] * span.size, constraints=constraints,
+        options={"ftol": PRECISION, "maxiter": MAX_DESIGN_ITERATIONS},
     )  # fmt: skip
-    at(np.clip(ended.x, 0.0, 1.0))
-    free = (ended.x > ON_BOUND) & (ended.x < 1.0 - ON_BOUND)
-    search.gradient_norm = float(np.linalg.norm(objective(ended.x)[1][free]))
+    point_at(np.clip(result.x, 0.0, 1.0))
+    free = (result.x > BOUND_TOLERANCE) & (result.x < 1.0 - BOUND_TOLERANCE)
+    search.gradient_norm = float(np.linalg.norm(objective(result.x)[1][free]))
     return search
 
 
-def kept(question: Aim, point: Point) -> bool:
-    """Whether other numbers are within their bounds, up to what rounding leaves."""
-    slack = {name: 1e-6 * max(abs(low), abs(high)) for name, (low, high) in question.keep.items()}
+def is_feasible(problem: DesignProblem, point: Point) -> bool:
+    slack = {name: 1e-6 * max(abs(low), abs(high)) for name, (low, high) in problem.keep.items()}
     return all(
         name in point.numbers and low - slack[name] <= point.numbers[name] <= high + slack[name]
-        for name, (low, high) in question.keep.items()
+        for name, (low, high) in problem.keep.items()
     )
 
 
-def searched(
-    question: Aim, own: Floats, starts: int, seed: int, search: Callable[[int, Floats], Descent] | None = None
-) -> list[Descent]:
-    """Searches from the walker's own numbers and from drawn ones, the best first, those that keep bounds in front.
+def search_from_starts(
+    problem: DesignProblem, own: Floats, starts: int, seed: int, search: Searcher | None = None
+) -> list[DesignSearch]:
+    """Search from the walker's own parameters and from random ones; return the best first, feasible ones before others.
 
-    search  does one, by its number and start (variables,); `sought` without
+    search  runs one search from its index and start (variables,); `minimise` by default
     """
-    search = search or (lambda _, start: sought(question, start))
-    drawn = np.random.default_rng(seed).uniform(question.lower, question.upper, (starts - 1, own.size))
-    begun = (np.clip(own, question.lower, question.upper), *drawn)
-    found = [search(number, start) for number, start in enumerate(begun)]
-    ended = [one for one in found if one.point is not None]
+    search = search or (lambda _, start: minimise(problem, start))
+    random_starts = np.random.default_rng(seed).uniform(problem.lower, problem.upper, (starts - 1, own.size))
+    all_starts = (np.clip(own, problem.lower, problem.upper), *random_starts)
+    searches = [search(number, start) for number, start in enumerate(all_starts)]
+    successful = [search_end for search_end in searches if search_end.point is not None]
 
-    def rank(one: Descent) -> tuple[bool, float]:
-        assert one.point is not None
-        return not kept(question, one.point), question.sign * one.point.numbers[question.quantity]
+    def rank(search_end: DesignSearch) -> tuple[bool, float]:
+        assert search_end.point is not None
+        return not is_feasible(problem, search_end.point), problem.sign * search_end.point.numbers[problem.quantity]
 
-    return sorted(ended, key=rank)
+    return sorted(successful, key=rank)
 
 
-def optima(question: Aim, searches: list[Descent]) -> int:
-    """How many different optima searches came to, of those that keep the bounds."""
-    span, ends = question.upper - question.lower, list[Floats]()
-    for one in searches:
-        if one.point is not None and kept(question, one.point):
-            u = (one.x - question.lower) / span
-            if all(np.abs(u - other).max() > SAME for other in ends):
+def count_optima(problem: DesignProblem, searches: list[DesignSearch]) -> int:
+    span, ends = problem.upper - problem.lower, list[Floats]()
+    for search in searches:
+        if search.point is not None and is_feasible(problem, search.point):
+            u = (search.x - problem.lower) / span
+            if all(np.abs(u - end).max() > SAME_OPTIMUM for end in ends):
                 ends.append(u)
     return len(ends)

@@ -1,9 +1,9 @@
-"""How a gait's numbers answer a number of the walker: by the implicit function theorem.
+"""Derivatives of gait quantities with respect to a walker parameter, by the implicit function theorem.
 
-With z the section's coordinates and P the step map, dz/dp = (I - A)^-1 dP/dp; all that follows from the gait changes
-along (dz/dp, 1). The derivatives by p are difference quotients of exact steps along the family as far as it is known;
-that of a multiplier comes from A's by its left and right eigenvectors. The difference between two step sizes is the
-error, and the steps are halved as long as that makes errors smaller which are no small part of their derivatives.
+With z the section's coordinates and P the step map, dz/dp = (I - A)^-1 dP/dp; every quantity of the gait then changes
+along (dz/dp, 1). Derivatives by p are difference quotients of exact steps along this direction; that of a multiplier
+follows from A's by its left and right eigenvectors. The difference between two step sizes estimates the error, and the
+step is halved while that reduces errors that are not yet small.
 """
 
 from __future__ import annotations
@@ -16,12 +16,15 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from walkerlab.orbits.robustness import Standpoint, response, slope_of
+from walkerlab.orbits.robustness import GaitOnMap, derivative, response
 from walkerlab.orbits.step_map import MappedStep, multipliers_of
 from walkerlab.outcome import Outcome
 from walkerlab.solvers.system import Floats
 
-QUANTITIES: Final[Mapping[str, str]] = {
+# Differentiable quantities with units.
+#
+# The norms are of the step period for a floor drop; the scaled one is in pendulum times per leg length of the walker.
+GAIT_QUANTITIES: Final[Mapping[str, str]] = {
     "period_s": "s",
     "step_length_m": "m",
     "speed_m_s": "m/s",
@@ -30,20 +33,18 @@ QUANTITIES: Final[Mapping[str, str]] = {
     "gait_sensitivity_norm_scaled": "1",
     "cost_of_transport": "1",
 }
-"""What is differentiated, with units; the norms are of the step period for a drop of the floor, the scaled one in
-pendulum times over leg lengths of the walker itself."""
-OWN = 3  # of them that a step itself has
-APART = 1e-6  # |l' r| of the largest multiplier's eigenvectors, below which multipliers meet
-STEP = 1.5  # of a difference quotient, in fifth roots of the relative tolerance
-APPROACH = (1e-4, 1e-2)  # of that: steps by which the direction of the family is found
-SIZES = (2.0, 1.0, 0.5, 0.25, 0.125)  # of the steps of difference quotients, one after the other
-SMALL = 1e-3  # error, relative to a derivative, that needs no smaller step
-LOST = 0.1  # error, relative to a derivative, from which rounding has eaten it
+STEP_QUANTITY_COUNT = 3  # the first ones, which a single step gives
+MIN_EIGENVECTOR_PRODUCT = 1e-6  # |l' r| of the largest multiplier's eigenvectors, below which multipliers coincide
+STEP_FACTOR = 1.5  # step of a difference quotient, in fifth roots of the relative tolerance
+APPROACH_STEPS = (1e-4, 1e-2)  # shares of that, to find the direction of the family
+STEP_SIZES = (2.0, 1.0, 0.5, 0.25, 0.125)  # shares of that, tried in turn
+SMALL_ERROR = 1e-3  # relative error that needs no smaller step
+LOST_ERROR = 0.1  # relative error above which a derivative is lost in rounding
 
 
 @dataclass(frozen=True)
 class Gradient:
-    """A derivative; `why` says in words why there is none, or that it is lost."""
+    """A derivative; `why` states why there is none, or that rounding dominates it."""
 
     value: float | None
     error: float | None
@@ -51,167 +52,164 @@ class Gradient:
 
     @property
     def small(self) -> bool:
-        """Whether no smaller step is needed, or would help."""
-        return self.value is None or self.error is None or self.error <= SMALL * abs(self.value)
+        return self.value is None or self.error is None or self.error <= SMALL_ERROR * abs(self.value)
 
     def halves(self, other: Gradient | None) -> bool:
-        """Whether its error is less than half of another one's."""
         return other is None or (self.error is not None and self.error < 0.5 * (other.error or 0.0))
 
 
-def gait_numbers(at: Standpoint, wanted: Collection[str] = QUANTITIES) -> dict[str, float] | None:
-    """The numbers of a gait, by name; no norm of an unstable one; None where its step ends.
+def gait_quantities(gait: GaitOnMap, wanted: Collection[str] = GAIT_QUANTITIES) -> dict[str, float] | None:
+    """Compute the quantities of a gait by name, without norms if it is unstable; None if its step fails.
 
-    wanted  those that are: what a step itself does not tell takes more steps
+    wanted  quantities to compute; those that a single step does not give cost more steps
     """
-    step = at.step_map.step(at.z, at.p)
+    step = gait.step_map.step(gait.z, gait.p)
     if step.outcome is not Outcome.WALKED:
         return None
     radius = float(np.abs(multipliers_of(step.DP)).max())
-    found = dict(zip(QUANTITIES, (*own_numbers(step), radius), strict=False))
-    for names, of in OTHERS.items():
-        values = None if set(names).isdisjoint(wanted) else of(at._replace(A=step.DP))
-        found |= {} if values is None else dict(zip(names, values, strict=True))
-    return found
+    quantities = dict(zip(GAIT_QUANTITIES, (*step_quantities(step), radius), strict=False))
+    for names, of in WALK_QUANTITIES.items():
+        values = None if set(names).isdisjoint(wanted) else of(gait._replace(A=step.DP))
+        quantities |= {} if values is None else dict(zip(names, values, strict=True))
+    return quantities
 
 
-def own_numbers(step: MappedStep) -> tuple[float, float, float]:
-    """What a step itself tells: period, length and speed."""
+def step_quantities(step: MappedStep) -> tuple[float, float, float]:
     return step.period_s, step.length_m, step.length_m / step.period_s
 
 
-def norms_of(at: Standpoint) -> tuple[float, float] | None:
-    """The norm of the step period for a drop of the floor, and the scaled one; None of an unstable gait."""
-    answer = response(at, "floor-drop")
+def sensitivity_norms(gait: GaitOnMap) -> tuple[float, float] | None:
+    """Return the norm of the step period for a floor drop, in SI and scaled; None for an unstable gait."""
+    answer = response(gait, "floor-drop")
     if answer is None:
         return None
-    length, time = at.step_map.leg_and_pendulum(at.p)
+    length, time = gait.step_map.leg_and_pendulum(gait.p)
     return float(answer[0][0]), float(answer[0][0]) * length / time
 
 
-def cost_of(at: Standpoint) -> tuple[float] | None:
-    """The cost of transport; None where the step ends."""
-    cost = at.step_map.cost_of_transport(at.z, at.p)
+def transport_cost(gait: GaitOnMap) -> tuple[float] | None:
+    cost = gait.step_map.cost_of_transport(gait.z, gait.p)
     return None if cost is None else (cost,)
 
 
-OTHERS: Final[Mapping[tuple[str, ...], Callable[[Standpoint], tuple[float, ...] | None]]] = {
-    ("gait_sensitivity_norm", "gait_sensitivity_norm_scaled"): norms_of,
-    ("cost_of_transport",): cost_of,
+# Functions for quantities that a single step does not give, by the names of their values.
+WALK_QUANTITIES: Final[Mapping[tuple[str, ...], Callable[[GaitOnMap], tuple[float, ...] | None]]] = {
+    ("gait_sensitivity_norm", "gait_sensitivity_norm_scaled"): sensitivity_norms,
+    ("cost_of_transport",): transport_cost,
 }
-"""What takes more than the step itself, by the names of the values."""
 
 
-def gradients(at: Standpoint, scale: float, wanted: Collection[str] = QUANTITIES) -> dict[str, Gradient]:
-    """Derivatives of a gait's numbers by the parameter of its step map; empty where steps beside it end.
+def gradients(gait: GaitOnMap, scale: float, wanted: Collection[str] = GAIT_QUANTITIES) -> dict[str, Gradient]:
+    """Differentiate a gait's quantities by the parameter of its step map; empty if neighbouring steps fail.
 
-    scale   magnitude of changes of the parameter that matter
-    wanted  the numbers, see `gait_numbers`
+    scale   magnitude of significant changes of the parameter
+    wanted  the quantities, see `gait_quantities`
     """
-    h, along = STEP * at.step_map.tolerances.rtol**0.2 * scale, np.zeros(at.z.size)
-    for part in APPROACH:
-        closer = along_family(at, part * h, along)
+    h, along = STEP_FACTOR * gait.step_map.tolerances.rtol**0.2 * scale, np.zeros(gait.z.size)
+    for part in APPROACH_STEPS:
+        closer = family_direction(gait, part * h, along)
         if closer is None:
             return {}
         along = closer
-    found, coarse = dict[str, Gradient](), None
-    for size in SIZES:
-        fine = changes(at, size * h, along, wanted)
+    best, coarse = dict[str, Gradient](), None
+    for size in STEP_SIZES:
+        fine = differentiate(gait, size * h, along, wanted)
         if fine is not None and coarse is not None:
-            better = {name: one for name, one in pair(at.A, fine, coarse).items() if one.halves(found.get(name))}
-            found |= better
-            if not better or all(one.small for one in found.values()):
+            better = {
+                name: gradient
+                for name, gradient in combine_steps(gait.A, fine, coarse).items()
+                if gradient.halves(best.get(name))
+            }
+            best |= better
+            if not better or all(gradient.small for gradient in best.values()):
                 break
         coarse = fine
-    return found
+    return best
 
 
-def pair(A: Floats, fine: Changes, coarse: Changes) -> dict[str, Gradient]:
-    """The derivatives by the finer of two steps, with the errors that the coarser one shows."""
-    found = {
-        name: told(value, abs(value - coarse.numbers[name]))
+def combine_steps(A: Floats, fine: Derivatives, coarse: Derivatives) -> dict[str, Gradient]:
+    """Combine the derivatives at two step sizes: values of the finer one, errors from the difference."""
+    combined = {
+        name: make_gradient(value, abs(value - coarse.numbers[name]))
         for name, value in fine.numbers.items()
         if name in coarse.numbers
     }
-    return found | {"spectral_radius": of_radius(A, fine.A, coarse.A - fine.A)}
+    return combined | {"spectral_radius": radius_gradient(A, fine.A, coarse.A - fine.A)}
 
 
-class Changes(NamedTuple):
-    """Of a gait's numbers and of A (d, d), by the parameter."""
-
+class Derivatives(NamedTuple):
     numbers: dict[str, float]
     A: Floats
 
 
-def along_family(at: Standpoint, h: float, guess: Floats) -> Floats | None:
-    """How the gait's z (d,) changes with the parameter, by steps from beside it, along a guess of that.
+def family_direction(gait: GaitOnMap, h: float, guess: Floats) -> Floats | None:
+    """Return the derivative of the gait's z (d,) by the parameter, from steps near z along a guess of it.
 
-    On compliant ground a step from z itself would be none of a walker of other measures: its foot would be in the air,
-    or deep in the ground.
+    On compliant ground a step from z itself would not do for a walker of other dimensions: its foot would be in the
+    air, or deep in the ground.
     """
 
-    def led(off: float) -> Floats | None:
-        step = at.step_map.step(at.z + off * guess, at.p + off, derived=False)
+    def step_from(off: float) -> Floats | None:
+        step = gait.step_map.step(gait.z + off * guess, gait.p + off, derived=False)
         return step.z if step.outcome is Outcome.WALKED else None
 
-    moved = slope_of(led, h)
-    return None if moved is None else np.asarray(np.linalg.solve(np.eye(guess.size) - at.A, moved - at.A @ guess))
+    moved = derivative(step_from, h)
+    return None if moved is None else np.asarray(np.linalg.solve(np.eye(guess.size) - gait.A, moved - gait.A @ guess))
 
 
-def changes(at: Standpoint, h: float, guess: Floats, wanted: Collection[str]) -> Changes | None:
-    """By difference quotients of a step h along the family; None where steps beside the gait end."""
-    along = along_family(at, h, guess)
+def differentiate(gait: GaitOnMap, h: float, guess: Floats, wanted: Collection[str]) -> Derivatives | None:
+    """Compute difference quotients of step h along the family; None if neighbouring steps fail."""
+    along = family_direction(gait, h, guess)
     if along is None:
         return None
 
     @cache
-    def beside(off: float) -> tuple[Standpoint, MappedStep]:
-        step = at.step_map.step(at.z + off * along, at.p + off)
-        return at._replace(z=at.z + off * along, p=at.p + off, A=step.DP), step
+    def neighbour(off: float) -> tuple[GaitOnMap, MappedStep]:
+        step = gait.step_map.step(gait.z + off * along, gait.p + off)
+        return gait._replace(z=gait.z + off * along, p=gait.p + off, A=step.DP), step
 
-    def of_step(off: float) -> Floats | None:
-        _, step = beside(off)
-        return np.append(own_numbers(step), step.DP) if step.outcome is Outcome.WALKED else None
+    def step_values(off: float) -> Floats | None:
+        _, step = neighbour(off)
+        return np.append(step_quantities(step), step.DP) if step.outcome is Outcome.WALKED else None
 
-    def other(off: float, of: Callable[[Standpoint], tuple[float, ...] | None]) -> Floats | None:
-        here, step = beside(off)
-        values = of(here) if step.outcome is Outcome.WALKED else None
+    def walk_values(off: float, of: Callable[[GaitOnMap], tuple[float, ...] | None]) -> Floats | None:
+        changed_gait, step = neighbour(off)
+        values = of(changed_gait) if step.outcome is Outcome.WALKED else None
         return None if values is None else np.array(values)
 
-    changed = slope_of(of_step, h)
+    changed = derivative(step_values, h)
     if changed is None:
         return None
-    numbers = dict(zip(QUANTITIES, changed[:OWN].tolist(), strict=False))
-    for names, of in OTHERS.items():
-        slopes = None if set(names).isdisjoint(wanted) else slope_of(partial(other, of=of), h)
+    numbers = dict(zip(GAIT_QUANTITIES, changed[:STEP_QUANTITY_COUNT].tolist(), strict=False))
+    for names, of in WALK_QUANTITIES.items():
+        slopes = None if set(names).isdisjoint(wanted) else derivative(partial(walk_values, of=of), h)
         numbers |= {} if slopes is None else dict(zip(names, slopes.tolist(), strict=True))
-    return Changes(numbers, changed[OWN:].reshape(at.A.shape))
+    return Derivatives(numbers, changed[STEP_QUANTITY_COUNT:].reshape(gait.A.shape))
 
 
-def told(value: float, error: float) -> Gradient:
-    """A derivative, said to be lost if its error is no small part of it."""
-    lost = error > LOST * abs(value) and value != 0.0
+def make_gradient(value: float, error: float) -> Gradient:
+    """Return a derivative, marked as lost if its error is comparable to its value."""
+    lost = error > LOST_ERROR * abs(value) and value != 0.0
     return Gradient(float(value), float(error), "lost in rounding" if lost else "")
 
 
-def of_radius(A: Floats, change: Floats, error: Floats) -> Gradient:
-    """The derivative of the spectral radius, by that of A (d, d)."""
+def radius_gradient(A: Floats, change: Floats, error: Floats) -> Gradient:
     values, right = np.linalg.eig(A)
-    left = np.linalg.inv(right) if np.linalg.cond(right) < 1.0 / APART else None
+    left = np.linalg.inv(right) if np.linalg.cond(right) < 1.0 / MIN_EIGENVECTOR_PRODUCT else None
     largest = int(np.argmax(np.abs(values)))
     others = [
         value for value in values if abs(value - values[largest]) > 0.0 and abs(value.conj() - values[largest]) > 0.0
     ]
-    meets = any(abs(abs(value) - abs(values[largest])) < APART for value in others)
+    meets = any(abs(abs(value) - abs(values[largest])) < MIN_EIGENVECTOR_PRODUCT for value in others)
     if left is None or meets or values[largest] == 0.0:
         return Gradient(None, None, "multipliers meet")
     towards = values[largest].conjugate() / abs(values[largest])
-    found = (towards * (left[largest] @ change @ right[:, largest])).real
-    # errors of A's elements may cancel by chance, which says nothing of the next step
+    slope = (towards * (left[largest] @ change @ right[:, largest])).real
+    # absolute values: errors of A's elements may cancel by chance
     off = np.abs(left[largest]) @ np.abs(error) @ np.abs(right[:, largest])
-    return told(float(found), float(off))
+    return make_gradient(float(slope), float(off))
 
 
-def relative(value: float, parameter: float, quantity: float) -> float | None:
-    """By how much of itself a quantity changes as the parameter changes by all of itself; None of one at 0."""
+def relative_gradient(value: float, parameter: float, quantity: float) -> float | None:
+    """Return the relative change of a quantity per relative change of the parameter; None if either is zero."""
     return None if parameter == 0.0 or math.isclose(quantity, 0.0, abs_tol=1e-300) else value * parameter / quantity

@@ -1,4 +1,4 @@
-"""Newton's method, for gaits of either model and for the points of their branches alike."""
+"""Newton's method for gaits of either model and for points on their branches."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -9,84 +9,66 @@ import numpy as np
 from walkerlab.outcome import Outcome
 from walkerlab.solvers.system import Floats
 
-D = TypeVar("D")
-MAX_EVALUATIONS = 8
-ROUNDING = 100.0  # a residual at most this many tolerances large that a move does not halve is rounding
+Data = TypeVar("Data")
+MAX_NEWTON_EVALUATIONS = 8
+# residuals up to this many tolerances are rounding if a move does not halve them
+ROUNDING_FACTOR = 100.0
 
 
-class Evaluated(NamedTuple, Generic[D]):
-    """The equations at a point.
+class Evaluated(NamedTuple, Generic[Data]):
+    """Value and derivative of the equations at a point."""
 
-    outcome   WALKED if there is a value
-    value     (m,)
-    jacobian  (m, m), or a column more for a curve
-    data      what the caller wants to keep of it
-    """
-
-    outcome: Outcome | None
-    value: Floats
-    jacobian: Floats
-    data: D
+    outcome: Outcome | None  # WALKED if there is a value
+    value: Floats  # (m,)
+    jacobian: Floats  # (m, m), or (m, m + 1) for a curve
+    data: Data  # the caller's own data
 
     @property
     def residual(self) -> float:
-        """Largest component of the value; infinite where there is none."""
+        """Largest component of the value; infinite without a value."""
         return max(map(abs, self.value.tolist())) if self.outcome is Outcome.WALKED else np.inf
 
 
-Equations = Callable[[Floats], Evaluated[D]]
-"""m equations at x: value and derivative; in m unknowns for a point, in one more for a curve."""
+# m equations with their derivative at x, in m unknowns for a point, m + 1 for a curve.
+Equations = Callable[[Floats], Evaluated[Data]]
 
 
 @dataclass(frozen=True)
-class Solution(Generic[D]):
-    """Where the equations hold."""
-
+class Solution(Generic[Data]):
     x: Floats
-    evaluated: Evaluated[D]
+    evaluated: Evaluated[Data]
     corrections: int
 
 
 @dataclass(frozen=True)
 class NotConverged:
-    """Why Newton's method found nothing.
+    """Why Newton's method failed."""
 
-    outcome   WALKED if the equations could be evaluated; None where the parameter makes no walker
-    singular  whether the matrix of a move was: a multiplier is 1
-    """
-
-    outcome: Outcome | None
-    singular: bool = False
+    outcome: Outcome | None  # WALKED if the equations could be evaluated; None where the parameter makes no walker
+    singular: bool = False  # whether the Jacobian was singular, i.e. a multiplier is 1
 
 
 class Effort(NamedTuple):
-    """How closely something is solved, and how hard.
+    """Accuracy of a solution and the limits of its search."""
 
-    tolerance  on the residual
-    most       evaluations of the equations
-    shortest   share of a move that is not halved any more
-    growth     of the residual from which on a move is
-    rounding   tolerances that a residual may be large which a move does not halve
-    """
-
-    tolerance: float
-    most: int = MAX_EVALUATIONS
-    shortest: float = 1.0
-    growth: float = 1.0
-    rounding: float = ROUNDING
+    tolerance: float  # on the residual
+    most: int = MAX_NEWTON_EVALUATIONS  # evaluations of the equations
+    shortest: float = 1.0  # share of a move below which it is not halved
+    growth: float = 1.0  # ratio of residuals from which on a move is halved
+    rounding: float = ROUNDING_FACTOR  # see there
 
 
-def newton(equations: Equations[D], guess: Floats, effort: Effort) -> Solution[D] | NotConverged:
+def newton(equations: Equations[Data], guess: Floats, effort: Effort) -> Solution[Data] | NotConverged:
     """Solve m equations in m unknowns from a guess (m,).
 
-    Returns the point, or with which outcome the equations could not be evaluated or did not converge.
+    Returns the solution, or the outcome with which the equations failed or did not converge.
     """
     tolerance, most, shortest, growth, rounding = effort
-    x, here, corrections, evaluations = guess, equations(guess), 0, 1
-    residual = here.residual
+    x, current, corrections, evaluations = guess, equations(guess), 0, 1
+    residual = current.residual
     while tolerance < residual < np.inf:
         try:
-            move = np.linalg.solve(here.jacobian, -here.value)
+            move = np.linalg.solve(current.jacobian, -current.value)
         except np.linalg.LinAlgError:
             return NotConverged(Outcome.WALKED, singular=True)
         share = 1.0
@@ -95,15 +77,17 @@ def newton(equations: Equations[D], guess: Floats, effort: Effort) -> Solution[D
                 return NotConverged(Outcome.WALKED)
             ahead = equations(x + share * move)
             evaluations += 1
-            left = ahead.residual
-            if 0.5 * residual <= left < np.inf and min(residual, left) <= rounding * tolerance:
-                better = left < residual
-                return Solution(x + share * move, ahead, corrections + 1) if better else Solution(x, here, corrections)
-            if left < growth * residual or share <= shortest:
+            remaining = ahead.residual
+            if 0.5 * residual <= remaining < np.inf and min(residual, remaining) <= rounding * tolerance:
+                better = remaining < residual
+                return (
+                    Solution(x + share * move, ahead, corrections + 1) if better else Solution(x, current, corrections)
+                )
+            if remaining < growth * residual or share <= shortest:
                 break
             share *= 0.5
-        x, here, residual, corrections = x + share * move, ahead, left, corrections + 1
-    if here.outcome is Outcome.WALKED:
-        return Solution(x, here, corrections)
-    # a move that left the walkers says nothing of the guess
-    return NotConverged(Outcome.WALKED if here.outcome is None and corrections else here.outcome)
+        x, current, residual, corrections = x + share * move, ahead, remaining, corrections + 1
+    if current.outcome is Outcome.WALKED:
+        return Solution(x, current, corrections)
+    # a move to parameters without a walker does not condemn the guess
+    return NotConverged(Outcome.WALKED if current.outcome is None and corrections else current.outcome)

@@ -1,7 +1,7 @@
-"""What separates the contact model from the rigid one: its contact led towards the rigid limit, knob by knob.
+"""Convergence of the contact model to the rigid one as parameters of its contact approach the rigid limit.
 
-Stiffness k, damping c and stiction velocity v_s are the knobs. With k the penetration d_max of full damping shrinks as
-the static penetration does, and with v_s the friction velocity v_d. A push-off is shortened as all three are turned.
+The parameters are stiffness k, damping c and stiction velocity v_s. The penetration d_max of full damping shrinks with
+the static penetration as k grows, and the friction velocity v_d with v_s. A push-off is shortened if all three vary.
 """
 
 import math
@@ -24,75 +24,73 @@ from walkerlab.hybrid.comparison import (
 )
 from walkerlab.hybrid.contact_events import JudgedGround
 from walkerlab.hybrid.contact_result import ContactWalkResult, walk_contact
-from walkerlab.orbits.contact_gait import EFFORT, with_scaled_laws
-from walkerlab.orbits.contact_map import OwnPads, step_of
+from walkerlab.orbits.contact_gait import CONTACT_EFFORT, with_scaled_laws
+from walkerlab.orbits.contact_map import OwnPads, contact_step
 from walkerlab.orbits.step_map import Cycle, gait_near
 from walkerlab.solvers.registry import Tolerances
 from walkerlab.solvers.system import Floats, State
 
-METHOD, BUDGET = "radau5", 50_000_000
+METHOD, LIMIT_BUDGET = "radau5", 50_000_000
 GAIT_TOLERANCE, CHECK_TOLERANCE = 1e-10, 1e-11
-WALK_TOLERANCE, WALK_CHECK = 1e-8, 1e-10  # of the walks that are timed, and of those that show their numerical error
-ABSOLUTE = 0.01  # absolute tolerance in relative ones
-REPEATS = 3
-SEARCH = EFFORT._replace(most=30)
-BRIEF = 0.1  # of sqrt(d / g), d the static penetration: a push-off as short is over while the other foot still lands
+# of timed walks, and of walks that measure their numerical error
+WALK_TOLERANCE, WALK_CHECK = 1e-8, 1e-10
+ABSOLUTE_FACTOR = 0.01  # absolute over relative tolerance
+TIMED_WALKS = 3
+SERIES_EFFORT = CONTACT_EFFORT._replace(most=30)
+# of sqrt(d / g), d the static penetration: a push-off this short ends while the other foot is still landing
+PUSH_OFF_FACTOR = 0.1
 
 
 class ContactFactors(NamedTuple):
-    """A contact: by which factors its numbers differ from the config's."""
+    """Factors on the contact parameters of the config."""
 
     series: str
-    rigidity: float  # how far the series has gone towards the limit
+    rigidity: float  # 1 for the config's contact, growing towards the limit
     stiffness: float
     damping: float
     stiction: float
 
 
-ALL, ALL_POINT = "all", "all, point foot"
-STICTION, STIFFNESS, DAMPING, NORMAL = "stiction velocity", "stiffness", "damping", "stiffness and damping"
+ALL_SERIES, ALL_POINT_SERIES = "all", "all, point foot"
+STICTION_SERIES, STIFFNESS_SERIES = "stiction velocity", "stiffness"
+DAMPING_SERIES, NORMAL_SERIES = "damping", "stiffness and damping"
 HALF_DECADES = math.sqrt(10.0)
-SERIES = {
-    ALL: (9, HALF_DECADES, (1.0, 0.5, -1.0)),
-    ALL_POINT: (9, HALF_DECADES, (1.0, 0.5, -1.0)),
-    STICTION: (15, 2.0, (0.0, 0.0, -1.0)),
-    STIFFNESS: (6, HALF_DECADES, (1.0, 0.0, 0.0)),
-    DAMPING: (6, HALF_DECADES, (0.0, 1.0, 0.0)),
-    NORMAL: (9, HALF_DECADES, (1.0, 0.5, 0.0)),
+# Number of settings, ratio of rigidity between neighbours, and exponents of rigidity in the three factors.
+SERIES_SETTINGS = {
+    ALL_SERIES: (9, HALF_DECADES, (1.0, 0.5, -1.0)),
+    ALL_POINT_SERIES: (9, HALF_DECADES, (1.0, 0.5, -1.0)),
+    STICTION_SERIES: (15, 2.0, (0.0, 0.0, -1.0)),
+    STIFFNESS_SERIES: (6, HALF_DECADES, (1.0, 0.0, 0.0)),
+    DAMPING_SERIES: (6, HALF_DECADES, (0.0, 1.0, 0.0)),
+    NORMAL_SERIES: (9, HALF_DECADES, (1.0, 0.5, 0.0)),
 }
-"""Settings of a series, by how much each is more rigid than the last, and powers of that in the three factors."""
 
 
-def series_of(name: str, every: int = 1) -> list[ContactFactors]:
-    """The settings of a series, from the config's contact towards the limit; of these every first, second or so on."""
-    count, ratio, powers = SERIES[name]
+def series_settings(name: str, every: int = 1) -> list[ContactFactors]:
+    """Return contact settings from the config's towards the rigid limit, every `every`-th of them."""
+    count, ratio, powers = SERIES_SETTINGS[name]
     rigidities = [ratio**step for step in range(0, count, every)]
     return [ContactFactors(name, rigidity, *(rigidity**power for power in powers)) for rigidity in rigidities]
 
 
-def with_setting(walker: ContactWalker, setting: ContactFactors) -> ContactWalker:
-    """The walker on the ground of a setting, its push-off brief on the way to the limit.
+def apply_setting(walker: ContactWalker, setting: ContactFactors) -> ContactWalker:
+    """Return the walker on the ground of a setting, with a brief push-off in series towards the rigid limit.
 
-    A longer one lifts the leading foot off again, however rigid the ground is, and leads to another limit.
+    A longer push-off lifts the leading foot again, however rigid the ground, and leads to another limit.
     """
     changed, law = with_scaled_laws(walker, *setting[2:]), walker.normal
-    if setting.series not in (ALL, ALL_POINT) or setting.rigidity == 1.0:
+    if setting.series not in (ALL_SERIES, ALL_POINT_SERIES) or setting.rigidity == 1.0:
         return changed
     static = (walker.mass * walker.gravity / law.stiffness) ** (1.0 / law.exponent)
-    brief = BRIEF * math.sqrt(static / (walker.gravity * setting.stiffness))
+    brief = PUSH_OFF_FACTOR * math.sqrt(static / (walker.gravity * setting.stiffness))
     return changed_forms(changed, push_off_duration=min(brief, float(walker.whole.push_off_duration)))
 
 
 @dataclass(frozen=True)
 class Distance:
-    """How far a setting's walk is from the rigid one's, and how well that is known.
+    """Differences of a setting's gait and walk from the rigid ones, with their numerical errors.
 
-    numerical_period  s, change of the period when the tolerance is ten times tighter
-    angle, velocity   largest difference in phase over the walk, between impacts; raw at the same time
-    numerical_time    s, change of the last touch's time with the tolerance a hundred times tighter
-    wall_s            s, processor time of the walk, the least of several
-
-    What is of walks is None where no walk is compared.
+    Quantities of the walk are None where no walk is compared.
     """
 
     setting: ContactFactors
@@ -101,47 +99,42 @@ class Distance:
     slip: float
     period_error: float
     length_error: float
-    numerical_period: float
-    angle: float | None = None
-    velocity: float | None = None
-    raw_angle: float | None = None
+    numerical_period: float  # s, change of the period at a ten times tighter tolerance
+    angle: float | None = None  # rad, maximum difference between impacts, at equal phase
+    velocity: float | None = None  # rad/s, the same
+    raw_angle: float | None = None  # rad, maximum difference at equal time
     raw_velocity: float | None = None
-    numerical_time: float | None = None
+    numerical_time: float | None = None  # s, change of the last touch-down's time at a hundred times tighter tolerance
     evaluations: int | None = None
-    wall_s: float | None = None
+    wall_s: float | None = None  # s, processor time of the walk, minimum of several
 
 
 @dataclass(frozen=True)
 class Limit:
-    """A scene, and what its distances are measured from: the rigid gait and the walk from the rigid start.
-
-    steps     of that walk
-    sampling  s
-    every     of a series' settings which are taken
-    """
+    """Ground and rigid reference of a series: the rigid gait and the walk from the rigid start."""
 
     ground: JudgedGround
     period_s: float
     length_m: float
     motion: Motion
-    steps: int
-    sampling: float
-    every: int = 1
+    steps: int  # of the walk
+    sampling: float  # s
+    every: int = 1  # use every n-th setting of a series
 
     def series(
         self, name: str, walker: ContactWalker, gait: Cycle, start: Callable[[ContactWalker], State] | None = None
     ) -> list[Distance]:
-        """The distances along a series, each gait searched from the one before; ends where a gait is lost.
+        """Return the distances along a series, until a gait is lost; each gait is solved for from the one before.
 
-        start  the walk's start, if whole walks are to be compared too
+        start  start of the walk for a walker, to compare whole walks as well
         """
-        found: list[Distance] = []
-        for setting in series_of(name, self.every):
-            changed = with_setting(walker, setting)
+        distances: list[Distance] = []
+        for setting in series_settings(name, self.every):
+            changed = apply_setting(walker, setting)
             near = self.gait(changed, gait, GAIT_TOLERANCE)
             if near is None:
                 break
-            gait, step, check = near, step_of(near), self.gait(changed, near, CHECK_TOLERANCE)
+            gait, step, check = near, contact_step(near), self.gait(changed, near, CHECK_TOLERANCE)
             off = step.period_s - self.period_s
             distance = Distance(
                 setting,
@@ -152,32 +145,30 @@ class Limit:
                 step.length_m - self.length_m,
                 abs(off if check is None else check.period_s - step.period_s),
             )
-            found.append(distance if start is None else self.walked(distance, changed, start(changed)))
-        return found
+            distances.append(distance if start is None else self.compare_walk(distance, changed, start(changed)))
+        return distances
 
     def gait(self, walker: ContactWalker, near: Cycle, tolerance: float) -> Cycle | None:
-        """The gait on this ground near another one's; None if it is not found."""
-        pads = OwnPads(lambda _: walker, self.ground, settings(tolerance), near.step.length_m)
-        found = gait_near(pads, near.z, 0.0, SEARCH)
-        return found if isinstance(found, Cycle) else None
+        """Solve for the gait on this ground near that of another setting; None if it fails."""
+        pads = OwnPads(lambda _: walker, self.ground, solver_settings(tolerance), near.step.length_m)
+        solution = gait_near(pads, near.z, 0.0, SERIES_EFFORT)
+        return solution if isinstance(solution, Cycle) else None
 
-    def walked(self, distance: Distance, walker: ContactWalker, start: State) -> Distance:
-        """With the whole walk from the rigid start beside."""
-
+    def compare_walk(self, distance: Distance, walker: ContactWalker, start: State) -> Distance:
         def walk(tolerance: float, sampling: float | None) -> ContactWalkResult:
-            how = settings(tolerance)
-            return walk_contact(walker, self.ground, False, STANCE_FOOT, start, how, self.steps, sampling)
+            solver = solver_settings(tolerance)
+            return walk_contact(walker, self.ground, False, STANCE_FOOT, start, solver, self.steps, sampling)
 
         sampled, check = walk(WALK_TOLERANCE, self.sampling), walk(WALK_CHECK, None)
         times = []
-        for _ in range(REPEATS):
-            begun = time.process_time()
+        for _ in range(TIMED_WALKS):
+            started = time.process_time()
             walk(WALK_TOLERANCE, None)
-            times.append(time.process_time() - begun)
+            times.append(time.process_time() - started)
         steps = sampled.touch_time_s.size
         if sampled.samples is None or steps == 0 or steps != check.touch_time_s.size:
             return distance
-        legs = motion_of_legs(sampled.samples.states, walker)
+        legs = leg_motion(sampled.samples.states, walker)
         motion = sampled_at_strikes(Motion(sampled.samples.time_s, *legs, sampled.touch_time_s, sampled.knee_strikes_s))
         phases = np.linspace(0.0, 1.0, PHASES)
         aligned = difference_in_phase(motion, self.motion, phases)
@@ -195,23 +186,22 @@ class Limit:
         )
 
 
-def motion_of_legs(states: Floats, walker: ContactWalker) -> tuple[Floats, Floats]:
-    """Angles and angular velocities, each (samples, leg), of the legs in states; of legs with knees the thighs'."""
+def leg_motion(states: Floats, walker: ContactWalker) -> tuple[Floats, Floats]:
+    """Return angles and angular velocities (samples, leg) of the legs; for kneed legs, of the thighs."""
     upper, half = walker.legs[:, 0], states.shape[1] // 2
     return states[:, 2 + upper], states[:, half + 2 + upper]
 
 
-def settings(tolerance: float) -> Tolerances:
-    """The method at a relative tolerance."""
-    return Tolerances(METHOD, tolerance, ABSOLUTE * tolerance, BUDGET)
+def solver_settings(tolerance: float) -> Tolerances:
+    return Tolerances(METHOD, tolerance, ABSOLUTE_FACTOR * tolerance, LIMIT_BUDGET)
 
 
 def observed_orders(distances: list[Distance]) -> list[float]:
-    """Order with which the period converges along a series, from each three settings in a row."""
+    """Return the order of convergence of the period from each three successive settings."""
     if len(distances) < 3:
         return []
     ratio = distances[1].setting.rigidity / distances[0].setting.rigidity
-    changes = np.abs(np.diff([one.period for one in distances]))
+    changes = np.abs(np.diff([distance.period for distance in distances]))
     changes = np.maximum(changes, np.finfo(float).tiny)
     orders: list[float] = (np.log(changes[:-1] / changes[1:]) / math.log(ratio)).tolist()
     return orders
@@ -219,21 +209,21 @@ def observed_orders(distances: list[Distance]) -> list[float]:
 
 @dataclass(frozen=True)
 class Extrapolation:
-    """The limit of a series' periods, and how far the last two estimates differ (s)."""
+    """Extrapolated limit of the period, and the difference between the last two estimates (s)."""
 
     period: float
     uncertainty: float
 
 
-def extrapolated(distances: list[Distance]) -> Extrapolation | None:
-    """The limit by Aitken's method on the last settings that still tell; None if they do not converge.
+def extrapolate(distances: list[Distance]) -> Extrapolation | None:
+    """Extrapolate the period by Aitken's method from the last resolved settings; None if they do not converge.
 
-    A change of the period below its numerical error tells nothing, and neither does what follows.
+    Settings from the first change of the period below its numerical error on are ignored.
     """
-    periods = np.array([one.period for one in distances])
-    errors = np.array([one.numerical_period for one in distances])
-    silent = np.flatnonzero(np.abs(np.diff(periods)) <= errors[1:])
-    periods = periods[: silent[0] + 1] if silent.size else periods
+    periods = np.array([distance.period for distance in distances])
+    errors = np.array([distance.numerical_period for distance in distances])
+    unresolved = np.flatnonzero(np.abs(np.diff(periods)) <= errors[1:])
+    periods = periods[: unresolved[0] + 1] if unresolved.size else periods
     if periods.size < 4:
         return None
     changes = np.diff(periods[-4:])

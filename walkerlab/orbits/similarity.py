@@ -1,6 +1,6 @@
-"""Similar walkers: every walker is one of unit leg length, total mass and gravity, measured in its own units.
+"""Similarity: every walker is a walker of unit leg length, mass and gravity, measured in its own units.
 
-Gaits are sought for the unit walker, so that starting ranges, tolerances and thresholds mean the same for all.
+Searches use the unit walker, so that starting ranges, tolerances and thresholds suit all walkers.
 """
 
 import math
@@ -13,29 +13,24 @@ from walkerlab.mechanics.standing import Standing, on_slope
 
 
 class Units(NamedTuple):
-    """What one unit of the unit walker measures in SI."""
-
     length: float  # m
     mass: float  # kg
     time: float  # s, sqrt(L / g)
 
     @property
     def energy(self) -> float:
-        """Unit of energy, J."""
         return self.mass * (self.length / self.time) ** 2
 
     @property
     def force(self) -> float:
-        """Unit of force, N."""
         return self.mass * self.length / self.time**2
 
     @property
     def impulse(self) -> float:
-        """Unit of impulse, N s."""
         return self.mass * self.length / self.time
 
     def of(self, unit: str) -> float:
-        """By its name in the config; of a pure number 1. KeyError for one that no key of a walker has."""
+        """Return the SI value of a unit named as in the config, 1 for pure numbers. Raises KeyError for other units."""
         inertia, damping = self.mass * self.length**2, self.energy * self.time
         basic = {"": 1.0, "1": 1.0, "m": self.length, "kg": self.mass, "s": self.time}
         derived = {"kg m^2": inertia, "N s": self.impulse, "N m": self.energy}
@@ -43,7 +38,7 @@ class Units(NamedTuple):
 
 
 def unit_walker(walker: Standing) -> tuple[Standing, Units]:
-    """The walker similar to `walker` with L = g = 1 and a total mass of 1, and its units."""
+    """Return the similar walker with L = g = 1 and a total mass of 1, and its units."""
     length, mass = float(walker.leg_length), float(walker.mass)
     if length == mass == walker.gravity == 1.0:
         return walker, Units(1.0, 1.0, 1.0)

@@ -1,14 +1,14 @@
-"""The two gaits of a compass walker in the limit of a vanishing slope: where searches for gaits start from.
+"""The two gaits of a compass walker in the limit of a vanishing slope, used as seeds of the search for gaits.
 
 At small angles the swing phase is linear, D(0) ddq = diag(-m b g, K g) q, with one oscillating and one growing mode,
-and the heel strike's map is constant. Two kinds of period-1 motion remain as the slope phi goes to zero.
+and the heel strike is a constant linear map. Two kinds of period-1 motion remain as the slope phi goes to zero.
 
-Long period: the step is symmetric about mid-swing, and both legs turn alike at heel strike, which then changes nothing
-at leading order. What it does lose, M (L omega alpha)^2 / 2 at an angle alpha between the legs, is what the step
-descends, M g L alpha phi; with omega proportional to alpha that makes phi = kappa alpha^3.
+Long period: the step is symmetric about mid-swing, and both legs turn at the same rate at heel strike, which to leading
+order changes nothing. The energy it does lose, M (L omega alpha)^2 / 2 at an angle alpha between the legs, equals the
+descent of a step, M g L alpha phi; omega is proportional to alpha, hence phi = kappa alpha^3.
 
-Short period: the swing foot comes down still moving forward, and all of the motion is proportional to phi. The factor
-grows without bound as the feet's mass vanishes; then this gait, too, loses alpha^2 and grows as the cube root of phi.
+Short period: the swing foot comes down while still moving forward, and the whole motion is proportional to phi. The
+factor grows without bound as the feet's mass vanishes; then this gait also grows as the cube root of phi.
 
 Source: Garcia, Chatterjee, Ruina, Coleman, The simplest walking model: stability, complexity, and scaling, J. Biomech.
 Eng. 120 (1998), section 4 and appendix, here with legs that have mass.
@@ -21,33 +21,23 @@ from typing import NamedTuple
 import numpy as np
 
 from walkerlab.mechanics.impact import heel_strike
-from walkerlab.mechanics.standing import (
-    STRAIGHT,
-    Standing,
-    equations,
-    kinetic_energy,
-    linked,
-    on_slope,
-    swing_foot,
-)
+from walkerlab.mechanics.standing import STRAIGHT, Standing, equations, kinetic_energy, linked, on_slope, swing_foot
 from walkerlab.solvers.system import Floats, State
 
 LONG_PERIOD, SHORT_PERIOD = "long-period seed", "short-period seed"
-SCAN = 400  # samples over one period of the swinging leg, to bracket roots with
-LOSS_ANGLE = 1e-3  # rad, small against one and large against rounding
+SCAN = 400  # samples to bracket roots with
+LOSS_ANGLE = 1e-3  # rad, small compared to one and large compared to rounding
 LONG_AMPLITUDE = 0.05  # angle between the legs at which the long-period seed is good to a percent
 SHORT_AMPLITUDE = 0.002
-MAX_GROWTH = 30.0  # exponent of a fall within half a step, beyond which no digit of the start is left
-# on a slope of one radian: the state of (z, 1), z itself, and theta_1 + theta_2
+MAX_GROWTH = 30.0  # growth exponent of a fall over half a step, beyond which no digit of the start is left
+# linear in (z, 1) on a slope of one radian: the state, z itself, and theta_1 + theta_2
 STATE_OF = np.array([[-1.0, 0.0, 0.0, -2.0], [1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]])
-COORDINATES = np.eye(3, 4)
+SECTION_ROWS = np.eye(3, 4)
 FEET_DOWN = np.array([1.0, 1.0, 0.0, 0.0])
 THETA_2 = np.array([1.0, 0.0, 0.0])
 
 
 class SmallSlopeSeed(NamedTuple):
-    """An approximate gait at a small slope."""
-
     name: str
     slope: float  # rad
     z: Floats  # (3,) theta_2, dtheta_1, dtheta_2 after the heel strike
@@ -60,11 +50,11 @@ class Modes(NamedTuple):
 
     swing: float  # rad/s, of the oscillating mode
     fall: float  # 1/s, of the growing mode
-    V: Floats  # (2, 2), a mode a column, oscillating first
+    V: Floats  # (2, 2), one mode per column, oscillating first
 
 
 def linear_modes(walker: Standing) -> Modes | None:
-    """Modes of the swing phase about both legs upright; None if the legs have too little inertia to tell them."""
+    """Return the modes of the swing phase about upright legs; None if the legs have too little inertia."""
     legs, n, level = leg_columns(walker), len(walker.arm_x), on_slope(walker, 0.0)
     inertias, (s, c, F, U, r) = np.empty((n, n)), np.empty((5, n))
     equations(level, level.zero_state, s, c, F, U, inertias, r)
@@ -82,14 +72,14 @@ def linear_modes(walker: Standing) -> Modes | None:
 
 
 def leg_columns(walker: Standing) -> Floats:
-    """Angles (n, 2) of all bodies for a unit angle of the swing leg, and of the stance leg."""
+    """Return the angles (n, 2) of all bodies for a unit angle of the swing leg, and of the stance leg."""
     return np.array([linked(walker, STRAIGHT, unit) for unit in np.eye(len(walker.arm_x))[:2]]).T
 
 
 def seeds(walker: Standing) -> tuple[SmallSlopeSeed, ...]:
-    """The small-slope gaits that `walker` has; its own slope plays no part.
+    """Return the small-slope gaits of `walker`, whatever its own slope.
 
-    Gaits shrink with the slope if upright legs balance.
+    There are none unless upright legs balance, so that gaits shrink with the slope.
     """
     modes = None if walker.kneed or walker.lean != 0.0 or walker.arm_x.any() else linear_modes(walker)
     try:
@@ -97,20 +87,20 @@ def seeds(walker: Standing) -> tuple[SmallSlopeSeed, ...]:
         if modes is None or long is None:
             return ()
         short = short_period_seed(walker, modes, long.period)
-    except FloatingPointError:  # masses that all sit in one place leave a heel strike undetermined
+    except FloatingPointError:  # with all masses in one place a heel strike is undetermined
         return ()
     return (long,) if short is None else (long, short)
 
 
 def long_period_seed(walker: Standing, modes: Modes) -> SmallSlopeSeed | None:
-    """The symmetric gait at LONG_AMPLITUDE; None if the legs do not come together again before the walker falls."""
+    """Return the symmetric gait at LONG_AMPLITUDE; None if the walker falls before its legs meet again."""
     half = symmetric_half_period(modes)
     if half is None or modes.fall * half > MAX_GROWTH:
         return None
     at_end = np.array([math.sin(modes.swing * half) / modes.swing, math.sinh(modes.fall * half) / modes.fall])
     rates_at_end = np.array([math.cos(modes.swing * half), math.cosh(modes.fall * half)])
     total = modes.V[0] + modes.V[1]
-    # both feet on the slope at the end: the weights of the modes, scaled to a unit angle between the legs
+    # weights of the modes, from both feet on the slope at the end, scaled to a unit angle between the legs
     weights = np.array([total[1] * at_end[1], -total[0] * at_end[0]])
     weights /= (modes.V[0] - modes.V[1]) @ (weights * at_end)
     omega = float((modes.V @ (weights * rates_at_end)).mean())
@@ -118,53 +108,49 @@ def long_period_seed(walker: Standing, modes: Modes) -> SmallSlopeSeed | None:
 
 
 def cube_root_seed(name: str, walker: Standing, per_angle: Floats, period: float) -> SmallSlopeSeed:
-    """The gait at LONG_AMPLITUDE whose motion grows as the cube root of the slope.
+    """Return the gait at LONG_AMPLITUDE that grows as the cube root of the slope.
 
-    per_angle  (3,) theta_2 + phi, dtheta_1, dtheta_2 after the heel strike for a unit angle between the legs
+    per_angle  (3,) theta_2 + phi, dtheta_1, dtheta_2 after heel strike per unit angle between the legs
     period     duration of a step, s
     """
-    kappa = loss(walker, per_angle)
+    kappa = slope_for_loss(walker, per_angle)
     slope = kappa * LONG_AMPLITUDE**3
     z = LONG_AMPLITUDE * per_angle - np.array([slope, 0.0, 0.0])
     return SmallSlopeSeed(name, slope, z, period, per_angle / np.cbrt(kappa))
 
 
 @np.errstate(divide="raise", invalid="raise")
-def loss(walker: Standing, per_angle: Floats) -> float:
-    """The slope that makes up for the heel strike's loss, over the cube of the angle between the legs.
+def slope_for_loss(walker: Standing, per_angle: Floats) -> float:
+    """Return the slope that balances the heel strike's loss, divided by the cube of the angle between the legs.
 
-    A gait of the limit comes down as it set out, with both legs at the same rates: what its heel strike takes is what
-    descending by a step gives, in the units of the cube of a small angle.
+    In the limit the gait ends a step as it began, with both legs at the same rates.
     """
     flat, angle = on_slope(walker, 0.0), LOSS_ANGLE
     omega = angle * float(per_angle[2])
     before = leg_state(flat, (0.5 * angle, -0.5 * angle), (omega, omega))
-    after = after_strike(flat, before)
+    after = apply_strike(flat, before)
     lost = kinetic_energy(flat, before) - kinetic_energy(flat, after)
     length = swing_foot(flat, before)[1] + flat.radius * angle
     return float(lost / (flat.mass * flat.gravity * length * angle**3))
 
 
 @np.errstate(divide="raise", invalid="raise")
-def after_strike(walker: Standing, state: State) -> Floats:
-    """The state (2 n,) after a heel strike."""
+def apply_strike(walker: Standing, state: State) -> Floats:
     after = np.zeros(len(state))
     heel_strike(walker, np.array(state), after)
     return after
 
 
 def leg_state(walker: Standing, theta: tuple[float, float], omega: tuple[float, float]) -> State:
-    """The state of straight legs: angles and rates of swing and stance leg, and of what follows them."""
     legs = leg_columns(walker)
     return tuple(float(x) for x in (*(legs @ theta), *(legs @ omega)))
 
 
 def symmetric_half_period(modes: Modes) -> float | None:
-    """The first time h > 0 after mid-swing, theta = 0, at which theta_1 + theta_2 = 0 and dtheta_1 = dtheta_2 (s)."""
+    """Return the first time h > 0 (s) after mid-swing with theta_1 + theta_2 = 0 and dtheta_1 = dtheta_2."""
     total, apart = modes.V[0] + modes.V[1], modes.V[0] - modes.V[1]
 
     def mismatch(h: Floats) -> Floats:
-        """Determinant of the two conditions on the modes' weights, over h cosh(fall h)."""
         swinging = total[0] * np.sin(modes.swing * h) / modes.swing * apart[1]
         falling = total[1] * np.tanh(modes.fall * h) / modes.fall * apart[0] * np.cos(modes.swing * h)
         return np.asarray((swinging - falling) / h)
@@ -173,7 +159,7 @@ def symmetric_half_period(modes: Modes) -> float | None:
 
 
 def short_period_seed(walker: Standing, modes: Modes, longest: float) -> SmallSlopeSeed | None:
-    """The gait of less than `longest` (s) that is proportional to the slope, or would be; None if there is none."""
+    """Return the gait of period below `longest` (s) proportional to the slope; None if there is none."""
     try:
         conditions = step_conditions(walker, modes)
         period = first_root(lambda t: np.asarray(np.linalg.det(conditions(t)) / t), longest)
@@ -181,49 +167,49 @@ def short_period_seed(walker: Standing, modes: Modes, longest: float) -> SmallSl
             return None
         rows = conditions(np.array(period))[:3]
         z = np.asarray(np.linalg.solve(rows[:, :3], -rows[:, 3]), np.float64)
-    except np.linalg.LinAlgError:  # masses that all sit in one place leave a heel strike undetermined
+    except np.linalg.LinAlgError:  # with all masses in one place a heel strike is undetermined
         return None
     if z[0] <= -1.0:
         return None
     slope = 0.5 * SHORT_AMPLITUDE / float(z[0] + 1.0)
     per_angle = 0.5 * (z + THETA_2) / (z[0] + 1.0)
-    if loss(walker, per_angle) * SHORT_AMPLITUDE**3 > slope:
+    if slope_for_loss(walker, per_angle) * SHORT_AMPLITUDE**3 > slope:
         return cube_root_seed(SHORT_PERIOD, walker, per_angle, period)
     return SmallSlopeSeed(SHORT_PERIOD, slope, slope * z, period, np.zeros(3))
 
 
 def step_conditions(walker: Standing, modes: Modes) -> Callable[[Floats], Floats]:
-    """One step of the linearised walker on a slope of one radian, for many durations at once.
+    """Linearise one step on a slope of one radian, for many durations at once.
 
-    Returns a function of durations t (s) that gives matrices (..., 4, 4) on (z, 1): three rows say that t later z is
-    back, one that both feet are down. Their determinant vanishes where they have a solution.
+    Returns a function of durations t (s) that gives matrices (..., 4, 4) on (z, 1): three rows require that z repeats
+    after t, one that both feet are down. A solution exists where the determinant vanishes.
     """
     flat, n = on_slope(walker, 0.0), len(walker.arm_x)
     swing, fall, inverse = modes.swing, modes.fall, np.linalg.inv(modes.V)
-    strike = np.zeros((3, 4))  # the heel strike's map at vanishing angles, with the change of roles
+    strike = np.zeros((3, 4))  # the heel strike at vanishing angles, including the exchange of roles
     strike[0, 0] = 1.0
     for leg, omega in enumerate(((1.0, 0.0), (0.0, 1.0))):
-        strike[1:, 2 + leg] = after_strike(flat, leg_state(flat, (0.0, 0.0), omega))[n : n + 2]
-    # a foot that rolls on a slope of one radian is in balance with its leg off the vertical
+        strike[1:, 2 + leg] = apply_strike(flat, leg_state(flat, (0.0, 0.0), omega))[n : n + 2]
+    # equilibrium: a leg with a rolling foot balances off the vertical on a slope of one radian
     legs = leg_columns(flat)
     pull = np.array([0.0, flat.mass * flat.gravity * flat.radius])
     rest = np.zeros((4, 4))
     rest[:2, 3] = np.linalg.solve(flat.gravity * legs.T @ np.diag(flat.arm_y) @ legs, pull)
 
-    def of_modes(oscillating: Floats, growing: Floats) -> Floats:
+    def combine_modes(oscillating: Floats, growing: Floats) -> Floats:
         weights = np.stack((oscillating, growing), axis=-1)[..., None, :]
         return np.asarray(modes.V * weights @ inverse, np.float64)
 
     def conditions(t: Floats) -> Floats:
         sine, cosine = np.sin(swing * t), np.cos(swing * t)
         growing, grown = np.sinh(fall * t), np.cosh(fall * t)
-        flow = np.empty((*t.shape, 4, 4))  # takes a state to the one t later
-        flow[..., :2, :2] = flow[..., 2:, 2:] = of_modes(cosine, grown)
-        flow[..., :2, 2:] = of_modes(sine / swing, growing / fall)
-        flow[..., 2:, :2] = of_modes(-swing * sine, fall * growing)
+        flow = np.empty((*t.shape, 4, 4))  # from a state to the one t later
+        flow[..., :2, :2] = flow[..., 2:, 2:] = combine_modes(cosine, grown)
+        flow[..., :2, 2:] = combine_modes(sine / swing, growing / fall)
+        flow[..., 2:, :2] = combine_modes(-swing * sine, fall * growing)
         end = flow @ (STATE_OF - rest) + rest
         bordered = np.empty_like(flow)
-        bordered[..., :3, :] = COORDINATES - strike @ end
+        bordered[..., :3, :] = SECTION_ROWS - strike @ end
         bordered[..., 3, :] = FEET_DOWN @ end
         bordered[..., 3, 3] += 2.0
         return bordered
@@ -232,8 +218,8 @@ def step_conditions(walker: Standing, modes: Modes) -> Callable[[Floats], Floats
 
 
 def first_root(f: Callable[[Floats], Floats], longest: float) -> float | None:
-    """The smallest root of f in (0, longest), bracketed by samples ever closer; None if f keeps its sign."""
-    # the end itself is left out: there the short gait's conditions degenerate into the long one's
+    """Return the smallest root of f in (0, longest) by successively finer samples; None if f keeps its sign."""
+    # exclude the end, where the short gait's conditions degenerate into the long one's
     samples = longest * np.arange(1, SCAN) / SCAN
     while True:
         values = f(samples)

@@ -1,7 +1,7 @@
-"""A walker's step from section to section over one parameter, whatever the model: all that orbits are sought on.
+"""Step map of a walker from section to section over one parameter, and its gaits, for either model.
 
-`shooting.RigidMap` is the rigid model; `contact_map.ContactMap` is a walker on compliant ground. A period-n gait is a
-fixed point of n steps in a row, `walk_steps`, whose derivative is the product of the steps' own.
+`rigid_map.RigidMap` is the rigid model; `contact_map.ContactMap` is a walker on compliant ground. A period-n gait is a
+fixed point of n steps, `walk_steps`, whose derivative is the product of the steps' derivatives.
 """
 
 from __future__ import annotations
@@ -20,18 +20,18 @@ from walkerlab.outcome import Outcome
 from walkerlab.solvers.registry import Tolerances
 from walkerlab.solvers.system import Floats
 
-SPREAD = 1e-3  # of the parameter, between the points of the difference formula
-REMEMBERED = 4096  # walkers built so far
-CENTRAL: tuple[tuple[int, float], ...] = ((-1, -0.5), (1, 0.5))
-FORWARD: tuple[tuple[int, float], ...] = ((0, -1.5), (1, 2.0), (2, -0.5))
-"""Offsets and weights of formulas of second order for a first derivative."""
-unity = lru_cache(np.eye)  # shared: never written to
-nothing = partial(np.zeros, 0)
+PARAMETER_STEP = 1e-3  # of the parameter, in difference formulas
+CACHE_SIZE = 4096  # per step map
+CENTRAL_2ND: tuple[tuple[int, float], ...] = ((-1, -0.5), (1, 0.5))
+# Offsets and weights of second-order formulas for a first derivative.
+FORWARD_2ND: tuple[tuple[int, float], ...] = ((0, -1.5), (1, 2.0), (2, -0.5))
+identity = lru_cache(np.eye)  # shared: never written to
+no_values = partial(np.zeros, 0)
 
 
 @dataclass(frozen=True)
 class Monitor:
-    """Something that a model assumes and does not enforce; `limit` is where the assumption fails."""
+    """A quantity whose limit the model assumes but does not enforce."""
 
     name: str
     unit: str
@@ -41,244 +41,199 @@ class Monitor:
 
 @dataclass(frozen=True)
 class MappedStep:
-    """One step from section to section.
-
-    z         (d,) where it led
-    DP        (d, d) its derivative with respect to where it began, if it was wanted
-    period_s, length_m  its duration and the distance walked
-    angle     rad, stance leg just after the step's heel strike
-    strike_s  when that is, from the section on
-    """
+    """One step from section to section."""
 
     outcome: Outcome | None
-    z: Floats
-    DP: Floats
+    z: Floats  # (d,) section coordinates at the end
+    DP: Floats  # (d, d) derivative with respect to the start, if requested
     period_s: float
-    length_m: float
-    angle: float
-    strike_s: float
+    length_m: float  # distance walked
+    angle: float  # rad, stance leg just after the step's heel strike
+    strike_s: float  # time of that heel strike, from the start of the step
 
 
 @dataclass(frozen=True)
 class Iterates:
-    """A walk on the section with a tangent beside it.
-
-    points   (steps, d) where each step led
-    lengths  (steps,) by how much the tangent grew in each; empty without one
-    periods_s  (steps,)
-    angles   (steps,) rad, as in `MappedStep`
-    """
+    """A walk on the section with a tangent vector."""
 
     outcome: Outcome
-    points: Floats
-    lengths: Floats
-    periods_s: Floats
-    angles: Floats
+    points: Floats  # (steps, d) section coordinates after each step
+    lengths: Floats  # (steps,) factor by which each step stretches the tangent; empty without a tangent
+    periods_s: Floats  # (steps,) durations
+    angles: Floats  # (steps,) rad, as in `MappedStep`
 
 
 @dataclass(frozen=True)
 class DisturbedWalk:
-    """A walk from the section over uneven ground, or pushed.
+    """A walk from the section over uneven ground, or after a push."""
 
-    outcome      WALKED if it took all its steps
-    durations_s  (steps,) between heel strikes
-    lengths_m    (steps,)
-    z            (d,) where it came to the section last: the next step from there follows the last one
-    """
-
-    outcome: Outcome
-    durations_s: Floats
-    lengths_m: Floats
-    z: Floats
+    outcome: Outcome  # WALKED if every step was completed
+    durations_s: Floats  # (steps,) between heel strikes
+    lengths_m: Floats  # (steps,) distances
+    z: Floats  # (d,) last point on the section
 
 
 class Stepper(Protocol):
-    """A walker's step from section to section, over one parameter: all that a gait is solved on."""
-
     def step(self, z: Floats, p: float, derived: bool = True) -> MappedStep:
-        """One step from z (d,) at the parameter's value p, with its derivative; no outcome where p makes no walker."""
+        """Take a step from z (d,) at parameter p, with its derivative; the outcome is None where p makes no walker."""
 
 
 class StepMap(Stepper, Protocol):
-    """A walker's step from section to section, with what its families are followed by.
+    """A walker's step from section to section, with everything that following its families needs."""
 
-    names       the section's coordinates, all of magnitude one
-    monitors    what `watch` measures
-    scale       magnitude of changes of the parameter that matter
-    tolerances  of its steps
-    probe       disturbance, in units of the walker, that they answer in proportion
-    """
-
-    names: tuple[str, ...]
-    monitors: tuple[Monitor, ...]
-    scale: float
-    tolerances: Tolerances
-    probe: float
+    names: tuple[str, ...]  # section coordinates, all of magnitude one
+    monitors: tuple[Monitor, ...]  # quantities that `watch` measures
+    scale: float  # magnitude of significant changes of the parameter
+    tolerances: Tolerances  # solver settings of a step
+    probe: float  # disturbance, in units of the walker, small enough for a linear response
 
     def watch(self, z: Floats, p: float, steps: int) -> Floats:
-        """(monitors,) the worst of each over some steps."""
+        """Return the worst value of each monitor (monitors,) over some steps."""
 
     def disturbed(self, z: Floats, p: float, heights_m: Floats, push_N_s: float = 0.0) -> DisturbedWalk:
         """Walk from z (d,) over footholds, after an impulse at the hip along the slope.
 
-        heights_m  (steps + 1,) of the footholds, the present one's first
+        heights_m  (steps + 1,) of the footholds, beginning with the current one
         """
 
     def cost_of_transport(self, z: Floats, p: float) -> float | None:
-        """Work given over weight and distance of a step from z (d,); None where it ends."""
+        """Return work divided by weight times distance of a step from z (d,); None if it fails."""
 
     def leg_and_pendulum(self, p: float) -> tuple[float, float]:
-        """Leg length (m) and pendulum time (s) of the walker at p."""
+        """Return leg length (m) and pendulum time (s) of the walker at p."""
 
-    def at(self, tolerances: Tolerances) -> StepMap:
-        """The same map, its steps integrated otherwise."""
+    def at(self, tolerances: Tolerances) -> StepMap: ...
 
     def iterate(self, z: Floats, p: float, steps: int, tangent: Floats | None) -> Iterates:
-        """Walk `steps` steps, with a tangent (d,) beside if one is given; fewer if the walk ends."""
-        taken, lengths, outcome = list[MappedStep](), list[float](), Outcome.WALKED
+        """Walk up to `steps` steps, transporting a tangent (d,) if there is one."""
+        completed, lengths, outcome = list[MappedStep](), list[float](), Outcome.WALKED
         for _ in range(steps):
             step = self.step(z, p, tangent is not None)
             outcome = Outcome.REJECTED if step.outcome is None else step.outcome
             if outcome is not Outcome.WALKED:
                 break
             z = step.z
-            taken.append(step)
+            completed.append(step)
             if tangent is not None:
                 image = step.DP @ tangent
                 lengths.append(float(np.linalg.norm(image)))
                 tangent = image / lengths[-1]
-        waits = [0.0, *(step.period_s - step.strike_s for step in taken)]
+        waits = [0.0, *(step.period_s - step.strike_s for step in completed)]
         return Iterates(
             outcome,
-            np.array([step.z for step in taken]).reshape(-1, z.size),
+            np.array([step.z for step in completed]).reshape(-1, z.size),
             np.array(lengths),
-            np.array([wait + step.strike_s for wait, step in zip(waits, taken, strict=False)]),
-            np.array([step.angle for step in taken]),
+            np.array([wait + step.strike_s for wait, step in zip(waits, completed, strict=False)]),
+            np.array([step.angle for step in completed]),
         )
 
 
-def along_parameter(step_map: StepMap, z: Floats, p: float) -> tuple[Outcome | None, Floats]:
-    """How a step from z (d,) ends near p, and the derivative (d,) of where it leads with respect to the parameter.
+def differentiate_by_parameter(step_map: StepMap, z: Floats, p: float) -> tuple[Outcome | None, Floats]:
+    """Return the outcome of steps from z (d,) near p, and the derivative (d,) of the step with respect to p.
 
-    A difference of exact steps of second order, central, one-sided where the parameter ends: it only steers predictors
-    and Newton's method and enters no result.
+    A second-order difference of exact steps, one-sided at the parameter's limits. It only steers predictors and
+    Newton's method and enters no result.
     """
-    h = SPREAD * (min(step_map.scale, abs(p)) if p != 0.0 else step_map.scale)
-    for formula in (CENTRAL, FORWARD, tuple((-offset, -weight) for offset, weight in FORWARD)):
+    h = PARAMETER_STEP * (min(step_map.scale, abs(p)) if p != 0.0 else step_map.scale)
+    for formula in (CENTRAL_2ND, FORWARD_2ND, tuple((-offset, -weight) for offset, weight in FORWARD_2ND)):
         steps = [step_map.step(z, p + offset * h, derived=False) for offset, _ in formula]
         outcomes = [step.outcome for step in steps]
         if None in outcomes or Outcome.REJECTED in outcomes:
             continue
-        ended = next((outcome for outcome in outcomes if outcome is not Outcome.WALKED), Outcome.WALKED)
-        return ended, sum((weight / h * step.z for step, (_, weight) in zip(steps, formula, strict=True)), 0.0 * z)
+        outcome = next((outcome for outcome in outcomes if outcome is not Outcome.WALKED), Outcome.WALKED)
+        return outcome, sum((weight / h * step.z for step, (_, weight) in zip(steps, formula, strict=True)), 0.0 * z)
     return None, 0.0 * z
 
 
-def no_step(outcome: Outcome | None, d: int) -> MappedStep:
-    """A step that did not come to its end."""
+def failed_step(outcome: Outcome | None, d: int) -> MappedStep:
     return MappedStep(outcome, np.zeros(d), np.eye(d), 0.0, 0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
 class Cycle:
-    """Some steps in a row; of a gait they lead back to where they begin.
+    """Consecutive steps; for a gait they return to their start."""
 
-    outcome   of the last step
-    value     of the parameter
-    z         (d,) where they begin
-    steps     those that were taken
-    DP, Dp    derivatives of where all of them together lead; Dp where it is asked for
-    monitors  the worst of each over the steps, where they are on a branch
-    """
+    outcome: Outcome | None  # of the last step
+    value: float  # of the parameter
+    z: Floats  # (d,) start
+    steps: tuple[MappedStep, ...]  # completed steps
+    DP: Floats  # (d, d) derivative of the end by z
+    Dp: Floats = field(default_factory=no_values)  # (d,) derivative of the end by the parameter, if requested
+    monitors: Floats = field(default_factory=no_values)  # worst values over the steps; only on a branch
 
-    outcome: Outcome | None
-    value: float
-    z: Floats
-    steps: tuple[MappedStep, ...]
-    DP: Floats
-    Dp: Floats = field(default_factory=nothing)
-    monitors: Floats = field(default_factory=nothing)
-
-    def returning(self) -> Evaluated[Cycle]:
-        """What a gait makes zero, P^n(z) - z, and its derivative by z."""
+    def mismatch(self) -> Evaluated[Cycle]:
+        """Return P^n(z) - z, which a gait makes zero, with its derivative by z."""
         off = self.steps[-1].z - self.z if self.outcome is Outcome.WALKED else self.z
-        return Evaluated(self.outcome, off, self.DP - unity(self.z.size), self)
+        return Evaluated(self.outcome, off, self.DP - identity(self.z.size), self)
 
     @property
     def residual(self) -> float:
-        """Largest component of P^n(z) - z."""
-        return self.returning().residual
+        return self.mismatch().residual
 
     @cached_property
     def multipliers(self) -> NDArray[np.complex128]:
-        """(d,) of the whole cycle, largest first."""
         return multipliers_of(self.DP)
 
     @property
     def stable(self) -> bool:
-        """Whether small disturbances die out."""
         return bool(abs(self.multipliers[0]) < 1.0)
 
     @property
     def step(self) -> MappedStep:
-        """The step of a gait of one step."""
         (step,) = self.steps
         return step
 
     @property
     def period_s(self) -> float:
-        """Duration of the steps."""
         return math.fsum(step.period_s for step in self.steps)
 
     @property
     def periods_s(self) -> Floats:
-        """(n,) durations of a gait's steps from heel strike to heel strike, wherever the section lies."""
+        """Durations (n,) of a gait's steps from heel strike to heel strike, independent of the section."""
         waits = [step.period_s - step.strike_s for step in self.steps]
         return np.array([waits[k - 1] + step.strike_s for k, step in enumerate(self.steps)])
 
     @property
     def lengths_m(self) -> Floats:
-        """(n,) of the steps."""
         return np.array([step.length_m for step in self.steps])
 
     @property
     def angles(self) -> Floats:
-        """(n,) of the stance leg just after each heel strike (rad)."""
+        """Angles (n,) of the stance leg just after each heel strike (rad)."""
         return np.array([step.angle for step in self.steps])
 
 
 def walk_steps(step_map: Stepper, z: Floats, p: float, n: int) -> Cycle:
-    """n steps from z (d,) at p, with their derivative by z."""
     steps: list[MappedStep] = []
-    at, DP = z, unity(z.size)
+    position, DP = z, identity(z.size)
     for _ in range(n):
-        step = step_map.step(at, p)
+        step = step_map.step(position, p)
         if step.outcome is not Outcome.WALKED:
             return Cycle(step.outcome, p, z, tuple(steps), DP)
-        at, DP = step.z, step.DP @ DP if steps else step.DP
+        position, DP = step.z, step.DP @ DP if steps else step.DP
         steps.append(step)
     return Cycle(Outcome.WALKED, p, z, tuple(steps), DP)
 
 
-def with_parameter(step_map: StepMap, cycle: Cycle) -> Cycle:
-    """The cycle with its derivative by the parameter; its outcome is that of a walk beside it that ends."""
-    at, Dp = cycle.z, 0.0 * cycle.z
+def add_parameter_derivative(step_map: StepMap, cycle: Cycle) -> Cycle:
+    """Return the cycle with its derivative by the parameter, or with the outcome of a neighbouring step that fails."""
+    position, Dp = cycle.z, 0.0 * cycle.z
     for step in cycle.steps:
-        outcome, beside = along_parameter(step_map, at, cycle.value)
+        outcome, by_parameter = differentiate_by_parameter(step_map, position, cycle.value)
         if outcome is not Outcome.WALKED:
             return replace(cycle, outcome=outcome, Dp=Dp)
-        at, Dp = step.z, step.DP @ Dp + beside
+        position, Dp = step.z, step.DP @ Dp + by_parameter
     return replace(cycle, Dp=Dp)
 
 
 def gait_near(step_map: Stepper, z: Floats, p: float, effort: Effort, n: int = 1) -> Cycle | NotConverged:
-    """The gait of n steps near z (d,) at p, by Newton's method."""
-    solved = newton(lambda z: walk_steps(step_map, z, p, n).returning(), z, effort)
+    """Solve for the gait of n steps near z (d,) at p by Newton's method."""
+    solved = newton(lambda z: walk_steps(step_map, z, p, n).mismatch(), z, effort)
     return solved if isinstance(solved, NotConverged) else solved.evaluated.data
 
 
 def multipliers_of(DP: Floats) -> NDArray[np.complex128]:
-    """Eigenvalues, largest first; of a pair the one with positive imaginary part first."""
+    """Return the eigenvalues, largest first; of a complex pair, the one with positive imaginary part first."""
     values = np.linalg.eigvals(DP).astype(np.complex128)
     order: Sequence[int] = sorted(range(values.size), key=lambda i: (-abs(values[i]), -values[i].imag))
     return np.asarray(values[list(order)])

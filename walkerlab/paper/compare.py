@@ -32,7 +32,7 @@ from walkerlab.paper.rows import NumberVerdict, counted, paper_rows, table_1, ta
 from walkerlab.paper.study import study_the_paper
 from walkerlab.paper.walker import compass
 from walkerlab.pipeline.progress import Progress
-from walkerlab.scene.contact import GAIT, contact_scene, start_state, with_contact
+from walkerlab.scene.contact import GAIT_TOLERANCES, contact_scene, require_contact, start_state
 from walkerlab.stages.walk import LEG, STEP, TIME, last_step, legs, over_time
 from walkerlab.store.columns import numbered, rows_group
 from walkerlab.store.content import Content, Group, Variable
@@ -266,9 +266,9 @@ def contact_model(config: CompareConfig, walk: Content) -> ContactModel:
     _, theta_2, omega_1, omega_2 = fixed_point_as_printed()
     scene = contact_scene(config, pitch, pitch)
     start = start_state(scene, (-2.0 * config.slope_rad - theta_2, theta_2, omega_1, omega_2))
-    from_x_p = scene.walk(start, 2 * CYCLES, GAIT)
+    from_x_p = scene.walk(start, 2 * CYCLES, GAIT_TOLERANCES)
     return ContactModel(
-        law=with_contact(config),
+        law=require_contact(config),
         foot_radius=config.walker.foot_radius_m,
         summary=summary,
         # leg 0 swings first, as in the rigid model's state

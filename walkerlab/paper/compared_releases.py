@@ -13,7 +13,7 @@ from walkerlab.hybrid.contact_result import ContactWalkResult, by_channel
 from walkerlab.hybrid.recorded_walk import take_walk
 from walkerlab.mechanics.rigid import standing
 from walkerlab.scene.contact import ContactScene, contact_scene, start_state
-from walkerlab.scene.parts import assembly_of, drive_numbers
+from walkerlab.scene.parts import assembly_of, drive_parameters
 from walkerlab.solvers.registry import Tolerances
 from walkerlab.solvers.system import State
 from walkerlab.stages.walk import last_step, numbers_of
@@ -46,7 +46,7 @@ def compare_releases(config: ContactConfig, state: State, pitch_m: float) -> dic
         released = replace(scene, walker=changed_forms(scene.walker, release_at_touch=at_touch))
         walk = released.walk(start_state(scene, state), STEPS, CONTACT)
         model = standing(assembly_of(config.walker, rigid=True), config.gravity_m_s2, config.slope_rad, not at_touch)
-        rigid = take_walk(model.changed(**drive_numbers(config)), RIGID, state, RIGID_STEPS)
+        rigid = take_walk(model.changed(**drive_parameters(config)), RIGID, state, RIGID_STEPS)
         last = {"period_s": float(rigid.periods_s[-1]), "length_m": float(rigid.lengths_m[-1])} if rigid.steps else {}
         of_rigid = {"outcome": rigid.outcome.label, "steps": rigid.steps, "of": RIGID_STEPS, **last}
         found[name] = {**told(scene, walk), "rigid": of_rigid}

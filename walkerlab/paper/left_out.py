@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from walkerlab.config.walkers import is_passive_compass
 from walkerlab.paper.law import is_own_walker
-from walkerlab.scene.left_out import Entry, left_out
+from walkerlab.scene.omissions import Entry, omission
 
 if TYPE_CHECKING:
     from walkerlab.config.reads import RigidConfig
@@ -18,7 +18,7 @@ def of_adjustment(config: RigidConfig) -> tuple[Entry, ...]:
     """Return the omissions for a walker other than the paper's compass."""
     entries = []
     if not is_passive_compass(config):
-        entries.append(left_out("the first step with a hinged stance foot", PAPERS, "two walks"))
+        entries.append(omission("the first step with a hinged stance foot", PAPERS, "two walks"))
     if not is_own_walker(config):
-        entries.append(left_out("the paper's start of its ADAMS model", "only that compass has it", "a walk"))
+        entries.append(omission("the paper's start of its ADAMS model", "only that compass has it", "a walk"))
     return tuple(entries)

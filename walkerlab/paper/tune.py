@@ -17,8 +17,8 @@ from walkerlab.labels import Label
 from walkerlab.mechanics.standing import STANCE, SWING, Standing
 from walkerlab.orbits import scaled_starts
 from walkerlab.orbits.contact_gait import GaitAnswer
-from walkerlab.orbits.contact_map import angled_bodies, step_of, turning_bodies
-from walkerlab.orbits.rigid_limit import motion_of_legs
+from walkerlab.orbits.contact_map import angled_bodies, contact_step, turning_bodies
+from walkerlab.orbits.rigid_limit import leg_motion
 from walkerlab.orbits.step_map import Cycle
 from walkerlab.outcome import Outcome
 from walkerlab.paper.adams_start import AdamsWalk, adams_walk
@@ -31,14 +31,14 @@ from walkerlab.scene.contact import (
     SAMPLES_PER_PENDULUM_TIME,
     ContactScene,
     contact_gait,
+    require_contact,
     scene_on_pads,
     start_state,
     tolerances_of,
-    with_contact,
 )
-from walkerlab.scene.endings import Pads, endings
-from walkerlab.scene.rigid import coordinates, rigid_walker
+from walkerlab.scene.rigid import rigid_walker, state_names
 from walkerlab.scene.scaled import for_a_map, starts_of
+from walkerlab.scene.walk_outcomes import Pads, describe_endings
 from walkerlab.solvers.registry import ENDLESS, Tolerances
 from walkerlab.solvers.system import State
 from walkerlab.stages.numerical_error import numerical_error
@@ -88,7 +88,7 @@ class TuneRun:
 
     def __init__(self, config: TuneConfig, scene: ContactScene, rigid_state: State, gait: GaitAnswer) -> None:
         self.config, self.scene, self.rigid_state, self.gait = config, scene, rigid_state, gait
-        self.names, self.steps = coordinates(config), 2 * config.strides
+        self.names, self.steps = state_names(config), 2 * config.strides
         self.tolerances = tolerances_of(config, self.steps)
         self.rigid: Standing = rigid_walker(config)
         self.hinge = is_passive_compass(config)
@@ -123,7 +123,7 @@ class TuneRun:
             self.adjusted_state = with_scaled_rates(self.rigid, self.rigid_state, *factors)
             self.take("adjusted", self.adjusted_state)
         if is_own_walker(self.config):
-            terrain = with_contact(self.config).terrain
+            terrain = require_contact(self.config).terrain
             self.paper = adams_walk(self.rigid, self.walk, self.scene.walker, terrain)
 
     def adjusted(self, quick: scaled_starts.ScaledStarts) -> scaled_starts.Adjustment | None:
@@ -152,7 +152,7 @@ class TuneRun:
         lifted = np.flatnonzero((time > walk.touch_time_s[-2]) & (normal[:, swing] <= 0.0) & (normal[:, landed] > 0.0))
         if not lifted.size:
             return None
-        rates = motion_of_legs(walk.samples.states[lifted[:1]], self.scene.walker)[1][0]
+        rates = leg_motion(walk.samples.states[lifted[:1]], self.scene.walker)[1][0]
         return float(rates[swing] / first[0]), float(rates[landed] / first[1])
 
     def walk(self, state: State, pinned: bool = False, tolerances: Tolerances | None = None) -> ContactWalkResult:
@@ -178,7 +178,7 @@ def walk_summary(walk: ContactWalkResult) -> dict[str, Any]:
 
 def summary(found: TuneRun) -> dict[str, Any]:
     paper, pitch, ends = found.paper, found.scene.pitch_m, count_outcomes(found.contact_map.outcome)
-    pads = Pads((pitch, pitch), laid=str(with_contact(found.config).pad_pitch))
+    pads = Pads((pitch, pitch), laid=str(require_contact(found.config).pad_pitch))
     return {
         "table2": table_2(found),
         "gait": gait_summary(found),
@@ -190,7 +190,7 @@ def summary(found: TuneRun) -> dict[str, Any]:
             "walks_share": found.contact_map.share(),
             "contact": ends,
             "rigid": count_outcomes(found.rigid_map.outcome),
-            "endings": endings(ends, found.config, True, pads),
+            "endings": describe_endings(ends, found.config, True, pads),
         },
         "slope_rad": found.scene.walker.slope,
         "pitch_m": pitch,
@@ -248,7 +248,7 @@ def gait_summary(found: TuneRun) -> dict[str, Any]:
     said = {"found": gait is not None, "reason": found.gait.reason, "advice": found.gait.advice}
     if gait is None:
         return said
-    step = step_of(gait)
+    step = contact_step(gait)
     return {
         **said,
         "state": gait.z.tolist(),
@@ -340,7 +340,7 @@ def legs_in_time(walk: ContactWalkResult, walker: ContactWalker) -> dict[str, Va
     """Angles and velocities of the legs; empty without samples."""
     if walk.samples is None:
         return {}
-    angle, velocity = motion_of_legs(walk.samples.states, walker)
+    angle, velocity = leg_motion(walk.samples.states, walker)
     return {**legs(), **over_time(time=walk.samples.time_s, angle=angle, velocity=velocity)}
 
 

@@ -12,22 +12,22 @@ from walkerlab.hybrid.comparison import Motion, sampled_at_strikes
 from walkerlab.hybrid.recorded_walk import RigidWalkResult
 from walkerlab.labels import Label
 from walkerlab.orbits.rigid_limit import (
-    ALL,
-    ALL_POINT,
-    DAMPING,
-    NORMAL,
-    STICTION,
-    STIFFNESS,
+    ALL_POINT_SERIES,
+    ALL_SERIES,
+    DAMPING_SERIES,
+    NORMAL_SERIES,
+    STICTION_SERIES,
+    STIFFNESS_SERIES,
     Distance,
     Extrapolation,
     Limit,
-    extrapolated,
+    extrapolate,
     observed_orders,
 )
 from walkerlab.orbits.step_map import Cycle
 from walkerlab.paper.printed import LARGEST_ERROR
 from walkerlab.pipeline.progress import Progress
-from walkerlab.scene.contact import SAMPLES_PER_PENDULUM_TIME, ContactScene, knee_rules, start_state, with_drives
+from walkerlab.scene.contact import SAMPLES_PER_PENDULUM_TIME, ContactScene, apply_drives, knee_rules, start_state
 from walkerlab.scene.parts import assembly_of
 from walkerlab.solvers.system import State
 from walkerlab.stages.rigid_groups import leg_variables
@@ -35,7 +35,8 @@ from walkerlab.store.columns import columns, rows_group, values_by_column
 from walkerlab.store.content import Group
 
 FINER = 4  # times the sampling of contact-sim, so that interpolation errors stay far below the model error
-COMPASS_GAITS, GAITS = (STICTION, STIFFNESS, DAMPING, NORMAL), (STICTION, NORMAL)
+COMPASS_GAITS = STICTION_SERIES, STIFFNESS_SERIES, DAMPING_SERIES, NORMAL_SERIES
+GAITS = STICTION_SERIES, NORMAL_SERIES
 OTHERS_EVERY = 3  # stride through the settings for slower walkers than the compass
 SETTING = "setting"
 FACTORS = {
@@ -110,7 +111,8 @@ def limit_findings(
         scene.ground.frame.pendulum_time / (FINER * SAMPLES_PER_PENDULUM_TIME),
         1 if compass else OTHERS_EVERY,
     )
-    walked = (ALL, ALL_POINT) if isinstance(config.walker, CompassWalker) else (ALL,)  # other feet roll in both models
+    # feet other than points roll in both models
+    walked = (ALL_SERIES, ALL_POINT_SERIES) if isinstance(config.walker, CompassWalker) else (ALL_SERIES,)
     gaits = COMPASS_GAITS if compass else GAITS
     progress.start("tune: rigid limit", len(walked) + len(gaits))
 
@@ -120,17 +122,17 @@ def limit_findings(
     found: dict[str, list[Distance]] = {}
     for name in walked:
         walker = scene.walker
-        if name != ALL:  # point feet, as in the rigid model
+        if name != ALL_SERIES:  # point feet, as in the rigid model
             points, rules = config.walker.model_copy(update={"foot_radius_m": 0.0}), knee_rules(config.walker)
             laws = walker.normal, walker.friction
             walker = contact_walker(assembly_of(points), *laws, config.gravity_m_s2, config.slope_rad, rules)
-            walker = with_drives(walker, config)
+            walker = apply_drives(walker, config)
         found[name] = limit.series(name, walker, gait, start)
         progress.advance()
     for name in gaits:
         found[name] = limit.series(name, scene.walker, gait)
         progress.advance()
-    return LimitFindings(walked, limit.period_s, gait.period_s, found, extrapolated(found[STICTION]))
+    return LimitFindings(walked, limit.period_s, gait.period_s, found, extrapolate(found[STICTION_SERIES]))
 
 
 def limit_summary(found: LimitFindings) -> dict[str, Any]:
@@ -165,10 +167,10 @@ def causes(found: LimitFindings) -> dict[str, Any]:
     parts: dict[str, float] = {}
     if found.without_creep is not None:
         parts["creep_s"] = found.contact_period - found.without_creep.period
-    if found.series[NORMAL]:
-        parts["penetration_and_finite_impact_s"] = found.contact_period - found.series[NORMAL][-1].period
-    if found.series.get(ALL_POINT):
-        parts["foot_radius_s"] = found.contact_period - found.series[ALL_POINT][0].period
+    if found.series[NORMAL_SERIES]:
+        parts["penetration_and_finite_impact_s"] = found.contact_period - found.series[NORMAL_SERIES][-1].period
+    if found.series.get(ALL_POINT_SERIES):
+        parts["foot_radius_s"] = found.contact_period - found.series[ALL_POINT_SERIES][0].period
     parts["rest_s" if found.without_creep is None else "together_s"] = total - sum(parts.values())
     return {
         "total_s": total,

@@ -15,7 +15,7 @@ from walkerlab.pipeline.graph import PIPELINE, Graph, Stage, without_block
 from walkerlab.pipeline.progress import Reporter, Silent, StageReporter
 from walkerlab.pipeline.results import FolderResults, MemoryResults, Results, Step
 from walkerlab.pipeline.task import Precompiler, StageTask, nothing_compiled_yet, run_in_worker, task_of
-from walkerlab.scene.left_out import STILL_COMPUTED, LeftOut
+from walkerlab.scene.omissions import STILL_COMPUTED, LeftOut
 from walkerlab.store.artifact import NOT_THERE, Stored
 from walkerlab.store.content import Content
 from walkerlab.store.key import Identity

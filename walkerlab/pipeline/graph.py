@@ -14,7 +14,7 @@ from walkerlab.config import reads
 from walkerlab.config.reads import RigidConfig, SceneConfig, StartConfig
 from walkerlab.errors import ConfigError
 from walkerlab.registration import later
-from walkerlab.scene.left_out import of_contact_walk, of_rigid_walk
+from walkerlab.scene.omissions import contact_walk_omissions, rigid_walk_omissions
 from walkerlab.scene.studies import is_studied
 
 if TYPE_CHECKING:
@@ -219,12 +219,12 @@ PIPELINE = Graph(
     ),
     Stage(
         "simulate", "walkerlab.stages.simulate", "Walk the rigid model.", reads.SimulateConfig,
-        gait_unless_start_is_given, options=(STRIDES,), does_without=of_rigid_walk,
+        gait_unless_start_is_given, options=(STRIDES,), does_without=rigid_walk_omissions,
     ),
     Stage(
         "contact-sim", "walkerlab.stages.contact_sim", "Walk the contact model, its contact forces as in ADAMS.",
         reads.ContactSimConfig, gait_for_start_or_pads, options=(STRIDES,), requires=("contact",),
-        precompile="compile_kernels", does_without=of_contact_walk,
+        precompile="compile_kernels", does_without=contact_walk_omissions,
     ),
     Stage(
         "tune", "walkerlab.paper.tune",

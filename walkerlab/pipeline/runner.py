@@ -13,7 +13,7 @@ from walkerlab.pipeline.graph import PIPELINE, Graph, Stage
 from walkerlab.pipeline.progress import Reporter
 from walkerlab.pipeline.results import FolderResults, Step
 from walkerlab.pipeline.runs import claim, refuse_another_config
-from walkerlab.scene.left_out import LeftOut
+from walkerlab.scene.omissions import LeftOut
 from walkerlab.store.runfolder import RunFolder
 
 

@@ -8,7 +8,7 @@ from typing import Any
 from walkerlab.config.schema import Config
 from walkerlab.pipeline.headlines import claims
 from walkerlab.report.blocks import Picture, Section
-from walkerlab.scene.left_out import LeftOut
+from walkerlab.scene.omissions import LeftOut
 from walkerlab.store.content import Content, Group
 
 

@@ -14,7 +14,7 @@ from walkerlab.report.registry import pages_of
 from walkerlab.report.results import Results
 from walkerlab.report.sections.closing import TITLES
 from walkerlab.report.tables import Table
-from walkerlab.scene.left_out import STILL_COMPUTED, LeftOut
+from walkerlab.scene.omissions import STILL_COMPUTED, LeftOut
 from walkerlab.store import index
 from walkerlab.store.artifact import Stored
 from walkerlab.store.content import Content

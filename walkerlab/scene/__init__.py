@@ -1,1 +1,1 @@
-"""From a config to the least that can run it, and what was left out and why."""
+"""Build minimal models from a config, and list the omissions with their reasons."""

@@ -1,4 +1,4 @@
-"""From a config to the least that can walk it on compliant ground."""
+"""Build the contact model of a config, leaving out everything that the config does not need."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from walkerlab.mechanics.parts import Assembly
 from walkerlab.mechanics.rigid import places_of
 from walkerlab.orbits.contact_gait import GaitAnswer, find_gait_from
 from walkerlab.orbits.contact_map import WalkerOnGround
-from walkerlab.scene.parts import AnyWalker, assembly_of, drive_numbers
+from walkerlab.scene.parts import AnyWalker, assembly_of, drive_parameters
 from walkerlab.solvers.registry import Tolerances
 from walkerlab.solvers.system import Floats, State
 
@@ -33,15 +33,13 @@ if TYPE_CHECKING:
     from walkerlab.config.schema import Config
 
 BUDGET_PER_STEP = 1_000_000  # right-hand sides
-SAMPLES_PER_PENDULUM_TIME = 200  # of a walk that is stored
-GAIT = Tolerances("radau5", 1e-10, 1e-12, 10_000_000)  # the tangent is exact for this method
-FULL_STOP_DAMPING = 1e-5  # rad into a compliant knee stop from which on its damping is full
+SAMPLES_PER_PENDULUM_TIME = 200  # of stored walks
+GAIT_TOLERANCES = Tolerances("radau5", 1e-10, 1e-12, 10_000_000)  # the tangent is exact for this method
+FULL_STOP_DAMPING = 1e-5  # rad, penetration of full damping in a compliant knee stop
 
 
 @dataclass(frozen=True)
 class ContactScene(WalkerOnGround):
-    """A walker on the ground, ready to walk."""
-
     pinned: bool  # whether the stance foot of the first step is hinged
     pitch_m: float
     assembly: Assembly
@@ -56,7 +54,7 @@ class ContactScene(WalkerOnGround):
     ) -> ContactWalkResult:
         """Walk up to `steps` steps from a state (4 + 2 n) of the free walker, see `walk_contact`.
 
-        heights  (footholds,) m over the slope, the start's first; even ground without
+        heights  (footholds,) m over the slope, beginning with the start's; even ground by default
         """
         even = self.ground.terrain
         ground = self.ground if heights is None else self.ground._replace(terrain=even._replace(heights=heights))
@@ -64,23 +62,22 @@ class ContactScene(WalkerOnGround):
 
 
 def contact_scene(config: ContactConfig, rigid_step_length_m: float, own_pitch_m: float | None = None) -> ContactScene:
-    """The scene of a config with a contact block.
+    """Build the scene of a config with a contact block.
 
-    rigid_step_length_m  step length of the rigid gait: what pads and steps are measured by
+    rigid_step_length_m  step length of the rigid gait, the reference length of pads and terrain
     own_pitch_m          step length of the contact gait, for `pad_pitch: own`
     """
-    contact = with_contact(config)
+    contact = require_contact(config)
     pitch = pads_pitch(contact, rigid_step_length_m, own_pitch_m)
     assembly, leg, gravity = assembly_of(config.walker), config.walker.leg_length_m, config.gravity_m_s2
     laws, rules = (normal_law(contact), friction_law(contact)), knee_rules(config.walker)
-    walker = with_drives(contact_walker(assembly, *laws, gravity, config.slope_rad, rules), config)
+    walker = apply_drives(contact_walker(assembly, *laws, gravity, config.slope_rad, rules), config)
     frame = Frame(leg, math.sqrt(leg / gravity), locate_switching=True)
     ground = JudgedGround(TERRAINS[contact.terrain](pitch), frame)
     return ContactScene(walker, ground, contact.stance == "pinned", pitch, assembly)
 
 
 def tolerances_of(config: GroundConfig, steps: int) -> Tolerances:
-    """Return the config's tolerances for a walk of at most `steps` steps."""
     settings = config.solver.contact
     return Tolerances(settings.method, settings.rtol, settings.atol, steps * BUDGET_PER_STEP)
 
@@ -88,12 +85,12 @@ def tolerances_of(config: GroundConfig, steps: int) -> Tolerances:
 def scene_on_pads(
     config: ContactConfig, rigid_step: float, rigid_state: State, answer: GaitAnswer | None = None
 ) -> ContactScene:
-    """Return the config's scene with its pads laid; raises NoAnswer if they follow a contact gait and there is none.
+    """Build the config's scene with pads laid; raises NoAnswer if they need a contact gait and there is none.
 
-    answer  of a search for that gait; None to search here
+    answer  of a search for that gait; by default it is searched for
     """
     own = None
-    if wants_own_pitch(with_contact(config)):
+    if wants_own_pitch(require_contact(config)):
         answer = answer or contact_gait(config, rigid_step, rigid_state)
         if answer.gait is None:
             raise NoAnswer(f"no contact gait to lay the pads for: {answer.reason}", answer.advice)
@@ -101,21 +98,19 @@ def scene_on_pads(
     return contact_scene(config, rigid_step, own)
 
 
-def with_drives(walker: ContactWalker, config: ContactConfig) -> ContactWalker:
-    """The walker with what drives it in a config."""
+def apply_drives(walker: ContactWalker, config: ContactConfig) -> ContactWalker:
     pulse = {"push_off_duration": config.push_off.duration_s} if config.push_off.impulse_N_s != 0.0 else {}
-    return changed_forms(walker, **drive_numbers(config), **pulse)
+    return changed_forms(walker, **drive_parameters(config), **pulse)
 
 
 def knee_rules(walker: AnyWalker) -> KneeRules:
-    """How the knees of a walker lock and are released; straight legs have none."""
     if not isinstance(walker, Kneed | PartsWalker):
         return KneeRules()
     knee = walker.knee
     at_touch = knee.release == "touch" or knee.at_heel_strike == "free"
     if knee.lock == "ideal":
         return KneeRules(release_at_touch=at_touch)
-    # damped from the first hundredth of a milliradian on
+    # full damping from 0.01 mrad on
     return KneeRules(NormalLaw(knee.stop_stiffness, 1.0, knee.stop_damping, FULL_STOP_DAMPING), at_touch)
 
 
@@ -126,37 +121,35 @@ TERRAINS: dict[str, Callable[[float], Terrain]] = {
 }
 
 
-def with_contact(config: ContactConfig) -> Contact:
-    """The contact block; ValueError if there is none."""
+def require_contact(config: ContactConfig) -> Contact:
     if config.contact is None:
         raise ValueError("this config has no contact block")
     return config.contact
 
 
 def contact_gait(config: ContactConfig, rigid_step_length_m: float, rigid_state: State) -> GaitAnswer:
-    """The contact model's own gait on pads of its own step length, searched for from a rigid start state.
+    """Find the contact model's gait on pads of its own step length, from a rigid start state.
 
-    rigid_step_length_m  what the pads are laid for to begin with
+    rigid_step_length_m  initial pad pitch
     """
     scene = replace(contact_scene(config, rigid_step_length_m, rigid_step_length_m), pinned=False)
-    return find_gait_from(scene.walker, scene.ground, GAIT, start_state(scene, rigid_state))
+    return find_gait_from(scene.walker, scene.ground, GAIT_TOLERANCES, start_state(scene, rigid_state))
 
 
 def gait_off_pads(config: Config, rigid_step_length_m: float, rigid_state: State) -> GaitAnswer:
-    """`contact_gait` on a plane that lets scuffing feet through where the config has pads."""
-    contact = with_contact(config)
+    """Find `contact_gait` on a plane that lets scuffing feet through, in place of pads."""
+    contact = require_contact(config)
     if contact.terrain == "checkerboard":
         config = config.model_copy(update={"contact": contact.model_copy(update={"terrain": "after-mid-swing"})})
     return contact_gait(config, rigid_step_length_m, rigid_state)
 
 
 def wants_own_pitch(contact: Contact) -> bool:
-    """Whether there are pads, to be laid for the contact gait's own step length."""
     return contact.terrain == "checkerboard" and contact.pad_pitch == "own"
 
 
 def pads_pitch(contact: Contact, rigid_step_length_m: float, own_pitch_m: float | None) -> float:
-    """Pitch of the pads (m); on a plane the rigid step length, by which steps are judged."""
+    """Return the pad pitch (m); on a plane the rigid step length, the reference length of the terrain."""
     if contact.terrain != "checkerboard" or contact.pad_pitch == "rigid":
         return rigid_step_length_m
     if contact.pad_pitch == "own":
@@ -167,29 +160,28 @@ def pads_pitch(contact: Contact, rigid_step_length_m: float, own_pitch_m: float 
 
 
 def normal_law(contact: Contact) -> NormalLaw:
-    """The normal force in SI."""
     si = contact.in_si()
     return NormalLaw(si.stiffness, si.exponent, si.damping, si.full_damping_penetration)
 
 
 def friction_law(contact: Contact) -> FrictionLaw:
-    """The friction in SI; no friction is a law of its own, not a coefficient of zero.
+    """Return the friction law in SI; frictionless contact is a law of its own, not a zero coefficient.
 
-    Raises ConfigError for a law that somebody has added and left incomplete.
+    Raises ConfigError for a law added by a user that is incomplete.
     """
     try:
         return law_named(contact.friction, contact.in_si())
     except TypeError as error:
-        raise ConfigError(f"{error}.", "docs/adding.md says what a law has.") from error
+        raise ConfigError(f"{error}.", "docs/adding.md lists the parts of a law.") from error
 
 
 def start_state(scene: ContactScene, rigid_state: State) -> State:
-    """The walker with the rigid start state, its stance foot just touching at along = 0, at rest and rolling.
+    """Return the walker in the rigid start state, its stance foot just touching at along = 0 and rolling.
 
-    rigid_state  of the rigid model, both feet on the slope; of a compass (theta_1 swing, theta_2 stance, dtheta_1,
+    rigid_state  of the rigid model, both feet on the slope; for a compass (theta_1 swing, theta_2 stance, dtheta_1,
                  dtheta_2)
 
-    The hinge at the ball's centre gives position and velocity; then the ball rolls without slip instead of turning
+    The hinge at the ball's centre gives position and velocity; the ball then rolls without slip instead of turning
     about its centre.
     """
     walker = scene.walker
@@ -204,15 +196,13 @@ def start_state(scene: ContactScene, rigid_state: State) -> State:
     return (*hinged[: 2 + n], hinged[2 + n] - rolled, *hinged[3 + n :])
 
 
-def resting(scene: ContactScene) -> RestingFoot:
-    """How the walker stands on one foot."""
+def stance_equilibrium(scene: ContactScene) -> RestingFoot:
     walker, law = scene.walker, scene.walker.normal
     return resting_foot(walker.mass * walker.gravity, walker.mass, law.stiffness, law.exponent, law.damping)
 
 
 def scene_measures(scene: ContactScene) -> dict[str, Any]:
-    """What the scene derives from the config, SI, for summaries."""
-    foot = resting(scene)
+    foot = stance_equilibrium(scene)
     return {
         "static_penetration_m": foot.depth,
         "damping_ratio": foot.damping_ratio,

@@ -1,4 +1,4 @@
-"""From a config and a parameter to the step maps that its families of gaits are followed on."""
+"""Build the step maps of a config over a parameter, on which families of gaits are followed."""
 
 from __future__ import annotations
 
@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from walkerlab.errors import ConfigError
-from walkerlab.mechanics.standing import Standing
-from walkerlab.orbits.shooting import RigidMap
+from walkerlab.orbits.rigid_map import RigidMap, WalkerAt
 from walkerlab.scene.parameter import Parameter, parameter_of
 from walkerlab.scene.rigid import rigid_walker
 from walkerlab.solvers.registry import Tolerances
@@ -20,71 +19,66 @@ if TYPE_CHECKING:
     from walkerlab.config.reads import ContactConfig
     from walkerlab.orbits.contact_map import ContactMap, WalkerOnGround
 
-CONTACT = Tolerances("radau5", 1e-10, 1e-12, 60_000)
-"""Of one step of the contact model."""
-NEARBY = 1e-3  # of a number: another value at which a model that reads it is another one
+# Solver settings of one step of the contact model.
+CONTACT_STEP = Tolerances("radau5", 1e-10, 1e-12, 60_000)
+RELATIVE_CHANGE = 1e-3  # of a parameter, to test whether a model depends on it
 
 
-def rigid_walkers(config: ContactConfig, parameter: Parameter) -> Callable[[float], Standing | None]:
-    """The rigid walker at a value of the parameter; None where the config refuses the value."""
+def rigid_walkers(config: ContactConfig, parameter: Parameter) -> WalkerAt:
     return parameter.over(config, rigid_walker)
 
 
 def rigid_map(config: ContactConfig, parameter: Parameter, scale: float) -> RigidMap:
-    """The rigid model's step map over the parameter."""
     return RigidMap(rigid_walkers(config, parameter), scale, rigid_walker(config))
 
 
 def walkers_on_ground(
     config: ContactConfig, parameter: Parameter, step_length_m: float
 ) -> Callable[[float], WalkerOnGround | None]:
-    """The contact model at a value of the parameter, steps judged by a length; None where the config refuses it."""
     from walkerlab.scene.contact import contact_scene
 
     return parameter.over(config, lambda changed: contact_scene(changed, step_length_m, step_length_m))
 
 
 def contact_map(config: ContactConfig, parameter: Parameter, scale: float, step_length_m: float) -> ContactMap:
-    """The contact model's step map over the parameter; steps are judged by a length (m)."""
     from walkerlab.orbits.contact_map import ContactMap
     from walkerlab.scene.contact import contact_scene
 
     walkers = walkers_on_ground(config, parameter, step_length_m)
     like = contact_scene(config, step_length_m, step_length_m)
-    return ContactMap(walkers, scale, CONTACT, step_length_m, like)
+    return ContactMap(walkers, scale, CONTACT_STEP, step_length_m, like)
 
 
-def differs(model: str, config: ContactConfig, parameter: Parameter, values: tuple[float, float]) -> bool:
-    """Whether a model, rigid or contact, is another one at another value of the parameter."""
+def model_differs(model: str, config: ContactConfig, parameter: Parameter, values: tuple[float, float]) -> bool:
     walkers: Callable[..., Callable[[float], Any]] = (
         rigid_walkers if model == "rigid" else partial(walkers_on_ground, step_length_m=1.0)
     )
-    first, last = ([*numbers_in(walkers(config, parameter)(value))] for value in values)
+    first, last = ([*iterate_values(walkers(config, parameter)(value))] for value in values)
     return len(first) != len(last) or not all(map(np.array_equal, first, last))
 
 
-def numbers_in(value: Any) -> Iterator[Any]:
-    """All that a record and the records in it are made of."""
+def iterate_values(value: Any) -> Iterator[Any]:
+    """Yield the leaves of a record and its nested records."""
     if isinstance(value, tuple) or is_dataclass(value):
-        for one in value if isinstance(value, tuple) else vars(value).values():
-            yield from numbers_in(one)
+        for field in value if isinstance(value, tuple) else vars(value).values():
+            yield from iterate_values(field)
     else:
         yield value
 
 
-def reads(model: str, config: ContactConfig, key: str) -> bool:
-    """Whether a number of the config makes a difference to a model, as far as the config allows another value."""
+def model_reads(model: str, config: ContactConfig, key: str) -> bool:
+    """Whether a config parameter affects a model, as far as the config allows other values."""
     parameter = parameter_of(key, config)
     value = parameter.value_in(config)
-    beside = (value + sign * NEARBY * (abs(value) or 1.0) for sign in (1.0, -1.0))
-    allowed = [one for one in beside if parameter.config_at(config, one) is not None]
-    return not allowed or any(differs(model, config, parameter, (value, one)) for one in allowed)
+    neighbours = (value + sign * RELATIVE_CHANGE * (abs(value) or 1.0) for sign in (1.0, -1.0))
+    allowed = [changed for changed in neighbours if parameter.config_at(config, changed) is not None]
+    return not allowed or any(model_differs(model, config, parameter, (value, changed)) for changed in allowed)
 
 
-def not_read(where: str, key: str, models: Sequence[str]) -> ConfigError:
-    """The error of a question, asked by some key of the config, about a number that none of the models reads."""
+def unused_key_error(where: str, key: str, models: Sequence[str]) -> ConfigError:
+    """Return the error for a request, made by the config key `where`, about a parameter that no model uses."""
     return ConfigError(
-        f"{where}: {key} does not touch the {' or the '.join(models)} model",
-        "Choose a key that the model is made of, or another model (--model).",
+        f"{where}: {key} does not affect the {' or the '.join(models)} model",
+        "Choose a key that the model uses, or another model (--model).",
         tuple(where.split(".")),
     )

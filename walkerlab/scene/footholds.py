@@ -1,4 +1,4 @@
-"""Footholds of a walk over uneven ground."""
+"""Foothold heights of a walk over uneven ground."""
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from walkerlab.solvers.system import Floats
 
 
 def foothold_heights(ground: Footholds, steps: int) -> Floats | None:
-    """Heights (steps + 1,) in m over the slope of a walk's footholds, its start's first; None where all are zero."""
+    """Return foothold heights (steps + 1,) in m over the slope, beginning with the start's; None on even ground."""
     if ground.even:
         return None
     if ground.heights_m:

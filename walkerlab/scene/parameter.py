@@ -1,4 +1,4 @@
-"""A number of the config as the parameter of a family of walkers: its key, its unit, and the config at a value."""
+"""A config key as the parameter of a family of walkers: its unit, its value, and the config at other values."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -17,20 +17,16 @@ from walkerlab.errors import ConfigError
 R = TypeVar("R")
 Key = tuple[int | str, ...]
 SLOPE_DEG, SLOPE_RAD = "slope_deg", "slope_rad"
-PHYSICAL = tuple(keys_of(ContactConfig))
-"""The keys that a model is made of."""
+# Top-level config keys that models depend on.
+MODEL_KEYS = tuple(keys_of(ContactConfig))
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """A key of the config that changes.
+    """A config key that varies."""
 
-    key   dotted, as it was asked for
-    unit  of its values
-    """
-
-    key: str
-    unit: str
+    key: str  # dotted, as requested
+    unit: str  # of its values
     path: tuple[str, ...]
 
     def value_in(self, config: ContactConfig) -> float:
@@ -39,14 +35,14 @@ class Parameter:
         return math.degrees(found) if self.key == SLOPE_DEG else float(found)
 
     def config_at(self, config: ContactConfig, value: float) -> Config | None:
-        """The config with another value there and all that follows from it; None if the schema refuses it."""
+        """Return the config at another value, with everything that follows from it; None if the schema refuses it."""
         try:
             return self._changed(config, value)
         except ValidationError:
             return None
 
     def refusal(self, config: ContactConfig, value: float, key: Key) -> ConfigError:
-        """What to raise where a key of the config asks for a value that the schema refuses: with its reason."""
+        """Return the error for a value that the schema refuses, requested by the config key `key`, with the reason."""
         why = ""
         try:
             self._changed(config, value)
@@ -59,12 +55,12 @@ class Parameter:
             why = f": {subject} {reason.replace('Input should', 'should')}"
         return ConfigError(
             f"{dotted(key)}: {self.key} cannot be {value:g} {self.unit}{why}",
-            f"`walkerlab schema {self.key}` says what the key allows.",
+            f"`walkerlab schema {self.key}` lists the allowed values.",
             key,
         )
 
     def _changed(self, config: ContactConfig, value: float) -> Config:
-        data = {name: _as_given(getattr(config, name)) for name in PHYSICAL}
+        data = {name: _keys_set(getattr(config, name)) for name in MODEL_KEYS}
         block = data
         for name in self.path[:-1]:
             block = block.setdefault(name, {})
@@ -72,51 +68,51 @@ class Parameter:
         return Config.model_validate(data)
 
     def over(self, config: ContactConfig, make: Callable[[Config], R]) -> Callable[[float], R | None]:
-        """What is made of the config, at a value of the parameter; None where the schema refuses the value."""
+        """Return `make(config)` as a function of the parameter's value; None where the schema refuses the value."""
 
-        def at(value: float) -> R | None:
+        def at_value(value: float) -> R | None:
             changed = self.config_at(config, value)
             return None if changed is None else make(changed)
 
-        return at
+        return at_value
 
 
 SLOPE = Parameter(SLOPE_RAD, "rad", (SLOPE_RAD,))
 
 
-def _as_given(value: Any) -> Any:
-    """A block as the keys that were given, so that defaults which follow from others are made anew."""
+def _keys_set(value: Any) -> Any:
+    """Return only the keys set in a block, so that defaults that depend on others are recomputed."""
     if not isinstance(value, Block):
         return value
-    given = value.model_dump(exclude_unset=True)
-    return {**given, "type": value.type} if hasattr(value, "type") else given
+    keys = value.model_dump(exclude_unset=True)
+    return {**keys, "type": value.type} if hasattr(value, "type") else keys
 
 
 def dotted(key: Key) -> str:
-    """A key's path as messages have it; an item of a list belongs to the list's key."""
+    """Join a key's path as messages show it; an item of a list belongs to the list's key."""
     return ".".join(part for part in key if isinstance(part, str))
 
 
 def parameter_of(key: str, config: ContactConfig, asker: Key = ()) -> Parameter:
-    """The parameter of a key of the config's own walker; ConfigError if it is no number that a model is made of.
+    """Return the parameter of a key of the config; raises ConfigError if it is not a number that a model uses.
 
-    asker  the key of the config that names it, if one does
+    asker  the config key that names it, if any
     """
     if key == SLOPE_DEG:
         return Parameter(key, "deg", (SLOPE_RAD,))
     own = {".".join(path): field for path, field in leaves(Config, held=config)}
     why = why_no_parameter(key, config, own)
     if why:
-        raise ConfigError(f"{f'{dotted(asker)}: ' if asker else ''}{printable(key)} {why}", _ADVICE, asker)
+        raise ConfigError(f"{f'{dotted(asker)}: ' if asker else ''}{printable(key)} {why}", _KEY_ADVICE, asker)
     unit = annotation_of(own[key], "unit") or "1"
     return Parameter(key, config.contact.unit_of(unit) if config.contact else unit, tuple(key.split(".")))
 
 
-_ADVICE = "Name a number that the walker, its slope or its ground is made of; `walkerlab schema` lists every key."
+_KEY_ADVICE = "Name a parameter of the walker, its slope or its ground; `walkerlab schema` lists every key."
 
 
 def why_no_parameter(key: str, config: ContactConfig, own: Mapping[str, FieldInfo]) -> str:
-    """Why a key is no number that a model of the config is made of; empty if it is.
+    """Return why a key is not a number that a model of the config uses; empty if it is.
 
     own  the keys of the config, of its own walker's type
     """
@@ -125,28 +121,27 @@ def why_no_parameter(key: str, config: ContactConfig, own: Mapping[str, FieldInf
             return "is a block of keys, not a number"
         others = {".".join(("walker", *path[1:])) for path, _ in leaves_of_other_kinds(Config)}
         if key in others | {".".join(path) for path, _ in leaves(Config)}:
-            return f"is not a key of this walker, whose type is {config.walker.type}{likely(key, own)}"
-        return f"is not a key of the config{likely(key, own)}"
+            return f"is not a key of this walker, whose type is {config.walker.type}{suggest_key(key, own)}"
+        return f"is not a key of the config{suggest_key(key, own)}"
     path = key.split(".")
-    if path[0] not in PHYSICAL:
-        return "touches no model"
+    if path[0] not in MODEL_KEYS:
+        return "affects no model"
     if "number" not in type_words(own[key].annotation):
         return "is not a number"
     for depth in range(1, len(path) + 1):
-        found, block = value_at(config, path[:depth]), ".".join(path[:depth])
-        if found is None:
+        value, block = value_at(config, path[:depth]), ".".join(path[:depth])
+        if value is None:
             return f"is not there: the config has no {block}; give it one first"
-        if isinstance(found, tuple):
-            return f"is a number of each of the {block}, not one number"
-    return "" if isinstance(found, int | float) else f"is {found!r} in the config, not a number"
+        if isinstance(value, tuple):
+            return f"has a value for each of the {block}, not a single one"
+    return "" if isinstance(value, int | float) else f"is {value!r} in the config, not a number"
 
 
-def likely(key: str, own: Mapping[str, FieldInfo]) -> str:
-    """A guess at the key that is meant, in words."""
+def suggest_key(key: str, own: Mapping[str, FieldInfo]) -> str:
     numbers = [
         name
         for name, field in own.items()
-        if name.split(".")[0] in PHYSICAL and block_of(field) is None and "number" in type_words(field.annotation)
+        if name.split(".")[0] in MODEL_KEYS and block_of(field) is None and "number" in type_words(field.annotation)
     ]
     meant = nearest(key, [*numbers, SLOPE_DEG])
     return f"; did you mean {meant}?" if meant else ""

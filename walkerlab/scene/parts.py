@@ -1,4 +1,4 @@
-"""From the walker of a config to the parts that both models are made of."""
+"""Build the parts of a config's walker, shared by both models."""
 
 from typing import Any
 
@@ -9,16 +9,14 @@ from walkerlab.errors import ConfigError
 from walkerlab.mechanics.parts import Assembly, BallFoot, Body, Coupling, Knee, Particle, Revolute
 from walkerlab.mechanics.walkers import Arc, Limb, kneed_legs, straight_legs, with_torso
 
-SHOWN_IN = "docs/walkers.md shows a walker described by its parts."
+PARTS_DOCS = "docs/walkers.md shows a walker described by its parts."
 AnyWalker = CompassWalker | StraightLegs | Kneed | PartsWalker
 
 
 def assembly_of(walker: AnyWalker, rigid: bool = False) -> Assembly:
-    """The parts of a walker.
+    """Return the parts of a walker; raises ConfigError if they make no walker.
 
     rigid  for the rigid model, where a compass has point feet
-
-    Raises ConfigError for parts that make no walker.
     """
     if isinstance(walker, CompassWalker):
         leg = Limb(walker.leg_length_m, walker.leg_mass_kg, walker.mass_to_hip_m, 0.0, walker.leg_inertia_kg_m2)
@@ -39,19 +37,18 @@ def assembly_of(walker: AnyWalker, rigid: bool = False) -> Assembly:
 
 
 def hip_mass(walker: CompassWalker | StraightLegs, rigid: bool) -> float:
-    """The mass at the hip of straight legs (kg).
+    """Return the mass at the hip of straight legs (kg).
 
-    On compliant ground legs that are point masses need some there: side by side they turn about their masses and take a
-    hip without mass along at no cost, so that no acceleration follows from the forces as they pass each other.
+    On compliant ground, legs that are point masses need a hip mass: when side by side they turn about their masses and
+    move a massless hip freely, so that the forces do not determine its acceleration.
     """
     if rigid:
         return walker.hip_mass_kg
-    there = torso_mass(walker.torso) + walker.leg_inertia_kg_m2 / walker.leg_length_m**2
-    return max(walker.hip_mass_kg, LIGHTEST_CONTACT * walker.total_mass_kg - there)
+    present = torso_mass(walker.torso) + walker.leg_inertia_kg_m2 / walker.leg_length_m**2
+    return max(walker.hip_mass_kg, LIGHTEST_CONTACT * walker.total_mass_kg - present)
 
 
 def own_parts(walker: PartsWalker) -> Assembly:
-    """The parts that a config lists; ConfigError, in words, if they do not fit together."""
     try:
         return Assembly(
             bodies=tuple(Body(**dict(body)) for body in walker.bodies),
@@ -63,16 +60,15 @@ def own_parts(walker: PartsWalker) -> Assembly:
             legs=walker.legs,
         )
     except (KeyError, ValueError) as error:
-        raise ConfigError(f"walker: {error.args[0]}", SHOWN_IN) from None
+        raise ConfigError(f"walker: {error.args[0]}", PARTS_DOCS) from None
 
 
-def drive_numbers(config: RigidConfig) -> dict[str, Any]:
-    """What drives the walker of a config, by the names that both models have for it."""
+def drive_parameters(config: RigidConfig) -> dict[str, Any]:
     hip = config.walker.hip
     numbers = tuple(dict(hip).values())
     return {"driven_hip": hip != Hip(), "hip": numbers, "push_off": config.push_off.impulse_N_s}
 
 
 def knee_locked_at_strike(walker: AnyWalker) -> bool:
-    """Whether the trailing knee is rigid during the heel strike."""
+    """Whether the trailing knee is rigid during heel strike."""
     return not isinstance(walker, Kneed | PartsWalker) or walker.knee.at_heel_strike == "locked"

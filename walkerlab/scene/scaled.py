@@ -1,4 +1,4 @@
-"""Starts of the contact model whose velocities are scaled: for maps of them, and for basins."""
+"""Scaled starts of the contact model, for maps and basins."""
 
 from dataclasses import replace
 
@@ -10,27 +10,27 @@ from walkerlab.scene.contact import ContactScene, start_state
 from walkerlab.solvers.registry import Tolerances
 from walkerlab.solvers.system import State
 
-# tolerances of a map: away from edges its outcomes are those of the config's (docs/adjustment.md)
+# away from edges, a map has the same outcomes as with the config's tolerances (docs/adjustment.md)
 MAP_RTOL, MAP_ATOL = 1e-4, 1e-6
-LEAST_BUDGET, BUDGET_FACTOR = 60_000, 4  # right-hand sides of a cell: at least, and of the rigid start's walk
+LEAST_BUDGET, BUDGET_FACTOR = 60_000, 4  # right-hand sides of a cell: minimum, and multiple of the unchanged start's
 
 
 def starts_of(
     scene: ContactScene, rigid: Standing, state: State, steps: int, answer: GaitAnswer, tolerances: Tolerances
 ) -> scaled_starts.ScaledStarts:
-    """Return a rigid start whose velocities are to be scaled, in a scene, to settle on the gait if there is one."""
+    """Return a rigid start with scalable velocities in a scene; walks must settle on the gait if there is one."""
     own = None if answer.gait is None else (answer.gait.step.period_s, answer.gait.step.length_m)
 
     def start(swing: float, stance: float) -> State:
         return start_state(scene, with_scaled_rates(rigid, state, swing, stance))
 
     starts = scaled_starts.scaled_starts(scene.walker, scene.ground, start, steps, own)
-    return replace(starts, tolerances=replace(tolerances, method=scaled_starts.TOLERANCES.method))
+    return replace(starts, tolerances=replace(tolerances, method=scaled_starts.START_TOLERANCES.method))
 
 
 def for_a_map(starts: scaled_starts.ScaledStarts, evaluations: int) -> scaled_starts.ScaledStarts:
-    """Return the same starts at the tolerances of a map.
+    """Return the same starts with the solver settings of a map.
 
-    evaluations  right-hand sides of the walk from the start as it stands; a cell's budget is a multiple of them
+    evaluations  right-hand sides of the walk from the unchanged start; a cell's budget is a multiple of them
     """
     return starts.coarser(MAP_RTOL, MAP_ATOL, max(LEAST_BUDGET, BUDGET_FACTOR * evaluations))

@@ -1,7 +1,7 @@
-"""Where the study that is redone registers what a scene needs of it: its own walker, and equations besides Lagrange's.
+"""Registration of the reproduced study's walker and of its equations besides Lagrange's.
 
-It is named in quotes and imported late: nothing here depends on it, yet its law is part of the code that results are
-made of (see sources.py).
+The study is named by a string and imported late: nothing here depends on it, yet its law is part of the code that
+results are made of (see sources.py).
 """
 
 from __future__ import annotations
@@ -15,20 +15,18 @@ if TYPE_CHECKING:
     from walkerlab.mechanics.standing import Standing
 
 STUDY = "walkerlab.paper.law"
-LAGRANGES: Equations = "corrected"
+LAGRANGE_EQUATIONS: Equations = "corrected"
 
 
 def is_studied(config: Any) -> bool:
-    """Whether a config has the study's own walker."""
     return bool(registered(STUDY, "is_own_walker")(config))
 
 
-def moved_by(model: Standing, equations: Equations) -> Standing:
-    """Return a walker that moves by a set of equations, Lagrange's or one of the study's."""
-    moved: Standing = model if equations == LAGRANGES else registered(STUDY, "LAWS")[equations](model)
+def with_equations(model: Standing, equations: Equations) -> Standing:
+    moved: Standing = model if equations == LAGRANGE_EQUATIONS else registered(STUDY, "LAWS")[equations](model)
     return moved
 
 
 def equation_sets(config: Any) -> tuple[Equations, ...]:
-    """Return the sets of equations that gaits are sought with: the config's, and every set for the study's walker."""
-    return (LAGRANGES, *registered(STUDY, "LAWS")) if is_studied(config) else (config.equations,)
+    """Return the sets of equations to search gaits with: the config's, and every set for the study's walker."""
+    return (LAGRANGE_EQUATIONS, *registered(STUDY, "LAWS")) if is_studied(config) else (config.equations,)

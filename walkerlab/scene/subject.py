@@ -1,4 +1,4 @@
-"""A model with its gait, ready to be disturbed or differentiated by a parameter of its config."""
+"""A model with its gait, ready to be disturbed or differentiated."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from walkerlab.hybrid.recorded_walk import as_state
 from walkerlab.mechanics.standing import Standing
 from walkerlab.orbits.family_search import CONTACT, RIGID
 from walkerlab.orbits.gradients import Gradient, gradients
-from walkerlab.orbits.robustness import Standpoint
-from walkerlab.orbits.shooting import coordinates_of
+from walkerlab.orbits.rigid_map import coordinates_of
+from walkerlab.orbits.robustness import GaitOnMap
 from walkerlab.orbits.similarity import unit_walker
 from walkerlab.orbits.step_map import StepMap
 from walkerlab.scene.families import contact_map, rigid_map
@@ -24,69 +24,67 @@ from walkerlab.solvers.system import Floats
 if TYPE_CHECKING:
     from walkerlab.config.reads import ContactConfig
 
-QUICK: Final = {RIGID: Tolerances("dop853", 1e-7, 1e-9, ENDLESS), CONTACT: Tolerances("radau5", 1e-6, 1e-8, 1_000_000)}
-"""Tolerances of walks that are only counted; the budget is per step."""
+# Solver settings of walks of which only the length matters; the budget is per step.
+QUICK_WALKS: Final = {
+    RIGID: Tolerances("dop853", 1e-7, 1e-9, ENDLESS),
+    CONTACT: Tolerances("radau5", 1e-6, 1e-8, 1_000_000),
+}
 
 
 @dataclass(frozen=True, eq=False)
-class Subject:
-    """A model whose gait is disturbed, as other processes are handed it.
-
-    config    whose scene it walks in
-    z         (d,) the gait on the section
-    length_m  of its steps
-    """
+class ModelUnderTest:
+    """A model and its gait, in a form that other processes can receive."""
 
     model: str
-    config: ContactConfig
-    z: Floats
-    length_m: float
+    config: ContactConfig  # of its scene
+    z: Floats  # (d,) the gait on the section
+    length_m: float  # step length
 
-    def at(self, parameter: Parameter = SLOPE, exact: bool = True) -> Standpoint:
-        """The gait on the step map over a parameter."""
+    def at(self, parameter: Parameter = SLOPE, exact: bool = True) -> GaitOnMap:
         p = parameter.value_in(self.config)
         step_map: StepMap = (
             rigid_map(self.config, parameter, 1.0)
             if self.model == RIGID
             else contact_map(self.config, parameter, 1.0, self.length_m)
         )
-        step_map = step_map if exact else step_map.at(QUICK[self.model])
+        step_map = step_map if exact else step_map.at(QUICK_WALKS[self.model])
         _, units = unit_walker(rigid_walker(self.config))
-        return Standpoint(step_map, p, self.z, step_map.step(self.z, p).DP, units)
+        return GaitOnMap(step_map, p, self.z, step_map.step(self.z, p).DP, units)
 
     def gradients(self, parameter: Parameter, wanted: Collection[str]) -> dict[str, Gradient]:
-        """Derivatives of the gait's numbers by a parameter."""
         return gradients(self.at(parameter), abs(parameter.value_in(self.config)) or 1e-2, wanted)
 
 
 def section_coordinates(walker: Standing, state: Sequence[float]) -> Floats:
-    """Where a state (SI) lies on the section of the unit walker."""
+    """Return the section coordinates of the unit walker for a state (SI)."""
     _, units = unit_walker(walker)
     z = coordinates_of(walker, state)
     z[1:] *= units.time
     return z
 
 
-def subject_of(model: str, config: ContactConfig, gait: Mapping[str, Any], note: Callable[[str], None]) -> Subject:
-    """Return a model with its gait, the contact model off its pads; raises NoAnswer if it has none.
+def find_model_gait(
+    model: str, config: ContactConfig, gait: Mapping[str, Any], note: Callable[[str], None]
+) -> ModelUnderTest:
+    """Return a model with its gait, the contact model off its pads; raises NoAnswer without a gait.
 
     gait  summary of `fixedpoint`
-    note  receives what differs from the config's scene
+    note  receives differences from the config's scene
     """
     length = float(gait["step_length_m"])
     if model == RIGID:
         z = section_coordinates(rigid_walker(config), gait["state"])
-        return Subject(RIGID, config, z, length)
-    # Imported here: the rigid model alone does without.
-    from walkerlab.scene.contact import gait_off_pads, with_contact
+        return ModelUnderTest(RIGID, config, z, length)
+    # Imported late: the rigid model does not need it.
+    from walkerlab.scene.contact import gait_off_pads, require_contact
 
     own = SLOPE.config_at(config, config.slope_rad)
     assert own is not None, "a config keeps its slope"
-    found = gait_off_pads(own, length, as_state(gait["state"]))
-    if found.gait is None:
-        raise NoAnswer(f"no gait of the contact model: {found.reason}", found.advice)
-    if with_contact(config).terrain == "checkerboard":
+    answer = gait_off_pads(own, length, as_state(gait["state"]))
+    if answer.gait is None:
+        raise NoAnswer(f"no gait of the contact model: {answer.reason}", answer.advice)
+    if require_contact(config).terrain == "checkerboard":
         note("robustness: the contact model is disturbed on after-mid-swing: pads would end its walks")
-    length = found.gait.step.length_m
-    z = contact_map(config, SLOPE, 1.0, length).of_section(found.gait.z)
-    return Subject(CONTACT, config, z, length)
+    length = answer.gait.step.length_m
+    z = contact_map(config, SLOPE, 1.0, length).scale_section(answer.gait.z)
+    return ModelUnderTest(CONTACT, config, z, length)

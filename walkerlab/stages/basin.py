@@ -20,26 +20,33 @@ from walkerlab.hybrid.rigid_lanes import two_legs
 from walkerlab.mechanics.standing import Standing
 from walkerlab.orbits.basin import (
     ATOL,
-    NONE,
     RTOL,
+    UNREACHED,
     Attractors,
     WalkEnds,
     Walker,
     Window,
-    arrivals,
     edge_cells,
     find_attractors,
-    inside_cell,
+    subcell_centres,
+    walk_to_attractor,
 )
+from walkerlab.orbits.rigid_map import state_on_section
 from walkerlab.orbits.scaled_starts import ScaledStarts
-from walkerlab.orbits.shooting import on_section
 from walkerlab.orbits.similarity import unit_walker
 from walkerlab.outcome import Outcome
 from walkerlab.pipeline.progress import Progress
 from walkerlab.pipeline.work import WorkUnit, complete
-from walkerlab.scene.contact import ContactScene, contact_gait, scene_on_pads, start_state, tolerances_of, with_contact
-from walkerlab.scene.endings import Pads, endings
+from walkerlab.scene.contact import (
+    ContactScene,
+    contact_gait,
+    require_contact,
+    scene_on_pads,
+    start_state,
+    tolerances_of,
+)
 from walkerlab.scene.rigid import rigid_walker
+from walkerlab.scene.walk_outcomes import Pads, describe_endings
 from walkerlab.solvers.system import Floats
 from walkerlab.stages.numerical_error import evenly_spread, tightened
 from walkerlab.stages.walk import OUTCOMES, count_outcomes
@@ -50,7 +57,7 @@ HALF_WIDTH = (0.15, 0.25, 0.25)  # of the default window, rad and sqrt(g/L)
 SAMPLE = 100  # cells whose walks are repeated
 DRAWN = 4_000  # starts of the search for attractors
 SIGMAS = 3.0  # of the Gaussian window, from its middle to the box's sides
-FAILED = NONE - 1  # class of a cell that does not walk
+FAILED = UNREACHED - 1  # class of a cell that does not walk
 UNITS = ("rad", "rad/s", "rad/s")
 TEXTS = ("angle of the stance leg", "angular velocity of the swing leg", "angular velocity of the stance leg")
 
@@ -96,10 +103,10 @@ def run(
     said = summary(config.basin, window, found, walking.reshape(window.cells), reached, aperiodic)
     pads = None
     if isinstance(question, ContactQuestion):
-        pads = Pads((question.scene.pitch_m, question.scene.pitch_m), laid=str(with_contact(config).pad_pitch))
+        pads = Pads((question.scene.pitch_m, question.scene.pitch_m), laid=str(require_contact(config).pad_pitch))
     said |= {
         "numerical_error": sample_again(question, window, found),
-        "endings": endings(said["outcomes"], config, config.basin.model == "contact", pads),
+        "endings": describe_endings(said["outcomes"], config, config.basin.model == "contact", pads),
         "edge_cells": int(edges.size),
         **margin_of(config, window, found, gait),
         **rate,
@@ -137,7 +144,7 @@ def question_of(config: BasinConfig, inputs: Mapping[str, Content], window: Wind
     walker = unit if legs is None else legs
     scale = (1.0, units.time, units.time)
     generator = np.random.default_rng(config.seed)
-    drawn = np.concatenate([np.array([window.rest]), window.drawn(DRAWN, generator)])
+    drawn = np.concatenate([np.array([window.rest]), window.draw(DRAWN, generator)])
     attractors = find_attractors(walker, drawn * np.array(scale), config.seed)
     question = RigidQuestion(walker, scale, attractors, config.basin.steps)
     one_by_one = replace(question, cells_at_once=500, edges_at_once=50, shared_from=10_000)
@@ -170,7 +177,7 @@ def group_of(settings: Basin, window: Window, found: WalkEnds, walking: Floats) 
     def over(values: Any, text: str) -> Variable:
         return Variable(np.ascontiguousarray(values).reshape(window.cells), dims, "1", text)
 
-    settled = np.where(found.attractor == NONE, 0, found.steps)
+    settled = np.where(found.attractor == UNREACHED, 0, found.steps)
     variables |= {
         "outcome": over(found.outcome, "how the walk ended, see attribute outcomes"),
         "attractor": over(found.attractor, "number of the attractor that was reached; -1 for none"),
@@ -189,7 +196,7 @@ def attractors_of(question: Question, rigid: Standing) -> list[dict[str, Any]]:
         return [] if own is None else [{"period": 1, "period_s": own[0], "step_length_m": own[1]}]
     rows = []
     for cycle in question.attractors.cycles:
-        state = on_section(rigid, tuple((cycle.points[0] / np.array(question.scale)).tolist()))
+        state = state_on_section(rigid, tuple((cycle.points[0] / np.array(question.scale)).tolist()))
         rows.append({"period": cycle.period, "state": list(state), "reached_within": cycle.reach})
     return rows
 
@@ -217,7 +224,7 @@ def summary(
         "outcomes": count_outcomes(found.outcome),
         "attractors": attractors,
         "aperiodic": aperiodic,
-        "unsettled_cells": int(np.count_nonzero(walked & (found.attractor == NONE))),
+        "unsettled_cells": int(np.count_nonzero(walked & (found.attractor == UNREACHED))),
         "steps_wanted": settings.steps if settings.model == "rigid" else settings.contact_steps,
     }
 
@@ -262,7 +269,7 @@ class RigidQuestion:
     def walked(self, z: Floats) -> WalkEnds:
         """Walk from section coordinates z (n, 3), SI."""
         scaled = z * np.array(self.scale)
-        return arrivals(self.walker, self.attractors, scaled, self.steps, tolerances=self.tolerances)
+        return walk_to_attractor(self.walker, self.attractors, scaled, self.steps, tolerances=self.tolerances)
 
     def tightened(self) -> RigidQuestion:
         """The same at a hundred times tighter tolerances."""
@@ -288,10 +295,10 @@ class ContactQuestion:
 
     def walk(self, z: tuple[float, float, float]) -> tuple[int, int, int]:
         """Return outcome, attractor and steps of one walk."""
-        state = on_section(self.rigid, z)
-        walk = self.starts.walked_from(start_state(self.scene, state))
-        settled = self.starts.settled_after(walk) if walk.outcome is Outcome.WALKED else None
-        return (walk.outcome, NONE, walk.touch_time_s.size) if settled is None else (walk.outcome, 0, settled)
+        state = state_on_section(self.rigid, z)
+        walk = self.starts.walk_from(start_state(self.scene, state))
+        settled = self.starts.settling_steps(walk) if walk.outcome is Outcome.WALKED else None
+        return (walk.outcome, UNREACHED, walk.touch_time_s.size) if settled is None else (walk.outcome, 0, settled)
 
     def tightened(self) -> ContactQuestion:
         """The same at a hundred times tighter tolerances."""
@@ -317,7 +324,7 @@ def ends_of(question: Question, window: Window, cells: Sequence[int]) -> list[fl
 
 def shares_of(question: Question, window: Window, refine: int, cells: Sequence[int]) -> list[float]:
     """Return the walking share of each cell, from the middles of its subcells."""
-    inside = inside_cell(refine, len(window.axes))
+    inside = subcell_centres(refine, len(window.axes))
     found = question.walked(window.starts(np.repeat(cells, len(inside)), np.tile(inside, (len(cells), 1))))
     walking = (found.outcome == Outcome.WALKED).reshape(len(cells), -1)
     return [float(share) for share in walking.mean(axis=1)]

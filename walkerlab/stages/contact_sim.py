@@ -20,14 +20,14 @@ from walkerlab.scene.contact import (
     SAMPLES_PER_PENDULUM_TIME,
     ContactScene,
     contact_scene,
+    require_contact,
     scene_measures,
     scene_on_pads,
     start_state,
     tolerances_of,
-    with_contact,
 )
 from walkerlab.scene.footholds import foothold_heights
-from walkerlab.scene.left_out import of_contact_walk
+from walkerlab.scene.omissions import contact_walk_omissions
 from walkerlab.solvers.registry import Tolerances
 from walkerlab.solvers.system import Floats
 from walkerlab.stages.walk import content_of_walk, legs, numbers_of, over_time, pace_of, rigid_start, steps_of, turning
@@ -87,7 +87,7 @@ def tell_unresolved_slip(atol: float, scene: ContactScene, progress: Progress) -
 
 def summary(config: ContactSimConfig, scene: ContactScene, walk: ContactWalkResult) -> dict[str, Any]:
     """Summarise the walk."""
-    scuffed = with_contact(config).terrain == "plane" and walk.outcome.stumbled and not scene.walker.kneed
+    scuffed = require_contact(config).terrain == "plane" and walk.outcome.stumbled and not scene.walker.kneed
     strikes = walk.knee_strike_time_s
     return {
         **numbers_of(walk),
@@ -107,7 +107,7 @@ def summary(config: ContactSimConfig, scene: ContactScene, walk: ContactWalkResu
         "jacobians": walk.work.jacobians,
         "slope_rad": scene.walker.slope,
         **scene_measures(scene),
-        "left_out": list(of_contact_walk(config)),
+        "left_out": list(contact_walk_omissions(config)),
     }
 
 

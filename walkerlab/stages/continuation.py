@@ -14,20 +14,20 @@ from walkerlab.config.continuation import Span
 from walkerlab.config.reads import ContactConfig, ContinuationConfig
 from walkerlab.config.walkers import contact_required_error
 from walkerlab.errors import ConfigError, NoAnswer
-from walkerlab.orbits.attractors import feigenbaum_ratios, may_part
+from walkerlab.orbits.attractors import feigenbaum_ratios, may_diverge
 from walkerlab.orbits.bifurcations import Bifurcation
 from walkerlab.orbits.families import Crossing, GaitBranch, Seed, ValueSpan, steps_word
 from walkerlab.orbits.family_search import CONTACT, RIGID, THOROUGHNESS, Family, FamilySearch
 from walkerlab.orbits.fixed_point import find_gaits
 from walkerlab.orbits.newton import Effort
-from walkerlab.orbits.plane import Plane
 from walkerlab.orbits.step_map import Cycle, StepMap, gait_near
+from walkerlab.orbits.two_parameters import Plane
 from walkerlab.outcome import outcome_of
 from walkerlab.pipeline.progress import Progress
-from walkerlab.scene.endings import causes, without_pads
-from walkerlab.scene.families import contact_map, differs, not_read, rigid_map, rigid_walkers
+from walkerlab.scene.families import contact_map, model_differs, rigid_map, rigid_walkers, unused_key_error
 from walkerlab.scene.parameter import Parameter, parameter_of
 from walkerlab.scene.rigid import rigid_walker
+from walkerlab.scene.walk_outcomes import ground_causes, without_pads
 from walkerlab.stages.family_groups import groups
 from walkerlab.stages.numerical_error import SAMPLE, USUAL, evenly_spread, tightened
 from walkerlab.store.content import Content
@@ -73,13 +73,13 @@ class FamilyQuestion:
 
     def touches(self, model: str) -> bool:
         """Whether a model changes over the span."""
-        return differs(model, self.config, self.parameter, (self.span.least, self.span.most))
+        return model_differs(model, self.config, self.parameter, (self.span.least, self.span.most))
 
     def touched(self, key: str) -> tuple[str, ...]:
         """Return the requested models that the parameter affects; raises ConfigError if there is none."""
         touched = tuple(model for model in self.models if self.touches(model))
         if not touched:
-            raise not_read(f"continuation.{key}", self.parameter.key, self.models)
+            raise unused_key_error(f"continuation.{key}", self.parameter.key, self.models)
         return touched
 
 
@@ -192,7 +192,7 @@ def contact_seeds(asked: FamilyQuestion, progress: Progress) -> Begun | None:
         map_of = partial(
             contact_map, parameter=asked.parameter, scale=asked.span.size, step_length_m=found.gait.step.length_m
         )
-        return [Seed(map_of(asked.config).of_section(found.gait.z), value)], map_of
+        return [Seed(map_of(asked.config).scale_section(found.gait.z), value)], map_of
     return None
 
 
@@ -313,7 +313,7 @@ def ending_rows(family: Family, parameter: Parameter, config: ContactConfig) -> 
         for end in branch.ends:
             outcome = end.reason.partition(":")[0]
             if outcome_of(outcome) is not None:
-                why = causes(outcome, config, family.model == CONTACT)
+                why = ground_causes(outcome, config, family.model == CONTACT)
                 said = " ".join([f"At {end.value:.5g} {parameter.unit} {gait} ends ({end.reason}).", *why])
                 yield {"period": branch.period, "value": end.value, "outcome": outcome, "said": said}
         for crossing in branch.crossings:
@@ -377,7 +377,7 @@ def attractor_summary(family: Family) -> dict[str, Any]:
         one.value
         for one in attractors.found
         if one.period == 0
-        and may_part(exponents, one.value)
+        and may_diverge(exponents, one.value)
         and not any(min(pair) <= one.value <= max(pair) for pair in periodic)
     ]
     return {

@@ -14,17 +14,25 @@ from walkerlab.config.schema import Config
 from walkerlab.config.walkers import contact_required_error
 from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.labels import Label
-from walkerlab.orbits.design import ON_BOUND, Aim, Descent, Point, optima, searched, sought
+from walkerlab.orbits.design import (
+    BOUND_TOLERANCE,
+    DesignProblem,
+    DesignSearch,
+    Point,
+    count_optima,
+    minimise,
+    search_from_starts,
+)
 from walkerlab.orbits.fixed_point import find_gaits
-from walkerlab.orbits.gradients import gait_numbers
+from walkerlab.orbits.gradients import gait_quantities
 from walkerlab.orbits.newton import Effort, NotConverged
-from walkerlab.orbits.robustness import Standpoint
+from walkerlab.orbits.robustness import GaitOnMap
 from walkerlab.orbits.step_map import gait_near, multipliers_of
 from walkerlab.pipeline.progress import Progress
-from walkerlab.scene.families import not_read, reads
+from walkerlab.scene.families import model_reads, unused_key_error
 from walkerlab.scene.parameter import Parameter, parameter_of
 from walkerlab.scene.rigid import rigid_walker
-from walkerlab.scene.subject import Subject, section_coordinates, subject_of
+from walkerlab.scene.subject import ModelUnderTest, find_model_gait, section_coordinates
 from walkerlab.solvers.system import Floats
 from walkerlab.store.checkpoint import Checkpoint
 from walkerlab.store.columns import rows_group
@@ -53,12 +61,12 @@ def run(config: DesignConfig, inputs: Mapping[str, Content], progress: Progress,
     gaits = Gaits(config, asked, parameters, inputs["fixedpoint"].summary, progress)
     lower, upper = np.array(list(asked.over.values()), float).T
     keep = {name: (bounds[0], bounds[1]) for name, bounds in asked.keep.items()}
-    question = Aim(quantity, -1.0 if asked.maximise else 1.0, lower, upper, keep, gaits.at)
+    question = DesignProblem(quantity, -1.0 if asked.maximise else 1.0, lower, upper, keep, gaits.at)
     own = np.array([parameter.value_in(config) for parameter in parameters])
     progress.start("design")
     begun, own_z = gaits.at(own), gaits.z
 
-    def search(number: int, start: Floats) -> Descent:
+    def search(number: int, start: Floats) -> DesignSearch:
         progress.start(f"design: search {number + 1} of {asked.starts}")
         name, before, gaits.z = f"search {number}", gaits.counts.copy(), own_z
         if name in checkpoint.kept:
@@ -66,19 +74,19 @@ def run(config: DesignConfig, inputs: Mapping[str, Content], progress: Progress,
             counts, gradient_norm, x, gaits.z = np.split(kept, (2, 3, 3 + own.size))
             point = gaits.at(x)
             gaits.counts = before + counts.astype(int)
-            return Descent(x, point, float(gradient_norm[0]))
-        one = sought(question, start)
+            return DesignSearch(x, point, float(gradient_norm[0]))
+        one = minimise(question, start)
         if one.point is not None:
             z = gaits.found[one.x.tobytes()]
             checkpoint.keep(name, [*(gaits.counts - before).tolist(), one.gradient_norm, *one.x.tolist(), *z.tolist()])
         return one
 
-    searches = searched(question, own, asked.starts, config.seed, search)
+    searches = search_from_starts(question, own, asked.starts, config.seed, search)
     if not searches or searches[0].point is None:
         raise NoAnswer(f"no gait of the {asked.model} model within the bounds", ADVICE)
     best = searches[0]
     assert best.point is not None
-    ends = optima(question, searches)
+    ends = count_optima(question, searches)
     start = {} if begun is None else {"start_value": begun.numbers[quantity], "start": dict(begun.numbers)}
     found = {
         key: float(f"{value:.12g}") for key, value in zip(asked.over, best.x, strict=True)
@@ -125,8 +133,8 @@ def refuse(config: DesignConfig) -> None:
         raise contact_required_error("design.model: contact", config.walker, "Add one.")
     parameters = [parameter_of(key, config, ("design", "over")) for key in asked.over]
     for key in asked.over:
-        if not reads(asked.model, config, key):
-            raise not_read("design.over", key, (asked.model,))
+        if not model_reads(asked.model, config, key):
+            raise unused_key_error("design.over", key, (asked.model,))
     own, bounds = [parameter.value_in(config) for parameter in parameters], list(asked.over.values())
     corners = np.column_stack((own, bounds)).T
     for place, parameter in enumerate(parameters):
@@ -149,7 +157,9 @@ def config_with(config: DesignConfig, parameters: Sequence[Parameter], x: Floats
 def on_bound(asked: Design, x: Floats) -> list[str]:
     """Return the keys whose optimum lies on a bound."""
     pairs = zip(asked.over.items(), x.tolist(), strict=True)
-    return [key for (key, (low, high)), value in pairs if min(value - low, high - value) < ON_BOUND * (high - low)]
+    return [
+        key for (key, (low, high)), value in pairs if min(value - low, high - value) < BOUND_TOLERANCE * (high - low)
+    ]
 
 
 class Gaits:
@@ -169,7 +179,7 @@ class Gaits:
         self.counts = np.zeros(2, int)  # evaluations, and those without a gait
         self.found: dict[bytes, Floats] = {}  # section coordinates of gaits, by parameter values
         self.length = float(gait["step_length_m"])
-        self.z = subject_of(asked.model, config, gait, progress.note).z
+        self.z = find_model_gait(asked.model, config, gait, progress.note).z
 
     def at(self, x: Floats) -> Point | None:
         """Return the gait; None if there is none or the config rejects the values."""
@@ -185,7 +195,7 @@ class Gaits:
 
     def gait_of(self, config: Config) -> Point | None:
         """Find the gait of a config near the last one, or by a search."""
-        subject = Subject(self.model, config, self.z, self.length)
+        subject = ModelUnderTest(self.model, config, self.z, self.length)
         here = subject.at()
         found = self.near(here, self.z)
         if self.model == "rigid" and (found is None or found[1]["spectral_radius"] >= 1.0):  # a long way, perhaps
@@ -205,11 +215,11 @@ class Gaits:
         apart = float(others[-1] - others[-2]) if others.size > 1 else 1.0
         return Point(numbers, {name: np.array([one[name] for one in by_key]) for name in self.wanted}, apart)
 
-    def near(self, at: Standpoint, z: Floats) -> tuple[Standpoint, dict[str, float]] | None:
+    def near(self, at: GaitOnMap, z: Floats) -> tuple[GaitOnMap, dict[str, float]] | None:
         """Find the gait near z (d,) with its quantities; None if one is undefined."""
         cycle = gait_near(at.step_map, z, at.p, SOLVED)
         if isinstance(cycle, NotConverged):
             return None
         here = at._replace(z=cycle.z, A=cycle.DP)
-        numbers = gait_numbers(here, self.wanted)
+        numbers = gait_quantities(here, self.wanted)
         return None if numbers is None or any(name not in numbers for name in self.wanted) else (here, numbers)

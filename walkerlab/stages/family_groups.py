@@ -15,10 +15,10 @@ from walkerlab.config.schema import Output
 from walkerlab.labels import Label
 from walkerlab.orbits.families import GaitBranch
 from walkerlab.orbits.family_search import RIGID, Family
-from walkerlab.orbits.plane import BifurcationCurve, Regions
-from walkerlab.orbits.shooting import on_section
+from walkerlab.orbits.rigid_map import state_on_section
 from walkerlab.orbits.similarity import unit_walker
 from walkerlab.orbits.step_map import Cycle, Monitor
+from walkerlab.orbits.two_parameters import BifurcationCurve, Regions
 from walkerlab.scene.parameter import Parameter
 from walkerlab.scene.rigid import rigid_scene
 from walkerlab.solvers.registry import ENDLESS, Tolerances
@@ -185,7 +185,7 @@ def motion(point: Cycle, period: int, config: ContactConfig, parameter: Paramete
         return
     scene = rigid_scene(changed, Footholds(), ALL_OUTPUTS)
     unit, units = unit_walker(scene.walker)
-    section, n = on_section(unit, point.z), len(scene.walker.arm_x)
+    section, n = state_on_section(unit, point.z), len(scene.walker.arm_x)
     start = (*section[:n], *(rate / units.time for rate in section[n:]))
     steps = max(period, STRIDE)
     walk = scene.walk(start, steps, TOLERANCES, sampled=True)

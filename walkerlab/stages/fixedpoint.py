@@ -11,7 +11,7 @@ from walkerlab.errors import NoAnswer
 from walkerlab.labels import Label
 from walkerlab.orbits.fixed_point import GaitSearch, RigidGait, find_gaits
 from walkerlab.pipeline.progress import Progress, track
-from walkerlab.scene.rigid import coordinates, rigid_walker
+from walkerlab.scene.rigid import rigid_walker, state_names
 from walkerlab.scene.studies import equation_sets
 from walkerlab.store.columns import real_and_imaginary, rows_group, values_by_column
 from walkerlab.store.content import Content, Group, Variable
@@ -62,7 +62,7 @@ def run(config: FixedPointConfig, _inputs: Mapping[str, Content], progress: Prog
 def advice(config: RigidConfig) -> str:
     """Advise on a slope without a gait."""
     walk_anyway = (
-        f"to walk there all the same, give a start state (start: [{', '.join(coordinates(config))}]), and the "
+        f"to walk there all the same, give a start state (start: [{', '.join(state_names(config))}]), and the "
         "contact model a pitch of its pads (contact.pad_pitch: a number)"
     )
     drives = "push_off.impulse_N_s or walker.hip.torque_N_m"
@@ -90,13 +90,13 @@ def summary(config: RigidConfig, searches: Mapping[str, GaitSearch]) -> dict[str
             "gaits_found": len(gaits),
             "gaits": gaits,
             "reason": search.reason,
-            "sought": search.sought,
+            "sought": search.method,
             "random_starts": search.random_starts,
             "random_hits": list(search.random_hits),
             "lost": list(search.lost),
         }
     driven = {"driven_by": list(drives_of(config)), "springs": list(springs_of(config))}
-    return {**sets[config.equations], **driven, "state_names": list(coordinates(config)), "equation_sets": sets}
+    return {**sets[config.equations], **driven, "state_names": list(state_names(config)), "equation_sets": sets}
 
 
 def numbers_of(gait: RigidGait) -> dict[str, Label]:
@@ -124,7 +124,7 @@ def gaits_group(search: GaitSearch, config: RigidConfig) -> Group:
     variables = {
         **rows_group(gaits, {"state": STATE, **numbers_of(gaits[0])}, GAIT, "gait, shortest period first").variables,
         **real_and_imaginary("multiplier", multipliers, (GAIT, "multiplier"), "multiplier"),
-        "coordinate": Variable(np.array(coordinates(config)), ("coordinate",), "", "coordinate of the state"),
+        "coordinate": Variable(np.array(state_names(config)), ("coordinate",), "", "coordinate of the state"),
         "random_hits": Variable(np.array(search.random_hits), (GAIT,), "1", "random starting values that led here"),
         "found_by": Variable(found_by, (GAIT,), "", "searches that led here"),
         "objections": Variable(objections, (GAIT,), "", "why the gait cannot be walked"),

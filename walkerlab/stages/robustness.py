@@ -21,23 +21,23 @@ from walkerlab.hybrid.recorded_walk import as_state
 from walkerlab.hybrid.walk_record import rough_heights
 from walkerlab.labels import Label
 from walkerlab.orbits.family_search import CONTACT, RIGID
-from walkerlab.orbits.gradients import QUANTITIES, Gradient, gait_numbers, relative
+from walkerlab.orbits.gradients import GAIT_QUANTITIES, Gradient, gait_quantities, relative_gradient
+from walkerlab.orbits.rigid_map import EXACT_STEPS, RigidMap
 from walkerlab.orbits.robustness import (
     DISTURBANCES,
     INDICATORS,
-    Standpoint,
+    GaitOnMap,
     largest_disturbance,
     rough_walks,
     sensitivity,
     steps_on_rough_ground,
 )
-from walkerlab.orbits.shooting import EXACT, RigidMap
 from walkerlab.pipeline.progress import Progress, track
 from walkerlab.pipeline.work import WorkUnit, complete
-from walkerlab.scene.families import not_read, reads
+from walkerlab.scene.families import model_reads, unused_key_error
 from walkerlab.scene.parameter import SLOPE, SLOPE_DEG, SLOPE_RAD, parameter_of, why_no_parameter
 from walkerlab.scene.rigid import rigid_scene
-from walkerlab.scene.subject import Subject, subject_of
+from walkerlab.scene.subject import ModelUnderTest, find_model_gait
 from walkerlab.solvers.system import Floats
 from walkerlab.stages.rigid_groups import groups as groups_of_walk
 from walkerlab.store.checkpoint import Checkpoint
@@ -119,7 +119,7 @@ def run(
         here = subject.at()
         # the rigid model's gradients and largest disturbances are faster than starting a process
         jobs_but_for_walks = jobs if subject.model == CONTACT else 1
-        numbers = gait_numbers(here)
+        numbers = gait_quantities(here)
         assert numbers is not None, "a gait that was found walks"
         found["gaits"].append({"model": subject.model, **numbers})
         found["sensitivity"] += sensitivities(subject, config.robustness.to, numbers, progress, jobs_but_for_walks)
@@ -160,8 +160,8 @@ def refuse(config: RobustnessConfig) -> None:
         raise contact_required_error(f"robustness.model: {asked.model}", config.walker, "Add one, or ask for rigid.")
     for place, key in enumerate(asked.to):
         parameter_of(key, config, ("robustness", "to", place))
-        if not any(reads(model, config, key) for model in models_of(config)):
-            raise not_read("robustness.to", key, models_of(config))
+        if not any(model_reads(model, config, key) for model in models_of(config)):
+            raise unused_key_error("robustness.to", key, models_of(config))
     half = 0.5 * config.walker.leg_length_m
     for roughness in asked.roughness_m:
         if roughness > half:
@@ -171,12 +171,12 @@ def refuse(config: RobustnessConfig) -> None:
             )
 
 
-def subjects(config: RobustnessConfig, inputs: Mapping[str, Content], progress: Progress) -> Iterator[Subject]:
+def subjects(config: RobustnessConfig, inputs: Mapping[str, Content], progress: Progress) -> Iterator[ModelUnderTest]:
     """Return the requested models with their gaits."""
     progress.start("robustness: gaits")
     gait = inputs["fixedpoint"].summary
     for model in models_of(config):
-        yield subject_of(model, config, gait, progress.note)
+        yield find_model_gait(model, config, gait, progress.note)
 
 
 def models_of(config: RobustnessConfig) -> tuple[str, ...]:
@@ -185,7 +185,7 @@ def models_of(config: RobustnessConfig) -> tuple[str, ...]:
     return (RIGID, CONTACT) if asked == "both" else (asked,)
 
 
-def norms(model: str, here: Standpoint) -> Iterator[dict[str, Any]]:
+def norms(model: str, here: GaitOnMap) -> Iterator[dict[str, Any]]:
     """Return rows of sensitivity norms, one for each disturbance and indicator."""
     for disturbance in DISTURBANCES:
         answer, units, of = sensitivity(here, disturbance), here.units, UNITS[disturbance]
@@ -205,7 +205,7 @@ def norms(model: str, here: Standpoint) -> Iterator[dict[str, Any]]:
             }
 
 
-def single(subject: Subject, config: RobustnessConfig) -> Iterator[WorkUnit]:
+def single(subject: ModelUnderTest, config: RobustnessConfig) -> Iterator[WorkUnit]:
     """Return the searches for the largest drop and push of either sign."""
     for disturbance in DISTURBANCES:
         for sign in (1.0, -1.0):
@@ -213,7 +213,7 @@ def single(subject: Subject, config: RobustnessConfig) -> Iterator[WorkUnit]:
             yield WorkUnit(f"{subject.model} {disturbance} {sign:g}", 1, run)
 
 
-def single_of(subject: Subject, disturbance: Any, sign: float, steps: int) -> list[float]:
+def single_of(subject: ModelUnderTest, disturbance: Any, sign: float, steps: int) -> list[float]:
     """Find the largest disturbance of a sign; after a push also the ground reactions, as `GIVEN` names them."""
     size = largest_disturbance(subject.at(exact=False), disturbance, sign, steps)
     if disturbance == "hip-push" and isinstance(rigid := subject.at().step_map, RigidMap):
@@ -221,7 +221,7 @@ def single_of(subject: Subject, disturbance: Any, sign: float, steps: int) -> li
     return [size]
 
 
-def rough(subject: Subject, config: RobustnessConfig) -> Iterator[WorkUnit]:
+def rough(subject: ModelUnderTest, config: RobustnessConfig) -> Iterator[WorkUnit]:
     """Iterate over batches of walks on rough ground."""
     asked, most = config.robustness, cap(subject.model, config)
     for roughness in asked.roughness_m:
@@ -236,7 +236,7 @@ def cap(model: str, config: RobustnessConfig) -> int:
     return min(config.robustness.max_steps, max(1, MAX_STEPS[model] // config.robustness.walks))
 
 
-def rough_of(subject: Subject, roughness: float, seed: int, walks: range, most: int) -> list[float]:
+def rough_of(subject: ModelUnderTest, roughness: float, seed: int, walks: range, most: int) -> list[float]:
     """Count steps of some walks; each has its own ground, independent of the process."""
     here = subject.at(exact=False)
     return [float(steps_on_rough_ground(here, roughness, (seed, walk), most)) for walk in walks]
@@ -262,7 +262,7 @@ def rough_walk(config: RobustnessConfig, inputs: Mapping[str, Content]) -> dict[
     _, *heights = rough_heights(max(config.robustness.roughness_m), (config.seed, 0), STEPS_DRAWN).tolist()
     scene = rigid_scene(config, Footholds(heights_m=tuple(heights)), ("states",))
     walk = scene.walk(
-        as_state(gait["state"]), STEPS_DRAWN, EXACT, sampled=True, step_length=float(gait["step_length_m"])
+        as_state(gait["state"]), STEPS_DRAWN, EXACT_STEPS, sampled=True, step_length=float(gait["step_length_m"])
     )
     return {f"rough_walk/{name}": group for name, group in groups_of_walk(scene, walk).items()}
 
@@ -278,7 +278,7 @@ def rough_rows(model: str, config: RobustnessConfig, steps: Floats) -> Rows:
 
 
 def sensitivities(
-    subject: Subject, wanted: tuple[str, ...], numbers: Mapping[str, float], progress: Progress, jobs: int
+    subject: ModelUnderTest, wanted: tuple[str, ...], numbers: Mapping[str, float], progress: Progress, jobs: int
 ) -> Rows:
     """Return rows of derivatives by decreasing relative effect; parameters that are 0 come last."""
     keys = numbers_read(subject, wanted)
@@ -289,10 +289,12 @@ def sensitivities(
         value = parameter.value_in(subject.config)
         for name, gradient in (of_key or dict.fromkeys(numbers, NONE_BESIDE)).items():
             if name in numbers:
-                share = None if gradient.value is None else relative(gradient.value, value, numbers[name])
+                share = None if gradient.value is None else relative_gradient(gradient.value, value, numbers[name])
                 told = {} if gradient.value is None else {"error": float(gradient.error or 0.0)}
                 told |= {} if share is None else {"relative": share}
-                unit = QUANTITIES[name] if parameter.unit == "1" else f"{QUANTITIES[name]} per {parameter.unit}"
+                unit = (
+                    GAIT_QUANTITIES[name] if parameter.unit == "1" else f"{GAIT_QUANTITIES[name]} per {parameter.unit}"
+                )
                 rows.append(
                     {"model": subject.model, "of": name, "to": key, "value": gradient.value, "unit": unit, **told}
                     | ({"why": gradient.why} if gradient.why else {})
@@ -300,17 +302,17 @@ def sensitivities(
     return sorted(rows, key=lambda row: (row["value"] is None, "relative" not in row, -abs(row.get("relative", 0.0))))
 
 
-def gradients_of(subject: Subject, key: str) -> dict[str, Gradient]:
+def gradients_of(subject: ModelUnderTest, key: str) -> dict[str, Gradient]:
     """Return derivatives by one key; a passive walker's cost of transport is the sine of the slope."""
     known = () if drives_of(subject.config) else ("cost_of_transport",)
-    wanted = [name for name in QUANTITIES if name not in known]
+    wanted = [name for name in GAIT_QUANTITIES if name not in known]
     return subject.gradients(parameter_of(key, subject.config), wanted)
 
 
-def numbers_read(subject: Subject, wanted: tuple[str, ...] = ()) -> tuple[str, ...]:
+def numbers_read(subject: ModelUnderTest, wanted: tuple[str, ...] = ()) -> tuple[str, ...]:
     """Return the requested parameters, or all, that the model reads, by dotted key."""
     own = {".".join(path): field for path, field in leaves(Config, held=subject.config)}
     in_degrees = slope_in_degrees(subject.config.slope_rad) is not None
     written = {SLOPE_RAD: SLOPE_DEG} if in_degrees else {}
     every = (written.get(key, key) for key in own if not why_no_parameter(key, subject.config, own))
-    return tuple(key for key in wanted or every if reads(subject.model, subject.config, key))
+    return tuple(key for key in wanted or every if model_reads(subject.model, subject.config, key))

@@ -7,7 +7,7 @@ from typing import Any
 from walkerlab.config.reads import SimulateConfig
 from walkerlab.hybrid.recorded_walk import RigidWalkResult
 from walkerlab.pipeline.progress import Progress
-from walkerlab.scene.left_out import of_rigid_walk
+from walkerlab.scene.omissions import rigid_walk_omissions
 from walkerlab.scene.rigid import rigid_scene
 from walkerlab.solvers.registry import ENDLESS, Tolerances
 from walkerlab.stages.rigid_groups import groups
@@ -50,5 +50,5 @@ def summary(config: SimulateConfig, walk: RigidWalkResult) -> dict[str, Any]:
         "objections": list(walk.objections),
         "equations": config.equations,
         "slope_rad": config.slope_rad,
-        "left_out": list(of_rigid_walk(config)),
+        "left_out": list(rigid_walk_omissions(config)),
     }

@@ -13,7 +13,7 @@ from walkerlab.config.schema import Config
 from walkerlab.labels import ERROR_OF_EACH_STEP, in_words, unit_by_name
 from walkerlab.pipeline.headlines import LAST_OF, headlines
 from walkerlab.report.tables import csv_text
-from walkerlab.scene.endings import Pads, endings
+from walkerlab.scene.walk_outcomes import Pads, describe_endings
 from walkerlab.solvers.system import Integers
 from walkerlab.store.artifact import InTurn
 from walkerlab.store.content import Content, Variable
@@ -164,7 +164,7 @@ class Merge:
             varied = PAD_PITCH in (axis.key for axis in question.axes)
             laid = "" if config.contact is None or varied else config.contact.pad_pitch
             pads = Pads(ends_of(pitch[off]), ends_of(steps) if steps.size else None, str(laid))
-        return endings(count_texts(outcomes), config, question.stage == CONTACT, pads)
+        return describe_endings(count_texts(outcomes), config, question.stage == CONTACT, pads)
 
     def numerical_error(self) -> dict[str, Any]:
         """The largest numerical errors of the walks that were taken again, how many those are, and of how many.

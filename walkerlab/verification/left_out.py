@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from walkerlab.scene.left_out import Entry, left_out
+from walkerlab.scene.omissions import Entry, omission
 from walkerlab.scene.studies import is_studied
 
 if TYPE_CHECKING:
@@ -16,10 +16,10 @@ def of_verification(config: CompassCasesConfig | SceneCasesConfig) -> tuple[Entr
     if is_studied(config):
         return ()
     return (
-        left_out(
+        omission(
             "the named extreme cases",
             "they are cases of the paper's compass; this walker has cases of its own",
             "about a hundred cases",
         ),
-        left_out("ordinary methods on the extreme cases", "they are tested on the paper's compass", "8 runs per case"),
+        omission("ordinary methods on the extreme cases", "they are tested on the paper's compass", "8 runs per case"),
     )

@@ -9,7 +9,7 @@ from walkerlab.report.numbers import count
 from walkerlab.report.results import Results
 from walkerlab.report.tables import Column, table
 from walkerlab.report.words import words
-from walkerlab.scene.left_out import LeftOut
+from walkerlab.scene.omissions import LeftOut
 
 TITLES = {
     PAPER: "Number by number: the paper and what is found here",

@@ -1,0 +1,139 @@
+"""Suggest changes that give a walker a gait: its feet ahead of its shanks, or another slope.
+
+A kneed walker is tried with its feet slightly ahead of the shanks, as in real machines. On a few slopes a gait is
+searched for, and its branch is followed over the slope.
+"""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from walkerlab.config.files import builtin_names
+from walkerlab.config.loader import load
+from walkerlab.config.schema import Config
+from walkerlab.config.walkers import Kneed
+from walkerlab.orbits.families import BranchFollower, GaitBranch, Seed, ValueSpan
+from walkerlab.orbits.fixed_point import RigidGait, SearchSettings, find_gaits
+from walkerlab.orbits.rigid_map import RigidMap, WalkerAt
+from walkerlab.scene.families import rigid_walkers
+from walkerlab.scene.parameter import SLOPE, Parameter
+from walkerlab.scene.rigid import rigid_walker
+
+SLOPE_FACTORS = (0.7, 1.5, 2.3, 0.35, 0.1)  # of the config's slope, in order of trial
+COMMON_SLOPES = (0.03, 0.12)  # rad: most walkers that have gaits have them here
+# rad: bounds of the steepest slope to follow gaits to
+MIN_FOLLOWED_TO, MAX_FOLLOWED_TO = 0.2, 0.35
+SUGGESTION_SEARCH = SearchSettings(random_starts=50, further_starts=100)
+SUGGESTION_POINTS = 60  # per branch
+INSET = 0.1  # from the end of a range, as a share of it
+FOOT_KEY = "foot_centre_ahead_m"
+FOOT_SHARES = (0.02, 0.03, 0.04, 0.05)  # in leg lengths
+
+
+@dataclass(frozen=True)
+class SlopeRange:
+    """A range of slopes with gaits, and the part of it where they are stable; None if nowhere."""
+
+    whole: tuple[float, float]
+    stable: tuple[float, float] | None
+
+    def nearest_slope(self, target: float) -> float:
+        """Return a slope slightly inside the nearer end of the range, of stable gaits if there are any."""
+        low, high = self.stable or self.whole
+        near, far = (low, high) if abs(low - target) < abs(high - target) else (high, low)
+        return near + INSET * (far - near)
+
+
+def find_slopes_with_gaits(config: Config) -> SlopeRange | None:
+    """Return the nearest range of slopes (rad) with gaits, stable ones first; None if none is found."""
+    own = config.slope_rad
+    span = ValueSpan(0.02 * own, min(MAX_FOLLOWED_TO, max(3.0 * own, MIN_FOLLOWED_TO)))
+    ranges: list[SlopeRange] = []
+    for value in (*(factor * own for factor in SLOPE_FACTORS), *COMMON_SLOPES):
+        if value in span and not any(candidate.stable for candidate in ranges):
+            ranges += walkable_ranges(follow(rigid_walkers(config, SLOPE), span, value))
+    return min(ranges, key=lambda r: (r.stable is None, distance(r.stable or r.whole, own)), default=None)
+
+
+def distance(span: tuple[float, float], value: float) -> float:
+    return max(span[0] - value, value - span[1], 0.0)
+
+
+def follow(walker_at: WalkerAt, span: ValueSpan, value: float) -> tuple[GaitBranch, ...]:
+    walker = walker_at(value)
+    if walker is None:
+        return ()
+    gaits = [gait for gait in find_gaits(walker, settings=SUGGESTION_SEARCH).gaits if not gait.objections]
+    follower = BranchFollower(RigidMap(walker_at, span.size, walker), span, most=SUGGESTION_POINTS)
+    return follower.family([Seed(np.array(gait.z), value) for gait in gaits], 1)
+
+
+def walkable_ranges(branches: tuple[GaitBranch, ...]) -> Iterator[SlopeRange]:
+    """Yield ranges of branches where the ground need not pull, and where gaits on them are stable."""
+    for branch in branches:
+        good = [point for point in branch.points if point.monitors[0] >= 0.0]
+        if len(good) < 2:
+            continue
+        values = [point.value for point in good]
+        whole = (min(values), max(values))
+        ranges = [(max(low, whole[0]), min(high, whole[1])) for low, high in branch.stable_ranges]
+        proper = [(low, high) for low, high in ranges if high > low]
+        yield SlopeRange(whole, max(proper, key=lambda ends: ends[1] - ends[0], default=None))
+
+
+def suggest_gaits(config: Config, typed: str = "") -> str:
+    """Describe where gaits exist near a config without one, with the commands that show them.
+
+    typed  command-line options that select the config, with a leading space
+    """
+    if config.slope_rad <= 0.0:
+        return ""
+    feet, slopes = find_gait_with_feet_ahead(config), find_slopes_with_gaits(config)
+    advice = []
+    if feet is not None:
+        ahead_m, gait = feet
+        description = "a stable gait" if gait.stable else "a gait, unstable"
+        command = f"`walkerlab fixedpoint{typed} --set walker.{FOOT_KEY}={ahead_m:.3g}`"
+        advice.append(f"With its feet {ahead_m:.3g} m ahead of the shanks this walker has {description}: {command}.")
+    if slopes is not None:
+        in_degrees = tuple(math.degrees(value) for value in slopes.stable or slopes.whole)
+        description = "A stable gait" if slopes.stable else "A gait, unstable,"
+        slope = slopes.nearest_slope(config.slope_rad)
+        setting = f"slope_rad={slope:.4g}" if "slope_rad=" in typed else f"slope_deg={math.degrees(slope):.3g}"
+        command = f"`walkerlab fixedpoint{typed} --set {setting}`"
+        advice.append(f"{description} exists from {in_degrees[0]:.3g} to {in_degrees[1]:.3g} deg: {command}.")
+    if not advice:
+        feet_tried = name_feet_tried(config)
+        advice.append(f"No gait was found on gentler or steeper slopes{feet_tried}.{suggest_walkers(config)}")
+    return " ".join(advice)
+
+
+def find_gait_with_feet_ahead(config: Config) -> tuple[float, RigidGait] | None:
+    """Return the most stable gait of a kneed walker with its feet ahead, and how far ahead (m); None without one."""
+    candidates = []
+    for ahead_m in feet_ahead(config):
+        walker = Parameter(f"walker.{FOOT_KEY}", "m", ("walker", FOOT_KEY)).over(config, rigid_walker)(ahead_m)
+        gaits = () if walker is None else find_gaits(walker, settings=SUGGESTION_SEARCH).gaits
+        candidates += [(ahead_m, gait) for gait in gaits if not gait.objections]
+    return min(candidates, key=lambda candidate: candidate[1].spectral_radius, default=None)
+
+
+def feet_ahead(config: Config) -> tuple[float, ...]:
+    if not isinstance(config.walker, Kneed):
+        return ()
+    return tuple(float(f"{share * config.walker.leg_length_m:.3g}") for share in FOOT_SHARES)
+
+
+def name_feet_tried(config: Config) -> str:
+    tried = feet_ahead(config)
+    return f", nor with feet {tried[0]:g} to {tried[-1]:g} m ahead of the shanks (walker.{FOOT_KEY})" if tried else ""
+
+
+def suggest_walkers(config: Config) -> str:
+    alike = [name for name in builtin_names() if load(Path(name)).config.walker.type == config.walker.type]
+    if not alike:
+        return ""
+    return f" Begin with a built-in walker of this type (`-c NAME`: {', '.join(alike)}) and change one key at a time."

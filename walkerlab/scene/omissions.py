@@ -1,0 +1,97 @@
+"""List what the scene of a config does not compute, why, and what that saves.
+
+The list follows from the config alone, so it is available before anything is loaded or run. scripts/benchmark.py
+measures the savings in time and bytes (docs/performance.md).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from walkerlab.config.reads import ContactSimConfig, RigidConfig, SimulateConfig
+    from walkerlab.config.schema import Output
+    from walkerlab.config.walkers import Walker
+
+# Reason why a figure drawn early lacks a result.
+STILL_COMPUTED = "still being computed"
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """Something that was not computed, why, and what that saves besides the work itself."""
+
+    what: str
+    why: str
+    saves: str = ""
+
+
+# `LeftOut` as stored in summaries.
+Entry = dict[str, str]
+RIGID_NUMBERS: Mapping[Output, int] = {"states": 10, "energies": 3, "forces": 4}
+# Values per sample of each output.
+CONTACT_NUMBERS: Mapping[Output, int] = {"states": 10, "energies": 8, "forces": 8}
+
+
+def rigid_walk_omissions(config: SimulateConfig) -> tuple[Entry, ...]:
+    return (stance_omission(config), *leg_omissions(config), *output_omissions(config.outputs, "rigid", RIGID_NUMBERS))
+
+
+def stance_omission(config: RigidConfig) -> Entry:
+    """Return the omission at the rigid stance foot: a compass pivots on a point, other walkers may roll."""
+    if config.walker.type == "compass":
+        return omission(
+            "floating base, stance contact and foot radius of the rigid walk",
+            "its stance foot is a hinge, its feet are points",
+            "4 of 8 equations, all contact code",
+        )
+    return omission(
+        "floating base and stance contact of the rigid walk",
+        "its stance foot turns on its point or rolls without slip",
+        "4 equations, all contact code",
+    )
+
+
+def contact_walk_omissions(config: ContactSimConfig) -> tuple[Entry, ...]:
+    contact = config.contact
+    omissions = [omission("force law of a foot out of reach", "no ground touches it", "one of two while a foot swings")]
+    if contact is not None and not contact.has_friction:
+        saved = "4 of the 9 event functions that a foot is watched by, and the friction law"
+        omissions.append(omission("tangential velocity and friction force", "contact.friction is none", saved))
+    if contact is not None and contact.stance == "pinned":
+        angles = count_step_angles(config.walker)
+        what, why = "floating base and stance contact in the first step", "contact.stance is pinned"
+        saved = f"4 of {2 * angles + 4} equations and both force laws in that step"
+        omissions.append(omission(what, f"{why}: {angles} angles suffice", saved))
+    if config.walker.foot_radius_m == 0.0:
+        saved = "nothing: a zero in their place takes no longer"
+        omissions.append(omission("terms of the feet's radius", "walker.foot_radius_m is 0", saved))
+    return (*omissions, *leg_omissions(config), *output_omissions(config.outputs, "contact", CONTACT_NUMBERS))
+
+
+def count_step_angles(walker: Walker) -> int:
+    """Return the number of angles during a step; with a compliant knee stop the stance shank has its own."""
+    from walkerlab.config.walkers import rigid_bodies  # late, to keep the command line's help fast
+
+    return rigid_bodies(walker) + int(walker.type == "kneed" and walker.knee.lock == "compliant")
+
+
+def leg_omissions(config: RigidConfig) -> Iterator[Entry]:
+    if getattr(config.walker, "leg_inertia_kg_m2", None) == 0.0:
+        saved = "nothing: it is summed into constants before anything runs"
+        yield omission("leg inertia", "walker.leg_inertia_kg_m2 is 0", saved)
+
+
+def output_omissions(wanted: tuple[Output, ...], model: str, numbers: Mapping[Output, int]) -> Iterator[Entry]:
+    for output, count in numbers.items():
+        if output not in wanted:
+            what, why = f"{output} of the {model} walk in time", f"outputs does not ask for {output}"
+            yield omission(what, why, f"{count} of {sum(numbers.values())} numbers a sample")
+    if not wanted:
+        yield omission(f"samples of the {model} walk", "outputs asks for nothing in time", "all states within steps")
+
+
+def omission(what: str, why: str, saves: str) -> Entry:
+    return {"what": what, "why": why, "saves": saves}

@@ -1,0 +1,79 @@
+"""Describe how walks ended and whether the ground is the cause: pads that end a walk do not limit the walker."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final
+
+from walkerlab.config.walkers import Kneed
+from walkerlab.outcome import TOLD, Outcome, outcome_of
+
+if TYPE_CHECKING:
+    from walkerlab.config.reads import ContactConfig
+
+# How the contact model's ground causes an outcome; pads are treated separately.
+GROUND_CAUSES: Final = {
+    "slid": "The ground's friction ends them: contact.static_friction, contact.dynamic_friction, "
+    "contact.stiction_velocity.",
+    "lifted-off": "The ground throws them off, or they start too fast: contact.stiffness, contact.damping.",
+}
+# Meaning of the values of `contact.pad_pitch`.
+PITCH_SOURCES: Final = {"rigid": ", the rigid gait's step length", "own": ", the contact gait's step length"}
+Range = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Pads:
+    """Pads on which walks ended."""
+
+    pitch_m: Range  # minimum and maximum over the walks, m
+    step_m: Range | None = None  # minimum and maximum length of their last steps, m; None if unknown
+    laid: str = ""  # the config's `contact.pad_pitch`, if all have the same
+
+
+def describe_endings(
+    outcomes: Mapping[str, int], config: ContactConfig, contact: bool, pads: Pads | None = None
+) -> list[dict[str, Any]]:
+    """Count and describe the walks that ended early, the most frequent outcome first.
+
+    outcomes  number of walks by outcome; other keys are ignored
+    contact   whether the contact model walked
+    pads      on which walks ended off-pad
+
+    Returns rows of `outcome`, `walks`, `of` (their total), `ground` (whether it is a cause) and `said` (the
+    description).
+    """
+    total = sum(walks for outcome, walks in outcomes.items() if outcome_of(outcome) is not None)
+    rows = []
+    for outcome, walks in sorted(outcomes.items(), key=lambda item: -item[1]):
+        ending = outcome_of(outcome)
+        if ending is not None and ending is not Outcome.WALKED:
+            why = ground_causes(outcome, config, contact, pads)
+            aside = "" if TOLD[ending].did == outcome else f" ({outcome})"
+            description = " ".join([f"{walks:,} of {total:,} walks {TOLD[ending].did}{aside}.", *why])
+            rows.append({"outcome": outcome, "walks": walks, "of": total, "ground": bool(why), "said": description})
+    return rows
+
+
+def ground_causes(outcome: str, config: ContactConfig, contact: bool, pads: Pads | None = None) -> list[str]:
+    if not contact or config.contact is None:
+        return []
+    if outcome != "off-pad":
+        return [GROUND_CAUSES[outcome]] if outcome in GROUND_CAUSES else []
+    sentences = ["The pads end them, not the walker."]
+    if pads is not None:
+        steps = "" if pads.step_m is None else f"; their last steps were {format_range(pads.step_m)} long"
+        sentences.append(f"The pads' pitch is {format_range(pads.pitch_m)}{PITCH_SOURCES.get(pads.laid, '')}{steps}.")
+    own = "" if config.contact.pad_pitch == "own" else " or contact.pad_pitch=own"
+    return [*sentences, f"Try {without_pads(config)}{own}."]
+
+
+def without_pads(config: ContactConfig) -> str:
+    """Return the setting for ground without pads; kneed legs clear a plane."""
+    return f"contact.terrain={'plane' if isinstance(config.walker, Kneed) else 'after-mid-swing'}"
+
+
+def format_range(lengths: Range) -> str:
+    least, most = (f"{length:.3g}" for length in lengths)
+    return f"{least} m" if least == most else f"{least} to {most} m"
