@@ -26,7 +26,7 @@ from kneed_walks import (
 from system_rates import gradient_of, rate_of
 
 from walkerlab.ground.compliant import KneeRules, contact_walker
-from walkerlab.ground.knees import lock
+from walkerlab.ground.knees import lock_knee
 from walkerlab.ground.normal_force import NormalLaw
 from walkerlab.ground.walker import LOCKED, RELEASED, STOPPING, feet_motion, on_ground
 from walkerlab.hybrid.contact_loop import walk_in_form
@@ -122,7 +122,7 @@ def test_a_lock_keeps_all_momentum_and_the_swing_legs_about_the_hip():
     """Momentum sums over the masses: of the whole, and of the leg whose knee locks about the hip that carries it."""
     scene = scene_of()
     state = (*BENT_STATE[:4], BENT_STATE[2], *BENT_STATE[5:])  # straight just now
-    after, lost, _ = lock(scene.walker.whole, scene.walker.forms[0, 3], state)
+    after, lost, _ = lock_knee(scene.walker.whole, scene.walker.forms[0, 3], state)
     before_points, after_points = masses_of(state), masses_of(after)
     assert after[10] == pytest.approx(after[8], abs=1e-14)
     np.testing.assert_allclose(after[:8], state[:8], atol=0.0)

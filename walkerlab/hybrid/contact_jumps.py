@@ -6,7 +6,7 @@ import numpy as np
 
 from walkerlab.account import KNEE_STOP, KNEE_STRIKES
 from walkerlab.ground.hinges import knee_energy
-from walkerlab.ground.knees import lock
+from walkerlab.ground.knees import lock_knee
 from walkerlab.ground.motion import motion_gradient
 from walkerlab.ground.walker import (
     OF_BODIES,
@@ -45,11 +45,12 @@ def change_form(
     whole = walker.forms[int(before.form.places == 0), 0]
     size = int(2 * (whole.places + whole.bodies))
     x = unfolded(before.form, y, size)
-    new, reset = x, np.eye(size)
     if event < EXTENSION and event % PER_FOOT == HEIGHT:  # a step's touch: the other leg stood before
         before = before._replace(progress=new_progress(stance=1 - after.progress.stance))
-    if EXTENSION <= event < PULSE_END:
-        new, lost, reset = lock(whole, after.form, x)
+    locks = EXTENSION <= event < PULSE_END
+    new = x
+    if locks:
+        new, lost, _ = lock_knee(whole, after.form, x)
         observer.account[KNEE_STRIKES] += lost
         if event >= EXTENSION_RATE:
             stopping = before.knee.copy()
@@ -69,7 +70,9 @@ def change_form(
             rate_after = np.zeros(size)
         for column, wait in zip(columns.T, waits, strict=True):
             shift_column(column, 0, rate, wait)
-            column[:] = reset @ column
+        if locks:
+            columns = lock_knee(whole, after.form, x, columns).columns
+        for column, wait in zip(columns.T, waits, strict=True):
             shift_column(column, 0, rate_after, -wait)
         Phi[: z.size] = folded(after.form, columns)
     return z
