@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from walkerlab.ground.normal_force import NormalLaw, elastic_energy, impact_normal_force
-from walkerlab.ground.walker import Form, half_size
+from walkerlab.ground.walker import FIRST_KNEE, Form, half_size
 from walkerlab.kernels import inlined
 from walkerlab.mechanics.hinges import HingeTorque, hinge_energy, hinge_torque
 from walkerlab.mechanics.impact import RootedTree, lock
@@ -18,32 +18,52 @@ class IdealLock(NamedTuple):
     """The knee is straight and locks at once: a plastic impact."""
 
 
+class KneeStop(NamedTuple):
+    """A stop by the IMPACT law that turns a knee back beyond straight."""
+
+    stiffness: float  # [k] N m/rad^e
+    exponent: float  # [e]
+    damping: float  # [c_max] N m s/rad
+    full_damping_angle: float  # [d_max] rad
+
+
+@inlined
+def impact_law(stop: KneeStop) -> NormalLaw:
+    """The IMPACT law with a stop's numbers: of rad and N m in place of m and N."""
+    return NormalLaw(stop.stiffness, stop.exponent, stop.damping, stop.full_damping_angle)
+
+
+@inlined
+def ahead(form: Form, row: int, y: Any, first: int) -> float:
+    """How far a hinge's body is ahead of the other (rad), by the angles that begin at y[first]; or how fast."""
+    return y[first + form.hinges[row, 0]] - y[first + form.hinges[row, 1]]
+
+
 @inlined
 def extension(form: Form, knee: int, y: Any) -> float:
     """How far a knee is beyond straight (rad): negative while it is bent, zero where there is none."""
-    return y[form.places + form.shanks[knee]] - y[form.places + form.thighs[knee]]
+    return ahead(form, FIRST_KNEE + knee, y, form.places)
 
 
 @inlined
 def extension_rate(form: Form, knee: int, y: Any) -> float:
     """How fast a knee straightens (rad/s)."""
-    rates = half_size(form) + form.places
-    return y[rates + form.shanks[knee]] - y[rates + form.thighs[knee]]
+    return ahead(form, FIRST_KNEE + knee, y, half_size(form) + form.places)
 
 
-@hinge_torque.case(NormalLaw)
-def stop_torque(law: NormalLaw, angle: float, rate: float) -> HingeTorque:
-    """A stop by the IMPACT law, in N m and rad, that acts beyond straight."""
+@hinge_torque.case(KneeStop)
+def stop_torque(law: KneeStop, angle: float, rate: float) -> HingeTorque:
+    """The IMPACT law beyond straight."""
     if angle <= 0.0:
         return HingeTorque(0.0, 0.0, 0.0, 0.0)
-    torque = impact_normal_force(angle, rate, law)
+    torque = impact_normal_force(angle, rate, impact_law(law))
     return HingeTorque(torque.force, torque.spring, torque.by_penetration, torque.by_rate)
 
 
-@hinge_energy.case(NormalLaw)
-def stop_energy(law: NormalLaw, angle: float) -> float:
+@hinge_energy.case(KneeStop)
+def stop_energy(law: KneeStop, angle: float) -> float:
     """Elastic energy (J) of a stop."""
-    return elastic_energy(angle, law)
+    return elastic_energy(angle, impact_law(law))
 
 
 class Locked(NamedTuple):

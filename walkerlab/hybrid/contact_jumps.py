@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from walkerlab.account import KNEE_STOP, KNEE_STRIKES
-from walkerlab.ground.hinges import knee_energy
+from walkerlab.ground.hinges import stop_energy
 from walkerlab.ground.knees import lock_knee
 from walkerlab.ground.motion import motion_gradient
 from walkerlab.ground.walker import (
@@ -56,7 +56,7 @@ def change_form(
             stopping = before.knee.copy()
             stopping[(event - EXTENSION) % 2] = STOPPING
             before = before._replace(knee=stopping)
-            observer.account[KNEE_STOP] += knee_energy(before, y)
+            observer.account[KNEE_STOP] += stop_energy(before, y)
     z = folded(after.form, new)
     Phi = observer.tangent.Phi
     if Phi.shape[1] > 0:
@@ -91,7 +91,7 @@ def event_gradient(whole: Form, event: int, x: Floats) -> Floats:
     if event >= EXTENSION:
         first = half + p if event >= EXTENSION_RATE else p
         knee = (event - EXTENSION) % 2
-        gradient[first + whole.shanks[knee]], gradient[first + whole.thighs[knee]] = 1.0, -1.0
+        gradient[first + whole.knees[knee]] = 1.0, -1.0
         return gradient
     foot, row = event // PER_FOOT, 0 if event % PER_FOOT == HEIGHT else 1
     s, c, F, U = vector(OF_BODIES), vector(OF_BODIES), vector(OF_BODIES), vector(OF_BODIES)

@@ -63,7 +63,7 @@ class SectionStep(MappedStep):
 
 def turning_bodies(walker: ContactWalker, stance: int) -> tuple[int, ...]:
     """Bodies that turn on their own, the swing leg's first; the shank below the stance leg's locked knee does not."""
-    locked = walker.whole.shanks[stance] if walker.kneed else None
+    locked = walker.whole.knees[stance, 0] if walker.kneed else None
     return (*walker.legs[1 - stance], *(body for body in walker.legs[stance] if body != locked))
 
 
@@ -71,15 +71,16 @@ def angled_bodies(walker: ContactWalker, stance: int) -> tuple[int, ...]:
     """Bodies whose angles are coordinates; a stop that has latched keeps an angle of its own in the stance knee."""
     free = turning_bodies(walker, stance)[1:]
     if walker.kneed and not isinstance(walker.stop, IdealLock):
-        return (*free, int(walker.whole.shanks[stance]))
+        return (*free, int(walker.whole.knees[stance, 0]))
     return free
 
 
 def with_followers(walker: ContactWalker, stance: int, angles: Floats, given: tuple[int, ...]) -> Floats:
     """Angles (n), or changes of them, with those of bodies that follow others and are not `given`."""
     whole, n = walker.whole, angles.size
-    if walker.kneed and whole.shanks[stance] not in given:
-        angles[whole.shanks[stance]] = angles[whole.thighs[stance]]
+    shank, thigh = whole.knees[stance]
+    if walker.kneed and shank not in given:
+        angles[shank] = angles[thigh]
     for body in range(n):
         if whole.E[0, body, body] == 0.0 and body not in given:
             angles[body] = whole.E[0, body, :n] @ angles

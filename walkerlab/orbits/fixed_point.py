@@ -303,9 +303,8 @@ def over_slope(walker: Standing, tolerances: Tolerances) -> RigidMap:
 
 def partly_driven(walker: Standing, slope: float, share: float) -> Standing:
     """The walker with a share of what drives it, on a slope (rad) as much nearer to its own; passive at 0."""
-    parts = {name: share * walker[name] for name in ("hip", "push_off")}
-    driven_hip = walker.driven_hip and share > 0.0
-    return on_slope(walker.changed(**parts, driven_hip=driven_hip), slope + share * (walker.slope - slope))
+    parts = {name: share * walker[name] for name in ("laws", "push_off")}
+    return on_slope(walker.changed(**parts), slope + share * (walker.slope - slope))
 
 
 @dataclass
