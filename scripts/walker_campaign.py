@@ -187,7 +187,7 @@ def light_hips(draw: Draw) -> CompassWalker:
 
 def torque_and_spring(draw: Draw) -> dict[str, Any]:
     """A constant torque and a spring at the hip, by fields of the rigid model."""
-    return {"driven_hip": True, "hip": (draw.uniform(0.0, 3.0), 0.0, draw.uniform(0.02, 0.4))}
+    return {"hip": (draw.uniform(0.0, 3.0), 0.0, draw.uniform(0.02, 0.4))}
 
 
 TYPES: dict[str, Callable[[Draw], AnyWalker]] = {

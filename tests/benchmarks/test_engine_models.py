@@ -12,7 +12,7 @@ from walkerlab.ground.friction import friction_coefficient
 from walkerlab.ground.terrain import STANCE_FOOT
 from walkerlab.ground.walker import BENT, LOCKED
 from walkerlab.hybrid.contact_result import walk_contact
-from walkerlab.mechanics.hinges import hip_law
+from walkerlab.mechanics.hinges import HIP_ROW, hinge_law
 from walkerlab.outcome import Outcome
 from walkerlab.solvers.registry import Tolerances
 
@@ -142,7 +142,7 @@ def test_forces_of_drives_do_the_work_that_our_walk_gives():
     for i in range(begin, end + 1):
         q, v = scene.from_base(tuple(samples.states[i]))
         powers.append(float(rules.forces(float(samples.time_s[i]), q, v) @ v))
-    elastic = 0.5 * hip_law(scene.ours.whole).stiffness * (samples.states[:, 3] - samples.states[:, 2]) ** 2
+    elastic = 0.5 * hinge_law(scene.ours.whole, HIP_ROW).stiffness * (samples.states[:, 3] - samples.states[:, 2]) ** 2
     given = samples.driven_J[end].sum() - samples.driven_J[begin].sum() + elastic[begin] - elastic[end]
     assert np.trapezoid(powers, samples.time_s[begin : end + 1]) == pytest.approx(given, rel=1e-5)
 

@@ -30,7 +30,7 @@ def state_in_line(walker, knee):
     whole, n = walker.whole, int(walker.whole.bodies)
     angles = np.array([-0.21, 0.17, -0.33, 0.11, 0.0][:n])
     rates = np.array([-0.6, -1.1, 0.9, -0.4, 0.0][:n])
-    for thigh, shank, doing in zip(whole.thighs, whole.shanks, knee, strict=True):
+    for (shank, thigh), doing in zip(whole.knees, knee, strict=True):
         if doing == LOCKED:
             angles[shank], rates[shank] = angles[thigh], rates[thigh]
     for body in np.flatnonzero(np.diagonal(whole.E[0])[:n] == 0.0):

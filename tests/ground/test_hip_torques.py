@@ -21,7 +21,7 @@ from walkerlab.solvers.system import derivative
 
 IN_THE_AIR = (False, False)
 RIGID_STEP = 0.3718088  # m
-HIP = {"driven_hip": True, "hip": (10.0, 0.4, 1.5)}
+HIP = {"hip": (10.0, 0.4, 1.5)}
 SETTINGS = ("walker.hip.spring_N_m_per_rad=10", "walker.hip.damping_N_m_s_per_rad=0.4", "walker.hip.torque_N_m=1.5")
 TOLERANCES = Tolerances("radau5", 1e-9, 1e-11, 10**6)
 angles = st.tuples(*(st.floats(-0.6, 0.6),) * 2)
@@ -52,7 +52,7 @@ def test_their_derivatives_are_those_of_differences(theta, omega, stance):
 def test_with_knees_they_act_on_the_thighs():
     config = loader.load(Path("kneed")).config
     passive = contact_scene(config, 0.4).walker
-    pushed = changed_forms(passive, driven_hip=True, hip=(0.0, 0.0, 1.0))
+    pushed = changed_forms(passive, hip=(0.0, 0.0, 1.0))
     y = (0.0, 5.0, -0.2, 0.2, -0.3, 0.2, *(0.0,) * 6)
     free = (RELEASED, RELEASED)
     for stance in range(2):
@@ -62,8 +62,8 @@ def test_with_knees_they_act_on_the_thighs():
         momentum = np.subtract(change[8:10], change[9:7:-1])
         assert momentum[1 - stance] > 0.0 > momentum[stance]
     locked = on_ground(pushed, IN_THE_AIR, (RELEASED, LOCKED))
-    swing, stance = (locked.form.uppers[k] for k in range(2))
-    assert (swing, stance) == (locked.form.thighs[0], locked.form.thighs[1])
+    swing, stance = (locked.form.hinges[0, k] for k in range(2))
+    assert (swing, stance) == tuple(locked.form.knees[:, 1])
 
 
 def test_a_springs_work_over_the_steps_taken_is_what_its_energy_fell_by():

@@ -116,7 +116,7 @@ def test_numbers_that_overflow_end_the_walk():
 
 
 def test_driven_walks_in_lanes_walk_as_they_do_one_by_one():
-    driven = assembled(ONE_DEGREE).changed(driven_hip=True, hip=(5.0, 0.1, 0.5), push_off=1.0)
+    driven = assembled(ONE_DEGREE).changed(hip=(5.0, 0.1, 0.5), push_off=1.0)
     starts = on_slope(ONE_DEGREE, np.array(START) * np.random.default_rng(4).uniform(0.95, 1.05, (16, 3)))
     fates, strikes = model_in_lanes(driven, starts, 1e-10)
     walks = [take_walk(driven, Tolerances("dop853", 1e-11, 1e-13, 10**7), tuple(start), STEPS) for start in starts]

@@ -30,7 +30,7 @@ from walkerlab.solvers.system import jacobian
 
 hips = st.builds(
     lambda stiffness, damping, torque: {
-        "driven_hip": True, "hip": (stiffness, damping, torque)
+        "hip": (stiffness, damping, torque)
     },
     st.floats(0.0, 20.0), st.floats(0.0, 2.0), st.floats(-5.0, 5.0),
 )  # fmt: skip
@@ -80,7 +80,7 @@ def test_a_swing_gains_what_the_torque_gives_and_the_damper_takes(assembly, mode
 @driven
 def test_torques_at_the_hip_turn_both_legs_and_nothing_else(assembly, model, free):
     """Angular momentum about the foothold changes as gravity has it; a push forward swings the free leg forward."""
-    passive = model.changed(driven_hip=False)
+    passive = model.changed(hip=0.0)
     y, n = state_of(model, BENT, free), len(model.arm_x)
     h, rate_of = 1e-6, []
     for walker in (model, passive):

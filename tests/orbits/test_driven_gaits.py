@@ -56,7 +56,7 @@ def test_kuos_gaits(name):
     (push, spring, slope), (angle, rate, period), multipliers = KUO[name]
     simplest = walker_of("simplest", push_off=push)
     foot_mass = float(simplest.A[SWING, SWING])
-    walker = on_slope(simplest.changed(driven_hip=spring != 0.0, hip=(spring * foot_mass, 0.0, 0.0)), slope)
+    walker = on_slope(simplest.changed(hip=(spring * foot_mass, 0.0, 0.0)), slope)
     gait = min(find_gaits(walker).gaits, key=lambda each: abs(each.period - period))
     assert gait.state[STANCE] + slope == pytest.approx(angle, abs=1e-9)
     assert gait.state[2 + STANCE] == pytest.approx(rate, abs=1e-9)
@@ -69,7 +69,7 @@ LEVEL = (-0.1931536892, 0.1931536892, -0.8881910818, -1.0417279402)
 
 def test_the_papers_compass_on_the_level():
     """Pushed by 4 N s, legs joined by a spring of 10 N m/rad: as an independent prototype has it."""
-    walker = on_slope(walker_of("paper", push_off=4.0, driven_hip=True, hip=(10.0, 0.0, 0.0)), 0.0)
+    walker = on_slope(walker_of("paper", push_off=4.0, hip=(10.0, 0.0, 0.0)), 0.0)
     gait = find_gaits(walker).gait
     assert gait.stable
     assert gait.state == pytest.approx(LEVEL, abs=1e-9)
@@ -77,10 +77,10 @@ def test_the_papers_compass_on_the_level():
 
 
 DRIVEN = {
-    "torso": {"push_off": 4.0, "driven_hip": True, "hip": (0.0, 0.005, 0.0)},
-    "round-feet": {"push_off": 0.12, "driven_hip": True, "hip": (0.3, 0.0, 0.0)},
-    "kneed": {"push_off": 0.2, "driven_hip": True, "hip": (0.0, 0.005, 0.15)},
-    "kneed-round-feet": {"push_off": 0.2, "driven_hip": True, "hip": (0.0, 0.0, 0.15)},
+    "torso": {"push_off": 4.0, "hip": (0.0, 0.005, 0.0)},
+    "round-feet": {"push_off": 0.12, "hip": (0.3, 0.0, 0.0)},
+    "kneed": {"push_off": 0.2, "hip": (0.0, 0.005, 0.15)},
+    "kneed-round-feet": {"push_off": 0.2, "hip": (0.0, 0.0, 0.15)},
 }
 
 
@@ -157,7 +157,7 @@ def test_uphill_what_gravity_takes_is_no_income():
 
 
 GIVERS = ("gravity", "push_off", "hip")
-DRIVES = {**DRIVEN, "paper": {"push_off": 4.0, "driven_hip": True, "hip": (10.0, 0.0, 0.3)}}
+DRIVES = {**DRIVEN, "paper": {"push_off": 4.0, "hip": (10.0, 0.0, 0.3)}}
 
 
 @pytest.mark.parametrize("name", DRIVES)
@@ -174,7 +174,7 @@ def test_the_energies_of_a_driven_walk_balance(name):
 
 
 def test_a_hips_damper_takes_the_integral_of_its_power():
-    walker = on_slope(walker_of("paper", push_off=4.0, driven_hip=True, hip=(10.0, 0.1, 0.0)), 0.0)
+    walker = on_slope(walker_of("paper", push_off=4.0, hip=(10.0, 0.1, 0.0)), 0.0)
     walk = take_walk(walker, EXACT_STEPS, LEVEL, 1, sampled=True)
     y, t = walk.samples.state[:-1], walk.samples.time_s[:-1]
     spring = 5.0 * float(np.diff((y[[-1, 0], 0] - y[[-1, 0], 1]) ** 2)[0])
@@ -183,9 +183,9 @@ def test_a_hips_damper_takes_the_integral_of_its_power():
 
 
 TURNED = {
-    "paper": {"push_off": 4.0, "driven_hip": True, "hip": (10.0, 0.0, 0.3)},
-    "kneed": {"push_off": 0.2, "driven_hip": True, "hip": (2.0, 0.0, 0.3)},
-    "kneed-round-feet": {"push_off": 0.2, "driven_hip": True, "hip": (0.0, 0.0, 0.15)},
+    "paper": {"push_off": 4.0, "hip": (10.0, 0.0, 0.3)},
+    "kneed": {"push_off": 0.2, "hip": (2.0, 0.0, 0.3)},
+    "kneed-round-feet": {"push_off": 0.2, "hip": (0.0, 0.0, 0.15)},
 }
 
 
@@ -207,7 +207,7 @@ def test_a_costs_derivative_across_a_knee_strike_is_the_slope_of_independent_cos
     """By the hip's spring, of a walker whose knee strike reverses the rate between its thighs."""
 
     def driven(spring):
-        return on_slope(walker_of("kneed", push_off=0.2, driven_hip=True, hip=(spring, 0.0, 0.3)), 0.0)
+        return on_slope(walker_of("kneed", push_off=0.2, hip=(spring, 0.0, 0.3)), 0.0)
 
     def cost(spring):
         walker = driven(spring)
@@ -238,5 +238,5 @@ def test_the_contact_step_maps_derivative_has_the_torques_change_of_legs():
 
 
 def test_a_drive_far_too_strong_for_the_gaits_that_there_are_without_it_is_not_said_to_be_for_want_of_one():
-    walker = walker_of("paper", driven_hip=True, hip=(0.0, 0.0, 1e8))
+    walker = walker_of("paper", hip=(0.0, 0.0, 1e8))
     assert "the passive gait at 0.0174 rad is lost at 0% of the way" in find_gaits(walker).reason

@@ -9,11 +9,12 @@ from numpy.typing import NDArray
 
 import walkerlab.ground.motion  # noqa: F401 (registers the equations of what is assembled here)
 from walkerlab.ground.friction import FrictionLaw
-from walkerlab.ground.knees import IdealLock
+from walkerlab.ground.knees import IdealLock, KneeStop
 from walkerlab.ground.normal_force import NormalLaw
 from walkerlab.ground.terrain import STANCE_FOOT
-from walkerlab.ground.walker import FORM, MAX_BODIES, NO_FOOT, ContactWalker
-from walkerlab.mechanics.assembly import Anchor, Tree, followers, levers, tree_about, tree_about_centre
+from walkerlab.ground.walker import FIRST_KNEE, FORM, MAX_BODIES, NO_FOOT, ContactWalker
+from walkerlab.mechanics.assembly import Anchor, Tree, followers, levers, reduction, tree_about, tree_about_centre
+from walkerlab.mechanics.hinges import HIP_ROW
 from walkerlab.mechanics.parts import Assembly, Position
 from walkerlab.solvers.system import Floats
 
@@ -25,7 +26,7 @@ class KneeRules:
     A walker with compliant stops keeps its bodies while its knees are locked: a stop that has latched keeps its angle.
     """
 
-    stop: NormalLaw | IdealLock = IdealLock()  # noqa: RUF009 (immutable)
+    stop: KneeStop | IdealLock = IdealLock()  # noqa: RUF009 (immutable)
     release_at_touch: bool = False  # else when the leading foot stops sinking in
 
 
@@ -63,7 +64,7 @@ def contact_walker(
             knees = [k for k in range(len(assembly.knees)) if locked & 1 << k]
             fill(forms[hinged, locked], assembly, root, knees, isinstance(rules.stop, IdealLock))
     legs = legs_of(assembly)
-    forms["uppers"] = np.take_along_axis(forms["onto"], np.broadcast_to(legs[:, 0], (2, 4, 2)), axis=2)
+    forms["hinges"][..., HIP_ROW, :] = np.take_along_axis(forms["onto"], np.broadcast_to(legs[:, 0], (2, 4, 2)), axis=2)
     return ContactWalker(forms, normal, friction, rules.stop, legs)
 
 
@@ -92,8 +93,7 @@ def about_foot(assembly: Assembly, foot: int) -> Root:
     tree = tree_about(assembly, Anchor(ball.body, ball.centre_m))
     _, from_centre = tree_about_centre(assembly)
     feet, hip = [d - from_centre[foot] for d in from_centre], hip_levers(assembly, from_centre[0]) - from_centre[foot]
-    arms = {"arm_x": tree.arm_x, "arm_y": tree.arm_y}
-    return Root(tree, {"places": 0, "hinged": foot, "root_height": ball.radius_m}, levers_by_axis(feet, hip) | arms)
+    return Root(tree, {"places": 0, "hinged": foot, "root_height": ball.radius_m}, levers_by_axis(feet, hip))
 
 
 def levers_by_axis(feet: Any, hip: Floats) -> dict[str, Floats]:
@@ -131,25 +131,21 @@ def fill(form: Any, assembly: Assembly, root: Root, locked: list[int], merges: b
     kept = [body for body in range(len(assembly.bodies)) if body not in one_with]
     onto = [kept.index(one_with.get(body, body)) for body in range(len(assembly.bodies))]
     S, n = np.eye(len(kept))[onto], len(kept)
-    E = np.eye(n)
-    for body, row in followers(assembly).items():
-        E[onto[body]] = row @ S
-    for shank, thigh in straight.items():
-        if shank not in one_with:
-            E[onto[shank]] = np.eye(n)[onto[thigh]]
+    rows = {onto[body]: row @ S for body, row in followers(assembly).items()}
+    rows |= {onto[shank]: np.eye(n)[onto[thigh]] for shank, thigh in straight.items() if shank not in one_with}
     rolling = np.zeros((2, len(onto)))
     for k, foot in enumerate(assembly.feet):
         rolling[k, assembly.index(foot.body)] = foot.radius_m
     for name, value in root.numbers.items():
         form[name] = value
-    form["A"][:n, :n], form["B"][:n, :n], form["mass"] = S.T @ root.tree.A @ S, S.T @ root.tree.B @ S, root.tree.mass
-    for name, value in (root.rows | {"rolling": rolling}).items():
-        form[name][..., :n] = value @ S
-    form["E"][0, :n, :n] = E
+    merged = root.tree.merged(S) | {name: value @ S for name, value in (root.rows | {"rolling": rolling}).items()}
+    form["mass"] = merged.pop("mass")
+    for name, value in (merged | {"E": reduction(rows, n)[None]}).items():
+        form[name][tuple(map(slice, value.shape))] = value
     form["bodies"], form["radius"] = n, [foot.radius_m for foot in assembly.feet]
     form["onto"][: len(onto)], form["first"][:n] = onto, kept
     if knees:
-        form["thighs"], form["shanks"] = ([onto[body] for body in bodies] for bodies in zip(*knees, strict=True))
+        form["hinges"][FIRST_KNEE:] = [(onto[shank], onto[thigh]) for thigh, shank in knees]
 
 
 def legs_of(assembly: Assembly) -> NDArray[np.int64]:

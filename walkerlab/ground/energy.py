@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from walkerlab.ground.hinges import hip_energy, knee_energy
+from walkerlab.ground.hinges import spring_energy, stop_energy
 from walkerlab.ground.normal_force import elastic_energy
 from walkerlab.ground.pulse import push_on
 from walkerlab.ground.walker import (
@@ -59,7 +59,7 @@ def total_energy(system: OnGround, y: Any) -> float:
     for foot in range(2):
         if system.has_ground[foot] != 0:
             total += foot_elastic_energy(system, foot, y)
-    return total + knee_energy(system, y) + hip_energy(system, y)
+    return total + stop_energy(system, y) + spring_energy(system, y)
 
 
 @inlined

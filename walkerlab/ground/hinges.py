@@ -1,109 +1,128 @@
-"""Torques at hinges on compliant ground: of the knees' stops, and of what acts between the legs."""
+"""Torques at hinges on compliant ground: each has a spring, damper and drive, and each knee a stop besides."""
 
 from typing import Any
 
-from walkerlab.ground.knees import extension_rate
-from walkerlab.ground.walker import STOPPING, Form, OnGround, half_size
+from walkerlab.ground.knees import ahead
+from walkerlab.ground.walker import FIRST_KNEE, STOPPING, OnGround, half_size
 from walkerlab.kernels import inlined
 from walkerlab.mechanics.hinges import (
+    HIP_ROW,
     HingeTorque,
     add_hinge_gradients,
     add_hinge_torque,
     hinge_energy,
+    hinge_law,
     hinge_torque,
-    hip_law,
+    is_sprung,
     legs_apart,
 )
 
 
 @inlined
-def ahead(form: Form, body: int, other: int, y: Any, first: int) -> float:
-    """How far a body is ahead of another (rad), of the coordinates that begin at y[first]; or how fast."""
-    return y[first + form.places + body] - y[first + form.places + other]
+def sign_of(system: OnGround, row: int) -> float:
+    """-1 for the hip while the first leg stands, whose body is ahead of the other by the array; otherwise 1."""
+    return -1.0 if row == HIP_ROW and system.progress.stance == 0 else 1.0
 
 
 @inlined
-def torque_now(law: Any, form: Form, body: int, other: int, y: Any) -> HingeTorque:
-    """The torque of a law between two bodies in a state."""
-    return hinge_torque(law, ahead(form, body, other, y, 0), ahead(form, body, other, y, half_size(form)))
+def angle_at(system: OnGround, row: int, y: Any) -> tuple[float, float]:
+    """How far a hinge's body is ahead of the other (rad), and how fast it gets further (rad/s).
+
+    Of the hip it is the swing leg's: at a touch the legs change places.
+    """
+    form, sign = system.form, sign_of(system, row)
+    return sign * ahead(form, row, y, form.places), sign * ahead(form, row, y, half_size(form) + form.places)
 
 
 @inlined
-def swing_and_stance(system: OnGround) -> tuple[int, int]:
-    """The uppermost bodies of the leg that swings and of that which stands: at a touch they change places."""
-    stance = system.progress.stance
-    return system.form.uppers[1 - stance], system.form.uppers[stance]
+def is_stopping(system: OnGround, row: int) -> bool:
+    """Whether a hinge is a knee in its stop."""
+    return row >= FIRST_KNEE and system.knee[row - FIRST_KNEE] == STOPPING
+
+
+@inlined
+def torque_at(system: OnGround, row: int, y: Any) -> HingeTorque:
+    """The torque at a hinge: of its spring, damper and drive, and of its stop."""
+    angle, rate = angle_at(system, row, y)
+    own = hinge_torque(hinge_law(system.form, row), angle, rate)
+    if not is_stopping(system, row):
+        return own
+    stop = hinge_torque(system.stop, angle, rate)
+    return HingeTorque(
+        own.torque + stop.torque, own.elastic + stop.elastic, own.by_angle + stop.by_angle, own.by_rate + stop.by_rate
+    )
+
+
+@inlined
+def bodies_at(system: OnGround, row: int) -> tuple[int, int]:
+    """The body that a hinge's torque turns back, and the other one."""
+    body, other = system.form.hinges[row, 0], system.form.hinges[row, 1]
+    return (other, body) if sign_of(system, row) < 0.0 else (body, other)
 
 
 @inlined
 def add_torques(system: OnGround, y: Any, r: Any) -> None:
     """Add the torques (N m) at all hinges to r (n,)."""
-    form = system.form
-    for knee in range(2):
-        if system.knee[knee] == STOPPING:
-            shank, thigh = form.shanks[knee], form.thighs[knee]
-            add_hinge_torque(torque_now(system.stop, form, shank, thigh, y), shank, thigh, r)
-    if form.driven_hip:
-        swing, stance = swing_and_stance(system)
-        add_hinge_torque(torque_now(hip_law(form), form, swing, stance, y), swing, stance, r)
+    for row in range(len(system.form.hinges)):
+        if is_sprung(system.form, row) or is_stopping(system, row):
+            body, other = bodies_at(system, row)
+            add_hinge_torque(torque_at(system, row, y), body, other, r)
 
 
 @inlined
 def add_gradients(system: OnGround, y: Any, by_angle: Any, by_rate: Any) -> None:
     """Add the derivatives of those torques by the angles and their velocities to by_angle and by_rate (n, n)."""
-    form = system.form
-    for knee in range(2):
-        if system.knee[knee] == STOPPING:
-            shank, thigh = form.shanks[knee], form.thighs[knee]
-            add_hinge_gradients(torque_now(system.stop, form, shank, thigh, y), shank, thigh, by_angle, by_rate)
-    if form.driven_hip:
-        swing, stance = swing_and_stance(system)
-        add_hinge_gradients(torque_now(hip_law(form), form, swing, stance, y), swing, stance, by_angle, by_rate)
+    for row in range(len(system.form.hinges)):
+        if is_sprung(system.form, row) or is_stopping(system, row):
+            body, other = bodies_at(system, row)
+            add_hinge_gradients(torque_at(system, row, y), body, other, by_angle, by_rate)
 
 
 @inlined
-def knee_energy(system: OnGround, y: Any) -> float:
-    """Elastic energy (J) in the stops."""
-    form, total = system.form, 0.0
-    for knee in range(2):
-        if system.knee[knee] == STOPPING:
-            total += hinge_energy(system.stop, ahead(form, form.shanks[knee], form.thighs[knee], y, 0))
+def stop_energy(system: OnGround, y: Any) -> float:
+    """Elastic energy (J) in the knees' stops."""
+    total = 0.0
+    for row in range(FIRST_KNEE, len(system.form.hinges)):
+        if is_stopping(system, row):
+            total += hinge_energy(system.stop, angle_at(system, row, y)[0])
     return total
 
 
 @inlined
-def knee_power(system: OnGround, y: Any) -> float:
-    """Power (W) that the stops dissipate."""
-    form, total = system.form, 0.0
-    for knee in range(2):
-        if system.knee[knee] == STOPPING:
-            now = torque_now(system.stop, form, form.shanks[knee], form.thighs[knee], y)
-            total += (now.torque - now.elastic) * extension_rate(form, knee, y)
+def stop_power(system: OnGround, y: Any) -> float:
+    """Power (W) that the knees' stops dissipate."""
+    total = 0.0
+    for row in range(FIRST_KNEE, len(system.form.hinges)):
+        if is_stopping(system, row):
+            angle, rate = angle_at(system, row, y)
+            now = hinge_torque(system.stop, angle, rate)
+            total += (now.torque - now.elastic) * rate
     return total
 
 
 @inlined
-def hip_energy(system: OnGround, y: Any) -> float:
-    """Elastic energy (J) of what acts between the legs."""
-    swing, stance = swing_and_stance(system)
-    law = hip_law(system.form)
-    return hinge_energy(law, ahead(system.form, swing, stance, y, 0)) if system.form.driven_hip else 0.0
+def spring_energy(system: OnGround, y: Any) -> float:
+    """Elastic energy (J) of the springs at all hinges."""
+    total = 0.0
+    for row in range(len(system.form.hinges)):
+        if is_sprung(system.form, row):
+            total += hinge_energy(hinge_law(system.form, row), angle_at(system, row, y)[0])
+    return total
 
 
 @inlined
-def hip_power(system: OnGround, y: Any) -> float:
-    """Power (W) that it gives and does not store."""
-    form = system.form
-    if not form.driven_hip:
-        return 0.0
-    swing, stance = swing_and_stance(system)
-    now = torque_now(hip_law(form), form, swing, stance, y)
-    return (now.elastic - now.torque) * ahead(form, swing, stance, y, half_size(form))
+def spring_power(system: OnGround, y: Any) -> float:
+    """Power (W) that springs, dampers and drives give and do not store."""
+    total = 0.0
+    for row in range(len(system.form.hinges)):
+        if is_sprung(system.form, row):
+            angle, rate = angle_at(system, row, y)
+            now = hinge_torque(hinge_law(system.form, row), angle, rate)
+            total += (now.elastic - now.torque) * rate
+    return total
 
 
 @legs_apart.case(OnGround)
 def legs_apart_on_ground(system: OnGround, y: Any) -> tuple[float, float]:
     """The uppermost bodies of both legs."""
-    form = system.form
-    swing, stance = swing_and_stance(system)
-    return ahead(form, swing, stance, y, 0), ahead(form, swing, stance, y, half_size(form))
+    return angle_at(system, HIP_ROW, y)

@@ -1,17 +1,14 @@
-"""Knees on compliant ground: what each is doing, the stop that it meets, and what its lock does to the motion.
-
-With absolute angles a shank below a locked knee has the angular velocity of its thigh, omega = Z z with constant Z, and
-a lock is a plastic impact: Z'MZ z = Z'M omega.
-"""
+"""Knees on compliant ground: how far each is bent, the stop that it meets, and its lock."""
 
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from walkerlab.ground.normal_force import NormalLaw, elastic_energy, impact_normal_force
-from walkerlab.ground.walker import Form, half_size
+from walkerlab.ground.walker import FIRST_KNEE, Form, half_size
 from walkerlab.kernels import inlined
 from walkerlab.mechanics.hinges import HingeTorque, hinge_energy, hinge_torque
+from walkerlab.mechanics.impact import RootedTree, lock
 from walkerlab.solvers.system import Floats
 
 FLEXED = 0.01  # rad of flexion from which on a knee that straightens is caught
@@ -21,64 +18,76 @@ class IdealLock(NamedTuple):
     """The knee is straight and locks at once: a plastic impact."""
 
 
+class KneeStop(NamedTuple):
+    """A stop by the IMPACT law that turns a knee back beyond straight."""
+
+    stiffness: float  # [k] N m/rad^e
+    exponent: float  # [e]
+    damping: float  # [c_max] N m s/rad
+    full_damping_angle: float  # [d_max] rad
+
+
+@inlined
+def impact_law(stop: KneeStop) -> NormalLaw:
+    """The IMPACT law with a stop's numbers: of rad and N m in place of m and N."""
+    return NormalLaw(stop.stiffness, stop.exponent, stop.damping, stop.full_damping_angle)
+
+
+@inlined
+def ahead(form: Form, row: int, y: Any, first: int) -> float:
+    """How far a hinge's body is ahead of the other (rad), by the angles that begin at y[first]; or how fast."""
+    return y[first + form.hinges[row, 0]] - y[first + form.hinges[row, 1]]
+
+
 @inlined
 def extension(form: Form, knee: int, y: Any) -> float:
     """How far a knee is beyond straight (rad): negative while it is bent, zero where there is none."""
-    return y[form.places + form.shanks[knee]] - y[form.places + form.thighs[knee]]
+    return ahead(form, FIRST_KNEE + knee, y, form.places)
 
 
 @inlined
 def extension_rate(form: Form, knee: int, y: Any) -> float:
     """How fast a knee straightens (rad/s)."""
-    rates = half_size(form) + form.places
-    return y[rates + form.shanks[knee]] - y[rates + form.thighs[knee]]
+    return ahead(form, FIRST_KNEE + knee, y, half_size(form) + form.places)
 
 
-@hinge_torque.case(NormalLaw)
-def stop_torque(law: NormalLaw, angle: float, rate: float) -> HingeTorque:
-    """A stop by the IMPACT law, in N m and rad, that acts beyond straight."""
+@hinge_torque.case(KneeStop)
+def stop_torque(law: KneeStop, angle: float, rate: float) -> HingeTorque:
+    """The IMPACT law beyond straight."""
     if angle <= 0.0:
         return HingeTorque(0.0, 0.0, 0.0, 0.0)
-    torque = impact_normal_force(angle, rate, law)
+    torque = impact_normal_force(angle, rate, impact_law(law))
     return HingeTorque(torque.force, torque.spring, torque.by_penetration, torque.by_rate)
 
 
-@hinge_energy.case(NormalLaw)
-def stop_energy(law: NormalLaw, angle: float) -> float:
+@hinge_energy.case(KneeStop)
+def stop_energy(law: KneeStop, angle: float) -> float:
     """Elastic energy (J) of a stop."""
-    return elastic_energy(angle, law)
+    return elastic_energy(angle, impact_law(law))
 
 
-class Lock(NamedTuple):
-    """What a lock does to the state of all bodies about its root, whether that is hinged or not."""
+class Locked(NamedTuple):
+    """The state of all bodies about their root after a knee has locked."""
 
-    state: Floats  # after it
+    state: Floats
     lost: float  # J
-    derivative: Floats  # of the state after by the state before
+    columns: Floats  # (size, columns) images of directions of the state before
 
 
-def lock(whole: Form, form: Form, x: Any) -> Lock:
-    """Project the angular velocities in the metric of M on what a form allows: E'ME z = E'M omega; the root rests.
+def lock_knee(whole: Form, form: Form, x: Any, columns: Floats | None = None) -> Locked:
+    """Bring the angular velocities to those that a form allows, by a plastic impact that leaves the root as it moves.
 
-    whole  the form of all bodies, about the root
-    form   as whose bodies they move from then on
-    x      state of all bodies
+    whole    the form of all bodies, about the root
+    form     as whose bodies they move from then on
+    x        (size,) state of all bodies
+    columns  (size, columns) directions of that state; None for none
     """
     x = np.array(x, float)
     n, p, rates = int(whole.bodies), int(whole.places), x.size - int(whole.bodies)
-    free = [k for k in range(form.bodies) if form.E[0, k, k] != 0.0]
-    Z = form.E[0, form.onto[:n]][:, free]
-    angles, omega = x[p : p + n] + whole.slope, x[rates:]
-    delta = angles[None, :] - angles[:, None]
-    A, B = whole.A[:n, :n], whole.B[:n, :n]
-    M = A * np.cos(delta) + B * np.sin(delta)
-    spread = Z @ np.linalg.inv(Z.T @ M @ Z) @ Z.T
-    new = x.copy()
-    new[rates:] = spread @ (M @ omega)
-    change = omega - new[rates:]
-    # dM (omega- - omega+) = (dM/d delta * (d theta_l - d theta_k)) change
-    turned = (B * np.cos(delta) - A * np.sin(delta)) * change
-    by_state = np.eye(x.size)
-    by_state[rates:, rates:] = spread @ M
-    by_state[rates:, p : p + n] = spread @ (turned - np.diag(turned.sum(axis=1)))
-    return Lock(new, float(0.5 * (M @ omega) @ change), by_state)
+    after = np.zeros((x.size, 0)) if columns is None else columns.copy()
+    E, m = np.zeros((1, n, n)), int(form.bodies)
+    E[0][:, form.first[:m]] = form.E[0, form.onto[:n], :m]
+    pairs, arms = (whole.A[:n, :n], whole.B[:n, :n]), (whole.arm_x[:n], whole.arm_y[:n])
+    tree = RootedTree(E, *pairs, *arms, whole.mass, 0.0, whole.slope)
+    x[rates:], lost, after[rates:] = lock(tree, x[p : p + n], x[rates:], after[p : p + n], after[rates:])
+    return Locked(x, lost, after)

@@ -17,7 +17,7 @@ from walkerlab.ground.friction import friction_coefficient
 from walkerlab.ground.normal_force import NormalForce, NormalLaw, impact_normal_force
 from walkerlab.kernels import by_reference, inlined, vector
 from walkerlab.mechanics import tree
-from walkerlab.mechanics.hinges import HIP_NUMBERS, hip_law
+from walkerlab.mechanics.hinges import HIP_ROW
 from walkerlab.mechanics.tree import lever_motion
 from walkerlab.solvers.system import Floats, Integers, State
 
@@ -25,15 +25,18 @@ MAX_BODIES = 8
 OF_BODIES = (0.0,) * MAX_BODIES  # scratch is made like these
 OF_STATES = (0.0,) * (4 + 2 * MAX_BODIES)
 NO_FOOT = -1
+FIRST_KNEE = HIP_ROW + 1  # row of its hinge
 # what a knee is doing
 RELEASED, BENT, STOPPING, LOCKED = 0, 1, 2, 3
 
 
 @tree.read_at_once
-class Form(np.record):  # type: ignore[misc]  # NumPy's stubs call one of its bases final
+class Form(tree.Mechanism):  # type: ignore[misc]  # as its base
     """The walker as it moves while its knees are as they are, hinged or free, SI: a structured scalar.
 
-    Its arrays have room for MAX_BODIES, so that one compiled walk serves all walkers; n of the places are used.
+    Its arrays have room for MAX_BODIES, so that one compiled walk serves all walkers; n of the places are used. Its
+    hinges are the hip, with the uppermost body of the first leg ahead of the second's, and each knee, with the shank
+    ahead of the thigh: thigh and shank are the same body while they move as one. E has one reduction.
     """
 
     bodies: int  # [n]
@@ -41,41 +44,30 @@ class Form(np.record):  # type: ignore[misc]  # NumPy's stubs call one of its ba
     hinged: int  # the foot that is; NO_FOOT
     kneed: bool
     release_at_touch: bool  # of the trailing knee: at the other foot's touch, not when that foot stops sinking in
-    A: Floats  # (n, n) kg m^2, of mechanics.assembly
-    B: Floats
-    E: Floats  # (1, n, n) the reduction; the row of a body that follows others has zero on the diagonal
-    arm_x: Floats  # (n,) c, kg m: first moments about the root, zero if that is the centre of mass
-    arm_y: Floats
     foot_x: Floats  # (2, n) m, levers from the root to the centres of the ball feet, in the bodies' frames
     foot_y: Floats
     rolling: Floats  # (2, n) m, the ball's radius for its own body, else zero
     radius: Floats  # (2,) m
     hip_x: Floats  # (n,) m, levers from the root to the hip
     hip_y: Floats
-    thighs: Integers  # (2,) bodies of either leg; thigh and shank are the same one while they move as one
-    shanks: Integers
-    uppers: Integers  # (2,) bodies of either leg at the hip
-    driven_hip: bool  # whether anything acts between the legs: see ground/hinges.py
-    hip: Floats  # numbers of that: see `hinges.hip_law`
-    push_off: float  # N s, along the trailing leg from a step's touch on
     push_off_duration: float  # s
     onto: Integers  # (all bodies,) which of these bodies each is
     first: Integers  # (n,) the first of the bodies that each of these is
-    mass: float  # kg
     root_along: float  # m, where the hinge is
     root_height: float
-    gravity_along: float  # m/s^2
-    gravity_down: float  # m/s^2, towards the slope
-    slope: float  # rad
+
+    @property
+    def knees(self) -> Integers:
+        """Shank and thigh of either leg (2, 2)."""
+        bodies: Integers = self.hinges[FIRST_KNEE:]
+        return bodies
 
 
 SHAPES: dict[str, tuple[int, ...]] = {
-    **dict.fromkeys(("A", "B"), (MAX_BODIES, MAX_BODIES)),
-    "E": (1, MAX_BODIES, MAX_BODIES),
-    **dict.fromkeys(("arm_x", "arm_y", "hip_x", "hip_y", "onto", "first"), (MAX_BODIES,)),
+    **tree.mechanism_shapes(MAX_BODIES, 1, 3),
+    **dict.fromkeys(("hip_x", "hip_y", "onto", "first"), (MAX_BODIES,)),
     **dict.fromkeys(("foot_x", "foot_y", "rolling"), (2, MAX_BODIES)),
-    "hip": (HIP_NUMBERS,),
-    **dict.fromkeys(("radius", "thighs", "shanks", "uppers"), (2,)),
+    "radius": (2,),
 }
 FORM = tree.record_type(Form, SHAPES)
 
@@ -86,7 +78,7 @@ class ContactWalker(NamedTuple):
     forms: Any  # (2, 4) of Form: free or hinged; which knees are locked, as `locked_knees` numbers them
     normal: NormalLaw
     friction: Any  # a FrictionLaw
-    stop: Any  # of the knees: IdealLock or a NormalLaw
+    stop: Any  # of the knees: IdealLock or a KneeStop
     legs: Integers  # (2, bodies of a leg) from the hip down
 
     @property
@@ -123,7 +115,7 @@ class ContactWalker(NamedTuple):
     @property
     def driven(self) -> bool:
         """Whether anything but gravity gives it energy."""
-        return bool(self.whole.push_off != 0.0 or hip_law(self.whole).torque != 0.0)
+        return self.whole.driven
 
     @property
     def gravity(self) -> float:
@@ -139,8 +131,7 @@ class ContactWalker(NamedTuple):
 def changed_forms(walker: ContactWalker, **fields: Any) -> ContactWalker:
     """The walker with other values of some fields of all its forms."""
     forms = walker.forms.copy()
-    for name, value in fields.items():
-        forms[name] = value
+    tree.write_fields(forms, fields)
     return walker._replace(forms=forms)
 
 

@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 
 from walkerlab.account import KNEE_STOP, KNEE_STRIKES
-from walkerlab.ground.hinges import knee_energy
-from walkerlab.ground.knees import lock
+from walkerlab.ground.hinges import stop_energy
+from walkerlab.ground.knees import lock_knee
 from walkerlab.ground.motion import motion_gradient
 from walkerlab.ground.walker import (
     OF_BODIES,
@@ -45,17 +45,18 @@ def change_form(
     whole = walker.forms[int(before.form.places == 0), 0]
     size = int(2 * (whole.places + whole.bodies))
     x = unfolded(before.form, y, size)
-    new, reset = x, np.eye(size)
     if event < EXTENSION and event % PER_FOOT == HEIGHT:  # a step's touch: the other leg stood before
         before = before._replace(progress=new_progress(stance=1 - after.progress.stance))
-    if EXTENSION <= event < PULSE_END:
-        new, lost, reset = lock(whole, after.form, x)
+    locks = EXTENSION <= event < PULSE_END
+    new = x
+    if locks:
+        new, lost, _ = lock_knee(whole, after.form, x)
         observer.account[KNEE_STRIKES] += lost
         if event >= EXTENSION_RATE:
             stopping = before.knee.copy()
             stopping[(event - EXTENSION) % 2] = STOPPING
             before = before._replace(knee=stopping)
-            observer.account[KNEE_STOP] += knee_energy(before, y)
+            observer.account[KNEE_STOP] += stop_energy(before, y)
     z = folded(after.form, new)
     Phi = observer.tangent.Phi
     if Phi.shape[1] > 0:
@@ -69,7 +70,9 @@ def change_form(
             rate_after = np.zeros(size)
         for column, wait in zip(columns.T, waits, strict=True):
             shift_column(column, 0, rate, wait)
-            column[:] = reset @ column
+        if locks:
+            columns = lock_knee(whole, after.form, x, columns).columns
+        for column, wait in zip(columns.T, waits, strict=True):
             shift_column(column, 0, rate_after, -wait)
         Phi[: z.size] = folded(after.form, columns)
     return z
@@ -88,7 +91,7 @@ def event_gradient(whole: Form, event: int, x: Floats) -> Floats:
     if event >= EXTENSION:
         first = half + p if event >= EXTENSION_RATE else p
         knee = (event - EXTENSION) % 2
-        gradient[first + whole.shanks[knee]], gradient[first + whole.thighs[knee]] = 1.0, -1.0
+        gradient[first + whole.knees[knee]] = 1.0, -1.0
         return gradient
     foot, row = event // PER_FOOT, 0 if event % PER_FOOT == HEIGHT else 1
     s, c, F, U = vector(OF_BODIES), vector(OF_BODIES), vector(OF_BODIES), vector(OF_BODIES)

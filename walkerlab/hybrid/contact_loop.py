@@ -23,6 +23,7 @@ from walkerlab.hybrid.endings import (
     WALKED,
 )
 from walkerlab.kernels import entered, inlined, kernel
+from walkerlab.mechanics.hinges import HIP_ROW, is_sprung
 from walkerlab.solvers.events import CrossingFinder
 from walkerlab.solvers.stepping import (
     H_NEXT,
@@ -232,7 +233,7 @@ def is_hinged(system: OnGround) -> bool:
 @inlined
 def jumps_at_touch(system: OnGround) -> bool:
     """Whether a step's touch may change what acts on the walker at once: the hip's legs change, a push-off begins."""
-    return system.form.driven_hip or system.form.push_off != 0.0
+    return is_sprung(system.form, HIP_ROW) or system.form.push_off != 0.0
 
 
 @inlined

@@ -6,14 +6,14 @@ import numpy as np
 
 from walkerlab.account import DAMPING, EDGES, ENTRIES, FORWARD, FRICTION, GIVEN, HIP, KNEE_STOP, LOST, PUSH_OFF, TORQUE
 from walkerlab.ground.energy import dissipated_power, foot_elastic_energy, push_power, total_energy
-from walkerlab.ground.hinges import hip_energy, hip_power, knee_power
+from walkerlab.ground.hinges import spring_energy, spring_power, stop_power
 from walkerlab.ground.walker import OF_STATES, STOPPING, OnGround, one_foot_motion, over_ground, store_whole
 from walkerlab.hybrid.contact_events import HEIGHT, LEGS_TURN, PER_FOOT, VERTICAL_VELOCITY
 from walkerlab.hybrid.contact_state import WalkState
 from walkerlab.hybrid.contact_tangent import Tangent, carry_tangent
 from walkerlab.hybrid.hip_torque import torque_work
 from walkerlab.kernels import by_reference, by_type_or_default, entered, inlined, matrix, vector
-from walkerlab.mechanics.hinges import hip_law
+from walkerlab.mechanics.hinges import HIP_ROW, hinge_law
 from walkerlab.mechanics.tree import read_at_once, record_type
 from walkerlab.solvers.events import RISING, CrossingFinder, first_crossing
 from walkerlab.solvers.radau5 import Radau5
@@ -134,7 +134,7 @@ def balance(observer: ContactObserver, method: Any, system: OnGround) -> None:
 @inlined
 def note_torque(observer: ContactObserver, method: Any, system: OnGround, finder: CrossingFinder) -> None:
     """Work of the hip's constant torque in the last step."""
-    torque = hip_law(system.form).torque
+    torque = hinge_law(system.form, HIP_ROW).torque
     if torque != 0.0:
         given = torque_work(torque, method, system, finder, LEGS_TURN, 1.0)
         observer.account[TORQUE] += given.net
@@ -146,7 +146,7 @@ def note_work(observer: ContactObserver, system: OnGround, y: Any) -> None:
     """A step has ended: what was given until now belongs to steps that were taken, and what the hip's spring gave."""
     for entry in range(ENTRIES):
         observer.account_at_touch[entry] = observer.account[entry]
-    observer.account_at_touch[HIP] += observer.tally.start_spring - hip_energy(system, y)
+    observer.account_at_touch[HIP] += observer.tally.start_spring - spring_energy(system, y)
 
 
 @inlined
@@ -219,8 +219,8 @@ def add_work(
     for i in range(1, len(nodes)):
         weight = span * weights[i]
         if stopping:
-            account[KNEE_STOP] += weight * knee_power(system, states[i])
-        account[HIP] += weight * hip_power(system, states[i])
+            account[KNEE_STOP] += weight * stop_power(system, states[i])
+        account[HIP] += weight * spring_power(system, states[i])
         account[PUSH_OFF] += weight * push_power(system, begin + nodes[i] * span, states[i])
 
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from walkerlab.account import ENTRIES, KNEE_STRIKES, LOSSES, LOST, PUSH_OFF, TORQUE
 from walkerlab.ground.energy import kinetic_energy, potential_energy, total_energy
-from walkerlab.ground.hinges import hip_energy
+from walkerlab.ground.hinges import spring_energy
 from walkerlab.ground.terrain import Terrain, is_uneven
 from walkerlab.ground.walker import (
     OF_BODIES,
@@ -149,9 +149,9 @@ def new_observer(
     times = np.zeros(0) if times is None else times
     samples = times.size
     tally = new_record(CONTACT_TALLY)
-    if track_energy or walker.whole.driven_hip:
+    if track_energy or walker.whole.sprung:
         here = on_ground(walker, walk_state.has_ground, level=walk_state.level, progress=walk_state.progress)
-        tally.start_energy, tally.start_spring = total_energy(here, y), hip_energy(here, y)
+        tally.start_energy, tally.start_spring = total_energy(here, y), spring_energy(here, y)
         tally.energy_below = tally.start_energy + walker.mass * walker.gravity_along * y[0]
     room = ContactSamples(
         times,

@@ -22,13 +22,12 @@ from walkerlab.hybrid.rigid_walk import (
 )
 from walkerlab.hybrid.walk_record import Array, DrivenWork, WalkRecord, WalkWork
 from walkerlab.kernels import uncompiled
-from walkerlab.mechanics.hinges import hinge_energy, hinge_torque, hip_law
+from walkerlab.mechanics.hinges import HIP_ROW, hinge_energy, hinge_law
 from walkerlab.mechanics.impact import push_off_work
 from walkerlab.mechanics.standing import (
     AT_STRIKE,
     BENT,
     STANCE,
-    SWING,
     Mode,
     Standing,
     energies,
@@ -211,16 +210,18 @@ class Recorder:
         A push-off works before its strike, which loses what that leaves. The balance gives the damper's work, which
         the states before and after strikes do not tell.
         """
-        walker, law = self.walker, hip_law(self.walker)
+        walker, rows = self.walker, range(len(self.walker.hinges))
+        laws = [hinge_law(walker, row) for row in rows]
         starts = np.vstack((self.start, after[:-1])) if self.steps else before
-        apart = [each[:, SWING] - each[:, STANCE] for each in (starts, before)]
-        torque = float(law.torque * (apart[1] - apart[0]).sum())
-        hip = torque - float(np.sum(hinge_energy(law, apart[1]) - hinge_energy(law, apart[0])))
-        # what the spring gives is among the works
-        unsprung = walker.changed(hip=0.0) if walker.driven_hip else walker
+        apart = [[each[:, body] - each[:, other] for body, other in walker.hinges] for each in (starts, before)]
+        torque = float(laws[HIP_ROW].torque * (apart[1][HIP_ROW] - apart[0][HIP_ROW]).sum())
+        stored = [hinge_energy(laws[row], apart[1][row]) - hinge_energy(laws[row], apart[0][row]) for row in rows]
+        hip = torque - float(np.sum(stored))
+        # what the springs give is among the works
+        unsprung = walker.changed(laws=0.0) if walker.sprung else walker
         ends = [sum(energies(unsprung, y)) - energy_at_touch(unsprung, y[STANCE]) for y in (self.start, self.state)]
         left = float(ends[1] - ends[0] - gravity - hip + self.tally.strike_loss)
-        hip, left = (hip + left, 0.0) if hinge_torque(law, 0.0, 0.0).by_rate else (hip, left)
+        hip, left = (hip + left, 0.0) if any(law.damping for law in laws) else (hip, left)
         push = float(push_off_work(walker, before).sum()) if walker.push_off else 0.0
         weight, forward = float(walker.mass * walker.gravity), float(self.tally.forward_work)
         return DrivenWork(weight, gravity, push, hip, torque, forward), abs(left)

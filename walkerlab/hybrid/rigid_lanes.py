@@ -21,7 +21,7 @@ from walkerlab.hybrid.endings import (
 )
 from walkerlab.hybrid.rigid_walk import LONGEST_SWING, hip_above_fall, hull
 from walkerlab.kernels import by_type, inlined, kernel, vector
-from walkerlab.mechanics.hinges import SpringDamper, hinge_torque, hip_law
+from walkerlab.mechanics.hinges import HIP_ROW, SpringDamper, hinge_law, hinge_torque
 from walkerlab.mechanics.impact import heel_strike
 from walkerlab.mechanics.standing import Standing, feet_on_slope
 from walkerlab.mechanics.trigonometry import sine_cosine
@@ -82,7 +82,7 @@ def two_legs(model: Standing) -> TwoLegs | None:
     return TwoLegs(
         model,
         **held,
-        hip=hip_law(model),
+        hip=hinge_law(model, HIP_ROW),
         upright=math.atan2(x, y),
         fallen=math.acos(max(-1.0, lowest)),
         pendulum_time=math.sqrt(model.leg_length / model.gravity),

@@ -6,7 +6,7 @@ import numpy as np
 
 from walkerlab.hybrid.hip_torque import torque_work
 from walkerlab.kernels import by_reference, inlined, vector
-from walkerlab.mechanics.hinges import hip_law
+from walkerlab.mechanics.hinges import HIP_ROW, hinge_law
 from walkerlab.mechanics.impact import push_off
 from walkerlab.mechanics.standing import Mode, energies, ground_reaction, momentum, swing_foot
 from walkerlab.mechanics.tree import new_record, read_at_once, record_type
@@ -186,7 +186,7 @@ def observe(
     row  a free row of the finder's values
     """
     tally = observer.tally[()]
-    torque = hip_law(mode.model).torque
+    torque = hinge_law(mode.model, HIP_ROW).torque
     if torque != 0.0:
         sample(method, mode, finder.nodes, finder.states)
         tally.step_forward_work += torque_work(torque, method, mode, finder, row, fraction).positive

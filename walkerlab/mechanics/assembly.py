@@ -12,9 +12,9 @@ theta_l - theta_k the equations of motion about a root at rest are
     M alpha = torques + sum over l of omega_l^2 (A_kl sin Delta - B_kl cos Delta)
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -30,6 +30,22 @@ class Tree(NamedTuple):
     B: Floats
     arm_x: Floats  # (n,) c, kg m: first moments about the root, zero if that is the centre of mass
     arm_y: Floats
+
+    def merged(self, members: Floats) -> dict[str, Any]:
+        """Fields of a mechanism whose bodies (n) each stand for those of the tree that turn as one.
+
+        members  (bodies, n) 1 where a body belongs to one of them
+        """
+        A, B = (members.T @ pairs @ members for pairs in (self.A, self.B))
+        return {"A": A, "B": B, "arm_x": self.arm_x @ members, "arm_y": self.arm_y @ members, "mass": self.mass}
+
+
+def reduction(rows: Mapping[int, Floats], n: int) -> Floats:
+    """E (n, n) by the followers' weights."""
+    E = np.eye(n)
+    for follower, row in rows.items():
+        E[follower] = row
+    return E
 
 
 @dataclass(frozen=True)

@@ -1,9 +1,11 @@
 """Torques at hinges, for both models: what acts between two bodies by the angle between them and its rate.
 
 A law is a type with a body in `hinge_torque` and in `hinge_energy`. Its torque turns the first body back and the second
-one forward; what it loses is (torque - elastic part) times the rate. That between the legs, `hip_law`, has numbers that
-the config's block `walker.hip` gives and both models hold; of these others need the units alone, and the constant
-`torque`, which drives.
+one forward; what it loses is (torque - elastic part) times the rate.
+
+Hinges are rows of two arrays in both models' record: `hinges` has the two bodies, `laws` the numbers of a SpringDamper.
+The first row is the hip, the others are the knees that can bend: the swing leg's in the rigid model, both on compliant
+ground, where each has a stop besides.
 """
 
 from typing import Any, NamedTuple
@@ -59,13 +61,21 @@ def spring_energy(law: SpringDamper, angle: float) -> float:
     return 0.5 * law.stiffness * angle * angle
 
 
-HIP_NUMBERS = len(SpringDamper._fields)
+LAW_NUMBERS = len(SpringDamper._fields)
+HIP_ROW = 0  # row of the hinge between the legs
+HINGE_ROWS = {"hip": slice(HIP_ROW, HIP_ROW + 1), "knees": slice(HIP_ROW + 1, None)}
 
 
 @always_inline
-def hip_law(model: Any) -> SpringDamper:
-    """What acts between the legs of a model, with its numbers in the order in which the config has them."""
-    return SpringDamper(model.hip[0], model.hip[1], model.hip[2])
+def hinge_law(model: Any, row: int) -> SpringDamper:
+    """The spring, damper and torque at a hinge, in the order in which the config has their numbers."""
+    return SpringDamper(model.laws[row, 0], model.laws[row, 1], model.laws[row, 2])
+
+
+@always_inline
+def is_sprung(model: Any, row: int) -> bool:
+    """Whether any of them acts at a hinge."""
+    return model.laws[row, 0] != 0.0 or model.laws[row, 1] != 0.0 or model.laws[row, 2] != 0.0
 
 
 @always_inline

@@ -26,7 +26,7 @@ from walkerlab.mechanics.standing import (
     equations,
     hip_height,
 )
-from walkerlab.mechanics.tree import projections, sines_cosines
+from walkerlab.mechanics.tree import add_inertia, projections, sines_cosines
 from walkerlab.mechanics.trigonometry import sine_cosine
 from walkerlab.solvers.system import Floats
 
@@ -74,11 +74,9 @@ def strike(model: Standing, phase: int, other_foot: bool, y: Any, new: Any) -> N
         for l in range(n):
             factors[k, l] = M[k, l]
     factor_linked(model, phase, factors)
-    momenta(model, M, F, U, new[n : 2 * n], along, upward, p)
     pushed = other_foot and model.push_off != 0.0
-    if pushed:
-        p[STANCE] += push_off(model, new).angular
-    solve_linked(model, phase, factors, p)
+    twist = push_off(model, new).angular if pushed else 0.0
+    project(model, phase, M, factors, F, U, new[n : 2 * n], along, upward, twist, p)
     jump, turned = vector(like), vector(like)
     for k in range(n):
         jump[k] = p[k] - new[n + k]
@@ -93,16 +91,56 @@ def strike(model: Standing, phase: int, other_foot: bool, y: Any, new: Any) -> N
         for k in range(n):
             place = model.roles[k] if other_foot else k
             new[at + k], new[at + n + k] = y[at + place], y[at + n + place]
-        momenta(model, M, F, U, new[at + n : at + 2 * n], along, upward, p)
-        mass_change(model, s, c, new[at : at + n], jump, jump_along, jump_upward, turned)
-        for k in range(n):
-            p[k] -= turned[k]
+        twist = 0.0
         if pushed:
             push = push_off(model, new)
-            p[STANCE] += push.by_trailing * new[at + SWING] + push.by_leading * new[at + STANCE]
-        solve_linked(model, phase, factors, p)
+            twist = push.by_trailing * new[at + SWING] + push.by_leading * new[at + STANCE]
+        turn, rate = new[at : at + n], new[at + n : at + 2 * n]
+        mass_change(model, s, c, turn, jump, jump_along, jump_upward, turned)
+        project_change(model, phase, M, factors, F, U, rate, along, upward, twist, turned, p)
         for k in range(n):
             new[at + n + k] = p[k]
+
+
+class RootedTree(NamedTuple):
+    """A tree of n bodies about its root, in the terms of `project`: what a mechanism of either model gives it."""
+
+    E: Floats  # (phases, n, n)
+    A: Floats  # (n, n) kg m^2
+    B: Floats
+    arm_x: Floats  # (n,) kg m
+    arm_y: Floats
+    mass: float  # kg
+    radius: float  # m, of the foot that rolls; 0 where the root is at rest or the centre of mass
+    slope: float  # rad
+
+
+class Lock(NamedTuple):
+    """A joint's lock: a plastic impact that leaves the root's motion as it is."""
+
+    velocities: Floats  # (n,) rad/s, after it
+    lost: float  # J
+    changes: Floats  # (n, columns) rad/s, images of the columns
+
+
+def lock(tree: RootedTree, angles: Floats, omega: Floats, turns: Floats, rates: Floats) -> Lock:
+    """Project angular velocities (n,) on what E[0] allows, by the impact of `strike`; the root takes no part.
+
+    angles        (n,) rad, from the vertical
+    turns, rates  (n, columns) directions of the state before: changes of the angles and of their velocities
+    """
+    n = len(omega)
+    s, c, F, U, p = np.zeros((5, n))
+    M, changes, turned = np.zeros((n, n)), np.zeros(rates.shape), np.zeros(rates.shape)
+    sines_cosines(tree, n, angles, s, c)
+    add_inertia(tree, n, s, c, omega, M, p)
+    factors = M.copy()
+    factor_linked(tree, 0, factors)
+    project(tree, 0, M, factors, F, U, omega, 0.0, 0.0, 0.0, p)
+    if rates.shape[1] > 0:
+        mass_change(tree, s, c, turns, p - omega, 0.0, 0.0, turned)
+        project_change(tree, 0, M, factors, F, U, rates, 0.0, 0.0, 0.0, turned, changes)
+    return Lock(p, float(0.5 * (M @ omega) @ (omega - p)), changes)
 
 
 class PushOffImpulse(NamedTuple):
@@ -181,7 +219,38 @@ def pushed_at_hip(model: Standing, y: Any, impulse: float) -> NDArray[np.float64
 
 
 @always_inline
-def momenta(model: Standing, M: Any, F: Any, U: Any, omega: Any, along: float, upward: float, p: Any) -> None:
+def project(
+    model: Any, phase: int, M: Any, factors: Any, F: Any, U: Any, omega: Any, along: float, upward: float, twist: float,
+    p: Any,
+) -> None:  # fmt: skip
+    """Write the velocities after a plastic impact on the constraints of E[phase] into p (n,).
+
+    model                 a tree of either model about the root that the constraints leave
+    M, factors            (n, n) kg m^2, and what `factor_linked` makes of it
+    F, U                  (n,) kg m, projections of the first moments
+    omega, along, upward  (n,) rad/s and m/s, velocities before of the bodies and of the root
+    twist                 N m s, an impulse on the stance leg
+    """
+    momenta(model, M, F, U, omega, along, upward, p)
+    p[STANCE] += twist
+    solve_linked(model, phase, factors, p)
+
+
+@always_inline
+def project_change(
+    model: Any, phase: int, M: Any, factors: Any, F: Any, U: Any, rate: Any, along: float, upward: float, twist: float,
+    turned: Any, p: Any,
+) -> None:  # fmt: skip
+    """As `project`, of a change of the velocities, with the change of the momenta (n,) by the angles in `turned`."""
+    momenta(model, M, F, U, rate, along, upward, p)
+    for k in range(len(model.arm_x)):
+        p[k] -= turned[k]
+    p[STANCE] += twist
+    solve_linked(model, phase, factors, p)
+
+
+@always_inline
+def momenta(model: Any, M: Any, F: Any, U: Any, omega: Any, along: float, upward: float, p: Any) -> None:
     """Z' M u into p (n,), with the angular velocities omega (n,).
 
     M is M' of standing.py, whose part in the rolling of angular velocities is taken out again.
@@ -197,7 +266,7 @@ def momenta(model: Standing, M: Any, F: Any, U: Any, omega: Any, along: float, u
 
 
 @always_inline
-def mass_change(model: Standing, s: Any, c: Any, turn: Any, jump: Any, along: float, upward: float, p: Any) -> None:
+def mass_change(model: Any, s: Any, c: Any, turn: Any, jump: Any, along: float, upward: float, p: Any) -> None:
     """Z' dM w into p (n,): the change of the masses' matrix as the bodies turn, times a jump w of the velocities.
 
     turn  (n,) how the angles change

@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from walkerlab.mechanics.assembly import Anchor, followers, levers, tree_about
+from walkerlab.mechanics.assembly import Anchor, followers, levers, reduction, tree_about
 from walkerlab.mechanics.parts import Assembly, Revolute
 from walkerlab.mechanics.standing import NO_SHANK, STANCE, SWING, Standing, new_standing, on_slope
 from walkerlab.solvers.system import Floats
@@ -50,26 +50,22 @@ def on_level_ground(assembly: Assembly, gravity: float, knee_locked_at_strike: b
     n = len(places.names)
     free = () if knee_locked_at_strike else tuple(shank for shank, _ in places.knees)
     tree, members = tree_about(assembly, root), places.members
-    A, B = (members.T @ pairs @ members for pairs in (tree.A, tree.B))
     section_indices = (STANCE, n + SWING, n + STANCE, *(n + shank for shank in free))
     in_line = {**torso, **knees}
     reductions = [reduction(rows, n) for rows in (torso, in_line, torso if free else in_line)]
     shank, thigh = places.knees[0] if places.knees else (NO_SHANK, NO_SHANK)
     return new_standing(
         n,
-        A=A,
-        B=B,
-        arm_x=tree.arm_x @ members,
-        arm_y=tree.arm_y @ members,
+        **tree.merged(members),
         foot_x=to_foot[:, 0],
         foot_y=to_foot[:, 1],
         E=reductions,
+        hinges=[(SWING, STANCE), *places.knees],
         roles=places.roles,
         section=[*section_indices, *[0] * (n + 1 - len(section_indices))],
         coordinates=len(section_indices),
         thigh=thigh,
         shank=shank,
-        mass=tree.mass,
         radius=foot.radius_m,
         hip_x=to_hip[STANCE, 0],
         hip_y=to_hip[STANCE, 1],
@@ -113,14 +109,6 @@ def torso_rows(assembly: Assembly, places: BodyPlaces) -> dict[int, Floats]:
 def knee_rows(places: BodyPlaces) -> dict[int, Floats]:
     """Weights by which the parts of a straight swing leg follow its thigh."""
     return {shank: np.eye(len(places.names))[thigh] for shank, thigh in places.knees}
-
-
-def reduction(rows: dict[int, Floats], n: int) -> Floats:
-    """E (n, n) by the followers' weights."""
-    E = np.eye(n)
-    for follower, row in rows.items():
-        E[follower] = row
-    return E
 
 
 def hip_of(assembly: Assembly) -> Revolute:

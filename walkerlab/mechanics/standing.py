@@ -21,13 +21,13 @@ import numpy as np
 from walkerlab.kernels import always_inline, inlined, matrix, vector, zeros
 from walkerlab.mechanics import tree
 from walkerlab.mechanics.hinges import (
-    HIP_NUMBERS,
     HingeTorque,
     add_hinge_gradients,
     add_hinge_torque,
     hinge_energy,
+    hinge_law,
     hinge_torque,
-    hip_law,
+    is_sprung,
     legs_apart,
 )
 from walkerlab.mechanics.links import factor_linked, solve_linked, spread
@@ -50,35 +50,26 @@ NO_SHANK = -1
 
 
 @tree.read_at_once
-class Standing(np.record):  # type: ignore[misc]  # NumPy's stubs call one of its bases final
-    """Everything that stays the same while the rigid model walks, SI: a structured scalar, of n bodies by its type."""
+class Standing(tree.Mechanism):  # type: ignore[misc]  # as its base
+    """Everything that stays the same while the rigid model walks, SI: a structured scalar, of n bodies by its type.
 
-    A: Floats  # (n, n) kg m^2
-    B: Floats
-    arm_x: Floats  # (n,) c, kg m: first moments about the root
-    arm_y: Floats
+    E has three reductions: BENT, STRAIGHT, AT_STRIKE.
+    """
+
     foot_x: Floats  # (n,) m, levers from the stance foot's centre to the swing foot's, body by body
     foot_y: Floats
-    E: Floats  # (3, n, n) the reductions; the row of a body that follows others has zero on the diagonal
     roles: Integers  # (n,) which body takes each place after the heel strike
     section: Integers  # (n + 1,) places in the state of the section's coordinates, the stance leg's angle first
     coordinates: int  # [d] of the section
     thigh: int  # places of the swing knee's bodies among them; NO_SHANK for legs without knees
     shank: int
-    driven_hip: bool  # whether anything acts between the legs
-    hip: Floats  # numbers of that: see `hinges.hip_law`
-    push_off: float  # N s, along the trailing leg in the heel strike
     unpaired: float  # kg m^2, of a torque on the stance leg that no hinge gives: see `add_unpaired_torque`
-    mass: float  # kg
     radius: float  # [R] m, of either foot; 0 is a point
     hip_x: float  # m, to the hip, which belongs to the stance leg
     hip_y: float
     lean: float  # rad, angle of the line from hip to foot centre in a straight leg
     leg_length: float  # [L] m, hip to sole
     gravity: float  # [g] m/s^2
-    gravity_along: float  # m/s^2
-    gravity_down: float  # m/s^2, towards the slope
-    slope: float  # [phi] rad, positive downhill in walking direction
     zero_state: Floats  # (2 n,) zeros: the bodies' angles from the vertical and their velocities
 
     @property
@@ -92,14 +83,9 @@ class Standing(np.record):  # type: ignore[misc]  # NumPy's stubs call one of it
         return bool(self.shank != NO_SHANK)
 
     @property
-    def driven(self) -> bool:
-        """Whether anything but gravity gives it energy."""
-        return bool(self.push_off != 0.0 or hip_law(self).torque != 0.0)
-
-    @property
     def passive(self) -> bool:
         """Whether nothing but gravity acts on it, not even a spring or a damper."""
-        return not self.driven_hip and not self.driven
+        return not self.sprung and not self.driven
 
     def __eq__(self, other: object) -> bool:
         """Whether all numbers are the same."""
@@ -117,8 +103,7 @@ class Standing(np.record):  # type: ignore[misc]  # NumPy's stubs call one of it
         """A copy with other values of some fields, that nobody can write to."""
         memory: Any = np.empty((), self.dtype)
         memory[()] = self
-        for name, value in fields.items():
-            memory[name] = value
+        tree.write_fields(memory, fields)
         memory.flags.writeable = False
         read_only: Standing = memory[()]
         return read_only
@@ -127,11 +112,9 @@ class Standing(np.record):  # type: ignore[misc]  # NumPy's stubs call one of it
 def new_standing(n: int, **fields: Any) -> Standing:
     """The rigid model of n bodies with these fields; the others are zero."""
     shapes = {
-        **dict.fromkeys(("A", "B"), (n, n)),
-        **dict.fromkeys(("arm_x", "arm_y", "foot_x", "foot_y", "roles"), (n,)),
+        **tree.mechanism_shapes(n, 3, len(fields["hinges"])),
+        **dict.fromkeys(("foot_x", "foot_y", "roles"), (n,)),
         "section": (n + 1,),
-        "E": (3, n, n),
-        "hip": (HIP_NUMBERS,),
         "zero_state": (2 * n,),
     }
     blank: Any = np.zeros((), tree.record_type(Standing, shapes))
@@ -176,8 +159,9 @@ def equations(model: Standing, y: Any, s: Any, c: Any, F: Any, U: Any, M: Any, r
         r[k] = 0.0
     add_gravity(model, n, F, U, r)
     add_inertia(model, n, s, c, omega, M, r)
-    if model.driven_hip:
-        add_hinge_torque(hip_torque(model, y), SWING, STANCE, r)
+    for row in range(len(model.hinges)):
+        if is_sprung(model, row):
+            add_hinge_torque(torque_at(model, row, y), model.hinges[row, 0], model.hinges[row, 1], r)
     add_unpaired_torque(model, s, c, omega, r)
     if R != 0.0:
         pulled = model.mass * model.gravity_along
@@ -190,10 +174,10 @@ def equations(model: Standing, y: Any, s: Any, c: Any, F: Any, U: Any, M: Any, r
 
 
 @always_inline
-def hip_torque(model: Standing, y: Any) -> HingeTorque:
-    """The torque between the legs, by how far the swing leg is ahead."""
-    n = len(model.arm_x)
-    return hinge_torque(hip_law(model), y[SWING] - y[STANCE], y[n + SWING] - y[n + STANCE])
+def torque_at(model: Standing, row: int, y: Any) -> HingeTorque:
+    """The torque of the spring, damper and drive at a hinge."""
+    n, body, other = len(model.arm_x), model.hinges[row, 0], model.hinges[row, 1]
+    return hinge_torque(hinge_law(model, row), y[body] - y[other], y[n + body] - y[n + other])
 
 
 @legs_apart.case(Mode)
@@ -264,8 +248,10 @@ def torque_gradients(model: Standing, y: Any, s: Any, c: Any, alpha: Any, by_ang
         by_angle[k, k] = -R * F[k] * alpha[STANCE]
     add_gravity_gradient(model, n, F, U, by_angle)
     add_inertia_gradients(model, n, s, c, omega, alpha, by_angle, by_rate)
-    if model.driven_hip:
-        add_hinge_gradients(hip_torque(model, y), SWING, STANCE, by_angle, by_rate)
+    for row in range(len(model.hinges)):
+        if is_sprung(model, row):
+            now = torque_at(model, row, y)
+            add_hinge_gradients(now, model.hinges[row, 0], model.hinges[row, 1], by_angle, by_rate)
     add_unpaired_gradients(model, s, c, omega, by_angle, by_rate)
     if R != 0.0:
         for l in range(n):
@@ -332,7 +318,7 @@ def momentum(model: Standing, y: Any) -> tuple[float, float]:
 def energies(model: Standing, y: Any) -> tuple[float, float]:
     """Kinetic and potential energy (J), the latter from where the foot touches with its leg normal to the slope.
 
-    The potential energy is gravity's and that of the spring between the legs.
+    The potential energy is gravity's and that of the springs at the hinges.
     """
     n = len(model.arm_x)
     s, c, F, U, r, M = (
@@ -342,8 +328,9 @@ def energies(model: Standing, y: Any) -> tuple[float, float]:
     equations(model, y, s, c, F, U, M, r)
     rolled = -model.radius * (y[STANCE] + model.slope)
     potential = tree.potential_energy(model, n, rolled, model.radius, F, U)
-    stored = hinge_energy(hip_law(model), y[SWING] - y[STANCE])
-    return tree.kinetic_energy(n, M, y[n : 2 * n]), potential + stored
+    for row in range(len(model.hinges)):
+        potential += hinge_energy(hinge_law(model, row), y[model.hinges[row, 0]] - y[model.hinges[row, 1]])
+    return tree.kinetic_energy(n, M, y[n : 2 * n]), potential
 
 
 def energy_at_touch(model: Standing, touched: Any) -> Any:

@@ -9,19 +9,21 @@ U_k = (R(psi_k) c_k)_y, psi the angles from the slope's normal, and Delta = thet
 the latter two terms about a root at rest. What the root's own motion adds is each model's: a rolling foot's in
 standing.py, Newton's law for the centre of mass in ground/motion.py.
 
-`tree` is the rigid model's Standing or a Form on compliant ground; n is how many bodies it has, known while compiling
-where the tree's type tells.
+`tree` is a Mechanism: the rigid model's Standing or a Form on compliant ground. n is how many bodies it has, known
+while compiling where the tree's type tells.
 """
 
 from collections.abc import Mapping
+from inspect import get_annotations
 from operator import itemgetter
 from typing import Any, TypeVar
 
 import numpy as np
 
 from walkerlab.kernels import always_inline
+from walkerlab.mechanics.hinges import HINGE_ROWS, HIP_ROW, LAW_NUMBERS
 from walkerlab.mechanics.trigonometry import sine_cosine
-from walkerlab.solvers.system import Integers
+from walkerlab.solvers.system import Floats, Integers
 
 R = TypeVar("R", bound=type)
 
@@ -42,7 +44,8 @@ def record_type(kind: type, shapes: Mapping[str, tuple[int, ...]]) -> Any:
     """NumPy's type of a structured scalar with the fields of a class, whose numbers have eight bytes each."""
     fields = [
         (name, np.int64 if of in (Integers, int, bool) else np.float64, shapes.get(name, ()))
-        for name, of in kind.__annotations__.items()
+        for each in (*kind.__bases__, kind)
+        for name, of in get_annotations(each).items()
     ]
     return np.dtype((kind, fields))
 
@@ -53,6 +56,55 @@ def new_record(kind: Any, **fields: Any) -> Any:
     for name, value in fields.items():
         record[name] = value
     return record
+
+
+@read_at_once
+class Mechanism(np.record):  # type: ignore[misc]  # NumPy's stubs call one of its bases final
+    """Constants of a tree of n bodies about its root, its hinges and what acts on it, for both models, SI."""
+
+    A: Floats  # (n, n) kg m^2, of mechanics/assembly.py
+    B: Floats
+    arm_x: Floats  # (n,) c, kg m: first moments about the root, zero if that is the centre of mass
+    arm_y: Floats
+    E: Floats  # (phases, n, n) the reductions of links.py; a body that follows others has zero on the diagonal
+    hinges: Integers  # (rows, 2) the body that a hinge's torque turns back, and the other one
+    laws: Floats  # (rows, 3) numbers of the SpringDamper at each hinge
+    push_off: float  # N s, along the trailing leg: at once or from a step's touch on
+    mass: float  # kg
+    gravity_along: float  # m/s^2
+    gravity_down: float  # m/s^2, towards the slope
+    slope: float  # [phi] rad, positive downhill in walking direction
+
+    @property
+    def hip(self) -> Floats:
+        """Numbers of the SpringDamper between the legs."""
+        numbers: Floats = self.laws[HIP_ROW]
+        return numbers
+
+    @property
+    def sprung(self) -> bool:
+        """Whether a spring, a damper or a torque acts at any hinge."""
+        return bool(self.laws.any())
+
+    @property
+    def driven(self) -> bool:
+        """Whether anything but gravity gives it energy."""
+        return bool(self.push_off != 0.0 or self.laws[:, -1].any())
+
+
+def mechanism_shapes(n: int, phases: int, rows: int) -> dict[str, tuple[int, ...]]:
+    """Shapes of a Mechanism's arrays for n bodies, some phases and rows of hinges."""
+    pairs, arms = dict.fromkeys(("A", "B"), (n, n)), dict.fromkeys(("arm_x", "arm_y"), (n,))
+    return {**pairs, **arms, "E": (phases, n, n), "hinges": (rows, 2), "laws": (rows, LAW_NUMBERS)}
+
+
+def write_fields(mechanisms: Any, fields: Mapping[str, Any]) -> None:
+    """Write fields into one or more mechanisms; names of HINGE_ROWS stand for the laws at those hinges."""
+    for name, value in fields.items():
+        if name in HINGE_ROWS:
+            mechanisms["laws"][..., HINGE_ROWS[name], :] = value
+        else:
+            mechanisms[name] = value
 
 
 @always_inline

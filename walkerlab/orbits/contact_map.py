@@ -63,7 +63,7 @@ class SectionStep(MappedStep):
 
 def turning_bodies(walker: ContactWalker, stance: int) -> tuple[int, ...]:
     """Bodies that turn independently, the swing leg's first; the shank below the locked stance knee does not."""
-    locked = walker.whole.shanks[stance] if walker.kneed else None
+    locked = walker.whole.knees[stance, 0] if walker.kneed else None
     return (*walker.legs[1 - stance], *(body for body in walker.legs[stance] if body != locked))
 
 
@@ -71,15 +71,16 @@ def angled_bodies(walker: ContactWalker, stance: int) -> tuple[int, ...]:
     """Bodies whose angles are coordinates; a latched compliant stop gives the stance knee an angle of its own."""
     free = turning_bodies(walker, stance)[1:]
     if walker.kneed and not isinstance(walker.stop, IdealLock):
-        return (*free, int(walker.whole.shanks[stance]))
+        return (*free, int(walker.whole.knees[stance, 0]))
     return free
 
 
 def fill_followers(walker: ContactWalker, stance: int, angles: Floats, fixed: tuple[int, ...]) -> Floats:
     """Fill in the angles (n), or changes of angles, of coupled bodies that are not `fixed`."""
     whole, n = walker.whole, angles.size
-    if walker.kneed and whole.shanks[stance] not in fixed:
-        angles[whole.shanks[stance]] = angles[whole.thighs[stance]]
+    shank, thigh = whole.knees[stance]
+    if walker.kneed and shank not in fixed:
+        angles[shank] = angles[thigh]
     for body in range(n):
         if whole.E[0, body, body] == 0.0 and body not in fixed:
             angles[body] = whole.E[0, body, :n] @ angles

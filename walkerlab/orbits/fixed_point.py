@@ -284,9 +284,8 @@ def with_partial_drive(walker: Standing, slope: float, share: float) -> Standing
 
     It is passive and on `slope` for a share of 0.
     """
-    parts = {name: share * walker[name] for name in ("hip", "push_off")}
-    driven_hip = walker.driven_hip and share > 0.0
-    return on_slope(walker.changed(**parts, driven_hip=driven_hip), slope + share * (walker.slope - slope))
+    parts = {name: share * walker[name] for name in ("laws", "push_off")}
+    return on_slope(walker.changed(**parts), slope + share * (walker.slope - slope))
 
 
 @dataclass

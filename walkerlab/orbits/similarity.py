@@ -47,7 +47,7 @@ def unit_walker(walker: Standing) -> tuple[Standing, Units]:
     scales = {
         **dict.fromkeys(("A", "B", "unpaired"), inertia),
         **dict.fromkeys(("arm_x", "arm_y"), moment),
-        "hip": np.array(SpringDamper(1.0 / units.energy, 1.0 / (units.energy * units.time), 1.0 / units.energy)),
+        "laws": np.array(SpringDamper(1.0 / units.energy, 1.0 / (units.energy * units.time), 1.0 / units.energy)),
         "push_off": 1.0 / units.impulse,
         **dict.fromkeys(("radius", "foot_x", "foot_y", "hip_x", "hip_y"), 1.0 / length),
     }

@@ -13,6 +13,7 @@ from walkerlab.config.walkers import Kneed, PartsWalker
 from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.ground.compliant import KneeRules, contact_walker
 from walkerlab.ground.friction import FrictionLaw, law_named
+from walkerlab.ground.knees import KneeStop
 from walkerlab.ground.normal_force import NormalLaw
 from walkerlab.ground.resting import RestingFoot, resting_foot
 from walkerlab.ground.terrain import STANCE_FOOT, Terrain, after_mid_swing, checkerboard, plane
@@ -111,7 +112,7 @@ def knee_rules(walker: AnyWalker) -> KneeRules:
     if knee.lock == "ideal":
         return KneeRules(release_at_touch=at_touch)
     # full damping from 0.01 mrad on
-    return KneeRules(NormalLaw(knee.stop_stiffness, 1.0, knee.stop_damping, FULL_STOP_DAMPING), at_touch)
+    return KneeRules(KneeStop(knee.stop_stiffness, 1.0, knee.stop_damping, FULL_STOP_DAMPING), at_touch)
 
 
 TERRAINS: dict[str, Callable[[float], Terrain]] = {

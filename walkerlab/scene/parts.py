@@ -2,7 +2,6 @@
 
 from typing import Any
 
-from walkerlab.config.drives import Hip
 from walkerlab.config.reads import RigidConfig
 from walkerlab.config.walkers import LIGHTEST_CONTACT, CompassWalker, Kneed, PartsWalker, StraightLegs, torso_mass
 from walkerlab.errors import ConfigError
@@ -64,9 +63,7 @@ def own_parts(walker: PartsWalker) -> Assembly:
 
 
 def drive_parameters(config: RigidConfig) -> dict[str, Any]:
-    hip = config.walker.hip
-    numbers = tuple(dict(hip).values())
-    return {"driven_hip": hip != Hip(), "hip": numbers, "push_off": config.push_off.impulse_N_s}
+    return {"hip": tuple(dict(config.walker.hip).values()), "push_off": config.push_off.impulse_N_s}
 
 
 def knee_locked_at_strike(walker: AnyWalker) -> bool:

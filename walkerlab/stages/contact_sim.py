@@ -178,7 +178,7 @@ def state_variables(scene: ContactScene, y: Floats) -> dict[str, Variable]:
     of_legs = {"angle": angle[:, upper], "velocity": velocity[:, upper]}
     found = over_time(**of_legs, hip_along_m=along, hip_height_m=height)
     if walker.kneed:
-        thighs, shanks = whole.thighs.tolist(), whole.shanks.tolist()
+        shanks, thighs = whole.knees.T.tolist()
         found |= turning("shank", angle[:, shanks], velocity[:, shanks])
         knees = np.zeros((2, len(y), 2))
         for leg, (thigh, shank) in enumerate(zip(thighs, shanks, strict=True)):

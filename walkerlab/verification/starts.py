@@ -78,7 +78,7 @@ class RigidStart(CaseStart):
         numbers = np.concatenate([walk.touch_time_s, walk.before.ravel(), walk.after.ravel()])
         touches, work = walk.touch_time_s / pendulum_time(self.config), walk.work
         cost = work.rhs_evaluations, work.accepted
-        off = walk.energy_balance_residual if self.walker.driven_hip else walk.energy_drift
+        off = walk.energy_balance_residual if self.walker.sprung else walk.energy_drift
         return JudgedWalk(walk.outcome, touches, None, off, *cost, numbers, walk)
 
     def measures(self, walk: JudgedWalk, _case: Case) -> list[Measure]:

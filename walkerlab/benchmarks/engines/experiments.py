@@ -303,7 +303,7 @@ def swing_truth(scene: EngineScene, start: Floats, until_s: float = SWING_S) -> 
     from scipy.integrate import solve_ivp
 
     knee = knees_at_start(scene.ours, STANCE_FOOT, scene.start)
-    passive = changed_forms(scene.ours, driven_hip=False, push_off=0.0, hip=0.0)
+    passive = changed_forms(scene.ours, push_off=0.0, laws=0.0)
     system = on_ground(passive, (False, False), knee, hinged=True)
     whole = passive.forms[1, 0]
 

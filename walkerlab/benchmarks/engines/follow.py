@@ -12,7 +12,7 @@ import numpy as np
 
 from walkerlab.benchmarks.engines.scenes import EngineScene
 from walkerlab.ground.external import feet_and_forces
-from walkerlab.ground.knees import FLEXED, lock
+from walkerlab.ground.knees import FLEXED, lock_knee
 from walkerlab.ground.pulse import pulse_left
 from walkerlab.ground.terrain import STANCE_FOOT, cell_at, cell_edges, has_ground_in_cell
 from walkerlab.ground.walker import BENT, LOCKED, RELEASED, FootMotion, locked_knees, on_ground
@@ -189,7 +189,7 @@ class RuleFollower:
         walker, walk_state, y = self.scene.ours, self.walk_state, self.scene.about_centre(q, v)
         if self.turn is not None and contact_events.EXTENSION <= self.turn.event < contact_events.PULSE_END:
             contact_transitions.knee_stops(walker.stop, walk_state, self.turn.event, self.time_s)
-            y = lock(walker.whole, walker.forms[0, locked_knees(walk_state.knee)], y).state
+            y = lock_knee(walker.whole, walker.forms[0, locked_knees(walk_state.knee)], y).state
         elif self.turn is not None:
             contact_transitions.release(walk_state, 1 - int(walk_state.progress.stance))
         self.turn = None

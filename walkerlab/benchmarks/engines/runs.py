@@ -115,7 +115,7 @@ class EngineWalk:
         def forces(time_s: float, q: Floats, v: Floats) -> Floats:
             return rules.forces(since + time_s, q, v)
 
-        driven = task.scene.ours.driven or task.scene.ours.whole.driven_hip
+        driven = task.scene.ours.driven or task.scene.ours.whole.sprung
         outside = forces if task.own is None or driven else None
         engine = self.engine.simulation(rules.scene.model, stepping, self.q, self.v, outside, task.own)
 
