@@ -40,8 +40,8 @@ def run(tmp_path_factory):
         for trial in (RigidTrial, ContactTrial):
             patch.setattr(trial, "methods", property(lambda self: ("dop853", "radau5")))
         patch.setattr(ladder, "OWN_LADDER", (1e-3, 1e-6))
-        patch.setattr(ladder, "REPEATS", 1)
-        patch.setattr(references, "TIGHTEST", {"dop853": 1e-8, "radau5": 1e-9})
+        patch.setattr(ladder, "MAX_REPEATS", 1)
+        patch.setattr(references, "TIGHTEST_CONTACT", {"dop853": 1e-8, "radau5": 1e-9})
         loaded = load(None, SETS)
         folder = RunFolder(tmp_path_factory.mktemp("runs"), loaded.run_name)
         return loaded.config, folder, execute(loaded.config, "report", folder)
