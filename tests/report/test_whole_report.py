@@ -22,7 +22,7 @@ from walkerlab.report.results import Results
 from walkerlab.store import artifact
 from walkerlab.store.runfolder import RunFolder
 from walkerlab.verification import known_problems, stability
-from walkerlab.verification.catalogue import shipped
+from walkerlab.verification.catalogue import package_cases
 
 SETS = ("strides=1", "tune.cells=2")
 JUDGED = ("paper", "rigid-no-hip-mass")
@@ -33,7 +33,7 @@ STAGES = PIPELINE["report"].inputs(load().config)
 def run(tmp_path_factory):
     """The report of the paper's config: two steps, four cells of the map, two cases, two methods."""
     with pytest.MonkeyPatch.context() as patch:
-        cases = tuple(case for case in shipped() if case.name in JUDGED)
+        cases = tuple(case for case in package_cases() if case.name in JUDGED)
         assert len(cases) == len(JUDGED)
         patch.setattr(stability, "judged", lambda own: cases)
         patch.setattr(known_problems, "PROBLEMS", known_problems.PROBLEMS[:1])
