@@ -27,7 +27,7 @@ from leaving_out import HEAD, leaving_out_rows
 from right_hand_sides import ONE_DEGREE, times_ns
 from whole_process import whole_process_times
 
-from walkerlab.benchmarks.accuracy import OFF_THE_GAIT
+from walkerlab.benchmarks.accuracy import START_RATE_FACTOR
 from walkerlab.benchmarks.contact_trials import contact_trial
 from walkerlab.benchmarks.references import Reference, reference_for
 from walkerlab.benchmarks.trials import USER_SCRIPT, ContactTrial, RigidTrial, Trial
@@ -206,7 +206,7 @@ def printed_trial() -> RigidTrial:
 def rigid_trial_of(config: Config) -> RigidTrial:
     """Ten rigid steps from near the gait of a config."""
     walker = rigid_walker(config, "corrected")
-    start = with_scaled_rates(walker, chosen_gait(config).state, OFF_THE_GAIT, OFF_THE_GAIT)
+    start = with_scaled_rates(walker, chosen_gait(config).state, START_RATE_FACTOR, START_RATE_FACTOR)
     return RigidTrial(walker, start, STEPS, compass_or_none(config, "corrected"))
 
 

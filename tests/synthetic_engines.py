@@ -76,4 +76,4 @@ def truth():
 
 def content(rows=ROWS):
     found = EngineFindings(list(rows), list(SWINGS), list(TUNING), {"compass": truth()}, [])
-    return engines.content(found, {"period_s": 0.7036, "step_length_m": 0.3714})
+    return engines.make_content(found, {"period_s": 0.7036, "step_length_m": 0.3714})

@@ -11,7 +11,7 @@ from walkerlab.errors import ConfigError
 from walkerlab.report.page import Page, render
 from walkerlab.report.results import Results
 from walkerlab.verification.section import section
-from walkerlab.verification.stability import summary_of
+from walkerlab.verification.stability import summarise
 from walkerlab.verification.verdict import CaseResult
 
 SCRIPTS = Path(__file__).parent.parent / "scripts"
@@ -102,7 +102,7 @@ def test_a_name_cannot_lead_out_of_the_runs_folder(name):
 
 def test_texts_of_cases_do_not_become_markup():
     case = CaseResult("x", "own", "contact", MARKUP, ("walked",), "fell", 0, 0.0, 1, 0.1, (), (MARKUP,))
-    summary = summary_of([case], [], [])
+    summary = summarise([case], [], [])
     stability = type("Stored", (), {"summary": summary, "groups": {}})()
     page = render(Page("title", (section(Results(None, {"stability": stability})),)))
     assert MARKUP not in page

@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 
 from walkerlab.benchmarks import accuracy, ladder
-from walkerlab.benchmarks.accuracy import best_methods, conclusion, summary_of
+from walkerlab.benchmarks.accuracy import best_methods, conclusion, summarise
 from walkerlab.benchmarks.ladder import (
     Ascent,
     MethodRow,
     MethodRun,
     ascend,
-    finished,
-    left_of,
+    complete_ascents,
+    make_row,
     measure,
-    row_of,
+    omitted_tolerances,
 )
 from walkerlab.benchmarks.references import End, Reference, WalkEndsError, reference_for
 from walkerlab.benchmarks.trials import USER_SCRIPT, RigidTrial, TrialRun
@@ -39,7 +39,7 @@ def reference():
 
 def measured(method, rtol, reference):
     one = Ascent(TRIAL, method, LADDER, (), unfinished=False)
-    return row_of(one, measure(TRIAL, method, rtol, 10**5), reference)
+    return make_row(one, measure(TRIAL, method, rtol, 10**5), reference)
 
 
 @pytest.fixture(scope="module")
@@ -102,16 +102,16 @@ def test_an_error_below_what_the_reference_is_known_to_is_marked():
     ends = {1e-4: 2e-8, 1e-8: 1e-9}
     climbed = Ascent(TRIAL, "radau5", tuple(ends), (), unfinished=False)
     runs = [MethodRun(rtol, TrialRun("walked", np.full(4, end), 1, 1, 0), (1.0,)) for rtol, end in ends.items()]
-    assert [row_of(climbed, run, unsure).within_reference for run in runs] == [False, True]
+    assert [make_row(climbed, run, unsure).within_reference for run in runs] == [False, True]
 
 
 def test_an_exhausted_budget_stays_visible_and_ends_the_ladder(reference, monkeypatch):
-    monkeypatch.setattr(ladder, "BUDGET", 500)
+    monkeypatch.setattr(ladder, "RUN_BUDGET", 500)
     one = ascend(TRIAL, "radau5")
-    rows = [row_of(one, run, reference) for run in one.runs]
+    rows = [make_row(one, run, reference) for run in one.runs]
     assert [row.outcome for row in rows[:-1]] == ["walked"] * (len(rows) - 1)
     assert (rows[-1].outcome, rows[-1].error, rows[-1].within_reference) == ("budget-exhausted", None, False)
-    not_run = left_of(one)
+    not_run = omitted_tolerances(one)
     assert len(rows) + len(not_run) == len(ladder.OWN_LADDER)
     assert all("budget-exhausted" in entry["why"] for entry in not_run)
 
@@ -119,14 +119,14 @@ def test_an_exhausted_budget_stays_visible_and_ends_the_ladder(reference, monkey
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_a_librarys_long_run_is_put_off_and_made_good(jobs, monkeypatch):
     whole = [run.result.rhs_evaluations for run in ascend(TRIAL, "scipy-dop853").runs]
-    monkeypatch.setattr(ladder, "SHORT", whole[2] - 1)
+    monkeypatch.setattr(ladder, "SHORT_RUN_BUDGET", whole[2] - 1)
     short = ascend(TRIAL, "scipy-dop853")
     assert short.unfinished
     assert [run.result.rhs_evaluations for run in short.runs] == whole[:2]
     other = ascend(TRIAL, "dop853")
-    (end,), (made_good, same) = finished([TRIAL], [short, other], jobs)
+    (end,), (made_good, same) = complete_ascents([TRIAL], [short, other], jobs)
     assert [run.result.rhs_evaluations for run in made_good.runs] == whole[:3]
-    assert len(left_of(made_good)) == len(ladder.LIBRARY_LADDER) - 3
+    assert len(omitted_tolerances(made_good)) == len(ladder.LIBRARY_LADDER) - 3
     assert same is other
     assert end.state == pytest.approx(made_good.runs[-1].result.state, abs=1e-5)
 
@@ -151,9 +151,9 @@ class SlowAtFirst:
 def test_compiling_is_not_measured(reference, monkeypatch):
     trial = SlowAtFirst()
     monkeypatch.setattr(ladder.time, "perf_counter", lambda: trial.clock)
-    rows = [row_of(one, run, reference) for one in (ascend(trial, "dop853"),) for run in one.runs]
+    rows = [make_row(one, run, reference) for one in (ascend(trial, "dop853"),) for run in one.runs]
     assert [row.wall_s for row in rows] == pytest.approx([1e-3] * len(ladder.OWN_LADDER))
-    assert {row.repeats_of_wall_s for row in rows} == {ladder.REPEATS}
+    assert {row.repeats_of_wall_s for row in rows} == {ladder.MAX_REPEATS}
 
 
 def made(method, error, wall_s):
@@ -198,17 +198,17 @@ def test_a_script_with_a_right_hand_side_of_its_own_is_not_the_library_of_the_fa
 
 
 def test_a_reference_says_by_whom_it_is_and_what_it_took(reference):
-    summary = summary_of([], [], {"rigid": reference}, 1)["reference"]["rigid"]
+    summary = summarise([], [], {"rigid": reference}, 1)["reference"]["rigid"]
     assert summary["from_outside"] == (reference.method == "heyoka-taylor")
     ours = reference_for(replace(TRIAL, compass=None, steps=1))
-    told = summary_of([], [], {"rigid": ours}, 1)["reference"]["rigid"]
+    told = summarise([], [], {"rigid": ours}, 1)["reference"]["rigid"]
     assert not told["from_outside"]
     assert told["tolerance"] == 1e-14
     assert told["rhs_evaluations"] == ours.first.rhs_evaluations > 100
 
 
 def test_the_summary_has_the_fixed_keys(rows, reference):
-    summary = summary_of(rows, [], {"rigid": reference}, 1)
+    summary = summarise(rows, [], {"rigid": reference}, 1)
     assert {"rows", "repeats", "reference", "best"} <= summary.keys()
     fixed = {"scene", "method", "tolerance", "error", "wall_s", "rhs_evaluations", "accepted", "rejected", "outcome"}
     assert fixed <= summary["rows"][0].keys()
@@ -223,5 +223,5 @@ def test_a_walk_that_ends_early_has_no_reference():
 
 
 def test_a_walk_that_ends_early_is_said_to_start_off_the_gait():
-    entry = accuracy.without(RigidTrial(None, None, 1, None), WalkEndsError("the walk ends early (fell)"))
+    entry = accuracy.omitted_scene(RigidTrial(None, None, 1, None), WalkEndsError("the walk ends early (fell)"))
     assert entry["why"] == "started with velocities scaled by 0.98, the walk ends early (fell)"

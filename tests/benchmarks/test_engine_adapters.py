@@ -8,7 +8,7 @@ import pytest
 from engine_scenes import compass, kneed
 
 from walkerlab.benchmarks.engines.adapter import Stepping
-from walkerlab.benchmarks.engines.experiments import STARTS, swing_truth, target_of, walked
+from walkerlab.benchmarks.engines.experiments import START_FACTORS, contact_target, simulate, swing_truth
 from walkerlab.benchmarks.engines.registry import ENGINES
 from walkerlab.benchmarks.engines.runs import Bench, SwingTask, TuningTask, WalkTask, pinned_model
 
@@ -55,7 +55,7 @@ def test_energy_drifts_no_more_than_the_swing_errs(engine):
 
 
 def test_a_ball_rests_where_the_law_has_it(engine):
-    target = target_of(compass())
+    target = contact_target(compass())
     for contact in engine.adapter().CONTACTS:
         task = TuningTask(engine.name, contact, target, 1e-4, 1.5)
         depth = Bench(task, engine.adapter().tuned(contact, target)).at_rest()
@@ -64,7 +64,7 @@ def test_a_ball_rests_where_the_law_has_it(engine):
 
 def test_a_block_creeps_and_slides_as_the_law_has_it(engine):
     """By the closed forms of its friction; a convex one, which lifts a block that slides, has another."""
-    target = target_of(compass())
+    target = contact_target(compass())
     for contact in engine.adapter().CONTACTS:
         task = TuningTask(engine.name, contact, target, 1e-4, 1.5)
         bench = Bench(task, engine.adapter().tuned(contact, target))
@@ -80,7 +80,7 @@ def test_a_knee_locks_in_an_engine_as_in_our_walk(engine):
     """The engine's own swing with a free knee, the lock, and its own swing with one body less."""
     scene = kneed()
     until = 0.4
-    truth = walked(scene, "radau5", 1e-10, 1, until)
+    truth = simulate(scene, "radau5", 1e-10, 1, until)
     name, entry = max(engine.adapter().INTEGRATORS.items(), key=lambda one: (one[1].adapts, one[1].order))
     stepping = Stepping(name, 5e-3 if entry.adapts else 5e-5, 1e-7 if entry.adapts else None)
     answer = WalkTask(engine.name, stepping, scene, 1, until, None, 50_000).run()
@@ -106,7 +106,7 @@ def test_our_law_in_an_engine_is_our_walk(engine, drives):
     """To the first touch and through it: of first order, by a factor that hangs on where in a step the touch falls."""
     scene = compass(*DRIVES[drives])
     until = 0.8
-    truth = walked(scene, "radau5", 1e-10, 2, until).samples.states[1]
+    truth = simulate(scene, "radau5", 1e-10, 2, until).samples.states[1]
     errors = []
     name = next(name for name, entry in engine.adapter().INTEGRATORS.items() if entry.order > 1)
     for step in (1.6e-4, 2e-5):
@@ -121,10 +121,10 @@ def test_our_law_in_an_engine_is_our_walk(engine, drives):
 def test_a_run_is_the_same_each_time(engine):
     scene = compass()
     contact, integrator = next(iter(engine.adapter().CONTACTS.items()))
-    own = engine.adapter().tuned(contact, target_of(scene))
+    own = engine.adapter().tuned(contact, contact_target(scene))
     ends = []
     for _ in range(2):
-        task = WalkTask(engine.name, Stepping(integrator, 2e-4), scene.started(STARTS[-1]), 1, 10.0, own, 6_000)
+        task = WalkTask(engine.name, Stepping(integrator, 2e-4), scene.started(START_FACTORS[-1]), 1, 10.0, own, 6_000)
         ends.append(task.run())
     assert ends[0].touches_s.tolist() == ends[1].touches_s.tolist()
     assert ends[0].steps == ends[1].steps

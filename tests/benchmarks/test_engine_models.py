@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from engine_scenes import compass, kneed
 
-from walkerlab.benchmarks.engines.experiments import CREEP_LOAD, target_of, walked
+from walkerlab.benchmarks.engines.experiments import CREEP_LOAD, contact_target, simulate
 from walkerlab.benchmarks.engines.follow import RuleFollower, crossing
 from walkerlab.benchmarks.engines.runs import pinned_model
 from walkerlab.errors import ConfigError
@@ -24,7 +24,7 @@ def scene(request):
 
 def our_samples(scene, interval_s, steps):
     """Our own walk, as an engine with steps of `interval_s` would give it."""
-    result = walked(scene, "radau5", 1e-9, steps, interval_s)
+    result = simulate(scene, "radau5", 1e-9, steps, interval_s)
     return result, result.samples
 
 
@@ -222,7 +222,7 @@ def test_a_touch_between_two_steps_is_that_of_the_cubic():
 
 def test_the_target_of_tuning_is_the_law_under_the_weight_of_the_walker():
     scene = compass()
-    target = target_of(scene)
+    target = contact_target(scene)
     law = scene.ours.normal
     assert law.stiffness * target.penetration**law.exponent == pytest.approx(20.0 * scene.ours.gravity_down)
     assert target.damping_ratio == pytest.approx(3.714, abs=1e-3)
@@ -230,4 +230,4 @@ def test_the_target_of_tuning_is_the_law_under_the_weight_of_the_walker():
 
 
 def test_there_is_nothing_to_tune_on_frictionless_ground():
-    assert target_of(compass("contact.friction=none")) is None
+    assert contact_target(compass("contact.friction=none")) is None

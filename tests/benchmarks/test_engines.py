@@ -7,7 +7,7 @@ from synthetic_engines import ROWS, SWINGS, TUNING, content, row, truth
 
 from walkerlab.benchmarks.engines import registry
 from walkerlab.benchmarks.engines import stage as engines
-from walkerlab.benchmarks.engines.experiments import TOLERANCES, EngineOnScene
+from walkerlab.benchmarks.engines.experiments import ADAPTIVE_TOLERANCES, EngineOnScene
 from walkerlab.benchmarks.engines.process import TaskLost
 from walkerlab.benchmarks.engines.registry import ENGINES, Engine
 from walkerlab.benchmarks.engines.scenes import scenes
@@ -24,7 +24,7 @@ ABSENT = Engine("absent", "no_such_engine_module", "absent-engine")
 
 def test_an_engine_that_is_absent_is_told_with_its_install_line(monkeypatch):
     monkeypatch.setattr(engines, "ENGINES", {"absent": ABSENT})
-    assert engines.not_installed() == [
+    assert engines.missing_engines() == [
         {"what": "engine absent", "why": "not installed: pip install absent-engine"},
     ]
 
@@ -69,7 +69,7 @@ def test_a_run_that_is_lost_is_a_row_and_what_takes_for_ever_is_not_refined(lost
     engine = replace(ABSENT, name="exudyn")
     runs = EngineOnScene(engine, scene, truth(), LosesEverything(lost)).same_law()
     rows = [one for one in runs if one.integrator == "DOPRI5 adaptive"]
-    assert len(rows) == min(rungs, len(TOLERANCES))
+    assert len(rows) == min(rungs, len(ADAPTIVE_TOLERANCES))
     assert {(one.outcome, one.why, one.error) for one in rows} == {(outcome, lost.why, None)}
 
 

@@ -6,7 +6,7 @@ from synthetic_engines import PERIOD, ROWS, content
 
 from walkerlab.benchmarks.engines.rows import EngineRow
 from walkerlab.benchmarks.engines.section import section
-from walkerlab.benchmarks.figures import COLOURS, FIGURES, engines_of
+from walkerlab.benchmarks.figures import COLOURS, FIGURES, engine_series
 from walkerlab.config.loader import load
 from walkerlab.figures.canvas import as_file, styled
 from walkerlab.labels import labels_of
@@ -54,7 +54,7 @@ def test_periods_stand_between_adams_law_and_the_rigid_gait(results):
 
 
 def test_engines_differ_in_colour_and_their_integrators_in_marker(results):
-    every = list(engines_of("compass", "same-law", results))
+    every = list(engine_series("compass", "same-law", results))
     assert len({one.look.colour for one in every}) == len({one.engine for one in every})
     assert {one.engine for one in every} <= set(COLOURS)
 

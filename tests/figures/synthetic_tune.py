@@ -4,7 +4,7 @@ import numpy as np
 from synthetic_walks import motion, stored
 
 from walkerlab.outcome import Outcome
-from walkerlab.paper.figures import ERRORS, LIMITS, WALL
+from walkerlab.paper.figures import ERROR_LOOKS, LIMITS, RUN_TIME
 from walkerlab.stages.walk import over_time
 from walkerlab.store.content import Group, Variable
 
@@ -32,8 +32,8 @@ def starts():
 
 
 def limit(run_times):
-    columns = {name: Variable(0.1 * 10.0 ** -np.arange(4.0), ("setting",), "1", name) for name in ERRORS}
-    return Group(columns | {WALL: Variable(np.array(run_times), ("setting",), "s", "run time")})
+    columns = {name: Variable(0.1 * 10.0 ** -np.arange(4.0), ("setting",), "1", name) for name in ERROR_LOOKS}
+    return Group(columns | {RUN_TIME: Variable(np.array(run_times), ("setting",), "s", "run time")})
 
 
 def tuned(run_times=(0.021, 0.024, 0.03, 0.067)):

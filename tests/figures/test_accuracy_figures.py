@@ -6,7 +6,7 @@ from matplotlib.colors import to_hex
 from synthetic_methods import RUNS, SCENES, measured_methods
 
 from walkerlab.benchmarks import figures as costs
-from walkerlab.benchmarks.figures import LOOKS, entries, series_of
+from walkerlab.benchmarks.figures import LOOKS, legend_entries, method_series
 from walkerlab.figures.canvas import styled
 from walkerlab.solvers.registry import METHODS
 
@@ -45,11 +45,11 @@ def test_runs_that_did_not_reach_the_end_stay_visible_above_all_others():
 
 
 def test_the_legend_has_a_cross_only_where_a_run_did_not_reach_the_end():
-    every = list(series_of(SCENES[0], measured_methods()))
+    every = list(method_series(SCENES[0], measured_methods()))
     whole = [one for one in every if one.runs["reached"].all()]
     assert 0 < len(whole) < len(every)
     for shown, there in ((every, True), (whole, False)):
-        assert ("end not reached" in [entry.get_label() for entry in entries(shown, AGREEMENT)]) is there
+        assert ("end not reached" in [entry.get_label() for entry in legend_entries(shown, AGREEMENT)]) is there
 
 
 def test_the_caption_tells_the_conclusion_the_reference_and_the_failures():

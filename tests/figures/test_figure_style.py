@@ -23,7 +23,7 @@ from walkerlab.figures.maps import ATTRACTORS
 from walkerlab.figures.registry import FIGURES
 from walkerlab.figures.style import CONTACT, LEGS, POINT, RIGID
 from walkerlab.outcome import TOLD, Outcome
-from walkerlab.paper.figures import AT_SAME_TIME, IN_PHASE, PAPER
+from walkerlab.paper.figures import TIME_LOOK, PHASE_LOOK, PAPER_ERROR
 
 RESULTS = {
     "both models": both_models(),
@@ -156,7 +156,7 @@ def brightness(colour):
 
 @pytest.mark.parametrize(
     "looks",
-    [(RIGID, CONTACT), LEGS, (AT_SAME_TIME, IN_PHASE), (IN_PHASE, PAPER)],
+    [(RIGID, CONTACT), LEGS, (TIME_LOOK, PHASE_LOOK), (PHASE_LOOK, PAPER_ERROR)],
     ids=["models", "legs", "errors", "paper"],
 )
 def test_lines_on_one_another_differ_in_brightness_and_in_style(looks):

@@ -20,7 +20,7 @@ from walkerlab.figures.canvas import styled
 from walkerlab.figures.illustration import WORDS, Illustration
 from walkerlab.figures.registry import FIGURES as ALL_FIGURES
 from walkerlab.figures.style import CONTACT, RIGID
-from walkerlab.paper.figures import AT_SAME_TIME, IN_PHASE, PAPER
+from walkerlab.paper.figures import TIME_LOOK, PHASE_LOOK, PAPER_ERROR
 from walkerlab.store.content import Group, Variable
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -229,9 +229,9 @@ def test_a_fall_is_told():
 def test_errors_are_shown_at_the_time_and_at_the_phase_they_belong_to():
     results = both_models()
     axes = plotted(NUMBERED[8], results).axes
-    (raw,) = lines_of(axes[0], AT_SAME_TIME)
+    (raw,) = lines_of(axes[0], TIME_LOOK)
     np.testing.assert_array_equal(raw.get_ydata(), np.abs(results["compare"]["errors"]["raw_angle_error_rad"][:, 0]))
-    steps = lines_of(axes[3], IN_PHASE)
+    steps = lines_of(axes[3], PHASE_LOOK)
     aligned = results["compare"]["aligned"]["aligned_velocity_error_rad_s"]
     assert len(steps) == 10
     for step, line in enumerate(steps):
@@ -242,7 +242,7 @@ def test_errors_are_shown_at_the_time_and_at_the_phase_they_belong_to():
 
 def test_the_papers_error_is_a_line_within_sight():
     for axes in plotted(NUMBERED[8], both_models()).axes:
-        (line,) = lines_of(axes, PAPER)
+        (line,) = lines_of(axes, PAPER_ERROR)
         bottom, top = axes.get_ylim()
         assert axes.get_yscale() == "log"
         assert set(line.get_ydata()) == {1e-4}

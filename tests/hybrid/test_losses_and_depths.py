@@ -7,7 +7,7 @@ from contact_walks import scene_of, walked
 from walkerlab.ground.friction import Coulomb
 from walkerlab.ground.normal_force import NormalLaw
 from walkerlab.hybrid.contact_result import sampled_feet
-from walkerlab.verification.known import ALONG_RATE, GRAVITY, HEIGHT, HEIGHT_RATE, rig, run_until, state
+from walkerlab.verification.known import ALONG_RATE, GRAVITY, BODY_HEIGHT, HEIGHT_RATE, rig, run_until, rig_state
 
 MASS, DROP = 2.0, 0.1
 DAMPED = NormalLaw(2e5, 1.5, 40.0, 1e-4)  # lets go on the way out
@@ -17,10 +17,10 @@ DAMPED = NormalLaw(2e5, 1.5, 40.0, 1e-4)  # lets go on the way out
 def test_dampings_share_of_a_bounce_is_the_height_that_it_costs(rtol):
     """In the air again, all that is missing went into damping: the law lets go before the ball has left the ground."""
     ball = rig(MASS, 1.0, DAMPED, Coulomb(0.0, 0.0, 0.1, 1.0))
-    run = run_until(ball, state((0.0, DROP), (0.0, 0.0)), 0.25, rtol=rtol, atol=1e-3 * rtol)
+    run = run_until(ball, rig_state((0.0, DROP), (0.0, 0.0)), 0.25, rtol=rtol, atol=1e-3 * rtol)
     end = np.array(run.end)
-    assert end[HEIGHT] > 0.0
-    left = MASS * (GRAVITY * end[HEIGHT] + 0.5 * (end[HEIGHT_RATE] ** 2 + end[ALONG_RATE] ** 2))
+    assert end[BODY_HEIGHT] > 0.0
+    left = MASS * (GRAVITY * end[BODY_HEIGHT] + 0.5 * (end[HEIGHT_RATE] ** 2 + end[ALONG_RATE] ** 2))
     missing = MASS * GRAVITY * DROP - left
     assert missing > 0.1
     # some hundred steps in contact, each to the tolerance

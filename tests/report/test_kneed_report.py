@@ -8,7 +8,7 @@ import pytest
 from html_page import Page
 
 from walkerlab.config.loader import load
-from walkerlab.paper.compared_releases import RELEASES, STEPS
+from walkerlab.paper.compared_releases import RELEASES, CONTACT_STEPS
 from walkerlab.pipeline.runner import execute
 from walkerlab.report.blocks import Player
 from walkerlab.report.registry import sections_of
@@ -60,7 +60,7 @@ def test_the_instant_of_release_decides_which_gait_is_walked(run):
     results, _ = run
     releases = results.summary("compare")["releases"]
     assert releases.keys() == RELEASES.keys()
-    assert all(walk["steps"] == STEPS for walk in releases.values())
+    assert all(walk["steps"] == CONTACT_STEPS for walk in releases.values())
     assert releases["compression"]["period_s"] == pytest.approx(PERIOD, abs=2e-3)
     assert releases["touch"]["period_s"] == pytest.approx(OTHER_PERIOD, abs=2e-3)
     # the rigid model by either rule: the published gait, and the other one

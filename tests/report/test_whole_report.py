@@ -22,7 +22,7 @@ from walkerlab.report.results import Results
 from walkerlab.store import artifact
 from walkerlab.store.runfolder import RunFolder
 from walkerlab.verification import known_problems, stability
-from walkerlab.verification.catalogue import shipped
+from walkerlab.verification.catalogue import package_cases
 
 SETS = ("strides=1", "tune.cells=2")
 JUDGED = ("paper", "rigid-no-hip-mass")
@@ -33,15 +33,15 @@ STAGES = PIPELINE["report"].inputs(load().config)
 def run(tmp_path_factory):
     """The report of the paper's config: two steps, four cells of the map, two cases, two methods."""
     with pytest.MonkeyPatch.context() as patch:
-        cases = tuple(case for case in shipped() if case.name in JUDGED)
+        cases = tuple(case for case in package_cases() if case.name in JUDGED)
         assert len(cases) == len(JUDGED)
         patch.setattr(stability, "judged", lambda own: cases)
         patch.setattr(known_problems, "PROBLEMS", known_problems.PROBLEMS[:1])
         for trial in (RigidTrial, ContactTrial):
             patch.setattr(trial, "methods", property(lambda self: ("dop853", "radau5")))
         patch.setattr(ladder, "OWN_LADDER", (1e-3, 1e-6))
-        patch.setattr(ladder, "REPEATS", 1)
-        patch.setattr(references, "TIGHTEST", {"dop853": 1e-8, "radau5": 1e-9})
+        patch.setattr(ladder, "MAX_REPEATS", 1)
+        patch.setattr(references, "TIGHTEST_CONTACT", {"dop853": 1e-8, "radau5": 1e-9})
         loaded = load(None, SETS)
         folder = RunFolder(tmp_path_factory.mktemp("runs"), loaded.run_name)
         return loaded.config, folder, execute(loaded.config, "report", folder)

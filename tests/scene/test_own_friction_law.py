@@ -8,8 +8,8 @@ from typing import NamedTuple, get_args
 import numpy as np
 import pytest
 
-from walkerlab.benchmarks.contact_trials import SLOWER, near_rigid_trial
-from walkerlab.benchmarks.engines.experiments import CREEP_LOAD, target_of
+from walkerlab.benchmarks.contact_trials import CREEP_FACTOR, near_rigid_trial
+from walkerlab.benchmarks.engines.experiments import CREEP_LOAD, contact_target
 from walkerlab.config.loader import load
 from walkerlab.config.schema import Contact
 from walkerlab.errors import ConfigError
@@ -140,7 +140,7 @@ def test_creep_of_any_law_is_led_towards_the_rigid_limit(own):
     setting = series_settings(STICTION_SERIES)[-1]
     assert with_scaled_laws(own.walker, *setting[2:]).friction.v_0 == pytest.approx(0.1 * setting.stiction)
     trial = near_rigid_trial(load().config, START, 0.3714, 2)
-    assert trial.walker.friction.v_0 == pytest.approx(0.1 * SLOWER)
+    assert trial.walker.friction.v_0 == pytest.approx(0.1 * CREEP_FACTOR)
 
 
 def test_any_law_can_be_too_weak_for_the_slope(own):
@@ -160,7 +160,7 @@ def test_an_unresolved_slip_of_any_law_is_told(own):
 
 
 def test_engines_are_tuned_to_the_creep_of_any_law(own):
-    target = target_of(SimpleNamespace(ours=own.walker))
+    target = contact_target(SimpleNamespace(ours=own.walker))
     assert target.friction == pytest.approx(0.7 * math.tanh(3.0))
     assert target.creep_velocity == pytest.approx(0.1 * math.atanh(CREEP_LOAD / 0.7), rel=1e-9)
-    assert target_of(SimpleNamespace(ours=own.walker._replace(friction=Frictionless()))) is None
+    assert contact_target(SimpleNamespace(ours=own.walker._replace(friction=Frictionless()))) is None

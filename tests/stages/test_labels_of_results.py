@@ -15,7 +15,7 @@ LABELS = {
     **{kind.__qualname__ + kind.__module__: labels_of(kind) for kind in CLASSES},
     "gait": fixedpoint.NUMBERS | fixedpoint.OF_KNEES,
     "walk": walk.OVER_TIME | walk.OF_STEPS,
-    "limit": tune_limit.FACTORS | tune_limit.DISTANCES | tune_limit.OF_WALKS,
+    "limit": tune_limit.FACTOR_LABELS | tune_limit.DISTANCE_LABELS | tune_limit.WALK_LABELS,
 }
 
 

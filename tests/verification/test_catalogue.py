@@ -4,11 +4,11 @@ import pytest
 
 from walkerlab.config.stability import Case
 from walkerlab.errors import ConfigError
-from walkerlab.verification.catalogue import config_of, shipped, without_doubles
+from walkerlab.verification.catalogue import config_of, package_cases, check_unique_names
 from walkerlab.verification.judge import CaseCell, judge
-from walkerlab.verification.starts import HEIGHT, prepared
+from walkerlab.verification.starts import CENTRE_HEIGHT, prepare_start
 
-CASES = {case.name: case for case in shipped()}
+CASES = {case.name: case for case in package_cases()}
 QUICK = (
     "paper",
     "si-linear",
@@ -82,9 +82,9 @@ def test_a_start_is_lowered_by_metres_whatever_the_leg():
     short = Case(name="x", expected=("walked",), reason="x", config={"walker": {"leg_length_m": 1.0}}, lowered_m=-0.01)
     long = short.model_copy(update={"config": {"walker": {"leg_length_m": 10.0}}})
     for case in (short, long):
-        there = prepared(config_of(case), case).start
-        on_ground = prepared(config_of(case), case.model_copy(update={"lowered_m": 0.0})).start
-        assert there[HEIGHT] - on_ground[HEIGHT] == pytest.approx(0.01, rel=1e-12)
+        there = prepare_start(config_of(case), case).start
+        on_ground = prepare_start(config_of(case), case.model_copy(update={"lowered_m": 0.0})).start
+        assert there[CENTRE_HEIGHT] - on_ground[CENTRE_HEIGHT] == pytest.approx(0.01, rel=1e-12)
 
 
 def test_disagreement_with_a_tighter_tolerance_is_told():
@@ -102,7 +102,7 @@ def test_lines_that_are_no_config_are_refused():
 
 def test_two_cases_of_one_name_are_refused():
     with pytest.raises(ConfigError, match="paper"):
-        without_doubles([CASES["paper"], CASES["paper"]])
+        check_unique_names([CASES["paper"], CASES["paper"]])
 
 
 def test_a_contact_block_in_si_means_the_same_quantities():

@@ -11,10 +11,10 @@ from walkerlab.pipeline.progress import Silent
 from walkerlab.store.checkpoint import Checkpoint
 from walkerlab.verification import stability_maps
 from walkerlab.verification.maps import (
-    NONE,
+    NO_ERROR,
     PAPER_STIFFNESS,
-    VERDICTS,
-    prepared_on_ground,
+    VERDICT_NAMES,
+    prepare_on_ground,
     step_column,
     stiction_cell,
     units_of,
@@ -57,29 +57,29 @@ def test_the_paper_is_a_cell_that_walks():
 
 
 def test_the_papers_ground_is_the_papers():
-    contact = prepared_on_ground(PAPER_STIFFNESS, 0.1, 4, 1000)[1].contact.in_si()
+    contact = prepare_on_ground(PAPER_STIFFNESS, 0.1, 4, 1000)[1].contact.in_si()
     assert vars(contact) == pytest.approx(vars(load().config.contact.in_si()))
 
 
 def test_a_fixed_step_is_fine_where_it_is_small_and_its_error_falls_with_it():
     numbers = step_column(PAPER_STIFFNESS, (4e-6, 8e-6, 1e-3))
-    verdicts = [VERDICTS[int(number)] for number in numbers[::2]]
+    verdicts = [VERDICT_NAMES[int(number)] for number in numbers[::2]]
     assert verdicts == ["fine", "fine", "diverges"]
     assert 0.0 < numbers[1] < 0.7 * numbers[3]  # halving the step of a method of first order or better
-    assert numbers[5] == NONE
+    assert numbers[5] == NO_ERROR
 
 
 def test_where_no_error_was_measured_the_map_has_a_gap():
     """Also where both runs end alike, but after different numbers of steps."""
     walked, slid = float(Outcome.WALKED), float(Outcome.SLID)
-    rows = ([walked, 4.0, walked, 1e-7, 9.0], [slid, 1.0, slid, NONE, 9.0], [walked, 4.0, slid, NONE, 9.0])
+    rows = ([walked, 4.0, walked, 1e-7, 9.0], [slid, 1.0, slid, NO_ERROR, 9.0], [walked, 4.0, slid, NO_ERROR, 9.0])
     cells = (rows[0], rows[1], rows[2], rows[1])
     kept = {f"stiction {i} {j}": list(cells[2 * i + j]) for i in range(2) for j in range(2)}
     found = stability_maps.stiction_group(2, kept)
     np.testing.assert_array_equal(found["error"], [[1e-7, np.nan], [np.nan, np.nan]])
     assert found["compared"].tolist() == [[1, 0], [0, 0]]
-    fine, diverges = float(VERDICTS.index("fine")), float(VERDICTS.index("diverges"))
-    step = stability_maps.step_group(2, {f"step {i}": [fine, 1e-5, diverges, NONE] for i in range(2)})
+    fine, diverges = float(VERDICT_NAMES.index("fine")), float(VERDICT_NAMES.index("diverges"))
+    step = stability_maps.step_group(2, {f"step {i}": [fine, 1e-5, diverges, NO_ERROR] for i in range(2)})
     np.testing.assert_array_equal(step["error"], [[1e-5, 1e-5], [np.nan, np.nan]])
     kept = {name: list(rows[1]) for name in kept}
     none = stability_maps.summary_of(stability_maps.stiction_group(2, kept), step)
@@ -97,7 +97,7 @@ def test_both_maps_are_stored(whole):
     assert stiction["outcome"].shape == step["verdict"].shape == (CELLS, CELLS)
     np.testing.assert_array_equal(step["step_size"], np.geomspace(1e-6, 1e-2, CELLS))
     assert stiction["outcome"][1, 0] == Outcome.SLID  # oil
-    assert step["verdict"][1].tolist() == [VERDICTS.index("diverges")] * 2
+    assert step["verdict"][1].tolist() == [VERDICT_NAMES.index("diverges")] * 2
     assert whole.summary["cells"] == 8
     assert sum(whole.summary["outcomes"].values()) == sum(whole.summary["fixed_step"].values()) == 4
 

@@ -14,14 +14,14 @@ from walkerlab.paper.appendix_a import impact
 from walkerlab.paper.walker import compass
 from walkerlab.scene.parts import assembly_of
 from walkerlab.scene.rigid import rigid_walker
-from walkerlab.verification.catalogue import config_of, shipped
+from walkerlab.verification.catalogue import config_of, package_cases
 from walkerlab.verification.judge import time_difference
 from walkerlab.verification.masses import RigidMasses
 from walkerlab.verification.scaling import scaled, to_twin
-from walkerlab.verification.starts import configured, prepared
+from walkerlab.verification.starts import case_tolerances, prepare_start
 from walkerlab.verification.verdict import Measure, finite
 
-CASE = next(case for case in shipped() if case.name == "paper").model_copy(update={"model": "rigid"})
+CASE = next(case for case in package_cases() if case.name == "paper").model_copy(update={"model": "rigid"})
 PAPER = config_of(CASE)
 COMPASS = compass(PAPER, "corrected")
 MASSES = RigidMasses(assembly_of(PAPER.walker, rigid=True), PAPER.slope_rad)
@@ -29,8 +29,8 @@ MASSES = RigidMasses(assembly_of(PAPER.walker, rigid=True), PAPER.slope_rad)
 
 @pytest.fixture(scope="module")
 def judged_walk():
-    start = prepared(PAPER, CASE)
-    return start.walk(CASE, configured(start, CASE))
+    start = prepare_start(PAPER, CASE)
+    return start.walk(CASE, case_tolerances(start, CASE))
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,7 @@ import pytest
 
 from walkerlab.config.stability import Case
 from walkerlab.verification import momentum
-from walkerlab.verification.catalogue import config_of, shipped
+from walkerlab.verification.catalogue import config_of, package_cases
 from walkerlab.verification.momentum import (
     MAX_UNKNOWN,
     MEASURE,
@@ -16,10 +16,10 @@ from walkerlab.verification.momentum import (
     unsettled,
     with_middles,
 )
-from walkerlab.verification.starts import prepared
+from walkerlab.verification.starts import prepare_start
 from walkerlab.verification.verdict import NotMeasured
 
-CASES = {case.name: case for case in shipped()}
+CASES = {case.name: case for case in package_cases()}
 
 
 def ready_for(name):
@@ -28,7 +28,7 @@ def ready_for(name):
 
 def prepared_for(case):
     config = config_of(case)
-    start = prepared(config, case)
+    start = prepare_start(config, case)
     return config, start.scene, start.start, case
 
 

@@ -16,11 +16,11 @@ from walkerlab.pipeline.identity import Keys
 from walkerlab.scene.parts import assembly_of
 from walkerlab.scene.rigid import rigid_walker
 from walkerlab.store.content import Content
-from walkerlab.verification.catalogue import ENDS, STOPS, scene_cases
+from walkerlab.verification.catalogue import PHYSICAL_ENDS, STOPPED_ENDS, scene_cases
 from walkerlab.verification.judge import CaseCell
 from walkerlab.verification.masses import RigidMasses
 from walkerlab.verification.scaling import scaled, to_twin
-from walkerlab.verification.stability import spelled_out
+from walkerlab.verification.stability import with_numbers
 
 OTHERS = ("kneed", "kneed-round-feet", "round-feet", "torso")
 GAIT = {"state": [-0.2889854602533978, 0.18818546025339777, -0.2889854602533978,
@@ -34,7 +34,9 @@ def config_of(name, *sets):
 
 
 def cases_of(config, gait=GAIT):
-    return {case.name: (case, own) for case, own in scene_cases(spelled_out(config, {"fixedpoint": Content({}, gait)}))}
+    return {
+        case.name: (case, own) for case, own in scene_cases(with_numbers(config, {"fixedpoint": Content({}, gait)}))
+    }
 
 
 def start_of(config):
@@ -52,7 +54,7 @@ def test_a_kneed_scene_is_tried_in_every_respect():
     cases = cases_of(config_of("kneed"))
     assert {case.family for case, _ in cases.values()} == {"walkers", "ground", "knees", "slopes", "starts", "numerics"}
     assert 12 <= len(cases) <= 20
-    assert all(set(case.expected) <= {*ENDS, "budget-exhausted"} for case, _ in cases.values())
+    assert all(set(case.expected) <= {*PHYSICAL_ENDS, "budget-exhausted"} for case, _ in cases.values())
     assert {name for name, (case, _) in cases.items() if case.twin} == {"scene-rigid", "scene-as-it-is"}
 
 
@@ -94,7 +96,7 @@ def test_a_kneed_walkers_case_passes_every_measure(name):
     result, *ordinary = CaseCell(case, own).run()
     assert result.failures == ()
     assert ordinary == []
-    if case.expected == STOPS:
+    if case.expected == STOPPED_ENDS:
         assert result.outcome != "walked"
 
 

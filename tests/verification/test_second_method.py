@@ -6,11 +6,11 @@ import pytest
 
 from walkerlab.config.stability import Case
 from walkerlab.outcome import Outcome
-from walkerlab.verification.catalogue import config_of, shipped
-from walkerlab.verification.judge import LIBRARY_BUDGET, judge, others, second_walk
+from walkerlab.verification.catalogue import config_of, package_cases
+from walkerlab.verification.judge import LIBRARY_BUDGET, judge, other_methods, second_walk
 from walkerlab.verification.verdict import promised
 
-CASES = {case.name: case for case in shipped()}
+CASES = {case.name: case for case in package_cases()}
 
 
 def ending(*outcomes):
@@ -26,7 +26,7 @@ def ending(*outcomes):
 
 def test_it_is_never_the_method_itself():
     for name in ("dop853", "radau5", "scipy-bdf"):
-        assert name not in [method.name for method in others(name)]
+        assert name not in [method.name for method in other_methods(name)]
 
 
 def test_the_first_method_that_answers_is_taken():

@@ -11,12 +11,12 @@ from walkerlab.errors import ConfigError
 from walkerlab.report.results import Results
 from walkerlab.report.sections import verdict as verdict_section
 from walkerlab.report.tables import Table
-from walkerlab.verification.catalogue import config_of, shipped
+from walkerlab.verification.catalogue import config_of, package_cases
 from walkerlab.verification.judge import CaseCell, judge, run_cells
 from walkerlab.verification.known import Known
 from walkerlab.verification.section import section
-from walkerlab.verification.stability import summary_of
-from walkerlab.verification.starts import prepared
+from walkerlab.verification.stability import summarise
+from walkerlab.verification.starts import prepare_start
 from walkerlab.verification.verdict import BUDGET_USED, CaseResult, Measure, NotMeasured
 
 GOOD = CaseResult(
@@ -51,20 +51,20 @@ def report_of(summary, **others):
 
 
 def test_all_right_is_an_answer():
-    summary = summary_of([GOOD], [RIGHT], [])
+    summary = summarise([GOOD], [RIGHT], [])
     assert "no_answer" not in summary
     assert (summary["passed"], summary["failed"]) == (2, 0)
 
 
 def test_what_is_wrong_is_named():
-    summary = summary_of([GOOD, BAD], [RIGHT, WRONG], [])
+    summary = summarise([GOOD, BAD], [RIGHT, WRONG], [])
     assert summary["no_answer"]["message"] == "2 of 4 did not end as expected: bad, block"
     assert (summary["passed"], summary["failed"]) == (2, 2)
     assert summary["cases"][1]["note"] == "ended as fell, not walked"
 
 
 def test_report_says_in_red_what_failed():
-    shown = report_of(summary_of([GOOD, BAD], [RIGHT, WRONG], []))
+    shown = report_of(summarise([GOOD, BAD], [RIGHT, WRONG], []))
     red = [block.text for block in shown.blocks if getattr(block, "tone", "") == "bad"]
     assert len(red) == 2
     assert "ended as fell, not walked" in red[0]
@@ -73,39 +73,37 @@ def test_report_says_in_red_what_failed():
 
 def test_a_case_that_gives_up_as_expected_is_counted_apart_and_is_not_green():
     gave_up = replace(GOOD, name="rings", expected=("budget-exhausted",), outcome="budget-exhausted")
-    summary = summary_of([GOOD, gave_up], [RIGHT], [])
+    summary = summarise([GOOD, gave_up], [RIGHT], [])
     shown = report_of(summary)
     counted = "3 of 3 extreme cases and known problems ended as expected, 1 of them without an answer."
     assert shown.finding == counted
     (table,) = [block for block in shown.blocks if getattr(block, "caption", "") == "Extreme cases"]
     assert [row[1].tone for row in next(iter(table.groups.values()))] == ["good", "fair"]
-    assert report_of(summary_of([GOOD], [RIGHT], [])).finding.endswith("ended as expected.")
+    assert report_of(summarise([GOOD], [RIGHT], [])).finding.endswith("ended as expected.")
 
 
 def test_the_page_lists_what_no_case_covers():
-    gaps = [
-        item.about for block in report_of(summary_of([GOOD], [], [])).blocks for item in getattr(block, "items", ())
-    ]
+    gaps = [item.about for block in report_of(summarise([GOOD], [], [])).blocks for item in getattr(block, "items", ())]
     assert {"Very stiff linear springs:", "The loosest tolerances:", "ADAMS:"} <= {*gaps}
 
 
 def test_the_worst_measure_is_of_what_is_right_and_not_of_work():
     busy = replace(GOOD, findings=(Measure(BUDGET_USED, 0.9, 1.0), Measure("x", 0.25, 1.0)))
-    table = next(block for block in report_of(summary_of([busy], [], [])).blocks if isinstance(block, Table))
+    table = next(block for block in report_of(summarise([busy], [], [])).blocks if isinstance(block, Table))
     place = [column.title for column in table.columns].index("worst measure / limit")
     assert next(iter(table.groups.values()))[0][place].text == "0.25"
 
 
 def test_report_names_the_other_method_or_why_there_is_none():
     alone = replace(GOOD, name="alone", second_tried="dop853 budget-exhausted")
-    shown = report_of(summary_of([replace(GOOD, second_method="dop853"), alone], [RIGHT], []))
+    shown = report_of(summarise([replace(GOOD, second_method="dop853"), alone], [RIGHT], []))
     (table,) = [block for block in shown.blocks if getattr(block, "caption", "") == "Extreme cases"]
     assert [row[3].text for row in next(iter(table.groups.values()))] == ["dop853", "none"]
     assert "dop853 budget-exhausted (alone)" in table.note
 
 
 def test_report_tells_of_the_maps_once_they_are_there_and_before_how_to_make_them():
-    summary = summary_of([GOOD], [RIGHT], [])
+    summary = summarise([GOOD], [RIGHT], [])
     assert "walkerlab stability --full" in report_of(summary).blocks[-1].text
     said = report_of(summary, **{"stability-maps": MAPS}).blocks[-1].text
     assert "5 walked and 4 slid. At a ten times tighter tolerance 1 of them change" in said
@@ -113,7 +111,9 @@ def test_report_tells_of_the_maps_once_they_are_there_and_before_how_to_make_the
 
 
 def test_one_and_two_processes_find_the_same():
-    cases = [case for case in shipped() if case.name in ("moon", "friction-0.05", "rigid-single-stride", "rigid-split")]
+    cases = [
+        case for case in package_cases() if case.name in ("moon", "friction-0.05", "rigid-single-stride", "rigid-split")
+    ]
     one, two = (
         [replace(item, wall_s=0.0) for found in run_cells([*map(CaseCell, cases)], jobs) for item in found]
         for jobs in (1, 2)
@@ -198,7 +198,7 @@ def test_a_scene_that_no_equation_without_events_describes_is_not_tried_with_ord
 
 
 def test_the_verdict_names_what_failed():
-    summary = summary_of([BAD], [], [])
+    summary = summarise([BAD], [], [])
     results = Results(load().config, {"stability": SimpleNamespace(summary=summary, groups={})})
     first = verdict_section.section(results).blocks[0]
     assert (first.tone, first.text) == ("bad", "stability: 1 of 1 did not end as expected: bad.")
@@ -208,14 +208,14 @@ def test_own_pads_on_ground_without_pads_are_walked_as_contact_sim_walks_them():
     ground = {"terrain": "after-mid-swing", "pad_pitch": "own"}
     case = Case(name="x", expected=("walked",), reason="r", steps=2, config={"slope_deg": 4.0, "contact": ground})
     plain = case.model_copy(update={"config": {"slope_deg": 4.0, "contact": {"terrain": "after-mid-swing"}}})
-    own, rigid = (prepared(config_of(one), one) for one in (case, plain))
+    own, rigid = (prepare_start(config_of(one), one) for one in (case, plain))
     assert own.start == rigid.start
     assert own.scene.ground == rigid.scene.ground
 
 
 def test_what_could_not_be_measured_is_told_with_the_reason():
     missed = replace(GOOD, not_measured=(NotMeasured("momentum", "the hinge transmits forces as well"),))
-    summary = summary_of([missed], [], [])
+    summary = summarise([missed], [], [])
     assert summary["cases"][0]["not_measured"] == [{"measure": "momentum", "why": "the hinge transmits forces as well"}]
     table = next(block for block in report_of(summary).blocks if isinstance(block, Table))
     assert "Not measured: momentum: the hinge transmits forces as well (good)." in table.note

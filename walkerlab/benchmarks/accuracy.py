@@ -5,7 +5,16 @@ from dataclasses import asdict
 from typing import Any
 
 from walkerlab.benchmarks.conditions import environment, hinge_left_out, plain_power
-from walkerlab.benchmarks.ladder import BUDGET, REPEATS, Ascent, MethodRow, ascend, finished, left_of, row_of
+from walkerlab.benchmarks.ladder import (
+    MAX_REPEATS,
+    RUN_BUDGET,
+    Ascent,
+    MethodRow,
+    ascend,
+    complete_ascents,
+    make_row,
+    omitted_tolerances,
+)
 from walkerlab.benchmarks.references import End, Reference, WalkEndsError, second_end
 from walkerlab.benchmarks.trials import USER_SCRIPT, RigidTrial, Trial
 from walkerlab.benchmarks.words import words
@@ -20,14 +29,14 @@ from walkerlab.stages.walk import rigid_start
 from walkerlab.store.columns import rows_group
 from walkerlab.store.content import Content
 
-LEVELS = (1e-3, 1e-6, 1e-9)
-RIGID_STEPS, CONTACT_STEPS, NEAR_RIGID_STEPS = 10, 10, 4
-OTHERS_CONTACT_STEPS = 4  # of other walkers than the compass, whose right-hand side is several times as long
-LESS = (
+ERROR_LEVELS = (1e-3, 1e-6, 1e-9)
+RIGID_TRIAL_STEPS, CONTACT_STEPS, NEAR_RIGID_STEPS = 10, 10, 4
+SLOW_CONTACT_STEPS = 4  # of other walkers than the compass, whose right-hand side is several times as long
+OMISSIONS_OFF_COMPASS = (
     {"what": "accuracy of the scene contact-near-rigid", "why": "only the compass has it", "saves": "a minute"},
     {"what": "libraries' longest runs on the contact model", "why": "they run in Python", "saves": "minutes"},
 )
-OFF_THE_GAIT = 0.98  # of the gait's angular velocities, so that no step repeats the one before
+START_RATE_FACTOR = 0.98  # of the gait's angular velocities, so that no step repeats the one before
 
 
 def run(config: SceneConfig, inputs: Mapping[str, Content], progress: Progress, jobs: int = 1) -> Content:
@@ -37,33 +46,35 @@ def run(config: SceneConfig, inputs: Mapping[str, Content], progress: Progress, 
           other, with nothing else running
     """
     trials: list[Trial] = []
-    seconds: list[End] = []
-    climbs: list[Ascent] = []
+    second_ends: list[End] = []
+    ascents: list[Ascent] = []
     compass = is_passive_compass(config)
-    left_out = hinge_left_out(config, "methods") + ([] if compass or config.contact is None else list(LESS))
-    for trial in scenes(config, inputs):
+    left_out = hinge_left_out(config, "methods") + (
+        [] if compass or config.contact is None else list(OMISSIONS_OFF_COMPASS)
+    )
+    for trial in trials_of_scene(config, inputs):
         progress.start(f"accuracy: {trial.name}", len(trial.methods))
         try:
-            seconds.append(second_end(trial))
+            second_ends.append(second_end(trial))
         except WalkEndsError as problem:
-            left_out.append(without(trial, problem))
+            left_out.append(omitted_scene(trial, problem))
             continue
         trials.append(trial)
         for method in trial.methods:
-            climbs.append(ascend(trial, method))
+            ascents.append(ascend(trial, method))
             progress.advance()
     progress.start("accuracy: long runs")
-    firsts, climbs = finished(trials, climbs, jobs, long_runs=compass)
+    first_ends, ascents = complete_ascents(trials, ascents, jobs, long_runs=compass)
     references: dict[str, Reference] = {}
-    for trial, first, second in zip(trials, firsts, seconds, strict=True):
+    for trial, first, second in zip(trials, first_ends, second_ends, strict=True):
         if isinstance(first, WalkEndsError):
-            left_out.append(without(trial, first))
+            left_out.append(omitted_scene(trial, first))
         else:
             references[trial.name] = Reference(first, second)
-    climbs = [one for one in climbs if one.trial.name in references]
-    rows = [row_of(one, run, references[one.trial.name]) for one in climbs for run in one.runs]
-    not_run = [entry for one in climbs for entry in left_of(one)]
-    summary = {**summary_of(rows, not_run, references, jobs), "left_out": left_out}
+    ascents = [ascent for ascent in ascents if ascent.trial.name in references]
+    rows = [make_row(ascent, run, references[ascent.trial.name]) for ascent in ascents for run in ascent.runs]
+    not_run = [entry for ascent in ascents for entry in omitted_tolerances(ascent)]
+    summary = {**summarise(rows, not_run, references, jobs), "left_out": left_out}
     groups = {
         f"{scene}/rows": rows_group([row for row in rows if row.scene == scene], labels_of(MethodRow))
         for scene in references
@@ -71,39 +82,41 @@ def run(config: SceneConfig, inputs: Mapping[str, Content], progress: Progress, 
     return Content(groups, summary, timed=("best", "conclusions", "environment"))
 
 
-def without(trial: Trial, why: WalkEndsError) -> dict[str, Any]:
-    start = f"started with velocities scaled by {OFF_THE_GAIT}, " if isinstance(trial, RigidTrial) else ""
+def omitted_scene(trial: Trial, why: WalkEndsError) -> dict[str, Any]:
+    start = f"started with velocities scaled by {START_RATE_FACTOR}, " if isinstance(trial, RigidTrial) else ""
     return {"what": f"accuracy of the scene {trial.name}", "why": f"{start}{why}"}
 
 
-def scenes(config: SceneConfig, inputs: Mapping[str, Content]) -> Iterator[Trial]:
+def trials_of_scene(config: SceneConfig, inputs: Mapping[str, Content]) -> Iterator[Trial]:
     """Yield the walks to measure on: rigid, on compliant ground, and for the compass also near the rigid limit."""
     length, state = rigid_start(config, inputs)
     walker = rigid_walker(config)
-    start = with_scaled_rates(walker, state, OFF_THE_GAIT, OFF_THE_GAIT)
-    yield RigidTrial(walker, start, RIGID_STEPS, compass_or_none(config, config.equations))
+    start = with_scaled_rates(walker, state, START_RATE_FACTOR, START_RATE_FACTOR)
+    yield RigidTrial(walker, start, RIGID_TRIAL_STEPS, compass_or_none(config, config.equations))
     if config.contact is None:
         return
     # contact code is loaded only for scenes that have contact
     from walkerlab.benchmarks.contact_trials import contact_trial, near_rigid_trial
 
     if not is_passive_compass(config):
-        yield contact_trial(config, state, length, OTHERS_CONTACT_STEPS)
+        yield contact_trial(config, state, length, SLOW_CONTACT_STEPS)
         return
     yield contact_trial(config, state, length, CONTACT_STEPS)
     yield near_rigid_trial(config, state, length, NEAR_RIGID_STEPS)
 
 
-def summary_of(
+def summarise(
     rows: Sequence[MethodRow], not_run: list[dict[str, Any]], references: Mapping[str, Reference], jobs: int
 ) -> dict[str, Any]:
     parts = ("method", "second_method", "agreement", "state", "from_outside", "tolerance", "rhs_evaluations")
     return {
         "rows": [asdict(row) for row in rows],
-        "repeats": REPEATS,
-        "rigid_velocity_factor": OFF_THE_GAIT,
-        "budget": BUDGET,
-        "reference": {name: {part: getattr(one, part) for part in parts} for name, one in references.items()},
+        "repeats": MAX_REPEATS,
+        "rigid_velocity_factor": START_RATE_FACTOR,
+        "budget": RUN_BUDGET,
+        "reference": {
+            name: {part: getattr(reference, part) for part in parts} for name, reference in references.items()
+        },
         "best": {scene: best_methods(rows, scene) for scene in references},
         "conclusions": {scene: conclusion(rows, scene) for scene in references},
         "not_run": not_run,
@@ -114,7 +127,7 @@ def summary_of(
 def good_enough(rows: Sequence[MethodRow], scene: str, level: float) -> list[MethodRow]:
     """Fastest run of each method that reaches an error of `level` on a scene, fastest method first."""
     fastest: dict[str, MethodRow] = {}
-    for row in sorted(rows, key=lambda one: one.wall_s):
+    for row in sorted(rows, key=lambda row: row.wall_s):
         if row.scene == scene and row.error is not None and row.error <= level:
             fastest.setdefault(row.method, row)
     return list(fastest.values())
@@ -122,22 +135,22 @@ def good_enough(rows: Sequence[MethodRow], scene: str, level: float) -> list[Met
 
 def best_methods(rows: Sequence[MethodRow], scene: str) -> dict[str, str]:
     """Fastest method for each error level that some method reaches."""
-    found = {plain_power(level): good_enough(rows, scene, level) for level in LEVELS}
-    return {level: runs[0].method for level, runs in found.items() if runs}
+    fastest = {plain_power(level): good_enough(rows, scene, level) for level in ERROR_LEVELS}
+    return {level: runs[0].method for level, runs in fastest.items() if runs}
 
 
 def conclusion(rows: Sequence[MethodRow], scene: str) -> str:
     """Describe in one sentence which method is fastest at which error, and by what factor over the best library."""
     levels = []
-    for level in LEVELS:
+    for level in ERROR_LEVELS:
         runs = good_enough(rows, scene, level)
-        own = runs[0].method.split("-")[0] if runs else ""
+        family = runs[0].method.split("-")[0] if runs else ""
         libraries = (
-            one
-            for one in runs
-            if one.method.split("-")[0] != own
-            and one.method.startswith(("scipy", "cvode"))
-            and one.method != USER_SCRIPT  # its right-hand side is not ours
+            run
+            for run in runs
+            if run.method.split("-")[0] != family
+            and run.method.startswith(("scipy", "cvode"))
+            and run.method != USER_SCRIPT  # its right-hand side is not ours
         )
         levels.append((level, runs[0] if runs else None, next(libraries, None)))
     return words("accuracy.conclusion", scene, levels)

@@ -7,7 +7,10 @@ from walkerlab.config.reads import ContactConfig
 from walkerlab.scene.contact import contact_scene, start_state
 from walkerlab.solvers.system import State
 
-STIFFER, SLOWER = 100.0, 0.01  # the near-rigid contact: stiffness and damping times, creep velocities times
+STIFFNESS_FACTOR, CREEP_FACTOR = (
+    100.0,
+    0.01,
+)  # the near-rigid contact: stiffness and damping times, creep velocities times
 
 
 def contact_trial(config: ContactConfig, state: State, length_m: float, steps: int) -> ContactTrial:
@@ -19,6 +22,6 @@ def contact_trial(config: ContactConfig, state: State, length_m: float, steps: i
 def near_rigid_trial(config: ContactConfig, state: State, length_m: float, steps: int) -> ContactTrial:
     """Walk on much stiffer ground that creeps less, which is harder for integrators."""
     trial = contact_trial(config, state, length_m, steps)
-    law, friction = trial.walker.normal, trial.walker.friction.with_creep(SLOWER)
-    normal = law._replace(stiffness=STIFFER * law.stiffness, damping=STIFFER * law.damping)
+    law, friction = trial.walker.normal, trial.walker.friction.with_creep(CREEP_FACTOR)
+    normal = law._replace(stiffness=STIFFNESS_FACTOR * law.stiffness, damping=STIFFNESS_FACTOR * law.damping)
     return replace(trial, walker=trial.walker._replace(normal=normal, friction=friction), name="contact-near-rigid")

@@ -15,14 +15,16 @@ from walkerlab.labels import Label
 from walkerlab.solvers.registry import METHODS
 from walkerlab.workers import in_order
 
-BUDGET = 200_000  # right-hand sides of any run, which ends the hopeless ones
-SHORT = 25_000  # of a library's run that is timed among the others; longer ones come after all of those
-LAST = 12_000  # of a library's run that is the last of its ladder: a walk in Python takes a hundred times as long
-WARM_UP = 2_000  # after which everything is compiled and loaded
-REPEATS, REPEAT_TIME_S = 7, 0.3
+RUN_BUDGET = 200_000  # right-hand sides of any run, which ends the hopeless ones
+SHORT_RUN_BUDGET = 25_000  # of a library's run that is timed among the others; longer ones come after all of those
+LAST_RUN_SIZE = (
+    12_000  # of a library's run that is the last of its ladder: a walk in Python takes a hundred times as long
+)
+WARM_UP_BUDGET = 2_000  # after which everything is compiled and loaded
+MAX_REPEATS, REPEAT_TIME_S = 7, 0.3
 OWN_LADDER = tuple(10.0**-digits for digits in range(3, 13))
 LIBRARY_LADDER = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11)
-ERROR = Label("1", "largest difference of the end state from the reference, SI units", absent=0.0)
+ERROR_LABEL = Label("1", "largest difference of the end state from the reference, SI units", absent=0.0)
 
 
 @dataclass(frozen=True)
@@ -52,7 +54,7 @@ class MethodRow:
     method: Annotated[str, Label("1", "method")]
     tolerance: Annotated[float, Label("1", "relative tolerance")]
     outcome: Annotated[str, Label("1", "outcome")]
-    error: Annotated[float | None, ERROR]
+    error: Annotated[float | None, ERROR_LABEL]
     against: Annotated[str, Label("1", "method of the end that it is measured by")]  # another one
     within_reference: bool  # whether the error is below what the reference is known to, and so only a bound
     wall_s: Annotated[float, Label("s", "median run time", timing=True)]
@@ -72,12 +74,16 @@ class MethodRow:
 def ascend(trial: Trial, method: str) -> Ascent:
     """Run one tolerance after the other until a run is too expensive."""
     own = method in METHODS and METHODS[method].compiled
-    ladder, short, last = (OWN_LADDER, BUDGET, BUDGET) if own else (LIBRARY_LADDER, min(SHORT, BUDGET), LAST)
-    trial.prepare(method, ladder[0], WARM_UP)()
+    ladder, short, last = (
+        (OWN_LADDER, RUN_BUDGET, RUN_BUDGET)
+        if own
+        else (LIBRARY_LADDER, min(SHORT_RUN_BUDGET, RUN_BUDGET), LAST_RUN_SIZE)
+    )
+    trial.prepare(method, ladder[0], WARM_UP_BUDGET)()
     runs: list[MethodRun] = []
     for tolerance in ladder:
         run = measure(trial, method, tolerance, short)
-        if run.result.outcome == "budget-exhausted" and short < BUDGET:
+        if run.result.outcome == "budget-exhausted" and short < RUN_BUDGET:
             return Ascent(trial, method, ladder, tuple(runs), unfinished=True)
         runs.append(run)
         if run.result.rhs_evaluations >= last:
@@ -85,7 +91,7 @@ def ascend(trial: Trial, method: str) -> Ascent:
     return Ascent(trial, method, ladder, tuple(runs), unfinished=False)
 
 
-def finished(
+def complete_ascents(
     trials: Sequence[Trial], ascents: Sequence[Ascent], jobs: int, long_runs: bool = True
 ) -> tuple[list[End | WalkEndsError], list[Ascent]]:
     """Compute the references' first ends and the postponed runs, in `jobs` processes.
@@ -95,19 +101,23 @@ def finished(
     Returns an end, or the reason for its absence, for each trial; and the completed ascents.
     """
     # longest first: near the rigid limit ground is the stiffest for the explicit method that references are made with
-    ends = [partial(end_or_reason, trial) for trial in reversed(trials)]
-    wanted = [one for one in ascents if one.unfinished and long_runs]
-    put_off = [partial(long_run, one.trial, one.method, one.ladder[len(one.runs)]) for one in wanted]
-    calls: list[Callable[[], Any]] = [*ends, *put_off]
-    done = in_order(calls, jobs)
-    firsts: list[End | WalkEndsError] = [next(done) for _ in trials][::-1]
-    return firsts, [
-        replace(one, runs=(*one.runs, next(done)), unfinished=False) if one.unfinished and long_runs else one
-        for one in ascents
+    ends = [partial(try_first_end, trial) for trial in reversed(trials)]
+    postponed = [ascent for ascent in ascents if ascent.unfinished and long_runs]
+    long_runs_postponed = [
+        partial(long_run, ascent.trial, ascent.method, ascent.ladder[len(ascent.runs)]) for ascent in postponed
+    ]
+    calls: list[Callable[[], Any]] = [*ends, *long_runs_postponed]
+    results = in_order(calls, jobs)
+    first_ends: list[End | WalkEndsError] = [next(results) for _ in trials][::-1]
+    return first_ends, [
+        replace(ascent, runs=(*ascent.runs, next(results)), unfinished=False)
+        if ascent.unfinished and long_runs
+        else ascent
+        for ascent in ascents
     ]
 
 
-def end_or_reason(trial: Trial) -> End | WalkEndsError:
+def try_first_end(trial: Trial) -> End | WalkEndsError:
     try:
         return first_end(trial)
     except WalkEndsError as problem:
@@ -116,38 +126,38 @@ def end_or_reason(trial: Trial) -> End | WalkEndsError:
 
 def long_run(trial: Trial, method: str, tolerance: float) -> MethodRun:
     """Make a postponed run; it may be in a fresh process, so it warms up first."""
-    trial.prepare(method, tolerance, WARM_UP)()
-    return measure(trial, method, tolerance, BUDGET)
+    trial.prepare(method, tolerance, WARM_UP_BUDGET)()
+    return measure(trial, method, tolerance, RUN_BUDGET)
 
 
 def measure(trial: Trial, method: str, tolerance: float, budget: int) -> MethodRun:
     """Time a walk up to `REPEATS` times within `REPEAT_TIME_S`."""
     walk = trial.prepare(method, tolerance, budget)
-    first_s, result = timed(walk)
+    first_s, result = time_walk(walk)
     walls = [first_s] if first_s > REPEAT_TIME_S else []
-    while len(walls) < REPEATS and (not walls or sum(walls) + walls[-1] <= REPEAT_TIME_S):
-        walls.append(timed(walk)[0])
+    while len(walls) < MAX_REPEATS and (not walls or sum(walls) + walls[-1] <= REPEAT_TIME_S):
+        walls.append(time_walk(walk)[0])
     return MethodRun(tolerance, result, tuple(walls))
 
 
-def timed(walk: Callable[[], TrialRun]) -> tuple[float, TrialRun]:
+def time_walk(walk: Callable[[], TrialRun]) -> tuple[float, TrialRun]:
     start = time.perf_counter()
     result = walk()
     return time.perf_counter() - start, result
 
 
-def row_of(one: Ascent, run: MethodRun, reference: Reference) -> MethodRow:
-    end, result = reference.for_method(one.method), run.result
+def make_row(ascent: Ascent, run: MethodRun, reference: Reference) -> MethodRow:
+    end, result = reference.for_method(ascent.method), run.result
     error = float(np.max(np.abs(result.state - end.state))) if result.state.size else None
-    known = error is not None and error <= reference.agreement
+    below_agreement = error is not None and error <= reference.agreement
     return MethodRow(
-        scene=one.trial.name,
-        method=one.method,
+        scene=ascent.trial.name,
+        method=ascent.method,
         tolerance=run.tolerance,
         outcome=result.outcome,
         error=error,
         against=end.method,
-        within_reference=known,
+        within_reference=below_agreement,
         wall_s=median(run.walls_s),
         least_wall_s=min(run.walls_s),
         largest_wall_s=max(run.walls_s),
@@ -158,14 +168,14 @@ def row_of(one: Ascent, run: MethodRun, reference: Reference) -> MethodRow:
     )
 
 
-def left_of(one: Ascent) -> list[dict[str, Any]]:
+def omitted_tolerances(ascent: Ascent) -> list[dict[str, Any]]:
     """List the tolerances that were not run, with reasons."""
-    if one.unfinished:
-        why = f"more than {SHORT} right-hand sides, each in Python"
+    if ascent.unfinished:
+        why = f"more than {SHORT_RUN_BUDGET} right-hand sides, each in Python"
     else:
-        last = one.runs[-1]
+        last = ascent.runs[-1]
         why = f"already {last.result.outcome} with {last.result.rhs_evaluations} right-hand sides at {last.tolerance:g}"
     return [
-        {"scene": one.trial.name, "method": one.method, "tolerance": rtol, "why": why}
-        for rtol in one.ladder[len(one.runs) :]
+        {"scene": ascent.trial.name, "method": ascent.method, "tolerance": rtol, "why": why}
+        for rtol in ascent.ladder[len(ascent.runs) :]
     ]

@@ -10,9 +10,11 @@ from walkerlab.outcome import Outcome
 from walkerlab.paper.appendix_a import RigidWalker
 from walkerlab.solvers.system import Floats
 
-BUDGET = 20_000_000  # right-hand sides: a million explicit steps, which stiff ground takes, and some to spare
+REFERENCE_RUN_BUDGET = (
+    20_000_000  # right-hand sides: a million explicit steps, which stiff ground takes, and some to spare
+)
 # on stiff ground an explicit step errs by rounding alone: asked for less, it shrinks without end and gains nothing
-TIGHTEST = {"dop853": 1e-12, "radau5": 1e-11}
+TIGHTEST_CONTACT = {"dop853": 1e-12, "radau5": 1e-11}
 TIGHTEST_RIGID = {"dop853": 1e-14, "radau5": 1e-12}
 
 
@@ -52,7 +54,7 @@ class Reference:
     @property
     def from_outside(self) -> bool:
         """Whether the first end is independent of this project's solvers, event search and equations."""
-        return self.method == taylor_reference.NAME
+        return self.method == taylor_reference.TAYLOR_METHOD
 
     @property
     def tolerance(self) -> float:
@@ -89,8 +91,8 @@ def first_end(trial: Trial) -> End:
     Raises WalkEndsError if the walk does not reach its end.
     """
     if isinstance(trial, RigidTrial) and (compass := compass_of(trial)) is not None:
-        return End(taylor_reference.NAME, taylor_reference.walk_by_taylor(compass, trial.start, trial.steps))
-    return tightest(trial, "dop853")
+        return End(taylor_reference.TAYLOR_METHOD, taylor_reference.walk_by_taylor(compass, trial.start, trial.steps))
+    return tightest_end(trial, "dop853")
 
 
 def second_end(trial: Trial) -> End:
@@ -98,7 +100,7 @@ def second_end(trial: Trial) -> End:
 
     Raises WalkEndsError if the walk does not reach its end.
     """
-    return tightest(trial, "radau5" if compass_of(trial) is None else "dop853")
+    return tightest_end(trial, "radau5" if compass_of(trial) is None else "dop853")
 
 
 def compass_of(trial: Trial) -> RigidWalker | None:
@@ -106,12 +108,12 @@ def compass_of(trial: Trial) -> RigidWalker | None:
     return trial.compass if isinstance(trial, RigidTrial) and taylor_reference.is_installed() else None
 
 
-def tightest(trial: Trial, method: str) -> End:
+def tightest_end(trial: Trial, method: str) -> End:
     """Compute the end by one of our methods at its tightest useful tolerance."""
-    tolerances = TIGHTEST_RIGID if isinstance(trial, RigidTrial) else TIGHTEST
-    result = trial.prepare(method, tolerances[method], BUDGET)()
+    tolerances = TIGHTEST_RIGID if isinstance(trial, RigidTrial) else TIGHTEST_CONTACT
+    result = trial.prepare(method, tolerances[method], REFERENCE_RUN_BUDGET)()
     if result.outcome == Outcome.BUDGET_EXHAUSTED.label:
-        why = f"{method} at {tolerances[method]:g} does not reach the end within {BUDGET // 1_000_000} million"
+        why = f"{method} at {tolerances[method]:g} does not reach the end within {REFERENCE_RUN_BUDGET // 1_000_000} million"
         raise WalkEndsError(f"{why} right-hand sides, so the reference has no error estimate")
     if not result.state.size:
         raise WalkEndsError(f"the walk ends early ({result.outcome}), without an end state to compare")

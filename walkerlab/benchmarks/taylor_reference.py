@@ -12,7 +12,7 @@ import numpy as np
 from walkerlab.paper.appendix_a import RigidWalker, impact
 from walkerlab.solvers.system import Floats
 
-NAME = "heyoka-taylor"
+TAYLOR_METHOD = "heyoka-taylor"
 
 
 def is_installed() -> bool:

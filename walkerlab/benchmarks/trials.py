@@ -76,7 +76,7 @@ class RigidTrial:
             clear_counts(solver)
             solver.clock[H_NEXT] = 0.0
             status, _ = stride(walker, solver, finder, observer, np.array(self.start), strikes)
-            return finished(Outcome(status), strikes.after[-1], solver.counts)
+            return make_run(Outcome(status), strikes.after[-1], solver.counts)
 
         return run
 
@@ -104,7 +104,7 @@ class ContactTrial:
 
         def run() -> TrialRun:
             result = walk_contact(*scene, tolerances, self.steps, None)
-            return finished(result.outcome, np.array(result.end_state), result.work)
+            return make_run(result.outcome, np.array(result.end_state), result.work)
 
         return run
 
@@ -113,7 +113,7 @@ Trial = RigidTrial | ContactTrial
 """A walk to measure methods by."""
 
 
-def finished(outcome: Outcome, state: Floats, counts: Any) -> TrialRun:
+def make_run(outcome: Outcome, state: Floats, counts: Any) -> TrialRun:
     """Build a run's record; without `Outcome.WALKED` it has no end state."""
     end = state.copy() if outcome is Outcome.WALKED else np.zeros(0)
     return TrialRun(outcome.label, end, int(counts[RHS]), int(counts[ACCEPTED]), int(counts[REJECTED]))

@@ -191,9 +191,9 @@ class Request:
         found = resolve(self.config, self.settings, self.strides, self.runs, self.name)
         loaded = found.loaded
         if loaded.config.stability.cases:
-            from walkerlab.verification.catalogue import judged
+            from walkerlab.verification.catalogue import all_cases
 
-            judged(loaded.config.stability.cases)
+            all_cases(loaded.config.stability.cases)
         for warning in loaded.warnings:
             self.console.warn(warning)
         self.console.detail(f"config: {loaded.source}; run folder: {found.folder.path}")

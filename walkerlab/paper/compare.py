@@ -13,7 +13,7 @@ from walkerlab.config.schema import Equations
 from walkerlab.hybrid import comparison
 from walkerlab.hybrid.recorded_walk import as_state
 from walkerlab.labels import labels_of
-from walkerlab.paper.compared_releases import LEFT_OUT, compare_releases
+from walkerlab.paper.compared_releases import LOCK_OMISSION, compare_releases
 from walkerlab.paper.departures import departures
 from walkerlab.paper.errata import Erratum, errata
 from walkerlab.paper.law import is_own_walker
@@ -28,7 +28,7 @@ from walkerlab.paper.measured import (
     rigid_model,
 )
 from walkerlab.paper.printed import fixed_point_as_printed
-from walkerlab.paper.rows import NumberVerdict, counted, paper_rows, table_1, table_2, table_3
+from walkerlab.paper.rows import NumberVerdict, count_verdicts, paper_rows, table_1, table_2, table_3
 from walkerlab.paper.study import study_the_paper
 from walkerlab.paper.walker import compass
 from walkerlab.pipeline.progress import Progress
@@ -37,23 +37,23 @@ from walkerlab.stages.walk import LEG, STEP, TIME, last_step, legs, over_time
 from walkerlab.store.columns import numbered, rows_group
 from walkerlab.store.content import Content, Group, Variable
 
-STRIDE = 2  # steps
-MOVED = 1e-6  # rad and rad/s: a start this far from the fixed point is another one
+STEPS_PER_STRIDE = 2  # steps
+START_TOLERANCE = 1e-6  # rad and rad/s: a start this far from the fixed point is another one
 EQUATION_SETS: tuple[Equations, ...] = ("as-printed", "corrected")
-NOT_THE_PAPERS = {
+PAPER_OMISSION = {
     "what": "the paper's numbers, tables and errata",
     "why": "they apply only to the paper's walker on even ground",
 }
-WAYS = ("raw", "aligned", "between_impacts", "settled")
-LARGEST: dict[str, comparison.Quantity] = {"max_angle_error_rad": "angle", "max_velocity_error_rad_s": "velocity"}
+ALIGNMENTS = ("raw", "aligned", "between_impacts", "settled")
+QUANTITY_KEYS: dict[str, comparison.Quantity] = {"max_angle_error_rad": "angle", "max_velocity_error_rad_s": "velocity"}
 PHASE, ROW = "phase", "row"
-MODELS = {
+MODEL_NAMES = {
     "as_printed": "rigid model, equations as printed",
     "corrected": "rigid model, corrected equations",
     "contact": "contact model",
 }
-MEANINGS = {
-    **MODELS,
+COLUMN_NAMES = {
+    **MODEL_NAMES,
     "quantity": "quantity",
     "unit": "unit of the row's values",
     "where": "location in the paper",
@@ -84,12 +84,12 @@ def run(config: CompareConfig, inputs: Mapping[str, Content], progress: Progress
     shared = motion.summary | ({"numerical_error": errors} if errors else {})
     progress.advance()
     if papers:
-        groups, said = against_the_paper(config, inputs, motion, progress)
+        groups, summary = against_the_paper(config, inputs, motion, progress)
     else:
-        groups, said = {}, models_compared(config, inputs)
+        groups, summary = {}, models_compared(config, inputs)
     progress.advance()
-    left_out = [*said.pop("left_out"), *motion.left_out]
-    return Content({**groups, **motion.groups}, {**said, **shared, "left_out": left_out})
+    left_out = [*summary.pop("left_out"), *motion.left_out]
+    return Content({**groups, **motion.groups}, {**summary, **shared, "left_out": left_out})
 
 
 def against_the_paper(
@@ -99,16 +99,16 @@ def against_the_paper(
     study = study_the_paper()
     progress.advance()
     measured = measure(config, inputs, motion)
-    judged, found = tuple(paper_rows(measured, study)), errata(study)
-    rows = [vars(row) for row in judged]
+    judged_rows, paper_errata = tuple(paper_rows(measured, study)), errata(study)
+    rows = [vars(row) for row in judged_rows]
     tables = {"table1": table_1(measured, study), "table2": table_2(measured), "table3": table_3(measured)}
     groups = {name: numbers_group(list(table.values()), table) for name, table in tables.items()}
-    groups |= {"paper_numbers": numbers_group(rows), "errata": rows_group(found, labels_of(Erratum))}
+    groups |= {"paper_numbers": numbers_group(rows), "errata": rows_group(paper_errata, labels_of(Erratum))}
     return groups, {
         "paper_numbers": rows,
-        "verdicts": counted(judged),
+        "verdicts": count_verdicts(judged_rows),
         **tables,
-        "errata": [vars(erratum) for erratum in found],
+        "errata": [vars(erratum) for erratum in paper_errata],
         "departures": list(measured.departures.contact),
         "left_out": left_out(inputs, measured),
     }
@@ -132,25 +132,25 @@ def models_compared(config: CompareConfig, inputs: Mapping[str, Content]) -> dic
         "dissipated_J": contact["dissipated_J"],
         "departures": list(departures(config, start_moved=False).contact),
         **({} if releases is None else {"releases": releases}),
-        "left_out": [NOT_THE_PAPERS, *(() if releases is None else LEFT_OUT)],
+        "left_out": [PAPER_OMISSION, *(() if releases is None else LOCK_OMISSION)],
     }
 
 
-def recorded(walk: Content, group: str, name: str) -> comparison.Array | None:
+def stored_variable(walk: Content, group: str, name: str) -> comparison.Array | None:
     """Variable of a stored walk, or None."""
-    found = walk.groups.get(group, Group({}))
-    return found[name] if name in found.variables else None
+    variables = walk.groups.get(group, Group({}))
+    return variables[name] if name in variables.variables else None
 
 
 def times_of_steps(walk: Content, name: str) -> comparison.Array:
     """Times (s) stored per step of a walk; empty if there are none."""
-    found = recorded(walk, "steps", name)
-    return np.zeros(0) if found is None else found
+    times = stored_variable(walk, "steps", name)
+    return np.zeros(0) if times is None else times
 
 
 def motion_of(walk: Content) -> comparison.Motion | None:
     """Motion of the legs in a stored walk; None if states were not stored or the walk ended at once."""
-    angle = recorded(walk, "trajectory", "angle")
+    angle = stored_variable(walk, "trajectory", "angle")
     if angle is None or len(angle) < 2:
         return None
     trajectory, strikes = walk["trajectory"], times_of_steps(walk, "knee_strike_time_s")
@@ -176,12 +176,12 @@ class Comparison:
     @property
     def summary(self) -> dict[str, Any]:
         """Largest errors of both legs by alignment; None where there is nothing to compare."""
-        said: dict[str, Any] = {}
-        for name, quantity in LARGEST.items():
-            per_leg = {way: self.errors[way].largest(quantity) if way in self.errors else None for way in WAYS}
-            said[name] = {way: max(both) if both else None for way, both in per_leg.items()} | {"per_leg": per_leg}
+        errors: dict[str, Any] = {}
+        for name, quantity in QUANTITY_KEYS.items():
+            per_leg = {way: self.errors[way].largest(quantity) if way in self.errors else None for way in ALIGNMENTS}
+            errors[name] = {way: max(both) if both else None for way, both in per_leg.items()} | {"per_leg": per_leg}
         orbit = None if self.orbit is None else max(self.orbit)
-        return {**said, "orbit_distance": orbit, "orbit_distance_per_leg": self.orbit}
+        return {**errors, "orbit_distance": orbit, "orbit_distance_per_leg": self.orbit}
 
 
 def compare_motion(rigid: comparison.Motion | None, contact: comparison.Motion | None) -> Comparison:
@@ -191,7 +191,7 @@ def compare_motion(rigid: comparison.Motion | None, contact: comparison.Motion |
         return Comparison({}, left_out=({"what": "differences of the walks", "why": why},))
     steps, orbit = min(rigid.steps, contact.steps), None
     time, raw = comparison.difference_in_time(contact, rigid)
-    found = {"raw": raw}
+    errors = {"raw": raw}
     groups = {"errors": Group({**over_time(time=time), **legs(), **differences("raw", raw, (TIME, LEG), "time")})}
     missing = ("differences in phase and between the orbits", "step")
     if steps:
@@ -199,7 +199,7 @@ def compare_motion(rigid: comparison.Motion | None, contact: comparison.Motion |
         phases = np.linspace(0.0, 1.0, comparison.PHASES)
         aligned = comparison.difference_in_phase(contact, rigid, phases)
         smooth = comparison.between_impacts(contact, rigid, phases)
-        found |= {"aligned": aligned, "between_impacts": part(aligned, smooth)}
+        errors |= {"aligned": aligned, "between_impacts": select(aligned, smooth)}
         coordinates = {
             **numbered(len(aligned.angle), STEP, "step number"),
             PHASE: Variable(phases, (PHASE,), "1", "time within the step over the step's period"),
@@ -207,50 +207,52 @@ def compare_motion(rigid: comparison.Motion | None, contact: comparison.Motion |
         }
         in_phase = differences("aligned", aligned, (STEP, PHASE, LEG), "phase")
         groups["aligned"] = Group({**coordinates, **in_phase}, {"impact_phase": comparison.IMPACT_PHASE})
-        if steps >= STRIDE:
-            last = slice(-STRIDE, None)
-            found["settled"] = part(part(aligned, last), smooth[last])
+        if steps >= STEPS_PER_STRIDE:
+            last = slice(-STEPS_PER_STRIDE, None)
+            errors["settled"] = select(select(aligned, last), smooth[last])
             distances = comparison.orbit_distances(contact, rigid)
             text = "Hausdorff distance of the last stride's orbits, angle and velocity in units of the rigid orbit's "
             groups["orbit"] = Group({**legs(), "orbit_distance": Variable(distances, (LEG,), "1", f"{text}ranges")})
             orbit = distances.tolist()
     what, needed = missing
     lacking = {"what": what, "why": f"no {needed} was completed by both models"}
-    return Comparison(found, orbit, groups, () if steps >= STRIDE else (lacking,))
+    return Comparison(errors, orbit, groups, () if steps >= STEPS_PER_STRIDE else (lacking,))
 
 
-def part(difference: comparison.WalkDifference, where: Any) -> comparison.WalkDifference:
+def select(difference: comparison.WalkDifference, where: Any) -> comparison.WalkDifference:
     return comparison.WalkDifference(difference.angle[where], difference.velocity[where])
 
 
-def differences(way: str, found: comparison.WalkDifference, dims: tuple[str, ...], same: str) -> dict[str, Variable]:
+def differences(
+    way: str, difference: comparison.WalkDifference, dims: tuple[str, ...], alignment: str
+) -> dict[str, Variable]:
     """Differences at the same time or phase, as variables."""
-    said = f"contact less rigid model, at the same {same}"
+    meaning = f"contact less rigid model, at the same {alignment}"
     return {
-        f"{way}_angle_error_rad": Variable(found.angle, dims, "rad", f"angle, {said}"),
-        f"{way}_velocity_error_rad_s": Variable(found.velocity, dims, "rad/s", f"velocity, {said}"),
+        f"{way}_angle_error_rad": Variable(difference.angle, dims, "rad", f"angle, {meaning}"),
+        f"{way}_velocity_error_rad_s": Variable(difference.velocity, dims, "rad/s", f"velocity, {meaning}"),
     }
 
 
 def measure(config: CompareConfig, inputs: Mapping[str, Content], motion: Comparison) -> Measured:
     """Measure everything that the paper's numbers are compared with."""
     sets = inputs["fixedpoint"].summary["equation_sets"]
-    found = {name: sets[name] for name in EQUATION_SETS if "state" in sets.get(name, {})}
+    gaits = {name: sets[name] for name in EQUATION_SETS if "state" in sets.get(name, {})}
     models: dict[str, RigidModel] = {
-        name: rigid_model(compass(config, name), as_state(gait["state"])) for name, gait in found.items()
+        name: rigid_model(compass(config, name), as_state(gait["state"])) for name, gait in gaits.items()
     }
     contact, model = contact_model(config, inputs["contact-sim"]), models.get(config.equations)
-    moved = contact.start is not None and (
-        model is None or bool(np.abs(np.subtract(contact.start, model.state)).max() > MOVED)
+    start_moved = contact.start is not None and (
+        model is None or bool(np.abs(np.subtract(contact.start, model.state)).max() > START_TOLERANCE)
     )
     return Measured(
         walker=compass(config, config.equations),
         equations=config.equations,
         models=models,
-        spectral_radii={name: float(gait["spectral_radius"]) for name, gait in found.items()},
+        spectral_radii={name: float(gait["spectral_radius"]) for name, gait in gaits.items()},
         contact=contact,
         errors=motion.errors,
-        departures=departures(config, moved),
+        departures=departures(config, start_moved),
     )
 
 
@@ -258,8 +260,8 @@ def contact_model(config: CompareConfig, walk: Content) -> ContactModel:
     """Measure what is compared with the paper's ADAMS model."""
     summary, pitch = walk.summary, float(walk.summary["pitch_m"])
     periods, lengths = np.array(summary["step_periods_s"]), np.array(summary["step_lengths_m"])
-    stride = STRIDE * (lengths.size // STRIDE)
-    angle, joules = (recorded(walk, "trajectory", name) for name in ("angle", "mechanical_J"))
+    stride = STEPS_PER_STRIDE * (lengths.size // STEPS_PER_STRIDE)
+    angle, joules = (stored_variable(walk, "trajectory", name) for name in ("angle", "mechanical_J"))
     touches = times_of_steps(walk, "touch_time_s")
     energy = None if joules is None else over_last_steps(walk["trajectory"]["time"], joules, touches)
     # from x_p with its printed digits, both feet on the config's slope
@@ -274,7 +276,7 @@ def contact_model(config: CompareConfig, walk: Content) -> ContactModel:
         # leg 0 swings first, as in the rigid model's state
         start=None if angle is None else as_state([*angle[0], *walk["trajectory"]["velocity"][0]]),
         table_3=characteristics(periods, lengths, None if energy is None else energy.mean),
-        step_length=float(lengths[stride - STRIDE : stride].mean()) if stride else None,
+        step_length=float(lengths[stride - STEPS_PER_STRIDE : stride].mean()) if stride else None,
         energy=energy,
         from_x_p=(from_x_p.steps, from_x_p.outcome.label),
     )
@@ -310,14 +312,16 @@ def numbers_group(rows: Sequence[Mapping[str, Any]], names: Sequence[str] | Mapp
     if names:
         variables["name"] = texts(list(names), "symbol of the row")
     for name in rows[0]:
-        values, meaning = [row[name] for row in rows], MEANINGS[name]
-        if name in MODELS:
+        values, meaning = [row[name] for row in rows], COLUMN_NAMES[name]
+        if name in MODEL_NAMES:
             variables[f"{name}_text"] = texts(["" if x is None else f"{x:.10g}" for x in values], f"{meaning}, as text")
-            known = [row for row, value in enumerate(values) if value is not None]
-            if known:
+            rows_with_value = [row for row, value in enumerate(values) if value is not None]
+            if rows_with_value:
                 dim = f"{name}_{ROW}"
-                variables[dim] = Variable(np.array(known), (dim,), "1", f"rows with a number: {meaning}")
-                variables[name] = Variable(np.array([values[row] for row in known], float), (dim,), unit, meaning)
+                variables[dim] = Variable(np.array(rows_with_value), (dim,), "1", f"rows with a number: {meaning}")
+                variables[name] = Variable(
+                    np.array([values[row] for row in rows_with_value], float), (dim,), unit, meaning
+                )
         elif isinstance(values[0], str):
             variables[name] = texts(values, meaning)
         else:

@@ -20,10 +20,13 @@ from walkerlab.stages.walk import last_step, numbers_of
 
 RELEASES = {"compression": False, "touch": True}
 """Whether the knee is released at the leading foot's first touch, by the config's name for the release."""
-STEPS = 20  # enough to settle on another gait, or to fall
+CONTACT_STEPS = 20  # enough to settle on another gait, or to fall
 RIGID_STEPS = 200
-RIGID, CONTACT = Tolerances("dop853", 1e-8, 1e-10, 2_000_000), Tolerances("radau5", 1e-8, 1e-10, 2_000_000)
-LEFT_OUT = (
+RIGID_TOLERANCES, CONTACT_TOLERANCES = (
+    Tolerances("dop853", 1e-8, 1e-10, 2_000_000),
+    Tolerances("radau5", 1e-8, 1e-10, 2_000_000),
+)
+LOCK_OMISSION = (
     {
         "what": "ideal against compliant lock",
         "why": "a walk has one lock; try the other by `walkerlab contact-sim --set walker.knee.lock=compliant`",
@@ -41,25 +44,25 @@ def compare_releases(config: ContactConfig, state: State, pitch_m: float) -> dic
     scene = contact_scene(config, pitch_m, pitch_m)
     if not scene.walker.kneed or config.push_off.impulse_N_s != 0.0:
         return None
-    found = {}
+    releases = {}
     for name, at_touch in RELEASES.items():
         released = replace(scene, walker=changed_forms(scene.walker, release_at_touch=at_touch))
-        walk = released.walk(start_state(scene, state), STEPS, CONTACT)
+        walk = released.walk(start_state(scene, state), CONTACT_STEPS, CONTACT_TOLERANCES)
         model = standing(assembly_of(config.walker, rigid=True), config.gravity_m_s2, config.slope_rad, not at_touch)
-        rigid = take_walk(model.changed(**drive_parameters(config)), RIGID, state, RIGID_STEPS)
+        rigid = take_walk(model.changed(**drive_parameters(config)), RIGID_TOLERANCES, state, RIGID_STEPS)
         last = {"period_s": float(rigid.periods_s[-1]), "length_m": float(rigid.lengths_m[-1])} if rigid.steps else {}
         of_rigid = {"outcome": rigid.outcome.label, "steps": rigid.steps, "of": RIGID_STEPS, **last}
-        found[name] = {**told(scene, walk), "rigid": of_rigid}
-    return found
+        releases[name] = {**walk_report(scene, walk), "rigid": of_rigid}
+    return releases
 
 
-def told(scene: ContactScene, walk: ContactWalkResult) -> dict[str, Any]:
+def walk_report(scene: ContactScene, walk: ContactWalkResult) -> dict[str, Any]:
     """Summarise a walk: outcome, last step, knee strike, and dissipation per step by channel."""
     steps, lost = walk.steps, by_channel(scene.walker, walk.dissipated_J)
     return {
         "outcome": walk.outcome.label,
         "steps": steps,
-        "of": STEPS,
+        "of": CONTACT_STEPS,
         "knee_strike_s": None,
         **last_step(numbers_of(walk)),
         "dissipated_J_per_step": {name: joules / steps for name, joules in lost.items()} if steps else None,

@@ -20,7 +20,7 @@ from walkerlab.paper.printed import (
     StartRow,
 )
 
-AROUND: Final = 2.0
+APPROXIMATE_FACTOR: Final = 2.0
 """'Around 1e-4' is up to twice that."""
 Interval = tuple[float, float]
 
@@ -28,7 +28,7 @@ Interval = tuple[float, float]
 @cache
 def contradictions() -> MappingProxyType[Printed, str]:
     """Printed values that other values of the paper contradict, each with the computation."""
-    return MappingProxyType(dict([*percentages(), *steps_of_a_cycle(), *lengths_and_speeds(), error_at_the_start()]))
+    return MappingProxyType(dict([*percentages(), *steps_of_a_cycle(), *lengths_and_speeds(), start_error()]))
 
 
 def interval(function: Callable[..., float], *entries: Printed) -> Interval:
@@ -37,8 +37,8 @@ def interval(function: Callable[..., float], *entries: Printed) -> Interval:
     return min(values), max(values)
 
 
-def apart(one: Interval, other: Interval) -> bool:
-    return one[1] < other[0] or other[1] < one[0]
+def are_disjoint(first: Interval, second: Interval) -> bool:
+    return first[1] < second[0] or second[1] < first[0]
 
 
 def percentages() -> Iterator[tuple[Printed, str]]:
@@ -47,7 +47,7 @@ def percentages() -> Iterator[tuple[Printed, str]]:
         low, high = percent_left_open(row)
         # the signs of the column follow no rule, so sizes are compared
         smallest = 0.0 if low <= 0.0 <= high else min(abs(low), abs(high))
-        if apart((smallest, max(abs(low), abs(high))), row.percent.rounding):
+        if are_disjoint((smallest, max(abs(low), abs(high))), row.percent.rounding):
             change = f"{row.matlab.text} to {row.adams.text} {row.matlab.unit} is {row.percent_of_matlab:+.3g}%"
             yield row.percent, f"{change} of the MATLAB value, with rounding {low:+.2f} to {high:+.2f}%"
 
@@ -60,14 +60,14 @@ def percent_left_open(row: StartRow) -> Interval:
 def steps_of_a_cycle() -> Iterator[tuple[Printed, str]]:
     """Unequal steps of a period-one gait, and a cycle that is not the sum of its steps."""
     left, right = T_LEFT.matlab, T_RIGHT.matlab
-    if apart(left.rounding, right.rounding):
+    if are_disjoint(left.rounding, right.rounding):
         equal = "x_p is a fixed point of one step (eq. 10 and 11), so its steps are equal"
         for step in (left, right):
             yield step, f"{equal}: not {left.text} and {right.text} s"
     for column in ("matlab", "adams"):
         cycle, *steps = (getattr(row, column) for row in (T_CYCLE, T_LEFT, T_RIGHT))
         low, high = interval(float.__add__, *steps)
-        if apart(cycle.rounding, (low, high)):
+        if are_disjoint(cycle.rounding, (low, high)):
             total = f"{steps[0].text} + {steps[1].text} s is {sum(step.value for step in steps):.2f} s"
             open_to = f"with rounding {low:.2f} to {high:.2f} s"
             yield cycle, f"{total}, {open_to}, and not {cycle.text} s: one of the three is wrong"
@@ -81,18 +81,18 @@ def lengths_and_speeds() -> Iterator[tuple[Printed, str]]:
         length = 2.0 * leg.value * sin(0.5 * (angles[1].value - angles[0].value))
         steps = interval(lambda swing, stance: 2.0 * leg.value * sin(0.5 * (stance - swing)), *angles)
         feet = f"the feet are 2 L sin((theta_2 - theta_1)/2) = {length:.4f} m apart ({source})"
-        if column == "matlab" and apart(steps, STEP_LENGTH.rounding):
+        if column == "matlab" and are_disjoint(steps, STEP_LENGTH.rounding):
             yield STEP_LENGTH, f"{feet}, {length / STEP_LENGTH.value:.1f} times {STEP_LENGTH.text} m"
         speed, cycle = getattr(V_COM, column), getattr(T_CYCLE, column)
         # one step over a cycle, as section 5 has it, or both steps of the cycle
         low, high = steps[0] / cycle.rounding[1], 2.0 * steps[1] / cycle.rounding[0]
-        if apart((low, high), speed.rounding):
-            one, two = length / cycle.value, 2.0 * length / cycle.value
-            speeds = f"one step is {one:.3f} m/s and two are {two:.3f} m/s"
+        if are_disjoint((low, high), speed.rounding):
+            one_step, two_steps = length / cycle.value, 2.0 * length / cycle.value
+            speeds = f"one step is {one_step:.3f} m/s and two are {two_steps:.3f} m/s"
             yield speed, f"{feet}: in {cycle.text} s {speeds}, not {speed.text} m/s"
 
 
-def error_at_the_start() -> tuple[Printed, str]:
+def start_error() -> tuple[Printed, str]:
     """The largest error, which cannot be below the difference between the two starts."""
     angle, rate = (max(abs(row.adams.value - row.matlab.value) for row in rows) for rows in (TABLE_2[:2], TABLE_2[2:]))
     return LARGEST_ERROR, (

@@ -12,10 +12,10 @@ from walkerlab.config.walkers import CompassWalker
 from walkerlab.paper.measured import Departures
 from walkerlab.paper.printed import X_P, slope_of
 
-PHYSICAL_MODEL_ONLY: Final = ("foot_radius_m",)
-IN_SI: Final = ("stiffness", "damping", *BOUNDS_SI)
+CONTACT_MODEL_KEYS: Final = ("foot_radius_m",)
+SI_KEYS: Final = ("stiffness", "damping", *BOUNDS_SI)
 """Keys of the contact block whose values depend on its units."""
-PURE: Final = tuple(name for name in Contact.model_fields if name not in (*IN_SI, "units", "stance"))
+UNITLESS_KEYS: Final = tuple(name for name in Contact.model_fields if name not in (*SI_KEYS, "units", "stance"))
 """Its other keys except `stance`: the paper also has a pinned first stance (section 4)."""
 
 
@@ -32,29 +32,32 @@ def departures(config: CompareConfig, start_moved: bool) -> Departures:
     if not config.ground.even:
         rigid.append("the ground is uneven")
     if not isinstance(walker, CompassWalker):
-        rigid.append(said("walker.type", walker.type, paper.type))
+        rigid.append(describe("walker.type", walker.type, paper.type))
     else:
-        compass = [name for name in CompassWalker.model_fields if name not in (*PHYSICAL_MODEL_ONLY, "hip")]
-        rigid += [*different(walker, paper, compass), *different(config, Config(), ["gravity_m_s2"])]
+        compass = [name for name in CompassWalker.model_fields if name not in (*CONTACT_MODEL_KEYS, "hip")]
+        rigid += [
+            *describe_differences(walker, paper, compass),
+            *describe_differences(config, Config(), ["gravity_m_s2"]),
+        ]
         slope, rounding = slope_of(*X_P[:2])
         if abs(config.slope_rad - slope) > rounding:
-            rigid.append(said("slope_rad", config.slope_rad, slope))
+            rigid.append(describe("slope_rad", config.slope_rad, slope))
         if contact is not None:
-            of_contact += different(walker, paper, PHYSICAL_MODEL_ONLY)
-            of_contact += different(contact.in_si(), Contact().in_si(), IN_SI, "contact.{} (SI)")
-            of_contact += different(contact, Contact(), PURE, "contact.{}")
+            of_contact += describe_differences(walker, paper, CONTACT_MODEL_KEYS)
+            of_contact += describe_differences(contact.in_si(), Contact().in_si(), SI_KEYS, "contact.{} (SI)")
+            of_contact += describe_differences(contact, Contact(), UNITLESS_KEYS, "contact.{}")
     if start_moved:
         of_contact.append("the start is not the rigid model's fixed point")
     return Departures(tuple(rigid), (*rigid, *of_contact))
 
 
-def different(used: Any, paper: Any, names: Iterable[str], called: str = "{}") -> Iterator[str]:
+def describe_differences(used: Any, paper: Any, names: Iterable[str], called: str = "{}") -> Iterator[str]:
     """Describe each key whose values differ."""
     for name in names:
         if not same(getattr(used, name), getattr(paper, name)):
-            yield said(called.format(name), getattr(used, name), getattr(paper, name))
+            yield describe(called.format(name), getattr(used, name), getattr(paper, name))
 
 
-def said(name: str, *values: Any) -> str:
+def describe(name: str, *values: Any) -> str:
     used, paper = (f"{value:.6g}" if isinstance(value, float) else str(value) for value in values)
     return f"{name} {used} instead of {paper}"

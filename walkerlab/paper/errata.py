@@ -20,11 +20,11 @@ class Erratum:
     measured: Annotated[str, Label("", "numbers of that argument, from this run")]
 
 
-PARTS = [field.name for field in fields(Erratum)]
-ERRATUM = re.compile(" ".join(rf"{name}: (?P<{name}>.*?)" for name in PARTS) + r"(?= where: |$)")
+ERRATUM_PARTS = [field.name for field in fields(Erratum)]
+ERRATUM_PATTERN = re.compile(" ".join(rf"{name}: (?P<{name}>.*?)" for name in ERRATUM_PARTS) + r"(?= where: |$)")
 """Matches an erratum in the rendered template."""
 
 
 def errata(study: PaperStudy) -> tuple[Erratum, ...]:
     """All errata, by theme and then in the order of the paper's sections."""
-    return tuple(Erratum(**found.groupdict()) for found in ERRATUM.finditer(prose("errata.errata", study)))
+    return tuple(Erratum(**found.groupdict()) for found in ERRATUM_PATTERN.finditer(prose("errata.errata", study)))

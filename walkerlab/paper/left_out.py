@@ -11,14 +11,14 @@ from walkerlab.scene.omissions import Entry, omission
 if TYPE_CHECKING:
     from walkerlab.config.reads import RigidConfig
 
-PAPERS = "the paper uses it for its compass only"
+COMPASS_ONLY = "the paper uses it for its compass only"
 
 
-def of_adjustment(config: RigidConfig) -> tuple[Entry, ...]:
+def adjustment_omissions(config: RigidConfig) -> tuple[Entry, ...]:
     """Return the omissions for a walker other than the paper's compass."""
     entries = []
     if not is_passive_compass(config):
-        entries.append(omission("the first step with a hinged stance foot", PAPERS, "two walks"))
+        entries.append(omission("the first step with a hinged stance foot", COMPASS_ONLY, "two walks"))
     if not is_own_walker(config):
         entries.append(omission("the paper's start of its ADAMS model", "only that compass has it", "a walk"))
     return tuple(entries)

@@ -66,9 +66,9 @@ def over_last_steps(time: Array, energy: Array, step_ends: Array) -> EnergyRecor
     start = step_ends[-1 - ENERGY_STEPS] if step_ends.size > ENERGY_STEPS else time[0]
     end = min(step_ends[-1], time[-1])
     inside = (time > start) & (time < end)
-    at = np.concatenate(([start], time[inside], [end]))
-    record = np.interp(at, time, energy)
-    mean = np.sum(0.5 * (record[1:] + record[:-1]) * np.diff(at)) / (end - start)
+    times = np.concatenate(([start], time[inside], [end]))
+    record = np.interp(times, time, energy)
+    mean = np.sum(0.5 * (record[1:] + record[:-1]) * np.diff(times)) / (end - start)
     return EnergyRecord(float(mean), float(record.min()), float(record.max()))
 
 

@@ -12,7 +12,7 @@ from walkerlab.paper.measured import TIGHT
 from walkerlab.solvers.system import State
 
 RIGHT, MISPRINTED = 1.0, -1.0  # sign of the second row of P and E
-SOLVED = 1e-9
+ROOT_TOLERANCE = 1e-9
 
 
 def inertia_at_impact(walker: RigidWalker, theta_1: float, theta_2: float) -> Array:
@@ -92,5 +92,5 @@ def fixed_point(walker: RigidWalker, guess: State, row_2: float) -> State | None
         after = step(walker, state(z), row_2)
         return np.full(3, 1.0) if after is None else np.array(after[1:]) - z
 
-    found = root(mismatch, np.array(guess[1:]), tol=SOLVED)
-    return state(found.x) if np.abs(mismatch(found.x)).max() < 1e3 * SOLVED else None
+    solution = root(mismatch, np.array(guess[1:]), tol=ROOT_TOLERANCE)
+    return state(solution.x) if np.abs(mismatch(solution.x)).max() < 1e3 * ROOT_TOLERANCE else None

@@ -46,20 +46,20 @@ class Printed:
         """How a value agrees to the printed digits: 'rounded', 'cut off', or '' if it does not."""
         if value is None:
             return ""
-        expected, found = number(self.text), Decimal(repr(float(value)))
+        expected, decimal = number(self.text), Decimal(repr(float(value)))
         last = Decimal(1).scaleb(int(expected.as_tuple().exponent))
-        if found.quantize(last, ROUND_HALF_UP) == expected:
+        if decimal.quantize(last, ROUND_HALF_UP) == expected:
             return "rounded"
-        return "cut off" if found.quantize(last, ROUND_DOWN) == expected else ""
+        return "cut off" if decimal.quantize(last, ROUND_DOWN) == expected else ""
 
 
-WORDS: Final = {"one": "1", "five": "5", "zero": "0"}
+NUMBER_WORDS: Final = {"one": "1", "five": "5", "zero": "0"}
 
 
 def number(text: str) -> Decimal:
     """Parse a text such as '-0.60', '+41%', '< 1 %', '10^5', '1e-4' or 'five'."""
     plain = text.replace("less than", "").strip("<+% ")
-    return Decimal(WORDS.get(plain, plain.replace("10^", "1e")))
+    return Decimal(NUMBER_WORDS.get(plain, plain.replace("10^", "1e")))
 
 
 X_P: Final = tuple(

@@ -16,7 +16,7 @@ from walkerlab.paper.printed import Printed, speed_difference
 from walkerlab.paper.prose import prose
 from walkerlab.paper.study import PaperStudy
 
-SETS = ("as-printed", "corrected")
+EQUATION_NAMES = ("as-printed", "corrected")
 WALKER_PARAMETERS = ("leg_length", "leg_mass", "hip_mass", "gravity")
 
 
@@ -50,7 +50,7 @@ Scene = Literal["rigid", "contact", "any"]
 """The model whose scene must be the paper's for a mismatch to count; "any" if the paper's own values decide."""
 
 
-def counted(rows: Iterable[JudgedNumber]) -> dict[str, int]:
+def count_verdicts(rows: Iterable[JudgedNumber]) -> dict[str, int]:
     """Values by verdict, and `refuted`, which repeats the last two until 0.3 is released."""
     verdicts = Counter(row.verdict for row in rows)
     by_class = {verdict.value: verdicts[verdict] for verdict in NumberVerdict}
@@ -111,7 +111,10 @@ class Judge:
             evidence += f" The verdict refers to the paper's own numbers, not to this scene ({differs})."
         elif differs and verdict not in (INPUT, REPRODUCED):
             verdict, evidence = EXPLAINED, f"Not the paper's scene ({differs}): {evidence}"
-        about, (as_printed, corrected) = (entry.where, entry.quantity, entry.unit, entry.text), map(rigid.get, SETS)
+        about, (as_printed, corrected) = (
+            (entry.where, entry.quantity, entry.unit, entry.text),
+            map(rigid.get, EQUATION_NAMES),
+        )
         return JudgedNumber(*about, as_printed, corrected, contact, verdict.value, evidence)
 
     @property
@@ -121,24 +124,24 @@ class Judge:
         if gait is None or start is None:
             return [None] * len(printed.COORDINATES)
         pairs = zip(start, gait.state, strict=True)
-        return [None if ours == 0.0 else 100.0 * (begun / ours - 1.0) for begun, ours in pairs]
+        return [None if ours == 0.0 else 100.0 * (initial / ours - 1.0) for initial, ours in pairs]
 
     def input(self, entry: Printed, value: float, scene: Scene, evidence: str = "") -> JudgedNumber:
         """Judge a parameter of both models, or of the contact model alone."""
-        rigid = dict.fromkeys(SETS, value) if scene == "rigid" else {}
+        rigid = dict.fromkeys(EQUATION_NAMES, value) if scene == "rigid" else {}
         verdict = INPUT if math.isclose(value, entry.value, rel_tol=1e-12) else EXPLAINED
         return self.row(entry, rigid, value, verdict, scene, evidence or prose("evidence.input", value, entry.unit))
 
     def fixed_point(self, entry: Printed, coordinate: int) -> JudgedNumber:
         values = {name: model.state[coordinate] for name, model in self.measured.models.items()}
-        found = {name: entry.agreement(value) for name, value in values.items()}
-        text = prose("evidence.fixed_point", values, found)
-        return self.row(entry, values, None, came_out(any(found.values())), "rigid", text)
+        agreements = {name: entry.agreement(value) for name, value in values.items()}
+        text = prose("evidence.fixed_point", values, agreements)
+        return self.row(entry, values, None, verdict_if(any(agreements.values())), "rigid", text)
 
     def eigenvalue(self) -> JudgedNumber:
         entry, radii = printed.EIGENVALUES, self.measured.spectral_radii
         stable = bool(radii) and max(radii.values()) < entry.value
-        return self.row(entry, radii, None, came_out(stable), "rigid", prose("evidence.eigenvalue", radii))
+        return self.row(entry, radii, None, verdict_if(stable), "rigid", prose("evidence.eigenvalue", radii))
 
     def lost_balance(self) -> JudgedNumber:
         """Judge the loss of balance from MATLAB's initial conditions."""
@@ -147,7 +150,7 @@ class Judge:
         short = None if right is None else 100.0 * (1.0 - printed.X_P[3].value / right.state[3])
         text = prose("evidence.lost_balance", steps, 2 * CYCLES, outcome, short)
         agrees = outcome != "walked" and steps == printed.LOST_BALANCE.value
-        return self.row(printed.LOST_BALANCE, {}, float(steps), came_out(agrees), "contact", text)
+        return self.row(printed.LOST_BALANCE, {}, float(steps), verdict_if(agrees), "contact", text)
 
     def percent(self, row: printed.StartRow, coordinate: int) -> JudgedNumber:
         """Judge a percentage of Table 2, which is arithmetic, whatever the config."""
@@ -169,9 +172,9 @@ class Judge:
         """Judge the five gait cycles, which the rigid models walk as well."""
         entry, contact = printed.STRIDES, self.measured.contact
         rigid = {name: float(model.steps // 2) for name, model in self.measured.models.items()}
-        done = contact.steps // 2
-        text = prose("evidence.strides", contact, done, contact.outcome == "walked" and done < entry.value)
-        return self.row(entry, rigid, float(done), INPUT, "contact", text)
+        completed = contact.steps // 2
+        text = prose("evidence.strides", contact, completed, contact.outcome == "walked" and completed < entry.value)
+        return self.row(entry, rigid, float(completed), INPUT, "contact", text)
 
     def error(self) -> JudgedNumber:
         """Judge the largest error of Fig. 8, for angles and angular velocities together."""
@@ -181,13 +184,13 @@ class Judge:
             ("angle", study.fastest * late, "rad"),
             ("velocity", study.largest_jump, "rad/s"),
         )
-        found = [
-            (f"{off:.2g} {unit}", unit, {way: one.largest(quantity) for way, one in differences.items()})
+        errors_by_quantity = [
+            (f"{off:.2g} {unit}", unit, {way: difference.largest(quantity) for way, difference in differences.items()})
             for quantity, off, unit in quantities
         ]
-        text = prose("evidence.error", late, self.measured.equations, found)
+        text = prose("evidence.error", late, self.measured.equations, errors_by_quantity)
         way = "aligned" if "aligned" in differences else "raw"
-        largest = max((max(errors[way]) for _, _, errors in found if way in errors), default=None)
+        largest = max((max(errors[way]) for _, _, errors in errors_by_quantity if way in errors), default=None)
         return self.row(entry, {}, largest, NOT_REPRODUCED, "any", text)
 
     def step_length(self) -> JudgedNumber:
@@ -196,13 +199,13 @@ class Judge:
         longest = max((*lengths.values(), *(() if contact is None else (contact,))), default=None)
         text = prose("evidence.step_length", lengths, contact, longest)
         agrees = any(entry.agreement(length) for length in lengths.values())
-        return self.row(entry, lengths, contact, came_out(agrees), "rigid", text)
+        return self.row(entry, lengths, contact, verdict_if(agrees), "rigid", text)
 
     def velocity_difference(self) -> JudgedNumber:
         """Judge the difference of the average velocities; the paper's own arithmetic is in the evidence."""
         entry, contact = printed.VELOCITY_DIFFERENCE, self.measured.contact.table_3.v_com
         speeds = {name: model.table_3.v_com for name, model in self.measured.models.items()}
-        found = {
+        percentages = {
             name: 100.0 * abs(contact - rigid) / abs(rigid)
             for name, rigid in speeds.items()
             if rigid and contact is not None
@@ -210,30 +213,30 @@ class Judge:
         left, right, cycle = printed.T_LEFT, printed.T_RIGHT, printed.T_CYCLE
         by_cycle = speed_difference(cycle.matlab.value, cycle.adams.value)
         sums = speed_difference(left.matlab.value + right.matlab.value, left.adams.value + right.adams.value)
-        text = prose("evidence.velocity_difference", found, by_cycle, sums)
-        agrees = bool(found) and max(found.values()) < entry.value
-        return self.row(entry, found, None, came_out(agrees), "contact", text)
+        text = prose("evidence.velocity_difference", percentages, by_cycle, sums)
+        agrees = bool(percentages) and max(percentages.values()) < entry.value
+        return self.row(entry, percentages, None, verdict_if(agrees), "contact", text)
 
     def table_3(self, row: printed.PrintedRow) -> Iterator[JudgedNumber]:
         """Judge a row of Table 3: MATLAB by the rigid model, ADAMS by the contact model."""
         measured, study = self.measured, self.study
-        found = {name: getattr(model.table_3, row.name) for name, model in measured.models.items()}
-        rigid = {name: value for name, value in found.items() if value is not None}
+        values = {name: getattr(model.table_3, row.name) for name, model in measured.models.items()}
+        rigid = {name: value for name, value in values.items() if value is not None}
         contact: float | None = getattr(measured.contact.table_3, row.name)
         # both step periods share one cause, so the evidence has both
         names = ("t_left", "t_right") if row in (printed.T_LEFT, printed.T_RIGHT) else (row.name,)
         means = {"five": study.five_steps_energy, "ten": study.from_x_p.E_avg} if row is printed.E_AVG else {}
-        taken = [steps for steps, mean in means.items() if row.matlab.agreement(mean)]
+        matching_means = [steps for steps, mean in means.items() if row.matlab.agreement(mean)]
         # an energy that is a mean over another number of steps follows from the misprint, which does not conserve it
-        verdict = EXPLAINED if taken else NOT_REPRODUCED
-        text = prose("evidence.matlab", row, measured, names, study, taken)
+        verdict = EXPLAINED if matching_means else NOT_REPRODUCED
+        text = prose("evidence.matlab", row, measured, names, study, matching_means)
         agrees = any(row.matlab.agreement(value) for value in rigid.values())
         yield self.row(row.matlab, rigid, contact, REPRODUCED if agrees else verdict, "rigid", text)
         text = prose("evidence.adams", row, measured, names)
-        yield self.row(row.adams, rigid, contact, came_out(bool(row.adams.agreement(contact))), "contact", text)
+        yield self.row(row.adams, rigid, contact, verdict_if(bool(row.adams.agreement(contact))), "contact", text)
 
 
-def came_out(agrees: bool) -> NumberVerdict:
+def verdict_if(agrees: bool) -> NumberVerdict:
     return REPRODUCED if agrees else NOT_REPRODUCED
 
 
@@ -269,7 +272,7 @@ def table_2(measured: Measured) -> Table:
     for place, (coordinate, row) in enumerate(zip(printed.COORDINATES, printed.TABLE_2, strict=True)):
         states = {name: model.state[place] for name, model in measured.models.items()}
         table[coordinate] = {
-            **beside(row, states, None if start is None else start[place]),
+            **number_columns(row, states, None if start is None else start[place]),
             "paper_percent": row.percent.value,
             "paper_percent_text": row.percent.text,
             "percent_of_matlab": row.percent_of_matlab,
@@ -283,11 +286,11 @@ def table_3(measured: Measured) -> Table:
     table = {}
     for row in printed.TABLE_3:
         rigid = {name: getattr(model.table_3, row.name) for name, model in measured.models.items()}
-        table[row.name] = beside(row, rigid, getattr(measured.contact.table_3, row.name))
+        table[row.name] = number_columns(row, rigid, getattr(measured.contact.table_3, row.name))
     return table
 
 
-def beside(row: printed.PrintedRow, rigid: Mapping[str, float | None], contact: float | None) -> dict[str, Any]:
+def number_columns(row: printed.PrintedRow, rigid: Mapping[str, float | None], contact: float | None) -> dict[str, Any]:
     """Columns of both printed numbers, of the rigid model by set of equations, and of the contact model."""
     return {
         "unit": row.matlab.unit,

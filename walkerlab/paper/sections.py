@@ -26,9 +26,9 @@ TONES: dict[str, Tone] = {
 }
 """Verdicts on printed values, and their appearance."""
 
-TEXT = "_text"
+TEXT_SUFFIX = "_text"
 """Suffix of the key of a printed number's text."""
-BESIDE = {"as_printed": "as printed", "corrected": "corrected", "contact": "contact model"}
+MODEL_COLUMNS = {"as_printed": "as printed", "corrected": "corrected", "contact": "contact model"}
 """Columns compared with the paper's numbers."""
 
 
@@ -37,21 +37,23 @@ def numbers(results: Results) -> Section | None:
     if not rows:
         return None
     meanings = words.terms("paper.verdicts").items()
-    told = tuple(Statement(f"{spelled(name).capitalize()}:", meaning, tone=TONES[name]) for name, meaning in meanings)
+    statements = tuple(
+        Statement(f"{spell_verdict(name).capitalize()}:", meaning, tone=TONES[name]) for name, meaning in meanings
+    )
     departs = words("paper.departs", results.departures) if results.departures else ""
-    blocks = (Paragraph(departs, "fair"), Statements(told, "lines"), numbers_table(rows))
+    blocks = (Paragraph(departs, "fair"), Statements(statements, "lines"), numbers_table(rows))
     finding = words("paper.finding", by_verdict(row["verdict"] for row in rows))
     return Section.of("paper-numbers", "The paper’s numbers", blocks, finding, PAPER)
 
 
 def numbers_table(rows: Sequence[Row]) -> Table:
     """Table of the paper's numbers by location, with columns for the models that have values."""
-    models = [key for key in BESIDE if any(row.get(key) is not None for row in rows)]
+    models = [key for key in MODEL_COLUMNS if any(row.get(key) is not None for row in rows)]
     columns = (
-        Column("quantity", lambda row: named(row["quantity"], row.get("unit"))),
+        Column("quantity", lambda row: name_with_unit(row["quantity"], row.get("unit"))),
         Column("printed", "printed", in_signs, numeric=True),
-        *(Column(BESIDE[key], key, number, numeric=True) for key in models),
-        Column("verdict", "verdict", lambda verdict: Cell(spelled(verdict), TONES.get(verdict, "plain"))),
+        *(Column(MODEL_COLUMNS[key], key, number, numeric=True) for key in models),
+        Column("verdict", "verdict", lambda verdict: Cell(spell_verdict(verdict), TONES.get(verdict, "plain"))),
         Column("evidence", "evidence", in_signs, wide=True),
     )
     caption = "What the paper prints, and what its equations give"
@@ -63,11 +65,11 @@ def by_verdict(verdicts: Iterable[str]) -> dict[str, int]:
     return {name: counts[name] for name in TONES}
 
 
-def spelled(verdict: str) -> str:
+def spell_verdict(verdict: str) -> str:
     return verdict.replace("-", " ")
 
 
-def named(name: str, unit: str | None) -> str:
+def name_with_unit(name: str, unit: str | None) -> str:
     return in_signs(with_unit(name, "unit not given" if unit == "not given" else unit or ""))
 
 
@@ -79,8 +81,8 @@ def paper_numbers(results: Results) -> Sequence[Row]:
 
 def tables(results: Results) -> Section | None:
     summary = results.summary("compare")
-    shown = (table_of(key, summary.get(key) or {}) for key in words.terms("paper.tables"))
-    return Section.of("tables", "The paper’s tables", shown, page=PAPER)
+    tables_shown = (table_of(key, summary.get(key) or {}) for key in words.terms("paper.tables"))
+    return Section.of("tables", "The paper’s tables", tables_shown, page=PAPER)
 
 
 def table_of(key: str, rows: Any) -> Table:
@@ -99,41 +101,47 @@ def paper_table(caption: str, rows: Mapping[str, Row], note: str) -> Table:
     has_quantities = any("quantity" in row for row in rows.values())
     columns, heads = [Column("symbol" if has_quantities else "quantity", "row")], words.terms("paper.heads")
     for key in dict.fromkeys(key for row in rows.values() for key, value in row.items() if value is not None):
-        if key == "unit" or key.endswith(TEXT):
+        if key == "unit" or key.endswith(TEXT_SUFFIX):
             continue
         texts = any(isinstance(row.get(key), str) for row in rows.values())
-        as_text = texts or any(f"{key}{TEXT}" in row for row in rows.values())
+        as_text = texts or any(f"{key}{TEXT_SUFFIX}" in row for row in rows.values())
         written = in_signs if as_text else partial(number, digits=3 if "percent" in key else 6)
-        of = key if texts or not as_text else f"{key}{TEXT}"
-        columns.append(Column(heads.get(key, key.replace("_", " ")), of, written, numeric=not texts))
-    names = {symbol: f"{said}, {symbol}" for symbol, said in words.terms("paper.quantities").items()}
+        source = key if texts or not as_text else f"{key}{TEXT_SUFFIX}"
+        columns.append(Column(heads.get(key, key.replace("_", " ")), source, written, numeric=not texts))
+    names = {symbol: f"{name}, {symbol}" for symbol, name in words.terms("paper.quantities").items()}
     return table(
         caption,
         columns,
-        [{"row": named(names.get(one, one), row.get("unit")), **row} for one, row in rows.items()],
+        [{"row": name_with_unit(names.get(symbol, symbol), row.get("unit")), **row} for symbol, row in rows.items()],
         note=note,
     )
 
 
-PARTS = {"where": "where", "printed": "printed", "right": "right", "evidence": "evidence", "measured": "measured here"}
+ERRATUM_HEADS = {
+    "where": "where",
+    "printed": "printed",
+    "right": "right",
+    "evidence": "evidence",
+    "measured": "measured here",
+}
 """Column heads of the stored errata."""
-ERRATUM_COLUMNS = [Column(head, name, in_signs, wide=name != "where") for name, head in PARTS.items()]
+ERRATUM_COLUMNS = [Column(head, name, in_signs, wide=name != "where") for name, head in ERRATUM_HEADS.items()]
 
 
 def errors(results: Results) -> Section | None:
     rows = errata(results)
-    found = table("What is printed, and what is right", ERRATUM_COLUMNS, rows, wordy=True)
+    block = table("What is printed, and what is right", ERRATUM_COLUMNS, rows, wordy=True)
     finding = f"{count(len(rows), 'error')} and gaps of the paper, with evidence."
-    return Section.of("errata", "Errata of the paper", (found,), finding, PAPER)
+    return Section.of("errata", "Errata of the paper", (block,), finding, PAPER)
 
 
 def errata(results: Results) -> Sequence[Row]:
     """Errata from `compare`; empty if it did not run."""
-    found: Sequence[Row] = results.summary("compare").get("errata", ())
-    return found
+    rows: Sequence[Row] = results.summary("compare").get("errata", ())
+    return rows
 
 
-def printed(results: Results) -> Section | None:
+def paper_section(results: Results) -> Section | None:
     """Show verdicts on the paper's values and its gravest errors; None for another scene."""
     rows = results.claims
     if not rows:
@@ -144,33 +152,38 @@ def printed(results: Results) -> Section | None:
 
 def fates(results: Results, rows: Sequence[Row]) -> Iterator[PageBlock]:
     """Yield the paper's values by verdict and location, and its gravest errors."""
-    found = errata(results)
+    all_errata = errata(results)
     places = {name: Counter(row["where"] for row in rows if row["verdict"] == name) for name in TONES}
-    parts = tuple((spelled(name), here.total(), TONES[name]) for name, here in places.items() if here)
+    parts = tuple((spell_verdict(name), counts.total(), TONES[name]) for name, counts in places.items() if counts)
     yield Shares(f"Of {count(len(rows), 'value')} that the paper prints", parts)
-    every = Counter(row["where"] for row in rows)
-    told = (
-        Statement(f"{spelled(name).capitalize()}:", words("verdict.places", here, every), tone=TONES[name])
-        for name, here in places.items()
-        if here
+    totals = Counter(row["where"] for row in rows)
+    statements = (
+        Statement(f"{spell_verdict(name).capitalize()}:", words("verdict.places", counts, totals), tone=TONES[name])
+        for name, counts in places.items()
+        if counts
     )
-    yield Statements(tuple(told), "lines")
+    yield Statements(tuple(statements), "lines")
     headlines = words.terms("verdict.headlines").items()
-    gravest = [(said, one) for place, said in headlines for one in found if one["where"].startswith(place)]
+    gravest = [
+        (headline, erratum)
+        for place, headline in headlines
+        for erratum in all_errata
+        if erratum["where"].startswith(place)
+    ]
     if gravest:
         yield Paragraph(words("verdict.reasons"))
-        told = (
-            Statement(in_signs(f"{said} ({one['where']}):"), words("verdict.gravest", one), tone="fair")
-            for said, one in gravest
+        statements = (
+            Statement(in_signs(f"{headline} ({erratum['where']}):"), words("verdict.gravest", erratum), tone="fair")
+            for headline, erratum in gravest
         )
-        yield Statements(tuple(told), "columns")
+        yield Statements(tuple(statements), "columns")
 
 
 def answer(summary: Row) -> list[str | Table]:
     """Report the verdicts on the paper's values or, for another walker, how the models differ."""
     errors = summary.get("numerical_error", {})
-    told = [f"numerical error of the {model} walk: {off_by(error)}." for model, error in errors.items()]
+    error_lines = [f"numerical error of the {model} walk: {off_by(error)}." for model, error in errors.items()]
     if "verdicts" in summary:
         head = words("paper.finding", by_verdict(row["verdict"] for row in summary["paper_numbers"]))
-        return [head, numbers_table(summary["paper_numbers"]), *told]
-    return [words("models.answer", summary["outcomes"]), last_steps(summary, errors), *told]
+        return [head, numbers_table(summary["paper_numbers"]), *error_lines]
+    return [words("models.answer", summary["outcomes"]), last_steps(summary, errors), *error_lines]

@@ -57,7 +57,7 @@ def study_the_paper() -> PaperStudy:
     """Walk the paper's walker from its printed states; takes milliseconds once compiled."""
     wrong, right = printed.walker_of_the_paper(AS_PRINTED), printed.walker_of_the_paper(CORRECTED)
     x_p = printed.fixed_point_as_printed()
-    as_printed, corrected = settled(wrong), settled(right)
+    as_printed, corrected = settle(wrong), settle(right)
     one_step = take_walk(assembled(wrong), measured.TIGHT, as_printed, 1, sampled=True)
     cycles = take_walk(assembled(wrong), measured.TIGHT, x_p, 2 * measured.CYCLES, sampled=True)
     five_steps = take_walk(assembled(wrong), measured.TIGHT, x_p, measured.ENERGY_STEPS)
@@ -81,7 +81,7 @@ def study_the_paper() -> PaperStudy:
     )
 
 
-def settled(walker: RigidWalker) -> State:
+def settle(walker: RigidWalker) -> State:
     """Stable gait to which walks from x_p converge."""
     walk = take_walk(assembled(walker), measured.TIGHT, printed.fixed_point_as_printed(), SETTLING_STEPS)
     if walk.steps < SETTLING_STEPS:

@@ -23,7 +23,7 @@ from walkerlab.orbits.step_map import Cycle
 from walkerlab.outcome import Outcome
 from walkerlab.paper.adams_start import AdamsWalk, adams_walk
 from walkerlab.paper.law import is_own_walker
-from walkerlab.paper.left_out import of_adjustment
+from walkerlab.paper.left_out import adjustment_omissions
 from walkerlab.paper.printed import TABLE_2
 from walkerlab.paper.tune_limit import limit_findings, limit_groups, limit_summary
 from walkerlab.pipeline.progress import Progress, track
@@ -48,12 +48,12 @@ from walkerlab.store.columns import numbered, real_and_imaginary, rows_group
 from walkerlab.store.content import Content, Group, Variable
 from walkerlab.workers import in_order
 
-RIGID = Tolerances("dop853", 1e-10, 1e-12, ENDLESS)
+RIGID_SETTINGS = Tolerances("dop853", 1e-10, 1e-12, ENDLESS)
 AS_IT_STANDS = (1.0, 1.0)
 # knees or rolling feet make walks several times slower than the compass's, so their map and margins are coarser
-COMPASS_CELLS, CELLS, COARSE = 61, 21, {"step": 0.05, "largest": 2.0}
-WIDER = "Widen the search (tune.swing_factors, tune.stance_factors, tune.cells) or choose another contact."
-OF_WALK = ("outcome", "advice", "steps", "step_periods_s", "step_lengths_m", "end_time_s")
+COMPASS_CELLS, OTHER_CELLS, COARSE_MARGINS = 61, 21, {"step": 0.05, "largest": 2.0}
+SEARCH_ADVICE = "Widen the search (tune.swing_factors, tune.stance_factors, tune.cells) or choose another contact."
+WALK_QUANTITIES = ("outcome", "advice", "steps", "step_periods_s", "step_lengths_m", "end_time_s")
 """Quantities reported of each walk of the procedure."""
 
 
@@ -63,15 +63,15 @@ def run(config: TuneConfig, inputs: Mapping[str, Content], progress: Progress, j
     rigid_gait = inputs["fixedpoint"].summary  # the start may be far from any gait
     gait = contact_gait(config, rigid_step, as_state(rigid_gait["state"]))
     scene = replace(scene_on_pads(config, rigid_step, rigid_state, gait), pinned=False)
-    found = TuneRun(config, scene, rigid_state, gait)
-    found.find(progress, jobs)
-    stored, said = groups(found), summary(found) | {"left_out": list(of_adjustment(config))}
+    tune = TuneRun(config, scene, rigid_state, gait)
+    tune.find(progress, jobs)
+    stored, report = groups(tune), summary(tune) | {"left_out": list(adjustment_omissions(config))}
     if gait.gait is not None and config.tune.rigid_limit:
-        limit = limit_findings(config, scene, gait.gait, rigid_gait, found.rigid_walk, progress)
+        limit = limit_findings(config, scene, gait.gait, rigid_gait, tune.rigid_walk, progress)
         if limit is not None:
             stored |= limit_groups(limit)
-            said |= limit_summary(limit)
-    return Content(stored, said)
+            report |= limit_summary(limit)
+    return Content(stored, report)
 
 
 class TuneRun:
@@ -102,24 +102,24 @@ class TuneRun:
     def find(self, progress: Progress, jobs: int) -> None:
         """Walk the procedure, compute map, adjustment and margins, and walk from the paper's start."""
         settings = self.config.tune
-        cells = settings.cells or (COMPASS_CELLS if self.hinge else CELLS)
+        cells = settings.cells or (COMPASS_CELLS if self.hinge else OTHER_CELLS)
         swing, stance = (np.linspace(*ends, cells) for ends in (settings.swing_factors, settings.stance_factors))
         progress.start("tune: procedure")
-        self.rigid_walk = take_walk(self.rigid, RIGID, self.rigid_state, self.steps, sampled=True)
+        self.rigid_walk = take_walk(self.rigid, RIGID_SETTINGS, self.rigid_state, self.steps, sampled=True)
         if self.hinge:
             self.take("hinged", self.rigid_state)
         self.take("released", self.rigid_state)
         self.as_it_stands = self.starts.walk(*AS_IT_STANDS)
         quick = for_a_map(self.starts, self.as_it_stands.evaluations)
         rows = in_order([partial(scaled_starts.contact_row, quick, swing, float(factor)) for factor in stance], jobs)
-        every = [*track(progress, "tune: map", swing.size * stance.size, rows, swing.size)]
-        self.contact_map = scaled_starts.as_map(swing, stance, every)
+        cells_by_row = [*track(progress, "tune: map", swing.size * stance.size, rows, swing.size)]
+        self.contact_map = scaled_starts.as_map(swing, stance, cells_by_row)
         progress.start("tune: rigid map and margins")
         self.rigid_map = scaled_starts.rigid_map(self.rigid, self.rigid_state, swing, stance, self.steps)
         self.adjustment = self.adjusted(quick)
         if self.adjustment is not None:
             factors = self.adjustment.swing, self.adjustment.stance
-            self.margins = scaled_starts.margins(self.starts, factors, **({} if self.hinge else COARSE))
+            self.margins = scaled_starts.margins(self.starts, factors, **({} if self.hinge else COARSE_MARGINS))
             self.adjusted_state = with_scaled_rates(self.rigid, self.rigid_state, *factors)
             self.take("adjusted", self.adjusted_state)
         if is_own_walker(self.config):
@@ -164,35 +164,35 @@ class TuneRun:
     def take(self, name: str, state: State) -> None:
         """Record a walk of the procedure, and its numerical error if it has an answer."""
         walk = self.walks[name] = self.walk(state, name == "hinged")
-        said = self.printed[name] = walk_summary(walk)
+        report = self.printed[name] = walk_summary(walk)
         if walk.outcome.answered:
-            said["numerical_error"] = numerical_error(
-                said, self.tolerances, lambda tighter: walk_summary(self.walk(state, name == "hinged", tighter))
+            report["numerical_error"] = numerical_error(
+                report, self.tolerances, lambda tighter: walk_summary(self.walk(state, name == "hinged", tighter))
             )
 
 
 def walk_summary(walk: ContactWalkResult) -> dict[str, Any]:
-    said = numbers_of(walk)
-    return {key: said[key] for key in OF_WALK}
+    quantities = numbers_of(walk)
+    return {key: quantities[key] for key in WALK_QUANTITIES}
 
 
-def summary(found: TuneRun) -> dict[str, Any]:
-    paper, pitch, ends = found.paper, found.scene.pitch_m, count_outcomes(found.contact_map.outcome)
-    pads = Pads((pitch, pitch), laid=str(require_contact(found.config).pad_pitch))
+def summary(tune: TuneRun) -> dict[str, Any]:
+    paper, pitch, ends = tune.paper, tune.scene.pitch_m, count_outcomes(tune.contact_map.outcome)
+    pads = Pads((pitch, pitch), laid=str(require_contact(tune.config).pad_pitch))
     return {
-        "table2": table_2(found),
-        "gait": gait_summary(found),
-        "adjustment": adjustment_summary(found),
+        "table2": table_2(tune),
+        "gait": gait_summary(tune),
+        "adjustment": adjustment_summary(tune),
         **({} if paper is None else {"paper_start": papers_start(paper)}),
-        "procedure": {**found.printed, "adjusted": found.printed.get("adjusted")},
+        "procedure": {**tune.printed, "adjusted": tune.printed.get("adjusted")},
         "map": {
-            "cells": int(found.contact_map.outcome.size),
-            "walks_share": found.contact_map.share(),
+            "cells": int(tune.contact_map.outcome.size),
+            "walks_share": tune.contact_map.share(),
             "contact": ends,
-            "rigid": count_outcomes(found.rigid_map.outcome),
-            "endings": describe_endings(ends, found.config, True, pads),
+            "rigid": count_outcomes(tune.rigid_map.outcome),
+            "endings": describe_endings(ends, tune.config, True, pads),
         },
-        "slope_rad": found.scene.walker.slope,
+        "slope_rad": tune.scene.walker.slope,
         "pitch_m": pitch,
     }
 
@@ -213,12 +213,12 @@ def papers_start(paper: AdamsWalk) -> dict[str, Any]:
     }
 
 
-def table_2(found: TuneRun) -> dict[str, dict[str, Any]]:
+def table_2(tune: TuneRun) -> dict[str, dict[str, Any]]:
     """The start before and after adjustment with percentages and, for the paper's compass, the printed values."""
-    rows, adjusted = {}, found.adjusted_state
-    for k, (name, value) in enumerate(zip(found.names, found.rigid_state, strict=True)):
-        row: dict[str, Any] = {"unit": "rad" if k < len(found.names) // 2 else "rad/s"}
-        if found.paper is not None:
+    rows, adjusted = {}, tune.adjusted_state
+    for k, (name, value) in enumerate(zip(tune.names, tune.rigid_state, strict=True)):
+        row: dict[str, Any] = {"unit": "rad" if k < len(tune.names) // 2 else "rad/s"}
+        if tune.paper is not None:
             row |= {
                 "paper_matlab": TABLE_2[k].matlab.value,
                 "paper_adams": TABLE_2[k].adams.value,
@@ -242,17 +242,17 @@ def percent(value: float, other: float, base: float) -> float | None:
     return 100.0 * (abs(value) - abs(other)) / abs(base) if base else None
 
 
-def gait_summary(found: TuneRun) -> dict[str, Any]:
+def gait_summary(tune: TuneRun) -> dict[str, Any]:
     """Gait of the contact model, or why there is none."""
-    gait = found.gait.gait
-    said = {"found": gait is not None, "reason": found.gait.reason, "advice": found.gait.advice}
+    gait = tune.gait.gait
+    report = {"found": gait is not None, "reason": tune.gait.reason, "advice": tune.gait.advice}
     if gait is None:
-        return said
+        return report
     step = contact_step(gait)
     return {
-        **said,
+        **report,
         "state": gait.z.tolist(),
-        "state_is": [f"{text} ({unit})" for text, unit in section_coordinates(found.scene)],
+        "state_is": [f"{text} ({unit})" for text, unit in section_coordinates(tune.scene)],
         "section": "the swing foot passes the stance foot, where no foot touches or lifts",
         "period_s": step.period_s,
         "step_length_m": step.length_m,
@@ -261,7 +261,7 @@ def gait_summary(found: TuneRun) -> dict[str, Any]:
         "stable": gait.stable,
         "slip_m": step.slip_m,
         "residual": gait.residual,
-        "lost_J": by_channel(found.scene.walker, step.dissipated_J),
+        "lost_J": by_channel(tune.scene.walker, step.dissipated_J),
         "height_lost_J": step.driven.gravity,
         "work_per_step_J": step.driven.per_step(1),
         "cost_of_transport": step.driven.cost_of_transport(step.length_m),
@@ -287,52 +287,52 @@ def section_coordinates(scene: ContactScene) -> list[tuple[str, str]]:
     ]
 
 
-def adjustment_summary(found: TuneRun) -> dict[str, Any]:
+def adjustment_summary(tune: TuneRun) -> dict[str, Any]:
     """Smallest change that walks, whether any is needed, and the margins around it."""
-    change = found.adjustment
-    said: dict[str, Any] = {"needed": not found.as_it_stands.walks, "found": change is not None}
+    change = tune.adjustment
+    report: dict[str, Any] = {"needed": not tune.as_it_stands.walks, "found": change is not None}
     if change is None:
-        settled = " and settled on the gait" if found.gait.gait is not None else ""
-        reason = f"none of {found.contact_map.outcome.size} starts walked {found.steps} steps{settled}"
-        return {**said, "reason": reason, "advice": found.gait.advice or WIDER}
-    around = {}
-    for margin in found.margins:
+        on_gait = " and settled on the gait" if tune.gait.gait is not None else ""
+        reason = f"none of {tune.contact_map.outcome.size} starts walked {tune.steps} steps{on_gait}"
+        return {**report, "reason": reason, "advice": tune.gait.advice or SEARCH_ADVICE}
+    margins = {}
+    for margin in tune.margins:
         fails = margin.fails
         beyond = None if fails is None else Outcome(fails.outcome)
-        around[margin.name] = {
+        margins[margin.name] = {
             "factor": margin.factor,
             "percent": 100.0 * (margin.factor - 1.0),
             "beyond": None if beyond is None else "not settled" if beyond is Outcome.WALKED else beyond.label,
             "steps_beyond": None if fails is None else fails.steps,
         }
     return {
-        **said,
+        **report,
         "scale_dtheta1": change.swing,
         "scale_dtheta2": change.stance,
         "distance": change.distance,
         "walked_steps": change.trial.steps,
-        "margins": around,
+        "margins": margins,
     }
 
 
-def groups(found: TuneRun) -> dict[str, Group]:
-    stored, walker = {"map": map_group(found)}, found.scene.walker
-    if found.margins:
+def groups(tune: TuneRun) -> dict[str, Group]:
+    stored, walker = {"map": map_group(tune)}, tune.scene.walker
+    if tune.margins:
         labels = {"name": Label("", "what is scaled"), "factor": Label("1", "the last that walks")}
-        stored["margins"] = rows_group(found.margins, labels, "margin", "number")
-    if found.gait.gait is not None:
-        stored["gait"] = gait_group(found.gait.gait, found.scene)
-    rigid = found.rigid_walk.samples
+        stored["margins"] = rows_group(tune.margins, labels, "margin", "number")
+    if tune.gait.gait is not None:
+        stored["gait"] = gait_group(tune.gait.gait, tune.scene)
+    rigid = tune.rigid_walk.samples
     if rigid is not None and rigid.time_s.size:
         in_time = {**legs(), **over_time(time=rigid.time_s), **leg_variables(rigid)}
-        stored["rigid_start"] = Group({**in_time, **of_steps(found.rigid_walk.touch_time_s)})
-    for name, walk in found.walks.items():
+        stored["rigid_start"] = Group({**in_time, **of_steps(tune.rigid_walk.touch_time_s)})
+    for name, walk in tune.walks.items():
         if walk.samples is not None and walk.samples.time_s.size:
             stored[name] = Group({**legs_in_time(walk, walker), **of_steps(walk.touch_time_s)})
-    if found.paper is not None:
-        energy = {"mechanical_J": Variable(found.paper.mechanical, (TIME,), "J", "kinetic and potential energy")}
-        forces = over_time(normal_force_N=found.paper.normal)
-        stored["paper_start"] = Group({**legs_in_time(found.paper.walk, walker), **forces, **energy})
+    if tune.paper is not None:
+        energy = {"mechanical_J": Variable(tune.paper.mechanical, (TIME,), "J", "kinetic and potential energy")}
+        forces = over_time(normal_force_N=tune.paper.normal)
+        stored["paper_start"] = Group({**legs_in_time(tune.paper.walk, walker), **forces, **energy})
     return stored
 
 
@@ -344,9 +344,9 @@ def legs_in_time(walk: ContactWalkResult, walker: ContactWalker) -> dict[str, Va
     return {**legs(), **over_time(time=walk.samples.time_s, angle=angle, velocity=velocity)}
 
 
-def map_group(found: TuneRun) -> Group:
+def map_group(tune: TuneRun) -> Group:
     """Outcome and steps of both models over the two factors."""
-    cells, rigid, swing, stance = found.contact_map, found.rigid_map, "swing_factor", "stance_factor"
+    cells, rigid, swing, stance = tune.contact_map, tune.rigid_map, "swing_factor", "stance_factor"
     over = {
         "outcome": (cells.outcome, "outcome of the contact model's walk, see attribute outcomes"),
         "steps": (cells.steps, "steps of the contact model"),
@@ -355,11 +355,11 @@ def map_group(found: TuneRun) -> Group:
         "rigid_steps": (rigid.steps, "steps of the rigid model"),
     }
     factor = "factor on the {} leg's initial angular velocity"
-    attrs: dict[str, Any] = {"outcomes": OUTCOMES, "steps_wanted": found.steps}
-    change = found.adjustment
+    attrs: dict[str, Any] = {"outcomes": OUTCOMES, "steps_wanted": tune.steps}
+    change = tune.adjustment
     if change is not None:
         attrs |= {"adjusted_swing_factor": change.swing, "adjusted_stance_factor": change.stance}
-    factors = found.gait_factors
+    factors = tune.gait_factors
     if factors is not None:
         attrs |= {"gait_swing_factor": factors[0], "gait_stance_factor": factors[1]}
     return Group(

@@ -18,48 +18,52 @@ from walkerlab.config.walkers import has_knees
 from walkerlab.errors import ConfigError
 
 CATALOGUE: Final = Path(__file__).parent / "catalogue.yaml"
-NAME_OF_ITS_OWN: Final = "Give each case a unique name."
+UNIQUE_NAME_ADVICE: Final = "Give each case a unique name."
 SCENE_CATALOGUE: Final = Path(__file__).with_name("scene_catalogue.yaml")
-ENDS: tuple[Fate, ...] = tuple(fate for fate in FATES if fate not in ("budget-exhausted", "solver-failed", "rejected"))
+PHYSICAL_ENDS: tuple[Fate, ...] = tuple(
+    fate for fate in FATES if fate not in ("budget-exhausted", "solver-failed", "rejected")
+)
 """The ends that physics may have: where nobody knows which, a case passes by its measures alone."""
-STOPS: tuple[Fate, ...] = tuple(fate for fate in ENDS if fate != "walked")
-CHANGES: Final = ("start", "slope", "times", "over", "set")
-USUAL: Final = {"steps": 4, "budget": 1_000_000, "expected": ENDS}
+STOPPED_ENDS: tuple[Fate, ...] = tuple(fate for fate in PHYSICAL_ENDS if fate != "walked")
+SCENE_CHANGES: Final = ("start", "slope", "times", "over", "set")
+CASE_DEFAULTS: Final = {"steps": 4, "budget": 1_000_000, "expected": PHYSICAL_ENDS}
 
 B = TypeVar("B", bound=Block)
 
 
-def shipped() -> tuple[Case, ...]:
+def package_cases() -> tuple[Case, ...]:
     """Cases that come with the package."""
-    families = listed(CATALOGUE).items()
-    return without_doubles([Case.model_validate({"family": name, **one}) for name, cases in families for one in cases])
+    families = read_catalogue(CATALOGUE).items()
+    return check_unique_names(
+        [Case.model_validate({"family": name, **entry}) for name, cases in families for entry in cases]
+    )
 
 
-def listed(path: Path) -> Any:
+def read_catalogue(path: Path) -> Any:
     """Plain values of a catalogue file."""
     root = read(path.read_text(encoding="utf-8"), path.name)
     assert root is not None, "a catalogue is not empty"
     return plain(root)
 
 
-def judged(own: Sequence[Case], catalogue: Sequence[Case] | None = None) -> tuple[Case, ...]:
+def all_cases(own: Sequence[Case], catalogue: Sequence[Case] | None = None) -> tuple[Case, ...]:
     """Cases of a catalogue, by default the package's, followed by those of a config.
 
     Raises ConfigError if two cases share a name.
     """
-    catalogue = shipped() if catalogue is None else catalogue
+    catalogue = package_cases() if catalogue is None else catalogue
     taken = {case.name for case in catalogue} & {case.name for case in own}
     if taken:
-        raise ConfigError(f"The catalogue already has cases named {', '.join(sorted(taken))}.", NAME_OF_ITS_OWN)
-    return (*catalogue, *without_doubles(own))
+        raise ConfigError(f"The catalogue already has cases named {', '.join(sorted(taken))}.", UNIQUE_NAME_ADVICE)
+    return (*catalogue, *check_unique_names(own))
 
 
-def without_doubles(cases: Sequence[Case]) -> tuple[Case, ...]:
+def check_unique_names(cases: Sequence[Case]) -> tuple[Case, ...]:
     """Check that the names of cases differ; raises ConfigError otherwise."""
     names = [case.name for case in cases]
     doubled = sorted({name for name in names if names.count(name) > 1})
     if doubled:
-        raise ConfigError(f"Several cases are named {', '.join(doubled)}.", NAME_OF_ITS_OWN)
+        raise ConfigError(f"Several cases are named {', '.join(doubled)}.", UNIQUE_NAME_ADVICE)
     return tuple(cases)
 
 
@@ -73,39 +77,39 @@ def scene_cases(config: Config) -> list[tuple[Case, Config]]:
 
     config  with start, and pitch of pads if there are any, given as numbers
     """
-    there, found = features(config), []
-    for entry in listed(SCENE_CATALOGUE):
+    present, cases = features(config), []
+    for entry in read_catalogue(SCENE_CATALOGUE):
         needs = {entry.get("model", "contact"), *entry.pop("needs", ())}
-        changes: dict[str, Any] = {name: entry.pop(name) for name in CHANGES if name in entry}
+        changes: dict[str, Any] = {name: entry.pop(name) for name in SCENE_CHANGES if name in entry}
         if entry.get("expected") == "stops":
-            entry["expected"] = STOPS
-        if needs <= there:
-            case = Case.model_validate({**USUAL, **entry, "name": f"scene-{entry['name']}"})
-            found.append((case, changed(config, changes)))
-    return found
+            entry["expected"] = STOPPED_ENDS
+        if needs <= present:
+            case = Case.model_validate({**CASE_DEFAULTS, **entry, "name": f"scene-{entry['name']}"})
+            cases.append((case, change_scene(config, changes)))
+    return cases
 
 
 def features(config: Config) -> set[str]:
     """Features of a scene that cases may require."""
-    walker, found = config.walker, {"rigid"}
+    walker, present = config.walker, {"rigid"}
     if config.contact is not None:
-        found |= {"contact", "friction"} if config.contact.has_friction else {"contact"}
+        present |= {"contact", "friction"} if config.contact.has_friction else {"contact"}
     if has_knees(walker):
-        found |= {f"release at {walker.knee.release}", f"{walker.knee.lock} lock"}
-    return found
+        present |= {f"release at {walker.knee.release}", f"{walker.knee.lock} lock"}
+    return present
 
 
-def changed(config: Config, changes: Mapping[str, Any]) -> Config:
+def change_scene(config: Config, changes: Mapping[str, Any]) -> Config:
     """Apply a case's changes to a scene; on another slope, the angles are turned so that both feet stand on it."""
     start, slope = changes.get("start", 1.0), changes.get("slope", 1.0) * config.slope_rad
     values = dict(changes.get("set", {}))
     values |= {path: factor * attrgetter(path)(config) for path, factor in changes.get("times", {}).items()}
     values |= {path: attrgetter(path)(config) / factor for path, factor in changes.get("over", {}).items()}
     if "start" in changes or "slope" in changes:
-        held, turned = config.start, config.slope_rad - slope
-        assert not isinstance(held, str), "the start is spelled out"
-        n = len(held) // 2
-        values |= {"slope_rad": slope, "start": (*(x + turned for x in held[:n]), *(start * x for x in held[n:]))}
+        state, rotation = config.start, config.slope_rad - slope
+        assert not isinstance(state, str), "the start is spelled out"
+        n = len(state) // 2
+        values |= {"slope_rad": slope, "start": (*(x + rotation for x in state[:n]), *(start * x for x in state[n:]))}
     for path, value in values.items():
         config = with_key(config, path, value)
     return config

@@ -14,13 +14,13 @@ from walkerlab.solvers.registry import METHODS, Method, method_named
 from walkerlab.verification.catalogue import config_of
 from walkerlab.verification.ordinary import Choice, choices
 from walkerlab.verification.scaling import scaled, to_twin
-from walkerlab.verification.starts import ContactStart, JudgedWalk, Start, configured, prepared
+from walkerlab.verification.starts import ContactStart, JudgedWalk, Start, case_tolerances, prepare_start
 from walkerlab.verification.verdict import BUDGET_USED, CaseResult, Measure, NotMeasured, finite, promised
 from walkerlab.workers import in_order
 
-TIGHTER = 0.1
+TIGHTER_FACTOR = 0.1
 SAMPLED_STEPS = 100  # longer walks are not sampled
-LIBRARY: Final = ("scipy-bdf", "scipy-radau")
+LIBRARY_METHODS: Final = ("scipy-bdf", "scipy-radau")
 """Asked where our other method gives up; multistep first, since its formulas are neither of ours."""
 LIBRARY_BUDGET: Final = 30_000  # right-hand sides; a library's walks run in Python
 
@@ -64,14 +64,14 @@ def run_cells(cells: Sequence[CaseCell], jobs: int) -> Iterator[tuple[CaseResult
 def judge(case: Case, config: Config) -> CaseResult:
     """Walk a case and judge it; walks of more than `SAMPLED_STEPS` steps are not sampled."""
     about = case.name, case.family, case.model, case.reason, case.expected
-    start = prepared(config, case)
+    start = prepare_start(config, case)
     if start is None:
         return CaseResult(*about, Outcome.REJECTED.label, 0, 0.0, 0, 0.0, (), second_tried="no start exists")
-    methods = configured(start, case)
+    methods = case_tolerances(start, case)
     began = time.perf_counter()
     walk = start.walk(case, methods, sampled=case.steps <= SAMPLED_STEPS)
     wall_s = time.perf_counter() - began
-    found: list[Measure | NotMeasured] = [
+    findings: list[Measure | NotMeasured] = [
         Measure("values that are not finite", float(np.count_nonzero(~np.isfinite(walk.numbers))), 0.0),
         Measure(f"{start.kept} over energy", finite(walk.residual_J / start.energy), case.balance),
         Measure(BUDGET_USED, walk.rhs_evaluations / case.budget, 1.0 + 20.0 / case.budget),
@@ -86,63 +86,63 @@ def judge(case: Case, config: Config) -> CaseResult:
             case.budget,
             lambda method, budget: start.walk(short, replace(methods, method=method.name, budget=budget)),
         )
-        for what, again in walked_again(start, config, short, second):
-            found += time_difference(what, walk, again, case, methods.rtol)
+        for what, again in repeat_walks(start, config, short, second):
+            findings += time_difference(what, walk, again, case, methods.rtol)
             differs = again.outcome is not walk.outcome and again.outcome.label not in case.expected
             if differs and short.steps == case.steps:
                 remarks.append(f"{what}: {again.outcome.label}, not {walk.outcome.label}")
     if isinstance(start, ContactStart):
-        found.append(start.momentum(walk, case))
+        findings.append(start.momentum(walk, case))
     numbers = int(walk.touches.size), finite(walk.residual_J), walk.rhs_evaluations, wall_s
-    measures = tuple(one for one in found if isinstance(one, Measure))
-    missing = tuple(one for one in found if isinstance(one, NotMeasured))
+    measures = tuple(finding for finding in findings if isinstance(finding, Measure))
+    missing = tuple(finding for finding in findings if isinstance(finding, NotMeasured))
     said = tuple(remarks)
     return CaseResult(*about, walk.outcome.label, *numbers, measures, said, second.method, second.tried, missing)
 
 
-def walked_again(start: Start, config: Config, case: Case, second: Second) -> list[tuple[str, JudgedWalk]]:
+def repeat_walks(start: Start, config: Config, case: Case, second: Second) -> list[tuple[str, JudgedWalk]]:
     """Walks that must agree with the first, with their descriptions."""
-    again = [("ten times tighter tolerance", start.walk(case, configured(start, case, TIGHTER)))]
+    again = [("ten times tighter tolerance", start.walk(case, case_tolerances(start, case, TIGHTER_FACTOR)))]
     if second.walk is not None:
         again.append((second.method, second.walk))
     if case.twin:
         scale = to_twin(config)
         twin_case = case.model_copy(update={"lowered_m": case.lowered_m * scale.length})
-        twin = prepared(scaled(config, scale), twin_case)
+        twin = prepare_start(scaled(config, scale), twin_case)
         if twin is not None:
-            again.append(("twin", twin.walk(case, configured(twin, case))))
+            again.append(("twin", twin.walk(case, case_tolerances(twin, case))))
     return again
 
 
-def time_difference(what: str, one: JudgedWalk, other: JudgedWalk, case: Case, rtol: float) -> list[Measure]:
+def time_difference(what: str, first: JudgedWalk, second: JudgedWalk, case: Case, rtol: float) -> list[Measure]:
     """Difference of two walks' touch times, or of their end times if they have no touches; empty if there are none."""
-    steps = min(one.touches.size, other.touches.size, case.compared_steps)
+    steps = min(first.touches.size, second.touches.size, case.compared_steps)
     if steps:
-        apart = float(np.max(np.abs(one.touches[:steps] - other.touches[:steps])))
-    elif one.end is None or other.end is None:
+        difference = float(np.max(np.abs(first.touches[:steps] - second.touches[:steps])))
+    elif first.end is None or second.end is None:
         return []
     else:
-        apart = abs(one.end - other.end)
-    limit = promised(case, rtol, one.accepted + other.accepted)
-    return [Measure(f"difference in time from {what}, in pendulum times", finite(apart), limit)]
+        difference = abs(first.end - second.end)
+    limit = promised(case, rtol, first.accepted + second.accepted)
+    return [Measure(f"difference in time from {what}, in pendulum times", finite(difference), limit)]
 
 
-def others(configured: str) -> tuple[Method, ...]:
+def other_methods(case_tolerances: str) -> tuple[Method, ...]:
     """Methods besides the configured one: ours first, then the libraries'."""
-    own = [name for name, method in METHODS.items() if method.compiled]
-    return tuple(method_named(name) for name in dict.fromkeys((*own, *LIBRARY)) if name != configured)
+    ours = [name for name, method in METHODS.items() if method.compiled]
+    return tuple(method_named(name) for name in dict.fromkeys((*ours, *LIBRARY_METHODS)) if name != case_tolerances)
 
 
-def second_walk(configured: str, budget: int, walk: Callable[[Method, int], JudgedWalk]) -> Second:
+def second_walk(case_tolerances: str, budget: int, walk: Callable[[Method, int], JudgedWalk]) -> Second:
     """Walk with other methods until one reaches an answer.
 
     budget  right-hand sides of our own methods
     walk    walks the case with a method and a budget
     """
     tried: list[str] = []
-    for method in others(configured):
-        found = walk(method, budget if method.compiled else min(budget, LIBRARY_BUDGET))
-        if found.outcome.answered:
-            return Second(method.name, found, ", ".join(tried))
-        tried.append(f"{method.name} {found.outcome.label}")
+    for method in other_methods(case_tolerances):
+        result = walk(method, budget if method.compiled else min(budget, LIBRARY_BUDGET))
+        if result.outcome.answered:
+            return Second(method.name, result, ", ".join(tried))
+        tried.append(f"{method.name} {result.outcome.label}")
     return Second("", None, ", ".join(tried))

@@ -33,11 +33,11 @@ from walkerlab.solvers.registry import Tolerances
 from walkerlab.solvers.system import Floats, State
 from walkerlab.verification import references
 
-ENDLESS = 1e7  # m, an area without edges, and a hip that cannot fall
+UNBOUNDED_M = 1e7  # m, an area without edges, and a hip that cannot fall
 OUT_OF_REACH: Position = (0.0, 1e3)  # m, where a foot is that takes no part
-BUDGET = 2_000_000  # right-hand sides
-SAMPLES = 4000
-HEIGHT, ANGLE, ALONG_RATE, HEIGHT_RATE, ANGLE_RATE = 1, 2, 4, 5, 6  # of the first body, in the state
+PROBLEM_BUDGET = 2_000_000  # right-hand sides
+SAMPLE_COUNT = 4000
+BODY_HEIGHT, BODY_ANGLE, ALONG_RATE, HEIGHT_RATE, ANGLE_RATE = 1, 2, 4, 5, 6  # of the first body, in the state
 GRAVITY: Final = 9.81
 CENTRE: Final = (0.0, 0.0)
 PAPER_LAW: Final = normal_law(Contact())
@@ -74,26 +74,28 @@ def rig(
     return contact_walker(assembly, normal, friction, GRAVITY, slope)
 
 
-def state(at: Position, velocity: Position, angle: float = 0.0, rate: float = 0.0) -> State:
+def rig_state(position: Position, velocity: Position, angle: float = 0.0, rate: float = 0.0) -> State:
     """State of the rig from the position and velocity of its centre of mass in the slope's frame."""
-    return (*at, angle, 0.0, *velocity, rate, 0.0)
+    return (*position, angle, 0.0, *velocity, rate, 0.0)
 
 
 def run_until(
     walker: ContactWalker, start: State, duration_s: float, rtol: float = 1e-9, atol: float = 1e-12
 ) -> ParticleRun:
     """Simulate for a time with evenly spaced samples; raises ArithmeticError if the run ends early."""
-    frame = Frame(-ENDLESS, 2.0 * duration_s / LONGEST_FLIGHT, True)
-    ground = JudgedGround(checkerboard(ENDLESS, (0.0, 0.0)), frame)
+    frame = Frame(-UNBOUNDED_M, 2.0 * duration_s / LONGEST_FLIGHT, True)
+    ground = JudgedGround(checkerboard(UNBOUNDED_M, (0.0, 0.0)), frame)
     walk_state = new_walk_state(walker, ground.terrain, 1, 1, start)
     walk_state.at_zero[:] = 0
     walk_state.progress.last_touch = duration_s - LONGEST_STEP * frame.pendulum_time
-    observer = new_observer(walker, walk_state, start, np.arange(SAMPLES, dtype=np.float64) * duration_s / SAMPLES)
-    stopped = walk_on(walker, ground, Tolerances("radau5", rtol, atol, BUDGET), walk_state, observer, start)
+    observer = new_observer(
+        walker, walk_state, start, np.arange(SAMPLE_COUNT, dtype=np.float64) * duration_s / SAMPLE_COUNT
+    )
+    stopped = walk_on(walker, ground, Tolerances("radau5", rtol, atol, PROBLEM_BUDGET), walk_state, observer, start)
     if stopped.outcome is not Outcome.NO_HEEL_STRIKE:
         raise ArithmeticError(f"ended as {stopped.outcome.label} at {stopped.time_s:.4g} s of {duration_s:.4g} s")
-    seen = int(observer.tally.recorded)
-    times, states = observer.samples.time_s[:seen].copy(), observer.samples.states[:seen].copy()
+    recorded = int(observer.tally.recorded)
+    times, states = observer.samples.time_s[:recorded].copy(), observer.samples.states[:recorded].copy()
     return ParticleRun(times, states, stopped.state, observer.account[LOST].copy())
 
 
@@ -123,8 +125,14 @@ class Known:
         return bool(math.isfinite(self.error) and self.error <= self.limit)
 
 
-def answered(
-    name: str, quantity: str, run: Callable[[], float], other: Callable[[], float], source: str, limit: float, why: str
+def solve_problem(
+    name: str,
+    quantity: str,
+    run: Callable[[], float],
+    reference_by: Callable[[], float],
+    source: str,
+    limit: float,
+    why: str,
 ) -> Known:
     """Solve a problem by both routes; a run that fails gets an error that fails.
 
@@ -132,7 +140,7 @@ def answered(
     other  reference; for the other arguments see `Known`
     """
     started = time.perf_counter()
-    reference = other()
+    reference = reference_by()
     try:
         value = run()
     except ArithmeticError:
@@ -152,22 +160,24 @@ def bouncing_ball_period() -> float:
     ball = rig(1.0, 0.1, SPRING)
     first = math.sqrt(2.0 * DROP / GRAVITY)
     period = references.linear_bounce_period(1.0, SPRING.stiffness, DROP, GRAVITY)
-    run = run_until(ball, state((0.0, DROP), (0.0, 0.0)), first + (BOUNCES - 0.5) * period)
+    run = run_until(ball, rig_state((0.0, DROP), (0.0, 0.0)), first + (BOUNCES - 0.5) * period)
     y = run.states[-1]
-    left = (y[HEIGHT_RATE] + math.sqrt(y[HEIGHT_RATE] ** 2 + 2.0 * GRAVITY * y[HEIGHT])) / GRAVITY  # in free flight
-    return (float(run.times[-1] + left) - first) / BOUNCES
+    time_to_landing = (
+        y[HEIGHT_RATE] + math.sqrt(y[HEIGHT_RATE] ** 2 + 2.0 * GRAVITY * y[BODY_HEIGHT])
+    ) / GRAVITY  # in free flight
+    return (float(run.times[-1] + time_to_landing) - first) / BOUNCES
 
 
 def restitution(law: NormalLaw, speed: float) -> float:
     """Restitution of a ball with the walker's mass that lands at `speed` (m/s)."""
     ball = rig(BLOCK_MASS, 1.0, law)
     height = 1e-3
-    start = state((0.0, height), (0.0, -math.sqrt(speed**2 - 2.0 * GRAVITY * height)))
-    flying = [y for y in run_until(ball, start, 0.02).states if y[HEIGHT] > 0.0 and y[HEIGHT_RATE] > 0.0]
+    start = rig_state((0.0, height), (0.0, -math.sqrt(speed**2 - 2.0 * GRAVITY * height)))
+    flying = [y for y in run_until(ball, start, 0.02).states if y[BODY_HEIGHT] > 0.0 and y[HEIGHT_RATE] > 0.0]
     if not flying:
         return 0.0
     y = flying[0]
-    return math.sqrt(y[HEIGHT_RATE] ** 2 + 2.0 * GRAVITY * y[HEIGHT]) / speed
+    return math.sqrt(y[HEIGHT_RATE] ** 2 + 2.0 * GRAVITY * y[BODY_HEIGHT]) / speed
 
 
 def block_speed(slope: float, start_speed: float) -> float:
@@ -175,7 +185,7 @@ def block_speed(slope: float, start_speed: float) -> float:
     law = PAPER_LAW
     foot = resting_foot(BLOCK_MASS * GRAVITY * math.cos(slope), BLOCK_MASS, law.stiffness, law.exponent, law.damping)
     block = rig(BLOCK_MASS, 1.0, law, slope=slope)
-    return float(run_until(block, state((0.0, -foot.depth), (start_speed, 0.0)), 1.0).end[ALONG_RATE])
+    return float(run_until(block, rig_state((0.0, -foot.depth), (start_speed, 0.0)), 1.0).end[ALONG_RATE])
 
 
 SPOKES, WHEEL_SLOPE, HUB_INERTIA = 8, 0.08, 1e-3
@@ -195,10 +205,10 @@ def rimless_wheel_speed() -> float:
     speed = 0.9 * references.wheel_upright_speed(SPOKES, WHEEL_SLOPE, GRAVITY, HUB_INERTIA)
     for _ in range(ROUNDS):
         height = 1.0 - GRAVITY * math.cos(WHEEL_SLOPE) / STIFF.stiffness
-        start = state((0.0, height), (speed, 0.0), -WHEEL_SLOPE, -speed)
+        start = rig_state((0.0, height), (speed, 0.0), -WHEEL_SLOPE, -speed)
         run = run_until(wheel, start, turn / speed, 1e-8, 1e-11)
-        turned = -(run.states[:, ANGLE] + WHEEL_SLOPE)
-        speed = float(np.interp(turn, turned, -run.states[:, ANGLE_RATE]))
+        angle = -(run.states[:, BODY_ANGLE] + WHEEL_SLOPE)
+        speed = float(np.interp(turn, angle, -run.states[:, ANGLE_RATE]))
     return speed
 
 
@@ -214,7 +224,7 @@ def painleve_growth_rate() -> float:
     ground, friction = NormalLaw(ROD_STIFFNESS, 1.0, 0.0, 1.0e-4), Coulomb(ROD_FRICTION, ROD_FRICTION, 0.1, 1.0)
     rod = rig(1.0, 1.0 / 3.0, ground, friction, (end, OUT_OF_REACH))
     rate = references.painleve_growth_rate(ROD_ANGLE, ROD_FRICTION, 1.0, ROD_STIFFNESS)
-    run = run_until(rod, state((0.0, math.sin(ROD_ANGLE)), (50.0, 0.0)), 6.0 / rate, 1e-11, 1e-16)
+    run = run_until(rod, rig_state((0.0, math.sin(ROD_ANGLE)), (50.0, 0.0)), 6.0 / rate, 1e-11, 1e-16)
     samples = np.linspace(0.4 * run.times.size, run.times.size - 1, 4).astype(int)
     samples = samples[0] + (samples[1] - samples[0]) * np.arange(4)
     samples = samples[samples < run.times.size]
@@ -225,41 +235,41 @@ def painleve_growth_rate() -> float:
 
 PROBLEMS: Final = (
     partial(
-        answered, "bouncing ball", "time between landings, s", bouncing_ball_period,
+        solve_problem, "bouncing ball", "time between landings, s", bouncing_ball_period,
         partial(references.linear_bounce_period, 1.0, SPRING.stiffness, DROP, GRAVITY),
         "closed form: free flight and half a period of the spring", 1e-7, "the tolerance, over five bounces",
     ),
     partial(
-        answered, "ball dropped on the IMPACT law", "restitution at 0.5 m/s, a hundredth of the paper's damping",
+        solve_problem, "ball dropped on the IMPACT law", "restitution at 0.5 m/s, a hundredth of the paper's damping",
         partial(restitution, LIGHT_LAW, 0.5),
         partial(references.restitution, BLOCK_MASS, 0.5, LIGHT_LAW, GRAVITY),
         "SciPy DOP853 on the law as written in its manual", 1e-6, "a thousand times the tolerance",
     ),
     partial(
-        answered, "ball dropped on thicker ground", "restitution at 0.5 m/s, a tenth of the paper's damping",
+        solve_problem, "ball dropped on thicker ground", "restitution at 0.5 m/s, a tenth of the paper's damping",
         partial(restitution, THICK_LAW, 0.5),
         partial(references.restitution, BLOCK_MASS, 0.5, THICK_LAW, GRAVITY),
         "SciPy DOP853 on the law as written in its manual", 1e-6, "a thousand times the tolerance",
     ),
     partial(
-        answered, "block on an incline that holds it", "creep speed at 0.2 rad, m/s", partial(block_speed, 0.2, 0.0),
+        solve_problem, "block on an incline that holds it", "creep speed at 0.2 rad, m/s", partial(block_speed, 0.2, 0.0),
         partial(references.creep_speed, 0.2, PAPER_FRICTION.static, PAPER_FRICTION.stiction_velocity),
         "root of the friction law's cubic, SciPy brentq", 1e-7, "the tolerance",
     ),
     partial(
-        answered, "block on too steep an incline", "speed at 0.8 rad a second after 2 m/s, m/s",
+        solve_problem, "block on too steep an incline", "speed at 0.8 rad a second after 2 m/s, m/s",
         partial(block_speed, 0.8, 2.0),
         lambda: 2.0 + references.sliding_acceleration(0.8, PAPER_FRICTION.dynamic, GRAVITY),
         "closed form: g (sin - mu cos)", 1e-7, "the tolerance",
     ),
     partial(
-        answered, "rimless wheel of eight spokes", "steady speed with a spoke upright at 0.08 rad, rad/s",
+        solve_problem, "rimless wheel of eight spokes", "steady speed with a spoke upright at 0.08 rad, rad/s",
         rimless_wheel_speed,
         partial(references.wheel_upright_speed, SPOKES, WHEEL_SLOPE, GRAVITY, HUB_INERTIA),
         "McGeer 1990: closed form for rigid spokes", 1e-3, "the ground under the spokes yields and creeps a little",
     ),
     partial(
-        answered, "Painleve's rod", "rate at which its end digs in at friction 4, 1/s", painleve_growth_rate,
+        solve_problem, "Painleve's rod", "rate at which its end digs in at friction 4, 1/s", painleve_growth_rate,
         partial(references.painleve_growth_rate, ROD_ANGLE, ROD_FRICTION, 1.0, ROD_STIFFNESS),
         "closed form, linearised", 1e-3, "the rod turns a little as it digs in",
     ),

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from walkerlab.config.reads import CompassCasesConfig, SceneCasesConfig
 
 
-def of_verification(config: CompassCasesConfig | SceneCasesConfig) -> tuple[Entry, ...]:
+def verification_omissions(config: CompassCasesConfig | SceneCasesConfig) -> tuple[Entry, ...]:
     """Return the omissions for a walker other than the paper's compass."""
     if is_studied(config):
         return ()

@@ -14,26 +14,30 @@ from walkerlab.config.schema import Config
 from walkerlab.config.stability import Case
 from walkerlab.solvers.registry import Tolerances
 from walkerlab.verification.catalogue import config_of
-from walkerlab.verification.judge import TIGHTER
-from walkerlab.verification.ordinary import REFERENCE, STEPS, arrival_of, fixed, natural_units
-from walkerlab.verification.starts import ContactStart, configured, prepared
+from walkerlab.verification.judge import TIGHTER_FACTOR
+from walkerlab.verification.ordinary import REFERENCE_SETTINGS, COMPARED_STEPS, arrival_of, euler, natural_units
+from walkerlab.verification.starts import ContactStart, case_tolerances, prepare_start
 from walkerlab.verification.verdict import finite
 
 PAPER_STIFFNESS: Final = Contact().in_si().stiffness
-STIFFNESS: Final = (1e-6 * PAPER_STIFFNESS, 1e6 * PAPER_STIFFNESS)
-STICTION_VELOCITY: Final = (1e-7, 10.0)  # m/s
-NONE: Final = -1.0  # in the place of an error in what is kept, whose numbers are finite
+STIFFNESS_RANGE: Final = (1e-6 * PAPER_STIFFNESS, 1e6 * PAPER_STIFFNESS)
+STICTION_RANGE: Final = (1e-7, 10.0)  # m/s
+NO_ERROR: Final = -1.0  # in the place of an error in what is kept, whose numbers are finite
 PER_STICTION: Final = 10.0  # friction velocity over stiction velocity, as the paper has it
-STEP: Final = (1e-6, 1e-2)  # s
+STEP_RANGE: Final = (1e-6, 1e-2)  # s
 WALK_STEPS: Final = 4
-BUDGET, TIGHTER_BUDGET, REFERENCE_BUDGET = 600_000, 1_200_000, 20_000_000  # right-hand sides; of the last most take 7e6
-MAX_EVALUATIONS: Final = 5_000_000  # of a fixed step: more than any cell needs
-VERDICTS: Final = ("fine", "wrong silently", "diverges", "gives up", "no reference")
+CELL_BUDGET, TIGHTER_CELL_BUDGET, REFERENCE_CELL_BUDGET = (
+    600_000,
+    1_200_000,
+    20_000_000,
+)  # right-hand sides; of the last most take 7e6
+MAX_FIXED_STEPS: Final = 5_000_000  # of a fixed step: more than any cell needs
+VERDICT_NAMES: Final = ("fine", "wrong silently", "diverges", "gives up", "no reference")
 
 Numbers = list[float]
 
 
-def prepared_on_ground(
+def prepare_on_ground(
     stiffness: float, stiction_velocity: float | None, steps: int, budget: int
 ) -> tuple[Case, Config, ContactStart]:
     """The paper's walk at a stiffness (N/m^e) and, if given, a stiction velocity (m/s)."""
@@ -44,7 +48,7 @@ def prepared_on_ground(
         name="map", expected=("walked",), reason="a cell", steps=steps, budget=budget, config={"contact": contact}
     )
     config = config_of(case)
-    start = prepared(config, case)
+    start = prepare_start(config, case)
     assert isinstance(start, ContactStart), "the paper's slope has a gait"
     return case, config, start
 
@@ -55,12 +59,12 @@ def stiction_cell(stiffness: float, stiction_velocity: float) -> Numbers:
     Returns outcome, steps, outcome at a ten times tighter tolerance, difference of both walks in legs, radians and
     pendulum times (`NONE` if they end differently), right-hand sides.
     """
-    case, config, start = prepared_on_ground(stiffness, stiction_velocity, WALK_STEPS, BUDGET)
-    walk = again = start.walk(case, configured(start, case))
+    case, config, start = prepare_on_ground(stiffness, stiction_velocity, WALK_STEPS, CELL_BUDGET)
+    walk = again = start.walk(case, case_tolerances(start, case))
     if walk.outcome.answered:
-        tighter = case.model_copy(update={"budget": TIGHTER_BUDGET})
-        again = start.walk(case, configured(start, tighter, TIGHTER))
-    error = NONE
+        tighter = case.model_copy(update={"budget": TIGHTER_CELL_BUDGET})
+        again = start.walk(case, case_tolerances(start, tighter, TIGHTER_FACTOR))
+    error = NO_ERROR
     if walk.outcome is again.outcome and walk.touches.size == again.touches.size:
         ends = np.abs(np.subtract(walk.record.end_state, again.record.end_state)) / natural_units(config)
         error = finite(float(np.max(np.concatenate([np.abs(walk.touches - again.touches), ends]))))
@@ -73,24 +77,24 @@ def step_column(stiffness: float, steps_s: tuple[float, ...]) -> Numbers:
 
     Returns verdict and error for each step size.
     """
-    case, config, start = prepared_on_ground(stiffness, None, STEPS, REFERENCE_BUDGET)
-    walk = start.walk(case, Tolerances(*REFERENCE, case.budget))
+    case, config, start = prepare_on_ground(stiffness, None, COMPARED_STEPS, REFERENCE_CELL_BUDGET)
+    walk = start.walk(case, Tolerances(*REFERENCE_SETTINGS, case.budget))
     if not walk.outcome.answered:
-        return [float(VERDICTS.index("no reference")), NONE] * len(steps_s)
+        return [float(VERDICT_NAMES.index("no reference")), NO_ERROR] * len(steps_s)
     arrival = arrival_of("map", walk.record, natural_units(config))
     numbers: Numbers = []
     for h in steps_s:
-        one = fixed(arrival, start, h, MAX_EVALUATIONS)
-        numbers += [float(VERDICTS.index(one.verdict)), NONE if one.error is None else one.error]
+        choice = euler(arrival, start, h, MAX_FIXED_STEPS)
+        numbers += [float(VERDICT_NAMES.index(choice.verdict)), NO_ERROR if choice.error is None else choice.error]
     return numbers
 
 
 def units_of(cells: int) -> Iterator[tuple[str, int, Callable[[], Numbers]]]:
     """Yield the work units of maps with `cells` cells along each axis: name, number of cells, and call."""
-    stiffness = np.geomspace(*STIFFNESS, cells)
-    steps = tuple(float(h) for h in np.geomspace(*STEP, cells))
+    stiffness = np.geomspace(*STIFFNESS_RANGE, cells)
+    steps = tuple(float(h) for h in np.geomspace(*STEP_RANGE, cells))
     for i, k in enumerate(stiffness):
         yield f"step {i}", cells, partial(step_column, float(k), steps)
-    for i, v in enumerate(np.geomspace(*STICTION_VELOCITY, cells)):
+    for i, v in enumerate(np.geomspace(*STICTION_RANGE, cells)):
         for j, k in enumerate(stiffness):
             yield f"stiction {i} {j}", 1, partial(stiction_cell, float(k), float(v))

@@ -21,22 +21,22 @@ class Masses:
     """
 
     def __init__(self, assembly: Assembly, about: Anchor | None = None) -> None:
-        found = list(masses(assembly))
-        root = about or found[0][1]
-        self.mass = np.array([mass for mass, _ in found])
-        self.levers = np.array([levers(assembly, root, at) for _, at in found])
+        point_masses = list(masses(assembly))
+        root = about or point_masses[0][1]
+        self.mass = np.array([mass for mass, _ in point_masses])
+        self.levers = np.array([levers(assembly, root, at) for _, at in point_masses])
         if about is None:
             self.levers = self.levers - np.average(self.levers, axis=0, weights=self.mass)
         self.inertia = np.array([body.inertia_kg_m2 for body in assembly.bodies])
 
     def moving(self, psi: Floats, rate: Floats) -> tuple[Floats, Floats]:
         """Positions and velocities (..., masses, 2) relative to the point, at angles and rates (..., bodies)."""
-        arms = turned(self.levers, psi[..., None, :])
+        arms = rotate(self.levers, psi[..., None, :])
         swept = np.stack([-arms[..., 1], arms[..., 0]], axis=-1) * rate[..., None, :, None]
         return arms.sum(axis=-2), swept.sum(axis=-2)
 
 
-def turned(d: Floats, psi: Floats) -> Floats:
+def rotate(d: Floats, psi: Floats) -> Floats:
     """Rotate levers (..., bodies, 2) with their bodies."""
     s, c = np.sin(psi), np.cos(psi)
     return np.stack([c * d[..., 0] - s * d[..., 1], s * d[..., 0] + c * d[..., 1]], axis=-1)
@@ -95,7 +95,7 @@ class RigidMasses:
         psi, rate = self.members @ state[:n] + self.slope, self.members @ state[n:]
         centre, rolling = np.array([0.0, self.radius]), np.array([-self.radius * state[n + STANCE], 0.0])
         place, velocity = self.masses.moving(psi, rate)
-        hip, contact = centre + turned(self.to_hip, psi).sum(axis=0), turned(self.to_foot, psi).sum(axis=0)
+        hip, contact = centre + rotate(self.to_hip, psi).sum(axis=0), rotate(self.to_foot, psi).sum(axis=0)
         mass, inertia = self.masses.mass, self.masses.inertia
         return Moving(mass, centre + place, rolling + velocity, inertia, rate, hip, contact)
 
@@ -130,9 +130,15 @@ class RigidMasses:
         """
         change, size = 0.0, 1e-300
         for old, new in zip(before, after, strict=True):
-            kept, left = np.array(self.momenta(old, new=False)), np.array(self.momenta(new, new=True))
-            kept[0] += self.moment_of(push_off, old)
-            change, size = max(change, *np.abs(left - kept)), max(size, *np.abs(kept), *np.abs(left))
+            momenta_before, momenta_after = (
+                np.array(self.momenta(old, new=False)),
+                np.array(self.momenta(new, new=True)),
+            )
+            momenta_before[0] += self.moment_of(push_off, old)
+            change, size = (
+                max(change, *np.abs(momenta_after - momenta_before)),
+                max(size, *np.abs(momenta_before), *np.abs(momenta_after)),
+            )
         return finite(change / size)
 
     def energy_won(self, before: Floats, after: Floats) -> float:

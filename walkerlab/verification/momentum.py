@@ -26,11 +26,13 @@ from walkerlab.verification.scaling import pendulum_time
 from walkerlab.verification.verdict import MAGNIFIED, Measure, NotMeasured, finite, promised
 
 MEASURE: Final = "momentum not from ground and gravity, over the walker's"
-STEPS: Final = 2  # so that there is an impact, and what comes of it
-INTERVALS: Final = 256  # to begin with
-PASSES: Final = 9  # each looks four times as closely where it is needed
+BALANCE_STEPS: Final = 2  # so that there is an impact, and what comes of it
+INITIAL_INTERVALS: Final = 256  # to begin with
+MAX_PASSES: Final = 9  # each looks four times as closely where it is needed
 MAX_INTERVALS: Final = 30_000  # beyond which nothing is looked at more closely
-SETTLED: Final = 1e-6  # of the walker's momentum: what an interval's sum may still change by, over the number of them
+SETTLED_SHARE: Final = (
+    1e-6  # of the walker's momentum: what an interval's sum may still change by, over the number of them
+)
 MAX_UNKNOWN: Final = 1e-3  # of the walker's momentum, beyond which a balance says nothing
 
 
@@ -57,17 +59,17 @@ def momentum_finding(config: WalksConfig, scene: ContactScene, start: State, cas
     """
     if scene.pinned:
         return NotMeasured(MEASURE, "the hinge transmits forces as well")
-    found = momentum_balance(config, scene, start, case)
-    unknown = found.unsure + found.unresolved
+    balance = momentum_balance(config, scene, start, case)
+    unknown = balance.unsure + balance.unresolved
     if unknown > MAX_UNKNOWN:
         shares = {
-            "the impulse sums do not settle": found.unsure,
-            "friction depends on slip velocities below the tolerance": found.unresolved,
+            "the impulse sums do not settle": balance.unsure,
+            "friction depends on slip velocities below the tolerance": balance.unresolved,
         }
         why = " and ".join(reason for reason, share in shares.items() if share > 0.5 * MAX_UNKNOWN)
         return NotMeasured(MEASURE, why)
-    limit = promised(case, config.solver.contact.rtol, found.steps) / MAGNIFIED + unknown
-    return Measure(MEASURE, finite(found.residual), limit)
+    limit = promised(case, config.solver.contact.rtol, balance.steps) / MAGNIFIED + unknown
+    return Measure(MEASURE, finite(balance.residual), limit)
 
 
 def momentum_balance(config: WalksConfig, scene: ContactScene, start: State, case: Case) -> Balance:
@@ -76,31 +78,31 @@ def momentum_balance(config: WalksConfig, scene: ContactScene, start: State, cas
     rates = np.abs(start[len(start) // 2 :])
     speed = max(leg / pendulum_time(config), *rates[:2], leg * float(rates[2:].max()))
     scale = mass * np.array([speed, speed, speed * leg])
-    settings, steps = config.solver.contact, min(case.steps, STEPS)
+    settings, steps = config.solver.contact, min(case.steps, BALANCE_STEPS)
     tolerances = Tolerances(settings.method, settings.rtol, settings.atol, case.budget)
     walk = scene.walk(start, steps, tolerances)
-    grid = np.linspace(0.0, walk.end_time_s, INTERVALS + 1)
+    grid = np.linspace(0.0, walk.end_time_s, INITIAL_INTERVALS + 1)
     if scene.walker.whole.push_off != 0.0:
         pulse = scene.walker.whole.push_off_duration * np.linspace(0.0, 1.0, 9)
         pushed = (walk.touch_time_s[:, None] + pulse).ravel()
         grid = np.union1d(grid, pushed[pushed < walk.end_time_s])
-    for _ in range(PASSES):
+    for _ in range(MAX_PASSES):
         samples = scene.walk(start, steps, tolerances, with_middles(grid)).samples
         assert samples is not None, "the walk was looked at"
-        given = impulse_rate(samples, scene, config, walk.touch_time_s) / scale
-        change = unsettled(samples.time_s, given)
-        wanting = change > SETTLED / grid.size
+        rates = impulse_rate(samples, scene, config, walk.touch_time_s) / scale
+        change = unsettled(samples.time_s, rates)
+        wanting = change > SETTLED_SHARE / grid.size
         if not wanting.any() or grid.size > MAX_INTERVALS:
             break
         grid = split(samples.time_s, wanting)
     assert samples is not None, "it was looked at"
-    held = momentum(samples, config) / scale
-    apart = np.abs(held - held[0] - impulse(samples.time_s, given))
+    momenta = momentum(samples, config) / scale
+    differences = np.abs(momenta - momenta[0] - impulse(samples.time_s, rates))
     accepted = int(walk.work[ACCEPTED])
     # in a state between the solver's own the slip is known to its tolerance, with another sign in every step
     slip = tolerances.atol + tolerances.rtol * speed
     push = steepest_change(scene.walker.friction, slip) * config.gravity_m_s2 * walk.end_time_s / speed
-    return Balance(float(apart.max()), float(change.sum()), push / max(1, accepted) ** 0.5, accepted)
+    return Balance(float(differences.max()), float(change.sum()), push / max(1, accepted) ** 0.5, accepted)
 
 
 def with_middles(grid: Floats) -> Floats:
@@ -138,29 +140,29 @@ def impulse_rate(samples: ContactSamples, scene: ContactScene, config: RigidConf
     slope = config.slope_rad
     weight = config.walker.total_mass_kg * config.gravity_m_s2 * np.array([np.sin(slope), -np.cos(slope)])
     torque = (along * normal - height * friction).sum(axis=1) + cross(samples.states[:, :2], weight)
-    given = np.column_stack([friction.sum(axis=1) + weight[0], normal.sum(axis=1) + weight[1], torque])
-    form, every = scene.walker.whole, np.arange(samples.time_s.size)
+    rates = np.column_stack([friction.sum(axis=1) + weight[0], normal.sum(axis=1) + weight[1], torque])
+    form, samples_range = scene.walker.whole, np.arange(samples.time_s.size)
     if form.push_off != 0.0:
         pushing, y = 1 - samples.stance, samples.states
-        foot = np.column_stack([along[every, pushing], height[every, pushing]])
-        turned = y[:, 2 : y.shape[1] // 2] + slope
-        s, c, x, up = np.sin(turned), np.cos(turned), form.hip_x[: turned.shape[1]], form.hip_y[: turned.shape[1]]
+        foot = np.column_stack([along[samples_range, pushing], height[samples_range, pushing]])
+        angles = y[:, 2 : y.shape[1] // 2] + slope
+        s, c, x, up = np.sin(angles), np.cos(angles), form.hip_x[: angles.shape[1]], form.hip_y[: angles.shape[1]]
         line = y[:, :2] + np.column_stack([c @ x - s @ up, s @ x + c @ up]) - foot
         u = np.clip((samples.time_s[:, None] - touches) / form.push_off_duration, 0.0, 1.0)
         bell = 30.0 * ((u * (1.0 - u)) ** 2).sum(axis=1) * form.push_off / form.push_off_duration
         push = (bell / np.hypot(*line.T))[:, None] * line
-        given += np.column_stack([push, cross(foot, push)])
-    return given
+        rates += np.column_stack([push, cross(foot, push)])
+    return rates
 
 
 def momentum(samples: ContactSamples, config: RigidConfig) -> Floats:
     """Momentum along and normal to the slope (kg m/s) and about a point of it (kg m^2/s), at intervals' ends."""
     y = samples.states[::2]
-    n, found = y.shape[1] // 2 - 2, Masses(assembly_of(config.walker))
+    n, walker_masses = y.shape[1] // 2 - 2, Masses(assembly_of(config.walker))
     rate = y[:, 4 + n :]
-    place, velocity = found.moving(y[:, 2 : 2 + n] + config.slope_rad, rate)
+    place, velocity = walker_masses.moving(y[:, 2 : 2 + n] + config.slope_rad, rate)
     r, v = y[:, None, 0:2] + place, y[:, None, 2 + n : 4 + n] + velocity
-    return np.column_stack([found.mass @ v, cross(r, v) @ found.mass + rate @ found.inertia])
+    return np.column_stack([walker_masses.mass @ v, cross(r, v) @ walker_masses.mass + rate @ walker_masses.inertia])
 
 
 def cross(r: Floats, v: Floats) -> Floats:

@@ -30,19 +30,19 @@ from walkerlab.solvers.semi_implicit_euler import DIVERGED, semi_implicit_euler
 from walkerlab.solvers.stepping import BUDGET, COUNTS, RHS
 from walkerlab.solvers.system import Floats
 from walkerlab.verification.scaling import pendulum_time
-from walkerlab.verification.starts import ContactStart, RigidStart, prepared
+from walkerlab.verification.starts import ContactStart, RigidStart, prepare_start
 from walkerlab.verification.verdict import finite
 
-CAP: Final = 20_000  # right-hand sides
-FINE: Final = 1e-2  # of a leg, of a radian, of their rates in pendulum times
+MAX_ORDINARY_EVALUATIONS: Final = 20_000  # right-hand sides
+FINE_ERROR: Final = 1e-2  # of a leg, of a radian, of their rates in pendulum times
 SCIPY_DEFAULT: Final = (1e-3, 1e-6)  # tolerances of solve_ivp
-RUNS_AWAY: Final = 10.0  # the same
-STEPS: Final = 2
-LIBRARY: Final = ("RK45", "LSODA", "Radau")
+DIVERGED_ERROR: Final = 10.0  # the same
+COMPARED_STEPS: Final = 2
+SCIPY_METHODS: Final = ("RK45", "LSODA", "Radau")
 FIXED_STEPS_S: Final = (1e-3, 1e-4)
-REFERENCE: Final = ("radau5", 1e-8, 1e-10)  # method, rtol, atol
-REFERENCE_BUDGET: Final = 1_000_000  # at least
-RIGID_REFERENCE: Final = ("dop853", 1e-12, 1e-14)
+REFERENCE_SETTINGS: Final = ("radau5", 1e-8, 1e-10)  # method, rtol, atol
+MIN_REFERENCE_BUDGET: Final = 1_000_000  # at least
+RIGID_REFERENCE_SETTINGS: Final = ("dop853", 1e-12, 1e-14)
 
 
 @dataclass(frozen=True)
@@ -69,24 +69,26 @@ def choices(case: Case, config: WalksConfig) -> tuple[Choice, ...]:
     """
     if not is_passive_compass(config):
         return ()
-    short = case.model_copy(update={"steps": min(case.steps, STEPS), "budget": max(case.budget, REFERENCE_BUDGET)})
-    start = prepared(config, short)
+    short = case.model_copy(
+        update={"steps": min(case.steps, COMPARED_STEPS), "budget": max(case.budget, MIN_REFERENCE_BUDGET)}
+    )
+    start = prepare_start(config, short)
     compass = compass_or_none(config, config.equations)
     if isinstance(start, RigidStart) and compass is not None:
-        walk = start.walk(short, Tolerances(*RIGID_REFERENCE, short.budget)).record
+        walk = start.walk(short, Tolerances(*RIGID_REFERENCE_SETTINGS, short.budget)).record
         if not walk.steps:
             return ()
         units = np.array([1.0, 1.0, *[1.0 / pendulum_time(config)] * 2])
         arrival = Arrival(case.name, float(walk.touch_time_s[-1]), np.array(walk.final_state), units)
-        return tuple(script(arrival, compass, walk, name) for name in LIBRARY)
+        return tuple(scipy_script(arrival, compass, walk, name) for name in SCIPY_METHODS)
     if not isinstance(start, ContactStart) or start.scene.pinned or start.scene.ground.terrain.order_matters:
         return ()
-    walk = start.walk(short, Tolerances(*REFERENCE, short.budget)).record
+    walk = start.walk(short, Tolerances(*REFERENCE_SETTINGS, short.budget)).record
     arrival = arrival_of(case.name, walk, natural_units(config))
     if arrival.time_s == 0.0:
         return ()
-    found = [library(arrival, start, name) for name in LIBRARY]
-    return (*found, *(fixed(arrival, start, h) for h in FIXED_STEPS_S))
+    by_library = [scipy_walk(arrival, start, name) for name in SCIPY_METHODS]
+    return (*by_library, *(euler(arrival, start, h) for h in FIXED_STEPS_S))
 
 
 @dataclass(frozen=True)
@@ -107,9 +109,11 @@ class Arrival:
             return Choice(self.case, method, "gives up", None, count, wall_s)
         error = finite(float(np.max(np.abs((y - self.state) / self.units))))
         scale = max(1.0, float(np.max(np.abs(self.state / self.units))))
-        if error > RUNS_AWAY * scale or float(np.max(np.abs(y[: y.size // 2]))) >= DIVERGED:
+        if error > DIVERGED_ERROR * scale or float(np.max(np.abs(y[: y.size // 2]))) >= DIVERGED:
             return Choice(self.case, method, "diverges", None, count, wall_s)
-        return Choice(self.case, method, "fine" if error <= FINE * scale else "wrong silently", error, count, wall_s)
+        return Choice(
+            self.case, method, "fine" if error <= FINE_ERROR * scale else "wrong silently", error, count, wall_s
+        )
 
 
 def arrival_of(case: str, walk: ContactWalkResult, units: Floats) -> Arrival:
@@ -123,7 +127,7 @@ def natural_units(config: RigidConfig) -> Floats:
 
 
 @contextmanager
-def in_silence() -> Iterator[None]:
+def silenced() -> Iterator[None]:
     """Suppress libraries' warnings, and leave the block on exceptions with which they give up."""
     with (
         warnings.catch_warnings(),
@@ -134,39 +138,39 @@ def in_silence() -> Iterator[None]:
         yield
 
 
-def script(arrival: Arrival, compass: RigidWalker, walk: RigidWalkResult, method: str) -> Choice:
+def scipy_script(arrival: Arrival, compass: RigidWalker, walk: RigidWalkResult, method: str) -> Choice:
     """Walk with a method of SciPy's solve_ivp at default settings, with an event function for heel strikes."""
     began = time.perf_counter()
-    y, count = None, CAP
-    with in_silence():
-        y, count = walk_as_a_script(compass, walk.start, walk.steps, *SCIPY_DEFAULT, CAP, method)
+    y, count = None, MAX_ORDINARY_EVALUATIONS
+    with silenced():
+        y, count = walk_as_a_script(compass, walk.start, walk.steps, *SCIPY_DEFAULT, MAX_ORDINARY_EVALUATIONS, method)
     return arrival.judged(f"SciPy {method}", y, count, time.perf_counter() - began)
 
 
-def library(arrival: Arrival, ready: ContactStart, method: str) -> Choice:
+def scipy_walk(arrival: Arrival, ready: ContactStart, method: str) -> Choice:
     """Walk with a method of SciPy's solve_ivp at default settings."""
     from scipy.integrate import solve_ivp
 
     system = OnPads(on_ground(ready.scene.walker, (True, True)), ready.scene.ground.terrain)
     start = np.array(ready.start)
     counts = np.zeros(COUNTS, np.int64)
-    counts[BUDGET] = CAP
+    counts[BUDGET] = MAX_ORDINARY_EVALUATIONS
     right_hand_side = counting_rhs(counts, system, start.size)
     began = time.perf_counter()
     y = None
-    with in_silence():
+    with silenced():
         solution = solve_ivp(right_hand_side, (0.0, arrival.time_s), start, method=method)
         if solution.success:
             y = solution.y[:, -1]
     return arrival.judged(f"SciPy {method}", y, int(counts[RHS]), time.perf_counter() - began)
 
 
-def fixed(arrival: Arrival, ready: ContactStart, h: float, cap: int = CAP) -> Choice:
+def euler(arrival: Arrival, ready: ContactStart, h: float, cap: int = MAX_ORDINARY_EVALUATIONS) -> Choice:
     """Walk by semi-implicit Euler with at most `cap` steps of h (s)."""
     system = OnPads(on_ground(ready.scene.walker, (True, True)), ready.scene.ground.terrain)
     y = np.array(ready.start)
     began = time.perf_counter()
-    taken = int(semi_implicit_euler(system, y, np.empty_like(y), arrival.time_s, h, cap))
+    steps = int(semi_implicit_euler(system, y, np.empty_like(y), arrival.time_s, h, cap))
     wall_s = time.perf_counter() - began
-    late = taken == cap and taken * h < arrival.time_s * (1.0 - 1e-9) and bool(np.all(np.abs(y) < DIVERGED))
-    return arrival.judged(f"semi-implicit Euler, {h:g} s", None if late else y, taken, wall_s)
+    late = steps == cap and steps * h < arrival.time_s * (1.0 - 1e-9) and bool(np.all(np.abs(y) < DIVERGED))
+    return arrival.judged(f"semi-implicit Euler, {h:g} s", None if late else y, steps, wall_s)

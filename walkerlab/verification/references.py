@@ -32,14 +32,14 @@ def restitution(mass: float, speed: float, law: tuple[float, float, float, float
     def motion(_t: float, y: Any) -> tuple[float, float]:
         return y[1], gravity - impact_force(y[0], y[1], law) / mass
 
-    def left(t: float, y: Any) -> float:
+    def leave(t: float, y: Any) -> float:
         return float(y[0]) if t > 0.0 else 1.0
 
-    left.terminal, left.direction = True, -1.0  # type: ignore[attr-defined]
-    found = solve_ivp(
-        motion, (0.0, 0.05), (0.0, speed), method="DOP853", rtol=1e-11, atol=1e-14, events=left, max_step=1e-5
+    leave.terminal, leave.direction = True, -1.0  # type: ignore[attr-defined]
+    solution = solve_ivp(
+        motion, (0.0, 0.05), (0.0, speed), method="DOP853", rtol=1e-11, atol=1e-14, events=leave, max_step=1e-5
     )
-    return float(-found.y[1, -1] / speed)
+    return float(-solution.y[1, -1] / speed)
 
 
 def creep_speed(slope: float, static: float, stiction_velocity: float) -> float:

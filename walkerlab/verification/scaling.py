@@ -27,17 +27,17 @@ def to_twin(config: RigidConfig) -> Units:
 def scaled_block(block: B, by: Units) -> B:
     """Scale each value of a block by the unit of its key."""
 
-    def value(given: Any, unit: float) -> Any:
-        if isinstance(given, Block):
-            return scaled_block(given, by)
-        if isinstance(given, tuple):
-            return tuple(value(each, unit) for each in given)
-        return given * unit if isinstance(given, float) and unit != 1.0 else given
+    def value(quantity: Any, unit: float) -> Any:
+        if isinstance(quantity, Block):
+            return scaled_block(quantity, by)
+        if isinstance(quantity, tuple):
+            return tuple(value(item, unit) for item in quantity)
+        return quantity * unit if isinstance(quantity, float) and unit != 1.0 else quantity
 
-    changed: dict[str, Any] = {}
+    values: dict[str, Any] = {}
     for name, field in type(block).model_fields.items():
-        changed[name] = value(getattr(block, name), by.of(annotation_of(field, "unit")))
-    return block.model_copy(update=changed)
+        values[name] = value(getattr(block, name), by.of(annotation_of(field, "unit")))
+    return block.model_copy(update=values)
 
 
 def scaled(config: Config, by: Units) -> Config:

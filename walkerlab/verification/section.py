@@ -13,7 +13,7 @@ from walkerlab.report.tables import Cell, Column, Table, Tone, grouped, measured
 from walkerlab.report.words import words
 from walkerlab.verification.verdict import BUDGET_USED
 
-VERDICTS: Mapping[str, Tone] = {"fine": "good", "wrong silently": "bad", "diverges": "bad", "gives up": "fair"}
+VERDICT_TONES: Mapping[str, Tone] = {"fine": "good", "wrong silently": "bad", "diverges": "bad", "gives up": "fair"}
 
 Row = Mapping[str, Any]
 Rows = Sequence[Row]
@@ -22,16 +22,18 @@ Rows = Sequence[Row]
 @of_stage("stability")
 def section(results: Results, summary: Row) -> Section | None:
     """Build the section; None if the stage did not run."""
-    cases, known = summary["cases"], summary["known"]
+    cases, problems = summary["cases"], summary["known"]
     unanswered = [{**row, "why": row["second_tried"]} for row in cases if row["second_tried"]]
-    missed = [{**row, "why": f"{one['measure']}: {one['why']}"} for row in cases for one in row["not_measured"]]
-    note = words("stability.cases", by_reason(unanswered), by_reason(missed))
+    unmeasured = [
+        {**row, "why": f"{measure['measure']}: {measure['why']}"} for row in cases for measure in row["not_measured"]
+    ]
+    note = words("stability.cases", by_reason(unanswered), by_reason(unmeasured))
     planes = results.summary("stability-maps")
     blocks: tuple[PageBlock, ...] = (
-        *(Paragraph(said, "bad") for said in failures(summary)),
+        *(Paragraph(failure, "bad") for failure in failures(summary)),
         Paragraph(words("stability.judgement")),
         table("Extreme cases", CASE_COLUMNS, grouped(cases, "family"), wordy=True, note=note),
-        table("Problems with known answers, run through the contact code", KNOWN_COLUMNS, known, wordy=True),
+        table("Problems with known answers, run through the contact code", KNOWN_COLUMNS, problems, wordy=True),
         Paragraph("Not covered:"),
         Statements(tuple(Statement(f"{what}:", why) for what, why in words.terms("stability.not_covered").items())),
         ordinary_table(summary),
@@ -58,14 +60,14 @@ def ending(row: Row) -> Cell:
 
 def failures(summary: Row) -> list[str]:
     """Describe each failure in a paragraph."""
-    failed = [words("stability.failed_case", one) for one in summary["cases"] if not one["ok"]]
-    return failed + [words("stability.failed_problem", one) for one in summary["known"] if not one["ok"]]
+    failed = [words("stability.failed_case", row) for row in summary["cases"] if not row["ok"]]
+    return failed + [words("stability.failed_problem", row) for row in summary["known"] if not row["ok"]]
 
 
 def worst_measure(row: Row) -> float | None:
     """Largest ratio of a measure to its limit, apart from the budget's."""
-    judged = [one for one in row["measures"] if one["limit"] > 0.0 and one["measure"] != BUDGET_USED]
-    return max((one["value"] / one["limit"] for one in judged), default=None)
+    measures = [measure for measure in row["measures"] if measure["limit"] > 0.0 and measure["measure"] != BUDGET_USED]
+    return max((measure["value"] / measure["limit"] for measure in measures), default=None)
 
 
 CASE_COLUMNS = (
@@ -87,8 +89,8 @@ def by_reason(cases: Rows) -> str:
 
 def family_table(cases: Rows) -> Table:
     """Count the outcomes in each family of cases."""
-    counted = Counter((case["family"], case["outcome"]) for case in cases)
-    return table("", [Column("family"), Column("outcome"), Column("cases")], [(*key, n) for key, n in counted.items()])
+    counts = Counter((case["family"], case["outcome"]) for case in cases)
+    return table("", [Column("family"), Column("outcome"), Column("cases")], [(*key, n) for key, n in counts.items()])
 
 
 KNOWN_COLUMNS = (
@@ -117,7 +119,7 @@ def ordinary_cell(row: Row | None) -> Cell:
     if row is None:
         return Cell("")
     error = f" {number(row['error'], 2)}," if "error" in row else ""
-    return Cell(f"{row['verdict']}:{error} {number(1e3 * row['wall_s'], 2)} ms", VERDICTS[row["verdict"]])
+    return Cell(f"{row['verdict']}:{error} {number(1e3 * row['wall_s'], 2)} ms", VERDICT_TONES[row["verdict"]])
 
 
 def answer(summary: Row) -> list[str | Table]:

@@ -13,10 +13,10 @@ from walkerlab.scene.studies import is_studied
 from walkerlab.stages.walk import rigid_start
 from walkerlab.store.columns import rows_group
 from walkerlab.store.content import Content
-from walkerlab.verification.catalogue import judged, scene_cases
+from walkerlab.verification.catalogue import all_cases, scene_cases
 from walkerlab.verification.judge import CaseCell, run_cells
-from walkerlab.verification.left_out import of_verification
-from walkerlab.verification.ordinary import CAP, FINE, Choice
+from walkerlab.verification.left_out import verification_omissions
+from walkerlab.verification.ordinary import MAX_ORDINARY_EVALUATIONS, FINE_ERROR, Choice
 from walkerlab.verification.verdict import CaseResult
 
 
@@ -29,27 +29,29 @@ def run(
 
     Raises ConfigError if two cases share a name.
     """
-    if judged_in_its_scene(config):
-        own = scene_cases(spelled_out(config, inputs))
-        judged(config.stability.cases, [case for case, _ in own])
-        cells = [*(CaseCell(*case) for case in own), *map(CaseCell, config.stability.cases)]
+    if has_scene_cases(config):
+        variations = scene_cases(with_numbers(config, inputs))
+        all_cases(config.stability.cases, [case for case, _ in variations])
+        cells = [*(CaseCell(*case) for case in variations), *map(CaseCell, config.stability.cases)]
     else:
-        cells = [*map(CaseCell, judged(config.stability.cases))]
-    every = track(progress, "stability", len(cells), run_cells(cells, jobs))
-    found: list[CaseResult | Choice] = [result for results in every for result in results]
-    cases = [item for item in found if isinstance(item, CaseResult)]
-    known = inputs["known-problems"]
-    said = summary_of(cases, known.summary["known"], [item for item in found if isinstance(item, Choice)])
+        cells = [*map(CaseCell, all_cases(config.stability.cases))]
+    results_by_case = track(progress, "stability", len(cells), run_cells(cells, jobs))
+    items: list[CaseResult | Choice] = [result for results in results_by_case for result in results]
+    cases = [item for item in items if isinstance(item, CaseResult)]
+    problems = inputs["known-problems"]
+    summary = summarise(cases, problems.summary["known"], [item for item in items if isinstance(item, Choice)])
     group = rows_group(cases, labels_of(CaseResult), "case", "number of the row")
-    return Content({"cases": group, "known": known["known"]}, {**said, "left_out": list(of_verification(config))})
+    return Content(
+        {"cases": group, "known": problems["known"]}, {**summary, "left_out": list(verification_omissions(config))}
+    )
 
 
-def judged_in_its_scene(config: CompassCasesConfig | SceneCasesConfig) -> TypeGuard[SceneCasesConfig]:
+def has_scene_cases(config: CompassCasesConfig | SceneCasesConfig) -> TypeGuard[SceneCasesConfig]:
     """Whether the walker is not the paper's compass."""
     return not is_studied(config)
 
 
-def spelled_out(config: WalksConfig, inputs: Mapping[str, Content]) -> Config:
+def with_numbers(config: WalksConfig, inputs: Mapping[str, Content]) -> Config:
     """Scene with start and pitch of pads given as numbers, shared by its cases."""
     step, start = rigid_start(config, inputs)
     scene = Config().model_copy(update={key: getattr(config, key) for key in keys_of(WalksConfig)} | {"start": start})
@@ -60,34 +62,37 @@ def spelled_out(config: WalksConfig, inputs: Mapping[str, Content]) -> Config:
     return scene.model_copy(update={"contact": contact.model_copy(update={"pad_pitch": pitch})})
 
 
-def summary_of(
+def summarise(
     cases: Sequence[CaseResult], known: Sequence[Mapping[str, Any]], ordinary: Sequence[Choice]
 ) -> dict[str, Any]:
     """Build the summary; a failure adds `no_answer`.
 
     known  the known problems, as stored by their stage
     """
-    failed = [*(case.name for case in cases if not case.ok), *(one["name"] for one in known if not one["ok"])]
-    of = len(cases) + len(known)
-    said = {
+    failed = [*(case.name for case in cases if not case.ok), *(row["name"] for row in known if not row["ok"])]
+    total = len(cases) + len(known)
+    summary = {
         "cases": [case_row(case) for case in cases],
         "known": list(known),
-        "passed": of - len(failed),
+        "passed": total - len(failed),
         "failed": len(failed),
         # an ordinary method that did not arrive has no error
-        "ordinary": [{name: value for name, value in asdict(one).items() if value is not None} for one in ordinary],
-        "ordinary_cap": CAP,
-        "ordinary_fine": FINE,
+        "ordinary": [{name: value for name, value in asdict(row).items() if value is not None} for row in ordinary],
+        "ordinary_cap": MAX_ORDINARY_EVALUATIONS,
+        "ordinary_fine": FINE_ERROR,
     }
     if failed:
-        message = f"{len(failed)} of {of} did not end as expected: {', '.join(failed)}"
+        message = f"{len(failed)} of {total} did not end as expected: {', '.join(failed)}"
         advice = "`walkerlab report` explains failures in red; `walkerlab stability --json` has every measure."
-        said["no_answer"] = {"message": message, "advice": advice}
-    return said
+        summary["no_answer"] = {"message": message, "advice": advice}
+    return summary
 
 
 def case_row(case: CaseResult) -> dict[str, Any]:
-    told = {name: value for name, value in asdict(case).items() if name not in ("findings", "remarks")}
-    told |= {name: list(told[name]) for name in ("expected", "not_measured")}
-    measures = [{"measure": one.measure, "value": one.value, "limit": one.limit, "ok": one.ok} for one in case.findings]
-    return {**told, "ok": case.ok, "note": "; ".join(case.failures), "measures": measures}
+    row = {name: value for name, value in asdict(case).items() if name not in ("findings", "remarks")}
+    row |= {name: list(row[name]) for name in ("expected", "not_measured")}
+    measures = [
+        {"measure": measure.measure, "value": measure.value, "limit": measure.limit, "ok": measure.ok}
+        for measure in case.findings
+    ]
+    return {**row, "ok": case.ok, "note": "; ".join(case.failures), "measures": measures}

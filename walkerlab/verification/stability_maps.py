@@ -13,9 +13,9 @@ from walkerlab.stages.walk import OUTCOMES, count_outcomes
 from walkerlab.store.checkpoint import Checkpoint
 from walkerlab.store.content import Content, Group, Variable
 from walkerlab.verification import maps
-from walkerlab.verification.ordinary import FINE, STEPS
+from walkerlab.verification.ordinary import FINE_ERROR, COMPARED_STEPS
 
-OF_STICTION = {
+STICTION_COLUMNS = {
     "outcome": "how the walk ended, see attribute outcomes",
     "steps": "steps walked",
     "sharper_outcome": "outcome at a ten times tighter tolerance",
@@ -41,43 +41,49 @@ def run(
 
 def stiction_group(cells: int, kept: Mapping[str, maps.Numbers]) -> Group:
     """Outcomes of the default method over stiction velocity and stiffness."""
-    found = np.array([[kept[f"stiction {i} {j}"] for j in range(cells)] for i in range(cells)])
-    columns = dict(zip(OF_STICTION, np.moveaxis(found, 2, 0), strict=True))
+    cells_by_axis = np.array([[kept[f"stiction {i} {j}"] for j in range(cells)] for i in range(cells)])
+    columns = dict(zip(STICTION_COLUMNS, np.moveaxis(cells_by_axis, 2, 0), strict=True))
     dims = ("stiction_velocity", "stiffness")
-    answered = np.isin(columns["outcome"], [int(one) for one in Outcome if one.answered])
-    compared = answered & (columns["error"] != maps.NONE)
+    answered = np.isin(columns["outcome"], [int(outcome) for outcome in Outcome if outcome.answered])
+    compared = answered & (columns["error"] != maps.NO_ERROR)
     errors = np.where(compared, columns["error"], np.nan)
-    variables = {name: whole(columns[name], dims, text) for name, text in OF_STICTION.items() if name != "error"}
-    variables |= {
-        **axis("stiction_velocity", maps.STICTION_VELOCITY, cells, "m/s", "stiction velocity"),
-        **axis("stiffness", maps.STIFFNESS, cells, "N/m^2.2", "stiffness of the ground"),
-        "compared": whole(compared, dims, "1 if both runs have an answer, with the same outcome and step count"),
-        "error": Variable(errors, dims, "1", OF_STICTION["error"], missing=True),
+    variables = {
+        name: integer_variable(columns[name], dims, text) for name, text in STICTION_COLUMNS.items() if name != "error"
     }
-    return Group(variables, {"outcomes": OUTCOMES, "steps_wanted": maps.WALK_STEPS, "budget": maps.BUDGET})
+    variables |= {
+        **axis("stiction_velocity", maps.STICTION_RANGE, cells, "m/s", "stiction velocity"),
+        **axis("stiffness", maps.STIFFNESS_RANGE, cells, "N/m^2.2", "stiffness of the ground"),
+        "compared": integer_variable(
+            compared, dims, "1 if both runs have an answer, with the same outcome and step count"
+        ),
+        "error": Variable(errors, dims, "1", STICTION_COLUMNS["error"], missing=True),
+    }
+    return Group(variables, {"outcomes": OUTCOMES, "steps_wanted": maps.WALK_STEPS, "budget": maps.CELL_BUDGET})
 
 
 def step_group(cells: int, kept: Mapping[str, maps.Numbers]) -> Group:
     """Results of semi-implicit Euler over step size and stiffness."""
-    found = np.array([np.reshape(kept[f"step {j}"], (cells, 2)) for j in range(cells)])  # stiffness, step, of each
-    verdicts, errors = found.transpose(2, 1, 0)
+    cells_by_axis = np.array(
+        [np.reshape(kept[f"step {j}"], (cells, 2)) for j in range(cells)]
+    )  # stiffness, step, of each
+    verdicts, errors = cells_by_axis.transpose(2, 1, 0)
     dims = ("step_size", "stiffness")
     text = "of the state at the end, in legs, radians, pendulum times"
     variables = {
-        **axis("step_size", maps.STEP, cells, "s", "step size"),
-        **axis("stiffness", maps.STIFFNESS, cells, "N/m^2.2", "stiffness of the ground"),
-        "verdict": whole(verdicts, dims, "verdict, see attribute verdicts"),
-        "error": Variable(np.where(errors == maps.NONE, np.nan, errors), dims, "1", text, missing=True),
+        **axis("step_size", maps.STEP_RANGE, cells, "s", "step size"),
+        **axis("stiffness", maps.STIFFNESS_RANGE, cells, "N/m^2.2", "stiffness of the ground"),
+        "verdict": integer_variable(verdicts, dims, "verdict, see attribute verdicts"),
+        "error": Variable(np.where(errors == maps.NO_ERROR, np.nan, errors), dims, "1", text, missing=True),
     }
-    legend = ", ".join(f"{number} {verdict}" for number, verdict in enumerate(maps.VERDICTS))
-    return Group(variables, {"verdicts": legend, "steps_wanted": STEPS, "fine": FINE})
+    legend = ", ".join(f"{number} {verdict}" for number, verdict in enumerate(maps.VERDICT_NAMES))
+    return Group(variables, {"verdicts": legend, "steps_wanted": COMPARED_STEPS, "fine": FINE_ERROR})
 
 
 def axis(name: str, ends: tuple[float, float], cells: int, unit: str, text: str) -> dict[str, Variable]:
     return {name: Variable(np.geomspace(*ends, cells), (name,), unit, text)}
 
 
-def whole(values: Any, dims: tuple[str, ...], text: str) -> Variable:
+def integer_variable(values: Any, dims: tuple[str, ...], text: str) -> Variable:
     """Integer variable."""
     return Variable(np.asarray(values).astype(np.int64), dims, "1", text)
 
@@ -92,5 +98,7 @@ def summary_of(stiction: Group, step: Group) -> dict[str, Any]:
         "ends_otherwise_sharper": int(np.count_nonzero(stiction["outcome"] != stiction["sharper_outcome"])),
         "largest_error": float(errors.max()) if errors.size else None,
         "median_error": float(np.median(errors)) if errors.size else None,
-        "fixed_step": {maps.VERDICTS[int(one)]: int(many) for one, many in zip(verdicts, times, strict=True)},
+        "fixed_step": {
+            maps.VERDICT_NAMES[int(verdict)]: int(count) for verdict, count in zip(verdicts, times, strict=True)
+        },
     }

@@ -24,10 +24,12 @@ from walkerlab.verification.momentum import MEASURE, momentum_finding
 from walkerlab.verification.scaling import pendulum_time
 from walkerlab.verification.verdict import Measure, NotMeasured, finite
 
-HEIGHT = 1  # index into the state of the free walker
-ROUNDING = 1e-9  # share of the momentum by which a heel strike may seem to change it
-SAMPLES_PER_PENDULUM_TIME = 40
-NEVER_LESS = 1e-3  # of the balance asked for: by how much what was dissipated may seem to fall, for the quadrature
+CENTRE_HEIGHT = 1  # index into the state of the free walker
+STRIKE_TOLERANCE = 1e-9  # share of the momentum by which a heel strike may seem to change it
+SAMPLE_RATE = 40
+REGAIN_TOLERANCE = (
+    1e-3  # of the balance asked for: by how much what was dissipated may seem to fall, for the quadrature
+)
 
 
 @dataclass(frozen=True)
@@ -87,14 +89,16 @@ class RigidStart(CaseStart):
         if not record.steps:
             return []
         strikes = RigidMasses(assembly_of(self.config.walker, rigid=True), self.config.slope_rad)
-        off = strikes.feet_off_the_slope(record.before) / self.walker.leg_length
+        distance = strikes.feet_off_the_slope(record.before) / self.walker.leg_length
         push = float(self.walker.push_off)
-        changed = strikes.momentum_change(record.before, record.after, push)
-        won = 0.0 if push else strikes.energy_won(record.before, record.after) / self.energy
+        momentum_change = strikes.momentum_change(record.before, record.after, push)
+        gain = 0.0 if push else strikes.energy_won(record.before, record.after) / self.energy
         return [
-            Measure("distance of the feet from the slope at heel strike, in leg lengths", finite(off), ROUNDING),
-            Measure("momentum changed by a heel strike", changed, ROUNDING),
-            Measure("energy gained at a heel strike", finite(won), ROUNDING),
+            Measure(
+                "distance of the feet from the slope at heel strike, in leg lengths", finite(distance), STRIKE_TOLERANCE
+            ),
+            Measure("momentum changed by a heel strike", momentum_change, STRIKE_TOLERANCE),
+            Measure("energy gained at a heel strike", finite(gain), STRIKE_TOLERANCE),
         ]
 
 
@@ -109,7 +113,7 @@ class ContactStart(CaseStart):
 
     def walk(self, case: Case, tolerances: Tolerances, sampled: bool = False) -> JudgedWalk:
         scene, unit = self.scene, pendulum_time(self.config)
-        interval = scene.ground.frame.pendulum_time / SAMPLES_PER_PENDULUM_TIME if sampled else None
+        interval = scene.ground.frame.pendulum_time / SAMPLE_RATE if sampled else None
         walk = scene.walk(self.start, case.steps, tolerances, interval)
         numbers = np.concatenate([walk.end_state, walk.touch_time_s, walk.touch_along_m, walk.dissipated_J])
         touches, end = walk.touch_time_s / unit, walk.end_time_s / unit
@@ -123,7 +127,7 @@ class ContactStart(CaseStart):
             return []
         falls = -np.diff(record.samples.dissipated_J[:, :2], axis=0)
         back = finite(max(0.0, float(np.max(falls))) / self.energy)
-        return [Measure("energy regained from friction and damping", back, NEVER_LESS * case.balance)]
+        return [Measure("energy regained from friction and damping", back, REGAIN_TOLERANCE * case.balance)]
 
     def momentum(self, walk: JudgedWalk, case: Case) -> Measure | NotMeasured:
         """Momentum balance of a walk that has an answer and a duration."""
@@ -135,7 +139,7 @@ class ContactStart(CaseStart):
 Start = RigidStart | ContactStart
 
 
-def configured(start: Start, case: Case, tighter: float = 1.0) -> Tolerances:
+def case_tolerances(start: Start, case: Case, tighter: float = 1.0) -> Tolerances:
     """The config's method, with its tolerances multiplied by `tighter`, within the case's budget."""
     solver = start.config.solver
     settings = solver.rigid if isinstance(start, RigidStart) else solver.contact
@@ -148,7 +152,7 @@ def gait_of(walker: Standing, seed: int) -> RigidGait | None:
     return find_gaits(walker, seed).gait
 
 
-def prepared(config: WalksConfig, case: Case) -> Start | None:
+def prepare_start(config: WalksConfig, case: Case) -> Start | None:
     """Prepare the start of a case; None if it, or the pads' pitch, depends on a gait that does not exist."""
     walker = rigid_walker(config)
     if isinstance(config.start, str):
@@ -164,13 +168,13 @@ def prepared(config: WalksConfig, case: Case) -> Start | None:
         return RigidStart(config, state, energy, walker)
     pitch = length
     if config.contact is not None and wants_own_pitch(config.contact):
-        found = contact_gait(config, length, state).gait
-        if found is None:
+        contact = contact_gait(config, length, state).gait
+        if contact is None:
             return None
-        pitch = found.step.length_m
+        pitch = contact.step.length_m
     scene = contact_scene(config, length, pitch)
     y = start_state(scene, state)
-    y = (*y[:HEIGHT], y[HEIGHT] - case.lowered_m, *y[HEIGHT + 1 :])
+    y = (*y[:CENTRE_HEIGHT], y[CENTRE_HEIGHT] - case.lowered_m, *y[CENTRE_HEIGHT + 1 :])
     leg, rates, law = config.walker.leg_length_m, y[len(y) // 2 :], scene.walker.normal
     speed = float(np.max(np.abs([*rates[:2], *(leg * rate for rate in rates[2:])])))
     stored = 2.0 * law.stiffness * max(0.0, case.lowered_m) ** (law.exponent + 1.0) / (law.exponent + 1.0)

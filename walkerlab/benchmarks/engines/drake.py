@@ -24,7 +24,7 @@ INTEGRATORS = {
     "runge_kutta3 adaptive": adapter.Integrator(3, 60_000, adapts=True),
     "discrete": adapter.Integrator(1, 45_000, for_contact_only=True),
 }
-EMBEDDED = ("runge_kutta3",)  # adaptive by default
+EMBEDDED_METHODS = ("runge_kutta3",)  # adaptive by default
 CONTACTS = {"sap": "discrete", "lagged": "discrete", "hunt-crossley": "runge_kutta3 adaptive"}
 APPROXIMATIONS = {"sap": "kSap", "lagged": "kLagged"}
 CANNOT_EXPRESS = (
@@ -70,7 +70,7 @@ class DrakeRun(adapter.Simulation):
         self._discrete = name == "discrete"
         builder = DiagramBuilder()
         self._plant, self._scene_graph = AddMultibodyPlantSceneGraph(builder, self._h if self._discrete else 0.0)
-        joints, self._feet, self._floor = assembled(self._plant, model, own)
+        joints, self._feet, self._floor = add_model(self._plant, model, own)
         if self._discrete:
             self._plant.SetUseSampledOutputPorts(False)  # unused, and each copies the whole state
         if self._discrete and own is not None:
@@ -82,7 +82,7 @@ class DrakeRun(adapter.Simulation):
         self._order = np.array([j.position_start() + i for j in joints for i in range(j.num_positions())])
         self._rates = len(q) + self._order
         if self.forces is not None:
-            apply(builder, self._plant, self.forces, self._order)
+            add_forces(builder, self._plant, self.forces, self._order)
         self._simulator = Simulator(builder.Build())
         self._context = self._simulator.get_mutable_context()
         self._at = self._plant.GetMyMutableContextFromRoot(self._context)
@@ -99,7 +99,7 @@ class DrakeRun(adapter.Simulation):
                 integrator.set_maximum_step_size(self._h)
                 integrator.set_requested_minimum_step_size(1e-12)
                 integrator.request_initial_step_size_target(1e-5)
-            elif name in EMBEDDED:
+            elif name in EMBEDDED_METHODS:
                 integrator.set_fixed_step_mode(True)
         self._simulator.Initialize()
 
@@ -112,13 +112,13 @@ class DrakeRun(adapter.Simulation):
                 if not on_step(count * self._h, *self._state()):
                     return
             return
-        left = [steps]
+        remaining = [steps]
 
         def monitor(root: Any) -> Any:
             if root.get_time() <= 0.0:
                 return EventStatus.DidNothing()
-            left[0] -= 1
-            if not on_step(root.get_time(), *self._state()) or left[0] <= 0:
+            remaining[0] -= 1
+            if not on_step(root.get_time(), *self._state()) or remaining[0] <= 0:
                 return EventStatus.ReachedTermination(None, "the walk is over")
             return EventStatus.DidNothing()
 
@@ -145,7 +145,7 @@ class DrakeRun(adapter.Simulation):
             self._declared[ball] = manager.ApplyTransient(declaration)
 
 
-def assembled(plant: Any, model: PlanarModel, own: adapter.OwnContact | None) -> tuple[list[Any], list[Any], Any]:
+def add_model(plant: Any, model: PlanarModel, own: adapter.OwnContact | None) -> tuple[list[Any], list[Any], Any]:
     """Add bodies, joints and feet; returns joints in coordinate order, the feet's geometries and the floor's."""
     from pydrake.geometry import HalfSpace, Sphere
     from pydrake.math import RigidTransform
@@ -159,7 +159,9 @@ def assembled(plant: Any, model: PlanarModel, own: adapter.OwnContact | None) ->
         inertia, centre = RotationalInertia(*[link.inertia_kg_m2] * 3), np.array((*link.centre_m, 0.0))
         whole = SpatialInertia.MakeFromCentralInertia(link.mass_kg, centre, inertia)
         body = plant.AddRigidBody(link.name, whole)
-        joints += joined(plant, model, link, plant.world_body() if link.parent < 0 else bodies[link.parent], body)
+        joints += join_to_parent(
+            plant, model, link, plant.world_body() if link.parent < 0 else bodies[link.parent], body
+        )
         bodies.append(body)
     if own is None:
         return joints, [], None
@@ -174,25 +176,25 @@ def assembled(plant: Any, model: PlanarModel, own: adapter.OwnContact | None) ->
     return joints, feet, floor
 
 
-def joined(plant: Any, model: PlanarModel, link: Link, parent: Any, body: Any) -> list[Any]:
+def join_to_parent(plant: Any, model: PlanarModel, link: Link, parent: Any, body: Any) -> list[Any]:
     """Hinge a link to its parent, or give the base its freedoms."""
     from pydrake.math import RigidTransform
     from pydrake.multibody.tree import FixedOffsetFrame, PlanarJoint, PrismaticJoint, RevoluteJoint, SpatialInertia
 
-    def frame(on: Any, name: str, at: tuple[float, float]) -> Any:
-        return plant.AddFrame(FixedOffsetFrame(name, on.body_frame(), RigidTransform(np.array((*at, 0.0)))))
+    def frame(on: Any, name: str, point: tuple[float, float]) -> Any:
+        return plant.AddFrame(FixedOffsetFrame(name, on.body_frame(), RigidTransform(np.array((*point, 0.0)))))
 
-    here = frame(body, f"{link.name} hinge", link.point_m)
-    there = frame(parent, f"{link.name} on its parent", link.parent_point_m)
+    child_frame = frame(body, f"{link.name} hinge", link.point_m)
+    parent_frame = frame(parent, f"{link.name} on its parent", link.parent_point_m)
     axis = np.array((0.0, 0.0, 1.0))
     if link.parent >= 0 or model.freedoms == ("turn",):
-        return [plant.AddJoint(RevoluteJoint(link.name, there, here, axis))]
+        return [plant.AddJoint(RevoluteJoint(link.name, parent_frame, child_frame, axis))]
     if model.freedoms == ("along", "height", "turn"):
-        return [plant.AddJoint(PlanarJoint(link.name, there, here))]
+        return [plant.AddJoint(PlanarJoint(link.name, parent_frame, child_frame))]
     carriage = plant.AddRigidBody("carriage", SpatialInertia.Zero())
     x, y = np.array((1.0, 0.0, 0.0)), np.array((0.0, 1.0, 0.0))
-    along = plant.AddJoint(PrismaticJoint("along", there, carriage.body_frame(), x))
-    return [along, plant.AddJoint(PrismaticJoint("height", carriage.body_frame(), here, y))]
+    along = plant.AddJoint(PrismaticJoint("along", parent_frame, carriage.body_frame(), x))
+    return [along, plant.AddJoint(PrismaticJoint("height", carriage.body_frame(), child_frame, y))]
 
 
 def material(own: adapter.OwnContact) -> Any:
@@ -213,7 +215,7 @@ def material(own: adapter.OwnContact) -> Any:
     return properties
 
 
-def apply(builder: Any, plant: Any, forces: adapter.Forces, place: Any) -> None:
+def add_forces(builder: Any, plant: Any, forces: adapter.Forces, place: Any) -> None:
     """Add a system that computes the ground's forces from the plant's state at every evaluation.
 
     place  index of each coordinate in Drake's order

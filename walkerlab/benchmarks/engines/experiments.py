@@ -29,25 +29,25 @@ from walkerlab.solvers.system import Floats, derivative
 SAME_LAW_STEPS = (4e-4, 2e-4, 1e-4, 5e-5, 2.5e-5, 1.25e-5, 6.25e-6, 3.125e-6)  # s
 OWN_LAW_STEPS = (2e-3, 1e-3, 5e-4, 2.5e-4, 1.25e-4, 6.25e-5)  # s
 SWING_STEPS = (8e-3, 4e-3, 2e-3, 1e-3)  # s
-TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8)  # where steps are adapted
-EXACT_ENOUGH = 1e-5  # error on the same law from which on nothing finer is run
-SETTLED = 1e-4  # relative change of the period on an engine's own law, after which nothing finer is run
+ADAPTIVE_TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8)  # where steps are adapted
+ERROR_GOAL = 1e-5  # error on the same law from which on nothing finer is run
+SETTLED_CHANGE = 1e-4  # relative change of the period on an engine's own law, after which nothing finer is run
 LARGEST_STEP_S = 0.01  # where they are
-STARTS = (0.95, 0.99)  # of the gait's velocities
+START_FACTORS = (0.95, 0.99)  # of the gait's velocities
 TUNING_STEP_S = 2e-5
-TOUCHES, OWN_TOUCHES = 2, 10
+COMPARED_TOUCHES, OWN_TOUCHES = 2, 10
 INTO_NEXT_STEP = 0.9  # share of the step after the last touch at which states are compared
 SWING_S = 0.48
 CREEP_LOAD = 0.1  # tangential over normal force, about the mean of a walk
-PATIENCE_S = 120.0  # with a run, before its process is ended
+RUN_TIMEOUT_S = 120.0  # with a run, before its process is ended
 OUR_METHOD = "radau5"
 OUR_LADDER = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
 ADAMS_RTOL = 1e-7  # of the walk that engines' own contact is held against
 REFERENCES = (("radau5", 1e-11), ("dop853", 1e-12))
-ENDLESS = 100_000_000  # right-hand sides
-ENDLESS_S = 1e9
-LONGER = 2  # times as long as the walk under ADAMS's law another may take
-REPEATS = 3
+UNLIMITED_BUDGET = 100_000_000  # right-hand sides
+UNLIMITED_S = 1e9
+STEP_ALLOWANCE = 2  # times as long as the walk under ADAMS's law another may take
+OUR_REPEATS = 3
 
 
 @dataclass(frozen=True)
@@ -66,30 +66,34 @@ class Truth:
     walk: ContactWalkResult
 
 
-def walked(scene: EngineScene, method: str, rtol: float, steps: int, until_s: float | None = None) -> ContactWalkResult:
+def simulate(
+    scene: EngineScene, method: str, rtol: float, steps: int, until_s: float | None = None
+) -> ContactWalkResult:
     """Walk the scene with this project's solver; with `until_s` the state at that time is sampled."""
-    tolerances = Tolerances(method, rtol, 1e-2 * rtol, ENDLESS, track_energy=False)
+    tolerances = Tolerances(method, rtol, 1e-2 * rtol, UNLIMITED_BUDGET, track_energy=False)
     return walk_contact(scene.ours, scene.ground, False, STANCE_FOOT, scene.start, tolerances, steps, until_s)
 
 
-def truth_of(scene: EngineScene) -> Truth | None:
+def make_truth(scene: EngineScene) -> Truth | None:
     """Compute the reference of a scene; None if the walk ends before states can be compared."""
-    walk = walked(scene, *REFERENCES[0], OWN_TOUCHES)
-    if walk.touch_time_s.size <= TOUCHES:
+    walk = simulate(scene, *REFERENCES[0], OWN_TOUCHES)
+    if walk.touch_time_s.size <= COMPARED_TOUCHES:
         return None
-    last, following = walk.touch_time_s[TOUCHES - 1 : TOUCHES + 1]
+    last, following = walk.touch_time_s[COMPARED_TOUCHES - 1 : COMPARED_TOUCHES + 1]
     until = float(last + INTO_NEXT_STEP * (following - last))
-    one, other = (walked(scene, *reference, TOUCHES + 1, until) for reference in REFERENCES)
-    end, other_end = end_of(one), end_of(other)
+    reference, second = (
+        simulate(scene, *method_and_rtol, COMPARED_TOUCHES + 1, until) for method_and_rtol in REFERENCES
+    )
+    end, second_end = sampled_end(reference), sampled_end(second)
     assert end is not None, "the walk goes on beyond that time"
-    assert other_end is not None, "so it does by the other method"
-    return Truth(until, end, one.touch_time_s[:TOUCHES], float(np.max(np.abs(end - other_end))), walk)
+    assert second_end is not None, "so it does by the other method"
+    return Truth(until, end, reference.touch_time_s[:COMPARED_TOUCHES], float(np.max(np.abs(end - second_end))), walk)
 
 
-def end_of(result: ContactWalkResult) -> Floats | None:
+def sampled_end(result: ContactWalkResult) -> Floats | None:
     """State at a walk's second sample, the first being its start; None if not reached."""
-    there = result.samples is not None and len(result.samples.states) > 1
-    return np.asarray(result.samples.states[1]) if result.samples is not None and there else None
+    reached = result.samples is not None and len(result.samples.states) > 1
+    return np.asarray(result.samples.states[1]) if result.samples is not None and reached else None
 
 
 @dataclass(frozen=True)
@@ -131,8 +135,8 @@ class EngineExperiment:
         elif truth is not None:
             if answer.end is not None and np.isfinite(answer.end).all():
                 error = float(np.max(np.abs(answer.end - truth.end)))
-            if touches.size >= TOUCHES:
-                touch_error = float(np.max(np.abs(touches[:TOUCHES] - truth.touches_s)))
+            if touches.size >= COMPARED_TOUCHES:
+                touch_error = float(np.max(np.abs(touches[:COMPARED_TOUCHES] - truth.touches_s)))
         if tolerance is not None or self.experiment == SAME_LAW:
             step_s = answer.time_s / max(1, answer.steps)
         numbers = error, touch_error, answer.wall_s, period_s, length_m, slip_m
@@ -145,23 +149,23 @@ def our_walk(
     """Time our own walk over `touches` steps, or until a time within the next step."""
     walls = []
     for _ in range(repeats):
-        begun = time.process_time()
-        result = walked(scene, OUR_METHOD, rtol, touches + (until_s is not None), until_s)
-        walls.append(time.process_time() - begun)
+        start_s = time.process_time()
+        result = simulate(scene, OUR_METHOD, rtol, touches + (until_s is not None), until_s)
+        walls.append(time.process_time() - start_s)
     times, along, slips = result.touch_time_s[:touches], result.touch_along_m[:touches], result.slip_m[:touches]
     steps, time_s = int(result.work[1]), float(result.end_time_s)
-    return runs.WalkAnswer(result.outcome.label, end_of(result), times, along, slips, steps, time_s, median(walls))
+    return runs.WalkAnswer(result.outcome.label, sampled_end(result), times, along, slips, steps, time_s, median(walls))
 
 
 def our_rows(scene: EngineScene, truth: Truth, version: str) -> Iterator[EngineRow]:
     """Yield our runs over a ladder of tolerances, then walks under ADAMS's law from the starts of own contact."""
     same_law = EngineExperiment(scene, OURS, version, SAME_LAW, truth)
-    our_walk(scene, OUR_LADDER[0], TOUCHES, truth.until_s)
+    our_walk(scene, OUR_LADDER[0], COMPARED_TOUCHES, truth.until_s)
     for rtol in OUR_LADDER:
-        answer = our_walk(scene, rtol, TOUCHES, truth.until_s, REPEATS)
+        answer = our_walk(scene, rtol, COMPARED_TOUCHES, truth.until_s, OUR_REPEATS)
         yield same_law.row(OUR_METHOD, Stepping(OUR_METHOD, 0.0, rtol), answer)
     own_law = EngineExperiment(scene, OURS, version, OWN_LAW)
-    for factor in (1.0, *STARTS):
+    for factor in (1.0, *START_FACTORS):
         answer = our_walk(scene.started(factor), ADAMS_RTOL, OWN_TOUCHES)
         yield own_law.row("impact", Stepping(OUR_METHOD, 0.0, ADAMS_RTOL), answer, factor)
 
@@ -169,11 +173,11 @@ def our_rows(scene: EngineScene, truth: Truth, version: str) -> Iterator[EngineR
 def steppings(name: str, integrator: Integrator, steps_s: Sequence[float]) -> list[Stepping]:
     """An integrator's step sizes, or tolerances where it adapts them, from coarse to fine."""
     if integrator.adapts:
-        return [Stepping(name, LARGEST_STEP_S, tolerance) for tolerance in TOLERANCES]
+        return [Stepping(name, LARGEST_STEP_S, tolerance) for tolerance in ADAPTIVE_TOLERANCES]
     return [Stepping(name, h) for h in steps_s]
 
 
-def target_of(scene: EngineScene) -> EngineContact | None:
+def contact_target(scene: EngineScene) -> EngineContact | None:
     """Linearise the walker's contact under its weight on one foot; None on frictionless ground."""
     from scipy.optimize import brentq
 
@@ -206,10 +210,10 @@ class EngineOnScene:
         most    step budget
         start   velocities over those of the gait
         """
-        law, until_s = (SAME_LAW, self.truth.until_s) if own is None else (OWN_LAW, ENDLESS_S)
+        law, until_s = (SAME_LAW, self.truth.until_s) if own is None else (OWN_LAW, UNLIMITED_S)
         scene = self.scene.started(start)
         task = runs.WalkTask(self.engine.name, stepping, scene, OWN_TOUCHES, until_s, own, most)
-        answer = self.process.do(task.run, PATIENCE_S)
+        answer = self.process.do(task.run, RUN_TIMEOUT_S)
         experiment = EngineExperiment(self.scene, self.engine.name, self.engine.version, law, self.truth)
         return experiment.row(called, stepping, answer, start), answer
 
@@ -224,13 +228,13 @@ class EngineOnScene:
                 row, answer = self.walk(name, stepping, integrator.most_steps)
                 yield row
                 late = isinstance(answer, TaskLost) and answer.timed_out
-                if late or (row.error is not None and row.error < EXACT_ENOUGH):
+                if late or (row.error is not None and row.error < ERROR_GOAL):
                     break
 
     def tuned(self, contact: str, target: EngineContact) -> tuple[OwnContact, list[TuningRow]] | TaskLost:
         """Tune a contact model to the scene's contact and measure how close it comes."""
         name, sliding = self.engine.name, 1.5 * self.scene.ours.friction.sliding_from
-        answer = self.process.do(runs.TuningTask(name, contact, target, TUNING_STEP_S, sliding).run, PATIENCE_S)
+        answer = self.process.do(runs.TuningTask(name, contact, target, TUNING_STEP_S, sliding).run, RUN_TIMEOUT_S)
         if isinstance(answer, TaskLost):
             return answer
         measured = (
@@ -249,13 +253,13 @@ class EngineOnScene:
         """
         name = self.engine.adapter().CONTACTS[contact]
         integrator = self.engine.adapter().INTEGRATORS[name]
-        most = integrator.most_steps if integrator.adapts else LONGER * integrator.most_steps
-        before, done, spent = None, [], 0
+        most = integrator.most_steps if integrator.adapts else STEP_ALLOWANCE * integrator.most_steps
+        before, completed, spent = None, [], 0
         usual_s = float(self.truth.walk.touch_time_s[-1])
         for stepping in steppings(name, integrator, [h for h in OWN_LAW_STEPS if usual_s / h <= integrator.most_steps]):
             row, answer = self.walk(contact, stepping, most, own)
             yield row
-            done.append(stepping)
+            completed.append(stepping)
             steps = answer.steps if not isinstance(answer, TaskLost) else most if answer.timed_out else 0
             spent += steps
             if steps >= most or (integrator.adapts and spent + steps > most):
@@ -263,8 +267,8 @@ class EngineOnScene:
             if before is not None and has_settled(before, row):
                 break
             before = row
-        for stepping in done[-2:][:1]:
-            yield from (self.walk(contact, stepping, most, own, factor)[0] for factor in STARTS)
+        for stepping in completed[-2:][:1]:
+            yield from (self.walk(contact, stepping, most, own, factor)[0] for factor in START_FACTORS)
 
     def swings(self) -> tuple[list[SwingRow], list[TaskLost]]:
         """Simulate the hinged walker's passive swing with each integrator."""
@@ -278,7 +282,7 @@ class EngineOnScene:
             before: float | None = None
             for stepping in steppings(integrator, entry, SWING_STEPS):
                 swing = model, scene.ours.slope, start, SWING_S, entry.most_steps
-                answer = self.process.do(runs.SwingTask(engine.name, stepping, *swing).run, PATIENCE_S)
+                answer = self.process.do(runs.SwingTask(engine.name, stepping, *swing).run, RUN_TIMEOUT_S)
                 if isinstance(answer, TaskLost):
                     lost.append(answer)
                     break
@@ -295,7 +299,7 @@ def has_settled(coarse: EngineRow, fine: EngineRow) -> bool:
     """Whether two completed walks agree in period."""
     if coarse.error is None or fine.error is None or coarse.period_s is None or fine.period_s is None:
         return False
-    return abs(fine.period_s / coarse.period_s - 1.0) <= SETTLED
+    return abs(fine.period_s / coarse.period_s - 1.0) <= SETTLED_CHANGE
 
 
 def swing_truth(scene: EngineScene, start: Floats, until_s: float = SWING_S) -> tuple[Floats, Any]:
@@ -316,8 +320,8 @@ def swing_truth(scene: EngineScene, start: Floats, until_s: float = SWING_S) -> 
         return float(kinetic_energy(whole, y) + potential_energy(whole, y))
 
     y = folded(system.form, start)
-    done = solve_ivp(rate, (0.0, until_s), y, method="DOP853", rtol=1e-13, atol=1e-14)
-    return unfolded(system.form, done.y[:, -1], start.size), energy
+    solution = solve_ivp(rate, (0.0, until_s), y, method="DOP853", rtol=1e-13, atol=1e-14)
+    return unfolded(system.form, solution.y[:, -1], start.size), energy
 
 
 def least_wall(rows: Sequence[EngineRow], error: float) -> float | None:

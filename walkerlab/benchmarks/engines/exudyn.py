@@ -34,7 +34,7 @@ PLANE_M = 1000.0
 NO_ROTATION = np.eye(3)
 SMALLEST_STEP_S = 1e-12
 NO_ITERATION = 1e12
-EXPLICIT = ("ExplicitEuler", "RK44")
+EXPLICIT_METHODS = ("ExplicitEuler", "RK44")
 
 
 def tuned(model: str, target: adapter.EngineContact) -> adapter.OwnContact:
@@ -59,29 +59,29 @@ class ExudynRun(adapter.Simulation):
 
         self._container = exu.SystemContainer()
         self._system = self._container.AddSystem()
-        zero, at, moving = [0.0] * model.size, q.tolist(), v.tolist()
+        zero, position, velocity = [0.0] * model.size, q.tolist(), v.tolist()
         start = NodeGenericODE2(
             referenceCoordinates=zero,
-            initialCoordinates=at,
-            initialCoordinates_t=moving,
+            initialCoordinates=position,
+            initialCoordinates_t=velocity,
             numberOfODE2Coordinates=len(zero),
         )
         node = self._system.AddNode(start)
-        tree, places = assembled(self._system, model, node, self.forces)
-        self._contacts = [] if self.own is None else list(contacts(self._system, model, tree, places, self.own))
+        tree, places = add_tree(self._system, model, node, self.forces)
+        self._contacts = [] if self.own is None else list(add_contacts(self._system, model, tree, places, self.own))
         self._system.Assemble()
 
     def run(self, steps: int, until_s: float, on_step: adapter.OnStep) -> None:
         import exudyn as exu
 
         data = self._system.systemData
-        left = [steps]
+        remaining = [steps]
 
-        def seen(_system: Any, time_s: float) -> bool:
+        def after_step(_system: Any, time_s: float) -> bool:
             if time_s <= 0.0:
                 return True
-            left[0] -= 1
-            return on_step(time_s, data.GetODE2Coordinates(), data.GetODE2Coordinates_t()) and left[0] > 0
+            remaining[0] -= 1
+            return on_step(time_s, data.GetODE2Coordinates(), data.GetODE2Coordinates_t()) and remaining[0] > 0
 
         name, _, adaptive = self.stepping.integrator.partition(" ")
         settings = exu.SimulationSettings()
@@ -90,7 +90,7 @@ class ExudynRun(adapter.Simulation):
         stepping.endTime = min(until_s, steps * h) if not adaptive else until_s
         stepping.numberOfSteps = max(1, math.ceil(stepping.endTime / h - 1e-9))
         stepping.verboseMode = 0
-        stepping.adaptiveStep = name not in EXPLICIT  # explicit methods keep their step
+        stepping.adaptiveStep = name not in EXPLICIT_METHODS  # explicit methods keep their step
         # detect contact at the end of a step, without iterating, as any explicit method does
         stepping.discontinuous.ignoreMaxIterations = True
         stepping.discontinuous.iterationTolerance = NO_ITERATION
@@ -98,7 +98,7 @@ class ExudynRun(adapter.Simulation):
         if adaptive:
             stepping.relativeTolerance = stepping.absoluteTolerance = self.stepping.tolerance
             stepping.minimumStepSize, stepping.initialStepSize = SMALLEST_STEP_S, 1e-5
-        self._system.SetPostStepUserFunction(seen)
+        self._system.SetPostStepUserFunction(after_step)
         self._system.SolveDynamic(settings, solverType=getattr(exu.DynamicSolverType, name))
 
     def carry(self, ball: int, has_ground: bool) -> None:
@@ -106,7 +106,7 @@ class ExudynRun(adapter.Simulation):
             self._system.SetObjectParameter(self._contacts[ball], "activeConnector", has_ground)
 
 
-def assembled(system: Any, model: PlanarModel, node: Any, forces: adapter.Forces | None) -> tuple[Any, list[int]]:
+def add_tree(system: Any, model: PlanarModel, node: Any, forces: adapter.Forces | None) -> tuple[Any, list[int]]:
     """Add the tree; returns its object number and each link's joint index."""
     import exudyn as exu
     from exudyn.itemInterface import ObjectKinematicTree
@@ -148,7 +148,9 @@ def assembled(system: Any, model: PlanarModel, node: Any, forces: adapter.Forces
     return system.AddObject(tree), places
 
 
-def contacts(system: Any, model: PlanarModel, tree: Any, places: list[int], own: adapter.OwnContact) -> Iterator[Any]:
+def add_contacts(
+    system: Any, model: PlanarModel, tree: Any, places: list[int], own: adapter.OwnContact
+) -> Iterator[Any]:
     """Add a ball on a large triangle for each foot; yields the object numbers."""
     import exudyn as exu
     from exudyn import itemInterface

@@ -25,8 +25,8 @@ from walkerlab.solvers.scipy_methods import entry_point
 from walkerlab.solvers.system import Floats
 
 Feet = tuple[FootMotion, FootMotion]
-HALVINGS = 60
-FAR_AWAY = 1e4  # m: where only the feet of a run that has lost its numbers get to
+CROSSING_HALVINGS = 60
+DIVERGED_M = 1e4  # m: where only the feet of a run that has lost its numbers get to
 
 
 @dataclass(frozen=True, order=True)
@@ -102,7 +102,7 @@ class RuleFollower:
     def follow(self, time_s: float, q: Floats, v: Floats) -> bool:
         """Update with the state at a step's end; returns whether the ground under a foot may have changed."""
         before, now = self._feet, self.feet(q, v)
-        if not all(-FAR_AWAY < place < FAR_AWAY for foot in now for place in (foot.along, foot.height)):
+        if not all(-DIVERGED_M < place < DIVERGED_M for foot in now for place in (foot.along, foot.height)):
             self._end(int(Outcome.SOLVER_FAILED))
             return False
         if self._bends:
@@ -145,36 +145,40 @@ class RuleFollower:
             walk_state.sides[foot * contact_events.PER_FOOT + contact_events.HEIGHT] = 1 if above else -1
             old, new = before[foot], now[foot]
             share = crossing(old.height, old.vertical_velocity, new.height, new.vertical_velocity, h)
-            there = within(before[0], now[0], share, h), within(before[1], now[1], share, h)
+            feet_at_event = foot_within_step(before[0], now[0], share, h), foot_within_step(before[1], now[1], share, h)
             y = tuple(self.scene.about_centre(q - (1.0 - share) * h * v, v).tolist())
             if above:
-                contact_transitions.lift(form, terrain, walk_state, there, foot, y)
+                contact_transitions.lift(form, terrain, walk_state, feet_at_event, foot, y)
             else:
-                self._end(contact_transitions.touch(form, terrain, walk_state, there, foot, self.time_s + share * h, y))
-        taken = walk_state.progress.steps == walk_state.touch_time.size
-        if taken and not contact_state.is_to_lift(walk_state):
+                self._end(
+                    contact_transitions.touch(
+                        form, terrain, walk_state, feet_at_event, foot, self.time_s + share * h, y
+                    )
+                )
+        completed = walk_state.progress.steps == walk_state.touch_time.size
+        if completed and not contact_state.is_to_lift(walk_state):
             self._end(int(Outcome.WALKED))
 
     def _turning(self, h: float, now: Feet, bends: list[tuple[float, float]]) -> Turn | None:
         """First lock or release of a knee within a step of h (s), or None."""
-        walk_state, found = self.walk_state, []
+        walk_state, turns = self.walk_state, []
         stance = walk_state.progress.stance
         pushing_s = pulse_left(self._fixed[0], self.time_s)
         if walk_state.progress.release == contact_state.AT_PULSE_END:
             if pushing_s <= h:
-                found.append(Turn(pushing_s / h, contact_events.PULSE_END))
+                turns.append(Turn(pushing_s / h, contact_events.PULSE_END))
         elif walk_state.progress.release and now[stance].vertical_velocity >= 0.0 and pushing_s > h:
             walk_state.progress.release = contact_state.AT_PULSE_END
         elif walk_state.progress.release and now[stance].vertical_velocity >= 0.0:
             sinking = max(0.0, -self._feet[stance].vertical_velocity)
             share = sinking / (sinking + now[stance].vertical_velocity) if sinking > 0.0 else 0.0
-            found.append(Turn(share, int(stance) * contact_events.PER_FOOT + contact_events.VERTICAL_VELOCITY))
+            turns.append(Turn(share, int(stance) * contact_events.PER_FOOT + contact_events.VERTICAL_VELOCITY))
         for knee, (old, bend) in enumerate(zip(self._bends, bends, strict=True)):
             if walk_state.knee[knee] == RELEASED and bend[0] < -FLEXED:
                 walk_state.knee[knee] = BENT
             elif walk_state.knee[knee] == BENT and bend[0] >= 0.0:
-                found.append(Turn(crossing(*old, *bend, h), contact_events.EXTENSION + knee))
-        return min(found, default=None)
+                turns.append(Turn(crossing(*old, *bend, h), contact_events.EXTENSION + knee))
+        return min(turns, default=None)
 
     @property
     def is_outdated(self) -> bool:
@@ -227,7 +231,7 @@ class RuleFollower:
 def crossing(x0: float, v0: float, x1: float, v1: float, h: float) -> float:
     """Share of a step of h (s) at which the cubic through values and rates at its ends crosses zero."""
     low, high = 0.0, 1.0
-    for _ in range(HALVINGS):
+    for _ in range(CROSSING_HALVINGS):
         middle = 0.5 * (low + high)
         if (cubic(x0, v0, x1, v1, h, middle) >= 0.0) == (x0 >= 0.0):
             low = middle
@@ -236,7 +240,7 @@ def crossing(x0: float, v0: float, x1: float, v1: float, h: float) -> float:
     return high
 
 
-def within(old: FootMotion, new: FootMotion, share: float, h: float) -> FootMotion:
+def foot_within_step(old: FootMotion, new: FootMotion, share: float, h: float) -> FootMotion:
     """Foot at a share of a step: height by the cubic, all other values interpolated linearly."""
     straight = FootMotion(*(a + share * (b - a) for a, b in zip(old, new, strict=True)))
     height = cubic(old.height, old.vertical_velocity, new.height, new.vertical_velocity, h, share)

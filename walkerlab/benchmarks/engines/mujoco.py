@@ -24,10 +24,10 @@ CANNOT_EXPRESS = (
     "point feet: a ball of half a millimetre replaces each",
     "a knee that locks rigidly at an instant: equality constraints are soft, so the walk continues in another model",
 )
-LEAST_INERTIA = 2e-15  # kg m^2, twice MuJoCo's minimum
+MIN_INERTIA = 2e-15  # kg m^2, twice MuJoCo's minimum
 IMPEDANCE = 0.1  # small, for a contact close to an ordinary spring and damper
-AXES = {"along": ("slide", "1 0 0"), "height": ("slide", "0 0 1"), "turn": ("hinge", "0 -1 0")}
-MODES = {"Euler": "mjINT_EULER", "RK4": "mjINT_RK4"}
+JOINT_AXES = {"along": ("slide", "1 0 0"), "height": ("slide", "0 0 1"), "turn": ("hinge", "0 -1 0")}
+INTEGRATOR_CODES = {"Euler": "mjINT_EULER", "RK4": "mjINT_RK4"}
 
 
 def tuned(model: str, target: adapter.EngineContact) -> adapter.OwnContact:
@@ -53,12 +53,12 @@ class MujocoRun(adapter.Simulation):
 
         mujoco.set_mjcb_passive(None)  # it is global; remove the last run's
         self._advance = mujoco.mj_step
-        self._model = mujoco.MjModel.from_xml_string(described(model, self.own))
+        self._model = mujoco.MjModel.from_xml_string(model_xml(model, self.own))
         self._model.opt.timestep = self.stepping.step_s
-        self._model.opt.integrator = getattr(mujoco.mjtIntegrator, MODES[self.stepping.integrator])
+        self._model.opt.integrator = getattr(mujoco.mjtIntegrator, INTEGRATOR_CODES[self.stepping.integrator])
         self._data = mujoco.MjData(self._model)
         self._data.qpos[:], self._data.qvel[:] = q, v
-        mujoco.set_mjcb_passive(None if self.forces is None else applied(self.forces, self._data))
+        mujoco.set_mjcb_passive(None if self.forces is None else force_callback(self.forces, self._data))
 
     def run(self, steps: int, until_s: float, on_step: adapter.OnStep) -> None:
         model, data, advance = self._model, self._data, self._advance
@@ -73,7 +73,7 @@ class MujocoRun(adapter.Simulation):
             self._model.geom_contype[self._model.geom(f"foot {ball}").id] = int(has_ground)
 
 
-def applied(forces: adapter.Forces, data: Any) -> Any:
+def force_callback(forces: adapter.Forces, data: Any) -> Any:
     """Callback for passive forces; MuJoCo calls it in every stage of every integrator."""
     q, v, passive_forces = data.qpos, data.qvel, data.qfrc_passive
 
@@ -83,7 +83,7 @@ def applied(forces: adapter.Forces, data: Any) -> Any:
     return passive
 
 
-def described(model: PlanarModel, own: adapter.OwnContact | None) -> str:
+def model_xml(model: PlanarModel, own: adapter.OwnContact | None) -> str:
     """Write the model as MJCF."""
     ratio, world = "", body(model, 0, own)
     if own is not None:
@@ -102,13 +102,15 @@ def body(model: PlanarModel, place: int, own: adapter.OwnContact | None) -> str:
     link = model.links[place]
     (px, pz), (x, z), (cx, cz) = link.parent_point_m, link.point_m, link.centre_m
     inside = ""
-    for kind, axis in (AXES[freedom] for freedom in (model.freedoms if link.parent < 0 else ("turn",))):
+    for kind, axis in (JOINT_AXES[freedom] for freedom in (model.freedoms if link.parent < 0 else ("turn",))):
         inside += f'<joint type="{kind}" axis="{axis}" pos="{x!r} 0 {z!r}"/>'
-    i = max(link.inertia_kg_m2, LEAST_INERTIA)
+    i = max(link.inertia_kg_m2, MIN_INERTIA)
     inside += f'<inertial pos="{cx!r} 0 {cz!r}" mass="{link.mass_kg!r}" diaginertia="{i!r} {i!r} {i!r}"/>'
     feet = [] if own is None else [(n, ball) for n, ball in enumerate(model.balls) if ball.link == place]
     inside += "".join(foot(number, ball, own.settings) for number, ball in feet if own is not None)
-    inside += "".join(body(model, child, own) for child, other in enumerate(model.links) if other.parent == place)
+    inside += "".join(
+        body(model, child, own) for child, candidate in enumerate(model.links) if candidate.parent == place
+    )
     return f'<body name="{link.name}" pos="{px - x!r} 0 {pz - z!r}">{inside}</body>'
 
 

@@ -69,7 +69,7 @@ class PlanarModel:
         return len(self.freedoms) + len(self.links) - 1
 
 
-def moved(point: Position, shift: Position) -> Position:
+def translate(point: Position, shift: Position) -> Position:
     return (point[0] + shift[0], point[1] + shift[1])
 
 
@@ -86,36 +86,36 @@ def planar_model(
     welds    locked knees, whose shank and thigh form one link
     """
     root = base.body
-    one = [{knee.thigh, knee.shank} for knee in welds]
+    welded = [{knee.thigh, knee.shank} for knee in welds]
     # of each link: its bodies, and where their frames' origins are in its own; and how it hangs from its parent
     members: list[list[tuple[str, Position]]] = [[(root, (0.0, 0.0))]]
     hinges: list[tuple[int, Position, Position]] = [(-1, (0.0, 0.0), base.at_m)]
-    placed: dict[str, tuple[int, Position]] = {root: (0, (0.0, 0.0))}
+    frames: dict[str, tuple[int, Position]] = {root: (0, (0.0, 0.0))}
     rows = {root: np.eye(1, len(assembly.bodies))[0]}
 
     def grow(name: str) -> None:
-        link, shift = placed[name]
-        for other, leaving, entering in neighbours(assembly, name):
-            if other in rows:
+        link, shift = frames[name]
+        for neighbour, leaving, entering in neighbours(assembly, name):
+            if neighbour in rows:
                 continue
-            hinge, rows[other] = moved(leaving, shift), rows[name].copy()
-            if {name, other} in one:
-                placed[other] = link, (hinge[0] - entering[0], hinge[1] - entering[1])
-                members[link].append((other, placed[other][1]))
+            hinge, rows[neighbour] = translate(leaving, shift), rows[name].copy()
+            if {name, neighbour} in welded:
+                frames[neighbour] = link, (hinge[0] - entering[0], hinge[1] - entering[1])
+                members[link].append((neighbour, frames[neighbour][1]))
             else:
-                placed[other] = len(members), (0.0, 0.0)
-                rows[other][len(members)] = 1.0
-                members.append([(other, (0.0, 0.0))])
+                frames[neighbour] = len(members), (0.0, 0.0)
+                rows[neighbour][len(members)] = 1.0
+                members.append([(neighbour, (0.0, 0.0))])
                 hinges.append((link, hinge, entering))
-            grow(other)
+            grow(neighbour)
 
     grow(root)
     chain = np.ascontiguousarray(np.array([rows[body.name] for body in assembly.bodies])[:, : len(members)])
-    links = tuple(lumped(assembly, *link) for link in zip(members, hinges, strict=True))
+    links = tuple(lump_bodies(assembly, *link) for link in zip(members, hinges, strict=True))
     balls = []
     for foot in assembly.feet:
-        link, shift = placed[foot.body]
-        balls.append(Ball(link, moved(foot.centre_m, shift), *ball_and_ground(foot.radius_m)))
+        link, shift = frames[foot.body]
+        balls.append(Ball(link, translate(foot.centre_m, shift), *ball_and_ground(foot.radius_m)))
     return PlanarModel(links, freedoms, tuple(balls), *gravity, chain)
 
 
@@ -125,16 +125,18 @@ def ball_and_ground(radius_m: float) -> tuple[float, float]:
     return ball, radius_m - ball
 
 
-def lumped(assembly: Assembly, members: Sequence[tuple[str, Position]], hinge: tuple[int, Position, Position]) -> Link:
+def lump_bodies(
+    assembly: Assembly, members: Sequence[tuple[str, Position]], hinge: tuple[int, Position, Position]
+) -> Link:
     """Combine bodies that move together, and the particles on them, into a link."""
     parent, parent_point, point = hinge
-    every = [
-        (mass, moved(at.at_m, shift))
+    particles = [
+        (mass, translate(at.at_m, shift))
         for name, shift in members
         for mass, at in masses(assembly)
         if at.body == name and mass > 0.0
     ]
-    weights, places = np.array([mass for mass, _ in every]), np.array([at for _, at in every])
+    weights, places = np.array([mass for mass, _ in particles]), np.array([at for _, at in particles])
     total = float(weights.sum())
     centre = weights @ places / total
     inertia = sum(assembly.bodies[assembly.index(name)].inertia_kg_m2 for name, _ in members)

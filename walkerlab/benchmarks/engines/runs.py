@@ -18,9 +18,9 @@ from walkerlab.mechanics.assembly import Anchor
 from walkerlab.outcome import Outcome
 from walkerlab.solvers.system import Floats
 
-ROUNDING = 1e-9
-MANY = 10_000_000  # steps
-STEADY = 5  # so many times longer steps serve where only a steady end counts
+TIME_ROUNDING = 1e-9
+UNLIMITED_STEPS = 10_000_000  # steps
+STEADY_STEP_FACTOR = 5  # so many times longer steps serve where only a steady end counts
 
 
 @dataclass(frozen=True)
@@ -70,8 +70,8 @@ class WalkTask:
         if outcome is None:
             outcome = Outcome.WALKED if walk.is_over else Outcome.BUDGET_EXHAUSTED
         end = rules.scene.about_centre(walk.q, walk.v) if outcome is Outcome.WALKED else None
-        done, lifted = int(walk_state.progress.steps), steps_with_lift(walk_state)
-        touches = walk_state.touch_time[:done].copy(), walk_state.touch_along[:done].copy()
+        steps, lifted = int(walk_state.progress.steps), steps_with_lift(walk_state)
+        touches = walk_state.touch_time[:steps].copy(), walk_state.touch_along[:steps].copy()
         slips = walk_state.slip[:lifted].copy()
         return WalkAnswer(outcome.label, end, *touches, slips, walk.steps, walk.time_s, walk.wall_s)
 
@@ -88,7 +88,7 @@ class EngineWalk:
     @property
     def is_over(self) -> bool:
         """Whether the end time is reached."""
-        return self.time_s >= (1.0 - ROUNDING) * self.task.until_s
+        return self.time_s >= (1.0 - TIME_ROUNDING) * self.task.until_s
 
     def go(self) -> None:
         """Walk to the end; a step in which a knee locks or is released is repeated up to that instant."""
@@ -98,7 +98,7 @@ class EngineWalk:
             if rules.turn is not None:
                 rules.watches = False
                 wait_s = rules.turn.share * (self.seen_s - self.time_s)
-                if wait_s > ROUNDING * self.task.stepping.step_s:
+                if wait_s > TIME_ROUNDING * self.task.stepping.step_s:
                     self._simulate(self.time_s + wait_s)
                 rules.watches = True
             if rules.turn is not None or rules.is_outdated:
@@ -109,11 +109,11 @@ class EngineWalk:
         task, rules, span = self.task, self.rules, until_s - self.time_s
         stepping = task.stepping
         if not self.engine.adapter().INTEGRATORS[stepping.integrator].adapts:
-            stepping = replace(stepping, step_s=span / math.ceil((1.0 - ROUNDING) * span / stepping.step_s))
-        since = self.time_s
+            stepping = replace(stepping, step_s=span / math.ceil((1.0 - TIME_ROUNDING) * span / stepping.step_s))
+        offset_s = self.time_s
 
         def forces(time_s: float, q: Floats, v: Floats) -> Floats:
-            return rules.forces(since + time_s, q, v)
+            return rules.forces(offset_s + time_s, q, v)
 
         driven = task.scene.ours.driven or task.scene.ours.whole.sprung
         outside = forces if task.own is None or driven else None
@@ -124,7 +124,7 @@ class EngineWalk:
                 engine.carry(foot, bool(rules.walk_state.has_ground[foot]))
 
         def on_step(time_s: float, q: Floats, v: Floats) -> bool:
-            self.seen_s = since + time_s
+            self.seen_s = offset_s + time_s
             changed = rules.follow(self.seen_s, q, v)
             if rules.turn is not None and rules.watches:
                 return False
@@ -135,9 +135,9 @@ class EngineWalk:
             return rules.outcome is None and not (changed and rules.is_outdated)
 
         hand_over_ground()
-        begun = time.process_time()
+        start_s = time.process_time()
         engine.run(task.most - self.steps, span, on_step)
-        self.wall_s += time.process_time() - begun
+        self.wall_s += time.process_time() - start_s
 
 
 @dataclass(frozen=True)
@@ -163,9 +163,9 @@ class SwingTask:
         absolute = np.column_stack((self.start[: len(chain)] + self.slope, self.start[len(chain) :]))
         q, v = np.linalg.lstsq(chain, absolute, rcond=None)[0].T
         engine = ENGINES[self.engine].simulation(self.model, self.stepping, q, v)
-        begun = time.process_time()
-        motion = recorded(engine, self.most, self.until_s)
-        wall = time.process_time() - begun
+        start_s = time.process_time()
+        motion = record_motion(engine, self.most, self.until_s)
+        wall = time.process_time() - start_s
         end = np.concatenate((chain @ motion.q[-1] - self.slope, chain @ motion.v[-1]))
         return SwingAnswer(end, wall)
 
@@ -178,16 +178,16 @@ class EngineMotion(NamedTuple):
     v: Floats
 
 
-def recorded(engine: Simulation, steps: int, until_s: float) -> EngineMotion:
+def record_motion(engine: Simulation, steps: int, until_s: float) -> EngineMotion:
     """Simulate, recording the state at the end of each step."""
-    seen: list[tuple[float, Floats, Floats]] = []
+    records: list[tuple[float, Floats, Floats]] = []
 
     def on_step(time_s: float, q: Floats, v: Floats) -> bool:
-        seen.append((time_s, q.copy(), v.copy()))
+        records.append((time_s, q.copy(), v.copy()))
         return True
 
     engine.run(steps, until_s, on_step)
-    return EngineMotion(*(np.array(column) for column in zip(*seen, strict=True)))
+    return EngineMotion(*(np.array(column) for column in zip(*records, strict=True)))
 
 
 def pinned_model(scene: EngineScene) -> planar.PlanarModel:
@@ -248,16 +248,16 @@ class Bench:
         ball = planar.Ball(0, (0.0, 0.0), *planar.ball_and_ground(0.0))
         model = planar.PlanarModel((link,), planar.UPRIGHT, (ball,), along * target.gravity, target.gravity, np.eye(1))
         name = adapter.CONTACTS[self.own.model]
-        stepping = Stepping(name, h, ROUNDING if adapter.INTEGRATORS[name].adapts else None)
+        stepping = Stepping(name, h, TIME_ROUNDING if adapter.INTEGRATORS[name].adapts else None)
         engine = ENGINES[self.task.engine].simulation(
             model, stepping, np.array((0.0, -depth)), np.array(velocity), own=self.own
         )
         engine.carry(0, True)
-        return recorded(engine, MANY, max(2, round(time_s / h)) * h)
+        return record_motion(engine, UNLIMITED_STEPS, max(2, round(time_s / h)) * h)
 
     def at_rest(self) -> float:
         """Penetration (m) at rest of a ball dropped from the surface."""
-        return -float(self.after(self.settling_s, STEADY * self.task.step_s, 0.0, 0.0, (0.0, 0.0)).q[-1, 1])
+        return -float(self.after(self.settling_s, STEADY_STEP_FACTOR * self.task.step_s, 0.0, 0.0, (0.0, 0.0)).q[-1, 1])
 
     def damping_ratio(self, depth: float) -> float:
         """Damping ratio of the oscillator fitted to the ball's accelerations about rest."""
@@ -281,5 +281,5 @@ class Bench:
 
     def creep(self, depth: float) -> float:
         """Creep velocity (m/s) of a block standing on an incline."""
-        target, h = self.target, STEADY * self.task.step_s
+        target, h = self.target, STEADY_STEP_FACTOR * self.task.step_s
         return float(self.after(self.settling_s, h, target.creep_load, depth, (target.creep_velocity, 0.0)).v[-1, 0])

@@ -73,17 +73,17 @@ class EngineScene:
     @cached_property
     def centre_levers(self) -> Floats:
         """Levers (n, 2) in m from the base to the centre of mass."""
-        every = [mass * levers(self.assembly, self.base, at) for mass, at in masses(self.assembly)]
-        return np.asarray(sum(every) / total_mass(self.assembly))
+        weighted = [mass * levers(self.assembly, self.base, at) for mass, at in masses(self.assembly)]
+        return np.asarray(sum(weighted) / total_mass(self.assembly))
 
     def from_base(self, y: State) -> tuple[Floats, Floats]:
         """Engine's coordinates and velocities from the state of the free walker."""
         n = len(self.model.chain)
         angles, rates = np.array(y[2 : 2 + n]) + self.ours.slope, np.array(y[4 + n :])
         shift, drift = self._centre(angles, rates)
-        at, moving = np.array(y[:2]) - shift, np.array(y[2 + n : 4 + n]) - drift
-        relative, turning = np.linalg.lstsq(self.model.chain, np.column_stack((angles, rates)), rcond=None)[0].T
-        return np.concatenate((at, relative)), np.concatenate((moving, turning))
+        position, velocity = np.array(y[:2]) - shift, np.array(y[2 + n : 4 + n]) - drift
+        relative, relative_rates = np.linalg.lstsq(self.model.chain, np.column_stack((angles, rates)), rcond=None)[0].T
+        return np.concatenate((position, relative)), np.concatenate((velocity, relative_rates))
 
     def about_centre(self, q: Floats, v: Floats) -> Floats:
         """State of the free walker from an engine's coordinates and velocities."""

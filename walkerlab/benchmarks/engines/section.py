@@ -12,7 +12,7 @@ from walkerlab.report.results import Results, of_stage
 from walkerlab.report.tables import Column, Table, grouped, measured, table
 from walkerlab.report.words import words
 
-ABOUT = {SAME_LAW: "same law", OWN_LAW: "own contact"}
+EXPERIMENT_TITLES = {SAME_LAW: "same law", OWN_LAW: "own contact"}
 Row = Mapping[str, Any]
 
 
@@ -20,9 +20,9 @@ Row = Mapping[str, Any]
 def section(_results: Results, summary: Row) -> Section | None:
     """Build the conclusions and a table for each experiment; None if the stage did not run."""
     concluded = [
-        Statement(f"{scene}, {ABOUT[experiment]}", text)
-        for scene, told in summary["conclusions"].items()
-        for experiment, text in told.items()
+        Statement(f"{scene}, {EXPERIMENT_TITLES[experiment]}", text)
+        for scene, items in summary["conclusions"].items()
+        for experiment, text in items.items()
         if text
     ]
     laws = grouped(summary["rows"], "experiment")
@@ -34,7 +34,7 @@ def section(_results: Results, summary: Row) -> Section | None:
         if "rigid_period_s" in reference:
             gait = {"period_s": reference["rigid_period_s"], "step_length_m": reference["rigid_step_length_m"]}
             own_law[scene].insert(0, {"engine": "rigid", "integrator": "gait", "start": 1.0, "slip_m": 0.0, **gait})
-    limits = [[name, "; ".join(told) + "."] for name, told in summary["cannot_express"].items()]
+    limits = [[name, "; ".join(items) + "."] for name, items in summary["cannot_express"].items()]
     blocks = (
         Paragraph(words("engines.introduction", summary["versions"])),
         Statements(tuple(concluded)),
@@ -51,27 +51,27 @@ def engine_and_integrator(row: Row) -> str:
     return f"{row['engine']} {row['integrator']}"
 
 
-RUN = partial(measured, labels=engines.EngineRow)
+RUN_COLUMN = partial(measured, labels=engines.EngineRow)
 SAME_LAW_COLUMNS = (
     Column("integrator", engine_and_integrator),
-    RUN("step", "step_s", partial(number, digits=3), prefix="µ"),
-    RUN("tolerance", "tolerance", lambda value: NONE if value is None else power_of_ten(value, 1)),
-    RUN("error", "error", partial(number, digits=2)),
-    RUN("of touch times", "touch_error_s", partial(number, digits=2)),
-    RUN("run time", "wall_s", partial(number, digits=3), prefix="m"),
+    RUN_COLUMN("step", "step_s", partial(number, digits=3), prefix="µ"),
+    RUN_COLUMN("tolerance", "tolerance", lambda value: NONE if value is None else power_of_ten(value, 1)),
+    RUN_COLUMN("error", "error", partial(number, digits=2)),
+    RUN_COLUMN("of touch times", "touch_error_s", partial(number, digits=2)),
+    RUN_COLUMN("run time", "wall_s", partial(number, digits=3), prefix="m"),
     Column("outcome", "outcome"),
 )
 
 
 OWN_LAW_COLUMNS = (
     Column("contact", engine_and_integrator),
-    RUN("start", "start", partial(number, digits=3)),
-    RUN("step", "step_s", partial(number, digits=3), prefix="µ"),
-    RUN("period", "period_s", partial(fixed, decimals=5)),
-    RUN("length", "step_length_m", partial(fixed, decimals=4)),
-    RUN("slip", "slip_m", partial(fixed, decimals=2), prefix="m"),
-    RUN("steps", "steps", number),
-    RUN("run time", "wall_s", partial(number, digits=2)),
+    RUN_COLUMN("start", "start", partial(number, digits=3)),
+    RUN_COLUMN("step", "step_s", partial(number, digits=3), prefix="µ"),
+    RUN_COLUMN("period", "period_s", partial(fixed, decimals=5)),
+    RUN_COLUMN("length", "step_length_m", partial(fixed, decimals=4)),
+    RUN_COLUMN("slip", "slip_m", partial(fixed, decimals=2), prefix="m"),
+    RUN_COLUMN("steps", "steps", number),
+    RUN_COLUMN("run time", "wall_s", partial(number, digits=2)),
     Column("outcome", "outcome"),
 )
 
@@ -85,13 +85,13 @@ TUNING_COLUMNS = (
 )
 
 
-SWING = partial(measured, labels=engines.SwingRow)
+SWING_COLUMN = partial(measured, labels=engines.SwingRow)
 SWING_COLUMNS = (
     Column("integrator", lambda swing: f"{engine_and_integrator(swing)}, {swing['scene']}"),
-    SWING("order promised", "promised_order", str),
+    SWING_COLUMN("order promised", "promised_order", str),
     Column("orders observed", "orders"),
-    SWING("smallest error", "error", partial(number, digits=2)),
-    SWING("energy drift there", "energy_drift_j", partial(number, digits=2)),
+    SWING_COLUMN("smallest error", "error", partial(number, digits=2)),
+    SWING_COLUMN("energy drift there", "energy_drift_j", partial(number, digits=2)),
 )
 
 

@@ -26,7 +26,7 @@ from walkerlab.stages.walk import rigid_start
 from walkerlab.store.columns import rows_group
 from walkerlab.store.content import Content
 
-LEVELS = (1e-3, 1e-5)
+RATIO_LEVELS = (1e-3, 1e-5)
 THREE_DIGITS = 5e-4  # relative
 
 
@@ -40,49 +40,49 @@ class EngineFindings:
     truths: dict[str, experiments.Truth] = field(default_factory=dict)
     left_out: list[dict[str, str]] = field(default_factory=list)
 
-    def add(self, other: EngineFindings) -> None:
+    def add(self, findings: EngineFindings) -> None:
         for name in ("rows", "swings", "tuning", "left_out"):
-            getattr(self, name).extend(getattr(other, name))
+            getattr(self, name).extend(getattr(findings, name))
 
 
 def run(config: SceneConfig, inputs: Mapping[str, Content], progress: Progress, jobs: int = 1) -> Content:
     """Measure every installed engine on every scene, `jobs` at a time; raises NoAnswer if none is installed."""
     engines = installed()
-    found = EngineFindings(left_out=[*not_installed(), *hinge_left_out(config, "engines")])
+    findings = EngineFindings(left_out=[*missing_engines(), *hinge_left_out(config, "engines")])
     if not engines:
         raise NoAnswer("engines: no engine is installed", f"Install them: {EXTRA}")
     rigid = inputs["fixedpoint"].summary if "fixedpoint" in inputs else None
     for scene in scenes(config, *rigid_start(config, inputs)):
-        truth = experiments.truth_of(scene)
+        truth = experiments.make_truth(scene)
         if truth is None:
             why = "the walk under ADAMS's law ends too early to be compared"
-            found.left_out.append({"what": f"engines on the scene {scene.name}", "why": why})
+            findings.left_out.append({"what": f"engines on the scene {scene.name}", "why": why})
             continue
-        found.truths[scene.name] = truth
+        findings.truths[scene.name] = truth
         progress.start(f"engines: {scene.name}", len(engines) + 1)
-        found.rows += experiments.our_rows(scene, truth, __version__)
+        findings.rows += experiments.our_rows(scene, truth, __version__)
         progress.advance()
-        each = [EngineOnScene(engine, scene, truth, OwnProcess()) for engine in engines]
-        for measured in side_by_side(each, jobs):
-            found.add(measured)
+        pairs = [EngineOnScene(engine, scene, truth, OwnProcess()) for engine in engines]
+        for measured in measure_all(pairs, jobs):
+            findings.add(measured)
             progress.advance()
-    if not found.truths:
+    if not findings.truths:
         raise NoAnswer("engines: no scene walks under ADAMS's law", "Start closer to a gait (start: fixed-point).")
-    return content(found, rigid)
+    return make_content(findings, rigid)
 
 
-def side_by_side(each: Sequence[EngineOnScene], jobs: int) -> Iterator[EngineFindings]:
+def measure_all(pairs: Sequence[EngineOnScene], jobs: int) -> Iterator[EngineFindings]:
     """Yield each engine's results, `jobs` engines at a time; an interruption kills the running engines."""
     with ThreadPoolExecutor(max(1, jobs)) as pool:
         try:
-            yield from pool.map(measure, each)
+            yield from pool.map(measure, pairs)
         except BaseException:
-            for one in each:
-                one.process.abandon()
+            for pair in pairs:
+                pair.process.abandon()
             raise
 
 
-def not_installed() -> list[dict[str, str]]:
+def missing_engines() -> list[dict[str, str]]:
     """List missing engines, with the command that installs each."""
     return [
         {"what": f"engine {engine.name}", "why": f"not installed: {engine.install_line}"}
@@ -91,41 +91,41 @@ def not_installed() -> list[dict[str, str]]:
     ]
 
 
-def measure(one: EngineOnScene) -> EngineFindings:
-    found, name = EngineFindings(), one.engine.name
-    target = experiments.target_of(one.scene)
-    with one.process:
-        found.swings, lost = one.swings()
-        found.left_out += [{"what": f"a swing in {name}", "why": other.why} for other in lost]
-        found.rows += one.same_law()
+def measure(pair: EngineOnScene) -> EngineFindings:
+    findings, name = EngineFindings(), pair.engine.name
+    target = experiments.contact_target(pair.scene)
+    with pair.process:
+        findings.swings, lost = pair.swings()
+        findings.left_out += [{"what": f"a swing in {name}", "why": failure.why} for failure in lost]
+        findings.rows += pair.same_law()
         if target is None:
-            found.left_out.append({"what": f"own contact of {name}", "why": "the ground has no friction"})
-            return found
-        for contact in one.engine.adapter().CONTACTS:
-            tuned = one.tuned(contact, target)
+            findings.left_out.append({"what": f"own contact of {name}", "why": "the ground has no friction"})
+            return findings
+        for contact in pair.engine.adapter().CONTACTS:
+            tuned = pair.tuned(contact, target)
             if isinstance(tuned, TaskLost):
-                found.left_out.append({"what": f"contact {contact} of {name}", "why": tuned.why})
+                findings.left_out.append({"what": f"contact {contact} of {name}", "why": tuned.why})
                 continue
             own, rows = tuned
-            found.tuning += rows
-            found.rows += one.own_law(contact, own)
-    return found
+            findings.tuning += rows
+            findings.rows += pair.own_law(contact, own)
+    return findings
 
 
-def content(found: EngineFindings, rigid: Mapping[str, Any] | None) -> Content:
+def make_content(findings: EngineFindings, rigid: Mapping[str, Any] | None) -> Content:
     """Build groups and summary.
 
     rigid  summary of `fixedpoint`, if the start or the pads depend on it
     """
-    rows, truths = found.rows, found.truths
-    stored = (("rows", EngineRow, rows), ("swings", SwingRow, found.swings), ("tuning", TuningRow, found.tuning))
+    rows, truths = findings.rows, findings.truths
+    stored = (("rows", EngineRow, rows), ("swings", SwingRow, findings.swings), ("tuning", TuningRow, findings.tuning))
     groups = {name: rows_group(table, labels_of(kind)) for name, kind, table in stored if table}
     engines = [engine for engine in installed() if any(row.engine == engine.name for row in rows)]
     of_rigid = {f"rigid_{key}": rigid[key] for key in ("period_s", "step_length_m")} if rigid is not None else {}
     summary = {
         "rows": [asdict(row) for row in rows],
-        "swings": [asdict(row) for row in found.swings],
-        "tuning": [{**asdict(row), "residual": row.residual} for row in found.tuning],
+        "swings": [asdict(row) for row in findings.swings],
+        "tuning": [{**asdict(row), "residual": row.residual} for row in findings.tuning],
         "reference": {
             name: {
                 "until_s": truth.until_s,
@@ -144,18 +144,19 @@ def content(found: EngineFindings, rigid: Mapping[str, Any] | None) -> Content:
         "three_digits_step_s": {name: three_digits(rows, name, truth) for name, truth in truths.items()},
         "convergence": {name: convergence(rows, name) for name in truths},
         "integrators": {
-            engine.name: {name: asdict(one) for name, one in engine.adapter().INTEGRATORS.items()} for engine in engines
+            engine.name: {name: asdict(integrator) for name, integrator in engine.adapter().INTEGRATORS.items()}
+            for engine in engines
         },
         "contacts": {engine.name: dict(engine.adapter().CONTACTS) for engine in engines},
         "ratios": {name: ratios(rows, name) for name in truths},
         "conclusions": {name: conclusions(rows, name, truth) for name, truth in truths.items()},
         "environment": environment(),
-        "left_out": found.left_out,
+        "left_out": findings.left_out,
     }
     return Content(groups, summary, timed=("ratios", "conclusions", "environment"))
 
 
-def series_of(rows: Sequence[EngineRow], scene: str, experiment: str) -> dict[str, list[EngineRow]]:
+def series_by_name(rows: Sequence[EngineRow], scene: str, experiment: str) -> dict[str, list[EngineRow]]:
     """Rows of an experiment started on the gait, by engine and integrator (or contact), from coarse to fine."""
     series: dict[str, list[EngineRow]] = {}
     for row in rows:
@@ -166,23 +167,23 @@ def series_of(rows: Sequence[EngineRow], scene: str, experiment: str) -> dict[st
 
 def ratios(rows: Sequence[EngineRow], scene: str) -> dict[str, dict[str, float]]:
     """Run time of each engine over ours on the same law, for each error level that both reach."""
-    ours = [row for row in rows if row.scene == scene and row.experiment == SAME_LAW and row.engine == OURS]
+    our_rows = [row for row in rows if row.scene == scene and row.experiment == SAME_LAW and row.engine == OURS]
     by_engine: dict[str, list[EngineRow]] = {}
-    for series in series_of(rows, scene, SAME_LAW).values():
+    for series in series_by_name(rows, scene, SAME_LAW).values():
         by_engine.setdefault(series[0].engine, []).extend(series)
-    found: dict[str, dict[str, float]] = {}
-    for level in LEVELS:
-        own = experiments.least_wall(ours, level)
+    factors: dict[str, dict[str, float]] = {}
+    for level in RATIO_LEVELS:
+        ours_s = experiments.least_wall(our_rows, level)
         for engine, runs in by_engine.items():
-            theirs = experiments.least_wall(runs, level)
-            if own is not None and theirs is not None:
-                found.setdefault(plain_power(level), {})[engine] = theirs / own
-    return found
+            engine_s = experiments.least_wall(runs, level)
+            if ours_s is not None and engine_s is not None:
+                factors.setdefault(plain_power(level), {})[engine] = engine_s / ours_s
+    return factors
 
 
 def closest(rows: Sequence[EngineRow], scene: str) -> dict[str, Any] | None:
     """Contact whose finest walk comes closest to ADAMS's law; None if no walk reaches the end."""
-    finest = [series[-1] for series in series_of(rows, scene, OWN_LAW).values()]
+    finest = [series[-1] for series in series_by_name(rows, scene, OWN_LAW).values()]
     reached = [row for row in finest if row.error is not None and row.steps == experiments.OWN_TOUCHES]
     if not reached:
         return None
@@ -195,27 +196,27 @@ def three_digits(rows: Sequence[EngineRow], scene: str, truth: experiments.Truth
 
     Digits are relative to the reference on the same law, and to the finest run on an engine's own.
     """
-    found: dict[str, dict[str, float]] = {SAME_LAW: {}, OWN_LAW: {}}
+    steps: dict[str, dict[str, float]] = {SAME_LAW: {}, OWN_LAW: {}}
     exact = float(np.diff(truth.touches_s)[-1])
-    for experiment in found:
-        for name, mine in series_of(rows, scene, experiment).items():
-            wanted = exact if experiment == SAME_LAW else mine[-1].period_s
-            step = largest_good_step(mine, experiment, wanted)
+    for experiment in steps:
+        for name, runs in series_by_name(rows, scene, experiment).items():
+            target = exact if experiment == SAME_LAW else runs[-1].period_s
+            step = largest_good_step(runs, experiment, target)
             if step is not None:
-                found[experiment][name] = step
-    return found
+                steps[experiment][name] = step
+    return steps
 
 
-def largest_good_step(mine: Sequence[EngineRow], experiment: str, wanted: float | None) -> float | None:
+def largest_good_step(runs: Sequence[EngineRow], experiment: str, target: float | None) -> float | None:
     """Largest step, going up from the finest, with three correct digits; None without a coarser step to confirm it."""
     good = None
-    if wanted is None:
+    if target is None:
         return None
-    for row in reversed(mine):
-        if row.outcome != "walked" or row.period_s is None or abs(row.period_s / wanted - 1.0) > THREE_DIGITS:
+    for row in reversed(runs):
+        if row.outcome != "walked" or row.period_s is None or abs(row.period_s / target - 1.0) > THREE_DIGITS:
             break
         good = row.step_s
-    finest_only = experiment == OWN_LAW and good == mine[-1].step_s
+    finest_only = experiment == OWN_LAW and good == runs[-1].step_s
     return None if finest_only else good
 
 
@@ -224,23 +225,23 @@ def convergence(rows: Sequence[EngineRow], scene: str) -> dict[str, dict[str, fl
 
     On the same law the factor by which the error shrinks, on own contact the change of the period (s).
     """
-    found: dict[str, dict[str, float]] = {SAME_LAW: {}, OWN_LAW: {}}
-    for experiment, by_name in found.items():
-        for name, mine in series_of(rows, scene, experiment).items():
-            if len(mine) < 2 or not mine[-2].error or not mine[-1].error:
+    effects: dict[str, dict[str, float]] = {SAME_LAW: {}, OWN_LAW: {}}
+    for experiment, by_name in effects.items():
+        for name, runs in series_by_name(rows, scene, experiment).items():
+            if len(runs) < 2 or not runs[-2].error or not runs[-1].error:
                 continue
-            fine, coarse = mine[-1], mine[-2]
-            divided = float(coarse.error or 0.0) / float(fine.error or 1.0)
-            changed = abs(float(fine.period_s or 0.0) - float(coarse.period_s or 0.0))
-            by_name[name] = divided if experiment == SAME_LAW else changed
-    return found
+            fine, coarse = runs[-1], runs[-2]
+            factor = float(coarse.error or 0.0) / float(fine.error or 1.0)
+            change = abs(float(fine.period_s or 0.0) - float(coarse.period_s or 0.0))
+            by_name[name] = factor if experiment == SAME_LAW else change
+    return effects
 
 
 def conclusions(rows: Sequence[EngineRow], scene: str, truth: experiments.Truth) -> dict[str, str]:
     """A paragraph for each experiment."""
-    same, own = (series_of(rows, scene, experiment) for experiment in (SAME_LAW, OWN_LAW))
+    same, own = (series_by_name(rows, scene, experiment) for experiment in (SAME_LAW, OWN_LAW))
     sizes, changes, shares = three_digits(rows, scene, truth), convergence(rows, scene), ratios(rows, scene)
-    reached = {label: shares.get(label, {}) for label in map(plain_power, LEVELS)}
+    by_level = {label: shares.get(label, {}) for label in map(plain_power, RATIO_LEVELS)}
     engines = list(dict.fromkeys(runs[0].engine for runs in same.values()))
     falling = {name: by for name, by in changes[SAME_LAW].items() if same[name][-1].tolerance is None}
     finest, settled = (
@@ -250,7 +251,7 @@ def conclusions(rows: Sequence[EngineRow], scene: str, truth: experiments.Truth)
     best, period = closest(rows, scene), float(truth.walk.periods_s[-1])
     return {
         SAME_LAW: words(
-            "engines.same_law", reached, engines, sizes[SAME_LAW], falling, plain_power(experiments.EXACT_ENOUGH)
+            "engines.same_law", by_level, engines, sizes[SAME_LAW], falling, plain_power(experiments.ERROR_GOAL)
         ),
         OWN_LAW: words("engines.own_law", best, finest, period, changes[OWN_LAW], settled, sizes[OWN_LAW]),
     }
