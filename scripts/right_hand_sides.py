@@ -11,8 +11,8 @@ import numpy as np
 from walkerlab.config import loader
 from walkerlab.ground.friction import Coulomb, Frictionless
 from walkerlab.ground.walker import ContactWalker, on_ground
-from walkerlab.kernels import inlined, kernel
-from walkerlab.mechanics.standing import BENT, Mode, Standing, swing_foot
+from walkerlab.kernels import kernel, kernel_part
+from walkerlab.mechanics.rigid_model import BENT, Mode, RigidModel, swing_foot
 from walkerlab.paper.appendix_a import RigidWalker, accelerations, swing_constants
 from walkerlab.paper.walker import compass
 from walkerlab.scene.contact import contact_scene
@@ -26,7 +26,7 @@ ANGLES = (-0.2044, 0.1695, -0.6, -0.86)
 
 
 for formula in (swing_constants, accelerations):
-    inlined(formula)
+    kernel_part(formula)
 
 
 class AppendixA(NamedTuple):
@@ -68,7 +68,7 @@ def systems() -> dict[str, tuple[Any, State]]:
     }
 
 
-def walker_of(rigid: Standing, *sets: str) -> ContactWalker:
+def walker_of(rigid: RigidModel, *sets: str) -> ContactWalker:
     """The walker on the ground at one degree, with some keys changed."""
     config = loader.load(None, ("slope_deg=1", *sets)).config
     return contact_scene(config, abs(swing_foot(rigid, ANGLES)[1])).walker

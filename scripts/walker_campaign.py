@@ -43,7 +43,7 @@ from walkerlab.hybrid.recorded_walk import take_walk
 from walkerlab.hybrid.rigid_walk import SHORTEST_LANDING
 from walkerlab.mechanics.parts import Assembly
 from walkerlab.mechanics.rigid import standing
-from walkerlab.mechanics.standing import Standing
+from walkerlab.mechanics.rigid_model import RigidModel
 from walkerlab.orbits.fixed_point import MAX_START, MIN_START, GaitSearch, RigidGait, Search, SearchSettings, find_gaits
 from walkerlab.orbits.rigid_map import SHORTEST_STEP, coordinates_of, state_on_section, strike_section
 from walkerlab.orbits.similarity import unit_walker
@@ -250,7 +250,7 @@ def end_of(search: GaitSearch) -> str:
     return "a stable gait" if search.gait.stable else "an unstable gait"
 
 
-def overlooks(walker: Standing) -> bool:
+def overlooks(walker: RigidModel) -> bool:
     """Whether another method finds a gait of a walker of which a search finds none."""
     search = Search(walker)
     looking, still = search.looking, search.walker.slope + search.walker.lean
@@ -273,7 +273,7 @@ def overlooks(walker: Standing) -> bool:
     return False
 
 
-def judged(walker: Standing, search: GaitSearch) -> tuple[list[str], int]:
+def judged(walker: RigidModel, search: GaitSearch) -> tuple[list[str], int]:
     """What is wrong with what was found, and over how many steps the chosen gait's multipliers were seen."""
     if search.gait is None:
         return ([] if search.reason else ["no gait and no reason"]), 0
@@ -288,7 +288,7 @@ def judged(walker: Standing, search: GaitSearch) -> tuple[list[str], int]:
     return faults, steps
 
 
-def impulse_faults(assembly: Assembly, walker: Standing, search: GaitSearch) -> list[str]:
+def impulse_faults(assembly: Assembly, walker: RigidModel, search: GaitSearch) -> list[str]:
     """Gaits whose heel strike needs another impulse than the masses' momentum says, or a pull without an objection."""
     faults = []
     for gait in search.gaits:
@@ -302,7 +302,7 @@ def impulse_faults(assembly: Assembly, walker: Standing, search: GaitSearch) -> 
     return faults
 
 
-def cost_faults(walker: Standing, search: GaitSearch) -> list[str]:
+def cost_faults(walker: RigidModel, search: GaitSearch) -> list[str]:
     """Gaits whose cost of transport is not that of gravity's work and the torque's positive work integrated plainly."""
     faults = []
     for gait in search.gaits if walker.hip[2] != 0.0 else ():
@@ -314,7 +314,7 @@ def cost_faults(walker: Standing, search: GaitSearch) -> list[str]:
     return faults
 
 
-def rough_walk(walker: Standing, gait: RigidGait, draw: Draw) -> tuple[list[str], bool]:
+def rough_walk(walker: RigidModel, gait: RigidGait, draw: Draw) -> tuple[list[str], bool]:
     """What is wrong with a walk over random heights from near a gait, and whether a foot landed just ahead in it."""
     n, nearest = len(gait.state) // 2, SHORTEST_LANDING * gait.step_length
     share = draw.uniform(SLOWEST, FASTEST)
@@ -334,7 +334,7 @@ def rough_walk(walker: Standing, gait: RigidGait, draw: Draw) -> tuple[list[str]
     return faults, bool(ahead) and ahead[-1] < nearest
 
 
-def ordinary_faults(walker: Standing, search: GaitSearch) -> list[str]:
+def ordinary_faults(walker: RigidModel, search: GaitSearch) -> list[str]:
     """What is wrong with the two ordinary gaits, the one chosen among them."""
     found = {name: [gait for gait in search.gaits if name in gait.found_by] for name in (LONG_PERIOD, SHORT_PERIOD)}
     faults = [f"no gait from the {name}" for name, gaits in found.items() if not gaits]
@@ -350,7 +350,7 @@ def ordinary_faults(walker: Standing, search: GaitSearch) -> list[str]:
     return faults
 
 
-def traces(walker: Standing, gait: RigidGait) -> Iterator[tuple[float, float, float]]:
+def traces(walker: RigidModel, gait: RigidGait) -> Iterator[tuple[float, float, float]]:
     """For one step, two, ... ten: trace of the derivative seen, the multipliers' sum of powers, the derivative's size.
 
     Ends where the starts' distance from the gait outgrows what is linear, or a walk ends.
@@ -368,14 +368,14 @@ def traces(walker: Standing, gait: RigidGait) -> Iterator[tuple[float, float, fl
         yield float(np.trace(seen)), sum(value ** (k + 1) for value in gait.multipliers).real, size
 
 
-def differences(walker: Standing, z: NDArray[np.float64], aside: float) -> NDArray[np.float64]:
+def differences(walker: RigidModel, z: NDArray[np.float64], aside: float) -> NDArray[np.float64]:
     """(steps, d, d) what walks from either side of z part by, per unit of the distance between their starts."""
     pairs = [(walked(walker, z + move), walked(walker, z - move)) for move in aside * np.eye(z.size)]
     steps = min(len(walk) for pair in pairs for walk in pair)
     return np.array([[(ahead[k] - behind[k]) / (2.0 * aside) for ahead, behind in pairs] for k in range(steps)])
 
 
-def walked(walker: Standing, z: NDArray[np.float64]) -> list[Any]:
+def walked(walker: RigidModel, z: NDArray[np.float64]) -> list[Any]:
     """Section coordinates after each of ten steps from z."""
     tolerances = Tolerances("dop853", RTOL, ATOL, BUDGET)
     return [

@@ -5,7 +5,7 @@ from scipy.integrate import solve_ivp
 
 from walkerlab.hybrid.endings import FALLEN_HIP
 from walkerlab.mechanics import impact
-from walkerlab.mechanics.standing import BENT, NO_SHANK, STANCE, STRAIGHT, Mode
+from walkerlab.mechanics.rigid_model import BENT, NO_SHANK, STANCE, STRAIGHT, Mode
 from walkerlab.outcome import Outcome
 from walkerlab.solvers.system import derivative
 

@@ -6,7 +6,7 @@ from scipy.integrate import solve_ivp
 from walkerlab.mechanics import impact
 from walkerlab.mechanics.assembly import Anchor, levers, masses
 from walkerlab.mechanics.rigid import places_of
-from walkerlab.mechanics.standing import BENT, STANCE, STRAIGHT, SWING, Mode, energies, linked
+from walkerlab.mechanics.rigid_model import BENT, STANCE, STRAIGHT, SWING, Mode, energies, linked
 from walkerlab.solvers.system import derivative
 
 

@@ -49,7 +49,7 @@ LAYERS = (
 )
 SOURCES = sorted(PACKAGE.rglob("*.py"))
 IN_LAYERS = [path for path in SOURCES if path.parent != PACKAGE or path.stem in LAYERS]
-COMPILING = {"kernel", "entered", "inlined", "always_inline", "by_type", "by_type_or_default"}
+COMPILING = {"kernel", "callable_kernel", "kernel_part", "forced_inline", "by_type", "by_type_or_default"}
 
 
 def layer_of(path):

@@ -30,10 +30,10 @@ def twice(x: float) -> float:
 '''
 CALLED = '''"""A function to be edited."""
 
-from walkerlab.kernels import inlined
+from walkerlab.kernels import kernel_part
 
 
-@inlined
+@kernel_part
 def once(x: float) -> float:
     """This."""
     return x + 1.0

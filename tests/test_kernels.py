@@ -17,12 +17,12 @@ from walkerlab import compiler
 from walkerlab.compiler import compiling
 from walkerlab.kernel_cache import watch_compilation
 from walkerlab.kernels import (
-    always_inline,
     by_reference,
     by_type,
     by_type_or_default,
-    inlined,
+    forced_inline,
     kernel,
+    kernel_part,
     matrix,
     uncompiled,
     vector,
@@ -134,7 +134,7 @@ class Box(NamedTuple):
     lid: Lid
 
 
-@inlined
+@kernel_part
 def filled(box, share):
     """What is in the box, which is written down in it."""
     box.sides[0] += share
@@ -155,7 +155,7 @@ def test_a_record_handed_on_by_its_address_is_the_callers_own():
         assert run(box._replace(lid=Lid(False, np.zeros(1))), 0.0) == 48.0
 
 
-@inlined
+@kernel_part
 def powers_summed(like, x):
     """x + x^2 + ..., as many powers as `like` is long, by scratch of its own."""
     powers, products = vector(like), matrix(like)
@@ -233,7 +233,7 @@ from typing import NamedTuple
 from walkerlab import compiler
 from walkerlab.compiler import compiling
 from walkerlab.kernel_cache import watch_compilation
-from walkerlab.kernels import by_type, by_type_or_default, inlined, kernel, vector, always_inline
+from walkerlab.kernels import by_type, by_type_or_default, kernel_part, kernel, vector, forced_inline
 
 
 class Thing(NamedTuple):
@@ -255,12 +255,12 @@ def factor(thing):
     return 1.0 / 3.0
 
 
-@always_inline
+@forced_inline
 def scaled(x, by):
     return x * by
 
 
-@inlined
+@kernel_part
 def summed(thing):
     scratch = vector((0.0, 0.0, 0.0))
     for i in range(3):
@@ -305,7 +305,7 @@ def test_without_numbas_inner_parts_kernels_are_compiled_as_numba_does_it_and_it
         assert {path: path.stat().st_mtime_ns for path in folder.rglob("*.nbc")} == stored
 
 
-@always_inline
+@forced_inline
 def squared(x):
     return (lambda y: y * y)(x)
 

@@ -48,14 +48,14 @@ def kernel(function: F) -> F:
     return cast(F, compiled)
 
 
-def inlined(function: F) -> F:
+def kernel_part(function: F) -> F:
     """Leave `function` as it is in Python, and compile it into the kernels that call it."""
     compile_as(function, lambda *_: (function, PART_FLAGS))
     return function
 
 
-def entered(function: F) -> F:
-    """As `inlined`, and called from Python as a kernel."""
+def callable_kernel(function: F) -> F:
+    """As `kernel_part`, and called from Python as a kernel."""
     whole = kernel(function)
 
     @functools.wraps(function)
@@ -66,8 +66,8 @@ def entered(function: F) -> F:
     return cast(F, enter)
 
 
-def always_inline(function: F) -> F:
-    """As `inlined`, with a copy of its code in every caller, however large."""
+def forced_inline(function: F) -> F:
+    """As `kernel_part`, with a copy of its code in every caller, however large."""
     compile_as(function, lambda *_: (function, ALWAYS_INLINE_FLAGS))
     return function
 
@@ -111,7 +111,7 @@ class ByType:
         """Take name and documentation from `declaration`."""
         functools.update_wrapper(self, declaration)
         self._bodies: dict[type, Callable[..., Any]] = {}
-        self._always_inline: set[type] = set()
+        self._forced_inline: set[type] = set()
         self._default: Callable[..., Any] | None = None
 
     def __call__(self, chooser: Any, *rest: Any) -> Any:
@@ -122,16 +122,16 @@ class ByType:
         """Whether a body is registered for a type."""
         return chosen in self._bodies
 
-    def case(self, chosen: type, always_inline: bool = False) -> Callable[[F], F]:
+    def case(self, chosen: type, forced_inline: bool = False) -> Callable[[F], F]:
         """Register the decorated function as the body for first arguments of type `chosen`.
 
-        always_inline  copy its code into every caller, however large
+        forced_inline  copy its code into every caller, however large
         """
 
         def register(body: F) -> F:
             self._bodies[chosen] = body
-            if always_inline:
-                self._always_inline.add(chosen)
+            if forced_inline:
+                self._forced_inline.add(chosen)
             return body
 
         return register
@@ -144,7 +144,7 @@ class ByType:
     def compiled_body(self, kind: Any, *_: Any) -> tuple[Callable[..., Any], dict[str, Any]]:
         """Return the body for numba's type of a first argument, and its compiler flags."""
         chosen = getattr(kind, "instance_class", type(None))
-        return self._body_for(chosen, str(kind)), ALWAYS_INLINE_FLAGS if chosen in self._always_inline else PART_FLAGS
+        return self._body_for(chosen, str(kind)), ALWAYS_INLINE_FLAGS if chosen in self._forced_inline else PART_FLAGS
 
     def _body_for(self, chosen: type, label: str) -> Callable[..., Any]:
         body = self._bodies.get(chosen, self._default)

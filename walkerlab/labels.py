@@ -60,7 +60,7 @@ def unit_by_name(name: str) -> str:
     return UNITS.get(unit_ending(name), "1")
 
 
-def in_words(key: str) -> str:
+def axis_label(key: str) -> str:
     """Turn a key into an axis label without unit: thigh mass for walker.thigh.mass_kg."""
     ending = unit_ending(key)
     return key.removeprefix("walker.").removesuffix(f"_{ending}" if ending else "").replace("_", " ").replace(".", " ")

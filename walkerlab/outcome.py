@@ -37,7 +37,7 @@ class Outcome(IntEnum):
     @property
     def advice(self) -> str:
         """Meaning of the outcome and what to try next."""
-        return TOLD[self].advice
+        return OUTCOME_TEXTS[self].advice
 
     @property
     def advice_on_uneven_ground(self) -> str:
@@ -60,7 +60,7 @@ class OutcomeWords(NamedTuple):
     advice: str  # what it means and what to try next
 
 
-TOLD = {
+OUTCOME_TEXTS = {
     Outcome.WALKED: OutcomeWords(
         "walks to the end",
         "walked on",

@@ -32,7 +32,7 @@ def percent(share: float, digits: int = 3) -> str:
     return f"{100.0 * share:.{digits}g} %"
 
 
-def listed(parts: Iterable[str]) -> str:
+def join_words(parts: Iterable[str]) -> str:
     """Join words: 'a', 'a and b', 'a, b and c'."""
     words = list(parts)
     return " and ".join([", ".join(words[:-1]), words[-1]]) if len(words) > 1 else "".join(words)

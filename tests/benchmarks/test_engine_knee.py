@@ -10,7 +10,7 @@ from walkerlab.benchmarks.engines.registry import ENGINES
 from walkerlab.benchmarks.engines.runs import SwingTask
 from walkerlab.mechanics.assembly import Anchor
 from walkerlab.mechanics.rigid import standing
-from walkerlab.mechanics.standing import BENT, STANCE, Mode
+from walkerlab.mechanics.rigid_model import BENT, STANCE, Mode
 from walkerlab.mechanics.walkers import Arc, Limb, kneed_legs
 from walkerlab.solvers.system import derivative
 

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from walkerlab.config.loader import load
-from walkerlab.config.numbers import short
+from walkerlab.config.numbers import short_number
 
 
 def name_of(*sets: str, path: Path | None = None, strides: int | None = None) -> str:
@@ -98,9 +98,9 @@ def test_a_run_name_is_one_safe_path_component(
 
 @given(st.floats(allow_nan=False, allow_infinity=False))
 def test_a_short_number_reads_back_as_itself(number: float) -> None:
-    assert float(short(number)) == number
-    assert len(short(number)) <= len(repr(number))
-    assert "+" not in short(number)
+    assert float(short_number(number)) == number
+    assert len(short_number(number)) <= len(repr(number))
+    assert "+" not in short_number(number)
 
 
 @settings(deadline=None)

@@ -26,7 +26,7 @@ from walkerlab.figures.families import (
     stretch_of,
 )
 from walkerlab.figures.style import GREY
-from walkerlab.labels import in_words
+from walkerlab.labels import axis_label
 from walkerlab.store.content import Group, Variable
 
 FIGURES = [FIGURE_13, FIGURE_14, FIGURE_16]
@@ -192,4 +192,4 @@ def test_keys_are_words_on_axes():
             for figure in (FIGURE_13, FIGURE_14, FIGURE_16):
                 assert said in {axes.get_xlabel() for axes in figure.draw({"continuation": result})[0].axes}
     keys = [path for path, _ in (*leaves(Config), *leaves_of_other_kinds(Config)) if path[0] != "name"]
-    assert all(re.fullmatch(r"[a-zA-Z0-9() -]+", in_words(".".join(path))) for path in keys)
+    assert all(re.fullmatch(r"[a-zA-Z0-9() -]+", axis_label(".".join(path))) for path in keys)

@@ -22,8 +22,8 @@ from walkerlab.figures.canvas import settle, styled
 from walkerlab.figures.maps import ATTRACTORS
 from walkerlab.figures.registry import FIGURES
 from walkerlab.figures.style import CONTACT, LEGS, POINT, RIGID
-from walkerlab.outcome import TOLD, Outcome
-from walkerlab.paper.figures import TIME_LOOK, PHASE_LOOK, PAPER_ERROR
+from walkerlab.outcome import OUTCOME_TEXTS, Outcome
+from walkerlab.paper.figures import PAPER_ERROR, PHASE_LOOK, TIME_LOOK
 
 RESULTS = {
     "both models": both_models(),
@@ -142,7 +142,7 @@ def test_legend_names_everything_once(drawn):
 
 
 def test_what_becomes_of_walks_has_a_colour_of_its_own_in_every_map():
-    failures = [TOLD[one].colour for one in Outcome if one is not Outcome.WALKED]
+    failures = [OUTCOME_TEXTS[one].colour for one in Outcome if one is not Outcome.WALKED]
     every = [tuple(int(colour[i : i + 2], 16) for i in (1, 3, 5)) for colour in (*failures, *ATTRACTORS)]
     for one, other in itertools.combinations(every, 2):
         assert max(abs(a - b) for a, b in zip(one, other, strict=True)) > TOLD_APART

@@ -20,7 +20,7 @@ from walkerlab.figures.canvas import styled
 from walkerlab.figures.illustration import WORDS, Illustration
 from walkerlab.figures.registry import FIGURES as ALL_FIGURES
 from walkerlab.figures.style import CONTACT, RIGID
-from walkerlab.paper.figures import TIME_LOOK, PHASE_LOOK, PAPER_ERROR
+from walkerlab.paper.figures import PAPER_ERROR, PHASE_LOOK, TIME_LOOK
 from walkerlab.store.content import Group, Variable
 
 SVG = "{http://www.w3.org/2000/svg}"

@@ -6,7 +6,7 @@ from synthetic_maps import ENDS, stability_maps
 
 from walkerlab.figures.canvas import styled
 from walkerlab.figures.maps import STABILITY, VERDICT_COLOURS, edges
-from walkerlab.outcome import TOLD, Outcome
+from walkerlab.outcome import OUTCOME_TEXTS, Outcome
 
 STICTION, STEP = STABILITY
 
@@ -33,7 +33,7 @@ def test_cells_meet_and_their_middles_are_the_values():
 
 def test_outcomes_have_the_colours_of_the_other_map():
     left, _ = meshes(STICTION)
-    expected = [TOLD[Outcome(outcome)].colour.lower() for outcome, _, _ in ENDS]
+    expected = [OUTCOME_TEXTS[Outcome(outcome)].colour.lower() for outcome, _, _ in ENDS]
     assert colours(left[0]).tolist() == [expected] * 3
 
 

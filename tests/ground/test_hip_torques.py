@@ -12,7 +12,7 @@ from test_foot_on_ground import differenced
 
 from walkerlab.config import loader
 from walkerlab.ground.walker import LOCKED, RELEASED, changed_forms, new_progress, on_ground
-from walkerlab.mechanics.standing import STRAIGHT, Mode
+from walkerlab.mechanics.rigid_model import STRAIGHT, Mode
 from walkerlab.orbits.fixed_point import find_gaits
 from walkerlab.scene.contact import contact_scene, start_state
 from walkerlab.scene.rigid import rigid_walker

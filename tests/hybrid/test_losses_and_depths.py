@@ -7,7 +7,7 @@ from contact_walks import scene_of, walked
 from walkerlab.ground.friction import Coulomb
 from walkerlab.ground.normal_force import NormalLaw
 from walkerlab.hybrid.contact_result import sampled_feet
-from walkerlab.verification.known import ALONG_RATE, GRAVITY, BODY_HEIGHT, HEIGHT_RATE, rig, run_until, rig_state
+from walkerlab.verification.known import ALONG_RATE, BODY_HEIGHT, GRAVITY, HEIGHT_RATE, rig, rig_state, run_until
 
 MASS, DROP = 2.0, 0.1
 DAMPED = NormalLaw(2e5, 1.5, 40.0, 1e-4)  # lets go on the way out

@@ -9,7 +9,7 @@ from plain_rigid_walk import foot_of, plain_walk
 from walkerlab.config.ground import Footholds
 from walkerlab.config.loader import load
 from walkerlab.hybrid.recorded_walk import take_walk
-from walkerlab.mechanics.standing import STANCE, SWING
+from walkerlab.mechanics.rigid_model import STANCE, SWING
 from walkerlab.orbits.fixed_point import find_gaits
 from walkerlab.orbits.rigid_map import EXACT_STEPS, TANGENT_SCALE, RigidStepper, coordinates_of, strike_section
 from walkerlab.outcome import Outcome

@@ -23,7 +23,7 @@ from test_random_walkers import (
 
 from walkerlab.mechanics import impact
 from walkerlab.mechanics.rigid import standing
-from walkerlab.mechanics.standing import AT_STRIKE, BENT, STANCE, STRAIGHT, SWING, Mode
+from walkerlab.mechanics.rigid_model import AT_STRIKE, BENT, STANCE, STRAIGHT, SWING, Mode
 from walkerlab.orbits.similarity import unit_walker
 from walkerlab.scene.parts import assembly_of
 from walkerlab.solvers.system import jacobian

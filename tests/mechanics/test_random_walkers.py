@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 from walkerlab.config.walkers import CompassWalker, Kneed, PartsWalker, StraightLegs, Torso
 from walkerlab.mechanics.parts import Assembly
 from walkerlab.mechanics.rigid import standing
-from walkerlab.mechanics.standing import BENT, STANCE, STRAIGHT, Mode, ground_reaction, kinetic_energy, swing_foot
+from walkerlab.mechanics.rigid_model import BENT, STANCE, STRAIGHT, Mode, ground_reaction, kinetic_energy, swing_foot
 from walkerlab.scene.parts import assembly_of
 
 G = 9.81

@@ -10,7 +10,7 @@ from rigid_physics import heel_strike, knee_strike, potential_energy, rates, sta
 from walkerlab.kernels import kernel, uncompiled
 from walkerlab.mechanics import impact
 from walkerlab.mechanics.rigid import standing
-from walkerlab.mechanics.standing import (
+from walkerlab.mechanics.rigid_model import (
     BENT,
     STANCE,
     STRAIGHT,

@@ -12,7 +12,7 @@ from test_step_derivatives import AGREEMENT, NEAR_THE_GAIT, RIGID_STEP, STEPS, s
 from walkerlab.config import loader
 from walkerlab.hybrid.recorded_walk import take_walk, with_scaled_rates
 from walkerlab.mechanics.impact import push_off_work
-from walkerlab.mechanics.standing import STANCE, STRAIGHT, SWING, kinetic_energy, on_slope
+from walkerlab.mechanics.rigid_model import STANCE, STRAIGHT, SWING, kinetic_energy, on_slope
 from walkerlab.orbits.fixed_point import find_gaits
 from walkerlab.orbits.gradients import gradients
 from walkerlab.orbits.newton import Effort

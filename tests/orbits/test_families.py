@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from walkerlab.mechanics.standing import on_slope
+from walkerlab.mechanics.rigid_model import on_slope
 from walkerlab.orbits.attractors import (
     Lyapunov,
     close_returns,

@@ -10,7 +10,7 @@ from plain_rigid_walk import plain_walk
 from walkerlab.config.loader import load
 from walkerlab.hybrid.walk_record import rough_heights
 from walkerlab.mechanics.impact import pushed_at_hip
-from walkerlab.mechanics.standing import energies, equations, momentum
+from walkerlab.mechanics.rigid_model import energies, equations, momentum
 from walkerlab.orbits.fixed_point import find_gaits
 from walkerlab.orbits.gradients import GAIT_QUANTITIES, gait_quantities, gradients
 from walkerlab.orbits.newton import Effort

@@ -9,11 +9,11 @@ from scipy.integrate import solve_ivp
 
 from walkerlab.config.schema import Contact
 from walkerlab.hybrid.comparison import WalkDifference
-from walkerlab.mechanics.standing import BENT, Mode
+from walkerlab.mechanics.rigid_model import BENT, Mode
 from walkerlab.paper.appendix_a import CORRECTED, assembled
 from walkerlab.paper.measured import (
     Characteristics,
-    ContactModel,
+    ContactMeasurements,
     Departures,
     EnergyRecord,
     Measured,
@@ -120,9 +120,9 @@ def study():
     return study_the_paper()
 
 
-def contact_model(**changed):
+def measure_contact_model(**changed):
     walk = {"outcome": "walked", "steps": 10, "static_penetration_m": 5.88e-5, "damping_ratio": 3.71}
-    model = ContactModel(
+    model = ContactMeasurements(
         law=Contact(),
         foot_radius=0.001,
         summary=walk | {name: changed.pop(name) for name in ("outcome", "steps") if name in changed},
@@ -147,7 +147,7 @@ def rows(study):
             equations="corrected",
             models=gaits,
             spectral_radii=dict.fromkeys(gaits, 0.6),
-            contact=contact_model(**changed),
+            contact=measure_contact_model(**changed),
             errors=errors,
             departures=departures,
         )

@@ -8,7 +8,7 @@ import pytest
 from html_page import Page
 
 from walkerlab.config.loader import load
-from walkerlab.paper.compared_releases import RELEASES, CONTACT_STEPS
+from walkerlab.paper.compared_releases import CONTACT_STEPS, RELEASES
 from walkerlab.pipeline.runner import execute
 from walkerlab.report.blocks import Player
 from walkerlab.report.registry import sections_of

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from walkerlab.prose import listed
+from walkerlab.prose import join_words
 from walkerlab.report.numbers import count, fixed, length, number, power_of_ten, quantity, span
 
 
@@ -54,7 +54,7 @@ def test_spans_of_equal_numbers_are_one_number():
 def test_words():
     assert count(1, "step") == "1 step"
     assert count(2, "step") == "2 steps"
-    assert listed(["a", "b", "c"]) == "a, b and c"
+    assert join_words(["a", "b", "c"]) == "a, b and c"
     assert quantity(3.0, "1") == "3"
     assert plain(power_of_ten(9.96e-10, 2)) == "10⁻⁹"
 

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from walkerlab.config.loader import load
-from walkerlab.outcome import TOLD, Outcome
+from walkerlab.outcome import OUTCOME_TEXTS, Outcome
 from walkerlab.scene.walk_outcomes import Pads, describe_endings, ground_causes
 
 PAPER = load().config
@@ -12,8 +12,8 @@ COUNTS = {"walked": 150, "off-pad": 178, "fell": 32, "no-answer": 7}
 
 def test_every_outcome_has_its_words_and_its_colour():
     for told in ("does", "did", "advice", "colour"):
-        assert len({getattr(TOLD[outcome], told) for outcome in Outcome}) == len(Outcome)
-    assert all(TOLD[outcome].why for outcome in Outcome if outcome is not Outcome.WALKED)
+        assert len({getattr(OUTCOME_TEXTS[outcome], told) for outcome in Outcome}) == len(Outcome)
+    assert all(OUTCOME_TEXTS[outcome].why for outcome in Outcome if outcome is not Outcome.WALKED)
 
 
 def test_walks_that_pads_end_are_told_from_limits_of_the_walker():

@@ -9,7 +9,7 @@ import pytest
 
 from walkerlab.config.loader import load
 from walkerlab.errors import ConfigError
-from walkerlab.mechanics.standing import Standing
+from walkerlab.mechanics.rigid_model import RigidModel
 from walkerlab.orbits.fixed_point import find_gaits
 from walkerlab.scene.contact import contact_scene
 from walkerlab.scene.families import iterate_values
@@ -20,7 +20,7 @@ from walkerlab.scene.studies import equation_sets
 DOCS = Path(__file__).parents[2] / "docs" / "walkers.md"
 
 
-def numbers_of(model: Standing):
+def numbers_of(model: RigidModel):
     names = [name for name in model.dtype.names if name not in ("roles", "section")]
     return np.concatenate([np.ravel(model[name]) for name in names])
 

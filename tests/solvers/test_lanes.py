@@ -9,7 +9,7 @@ import pytest
 
 from walkerlab.hybrid.rigid_lanes import two_legs
 from walkerlab.kernels import kernel
-from walkerlab.mechanics.standing import STRAIGHT, Mode
+from walkerlab.mechanics.rigid_model import STRAIGHT, Mode
 from walkerlab.mechanics.trigonometry import sine_cosine
 from walkerlab.paper.appendix_a import CORRECTED, RigidWalker, assembled
 from walkerlab.solvers import system

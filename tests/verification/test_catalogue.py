@@ -4,7 +4,7 @@ import pytest
 
 from walkerlab.config.stability import Case
 from walkerlab.errors import ConfigError
-from walkerlab.verification.catalogue import config_of, package_cases, check_unique_names
+from walkerlab.verification.catalogue import check_unique_names, config_of, package_cases
 from walkerlab.verification.judge import CaseCell, judge
 from walkerlab.verification.starts import CENTRE_HEIGHT, prepare_start
 

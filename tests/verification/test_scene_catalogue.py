@@ -9,7 +9,7 @@ from walkerlab.config.loader import load
 from walkerlab.config.reads import dotted_keys
 from walkerlab.config.schema import Config
 from walkerlab.mechanics.impact import heel_strike
-from walkerlab.mechanics.standing import STANCE, kinetic_energy
+from walkerlab.mechanics.rigid_model import STANCE, kinetic_energy
 from walkerlab.orbits.similarity import Units
 from walkerlab.pipeline.graph import PIPELINE
 from walkerlab.pipeline.identity import Keys

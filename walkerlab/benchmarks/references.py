@@ -113,8 +113,9 @@ def tightest_end(trial: Trial, method: str) -> End:
     tolerances = TIGHTEST_RIGID if isinstance(trial, RigidTrial) else TIGHTEST_CONTACT
     result = trial.prepare(method, tolerances[method], REFERENCE_RUN_BUDGET)()
     if result.outcome == Outcome.BUDGET_EXHAUSTED.label:
-        why = f"{method} at {tolerances[method]:g} does not reach the end within {REFERENCE_RUN_BUDGET // 1_000_000} million"
-        raise WalkEndsError(f"{why} right-hand sides, so the reference has no error estimate")
+        budget = f"{REFERENCE_RUN_BUDGET // 1_000_000} million right-hand sides"
+        why = f"{method} at {tolerances[method]:g} does not reach the end within {budget}"
+        raise WalkEndsError(f"{why}, so the reference has no error estimate")
     if not result.state.size:
         raise WalkEndsError(f"the walk ends early ({result.outcome}), without an end state to compare")
     return End(method, result.state, tolerances[method], result.rhs_evaluations)

@@ -13,7 +13,7 @@ from walkerlab.hybrid.rigid_record import unwatched
 from walkerlab.hybrid.rigid_walk import EVENTS as RIGID_EVENTS
 from walkerlab.hybrid.rigid_walk import new_heel_strikes, walk
 from walkerlab.kernels import uncompiled
-from walkerlab.mechanics.standing import Standing
+from walkerlab.mechanics.rigid_model import RigidModel
 from walkerlab.outcome import Outcome
 from walkerlab.paper.appendix_a import RigidWalker
 from walkerlab.solvers.registry import METHODS, Tolerances, finder_for
@@ -41,7 +41,7 @@ class TrialRun:
 class RigidTrial:
     """Walk of the rigid model; its end state follows the last impact."""
 
-    walker: Standing
+    walker: RigidModel
     start: tuple[float, ...]
     steps: int
     compass: RigidWalker | None = None  # the walker as Appendix A has it, which a user's script is for

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import typer
 
-from walkerlab.cli.failures import tell
+from walkerlab.cli.failures import print_result
 from walkerlab.cli.request import Request
 from walkerlab.store.clean import CHUNKS, FIGURES, files_of, remove, remove_if_empty
 from walkerlab.store.runfolder import RunFolder
@@ -41,7 +41,7 @@ def clean_folders(request: Request, every: bool, stages: Sequence[str], yes: boo
                 remove_if_empty(folder)
     said = "would be removed" if request.dry_run else "removed"
     lines = [f"{said}: {one}" for one in file_lines(files, sizes)] or [f"{where}: nothing {said}"]
-    tell(request, {"run_dir": str(where), "removed": [*map(str, files)], "dry_run": request.dry_run}, lines)
+    print_result(request, {"run_dir": str(where), "removed": [*map(str, files)], "dry_run": request.dry_run}, lines)
 
 
 def file_lines(files: Sequence[Path], sizes: Mapping[Path, int]) -> list[str]:

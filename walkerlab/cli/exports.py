@@ -29,7 +29,7 @@ from walkerlab.pipeline.runs import (
     results_to_show,
     the_result,
 )
-from walkerlab.prose import listed
+from walkerlab.prose import join_words
 from walkerlab.report.outcomes import MODELS
 from walkerlab.report.tables import Table, as_csv, csv_text, of_records
 from walkerlab.report.tex import as_tex
@@ -233,7 +233,7 @@ def figure(
         why = illustration.why_left_out(stored, {})
     if why is not None:
         made = [command(folder, PIPELINE[stage]) for stage in illustration.stages if stage not in stored]
-        advice = f"{listed(made)} {'makes' if len(made) == 1 else 'make'} what it needs." if made else ""
+        advice = f"{join_words(made)} {'makes' if len(made) == 1 else 'make'} what it needs." if made else ""
         raise StaleError(f"{illustration.name} cannot be drawn: {why}.", advice)
     left_out = stored.keys() <= taken.keys()
     if not left_out:
@@ -241,7 +241,7 @@ def figure(
     if outdated:
         console.warn(
             f"{folder.path} has outdated results, which are {'left out' if left_out else 'drawn all the same'}: "
-            f"{listed(sorted(outdated))}; {command(folder, PIPELINE['report'])} makes them anew."
+            f"{join_words(sorted(outdated))}; {command(folder, PIPELINE['report'])} makes them anew."
         )
     with refusing_older(folder, outdated):
         return illustration.as_file(taken, kind, *size)
@@ -257,7 +257,7 @@ def table(folder: RunFolder, name: str, kind: str, console: Console) -> Table:
     if TABLES[name] not in summary:
         raise ConfigError(
             f"{folder.path} has no {name}: it compares with the paper's walker, and this run's walker is another.",
-            f"Its page has {listed(page_tables(folder))}.",
+            f"Its page has {join_words(page_tables(folder))}.",
         )
     rows = summary[TABLES[name]]
     if kind == "tex":

@@ -71,7 +71,9 @@ def discard_output() -> None:
     os.close(nowhere)
 
 
-def tell(request: Request, value: dict[str, Any], lines: Iterable[str], error: WalkerlabError | None = None) -> None:
+def print_result(
+    request: Request, value: dict[str, Any], lines: Iterable[str], error: WalkerlabError | None = None
+) -> None:
     """Print a result as text or JSON; exit non-zero if it holds an error.
 
     value  object for `--json`

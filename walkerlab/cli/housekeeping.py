@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from walkerlab.cli.failures import exit_on_failure, tell
+from walkerlab.cli.failures import exit_on_failure, print_result
 from walkerlab.cli.request import OF_A_RUN, OF_TALK, Request, command
 from walkerlab.pipeline.graph import Graph
 
@@ -58,7 +58,7 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
         """Print the keys of a config: type, unit, bounds, default, meaning, source."""
         from walkerlab.config.reference import as_json_schema, as_paragraphs
 
-        tell(request, as_json_schema(key), [as_paragraphs(key)])
+        print_result(request, as_json_schema(key), [as_paragraphs(key)])
 
     @command(app, *OF_A_RUN, "dry_run", "no_wait", *OF_TALK)
     def clean(

@@ -3,7 +3,7 @@
 import tempfile
 from pathlib import Path
 
-from walkerlab.cli.failures import tell
+from walkerlab.cli.failures import print_result
 from walkerlab.cli.request import Request
 from walkerlab.config.files import ConfigFile
 from walkerlab.config.loader import load
@@ -45,11 +45,11 @@ def rerun_artifact(path: Path, graph: Graph, request: Request) -> None:
         "same_code": same_code,
     }
     if before == after:
-        tell(request, value, [f"{path} is reproduced bit for bit: content {before[:SHORT]}."])
+        print_result(request, value, [f"{path} is reproduced bit for bit: content {before[:SHORT]}."])
         return
     why = "the code is the same" if same_code else "the code has changed since"
     another = StaleError(
         f"{path} is not reproduced: {before[:SHORT]} then, {(after or 'no result')[:SHORT]} now; {why}.",
         "Results agree bit for bit only on the same platform with the same versions; `walkerlab show` lists both.",
     )
-    tell(request, value, [], another)
+    print_result(request, value, [], another)

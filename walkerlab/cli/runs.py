@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from walkerlab.cli.failures import tell
+from walkerlab.cli.failures import print_result
 from walkerlab.cli.request import Request, command
 from walkerlab.pipeline.graph import Graph
 
@@ -50,7 +50,7 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
             found_difference = difference(results[0], results[1], [config_of(folder) for folder in folders])
             figures = draw(folders, results)
         shown = lines(folders, found_difference, figures, request.every)
-        tell(request, as_object(folders, found_difference, figures), shown)
+        print_result(request, as_object(folders, found_difference, figures), shown)
 
 
 def run_labels(folders: tuple[RunFolder, RunFolder]) -> tuple[str, str]:

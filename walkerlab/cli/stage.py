@@ -6,7 +6,7 @@ import shlex
 from dataclasses import replace
 from pathlib import Path
 
-from walkerlab.cli.failures import tell
+from walkerlab.cli.failures import print_result
 from walkerlab.cli.request import Request
 from walkerlab.config.files import builtin_names, config_to_extend
 from walkerlab.config.layers import parse_setting
@@ -40,7 +40,7 @@ def report_on(request: Request, stage: Stage, graph: Graph) -> None:
     config, folder = request.resolved, request.folder
     if options.dry:
         report = execute(config, stage.name, folder, options, graph=graph)
-        tell(request, report.as_json() | {"dry_run": True}, planned(report))
+        print_result(request, report.as_json() | {"dry_run": True}, planned(report))
         return
     report = with_nearby_gaits(execute(config, stage.name, folder, options, request.console, graph), request)
     if stage.name == "design" and report.no_answer is None:
@@ -48,7 +48,7 @@ def report_on(request: Request, stage: Stage, graph: Graph) -> None:
     lines = printed(request, report)
     if request.open_page and "html" in report.summary and not request.console.shown:
         request.console.show(report.run_dir / str(report.summary["html"]))
-    tell(request, report.as_json(), lines, report.no_answer)
+    print_result(request, report.as_json(), lines, report.no_answer)
 
 
 def with_nearby_gaits(report: StageReport, request: Request) -> StageReport:

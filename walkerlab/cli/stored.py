@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from typing import Any
 
-from walkerlab.cli.failures import tell
+from walkerlab.cli.failures import print_result
 from walkerlab.cli.request import Request
 from walkerlab.errors import ConfigError, StaleError
 from walkerlab.pipeline.executor import short_reason, survey
@@ -62,7 +62,7 @@ def print_status(request: Request, graph: Graph, check: bool, run: str | None) -
     if listed:
         head = ["run", "results", "up to date", "sweeps", "size", "last written", "changed"]
         lines += ["", f"all runs in {request.runs}:", *aligned([head, *map(row_of, listed)])]
-    tell(request, status, lines, error if check else None)
+    print_result(request, status, lines, error if check else None)
 
 
 def row_of(run: RunSummary) -> list[str]:
@@ -120,7 +120,7 @@ def print_stored(request: Request, graph: Graph, stage: str) -> None:
     if step.action != "reuse":
         request.console.warn(f"{path} is out of date: {step.reason}")
     about = {"stage": stage, "artifact": str(path), "current": step.action == "reuse", "why": step.reason}
-    tell(request, about | as_json(step.found), [f"{stage}: {path}", *lines(step.found)])
+    print_result(request, about | as_json(step.found), [f"{stage}: {path}", *lines(step.found)])
 
 
 def as_json(stored: Stored) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from walkerlab.cli.failures import tell
+from walkerlab.cli.failures import print_result
 from walkerlab.cli.request import OF_A_RUN, OF_TALK, Request, command, option
 from walkerlab.pipeline.graph import PIPELINE, Graph
 from walkerlab.report.text import paragraph
@@ -145,7 +145,7 @@ def show_plan(request: Request, foreseen: "Foreseen") -> None:
     known = foreseen.estimate_s
     time = "no point of this kind has been timed yet" if known is None else f"about {format_duration(known)}"
     counts = f"{foreseen.count} points, {foreseen.there} already computed, {missing} to compute: {time}"
-    tell(request, value, [f"in {foreseen.path}:", *lines, counts])
+    print_result(request, value, [f"in {foreseen.path}:", *lines, counts])
 
 
 def format_duration(seconds: float) -> str:
@@ -187,7 +187,7 @@ def show_result(request: SweepRequest, swept: "Swept") -> None:
         beside = swept.path.with_suffix(".csv")
         write_atomically(beside, table.encode())
         value["csv"], lines = str(beside), [table.removesuffix("\n")]
-    tell(request, value, lines, swept.error() if swept.failed else None)
+    print_result(request, value, lines, swept.error() if swept.failed else None)
 
 
 def result_lines(swept: "Swept", page: Path) -> list[str]:

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 from walkerlab.config.fields import Block, key
-from walkerlab.config.numbers import short
+from walkerlab.config.numbers import short_number
 
 KUO: Final = "Kuo, Energetics of actively powered locomotion, J. Biomech. Eng. 124 (2002)"
 STRONGEST: Final = 1e9
@@ -44,15 +44,17 @@ class PushOff(Block):
 def drives_of(config: Any) -> tuple[str, ...]:
     """Describe what supplies energy to a config's walker besides gravity."""
     push, torque = config.push_off.impulse_N_s, config.walker.hip.torque_N_m
-    return nonzero_words({f"a push-off of {short(push)} N s": push, f"a hip torque of {short(torque)} N m": torque})
+    return nonzero_words(
+        {f"a push-off of {short_number(push)} N s": push, f"a hip torque of {short_number(torque)} N m": torque}
+    )
 
 
 def springs_of(config: Any) -> tuple[str, ...]:
     """Describe the spring and damper between a walker's legs, which supply no energy."""
     stiffness, damping = config.walker.hip.spring_N_m_per_rad, config.walker.hip.damping_N_m_s_per_rad
     return nonzero_words({
-        f"a hip spring of {short(stiffness)} N m/rad": stiffness,
-        f"a hip damper of {short(damping)} N m s/rad": damping,
+        f"a hip spring of {short_number(stiffness)} N m/rad": stiffness,
+        f"a hip damper of {short_number(damping)} N m s/rad": damping,
     })  # fmt: skip
 
 

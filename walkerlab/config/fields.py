@@ -10,7 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field, Tag, ValidationInfo, field_va
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticCustomError
 
-from walkerlab.config.numbers import short
+from walkerlab.config.numbers import short_number
 from walkerlab.labels import with_unit
 
 
@@ -158,8 +158,8 @@ def bounds_of(field: FieldInfo) -> str:
         return ", ".join(words_of(field.annotation)) or what
     limits = {sign: getattr(item, sign) for item in field.metadata for sign, _ in _SIGNS if hasattr(item, sign)}
     if limits.keys() == {"ge", "le"}:
-        return f"from {short(limits['ge'])} to {short(limits['le'])}"
-    return ", ".join(f"{word} {short(limits[sign])}" for sign, word in _SIGNS if sign in limits)
+        return f"from {short_number(limits['ge'])} to {short_number(limits['le'])}"
+    return ", ".join(f"{word} {short_number(limits[sign])}" for sign, word in _SIGNS if sign in limits)
 
 
 def describe_allowed(field: FieldInfo) -> str:

@@ -17,7 +17,7 @@ from walkerlab.config.canonical import flatten
 from walkerlab.config.fields import block_of
 from walkerlab.config.files import DEFAULT, ConfigFile, builtin_config, find_config, read_layers, with_cases
 from walkerlab.config.layers import ConfigSetting, apply_settings, merge_layers, option_setting, parse_setting
-from walkerlab.config.numbers import short
+from walkerlab.config.numbers import short_number
 from walkerlab.config.overlay import check_cases
 from walkerlab.config.problems import Problem
 from walkerlab.config.schema import QUESTIONS, Config
@@ -125,29 +125,29 @@ def suspicious_values(config: Config, tree: Mapping) -> Iterator[str]:
     """Yield warnings about likely mistakes: a leg mass left in place, wrong units, a pitch without pads."""
     walker, block = config.walker, tree.entries.get("walker")
     places = block.keys if isinstance(block, Mapping) else {}
-    length = short(walker.leg_length_m)
+    length = short_number(walker.leg_length_m)
     if isinstance(walker, CompassWalker) and {"leg_length_m", "foot_to_mass_m"} <= places.keys():
         leg, mass, stays = places["leg_length_m"], places["foot_to_mass_m"].source, walker.foot_to_mass_m
         moved = leg.source.startswith("built-in") or mass.startswith("--")  # the mass itself, over a leg that was there
         if leg.source != mass and not moved and stays != walker.leg_length_m / 2:
             yield (
-                f"{leg}: walker.leg_length_m is {length} m, and walker.foot_to_mass_m stays {short(stays)} m, "
+                f"{leg}: walker.leg_length_m is {length} m, and walker.foot_to_mass_m stays {short_number(stays)} m, "
                 f"as {mass} has it: the mass is not in the middle of the leg"
             )
     slope = tree.keys.get("slope_rad")
     if slope is not None and abs(config.slope_rad) > STEEP_RAD:
-        degrees = short(round(math.degrees(config.slope_rad), 1))
+        degrees = short_number(round(math.degrees(config.slope_rad), 1))
         yield str(Problem(slope, f"slope_rad is in radians, so this is {degrees} degrees; slope_deg takes degrees"))
     gravity = tree.keys.get("gravity_m_s2")
     if gravity is not None and config.gravity_m_s2 > STRONG_M_S2:
-        text = f"gravity_m_s2 is {short(config.gravity_m_s2)}; it is in m/s^2 (9.81 on earth), not in cm/s^2"
+        text = f"gravity_m_s2 is {short_number(config.gravity_m_s2)}; it is in m/s^2 (9.81 on earth), not in cm/s^2"
         yield str(Problem(gravity, text))
     contact = config.contact
     if contact is not None and contact.terrain != "checkerboard" and not isinstance(contact.pad_pitch, str):
         text = f"contact.pad_pitch has no effect on {contact.terrain}, which has no pads"
         yield str(Problem(key_at(tree, ("contact", "pad_pitch")), f"{text}; only checkerboard has pads"))
     for path, value in numbers_in(("walker",), walker.model_dump(mode="json")):
-        key, text = str(path[-1]), f"{'.'.join(map(str, path))} is {short(value)}"
+        key, text = str(path[-1]), f"{'.'.join(map(str, path))} is {short_number(value)}"
         if key.endswith("length_m") and value > LONG_M:
             yield str(Problem(key_at(tree, path), f"{text} m; lengths are in m, not in mm"))
         if key.endswith("mass_kg") and value > HEAVY_KG_M3 * walker.leg_length_m**3:
@@ -209,5 +209,5 @@ def _word(value: Any) -> str:
     if isinstance(value, list):
         return "_".join(_word(item) for item in value) or "none"
     if isinstance(value, int | float):
-        return short(value)
+        return short_number(value)
     return "none" if value is None else str(value)

@@ -8,7 +8,7 @@ SAME: Final = 1e-9
 """Relative difference up to which two numbers are one, written in different units."""
 
 
-def short(number: float) -> str:
+def short_number(number: float) -> str:
     """Return the shortest text that reads back as `number` (finite), e.g. 3, 0.0174, 1e6; integers in full."""
     if isinstance(number, int):
         return str(number)

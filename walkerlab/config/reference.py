@@ -12,7 +12,7 @@ from pydantic_core import PydanticUndefined
 
 from walkerlab.config.fields import annotation_of, bounds_of, leaves, leaves_of_other_kinds, type_words
 from walkerlab.config.files import builtin_names
-from walkerlab.config.numbers import short
+from walkerlab.config.numbers import short_number
 from walkerlab.config.problems import suggestion
 from walkerlab.config.schema import Config, SlopeInDegrees
 from walkerlab.errors import ConfigError
@@ -69,7 +69,7 @@ def _spelled(value: Any) -> str:
         return "none"
     if isinstance(value, tuple):
         return f"[{', '.join(_spelled(item) for item in value)}]"
-    return short(value) if isinstance(value, int | float) else str(value)
+    return short_number(value) if isinstance(value, int | float) else str(value)
 
 
 def as_paragraphs(asked: str = "") -> str:

@@ -12,7 +12,7 @@ from walkerlab.config.contact import BOUNDS_SI
 from walkerlab.config.fields import Block, block_of, describe_allowed, kinds_of, leaves, words_of
 from walkerlab.config.files import DEFAULT, builtin_config, builtin_names, read_layers
 from walkerlab.config.layers import merge_layers
-from walkerlab.config.numbers import short
+from walkerlab.config.numbers import short_number
 from walkerlab.config.problems import Problem, beyond_scope, format_node, nearest, printable, problems_error
 from walkerlab.config.schema import Config, SlopeInDegrees
 from walkerlab.config.tree import Mapping, Node, Position, Scalar, plain
@@ -93,7 +93,7 @@ def align_start(config: Config, tree: Mapping) -> tuple[Config, tuple[str, ...]]
     bodies, why = len(start) // 2, {}
     if not isinstance(walker, PartsWalker):
         start[0] = -2 * (config.slope_rad + walker.lean_rad) - start[1]
-        why[0] = "theta_1", f"so that both feet stand on the slope of {short(config.slope_rad)} rad"
+        why[0] = "theta_1", f"so that both feet stand on the slope of {short_number(config.slope_rad)} rad"
     if isinstance(walker, Kneed):
         start[2] = start[0]
         why[2] = "theta_1_shank", "so that the leg is straight"
@@ -102,7 +102,7 @@ def align_start(config: Config, tree: Mapping) -> tuple[Config, tuple[str, ...]]
             start[first + place] = sum(weight * start[first + other] for other, weight in of.items())
             why[first + place] = f"{theta}_{name.split()[0]}", f"as the {name} follows other bodies"
     moved = [
-        f"start: {name} moved from {short(config.start[place])} to {short(start[place])} "
+        f"start: {name} moved from {short_number(config.start[place])} to {short_number(start[place])} "
         f"{'rad' if place < bodies else 'rad/s'}, {because}"
         for place, (name, because) in why.items()
         if abs(start[place] - config.start[place]) > MOVED_RAD

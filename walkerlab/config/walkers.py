@@ -12,7 +12,7 @@ from pydantic import Discriminator, Field, Tag, ValidationInfo, field_validator
 from walkerlab.config.contact import Contact
 from walkerlab.config.drives import QUICKEST, Hip, acting_on
 from walkerlab.config.fields import Block, check_against, key, meaning_error
-from walkerlab.config.numbers import short
+from walkerlab.config.numbers import short_number
 from walkerlab.errors import ConfigError
 
 WISSE: Final = "Wisse, Schwab, Int. J. Robotics Research 24 (2005): arc feet"
@@ -455,7 +455,7 @@ def why_no_state(start: Any, walker: Any) -> str:
 def contact_to_add(walker: Any) -> str:
     """Suggest a contact block in YAML: the paper's values scaled by mass, on terrain that suits the legs."""
     share, paper = walker.total_mass_kg / CompassWalker().total_mass_kg, Contact()
-    stiffness, damping = (short(float(f"{share * one:.3g}")) for one in (paper.stiffness, paper.damping))
+    stiffness, damping = (short_number(float(f"{share * one:.3g}")) for one in (paper.stiffness, paper.damping))
     numbers = f"stiffness: {stiffness}, damping: {damping}"
     return f"contact: {{{numbers}, terrain: {'plane' if has_knees(walker) else 'after-mid-swing'}}}"
 

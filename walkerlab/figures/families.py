@@ -18,7 +18,7 @@ from walkerlab.figures.canvas import add_legend, entry, is_narrow, label_of, pan
 from walkerlab.figures.illustration import Drawn, Need, Results, paper_figure
 from walkerlab.figures.maps import Kind, draw_kinds
 from walkerlab.figures.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, VERMILLION
-from walkerlab.labels import in_words
+from walkerlab.labels import axis_label
 from walkerlab.store.content import Group
 
 if TYPE_CHECKING:
@@ -66,7 +66,7 @@ def branches_of(results: Results, name: str = "branch") -> Iterator[DrawnBranch]
 def parameter_of(results: Results) -> str:
     """The parameter with its unit, as an axis says it."""
     summary = results[STAGE].summary
-    return label_of(in_words(str(summary["over"])), str(summary["unit"]))
+    return label_of(axis_label(str(summary["over"])), str(summary["unit"]))
 
 
 @dataclass(frozen=True)
@@ -359,7 +359,7 @@ def draw_plane(results: Results) -> Drawn:
         look = looks[curve.model, kind] = {"color": CURVE_COLOURS[curve.model], "linestyle": CURVE_STYLES[kind]}
         axes.plot(curve.group["value"], curve.group["second"], **look, linewidth=WIDTHS.get(curve.period, FINEST))
         second = curve.group.variables["second"]
-        axes.set_ylabel(label_of(in_words(second.long_name), second.units))
+        axes.set_ylabel(label_of(axis_label(second.long_name), second.units))
     axes.set_xlabel(parameter_of(results))
     order = sorted(looks, key=lambda one: (list(CURVE_COLOURS).index(one[0]), one[1]))
     add_legend(figure, [*key, *(entry(f"{kind}s, {model} model", **looks[model, kind]) for model, kind in order)])

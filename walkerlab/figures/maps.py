@@ -19,7 +19,7 @@ from walkerlab.figures.canvas import add_legend, entry, label_of, label_ticks, p
 from walkerlab.figures.illustration import Drawn, Illustration, Need, Results, paper_figure
 from walkerlab.figures.style import BLACK, BLUE, GREEN, GREY, ORANGE, PALE, PURPLE, VERMILLION
 from walkerlab.figures.walks import TUNE_STAGE, claims_in, redoes_the_procedure
-from walkerlab.outcome import TOLD, Outcome
+from walkerlab.outcome import OUTCOME_TEXTS, Outcome
 from walkerlab.store.content import Group
 
 WHITE: Final = "#FFFFFF"
@@ -51,7 +51,7 @@ def patches(kinds: Iterable[tuple[str, str]]) -> list[Artist]:
 
 def ends_among(outcomes: Any) -> list[tuple[str, str]]:
     """Colours and names of the outcomes that occur."""
-    return [(TOLD[one].colour, one.label) for one in map(Outcome, np.unique(outcomes).tolist())]
+    return [(OUTCOME_TEXTS[one].colour, one.label) for one in map(Outcome, np.unique(outcomes).tolist())]
 
 
 def edges(centres: NDArray[Any]) -> NDArray[Any]:
@@ -84,7 +84,7 @@ MAP = Need(
     TUNE_STAGE, "map", (SWING, STANCE, "outcome", "steps", "rigid_outcome", "rigid_steps"), "no start was walked"
 )
 
-OUTCOMES: Final = discrete([TOLD[one].colour for one in Outcome])
+OUTCOMES: Final = discrete([OUTCOME_TEXTS[one].colour for one in Outcome])
 MODELS: Final = (("", "(a) contact model"), ("rigid_", "(b) rigid model"))
 STEP_LEVELS: Final = (0.5, 1.5, 2.5, 4.5)
 
@@ -186,9 +186,11 @@ def fates(outcome: NDArray[Any], attractor: NDArray[Any], summary: Mapping[str, 
         for number in range(len(attractors))
     ]
     said = "never repeats itself" if summary["aperiodic"] else "walks, not settled"
-    kinds.append((TOLD[Outcome.WALKED].colour, said, (outcome == Outcome.WALKED) & (attractor == NO_ATTRACTOR)))
+    kinds.append(
+        (OUTCOME_TEXTS[Outcome.WALKED].colour, said, (outcome == Outcome.WALKED) & (attractor == NO_ATTRACTOR))
+    )
     failures = [one for one in Outcome if one is not Outcome.WALKED]
-    kinds += [(TOLD[one].colour, one.label, outcome == one) for one in failures]
+    kinds += [(OUTCOME_TEXTS[one].colour, one.label, outcome == one) for one in failures]
     return [kind for kind in kinds if kind[2].any()]
 
 

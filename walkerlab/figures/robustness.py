@@ -16,7 +16,7 @@ from walkerlab.figures.families import MODELS
 from walkerlab.figures.illustration import Drawn, Illustration, Need, Results, paper_figure
 from walkerlab.figures.stick_diagram import FAINT, FULL, draw_postures, draw_slope, sticks_of, surrounding
 from walkerlab.figures.style import BLACK, BLUE, GREY, VERMILLION
-from walkerlab.labels import in_words
+from walkerlab.labels import axis_label
 from walkerlab.store.content import Group
 
 Values = NDArray[np.float64]
@@ -65,7 +65,7 @@ def can_be_drawn(group: Group, parameters: Sequence[str]) -> bool:
 
 def over_one_number(group: Group, parameter: str, _results: Results) -> Drawn:
     """Figure 17; caption: the number, its unit, and each model's least disturbed gait, with its norm (s/m)."""
-    x, said, unit = group[parameter].astype(float), in_words(parameter), group.variables[parameter].units
+    x, said, unit = group[parameter].astype(float), axis_label(parameter), group.variables[parameter].units
     models = {str(group[f"gaits.{k}.model"][0]): k for k in range(2) if f"gaits.{k}.model" in group.variables}
     figure, axes = panels(0.6 + PANEL_HEIGHT * len(PANELS), len(PANELS), sharex=True)
     for one, (label, name, shown) in zip(axes, PANELS, strict=True):

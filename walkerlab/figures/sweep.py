@@ -16,7 +16,7 @@ from walkerlab.figures.canvas import add_legend, entry, label_of, panels
 from walkerlab.figures.illustration import Drawn, Illustration, Results
 from walkerlab.figures.maps import WHITE, edges, is_logarithmic
 from walkerlab.figures.style import BLUE, GREY, VERMILLION
-from walkerlab.labels import in_words
+from walkerlab.labels import axis_label
 from walkerlab.store.content import Group
 
 PANEL_HEIGHT: Final = 1.9
@@ -120,7 +120,7 @@ def spoken(group: Group, name: str) -> str:
 
 def label(group: Group, name: str) -> str:
     """A variable's axis: its name in words, and its unit."""
-    return label_of(LABELS.get(name, in_words(name.rpartition(".")[2])), group.variables[name].units)
+    return label_of(LABELS.get(name, axis_label(name.rpartition(".")[2])), group.variables[name].units)
 
 
 def scattered(group: Group, parameters: Sequence[str], dims: tuple[str, ...], names: Sequence[str]) -> Figure:
@@ -200,7 +200,7 @@ def lines(group: Group, parameters: Sequence[str], names: Sequence[str]) -> Figu
     key = []
     for value, look in zip(values, looks, strict=True):
         said = f"{value:.6g}" if isinstance(value, float) else str(value)
-        key.append(entry(f"{in_words(few)} {said}{f' {unit}' if unit not in ('', '1') else ''}", **look))
+        key.append(entry(f"{axis_label(few)} {said}{f' {unit}' if unit not in ('', '1') else ''}", **look))
     add_legend(figure, [*key, *marked(group, names)])
     return figure
 

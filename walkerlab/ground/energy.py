@@ -7,7 +7,7 @@ from walkerlab.ground.normal_force import elastic_energy
 from walkerlab.ground.pulse import push_on
 from walkerlab.ground.walker import (
     OF_BODIES,
-    Form,
+    GroundModel,
     OnGround,
     foot_force,
     foot_motion,
@@ -16,13 +16,13 @@ from walkerlab.ground.walker import (
     over_ground,
     sines_cosines,
 )
-from walkerlab.kernels import inlined, matrix, vector
+from walkerlab.kernels import kernel_part, matrix, vector
 from walkerlab.mechanics import tree
 from walkerlab.mechanics.tree import add_inertia, projections
 
 
-@inlined
-def kinetic_energy(form: Form, y: Any) -> float:
+@kernel_part
+def kinetic_energy(form: GroundModel, y: Any) -> float:
     """Kinetic energy (J)."""
     # what is added to r here is not wanted
     s, c, r, M = vector(OF_BODIES), vector(OF_BODIES), vector(OF_BODIES), matrix(OF_BODIES)
@@ -35,8 +35,8 @@ def kinetic_energy(form: Form, y: Any) -> float:
     return 0.5 * total + tree.kinetic_energy(form.bodies, M, omega)
 
 
-@inlined
-def potential_energy(form: Form, y: Any) -> float:
+@kernel_part
+def potential_energy(form: GroundModel, y: Any) -> float:
     """Potential energy of gravity (J) from the slope frame's origin."""
     s, c, F, U = vector(OF_BODIES), vector(OF_BODIES), vector(OF_BODIES), vector(OF_BODIES)
     sines_cosines(form, y, s, c)
@@ -46,13 +46,13 @@ def potential_energy(form: Form, y: Any) -> float:
     return tree.potential_energy(form, form.bodies, form.root_along, form.root_height, F, U)
 
 
-@inlined
+@kernel_part
 def foot_elastic_energy(system: OnGround, foot: int, y: Any) -> float:
     """Elastic energy (J) in the ground under a foot that it carries."""
     return elastic_energy(-over_ground(system, foot, one_foot_motion(system.form, foot, y)).height, system.normal)
 
 
-@inlined
+@kernel_part
 def total_energy(system: OnGround, y: Any) -> float:
     """Mechanical energy (J) of the energy balance: kinetic, potential from a fixed origin, elastic."""
     total = kinetic_energy(system.form, y) + potential_energy(system.form, y)
@@ -62,7 +62,7 @@ def total_energy(system: OnGround, y: Any) -> float:
     return total + stop_energy(system, y) + spring_energy(system, y)
 
 
-@inlined
+@kernel_part
 def push_power(system: OnGround, t: float, y: Any) -> float:
     """Power (W) that the push-off gives."""
     if system.form.push_off == 0.0:
@@ -73,7 +73,7 @@ def push_power(system: OnGround, t: float, y: Any) -> float:
     return push.along * motion.slip + push.upward * motion.vertical_velocity
 
 
-@inlined
+@kernel_part
 def dissipated_power(system: OnGround, foot: int, y: Any) -> tuple[float, float, float]:
     """Power (W) lost under a foot in the normal direction, (F_n - k d^e) d', and to friction; the normal force (N)."""
     motion = over_ground(system, foot, one_foot_motion(system.form, foot, y))

@@ -9,10 +9,10 @@ from typing import Any
 from walkerlab.ground.hinges import add_torques
 from walkerlab.ground.motion import foot_wrench
 from walkerlab.ground.walker import OF_BODIES, OF_STATES, OnGround, foot_motion, sines_cosines
-from walkerlab.kernels import inlined, kernel, vector
+from walkerlab.kernels import kernel, kernel_part, vector
 
 
-@inlined
+@kernel_part
 def absolute_state(slope: float, chain: Any, q: Any, v: Any, y: Any) -> None:
     """The state in absolute angles into y; `chain` (n, links) holds a one where an angle is a sum over a joint."""
     n = chain.shape[0]

@@ -4,7 +4,7 @@ from typing import Any
 
 from walkerlab.ground.knees import ahead
 from walkerlab.ground.walker import FIRST_KNEE, STOPPING, OnGround, half_size
-from walkerlab.kernels import inlined
+from walkerlab.kernels import kernel_part
 from walkerlab.mechanics.hinges import (
     HIP_ROW,
     HingeTorque,
@@ -18,13 +18,13 @@ from walkerlab.mechanics.hinges import (
 )
 
 
-@inlined
+@kernel_part
 def sign_of(system: OnGround, row: int) -> float:
     """-1 for the hip while the first leg stands, whose body is ahead of the other by the array; otherwise 1."""
     return -1.0 if row == HIP_ROW and system.progress.stance == 0 else 1.0
 
 
-@inlined
+@kernel_part
 def angle_at(system: OnGround, row: int, y: Any) -> tuple[float, float]:
     """How far a hinge's body is ahead of the other (rad), and how fast it gets further (rad/s).
 
@@ -34,13 +34,13 @@ def angle_at(system: OnGround, row: int, y: Any) -> tuple[float, float]:
     return sign * ahead(form, row, y, form.places), sign * ahead(form, row, y, half_size(form) + form.places)
 
 
-@inlined
+@kernel_part
 def is_stopping(system: OnGround, row: int) -> bool:
     """Whether a hinge is a knee in its stop."""
     return row >= FIRST_KNEE and system.knee[row - FIRST_KNEE] == STOPPING
 
 
-@inlined
+@kernel_part
 def torque_at(system: OnGround, row: int, y: Any) -> HingeTorque:
     """The torque at a hinge: of its spring, damper and drive, and of its stop."""
     angle, rate = angle_at(system, row, y)
@@ -53,14 +53,14 @@ def torque_at(system: OnGround, row: int, y: Any) -> HingeTorque:
     )
 
 
-@inlined
+@kernel_part
 def bodies_at(system: OnGround, row: int) -> tuple[int, int]:
     """The body that a hinge's torque turns back, and the other one."""
     body, other = system.form.hinges[row, 0], system.form.hinges[row, 1]
     return (other, body) if sign_of(system, row) < 0.0 else (body, other)
 
 
-@inlined
+@kernel_part
 def add_torques(system: OnGround, y: Any, r: Any) -> None:
     """Add the torques (N m) at all hinges to r (n,)."""
     for row in range(len(system.form.hinges)):
@@ -69,7 +69,7 @@ def add_torques(system: OnGround, y: Any, r: Any) -> None:
             add_hinge_torque(torque_at(system, row, y), body, other, r)
 
 
-@inlined
+@kernel_part
 def add_gradients(system: OnGround, y: Any, by_angle: Any, by_rate: Any) -> None:
     """Add the derivatives of those torques by the angles and their velocities to by_angle and by_rate (n, n)."""
     for row in range(len(system.form.hinges)):
@@ -78,7 +78,7 @@ def add_gradients(system: OnGround, y: Any, by_angle: Any, by_rate: Any) -> None
             add_hinge_gradients(torque_at(system, row, y), body, other, by_angle, by_rate)
 
 
-@inlined
+@kernel_part
 def stop_energy(system: OnGround, y: Any) -> float:
     """Elastic energy (J) in the knees' stops."""
     total = 0.0
@@ -88,7 +88,7 @@ def stop_energy(system: OnGround, y: Any) -> float:
     return total
 
 
-@inlined
+@kernel_part
 def stop_power(system: OnGround, y: Any) -> float:
     """Power (W) that the knees' stops dissipate."""
     total = 0.0
@@ -100,7 +100,7 @@ def stop_power(system: OnGround, y: Any) -> float:
     return total
 
 
-@inlined
+@kernel_part
 def spring_energy(system: OnGround, y: Any) -> float:
     """Elastic energy (J) of the springs at all hinges."""
     total = 0.0
@@ -110,7 +110,7 @@ def spring_energy(system: OnGround, y: Any) -> float:
     return total
 
 
-@inlined
+@kernel_part
 def spring_power(system: OnGround, y: Any) -> float:
     """Power (W) that springs, dampers and drives give and do not store."""
     total = 0.0

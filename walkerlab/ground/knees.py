@@ -5,8 +5,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from walkerlab.ground.normal_force import NormalLaw, elastic_energy, impact_normal_force
-from walkerlab.ground.walker import FIRST_KNEE, Form, half_size
-from walkerlab.kernels import inlined
+from walkerlab.ground.walker import FIRST_KNEE, GroundModel, half_size
+from walkerlab.kernels import kernel_part
 from walkerlab.mechanics.hinges import HingeTorque, hinge_energy, hinge_torque
 from walkerlab.mechanics.impact import RootedTree, lock
 from walkerlab.solvers.system import Floats
@@ -27,26 +27,26 @@ class KneeStop(NamedTuple):
     full_damping_angle: float  # [d_max] rad
 
 
-@inlined
+@kernel_part
 def impact_law(stop: KneeStop) -> NormalLaw:
     """The IMPACT law with a stop's numbers: of rad and N m in place of m and N."""
     return NormalLaw(stop.stiffness, stop.exponent, stop.damping, stop.full_damping_angle)
 
 
-@inlined
-def ahead(form: Form, row: int, y: Any, first: int) -> float:
+@kernel_part
+def ahead(form: GroundModel, row: int, y: Any, first: int) -> float:
     """How far a hinge's body is ahead of the other (rad), by the angles that begin at y[first]; or how fast."""
     return y[first + form.hinges[row, 0]] - y[first + form.hinges[row, 1]]
 
 
-@inlined
-def extension(form: Form, knee: int, y: Any) -> float:
+@kernel_part
+def extension(form: GroundModel, knee: int, y: Any) -> float:
     """How far a knee is beyond straight (rad): negative while it is bent, zero where there is none."""
     return ahead(form, FIRST_KNEE + knee, y, form.places)
 
 
-@inlined
-def extension_rate(form: Form, knee: int, y: Any) -> float:
+@kernel_part
+def extension_rate(form: GroundModel, knee: int, y: Any) -> float:
     """How fast a knee straightens (rad/s)."""
     return ahead(form, FIRST_KNEE + knee, y, half_size(form) + form.places)
 
@@ -74,7 +74,7 @@ class Locked(NamedTuple):
     columns: Floats  # (size, columns) images of directions of the state before
 
 
-def lock_knee(whole: Form, form: Form, x: Any, columns: Floats | None = None) -> Locked:
+def lock_knee(whole: GroundModel, form: GroundModel, x: Any, columns: Floats | None = None) -> Locked:
     """Bring the angular velocities to those that a form allows, by a plastic impact that leaves the root as it moves.
 
     whole    the form of all bodies, about the root

@@ -6,7 +6,7 @@ from walkerlab.ground.hinges import add_gradients, add_torques
 from walkerlab.ground.pulse import push_gradient, push_on
 from walkerlab.ground.walker import (
     OF_BODIES,
-    Form,
+    GroundModel,
     OnGround,
     foot_force,
     foot_motion,
@@ -14,7 +14,7 @@ from walkerlab.ground.walker import (
     over_ground,
     sines_cosines,
 )
-from walkerlab.kernels import always_inline, inlined, matrix, vector
+from walkerlab.kernels import forced_inline, kernel_part, matrix, vector
 from walkerlab.mechanics.links import Counted, factor_linked, solve_linked
 from walkerlab.mechanics.tree import (
     add_gravity,
@@ -32,7 +32,7 @@ def coordinate_and_rate(system: OnGround) -> tuple[float, float]:
     return (0.0, 0.0)
 
 
-@always_inline
+@forced_inline
 def foot_wrench(system: OnGround, t: float, foot: int, s: Any, c: Any, y: Any, r: Any) -> tuple[float, float]:
     """Force of ground and push-off on a foot, along and normal to the slope (N); adds its torques (N m) to r (n,)."""
     form, push = system.form, push_on(system, t, foot, s, c)
@@ -52,7 +52,7 @@ def foot_wrench(system: OnGround, t: float, foot: int, s: Any, c: Any, y: Any, r
     return along, normal
 
 
-@always_inline
+@forced_inline
 def all_forces(system: OnGround, t: float, s: Any, c: Any, y: Any, M: Any, r: Any) -> tuple[float, float]:
     """Force of ground and push-off along and normal to the slope (N); M (n, n) and all torques (N m) into r (n,).
 
@@ -97,8 +97,8 @@ def on_ground_derivative(system: OnGround, t: float, y: Any, f: Any) -> None:
         f[half + first + k] = r[k]
 
 
-@inlined
-def motion_gradient(form: Form, foot: int, F: Any, U: Any, y: Any, j: int) -> tuple[float, float, float]:
+@kernel_part
+def motion_gradient(form: GroundModel, foot: int, F: Any, U: Any, y: Any, j: int) -> tuple[float, float, float]:
     """Derivatives of a foot's penetration, penetration rate and slip along number j of the state.
 
     F, U  (n,) projections of the levers to the foot
@@ -116,7 +116,7 @@ def motion_gradient(form: Form, foot: int, F: Any, U: Any, y: Any, j: int) -> tu
     return -F[k], omega * U[k], -omega * F[k]
 
 
-@inlined
+@kernel_part
 def add_foot_gradients(system: OnGround, t: float, foot: int, s: Any, c: Any, y: Any, J: Any) -> None:
     """Add the derivatives of a foot's force and torques to the acceleration rows of J, before masses divide them."""
     form, push = system.form, push_on(system, t, foot, s, c)
@@ -143,8 +143,8 @@ def add_foot_gradients(system: OnGround, t: float, foot: int, s: Any, c: Any, y:
             add_column(form, foot, p + k, by_angle[0], by_angle[1], F, U, J)
 
 
-@inlined
-def add_column(form: Form, foot: int, j: int, along: float, normal: float, F: Any, U: Any, J: Any) -> None:
+@kernel_part
+def add_column(form: GroundModel, foot: int, j: int, along: float, normal: float, F: Any, U: Any, J: Any) -> None:
     """Add to column j of J what a force on a foot changes by, along and normal to the slope; and its torques."""
     p, half = form.places, half_size(form)
     if p > 0:
@@ -154,7 +154,7 @@ def add_column(form: Form, foot: int, j: int, along: float, normal: float, F: An
         J[half + p + k, j] += along * (form.rolling[foot, k] - U[k]) + normal * F[k]
 
 
-@inlined
+@kernel_part
 def add_torque_gradients(system: OnGround, s: Any, c: Any, y: Any, alpha: Any, by_angle: Any, by_rate: Any) -> None:
     """Add the derivatives (n, n) of the torques but the ground's, less M alpha at fixed alpha, by angles and rates."""
     form = system.form

@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 from walkerlab.ground.smooth_step import smooth_step
-from walkerlab.kernels import inlined
+from walkerlab.kernels import kernel_part
 
 
 class NormalLaw(NamedTuple):
@@ -24,7 +24,7 @@ class NormalForce(NamedTuple):
     by_rate: float  # N s/m
 
 
-@inlined
+@kernel_part
 def impact_normal_force(penetration: float, penetration_rate: float, law: NormalLaw) -> NormalForce:
     """Normal force of ADAMS's IMPACT law, never adhesive.
 
@@ -43,7 +43,7 @@ def impact_normal_force(penetration: float, penetration_rate: float, law: Normal
     return NormalForce(force, spring, law.exponent * spring / penetration + c_slope * penetration_rate, c)
 
 
-@inlined
+@kernel_part
 def grip(penetration: float, penetration_rate: float, law: NormalLaw) -> float:
     """A measure of the force before it is kept from pulling: where it falls through zero the ground lets go.
 
@@ -59,7 +59,7 @@ def grip(penetration: float, penetration_rate: float, law: NormalLaw) -> float:
     return spring + damping * penetration_rate * (d ** (2.0 - power) if power < 2.0 else 1.0)
 
 
-@inlined
+@kernel_part
 def elastic_energy(penetration: float, law: NormalLaw) -> float:
     """Energy stored in the contact's spring (J): k d^(e+1) / (e+1)."""
     if penetration <= 0.0:

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 from walkerlab.ground.terrain import cell_at, has_ground_in_cell
 from walkerlab.ground.walker import OnGround, feet_motion
-from walkerlab.kernels import inlined
+from walkerlab.kernels import kernel_part
 from walkerlab.solvers.system import block, derivative, jacobian
 
 
@@ -19,7 +19,7 @@ class OnPads(NamedTuple):
     terrain: Any
 
 
-@inlined
+@kernel_part
 def find_pads(system: OnPads, y: Any) -> None:
     """Tell the walker of ground under the feet that are over a pad, at whatever height."""
     feet = feet_motion(system.walker.form, y)

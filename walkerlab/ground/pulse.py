@@ -7,11 +7,11 @@ passed its force is 30 u^2 (1 - u)^2 P / D, smooth where it begins and ends.
 import math
 from typing import Any, NamedTuple
 
-from walkerlab.ground.walker import Form, OnGround
-from walkerlab.kernels import inlined
+from walkerlab.ground.walker import GroundModel, OnGround
+from walkerlab.kernels import kernel_part
 
 
-@inlined
+@kernel_part
 def pulse_force(system: OnGround, t: float) -> float:
     """Force (N) of the pulse at a time; 0 where none lasts."""
     if system.form.push_off == 0.0 or system.progress.steps == 0:
@@ -22,7 +22,7 @@ def pulse_force(system: OnGround, t: float) -> float:
     return 30.0 * (u * (1.0 - u)) ** 2 * system.form.push_off / system.form.push_off_duration
 
 
-@inlined
+@kernel_part
 def pulse_left(system: OnGround, t: float) -> float:
     """How much longer (s) a pulse lasts; nothing where none does."""
     if system.form.push_off == 0.0 or system.progress.steps == 0:
@@ -39,7 +39,7 @@ class Push(NamedTuple):
     above: float  # m
 
 
-@inlined
+@kernel_part
 def push_on(system: OnGround, t: float, foot: int, s: Any, c: Any) -> Push:
     """What pushes a foot at a time; no force where no pulse lasts."""
     form, force = system.form, pulse_force(system, t) if foot != system.progress.stance else 0.0
@@ -54,15 +54,15 @@ def push_on(system: OnGround, t: float, foot: int, s: Any, c: Any) -> Push:
     return Push(over_length * ahead, over_length * above, ahead, above)
 
 
-@inlined
-def lever_to_hip(form: Form, foot: int, s: Any, c: Any, k: int) -> tuple[float, float]:
+@kernel_part
+def lever_to_hip(form: GroundModel, foot: int, s: Any, c: Any, k: int) -> tuple[float, float]:
     """A body's part (m) of the way from a foot's centre to the hip, along the slope and over it."""
     x, y = form.hip_x[k] - form.foot_x[foot, k], form.hip_y[k] - form.foot_y[foot, k]
     return c[k] * x - s[k] * y, s[k] * x + c[k] * y
 
 
-@inlined
-def push_gradient(form: Form, push: Push, foot: int, s: Any, c: Any, k: int) -> tuple[float, float]:
+@kernel_part
+def push_gradient(form: GroundModel, push: Push, foot: int, s: Any, c: Any, k: int) -> tuple[float, float]:
     """Derivatives (N/rad) of a push along and upward by a body's angle: its line turns, its force is the same."""
     forward, upward = lever_to_hip(form, foot, s, c, k)
     turned = (push.along * forward + push.upward * upward) / (push.ahead * push.ahead + push.above * push.above)

@@ -1,9 +1,9 @@
 """The cubic STEP function that ADAMS blends with."""
 
-from walkerlab.kernels import inlined
+from walkerlab.kernels import kernel_part
 
 
-@inlined
+@kernel_part
 def smooth_step(x: float, x0: float, h0: float, x1: float, h1: float) -> tuple[float, float]:
     """STEP(x, x0, h0, x1, h1) and its derivative: h0 before x0, h1 behind x1, the cubic in between.
 

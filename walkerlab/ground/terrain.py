@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from walkerlab.kernels import inlined
+from walkerlab.kernels import kernel_part
 
 FAR = 1e9  # m, an edge out of reach
 STANCE_FOOT = 1  # which carries the first step
@@ -42,26 +42,26 @@ def plane(stride_measure: float) -> Terrain:
     return Terrain(stride_measure, (0.0, 0.0), False, False, EVEN)
 
 
-@inlined
+@kernel_part
 def is_uneven(terrain: Terrain) -> bool:
     """Whether footholds have heights of their own."""
     return terrain.heights.size > 1
 
 
-@inlined
+@kernel_part
 def foothold_height(terrain: Terrain, foothold: int) -> float:
     """Height (m) of a foothold over the slope; the start's is number 0, and what lies behind it is level."""
     return float(terrain.heights[min(max(foothold, 0), terrain.heights.size - 1)])
 
 
-@inlined
+@kernel_part
 def height_of_pad(terrain: Terrain, foot: int, cell: int) -> float:
     """Height (m) of the pad that is a cell of a foot's lane."""
     apart = (terrain.lanes[foot] - terrain.lanes[STANCE_FOOT]) / terrain.stride_measure
     return foothold_height(terrain, cell + math.floor(apart + 0.5))
 
 
-@inlined
+@kernel_part
 def cell_at(terrain: Terrain, foot: int, along: float) -> int:
     """Number of the cell of a foot's lane at `along` (m); pad 2 j is centred 2 j S from the lane's first."""
     if not terrain.has_pads:
@@ -69,7 +69,7 @@ def cell_at(terrain: Terrain, foot: int, along: float) -> int:
     return math.floor((along - terrain.lanes[foot]) / terrain.stride_measure + 0.5)
 
 
-@inlined
+@kernel_part
 def cell_edges(terrain: Terrain, foot: int, cell: int) -> tuple[float, float]:
     """Where a cell begins and ends (m)."""
     if not terrain.has_pads:
@@ -78,19 +78,19 @@ def cell_edges(terrain: Terrain, foot: int, cell: int) -> tuple[float, float]:
     return centre - 0.5 * terrain.stride_measure, centre + 0.5 * terrain.stride_measure
 
 
-@inlined
+@kernel_part
 def has_ground_in_cell(cell: int) -> bool:
     """Whether a foot that comes into a cell from above is carried there: pads have even numbers."""
     return cell % 2 == 0
 
 
-@inlined
+@kernel_part
 def starts_with_ground(terrain: Terrain, is_stance: bool) -> bool:
     """Whether a foot that starts on the ground is carried by it; one about to swing has not been ahead yet."""
     return is_stance or not terrain.order_matters
 
 
-@inlined
+@kernel_part
 def has_ground_in_air(terrain: Terrain, has_ground: bool, stands: bool, ahead: bool) -> bool:
     """Whether ground would carry a foot that is above it.
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from walkerlab.ground.friction import friction_coefficient
 from walkerlab.ground.normal_force import NormalForce, NormalLaw, impact_normal_force
-from walkerlab.kernels import by_reference, inlined, vector
+from walkerlab.kernels import by_reference, kernel_part, vector
 from walkerlab.mechanics import tree
 from walkerlab.mechanics.hinges import HIP_ROW
 from walkerlab.mechanics.tree import lever_motion
@@ -31,7 +31,7 @@ RELEASED, BENT, STOPPING, LOCKED = 0, 1, 2, 3
 
 
 @tree.read_at_once
-class Form(tree.Mechanism):  # type: ignore[misc]  # as its base
+class GroundModel(tree.Mechanism):  # type: ignore[misc]  # as its base
     """The walker as it moves while its knees are as they are, hinged or free, SI: a structured scalar.
 
     Its arrays have room for MAX_BODIES, so that one compiled walk serves all walkers; n of the places are used. Its
@@ -69,7 +69,7 @@ SHAPES: dict[str, tuple[int, ...]] = {
     **dict.fromkeys(("foot_x", "foot_y", "rolling"), (2, MAX_BODIES)),
     "radius": (2,),
 }
-FORM = tree.record_type(Form, SHAPES)
+FORM = tree.record_type(GroundModel, SHAPES)
 
 
 class ContactWalker(NamedTuple):
@@ -82,9 +82,9 @@ class ContactWalker(NamedTuple):
     legs: Integers  # (2, bodies of a leg) from the hip down
 
     @property
-    def whole(self) -> Form:
+    def whole(self) -> GroundModel:
         """With all its bodies, free, no knee locked."""
-        form: Form = self.forms[0, 0]
+        form: GroundModel = self.forms[0, 0]
         return form
 
     @property
@@ -161,7 +161,7 @@ def new_progress(stance: int = 1, steps: int = 0, last_touch: float = 0.0) -> Wa
 class OnGround(NamedTuple):
     """The walker in one of its forms, with what may change while it moves so: in memory of the walk's own."""
 
-    form: Form
+    form: GroundModel
     normal: NormalLaw
     friction: Any
     stop: Any
@@ -192,7 +192,7 @@ def on_ground(
     return OnGround(form, walker.normal, walker.friction, walker.stop, *memory, progress)
 
 
-@inlined
+@kernel_part
 def locked_knees(knee: Any) -> int:
     """The number of the form whose knees are locked as these, (2,) by what each is doing: 0 none, 1, 2, 3 both."""
     return (1 if knee[0] == LOCKED else 0) + (2 if knee[1] == LOCKED else 0)
@@ -207,20 +207,20 @@ class FootMotion(NamedTuple):
     vertical_velocity: float  # m/s, velocity of the height
 
 
-@inlined
-def half_size(form: Form) -> int:
+@kernel_part
+def half_size(form: GroundModel) -> int:
     """How many coordinates there are: where the velocities begin in the state."""
     return form.places + form.bodies
 
 
-@inlined
-def sines_cosines(form: Form, y: Any, s: Any, c: Any) -> None:
+@kernel_part
+def sines_cosines(form: GroundModel, y: Any, s: Any, c: Any) -> None:
     """Sines and cosines (n,) of the bodies' angles from the slope's normal, into s and c."""
     tree.sines_cosines(form, form.bodies, y[form.places : half_size(form)], s, c)
 
 
-@inlined
-def foot_motion(form: Form, foot: int, s: Any, c: Any, y: Any) -> FootMotion:
+@kernel_part
+def foot_motion(form: GroundModel, foot: int, s: Any, c: Any, y: Any) -> FootMotion:
     """Position and velocity of the lowest point of a ball foot; the slip is that of the ball's own material there."""
     n, half = form.bodies, half_size(form)
     along, height, slip, vertical_velocity = form.root_along, form.root_height, 0.0, 0.0
@@ -234,23 +234,23 @@ def foot_motion(form: Form, foot: int, s: Any, c: Any, y: Any) -> FootMotion:
     return FootMotion(along + ahead, height, slip + ahead_rate, vertical_velocity + above_rate)
 
 
-@inlined
-def one_foot_motion(form: Form, foot: int, y: Any) -> FootMotion:
+@kernel_part
+def one_foot_motion(form: GroundModel, foot: int, y: Any) -> FootMotion:
     """A foot in a state of a form."""
     s, c = vector(OF_BODIES), vector(OF_BODIES)
     sines_cosines(form, y, s, c)
     return foot_motion(form, foot, s, c, y)
 
 
-@inlined
-def feet_motion(form: Form, y: Any) -> tuple[FootMotion, FootMotion]:
+@kernel_part
+def feet_motion(form: GroundModel, y: Any) -> tuple[FootMotion, FootMotion]:
     """Both feet in a state of a form."""
     s, c = vector(OF_BODIES), vector(OF_BODIES)
     sines_cosines(form, y, s, c)
     return foot_motion(form, 0, s, c, y), foot_motion(form, 1, s, c, y)
 
 
-@inlined
+@kernel_part
 def over_ground(system: OnGround, foot: int, motion: FootMotion) -> FootMotion:
     """A foot's motion with its height over the ground that is there for it."""
     return FootMotion(motion.along, motion.height - system.level[foot], motion.slip, motion.vertical_velocity)
@@ -265,7 +265,7 @@ class FootForce(NamedTuple):
     coefficient: float  # friction over normal force, with its sign
 
 
-@inlined
+@kernel_part
 def foot_force(laws: Any, motion: FootMotion) -> FootForce:
     """Force of the ground on a foot that is inside it; by the laws of a walker or of its system."""
     normal = impact_normal_force(-motion.height, -motion.vertical_velocity, laws.normal)
@@ -273,7 +273,7 @@ def foot_force(laws: Any, motion: FootMotion) -> FootForce:
     return FootForce(mu * normal.force, normal, mu_slope * normal.force, mu)
 
 
-def folded(form: Form, x: Any) -> Floats:
+def folded(form: GroundModel, x: Any) -> Floats:
     """The form's state, or a column of its tangent, from that of all bodies about the same root.
 
     Bodies that are one turn alike up to rounding; of each group the first tells.
@@ -281,21 +281,21 @@ def folded(form: Form, x: Any) -> Floats:
     return np.asarray(x)[places_in_whole(form, len(x))]
 
 
-def unfolded(form: Form, y: Any, size: int) -> Floats:
+def unfolded(form: GroundModel, y: Any, size: int) -> Floats:
     """State of all bodies (size,) about the same root: bodies that are one turn alike."""
     p, n, every = int(form.places), int(form.bodies), size // 2 - int(form.places)
     onto = form.onto[:every]
     return np.asarray(y)[[*range(p), *(p + onto), *range(p + n, 2 * p + n), *(2 * p + n + onto)]]
 
 
-def places_in_whole(form: Form, size: int) -> list[int]:
+def places_in_whole(form: GroundModel, size: int) -> list[int]:
     """Where the numbers of a form's state stand in that of all bodies about the same root."""
     p, half, first = int(form.places), size // 2, form.first[: form.bodies]
     return [*range(p), *(p + first), *range(half, half + p), *(half + p + first)]
 
 
-@inlined
-def store_whole(form: Form, y: Any, whole: Any) -> None:
+@kernel_part
+def store_whole(form: GroundModel, y: Any, whole: Any) -> None:
     """Write the state y of a form into `whole`, as that of the whole walker, free: the hinge tells the rest."""
     n, p, half = form.bodies, form.places, half_size(form)
     middle = whole.size // 2
@@ -312,7 +312,7 @@ def store_whole(form: Form, y: Any, whole: Any) -> None:
     whole[middle], whole[middle + 1] = speed / form.mass, vertical_velocity / form.mass
 
 
-def floating_state(form: Form, y: Any, size: int) -> State:
+def floating_state(form: GroundModel, y: Any, size: int) -> State:
     """The state (size,) of the whole walker, free, of a form's state y."""
     whole = np.zeros(size)
     store_whole(form, y, whole)

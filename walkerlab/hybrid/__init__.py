@@ -1,7 +1,7 @@
 """Walks as hybrid systems: smooth motion between events, jumps at them, and how a walk ends.
 
 Rigid model (`rigid_walk`; many walks side by side in `rigid_lanes`)
-    modes         one foot on the slope, the swing knee BENT or STRAIGHT (`mechanics/standing`)
+    modes         one foot on the slope, the swing knee BENT or STRAIGHT (`mechanics/rigid_model`)
     KNEE          the bent knee straightens: plastic strike, the knee locks; BENT -> STRAIGHT
     HEEL_STRIKE   the swing foot comes down with AHEAD positive: plastic strike, a push-off before it, the legs change
                   roles; a step; STRAIGHT -> BENT, or STRAIGHT without knees

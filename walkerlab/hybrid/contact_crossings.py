@@ -17,7 +17,7 @@ from walkerlab.ground.walker import (
     OF_BODIES,
     STOPPING,
     FootMotion,
-    Form,
+    GroundModel,
     OnGround,
     foot_motion,
     over_ground,
@@ -43,7 +43,7 @@ from walkerlab.hybrid.contact_events import (
 )
 from walkerlab.hybrid.contact_state import AT_COMPRESSION, WalkState, material_along
 from walkerlab.hybrid.endings import FALLEN_HIP
-from walkerlab.kernels import inlined, vector
+from walkerlab.kernels import kernel_part, vector
 from walkerlab.solvers.events import NO_CROSSING, CrossingFinder, first_crossing, way_from_zero
 
 NO_SIDE = 0  # of an event function that may cross zero either way
@@ -51,8 +51,8 @@ ROUNDING = 1e-14  # m, rad or their rates: what event functions are zero to
 CLEARLY_MOVED = 1e-12  # the same, over a step: what they move away from zero by, if not by rounding alone
 
 
-@inlined
-def hip_height(form: Form, s: Any, c: Any, y: Any) -> float:
+@kernel_part
+def hip_height(form: GroundModel, s: Any, c: Any, y: Any) -> float:
     """Height of the hip over the slope (m)."""
     height = y[1] if form.places > 0 else form.root_height
     for k in range(form.bodies):
@@ -60,7 +60,7 @@ def hip_height(form: Form, s: Any, c: Any, y: Any) -> float:
     return height
 
 
-@inlined
+@kernel_part
 def sample_event_functions(
     system: OnGround, ground: JudgedGround, walk_state: WalkState, y: Any, node: int, finder: CrossingFinder
 ) -> None:
@@ -83,7 +83,7 @@ def sample_event_functions(
         values[EXTENSION_RATE + knee, node] = extension_rate(form, knee, y)
 
 
-@inlined
+@kernel_part
 def sample_foot(
     system: OnGround, motion: FootMotion, edges: tuple[float, float], first: int, j: int, finder: CrossingFinder
 ) -> None:
@@ -98,7 +98,7 @@ def sample_foot(
     sample_switching(system.friction, motion.slip, values, first + FRICTION_SWITCHES, j)
 
 
-@inlined
+@kernel_part
 def knee_crossing(walk_state: WalkState, finder: CrossingFinder) -> tuple[float, int]:
     """Fraction of the step at which a knee locks, latches or is to be released, and which event function's that is.
 
@@ -122,7 +122,7 @@ def knee_crossing(walk_state: WalkState, finder: CrossingFinder) -> tuple[float,
     return best, event
 
 
-@inlined
+@kernel_part
 def earliest_crossing(
     system: OnGround, ground: JudgedGround, walk_state: WalkState, watch_order: bool, finder: CrossingFinder
 ) -> tuple[float, int]:
@@ -164,7 +164,7 @@ def earliest_crossing(
     return best, event
 
 
-@inlined
+@kernel_part
 def leaves_side(finder: CrossingFinder, event: int, side: int, zero_at_start: bool) -> float:
     """Fraction at which an event function crosses to the other side of zero than it is known to be on.
 

@@ -9,7 +9,7 @@ They are module constants: kernels take members of an IntEnum for objects, and c
 from typing import NamedTuple
 
 from walkerlab.ground.terrain import Terrain
-from walkerlab.kernels import by_reference, inlined
+from walkerlab.kernels import by_reference, kernel_part
 
 # event functions of each foot
 HEIGHT, LEFT_EDGE, RIGHT_EDGE, RELEASE, FULL_DAMPING = range(5)
@@ -44,13 +44,13 @@ class JudgedGround(NamedTuple):
     frame: Frame
 
 
-@inlined
+@kernel_part
 def farthest_slide(terrain: Terrain) -> float:
     """How far a loaded stance foot may slip (m)."""
     return FARTHEST_SLIDE * terrain.stride_measure
 
 
-@inlined
+@kernel_part
 def is_switching(event: int) -> bool:
     """Whether an event is a mere switching point of the force law."""
     return event < 2 * PER_FOOT and RELEASE <= event % PER_FOOT < MATERIAL

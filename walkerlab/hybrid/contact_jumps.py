@@ -12,7 +12,7 @@ from walkerlab.ground.walker import (
     OF_BODIES,
     STOPPING,
     ContactWalker,
-    Form,
+    GroundModel,
     OnGround,
     folded,
     new_progress,
@@ -85,7 +85,7 @@ def rate_of(system: OnGround, y: Floats, size: int, t: float) -> Floats:
     return unfolded(system.form, rate, size)
 
 
-def event_gradient(whole: Form, event: int, x: Floats) -> Floats:
+def event_gradient(whole: GroundModel, event: int, x: Floats) -> Floats:
     """Derivative by the state of all bodies of a knee's extension or a foot's height, or of the rate of either."""
     gradient, p, half = np.zeros(x.size), int(whole.places), x.size // 2
     if event >= EXTENSION:

@@ -22,7 +22,7 @@ from walkerlab.hybrid.endings import (
     SOLVER_FAILED,
     WALKED,
 )
-from walkerlab.kernels import entered, inlined, kernel
+from walkerlab.kernels import callable_kernel, kernel, kernel_part
 from walkerlab.mechanics.hinges import HIP_ROW, is_sprung
 from walkerlab.solvers.events import CrossingFinder
 from walkerlab.solvers.stepping import (
@@ -48,7 +48,7 @@ REWINDS = 24  # of one step; where rounding moves an event with each try, the st
 DOUBTS = 12  # rewinds of one step after which an event that its end does not bear out does not count
 
 
-@entered
+@callable_kernel
 def scan(
     system: OnGround, ground: JudgedGround, walk_state: WalkState, watch_order: bool, finder: CrossingFinder
 ) -> tuple[float, int]:
@@ -125,19 +125,19 @@ def walk_in_form(
     return WALKED, search.event
 
 
-@inlined
+@kernel_part
 def steps_are_left(walk_state: WalkState, until: int) -> bool:
     """Whether the walk state has room for a step, or waits for the lift that ends the last one."""
     return walk_state.progress.steps < walk_state.touch_time.size or (until == AT_LIFT and is_to_lift(walk_state))
 
 
-@inlined
+@kernel_part
 def seek(target: float, event: int) -> EventSearch:
     """Look for the next event, from a step that stands up to a time (s); `event` was the last one."""
     return EventSearch(target, event, target, False, 0, 0, False, False)
 
 
-@inlined
+@kernel_part
 def aim(
     search: EventSearch, walk_state: WalkState, method: Any, finder: CrossingFinder, fraction: float, event: int
 ) -> EventSearch:
@@ -153,7 +153,7 @@ def aim(
     return EventSearch(end, search.event, end, False, 0, 0, True, False)
 
 
-@inlined
+@kernel_part
 def approach(
     search: EventSearch, walk_state: WalkState, start: float, end: float, fraction: float, event: int
 ) -> EventSearch:
@@ -177,7 +177,7 @@ def approach(
     return EventSearch(end, event, latest, True, refinements, search.rewinds, True, True)
 
 
-@inlined
+@kernel_part
 def confirm(search: EventSearch, start: float, wait: float) -> EventSearch:
     """Let the event happen at the end of a step that just did not reach it, or lead the step on by `wait` (s)."""
     happens = abs(wait) <= EVENT_TIME
@@ -188,7 +188,7 @@ def confirm(search: EventSearch, start: float, wait: float) -> EventSearch:
     return EventSearch(search.target, search.event, search.latest, True, refinements, rewinds, True, happens)
 
 
-@inlined
+@kernel_part
 def forget_zeros(walk_state: WalkState, h: float) -> None:
     """After a step of h (s) no event function counts as zero any more; of events at one time each is found once."""
     if h > 2.0 * EVENT_TIME:
@@ -196,7 +196,7 @@ def forget_zeros(walk_state: WalkState, h: float) -> None:
             walk_state.at_zero[i] = 0
 
 
-@inlined
+@kernel_part
 def react(
     system: OnGround,
     terrain: Terrain,
@@ -224,19 +224,19 @@ def react(
     return GOES_ON
 
 
-@inlined
+@kernel_part
 def is_hinged(system: OnGround) -> bool:
     """Whether a hinge carries the walker, until its first step releases it."""
     return system.form.places == 0
 
 
-@inlined
+@kernel_part
 def jumps_at_touch(system: OnGround) -> bool:
     """Whether a step's touch may change what acts on the walker at once: the hip's legs change, a push-off begins."""
     return is_sprung(system.form, HIP_ROW) or system.form.push_off != 0.0
 
 
-@inlined
+@kernel_part
 def deadline(system: OnGround, frame: Frame, walk_state: WalkState, t: float) -> float:
     """When the walk ends if nothing happens before: too long a step, or too long a flight (s); or when a pulse does."""
     by_step = walk_state.progress.last_touch + LONGEST_STEP * frame.pendulum_time
@@ -245,7 +245,7 @@ def deadline(system: OnGround, frame: Frame, walk_state: WalkState, t: float) ->
     return min(by_step, by_flight, t + left) if left > EVENT_TIME else min(by_step, by_flight)
 
 
-@inlined
+@kernel_part
 def time_to_zero(method: Any, finder: CrossingFinder, event: int) -> float:
     """How much later than the end of the last step an event function is zero (s), by its slope there."""
     last = finder.nodes.size - 1
@@ -258,7 +258,7 @@ def time_to_zero(method: Any, finder: CrossingFinder, event: int) -> float:
     return max(-0.5 * h, min(0.5 * h, wait))
 
 
-@inlined
+@kernel_part
 def judge(system: OnGround, frame: Frame, t: float, walk_state: WalkState) -> int:
     """End the walk if it has flown or taken too long at time t (s); note until when a foot was on the ground.
 

@@ -12,7 +12,7 @@ from walkerlab.hybrid.contact_events import HEIGHT, LEGS_TURN, PER_FOOT, VERTICA
 from walkerlab.hybrid.contact_state import WalkState
 from walkerlab.hybrid.contact_tangent import Tangent, carry_tangent
 from walkerlab.hybrid.hip_torque import torque_work
-from walkerlab.kernels import by_reference, by_type_or_default, entered, inlined, matrix, vector
+from walkerlab.kernels import by_reference, by_type_or_default, callable_kernel, kernel_part, matrix, vector
 from walkerlab.mechanics.hinges import HIP_ROW, hinge_law
 from walkerlab.mechanics.tree import read_at_once, record_type
 from walkerlab.solvers.events import RISING, CrossingFinder, first_crossing
@@ -81,7 +81,7 @@ class ContactObserver(NamedTuple):
     tangent: Tangent  # derivative of the state with respect to where it started, if wanted
 
 
-@inlined
+@kernel_part
 def observe(
     observer: ContactObserver, method: Any, system: OnGround, finder: CrossingFinder, walk_state: WalkState
 ) -> None:
@@ -97,7 +97,7 @@ def observe(
         carry_tangent(observer.tangent, method, system)
 
 
-@inlined
+@kernel_part
 def record_samples(observer: ContactObserver, method: Any, system: OnGround, walk_state: WalkState) -> None:
     """The samples that fall into the last step."""
     t, h = method.clock[T_OLD], method.clock[T] - method.clock[T_OLD]
@@ -119,7 +119,7 @@ def record_samples(observer: ContactObserver, method: Any, system: OnGround, wal
     observer.tally.recorded = index
 
 
-@inlined
+@kernel_part
 def balance(observer: ContactObserver, method: Any, system: OnGround) -> None:
     """What the last step took and gave, and how well the energy balances at its end."""
     account = observer.account
@@ -131,7 +131,7 @@ def balance(observer: ContactObserver, method: Any, system: OnGround) -> None:
     observer.tally.residual = max(observer.tally.residual, abs(residual))
 
 
-@inlined
+@kernel_part
 def note_torque(observer: ContactObserver, method: Any, system: OnGround, finder: CrossingFinder) -> None:
     """Work of the hip's constant torque in the last step."""
     torque = hinge_law(system.form, HIP_ROW).torque
@@ -141,7 +141,7 @@ def note_torque(observer: ContactObserver, method: Any, system: OnGround, finder
         observer.account[FORWARD] += given.positive
 
 
-@inlined
+@kernel_part
 def note_work(observer: ContactObserver, system: OnGround, y: Any) -> None:
     """A step has ended: what was given until now belongs to steps that were taken, and what the hip's spring gave."""
     for entry in range(ENTRIES):
@@ -149,7 +149,7 @@ def note_work(observer: ContactObserver, system: OnGround, y: Any) -> None:
     observer.account_at_touch[HIP] += observer.tally.start_spring - spring_energy(system, y)
 
 
-@inlined
+@kernel_part
 def note_depth(observer: ContactObserver, method: Any, system: OnGround, finder: CrossingFinder, foot: int) -> None:
     """How deep a foot got in the last step: at its end, or where it stopped sinking in."""
     end, first = finder.nodes.size - 1, foot * PER_FOOT
@@ -162,14 +162,14 @@ def note_depth(observer: ContactObserver, method: Any, system: OnGround, finder:
     observer.tally.max_penetration = max(observer.tally.max_penetration, deepest)
 
 
-@inlined
+@kernel_part
 def observe_edge(observer: ContactObserver, system: OnGround, foot: int, y: Any) -> None:
     """A foot left its pad: the spring under it is gone, and what it held with it."""
     if system.has_ground[foot] != 0 and observer.track_energy:
         observer.account[EDGES] += foot_elastic_energy(system, foot, y)
 
 
-@entered
+@callable_kernel
 def end_energy(system: OnGround, y: Any) -> float:
     """Mechanical energy (J) at the end of the last step."""
     return total_energy(system, y)
@@ -187,7 +187,7 @@ def of_collocation(method: Radau5) -> Quadrature:
     return OF_ORDER_5
 
 
-@inlined
+@kernel_part
 def add_work_until(method: Any, system: OnGround, fraction: float, account: Any) -> None:
     """Add to an account (entries,) what the first part of the last step took and gave (J)."""
     nodes, weights = quadrature(method)
@@ -199,7 +199,7 @@ def add_work_until(method: Any, system: OnGround, fraction: float, account: Any)
     add_work(system, states, nodes, weights, method.clock[T_OLD], span, account)
 
 
-@entered
+@callable_kernel
 def add_work(
     system: OnGround,
     states: Any,
@@ -224,7 +224,7 @@ def add_work(
         account[PUSH_OFF] += weight * push_power(system, begin + nodes[i] * span, states[i])
 
 
-@inlined
+@kernel_part
 def foot_work(system: OnGround, states: Any, weights: tuple[float, ...], foot: int, span: float) -> tuple[float, float]:
     """Work (J) lost under a foot that there is ground for.
 

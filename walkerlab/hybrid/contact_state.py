@@ -13,7 +13,7 @@ from walkerlab.ground.walker import (
     RELEASED,
     ContactWalker,
     FootMotion,
-    Form,
+    GroundModel,
     WalkProgress,
     feet_motion,
     new_progress,
@@ -28,7 +28,7 @@ from walkerlab.hybrid.contact_events import (
     RIGHT_EDGE,
     SLIDE,
 )
-from walkerlab.kernels import by_reference, inlined
+from walkerlab.kernels import by_reference, kernel_part
 from walkerlab.solvers.system import State
 
 # when the trailing knee is to be released: no more, as the leading foot stops sinking in, or as the push-off ends
@@ -135,8 +135,8 @@ def side_of(value_and_rate: tuple[float, float], scales: tuple[float, float], ot
     return otherwise, True
 
 
-@inlined
-def material_along(form: Form, foot: int, along: float, y: Any) -> float:
+@kernel_part
+def material_along(form: GroundModel, foot: int, along: float, y: Any) -> float:
     """Where a foot at `along` (m) would be had it not rolled: what this changes by is slip.
 
     The velocity of the material point at the bottom of the ball is that of the contact point plus radius times angular
@@ -147,19 +147,19 @@ def material_along(form: Form, foot: int, along: float, y: Any) -> float:
     return along
 
 
-@inlined
+@kernel_part
 def is_above(walk_state: WalkState, foot: int) -> bool:
     """Whether a foot is above the ground."""
     return walk_state.sides[foot * PER_FOOT + HEIGHT] > 0
 
 
-@inlined
+@kernel_part
 def is_ahead(walk_state: WalkState, foot: int) -> bool:
     """Whether a foot is further along than the other; known where the order of the feet is watched."""
     return (walk_state.sides[PASSING] > 0) == (foot == 1)
 
 
-@inlined
+@kernel_part
 def is_to_lift(walk_state: WalkState) -> bool:
     """Whether the foot that carried the last step is still to lift from it."""
     return walk_state.leaving[1 - walk_state.progress.stance] != 0

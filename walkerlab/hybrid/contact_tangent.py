@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from walkerlab.ground.walker import OF_STATES
-from walkerlab.kernels import by_reference, inlined, vector
+from walkerlab.kernels import by_reference, kernel_part, vector
 from walkerlab.solvers.linear import factor, solve
 from walkerlab.solvers.radau5 import C
 from walkerlab.solvers.stepping import T_OLD, T, interpolate
@@ -55,7 +55,7 @@ def new_tangent(n: int, directions: int) -> Tangent:
     )
 
 
-@inlined
+@kernel_part
 def jacobian_at(method: Any, system: Any, fraction: float, J: Any) -> None:
     """The Jacobian at a fraction of the last step into J."""
     y = vector(OF_STATES)[: method.y.size]
@@ -63,7 +63,7 @@ def jacobian_at(method: Any, system: Any, fraction: float, J: Any) -> None:
     jacobian(system, method.clock[T_OLD] + fraction * (method.clock[T] - method.clock[T_OLD]), y, J)
 
 
-@inlined
+@kernel_part
 def carry_tangent(tangent: Tangent, method: Any, system: Any) -> None:
     """Carry Phi over the last step of `method`."""
     n, h = method.y.size, method.clock[T] - method.clock[T_OLD]
@@ -81,7 +81,7 @@ def carry_tangent(tangent: Tangent, method: Any, system: Any) -> None:
         carry_direction(tangent, n, direction, h)
 
 
-@inlined
+@kernel_part
 def jacobian_at_end(tangent: Tangent, method: Any, system: Any) -> None:
     """The Jacobian at the step's end, seen from within the step: extrapolated from two states shortly before.
 
@@ -96,7 +96,7 @@ def jacobian_at_end(tangent: Tangent, method: Any, system: Any) -> None:
             tangent.stages[2, row, column] += tangent.stages[2, row, column] - tangent.stages[3, row, column]
 
 
-@inlined
+@kernel_part
 def carry_direction(tangent: Tangent, n: int, direction: int, h: float) -> None:
     """One column of Phi (n,): stage derivatives K = J (Phi + h A K), then the step's sum."""
     for i in range(3):

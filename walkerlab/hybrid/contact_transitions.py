@@ -18,7 +18,7 @@ from walkerlab.ground.walker import (
     RELEASED,
     STOPPING,
     FootMotion,
-    Form,
+    GroundModel,
     OnGround,
     feet_motion,
     over_ground,
@@ -47,14 +47,14 @@ from walkerlab.hybrid.contact_state import (
     material_along,
 )
 from walkerlab.hybrid.endings import BENT_KNEE, FELL, GOES_ON, OFF_PAD, SLID, STUBBED
-from walkerlab.kernels import by_type_or_default, inlined
+from walkerlab.kernels import by_type_or_default, kernel_part
 
 AHEAD = 0.25  # of the stride measure: how far ahead a step must land
 AT_SURFACE = 1e-11  # m: how far off the surface a foot may be, by the error of an event's time, that is at it
 TRIP = 0.25  # of the stride measure: how far from where it stood a foot must come down to have tripped
 
 
-@inlined
+@kernel_part
 def apply_event(
     system: OnGround, terrain: Terrain, observer: ContactObserver, walk_state: WalkState, event: int, t: float, y: Any
 ) -> int:
@@ -113,7 +113,7 @@ def apply_event(
     return GOES_ON
 
 
-@inlined
+@kernel_part
 def set_level(
     system: OnGround,
     observer: ContactObserver,
@@ -134,7 +134,7 @@ def set_level(
     walk_state.at_zero[foot * PER_FOOT + HEIGHT] = 0
 
 
-@inlined
+@kernel_part
 def next_foothold_counts(terrain: Terrain, walk_state: WalkState, foot: int) -> bool:
     """Whether the ground for a foot that nothing carries is to take the height of its next foothold, if it has not."""
     if terrain.has_pads or not is_uneven(terrain) or foot == walk_state.progress.stance:
@@ -143,7 +143,7 @@ def next_foothold_counts(terrain: Terrain, walk_state: WalkState, foot: int) -> 
     return is_ahead(walk_state, foot) and walk_state.level[foot] != level
 
 
-@inlined
+@kernel_part
 def set_foothold(
     system: OnGround,
     terrain: Terrain,
@@ -159,7 +159,7 @@ def set_foothold(
     return GOES_ON if is_above(walk_state, foot) or terrain.order_matters else STUBBED
 
 
-@inlined
+@kernel_part
 def find_ground(terrain: Terrain, walk_state: WalkState, foot: int, above: bool) -> None:
     """A foot above the surface may find ground, or lose it, as the feet change places or roles."""
     if above:
@@ -168,9 +168,9 @@ def find_ground(terrain: Terrain, walk_state: WalkState, foot: int, above: bool)
         walk_state.has_ground[foot] = 1 if has_ground else 0
 
 
-@inlined
+@kernel_part
 def lift(
-    form: Form,
+    form: GroundModel,
     terrain: Terrain,
     walk_state: WalkState,
     feet: tuple[FootMotion, FootMotion],
@@ -188,17 +188,17 @@ def lift(
     find_ground(terrain, walk_state, foot, True)
 
 
-@inlined
-def note_slip(form: Form, walk_state: WalkState, feet: tuple[FootMotion, FootMotion], foot: int, y: Any) -> None:
+@kernel_part
+def note_slip(form: GroundModel, walk_state: WalkState, feet: tuple[FootMotion, FootMotion], foot: int, y: Any) -> None:
     """How far a foot has slipped and rolled since it touched."""
     slip = material_along(form, foot, feet[foot].along, y) - walk_state.touched[foot]
     walk_state.slipped[foot] = slip
     walk_state.rolled[foot] = feet[foot].along - walk_state.foothold[foot] - slip
 
 
-@inlined
+@kernel_part
 def touch(
-    form: Form,
+    form: GroundModel,
     terrain: Terrain,
     walk_state: WalkState,
     feet: tuple[FootMotion, FootMotion],
@@ -257,7 +257,7 @@ def lock_catches(stop: IdealLock) -> bool:
     return True
 
 
-@inlined
+@kernel_part
 def knee_stops(stop: Any, walk_state: WalkState, event: int, t: float) -> None:
     """A knee got straight: it locks, or meets its stop, where it latches when it turns back."""
     if event < EXTENSION_RATE and not catches(stop):
@@ -268,21 +268,21 @@ def knee_stops(stop: Any, walk_state: WalkState, event: int, t: float) -> None:
     walk_state.knee_strike[walk_state.progress.steps] = t
 
 
-@inlined
+@kernel_part
 def release(walk_state: WalkState, knee: int) -> None:
     """A knee is free again: its shank turns on its own."""
     walk_state.progress.release = NOT_DUE
     walk_state.knee[knee] = RELEASED
 
 
-@inlined
-def is_straight(form: Form, walk_state: WalkState, foot: int) -> bool:
+@kernel_part
+def is_straight(form: GroundModel, walk_state: WalkState, foot: int) -> bool:
     """Whether a foot may come down: its knee is locked, if it has one."""
     return not form.kneed or walk_state.knee[foot] == LOCKED
 
 
-@inlined
-def follow_strike(form: Form, walk_state: WalkState, trailing: int) -> None:
+@kernel_part
+def follow_strike(form: GroundModel, walk_state: WalkState, trailing: int) -> None:
     """The other foot has touched: the trailing knee is released, at once or when the leading foot stops sinking in."""
     if form.kneed:
         if form.release_at_touch and form.push_off != 0.0:
@@ -293,8 +293,8 @@ def follow_strike(form: Form, walk_state: WalkState, trailing: int) -> None:
             walk_state.progress.release = AT_COMPRESSION
 
 
-@inlined
-def note_flexion(form: Form, walk_state: WalkState, y: Any) -> None:
+@kernel_part
+def note_flexion(form: GroundModel, walk_state: WalkState, y: Any) -> None:
     """A released knee that has bent is caught when it straightens."""
     for knee in range(2):
         if walk_state.knee[knee] == RELEASED and extension(form, knee, y) < -FLEXED:

@@ -6,7 +6,7 @@ the turns within a step are located, as events are.
 
 from typing import Any, NamedTuple
 
-from walkerlab.kernels import entered, inlined
+from walkerlab.kernels import callable_kernel, kernel_part
 from walkerlab.mechanics.hinges import legs_apart
 from walkerlab.solvers.events import CrossingFinder, first_crossing
 from walkerlab.solvers.stepping import interpolate
@@ -21,7 +21,7 @@ class TorqueWork(NamedTuple):
     positive: float
 
 
-@inlined
+@kernel_part
 def torque_work(torque: float, method: Any, system: Any, finder: CrossingFinder, row: int, until: float) -> TorqueWork:
     """Work of the torque (N m) in the last step up to a fraction of it.
 
@@ -41,7 +41,7 @@ def torque_work(torque: float, method: Any, system: Any, finder: CrossingFinder,
     return TorqueWork(torque * (angle - first), positive)
 
 
-@entered
+@callable_kernel
 def sample_rates(system: Any, finder: CrossingFinder, row: int) -> None:
     """The rate between the legs at the nodes of a step."""
     for node in range(finder.nodes.size):

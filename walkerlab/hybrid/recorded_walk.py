@@ -24,12 +24,12 @@ from walkerlab.hybrid.walk_record import Array, DrivenWork, WalkRecord, WalkWork
 from walkerlab.kernels import uncompiled
 from walkerlab.mechanics.hinges import HIP_ROW, hinge_energy, hinge_law
 from walkerlab.mechanics.impact import push_off_work
-from walkerlab.mechanics.standing import (
+from walkerlab.mechanics.rigid_model import (
     AT_STRIKE,
     BENT,
     STANCE,
     Mode,
-    Standing,
+    RigidModel,
     energies,
     energy_at_touch,
     linked,
@@ -102,7 +102,7 @@ def as_state(values: Any) -> State:
 
 
 def take_walk(
-    walker: Standing,
+    walker: RigidModel,
     tolerances: Tolerances,
     start: State,
     steps: int,
@@ -142,7 +142,7 @@ def take_walk(
 class Recorder:
     """Walks on from where it is, and keeps what was seen."""
 
-    def __init__(self, walker: Standing, tolerances: Tolerances, start: State, sampled: bool) -> None:
+    def __init__(self, walker: RigidModel, tolerances: Tolerances, start: State, sampled: bool) -> None:
         """Stand at `start`, at time 0."""
         self.walker, self.sampled, self.budget = walker, sampled, tolerances.budget
         self.method = method = tolerances.new(len(walker.zero_state))
@@ -282,7 +282,7 @@ class Recorder:
         )
 
 
-def with_scaled_rates(walker: Standing, state: State, swing: float, stance: float) -> State:
+def with_scaled_rates(walker: RigidModel, state: State, swing: float, stance: float) -> State:
     """A state just after heel strike with the velocities of swing and stance leg scaled."""
     n = len(state) // 2
     rates = [(stance if place == STANCE else swing) * rate for place, rate in enumerate(state[n:])]

@@ -20,10 +20,10 @@ from walkerlab.hybrid.endings import (
     SOLVER_FAILED,
 )
 from walkerlab.hybrid.rigid_walk import LONGEST_SWING, hip_above_fall, hull
-from walkerlab.kernels import by_type, inlined, kernel, vector
+from walkerlab.kernels import by_type, kernel, kernel_part, vector
 from walkerlab.mechanics.hinges import HIP_ROW, SpringDamper, hinge_law, hinge_torque
 from walkerlab.mechanics.impact import heel_strike
-from walkerlab.mechanics.standing import Standing, feet_on_slope
+from walkerlab.mechanics.rigid_model import RigidModel, feet_on_slope
 from walkerlab.mechanics.trigonometry import sine_cosine
 from walkerlab.solvers.dop853 import GROW_MOST, SAFETY, SHRINK_MOST
 from walkerlab.solvers.events import NO_CROSSING, CrossingFinder, new_crossing_finder
@@ -51,8 +51,8 @@ NO_ERROR = 1e-300
 class TwoLegs(NamedTuple):
     """The rigid model of two straight legs, with what lanes need of it."""
 
-    model: Standing
-    A: tuple[float, ...]  # (4,) constants of standing.py, row by row
+    model: RigidModel
+    A: tuple[float, ...]  # (4,) constants of rigid_model.py, row by row
     B: tuple[float, ...]
     arm_x: tuple[float, ...]  # (2,)
     arm_y: tuple[float, ...]
@@ -69,7 +69,7 @@ class TwoLegs(NamedTuple):
     pendulum_time: float  # s
 
 
-def two_legs(model: Standing) -> TwoLegs | None:
+def two_legs(model: RigidModel) -> TwoLegs | None:
     """The model as that of two straight legs; None if it has more bodies."""
     if len(model.arm_x) != 2 or model.kneed:
         return None
@@ -89,9 +89,9 @@ def two_legs(model: Standing) -> TwoLegs | None:
     )
 
 
-@derivative.case(TwoLegs, always_inline=True)
+@derivative.case(TwoLegs, forced_inline=True)
 def swing_derivative(system: TwoLegs, t: float, y: Any) -> Any:
-    """The equations of motion of standing.py for two bodies, written out: of floats or of lanes."""
+    """The equations of motion of rigid_model.py for two bodies, written out: of floats or of lanes."""
     R, along, down = system.radius, system.gravity_along, system.gravity_down
     s_1, c_1 = sine_cosine(y[0] + system.slope)
     s_2, c_2 = sine_cosine(y[1] + system.slope)
@@ -181,7 +181,7 @@ def walk_lanes(walker: TwoLegs, memory: LaneMemory, observer: Any, starts: Any, 
                 walking = walking or slots[SLOT_OF_START, lane] != NOBODY
 
 
-@inlined
+@kernel_part
 def refill(walker: TwoLegs, memory: LaneMemory, starts: Any, fates: Fates, lane: int, waiting: int) -> int:
     """Give a lane the next start that is one; returns how many starts have been given out."""
     while waiting < starts.shape[0]:
@@ -197,7 +197,7 @@ def refill(walker: TwoLegs, memory: LaneMemory, starts: Any, fates: Fates, lane:
     return waiting
 
 
-@inlined
+@kernel_part
 def begin_swing(walker: TwoLegs, memory: LaneMemory, lane: int, t: float, y: State, h: float) -> None:
     """Have a lane start a swing from state y at time t (s), with a step h."""
     rows = memory.rows
@@ -209,7 +209,7 @@ def begin_swing(walker: TwoLegs, memory: LaneMemory, lane: int, t: float, y: Sta
     rows[ARRIVING, lane], rows[FIRST, lane], rows[TRIES, lane] = 0.0, 1.0, 0.0
 
 
-@inlined
+@kernel_part
 def four(rows: Any, row: int) -> tuple[Lanes, Lanes, Lanes, Lanes]:
     """Four rows as a state in lanes."""
     return (
@@ -220,7 +220,7 @@ def four(rows: Any, row: int) -> tuple[Lanes, Lanes, Lanes, Lanes]:
     )
 
 
-@inlined
+@kernel_part
 def try_steps(walker: TwoLegs, memory: LaneMemory) -> bool:
     """Try a step in every lane; where nothing can have happened the lane moves on. Returns whether others need a look.
 
@@ -259,7 +259,7 @@ def try_steps(walker: TwoLegs, memory: LaneMemory) -> bool:
     return any_positive(event)
 
 
-@inlined
+@kernel_part
 def may_end(walker: TwoLegs, y: Any, end: Any, h: Lanes) -> Lanes:
     """Positive where a step from y to `end` may hold a heel strike or a fall; see `rigid_walk.may_end`."""
     ahead = hull(y[0] - y[1], h * (y[2] - y[3]), end[0] - end[1], h * (end[2] - end[3]))
@@ -268,7 +268,7 @@ def may_end(walker: TwoLegs, y: Any, end: Any, h: Lanes) -> Lanes:
     return max(min(ahead[1], -guard[0]), abs(end[1] + walker.slope - walker.upright) - walker.fallen)
 
 
-@inlined
+@kernel_part
 def look_at(walker: TwoLegs, memory: LaneMemory, observer: Any, lane: int) -> int:
     """Do what the step of a lane asks for; returns GOES_ON, or the outcome's number if its walk is over."""
     rows = memory.rows
@@ -291,7 +291,7 @@ def look_at(walker: TwoLegs, memory: LaneMemory, observer: Any, lane: int) -> in
     return GOES_ON
 
 
-@inlined
+@kernel_part
 def move_on(memory: LaneMemory, lane: int) -> None:
     """Accept the step of one lane."""
     rows = memory.rows
@@ -302,7 +302,7 @@ def move_on(memory: LaneMemory, lane: int) -> None:
     rows[FIRST, lane] = 0.0
 
 
-@inlined
+@kernel_part
 def arrive(walker: TwoLegs, memory: LaneMemory, observer: Any, lane: int) -> int:
     """Strike if the step has led to the slope, else take the rest of the way."""
     rows, slots = memory.rows, memory.slots
@@ -327,7 +327,7 @@ def arrive(walker: TwoLegs, memory: LaneMemory, observer: Any, lane: int) -> int
     return outcome
 
 
-@inlined
+@kernel_part
 def bridge(rows: Any, lane: int, wait: float, y: Any) -> None:
     """The state a moment later into y: a Taylor expansion, of second order in the angles that the guard is made of."""
     for i in range(2):
@@ -336,7 +336,7 @@ def bridge(rows: Any, lane: int, wait: float, y: Any) -> None:
         y[2 + i] = omega + wait * alpha
 
 
-@inlined
+@kernel_part
 def event_function(rows: Any, at: int, lane: int, swing: float, stance: float) -> Jet:
     """swing theta_1 + stance theta_2 and its first two derivatives in time, at the start or end of a lane's step."""
     return (
@@ -346,7 +346,7 @@ def event_function(rows: Any, at: int, lane: int, swing: float, stance: float) -
     )
 
 
-@inlined
+@kernel_part
 def in_step(memory: LaneMemory, lane: int, swing: float, stance: float, constant: float) -> Quintic:
     """swing theta_1 + stance theta_2 + constant over a lane's step."""
     rows = memory.rows
@@ -355,7 +355,7 @@ def in_step(memory: LaneMemory, lane: int, swing: float, stance: float, constant
     return hermite(rows[TRIED, lane], (a[0] + constant, a[1], a[2]), (b[0] + constant, b[1], b[2]))
 
 
-@inlined
+@kernel_part
 def strike_in_step(walker: TwoLegs, memory: LaneMemory, lane: int) -> float:
     """Fraction of a lane's step at which the swing foot strikes with its leg ahead; NO_CROSSING if it does not."""
     guard = in_step(memory, lane, 1.0, 1.0, feet_on_slope(walker, 0.0, 0.0))
@@ -369,7 +369,7 @@ def strike_in_step(walker: TwoLegs, memory: LaneMemory, lane: int) -> float:
     return strike
 
 
-@inlined
+@kernel_part
 def fall_in_step(walker: TwoLegs, memory: LaneMemory, lane: int) -> float:
     """Fraction of a lane's step at which the hip comes below half a leg; NO_CROSSING if it is above at the end."""
     from_upright = walker.slope - walker.upright

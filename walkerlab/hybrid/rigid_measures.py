@@ -9,18 +9,18 @@ from numpy.typing import NDArray
 from walkerlab.hybrid.recorded_walk import RigidWalkResult, Samples
 from walkerlab.hybrid.walk_record import Array
 from walkerlab.kernels import kernel
-from walkerlab.mechanics import standing
-from walkerlab.mechanics.standing import BENT, STANCE, STRAIGHT, SWING, Mode, Standing, ground_reaction
+from walkerlab.mechanics import rigid_model
+from walkerlab.mechanics.rigid_model import BENT, STANCE, STRAIGHT, SWING, Mode, RigidModel, ground_reaction
 
 
-def energies(walker: Standing, states: Array) -> Array:
+def energies(walker: RigidModel, states: Array) -> Array:
     """Kinetic and potential energy (samples, 2) of states (samples, 2 n) in J, from the current stance foot."""
     out = np.zeros((len(states), 2))
     fill_energies(walker, np.ascontiguousarray(states), out)
     return out
 
 
-def reactions(walker: Standing, states: Array, bent: NDArray[np.bool_] | None = None) -> Array:
+def reactions(walker: RigidModel, states: Array, bent: NDArray[np.bool_] | None = None) -> Array:
     """Force of the ground on the stance foot (samples, 2) in N: along the slope, and normal to it.
 
     bent  (samples,) whether the swing leg's knee is free; None if it never is
@@ -32,14 +32,14 @@ def reactions(walker: Standing, states: Array, bent: NDArray[np.bool_] | None = 
 
 
 @kernel
-def fill_energies(walker: Standing, states: Any, out: Any) -> None:
+def fill_energies(walker: RigidModel, states: Any, out: Any) -> None:
     """Write the energies of `states` (samples, 2 n) into `out` (samples, 2)."""
     for i in range(states.shape[0]):
-        out[i, 0], out[i, 1] = standing.energies(walker, states[i])
+        out[i, 0], out[i, 1] = rigid_model.energies(walker, states[i])
 
 
 @kernel
-def fill_reactions(walker: Standing, states: Any, bent: Any, out: Any) -> None:
+def fill_reactions(walker: RigidModel, states: Any, bent: Any, out: Any) -> None:
     """Write the ground's forces at `states` (samples, 2 n), where the swing knee is `bent` or not, into `out`."""
     for i in range(states.shape[0]):
         out[i, 0], out[i, 1] = ground_reaction(Mode(walker, BENT if bent[i] else STRAIGHT), states[i])
@@ -55,7 +55,7 @@ class Places:
     knees: Array | None  # (samples, 2, 2) of swing and stance leg; None without knees
 
 
-def places(walker: Standing, knee_m: tuple[float, float] | None, walk: RigidWalkResult, samples: Samples) -> Places:
+def places(walker: RigidModel, knee_m: tuple[float, float] | None, walk: RigidWalkResult, samples: Samples) -> Places:
     """Where the walker's points are.
 
     knee_m  the knee in its thigh's frame; None without knees

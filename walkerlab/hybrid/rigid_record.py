@@ -5,10 +5,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from walkerlab.hybrid.hip_torque import torque_work
-from walkerlab.kernels import by_reference, inlined, vector
+from walkerlab.kernels import by_reference, kernel_part, vector
 from walkerlab.mechanics.hinges import HIP_ROW, hinge_law
 from walkerlab.mechanics.impact import push_off
-from walkerlab.mechanics.standing import Mode, energies, ground_reaction, momentum, swing_foot
+from walkerlab.mechanics.rigid_model import Mode, energies, ground_reaction, momentum, swing_foot
 from walkerlab.mechanics.tree import new_record, read_at_once, record_type
 from walkerlab.solvers.events import CrossingFinder
 from walkerlab.solvers.stepping import T_OLD, T, interpolate, sample
@@ -70,7 +70,7 @@ def unwatched() -> Observer:
     return new_observer(np.zeros(0), 0)._replace(watching=False)
 
 
-@inlined
+@kernel_part
 def observe_start(observer: Observer, mode: Mode, y: Any) -> None:
     """Record the start of a swing, whose energy the swing must keep."""
     if observer.watching:
@@ -81,7 +81,7 @@ def observe_start(observer: Observer, mode: Mode, y: Any) -> None:
         record_extremes(tally, mode, y)
 
 
-@inlined
+@kernel_part
 def observe_strike(observer: Observer, mode: Mode, heel: bool, before: Any, after: Any) -> None:
     """Record the energy lost in a knee or heel strike and the impulse on the new stance foot.
 
@@ -107,7 +107,7 @@ def observe_strike(observer: Observer, mode: Mode, heel: bool, before: Any, afte
             tally.max_impulse_ratio = max(tally.max_impulse_ratio, abs(along) / impulse)
 
 
-@inlined
+@kernel_part
 def assumptions(mode: Mode, y: Any) -> tuple[float, float, float]:
     """Measures of the model's assumptions (section 3.1 of the paper); each is worst where it is largest.
 
@@ -118,7 +118,7 @@ def assumptions(mode: Mode, y: Any) -> tuple[float, float, float]:
     return -normal, ratio, -swing_foot(mode.model, y)[0]
 
 
-@inlined
+@kernel_part
 def assumptions_at(method: Any, mode: Mode, fraction: float) -> tuple[float, float, float]:
     """`assumptions` at a fraction of the last step."""
     y = vector(mode.model.zero_state)
@@ -126,7 +126,7 @@ def assumptions_at(method: Any, mode: Mode, fraction: float) -> tuple[float, flo
     return assumptions(mode, y)
 
 
-@inlined
+@kernel_part
 def keep_worst(tally: Any, measures: tuple[float, float, float]) -> None:
     """Update the extremes with the measures of `assumptions`."""
     tally.min_normal_force = min(tally.min_normal_force, -measures[0])
@@ -134,7 +134,7 @@ def keep_worst(tally: Any, measures: tuple[float, float, float]) -> None:
     tally.max_scuff_depth = max(tally.max_scuff_depth, measures[2])
 
 
-@inlined
+@kernel_part
 def record_extremes(tally: Any, mode: Mode, y: Any) -> tuple[float, float, float]:
     """Update the extremes and the energies with state y; returns its `assumptions`."""
     measures = assumptions(mode, y)
@@ -147,14 +147,14 @@ def record_extremes(tally: Any, mode: Mode, y: Any) -> tuple[float, float, float
     return measures
 
 
-@inlined
+@kernel_part
 def vertex(before: float, middle: float, after: float) -> float:
     """Maximum (-1 to 1) of the parabola through values at -1, 0 and 1; 2 if it has none there."""
     bend = before - 2.0 * middle + after
     return 0.5 * (before - after) / bend if bend < 0.0 else 2.0
 
 
-@inlined
+@kernel_part
 def ascend_to_worst(
     tally: Any, method: Any, mode: Mode, measure: int, middle: float, spacing: float, last: float
 ) -> None:
@@ -175,7 +175,7 @@ def ascend_to_worst(
         middle = min(max(middle, spacing), last - spacing)
 
 
-@inlined
+@kernel_part
 def observe(
     observer: Observer, method: Any, mode: Mode, finder: CrossingFinder, row: int, fraction: float, step: int
 ) -> None:

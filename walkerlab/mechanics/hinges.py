@@ -10,7 +10,7 @@ ground, where each has a stop besides.
 
 from typing import Any, NamedTuple
 
-from walkerlab.kernels import always_inline, by_type_or_default, inlined
+from walkerlab.kernels import by_type_or_default, forced_inline, kernel_part
 
 
 @by_type_or_default
@@ -48,14 +48,14 @@ class SpringDamper(NamedTuple):
     torque: float  # N m
 
 
-@hinge_torque.case(SpringDamper, always_inline=True)
+@hinge_torque.case(SpringDamper, forced_inline=True)
 def spring_damper_torque(law: SpringDamper, angle: float, rate: float) -> HingeTorque:
     """Linear in both."""
     elastic = law.stiffness * angle
     return HingeTorque(elastic + law.damping * rate - law.torque, elastic, law.stiffness, law.damping)
 
 
-@hinge_energy.case(SpringDamper, always_inline=True)
+@hinge_energy.case(SpringDamper, forced_inline=True)
 def spring_energy(law: SpringDamper, angle: float) -> float:
     """That of the spring."""
     return 0.5 * law.stiffness * angle * angle
@@ -66,26 +66,26 @@ HIP_ROW = 0  # row of the hinge between the legs
 HINGE_ROWS = {"hip": slice(HIP_ROW, HIP_ROW + 1), "knees": slice(HIP_ROW + 1, None)}
 
 
-@always_inline
+@forced_inline
 def hinge_law(model: Any, row: int) -> SpringDamper:
     """The spring, damper and torque at a hinge, in the order in which the config has their numbers."""
     return SpringDamper(model.laws[row, 0], model.laws[row, 1], model.laws[row, 2])
 
 
-@always_inline
+@forced_inline
 def is_sprung(model: Any, row: int) -> bool:
     """Whether any of them acts at a hinge."""
     return model.laws[row, 0] != 0.0 or model.laws[row, 1] != 0.0 or model.laws[row, 2] != 0.0
 
 
-@always_inline
+@forced_inline
 def add_hinge_torque(now: HingeTorque, body: int, other: int, r: Any) -> None:
     """Add a hinge's torques (N m) on both bodies to r (n,)."""
     r[body] -= now.torque
     r[other] += now.torque
 
 
-@inlined
+@kernel_part
 def add_hinge_gradients(now: HingeTorque, body: int, other: int, by_angle: Any, by_rate: Any) -> None:
     """Add the derivatives of those torques by the angles and by their velocities to by_angle and by_rate (n, n)."""
     for row, sign in ((other, 1.0), (body, -1.0)):

@@ -13,16 +13,16 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from walkerlab.kernels import always_inline, inlined, matrix, vector
+from walkerlab.kernels import forced_inline, kernel_part, matrix, vector
 from walkerlab.mechanics.links import factor_linked, solve_linked
-from walkerlab.mechanics.standing import (
+from walkerlab.mechanics.rigid_model import (
     AT_STRIKE,
     BENT,
     NO_SHANK,
     STANCE,
     STRAIGHT,
     SWING,
-    Standing,
+    RigidModel,
     equations,
     hip_height,
 )
@@ -31,8 +31,8 @@ from walkerlab.mechanics.trigonometry import sine_cosine
 from walkerlab.solvers.system import Floats
 
 
-@inlined
-def heel_strike(model: Standing, y: Any, new: Any) -> None:
+@kernel_part
+def heel_strike(model: RigidModel, y: Any, new: Any) -> None:
     """Write the state after the heel strike that y leads to, roles changed, into `new`.
 
     y  the state, and as many columns behind it as there are: directions, whose images `new` gets
@@ -40,14 +40,14 @@ def heel_strike(model: Standing, y: Any, new: Any) -> None:
     strike(model, AT_STRIKE, True, y, new)
 
 
-@inlined
-def knee_strike(model: Standing, y: Any, new: Any) -> None:
+@kernel_part
+def knee_strike(model: RigidModel, y: Any, new: Any) -> None:
     """As `heel_strike`, after the swing leg's knee has come into line and locked."""
     strike(model, STRAIGHT, False, y, new)
 
 
-@inlined
-def strike(model: Standing, phase: int, other_foot: bool, y: Any, new: Any) -> None:
+@kernel_part
+def strike(model: RigidModel, phase: int, other_foot: bool, y: Any, new: Any) -> None:
     """A plastic impact on the constraints of E[phase].
 
     other_foot  the swing foot stands afterwards; else the foot that stood goes on standing
@@ -153,8 +153,8 @@ class PushOffImpulse(NamedTuple):
     by_leading: float
 
 
-@inlined
-def push_off(model: Standing, new: Any) -> PushOffImpulse:
+@kernel_part
+def push_off(model: RigidModel, new: Any) -> PushOffImpulse:
     """The push-off of a heel strike, by the state after it."""
     s_t, c_t = sine_cosine(new[SWING] + model.slope)
     s_l, c_l = sine_cosine(new[STANCE] + model.slope)
@@ -170,7 +170,7 @@ def push_off(model: Standing, new: Any) -> PushOffImpulse:
     return PushOffImpulse(share * x_t, share * y_t, angular, by_trailing, by_leading)
 
 
-def push_off_work(model: Standing, before: Floats) -> Floats:
+def push_off_work(model: RigidModel, before: Floats) -> Floats:
     """Work (strikes,) in J of the push-offs at heel strikes, each done just before its strike.
 
     The walker is free of the ground then, its knees locked and its torso coupled: an impulse P along e gives
@@ -201,7 +201,7 @@ def push_off_work(model: Standing, before: Floats) -> Floats:
     return np.asarray(0.5 * (impulse[:, None, :] @ np.linalg.solve(apparent, impulse[:, :, None]))[:, 0, 0])
 
 
-def pushed_at_hip(model: Standing, y: Any, impulse: float) -> NDArray[np.float64]:
+def pushed_at_hip(model: RigidModel, y: Any, impulse: float) -> NDArray[np.float64]:
     """The state (2 n) just after a heel strike y, changed by an impulse (N s) at the hip along the slope.
 
     The new stance foot stays where it is. It comes after the release of the trailing knee, which is free.
@@ -218,7 +218,7 @@ def pushed_at_hip(model: Standing, y: Any, impulse: float) -> NDArray[np.float64
     return new
 
 
-@always_inline
+@forced_inline
 def project(
     model: Any, phase: int, M: Any, factors: Any, F: Any, U: Any, omega: Any, along: float, upward: float, twist: float,
     p: Any,
@@ -236,7 +236,7 @@ def project(
     solve_linked(model, phase, factors, p)
 
 
-@always_inline
+@forced_inline
 def project_change(
     model: Any, phase: int, M: Any, factors: Any, F: Any, U: Any, rate: Any, along: float, upward: float, twist: float,
     turned: Any, p: Any,
@@ -249,11 +249,11 @@ def project_change(
     solve_linked(model, phase, factors, p)
 
 
-@always_inline
+@forced_inline
 def momenta(model: Any, M: Any, F: Any, U: Any, omega: Any, along: float, upward: float, p: Any) -> None:
     """Z' M u into p (n,), with the angular velocities omega (n,).
 
-    M is M' of standing.py, whose part in the rolling of angular velocities is taken out again.
+    M is M' of rigid_model.py, whose part in the rolling of angular velocities is taken out again.
     """
     n, R = len(model.arm_x), model.radius
     sliding = along + R * omega[STANCE]
@@ -265,7 +265,7 @@ def momenta(model: Any, M: Any, F: Any, U: Any, omega: Any, along: float, upward
     p[STANCE] -= R * model.mass * sliding
 
 
-@always_inline
+@forced_inline
 def mass_change(model: Any, s: Any, c: Any, turn: Any, jump: Any, along: float, upward: float, p: Any) -> None:
     """Z' dM w into p (n,): the change of the masses' matrix as the bodies turn, times a jump w of the velocities.
 

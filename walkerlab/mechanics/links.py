@@ -8,7 +8,7 @@ phase.
 
 from typing import Any, NamedTuple
 
-from walkerlab.kernels import always_inline
+from walkerlab.kernels import forced_inline
 
 
 class Counted(NamedTuple):
@@ -21,7 +21,7 @@ class Counted(NamedTuple):
     arm_x: Any  # (n,)
 
 
-@always_inline
+@forced_inline
 def spread(model: Any, phase: int, z: Any) -> None:
     """E z in place of z (n,): a follower moves with those it follows."""
     n = len(model.arm_x)
@@ -33,7 +33,7 @@ def spread(model: Any, phase: int, z: Any) -> None:
             z[c] = total
 
 
-@always_inline
+@forced_inline
 def factor_linked(model: Any, phase: int, M: Any) -> None:
     """L D L' = E' M E in place of M (n, n): 1/D on the diagonal, L' above it."""
     n = len(model.arm_x)
@@ -56,7 +56,7 @@ def factor_linked(model: Any, phase: int, M: Any) -> None:
                 M[i, j] -= M[k, i] * M[j, k]
 
 
-@always_inline
+@forced_inline
 def solve_linked(model: Any, phase: int, factors: Any, b: Any) -> None:
     """E dz in place of b (n,) = r, of a matrix that `factor_linked` has taken apart.
 

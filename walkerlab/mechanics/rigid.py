@@ -8,7 +8,7 @@ import numpy as np
 
 from walkerlab.mechanics.assembly import Anchor, followers, levers, reduction, tree_about
 from walkerlab.mechanics.parts import Assembly, Revolute
-from walkerlab.mechanics.standing import NO_SHANK, STANCE, SWING, Standing, new_standing, on_slope
+from walkerlab.mechanics.rigid_model import NO_SHANK, STANCE, SWING, RigidModel, new_rigid_model, on_slope
 from walkerlab.solvers.system import Floats
 
 ALIKE = 1e-12  # relative difference up to which two legs are alike
@@ -24,12 +24,12 @@ class BodyPlaces:
     knees: tuple[tuple[int, int], ...]  # (shank, thigh) of the swing leg
 
 
-def standing(assembly: Assembly, gravity: float, slope: float, knee_locked_at_strike: bool = True) -> Standing:
+def standing(assembly: Assembly, gravity: float, slope: float, knee_locked_at_strike: bool = True) -> RigidModel:
     """The rigid model of an assembly on a slope (rad), as `on_level_ground` makes it."""
     return on_slope(on_level_ground(assembly, gravity, knee_locked_at_strike), slope)
 
 
-def on_level_ground(assembly: Assembly, gravity: float, knee_locked_at_strike: bool) -> Standing:
+def on_level_ground(assembly: Assembly, gravity: float, knee_locked_at_strike: bool) -> RigidModel:
     """The rigid model of an assembly; gravity in m/s^2.
 
     knee_locked_at_strike  whether the trailing knee is rigid during the heel strike and released just after it
@@ -54,7 +54,7 @@ def on_level_ground(assembly: Assembly, gravity: float, knee_locked_at_strike: b
     in_line = {**torso, **knees}
     reductions = [reduction(rows, n) for rows in (torso, in_line, torso if free else in_line)]
     shank, thigh = places.knees[0] if places.knees else (NO_SHANK, NO_SHANK)
-    return new_standing(
+    return new_rigid_model(
         n,
         **tree.merged(members),
         foot_x=to_foot[:, 0],

@@ -7,9 +7,9 @@ U_k = (R(psi_k) c_k)_y, psi the angles from the slope's normal, and Delta = thet
     r_k = sum over l of omega_l^2 (A_kl sin Delta - B_kl cos Delta) - g_along U_k - g_down F_k
 
 the latter two terms about a root at rest. What the root's own motion adds is each model's: a rolling foot's in
-standing.py, Newton's law for the centre of mass in ground/motion.py.
+rigid_model.py, Newton's law for the centre of mass in ground/motion.py.
 
-`tree` is a Mechanism: the rigid model's Standing or a Form on compliant ground. n is how many bodies it has, known
+`tree` is a Mechanism: the `RigidModel` or a `GroundModel` on compliant ground. n is the number of bodies, known
 while compiling where the tree's type tells.
 """
 
@@ -20,7 +20,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from walkerlab.kernels import always_inline
+from walkerlab.kernels import forced_inline
 from walkerlab.mechanics.hinges import HINGE_ROWS, HIP_ROW, LAW_NUMBERS
 from walkerlab.mechanics.trigonometry import sine_cosine
 from walkerlab.solvers.system import Floats, Integers
@@ -107,14 +107,14 @@ def write_fields(mechanisms: Any, fields: Mapping[str, Any]) -> None:
             mechanisms[name] = value
 
 
-@always_inline
+@forced_inline
 def sines_cosines(tree: Any, n: int, theta: Any, s: Any, c: Any) -> None:
     """Sines and cosines (n,) of the bodies' angles from the slope's normal, into s and c; theta from the vertical."""
     for k in range(n):
         s[k], c[k] = sine_cosine(theta[k] + tree.slope)
 
 
-@always_inline
+@forced_inline
 def projections(lever_x: Any, lever_y: Any, n: int, s: Any, c: Any, F: Any, U: Any) -> None:
     """Levers or moments (n,) seen along the slope and normal to it, into F and U."""
     for k in range(n):
@@ -122,7 +122,7 @@ def projections(lever_x: Any, lever_y: Any, n: int, s: Any, c: Any, F: Any, U: A
         U[k] = s[k] * lever_x[k] + c[k] * lever_y[k]
 
 
-@always_inline
+@forced_inline
 def lever_motion(lever_x: Any, lever_y: Any, n: int, s: Any, c: Any, omega: Any) -> tuple[float, float, float, float]:
     """Where a point is from the root along the slope and over it (m), by its levers, and its rates (m/s)."""
     along, height, along_rate, height_rate = 0.0, 0.0, 0.0, 0.0
@@ -135,14 +135,14 @@ def lever_motion(lever_x: Any, lever_y: Any, n: int, s: Any, c: Any, omega: Any)
     return along, height, along_rate, height_rate
 
 
-@always_inline
+@forced_inline
 def add_gravity(tree: Any, n: int, F: Any, U: Any, r: Any) -> None:
     """Add the torques of gravity (N m) about a root at rest to r (n,); F and U of the first moments."""
     for k in range(n):
         r[k] -= tree.gravity_along * U[k] + tree.gravity_down * F[k]
 
 
-@always_inline
+@forced_inline
 def add_inertia(tree: Any, n: int, s: Any, c: Any, omega: Any, M: Any, r: Any) -> None:
     """M (n, n) in kg m^2 into M, and the centrifugal terms (N m) added to r (n,)."""
     for k in range(n):
@@ -157,14 +157,14 @@ def add_inertia(tree: Any, n: int, s: Any, c: Any, omega: Any, M: Any, r: Any) -
             r[l] -= omega[k] * omega[k] * turning
 
 
-@always_inline
+@forced_inline
 def add_gravity_gradient(tree: Any, n: int, F: Any, U: Any, by_angle: Any) -> None:
     """Add the derivatives of the torques of gravity with respect to the angles to by_angle (n, n)."""
     for k in range(n):
         by_angle[k, k] += tree.gravity_down * U[k] - tree.gravity_along * F[k]
 
 
-@always_inline
+@forced_inline
 def add_inertia_gradients(
     tree: Any, n: int, s: Any, c: Any, omega: Any, alpha: Any, by_angle: Any, by_rate: Any
 ) -> None:
@@ -182,7 +182,7 @@ def add_inertia_gradients(
         by_angle[k, k] += own
 
 
-@always_inline
+@forced_inline
 def kinetic_energy(n: int, M: Any, omega: Any) -> float:
     """Kinetic energy (J) of the bodies' turning, with a mass matrix M (n, n)."""
     total = 0.0
@@ -192,7 +192,7 @@ def kinetic_energy(n: int, M: Any, omega: Any) -> float:
     return 0.5 * total
 
 
-@always_inline
+@forced_inline
 def potential_energy(tree: Any, n: int, along: float, height: float, F: Any, U: Any) -> float:
     """Potential energy of gravity (J) with the root at a place along the slope and a height over it (m)."""
     total = tree.mass * (tree.gravity_down * height - tree.gravity_along * along)

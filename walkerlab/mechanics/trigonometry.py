@@ -2,7 +2,7 @@
 
 import math
 
-from walkerlab.kernels import PART_FLAGS, compile_as, inlined
+from walkerlab.kernels import PART_FLAGS, compile_as, kernel_part
 from walkerlab.solvers.fused import fused
 from walkerlab.solvers.lanes import Lanes, any_positive, holds_lanes, nearest
 
@@ -51,7 +51,7 @@ def lanes_sine_cosine(x: Lanes) -> tuple[Lanes, Lanes]:
     return half_turn(x)
 
 
-@inlined
+@kernel_part
 def half_turn(x: Lanes) -> tuple[Lanes, Lanes]:
     """(sin x, cos x) up to pi/2: polynomials from Chebyshev interpolation in x^2, truncated below 1e-16."""
     z = x * x

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from walkerlab.hybrid.endings import GOES_ON, REJECTED, WALKED
 from walkerlab.hybrid.rigid_lanes import Fates, TwoLegs, new_fates, new_lane_memory, struck, walk_lanes
 from walkerlab.hybrid.rigid_walk import hip_above_fall
-from walkerlab.mechanics.standing import Standing
+from walkerlab.mechanics.rigid_model import RigidModel
 from walkerlab.orbits.rigid_map import RigidStepper, state_on_section, states_on_section, strike_section
 from walkerlab.outcome import Outcome
 from walkerlab.solvers.registry import Tolerances
@@ -39,7 +39,7 @@ STARTS_PER_POINT = 24  # of an attractor, which must all return to it
 STEPS_PER_LOOK, BATCH_BUDGET = 16, 4_000_000
 
 # A unit walker: two straight legs walk all starts in lanes, other walkers one start at a time.
-Walker = TwoLegs | Standing
+Walker = TwoLegs | RigidModel
 
 
 class Capture(NamedTuple):
@@ -117,7 +117,7 @@ def walk_to_attractor(
     """Walk from section coordinates z (n, 3) to an attractor, a failure, or `most` steps."""
     fates: Fates = new_fates(len(z))
     capture = attractors.capture(len(z), most, share)
-    if isinstance(walker, Standing):
+    if isinstance(walker, RigidModel):
         walk_one_by_one(walker, capture, z, fates, tolerances)
     else:
         walk_lanes(walker, new_lane_memory(*tolerances), capture, states_on_section(walker.model, z), fates)
@@ -125,7 +125,7 @@ def walk_to_attractor(
 
 
 def walk_one_by_one(
-    walker: Standing, capture: Capture, starts: Floats, fates: Fates, tolerances: tuple[float, float]
+    walker: RigidModel, capture: Capture, starts: Floats, fates: Fates, tolerances: tuple[float, float]
 ) -> None:
     """Do the same as `walk_lanes` for any walker, checking for capture after each batch of steps."""
     shooting, section = RigidStepper(walker, Tolerances("dop853", *tolerances, BATCH_BUDGET)), strike_section(walker)

@@ -25,7 +25,7 @@ from walkerlab.orbits.bifurcations import (
 from walkerlab.orbits.continuation import CurvePoint, Segment, StepControl, correct, step_along
 from walkerlab.orbits.newton import Effort, NotConverged
 from walkerlab.orbits.step_map import Cycle, Monitor, StepMap, gait_near
-from walkerlab.outcome import TOLD, Outcome
+from walkerlab.outcome import OUTCOME_TEXTS, Outcome
 from walkerlab.solvers.system import Floats
 
 SAME_STATE = 1e-6  # distance below which states are equal
@@ -362,4 +362,4 @@ def describe_loss(lost: NotConverged) -> str:
     if lost.outcome is None:
         return NO_WALKER
     aside = "" if lost.outcome is Outcome.REJECTED else f"{lost.outcome.label}: "
-    return f"{aside}{TOLD[lost.outcome].why}"
+    return f"{aside}{OUTCOME_TEXTS[lost.outcome].why}"

@@ -14,7 +14,7 @@ import numpy as np
 
 from walkerlab.hybrid.recorded_walk import take_walk
 from walkerlab.hybrid.rigid_walk import LONGEST_SWING
-from walkerlab.mechanics.standing import STANCE, SWING, Standing, feet_on_slope, on_slope, swing_foot_motion
+from walkerlab.mechanics.rigid_model import STANCE, SWING, RigidModel, feet_on_slope, on_slope, swing_foot_motion
 from walkerlab.orbits.continuation import Follower, FollowerState, Strides, interpolate
 from walkerlab.orbits.newton import Effort, NotConverged
 from walkerlab.orbits.rigid_map import EXACT_STEPS, NEW_GAIT, RigidMap, RigidStepper, state_on_section, strike_section
@@ -100,7 +100,7 @@ class RigidGait:
         return tuple(reasons)
 
 
-def feet_meet(walker: Standing, swing: Floats) -> bool:
+def feet_meet(walker: RigidModel, swing: Floats) -> bool:
     """Whether the swing foot comes down exactly at the stance foot, where the step map is discontinuous.
 
     Any further ahead, it would strike.
@@ -113,7 +113,7 @@ def feet_meet(walker: Standing, swing: Floats) -> bool:
     return bool(np.any(np.abs(where) < ANGLE_NOISE * abs(ahead[-1])))
 
 
-def measure_gait(walker: Standing, units: Units, gait: Cycle) -> RigidGait | None:
+def measure_gait(walker: RigidModel, units: Units, gait: Cycle) -> RigidGait | None:
     """Walk one step of a gait of the unit walker and measure it in SI; None if the step fails."""
     start = state_on_section(walker, gait.z)
     step = take_walk(walker, EXACT_STEPS, start, 1, sampled=True)
@@ -182,7 +182,7 @@ class GaitSearch:
         return None if self.chosen is None else self.gaits[self.chosen]
 
 
-def find_gaits(walker: Standing, seed: int = 0, settings: SearchSettings = SearchSettings()) -> GaitSearch:
+def find_gaits(walker: RigidModel, seed: int = 0, settings: SearchSettings = SearchSettings()) -> GaitSearch:
     """Find the period-1 gaits of `walker`.
 
     seed  of the random starting values
@@ -269,17 +269,17 @@ def scale_gait(s: float, z: Floats, period: float) -> Floats:
 
 
 @lru_cache(maxsize=16)
-def slope_branches(walker: Standing) -> tuple[SlopeBranch, ...]:
+def slope_branches(walker: RigidModel) -> tuple[SlopeBranch, ...]:
     """Return the gaits of small-slope theory, cached for all slopes of one walker; `walker` on level ground."""
     looking = over_slope(walker, SEARCH_TOLERANCES)
     return tuple(SlopeBranch(looking, seed) for seed in seeds(walker))
 
 
-def over_slope(walker: Standing, tolerances: Tolerances) -> RigidMap:
+def over_slope(walker: RigidModel, tolerances: Tolerances) -> RigidMap:
     return RigidMap(partial(on_slope, walker), 1.0, walker, tolerances)
 
 
-def with_partial_drive(walker: Standing, slope: float, share: float) -> Standing:
+def with_partial_drive(walker: RigidModel, slope: float, share: float) -> RigidModel:
     """Return the walker with a share of its drive, on a slope (rad) interpolated to its own.
 
     It is passive and on `slope` for a share of 0.
@@ -296,7 +296,7 @@ class GaitRecord:
 
 
 class Search:
-    def __init__(self, walker: Standing) -> None:
+    def __init__(self, walker: RigidModel) -> None:
         self.walker, self.units = unit_walker(walker)
         self.found: list[GaitRecord] = []
         self.lost: list[str] = []

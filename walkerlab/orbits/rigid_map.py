@@ -19,14 +19,14 @@ import numpy as np
 from walkerlab.hybrid.recorded_walk import as_state, take_walk
 from walkerlab.hybrid.rigid_record import Observer, unwatched
 from walkerlab.hybrid.rigid_walk import EVENTS, SHORTEST_LANDING, HeelStrikes, new_heel_strikes, take_step, walk
-from walkerlab.kernels import inlined, kernel, matrix, vector
+from walkerlab.kernels import kernel, kernel_part, matrix, vector
 from walkerlab.mechanics.impact import pushed_at_hip
-from walkerlab.mechanics.standing import (
+from walkerlab.mechanics.rigid_model import (
     AT_STRIKE,
     STANCE,
     STRAIGHT,
     SWING,
-    Standing,
+    RigidModel,
     feet_on_slope,
     momentum,
     step_lengths,
@@ -40,7 +40,7 @@ from walkerlab.solvers.registry import ENDLESS, Tolerances, finder_for
 from walkerlab.solvers.stepping import BUDGET, H_NEXT, clear_counts
 from walkerlab.solvers.system import Floats, Integers, State
 
-WalkerAt = Callable[[float], Standing | None]
+WalkerAt = Callable[[float], RigidModel | None]
 STEP_WALKED = int(Outcome.WALKED)
 # Scale of the variational columns. They are exactly linear and need fewer digits than the state.
 #
@@ -71,7 +71,7 @@ class StrikeSection(NamedTuple):
 
 
 @lru_cache(CACHE_SIZE)
-def strike_section(walker: Standing) -> StrikeSection:
+def strike_section(walker: RigidModel) -> StrikeSection:
     """Return the section of a walker (its legs are straight there)."""
     straight, at_strike, d = walker.E[STRAIGHT], walker.E[AT_STRIKE], int(walker.coordinates)
     n, places = len(straight), walker.section[:d]
@@ -85,18 +85,18 @@ def strike_section(walker: Standing) -> StrikeSection:
     )
 
 
-def state_on_section(walker: Standing, z: Any) -> State:
+def state_on_section(walker: RigidModel, z: Any) -> State:
     """Return the state (2 n) at section coordinates z (d,)."""
     return tuple(states_on_section(walker, z).tolist())
 
 
-def states_on_section(walker: Standing, z: Any) -> Floats:
+def states_on_section(walker: RigidModel, z: Any) -> Floats:
     """Return the states (n, 2 n) at section coordinates z (n, d); also takes a single z (d,)."""
     section = strike_section(walker)
     return np.asarray(section.start[: len(walker.zero_state)] + np.asarray(z) @ section.basis)
 
 
-def coordinates_of(walker: Standing, y: Any) -> Floats:
+def coordinates_of(walker: RigidModel, y: Any) -> Floats:
     """Return the section coordinates (d,) of a state (2 n) just after heel strike."""
     return np.asarray(y, float)[walker.section[: walker.coordinates]]
 
@@ -123,7 +123,7 @@ class Memory(NamedTuple):
 class RigidStepper(local):
     """Step map of walkers of one kind, with the memory to evaluate it; each thread has its own."""
 
-    def __init__(self, like: Standing, tolerances: Tolerances) -> None:
+    def __init__(self, like: RigidModel, tolerances: Tolerances) -> None:
         size, d = len(like.zero_state), int(like.coordinates)
         self.plain, varied = tolerances.new(size), tolerances.new(size * (1 + d))
         finder = finder_for(self.plain, EVENTS, size)
@@ -188,8 +188,8 @@ def solve_from_starts(section: StrikeSection, memory: Memory, known: KnownGaits,
         results[k] = solve_from(section.walker[()], section, memory, known, starts[k])
 
 
-@inlined
-def solve_from(model: Standing, section: StrikeSection, memory: Memory, known: KnownGaits, z: Any) -> int:
+@kernel_part
+def solve_from(model: RigidModel, section: StrikeSection, memory: Memory, known: KnownGaits, z: Any) -> int:
     """Run Newton's method from z (d,), overwritten with the last state tried.
 
     A move is halved until it reduces the residual. A start that reaches no heel strike, or stands still, is given up. A
@@ -256,7 +256,7 @@ class RigidMap(StepMap):
     tolerances = MONITORED_STEPS
     probe = 2e-5
 
-    def __init__(self, walker_at: WalkerAt, scale: float, like: Standing, exact: Tolerances = EXACT_STEPS) -> None:
+    def __init__(self, walker_at: WalkerAt, scale: float, like: RigidModel, exact: Tolerances = EXACT_STEPS) -> None:
         """Prepare the step map of a family of walkers.
 
         walker_at  the walker at a value of the parameter; None where the value makes no walker
@@ -384,7 +384,7 @@ class RigidMap(StepMap):
 
 
 class SimilarWalker(NamedTuple):
-    walker: Standing
+    walker: RigidModel
     units: Units
     section: StrikeSection
     feet: list[list[float]]  # for each body: angle from the slope's normal at z = 0, its derivative by theta_2, levers

@@ -19,7 +19,7 @@ from walkerlab.ground.walker import ContactWalker
 from walkerlab.hybrid.contact_events import JudgedGround
 from walkerlab.hybrid.contact_result import ContactWalkResult, walk_contact
 from walkerlab.hybrid.recorded_walk import take_walk, with_scaled_rates
-from walkerlab.mechanics.standing import Standing
+from walkerlab.mechanics.rigid_model import RigidModel
 from walkerlab.outcome import Outcome
 from walkerlab.solvers.registry import ENDLESS, Tolerances
 from walkerlab.solvers.stepping import RHS
@@ -213,7 +213,7 @@ def contact_row(starts: ScaledStarts, swing: Floats, stance: float) -> Integers:
     return np.array([(trial.outcome, trial.steps, trial.settled) for trial in trials], np.int64)
 
 
-def rigid_map(walker: Standing, state: State, swing: Floats, stance: Floats, steps: int) -> StartMap:
+def rigid_map(walker: RigidModel, state: State, swing: Floats, stance: Floats, steps: int) -> StartMap:
     """Compute the same map for the rigid model; where its ground would have to pull, the outcome is `lifted-off`."""
 
     def cell(factor_1: float, factor_2: float) -> tuple[int, int, bool]:

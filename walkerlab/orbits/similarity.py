@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from walkerlab.mechanics.hinges import SpringDamper
-from walkerlab.mechanics.standing import Standing, on_slope
+from walkerlab.mechanics.rigid_model import RigidModel, on_slope
 
 
 class Units(NamedTuple):
@@ -37,7 +37,7 @@ class Units(NamedTuple):
         return (basic | derived | {"N m/rad": self.energy, "N m s/rad": damping})[unit]
 
 
-def unit_walker(walker: Standing) -> tuple[Standing, Units]:
+def unit_walker(walker: RigidModel) -> tuple[RigidModel, Units]:
     """Return the similar walker with L = g = 1 and a total mass of 1, and its units."""
     length, mass = float(walker.leg_length), float(walker.mass)
     if length == mass == walker.gravity == 1.0:

@@ -21,7 +21,15 @@ from typing import NamedTuple
 import numpy as np
 
 from walkerlab.mechanics.impact import heel_strike
-from walkerlab.mechanics.standing import STRAIGHT, Standing, equations, kinetic_energy, linked, on_slope, swing_foot
+from walkerlab.mechanics.rigid_model import (
+    STRAIGHT,
+    RigidModel,
+    equations,
+    kinetic_energy,
+    linked,
+    on_slope,
+    swing_foot,
+)
 from walkerlab.solvers.system import Floats, State
 
 LONG_PERIOD, SHORT_PERIOD = "long-period seed", "short-period seed"
@@ -53,7 +61,7 @@ class Modes(NamedTuple):
     V: Floats  # (2, 2), one mode per column, oscillating first
 
 
-def linear_modes(walker: Standing) -> Modes | None:
+def linear_modes(walker: RigidModel) -> Modes | None:
     """Return the modes of the swing phase about upright legs; None if the legs have too little inertia."""
     legs, n, level = leg_columns(walker), len(walker.arm_x), on_slope(walker, 0.0)
     inertias, (s, c, F, U, r) = np.empty((n, n)), np.empty((5, n))
@@ -71,12 +79,12 @@ def linear_modes(walker: Standing) -> Modes | None:
     return Modes(math.sqrt(-oscillating), math.sqrt(growing), V)
 
 
-def leg_columns(walker: Standing) -> Floats:
+def leg_columns(walker: RigidModel) -> Floats:
     """Return the angles (n, 2) of all bodies for a unit angle of the swing leg, and of the stance leg."""
     return np.array([linked(walker, STRAIGHT, unit) for unit in np.eye(len(walker.arm_x))[:2]]).T
 
 
-def seeds(walker: Standing) -> tuple[SmallSlopeSeed, ...]:
+def seeds(walker: RigidModel) -> tuple[SmallSlopeSeed, ...]:
     """Return the small-slope gaits of `walker`, whatever its own slope.
 
     There are none unless upright legs balance, so that gaits shrink with the slope.
@@ -92,7 +100,7 @@ def seeds(walker: Standing) -> tuple[SmallSlopeSeed, ...]:
     return (long,) if short is None else (long, short)
 
 
-def long_period_seed(walker: Standing, modes: Modes) -> SmallSlopeSeed | None:
+def long_period_seed(walker: RigidModel, modes: Modes) -> SmallSlopeSeed | None:
     """Return the symmetric gait at LONG_AMPLITUDE; None if the walker falls before its legs meet again."""
     half = symmetric_half_period(modes)
     if half is None or modes.fall * half > MAX_GROWTH:
@@ -107,7 +115,7 @@ def long_period_seed(walker: Standing, modes: Modes) -> SmallSlopeSeed | None:
     return cube_root_seed(LONG_PERIOD, walker, np.array([0.5, omega, omega]), 2.0 * half)
 
 
-def cube_root_seed(name: str, walker: Standing, per_angle: Floats, period: float) -> SmallSlopeSeed:
+def cube_root_seed(name: str, walker: RigidModel, per_angle: Floats, period: float) -> SmallSlopeSeed:
     """Return the gait at LONG_AMPLITUDE that grows as the cube root of the slope.
 
     per_angle  (3,) theta_2 + phi, dtheta_1, dtheta_2 after heel strike per unit angle between the legs
@@ -120,7 +128,7 @@ def cube_root_seed(name: str, walker: Standing, per_angle: Floats, period: float
 
 
 @np.errstate(divide="raise", invalid="raise")
-def slope_for_loss(walker: Standing, per_angle: Floats) -> float:
+def slope_for_loss(walker: RigidModel, per_angle: Floats) -> float:
     """Return the slope that balances the heel strike's loss, divided by the cube of the angle between the legs.
 
     In the limit the gait ends a step as it began, with both legs at the same rates.
@@ -135,13 +143,13 @@ def slope_for_loss(walker: Standing, per_angle: Floats) -> float:
 
 
 @np.errstate(divide="raise", invalid="raise")
-def apply_strike(walker: Standing, state: State) -> Floats:
+def apply_strike(walker: RigidModel, state: State) -> Floats:
     after = np.zeros(len(state))
     heel_strike(walker, np.array(state), after)
     return after
 
 
-def leg_state(walker: Standing, theta: tuple[float, float], omega: tuple[float, float]) -> State:
+def leg_state(walker: RigidModel, theta: tuple[float, float], omega: tuple[float, float]) -> State:
     legs = leg_columns(walker)
     return tuple(float(x) for x in (*(legs @ theta), *(legs @ omega)))
 
@@ -158,7 +166,7 @@ def symmetric_half_period(modes: Modes) -> float | None:
     return first_root(mismatch, 2.0 * math.pi / modes.swing)
 
 
-def short_period_seed(walker: Standing, modes: Modes, longest: float) -> SmallSlopeSeed | None:
+def short_period_seed(walker: RigidModel, modes: Modes, longest: float) -> SmallSlopeSeed | None:
     """Return the gait of period below `longest` (s) proportional to the slope; None if there is none."""
     try:
         conditions = step_conditions(walker, modes)
@@ -178,7 +186,7 @@ def short_period_seed(walker: Standing, modes: Modes, longest: float) -> SmallSl
     return SmallSlopeSeed(SHORT_PERIOD, slope, slope * z, period, np.zeros(3))
 
 
-def step_conditions(walker: Standing, modes: Modes) -> Callable[[Floats], Floats]:
+def step_conditions(walker: RigidModel, modes: Modes) -> Callable[[Floats], Floats]:
     """Linearise one step on a slope of one radian, for many durations at once.
 
     Returns a function of durations t (s) that gives matrices (..., 4, 4) on (z, 1): three rows require that z repeats

@@ -12,7 +12,7 @@ from walkerlab.hybrid.contact_result import ContactWalkResult, sampled_energies,
 from walkerlab.hybrid.endings import FALLEN_HIP
 from walkerlab.hybrid.recorded_walk import take_walk
 from walkerlab.hybrid.rigid_measures import energies, reactions
-from walkerlab.mechanics.standing import Standing
+from walkerlab.mechanics.rigid_model import RigidModel
 from walkerlab.outcome import Outcome
 from walkerlab.paper.measured import TIGHT
 from walkerlab.paper.printed import adams_start_as_printed
@@ -74,7 +74,7 @@ class AdamsWalk:
         return prose("adams_start.reason", self, int(self.walk.touch_time_s.size))
 
 
-def adams_start(walker: Standing, state: State) -> AdamsStart:
+def adams_start(walker: RigidModel, state: State) -> AdamsStart:
     """Walk a step of the rigid model from Table 2's ADAMS start."""
     walk = take_walk(walker, TIGHT, state, 1, sampled=True)
     assert walk.samples is not None
@@ -97,7 +97,7 @@ def adams_start(walker: Standing, state: State) -> AdamsStart:
 
 
 def adams_walk(
-    walker: Standing, walk: Callable[[State], ContactWalkResult], contact: ContactWalker, terrain: str
+    walker: RigidModel, walk: Callable[[State], ContactWalkResult], contact: ContactWalker, terrain: str
 ) -> AdamsWalk:
     """Walk the contact model from Table 2's ADAMS start: the printed stance angle and velocities on the walker's slope.
 

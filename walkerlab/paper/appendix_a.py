@@ -11,7 +11,7 @@ import math
 from typing import NamedTuple
 
 from walkerlab.mechanics.rigid import standing
-from walkerlab.mechanics.standing import Standing
+from walkerlab.mechanics.rigid_model import RigidModel
 from walkerlab.mechanics.trigonometry import sine_cosine
 from walkerlab.mechanics.walkers import Arc, Limb, straight_legs
 from walkerlab.paper.law import as_printed
@@ -106,7 +106,7 @@ def impact(
     return theta_2, theta_1, (A_11 * r2 - A_12 * r1) * scale, (A_22 * r1 - A_12 * r2) * scale
 
 
-def assembled(walker: RigidWalker) -> Standing:
+def assembled(walker: RigidWalker) -> RigidModel:
     """Assemble the walker's rigid model from its parts."""
     below_hip = walker.leg_length - walker.foot_to_mass
     leg = Limb(walker.leg_length, walker.leg_mass, below_hip, inertia_kg_m2=walker.leg_inertia)

@@ -19,13 +19,13 @@ from walkerlab.paper.errata import Erratum, errata
 from walkerlab.paper.law import is_own_walker
 from walkerlab.paper.measured import (
     CYCLES,
-    ContactModel,
+    ContactMeasurements,
     Errors,
     Measured,
-    RigidModel,
+    RigidMeasurements,
     characteristics,
+    measure_rigid_model,
     over_last_steps,
-    rigid_model,
 )
 from walkerlab.paper.printed import fixed_point_as_printed
 from walkerlab.paper.rows import NumberVerdict, count_verdicts, paper_rows, table_1, table_2, table_3
@@ -238,10 +238,10 @@ def measure(config: CompareConfig, inputs: Mapping[str, Content], motion: Compar
     """Measure everything that the paper's numbers are compared with."""
     sets = inputs["fixedpoint"].summary["equation_sets"]
     gaits = {name: sets[name] for name in EQUATION_SETS if "state" in sets.get(name, {})}
-    models: dict[str, RigidModel] = {
-        name: rigid_model(compass(config, name), as_state(gait["state"])) for name, gait in gaits.items()
+    models: dict[str, RigidMeasurements] = {
+        name: measure_rigid_model(compass(config, name), as_state(gait["state"])) for name, gait in gaits.items()
     }
-    contact, model = contact_model(config, inputs["contact-sim"]), models.get(config.equations)
+    contact, model = measure_contact_model(config, inputs["contact-sim"]), models.get(config.equations)
     start_moved = contact.start is not None and (
         model is None or bool(np.abs(np.subtract(contact.start, model.state)).max() > START_TOLERANCE)
     )
@@ -256,7 +256,7 @@ def measure(config: CompareConfig, inputs: Mapping[str, Content], motion: Compar
     )
 
 
-def contact_model(config: CompareConfig, walk: Content) -> ContactModel:
+def measure_contact_model(config: CompareConfig, walk: Content) -> ContactMeasurements:
     """Measure what is compared with the paper's ADAMS model."""
     summary, pitch = walk.summary, float(walk.summary["pitch_m"])
     periods, lengths = np.array(summary["step_periods_s"]), np.array(summary["step_lengths_m"])
@@ -269,7 +269,7 @@ def contact_model(config: CompareConfig, walk: Content) -> ContactModel:
     scene = contact_scene(config, pitch, pitch)
     start = start_state(scene, (-2.0 * config.slope_rad - theta_2, theta_2, omega_1, omega_2))
     from_x_p = scene.walk(start, 2 * CYCLES, GAIT_TOLERANCES)
-    return ContactModel(
+    return ContactMeasurements(
         law=require_contact(config),
         foot_radius=config.walker.foot_radius_m,
         summary=summary,

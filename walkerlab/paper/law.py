@@ -8,7 +8,7 @@ from typing import Any
 
 from walkerlab.config.numbers import same
 from walkerlab.config.walkers import CompassWalker, is_passive_compass
-from walkerlab.mechanics.standing import STANCE, SWING, Standing
+from walkerlab.mechanics.rigid_model import STANCE, SWING, RigidModel
 
 
 def is_own_walker(config: Any) -> bool:
@@ -19,10 +19,10 @@ def is_own_walker(config: Any) -> bool:
     )
 
 
-def as_printed(model: Standing) -> Standing:
+def as_printed(model: RigidModel) -> RigidModel:
     """Return a compass whose centrifugal torque on the stance leg, C_21 dtheta_1, has the sign printed in (A.5)."""
     return model.changed(unpaired=-2.0 * model.A[STANCE, SWING])
 
 
-LAWS: Mapping[str, Callable[[Standing], Standing]] = {"as-printed": as_printed}
+LAWS: Mapping[str, Callable[[RigidModel], RigidModel]] = {"as-printed": as_printed}
 """Changes of a walker's model, by the config's name for a set of equations."""

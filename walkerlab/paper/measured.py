@@ -73,7 +73,7 @@ def over_last_steps(time: Array, energy: Array, step_ends: Array) -> EnergyRecor
 
 
 @dataclass(frozen=True)
-class RigidModel:
+class RigidMeasurements:
     """Gait of one set of equations, and a walk from it.
 
     state          fixed point, rad and rad/s
@@ -92,13 +92,13 @@ class RigidModel:
     energy_drift: float
 
 
-def rigid_model(walker: RigidWalker, state: State) -> RigidModel:
+def measure_rigid_model(walker: RigidWalker, state: State) -> RigidMeasurements:
     """Walk five cycles from a gait's fixed point; energy is measured from the current stance foot."""
     model = assembled(walker)
     walk = take_walk(model, TIGHT, state, 2 * CYCLES, sampled=True)
     assert walk.samples is not None
     energy = energies(model, walk.samples.state).sum(axis=1)
-    return RigidModel(
+    return RigidMeasurements(
         state=state,
         steps=walk.steps,
         step_length=step_length(walker, state[0], state[1]),
@@ -110,7 +110,7 @@ def rigid_model(walker: RigidWalker, state: State) -> RigidModel:
 
 
 @dataclass(frozen=True)
-class ContactModel:
+class ContactMeasurements:
     """Walk of the contact model, to compare with the paper's ADAMS model.
 
     law          the contact block of its config
@@ -164,8 +164,8 @@ class Measured:
 
     walker: RigidWalker
     equations: str
-    models: Mapping[str, RigidModel]  # by set of equations, if it has a gait
+    models: Mapping[str, RigidMeasurements]  # by set of equations, if it has a gait
     spectral_radii: Mapping[str, float]  # of the same gaits
-    contact: ContactModel
+    contact: ContactMeasurements
     errors: Errors
     departures: Departures

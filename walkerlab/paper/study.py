@@ -40,8 +40,8 @@ class PaperStudy:
 
     slope: float
     slope_rounding: float
-    as_printed: measured.RigidModel
-    corrected: measured.RigidModel
+    as_printed: measured.RigidMeasurements
+    corrected: measured.RigidMeasurements
     from_x_p: measured.Characteristics
     five_steps_energy: float
     fastest: float
@@ -67,8 +67,8 @@ def study_the_paper() -> PaperStudy:
     return PaperStudy(
         slope=slope,
         slope_rounding=rounding,
-        as_printed=measured.rigid_model(wrong, as_printed),
-        corrected=measured.rigid_model(right, corrected),
+        as_printed=measured.measure_rigid_model(wrong, as_printed),
+        corrected=measured.measure_rigid_model(right, corrected),
         from_x_p=measured.characteristics(cycles.periods_s, cycles.lengths_m, cycles.mean_energy),
         five_steps_energy=five_steps.mean_energy,
         fastest=float(np.abs(one_step.samples.state[:, 2:]).max()),

@@ -14,7 +14,7 @@ from walkerlab.ground.walker import ContactWalker
 from walkerlab.hybrid.contact_result import ContactWalkResult, by_channel, sampled_feet
 from walkerlab.hybrid.recorded_walk import as_state, take_walk, with_scaled_rates
 from walkerlab.labels import Label
-from walkerlab.mechanics.standing import STANCE, SWING, Standing
+from walkerlab.mechanics.rigid_model import STANCE, SWING, RigidModel
 from walkerlab.orbits import scaled_starts
 from walkerlab.orbits.contact_gait import GaitAnswer
 from walkerlab.orbits.contact_map import angled_bodies, contact_step, turning_bodies
@@ -90,7 +90,7 @@ class TuneRun:
         self.config, self.scene, self.rigid_state, self.gait = config, scene, rigid_state, gait
         self.names, self.steps = state_names(config), 2 * config.strides
         self.tolerances = tolerances_of(config, self.steps)
-        self.rigid: Standing = rigid_walker(config)
+        self.rigid: RigidModel = rigid_walker(config)
         self.hinge = is_passive_compass(config)
         self.starts = starts_of(scene, self.rigid, rigid_state, self.steps, gait, self.tolerances)
         self.walks: dict[str, ContactWalkResult] = {}

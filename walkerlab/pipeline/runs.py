@@ -18,7 +18,7 @@ from walkerlab.errors import ConfigError, StaleError
 from walkerlab.pipeline.executor import survey
 from walkerlab.pipeline.graph import PIPELINE, Graph, Stage
 from walkerlab.pipeline.headlines import LAST_OF, headlines
-from walkerlab.prose import listed
+from walkerlab.prose import join_words
 from walkerlab.store import artifact
 from walkerlab.store.artifact import Stored
 from walkerlab.store.key import differences
@@ -110,7 +110,7 @@ def results_in(folder: RunFolder, stages: Iterable[str], graph: Graph = PIPELINE
     """Return the existing results of these stages; raises StaleError that names all unreadable ones."""
     intact, bad = read_all(folder, stages)
     if bad:
-        commands = listed(command(folder, graph[stage]) for stage in bad)
+        commands = join_words(command(folder, graph[stage]) for stage in bad)
         them = "recomputes it" if len(bad) == 1 else "recompute them"
         raise StaleError(f"{'; '.join(bad.values())}.", f"{commands} {them}.")
     return intact
@@ -164,7 +164,9 @@ def refusing_older(folder: RunFolder, outdated: Collection[str], graph: Graph = 
         paths = [str(folder.artifact(stage)) for stage in outdated]
         commands = [command(folder, graph[stage]) for stage in outdated]
         they = "is outdated and lacks" if len(paths) == 1 else "are outdated and lack"
-        raise StaleError(f"{listed(paths)} {they} {missing}.", f"{listed(commands)} computes it anew.") from missing
+        raise StaleError(
+            f"{join_words(paths)} {they} {missing}.", f"{join_words(commands)} computes it anew."
+        ) from missing
 
 
 def command(folder: RunFolder, stage: Stage) -> str:

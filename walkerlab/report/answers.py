@@ -11,7 +11,7 @@ from typing import Any
 
 from walkerlab.account import CHANNELS
 from walkerlab.labels import unit_by_name
-from walkerlab.prose import listed
+from walkerlab.prose import join_words
 from walkerlab.registration import later
 from walkerlab.report import gaits
 from walkerlab.report.numbers import count, decimals_left, fixed, length, number, quantity
@@ -58,8 +58,8 @@ def fixedpoint(summary: Summary) -> list[str | Table]:
     slope = f"{number(summary['slope_rad'])} rad ({number(math.degrees(summary['slope_rad']), 3)}°)"
     if "state" not in summary:
         return [f"No gait on a slope of {slope}: {summary['reason']}."]
-    driven = f", driven by {listed(summary['driven_by'])}," if summary.get("driven_by") else ""
-    driven += f"{'' if driven else ','} with {listed(summary['springs'])}," if summary.get("springs") else ""
+    driven = f", driven by {join_words(summary['driven_by'])}," if summary.get("driven_by") else ""
+    driven += f"{'' if driven else ','} with {join_words(summary['springs'])}," if summary.get("springs") else ""
     head = (
         f"On a slope of {slope}{driven} there is {'a stable' if summary['stable'] else 'an unstable'} gait: steps of "
         f"{fixed(summary['step_length_m'], 4)} m in {fixed(summary['period_s'], 4)} s; "
@@ -83,7 +83,9 @@ def told(title: str, key: str, digits: int = 4) -> Column:
 
 def energy_lost(dissipated: Mapping[str, float]) -> str:
     """Where a walk dissipated its energy; empty if nowhere."""
-    return listed(f"{quantity(lost, 'J', 3)} {CHANNELS.get(name, name)}" for name, lost in dissipated.items() if lost)
+    return join_words(
+        f"{quantity(lost, 'J', 3)} {CHANNELS.get(name, name)}" for name, lost in dissipated.items() if lost
+    )
 
 
 OF_EACH_STEP = {"step_periods_s": "period (s)", "step_lengths_m": "length (m)", "slips_m": "slip (mm)"}
@@ -230,7 +232,7 @@ def engines(summary: Summary) -> list[str | Table]:
         for experiment, text in concluded.items()
         if text
     ]
-    ran = listed(f"{name} {version}" for name, version in summary["versions"].items())
+    ran = join_words(f"{name} {version}" for name, version in summary["versions"].items())
     return [f"{count(len(summary['rows']), 'run')} in {ran}.", *told]
 
 

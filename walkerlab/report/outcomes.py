@@ -3,8 +3,8 @@
 from collections.abc import Mapping
 from typing import Any
 
-from walkerlab.outcome import TOLD, Outcome, outcome_of
-from walkerlab.prose import listed
+from walkerlab.outcome import OUTCOME_TEXTS, Outcome, outcome_of
+from walkerlab.prose import join_words
 from walkerlab.report.numbers import count, quantity
 from walkerlab.report.tables import Tone
 
@@ -18,7 +18,7 @@ WALKED = Outcome.WALKED.label
 def ends(outcome: str) -> str:
     """What a walker does in the end; an outcome that this version does not know keeps its name."""
     known = outcome_of(outcome)
-    return f"ends as {outcome}" if known is None else TOLD[known].does
+    return f"ends as {outcome}" if known is None else OUTCOME_TEXTS[known].does
 
 
 def walks(steps: int, outcome: str) -> str:
@@ -51,5 +51,5 @@ def off_by(error: Mapping[str, Any]) -> str:
     """How far the numbers of a walk are off, and how that is known."""
     if "reason" in error:
         return f"unknown: {error['reason']}"
-    off = listed(f"{quantity(error[key], unit, 1)} {what}" for key, (what, unit) in ERRORS.items() if key in error)
+    off = join_words(f"{quantity(error[key], unit, 1)} {what}" for key, (what, unit) in ERRORS.items() if key in error)
     return f"{off}, by a second walk with {error.get('by', USUAL)}"

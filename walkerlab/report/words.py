@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from walkerlab.account import CHANNELS
-from walkerlab.prose import Prose, listed, parts
+from walkerlab.prose import Prose, join_words, parts
 from walkerlab.report import numbers
 from walkerlab.report.outcomes import ERRORS, USUAL, ends, off_by, walks
 from walkerlab.report.symbols import in_signs
@@ -11,12 +11,12 @@ from walkerlab.report.symbols import in_signs
 
 def in_row(text: str) -> str:
     """The parts of a text as words in a row: 'a, b and c' of 'a | b | c'."""
-    return listed(parts(text))
+    return join_words(parts(text))
 
 
 WRITTEN = (
     *(numbers.number, numbers.fixed, numbers.quantity, numbers.length, numbers.whole, numbers.span),
-    *(numbers.count, listed, numbers.power_of_ten, in_row, in_signs, ends, walks, off_by, len),
+    *(numbers.count, join_words, numbers.power_of_ten, in_row, in_signs, ends, walks, off_by, len),
 )
 """What the templates may call."""
 KNOWN = {"CHANNELS": CHANNELS, "ERRORS": ERRORS, "USUAL": USUAL}

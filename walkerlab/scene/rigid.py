@@ -12,7 +12,7 @@ from walkerlab.config.walkers import Walker
 from walkerlab.errors import ConfigError
 from walkerlab.hybrid.recorded_walk import RigidWalkResult, take_walk
 from walkerlab.mechanics.rigid import knee_of, on_level_ground, places_of
-from walkerlab.mechanics.standing import Standing, on_slope
+from walkerlab.mechanics.rigid_model import RigidModel, on_slope
 from walkerlab.scene.footholds import foothold_heights
 from walkerlab.scene.parts import PARTS_DOCS, assembly_of, drive_parameters, knee_locked_at_strike
 from walkerlab.scene.studies import with_equations
@@ -28,7 +28,7 @@ CACHED_LEVEL_WALKERS = 16  # families over a slope reuse the same walker
 
 @dataclass(frozen=True)
 class RigidScene:
-    walker: Standing
+    walker: RigidModel
     names: tuple[str, ...]  # of the state variables
     knee_m: tuple[float, float] | None  # position of the knee in its thigh's frame
     outputs: tuple[Output, ...]  # to record over time
@@ -58,14 +58,14 @@ def rigid_scene(config: RigidConfig, ground: Footholds, outputs: tuple[Output, .
     )
 
 
-def rigid_walker(config: RigidConfig, equations: Equations | None = None) -> Standing:
+def rigid_walker(config: RigidConfig, equations: Equations | None = None) -> RigidModel:
     """Return the walker of a config, with its own set of equations or another one."""
     passive = on_slope(level_walker(config.walker, config.gravity_m_s2), config.slope_rad)
     return with_equations(passive.changed(**drive_parameters(config)), equations or config.equations)
 
 
 @lru_cache(CACHED_LEVEL_WALKERS)
-def level_walker(walker: Walker, gravity: float) -> Standing:
+def level_walker(walker: Walker, gravity: float) -> RigidModel:
     """Return a walker on level ground (gravity in m/s^2); raises ConfigError for parts that make no walker."""
     try:
         return on_level_ground(assembly_of(walker, rigid=True), gravity, knee_locked_at_strike(walker))

@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from walkerlab.hybrid.recorded_walk import with_scaled_rates
-from walkerlab.mechanics.standing import Standing
+from walkerlab.mechanics.rigid_model import RigidModel
 from walkerlab.orbits import scaled_starts
 from walkerlab.orbits.contact_gait import GaitAnswer
 from walkerlab.scene.contact import ContactScene, start_state
@@ -16,7 +16,7 @@ LEAST_BUDGET, BUDGET_FACTOR = 60_000, 4  # right-hand sides of a cell: minimum, 
 
 
 def starts_of(
-    scene: ContactScene, rigid: Standing, state: State, steps: int, answer: GaitAnswer, tolerances: Tolerances
+    scene: ContactScene, rigid: RigidModel, state: State, steps: int, answer: GaitAnswer, tolerances: Tolerances
 ) -> scaled_starts.ScaledStarts:
     """Return a rigid start with scalable velocities in a scene; walks must settle on the gait if there is one."""
     own = None if answer.gait is None else (answer.gait.step.period_s, answer.gait.step.length_m)

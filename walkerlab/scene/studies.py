@@ -12,7 +12,7 @@ from walkerlab.registration import registered
 
 if TYPE_CHECKING:
     from walkerlab.config.schema import Equations
-    from walkerlab.mechanics.standing import Standing
+    from walkerlab.mechanics.rigid_model import RigidModel
 
 STUDY = "walkerlab.paper.law"
 LAGRANGE_EQUATIONS: Equations = "corrected"
@@ -22,8 +22,8 @@ def is_studied(config: Any) -> bool:
     return bool(registered(STUDY, "is_own_walker")(config))
 
 
-def with_equations(model: Standing, equations: Equations) -> Standing:
-    moved: Standing = model if equations == LAGRANGE_EQUATIONS else registered(STUDY, "LAWS")[equations](model)
+def with_equations(model: RigidModel, equations: Equations) -> RigidModel:
+    moved: RigidModel = model if equations == LAGRANGE_EQUATIONS else registered(STUDY, "LAWS")[equations](model)
     return moved
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from walkerlab.errors import NoAnswer
 from walkerlab.hybrid.recorded_walk import as_state
-from walkerlab.mechanics.standing import Standing
+from walkerlab.mechanics.rigid_model import RigidModel
 from walkerlab.orbits.family_search import CONTACT, RIGID
 from walkerlab.orbits.gradients import Gradient, gradients
 from walkerlab.orbits.rigid_map import coordinates_of
@@ -55,7 +55,7 @@ class ModelUnderTest:
         return gradients(self.at(parameter), abs(parameter.value_in(self.config)) or 1e-2, wanted)
 
 
-def section_coordinates(walker: Standing, state: Sequence[float]) -> Floats:
+def section_coordinates(walker: RigidModel, state: Sequence[float]) -> Floats:
     """Return the section coordinates of the unit walker for a state (SI)."""
     _, units = unit_walker(walker)
     z = coordinates_of(walker, state)

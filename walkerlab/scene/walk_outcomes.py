@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 from walkerlab.config.walkers import Kneed
-from walkerlab.outcome import TOLD, Outcome, outcome_of
+from walkerlab.outcome import OUTCOME_TEXTS, Outcome, outcome_of
 
 if TYPE_CHECKING:
     from walkerlab.config.reads import ContactConfig
@@ -50,8 +50,8 @@ def describe_endings(
         ending = outcome_of(outcome)
         if ending is not None and ending is not Outcome.WALKED:
             why = ground_causes(outcome, config, contact, pads)
-            aside = "" if TOLD[ending].did == outcome else f" ({outcome})"
-            description = " ".join([f"{walks:,} of {total:,} walks {TOLD[ending].did}{aside}.", *why])
+            aside = "" if OUTCOME_TEXTS[ending].did == outcome else f" ({outcome})"
+            description = " ".join([f"{walks:,} of {total:,} walks {OUTCOME_TEXTS[ending].did}{aside}.", *why])
             rows.append({"outcome": outcome, "walks": walks, "of": total, "ground": bool(why), "said": description})
     return rows
 

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from walkerlab.kernels import by_reference, inlined, vector
+from walkerlab.kernels import by_reference, kernel_part, vector
 from walkerlab.solvers import dop853_tableau as tableau
 from walkerlab.solvers.fused import fused
 from walkerlab.solvers.stepping import (
@@ -76,7 +76,7 @@ def new_dop853(n: int, rtol: float, atol: float, budget: int) -> Dop853:
     return Dop853(rtol, atol, np.zeros(3), y_old, y, counts, at, np.zeros((ALL, n)), np.zeros((7, n)))
 
 
-@inlined
+@kernel_part
 def evaluate_stages(method: Dop853, system: Any, t: float, h: float, first: int, end: int) -> None:
     """Evaluate stages first to end - 1 of the step from `y_old` at time t over h; `at` keeps the state of the last."""
     y, at, K = method.y_old, method.at, method.stages
@@ -97,7 +97,7 @@ def evaluate_stages(method: Dop853, system: Any, t: float, h: float, first: int,
     method.counts[RHS] += end - first
 
 
-@inlined
+@kernel_part
 def try_step(method: Dop853, system: Any, t: float, h: float) -> float:
     """Compute the step from `y_old` over h into `y`; returns its error relative to the tolerance, (10.17)."""
     y_old, y, at, K = method.y_old, method.y, method.at, method.stages
@@ -125,7 +125,7 @@ def try_step(method: Dop853, system: Any, t: float, h: float) -> float:
     return abs(h) * error_5 / math.sqrt(denominator * y.size)
 
 
-@inlined
+@kernel_part
 def scaled_norm(method: Dop853, v: Any) -> float:
     """Norm of v with each component divided by its tolerance at the current state."""
     total = 0.0
@@ -135,7 +135,7 @@ def scaled_norm(method: Dop853, v: Any) -> float:
     return math.sqrt(total)
 
 
-@inlined
+@kernel_part
 def change_of_step(error: float) -> float:
     """Factor from a step with this error to the next; the eighth root is three square roots."""
     return max(SHRINK_MOST, SAFETY / math.sqrt(math.sqrt(math.sqrt(error))))

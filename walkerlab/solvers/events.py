@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.polynomial import polynomial
 
-from walkerlab.kernels import by_reference, inlined
+from walkerlab.kernels import by_reference, kernel_part
 
 NO_CROSSING = 2.0
 FALLING, RISING = -1, 1
@@ -62,7 +62,7 @@ def sampling(degree: int) -> tuple[Any, Any]:
     return nodes, np.linalg.inv(basis)
 
 
-@inlined
+@kernel_part
 def first_crossing(finder: CrossingFinder, event: int, direction: int, after: float, zero_at_start: bool) -> float:
     """Find the fraction of the step at which an event function first changes sign; NO_CROSSING if it does not.
 
@@ -76,7 +76,7 @@ def first_crossing(finder: CrossingFinder, event: int, direction: int, after: fl
     return crossing_of_piece(finder, set_root_piece(finder, event, zero_at_start), direction, after)
 
 
-@inlined
+@kernel_part
 def crossing_of_piece(finder: CrossingFinder, size: int, direction: int, after: float) -> float:
     """Find the first crossing of the polynomial at the bottom of the stack, with `size` Bernstein coefficients."""
     stack, ends = finder.stack, finder.ends
@@ -103,13 +103,13 @@ def crossing_of_piece(finder: CrossingFinder, size: int, direction: int, after: 
     return NO_CROSSING
 
 
-@inlined
+@kernel_part
 def value_at(finder: CrossingFinder, event: int, fraction: float) -> float:
     """Evaluate a sampled event function at a fraction of the step."""
     return evaluate(finder.stack, 0, set_root_piece(finder, event, False), fraction)
 
 
-@inlined
+@kernel_part
 def spans_zero(finder: CrossingFinder, event: int) -> bool:
     """Whether an event function may cross: false if it stays further from zero than it varies."""
     smallest, largest = finder.values[event, 0], finder.values[event, 0]
@@ -120,7 +120,7 @@ def spans_zero(finder: CrossingFinder, event: int) -> bool:
     return smallest <= room and largest >= -room
 
 
-@inlined
+@kernel_part
 def set_root_piece(finder: CrossingFinder, event: int, zero_at_start: bool) -> int:
     """Write the whole step's coefficients to the bottom of the stack; returns their number."""
     stack, size = finder.stack, finder.nodes.size
@@ -132,7 +132,7 @@ def set_root_piece(finder: CrossingFinder, event: int, zero_at_start: bool) -> i
     return without_zero_at_start(stack, size) if zero_at_start else size
 
 
-@inlined
+@kernel_part
 def without_zero_at_start(stack: Any, size: int) -> int:
     """Divide a zero at the start out of the polynomial at the bottom of the stack; returns its new size."""
     degree = size - 1
@@ -141,7 +141,7 @@ def without_zero_at_start(stack: Any, size: int) -> int:
     return degree
 
 
-@inlined
+@kernel_part
 def way_from_zero(finder: CrossingFinder, event: int, clearly: float) -> float:
     """Direction of an event function that is zero at the step's start, as a number of its sign; 0 if it stays there.
 
@@ -157,7 +157,7 @@ def way_from_zero(finder: CrossingFinder, event: int, clearly: float) -> float:
     return 0.0
 
 
-@inlined
+@kernel_part
 def sign_changes(stack: Any, piece: int, size: int) -> int:
     """Count sign changes of a piece's coefficients; zero counts as positive."""
     changes = 0
@@ -167,7 +167,7 @@ def sign_changes(stack: Any, piece: int, size: int) -> int:
     return changes
 
 
-@inlined
+@kernel_part
 def split(stack: Any, piece: int, size: int) -> None:
     """Bisect a piece by de Casteljau: its left half goes on top of the stack, its right half replaces it."""
     for i in range(size):
@@ -179,7 +179,7 @@ def split(stack: Any, piece: int, size: int) -> None:
     stack[piece, 0] = stack[piece + 1, size - 1]
 
 
-@inlined
+@kernel_part
 def regula_falsi(stack: Any, piece: int, size: int, low: float, high: float) -> float:
     """Find the only crossing of a piece by the Illinois variant, as a fraction of the step."""
     a, b = 0.0, 1.0
@@ -204,7 +204,7 @@ def regula_falsi(stack: Any, piece: int, size: int, low: float, high: float) -> 
     return low + 0.5 * (a + b) * (high - low)
 
 
-@inlined
+@kernel_part
 def evaluate(stack: Any, piece: int, size: int, x: float) -> float:
     """Evaluate a piece at x (0 to 1) by nested products."""
     degree = size - 1
@@ -217,7 +217,7 @@ def evaluate(stack: Any, piece: int, size: int, x: float) -> float:
     return total + power * x * stack[piece, degree]
 
 
-@inlined
+@kernel_part
 def shift_column(columns: Any, at: int, rate: Any, wait: float) -> None:
     """Move a variational column from fixed time to the event's time, or back: Phi + f wait (saltation).
 

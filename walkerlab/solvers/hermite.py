@@ -3,7 +3,7 @@
 It needs values and two derivatives at both ends, which an explicit method has for free; dense output costs stages.
 """
 
-from walkerlab.kernels import inlined
+from walkerlab.kernels import kernel_part
 from walkerlab.solvers.events import FALLING, NO_CROSSING, CrossingFinder, crossing_of_piece, without_zero_at_start
 
 Jet = tuple[float, float, float]
@@ -14,7 +14,7 @@ LAST_MOVE = 1e-4  # of the step; Newton's error is about the square of its last 
 MAX_ITERATIONS = 50
 
 
-@inlined
+@kernel_part
 def hermite(h: float, start: Jet, end: Jet) -> Quintic:
     """Quintic over a step h (s) with these values and derivatives at its ends."""
     slope, bend = 0.2 * h * start[1], 0.05 * h * h * start[2]
@@ -29,13 +29,13 @@ def hermite(h: float, start: Jet, end: Jet) -> Quintic:
     )
 
 
-@inlined
+@kernel_part
 def value_of(quintic: Quintic, x: float) -> float:
     """Evaluate a quintic at fraction x of the step."""
     return value_and_slope(in_powers(quintic), x)[0]
 
 
-@inlined
+@kernel_part
 def in_powers(quintic: Quintic) -> Quintic:
     """Convert to coefficients of powers of the fraction, lowest first."""
     b0, b1, b2, b3, b4, b5 = quintic
@@ -49,7 +49,7 @@ def in_powers(quintic: Quintic) -> Quintic:
     )
 
 
-@inlined
+@kernel_part
 def value_and_slope(powers: Quintic, x: float) -> tuple[float, float]:
     """Evaluate a polynomial and its derivative at x from coefficients of powers."""
     c0, c1, c2, c3, c4, c5 = powers
@@ -58,7 +58,7 @@ def value_and_slope(powers: Quintic, x: float) -> tuple[float, float]:
     return value, slope
 
 
-@inlined
+@kernel_part
 def first_fall(finder: CrossingFinder, quintic: Quintic, zero_at_start: bool, after: float) -> float:
     """Fraction of the step at which a quintic first falls through zero; NO_CROSSING if it does not.
 
@@ -80,7 +80,7 @@ def first_fall(finder: CrossingFinder, quintic: Quintic, zero_at_start: bool, af
     return crossing_of_piece(finder, size, FALLING, after)
 
 
-@inlined
+@kernel_part
 def only_crossing(quintic: Quintic) -> float:
     """Find the zero of a quintic with a single, falling crossing: Newton from the end, safeguarded by bisection."""
     powers = in_powers(quintic)

@@ -5,7 +5,7 @@ from typing import Any
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from walkerlab.kernels import by_type, inlined
+from walkerlab.kernels import by_type, kernel_part
 from walkerlab.solvers import dop853_tableau as tableau
 from walkerlab.solvers.dop853_tableau import nonzero
 from walkerlab.solvers.lanes import VECTOR, multiply_add, spread_over
@@ -68,7 +68,7 @@ def stage_state(context: Any, y: Any, h: Any, weights: Any, vectors: Any) -> Any
     return y(y, y.dtype, weights, vectors), generate
 
 
-@inlined
+@kernel_part
 def stages_of(system: Any, t: float, y: State, k1: State, h: float) -> tuple[tuple[State, ...], State, State]:
     """Compute the stages that solution and error use (k1, k6 .. k12), the solution and its derivative."""
     k2 = derivative(system, t + C[1] * h, stage_state(y, h, A_2, (k1,)))
@@ -87,7 +87,7 @@ def stages_of(system: Any, t: float, y: State, k1: State, h: float) -> tuple[tup
     return used, y_new, derivative(system, t + h, y_new)
 
 
-@inlined
+@kernel_part
 def error_sums(method: Any, y: State, y_new: State, by_order_5: State, by_order_3: State) -> tuple[float, float]:
     """Sum the squares of both errors divided by the tolerance; `method` holds rtol and atol."""
     error_5, error_3 = 0.0, 0.0

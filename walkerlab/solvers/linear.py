@@ -4,7 +4,7 @@ from typing import Any
 
 from numba import types
 
-from walkerlab.kernels import PART_FLAGS, compile_as, inlined
+from walkerlab.kernels import PART_FLAGS, compile_as, kernel_part
 
 
 def reciprocal(x: Any) -> Any:
@@ -26,13 +26,13 @@ def complex_reciprocal(x: Any) -> Any:
 compile_as(reciprocal, lambda x: (complex_reciprocal if isinstance(x, types.Complex) else reciprocal, PART_FLAGS))
 
 
-@inlined
+@kernel_part
 def size(x: Any) -> float:
     """Sum of the sizes of real and imaginary part: chooses pivots without a square root."""
     return abs(x.real) + abs(x.imag)
 
 
-@inlined
+@kernel_part
 def factor(A: Any, pivots: Any, n: int) -> bool:
     """Compute LU factors of A[:n, :n] in place, with row exchanges; returns False if it is singular.
 
@@ -59,7 +59,7 @@ def factor(A: Any, pivots: Any, n: int) -> bool:
     return True
 
 
-@inlined
+@kernel_part
 def solve(A: Any, pivots: Any, b: Any, first: int, n: int) -> None:
     """Solve with factors from `factor`, overwriting b[first : first + n]."""
     for k in range(n):

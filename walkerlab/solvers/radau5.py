@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from walkerlab.kernels import by_reference, inlined
+from walkerlab.kernels import by_reference, kernel_part
 from walkerlab.solvers.fused import fused
 from walkerlab.solvers.shifted_system import factor_shifted, solve_shifted, unknowns
 from walkerlab.solvers.stepping import (
@@ -99,7 +99,7 @@ def new_radau5(n: int, rtol: float, atol: float, budget: int) -> Radau5:
     )  # fmt: skip
 
 
-@inlined
+@kernel_part
 def factor_matrices(method: Radau5, h: float) -> bool:
     """Factor both matrices of the simplified Newton iteration for step h; returns False if one is singular."""
     size = int(method.control[UNKNOWNS])
@@ -108,14 +108,14 @@ def factor_matrices(method: Radau5, h: float) -> bool:
     return real and factor_shifted(method.J, size, complex(ALPHA / h, -BETA / h), method.pair, method.pivots[1])
 
 
-@inlined
+@kernel_part
 def solve_real(method: Radau5, r: Any) -> None:
     """Solve with the real matrix of the step, overwriting r (n,)."""
     s = GAMMA / method.control[H_FACTORED]
     solve_shifted(method.J, int(method.control[UNKNOWNS]), s, method.real, method.pivots[0], r)
 
 
-@inlined
+@kernel_part
 def solve_pair(method: Radau5, r: Any) -> None:
     """Solve with the complex matrix of the step, overwriting r (n,)."""
     h = method.control[H_FACTORED]
@@ -123,7 +123,7 @@ def solve_pair(method: Radau5, r: Any) -> None:
     solve_shifted(method.J, int(method.control[UNKNOWNS]), s, method.pair, method.pivots[1], r)
 
 
-@inlined
+@kernel_part
 def first_guess(method: Radau5, h: float) -> None:
     """Extrapolate the stages from the last step's collocation polynomial; zero after a start."""
     ratio = h / method.control[H_OLD] if method.control[SMOOTH] > 0.0 else 0.0
@@ -138,7 +138,7 @@ def first_guess(method: Radau5, h: float) -> None:
         w[2, i] = INV_3[0] * z[0, i] + INV_3[1] * z[1, i] + INV_3[2] * z[2, i]
 
 
-@inlined
+@kernel_part
 def newton_move(method: Radau5, system: Any, t: float, h: float) -> float:
     """Do one simplified Newton iteration; returns the size of its move relative to the tolerance."""
     y, z, w, f = method.y, method.z, method.w, method.f
@@ -170,7 +170,7 @@ def newton_move(method: Radau5, system: Any, t: float, h: float) -> float:
     return math.sqrt(size / (3 * n))
 
 
-@inlined
+@kernel_part
 def solve_stages(method: Radau5, system: Any, t: float, h: float) -> int:
     """Iterate until the stages are accurate enough; returns the number of iterations, 0 if they diverge."""
     tolerance = max(10.0 * 2.3e-16 / method.rtol, min(0.03, math.sqrt(method.rtol)))
@@ -207,7 +207,7 @@ def begin_radau5(method: Radau5, system: Any, t: float, y: Any, h: float) -> Non
     control[H_OLD], control[RATE], control[SMOOTH] = 0.0, 1.0, 0.0
 
 
-@inlined
+@kernel_part
 def step_error(method: Radau5, system: Any, t: float, h: float, again: bool) -> float:
     """Error relative to the tolerance, (8.19); filtered again by (8.20) after a rejection or a start."""
     n = method.y.size
@@ -229,7 +229,7 @@ def step_error(method: Radau5, system: Any, t: float, h: float, again: bool) -> 
     return size
 
 
-@inlined
+@kernel_part
 def error_size(method: Radau5, error: Any) -> float:
     """Root mean square of the error divided by the tolerance."""
     y, total = method.y, 0.0
@@ -277,7 +277,7 @@ def advance_radau5(method: Radau5, system: Any, t_end: float) -> int:
     return OUT_OF_BUDGET
 
 
-@inlined
+@kernel_part
 def refresh(method: Radau5, system: Any) -> None:
     """Evaluate the Jacobian at the step's start."""
     jacobian(system, method.clock[T], method.y, method.J)
@@ -286,7 +286,7 @@ def refresh(method: Radau5, system: Any) -> None:
     method.control[UNKNOWNS] = unknowns(method.J)
 
 
-@inlined
+@kernel_part
 def next_step(method: Radau5, h: float, error: float, shrink: float, safety: float) -> float:
     """Step after an accepted one: the smaller of the standard and Gustafsson's prediction, (8.25)."""
     control = method.control
@@ -300,7 +300,7 @@ def next_step(method: Radau5, h: float, error: float, shrink: float, safety: flo
     return h_new
 
 
-@inlined
+@kernel_part
 def accept(method: Radau5, system: Any, t: float, t_new: float) -> None:
     """Move to the end of the step, store its polynomial, and update derivative and Jacobian."""
     clock, control = method.clock, method.control

@@ -9,11 +9,11 @@ Source: Hairer, Wanner, Solving Ordinary Differential Equations II, 2nd ed. (199
 
 from typing import Any
 
-from walkerlab.kernels import inlined
+from walkerlab.kernels import kernel_part
 from walkerlab.solvers.linear import factor, reciprocal, solve
 
 
-@inlined
+@kernel_part
 def unknowns(J: Any) -> int:
     """Count the unknowns of the reduced system for a Jacobian J (n, n): n/2 for equations of motion, otherwise n."""
     n = J.shape[0]
@@ -27,7 +27,7 @@ def unknowns(J: Any) -> int:
     return half
 
 
-@inlined
+@kernel_part
 def factor_shifted(J: Any, size: int, s: Any, factors: Any, pivots: Any) -> bool:
     """Factor the reduced matrix for shift s into `factors` (size, size), real or complex; False if it is singular."""
     n, inverse = J.shape[0], reciprocal(s)
@@ -38,7 +38,7 @@ def factor_shifted(J: Any, size: int, s: Any, factors: Any, pivots: Any) -> bool
     return factor(factors, pivots, size)
 
 
-@inlined
+@kernel_part
 def solve_shifted(J: Any, size: int, s: Any, factors: Any, pivots: Any, r: Any) -> None:
     """Solve with factors from `factor_shifted`, overwriting r (n,)."""
     if size == J.shape[0]:

@@ -11,7 +11,7 @@ dense        (d, n) coefficients of dense output of degree d; a library's method
 
 from typing import Any
 
-from walkerlab.kernels import by_type, by_type_or_default, inlined
+from walkerlab.kernels import by_type, by_type_or_default, kernel_part
 
 # indices into `clock`
 T_OLD, T, H_NEXT = 0, 1, 2
@@ -55,7 +55,7 @@ def sample(method: Any, system: Any, fractions: Any, states: Any) -> None:
         interpolate(method, system, fractions[k], states[k, : method.y.size])
 
 
-@inlined
+@kernel_part
 def clear_counts(method: Any) -> None:
     """Reset all counts except the budget."""
     for i in range(BUDGET):

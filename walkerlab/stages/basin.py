@@ -17,7 +17,7 @@ from walkerlab.config.walkers import contact_required_error
 from walkerlab.errors import ConfigError
 from walkerlab.hybrid.recorded_walk import as_state
 from walkerlab.hybrid.rigid_lanes import two_legs
-from walkerlab.mechanics.standing import Standing
+from walkerlab.mechanics.rigid_model import RigidModel
 from walkerlab.orbits.basin import (
     ATOL,
     RTOL,
@@ -135,7 +135,7 @@ def window_of(config: BasinConfig, z: list[float]) -> Window:
     return Window(axes, lower, upper, settings.cells, (z[0], z[1], z[2]))
 
 
-def question_of(config: BasinConfig, inputs: Mapping[str, Content], window: Window, rigid: Standing) -> Question:
+def question_of(config: BasinConfig, inputs: Mapping[str, Content], window: Window, rigid: RigidModel) -> Question:
     """Build the model whose walks are classified, with its attractors."""
     if config.basin.model == "contact":
         return contact_question(config, inputs, rigid)
@@ -151,7 +151,7 @@ def question_of(config: BasinConfig, inputs: Mapping[str, Content], window: Wind
     return question if legs is not None else one_by_one
 
 
-def contact_question(config: BasinConfig, inputs: Mapping[str, Content], rigid: Standing) -> ContactQuestion:
+def contact_question(config: BasinConfig, inputs: Mapping[str, Content], rigid: RigidModel) -> ContactQuestion:
     """Build the same for the contact model, at the tolerances of `tune`'s map."""
     if config.contact is None:
         raise contact_required_error("basin.model: contact", config.walker, "Add one.")
@@ -189,7 +189,7 @@ def group_of(settings: Basin, window: Window, found: WalkEnds, walking: Floats) 
     return Group(variables, {"outcomes": OUTCOMES, "model": settings.model, **rest})
 
 
-def attractors_of(question: Question, rigid: Standing) -> list[dict[str, Any]]:
+def attractors_of(question: Question, rigid: RigidModel) -> list[dict[str, Any]]:
     """Return period and a state (SI) of each attractor."""
     if isinstance(question, ContactQuestion):
         own = question.starts.gait
@@ -282,7 +282,7 @@ class ContactQuestion:
     """Starts of the contact model: rigid states with the stance foot just touching, rolling without slip."""
 
     scene: ContactScene
-    rigid: Standing
+    rigid: RigidModel
     starts: ScaledStarts
     cells_at_once: int = 100
     edges_at_once: int = 10

@@ -6,7 +6,7 @@ import numpy as np
 
 from walkerlab.hybrid.recorded_walk import RigidWalkResult, Samples
 from walkerlab.hybrid.rigid_measures import energies, places, reactions
-from walkerlab.mechanics.standing import STANCE, energy_at_touch
+from walkerlab.mechanics.rigid_model import STANCE, energy_at_touch
 from walkerlab.scene.rigid import RigidScene
 from walkerlab.stages.walk import COORDINATE, legs, over_time, steps_of, turning
 from walkerlab.store.content import Group, Variable

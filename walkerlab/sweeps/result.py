@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walkerlab.config.schema import Config
-from walkerlab.labels import ERROR_OF_EACH_STEP, in_words, unit_by_name
+from walkerlab.labels import ERROR_OF_EACH_STEP, axis_label, unit_by_name
 from walkerlab.pipeline.headlines import LAST_OF, headlines
 from walkerlab.report.tables import csv_text
 from walkerlab.scene.walk_outcomes import Pads, describe_endings
@@ -196,7 +196,7 @@ class Merge:
         elif last in self.labels:
             unit, text = self.labels[last]
         else:
-            unit, text = unit_by_name(last), in_words(name)
+            unit, text = unit_by_name(last), axis_label(name)
         gaps = values.dtype.kind == "f" and bool(np.isnan(values).any())
         return Variable(values.reshape(self.question.shape + extra), self.question.dims + own, unit, text, missing=gaps)
 

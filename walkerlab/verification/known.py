@@ -252,7 +252,8 @@ PROBLEMS: Final = (
         "SciPy DOP853 on the law as written in its manual", 1e-6, "a thousand times the tolerance",
     ),
     partial(
-        solve_problem, "block on an incline that holds it", "creep speed at 0.2 rad, m/s", partial(block_speed, 0.2, 0.0),
+        solve_problem, "block on an incline that holds it", "creep speed at 0.2 rad, m/s",
+        partial(block_speed, 0.2, 0.0),
         partial(references.creep_speed, 0.2, PAPER_FRICTION.static, PAPER_FRICTION.stiction_velocity),
         "root of the friction law's cubic, SciPy brentq", 1e-7, "the tolerance",
     ),

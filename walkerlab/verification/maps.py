@@ -15,7 +15,7 @@ from walkerlab.config.stability import Case
 from walkerlab.solvers.registry import Tolerances
 from walkerlab.verification.catalogue import config_of
 from walkerlab.verification.judge import TIGHTER_FACTOR
-from walkerlab.verification.ordinary import REFERENCE_SETTINGS, COMPARED_STEPS, arrival_of, euler, natural_units
+from walkerlab.verification.ordinary import COMPARED_STEPS, REFERENCE_SETTINGS, arrival_of, euler, natural_units
 from walkerlab.verification.starts import ContactStart, case_tolerances, prepare_start
 from walkerlab.verification.verdict import finite
 

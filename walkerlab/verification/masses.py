@@ -7,7 +7,7 @@ import numpy as np
 from walkerlab.mechanics.assembly import Anchor, levers, masses
 from walkerlab.mechanics.parts import Assembly
 from walkerlab.mechanics.rigid import hip_of, places_of
-from walkerlab.mechanics.standing import STANCE, SWING
+from walkerlab.mechanics.rigid_model import STANCE, SWING
 from walkerlab.solvers.system import Floats
 from walkerlab.verification.verdict import finite
 

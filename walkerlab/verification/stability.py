@@ -16,7 +16,7 @@ from walkerlab.store.content import Content
 from walkerlab.verification.catalogue import all_cases, scene_cases
 from walkerlab.verification.judge import CaseCell, run_cells
 from walkerlab.verification.left_out import verification_omissions
-from walkerlab.verification.ordinary import MAX_ORDINARY_EVALUATIONS, FINE_ERROR, Choice
+from walkerlab.verification.ordinary import FINE_ERROR, MAX_ORDINARY_EVALUATIONS, Choice
 from walkerlab.verification.verdict import CaseResult
 
 

@@ -13,7 +13,7 @@ from walkerlab.stages.walk import OUTCOMES, count_outcomes
 from walkerlab.store.checkpoint import Checkpoint
 from walkerlab.store.content import Content, Group, Variable
 from walkerlab.verification import maps
-from walkerlab.verification.ordinary import FINE_ERROR, COMPARED_STEPS
+from walkerlab.verification.ordinary import COMPARED_STEPS, FINE_ERROR
 
 STICTION_COLUMNS = {
     "outcome": "how the walk ended, see attribute outcomes",

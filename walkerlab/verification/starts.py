@@ -10,7 +10,7 @@ from walkerlab.config.reads import WalksConfig
 from walkerlab.config.stability import Case
 from walkerlab.hybrid.contact_result import ContactWalkResult
 from walkerlab.hybrid.recorded_walk import RigidWalkResult, as_state, take_walk
-from walkerlab.mechanics.standing import Standing, swing_foot
+from walkerlab.mechanics.rigid_model import RigidModel, swing_foot
 from walkerlab.orbits.fixed_point import RigidGait, find_gaits
 from walkerlab.outcome import Outcome
 from walkerlab.scene.contact import ContactScene, contact_gait, contact_scene, start_state, wants_own_pitch
@@ -68,7 +68,7 @@ class CaseStart:
 @dataclass(frozen=True)
 class RigidStart(CaseStart):
     kept: ClassVar[str] = "energy drift within a swing"
-    walker: Standing
+    walker: RigidModel
 
     def again(self, case: Case) -> Case:
         """Shorten a repeated walk to the steps whose times are compared."""
@@ -147,7 +147,7 @@ def case_tolerances(start: Start, case: Case, tighter: float = 1.0) -> Tolerance
 
 
 @cache
-def gait_of(walker: Standing, seed: int) -> RigidGait | None:
+def gait_of(walker: RigidModel, seed: int) -> RigidGait | None:
     """Find a walker's gait; cached, since most cases of a catalogue are one walker on other ground."""
     return find_gaits(walker, seed).gait
 

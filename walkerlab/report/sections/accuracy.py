@@ -5,7 +5,7 @@ from functools import partial
 from typing import Any
 
 from walkerlab.outcome import Outcome
-from walkerlab.prose import listed
+from walkerlab.prose import join_words
 from walkerlab.report.blocks import COSTS, Gallery, PageBlock, Paragraph, Section, Statement, Statements
 from walkerlab.report.numbers import NONE, number, power_of_ten, whole
 from walkerlab.report.results import Results, of_stage
@@ -37,7 +37,7 @@ def section(results: Results, summary: Row) -> Section | None:
     )
     fastest: dict[str, list[str]] = {}
     for scene, best in summary["best"].items():
-        fastest.setdefault(listed(dict.fromkeys(best.values())), []).append(scene)
+        fastest.setdefault(join_words(dict.fromkeys(best.values())), []).append(scene)
     return Section.of("accuracy", "Error against run time", blocks, words("accuracy.fastest", fastest), COSTS)
 
 
@@ -71,7 +71,7 @@ def methods_of(summary: Row, scene: str, levels: Sequence[float]) -> Iterator[Ro
             "method": Cell(method, "good" if method in best else None),
             "smallest_error": number(error, 2) if error is None or error > known else f"≤ {number(known, 2)}",
             "rhs_evaluations": exact.get("rhs_evaluations"),
-            "failures": listed(failed),
+            "failures": join_words(failed),
             **{
                 f"{level}": min(
                     (run for run in ended if run["error"] <= level), key=lambda run: run["wall_s"], default=None
@@ -122,7 +122,7 @@ REFERENCE_COLUMNS = (
 NOT_RUN_COLUMNS = (
     Column("scene", "scene"),
     Column("method", "method"),
-    Column("tolerances", "tolerances", lambda values: listed(power_of_ten(value, 1) for value in values)),
+    Column("tolerances", "tolerances", lambda values: join_words(power_of_ten(value, 1) for value in values)),
     Column("why", "why", wide=True),
 )
 

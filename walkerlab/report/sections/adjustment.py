@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any
 
-from walkerlab.prose import listed
+from walkerlab.prose import join_words
 from walkerlab.report.blocks import COSTS, Paragraph, Section
 from walkerlab.report.gaits import symbol, works
 from walkerlab.report.numbers import NONE, fixed, length, number, quantity
@@ -84,7 +84,7 @@ def lost(channel: str, gait: Summary) -> float | Cell | None:
 
 def factors(multipliers: Sequence[tuple[float, float]]) -> str:
     """Multipliers, largest first; a complex one stands for itself and its conjugate."""
-    return listed(
+    return join_words(
         fixed(real, 4) + (f" ± {fixed(imag, 4)}i" if imag > 1e-9 else "") for real, imag in multipliers if imag >= 0.0
     )
 

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 
 from walkerlab.config.drives import drives_of
-from walkerlab.prose import listed
+from walkerlab.prose import join_words
 from walkerlab.report.blocks import CASES, COSTS, PAPER, Cards, Paragraph, Section, Terms
 from walkerlab.report.numbers import count
 from walkerlab.report.results import Results
@@ -54,8 +54,8 @@ def rows_of(missing: Sequence[LeftOut]) -> Iterator[tuple[str, str, str]]:
     causes = {absent.why: min(filter(absent.why.endswith, reasons), key=len) for absent in missing}
     for why in dict.fromkeys(causes.values()):
         alike = [absent for absent in missing if absent.why == why]
-        first = listed(absent.what for absent in alike)
+        first = join_words(absent.what for absent in alike)
         yield first, why, "; ".join(dict.fromkeys(absent.saves for absent in alike if absent.saves))
-        further = listed(absent.what for absent in missing if absent.why != why and causes[absent.why] == why)
+        further = join_words(absent.what for absent in missing if absent.why != why and causes[absent.why] == why)
         if further:
             yield further, f"needs {first}", ""

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from walkerlab.labels import in_words, with_unit
+from walkerlab.labels import axis_label, with_unit
 from walkerlab.report.blocks import Diagram, GaitMark, Paragraph, Section, Walker
 from walkerlab.report.gaits import complex_number
 from walkerlab.report.numbers import number, whole
@@ -51,7 +51,7 @@ def bifurcations(summary: Mapping[str, Any]) -> Table:
 
 def parameter(summary: Mapping[str, Any]) -> str:
     """What the families are over."""
-    return in_words(str(summary["over"]))
+    return axis_label(str(summary["over"]))
 
 
 MODEL = "rigid"

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from walkerlab.kernels import always_inline, inlined, matrix, vector, zeros
+from walkerlab.kernels import forced_inline, kernel_part, matrix, vector, zeros
 from walkerlab.mechanics import tree
 from walkerlab.mechanics.hinges import (
     HingeTorque,
@@ -50,7 +50,7 @@ NO_SHANK = -1
 
 
 @tree.read_at_once
-class Standing(tree.Mechanism):  # type: ignore[misc]  # as its base
+class RigidModel(tree.Mechanism):  # type: ignore[misc]  # as its base
     """Everything that stays the same while the rigid model walks, SI: a structured scalar, of n bodies by its type.
 
     E has three reductions: BENT, STRAIGHT, AT_STRIKE.
@@ -89,7 +89,7 @@ class Standing(tree.Mechanism):  # type: ignore[misc]  # as its base
 
     def __eq__(self, other: object) -> bool:
         """Whether all numbers are the same."""
-        return isinstance(other, Standing) and self.dtype == other.dtype and self.tobytes() == other.tobytes()
+        return isinstance(other, RigidModel) and self.dtype == other.dtype and self.tobytes() == other.tobytes()
 
     def __hash__(self) -> int:
         """Of all numbers."""
@@ -97,19 +97,19 @@ class Standing(tree.Mechanism):  # type: ignore[misc]  # as its base
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Its copy in another process, read-only too: kernels are compiled anew for what can be written to."""
-        return Standing.changed, (np.asarray(self),)
+        return RigidModel.changed, (np.asarray(self),)
 
-    def changed(self, **fields: Any) -> "Standing":
+    def changed(self, **fields: Any) -> "RigidModel":
         """A copy with other values of some fields, that nobody can write to."""
         memory: Any = np.empty((), self.dtype)
         memory[()] = self
         tree.write_fields(memory, fields)
         memory.flags.writeable = False
-        read_only: Standing = memory[()]
+        read_only: RigidModel = memory[()]
         return read_only
 
 
-def new_standing(n: int, **fields: Any) -> Standing:
+def new_rigid_model(n: int, **fields: Any) -> RigidModel:
     """The rigid model of n bodies with these fields; the others are zero."""
     shapes = {
         **tree.mechanism_shapes(n, 3, len(fields["hinges"])),
@@ -117,12 +117,12 @@ def new_standing(n: int, **fields: Any) -> Standing:
         "section": (n + 1,),
         "zero_state": (2 * n,),
     }
-    blank: Any = np.zeros((), tree.record_type(Standing, shapes))
-    model: Standing = blank[()]
+    blank: Any = np.zeros((), tree.record_type(RigidModel, shapes))
+    model: RigidModel = blank[()]
     return model.changed(**fields)
 
 
-def on_slope(model: Standing, slope: float) -> Standing:
+def on_slope(model: RigidModel, slope: float) -> RigidModel:
     """The same walker on another slope (rad)."""
     along, down = model.gravity * math.sin(slope), model.gravity * math.cos(slope)
     return model.changed(slope=slope, gravity_along=along, gravity_down=down)
@@ -135,7 +135,7 @@ class Mode(NamedTuple):
     for in what a method integrates: the variational equations.
     """
 
-    model: Standing
+    model: RigidModel
     phase: int  # BENT or STRAIGHT
     # m, heights over the present foothold: of that which the swing foot leaves, and of that on which it is to land
     behind: float = 0.0
@@ -148,8 +148,8 @@ def state_or_column(system: Mode) -> Any:
     return zeros(system.model.zero_state)
 
 
-@always_inline
-def equations(model: Standing, y: Any, s: Any, c: Any, F: Any, U: Any, M: Any, r: Any) -> None:
+@forced_inline
+def equations(model: RigidModel, y: Any, s: Any, c: Any, F: Any, U: Any, M: Any, r: Any) -> None:
     """M' (n, n) in kg m^2 and r' (n,) in N m at the state y, with all that they are made of."""
     n, R = len(model.arm_x), model.radius
     omega = y[n : 2 * n]
@@ -173,8 +173,8 @@ def equations(model: Standing, y: Any, s: Any, c: Any, F: Any, U: Any, M: Any, r
         M[STANCE, STANCE] += model.mass * R * R
 
 
-@always_inline
-def torque_at(model: Standing, row: int, y: Any) -> HingeTorque:
+@forced_inline
+def torque_at(model: RigidModel, row: int, y: Any) -> HingeTorque:
     """The torque of the spring, damper and drive at a hinge."""
     n, body, other = len(model.arm_x), model.hinges[row, 0], model.hinges[row, 1]
     return hinge_torque(hinge_law(model, row), y[body] - y[other], y[n + body] - y[n + other])
@@ -187,8 +187,8 @@ def legs_apart_standing(system: Mode, y: Any) -> tuple[float, float]:
     return y[SWING] - y[STANCE], y[n + SWING] - y[n + STANCE]
 
 
-@always_inline
-def add_unpaired_torque(model: Standing, s: Any, c: Any, omega: Any, r: Any) -> None:
+@forced_inline
+def add_unpaired_torque(model: RigidModel, s: Any, c: Any, omega: Any, r: Any) -> None:
     """Add a torque (N m) on the stance leg, by the swing leg's angular velocity squared, that nothing answers.
 
     It is centrifugal, unpaired sin(theta_1 - theta_2) omega_1^2, without a counterpart on the swing leg, so it does not
@@ -198,8 +198,8 @@ def add_unpaired_torque(model: Standing, s: Any, c: Any, omega: Any, r: Any) -> 
         r[STANCE] += model.unpaired * omega[SWING] * omega[SWING] * (s[SWING] * c[STANCE] - c[SWING] * s[STANCE])
 
 
-@always_inline
-def add_unpaired_gradients(model: Standing, s: Any, c: Any, omega: Any, by_angle: Any, by_rate: Any) -> None:
+@forced_inline
+def add_unpaired_gradients(model: RigidModel, s: Any, c: Any, omega: Any, by_angle: Any, by_rate: Any) -> None:
     """Add its derivatives by the angles and by their velocities."""
     if model.unpaired != 0.0:
         cos_d, sin_d = c[SWING] * c[STANCE] + s[SWING] * s[STANCE], s[SWING] * c[STANCE] - c[SWING] * s[STANCE]
@@ -236,8 +236,8 @@ def mode_derivative(system: Mode, t: float, y: Any, f: Any) -> None:
                 f[at + k], f[at + n + k] = y[at + n + k], alpha[k]
 
 
-@always_inline
-def torque_gradients(model: Standing, y: Any, s: Any, c: Any, alpha: Any, by_angle: Any, by_rate: Any) -> None:
+@forced_inline
+def torque_gradients(model: RigidModel, y: Any, s: Any, c: Any, alpha: Any, by_angle: Any, by_rate: Any) -> None:
     """Derivatives (n, n) of r' - M' alpha at fixed alpha with respect to the angles and to their velocities."""
     n, R = len(model.arm_x), model.radius
     omega, F, U = y[n : 2 * n], vector(model.arm_x), vector(model.arm_x)
@@ -280,7 +280,7 @@ def mode_jacobian(system: Mode, t: float, y: Any, J: Any) -> None:
             J[n + k, j] = alpha[k]
 
 
-@inlined
+@kernel_part
 def ground_reaction(system: Mode, y: Any) -> tuple[float, float]:
     """Force of the ground on the stance foot (N): along the slope (positive in walking direction) and normal to it."""
     model = system.model
@@ -304,8 +304,8 @@ def ground_reaction(system: Mode, y: Any) -> tuple[float, float]:
     return along, normal
 
 
-@inlined
-def momentum(model: Standing, y: Any) -> tuple[float, float]:
+@kernel_part
+def momentum(model: RigidModel, y: Any) -> tuple[float, float]:
     """Linear momentum (kg m/s): along the slope and normal to it."""
     n = len(model.arm_x)
     s, c = vector(model.arm_x), vector(model.arm_x)
@@ -314,8 +314,8 @@ def momentum(model: Standing, y: Any) -> tuple[float, float]:
     return along - model.mass * model.radius * y[n + STANCE], normal
 
 
-@inlined
-def energies(model: Standing, y: Any) -> tuple[float, float]:
+@kernel_part
+def energies(model: RigidModel, y: Any) -> tuple[float, float]:
     """Kinetic and potential energy (J), the latter from where the foot touches with its leg normal to the slope.
 
     The potential energy is gravity's and that of the springs at the hinges.
@@ -333,7 +333,7 @@ def energies(model: Standing, y: Any) -> tuple[float, float]:
     return tree.kinetic_energy(n, M, y[n : 2 * n]), potential
 
 
-def energy_at_touch(model: Standing, touched: Any) -> Any:
+def energy_at_touch(model: RigidModel, touched: Any) -> Any:
     """Potential energy (J), as `energies` counts it, of the walker's mass at the contact point of a step's touch.
 
     touched  rad, angle of the stance leg at the touch; or (...,) of several
@@ -341,15 +341,15 @@ def energy_at_touch(model: Standing, touched: Any) -> Any:
     return model.mass * model.gravity_along * model.radius * (touched + model.slope)
 
 
-@inlined
-def swing_foot(model: Standing, y: Any) -> tuple[float, float]:
+@kernel_part
+def swing_foot(model: RigidModel, y: Any) -> tuple[float, float]:
     """How high the swing foot's lowest point is over the slope, and how far it is ahead of the stance foot's (m)."""
     height, ahead, _, _ = swing_foot_motion(model, y, y)
     return height, ahead
 
 
-@inlined
-def swing_foot_motion(model: Standing, y: Any, turn: Any) -> tuple[float, float, float, float]:
+@kernel_part
+def swing_foot_motion(model: RigidModel, y: Any, turn: Any) -> tuple[float, float, float, float]:
     """`swing_foot`, and how both change as the bodies turn: rates (m/s) where `turn` are angular velocities."""
     n = len(model.arm_x)
     s, c = vector(model.arm_x), vector(model.arm_x)
@@ -358,14 +358,14 @@ def swing_foot_motion(model: Standing, y: Any, turn: Any) -> tuple[float, float,
     return height, ahead, upward, apart
 
 
-@inlined
-def hip_height(model: Standing, y: Any) -> float:
+@kernel_part
+def hip_height(model: RigidModel, y: Any) -> float:
     """Height of the hip over the slope (m)."""
     s, c = sine_cosine(y[STANCE] + model.slope)
     return model.radius + s * model.hip_x + c * model.hip_y
 
 
-@inlined
+@kernel_part
 def feet_on_slope(model: Any, swing: Any, stance: Any) -> Any:
     """Sum (rad) of the straight legs' angles from the slope's normal: zero with both feet on even ground.
 
@@ -376,19 +376,19 @@ def feet_on_slope(model: Any, swing: Any, stance: Any) -> Any:
     return swing + stance + 2.0 * (model.slope + model.lean)
 
 
-def step_lengths(model: Standing, starts: Any, ends: Any) -> Floats:
+def step_lengths(model: RigidModel, starts: Any, ends: Any) -> Floats:
     """Distances (steps,) in m along the slope from touch to touch, by first and last states (steps, 2 n) of steps."""
     psi = ends[:, : len(model.arm_x)] + model.slope
     ahead = np.cos(psi) @ model.foot_x - np.sin(psi) @ model.foot_y
     return np.asarray(ahead - model.radius * (ends[:, STANCE] - starts[:, STANCE]))
 
 
-def kinetic_energy(model: Standing, y: Any) -> float:
+def kinetic_energy(model: RigidModel, y: Any) -> float:
     """Kinetic energy (J)."""
     return energies(model, y)[0]
 
 
-def linked(model: Standing, phase: int, values: Any) -> Floats:
+def linked(model: RigidModel, phase: int, values: Any) -> Floats:
     """Values (n,) of all bodies, those of the followers from those that they follow."""
     every = np.array(values, float)
     spread(model, phase, every)
