@@ -27,33 +27,40 @@ from leaving_out import HEAD, leaving_out_rows
 from right_hand_sides import ONE_DEGREE, times_ns
 from whole_process import whole_process_times
 
-from walkerlab.benchmarks.accuracy import START_RATE_FACTOR
-from walkerlab.benchmarks.contact_trials import contact_trial
-from walkerlab.benchmarks.references import Reference, reference_for
-from walkerlab.benchmarks.trials import USER_SCRIPT, ContactTrial, RigidTrial, Trial
-from walkerlab.benchmarks.user_script import walk_as_a_script
 from walkerlab.config.basin import COORDINATES
 from walkerlab.config.loader import load
 from walkerlab.config.schema import Config
-from walkerlab.hybrid.endings import FALLEN_HIP
-from walkerlab.hybrid.recorded_walk import with_scaled_rates
-from walkerlab.hybrid.rigid_lanes import new_fates, new_lane_memory, two_legs, walk_lanes
-from walkerlab.orbits.basin import ATOL, RTOL, Attractors
-from walkerlab.orbits.families import ValueSpan
-from walkerlab.orbits.fixed_point import SEARCH_TOLERANCES, RigidGait, Search, SlopeBranch, find_gaits, over_slope
-from walkerlab.orbits.newton import Effort
-from walkerlab.orbits.rigid_map import state_on_section
-from walkerlab.orbits.small_slope import seeds
-from walkerlab.orbits.step_map import Cycle, gait_near
-from walkerlab.paper.walker import compass, compass_or_none
+from walkerlab.evidence.benchmarks.accuracy import START_RATE_FACTOR
+from walkerlab.evidence.benchmarks.contact_trials import contact_trial
+from walkerlab.evidence.benchmarks.references import Reference, reference_for
+from walkerlab.evidence.benchmarks.trials import USER_SCRIPT, ContactTrial, RigidTrial, Trial
+from walkerlab.evidence.benchmarks.user_script import walk_as_a_script
+from walkerlab.evidence.paper.walker import compass, compass_or_none
+from walkerlab.physics.hybrid.endings import FALLEN_HIP
+from walkerlab.physics.hybrid.recorded_walk import with_scaled_rates
+from walkerlab.physics.hybrid.rigid_lanes import new_fates, new_lane_memory, two_legs, walk_lanes
+from walkerlab.physics.orbits.basin import ATOL, RTOL, Attractors
+from walkerlab.physics.orbits.families import ValueSpan
+from walkerlab.physics.orbits.fixed_point import (
+    SEARCH_TOLERANCES,
+    RigidGait,
+    Search,
+    SlopeBranch,
+    find_gaits,
+    over_slope,
+)
+from walkerlab.physics.orbits.newton import Effort
+from walkerlab.physics.orbits.rigid_map import state_on_section
+from walkerlab.physics.orbits.small_slope import seeds
+from walkerlab.physics.orbits.step_map import Cycle, gait_near
 from walkerlab.pipeline.progress import Silent
 from walkerlab.pipeline.runner import Options, execute
+from walkerlab.pipeline.stages.continuation import FamilyQuestion, search_of
+from walkerlab.pipeline.store.runfolder import RunFolder
 from walkerlab.scene.contact import contact_scene, start_state
 from walkerlab.scene.parameter import parameter_of
 from walkerlab.scene.rigid import rigid_walker
 from walkerlab.scene.scaled import MAP_RTOL
-from walkerlab.stages.continuation import FamilyQuestion, search_of
-from walkerlab.store.runfolder import RunFolder
 
 PRINTED_START = (0.1674, -0.60, -0.84)  # theta_2 and the velocities of x_p, eq. 11
 STEPS = 10

@@ -18,9 +18,10 @@ bent knees are among the walks.
 
 Compared are how a walk ends and its quantities: times (touches, locks of knees, end), places of touches, slips,
 rolling, work lost by channel, and mechanical energy at the end. Each may differ by five times its numerical error: that
-of the plain integration (tests/hybrid/plain_walk.py), which is what halving its step changes, and our own. We walk each
-at the config's tolerances, and at a hundred and ten thousand times tighter ones. The error of the first is its change
-to the second. Of the others it is the smallest change between any two of the three: otherwise a fault that comes and
+of the plain integration (tests/physics/hybrid/plain_walk.py), which is what halving its step changes, and our own. We
+walk each at the config's tolerances, and at a hundred and ten thousand times tighter ones. The error of the
+first is its change to the second. Of the others it
+is the smallest change between any two of the three: otherwise a fault that comes and
 goes with the tolerance would vouch for itself. The energy balance of each has to close as well. Prints a table in
 Markdown (of the tightest walks), how much the default tolerances err, how well the energy balances, and which walk took
 most work; exits 1 if a walk differs.
@@ -41,18 +42,18 @@ from typing import Any
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).parent.parent / "tests" / "hybrid"))
+sys.path.insert(0, str(Path(__file__).parent.parent / "tests" / "physics" / "hybrid"))
 
 import plain_walk
 
 from walkerlab.config.loader import load
 from walkerlab.config.schema import Config
 from walkerlab.config.walkers import Kneed
-from walkerlab.hybrid.contact_loop import EVENT_TIME
-from walkerlab.hybrid.contact_result import UNEXPLAINED, ContactWalkResult
 from walkerlab.outcome import Outcome
+from walkerlab.physics.hybrid.contact_loop import EVENT_TIME
+from walkerlab.physics.hybrid.contact_result import UNEXPLAINED, ContactWalkResult
+from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.scene.contact import ContactScene, contact_scene, start_state
-from walkerlab.solvers.registry import Tolerances
 
 TIMES = 5.0  # the numerical error that walks may differ by
 TIGHTER = (1.0, 1e-2, 1e-4)  # than the config's tolerances

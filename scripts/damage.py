@@ -10,7 +10,7 @@ from collections.abc import Callable
 import h5py
 import numpy as np
 
-from walkerlab.store.artifact import SEAL_BYTES
+from walkerlab.pipeline.store.artifact import SEAL_BYTES
 
 Alteration = Callable[[random.Random, h5py.File], None]
 HOSTILE = ("<script>alert(1)</script>", "../../x", "\x1b[2J", "9" * 10_000, "nan", "{}", "")

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from walkerlab.config.loader import load
 from walkerlab.config.schema import Config
-from walkerlab.figures.measures import drawn
+from walkerlab.views.figures.measures import drawn
 
 ROOT = Path(__file__).parent.parent
 IMAGES = ROOT / "docs" / "images"

@@ -21,11 +21,11 @@ from typing import NamedTuple
 
 from walkerlab.config.loader import load
 from walkerlab.config.schema import Config
-from walkerlab.orbits.families import ValueSpan
-from walkerlab.orbits.family_search import first_flip
+from walkerlab.physics.orbits.families import ValueSpan
+from walkerlab.physics.orbits.family_search import first_flip
 from walkerlab.pipeline.progress import Silent
+from walkerlab.pipeline.stages.continuation import FamilyQuestion, search_of
 from walkerlab.scene.parameter import parameter_of
-from walkerlab.stages.continuation import FamilyQuestion, search_of
 
 SPAN = ValueSpan(3.9, 4.5)  # deg; holds every flip that is asked for
 

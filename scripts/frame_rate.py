@@ -12,7 +12,7 @@ import argparse
 import sys
 from pathlib import Path
 
-sys.path.append(str(Path(__file__).parent.parent / "tests" / "report"))
+sys.path.append(str(Path(__file__).parent.parent / "tests" / "views" / "report"))
 from browser import Browser, executable
 
 MEASURE = """

@@ -32,8 +32,8 @@ from walkerlab.config.files import BUILTIN_FOLDER
 from walkerlab.config.loader import LoadedConfig, load
 from walkerlab.errors import WalkerlabError
 from walkerlab.pipeline.runner import Options, execute
-from walkerlab.store import artifact
-from walkerlab.store.runfolder import RunFolder
+from walkerlab.pipeline.store import artifact
+from walkerlab.pipeline.store.runfolder import RunFolder
 
 LONGEST_S = 20.0  # that a config may take to be refused or walked, once its models are compiled
 HANGS_S = 300.0  # after which the campaign ends with a traceback of where it hangs

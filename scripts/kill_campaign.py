@@ -32,7 +32,7 @@ from datetime import datetime
 from functools import partial
 from pathlib import Path
 
-from walkerlab.store import artifact
+from walkerlab.pipeline.store import artifact
 
 sys.path.append(str(Path(__file__).resolve().parent.parent / "tests"))
 from process_table import processes_below

@@ -17,10 +17,10 @@ from pathlib import Path
 
 from walkerlab.config.loader import load
 from walkerlab.config.schema import Config
-from walkerlab.orbits.fixed_point import find_gaits
+from walkerlab.physics.orbits.fixed_point import find_gaits
+from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.scene.contact import contact_scene, start_state
 from walkerlab.scene.rigid import rigid_walker
-from walkerlab.solvers.registry import Tolerances
 
 STIFFNESSES = (1e3, 1e4, 1e5, 1e6, 1e7)  # N m/rad
 DAMPING, AT = 90.0, 1e5  # N m s/rad at a stiffness: the config's defaults

@@ -20,13 +20,13 @@ from statistics import median
 
 from walkerlab.config import loader
 from walkerlab.config.schema import Config
+from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.pipeline.graph import PIPELINE
 from walkerlab.pipeline.progress import Silent
+from walkerlab.pipeline.store.artifact import write
+from walkerlab.pipeline.store.key import Identity
+from walkerlab.pipeline.store.provenance import Provenance, begin
 from walkerlab.scene.contact import contact_scene, start_state
-from walkerlab.solvers.registry import Tolerances
-from walkerlab.store.artifact import write
-from walkerlab.store.key import Identity
-from walkerlab.store.provenance import Provenance, begin
 
 ROOT = Path(__file__).resolve().parent.parent
 # nothing but the stage itself runs: the start and the pads ask for no gait
@@ -166,7 +166,10 @@ def reductions() -> list[Reduction]:
         Reduction(
             "all science: help is shown",
             "a command that walks",
-            imports=(walking, "import sys; sys.argv = ['walkerlab', 'schema', '--help']; import walkerlab.cli.main"),
+            imports=(
+                walking,
+                "import sys; sys.argv = ['walkerlab', 'schema', '--help']; import walkerlab.views.cli.main",
+            ),
         ),
     ]
 

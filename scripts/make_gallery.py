@@ -18,10 +18,10 @@ from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup
 
 import walkerlab
-from walkerlab.report.blocks import Player, Walker
-from walkerlab.report.page import environment, source
-from walkerlab.report.sections.motion import STILL_VIEW_OF_RIGID, stills, view, weight
-from walkerlab.report.tracks import Track, track_in
+from walkerlab.views.report.blocks import Player, Walker
+from walkerlab.views.report.page import environment, source
+from walkerlab.views.report.sections.motion import STILL_VIEW_OF_RIGID, stills, view, weight
+from walkerlab.views.report.tracks import Track, track_in
 
 TEMPLATE = Path(__file__).with_name("gallery.html.j2")
 WALKERS = ("paper", "simplest", "round-feet", "kneed", "kneed-round-feet", "torso")

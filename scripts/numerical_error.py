@@ -19,9 +19,9 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from contact_campaign import TIGHTER, Drawn, arguments, ours_at, scene_of, spread, tell_row, walks_of
 
+from walkerlab.evidence.paper.tune import walk_summary
 from walkerlab.labels import ERROR_OF_EACH_STEP
-from walkerlab.paper.tune import walk_summary
-from walkerlab.stages.numerical_error import change
+from walkerlab.pipeline.stages.numerical_error import change
 
 ERRORS = (*ERROR_OF_EACH_STEP.values(), "end_time_s")
 FACTORS = (1.5, 10.0)

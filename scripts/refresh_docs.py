@@ -36,7 +36,7 @@ from walkerlab.config.reference import KeyReference, keys
 from walkerlab.config.schema import Config
 from walkerlab.pipeline.graph import PIPELINE
 from walkerlab.pipeline.runner import execute
-from walkerlab.store.runfolder import RunFolder
+from walkerlab.pipeline.store.runfolder import RunFolder
 
 ROOT = Path(__file__).parent.parent
 DOCUMENTS = ("README.md", "docs/theory.md", "docs/pipeline.md", "docs/config.md")

@@ -9,15 +9,15 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from walkerlab.config import loader
-from walkerlab.ground.friction import Coulomb, Frictionless
-from walkerlab.ground.walker import ContactWalker, on_ground
-from walkerlab.kernels import kernel, kernel_part
-from walkerlab.mechanics.rigid_model import BENT, Mode, RigidModel, swing_foot
-from walkerlab.paper.appendix_a import RigidWalker, accelerations, swing_constants
-from walkerlab.paper.walker import compass
+from walkerlab.evidence.paper.appendix_a import RigidWalker, accelerations, swing_constants
+from walkerlab.evidence.paper.walker import compass
+from walkerlab.physics.ground.friction import Coulomb, Frictionless
+from walkerlab.physics.ground.walker import ContactWalker, on_ground
+from walkerlab.physics.kernels import kernel, kernel_part
+from walkerlab.physics.mechanics.rigid_model import BENT, Mode, RigidModel, swing_foot
+from walkerlab.physics.solvers.system import State, derivative
 from walkerlab.scene.contact import contact_scene
 from walkerlab.scene.rigid import rigid_walker
-from walkerlab.solvers.system import State, derivative
 
 ONE_DEGREE = loader.load(None, ("slope_deg=1",)).config
 CALLS, STATES = 200_000, 64  # calls of a right-hand side, and the states that they are at

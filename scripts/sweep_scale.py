@@ -21,7 +21,7 @@ from typing import Any
 
 from walkerlab.config.reads import RigidConfig
 from walkerlab.pipeline.graph import Graph, Stage
-from walkerlab.store.content import Content
+from walkerlab.pipeline.store.content import Content
 
 HERE = Path(__file__)
 GRAPH = Graph(Stage("echo", HERE.stem, "Say what a fixed point says.", RigidConfig))
@@ -71,9 +71,9 @@ def parsed() -> argparse.Namespace:
 def measure(points: int) -> None:
     """Sweep once, and say what it took."""
     from walkerlab.config.loader import load
-    from walkerlab.store.runfolder import RunFolder
-    from walkerlab.sweeps.question import axis_of_text, build_sweep
-    from walkerlab.sweeps.sweep import SweepRun, SweepWork
+    from walkerlab.pipeline.store.runfolder import RunFolder
+    from walkerlab.pipeline.sweeps.question import axis_of_text, build_sweep
+    from walkerlab.pipeline.sweeps.sweep import SweepRun, SweepWork
 
     runs = Path(os.environ["SWEEP_SCALE_RUNS"], str(points))
     real_summary()

@@ -20,9 +20,9 @@ from flip_shift import Ground, config_of
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from walkerlab.benchmarks.contact_trials import contact_trial
-from walkerlab.ground.motion import motion_gradient
-from walkerlab.ground.walker import (
+from walkerlab.evidence.benchmarks.contact_trials import contact_trial
+from walkerlab.physics.ground.motion import motion_gradient
+from walkerlab.physics.ground.walker import (
     LOCKED,
     FootMotion,
     OnGround,
@@ -32,12 +32,12 @@ from walkerlab.ground.walker import (
     on_ground,
     sines_cosines,
 )
-from walkerlab.hybrid.contact_result import walk_contact
-from walkerlab.mechanics.tree import add_inertia, projections
-from walkerlab.orbits.fixed_point import find_gaits
+from walkerlab.physics.hybrid.contact_result import walk_contact
+from walkerlab.physics.mechanics.tree import add_inertia, projections
+from walkerlab.physics.orbits.fixed_point import find_gaits
+from walkerlab.physics.solvers.registry import Tolerances
+from walkerlab.physics.solvers.system import derivative
 from walkerlab.scene.rigid import rigid_walker
-from walkerlab.solvers.registry import Tolerances
-from walkerlab.solvers.system import derivative
 
 Floats = NDArray[np.float64]
 GROUNDS = (

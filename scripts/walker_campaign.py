@@ -39,18 +39,26 @@ from plain_rigid_walk import plain_walk
 from rigid_physics import momentum_of_masses, torque_work_of_a_step
 
 from walkerlab.config.walkers import CompassWalker, Kneed, KneeJoint, PartsWalker, Shank, StraightLegs, Thigh, Torso
-from walkerlab.hybrid.recorded_walk import take_walk
-from walkerlab.hybrid.rigid_walk import SHORTEST_LANDING
-from walkerlab.mechanics.parts import Assembly
-from walkerlab.mechanics.rigid import standing
-from walkerlab.mechanics.rigid_model import RigidModel
-from walkerlab.orbits.fixed_point import MAX_START, MIN_START, GaitSearch, RigidGait, Search, SearchSettings, find_gaits
-from walkerlab.orbits.rigid_map import SHORTEST_STEP, coordinates_of, state_on_section, strike_section
-from walkerlab.orbits.similarity import unit_walker
-from walkerlab.orbits.small_slope import LONG_PERIOD, SHORT_PERIOD
 from walkerlab.outcome import Outcome
+from walkerlab.physics.hybrid.recorded_walk import take_walk
+from walkerlab.physics.hybrid.rigid_walk import SHORTEST_LANDING
+from walkerlab.physics.mechanics.parts import Assembly
+from walkerlab.physics.mechanics.rigid import standing
+from walkerlab.physics.mechanics.rigid_model import RigidModel
+from walkerlab.physics.orbits.fixed_point import (
+    MAX_START,
+    MIN_START,
+    GaitSearch,
+    RigidGait,
+    Search,
+    SearchSettings,
+    find_gaits,
+)
+from walkerlab.physics.orbits.rigid_map import SHORTEST_STEP, coordinates_of, state_on_section, strike_section
+from walkerlab.physics.orbits.similarity import unit_walker
+from walkerlab.physics.orbits.small_slope import LONG_PERIOD, SHORT_PERIOD
+from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.scene.parts import AnyWalker, assembly_of, knee_locked_at_strike
-from walkerlab.solvers.registry import Tolerances
 
 Draw = np.random.Generator
 STEPS = 10

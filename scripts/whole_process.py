@@ -13,9 +13,9 @@ from statistics import median
 BARE = """
 import sys
 import h5py
-from walkerlab.hybrid.recorded_walk import take_walk
-from walkerlab.paper.appendix_a import CORRECTED, RigidWalker, assembled
-from walkerlab.solvers.registry import Tolerances
+from walkerlab.physics.hybrid.recorded_walk import take_walk
+from walkerlab.evidence.paper.appendix_a import CORRECTED, RigidWalker, assembled
+from walkerlab.physics.solvers.registry import Tolerances
 
 walker = assembled(RigidWalker(1.0, 0.5, 5.0, 10.0, 0.0, 9.81, 0.0174, CORRECTED))
 start = (-0.20420, 0.16940, -0.605819, -0.861041)

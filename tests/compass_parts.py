@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from walkerlab.mechanics.parts import Assembly, BallFoot, Body, Particle, Revolute
+from walkerlab.physics.mechanics.parts import Assembly, BallFoot, Body, Particle, Revolute
 
 
 @dataclass(frozen=True)

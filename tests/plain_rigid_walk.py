@@ -3,11 +3,11 @@
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from walkerlab.hybrid.endings import FALLEN_HIP
-from walkerlab.mechanics import impact
-from walkerlab.mechanics.rigid_model import BENT, NO_SHANK, STANCE, STRAIGHT, Mode
 from walkerlab.outcome import Outcome
-from walkerlab.solvers.system import derivative
+from walkerlab.physics.hybrid.endings import FALLEN_HIP
+from walkerlab.physics.mechanics import impact
+from walkerlab.physics.mechanics.rigid_model import BENT, NO_SHANK, STANCE, STRAIGHT, Mode
+from walkerlab.physics.solvers.system import derivative
 
 LATEST = 10.0  # pendulum times that a swing may take
 CLOSEST_LOOK = 0.01  # pendulum times: two crossings of a foothold's height within less are missed

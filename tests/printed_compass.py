@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 
-from walkerlab.mechanics.trigonometry import sine_cosine
-from walkerlab.paper.appendix_a import accelerations, swing_constants
+from walkerlab.evidence.paper.appendix_a import accelerations, swing_constants
+from walkerlab.physics.mechanics.trigonometry import sine_cosine
 
 
 def released_mass_matrix(L, a, m, M_H, theta_1, theta_2):

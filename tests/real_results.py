@@ -5,10 +5,10 @@ import functools
 import pytest
 
 from walkerlab.config.loader import load
-from walkerlab.orbits import two_parameters
+from walkerlab.physics.orbits import two_parameters
 from walkerlab.pipeline.executor import answer_in_memory
 from walkerlab.pipeline.results import MemoryResults
-from walkerlab.store.content import Group, Variable
+from walkerlab.pipeline.store.content import Group, Variable
 
 SMALL = {
     "fixedpoint": (),

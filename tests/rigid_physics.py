@@ -3,11 +3,11 @@
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from walkerlab.mechanics import impact
-from walkerlab.mechanics.assembly import Anchor, levers, masses
-from walkerlab.mechanics.rigid import places_of
-from walkerlab.mechanics.rigid_model import BENT, STANCE, STRAIGHT, SWING, Mode, energies, linked
-from walkerlab.solvers.system import derivative
+from walkerlab.physics.mechanics import impact
+from walkerlab.physics.mechanics.assembly import Anchor, levers, masses
+from walkerlab.physics.mechanics.rigid import places_of
+from walkerlab.physics.mechanics.rigid_model import BENT, STANCE, STRAIGHT, SWING, Mode, energies, linked
+from walkerlab.physics.solvers.system import derivative
 
 
 def rates(model, phase, y):

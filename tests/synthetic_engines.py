@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from walkerlab.benchmarks.engines import stage as engines
-from walkerlab.benchmarks.engines.experiments import Truth
-from walkerlab.benchmarks.engines.rows import EngineRow, SwingRow, TuningRow
-from walkerlab.benchmarks.engines.stage import EngineFindings
-from walkerlab.hybrid.contact_result import ContactWalkResult
-from walkerlab.hybrid.walk_record import DrivenWork, WalkWork
+from walkerlab.evidence.benchmarks.engines import stage as engines
+from walkerlab.evidence.benchmarks.engines.experiments import Truth
+from walkerlab.evidence.benchmarks.engines.rows import EngineRow, SwingRow, TuningRow
+from walkerlab.evidence.benchmarks.engines.stage import EngineFindings
 from walkerlab.outcome import Outcome
+from walkerlab.physics.hybrid.contact_result import ContactWalkResult
+from walkerlab.physics.hybrid.walk_record import DrivenWork, WalkWork
 
 PERIOD, LENGTH = 0.711, 0.3608
 

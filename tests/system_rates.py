@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from walkerlab.solvers.system import derivative, jacobian
+from walkerlab.physics.solvers.system import derivative, jacobian
 
 
 def rate_of(system, state):

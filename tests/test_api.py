@@ -12,9 +12,9 @@ import pytest
 
 import walkerlab
 from walkerlab import api
+from walkerlab.code_digest import Sources
 from walkerlab.config.loader import load
 from walkerlab.errors import ConfigError, StaleError
-from walkerlab.sources import Sources
 
 
 def test_the_examples_of_the_docstrings_say_what_happens(tmp_path):
@@ -46,7 +46,7 @@ def test_importing_the_package_loads_nothing():
 
 def test_no_stage_is_made_of_the_python_interface():
     """Else every result would be out of date once a docstring of it is edited."""
-    names = {module.name for module in Sources().closure("walkerlab.stages.fixedpoint")}
+    names = {module.name for module in Sources().closure("walkerlab.pipeline.stages.fixedpoint")}
     assert "walkerlab" in names
     assert "walkerlab.api" not in names
 

@@ -9,55 +9,65 @@ from pathlib import Path
 import pytest
 
 import walkerlab
-from walkerlab.kernel_cache import KERNEL_HOMES
+from walkerlab.physics.kernel_cache import KERNEL_HOMES
 from walkerlab.pipeline.graph import PIPELINE
 
 PACKAGE = Path(walkerlab.__file__).parent
 # each imports only those after it
 LAYERS = (
-    "cli",
     "api",
-    "explorer",
-    "sweeps",
-    "verification",
-    "benchmarks",
-    "paper",
-    "report",
-    "figures",
-    "stages",
+    "evidence.verification",
+    "evidence.benchmarks",
+    "evidence.paper",
+    "views.cli",
+    "views.explore",
+    "views.report",
+    "views.figures",
+    "views.prose",
+    "pipeline.sweeps",
+    "pipeline.stages",
     "pipeline",
-    "store",
+    "pipeline.store",
     "scene",
-    "orbits",
-    "hybrid",
-    "ground",
-    "mechanics",
-    "solvers",
-    "workers",
+    "physics.orbits",
+    "physics.hybrid",
+    "physics.ground",
+    "physics.mechanics",
+    "physics.solvers",
+    "physics.kernels",
+    "physics.compiler",
+    "physics.kernel_cache",
+    "physics.energy_channels",
     "config",
-    "kernels",
-    "compiler",
-    "kernel_cache",
-    "sources",
+    "code_digest",
     "labels",
-    "prose",
     "registration",
-    "stopping",
     "outcome",
-    "account",
     "errors",
 )
+WINGS = ("evidence", "views", "pipeline", "scene", "physics", "config")
 SOURCES = sorted(PACKAGE.rglob("*.py"))
-IN_LAYERS = [path for path in SOURCES if path.parent != PACKAGE or path.stem in LAYERS]
+DOORS = {"__init__.py", "__main__.py", *(f"{wing}/__init__.py" for wing in WINGS)}
+KERNEL_LAYERS = {f"physics.{home}" for home in KERNEL_HOMES}
+COMPILER = {"physics.kernels", "physics.compiler", "physics.kernel_cache"}
 COMPILING = {"kernel", "callable_kernel", "kernel_part", "forced_inline", "by_type", "by_type_or_default"}
 
 
+def layer_of_module(name):
+    """The layer that a module belongs to, the longest that its name begins with; empty outside of all."""
+    layers = [layer for layer in LAYERS if f"{name}.".startswith(f"walkerlab.{layer}.")]
+    return max(layers, key=len, default="")
+
+
 def layer_of(path):
-    return path.relative_to(PACKAGE).parts[0].removesuffix(".py")
+    return layer_of_module(".".join(("walkerlab", *path.relative_to(PACKAGE).with_suffix("").parts)))
 
 
 def named(path):
     return str(path.relative_to(PACKAGE))
+
+
+IN_LAYERS = [path for path in SOURCES if named(path) not in DOORS]
 
 
 def imported_modules(path):
@@ -71,19 +81,17 @@ def imported_modules(path):
 
 
 def imported_layers(path):
-    modules = (name.split(".") for name in imported_modules(path))
-    return {parts[1] for parts in modules if parts[0] == "walkerlab" and len(parts) > 1 and parts[1] in LAYERS}
+    return set(map(layer_of_module, imported_modules(path))) - {""}
 
 
-def test_every_part_of_the_package_has_its_layer():
-    parts = {path.name.removesuffix(".py") for path in PACKAGE.iterdir() if path.suffix == ".py" or path.is_dir()}
-    assert parts - {"__init__", "__main__", "__pycache__"} <= set(LAYERS)
+def test_every_module_has_its_layer():
+    assert [named(path) for path in IN_LAYERS if not layer_of(path)] == []
 
 
-def test_the_docs_tell_of_the_same_layers():
+def test_the_docs_list_the_same_layers():
     text = (Path(__file__).parent.parent / "docs" / "architecture.md").read_text()
-    told = text.partition("## Layers")[2].partition("Each imports")[0]
-    assert tuple(told.replace(">", " ").split()) == LAYERS
+    listed = text.partition("## Layers")[2].partition("```text")[2].partition("```")[0]
+    assert tuple(listed.replace(">", " ").split()) == LAYERS
 
 
 @pytest.mark.parametrize("path", IN_LAYERS, ids=named)
@@ -92,19 +100,27 @@ def test_imports_run_downward(path):
     assert {name for name in imported_layers(path) if LAYERS.index(name) < own} == set()
 
 
+@pytest.mark.parametrize("path", sorted((PACKAGE / "physics").rglob("*.py")), ids=named)
+def test_physics_knows_no_config_no_file_and_no_study(path):
+    wings = {layer.partition(".")[0] for layer in imported_layers(path)}
+    assert wings <= {"physics", "outcome", "errors", "code_digest"}
+    libraries = {name.partition(".")[0] for name in imported_modules(path)}
+    assert not libraries & {"h5py", "ruamel", "pydantic", "typer", "matplotlib"}
+
+
 @pytest.mark.parametrize("path", IN_LAYERS, ids=named)
 def test_compiled_functions_stand_where_the_cache_key_looks(path):
-    if layer_of(path) in (*KERNEL_HOMES, "kernels", "compiler", "kernel_cache"):
+    if layer_of(path) in KERNEL_LAYERS | COMPILER:
         return
     names = set(imported_modules(path))
     assert not {name.split(".")[0] for name in names} & {"numba", "llvmlite"}
-    assert not names & {f"walkerlab.kernels.{name}" for name in COMPILING}
+    assert not names & {f"walkerlab.physics.kernels.{name}" for name in COMPILING}
 
 
-@pytest.mark.parametrize("path", [path for path in IN_LAYERS if layer_of(path) in KERNEL_HOMES], ids=named)
+@pytest.mark.parametrize("path", [path for path in IN_LAYERS if layer_of(path) in KERNEL_LAYERS], ids=named)
 def test_compiled_functions_are_made_only_of_what_the_cache_key_covers(path):
     """A constant from elsewhere would be frozen into machine code that its change does not renew."""
-    assert imported_layers(path) <= {*KERNEL_HOMES, "kernels", "outcome", "account", "errors"}
+    assert imported_layers(path) <= {*KERNEL_LAYERS, "physics.kernels", "physics.energy_channels", "outcome", "errors"}
 
 
 def test_no_two_modules_of_tests_have_one_name():
@@ -114,7 +130,7 @@ def test_no_two_modules_of_tests_have_one_name():
 
 RUN = """
 import sys
-from walkerlab.cli.main import main
+from walkerlab.views.cli.main import main
 sys.argv = ["walkerlab", *sys.argv[1:]]
 try:
     main()
@@ -131,11 +147,11 @@ def test_a_walk_of_the_rigid_model_never_loads_contact_code(tmp_path):
     done = subprocess.run(command, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     loaded = done.stdout.splitlines()[-1].split()
-    assert "walkerlab.hybrid.rigid_walk" in loaded
+    assert "walkerlab.physics.hybrid.rigid_walk" in loaded
     physical = (
-        "walkerlab.ground",
-        "walkerlab.orbits.contact_gait",
-        "walkerlab.hybrid.contact",
+        "walkerlab.physics.ground",
+        "walkerlab.physics.orbits.contact_gait",
+        "walkerlab.physics.hybrid.contact",
         "walkerlab.scene.contact",
     )
     assert [name for name in loaded if name.startswith(physical)] == []
@@ -149,7 +165,7 @@ def test_a_walk_from_a_given_start_loads_nothing_that_draws_or_seeks_gaits(tmp_p
     assert done.returncode == 0, done.stderr
     loaded = done.stdout.splitlines()[-1].split()
     assert "numba" in loaded
-    assert {"matplotlib", "scipy.optimize", "walkerlab.orbits.fixed_point", "jinja2"} & set(loaded) == set()
+    assert {"matplotlib", "scipy.optimize", "walkerlab.physics.orbits.fixed_point", "jinja2"} & set(loaded) == set()
 
 
 def test_a_gait_is_found_and_told_without_the_page_or_scipy_linalg(tmp_path):
@@ -158,18 +174,21 @@ def test_a_gait_is_found_and_told_without_the_page_or_scipy_linalg(tmp_path):
     assert done.returncode == 0, done.stderr
     assert "there is a stable gait" in done.stdout
     loaded = done.stdout.splitlines()[-1].split()
-    assert [name for name in loaded if name.startswith(("scipy.linalg", "walkerlab.report.sections", "jinja2"))] == []
+    assert [
+        name for name in loaded if name.startswith(("scipy.linalg", "walkerlab.views.report.sections", "jinja2"))
+    ] == []
 
 
-EVIDENCE = ("verification", "benchmarks", "paper")
-REGISTRIES = {"scene/studies.py", "pipeline/graph.py", "figures/registry.py", "report/registry.py", "report/answers.py"}
-QUOTED_EVIDENCE = re.compile(rf"[\"']walkerlab\.(?:{'|'.join(EVIDENCE)})\.")
+REGISTRIES = {
+    "scene/studies.py", "pipeline/graph.py", "views/figures/registry.py", "views/report/registry.py",
+    "views/report/answers.py",
+}  # fmt: skip
+QUOTED_EVIDENCE = re.compile(r"[\"']walkerlab\.evidence\.")
 
 
 def test_evidence_is_named_by_registries_alone():
     """What stands below the study, the verification and the benchmarks names them only where they register."""
-    below = LAYERS.index(EVIDENCE[-1])
-    core = [path for path in IN_LAYERS if LAYERS.index(layer_of(path)) > below]
+    core = [path for path in IN_LAYERS if not layer_of(path).startswith("evidence.")]
     assert {named(path) for path in core if QUOTED_EVIDENCE.search(path.read_text())} == REGISTRIES
 
 

@@ -8,11 +8,11 @@ import pytest
 
 from walkerlab.config.loader import load
 from walkerlab.errors import ConfigError
-from walkerlab.report.page import Page, render
-from walkerlab.report.results import Results
-from walkerlab.verification.section import section
-from walkerlab.verification.stability import summarise
-from walkerlab.verification.verdict import CaseResult
+from walkerlab.evidence.verification.section import section
+from walkerlab.evidence.verification.stability import summarise
+from walkerlab.evidence.verification.verdict import CaseResult
+from walkerlab.views.report.page import Page, render
+from walkerlab.views.report.results import Results
 
 SCRIPTS = Path(__file__).parent.parent / "scripts"
 MARKUP = "<script>alert(1)</script>"

@@ -17,13 +17,13 @@ from typer.main import get_command
 from typer.testing import CliRunner
 
 import walkerlab
-from walkerlab.cli.main import program
 from walkerlab.config.loader import load
 from walkerlab.config.schema import Contact
-from walkerlab.figures import illustration
-from walkerlab.ground.friction import friction_coefficient, lacking
+from walkerlab.physics.ground.friction import friction_coefficient, lacking
 from walkerlab.pipeline.graph import PIPELINE, Stage, results_of
-from walkerlab.store.content import Content, Group, Variable
+from walkerlab.pipeline.store.content import Content, Group, Variable
+from walkerlab.views.cli.main import program
+from walkerlab.views.figures import illustration
 
 ROOT = Path(__file__).parent.parent
 DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").glob("*.md"))]
@@ -114,8 +114,8 @@ def test_files_and_names_of_the_pages_about_the_inside_are_there(page):
     text = re.sub(r"^```.*?^```$", "", text_of(ROOT / "docs" / f"{page}.md"), flags=re.DOTALL | re.MULTILINE)
     source = "".join(text_of(file) for file in (ROOT / "walkerlab").rglob("*.py"))
     said = set(re.findall(r"`([a-z_/]+\.py|[a-z_]+/[a-z_/]+)`", text)) - {
-        "walkerlab/figures/slip.py",
-        "walkerlab/stages/speed.py",
+        "walkerlab/views/figures/slip.py",
+        "walkerlab/pipeline/stages/speed.py",
     }
     assert [name for name in said if not any((base / name).exists() for base in places())] == []
     names = set(re.findall(r"`([A-Z]\w+|[A-Z_]{4,})`", text)) - {"SpeedConfig"}

@@ -9,18 +9,18 @@ from pathlib import Path
 
 import pytest
 
-from walkerlab.kernel_cache import KEPT_GENERATIONS
+from walkerlab.physics.kernel_cache import KEPT_GENERATIONS
 
 PACKAGE = Path(__file__).parents[1] / "walkerlab"
 CALL = """
-from walkerlab.kernel_cache import cache_folder
-import walkerlab.orbits.trial_of_code as trial
+from walkerlab.physics.kernel_cache import cache_folder
+import walkerlab.physics.orbits.trial_of_code as trial
 print(trial.twice(3.0), cache_folder().name)
 """
 CALLER = '''"""A kernel that calls a function of another file."""
 
-from walkerlab.kernels import kernel
-from walkerlab.mechanics.trial_of_code import once
+from walkerlab.physics.kernels import kernel
+from walkerlab.physics.mechanics.trial_of_code import once
 
 
 @kernel
@@ -30,7 +30,7 @@ def twice(x: float) -> float:
 '''
 CALLED = '''"""A function to be edited."""
 
-from walkerlab.kernels import kernel_part
+from walkerlab.physics.kernels import kernel_part
 
 
 @kernel_part
@@ -115,12 +115,12 @@ def test_a_cache_folder_that_cannot_be_written_into_is_told_once_and_workers_use
 
 
 IN_WORKERS = """
-from walkerlab.kernel_cache import cache_root
-from walkerlab.workers import in_order
+from walkerlab.physics.kernel_cache import cache_root
+from walkerlab.pipeline.workers import in_order
 print(cache_root(), *in_order([cache_root] * 4, jobs=2))
 """
 IMPORT_ALL = """
-import walkerlab, walkerlab.kernels, walkerlab.orbits.trial_of_code
+import walkerlab, walkerlab.physics.kernels, walkerlab.physics.orbits.trial_of_code
 """
 
 
@@ -136,7 +136,7 @@ def test_importing_kernels_writes_nothing(copy, tmp_path):
 
 CHOSEN_LATE = """
 import os, sys
-from walkerlab.orbits.trial_of_code import twice
+from walkerlab.physics.orbits.trial_of_code import twice
 os.environ["WALKERLAB_CACHE"] = sys.argv[1]
 twice(3.0)
 """
@@ -178,8 +178,8 @@ def test_compiled_code_that_nobody_has_used_for_long_goes_but_for_the_latest(gen
 
 FOLDER_GONE = """
 import shutil
-from walkerlab.kernel_cache import cache_folder
-from walkerlab.orbits.trial_of_code import twice
+from walkerlab.physics.kernel_cache import cache_folder
+from walkerlab.physics.orbits.trial_of_code import twice
 twice(3.0)
 shutil.rmtree(cache_folder())
 print(twice(3))
@@ -200,7 +200,7 @@ def digest_after_an_edit(tmp_path):
     """The digest of the kernels' sources before and after a remark is added to a file of a copy of the package."""
     package = tmp_path / "walkerlab"
     shutil.copytree(PACKAGE, package, ignore=shutil.ignore_patterns("__pycache__"))
-    code = "from walkerlab.kernel_cache import sources_digest; print(sources_digest())"
+    code = "from walkerlab.physics.kernel_cache import sources_digest; print(sources_digest())"
 
     def digest():
         environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
@@ -245,7 +245,7 @@ def test_each_processor_has_compiled_code_of_its_own(copy, monkeypatch):
 
 NOTEBOOK = """
 import numba
-import walkerlab.kernels
+import walkerlab.physics.kernels
 
 @numba.njit(cache=True)
 def own(x):
@@ -270,23 +270,23 @@ def test_what_another_program_caches_stays_where_it_was(tmp_path):
 
 FOREIGN = """
 from typing import NamedTuple
-from walkerlab.mechanics.trial_of_system import value
-from walkerlab.orbits.trial_of_system import valued
+from walkerlab.physics.mechanics.trial_of_system import value
+from walkerlab.physics.orbits.trial_of_system import valued
 class Foreign(NamedTuple):
     number: float
 value.case(Foreign)(lambda system: 3.0)
 result = valued(Foreign(1.0))
 """
 OWN = """
-from walkerlab.mechanics.trial_of_system import Own
-from walkerlab.orbits.trial_of_system import valued
+from walkerlab.physics.mechanics.trial_of_system import Own
+from walkerlab.physics.orbits.trial_of_system import valued
 print(valued(Own(1.0)))
 """
 SYSTEM = '''"""Systems of several types."""
 
 from typing import Any, NamedTuple
 
-from walkerlab.kernels import by_type
+from walkerlab.physics.kernels import by_type
 
 
 class Own(NamedTuple):
@@ -309,8 +309,8 @@ VALUED = '''"""A kernel for systems of any type."""
 
 from typing import Any
 
-from walkerlab.kernels import kernel
-from walkerlab.mechanics.trial_of_system import value
+from walkerlab.physics.kernels import kernel
+from walkerlab.physics.mechanics.trial_of_system import value
 
 
 @kernel

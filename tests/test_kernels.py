@@ -13,10 +13,10 @@ from numba import typeof
 from numba.core.errors import TypingError
 from numba.core.itanium_mangler import mangle_type
 
-from walkerlab import compiler
-from walkerlab.compiler import compiling
-from walkerlab.kernel_cache import watch_compilation
-from walkerlab.kernels import (
+from walkerlab.physics import compiler
+from walkerlab.physics.compiler import compiling
+from walkerlab.physics.kernel_cache import watch_compilation
+from walkerlab.physics.kernels import (
     by_reference,
     by_type,
     by_type_or_default,
@@ -220,8 +220,8 @@ elif sys.argv[1] == "method":
     numba.core.caching.IndexDataCacheFile.load = lambda self, key: None
     numba.core.caching.IndexDataCacheFile.save = lambda self, key, data: None
 import numba
-import walkerlab.kernels
-from walkerlab.kernel_cache import cache_folder
+import walkerlab.physics.kernels
+from walkerlab.physics.kernel_cache import cache_folder
 own = numba.config.CACHE_DIR
 sys.path.insert(0, sys.argv[2])
 import chosen_kernels
@@ -230,10 +230,10 @@ print(chosen_kernels.measured(thing).hex(), own == numba.config.CACHE_DIR, cache
 """
 CHOSEN = """
 from typing import NamedTuple
-from walkerlab import compiler
-from walkerlab.compiler import compiling
-from walkerlab.kernel_cache import watch_compilation
-from walkerlab.kernels import by_type, by_type_or_default, kernel_part, kernel, vector, forced_inline
+from walkerlab.physics import compiler
+from walkerlab.physics.compiler import compiling
+from walkerlab.physics.kernel_cache import watch_compilation
+from walkerlab.physics.kernels import by_type, by_type_or_default, kernel_part, kernel, vector, forced_inline
 
 
 class Thing(NamedTuple):
@@ -320,7 +320,7 @@ def test_a_function_inside_a_kernel_is_compiled_with_it():
 
 
 NESTED = """
-from walkerlab.kernels import kernel
+from walkerlab.physics.kernels import kernel
 
 
 @kernel
@@ -378,7 +378,7 @@ def test_numba_multiplies_matrices_after_kernels_are_loaded():
     code = """
 import sys
 import numba, numpy as np
-from walkerlab import kernels
+from walkerlab.physics import kernels
 assert not any(name.startswith("scipy.linalg") for name in sys.modules)
 A = np.arange(4.0).reshape(2, 2)
 print(np.array_equal(numba.njit(lambda a: a @ a)(A), A @ A), numba.njit(lambda a, b: np.convolve(a, b))(*A).tolist())

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 import walkerlab
+from walkerlab.code_digest import Sources
 from walkerlab.pipeline.graph import STAGES
-from walkerlab.sources import Sources
 
 NUMBER = itertools.count()
 NO_CACHES = shutil.ignore_patterns("__pycache__")
@@ -110,7 +110,7 @@ def test_a_module_that_does_not_exist_is_an_error(package):
 
 ROOT = Path(walkerlab.__file__).parent.parent
 WRITTEN = [stage.module for stage in STAGES if (ROOT / stage.module.replace(".", "/")).with_suffix(".py").exists()]
-STARTS = ["walkerlab.pipeline.runner", "walkerlab.cli.stored", "walkerlab.kernels", *WRITTEN]
+STARTS = ["walkerlab.pipeline.runner", "walkerlab.views.cli.stored", "walkerlab.physics.kernels", *WRITTEN]
 LIBRARIES = ["h5py", "jinja2", "matplotlib.figure", "numba", "pydantic", "ruamel.yaml", "scipy.integrate", "typer"]
 IMPORTED = """
 import importlib, os, sys
@@ -152,8 +152,8 @@ def test_a_new_version_number_changes_no_stage_key(tmp_path):
         shutil.copytree(Path(walkerlab.__file__).parent, tmp_path / version / "walkerlab", ignore=NO_CACHES)
         init = tmp_path / version / "walkerlab" / "__init__.py"
         init.write_text(init.read_text().replace(walkerlab.__version__, version))
-        stage = "walkerlab.benchmarks.engines.stage"
-        code = f"from walkerlab.sources import Sources; print(Sources().code_digest({stage!r}))"
+        stage = "walkerlab.evidence.benchmarks.engines.stage"
+        code = f"from walkerlab.code_digest import Sources; print(Sources().code_digest({stage!r}))"
         done = subprocess.run(
             [sys.executable, "-c", code], cwd=tmp_path / version, env={}, capture_output=True, text=True
         )

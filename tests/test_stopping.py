@@ -22,9 +22,9 @@ def hook(cls, module, compiled):
 codegen.CPUCodeLibrary._object_compiled_hook = classmethod(hook)
 
 import typer
-from walkerlab.cli.failures import exit_on_failure
-from walkerlab.cli.request import Request
-from walkerlab.kernels import kernel
+from walkerlab.views.cli.failures import exit_on_failure
+from walkerlab.views.cli.request import Request
+from walkerlab.physics.kernels import kernel
 
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a job in the background ignores it
 

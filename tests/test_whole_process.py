@@ -25,7 +25,8 @@ def test_the_bare_process_walks_writes_and_is_bare(tmp_path):
 
 def test_a_warm_simulate_loads_no_more_heavy_packages_than_the_bare_process(tmp_path):
     simulate = (
-        "import walkerlab.cli.main as cli\ntry:\n    cli.main()\nexcept SystemExit as end:\n    assert not end.code\n"
+        "from walkerlab.views.cli.main import main\n"
+        "try:\n    main()\nexcept SystemExit as end:\n    assert not end.code\n"
     )
     arguments = ("simulate", "--quiet", "--runs", str(tmp_path))
     loaded_by(simulate, *arguments)

@@ -1,6 +1,6 @@
 """`python -m walkerlab` is `walkerlab`."""
 
-from walkerlab.cli.main import main
+from walkerlab.views.cli.main import main
 
 if __name__ == "__main__":
     main()

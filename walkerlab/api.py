@@ -27,11 +27,11 @@ from walkerlab.pipeline.resolve import resolve
 from walkerlab.pipeline.results import MemoryResults
 from walkerlab.pipeline.runner import Options, execute
 from walkerlab.pipeline.runs import config_of, headline_values, result_in, run_named
-from walkerlab.report.text import in_words
-from walkerlab.store import artifact
-from walkerlab.store.artifact import Damaged
-from walkerlab.store.content import Content, Group
-from walkerlab.store.runfolder import RunFolder
+from walkerlab.pipeline.store import artifact
+from walkerlab.pipeline.store.artifact import Damaged
+from walkerlab.pipeline.store.content import Content, Group
+from walkerlab.pipeline.store.runfolder import RunFolder
+from walkerlab.views.report.text import in_words
 
 RUNS = "runs"
 MADE_HERE: dict[str, tuple[tuple[type[Block], ...], str]] = {
@@ -145,11 +145,11 @@ class Run:
 
     def result(self, stage: str) -> Result:
         """Return the stored result of a stage, up to date or not; StaleError if it cannot be read."""
-        refuse_unknown_stage(stage)
+        _check_stage(stage)
         found = result_in(self.folder, stage)
         said = found.summary.get("no_answer")
         no_answer = None if said is None else NoAnswer(said["message"], said["advice"])
-        return result_of(stage, found.summary, found, no_answer, self.folder.artifact(stage))
+        return _result_of(stage, found.summary, found, no_answer, self.folder.artifact(stage))
 
     def sweep(self, name: str = "") -> Any:
         """Return a sweep as an xarray Dataset; by default the only one. StaleError if it cannot be read."""
@@ -192,12 +192,12 @@ def run(
     >>> float(gait.dataset("corrected/gaits").period_s.max()) == gait.summary["period_s"]
     True
     """
-    refuse_unknown_stage(stage)
-    resolved = resolve(str(config), set_options(set), strides, folder_of(runs), name)
+    _check_stage(stage)
+    resolved = resolve(str(config), set_options(set), strides, _folder_of(runs), name)
     warn(resolved.loaded.warnings)
     report = execute(resolved.loaded.config, stage, resolved.folder, Options(force=force, jobs=jobs))
     content = artifact.read(report.artifact) if report.artifact is not None else Content()
-    return result_of(stage, report.as_json(), content, report.no_answer, report.artifact)
+    return _result_of(stage, report.as_json(), content, report.no_answer, report.artifact)
 
 
 def open_run(name: str | Path, runs: str | Path = RUNS) -> Run:
@@ -209,7 +209,7 @@ def open_run(name: str | Path, runs: str | Path = RUNS) -> Run:
     >>> open_run("paper", folder).result("fixedpoint").summary["stable"]
     True
     """
-    return Run(run_named(str(name), folder_of(runs)))
+    return Run(run_named(str(name), _folder_of(runs)))
 
 
 def sweep(
@@ -238,12 +238,12 @@ def sweep(
     >>> [round(float(period), 4) for period in gaits.period_s]
     [0.7036, 0.7343]
     """
-    from walkerlab.sweeps.engines import Order, engine_named
-    from walkerlab.sweeps.question import build_sweep
-    from walkerlab.sweeps.sweep import SweepRun, SweepWork, modules_of
+    from walkerlab.pipeline.sweeps.engines import Order, engine_named
+    from walkerlab.pipeline.sweeps.question import build_sweep
+    from walkerlab.pipeline.sweeps.sweep import SweepRun, SweepWork, modules_of
 
     xarray_here()  # the answer is a Dataset
-    found = resolve(str(config), set_options(set), runs=folder_of(runs), name=name)
+    found = resolve(str(config), set_options(set), runs=_folder_of(runs), name=name)
     warn(found.loaded.warnings)
     if not isinstance(over, Mapping):
         raise ConfigError(f"over: {over!r} is not a mapping of keys to values.", 'For example {"slope_deg": [1, 2]}.')
@@ -353,8 +353,8 @@ def continue_gait(
     slope_deg  positive downhill, deg, where `over` is another key
     keys       others of the block `continuation`, such as model; other keys of a config, such as contact, seed
     """
-    ends = {} if span is None else dict(zip(("from", "to"), two_numbers("span", plain(span)), strict=True))
-    given = {"slope_deg": slope_deg, **stage_block("continuation", keys, over=over, **ends)}
+    ends = {} if span is None else dict(zip(("from", "to"), _two_numbers("span", _plain(span)), strict=True))
+    given = {"slope_deg": slope_deg, **_stage_block("continuation", keys, over=over, **ends)}
     return in_memory("continuation", config_of_scene(walker, given, keys))
 
 
@@ -368,7 +368,7 @@ def basin(
     cells      along either axis of the window
     keys       others of the block `basin`, such as model; other keys of a config, such as seed
     """
-    given = {"slope_deg": slope_deg, **stage_block("basin", keys, cells=cells)}
+    given = {"slope_deg": slope_deg, **_stage_block("basin", keys, cells=cells)}
     return in_memory("basin", config_of_scene(walker, given, keys))
 
 
@@ -383,7 +383,7 @@ def robustness(
     walks      on each rough ground
     keys       model, steps, roughness_m and max_steps of the block `robustness`; other keys of a config
     """
-    given = {"slope_deg": slope_deg, **stage_block("robustness", keys, to=to or None, walks=walks)}
+    given = {"slope_deg": slope_deg, **_stage_block("robustness", keys, to=to or None, walks=walks)}
     return in_memory("robustness", config_of_scene(walker, given, keys))
 
 
@@ -402,11 +402,11 @@ def explore(
     runs       the folder of all runs, for reports and films that the page is asked for
     keys       other keys of a config
     """
-    from walkerlab.explorer.server import Server
-    from walkerlab.explorer.walks import ExploredConfig, sets_of
+    from walkerlab.views.explore.server import Server
+    from walkerlab.views.explore.walks import ExploredConfig, sets_of
 
     config = config_of_scene(walker, {"slope_deg": slope_deg, "contact": contact}, keys)
-    server = Server(0, ExploredConfig(None, sets_of(config), folder_of(runs), {}, called="your walker"))
+    server = Server(0, ExploredConfig(None, sets_of(config), _folder_of(runs), {}, called="your walker"))
     server.begin()
     return server
 
@@ -418,10 +418,10 @@ def design(walker: Any = None, over: Mapping[str, Any] | None = None, **keys: An
     over    bounds (low, high) of numbers of the config, in the key's unit
     keys    minimise or maximise, keep (bounds of other numbers of the gait), model, starts; other keys of a config
     """
-    return in_memory("design", config_of_scene(walker, stage_block("design", keys, over=over or {}), keys))
+    return in_memory("design", config_of_scene(walker, _stage_block("design", keys, over=over or {}), keys))
 
 
-def stage_block(stage: str, keys: dict[str, Any], **given: Any) -> dict[str, Any]:
+def _stage_block(stage: str, keys: dict[str, Any], **given: Any) -> dict[str, Any]:
     block = block_of(Config.model_fields[stage])
     assert block is not None, "a stage that is asked something has a block"
     own = {name: keys.pop(name) for name in block.model_fields if name in keys}
@@ -450,10 +450,10 @@ def xarray_here() -> Any:
 
 def in_memory(stage: str, config: Config) -> Result:
     """Compute a stage and its inputs without files; ConfigError if the config lacks a block it needs."""
-    refuse_unknown_stage(stage)
+    _check_stage(stage)
     PIPELINE[stage].refuse_question(config)
     answer = answer_in_memory(config, stage, MemoryResults())
-    return result_of(stage, answer.findings, answer, answer.no_answer)
+    return _result_of(stage, answer.findings, answer, answer.no_answer)
 
 
 def config_of_scene(walker: Any, given: Mapping[str, Any], keys: Mapping[str, Any]) -> Config:
@@ -470,7 +470,7 @@ def config_of_scene(walker: Any, given: Mapping[str, Any], keys: Mapping[str, An
         kinds, makers = MADE_HERE[name]
         if not isinstance(named[name], kinds):
             raise ConfigError(f"{name}: {named[name]!r} is not a {name} block.", makers)
-    lines = {key: plain(value) for key, value in {"name": "memory", **keys, **named}.items()}
+    lines = {key: _plain(value) for key, value in {"name": "memory", **keys, **named}.items()}
     replaced = {"source", "contact", *({"walker"} & lines.keys())}
     upper = tree_of(lines, NOWHERE)
     tree = merge_layers([*(layer.without(*replaced) for layer in read_layers(builtin_config(DEFAULT))), upper])
@@ -485,13 +485,13 @@ def warn(said: Iterable[str], inside: int = 0) -> None:
         warnings.warn(text, stacklevel=3 + inside)
 
 
-def plain(value: Any) -> Any:
+def _plain(value: Any) -> Any:
     if isinstance(value, Block):
         return value.model_dump(mode="json")
     return value.tolist() if hasattr(value, "tolist") else value
 
 
-def two_numbers(name: str, values: Any) -> Sequence[Any]:
+def _two_numbers(name: str, values: Any) -> Sequence[Any]:
     if not isinstance(values, Sequence) or len(values) != 2:
         raise ConfigError(f"{name}: {values!r} is not a pair of numbers.", f"For example {name}=(0.001, 0.09).")
     return values
@@ -504,7 +504,7 @@ def set_options(values: Mapping[str, Any] | None) -> list[str]:
     return [f"{key}={json.dumps(value)}" for key, value in (values or {}).items()]
 
 
-def folder_of(runs: Any) -> Path:
+def _folder_of(runs: Any) -> Path:
     if not isinstance(runs, str | os.PathLike):
         raise ConfigError(f"runs: {runs!r} is not a folder.", 'For example runs="runs".')
     return Path(runs)
@@ -513,7 +513,7 @@ def folder_of(runs: Any) -> Path:
 def sweep_values(key: str, given: Any) -> str | list[Any]:
     """Return the values of a sweep's parameter, or the text of a range; ConfigError for anything else."""
     # Imported here: few callers sweep.
-    from walkerlab.sweeps.question import MAX_POINTS
+    from walkerlab.pipeline.sweeps.question import MAX_POINTS
 
     if isinstance(given, str) and not given.lstrip().startswith("["):
         return given
@@ -525,13 +525,13 @@ def sweep_values(key: str, given: Any) -> str | list[Any]:
     return list(itertools.islice(given, MAX_POINTS + 1))  # more are refused, and need not be held for that
 
 
-def refuse_unknown_stage(stage: str) -> None:
+def _check_stage(stage: str) -> None:
     names = [one.name for one in PIPELINE.stages]
     if stage not in names:
         raise ConfigError(f"{stage}: no such stage.", f"There are {', '.join(names)}.")
 
 
-def result_of(
+def _result_of(
     stage: str, summary: Mapping[str, Any], content: Content, no_answer: NoAnswer | None, path: Path | None = None
 ) -> Result:
     said = None if no_answer is None else no_answer.message

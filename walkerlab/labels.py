@@ -1,6 +1,6 @@
 """Labels of a result's columns: unit and meaning, declared next to the field that holds the values."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from typing import Final, get_args, get_type_hints
@@ -69,3 +69,9 @@ def axis_label(key: str) -> str:
 def with_unit(words: str, unit: str) -> str:
     """Append a unit in parentheses, unless it is '' or '1'."""
     return words if unit in ("", "1") else f"{words} ({unit})"
+
+
+def join_words(parts: Iterable[str]) -> str:
+    """Join words: 'a', 'a and b', 'a, b and c'."""
+    words = list(parts)
+    return " and ".join([", ".join(words[:-1]), words[-1]]) if len(words) > 1 else "".join(words)

@@ -1,6 +1,6 @@
 """Late imports for registries: code is named by a quoted string and imported when it is used.
 
-Names are written in full, so that digests of code include them (see sources.py).
+Names are written in full, so that digests of code include them (see code_digest.py).
 """
 
 from collections.abc import Callable

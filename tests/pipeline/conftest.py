@@ -13,7 +13,7 @@ from walkerlab.config.loader import load
 from walkerlab.pipeline.executor import Executor
 from walkerlab.pipeline.results import FolderResults
 from walkerlab.pipeline.runner import Options, execute
-from walkerlab.store.runfolder import RunFolder
+from walkerlab.pipeline.store.runfolder import RunFolder
 
 HERE = Path(__file__).parent
 

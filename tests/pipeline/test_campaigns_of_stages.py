@@ -2,9 +2,9 @@
 
 import pytest
 
-from walkerlab.cli.stored import state_of
 from walkerlab.pipeline.executor import survey
-from walkerlab.store.artifact import read
+from walkerlab.pipeline.store.artifact import read
+from walkerlab.views.cli.stored import state_of
 
 
 def actions(report):

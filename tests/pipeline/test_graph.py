@@ -8,6 +8,7 @@ from typing import get_args
 
 import pytest
 
+from walkerlab.code_digest import Sources
 from walkerlab.config import files
 from walkerlab.config.canonical import slice_of
 from walkerlab.config.files import BUILTIN_FOLDER, builtin_names
@@ -16,8 +17,7 @@ from walkerlab.config.reads import CompassCasesConfig, SceneCasesConfig, dotted_
 from walkerlab.config.schema import Config
 from walkerlab.pipeline.graph import PIPELINE, STAGES, Graph, Stage, results_of
 from walkerlab.pipeline.identity import Keys
-from walkerlab.sources import Sources
-from walkerlab.store.key import differences
+from walkerlab.pipeline.store.key import differences
 
 NAMES = [stage.name for stage in STAGES]
 EXPLICIT = "start=[-0.2, 0.17, -0.6, -0.86]"
@@ -147,10 +147,10 @@ def test_an_edited_stage_of_evidence_renews_its_own_key_alone(made_of, stage):
 
 @pytest.mark.parametrize("stage", [stage.name for stage in STAGES if not stage.draws])
 def test_no_result_is_made_with_the_registry_of_stages_figures_or_sections(made_of, stage):
-    registries = {"walkerlab.pipeline.graph", "walkerlab.figures.registry", "walkerlab.report.registry"}
+    registries = {"walkerlab.pipeline.graph", "walkerlab.views.figures.registry", "walkerlab.views.report.registry"}
     assert not registries & made_of[stage]
 
 
 def test_the_torque_law_of_the_study_is_part_of_what_walks_are_made_of(made_of):
-    assert "walkerlab.paper.law" in made_of["simulate"]
-    assert "walkerlab.paper.compare" not in made_of["simulate"]
+    assert "walkerlab.evidence.paper.law" in made_of["simulate"]
+    assert "walkerlab.evidence.paper.compare" not in made_of["simulate"]

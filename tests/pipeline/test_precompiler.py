@@ -9,18 +9,18 @@ import pytest
 from walkerlab.config.loader import load
 from walkerlab.pipeline import executor
 from walkerlab.pipeline.graph import PIPELINE, Graph
+from walkerlab.pipeline.store.artifact import read
 from walkerlab.pipeline.task import Precompiler
-from walkerlab.store.artifact import read
-from walkerlab.workers import WorkerPool
+from walkerlab.pipeline.workers import WorkerPool
 
 # in a process of its own: here other tests have compiled already
 COMPILED_THEN_RUN = """
 import sys
 from walkerlab.config.loader import load
-from walkerlab.hybrid import contact_result
-from walkerlab.stages import contact_sim
+from walkerlab.physics.hybrid import contact_result
+from walkerlab.pipeline.stages import contact_sim
 from walkerlab.pipeline.progress import Silent
-from walkerlab.store.content import Content
+from walkerlab.pipeline.store.content import Content
 
 def compiled():
     kernels = (vars(contact_result)[name] for name in sorted(vars(contact_result)))
@@ -63,7 +63,7 @@ def compiling_bounce(toy, monkeypatch):
         with (toy.source / "toy" / "bounce.py").open("a") as file:
             file.write(source)
         with (toy.source / "toy" / "__init__.py").open("a") as file:
-            file.write("\nimport walkerlab.kernels\n")
+            file.write("\nimport walkerlab.physics.kernels\n")
         monkeypatch.setenv("WALKERLAB_CACHE", str(toy.source / "nothing-compiled"))
         monkeypatch.setattr(executor, "nothing_compiled_yet", lambda: True)
         compiled = {"bounce": "compile_kernels"}

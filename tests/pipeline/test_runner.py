@@ -10,7 +10,7 @@ from walkerlab.errors import ConfigError, LockedError, StorageError
 from walkerlab.pipeline.executor import survey
 from walkerlab.pipeline.graph import Graph, Stage
 from walkerlab.pipeline.runner import execute
-from walkerlab.store.artifact import read
+from walkerlab.pipeline.store.artifact import read
 
 EXPLICIT = "start=[0.1, 0.2, 0.3, 0.4]"
 STEEP = "slope_rad=1.2"
@@ -279,7 +279,7 @@ from toy.pipeline import GRAPH
 from walkerlab.config.loader import load
 from walkerlab.pipeline.progress import Silent
 from walkerlab.pipeline.runner import execute
-from walkerlab.store.runfolder import RunFolder
+from walkerlab.pipeline.store.runfolder import RunFolder
 class Notes(Silent):
     def note(self, text):
         print(text, file=sys.stderr, flush=True)

@@ -10,9 +10,9 @@ from process_table import workers_below
 from walkerlab.pipeline.executor import any_side_by_side
 from walkerlab.pipeline.graph import Graph
 from walkerlab.pipeline.runner import Options, execute
+from walkerlab.pipeline.store.artifact import read
+from walkerlab.pipeline.workers import WorkerDiedError
 from walkerlab.scene.omissions import STILL_COMPUTED
-from walkerlab.store.artifact import read
-from walkerlab.workers import WorkerDiedError
 
 STEEP = "slope_rad=1.2"
 NUMBERS = ("drop", "roll", "bounce", "survey")

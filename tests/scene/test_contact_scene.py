@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 from numba import typeof
 
 from walkerlab.config.loader import load
-from walkerlab.ground.friction import Coulomb, Frictionless
-from walkerlab.ground.terrain import after_mid_swing, checkerboard
-from walkerlab.ground.walker import feet_motion
-from walkerlab.hybrid.contact_crossings import hip_height
+from walkerlab.physics.ground.friction import Coulomb, Frictionless
+from walkerlab.physics.ground.terrain import after_mid_swing, checkerboard
+from walkerlab.physics.ground.walker import feet_motion
+from walkerlab.physics.hybrid.contact_crossings import hip_height
 from walkerlab.scene.contact import contact_scene, stance_equilibrium, start_state
 from walkerlab.scene.omissions import contact_walk_omissions
 from walkerlab.scene.rigid import rigid_walker

@@ -11,19 +11,19 @@ from hypothesis import strategies as st
 from system_rates import gradient_of, rate_of
 
 from walkerlab.config.loader import load
-from walkerlab.ground.compliant import contact_walker
-from walkerlab.ground.friction import Coulomb, Frictionless, switching_count
-from walkerlab.ground.walker import FootMotion, feet_motion, foot_force, on_ground
-from walkerlab.hybrid.contact_events import FRICTION_SWITCHES, MATERIAL
-from walkerlab.mechanics.parts import Assembly, Body, Particle
+from walkerlab.physics.ground.compliant import contact_walker
+from walkerlab.physics.ground.friction import Coulomb, Frictionless, switching_count
+from walkerlab.physics.ground.walker import FootMotion, feet_motion, foot_force, on_ground
+from walkerlab.physics.hybrid.contact_events import FRICTION_SWITCHES, MATERIAL
+from walkerlab.physics.mechanics.parts import Assembly, Body, Particle
+from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.pipeline.progress import Silent
 from walkerlab.pipeline.runner import Options, execute
+from walkerlab.pipeline.stages import contact_sim, simulate
+from walkerlab.pipeline.store.runfolder import RunFolder
 from walkerlab.scene import omissions
 from walkerlab.scene.contact import contact_scene, start_state
 from walkerlab.scene.rigid import rigid_scene
-from walkerlab.solvers.registry import Tolerances
-from walkerlab.stages import contact_sim, simulate
-from walkerlab.store.runfolder import RunFolder
 
 START = (-0.2042, 0.1694, -0.6, -0.86)
 NO_FRICTION = Coulomb(0.0, 0.0, 0.1, 1.0)

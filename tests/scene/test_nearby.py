@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from walkerlab.config.loader import load
-from walkerlab.orbits.fixed_point import find_gaits
+from walkerlab.physics.orbits.fixed_point import find_gaits
 from walkerlab.scene.gait_suggestions import find_slopes_with_gaits, suggest_gaits
 from walkerlab.scene.rigid import rigid_walker
 

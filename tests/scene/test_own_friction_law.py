@@ -8,20 +8,20 @@ from typing import NamedTuple, get_args
 import numpy as np
 import pytest
 
-from walkerlab.benchmarks.contact_trials import CREEP_FACTOR, near_rigid_trial
-from walkerlab.benchmarks.engines.experiments import CREEP_LOAD, contact_target
 from walkerlab.config.loader import load
 from walkerlab.config.schema import Contact
 from walkerlab.errors import ConfigError
-from walkerlab.ground import friction
-from walkerlab.ground.friction import FRICTION_LAWS, Frictionless, friction_coefficient, steepest_change
-from walkerlab.orbits.contact_gait import why_no_gait, with_rigidity, with_scaled_laws
-from walkerlab.orbits.rigid_limit import STICTION_SERIES, series_settings
+from walkerlab.evidence.benchmarks.contact_trials import CREEP_FACTOR, near_rigid_trial
+from walkerlab.evidence.benchmarks.engines.experiments import CREEP_LOAD, contact_target
+from walkerlab.physics.ground import friction
+from walkerlab.physics.ground.friction import FRICTION_LAWS, Frictionless, friction_coefficient, steepest_change
+from walkerlab.physics.orbits.contact_gait import why_no_gait, with_rigidity, with_scaled_laws
+from walkerlab.physics.orbits.rigid_limit import STICTION_SERIES, series_settings
+from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.pipeline.runner import execute
+from walkerlab.pipeline.stages.contact_sim import tell_unresolved_slip
+from walkerlab.pipeline.store.runfolder import RunFolder
 from walkerlab.scene.contact import contact_scene, friction_law, scene_measures, start_state
-from walkerlab.solvers.registry import Tolerances
-from walkerlab.stages.contact_sim import tell_unresolved_slip
-from walkerlab.store.runfolder import RunFolder
 
 START = (-0.2042, 0.1694, -0.605819, -0.861041)
 

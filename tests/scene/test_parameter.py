@@ -8,10 +8,10 @@ from walkerlab.config.fields import leaves, leaves_of_other_kinds, type_words
 from walkerlab.config.loader import load
 from walkerlab.config.schema import Config
 from walkerlab.errors import ConfigError
+from walkerlab.pipeline.sweeps.question import axis, described
 from walkerlab.scene.contact import contact_scene
 from walkerlab.scene.parameter import MODEL_KEYS, parameter_of
 from walkerlab.scene.rigid import rigid_walker
-from walkerlab.sweeps.question import axis, described
 
 TORSO = "walker.torso={mass_kg: 3, above_hip_m: 0.3}"
 WALKERS = {

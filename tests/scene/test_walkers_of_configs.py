@@ -9,8 +9,8 @@ import pytest
 
 from walkerlab.config.loader import load
 from walkerlab.errors import ConfigError
-from walkerlab.mechanics.rigid_model import RigidModel
-from walkerlab.orbits.fixed_point import find_gaits
+from walkerlab.physics.mechanics.rigid_model import RigidModel
+from walkerlab.physics.orbits.fixed_point import find_gaits
 from walkerlab.scene.contact import contact_scene
 from walkerlab.scene.families import iterate_values
 from walkerlab.scene.parts import assembly_of

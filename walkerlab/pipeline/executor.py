@@ -10,17 +10,17 @@ from queue import SimpleQueue
 from typing import Any
 
 from walkerlab.config.schema import Config
-from walkerlab.kernel_cache import watch_compilation
+from walkerlab.physics.kernel_cache import watch_compilation
 from walkerlab.pipeline.graph import PIPELINE, Graph, Stage, without_block
 from walkerlab.pipeline.progress import Reporter, Silent, StageReporter
 from walkerlab.pipeline.results import FolderResults, MemoryResults, Results, Step
+from walkerlab.pipeline.store.artifact import NOT_THERE, Stored
+from walkerlab.pipeline.store.content import Content
+from walkerlab.pipeline.store.key import Identity
+from walkerlab.pipeline.store.runfolder import RunFolder
 from walkerlab.pipeline.task import Precompiler, StageTask, nothing_compiled_yet, run_in_worker, task_of
+from walkerlab.pipeline.workers import WorkerPool
 from walkerlab.scene.omissions import STILL_COMPUTED, LeftOut
-from walkerlab.store.artifact import NOT_THERE, Stored
-from walkerlab.store.content import Content
-from walkerlab.store.key import Identity
-from walkerlab.store.runfolder import RunFolder
-from walkerlab.workers import WorkerPool
 
 
 @dataclass(frozen=True)

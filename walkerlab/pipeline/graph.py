@@ -214,55 +214,58 @@ MODEL_HELP = "Model whose gaits to study."
 WALKED = ("fixedpoint", "simulate", "contact-sim")
 PIPELINE = Graph(
     Stage(
-        "fixedpoint", "walkerlab.stages.fixedpoint",
+        "fixedpoint", "walkerlab.pipeline.stages.fixedpoint",
         "Find the periodic gait of the rigid model and its multipliers.", reads.FixedPointConfig,
     ),
     Stage(
-        "simulate", "walkerlab.stages.simulate", "Walk the rigid model.", reads.SimulateConfig,
+        "simulate", "walkerlab.pipeline.stages.simulate", "Walk the rigid model.", reads.SimulateConfig,
         gait_unless_start_is_given, options=(STRIDES,), does_without=rigid_walk_omissions,
     ),
     Stage(
-        "contact-sim", "walkerlab.stages.contact_sim", "Walk the contact model, its contact forces as in ADAMS.",
+        "contact-sim", "walkerlab.pipeline.stages.contact_sim",
+        "Walk the contact model, its contact forces as in ADAMS.",
         reads.ContactSimConfig, gait_for_start_or_pads, options=(STRIDES,), requires=("contact",),
         precompile="compile_kernels", does_without=contact_walk_omissions,
     ),
     Stage(
-        "tune", "walkerlab.paper.tune",
+        "tune", "walkerlab.evidence.paper.tune",
         "Adjust the initial velocities until the contact model walks; say whether, how much, and why.",
         reads.TuneConfig, results_of("fixedpoint"), requires=("contact",),
-        does_without=later("walkerlab.paper.left_out", "of_adjustment"),
+        does_without=later("walkerlab.evidence.paper.left_out", "adjustment_omissions"),
     ),
     Stage(
-        "compare", "walkerlab.paper.compare",
+        "compare", "walkerlab.evidence.paper.compare",
         "Compare both models with each other and with every number of the paper.", reads.CompareConfig,
         results_of(*WALKED), requires=("contact",),
     ),
     Stage(
-        "accuracy", "walkerlab.benchmarks.accuracy", "Measure error against run time, method by method.",
+        "accuracy", "walkerlab.evidence.benchmarks.accuracy", "Measure error against run time, method by method.",
         reads.SceneConfig, gait_for_start_or_pads, work="times",
     ),
     Stage(
-        "engines", "walkerlab.benchmarks.engines.stage",
+        "engines", "walkerlab.evidence.benchmarks.engines.stage",
         "Walk in other engines (MuJoCo, Drake, Exudyn): our contact law in their integrators, then their own contact.",
         reads.SceneConfig, gait_for_start_or_pads, requires=("contact",), only_by="engines",
-        programs=later("walkerlab.benchmarks.engines.registry", "installed_versions"),
+        programs=later("walkerlab.evidence.benchmarks.engines.registry", "installed_versions"),
     ),
     Stage(
-        "known-problems", "walkerlab.verification.known_problems",
+        "known-problems", "walkerlab.evidence.verification.known_problems",
         "Check the contact code on problems whose answers are known, once for all scenes.", object,
     ),
     Stage(
-        "stability", "walkerlab.verification.stability", "Verify extreme cases and problems with known answers.",
+        "stability", "walkerlab.evidence.verification.stability",
+        "Verify extreme cases and problems with known answers.",
         reads.CompassCasesConfig, known_and_start, takes_of_scene=reads.SceneCasesConfig,
-        takes_of_paper=reads.WalksConfig, does_without=later("walkerlab.verification.left_out", "of_verification"),
+        takes_of_paper=reads.WalksConfig,
+        does_without=later("walkerlab.evidence.verification.left_out", "verification_omissions"),
     ),
     Stage(
-        "stability-maps", "walkerlab.verification.stability_maps",
+        "stability-maps", "walkerlab.evidence.verification.stability_maps",
         "Map stability over stiffness, stiction velocity and step size; resumes where it was interrupted.",
         reads.MapsConfig, only_by="stability --full", takes_of_paper=reads.WalksConfig,
     ),
     Stage(
-        "continuation", "walkerlab.stages.continuation",
+        "continuation", "walkerlab.pipeline.stages.continuation",
         "Follow families of gaits over a parameter: branches, bifurcations, cascades, chaos.",
         reads.ContinuationConfig, only_by="continuation",
         options=(
@@ -274,18 +277,18 @@ PIPELINE = Graph(
         ),
     ),
     Stage(
-        "basin", "walkerlab.stages.basin",
+        "basin", "walkerlab.pipeline.stages.basin",
         "Map which starts reach which attractor, and which fall; resumes where it was interrupted.",
         reads.BasinConfig, results_of("fixedpoint"), only_by="basin",
     ),
     Stage(
-        "robustness", "walkerlab.stages.robustness",
+        "robustness", "walkerlab.pipeline.stages.robustness",
         "Find the largest drop, push and roughness that a gait survives, and the parameter that matters most.",
         reads.RobustnessConfig, results_of("fixedpoint"), only_by="robustness",
         options=(Option("--model", "robustness.model", "rigid|contact|both", MODEL_HELP),),
     ),
     Stage(
-        "design", "walkerlab.stages.design",
+        "design", "walkerlab.pipeline.stages.design",
         "Optimise walker parameters within bounds.",
         reads.DesignConfig, results_of("fixedpoint"), only_by="design",
         options=(
@@ -297,15 +300,17 @@ PIPELINE = Graph(
         ),
     ),
     Stage(
-        "plot", "walkerlab.figures.stage", "Draw the figures from the stored results.", reads.NamedConfig,
+        "plot", "walkerlab.views.figures.stage", "Draw the figures from the stored results.", reads.NamedConfig,
         results_of(*WALKED, "compare"), work="draws",
         if_current=("accuracy", "engines", "tune", "stability-maps", "continuation", "basin", "robustness"),
     ),
     Stage(
-        "report", "walkerlab.report.stage", "Write the report, one HTML file.", None,
+        "report", "walkerlab.views.report.stage", "Write the report, one HTML file.", None,
         results_of(*WALKED, "tune", "compare", "accuracy", "stability", "plot"), options=(STRIDES,), work="draws",
         early_with=WALKED,
         if_current=("engines", "stability-maps", "continuation", "basin", "robustness"),
     ),
 )  # fmt: skip
 STAGES = PIPELINE.stages
+check_cases = later("walkerlab.evidence.verification.catalogue", "all_cases")
+"""Check a config's own stability cases; raises ConfigError for one that is not usable."""

@@ -5,12 +5,12 @@ from importlib import import_module
 from inspect import signature
 from typing import Any
 
+from walkerlab.code_digest import Sources
 from walkerlab.config.canonical import slice_of
 from walkerlab.config.overlay import paper_config_with
 from walkerlab.config.schema import Config
 from walkerlab.pipeline.graph import PIPELINE, Graph, Stage
-from walkerlab.sources import Sources
-from walkerlab.store.key import Identity
+from walkerlab.pipeline.store.key import Identity
 
 
 def takes_again(stage: Stage) -> bool:

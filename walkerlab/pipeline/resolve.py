@@ -11,9 +11,9 @@ from walkerlab.config.problems import problem_error
 from walkerlab.config.walkers import PartsWalker
 from walkerlab.errors import ConfigError
 from walkerlab.pipeline.runs import config_text, find_run, read_all, stored_in
-from walkerlab.store import artifact
-from walkerlab.store.artifact import Damaged
-from walkerlab.store.runfolder import RunFolder
+from walkerlab.pipeline.store import artifact
+from walkerlab.pipeline.store.artifact import Damaged
+from walkerlab.pipeline.store.runfolder import RunFolder
 
 SUFFIX = ".h5"
 

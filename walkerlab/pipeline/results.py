@@ -9,15 +9,15 @@ from typing import Any, Literal
 from walkerlab.config.schema import Config
 from walkerlab.pipeline.graph import PIPELINE, Graph, Stage
 from walkerlab.pipeline.identity import Keys
-from walkerlab.store import artifact, provenance
-from walkerlab.store.artifact import Stored, Verdict
-from walkerlab.store.checkpoint import Checkpoint
-from walkerlab.store.content import Content
-from walkerlab.store.elsewhere import find_elsewhere, take_over
-from walkerlab.store.index import broken_file
-from walkerlab.store.key import Identity, changed_parts
-from walkerlab.store.provenance import Provenance
-from walkerlab.store.runfolder import RunFolder
+from walkerlab.pipeline.store import artifact, provenance
+from walkerlab.pipeline.store.artifact import Stored, Verdict
+from walkerlab.pipeline.store.checkpoint import Checkpoint
+from walkerlab.pipeline.store.content import Content
+from walkerlab.pipeline.store.elsewhere import find_elsewhere, take_over
+from walkerlab.pipeline.store.index import broken_file
+from walkerlab.pipeline.store.key import Identity, changed_parts
+from walkerlab.pipeline.store.provenance import Provenance
+from walkerlab.pipeline.store.runfolder import RunFolder
 
 Action = Literal["reuse", "run", "leave out"]
 

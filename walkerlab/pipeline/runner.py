@@ -13,8 +13,8 @@ from walkerlab.pipeline.graph import PIPELINE, Graph, Stage
 from walkerlab.pipeline.progress import Reporter
 from walkerlab.pipeline.results import FolderResults, Step
 from walkerlab.pipeline.runs import claim, refuse_another_config
+from walkerlab.pipeline.store.runfolder import RunFolder
 from walkerlab.scene.omissions import LeftOut
-from walkerlab.store.runfolder import RunFolder
 
 
 @dataclass(frozen=True)

@@ -15,14 +15,14 @@ from walkerlab.config.tree import Mapping as Tree
 from walkerlab.config.validation import validate_tree
 from walkerlab.config.writer import to_yaml
 from walkerlab.errors import ConfigError, StaleError
+from walkerlab.labels import join_words
 from walkerlab.pipeline.executor import survey
 from walkerlab.pipeline.graph import PIPELINE, Graph, Stage
 from walkerlab.pipeline.headlines import LAST_OF, headlines
-from walkerlab.prose import join_words
-from walkerlab.store import artifact
-from walkerlab.store.artifact import Stored
-from walkerlab.store.key import differences
-from walkerlab.store.runfolder import Record, RunFolder
+from walkerlab.pipeline.store import artifact
+from walkerlab.pipeline.store.artifact import Stored
+from walkerlab.pipeline.store.key import differences
+from walkerlab.pipeline.store.runfolder import Record, RunFolder
 
 SWEEP = "sweep-"
 """Prefix of sweep files."""

@@ -10,15 +10,15 @@ from functools import partial
 from inspect import signature
 from typing import Any
 
-from walkerlab import kernel_cache
 from walkerlab.config.reads import only
 from walkerlab.config.schema import Config
 from walkerlab.errors import NoAnswer, WalkerlabError
+from walkerlab.physics import kernel_cache
 from walkerlab.pipeline.graph import Stage
 from walkerlab.pipeline.progress import Progress
-from walkerlab.store.content import Content
-from walkerlab.store.files import drawing_into
-from walkerlab.workers import WorkerPool, tell
+from walkerlab.pipeline.store.content import Content
+from walkerlab.pipeline.store.files import drawing_into
+from walkerlab.pipeline.workers import WorkerPool, tell
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,7 @@ def run_in_worker(task: StageTask) -> Content:
 
 def nothing_compiled_yet() -> bool:
     """Whether kernels are imported and none was compiled on this machine yet."""
-    return "walkerlab.kernels" in sys.modules and kernel_cache.nothing_compiled_yet()
+    return "walkerlab.physics.kernels" in sys.modules and kernel_cache.nothing_compiled_yet()
 
 
 def compile_kernels(module: str, function: str, config: Config, only_first: bool) -> None:

@@ -11,8 +11,8 @@ from typing import Any, Final, NamedTuple
 
 from walkerlab.errors import NoAnswer, WalkerlabError
 from walkerlab.pipeline.progress import Progress
-from walkerlab.store.checkpoint import Checkpoint, Numbers
-from walkerlab.workers import WorkerDiedError, WorkerPool
+from walkerlab.pipeline.store.checkpoint import Checkpoint, Numbers
+from walkerlab.pipeline.workers import WorkerDiedError, WorkerPool
 
 SCOUTS: Final = 2
 """Size of the first batch, which runs alone: it compiles the kernels once and measures the time of a unit."""

@@ -11,22 +11,22 @@ import numpy as np
 
 from walkerlab.config.walkers import Kneed, PartsWalker
 from walkerlab.errors import ConfigError, NoAnswer
-from walkerlab.ground.compliant import KneeRules, contact_walker
-from walkerlab.ground.friction import FrictionLaw, law_named
-from walkerlab.ground.knees import KneeStop
-from walkerlab.ground.normal_force import NormalLaw
-from walkerlab.ground.resting import RestingFoot, resting_foot
-from walkerlab.ground.terrain import STANCE_FOOT, Terrain, after_mid_swing, checkerboard, plane
-from walkerlab.ground.walker import ContactWalker, changed_forms, floating_state
-from walkerlab.hybrid.contact_events import Frame, JudgedGround
-from walkerlab.hybrid.contact_result import ContactWalkResult, walk_contact
-from walkerlab.mechanics.parts import Assembly
-from walkerlab.mechanics.rigid import places_of
-from walkerlab.orbits.contact_gait import GaitAnswer, find_gait_from
-from walkerlab.orbits.contact_map import WalkerOnGround
+from walkerlab.physics.ground.compliant import KneeRules, contact_walker
+from walkerlab.physics.ground.friction import FrictionLaw, law_named
+from walkerlab.physics.ground.knees import KneeStop
+from walkerlab.physics.ground.normal_force import NormalLaw
+from walkerlab.physics.ground.resting import RestingFoot, resting_foot
+from walkerlab.physics.ground.terrain import STANCE_FOOT, Terrain, after_mid_swing, checkerboard, plane
+from walkerlab.physics.ground.walker import ContactWalker, changed_forms, floating_state
+from walkerlab.physics.hybrid.contact_events import Frame, JudgedGround
+from walkerlab.physics.hybrid.contact_result import ContactWalkResult, walk_contact
+from walkerlab.physics.mechanics.parts import Assembly
+from walkerlab.physics.mechanics.rigid import places_of
+from walkerlab.physics.orbits.contact_gait import GaitAnswer, find_gait_from
+from walkerlab.physics.orbits.contact_map import WalkerOnGround
+from walkerlab.physics.solvers.registry import Tolerances
+from walkerlab.physics.solvers.system import Floats, State
 from walkerlab.scene.parts import AnyWalker, assembly_of, drive_parameters
-from walkerlab.solvers.registry import Tolerances
-from walkerlab.solvers.system import Floats, State
 
 if TYPE_CHECKING:
     from walkerlab.config.contact import Contact

@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from walkerlab.errors import ConfigError
-from walkerlab.orbits.rigid_map import RigidMap, WalkerAt
+from walkerlab.physics.orbits.rigid_map import RigidMap, WalkerAt
+from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.scene.parameter import Parameter, parameter_of
 from walkerlab.scene.rigid import rigid_walker
-from walkerlab.solvers.registry import Tolerances
 
 if TYPE_CHECKING:
     from walkerlab.config.reads import ContactConfig
-    from walkerlab.orbits.contact_map import ContactMap, WalkerOnGround
+    from walkerlab.physics.orbits.contact_map import ContactMap, WalkerOnGround
 
 # Solver settings of one step of the contact model.
 CONTACT_STEP = Tolerances("radau5", 1e-10, 1e-12, 60_000)
@@ -41,7 +41,7 @@ def walkers_on_ground(
 
 
 def contact_map(config: ContactConfig, parameter: Parameter, scale: float, step_length_m: float) -> ContactMap:
-    from walkerlab.orbits.contact_map import ContactMap
+    from walkerlab.physics.orbits.contact_map import ContactMap
     from walkerlab.scene.contact import contact_scene
 
     walkers = walkers_on_ground(config, parameter, step_length_m)

@@ -3,8 +3,8 @@
 import numpy as np
 
 from walkerlab.config.ground import Footholds
-from walkerlab.hybrid.walk_record import rough_heights
-from walkerlab.solvers.system import Floats
+from walkerlab.physics.hybrid.walk_record import rough_heights
+from walkerlab.physics.solvers.system import Floats
 
 
 def foothold_heights(ground: Footholds, steps: int) -> Floats | None:

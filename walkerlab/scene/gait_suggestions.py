@@ -15,9 +15,9 @@ from walkerlab.config.files import builtin_names
 from walkerlab.config.loader import load
 from walkerlab.config.schema import Config
 from walkerlab.config.walkers import Kneed
-from walkerlab.orbits.families import BranchFollower, GaitBranch, Seed, ValueSpan
-from walkerlab.orbits.fixed_point import RigidGait, SearchSettings, find_gaits
-from walkerlab.orbits.rigid_map import RigidMap, WalkerAt
+from walkerlab.physics.orbits.families import BranchFollower, GaitBranch, Seed, ValueSpan
+from walkerlab.physics.orbits.fixed_point import RigidGait, SearchSettings, find_gaits
+from walkerlab.physics.orbits.rigid_map import RigidMap, WalkerAt
 from walkerlab.scene.families import rigid_walkers
 from walkerlab.scene.parameter import SLOPE, Parameter
 from walkerlab.scene.rigid import rigid_walker

@@ -5,8 +5,8 @@ from typing import Any
 from walkerlab.config.reads import RigidConfig
 from walkerlab.config.walkers import LIGHTEST_CONTACT, CompassWalker, Kneed, PartsWalker, StraightLegs, torso_mass
 from walkerlab.errors import ConfigError
-from walkerlab.mechanics.parts import Assembly, BallFoot, Body, Coupling, Knee, Particle, Revolute
-from walkerlab.mechanics.walkers import Arc, Limb, kneed_legs, straight_legs, with_torso
+from walkerlab.physics.mechanics.parts import Assembly, BallFoot, Body, Coupling, Knee, Particle, Revolute
+from walkerlab.physics.mechanics.walkers import Arc, Limb, kneed_legs, straight_legs, with_torso
 
 PARTS_DOCS = "docs/walkers.md shows a walker described by its parts."
 AnyWalker = CompassWalker | StraightLegs | Kneed | PartsWalker

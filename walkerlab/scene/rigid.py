@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING
 from walkerlab.config.ground import Footholds
 from walkerlab.config.walkers import Walker
 from walkerlab.errors import ConfigError
-from walkerlab.hybrid.recorded_walk import RigidWalkResult, take_walk
-from walkerlab.mechanics.rigid import knee_of, on_level_ground, places_of
-from walkerlab.mechanics.rigid_model import RigidModel, on_slope
+from walkerlab.physics.hybrid.recorded_walk import RigidWalkResult, take_walk
+from walkerlab.physics.mechanics.rigid import knee_of, on_level_ground, places_of
+from walkerlab.physics.mechanics.rigid_model import RigidModel, on_slope
+from walkerlab.physics.solvers.registry import Tolerances
+from walkerlab.physics.solvers.system import State
 from walkerlab.scene.footholds import foothold_heights
 from walkerlab.scene.parts import PARTS_DOCS, assembly_of, drive_parameters, knee_locked_at_strike
 from walkerlab.scene.studies import with_equations
-from walkerlab.solvers.registry import Tolerances
-from walkerlab.solvers.system import State
 
 if TYPE_CHECKING:
     from walkerlab.config.reads import RigidConfig

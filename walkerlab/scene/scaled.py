@@ -2,13 +2,13 @@
 
 from dataclasses import replace
 
-from walkerlab.hybrid.recorded_walk import with_scaled_rates
-from walkerlab.mechanics.rigid_model import RigidModel
-from walkerlab.orbits import scaled_starts
-from walkerlab.orbits.contact_gait import GaitAnswer
+from walkerlab.physics.hybrid.recorded_walk import with_scaled_rates
+from walkerlab.physics.mechanics.rigid_model import RigidModel
+from walkerlab.physics.orbits import scaled_starts
+from walkerlab.physics.orbits.contact_gait import GaitAnswer
+from walkerlab.physics.solvers.registry import Tolerances
+from walkerlab.physics.solvers.system import State
 from walkerlab.scene.contact import ContactScene, start_state
-from walkerlab.solvers.registry import Tolerances
-from walkerlab.solvers.system import State
 
 # away from edges, a map has the same outcomes as with the config's tolerances (docs/adjustment.md)
 MAP_RTOL, MAP_ATOL = 1e-4, 1e-6

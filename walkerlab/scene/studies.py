@@ -1,7 +1,7 @@
 """Registration of the reproduced study's walker and of its equations besides Lagrange's.
 
 The study is named by a string and imported late: nothing here depends on it, yet its law is part of the code that
-results are made of (see sources.py).
+results are made of (see code_digest.py).
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ from walkerlab.registration import registered
 
 if TYPE_CHECKING:
     from walkerlab.config.schema import Equations
-    from walkerlab.mechanics.rigid_model import RigidModel
+    from walkerlab.physics.mechanics.rigid_model import RigidModel
 
-STUDY = "walkerlab.paper.law"
+STUDY = "walkerlab.evidence.paper.law"
 LAGRANGE_EQUATIONS: Equations = "corrected"
 
 

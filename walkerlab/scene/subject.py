@@ -7,19 +7,19 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 from walkerlab.errors import NoAnswer
-from walkerlab.hybrid.recorded_walk import as_state
-from walkerlab.mechanics.rigid_model import RigidModel
-from walkerlab.orbits.family_search import CONTACT, RIGID
-from walkerlab.orbits.gradients import Gradient, gradients
-from walkerlab.orbits.rigid_map import coordinates_of
-from walkerlab.orbits.robustness import GaitOnMap
-from walkerlab.orbits.similarity import unit_walker
-from walkerlab.orbits.step_map import StepMap
+from walkerlab.physics.hybrid.recorded_walk import as_state
+from walkerlab.physics.mechanics.rigid_model import RigidModel
+from walkerlab.physics.orbits.family_search import CONTACT, RIGID
+from walkerlab.physics.orbits.gradients import Gradient, gradients
+from walkerlab.physics.orbits.rigid_map import coordinates_of
+from walkerlab.physics.orbits.robustness import GaitOnMap
+from walkerlab.physics.orbits.similarity import unit_walker
+from walkerlab.physics.orbits.step_map import StepMap
+from walkerlab.physics.solvers.registry import ENDLESS, Tolerances
+from walkerlab.physics.solvers.system import Floats
 from walkerlab.scene.families import contact_map, rigid_map
 from walkerlab.scene.parameter import SLOPE, Parameter
 from walkerlab.scene.rigid import rigid_walker
-from walkerlab.solvers.registry import ENDLESS, Tolerances
-from walkerlab.solvers.system import Floats
 
 if TYPE_CHECKING:
     from walkerlab.config.reads import ContactConfig

@@ -1,6 +1,6 @@
 """`python -m toy` is the command line of the toy pipeline."""
 
 from toy.pipeline import GRAPH
-from walkerlab.cli.main import program
+from walkerlab.views.cli.main import program
 
 program(GRAPH)(prog_name="toy")

@@ -1,6 +1,6 @@
 """How high, by the contact's stiffness."""
 
-from walkerlab.store.content import Content
+from walkerlab.pipeline.store.content import Content
 
 
 def run(config, inputs, progress):

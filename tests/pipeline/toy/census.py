@@ -2,7 +2,7 @@
 
 import os
 
-from walkerlab.store.content import Content
+from walkerlab.pipeline.store.content import Content
 
 
 def run(config, inputs, progress, checkpoint):

@@ -8,7 +8,7 @@ import numpy as np
 
 from toy.physics import fall_time
 from walkerlab.errors import NoAnswer
-from walkerlab.store.content import Content, Group, Variable
+from walkerlab.pipeline.store.content import Content, Group, Variable
 
 
 def run(config, inputs, progress):

@@ -1,8 +1,8 @@
 """One page."""
 
-from walkerlab.store import index
-from walkerlab.store.content import Content
-from walkerlab.store.files import write_atomically
+from walkerlab.pipeline.store import index
+from walkerlab.pipeline.store.content import Content
+from walkerlab.pipeline.store.files import write_atomically
 
 
 def run(config, inputs, progress, folder, left_out):

@@ -1,8 +1,8 @@
 """One figure, that names what it was drawn from."""
 
-from walkerlab.store import index
-from walkerlab.store.content import Content
-from walkerlab.store.files import make_folder, write_atomically
+from walkerlab.pipeline.store import index
+from walkerlab.pipeline.store.content import Content
+from walkerlab.pipeline.store.files import make_folder, write_atomically
 
 
 def run(config, inputs, progress, folder, left_out):

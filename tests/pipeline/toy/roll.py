@@ -1,6 +1,6 @@
 """As many steps as asked for, each a fall."""
 
-from walkerlab.store.content import Content
+from walkerlab.pipeline.store.content import Content
 
 
 def run(config, inputs, progress):

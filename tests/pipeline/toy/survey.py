@@ -4,7 +4,7 @@ import time
 
 import numpy as np
 
-from walkerlab.store.content import Content, Group, Variable
+from walkerlab.pipeline.store.content import Content, Group, Variable
 
 
 def run(config, inputs, progress, jobs):

@@ -1,0 +1,227 @@
+"""Error against run time on the rigid scene, a few methods: what the rows say, and what is computed from them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from walkerlab.config.loader import load
+from walkerlab.evidence.benchmarks import accuracy, ladder
+from walkerlab.evidence.benchmarks.accuracy import best_methods, conclusion, summarise
+from walkerlab.evidence.benchmarks.ladder import (
+    Ascent,
+    MethodRow,
+    MethodRun,
+    ascend,
+    complete_ascents,
+    make_row,
+    measure,
+    omitted_tolerances,
+)
+from walkerlab.evidence.benchmarks.references import End, Reference, WalkEndsError, reference_for
+from walkerlab.evidence.benchmarks.trials import USER_SCRIPT, RigidTrial, TrialRun
+from walkerlab.evidence.paper.walker import compass
+from walkerlab.labels import labels_of
+from walkerlab.pipeline.store.columns import rows_group
+from walkerlab.scene.rigid import rigid_walker
+
+CONFIG = load(None, ("contact=null",)).config
+START = (-0.20420, 0.16940, 0.98 * -0.605819, 0.98 * -0.861041)
+FEW = ("dop853", "radau5", "scipy-dop853", USER_SCRIPT)
+TRIAL = RigidTrial(rigid_walker(CONFIG, CONFIG.equations), START, 3, compass(CONFIG, CONFIG.equations))
+LADDER = (1e-4, 1e-7, 1e-10)
+
+
+@pytest.fixture(scope="module")
+def reference():
+    return reference_for(TRIAL)
+
+
+def measured(method, rtol, reference):
+    one = Ascent(TRIAL, method, LADDER, (), unfinished=False)
+    return make_row(one, measure(TRIAL, method, rtol, 10**5), reference)
+
+
+@pytest.fixture(scope="module")
+def rows(reference):
+    return [measured(method, rtol, reference) for method in FEW for rtol in LADDER]
+
+
+def test_the_reference_is_known_to_rounding_and_by_two_ways(reference):
+    assert reference.method != reference.second_method
+    assert reference.agreement < 1e-13
+
+
+def test_a_walker_that_taylor_series_cannot_walk_is_known_by_two_ways_too():
+    """Neither is then the Taylor method: the closed form is that of a compass."""
+    reference = reference_for(replace(TRIAL, compass=None, steps=1))
+    assert {reference.method, reference.second_method} == {"dop853", "radau5"}
+    assert reference.agreement < 1e-10
+
+
+def test_every_method_converges_to_the_reference(rows):
+    for method in FEW:
+        errors = [row.error for row in rows if row.method == method]
+        assert errors == sorted(errors, reverse=True)
+        assert errors[-1] < 1e-8
+
+
+def test_our_compiled_methods_and_scipys_agree_to_what_the_tolerances_promise(rows):
+    tightest = {row.method: row.error for row in rows if row.tolerance == LADDER[-1]}
+    assert max(tightest.values()) < 100 * LADDER[-1]
+
+
+def test_a_script_with_numpy_needs_the_work_of_the_same_method(rows):
+    work = {row.method: row.rhs_evaluations for row in rows if row.tolerance == 1e-7}
+    assert 0.5 * work["scipy-dop853"] < work[USER_SCRIPT] <= work["scipy-dop853"]
+
+
+def test_content_is_the_same_each_time_apart_from_timings(reference, rows):
+    again = measured("dop853", 1e-7, reference)
+    first = next(row for row in rows if row.method == "dop853" and row.tolerance == 1e-7)
+    timings = {"wall_s": 0.0, "least_wall_s": 0.0, "largest_wall_s": 0.0, "repeats_of_wall_s": 0}
+    assert replace(again, **timings) == replace(first, **timings)
+
+
+def test_timings_are_marked_as_such(rows):
+    variables = rows_group(rows, labels_of(MethodRow)).variables
+    timings = {"wall_s", "least_wall_s", "largest_wall_s", "repeats"}
+    assert {name for name, variable in variables.items() if variable.timing} == timings
+
+
+def test_no_method_is_measured_by_its_own_end(rows, reference):
+    assert all(row.against != row.method for row in rows)
+    near = Reference(End("dop853", np.zeros(4)), End("radau5", np.full(4, 1e-12)))
+    assert near.agreement == 1e-12
+    assert near.for_method("dop853").method == "radau5"
+    assert {near.for_method(method).method for method in ("radau5", "scipy-radau")} == {"dop853"}
+
+
+def test_an_error_below_what_the_reference_is_known_to_is_marked():
+    unsure = Reference(End("heyoka-taylor", np.zeros(4)), End("dop853", np.full(4, 1e-8)))
+    ends = {1e-4: 2e-8, 1e-8: 1e-9}
+    climbed = Ascent(TRIAL, "radau5", tuple(ends), (), unfinished=False)
+    runs = [MethodRun(rtol, TrialRun("walked", np.full(4, end), 1, 1, 0), (1.0,)) for rtol, end in ends.items()]
+    assert [make_row(climbed, run, unsure).within_reference for run in runs] == [False, True]
+
+
+def test_an_exhausted_budget_stays_visible_and_ends_the_ladder(reference, monkeypatch):
+    monkeypatch.setattr(ladder, "RUN_BUDGET", 500)
+    one = ascend(TRIAL, "radau5")
+    rows = [make_row(one, run, reference) for run in one.runs]
+    assert [row.outcome for row in rows[:-1]] == ["walked"] * (len(rows) - 1)
+    assert (rows[-1].outcome, rows[-1].error, rows[-1].within_reference) == ("budget-exhausted", None, False)
+    not_run = omitted_tolerances(one)
+    assert len(rows) + len(not_run) == len(ladder.OWN_LADDER)
+    assert all("budget-exhausted" in entry["why"] for entry in not_run)
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_a_librarys_long_run_is_put_off_and_made_good(jobs, monkeypatch):
+    whole = [run.result.rhs_evaluations for run in ascend(TRIAL, "scipy-dop853").runs]
+    monkeypatch.setattr(ladder, "SHORT_RUN_BUDGET", whole[2] - 1)
+    short = ascend(TRIAL, "scipy-dop853")
+    assert short.unfinished
+    assert [run.result.rhs_evaluations for run in short.runs] == whole[:2]
+    other = ascend(TRIAL, "dop853")
+    (end,), (made_good, same) = complete_ascents([TRIAL], [short, other], jobs)
+    assert [run.result.rhs_evaluations for run in made_good.runs] == whole[:3]
+    assert len(omitted_tolerances(made_good)) == len(ladder.LIBRARY_LADDER) - 3
+    assert same is other
+    assert end.state == pytest.approx(made_good.runs[-1].result.state, abs=1e-5)
+
+
+class SlowAtFirst:
+    """A trial whose first run of all takes much longer, as one that compiles does."""
+
+    name, methods = "rigid", ("dop853",)
+
+    def __init__(self):
+        self.clock, self.runs = 0.0, 0
+
+    def prepare(self, method, rtol, budget):
+        return self.run
+
+    def run(self):
+        self.clock += 1e-3 if self.runs else 60.0
+        self.runs += 1
+        return TrialRun("walked", np.zeros(4), 1, 1, 0)
+
+
+def test_compiling_is_not_measured(reference, monkeypatch):
+    trial = SlowAtFirst()
+    monkeypatch.setattr(ladder.time, "perf_counter", lambda: trial.clock)
+    rows = [make_row(one, run, reference) for one in (ascend(trial, "dop853"),) for run in one.runs]
+    assert [row.wall_s for row in rows] == pytest.approx([1e-3] * len(ladder.OWN_LADDER))
+    assert {row.repeats_of_wall_s for row in rows} == {ladder.MAX_REPEATS}
+
+
+def made(method, error, wall_s):
+    work = 1600 if method.startswith("scipy") else 800
+    walls = wall_s, 0.9 * wall_s, 1.2 * wall_s
+    return MethodRow("rigid", method, 1e-6, "walked", error, "heyoka-taylor", False, *walls, 7, work, 10, 0)
+
+
+MADE = [
+    made("dop853", 1e-4, 1.0),
+    made("dop853", 1e-10, 3.0),
+    made("radau5", 1e-7, 2.0),
+    made("scipy-bdf", 1e-7, 8.0),
+    made("scipy-lsoda", None, 0.1),
+]
+
+
+def test_the_best_is_the_fastest_that_is_exact_enough():
+    assert best_methods(MADE, "rigid") == {"1e-3": "dop853", "1e-6": "radau5", "1e-9": "dop853"}
+    assert best_methods(MADE, "contact") == {}
+
+
+def test_the_conclusion_compares_with_the_best_library():
+    said = conclusion(MADE, "rigid")
+    assert "at 1e-06, radau5 is fastest with 2e+03 ms, 4 times faster than scipy-bdf" in said
+    assert "no method reaches" not in said
+
+
+def test_the_factor_over_a_library_is_told_as_work_of_the_method_times_cost_of_a_right_hand_side():
+    said = conclusion(MADE, "rigid")
+    # 1600 against 800 right-hand sides, 8 s against 2 s: twice as many, each twice as costly
+    factors = "a factor of 2 from fewer right-hand sides, and 2 from the total cost of each: 2500 µs against 5000 µs"
+    assert factors in said
+    assert "the library’s run in Python" in said
+    more = [made("dop853", 1e-10, 2.0), replace(made("scipy-bdf", 1e-10, 8.0), rhs_evaluations=400)]
+    assert "0.5 from more right-hand sides, and 8 from the total cost of each" in conclusion(more, "rigid")
+
+
+def test_a_script_with_a_right_hand_side_of_its_own_is_not_the_library_of_the_factor():
+    script = [made("dop853", 1e-4, 1.0), made(USER_SCRIPT, 1e-4, 5.0), made("scipy-bdf", 1e-4, 8.0)]
+    assert "8 times faster than scipy-bdf" in conclusion(script, "rigid")
+
+
+def test_a_reference_says_by_whom_it_is_and_what_it_took(reference):
+    summary = summarise([], [], {"rigid": reference}, 1)["reference"]["rigid"]
+    assert summary["from_outside"] == (reference.method == "heyoka-taylor")
+    ours = reference_for(replace(TRIAL, compass=None, steps=1))
+    told = summarise([], [], {"rigid": ours}, 1)["reference"]["rigid"]
+    assert not told["from_outside"]
+    assert told["tolerance"] == 1e-14
+    assert told["rhs_evaluations"] == ours.first.rhs_evaluations > 100
+
+
+def test_the_summary_has_the_fixed_keys(rows, reference):
+    summary = summarise(rows, [], {"rigid": reference}, 1)
+    assert {"rows", "repeats", "reference", "best"} <= summary.keys()
+    fixed = {"scene", "method", "tolerance", "error", "wall_s", "rhs_evaluations", "accepted", "rejected", "outcome"}
+    assert fixed <= summary["rows"][0].keys()
+    assert summary["rigid_velocity_factor"] == 0.98
+    assert {"method", "second_method", "agreement", "state"} <= summary["reference"]["rigid"].keys()
+
+
+def test_a_walk_that_ends_early_has_no_reference():
+    lying = replace(TRIAL, start=(-1.6, 1.6, 0.0, 0.0))
+    with pytest.raises((WalkEndsError, ValueError)):
+        reference_for(lying)
+
+
+def test_a_walk_that_ends_early_is_said_to_start_off_the_gait():
+    entry = accuracy.omitted_scene(RigidTrial(None, None, 1, None), WalkEndsError("the walk ends early (fell)"))
+    assert entry["why"] == "started with velocities scaled by 0.98, the walk ends early (fell)"

@@ -1,0 +1,135 @@
+"""Every engine that is installed: its swing converges to ours, its contact carries what it should, our law is ours."""
+
+import importlib
+from functools import cache
+
+import numpy as np
+import pytest
+from engine_scenes import compass, kneed
+
+from walkerlab.evidence.benchmarks.engines.adapter import Stepping
+from walkerlab.evidence.benchmarks.engines.experiments import START_FACTORS, contact_target, simulate, swing_truth
+from walkerlab.evidence.benchmarks.engines.registry import ENGINES
+from walkerlab.evidence.benchmarks.engines.runs import Bench, SwingTask, TuningTask, WalkTask, pinned_model
+
+SWING_S, COARSE_S = 0.24, 4e-3
+
+
+@pytest.fixture(params=ENGINES)
+def engine(request):
+    entry = ENGINES[request.param]
+    pytest.importorskip(entry.module, reason=f"{entry.name} is not installed: {entry.install_line}")
+    return entry
+
+
+@cache
+def free_swing(walker):
+    scene = walker()
+    n = len(scene.model.chain)
+    start = np.array((*scene.start[2 : 2 + n], *scene.start[4 + n :]))
+    return scene, start, *swing_truth(scene, start, SWING_S)
+
+
+def swing(engine, integrator, step_s, tolerance=None, walker=compass):
+    scene, start, truth, energy = free_swing(walker)
+    stepping = Stepping(integrator, step_s, tolerance)
+    task = SwingTask(engine.name, stepping, pinned_model(scene), scene.ours.slope, start, SWING_S, 10_000)
+    end = task.run().end
+    return float(np.max(np.abs(end - truth))), abs(energy(end) - energy(start))
+
+
+@pytest.mark.parametrize("walker", [compass, kneed])
+def test_swings_converge_to_ours_with_the_order_that_is_promised(engine, walker):
+    for name, entry in engine.adapter().INTEGRATORS.items():
+        if entry.adapts:
+            continue
+        coarse, fine = (swing(engine, name, h, walker=walker)[0] for h in (COARSE_S, 0.5 * COARSE_S))
+        assert np.log2(coarse / fine) == pytest.approx(entry.order, abs=0.2), name
+
+
+def test_energy_drifts_no_more_than_the_swing_errs(engine):
+    for name, entry in engine.adapter().INTEGRATORS.items():
+        error, drift = swing(engine, name, 1e-3, 1e-8 if entry.adapts else None)
+        # at most 25 kg m^2/s^2 per unit of angle or velocity
+        assert drift < 25.0 * error + 1e-12, name
+
+
+def test_a_ball_rests_where_the_law_has_it(engine):
+    target = contact_target(compass())
+    for contact in engine.adapter().CONTACTS:
+        task = TuningTask(engine.name, contact, target, 1e-4, 1.5)
+        depth = Bench(task, engine.adapter().tuned(contact, target)).at_rest()
+        assert depth == pytest.approx(target.penetration, rel=2e-3), contact
+
+
+def test_a_block_creeps_and_slides_as_the_law_has_it(engine):
+    """By the closed forms of its friction; a convex one, which lifts a block that slides, has another."""
+    target = contact_target(compass())
+    for contact in engine.adapter().CONTACTS:
+        task = TuningTask(engine.name, contact, target, 1e-4, 1.5)
+        bench = Bench(task, engine.adapter().tuned(contact, target))
+        if contact == "sap":
+            assert bench.creep(target.penetration) < 1e-3 * target.creep_velocity
+            continue
+        assert bench.creep(target.penetration) == pytest.approx(target.creep_velocity, rel=1e-3), contact
+        if engine.name != "mujoco":
+            assert bench.friction(target.penetration) == pytest.approx(target.friction, rel=1e-2), contact
+
+
+def test_a_knee_locks_in_an_engine_as_in_our_walk(engine):
+    """The engine's own swing with a free knee, the lock, and its own swing with one body less."""
+    scene = kneed()
+    until = 0.4
+    truth = simulate(scene, "radau5", 1e-10, 1, until)
+    name, entry = max(engine.adapter().INTEGRATORS.items(), key=lambda one: (one[1].adapts, one[1].order))
+    stepping = Stepping(name, 5e-3 if entry.adapts else 5e-5, 1e-7 if entry.adapts else None)
+    answer = WalkTask(engine.name, stepping, scene, 1, until, None, 50_000).run()
+    assert answer.outcome == "walked"
+    assert truth.knee_strike_time_s[0] < until < truth.touch_time_s[0]
+    shank, thigh = (scene.assembly.index(body) for body in ("shank 1", "thigh 1"))
+    assert answer.end[2 + shank] == answer.end[2 + thigh]
+    assert answer.end == pytest.approx(truth.samples.states[1], abs=2e-5)
+
+
+DRIVES = {
+    "nothing": (),
+    "a push-off": ("push_off.impulse_N_s=1",),
+    "all drives": (
+        "push_off.impulse_N_s=1", "push_off.duration_s=0.02", "walker.hip.spring_N_m_per_rad=2",
+        "walker.hip.damping_N_m_s_per_rad=0.05", "walker.hip.torque_N_m=0.3",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("drives", DRIVES)
+def test_our_law_in_an_engine_is_our_walk(engine, drives):
+    """To the first touch and through it: of first order, by a factor that hangs on where in a step the touch falls."""
+    scene = compass(*DRIVES[drives])
+    until = 0.8
+    truth = simulate(scene, "radau5", 1e-10, 2, until).samples.states[1]
+    errors = []
+    name = next(name for name, entry in engine.adapter().INTEGRATORS.items() if entry.order > 1)
+    for step in (1.6e-4, 2e-5):
+        task = WalkTask(engine.name, Stepping(name, until / round(until / step)), scene, 2, until, None, 50_000)
+        answer = task.run()
+        assert answer.outcome == "walked"
+        errors.append(float(np.max(np.abs(answer.end - truth))))
+    assert errors[1] < 0.5 * errors[0]
+    assert errors[1] < 1e-2
+
+
+def test_a_run_is_the_same_each_time(engine):
+    scene = compass()
+    contact, integrator = next(iter(engine.adapter().CONTACTS.items()))
+    own = engine.adapter().tuned(contact, contact_target(scene))
+    ends = []
+    for _ in range(2):
+        task = WalkTask(engine.name, Stepping(integrator, 2e-4), scene.started(START_FACTORS[-1]), 1, 10.0, own, 6_000)
+        ends.append(task.run())
+    assert ends[0].touches_s.tolist() == ends[1].touches_s.tolist()
+    assert ends[0].steps == ends[1].steps
+
+
+def test_nothing_of_an_engine_is_imported_by_its_adapter(engine):
+    module = importlib.import_module(f"walkerlab.evidence.benchmarks.engines.{engine.name}")
+    assert not any(getattr(value, "__name__", "").split(".")[0] == engine.module for value in vars(module).values())

@@ -1,0 +1,233 @@
+"""What engines are told of a walker, and how a walk is judged from outside: no engine is needed for this."""
+
+import numpy as np
+import pytest
+from engine_scenes import compass, kneed
+
+from walkerlab.errors import ConfigError
+from walkerlab.evidence.benchmarks.engines.experiments import CREEP_LOAD, contact_target, simulate
+from walkerlab.evidence.benchmarks.engines.follow import RuleFollower, crossing
+from walkerlab.evidence.benchmarks.engines.runs import pinned_model
+from walkerlab.outcome import Outcome
+from walkerlab.physics.ground.friction import friction_coefficient
+from walkerlab.physics.ground.terrain import STANCE_FOOT
+from walkerlab.physics.ground.walker import BENT, LOCKED
+from walkerlab.physics.hybrid.contact_result import walk_contact
+from walkerlab.physics.mechanics.hinges import HIP_ROW, hinge_law
+from walkerlab.physics.solvers.registry import Tolerances
+
+
+@pytest.fixture(params=[(), ("contact.terrain=after-mid-swing",)], ids=["pads", "after-mid-swing"])
+def scene(request):
+    return compass(*request.param)
+
+
+def our_samples(scene, interval_s, steps):
+    """Our own walk, as an engine with steps of `interval_s` would give it."""
+    result = simulate(scene, "radau5", 1e-9, steps, interval_s)
+    return result, result.samples
+
+
+def test_coordinates_lead_to_an_engine_and_back(scene):
+    q, v = scene.from_base(scene.start)
+    assert scene.about_centre(q, v) == pytest.approx(scene.start, abs=1e-14)
+
+
+def test_the_whole_mass_goes_over_with_its_centre(scene):
+    model = scene.model
+    assert sum(link.mass_kg for link in model.links) == pytest.approx(20.0)
+    hip_leg = model.links[0]
+    # 10 kg at the hip and 5 kg half a metre below it
+    assert hip_leg.centre_m == pytest.approx((0.0, -0.5 * 5.0 / 15.0))
+    assert hip_leg.inertia_kg_m2 == pytest.approx(5.0 * 10.0 / 15.0 * 0.25)
+
+
+def test_locked_thigh_and_shank_are_one_body_and_the_released_ones_two():
+    scene = kneed()
+    stance, *swing = scene.model.links
+    assert [link.name for link in swing] == ["thigh 1", "shank 1"]
+    assert scene.knee_places == (4, -1)
+    # hip 0.5 kg, thigh 0.5 kg 0.325 m and shank 0.05 kg 0.625 m below the hip
+    centre = -(0.5 * 0.325 + 0.05 * 0.625) / 1.05
+    about_hip = 0.5 * 0.325**2 + 0.05 * 0.625**2
+    assert stance.mass_kg == pytest.approx(1.05)
+    assert stance.centre_m == pytest.approx((0.0, centre))
+    assert stance.inertia_kg_m2 == pytest.approx(about_hip - 1.05 * centre**2)
+    assert scene.model.balls[1].centre_m[1] == pytest.approx(-1.0)
+
+
+def test_feet_ahead_of_the_shanks_are_ahead_in_an_engine_too():
+    scene = kneed("walker.foot_centre_ahead_m=0.03", "walker.foot_radius_m=0.2")
+    bent, straight = (scene.model.balls[foot] for foot in (0, 1))
+    # of the swing leg in its shank's frame, of the stance leg, which is one link, in its thigh's
+    assert bent.centre_m == pytest.approx((0.03, 0.2 - 0.5))
+    assert straight.centre_m == pytest.approx((0.03, 0.2 - 1.0))
+    assert {ball.radius_m for ball in (bent, straight)} == {0.2}
+
+
+@pytest.mark.parametrize("doing", [(BENT, BENT), (LOCKED, BENT), (LOCKED, LOCKED)])
+def test_coordinates_of_a_kneed_walker_lead_to_an_engine_and_back(doing):
+    scene = kneed().with_knees_locked(np.array(doing, np.int8))
+    y = np.array(scene.start)
+    for knee in scene.locked:
+        shank, thigh = (scene.assembly.index(body) for body in (knee.shank, knee.thigh))
+        for first in (2, 8):
+            y[first + shank] = y[first + thigh]
+    q, v = scene.from_base(tuple(y))
+    assert len(q) == scene.model.size == 6 - len(scene.locked)
+    assert scene.about_centre(q, v) == pytest.approx(y, abs=1e-14)
+
+
+def knees_seen(scene):
+    """Our own walk of two steps, what the rules remember of it, and when knees change: time, places before, after."""
+    result, samples = our_samples(scene, 1e-4, 2)
+    rules, changes = RuleFollower(scene, 2, *scene.from_base(scene.start)), []
+    for time_s, y in zip(samples.time_s[1:].tolist(), samples.states[1:], strict=True):
+        q, v = rules.scene.from_base(tuple(y))
+        q[np.abs(q) < 1e-12] = 0.0  # a knee that has just locked is straight but for rounding
+        before = rules.scene.knee_places
+        rules.follow(time_s, q, v)
+        if rules.turn is not None:
+            rules.watches = False
+            rules.follow(time_s, q, v)
+            rules.watches = True
+        if rules.turn is not None or rules.is_outdated:
+            rules.go_on(q, v)
+        if rules.scene.knee_places != before:
+            changes.append((time_s, before, rules.scene.knee_places))
+    return result, rules, changes
+
+
+def test_the_rules_see_knees_lock_and_be_released_as_in_our_own_walk():
+    result, rules, changes = knees_seen(kneed())
+    # the swing knee locks, the trailing one is released and locks in turn
+    assert [places for _, _, places in changes] == [(-1, -1), (-1, 4), (-1, -1)]
+    assert changes[0][0] == pytest.approx(result.knee_strike_time_s[0], abs=1e-4)
+    assert 0.0 < changes[1][0] - result.touch_time_s[0] < 2e-3
+    assert changes[2][0] == pytest.approx(result.knee_strike_time_s[1], abs=1e-4)
+    # the ground stops the foot, at about 2000 m/s^2 from 0.4 m/s, within the step that the cubic spans
+    assert rules.walk_state.touch_time[:1] == pytest.approx(result.touch_time_s[:1], abs=1e-5)
+
+
+def test_a_knee_that_a_touch_releases_is_free_from_the_next_step_on():
+    result, _, changes = knees_seen(kneed("walker.knee={release: touch}"))
+    time_s, before, after = changes[1]
+    assert 0.0 <= time_s - result.touch_time_s[0] < 1e-4
+    assert (before, after) == ((-1, -1), (-1, 4))
+
+
+def test_a_knee_that_a_push_holds_is_free_as_it_ends():
+    push = ("push_off.impulse_N_s=0.05", "push_off.duration_s=0.02")
+    for rule in ("touch", "compression"):
+        result, _, changes = knees_seen(kneed(*push, f"walker.knee={{release: {rule}}}"))
+        time_s, before, after = changes[1]
+        assert time_s - result.touch_time_s[0] == pytest.approx(0.02, abs=1.5e-4)
+        assert (before, after) == ((-1, -1), (-1, 4))
+
+
+DRIVEN = ("push_off.impulse_N_s=1", "walker.hip.spring_N_m_per_rad=2", "walker.hip.torque_N_m=0.3")
+
+
+def test_forces_of_drives_do_the_work_that_our_walk_gives():
+    """In the twentieth of a second after the first touch."""
+    scene = compass(*DRIVEN)
+    tight = Tolerances("radau5", 1e-9, 1e-11, 10**6)
+    result = walk_contact(scene.ours, scene.ground, False, STANCE_FOOT, scene.start, tight, 2, 1e-5)
+    samples = result.samples
+    rules = RuleFollower(scene, 2, *scene.from_base(scene.start), carries=False)
+    begin, end = (int(np.searchsorted(samples.time_s, result.touch_time_s[0] + late)) for late in (1e-4, 0.05))
+    progress = rules.walk_state.progress
+    progress.stance, progress.steps, progress.last_touch = 0, 1, result.touch_time_s[0]
+    powers = []
+    for i in range(begin, end + 1):
+        q, v = scene.from_base(tuple(samples.states[i]))
+        powers.append(float(rules.forces(float(samples.time_s[i]), q, v) @ v))
+    elastic = 0.5 * hinge_law(scene.ours.whole, HIP_ROW).stiffness * (samples.states[:, 3] - samples.states[:, 2]) ** 2
+    given = samples.driven_J[end].sum() - samples.driven_J[begin].sum() + elastic[begin] - elastic[end]
+    assert np.trapezoid(powers, samples.time_s[begin : end + 1]) == pytest.approx(given, rel=1e-5)
+
+
+def test_a_torso_and_a_stop_that_gives_are_refused_in_words():
+    with pytest.raises(ConfigError, match="compliant stop"):
+        kneed("walker.knee={lock: compliant}")
+    with pytest.raises(ConfigError, match="torso"):
+        kneed("walker.torso={mass_kg: 1.0, above_hip_m: 0.1}")
+
+
+def test_a_hinged_walker_hangs_from_its_stance_foot(scene):
+    model = pinned_model(scene)
+    assert model.freedoms == ("turn",)
+    assert model.links[0].point_m == scene.assembly.feet[STANCE_FOOT].centre_m
+    assert model.chain.tolist() == [[1.0, 1.0], [1.0, 0.0]]
+
+
+def test_forces_of_the_ground_do_the_work_that_the_feet_see(scene):
+    """Generalised forces times velocities equal the contact forces times the velocities of their points."""
+    _, samples = our_samples(scene, 0.05, 3)
+    for i in range(1, 20):
+        q, v = scene.from_base(tuple(samples.states[i]))
+        rules = RuleFollower(scene, 3, *scene.from_base(scene.start))
+        rules.walk_state.has_ground[:] = samples.has_ground[i]
+        forces = rules.forces(0.0, q, v).copy()
+        law, friction = scene.ours.normal, scene.ours.friction
+        power = 0.0
+        for foot, (_, height, slip, vertical_velocity) in enumerate(rules.feet(q, v)):
+            if height < 0.0 and samples.has_ground[i, foot]:
+                depth = -height
+                share = min(1.0, depth / law.full_damping_penetration)
+                damping = law.damping * share**2 * (3.0 - 2.0 * share)
+                normal = max(0.0, law.stiffness * depth**law.exponent - damping * vertical_velocity)
+                power += normal * (vertical_velocity + friction_coefficient(friction, slip)[0] * slip)
+        assert forces @ v == pytest.approx(power, rel=1e-9, abs=1e-9)
+
+
+def test_the_rules_see_our_own_walk_as_it_was(scene):
+    result, samples = our_samples(scene, 1e-4, 4)
+    rules = RuleFollower(scene, 4, *scene.from_base(scene.start))
+    for time_s, y in zip(samples.time_s[1:], samples.states[1:], strict=True):
+        rules.follow(float(time_s), *scene.from_base(tuple(y)))
+    seen = rules.walk_state.touch_time[:3]
+    # the ground stops the foot, at about 700 m/s^2 from 0.27 m/s, within the step that the cubic spans
+    bound = 700.0 * 1e-4**2 / (8.0 * 0.27)
+    assert seen == pytest.approx(result.touch_time_s[:3], abs=bound)
+    assert rules.walk_state.touch_along[:3] == pytest.approx(result.touch_along_m[:3], abs=bound)
+    assert rules.walk_state.slip[:3] == pytest.approx(result.slip_m[:3], abs=bound)
+
+
+def test_a_walk_whose_numbers_are_lost_is_a_failed_solver(scene):
+    q, v = scene.from_base(scene.start)
+    rules = RuleFollower(scene, 4, q, v)
+    rules.follow(1e-3, np.full_like(q, np.nan), v)
+    assert rules.outcome is Outcome.SOLVER_FAILED
+
+
+def test_a_walker_whose_hip_is_low_has_fallen(scene):
+    q, v = scene.from_base(scene.start)
+    rules = RuleFollower(scene, 4, q, v)
+    rules.follow(1e-3, q - np.array((0.0, 0.6, 0.0, 0.0)), v)
+    assert rules.outcome is Outcome.FELL
+
+
+def test_a_touch_between_two_steps_is_that_of_the_cubic():
+    h, touch = 0.1, 0.037
+
+    def height(t):
+        return (touch - t) * (1.0 + t + 3.0 * t * t)
+
+    def velocity(t):
+        return -(1.0 + t + 3.0 * t * t) + (touch - t) * (1.0 + 6.0 * t)
+
+    assert h * crossing(height(0.0), velocity(0.0), height(h), velocity(h), h) == pytest.approx(touch, abs=1e-15)
+
+
+def test_the_target_of_tuning_is_the_law_under_the_weight_of_the_walker():
+    scene = compass()
+    target = contact_target(scene)
+    law = scene.ours.normal
+    assert law.stiffness * target.penetration**law.exponent == pytest.approx(20.0 * scene.ours.gravity_down)
+    assert target.damping_ratio == pytest.approx(3.714, abs=1e-3)
+    assert -friction_coefficient(scene.ours.friction, target.creep_velocity)[0] == pytest.approx(CREEP_LOAD)
+
+
+def test_there_is_nothing_to_tune_on_frictionless_ground():
+    assert contact_target(compass("contact.friction=none")) is None

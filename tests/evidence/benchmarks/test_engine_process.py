@@ -1,0 +1,61 @@
+"""An engine's crash, exception or endless loop ends its own task and nothing else."""
+
+from concurrent.futures import ThreadPoolExecutor
+from types import SimpleNamespace
+
+import pytest
+from crashing_tasks import Answers, Crashes, Raises, Sleeps
+
+from walkerlab.evidence.benchmarks.engines import process
+from walkerlab.evidence.benchmarks.engines.adapter import Stepping
+from walkerlab.evidence.benchmarks.engines.experiments import EngineExperiment
+from walkerlab.evidence.benchmarks.engines.process import OwnProcess, TaskLost
+
+
+@pytest.fixture
+def own():
+    with OwnProcess() as one:
+        yield one
+
+
+def test_results_come_back_and_what_an_engine_prints_does_not(own, capfd):
+    assert [own.do(Answers(number).run, 30.0) for number in (1, 2)] == [1, 2]
+    assert "engines talk" not in capfd.readouterr().out
+
+
+def test_a_crash_is_told_with_its_code_and_the_next_task_runs(own):
+    lost = own.do(Crashes().run, 30.0)
+    assert isinstance(lost, TaskLost)
+    assert "-11" in lost.why
+    assert own.do(Answers(3).run, 30.0) == 3
+
+
+def test_an_exception_is_told_in_its_words(own):
+    assert own.do(Raises().run, 30.0) == TaskLost("RuntimeError: bad model")
+
+
+def test_what_takes_for_ever_is_ended(own, monkeypatch):
+    assert own.do(Answers(1).run, 30.0) == 1
+    lost = own.do(Sleeps().run, 0.2)
+    assert isinstance(lost, TaskLost)
+    assert lost.timed_out
+    monkeypatch.setattr(process, "START_UP_S", 30.0)
+    assert own.do(Answers(2).run, 1.0) == 2
+
+
+def test_who_stops_waiting_ends_what_runs(own):
+    assert own.do(Answers(1).run, 30.0) == 1
+    with ThreadPoolExecutor(1) as pool:
+        waiting = pool.submit(own.do, Sleeps().run, 60.0)
+        own.abandon()
+        assert isinstance(waiting.result(30.0), TaskLost)
+    with pytest.raises(RuntimeError, match="nobody waits"):
+        own.do(Answers(2).run, 1.0)
+
+
+def test_a_lost_run_took_no_time_that_anybody_knows():
+    scene = SimpleNamespace(name="compass")
+    experiment = EngineExperiment(scene, "engine", "1.0", "own-law")
+    row = experiment.row("rule", Stepping("rule", 1e-4), TaskLost("it crashed"))
+    assert row.wall_s is None
+    assert row.error is None

@@ -1,0 +1,159 @@
+"""The stage that walks in other engines: what is told of rows, and of engines that are not there."""
+
+from dataclasses import dataclass, replace
+
+import pytest
+from synthetic_engines import ROWS, SWINGS, TUNING, content, row, truth
+
+from walkerlab.config.loader import load
+from walkerlab.errors import NoAnswer
+from walkerlab.evidence.benchmarks.engines import registry
+from walkerlab.evidence.benchmarks.engines import stage as engines
+from walkerlab.evidence.benchmarks.engines.experiments import ADAPTIVE_TOLERANCES, EngineOnScene
+from walkerlab.evidence.benchmarks.engines.process import TaskLost
+from walkerlab.evidence.benchmarks.engines.registry import ENGINES, Engine
+from walkerlab.evidence.benchmarks.engines.scenes import scenes
+from walkerlab.evidence.benchmarks.engines.stage import closest, ratios, three_digits
+from walkerlab.pipeline.graph import PIPELINE
+from walkerlab.pipeline.identity import Keys
+from walkerlab.pipeline.progress import Silent
+from walkerlab.pipeline.store.key import differences
+
+ABSENT = Engine("absent", "no_such_engine_module", "absent-engine")
+
+
+def test_an_engine_that_is_absent_is_told_with_its_install_line(monkeypatch):
+    monkeypatch.setattr(engines, "ENGINES", {"absent": ABSENT})
+    assert engines.missing_engines() == [
+        {"what": "engine absent", "why": "not installed: pip install absent-engine"},
+    ]
+
+
+def test_without_any_engine_there_is_no_answer_but_the_extra(monkeypatch):
+    monkeypatch.setattr(engines, "installed", lambda: ())
+    with pytest.raises(NoAnswer) as caught:
+        engines.run(load().config, {}, Silent())
+    assert "walkerlab[engines]" in caught.value.advice
+
+
+def test_another_version_of_an_engine_makes_another_key(monkeypatch):
+    config = load().config
+    monkeypatch.setattr(registry, "installed", lambda: (ABSENT,))
+    monkeypatch.setattr(Engine, "version", "1.0")
+    before = Keys().identity(PIPELINE["engines"], config, {}).config_slice
+    monkeypatch.setattr(Engine, "version", "1.1")
+    after = Keys().identity(PIPELINE["engines"], config, {}).config_slice
+    assert list(differences("", before, after)) == ["programs.absent 1.0 -> 1.1"]
+
+
+@dataclass
+class LosesEverything:
+    lost: TaskLost
+    asked: int = 0
+
+    def do(self, _task, _timeout_s):
+        self.asked += 1
+        return self.lost
+
+
+@pytest.mark.parametrize(
+    ("lost", "outcome", "rungs"),
+    [
+        (TaskLost("the engine's process ended with code -11"), "solver-failed", 8),
+        (TaskLost("", True), "budget-exhausted", 1),
+    ],
+    ids=["crash", "time-out"],
+)
+def test_a_run_that_is_lost_is_a_row_and_what_takes_for_ever_is_not_refined(lost, outcome, rungs):
+    (scene,) = scenes(load().config, 0.37, (-0.2042, 0.1694, -0.6058, -0.861))
+    engine = replace(ABSENT, name="exudyn")
+    runs = EngineOnScene(engine, scene, truth(), LosesEverything(lost)).same_law()
+    rows = [one for one in runs if one.integrator == "DOPRI5 adaptive"]
+    assert len(rows) == min(rungs, len(ADAPTIVE_TOLERANCES))
+    assert {(one.outcome, one.why, one.error) for one in rows} == {(outcome, lost.why, None)}
+
+
+def test_every_engine_has_an_adapter_with_one_signature():
+    for engine in ENGINES.values():
+        adapter = engine.adapter()
+        assert set(adapter.CONTACTS.values()) <= set(adapter.INTEGRATORS)
+        assert adapter.CANNOT_EXPRESS
+
+
+def test_ratios_are_of_the_quickest_runs_that_are_exact_enough():
+    found = ratios(ROWS, "compass")
+    # ours 5 ms at 1e-3; mujoco 0.4 s, and its run of 0.1 s is not exact enough
+    assert found["1e-3"]["mujoco"] == pytest.approx(0.4 / 0.005)
+    assert "mujoco" not in found["1e-5"]
+    assert found["1e-5"]["drake"] == pytest.approx(2.0 / 0.006)
+
+
+def test_the_closest_contact_is_judged_at_its_smallest_step():
+    best = closest(ROWS, "compass")
+    assert (best["engine"], best["contact"]) == ("drake", "lagged")
+    assert best["period_error_s"] == pytest.approx(6e-4)
+
+
+def test_a_contact_that_does_not_walk_to_the_end_is_not_the_closest():
+    fallen = [replace(one, error=None, outcome="fell") if one.engine == "drake" else one for one in ROWS]
+    assert closest(fallen, "compass")["engine"] == "mujoco"
+
+
+def test_three_digits_need_every_smaller_step_to_have_them_too():
+    steps = three_digits(ROWS, "compass", truth())
+    assert steps["same-law"] == {"mujoco RK4": 1e-4, "drake runge_kutta3": 2e-4}
+    # mujoco's own period is 0.7125 and 0.7126 at the two smallest steps, and 0.675 at the largest
+    assert steps["own-law"]["mujoco soft"] == pytest.approx(2.5e-4)
+
+
+def test_a_conclusion_names_the_closest_contact_its_cost_and_its_step():
+    text = content().summary["conclusions"]["compass"]["own-law"]
+    assert text.startswith("The contact closest to ADAMS's law is 'lagged' of drake")
+    assert "differs by 0.6 ms from" in text
+    assert "fell after 3 steps" in text
+
+
+def test_a_period_that_has_settled_is_told_apart_from_one_that_still_changes():
+    rows = [replace(one, period_s=0.71251) if one.period_s == 0.7125 else one for one in ROWS]
+    rows = [replace(one, period_s=0.71252) if one.period_s == 0.7126 else one for one in rows]
+    text = content(rows).summary["conclusions"]["compass"]["own-law"]
+    assert "their difference is due to the model: mujoco soft by 0.01 ms." in text
+    # 4.9 and 0.6 ms off
+    assert "still changes these periods: drake lagged by 4.3 ms." in text
+
+
+def test_what_the_last_halving_divides_the_error_by_is_told():
+    found = content().summary["convergence"]["compass"]["same-law"]
+    assert found["mujoco RK4"] == pytest.approx(4e-3 / 6e-4)
+    assert "divides the error by: mujoco RK4 6.7" in content().summary["conclusions"]["compass"]["same-law"]
+
+
+def test_the_stored_result_is_the_same_whatever_the_run_times():
+    slower = [replace(one, wall_s=3.0 * one.wall_s) for one in ROWS]
+    assert content(slower).digest() == content().digest()
+    other = [replace(one, period_s=one.period_s and one.period_s + 1e-9) for one in ROWS]
+    assert content(other).digest() != content().digest()
+
+
+def test_rows_have_the_keys_that_readers_rely_on():
+    keys = {"engine", "version", "experiment", "step_s", "error", "wall_s", "period_s", "step_length_m", "outcome"}
+    assert all(keys <= set(one) for one in content().summary["rows"])
+
+
+def test_tables_are_stored_whole():
+    stored = content()
+    assert stored["rows"].variables["engine"].values.size == len(ROWS)
+    assert stored["swings"].variables["order"].values.size == len(SWINGS)
+    assert stored["tuning"].variables["target"].values.size == len(TUNING)
+
+
+def test_a_start_of_another_speed_has_the_same_angles():
+    (scene,) = scenes(load().config, 0.37, (-0.2042, 0.1694, -0.6058, -0.861))
+    slower = scene.started(0.95)
+    assert slower.start[:4] == scene.start[:4]
+    assert slower.start[4:] == pytest.approx([0.95 * x for x in scene.start[4:]])
+
+
+def test_a_row_of_another_start_is_not_among_those_from_the_gait():
+    other = row("drake", "lagged", "own-law", 2.5e-4, 1e-9, 1.0, 0.711, start=0.95)
+    assert closest([*ROWS, other], "compass")["period_error_s"] == pytest.approx(6e-4)

@@ -1,0 +1,250 @@
+"""The adjustment: not needed on the paper's contact, found where it is, and words where there is none."""
+
+import functools
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from walkerlab.config.loader import load
+from walkerlab.config.reads import only
+from walkerlab.errors import NoAnswer
+from walkerlab.evidence.paper import tune
+from walkerlab.evidence.paper.tune_limit import LimitFindings, causes
+from walkerlab.physics.orbits.rigid_limit import ALL_SERIES, NORMAL_SERIES, ContactFactors, Distance, Extrapolation
+from walkerlab.pipeline.graph import PIPELINE
+from walkerlab.pipeline.progress import Silent
+from walkerlab.pipeline.stages import fixedpoint
+from walkerlab.views.report.blocks import Statements
+from walkerlab.views.report.results import Results
+from walkerlab.views.report.sections import adjustment, verdict
+from walkerlab.views.report.words import words
+
+
+@functools.cache
+def tuned(config, *sets):
+    """The stage's result with a small map."""
+    loaded = load(Path(config), sets).config
+    gait = fixedpoint.run(only(loaded, PIPELINE["fixedpoint"].takes), {}, Silent())
+    return tune.run(only(loaded, PIPELINE["tune"].takes), {"fixedpoint": gait}, Silent())
+
+
+def small(config, *sets, cells=5):
+    return tuned(config, f"tune.cells={cells}", "tune.rigid_limit=false", *sets)
+
+
+def test_the_papers_contact_needs_no_adjustment():
+    found = small("paper").summary["adjustment"]
+    assert not found["needed"]
+    assert (found["scale_dtheta1"], found["scale_dtheta2"], found["walked_steps"]) == (1.0, 1.0, 10)
+    margins = found["margins"]
+    assert 0.95 < margins["dtheta_2 down"]["factor"] < 1.0 < margins["dtheta_2 up"]["factor"] < 1.2
+    assert margins["dtheta_2 down"]["beyond"] == "off-pad"
+
+
+def test_the_gait_is_the_one_that_the_walk_settles_on():
+    summary = small("paper").summary
+    gait, walk = summary["gait"], summary["procedure"]["adjusted"]
+    assert gait["stable"]
+    assert walk["step_periods_s"][-1] == pytest.approx(gait["period_s"], rel=1e-3)
+    assert walk["step_lengths_m"][-1] == pytest.approx(gait["step_length_m"], rel=1e-3)
+    assert sum(gait["lost_J"].values()) == pytest.approx(gait["height_lost_J"], rel=1e-7)
+
+
+def test_what_drives_a_gaits_step_is_what_the_ground_takes_of_it():
+    gait = small("level").summary["gait"]
+    given = gait["work_per_step_J"]
+    assert sum(gait["lost_J"].values()) == pytest.approx(sum(given.values()), rel=1e-7)
+    assert given["push_off"] == pytest.approx(sum(given.values()), rel=1e-9)
+    assert gait["cost_of_transport"] == pytest.approx(given["push_off"] / (20 * 9.81 * gait["step_length_m"]))
+    assert abs(gait["balance_J"]) < 1e-7
+    said = words("adjustment.explained", {"gait": gait}, False).replace("\xa0", " ")
+    assert "of the 1.694 J that drive a step, 1.556 J go into damping at touch-down" in said
+    told = words("adjustment.caused", {"total_s": 1e-3, "together_s": 1e-3}, True)
+    assert "what they and the push-off's length do together" in told
+
+
+def test_the_papers_own_start_does_not_walk_and_says_why():
+    start = small("paper").summary["paper_start"]
+    assert start["outcome"] != "walked"
+    assert start["energy_J"] == pytest.approx(221.5, abs=0.5)
+    assert start["normal_force_N"] < 0.1 * start["weight_N"]
+    assert "221.5 J" in start["reason"]
+
+
+def test_both_fates_of_the_papers_adams_start_are_told_with_model_and_ground():
+    start = small("paper").summary["paper_start"]
+    rigid, contact = start["reason"].split("the contact model on ")
+    assert "in the rigid model, whose stance foot is hinged to an even slope" in rigid
+    assert "with its foot held down like that the walk ends (fell) at 0.347 s" in rigid
+    assert contact.startswith("its checkerboard of pads has ground that cannot pull")
+    assert f"ends there at {start['end_time_s']:.3g} s" in contact
+    assert "off-pad: a foot meets a pad from the side, where the rigid model has no pads" in contact
+    # pads are what ends it: without them it flies on
+    assert small("paper", "contact.terrain=after-mid-swing").summary["paper_start"]["outcome"] != "off-pad"
+
+
+def test_percentages_are_given_on_both_bases():
+    row = small("paper").summary["table2"]["dtheta_2"]
+    assert row["paper_percent_of_matlab"] == pytest.approx(100 * (3.20 - 0.84) / 0.84)
+    assert row["paper_percent_of_adams"] == pytest.approx(100 * (3.20 - 0.84) / 3.20)
+
+
+def test_creeping_feet_need_an_adjustment_and_the_found_start_walks():
+    summary = small("sliding-feet", "tune.stance_factors=[1.0, 1.1]").summary
+    found = summary["adjustment"]
+    assert found["needed"]
+    assert summary["procedure"]["released"]["outcome"] == "off-pad"
+    assert summary["procedure"]["adjusted"]["outcome"] == "walked"
+    assert 0.0 < summary["procedure"]["adjusted"]["numerical_error"]["step_period_s"] < 1e-5
+    assert 0.0 < found["distance"] < 0.2
+
+
+def test_the_map_is_what_single_walks_say():
+    content = small("paper")
+    cells = content["map"]
+    assert cells["outcome"].shape == (5, 5)
+    walked = (cells["outcome"] == 0).sum()
+    assert walked == content.summary["map"]["contact"].get("walked", 0)
+    ended = {row["outcome"]: row["walks"] for row in content.summary["map"]["endings"]}
+    assert ended == {name: many for name, many in content.summary["map"]["contact"].items() if name != "walked"}
+    assert np.all(cells["steps"][cells["outcome"] == 0] == 10)
+
+
+@pytest.mark.parametrize(
+    "sets",
+    [
+        ("contact.static_friction=0", "contact.dynamic_friction=0"),
+        ("contact.static_friction=0.05", "contact.dynamic_friction=0.04"),
+    ],
+)
+def test_that_no_start_walks_is_an_answer_in_words(sets):
+    content = small("paper", *sets, cells=3)
+    gait, found = content.summary["gait"], content.summary["adjustment"]
+    assert not gait["found"]
+    assert len(gait["reason"]) > 20
+    assert (found["needed"], found["found"], found["reason"]) == (True, False, "none of 9 starts walked 10 steps")
+    assert len(found["advice"]) > 20
+    assert "adjusted" not in content.groups
+    assert "no_answer" not in content.summary
+
+
+def test_the_page_says_that_no_start_walks():
+    results = Results(None, {"tune": small("contact-si", cells=3)})
+    (found,) = [block for block in verdict.section(results).blocks if isinstance(block, Statements)]
+    (told,) = found.items
+    assert (told.about, told.tone) == ("Parameter adjustment", "bad")
+    assert "None of 9 starts walked" in told.text
+    made = adjustment.section(results)
+    assert made.finding == "No adjustment of the two initial velocities helps: none of 9 starts walked 10 steps."
+    assert made.blocks[0].text.startswith("The contact model has no gait of its own")
+
+
+def test_pads_for_a_gait_that_is_not_there_have_no_answer():
+    ground = ("contact.static_friction=0", "contact.dynamic_friction=0", "contact.pad_pitch=own")
+    with pytest.raises(NoAnswer, match="no contact gait to lay the pads for"):
+        small("paper", *ground, cells=3)
+
+
+def test_a_start_that_flies_is_an_answer():
+    summary = small("paper", "start=[-0.2018, 0.167, -1.02, -3.2]", cells=3).summary
+    assert summary["adjustment"]["needed"]
+    assert summary["procedure"]["released"]["outcome"] != "walked"
+
+
+@functools.cache
+def kneed():
+    return small(
+        "kneed", "strides=1", "solver.contact={rtol: 1.0e-5, atol: 1.0e-7}", "tune.stance_factors=[0.9, 1.1]", cells=2
+    )
+
+
+def test_a_kneed_walker_needs_no_adjustment_on_plain_ground():
+    summary = kneed().summary
+    found = summary["adjustment"]
+    assert (found["needed"], found["found"], found["walked_steps"]) == (False, True, 2)
+    down, up = (found["margins"][f"dtheta_2 {way}"] for way in ("down", "up"))
+    assert 0.9 < down["factor"] < 1.0 < up["factor"]
+    assert down["beyond"] is not None
+
+
+def test_a_kneed_gait_gives_its_height_to_ground_friction_and_knees():
+    gait = kneed().summary["gait"]
+    assert sum(gait["lost_J"].values()) == pytest.approx(gait["height_lost_J"], rel=1e-7)
+    assert gait["lost_J"]["knee_strikes"] > 0.0
+    assert len(gait["multipliers"]) == len(gait["state"]) == len(gait["state_is"]) == 8
+    assert "angular velocity of the swing shank (rad/s)" in gait["state_is"]
+    step = kneed().summary["procedure"]["adjusted"]["step_periods_s"][-1]
+    assert step == pytest.approx(gait["period_s"], rel=0.01)
+
+
+def test_what_is_the_papers_alone_is_left_out_for_another_walker_in_words():
+    content = kneed()
+    assert set(content.summary["procedure"]) == {"released", "adjusted"}
+    assert "paper_start" not in content.summary
+    assert not {"hinged", "paper_start"} & set(content.groups)
+    assert [entry["what"] for entry in content.summary["left_out"]] == [
+        "the first step with a hinged stance foot",
+        "the paper's start of its ADAMS model",
+    ]
+    assert set(content.summary["table2"]) == {f"{d}theta_{leg}" for d in ("", "d") for leg in ("1", "2", "1_shank")}
+    assert content.summary["table2"]["dtheta_2"].keys() >= {"unit", "ours_rigid", "ours_adjusted"}
+    assert small("paper").summary["left_out"] == []
+
+
+def test_the_page_tells_of_the_kneed_adjustment_in_its_own_words():
+    made = adjustment.section(Results(load(Path("kneed")).config, {"tune": kneed()}))
+    assert "the stance leg starts" in made.finding
+    assert "into the knee's strike" in made.blocks[0].text
+    assert "link" not in made.finding
+
+
+def tables_of(summary):
+    made = adjustment.section(Results(load(Path("kneed")).config, {"tune": replace(kneed(), summary=summary)}))
+    return {block.caption: block for block in made.blocks if hasattr(block, "caption")}
+
+
+def test_a_start_that_stays_as_it_is_has_no_table_of_before_and_after():
+    assert not {"The start before and after the adjustment", "The procedure, walk by walk"} & set(
+        tables_of(kneed().summary)
+    )
+
+
+def test_the_page_names_what_swings_beside_the_legs_and_no_joint_that_was_not_there():
+    row = kneed().summary["table2"]["dtheta_2"]
+    changed = kneed().summary | {
+        "adjustment": kneed().summary["adjustment"] | {"needed": True},
+        "table2": kneed().summary["table2"] | {"dtheta_torso": row},
+    }
+    tables = tables_of(changed)
+    names = [row[0].text for row in next(iter(tables["The start before and after the adjustment"].groups.values()))]
+    assert (names[2], names[-1]) == ("θ₁, shank (rad)", "θ̇, torso (rad/s)")
+    walks = [row[0].text for row in next(iter(tables["The procedure, walk by walk"].groups.values()))]
+    assert walks == ["from the rigid state", "from the adjusted start"]
+
+
+def test_what_could_not_be_told_apart_is_not_put_down_to_what_causes_do_together():
+    limit = LimitFindings((ALL_SERIES,), 0.7, 0.71, {ALL_SERIES: [], NORMAL_SERIES: [at_period(0.712)]}, None)
+    told = causes(limit)
+    assert "together_s" not in told
+    assert told["rest_s"] == pytest.approx(0.012)
+    said = words("adjustment.caused", told).replace("\u00a0", " ")
+    assert said.startswith(
+        "Its period differs from the rigid gait's by 10 ms. With each cause switched off alone, −2 ms"
+    )
+    assert "12 ms (120 %) from creep in the friction law and what they do together, which could not" in said
+    told = causes(replace(limit, without_creep=Extrapolation(0.701, 1e-6)))
+    assert told["together_s"] == pytest.approx(0.003)
+
+
+def at_period(period):
+    return Distance(ContactFactors(NORMAL_SERIES, 1.0, 1.0, 1.0, 1.0), period, 0.37, 0.0, period - 0.7, 0.0, 0.0)
+
+
+def test_of_a_compass_that_is_not_the_papers_nothing_of_the_paper_is_told():
+    content = small("paper", "walker.hip_mass_kg=11", cells=3)
+    assert "paper_start" not in content.summary
+    assert "paper_start" not in content.groups
+    assert not [key for row in content.summary["table2"].values() for key in row if key.startswith("paper")]
+    assert [entry["what"] for entry in content.summary["left_out"]] == ["the paper's start of its ADAMS model"]

@@ -1,0 +1,112 @@
+"""The catalogue: what it covers, that it is sound, and that some of each family end as it says."""
+
+import pytest
+
+from walkerlab.config.stability import Case
+from walkerlab.errors import ConfigError
+from walkerlab.evidence.verification.catalogue import check_unique_names, config_of, package_cases
+from walkerlab.evidence.verification.judge import CaseCell, judge
+from walkerlab.evidence.verification.starts import CENTRE_HEIGHT, prepare_start
+
+CASES = {case.name: case for case in package_cases()}
+QUICK = (
+    "paper",
+    "si-linear",
+    "k-1e14-linear",
+    "near-rigid",
+    "undamped",
+    "friction-0.05",
+    "leg-1-mm",
+    "leg-mass-1e-6",
+    "moon",
+    "rigid-1-km",
+    "rigid-simplest",
+    "after-mid-swing-hinged",
+    "slope-0",
+    "rigid-slope-5.2-deg",
+    "rigid-slope-minus-1-deg",
+    "adams-start",
+    "deep-1-cm",
+    "velocities-10",
+    "velocities-1e3",
+    "rigid-split",
+    "loosest",
+    "no-budget",
+    "rigid-1000-strides",
+)
+
+
+def test_families_and_their_sizes():
+    families = {case.family for case in CASES.values()}
+    assert families == {"stiffness", "walkers", "terrain", "slopes", "starts", "numerics"}
+    assert len(CASES) >= 60
+
+
+def test_every_case_says_why_and_is_a_config():
+    for case in CASES.values():
+        assert len(case.reason) > 5
+        assert config_of(case).name == "paper"
+
+
+@pytest.mark.parametrize("name", QUICK)
+def test_case_ends_as_expected_and_passes_every_measure(name):
+    result = CaseCell(CASES[name]).run()[0]
+    assert result.failures == ()
+
+
+def test_another_outcome_than_expected_is_told():
+    case = Case(name="wrong", expected=("fell",), reason="to be wrong", steps=2)
+    result = judge(case, config_of(case))
+    assert not result.ok
+    assert "ended as walked, not fell" in result.failures
+
+
+def test_a_budget_too_small_is_told_with_what_there_was():
+    case = Case(name="small", expected=("walked",), reason="to be cut short", steps=4, budget=10_000)
+    result = judge(case, config_of(case))
+    assert result.outcome == "budget-exhausted"
+    assert 10_000 <= result.rhs_evaluations < 10_100
+    assert 0 < result.steps < 4
+
+
+def test_a_rigid_case_too_ends_with_its_budget():
+    needed = judge(CASES["rigid-single-stride"], config_of(CASES["rigid-single-stride"])).rhs_evaluations
+    case = CASES["rigid-single-stride"].model_copy(update={"budget": needed // 2, "expected": ("budget-exhausted",)})
+    result = judge(case, config_of(case))
+    assert result.failures == ()
+    assert result.outcome == "budget-exhausted"
+    assert case.budget <= result.rhs_evaluations < needed
+
+
+def test_a_start_is_lowered_by_metres_whatever_the_leg():
+    short = Case(name="x", expected=("walked",), reason="x", config={"walker": {"leg_length_m": 1.0}}, lowered_m=-0.01)
+    long = short.model_copy(update={"config": {"walker": {"leg_length_m": 10.0}}})
+    for case in (short, long):
+        there = prepare_start(config_of(case), case).start
+        on_ground = prepare_start(config_of(case), case.model_copy(update={"lowered_m": 0.0})).start
+        assert there[CENTRE_HEIGHT] - on_ground[CENTRE_HEIGHT] == pytest.approx(0.01, rel=1e-12)
+
+
+def test_disagreement_with_a_tighter_tolerance_is_told():
+    case = Case(name="sharp", expected=("walked",), reason="to be inexact", steps=2, agreement=1e-15)
+    result = judge(case, config_of(case))
+    assert any("ten times tighter" in failure for failure in result.failures)
+    assert any("dop853" in failure for failure in result.failures)
+
+
+def test_lines_that_are_no_config_are_refused():
+    case = Case(name="bad", expected=("walked",), reason="none", config={"slope_degg": 1.0})
+    with pytest.raises(ConfigError, match="slope_deg"):
+        config_of(case)
+
+
+def test_two_cases_of_one_name_are_refused():
+    with pytest.raises(ConfigError, match="paper"):
+        check_unique_names([CASES["paper"], CASES["paper"]])
+
+
+def test_a_contact_block_in_si_means_the_same_quantities():
+    si = config_of(Case(name="si", expected=("walked",), reason="none", config={"contact": {"units": "si"}}))
+    paper = config_of(CASES["paper"])
+    assert si.contact.in_si().stiffness == pytest.approx(paper.contact.in_si().stiffness)
+    assert si.contact.in_si().stiction_velocity == pytest.approx(paper.contact.in_si().stiction_velocity)

@@ -1,0 +1,96 @@
+"""The measures themselves notice what is wrong."""
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from walkerlab.config.drives import Hip
+from walkerlab.config.loader import load
+from walkerlab.evidence.paper.appendix_a import impact
+from walkerlab.evidence.paper.walker import compass
+from walkerlab.evidence.verification.catalogue import config_of, package_cases
+from walkerlab.evidence.verification.judge import time_difference
+from walkerlab.evidence.verification.masses import RigidMasses
+from walkerlab.evidence.verification.scaling import scaled, to_twin
+from walkerlab.evidence.verification.starts import case_tolerances, prepare_start
+from walkerlab.evidence.verification.verdict import Measure, finite
+from walkerlab.physics.orbits.similarity import Units, unit_walker
+from walkerlab.scene.parts import assembly_of
+from walkerlab.scene.rigid import rigid_walker
+
+CASE = next(case for case in package_cases() if case.name == "paper").model_copy(update={"model": "rigid"})
+PAPER = config_of(CASE)
+COMPASS = compass(PAPER, "corrected")
+MASSES = RigidMasses(assembly_of(PAPER.walker, rigid=True), PAPER.slope_rad)
+
+
+@pytest.fixture(scope="module")
+def judged_walk():
+    start = prepare_start(PAPER, CASE)
+    return start.walk(CASE, case_tolerances(start, CASE))
+
+
+@pytest.fixture(scope="module")
+def walk(judged_walk):
+    return judged_walk.record
+
+
+def test_a_heel_strike_keeps_momentum(walk):
+    assert MASSES.momentum_change(walk.before, walk.after) < 1e-14
+
+
+@pytest.mark.parametrize("index", [2, 3])
+def test_a_heel_strike_that_is_a_little_wrong_does_not(walk, index):
+    wrong = walk.after.copy()
+    wrong[:, index] *= 1.0 + 1e-6
+    assert MASSES.momentum_change(walk.before, wrong) > 1e-8
+
+
+def test_walks_without_a_heel_strike_are_not_called_equal(judged_walk):
+    none = replace(judged_walk, touches=np.zeros(0))
+    assert time_difference("a walk", none, judged_walk, CASE, 1e-9) == []
+    (found,) = time_difference("itself", judged_walk, judged_walk, CASE, 1e-9)
+    assert found.value == 0.0
+
+
+def test_momentum_with_leg_inertia_is_kept_too():
+    heavy = COMPASS._replace(leg_inertia=0.7)
+    before = np.array([[0.21, -0.245, -0.4, -1.1]])
+    after = np.array([impact(heavy, *before[0])])
+    walker = PAPER.walker.model_copy(update={"leg_inertia_kg_m2": 0.7})
+    masses = RigidMasses(assembly_of(walker, rigid=True), PAPER.slope_rad)
+    assert masses.momentum_change(before, after) < 1e-14
+
+
+def test_energy_won_at_a_heel_strike_is_seen(walk):
+    assert MASSES.energy_won(walk.before, walk.after) == 0.0
+    assert MASSES.energy_won(walk.after, walk.before[:, [1, 0, 3, 2]]) > 0.0
+    assert MASSES.at(walk.after[0]).kinetic < MASSES.at(walk.before[0]).kinetic
+
+
+def test_what_is_no_number_fails():
+    assert not Measure("x", math.nan, 1.0).ok
+    assert not Measure("x", finite(math.inf), 1.0).ok
+    assert Measure("x", 0.0, 0.0).ok
+
+
+def test_a_twin_there_and_back_is_the_walker():
+    by = to_twin(PAPER)
+    back = Units(1.0 / by.length, 1.0 / by.mass, 1.0 / by.time)
+    again = scaled(scaled(PAPER, by), back)
+    assert again.walker.leg_length_m == pytest.approx(PAPER.walker.leg_length_m)
+    assert again.gravity_m_s2 == pytest.approx(PAPER.gravity_m_s2)
+    one, other = again.contact.in_si(), PAPER.contact.in_si()
+    assert vars(one) == pytest.approx(vars(other))
+
+
+@pytest.mark.parametrize("name", ["paper", "round-feet", "kneed", "torso"])
+def test_a_driven_walker_and_its_twin_are_one_walker_of_unit_size(name):
+    sets = (*(f"walker.hip.{number}=0.01" for number in Hip.model_fields), "push_off.impulse_N_s=0.1")
+    config = load(Path(name), sets).config
+    own, twins = (unit_walker(rigid_walker(each, "corrected"))[0] for each in (config, scaled(config, to_twin(config))))
+    for field in own.dtype.names:
+        np.testing.assert_allclose(twins[field], own[field], rtol=1e-12, atol=1e-15, err_msg=field)

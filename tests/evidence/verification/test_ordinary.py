@@ -1,0 +1,48 @@
+"""Ordinary methods are shown as they are: what they say, and what they do not."""
+
+import numpy as np
+import pytest
+
+from walkerlab.evidence.verification.catalogue import config_of, package_cases
+from walkerlab.evidence.verification.ordinary import MAX_ORDINARY_EVALUATIONS, Arrival, choices
+
+PAPER = next(case for case in package_cases() if case.name == "paper")
+ARRIVAL = Arrival("c", 1.0, np.zeros(8), np.ones(8))
+
+
+def test_ordinary_methods_on_the_paper_walker():
+    found = {choice.method: choice for choice in choices(PAPER, config_of(PAPER))}
+    assert found["SciPy Radau"].verdict == "fine"
+    assert found["semi-implicit Euler, 0.001 s"].verdict != "fine"
+    assert all(choice.rhs_evaluations <= MAX_ORDINARY_EVALUATIONS for choice in found.values())
+
+
+def test_a_script_on_the_rigid_walker():
+    case = next(case for case in package_cases() if case.name == "rigid-single-stride")
+    found = choices(case, config_of(case))
+    assert [choice.method for choice in found] == ["SciPy RK45", "SciPy LSODA", "SciPy Radau"]
+    assert all(0.0 < choice.error < 1e-2 and choice.verdict == "fine" for choice in found)
+
+
+def test_a_walk_that_goes_nowhere_shows_nothing():
+    for name in ("split", "rigid-split", "rigid-standing-still", "rigid-slope-minus-1-deg"):
+        case = next(case for case in package_cases() if case.name == name)
+        assert choices(case, config_of(case)) == ()
+
+
+def test_the_reference_is_sharp_whatever_the_case_asks_for():
+    loosest = next(case for case in package_cases() if case.name == "loosest")
+    one, other = (choices(case, config_of(case)) for case in (PAPER, loosest))
+    assert [choice.error for choice in one] == [choice.error for choice in other]
+
+
+@pytest.mark.parametrize(
+    ("off", "verdict"), [(1e-3, "fine"), (0.1, "wrong silently"), (100.0, "diverges"), (np.nan, "diverges")]
+)
+def test_verdict_follows_from_the_error(off, verdict):
+    assert ARRIVAL.judged("m", np.full(8, off), 1, 0.0).verdict == verdict
+
+
+def test_what_did_not_arrive_has_no_error():
+    choice = ARRIVAL.judged("m", None, MAX_ORDINARY_EVALUATIONS, 0.0)
+    assert (choice.verdict, choice.error) == ("gives up", None)

@@ -1,0 +1,154 @@
+"""A scene's own extremes: what they cover for which walker, and that measures hold for walkers of every kind."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from walkerlab.config.loader import load
+from walkerlab.config.reads import dotted_keys
+from walkerlab.config.schema import Config
+from walkerlab.evidence.verification.catalogue import PHYSICAL_ENDS, STOPPED_ENDS, scene_cases
+from walkerlab.evidence.verification.judge import CaseCell
+from walkerlab.evidence.verification.masses import RigidMasses
+from walkerlab.evidence.verification.scaling import scaled, to_twin
+from walkerlab.evidence.verification.stability import with_numbers
+from walkerlab.physics.mechanics.impact import heel_strike
+from walkerlab.physics.mechanics.rigid_model import STANCE, kinetic_energy
+from walkerlab.physics.orbits.similarity import Units
+from walkerlab.pipeline.graph import PIPELINE
+from walkerlab.pipeline.identity import Keys
+from walkerlab.pipeline.store.content import Content
+from walkerlab.scene.parts import assembly_of
+from walkerlab.scene.rigid import rigid_walker
+
+OTHERS = ("kneed", "kneed-round-feet", "round-feet", "torso")
+GAIT = {"state": [-0.2889854602533978, 0.18818546025339777, -0.2889854602533978,
+                  -0.05714810633751748, -1.1095873311765583, -0.05714810633751748],
+        "step_length_m": 0.4726567858005637}  # fmt: skip
+COMPLIANT = "walker.knee={lock: compliant, stop_stiffness: 1.0e+4}"
+
+
+def config_of(name, *sets):
+    return load(Path(name), sets).config
+
+
+def cases_of(config, gait=GAIT):
+    return {
+        case.name: (case, own) for case, own in scene_cases(with_numbers(config, {"fixedpoint": Content({}, gait)}))
+    }
+
+
+def start_of(config):
+    """Legs apart on the slope, knees straight and the torso on the bisector, moving."""
+    model = rigid_walker(config, "corrected")
+    bodies = len(model.zero_state) // 2
+    stance = 0.2
+    swing = -2.0 * (config.slope_rad + config.walker.lean_rad) - stance
+    more = 0.5 * (swing + stance) if config.walker.torso is not None else swing
+    rates = (-0.4, -1.1, -0.75 if config.walker.torso is not None else -0.4)
+    return model, np.array([*(swing, stance, more)[:bodies], *rates[:bodies]])
+
+
+def test_a_kneed_scene_is_tried_in_every_respect():
+    cases = cases_of(config_of("kneed"))
+    assert {case.family for case, _ in cases.values()} == {"walkers", "ground", "knees", "slopes", "starts", "numerics"}
+    assert 12 <= len(cases) <= 20
+    assert all(set(case.expected) <= {*PHYSICAL_ENDS, "budget-exhausted"} for case, _ in cases.values())
+    assert {name for name, (case, _) in cases.items() if case.twin} == {"scene-rigid", "scene-as-it-is"}
+
+
+@pytest.mark.parametrize(
+    ("name", "sets", "knees"),
+    [
+        ("kneed", (), {"scene-released-at-touch"}),
+        ("kneed", (COMPLIANT,), {"scene-released-at-touch", "scene-stop-times-10", "scene-stop-over-10"}),
+        ("round-feet", (), set()),
+    ],
+)
+def test_knees_and_stops_are_tried_where_there_are_some(name, sets, knees):
+    gait = GAIT if name == "kneed" else {"state": [-0.22, 0.2, -1.1, -1.4], "step_length_m": 0.2}
+    cases = cases_of(config_of(name, *sets), gait)
+    assert {name for name, (case, _) in cases.items() if case.family == "knees"} == knees
+
+
+def test_every_case_is_a_config_of_its_own():
+    cases = cases_of(config_of("kneed", COMPLIANT))
+    for case, own in cases.values():
+        assert Config.model_validate(own.model_dump()) == own, case.name
+    assert len({own.model_dump_json() for case, own in cases.values() if case.model == "contact"}) >= len(cases) - 5
+
+
+def test_a_scene_without_contact_is_tried_in_the_rigid_model_alone():
+    assert {case.model for case, _ in cases_of(config_of("kneed", "contact=null")).values()} == {"rigid"}
+
+
+@pytest.mark.parametrize("slope", ["scene-level", "scene-twice-as-steep"])
+def test_on_another_slope_both_feet_stand_on_it(slope):
+    _, own = cases_of(config_of("kneed"))[slope]
+    masses = RigidMasses(assembly_of(own.walker, rigid=True), own.slope_rad)
+    assert masses.feet_off_the_slope(np.array([own.start])) == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("name", ["scene-friction-0", "scene-standing-still", "scene-rigid"])
+def test_a_kneed_walkers_case_passes_every_measure(name):
+    case, own = cases_of(config_of("kneed"))[name]
+    result, *ordinary = CaseCell(case, own).run()
+    assert result.failures == ()
+    assert ordinary == []
+    if case.expected == STOPPED_ENDS:
+        assert result.outcome != "walked"
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_a_heel_strike_keeps_momentum_summed_over_the_masses_of_any_walker(name):
+    config = config_of(name)
+    model, before = start_of(config)
+    after = np.zeros(before.size)
+    heel_strike(model, before, after)
+    masses = RigidMasses(assembly_of(config.walker, rigid=True), config.slope_rad)
+    assert masses.feet_off_the_slope(before[None]) < 1e-12
+    assert masses.momentum_change(before[None], after[None]) < 1e-12
+    assert masses.energy_won(before[None], after[None]) == 0.0
+    wrong = after.copy()
+    wrong[after.size // 2 + STANCE] *= 1.0 + 1e-6
+    assert masses.momentum_change(before[None], wrong[None]) > 1e-8
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_kinetic_energy_summed_over_the_masses_is_that_of_the_equations(name):
+    config = config_of(name)
+    model, state = start_of(config)
+    masses = RigidMasses(assembly_of(config.walker, rigid=True), config.slope_rad)
+    assert masses.at(state).kinetic == pytest.approx(kinetic_energy(model, tuple(state.tolist())), rel=1e-12)
+
+
+@pytest.mark.parametrize(("name", "sets"), [("kneed", (COMPLIANT,)), ("round-feet", ()), ("torso", ())])
+def test_a_twin_of_any_walker_there_and_back_is_the_walker(name, sets):
+    config = config_of(name, *sets)
+    by = to_twin(config)
+    twin = scaled(config, by)
+    assert twin.walker.total_mass_kg == pytest.approx(by.mass * config.walker.total_mass_kg)
+    again = scaled(twin, Units(1.0 / by.length, 1.0 / by.mass, 1.0 / by.time))
+    assert numbers_of(again.walker.model_dump()) == pytest.approx(numbers_of(config.walker.model_dump()))
+
+
+def numbers_of(block):
+    """Every number of a block and the blocks in it."""
+    inner = [numbers_of(value) if isinstance(value, dict) else value for value in block.values()]
+    return [x for value in inner for x in (value if isinstance(value, list) else [value]) if isinstance(x, float)]
+
+
+def test_known_problems_are_answered_once_for_all_scenes():
+    stage = PIPELINE["known-problems"]
+    slices = [Keys().identity(stage, config_of(name), {}).config_slice for name in ("kneed", "paper")]
+    assert slices == [{}, {}]
+
+
+def test_only_other_walkers_read_their_scene():
+    stage = PIPELINE["stability"]
+    steep, paper = (Keys().identity(stage, config_of(name), {}).config_slice for name in ("slope-3deg", "paper"))
+    assert steep == paper
+    assert {"walker", "contact", "solver", "stability.cases"} <= set(dotted_keys(stage.takes_under(config_of("kneed"))))
+    assert stage.inputs(config_of("slope-3deg")) == ("known-problems",)
+    assert stage.inputs(config_of("kneed")) == ("known-problems", "fixedpoint")

@@ -1,0 +1,68 @@
+"""A case is walked by another method too: by which, how far both may be apart, and what is said if there is none."""
+
+from types import SimpleNamespace
+
+import pytest
+
+from walkerlab.config.stability import Case
+from walkerlab.evidence.verification.catalogue import config_of, package_cases
+from walkerlab.evidence.verification.judge import LIBRARY_BUDGET, judge, other_methods, second_walk
+from walkerlab.evidence.verification.verdict import promised
+from walkerlab.outcome import Outcome
+
+CASES = {case.name: case for case in package_cases()}
+
+
+def ending(*outcomes):
+    """A walk that ends so with the first method it is asked for, so with the next; and what it was asked for."""
+    asked, left = [], list(outcomes)
+
+    def walk(method, budget):
+        asked.append((method.name, budget))
+        return SimpleNamespace(outcome=left.pop(0))
+
+    return walk, asked
+
+
+def test_it_is_never_the_method_itself():
+    for name in ("dop853", "radau5", "scipy-bdf"):
+        assert name not in [method.name for method in other_methods(name)]
+
+
+def test_the_first_method_that_answers_is_taken():
+    walk, asked = ending(Outcome.BUDGET_EXHAUSTED, Outcome.FELL)
+    second = second_walk("radau5", 400_000, walk)
+    assert (second.method, second.walk.outcome, second.tried) == ("scipy-bdf", Outcome.FELL, "dop853 budget-exhausted")
+    assert asked == [("dop853", 400_000), ("scipy-bdf", LIBRARY_BUDGET)]
+
+
+def test_that_none_answers_is_told():
+    walk, _ = ending(Outcome.BUDGET_EXHAUSTED, Outcome.BUDGET_EXHAUSTED, Outcome.SOLVER_FAILED)
+    second = second_walk("radau5", 400_000, walk)
+    assert (second.method, second.walk) == ("", None)
+    assert second.tried == "dop853 budget-exhausted, scipy-bdf budget-exhausted, scipy-radau solver-failed"
+
+
+def test_stiff_ground_is_walked_by_a_multistep_method():
+    result = judge(CASES["stiction-1e-4"], config_of(CASES["stiction-1e-4"]))
+    assert result.ok
+    assert (result.second_method, result.second_tried) == ("scipy-bdf", "dop853 budget-exhausted")
+    assert any("from scipy-bdf" in finding.measure for finding in result.findings)
+
+
+def test_a_rigid_walk_too():
+    result = judge(CASES["rigid-single-stride"], config_of(CASES["rigid-single-stride"]))
+    (finding,) = [finding for finding in result.findings if "from radau5" in finding.measure]
+    assert 0.0 < finding.value < finding.limit < 1e-6
+
+
+def test_what_has_no_answer_is_not_compared_and_says_so():
+    case = CASES["no-budget"]
+    result = judge(case, config_of(case))
+    assert (result.second_method, result.second_tried) == ("", "the walk itself ended budget-exhausted")
+
+
+@pytest.mark.parametrize(("rtol", "limit"), [(1e-10, 1e-7), (1e-3, 1e-4)])
+def test_what_tolerances_promise(rtol, limit):
+    case = Case(name="x", expected=("walked",), reason="to be compared")
+    assert promised(case, rtol, 100) == pytest.approx(limit)

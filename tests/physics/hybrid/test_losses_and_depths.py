@@ -1,0 +1,44 @@
+"""What the ground takes, and how deep feet get, by closed forms and by looking closely."""
+
+import numpy as np
+import pytest
+from contact_walks import scene_of, walked
+
+from walkerlab.evidence.verification.known import (
+    ALONG_RATE,
+    BODY_HEIGHT,
+    GRAVITY,
+    HEIGHT_RATE,
+    rig,
+    rig_state,
+    run_until,
+)
+from walkerlab.physics.ground.friction import Coulomb
+from walkerlab.physics.ground.normal_force import NormalLaw
+from walkerlab.physics.hybrid.contact_result import sampled_feet
+
+MASS, DROP = 2.0, 0.1
+DAMPED = NormalLaw(2e5, 1.5, 40.0, 1e-4)  # lets go on the way out
+
+
+@pytest.mark.parametrize("rtol", [1e-6, 1e-9, 1e-11])
+def test_dampings_share_of_a_bounce_is_the_height_that_it_costs(rtol):
+    """In the air again, all that is missing went into damping: the law lets go before the ball has left the ground."""
+    ball = rig(MASS, 1.0, DAMPED, Coulomb(0.0, 0.0, 0.1, 1.0))
+    run = run_until(ball, rig_state((0.0, DROP), (0.0, 0.0)), 0.25, rtol=rtol, atol=1e-3 * rtol)
+    end = np.array(run.end)
+    assert end[BODY_HEIGHT] > 0.0
+    left = MASS * (GRAVITY * end[BODY_HEIGHT] + 0.5 * (end[HEIGHT_RATE] ** 2 + end[ALONG_RATE] ** 2))
+    missing = MASS * GRAVITY * DROP - left
+    assert missing > 0.1
+    # some hundred steps in contact, each to the tolerance
+    assert run.dissipated[0] == pytest.approx(missing, abs=max(1e3 * rtol, 1e-11))
+
+
+def test_the_deepest_penetration_is_found_inside_a_step():
+    walk, scene = walked(interval=2e-5, steps=2), scene_of()
+    feet = sampled_feet(scene.walker, walk.samples)
+    seen = np.where(walk.samples.has_ground > 0, -feet[:, :, 1], 0.0).max()
+    assert seen <= walk.max_penetration_m * (1.0 + 1e-12)
+    # a parabola between samples 20 us apart at a touch of a millisecond
+    assert walk.max_penetration_m == pytest.approx(seen, rel=1e-3)

@@ -1,0 +1,34 @@
+"""The page at the top of the hybrid package: it leaves out no event and no file."""
+
+import re
+from pathlib import Path
+
+from walkerlab.physics import hybrid
+from walkerlab.physics.hybrid import contact_events, rigid_walk
+
+NO_EVENTS = {"MATERIAL", "PER_FOOT", "EVENT_FUNCTIONS", "NO_EVENT", "LEGS_TURN", "ROWS", "FARTHEST_SLIDE"}
+
+
+def test_the_page_lists_every_event_of_both_models():
+    of_contact = {name for name in vars(contact_events) if name.isupper()} - NO_EVENTS
+    rigid = ("HEEL_STRIKE", "FALL", "AHEAD", "KNEE")
+    assert [getattr(rigid_walk, name) for name in rigid] == list(range(rigid_walk.LEGS_TURN))
+    assert of_contact | set(rigid) <= set(re.findall(r"[A-Z_]+", hybrid.__doc__))
+
+
+def test_the_page_lists_every_file():
+    files = {path.stem for path in Path(hybrid.__file__).parent.glob("*.py")} - {"__init__"}
+    assert files <= set(re.findall(r"`(\w+)`", hybrid.__doc__))
+
+
+def test_no_two_events_of_a_contact_walk_share_a_number():
+    of_foot = ("HEIGHT", "LEFT_EDGE", "RIGHT_EDGE", "RELEASE", "FULL_DAMPING", "MATERIAL", "VERTICAL_VELOCITY")
+    each = [getattr(contact_events, name) for name in of_foot]
+    each += range(contact_events.FRICTION_SWITCHES, contact_events.FRICTION_SWITCHES + 4)
+    assert sorted(each) == list(range(contact_events.PER_FOOT))
+    of_walker = [getattr(contact_events, name) for name in ("PASSING", "FALL", "SLIDE")]
+    of_knees = [
+        first + knee for first in (contact_events.EXTENSION, contact_events.EXTENSION_RATE) for knee in range(2)
+    ]
+    others = [*of_walker, *of_knees, contact_events.PULSE_END]
+    assert sorted(others) == list(range(2 * contact_events.PER_FOOT, contact_events.PULSE_END + 1))

@@ -1,0 +1,104 @@
+"""Orders and limits of series that are known exactly, and what a setting changes."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from walkerlab.config.loader import load
+from walkerlab.physics.orbits.contact_gait import with_scaled_laws
+from walkerlab.physics.orbits.contact_map import OwnPads
+from walkerlab.physics.orbits.fixed_point import find_gaits
+from walkerlab.physics.orbits.rigid_limit import (
+    ALL_POINT_SERIES,
+    ALL_SERIES,
+    SERIES_EFFORT,
+    STICTION_SERIES,
+    ContactFactors,
+    Distance,
+    apply_setting,
+    extrapolate,
+    observed_orders,
+    series_settings,
+    solver_settings,
+)
+from walkerlab.physics.orbits.step_map import Cycle, gait_near
+from walkerlab.scene.contact import contact_scene, gait_off_pads
+from walkerlab.scene.rigid import rigid_walker
+
+
+def distances(periods, ratio):
+    """Settings each `ratio` times as rigid as the one before."""
+    return [
+        Distance(ContactFactors("made up", ratio**i, 1.0, 1.0, 1.0), period, 0.3, 0.0, 0.0, 0.0, 0.0)
+        for i, period in enumerate(periods)
+    ]
+
+
+@pytest.mark.parametrize("order", [0.5, 1.0, 2.0])
+@pytest.mark.parametrize("ratio", [2.0, 10.0])
+def test_the_order_and_the_limit_of_a_power_law_are_found(order, ratio):
+    made = distances([0.7 + 0.01 * ratio ** (-order * i) for i in range(6)], ratio)
+    assert observed_orders(made) == pytest.approx(np.full(4, order), rel=1e-4)
+    limit = extrapolate(made)
+    assert limit is not None
+    assert limit.period == pytest.approx(0.7, abs=1e-9)
+    assert limit.uncertainty < 1e-9
+
+
+def test_a_series_that_does_not_converge_has_no_limit():
+    assert extrapolate(distances([0.7, 0.71, 0.73, 0.77], 2.0)) is None
+    assert extrapolate(distances([0.7, 0.71], 2.0)) is None
+
+
+def test_changes_below_the_numerical_error_do_not_spoil_the_limit():
+    made = distances([0.7 + 0.01 * 2.0**-i for i in range(6)], 2.0)
+    rounded = [replace(made[-1], period=made[-1].period + noise, numerical_period=1e-6) for noise in (3e-7, -5e-7)]
+    assert extrapolate([*made, *rounded]) == extrapolate(made)
+
+
+@pytest.mark.parametrize("name", [ALL_SERIES, STICTION_SERIES])
+def test_a_series_begins_at_the_configs_own_contact(name):
+    walker = contact_scene(load().config, 0.37).walker
+    assert with_scaled_laws(walker, *series_settings(name)[0][2:]) == walker
+
+
+def test_full_damping_stays_where_the_static_penetration_is():
+    walker = contact_scene(load().config, 0.37).walker
+    changed = with_scaled_laws(walker, *series_settings(ALL_SERIES)[4][2:])
+    before, after = walker.normal, changed.normal
+    static = [(196.2 / law.stiffness) ** (1.0 / law.exponent) for law in (before, after)]
+    ratio = after.full_damping_penetration / before.full_damping_penetration
+    assert ratio == pytest.approx(static[1] / static[0])
+
+
+def test_the_gait_of_a_walker_that_is_pushed_off_comes_to_the_rigid_one_in_first_order():
+    """As the ground stiffens and the pulse shortens; where it stays as long no gait is near."""
+    config = load(Path("level"), ["contact.terrain=after-mid-swing", "walker.foot_radius_m=1e-6"]).config
+    rigid = find_gaits(rigid_walker(config, config.equations)).gait
+    scene, found = contact_scene(config, rigid.step_length), gait_off_pads(config, rigid.step_length, rigid.state)
+
+    def off(walker, gait):
+        pads = OwnPads(lambda _: walker, scene.ground, solver_settings(1e-10), rigid.step_length)
+        near = gait_near(pads, gait.z, 0.0, SERIES_EFFORT)
+        return near, abs(near.step.period_s - rigid.period) if isinstance(near, Cycle) else np.inf
+
+    gait, distances = found.gait, []
+    for setting in series_settings(ALL_POINT_SERIES)[1:5]:
+        gait, distance = off(apply_setting(scene.walker, setting), gait)
+        distances.append(distance)
+    orders = np.log(np.divide(distances[:-1], distances[1:])) / np.log(np.sqrt(10.0))
+    assert orders == pytest.approx(1.0, abs=0.06)
+    assert distances[-1] < 2e-4
+    assert not isinstance(
+        off(with_scaled_laws(scene.walker, *series_settings(ALL_POINT_SERIES)[4][2:]), gait)[0], Cycle
+    )
+
+
+def test_only_the_way_to_the_limit_shortens_a_push_off_and_only_beyond_the_configs_contact():
+    walker = contact_scene(load(Path("level")).config, 0.4).walker
+    for name, shortened in ((ALL_SERIES, True), (STICTION_SERIES, False)):
+        durations = [apply_setting(walker, one).whole.push_off_duration for one in series_settings(name)]
+        assert durations[0] == 0.005
+        assert (np.diff(durations) < 0.0).all() == shortened

@@ -1,0 +1,318 @@
+"""Sensitivity norms, largest steps and rough ground against published values, brute sums and theory; gradients."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from plain_rigid_walk import plain_walk
+
+from walkerlab.config.loader import load
+from walkerlab.outcome import Outcome
+from walkerlab.physics.hybrid.walk_record import rough_heights
+from walkerlab.physics.mechanics.impact import pushed_at_hip
+from walkerlab.physics.mechanics.rigid_model import energies, equations, momentum
+from walkerlab.physics.orbits.fixed_point import find_gaits
+from walkerlab.physics.orbits.gradients import GAIT_QUANTITIES, gait_quantities, gradients
+from walkerlab.physics.orbits.newton import Effort
+from walkerlab.physics.orbits.rigid_map import EXACT_STEPS, LONG_WALKS, state_on_section
+from walkerlab.physics.orbits.robustness import (
+    GaitOnMap,
+    derivative,
+    indicators,
+    largest_disturbance,
+    largest_survived,
+    rough_walks,
+    sensitivity,
+    sensitivity_norm,
+    steps_on_rough_ground,
+    walk_disturbed,
+)
+from walkerlab.physics.orbits.similarity import unit_walker
+from walkerlab.physics.orbits.step_map import gait_near
+from walkerlab.scene.contact import gait_off_pads
+from walkerlab.scene.families import contact_map, rigid_map
+from walkerlab.scene.parameter import parameter_of
+from walkerlab.scene.rigid import rigid_walker
+
+
+def standpoint(name, key="slope_rad", tolerances=EXACT_STEPS, changes=()):
+    config = load(Path(name), changes).config
+    walker = rigid_walker(config, config.equations)
+    _, units = unit_walker(walker)
+    z = np.array(find_gaits(walker).gait.state)[walker.section[: walker.coordinates]]
+    z[1:] *= units.time
+    parameter = parameter_of(key, config)
+    step_map, p = rigid_map(config, parameter, 1.0).at(tolerances), parameter.value_in(config)
+    return GaitOnMap(step_map, p, z, step_map.step(z, p).DP, units)
+
+
+def on_compliant_ground(name, key="slope_rad", changes=()):
+    """The same on the contact model's section, off its pads."""
+    config = load(Path(name), changes).config
+    rigid = standpoint(name, changes=changes)
+    walker = rigid_walker(config, config.equations)
+    gait = gait_off_pads(config, 0.3 * walker.leg_length, find_gaits(walker).gait.state).gait
+    parameter = parameter_of(key, config)
+    step_map, p = contact_map(config, parameter, 1.0, gait.step.length_m), parameter.value_in(config)
+    z = step_map.scale_section(gait.z)
+    return GaitOnMap(step_map, p, z, step_map.step(z, p).DP, rigid.units)
+
+
+# ---- the norm ------------------------------------------------------------------------------------------------------
+
+
+def test_the_simplest_walkers_norm_is_that_of_two_other_codes():
+    """Floor drop to step period, gamma .009, l = g = 1: direct part and norm."""
+    answer = sensitivity(standpoint("simplest"), "floor-drop")
+    units = standpoint("simplest").units
+    to_pure = units.length / units.time
+    assert answer.direct[0] * to_pure == pytest.approx(11.56992214, rel=1e-8)
+    assert answer.norm[0] * to_pure == pytest.approx(680.1273, rel=1e-7)
+
+
+@pytest.mark.parametrize("disturbance", ["floor-drop", "hip-push"])
+@pytest.mark.parametrize("name", ["slope-3deg", "kneed", "round-feet", "torso"])
+def test_the_norm_is_the_brute_sum_over_walks(name, disturbance):
+    """Every step of a long walk from a gait that was disturbed a little either way, summed."""
+    at = standpoint(name)
+    unit, steps = at.unit_of(disturbance), 60
+    walks = {k: walk_disturbed(at, disturbance, k * 1e-5 * unit, steps) for k in (-2, -1, 1, 2)}
+    seen = {k: indicators(walk) for k, walk in walks.items()}
+    changes = (8.0 * (seen[1] - seen[-1]) - (seen[2] - seen[-2])) / (12e-5 * unit)
+    answer = sensitivity(at, disturbance)
+    np.testing.assert_allclose(answer.norm, np.sqrt((changes**2).sum(axis=0)), rtol=1e-6)
+    np.testing.assert_allclose(answer.direct, changes[0], rtol=1e-7)
+    assert (answer.error < 1e-6 * answer.norm).all()
+
+
+@pytest.mark.parametrize("disturbance", ["floor-drop", "hip-push"])
+@pytest.mark.parametrize("name", ["paper", "kneed"])
+def test_the_norm_on_compliant_ground_is_the_brute_sum_over_walks(name, disturbance):
+    """Quotients that reach over more than the ground gives way to are 0.5 % off for a kneed walker."""
+    at = on_compliant_ground(name)
+    size, steps = 2e-6 * at.unit_of(disturbance), 40
+    either = [indicators(walk_disturbed(at, disturbance, sign * size, steps)) for sign in (1.0, -1.0)]
+    changes = (either[0] - either[1]) / (2.0 * size)
+    answer = sensitivity(at, disturbance)
+    np.testing.assert_allclose(answer.norm, np.sqrt((changes**2).sum(axis=0)), rtol=1e-5)
+    np.testing.assert_allclose(answer.direct, changes[0], rtol=1e-5)
+    assert (answer.error < 1e-5 * answer.norm).all()
+
+
+def test_the_norm_by_the_lyapunov_equation_is_the_sum_and_an_unstable_gait_has_none():
+    generator = np.random.default_rng(3)
+    for d in (1, 3, 5):
+        A = generator.normal(size=(d, d))
+        A *= 0.9 / np.abs(np.linalg.eigvals(A)).max()
+        B, C, D = generator.normal(size=d), generator.normal(size=(2, d)), generator.normal(size=(3, 2))
+        total, z = (D**2).sum(axis=0), B
+        for _ in range(2000):
+            total, z = total + (C @ z) ** 2, A @ z
+        np.testing.assert_allclose(sensitivity_norm(A, B, C, D), np.sqrt(total), rtol=1e-10)
+        assert sensitivity_norm(A / 0.9 * 1.001, B, C, D) is None
+
+
+def test_a_push_at_the_hip_keeps_the_foot_and_gives_its_impulse_along_the_hips_lever():
+    """The moment of momentum about the foot grows by the impulse times the hip's height, and by nothing else."""
+    at = standpoint("slope-3deg")
+    walker = at.step_map._unit_at(at.p).walker
+    y = np.array(state_on_section(walker, at.z))
+    pushed = pushed_at_hip(walker, y, 1e-3)
+    np.testing.assert_array_equal(pushed[: y.size // 2], y[: y.size // 2])
+    # work of an impulse: the mean velocity of the hip along the slope, before and after
+    height = walker.radius + np.cos(y[1] + walker.slope) * walker.hip_y
+    hip_velocity = -0.5 * height * (y[3] + pushed[3])
+    assert sum(energies(walker, pushed)) - sum(energies(walker, y)) == pytest.approx(1e-3 * hip_velocity, rel=1e-10)
+    assert momentum(walker, pushed)[0] > momentum(walker, y)[0]
+
+
+def test_a_push_at_the_hip_comes_after_the_release_of_the_trailing_knee():
+    """It turns the free shank, whose moment of momentum about its knee stays; the norm is that of another code."""
+    at = standpoint("kneed")
+    walker = at.step_map._unit_at(at.p).walker
+    n, y = len(walker.arm_x), np.array(state_on_section(walker, at.z))
+    change = (pushed_at_hip(walker, y, 1e-3) - y)[n:]
+    assert abs(change[walker.shank] - change[walker.thigh]) > 1e-4
+    M, r, s, c, F, U = np.zeros((n, n)), *np.zeros((5, n))
+    equations(walker, y, s, c, F, U, M, r)
+    assert abs(M[walker.shank] @ change) < 1e-15
+    in_seconds = sensitivity(at, "hip-push").norm[0]
+    assert in_seconds == pytest.approx(0.621718267, rel=1e-8)
+
+
+# ---- large disturbances --------------------------------------------------------------------------------------------
+
+
+def test_the_compass_at_three_degrees_stands_the_steps_that_are_known():
+    at = standpoint("slope-3deg", tolerances=LONG_WALKS)
+    down, up = (largest_disturbance(at, "floor-drop", sign, 50) for sign in (1.0, -1.0))
+    assert down == pytest.approx(14.37e-3, rel=5e-3)
+    assert up == pytest.approx(5.98e-3, rel=5e-3)
+
+
+def test_the_largest_is_below_the_first_that_falls_even_where_larger_ones_are_stood():
+    assert largest_survived(lambda size: size < 0.0123456 or size > 0.02, 1.0) == pytest.approx(0.0123456, abs=1e-6)
+    assert largest_survived(lambda size: True, 2.0) == 1.0
+
+
+def test_rough_ground_takes_the_compass_as_many_steps_as_is_known():
+    """2 mm at 3 degrees: 18.4 steps."""
+    at = standpoint("slope-3deg", tolerances=LONG_WALKS)
+    seen = rough_walks(np.array([steps_on_rough_ground(at, 2e-3, (0, walk), 5000) for walk in range(200)]), 5000)
+    assert seen.method == "all-failed"
+    assert abs(seen.mean_steps - 18.4) < 4.0 * math.hypot(seen.standard_error, 0.7)
+
+
+def test_a_foot_that_lands_just_ahead_of_the_other_ends_a_walk_on_rough_ground():
+    """The level compass, 1 mm: its fourth walk comes down once more after a sixth step, by a library's integrator."""
+    at = standpoint("level")
+    walker, units = at.step_map._unit_at(at.p)[:2]
+    length = at.step_map.step(at.z, at.p).length_m / units.length
+    heights = rough_heights(1e-3, (0, 3), 8) / units.length
+    plain, outcome, ahead = plain_walk(walker, np.array(state_on_section(walker, at.z)), heights, 0.25 * length)
+    assert outcome is Outcome.FELL
+    assert 0.0 < ahead[-1] < 0.25 * length < min(ahead[:-1])
+    assert steps_on_rough_ground(at, 1e-3, (0, 3), 8) == len(plain) == 6
+
+
+def rimless_wheel(deviation_deg, walks, most, seed=0):
+    """Steps of Byl and Tedrake's rimless wheel on slopes drawn step by step (2009): alpha pi/8, mean slope 8 deg."""
+    generator, alpha, ratio = np.random.default_rng(seed), np.pi / 8, 9.8
+    slope = np.deg2rad(8.0)
+    steps, alive = np.zeros(walks), np.ones(walks, bool)
+    squared = np.full(walks, 2.0)
+    for _ in range(most):
+        gamma = slope + np.deg2rad(deviation_deg) * generator.normal(size=walks)
+        squared = np.cos(2 * alpha) ** 2 * (squared + 2 * ratio * (1 - np.cos(alpha + gamma))) - 2 * ratio * (
+            1 - np.cos(alpha - gamma)
+        )
+        alive &= squared >= 0.0
+        squared = np.maximum(squared, 0.0)
+        steps += alive
+    return steps
+
+
+@pytest.mark.parametrize(("deviation", "mean"), [(2.5, 412.0), (3.0, 114.0)])
+def test_mean_steps_of_the_rimless_wheel_are_those_published_whether_walks_are_cut_off_or_not(deviation, mean):
+    """Byl and Tedrake, Metastable walking machines, IJRR 28 (2009), by the recomputed map."""
+    for most, method in ((20_000, "all-failed"), (round(mean), "censored")):
+        seen = rough_walks(rimless_wheel(deviation, 4000, most), most)
+        assert seen.method == method
+        assert abs(seen.mean_steps - mean) < 4.0 * seen.standard_error + 0.01 * mean
+
+
+def expected_steps(deviation_deg, cells=300):
+    """Steps to failure of the wheel by the second eigenvalue of the transition between cells of its squared rate."""
+    alpha, ratio = np.pi / 8, 9.8
+    slope = np.deg2rad(8.0 + deviation_deg * np.linspace(-6.0, 6.0, 601))
+    weight = np.exp(-0.5 * np.linspace(-6.0, 6.0, 601) ** 2)
+    fastest = 2.5
+    squared = np.linspace(0.0, fastest, cells) ** 2
+    ahead = np.cos(2 * alpha) ** 2 * (squared[:, None] + 2 * ratio * (1 - np.cos(alpha + slope))) - 2 * ratio * (
+        1 - np.cos(alpha - slope)
+    )
+    place = np.minimum(np.sqrt(np.maximum(ahead, 0.0)) / fastest * (cells - 1), cells - 1.0 - 1e-9)
+    below, share = np.floor(place).astype(int), place % 1.0
+    going = np.where(ahead >= 0.0, weight / weight.sum(), 0.0)
+    transition = np.zeros((cells, cells))
+    rows = np.broadcast_to(np.arange(cells)[:, None], place.shape)
+    np.add.at(transition, (rows, below), going * (1.0 - share))
+    np.add.at(transition, (rows, below + 1), going * share)
+    return 1.0 / (1.0 - np.abs(np.linalg.eigvals(transition)).max())
+
+
+@pytest.mark.parametrize(("deviation", "mean"), [(1.5, 6.54e5), (2.0, 4324.0), (2.5, 412.0), (3.0, 114.0)])
+def test_the_rimless_wheels_table_is_that_of_its_transitions_second_eigenvalue(deviation, mean):
+    """Failure is absorbing, with the eigenvalue 1; the next one says how long the wheel goes on."""
+    assert expected_steps(deviation) == pytest.approx(mean, rel=0.01)
+
+
+def test_walks_that_all_go_on_bound_the_mean_from_below():
+    seen = rough_walks(np.full(20, 100.0), 100)
+    assert (seen.method, seen.mean_steps, seen.standard_error, seen.capped) == ("lower-bound", 2000.0, None, 20)
+
+
+# ---- gradients -----------------------------------------------------------------------------------------------------
+
+KEYS = {"slope-3deg": ("slope_rad", "walker.hip_mass_kg", "gravity_m_s2"), "kneed": ("walker.shank.mass_below_knee_m",)}
+
+
+@pytest.mark.parametrize(("name", "key"), [(name, key) for name, keys in KEYS.items() for key in keys])
+def test_gradients_are_differences_of_converged_gaits(name, key):
+    at = standpoint(name, key)
+    found = gradients(at, abs(at.p))
+
+    def numbers_at(off):
+        p = at.p + off
+        gait = gait_near(at.step_map, at.z, p, Effort(1e-12))
+        numbers = gait_quantities(at._replace(p=p, z=gait.z, A=gait.DP))
+        return np.array([numbers[one] for one in GAIT_QUANTITIES])
+
+    by_difference, sizes = derivative(numbers_at, 3e-3 * abs(at.p)), gait_quantities(at)
+    for one, expected in zip(GAIT_QUANTITIES, by_difference, strict=True):
+        # differences leave rounding in proportion to the quantity: that of a derivative of zero is all there is
+        rounding = 1e-9 * max(1.0, sizes[one])
+        assert found[one].value == pytest.approx(expected, rel=1e-6, abs=rounding), one
+        assert found[one].error < 1e-5 * abs(expected) + 1e-8
+
+
+@pytest.mark.parametrize(("name", "key"), [("paper", "walker.foot_to_mass_m"), ("kneed", "walker.hip_mass_kg")])
+def test_gradients_on_compliant_ground_are_differences_of_converged_gaits(name, key):
+    """Also by measures that put a foot of the same section coordinates in the air, or millimetres deep."""
+    at = on_compliant_ground(name, key)
+    wanted = ("period_s", "step_length_m", "speed_m_s", "spectral_radius")
+    found = gradients(at, abs(at.p), wanted)
+    near, step = 3e-5 * abs(at.p), 3e-3 * abs(at.p)
+    along = (gait_near(at.step_map, at.z, at.p + near, Effort(1e-11)).z - at.z) / near
+
+    def numbers_at(off):
+        gait = gait_near(at.step_map, at.z + off * along, at.p + off, Effort(1e-11))
+        numbers = gait_quantities(at._replace(p=at.p + off, z=gait.z, A=gait.DP), wanted)
+        return np.array([numbers[one] for one in wanted])
+
+    for one, expected in zip(wanted, derivative(numbers_at, step), strict=True):
+        bound = 4.0 * found[one].error + 1e-6 * abs(expected)
+        assert abs(found[one].value - expected) < bound < 1e-2 * abs(expected), one
+
+
+def test_transport_on_compliant_ground_costs_the_slope_of_a_passive_walker():
+    at = on_compliant_ground("kneed")
+    assert gait_quantities(at, ("cost_of_transport",))["cost_of_transport"] == pytest.approx(math.sin(at.p), rel=1e-9)
+
+
+def test_gravity_scales_times_and_nothing_else():
+    at = standpoint("slope-3deg", "gravity_m_s2")
+    numbers, found = gait_quantities(at), gradients(at, at.p)
+    of_itself = {one: found[one].value * at.p / numbers[one] for one in GAIT_QUANTITIES}
+    expected = {"period_s": -0.5, "step_length_m": 0.0, "speed_m_s": 0.5, "spectral_radius": 0.0}
+    for one, power in expected.items():
+        assert of_itself[one] == pytest.approx(power, abs=1e-7), one
+    assert of_itself["gait_sensitivity_norm"] == pytest.approx(-0.5, abs=1e-6)
+
+
+def test_a_slope_is_of_fourth_order_and_one_sided_at_a_wall():
+    for wall in (-np.inf, -1e-12):
+        off = [
+            derivative(lambda x, wall=wall: np.array([math.exp(x)]) if x > wall else None, h)[0] - 1.0
+            for h in (1e-2, 2e-2)
+        ]
+        assert abs(off[0]) < 3e-8
+        assert off[1] == pytest.approx(16.0 * off[0], rel=0.1)
+    assert derivative(lambda x: None, 1e-2) is None
+
+
+def test_a_walk_that_ends_has_fewer_steps_and_says_how():
+    at = standpoint("slope-3deg")
+    walk = walk_disturbed(at, "floor-drop", 0.2, 3)
+    assert walk.outcome is Outcome.FELL
+    assert walk.durations_s.size < 3
+
+
+def test_a_gradient_takes_the_step_whose_error_is_small():
+    """Twice the usual step leaves the range over which the level compass's gait changes smoothly with its hip."""
+    at = on_compliant_ground("level", "walker.hip_mass_kg", ("contact.terrain=after-mid-swing",))
+    found = gradients(at, abs(at.p), ("period_s",))["period_s"]
+    assert not found.why
+    assert found.value == pytest.approx(0.00922006, abs=2e-8)
+    assert found.error < 1e-4 * found.value

@@ -1,0 +1,269 @@
+"""What holds for every method of the registry; a new one is covered as soon as it is listed."""
+
+import math
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+from walkerlab.physics.kernels import kernel
+from walkerlab.physics.solvers.registry import METHODS, dense_degree, method_named
+from walkerlab.physics.solvers.stepping import (
+    ACCEPTED,
+    OUT_OF_BUDGET,
+    RHS,
+    STEP_DONE,
+    T_OLD,
+    T,
+    advance,
+    begin,
+    interpolate,
+    prepare_dense,
+    rewind,
+)
+from walkerlab.physics.solvers.system import block, derivative, jacobian
+
+MOON = 0.012277471
+PLENTY = 10**6
+
+
+class Satellite(NamedTuple):
+    """Arenstorf's orbit about earth and moon; Hairer, Norsett, Wanner, section II.0, (0.1) and (0.2)."""
+
+    moon: float
+
+
+START = np.array((0.994, 0.0, 0.0, -2.00158510637908252240537862224))
+PERIOD = 17.0652165601579625588917206249
+
+
+@block.case(Satellite)
+def satellite_block(system):
+    return (0.0, 0.0, 0.0, 0.0)
+
+
+@derivative.case(Satellite)
+def satellite_derivative(system, t, y, f):
+    m, e = system.moon, 1.0 - system.moon
+    earth = ((y[0] + m) ** 2 + y[1] ** 2) ** 1.5
+    moon = ((y[0] - e) ** 2 + y[1] ** 2) ** 1.5
+    f[0], f[1] = y[2], y[3]
+    f[2] = y[0] + 2.0 * y[3] - e * (y[0] + m) / earth - m * (y[0] - e) / moon
+    f[3] = y[1] - 2.0 * y[2] - e * y[1] / earth - m * y[1] / moon
+
+
+@jacobian.case(Satellite)
+def satellite_jacobian(system, t, y, J):
+    m, e = system.moon, 1.0 - system.moon
+    x_e, x_m = y[0] + m, y[0] - e
+    r_e, r_m = math.sqrt(x_e * x_e + y[1] * y[1]), math.sqrt(x_m * x_m + y[1] * y[1])
+    for i in range(4):
+        for j in range(4):
+            J[i, j] = 0.0
+    J[0, 2], J[1, 3], J[2, 3], J[3, 2] = 1.0, 1.0, 2.0, -2.0
+    pull = e / r_e**3 + m / r_m**3
+    J[2, 0] = 1.0 - pull + 3.0 * (e * x_e * x_e / r_e**5 + m * x_m * x_m / r_m**5)
+    J[3, 1] = 1.0 - pull + 3.0 * (e * y[1] * y[1] / r_e**5 + m * y[1] * y[1] / r_m**5)
+    J[2, 1] = J[3, 0] = 3.0 * y[1] * (e * x_e / r_e**5 + m * x_m / r_m**5)
+
+
+ORBIT = Satellite(MOON)
+
+
+@kernel
+def drive(method, system, start, t_end):
+    begin(method, system, 0.0, start, 0.0)
+    status = STEP_DONE
+    while method.clock[T] < t_end and status == STEP_DONE:
+        status = advance(method, system, t_end)
+    return status
+
+
+@kernel
+def start(method, system, y):
+    begin(method, system, 0.0, y, 0.0)
+
+
+@kernel
+def step(method, system, t_end):
+    return advance(method, system, t_end)
+
+
+@kernel
+def half_way(method, system, out):
+    prepare_dense(method, system)
+    interpolate(method, system, 0.5, out)
+
+
+@kernel
+def once_more(method, system, t_end):
+    rewind(method, system)
+    return advance(method, system, t_end)
+
+
+def called(name, function, *arguments):
+    """A kernel as the walks call it: compiled for our own methods, in Python for a library's."""
+    return (function if METHODS[name].compiled else function.py_func)(*arguments)
+
+
+def driven(name, rtol, t_end, budget=PLENTY):
+    method = method_named(name).new(4, rtol, 1e-2 * rtol, budget)
+    return method, called(name, drive, method, ORBIT, START, t_end)
+
+
+@cache
+def growth(t):
+    """How much larger a change of the start has become by a time, at most: 3e3 after a tenth of the orbit."""
+    change = 1e-9
+    ends = [drive_to(t, START + sign * change * unit) for unit in np.eye(4) for sign in (1.0, -1.0)]
+    columns = [(up - down) / (2.0 * change) for up, down in zip(ends[::2], ends[1::2], strict=True)]
+    return np.abs(columns).sum(axis=0)
+
+
+def drive_to(t, y):
+    method = method_named("dop853").new(4, 1e-13, 1e-15, PLENTY)
+    drive(method, ORBIT, y, t)
+    return method.y.copy()
+
+
+def allowed(name, rtol, t):
+    """What the end may be off by, a number for each of the state.
+
+    A step may err by rtol times the state, which is of order one, and that grows. Most steps err less, and what errs
+    later grows less: a hundredth of it is left, of methods that vary their order, and take many more steps, a tenth.
+    """
+    lowest, highest = METHODS[name].orders
+    return (0.01 if lowest == highest else 0.1) * growth(t) * rtol
+
+
+# without a moon a circle around the earth, seen from the rotating frame: Kepler's third law gives its rate
+NO_MOON = Satellite(0.0)
+RADIUS = 0.64
+TURN = RADIUS**-1.5 - 1.0
+
+
+def on_circle(t):
+    x, y = RADIUS * math.cos(TURN * t), RADIUS * math.sin(TURN * t)
+    return np.array((x, y, -TURN * y, TURN * x))
+
+
+def circled(name, rtol):
+    """Steps of one turn, and the error of its end."""
+    method = method_named(name).new(4, rtol, 1e-2 * rtol, PLENTY)
+    t_end = 2.0 * math.pi / TURN
+    assert called(name, drive, method, NO_MOON, on_circle(0.0), t_end) == STEP_DONE
+    return int(method.counts[ACCEPTED]), np.abs(method.y - on_circle(t_end)).max()
+
+
+@pytest.fixture(scope="module")
+def early():
+    """The satellite after a tenth of its period, by the most exact of all."""
+    return driven("dop853", 1e-14, 0.1 * PERIOD)[0].y.copy()
+
+
+every_method = pytest.mark.parametrize("name", METHODS)
+
+
+@every_method
+def test_arenstorfs_orbit_closes(name):
+    """Along the orbit changes of the place grow about 10^4 times, those of the velocity 10^6 times."""
+    method, status = driven(name, 1e-9, PERIOD)
+    assert status == STEP_DONE
+    assert np.all(np.abs(method.y - START) < allowed(name, 1e-9, PERIOD))
+    assert method.clock[T] == PERIOD
+
+
+@every_method
+def test_error_falls_with_the_tolerance(name, early):
+    errors = [np.abs(driven(name, rtol, 0.1 * PERIOD)[0].y - early).max() for rtol in (1e-4, 1e-6, 1e-8)]
+    assert errors[0] > errors[1] > errors[2]
+    assert errors[2] < allowed(name, 1e-8, 0.1 * PERIOD).max()
+
+
+@every_method
+def test_observed_order(name):
+    """On a circle, where steps are equally long, the error falls with the steps to the power of minus the order.
+
+    The fit runs from where the error per step is no more than a thousandth to where rounding and the tolerances of
+    inner iterations are far below it. Both ends of it hold the order from below only: the error constants of the next
+    order are the larger ones in good methods, so that on steps this long the error falls faster. A method that varies
+    its order has none to observe; its order rises as the tolerance falls, so that the error falls at least as that of
+    a method of order four would, whatever it begins with.
+    """
+    lowest, highest = METHODS[name].orders
+    steps, errors = zip(*(circled(name, 10.0**-digits) for digits in range(5, 10)), strict=True)
+    observed = -np.polyfit(np.log(steps), np.log(errors), 1)[0]
+    assert observed > (highest - 0.25 if lowest == highest else 4.0)
+
+
+@every_method
+def test_work_is_counted_and_rises_with_accuracy(name):
+    loose, tight = (driven(name, rtol, 0.1 * PERIOD)[0].counts for rtol in (1e-4, 1e-8))
+    assert 0 < loose[ACCEPTED] < tight[ACCEPTED]
+    assert 0 < loose[RHS] < tight[RHS]
+
+
+@every_method
+def test_a_budget_ends_the_run(name):
+    method, status = driven(name, 1e-8, PERIOD, budget=100)
+    assert status == OUT_OF_BUDGET
+    assert method.counts[RHS] <= 130  # a step that has begun may be finished
+
+
+@every_method
+def test_dense_output_agrees_with_a_run_that_ends_there(name):
+    rtol = 1e-8
+    method, _ = driven(name, rtol, 0.05 * PERIOD)
+    out = np.zeros(4)
+    called(name, half_way, method, ORBIT, out)
+    middle = 0.5 * (method.clock[T_OLD] + method.clock[T])
+    exact = driven("dop853", 1e-13, middle)[0].y
+    assert out == pytest.approx(exact, abs=allowed(name, rtol, middle).max())
+
+
+@every_method
+def test_a_step_taken_back_is_taken_again_up_to_an_event(name):
+    rtol = 1e-8
+    method, _ = driven(name, rtol, 0.05 * PERIOD)
+    event = 0.25 * method.clock[T_OLD] + 0.75 * method.clock[T]
+    assert called(name, once_more, method, ORBIT, event) == STEP_DONE
+    assert method.clock[T] == event
+    exact = driven("dop853", 1e-13, event)[0].y
+    assert method.y == pytest.approx(exact, abs=allowed(name, rtol, event).max())
+
+
+@every_method
+def test_steps_that_a_deadline_cuts_short_leave_no_gap_and_do_not_overlap(name):
+    """Deadlines every few thousandths of the orbit, and each third step taken back halfway, as events do."""
+    rtol, t_end = 1e-8, 0.1 * PERIOD
+    method = method_named(name).new(4, rtol, 1e-2 * rtol, PLENTY)
+    called(name, start, method, ORBIT, START)
+    t, y, steps = 0.0, np.array(START), 0
+    for deadline in np.linspace(0.0, t_end, 38)[1:].tolist():
+        while method.clock[T] < deadline:
+            assert called(name, step, method, ORBIT, deadline) == STEP_DONE
+            if steps % 3 == 0:
+                event = 0.5 * (method.clock[T_OLD] + method.clock[T])
+                assert called(name, once_more, method, ORBIT, event) == STEP_DONE
+            assert method.clock[T_OLD] == t
+            assert method.y_old.tolist() == y.tolist()
+            t, y, steps = float(method.clock[T]), method.y.copy(), steps + 1
+        assert t == deadline
+    whole, _ = driven(name, rtol, t_end)
+    assert y == pytest.approx(whole.y, abs=allowed(name, rtol, t_end).max())
+    if not METHODS[name].compiled:
+        # a library's solver goes its own way: cutting its steps short is no work for it
+        assert method.counts[ACCEPTED] == whole.counts[ACCEPTED]
+
+
+@every_method
+def test_the_same_run_gives_the_same_bits(name):
+    first, second = (driven(name, 1e-7, 0.1 * PERIOD)[0] for _ in range(2))
+    assert first.y.tobytes() == second.y.tobytes()
+    assert first.counts.tolist() == second.counts.tolist()
+
+
+@every_method
+def test_dense_degree_is_that_of_a_polynomial(name):
+    assert 3 <= dense_degree(method_named(name).new(4, 1e-6, 1e-8, PLENTY)) <= 10

@@ -1,0 +1,43 @@
+"""The list of methods: what configs may name, what is there, and what it costs to look."""
+
+import importlib.util
+import subprocess
+import sys
+
+import pytest
+
+from walkerlab.config.schema import CVODE_PACKAGE
+from walkerlab.config.schema import METHODS as NAMES
+from walkerlab.physics.solvers import cvode
+from walkerlab.physics.solvers import registry as registry_module
+from walkerlab.physics.solvers.registry import CVODE, METHODS, method_named
+
+OF_CVODE = {method.name for method in CVODE}
+
+
+def test_a_config_may_name_every_method_and_no_other():
+    assert set(NAMES) == {*METHODS, *OF_CVODE}
+
+
+def test_cvode_is_there_if_its_package_is():
+    assert cvode.PACKAGE == CVODE_PACKAGE
+    there = importlib.util.find_spec(cvode.PACKAGE) is not None
+    assert set(METHODS) >= OF_CVODE if there else not set(METHODS) & OF_CVODE
+
+
+def test_an_unknown_method_is_an_error_that_names_the_known():
+    with pytest.raises(KeyError, match="dop853, radau5"):
+        method_named("euler")
+
+
+def test_a_method_that_is_not_installed_says_what_to_install(monkeypatch):
+    monkeypatch.setattr(registry_module, "METHODS", {})
+    with pytest.raises(KeyError, match="pip install scikit-sundae"):
+        method_named("cvode-bdf")
+
+
+def test_libraries_are_loaded_only_where_they_are_used():
+    loaded = "print('scipy.integrate' in sys.modules, 'sksundae' in sys.modules)"
+    look = f"import sys, walkerlab.physics.solvers.registry; {loaded}"
+    found = subprocess.run([sys.executable, "-c", look], capture_output=True, text=True, check=True)
+    assert found.stdout.split() == ["False", "False"]

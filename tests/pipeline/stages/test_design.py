@@ -1,0 +1,187 @@
+"""The design stage: optima against brute grids, bounds kept, questions refused, and the config that it ends in."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from walkerlab.config.loader import load
+from walkerlab.config.reads import only
+from walkerlab.errors import ConfigError, NoAnswer
+from walkerlab.physics.orbits.design import DesignProblem, Point, count_optima, search_from_starts
+from walkerlab.physics.orbits.fixed_point import find_gaits
+from walkerlab.physics.orbits.gradients import gait_quantities
+from walkerlab.physics.solvers.registry import Tolerances
+from walkerlab.pipeline.graph import PIPELINE
+from walkerlab.pipeline.progress import Silent
+from walkerlab.pipeline.stages import design, fixedpoint
+from walkerlab.pipeline.store.checkpoint import Checkpoint
+from walkerlab.scene.contact import contact_scene, gait_off_pads, start_state
+from walkerlab.scene.rigid import rigid_walker
+from walkerlab.scene.subject import find_model_gait
+from walkerlab.views.report.answers import answer
+
+# design contract, section 4
+FIXED_KEYS = {
+    "best", "value", "start_value", "quantity", "constraints", "gradient_norm", "evaluations",
+}  # fmt: skip
+
+
+def run(name, *changes, checkpoint=None):
+    config = load(Path(name), changes).config
+    gait = fixedpoint.run(only(config, PIPELINE["fixedpoint"].takes), {}, Silent())
+    return design.run(
+        only(config, PIPELINE["design"].takes),
+        {"fixedpoint": gait},
+        Silent(),
+        checkpoint=checkpoint or Checkpoint(None, ""),
+    ).summary
+
+
+def gait_at(name, *changes):
+    config = load(Path(name), changes).config
+    return find_gaits(rigid_walker(config, config.equations)).gait
+
+
+def test_the_optimum_is_that_of_a_brute_grid():
+    """The least spectral radius over the hip's mass, on a grid of 46 walkers."""
+    found = run(
+        "slope-3deg", "design.minimise=spectral_radius", "design.over={walker.hip_mass_kg: [5, 50]}", "design.starts=3"
+    )
+    assert set(found) >= FIXED_KEYS
+    json.dumps(found, allow_nan=False)
+    masses = np.linspace(5.0, 50.0, 46)
+    radii = [gait_at("slope-3deg", f"walker.hip_mass_kg={mass!r}").spectral_radius for mass in masses.tolist()]
+    assert found["value"] <= min(radii) + 1e-9
+    assert abs(found["best"]["walker.hip_mass_kg"] - masses[int(np.argmin(radii))]) <= 1.0
+    assert found["value"] == pytest.approx(
+        gait_at("slope-3deg", f"walker.hip_mass_kg={found['best']['walker.hip_mass_kg']!r}").spectral_radius, rel=1e-8
+    )
+
+
+def test_a_search_far_from_the_configs_own_numbers_is_on_the_gait_that_is_sought_there():
+    """From a hip of 10 kg Newton's method comes to an unstable gait of the walker of 50 kg, with multiplier 4.55."""
+    asked = ("design.minimise=spectral_radius", "design.over={walker.hip_mass_kg: [49.9, 50]}", "design.starts=1")
+    found = run("slope-3deg", *asked)
+    assert found["value"] == pytest.approx(gait_at("slope-3deg", "walker.hip_mass_kg=50").spectral_radius, rel=1e-3)
+
+
+def test_searches_that_were_cut_off_go_on_where_they_stopped(tmp_path):
+    asked = ("design.minimise=spectral_radius", "design.over={walker.hip_mass_kg: [5, 50]}", "design.starts=2")
+    whole = run("slope-3deg", *asked, checkpoint=Checkpoint(tmp_path / "parts", "key"))
+    kept = Checkpoint(tmp_path / "parts", "key")
+    assert list(kept.kept) == ["search 0", "search 1"]
+    del kept.kept["search 1"]  # cut off while it was at work
+    again = run("slope-3deg", *asked, checkpoint=kept)
+    for name in ("evaluations", "without_gait", "optima", "on_bound", "best"):
+        assert again[name] == whole[name]
+    assert again["best"] == {"walker.hip_mass_kg": 50.0}
+    assert again["value"] == pytest.approx(whole["value"], rel=1e-9)
+
+
+def test_other_numbers_are_kept_within_their_bounds_and_a_bound_that_is_reached_is_said():
+    found = run(
+        "slope-3deg", "design.maximise=speed_m_s", "design.over={slope_deg: [1, 4]}",
+        "design.keep={step_length_m: [0.3, 0.5]}", "design.starts=2",
+    )  # fmt: skip
+    assert found["numbers"]["step_length_m"] == pytest.approx(0.5, abs=1e-6)
+    assert found["constraints"][0]["value"] <= 0.5 + 1e-6
+    assert found["on_bound"] == []
+    free = run("slope-3deg", "design.maximise=speed_m_s", "design.over={slope_deg: [1, 4]}", "design.starts=2")
+    assert free["on_bound"] == ["slope_deg"]
+    assert free["best"]["slope_deg"] == pytest.approx(4.0)
+    assert free["value"] > free["start_value"]
+
+
+def test_drawn_starts_end_in_one_place_or_are_said_not_to():
+    asked = ("design.minimise=gait_sensitivity_norm", "design.over={walker.foot_to_mass_m: [0.4, 0.6]}")
+    found = run("slope-3deg", *asked, "design.starts=4", "seed=5")
+    assert found["optima"] == 1
+    assert found["value"] < found["start_value"]
+
+
+def bowls(x):
+    """Two bowls, the deeper one at 0.8; between 0.4 and 0.6 there is nothing."""
+    u = float(x[0])
+    if 0.4 < u < 0.6:
+        return None
+    low, depth = (0.2, 1.0) if u <= 0.4 else (0.8, 0.5)
+    return Point({"f": depth + (u - low) ** 2, "g": u}, {"f": np.array([2.0 * (u - low)]), "g": np.array([1.0])})
+
+
+def test_searches_go_round_places_without_a_gait_and_tell_how_many_optima_there_are():
+    question = DesignProblem("f", 1.0, np.array([0.0]), np.array([1.0]), {}, bowls)
+    found = search_from_starts(question, np.array([0.1]), 12, seed=1)
+    assert found[0].x[0] == pytest.approx(0.8, abs=1e-6)
+    assert count_optima(question, found) == 2
+    within = DesignProblem("f", 1.0, np.array([0.0]), np.array([1.0]), {"g": (0.0, 0.3)}, bowls)
+    assert search_from_starts(within, np.array([0.1]), 4, seed=1)[0].x[0] == pytest.approx(0.2, abs=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ((), "no question"),
+        (("design.minimise=period_s",), "no question"),
+        (("design.minimise=period_s", "design.over={walker.thigh.mass_kg: [1, 2]}"), "walker.thigh.mass_kg"),
+        (("design.minimise=period_s", "design.over={slope_deg: [3, 1]}"), "first below the second"),
+        (("design.minimise=period_s", "design.maximise=speed_m_s"), "remove one of them"),
+        (("design.minimise=period_s", "design.over={walker.hip_mass_kg: [-5, 3]}"), "hip_mass_kg cannot be -5 kg"),
+        (("design.minimise=height",), "design.minimise"),
+        (("design.minimise=period_s", "design.over={slope_deg: [1, 3]}", "design.keep={w: [0, 1]}"), "not a number of"),
+    ],
+)  # fmt: skip
+def test_bad_questions_end_in_words(changes, said):
+    with pytest.raises(ConfigError, match=said):
+        run("rigid-only", *changes)
+
+
+def test_numbers_that_the_config_refuses_are_places_without_a_gait():
+    """A leg's mass lies on the leg."""
+    over = "design.over={walker.leg_length_m: [0.6, 1.1], walker.foot_to_mass_m: [0.3, 0.9]}"
+    found = run("rigid-only", "design.minimise=period_s", over, "design.starts=2")
+    assert 0 < found["without_gait"] < found["evaluations"]
+
+
+@pytest.mark.parametrize("key", ["contact.damping", "push_off.duration_s"])
+def test_a_number_that_the_model_does_not_read_is_refused_in_words(key):
+    """Every value of it is as good as any other."""
+    with pytest.raises(ConfigError, match=f"{key} does not affect the rigid model"):
+        run("paper", "design.minimise=period_s", f"design.over={{{key}: [1, 2]}}")
+
+
+def test_bounds_that_no_walker_keeps_are_no_answer():
+    with pytest.raises(NoAnswer, match="keeps the other numbers") as raised:
+        run("slope-3deg", "design.minimise=period_s", "design.over={slope_deg: [2, 3]}",
+            "design.keep={step_length_m: [2, 3]}", "design.starts=2")  # fmt: skip
+    said = " ".join("\n".join(answer("design", raised.value.partial.summary)).split())
+    assert said.startswith("No walker that was found keeps the other numbers within their bounds.")
+    assert "one place" not in said
+
+
+def contact_gait(name):
+    """Its step, and the cost of transport as design has it."""
+    config = load(Path(name), ["contact.terrain=after-mid-swing"]).config
+    walker = rigid_walker(config, config.equations)
+    gait = find_gaits(walker).gait
+    told = {"state": gait.state, "step_length_m": gait.step_length}
+    here = find_model_gait("contact", config, told, Silent().note).at()
+    found = gait_off_pads(config, gait.step_length, gait.state).gait
+    return config, gait, found.step, gait_quantities(here, ["cost_of_transport"])["cost_of_transport"]
+
+
+@pytest.mark.parametrize("name", ["slope-3deg", "level"])
+def test_a_contact_gaits_cost_of_transport_is_what_the_ground_takes_over_weight_and_distance(name):
+    _, _, step, cost = contact_gait(name)
+    assert cost == pytest.approx(step.dissipated_J.sum() / (20.0 * 9.81 * step.length_m), rel=1e-7)
+
+
+def test_a_settled_walk_with_knees_and_torque_costs_what_its_gait_does():
+    config, gait, _, cost = contact_gait("kneed-level")
+    scene, costs, ways = contact_scene(config, gait.step_length), [], []
+    for steps in (14, 15):
+        walk = scene.walk(start_state(scene, gait.state), steps, Tolerances("radau5", 1e-9, 1e-11, 10**8))
+        ways.append(walk.touch_along_m[-1])
+        costs.append(walk.driven.cost_of_transport(1.0))
+    assert np.subtract(*costs) / np.subtract(*ways) == pytest.approx(cost, rel=1e-5)

@@ -1,0 +1,178 @@
+"""Every number of every built-in walker, in every stage that takes a key: it is followed, or refused in words."""
+
+from dataclasses import replace
+from fnmatch import fnmatch
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from walkerlab.config.design import Design
+from walkerlab.config.fields import leaves, type_words
+from walkerlab.config.files import builtin_names
+from walkerlab.config.loader import load
+from walkerlab.config.reads import only
+from walkerlab.config.schema import Config
+from walkerlab.errors import ConfigError
+from walkerlab.physics.orbits.families import ValueSpan
+from walkerlab.physics.orbits.family_search import CONTACT, RIGID
+from walkerlab.pipeline.executor import answer_in_memory
+from walkerlab.pipeline.graph import PIPELINE
+from walkerlab.pipeline.progress import Silent
+from walkerlab.pipeline.results import MemoryResults
+from walkerlab.pipeline.stages import robustness
+from walkerlab.pipeline.stages.continuation import FamilyQuestion, models_of
+from walkerlab.pipeline.stages.design import Gaits
+from walkerlab.pipeline.sweeps.question import axis, described
+from walkerlab.scene.parameter import MODEL_KEYS, parameter_of
+
+WALKERS = {
+    **dict.fromkeys(builtin_names(), ()),
+    "kneed with compliant stops": ("walker.knee.lock=compliant",),
+    "paper with a hip": ("walker.hip={spring_N_m_per_rad: 1, damping_N_m_s_per_rad: 0.1, torque_N_m: 0.01}",),
+}
+ONLY_CONTACT = ("contact.", "push_off.duration_s", "walker.knee.stop_")
+PULSED = ("level", "kneed-level")
+RIGID_ONLY = ("kuo", "rigid-only", "simplest")
+IDEAL_KNEES = ("kneed", "kneed-level", "kneed-round-feet", "parts")
+REFUSED = (
+    ("continuation", sorted({*WALKERS} - {*PULSED}), "push_off.duration_s", "does not affect the rigid"),
+    ("continuation", RIGID_ONLY, "walker.foot_radius_m", "does not affect the rigid model"),
+    ("continuation", IDEAL_KNEES, "walker.knee.stop_*", "does not affect the rigid or the contact model"),
+    ("second", WALKERS, "contact.*", "does not affect the rigid model"),
+    ("second", WALKERS, "push_off.duration_s", "does not affect the rigid model"),
+    ("second", WALKERS, "walker.foot_radius_m", "does not affect the rigid model"),
+    ("second", WALKERS, "walker.knee.stop_*", "does not affect the rigid model"),
+    ("second", WALKERS, "gravity_m_s2", "is already the number that gaits are followed over"),
+    ("*", ("paper-as-printed",), "walker.hip.*", "cannot be 1e-15"),
+    ("*", ("paper-as-printed",), "push_off.impulse_N_s", "cannot be 1e-15"),
+    ("*", ("parts",), "walker.leg_length_m", "cannot be 0.999 m"),
+    ("gradients", ("kuo", "simplest"), "walker.leg_inertia_kg_m2", ""),
+    ("gradients", ("kuo",), "walker.hip.[dt]*", ""),
+    ("gradients", ("simplest",), "walker.hip.*", ""),
+)
+"""Whatever may be refused: by which question, of which walkers, which keys, and in which words, where there are any."""
+
+
+def may_be_refused(question, walker, key, said=""):
+    """Whether a refusal is one of those that are known."""
+    return any(
+        fnmatch(question, asked) and walker in walkers and fnmatch(key, keys) and (words in said or not said)
+        for asked, walkers, keys, words in REFUSED
+    )
+
+
+@pytest.fixture(scope="module", params=WALKERS)
+def walker(request):
+    return request.param
+
+
+@pytest.fixture(scope="module")
+def config(walker):
+    return load(Path(walker.split(" ")[0]), WALKERS[walker]).config
+
+
+@pytest.fixture(scope="module")
+def keys(config):
+    """The keys of a model that hold a number in the config."""
+    found = ["slope_deg"]
+    for path, field in leaves(Config, held=config):
+        held = config
+        for name in path:
+            held = getattr(held, name, None)
+        if path[0] in MODEL_KEYS and "number" in type_words(field.annotation) and isinstance(held, int | float):
+            found.append(".".join(path))
+    return found
+
+
+def question(config, key, model):
+    """What `continuation` asks over a small span above a key's own value, or below where that is the largest."""
+    taken = only(config, PIPELINE["continuation"].takes)
+    taken.continuation = config.continuation.model_copy(update={"model": model})
+    parameter = parameter_of(key, taken)
+    value = parameter.value_in(taken)
+    ends = (value, 1.001 * value) if value else (0.0, 1e-15)
+    if value and parameter.config_at(taken, ends[1]) is None:
+        ends = (0.999 * value, value)
+    return FamilyQuestion(taken, parameter, ValueSpan(*ends))
+
+
+def followed(asked):
+    """The models that are followed, or why none is."""
+    try:
+        return models_of(asked), ""
+    except ConfigError as error:
+        return (), error.message
+
+
+def test_continuation_follows_every_number_in_the_models_that_have_it_or_says_why_not(walker, config, keys):
+    every = (RIGID,) if config.contact is None else (RIGID, CONTACT)
+    for key in keys:
+        models, refused = followed(question(config, key, "rigid" if len(every) == 1 else "both"))
+        assert models in (every, (CONTACT,)) or f" {key} " in f" {refused} "
+        assert models or may_be_refused("continuation", walker, key, refused), f"{key}: {refused}"
+        assert RIGID in models or refused or key.startswith((*ONLY_CONTACT, "walker.foot_radius_m"))
+
+
+def test_a_second_number_is_followed_or_refused_too(walker, config, keys):
+    first = question(config, "gravity_m_s2", "rigid")
+    for key in keys:
+        span = question(config, key, "rigid").span
+        second = {"over": key, "from": span.least, "to": span.most}
+        block = Config.model_validate({"continuation": {"model": "rigid", "second": second}}).continuation
+        taken = only(config, PIPELINE["continuation"].takes)
+        taken.continuation = block
+        models, refused = followed(replace(first, config=taken))
+        assert models == (RIGID,) or refused.startswith("continuation.second")
+        assert models or f" {key} " in f" {refused} "
+        assert models or may_be_refused("second", walker, key, refused), f"{key}: {refused}"
+
+
+@pytest.fixture(scope="module")
+def fixedpoint(config):
+    return answer_in_memory(config, "fixedpoint", MemoryResults())
+
+
+@pytest.fixture(scope="module")
+def subject(config, fixedpoint):
+    """The rigid model's gait, to be disturbed."""
+    taken = only(config, PIPELINE["robustness"].takes)
+    return next(robustness.subjects(taken, {"fixedpoint": fixedpoint}, Silent()))
+
+
+def test_design_knows_the_gait_and_its_gradient_over_every_number(walker, config, keys, fixedpoint, subject):
+    taken = only(config, PIPELINE["design"].takes)
+    for key in keys:
+        parameter, asked = parameter_of(key, taken), Design(minimise="period_s", over={key: [0.0, 1.0]})
+        own = np.array([parameter.value_in(taken)])
+        found = Gaits(taken, asked, [parameter], fixedpoint.summary, Silent()).at(own)
+        if found is None:
+            assert not robustness.gradients_of(subject, key), "the walker has no other value of it"
+            assert may_be_refused("gradients", walker, key), key
+            continue
+        assert found.numbers["period_s"] == pytest.approx(fixedpoint.summary["period_s"], abs=1e-9)
+        assert np.all(np.isfinite(found.gradients["period_s"])), key
+
+
+def test_robustness_differentiates_the_gait_by_every_number(walker, config, keys, subject):
+    read = set(robustness.numbers_read(subject))
+    assert read <= set(keys)
+    assert not any(key.startswith(ONLY_CONTACT) for key in read)
+    for key in keys:
+        gradients = robustness.gradients_of(subject, key)
+        assert gradients or may_be_refused("gradients", walker, key), key
+        for name, gradient in gradients.items():
+            assert gradient.value is not None or gradient.why, f"{name} by {key}"
+            assert gradient.value is None or np.isfinite(gradient.value), f"{name} by {key}"
+            if key.startswith(ONLY_CONTACT):
+                assert gradient.value is not None, f"{name} by {key}: {gradient.why}"
+                effect = gradient.value * parameter_of(key, config).value_in(config)
+                assert abs(effect) < 1e-6, f"the rigid model does not read {key}"
+
+
+def test_sweeps_take_every_number(config, keys):
+    for key in keys:
+        asked = question(config, key, "rigid")
+        ends = (asked.span.least, asked.span.most)
+        assert axis(key, f"{ends[0]!r}:{ends[1]!r}:2", f"--over {key}").values == pytest.approx(ends)
+        assert described(config, key)[1] != key, "its meaning is known"

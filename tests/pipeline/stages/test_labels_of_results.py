@@ -1,0 +1,35 @@
+"""Units stand in labels, and some in names as well: they have to be the same."""
+
+import pytest
+
+from walkerlab.evidence.benchmarks import ladder
+from walkerlab.evidence.benchmarks.engines import rows as engines
+from walkerlab.evidence.paper import tune_limit
+from walkerlab.evidence.verification.known import Known
+from walkerlab.evidence.verification.verdict import CaseResult
+from walkerlab.labels import labels_of, unit_by_name
+from walkerlab.pipeline.stages import fixedpoint, walk
+
+CLASSES = (engines.EngineRow, engines.SwingRow, engines.TuningRow, ladder.MethodRow, CaseResult, Known)
+LABELS = {
+    **{kind.__qualname__ + kind.__module__: labels_of(kind) for kind in CLASSES},
+    "gait": fixedpoint.NUMBERS | fixedpoint.OF_KNEES,
+    "walk": walk.OVER_TIME | walk.OF_STEPS,
+    "limit": tune_limit.FACTOR_LABELS | tune_limit.DISTANCE_LABELS | tune_limit.WALK_LABELS,
+}
+
+
+@pytest.mark.parametrize("labels", LABELS.values(), ids=LABELS)
+def test_a_name_that_ends_in_a_unit_ends_in_its_own(labels):
+    assert labels
+    for field, label in labels.items():
+        assert unit_by_name(label.name or field) in ("1", label.unit)
+        assert label.text
+
+
+@pytest.mark.parametrize(
+    ("name", "unit"),
+    [("period_s", "s"), ("velocity_m_s", "m/s"), ("max_friction_ratio", "1"), ("slope_deg", "deg"), ("s", "1")],
+)
+def test_the_longest_ending_that_is_a_unit_tells_it(name, unit):
+    assert unit_by_name(name) == unit

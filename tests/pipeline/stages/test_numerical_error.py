@@ -1,0 +1,123 @@
+"""The numerical error of a walk: what tighter tolerances change, and what is said where there are none."""
+
+import pytest
+from annotated_types import Ge
+
+from walkerlab.config.loader import load
+from walkerlab.config.reads import only
+from walkerlab.config.schema import SolverSettings
+from walkerlab.errors import NoAnswer
+from walkerlab.physics.hybrid import recorded_walk
+from walkerlab.physics.solvers.registry import Tolerances
+from walkerlab.pipeline.graph import PIPELINE
+from walkerlab.pipeline.progress import Silent
+from walkerlab.pipeline.stages import contact_sim, simulate
+from walkerlab.pipeline.stages.numerical_error import LEAST_RTOL, change, tightened
+from walkerlab.pipeline.store.content import Content
+
+# corrected equations, 0.0174 rad (fixed point of the paper's walker)
+STATE = [-0.2042, 0.1694, -0.605819, -0.861041]
+GAIT = Content({}, {"state": STATE, "step_length_m": 0.3714})
+MODULES = {"simulate": simulate, "contact-sim": contact_sim}
+KEYS = {"step_period_s": "step_periods_s", "step_length_m": "step_lengths_m"}
+OF_FEET = {"slip_m": "slips_m", "rolling_m": "rolling_m"}
+
+
+def walk(stage, *sets, **options):
+    config = load(None, sets).config
+    return MODULES[stage].run(only(config, PIPELINE[stage].takes), {"fixedpoint": GAIT}, Silent(), **options).summary
+
+
+@pytest.mark.parametrize(
+    ("stage", "model", "keys"), [("simulate", "rigid", KEYS), ("contact-sim", "contact", KEYS | OF_FEET)]
+)
+def test_the_error_is_of_the_size_of_that_against_a_far_tighter_walk(stage, model, keys):
+    loose = walk(stage, f"solver.{model}.rtol=1e-4", f"solver.{model}.atol=1e-6", "outputs=[]", "strides=2")
+    right = walk(stage, f"solver.{model}.rtol=1e-10", f"solver.{model}.atol=1e-12", "outputs=[]", "strides=2")
+    error = loose["numerical_error"]
+    assert list(error) == [*keys, "end_time_s"]
+    for key, of in keys.items():
+        true = max(abs(a - b) for a, b in zip(loose[of], right[of], strict=True))
+        # what the second walk leaves of the first one's error, at an order of five or more: some 2 % of it
+        assert error[key] == pytest.approx(true, rel=0.2)
+        assert right["numerical_error"][key] < 1e-3 * true
+
+
+def test_the_error_of_a_hip_torques_cost_is_of_the_size_of_that_against_a_far_tighter_walk():
+    driven = ("walker.hip.torque_N_m=0.3", "outputs=[]", "strides=2")
+    loose = walk("simulate", "solver.rigid.rtol=1e-4", "solver.rigid.atol=1e-6", *driven)
+    right = walk("simulate", "solver.rigid.rtol=1e-10", "solver.rigid.atol=1e-12", *driven)
+    true = abs(loose["cost_of_transport"] - right["cost_of_transport"])
+    assert loose["numerical_error"]["cost_of_transport"] == pytest.approx(true, rel=0.2)
+    assert right["numerical_error"]["cost_of_transport"] < 1e-3 * true
+    assert "cost_of_transport" not in walk("simulate", "outputs=[]", "strides=2")["numerical_error"]
+
+
+def test_tolerances_that_cannot_be_a_hundred_times_tighter_are_ten_times_tighter_or_give_way_to_another_method():
+    assert [bound.ge for bound in SolverSettings.model_fields["rtol"].metadata if isinstance(bound, Ge)] == [LEAST_RTOL]
+    usual, by = tightened(Tolerances("dop853", 1e-12, 1e-12, 1))
+    assert (usual.rtol, usual.atol, by) == (pytest.approx(1e-14), 1e-14, "a hundred times tighter tolerances")
+    some, by = tightened(Tolerances("dop853", 1e-13, 1e-12, 1))
+    assert (some.rtol, some.atol, by) == (pytest.approx(1e-14), 1e-13, "ten times tighter tolerances")
+    other, by = tightened(Tolerances("dop853", 2e-14, 1e-12, 1))
+    assert (other.method, other.rtol, by) == ("radau5", 2e-14, "another method, radau5")
+    assert tightened(Tolerances("radau5", LEAST_RTOL, 1e-12, 1))[0].method == "dop853"
+
+
+def test_what_the_second_walk_changed_is_told_where_it_is_not_the_usual():
+    error = walk("simulate", "solver.rigid.rtol=1e-13", "solver.rigid.atol=1e-15", "outputs=[]")["numerical_error"]
+    assert error["by"] == "ten times tighter tolerances"
+    assert error["step_period_s"] < 1e-12
+
+
+WALKED = {
+    "outcome": "walked",
+    "steps": 2,
+    "step_periods_s": [0.7, 0.7],
+    "step_lengths_m": [0.3, 0.3],
+    "end_time_s": 1.4,
+}
+
+
+def test_where_the_second_walk_ends_otherwise_there_is_a_reason_and_no_number():
+    fell = WALKED | {"outcome": "fell", "steps": 1}
+    assert change(WALKED, fell) == {
+        "reason": "with a hundred times tighter tolerances the walk ends otherwise: fell after 1 step"
+    }
+    assert list(change(WALKED, WALKED | {"steps": 1}, by="another method, radau5")) == ["reason"]
+
+
+def test_the_largest_change_counts_wherever_it_is():
+    again = WALKED | {"step_periods_s": [0.7, 0.75], "step_lengths_m": [0.2, 0.3], "end_time_s": 1.45}
+    expected = {"step_period_s": 0.05, "step_length_m": 0.1, "end_time_s": 0.05}
+    assert change(WALKED, again) == pytest.approx(expected)
+    knees = {"knee_strike_times_s": [0.4, None, 1.2]}
+    later = change(WALKED | knees, again | {"knee_strike_times_s": [0.4, None, 1.5]})
+    assert later == pytest.approx(expected | {"knee_strike_time_s": 0.3})
+
+
+@pytest.mark.parametrize("stage", MODULES)
+def test_a_walk_without_a_step_has_an_end_alone(stage):
+    fallen = walk(stage, "start=[-0.1674, 0.1674, -0.4, -0.5]", "slope_rad=0", "contact.pad_pitch=0.3", "outputs=[]")
+    assert fallen["outcome"] in ("fell", "off-pad")
+    assert fallen["steps"] == 0
+    assert list(fallen["numerical_error"]) == ["end_time_s"]
+    assert 0.0 < fallen["end_time_s"] < 10.0
+    assert fallen["numerical_error"]["end_time_s"] < 1e-6
+
+
+def test_the_end_of_a_walk_of_all_steps_is_its_last_touch():
+    found = walk("simulate", "outputs=[]")
+    assert found["end_time_s"] == found["touch_times_s"][-1]
+
+
+@pytest.mark.parametrize("stage", MODULES)
+def test_the_second_walk_can_be_left_out(stage):
+    assert "numerical_error" not in walk(stage, "outputs=[]", "strides=1", again=False)
+
+
+def test_a_walk_that_has_no_answer_is_not_walked_again(monkeypatch):
+    monkeypatch.setattr(recorded_walk, "BUDGET_OF_A_STEP", 100)
+    with pytest.raises(NoAnswer) as caught:
+        walk("simulate")
+    assert "numerical_error" not in caught.value.partial.summary

@@ -1,0 +1,231 @@
+"""The robustness stage: what it answers, keeps and refuses."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from walkerlab.config.loader import load
+from walkerlab.config.reads import only
+from walkerlab.errors import ConfigError, NoAnswer
+from walkerlab.physics.hybrid.recorded_walk import take_walk
+from walkerlab.physics.hybrid.rigid_measures import reactions
+from walkerlab.physics.mechanics.impact import pushed_at_hip
+from walkerlab.physics.orbits.rigid_map import EXACT_STEPS
+from walkerlab.pipeline.graph import PIPELINE
+from walkerlab.pipeline.progress import Silent
+from walkerlab.pipeline.stages import fixedpoint, robustness
+from walkerlab.pipeline.store.checkpoint import Checkpoint
+from walkerlab.pipeline.store.columns import rows_group
+from walkerlab.scene.rigid import rigid_walker
+from walkerlab.views.report.answers import answer
+from walkerlab.views.report.sections.robustness import tables
+
+# design contract, section 4
+FIXED_KEYS = {
+    "gait_sensitivity_norm": {"model", "disturbance", "indicator", "value", "direct", "unit", "scaled"},
+    "sensitivity": {"model", "of", "to", "value", "unit"},
+    "largest_step": {"model", "down_m", "up_m", "steps"},
+    "largest_push": {"model", "forward_N_s", "backward_N_s", "steps"},
+    "rough_ground": {"model", "roughness_m", "mean_steps", "standard_error", "walks", "capped"},
+}
+SCALED = "gait_sensitivity_norm_scaled"
+FEW = ("robustness.walks=20", "robustness.roughness_m=[0.002]", "robustness.to=[slope_deg, walker.hip_mass_kg]")
+
+
+def run(name, *changes, jobs=1, checkpoint=None):
+    config = load(Path(name), changes).config
+    gait = fixedpoint.run(only(config, PIPELINE["fixedpoint"].takes), {}, Silent())
+    asked = only(config, PIPELINE["robustness"].takes)
+    return robustness.run(
+        asked, {"fixedpoint": gait}, Silent(), checkpoint=checkpoint or Checkpoint(None, ""), jobs=jobs
+    )
+
+
+@pytest.fixture(scope="module")
+def rigid():
+    return run("slope-3deg", "robustness.model=rigid", *FEW)
+
+
+@pytest.fixture(scope="module")
+def both():
+    return run(
+        "kneed",
+        "robustness.steps=3",
+        "robustness.walks=2",
+        "robustness.max_steps=3",
+        FEW[1],
+        "robustness.to=[slope_deg]",
+    )
+
+
+def test_the_answer_has_the_fixed_keys(rigid, both):
+    for summary in (rigid.summary, both.summary):
+        json.dumps(summary, allow_nan=False)
+        for name, keys in FIXED_KEYS.items():
+            assert summary[name], name
+            for row in summary[name]:
+                assert set(row) >= keys - {"standard_error"}, name
+    assert [row["model"] for row in both.summary["largest_step"]] == ["rigid", "contact"]
+    assert len(rigid.summary["gait_sensitivity_norm"]) == 6
+
+
+def test_both_models_stand_about_the_same(both):
+    rigid, contact = both.summary["largest_step"]
+    first, second = (row["value"] for row in both.summary["gait_sensitivity_norm"][::6])
+    assert contact["down_m"] == pytest.approx(rigid["down_m"], rel=0.2)
+    assert second == pytest.approx(first, rel=0.1)
+    pushes = both.summary["largest_push"]
+    assert pushes[1]["forward_N_s"] == pytest.approx(pushes[0]["forward_N_s"], rel=0.2)
+
+
+def test_a_slope_in_degrees_is_differentiated_by_degrees(rigid):
+    found = {(row["of"], row["to"]): row for row in rigid.summary["sensitivity"]}
+    one = found["step_length_m", "slope_deg"]
+    assert one["unit"] == "m per deg"
+    # a step of a compass on gentle slopes grows with about the slope's cube root
+    assert 0.2 < one["relative"] < 0.5
+
+
+def said_of(summary):
+    return " ".join("\n".join(answer("robustness", summary)).replace("\N{NO-BREAK SPACE}", " ").split())
+
+
+def test_a_builder_understands_the_answer(rigid):
+    said = said_of(rigid.summary)
+    assert "stands a step down of 14.37 mm or a step up of 5.977 mm" in said
+    assert "On a floor that is rough by 2 mm the rigid model walks" in said
+    assert "What to change first, by the rigid model: walker.hip_mass_kg. With 1 %" in said
+
+
+def test_what_to_change_is_a_number_of_the_walker_that_rounding_has_not_eaten(rigid):
+    """Neither gravity, nor what has no effect."""
+    row = next(row for row in rigid.summary["sensitivity"] if row["of"] == "gait_sensitivity_norm_scaled")
+    others = [row | {"to": "gravity_m_s2", "relative": -9.0}, row | {"to": "walker.x", "why": "lost in rounding"}]
+    own = [row | {"to": "walker.hip_mass_kg", "relative": 0.25}]
+    said = said_of({**rigid.summary, "sensitivity": [*others, *own]})
+    assert (
+        "walker.hip_mass_kg. With 1 % less of it a drop of the floor disturbs the period of the steps 0.25 % less"
+        in said
+    )
+    assert "What to change first" not in said_of({**rigid.summary, "sensitivity": others})
+
+
+def test_a_longer_leg_does_not_win_by_the_dimension_of_the_norm():
+    """All lengths together scale the walker, which leaves the dimensionless norm as it is; keys are the config's."""
+    found = run("slope-3deg", "robustness.model=rigid", "robustness.roughness_m=[]", "robustness.steps=1")
+    shares = {row["to"]: row.get("relative") for row in found.summary["sensitivity"] if row["of"] == SCALED}
+    lengths = [key for key in shares if key.endswith("_m")]
+    assert {"walker.leg_length_m", "walker.foot_to_mass_m"} <= set(lengths)
+    assert sum(shares[key] or 0.0 for key in lengths) == pytest.approx(0.0, abs=1e-6)
+    assert abs(shares["gravity_m_s2"]) < 1e-6
+    assert "slope_deg" in shares
+    assert "slope_rad" not in shares
+    shown = {
+        one.caption: [row[1].text for rows in one.groups.values() for row in rows] for one in tables(found.summary)
+    }
+    assert all(key.startswith("walker.") for key in shown["What to change first"])
+    assert set(shown["Gravity, slope and ground"]) == {"gravity_m_s2", "slope_deg"}
+    assert "push_off.impulse_N_s" in shown["Parameters that are zero"]
+
+
+def test_a_push_says_whether_the_ground_then_pushes(rigid, both):
+    """By the force on all masses: their weight and what accelerates them, along the walk that follows the push."""
+    (push,) = rigid.summary["largest_push"]
+    assert push["forward_normal_impulse_N_s"] > 0.0 > push["backward_normal_impulse_N_s"]
+    said = said_of(rigid.summary)
+    assert "After the largest push forward the ground still pushes, with at least" in said
+    assert "For the largest push backward the ground would have to pull with" in said
+    config = load(Path("slope-3deg")).config
+    walker, gait = rigid_walker(config), fixedpoint.run(config, {}, Silent()).summary["state"]
+    pushed = pushed_at_hip(walker, np.array(gait), -push["backward_N_s"])
+    walk = take_walk(walker, EXACT_STEPS, tuple(pushed), 50, sampled=True)
+    lowest = reactions(walker, walk.samples.state)[:, 1].min()
+    assert push["backward_min_normal_force_N"] == pytest.approx(lowest, abs=0.05)
+    assert {value for key, value in both.summary["largest_push"][1].items() if "normal" in key} == {None}
+
+
+def test_what_moves_the_gait_is_ranked_over_both_models(both):
+    lines = [line.split() for line in "\n".join(answer("robustness", both.summary)).splitlines() if " slope_" in line]
+    shares = [abs(float(line[-1].replace("\N{MINUS SIGN}", "-"))) for line in lines]
+    assert {line[0] for line in lines} == {"rigid", "contact"}
+    assert len(shares) > 4
+    assert shares == sorted(shares, reverse=True)
+
+
+def test_large_means_are_told_to_the_digits_that_mean_something(rigid):
+    one = rigid.summary["rough_ground"][0] | {"mean_steps": 492652.3, "standard_error": 348357.1, "method": "censored"}
+    assert "walks 490,000 steps on average, give or take 350,000." in said_of({**rigid.summary, "rough_ground": [one]})
+
+
+def test_walks_are_the_same_for_any_number_of_processes_and_after_an_interruption(rigid, tmp_path):
+    assert run("slope-3deg", "robustness.model=rigid", *FEW, jobs=3).summary == rigid.summary
+    kept = Checkpoint(tmp_path / "parts", "key")
+    run("slope-3deg", "robustness.model=rigid", *FEW, checkpoint=kept)
+    again = Checkpoint(tmp_path / "parts", "key")
+    assert len(again.kept) == 5
+    assert run("slope-3deg", "robustness.model=rigid", *FEW, checkpoint=again).summary == rigid.summary
+
+
+def test_a_number_that_no_walker_beside_has_is_told_with_the_reason():
+    """Legs of next to no mass follow no torque of the usual step."""
+    found = run("kuo", "robustness.to=[walker.hip.torque_N_m]", "robustness.roughness_m=[]", "robustness.steps=1")
+    rows = found.summary["sensitivity"]
+    assert {row["of"] for row in rows} >= {"period_s", "spectral_radius"}
+    assert all(row["value"] is None and row["why"] == robustness.NONE_BESIDE.why for row in rows)
+
+
+def test_gradients_are_the_same_for_any_number_of_processes(rigid):
+    asked = only(load(Path("slope-3deg"), ("robustness.model=rigid",)).config, PIPELINE["robustness"].takes)
+    gait = fixedpoint.run(asked, {}, Silent())
+    subject, numbers = next(robustness.subjects(asked, {"fixedpoint": gait}, Silent())), rigid.summary["gaits"][0]
+    keys = ("slope_deg", "walker.hip_mass_kg")
+    assert robustness.sensitivities(subject, keys, numbers, Silent(), jobs=2) == rigid.summary["sensitivity"]
+
+
+def test_an_unstable_gait_has_no_norm_and_says_so_with_what_there_is():
+    with pytest.raises(NoAnswer, match="the gait of the rigid model is unstable") as raised:
+        run("rigid-only", "slope_deg=4.6", *FEW)
+    summary = raised.value.partial.summary
+    assert summary["gaits"][0]["spectral_radius"] > 1.0
+    assert not summary["gait_sensitivity_norm"]
+    assert "What moves the gait" not in "".join(answer("robustness", {**summary, "sensitivity": []}))
+    assert any("spectral_radius" in line for line in answer("robustness", summary))
+    assert {row["of"] for row in summary["sensitivity"]} >= {"period_s", "spectral_radius"}
+
+
+def test_a_derivative_that_does_not_exist_is_a_gap():
+    """Where multipliers meet the spectral radius has none."""
+    rows = [
+        {"of": "period_s", "to": "slope_rad", "value": 0.1},
+        {"of": "spectral_radius", "to": "slope_rad", "value": None},
+    ]
+    stored = rows_group(rows, robustness.LABELS["sensitivity"])["value"]
+    np.testing.assert_array_equal(stored, [0.1, np.nan])
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        (("robustness.roughness_m=[0.7]",), "more than half a leg"),
+        (("robustness.to=[walker.thigh.mass_kg]",), "walker.thigh.mass_kg"),
+        (("robustness.to=[strides]",), "affects no model"),
+        (("robustness.to=[contact.stiffness]", "robustness.model=rigid"), "does not affect the rigid model"),
+        (("robustness.to=[push_off.duration_s]",), "does not affect the rigid or the contact model"),
+    ],
+)
+def test_bad_questions_end_in_words(changes, said):
+    with pytest.raises(ConfigError, match=said):
+        run("slope-3deg", *changes)
+
+
+def test_a_number_that_one_of_both_models_reads_is_answered_for_that_one():
+    found = run("kneed", "robustness.roughness_m=[]", "robustness.steps=1", "robustness.to=[contact.stiffness]")
+    assert {row["model"] for row in found.summary["sensitivity"]} == {"contact"}
+
+
+def test_contact_is_not_asked_for_without_its_block():
+    with pytest.raises(ConfigError, match="contact"):
+        run("rigid-only", "robustness.model=both")
+    assert {row["model"] for row in run("rigid-only", "slope_deg=3", *FEW).summary["gaits"]} == {"rigid"}

@@ -1,0 +1,217 @@
+"""The simulate stage: physical legs, what outputs ask for, and outcomes."""
+
+import json
+import tracemalloc
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from walkerlab.config.loader import load
+from walkerlab.config.reads import only
+from walkerlab.config.schema import Config
+from walkerlab.errors import NoAnswer
+from walkerlab.physics.hybrid import recorded_walk
+from walkerlab.pipeline.graph import PIPELINE
+from walkerlab.pipeline.progress import Silent
+from walkerlab.pipeline.stages import fixedpoint, simulate
+from walkerlab.views.report.answers import answer
+
+# design contract, section 4
+FIXED_KEYS = {
+    "outcome",
+    "steps",
+    "step_periods_s",
+    "step_lengths_m",
+    "final_state",
+    "energy_drift_J",
+    "min_normal_force_N",
+    "max_friction_ratio",
+    "max_scuff_depth_m",
+    "mean_energy_J",
+    "work_per_step_J",
+    "cost_of_transport",
+}
+GIVEN = (-0.2022, 0.1674, -0.60, -0.84)
+SLOW = (-0.2022, 0.1674, -0.4, -0.5)
+
+
+def run(**changes):
+    config = Config.model_validate(changes)
+    inputs = {}
+    if PIPELINE["simulate"].inputs(config):
+        inputs["fixedpoint"] = fixedpoint.run(only(config, PIPELINE["fixedpoint"].takes), {}, Silent())
+    return simulate.run(only(config, PIPELINE["simulate"].takes), inputs, Silent())
+
+
+@pytest.fixture(scope="module")
+def paper():
+    return run()
+
+
+def test_summary_has_the_fixed_keys(paper):
+    assert set(paper.summary) >= FIXED_KEYS
+    json.dumps(paper.summary, allow_nan=False)
+
+
+def test_five_strides_from_the_fixed_point_are_ten_equal_steps(paper):
+    summary = paper.summary
+    assert (summary["outcome"], summary["steps"]) == ("walked", 10)
+    assert summary["step_periods_s"] == pytest.approx([0.7035969] * 10, abs=1e-7)
+    assert summary["step_lengths_m"] == pytest.approx([0.3714303] * 10, abs=1e-7)
+    assert summary["final_state"] == pytest.approx(summary["start_state"], abs=1e-8)
+    assert summary["mean_energy_J"] == pytest.approx(150.241, abs=1e-3)
+    assert summary["energy_drift_J"] < 1e-8
+
+
+def test_mean_energy_as_printed_is_that_of_table_3():
+    assert run(equations="as-printed").summary["mean_energy_J"] == pytest.approx(150.142, abs=1e-3)
+
+
+def test_steps_table_agrees_with_the_summary(paper):
+    steps, summary = paper["steps"], paper.summary
+    assert steps["period_s"].tolist() == summary["step_periods_s"]
+    assert steps["length_m"].tolist() == summary["step_lengths_m"]
+    assert steps["state_after"][-1].tolist() == summary["final_state"]
+    assert steps["touch_time_s"] == pytest.approx(np.cumsum(summary["step_periods_s"]), rel=1e-14)
+    assert steps["touch_time_s"].tolist() == summary["touch_times_s"]
+    assert steps["touch_along_m"] == pytest.approx(np.cumsum(summary["step_lengths_m"]), rel=1e-14)
+    # the legs change roles: what swung stands, what stood swings
+    assert (steps["state_before"][:, [1, 0]] == steps["state_after"][:, :2]).all()
+
+
+def test_each_leg_moves_without_jumps_through_the_changes_of_roles(paper):
+    trajectory = paper["trajectory"]
+    time, angle, velocity = trajectory["time"], trajectory["angle"], trajectory["velocity"]
+    assert (np.diff(time) > 0.0).all()
+    # the fastest moment may lie between samples
+    bound = 1.01 * np.abs(velocity).max() * np.diff(time)[:, None] + 1e-12
+    assert (np.abs(np.diff(angle, axis=0)) <= bound).all()
+
+
+def test_leg_0_swings_first_and_the_legs_take_turns(paper):
+    trajectory = paper["trajectory"]
+    assert trajectory["stance_leg"][0] == 2
+    assert (trajectory["stance_leg"] == 2 - trajectory["step"] % 2).all()
+    assert trajectory["angle"][0].tolist() == paper.summary["start_state"][:2]
+    assert trajectory["velocity"][0].tolist() == paper.summary["start_state"][2:]
+
+
+def test_forces_and_energies_in_time_agree_with_the_summary(paper):
+    trajectory, summary = paper["trajectory"], paper.summary
+    stands = trajectory["stance_leg"][:, None] == trajectory["leg"]
+    normal, friction = trajectory["normal_force_N"], trajectory["friction_force_N"]
+    assert normal[stands].min() == pytest.approx(summary["min_normal_force_N"], rel=1e-4)
+    assert (normal[~stands] == 0.0).all()
+    assert (friction[~stands] == 0.0).all()
+    total = trajectory["kinetic_J"] + trajectory["potential_J"]
+    assert trajectory["mechanical_J"] == pytest.approx(total, rel=1e-15)
+    assert total == pytest.approx(summary["mean_energy_J"], rel=1e-9)
+
+
+def test_what_a_step_rolled_is_how_far_the_stance_foots_lowest_point_moved():
+    config = load(Path("round-feet"), ["strides=2"]).config
+    inputs = {"fixedpoint": fixedpoint.run(only(config, PIPELINE["fixedpoint"].takes), {}, Silent())}
+    walk = simulate.run(only(config, PIPELINE["simulate"].takes), inputs, Silent())
+    trajectory = walk["trajectory"]
+    for step, rolled in enumerate(walk["steps"]["rolling_m"]):
+        along = trajectory["foot_along_m"][trajectory["step"] == step, 1 - step % 2]
+        assert rolled == pytest.approx(along[-1] - along[0], abs=1e-12)
+        assert rolled > 0.01
+
+
+def test_what_outputs_do_not_ask_for_is_left_out_and_said():
+    none = run(outputs=[])
+    assert set(none.groups) == {"steps"}
+    whys = [entry["why"] for entry in none.summary["left_out"]]
+    assert {f"outputs does not ask for {output}" for output in ("states", "energies", "forces")} <= set(whys)
+    energies = run(outputs=["energies"])
+    assert set(energies["trajectory"].variables) == {
+        "time",
+        "leg",
+        "step",
+        "stance_leg",
+        "kinetic_J",
+        "potential_J",
+        "mechanical_J",
+    }
+    assert none.summary["final_state"] == energies.summary["final_state"]
+
+
+def test_a_slope_without_a_gait_can_be_walked_from_a_given_start():
+    result = run(slope_rad=0.0, start=(-0.1674, *SLOW[1:]))
+    assert result.summary["outcome"] == "fell"
+    assert "hip" in result.summary["advice"]
+    assert result.summary["steps"] == 0
+    assert result.summary["step_periods_s"] == []
+    assert result.summary["final_state"] == [-0.1674, *SLOW[1:]]
+    assert set(result.groups) == {"trajectory"}
+
+
+def test_a_start_lying_down_is_rejected():
+    result = run(start=(-1.5348, 1.5, 0.0, 0.0))
+    assert result.summary["outcome"] == "rejected"
+    assert set(result.groups) == set()
+
+
+def test_a_pulling_ground_is_said():
+    result = run(slope_rad=float(np.deg2rad(20.0)), strides=1, start=(-0.7935165, 0.0953848, 0.7024719, -1.8681666))
+    assert result.summary["outcome"] == "lifted-off"
+    assert result.summary["steps"] == 2
+    assert result.summary["min_normal_force_N"] < 0.0
+
+
+def test_a_walk_says_what_no_ground_can_give():
+    """A pull, also of a walk that falls, and friction; nothing of a walk that keeps to both."""
+    fast = run(contact=None, start=(-0.3, 0.25, -1.5, -2.6), strides=1).summary
+    assert fast["min_normal_force_N"] < 0.0
+    assert f"pull with {-fast['min_normal_force_N']:.3g} N" in fast["objections"][0]
+    slippery = [one for one in fast["objections"] if f"coefficient of {fast['max_friction_ratio']:.3g}" in one]
+    assert bool(slippery) == (fast["max_friction_ratio"] > 1.0)
+    assert any("Not a walk on real ground: the ground would have to pull" in line for line in answer("simulate", fast))
+    assert run(contact=None, strides=1).summary["objections"] == []
+
+
+@pytest.mark.parametrize("heights", [(-0.03, 0.05), (0.0, 0.0)])
+def test_a_fall_on_uneven_ground_is_not_blamed_on_the_start(heights):
+    uneven = any(heights)
+    start = "fixed-point" if uneven else SLOW
+    walk = run(contact=None, start=start, ground={"heights_m": heights}, strides=2).summary
+    assert walk["outcome"] == "fell"
+    assert ("lower the footholds (ground.heights_m" in walk["advice"]) == uneven
+    assert ("start nearer to a gait" in walk["advice"]) != uneven
+
+
+def test_where_the_ground_would_have_to_pull_all_along_there_is_no_friction_ratio():
+    summary = run(start=(-0.2022, 0.1674, -20.0, -20.0), strides=1).summary
+    assert summary["min_normal_force_N"] < 0.0
+    assert summary["max_friction_ratio"] is None
+    json.dumps(summary, allow_nan=False)
+
+
+def test_an_exhausted_budget_is_no_answer_with_what_was_walked(monkeypatch):
+    monkeypatch.setattr(recorded_walk, "BUDGET_OF_A_STEP", 100)
+    with pytest.raises(NoAnswer, match=r"budget-exhausted after [1-9] steps") as caught:
+        run(start=GIVEN)
+    assert "solver" in caught.value.advice
+    assert caught.value.partial.summary["steps"] > 0
+
+
+def test_another_method_walks_the_same_way(paper):
+    other = run(solver={"rigid": {"method": "scipy-dop853", "rtol": 1e-10, "atol": 1e-12}})
+    assert other.summary["final_state"] == pytest.approx(paper.summary["final_state"], abs=1e-8)
+
+
+def test_a_long_walk_needs_memory_for_its_steps_only():
+    inputs = {"fixedpoint": fixedpoint.run(only(Config(), PIPELINE["fixedpoint"].takes), {}, Silent())}
+    config = only(Config(strides=2000, outputs=()), PIPELINE["simulate"].takes)
+    tracemalloc.start()
+    try:
+        result = simulate.run(config, inputs, Silent())
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert result.summary["steps"] == 4000
+    table = sum(variable.values.nbytes for variable in result["steps"].variables.values())
+    # the table, its frozen copy, and the summary's lists; beside it, of the second walk, its table and lists
+    assert peak < 5 * table

@@ -1,0 +1,47 @@
+"""What is stored of a long walk: less of its middle, and every heel strike."""
+
+import numpy as np
+
+from walkerlab.physics.hybrid.recorded_walk import Samples
+from walkerlab.pipeline.progress import Silent
+from walkerlab.pipeline.stages.walk import FIRST_STEPS, LAST_STEPS, MAX_BETWEEN, thinned
+
+
+def walk(steps, per_step=50):
+    """Heel strikes at whole numbers, with a sample one rounding before each and one at it."""
+    ends = np.arange(1.0, steps + 1.0)
+    grid = np.arange(steps * per_step) / per_step
+    time = np.unique(np.concatenate((grid, ends, np.nextafter(ends, 0.0))))
+    state, step = np.sin(time)[:, None], np.searchsorted(ends, time, side="right")
+    return Samples(time, state, step, np.zeros(time.size, bool)), ends
+
+
+def test_an_ordinary_walk_is_stored_whole():
+    samples, ends = walk(FIRST_STEPS + LAST_STEPS)
+    assert thinned(samples, ends, Silent()) is samples
+
+
+def test_of_a_long_walk_both_sides_of_every_heel_strike_are_stored():
+    samples, ends = walk(20_000)
+    kept = thinned(samples, ends, Silent())
+    assert np.isin(ends[:-1], kept.time_s).all()
+    assert np.isin(np.nextafter(ends, 0.0), kept.time_s).all()
+    assert kept.state[:, 0].tolist() == np.sin(kept.time_s).tolist()
+
+
+def test_beginning_and_end_are_whole_and_the_middle_is_bounded():
+    samples, ends = walk(20_000)
+    kept = thinned(samples, ends, Silent())
+    first, last = samples.time_s < FIRST_STEPS, samples.time_s >= ends.size - LAST_STEPS
+    assert np.isin(samples.time_s[first | last], kept.time_s).all()
+    assert kept.time_s.size <= MAX_BETWEEN + 2 * ends.size + (first | last).sum()
+    assert kept.time_s.size < samples.time_s.size / 8
+
+
+def test_it_is_told():
+    told = []
+    progress = Silent()
+    progress.note = told.append
+    samples, ends = walk(1000)
+    thinned(samples, ends, progress)
+    assert told[0].startswith("1000 steps: of ")

@@ -1,0 +1,57 @@
+import pytest
+
+from walkerlab.pipeline.store import artifact, index
+from walkerlab.pipeline.store.clean import files_of, remove
+from walkerlab.pipeline.store.content import Content
+from walkerlab.pipeline.store.runfolder import RunFolder
+
+
+@pytest.fixture
+def folder(tmp_path):
+    made = RunFolder(tmp_path, "paper")
+    made.figures.mkdir(parents=True)
+    (made.figures / "figure-02.svg").write_text("<svg/>")
+    (made.figures / "own.svg").write_text("drawn by a plot of mine")
+    (made.path / "notes.txt").write_text("mine")
+    return made
+
+
+def drawn(folder):
+    return Content({index.GROUP: index.index(folder.path, [folder.figures / "figure-02.svg"])})
+
+
+def test_files_that_are_as_they_were_written_pass(folder):
+    assert index.broken_file(folder.path, drawn(folder)) is None
+    assert index.broken_file(folder.path, Content()) is None
+
+
+def test_a_file_that_was_altered_or_taken_away_is_named(folder):
+    content = drawn(folder)
+    (folder.figures / "figure-02.svg").write_text("<svg>other</svg>")
+    assert index.broken_file(folder.path, content) == "figures/figure-02.svg was altered"
+    (folder.figures / "figure-02.svg").unlink()
+    assert index.broken_file(folder.path, content) == "figures/figure-02.svg is missing"
+
+
+def test_only_files_of_the_run_can_be_listed(folder, tmp_path):
+    (tmp_path / "elsewhere").touch()
+    with pytest.raises(ValueError):
+        index.index(folder.path, [tmp_path / "elsewhere"])
+
+
+def test_clean_removes_what_was_made_and_nothing_else(folder, identity, origin):
+    artifact.write(folder.artifact("plot"), drawn(folder), identity, origin)
+    folder.artifact("simulate").write_bytes(b"damaged")
+    (folder.path / ".simulate.h5.12345678.tmp").touch()
+    remove(folder, files_of(folder, ["simulate", "plot"]))
+    left = sorted(path.name for path in folder.path.rglob("*"))
+    assert left == ["figures", "notes.txt", "own.svg"]
+
+
+def test_clean_does_not_follow_a_list_out_of_the_run_folder(folder, identity, origin, tmp_path):
+    (tmp_path / "precious").write_text("not of this run")
+    forged = index.index(tmp_path, [tmp_path / "precious"])
+    forged["file"].setflags(write=True)
+    forged["file"][0] = "../precious"
+    artifact.write(folder.artifact("plot"), Content({index.GROUP: forged}), identity, origin)
+    assert files_of(folder, ["plot"]) == [folder.figures / "figure-02.svg", folder.artifact("plot")]

@@ -1,0 +1,96 @@
+import os
+import signal
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import pytest
+
+import walkerlab
+from walkerlab.errors import LockedError, StorageError
+from walkerlab.pipeline.store.runfolder import RunFolder
+
+HOLD = """
+import sys, time
+from pathlib import Path
+from walkerlab.pipeline.store.runfolder import RunFolder
+with RunFolder(Path(sys.argv[1]), "paper").locked():
+    print("held", flush=True)
+    time.sleep(600)
+"""
+
+
+@pytest.fixture
+def folder(tmp_path):
+    return RunFolder(tmp_path / "runs", "paper")
+
+
+@pytest.fixture
+def holder(folder):
+    """Another process that holds the folder's lock."""
+    environment = {**os.environ, "PYTHONPATH": str(Path(walkerlab.__file__).parent.parent)}
+    command = [sys.executable, "-c", HOLD, folder.runs_dir]
+    with subprocess.Popen(command, env=environment, stdout=subprocess.PIPE) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == b"held\n"
+        yield process
+        process.kill()
+
+
+def test_files_are_where_they_belong(folder):
+    assert folder.path == folder.runs_dir / "paper"
+    assert folder.artifact("contact-sim") == folder.path / "contact-sim.h5"
+    assert not folder.path.exists()
+
+
+def test_who_does_not_want_to_wait_is_refused(folder, holder):
+    with pytest.raises(LockedError) as caught, folder.locked(wait=False):
+        pass
+    assert caught.value.exit_code == 6
+
+
+def test_lock_dies_with_its_owner(folder, holder):
+    os.kill(holder.pid, signal.SIGKILL)
+    holder.wait()
+    with folder.locked(wait=False):
+        pass
+
+
+def test_who_waits_is_told_so_and_gets_the_lock(folder, holder):
+    said = []
+
+    def say(text):
+        said.append(text)
+        threading.Timer(0.1, holder.kill).start()
+
+    with folder.locked(wait=True, say=say):
+        assert holder.wait() == -signal.SIGKILL
+    assert len(said) == 1
+    assert "waiting" in said[0]
+
+
+def test_lock_is_free_again_after_a_failure(folder):
+    with pytest.raises(KeyboardInterrupt), folder.locked():
+        raise KeyboardInterrupt
+    with folder.locked(wait=False):
+        pass
+
+
+def test_what_killed_writers_left_goes_under_the_lock(folder):
+    folder.path.mkdir(parents=True)
+    (folder.path / ".simulate.h5.12345678.tmp").touch()
+    with folder.locked():
+        assert [entry.name for entry in folder.path.iterdir()] == [".lock"]
+
+
+def test_a_folder_that_cannot_be_made_is_told(tmp_path, unprivileged):
+    (tmp_path / "file").write_text("in the way")
+    with pytest.raises(StorageError, match="could not be stored"), RunFolder(tmp_path / "file", "paper").locked():
+        pass
+    with pytest.raises(StorageError, match="could not be stored"), RunFolder(tmp_path, "file").locked():
+        pass
+    tmp_path.chmod(0o555)
+    with unprivileged(), pytest.raises(StorageError), RunFolder(tmp_path, "paper").locked():
+        pass
+    tmp_path.chmod(0o755)

@@ -1,0 +1,322 @@
+"""A sweep of quick points: what is computed, what is taken over, what is stored."""
+
+import csv
+import io
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from walkerlab.config.loader import load
+from walkerlab.errors import ConfigError
+from walkerlab.evidence.benchmarks.engines import registry
+from walkerlab.pipeline.executor import Executor, answer_in_memory
+from walkerlab.pipeline.graph import PIPELINE
+from walkerlab.pipeline.identity import Keys
+from walkerlab.pipeline.results import FolderResults, MemoryResults
+from walkerlab.pipeline.runner import execute
+from walkerlab.pipeline.stages.numerical_error import SAMPLE
+from walkerlab.pipeline.store import artifact
+from walkerlab.pipeline.store.content import untimed
+from walkerlab.pipeline.store.files import refused
+from walkerlab.pipeline.store.runfolder import RunFolder
+from walkerlab.pipeline.sweeps import sweep as sweeps
+from walkerlab.pipeline.sweeps.chunk import FOLDER, Chunk, PointResult, by_name, compute_point, without_outputs
+from walkerlab.pipeline.sweeps.question import axis_of_text, build_sweep
+from walkerlab.pipeline.sweeps.result import Merge, as_csv, last_of_each
+from walkerlab.views.report.sweep_page import summary_lines
+
+GRAVITIES = "gravity_m_s2=1:9:5"
+
+
+def opened(swept):
+    return xr.open_dataset(swept.path, engine="h5netcdf")
+
+
+def test_every_number_of_the_stage_is_a_variable_over_the_parameters(toy):
+    swept = toy.run("drop", GRAVITIES, "walker.hip_mass_kg=[1, 2]")
+    assert (swept.done, swept.failed, swept.reused) == (10, 0, 0)
+    with opened(swept) as dataset:
+        assert dataset.period_s.dims == ("gravity_m_s2", "hip_mass_kg")
+        assert dataset.gravity_m_s2.values.tolist() == [1.0, 3.0, 5.0, 7.0, 9.0]
+        assert dataset.hip_mass_kg.attrs["units"] == "kg"
+        assert dataset.period_s.attrs == {"units": "s", "long_name": "duration of the fall"}
+        assert dataset.speed_m_s.attrs["units"] == "m/s"
+        assert float(dataset.period_s.sel(gravity_m_s2=9.0, hip_mass_kg=1)) == math.sqrt(2 / 9)
+        assert dataset["losses_J.ground"].values.tolist() == [[1.0, 2.0]] * 5
+        assert dataset.bounces.dtype == np.int64
+        assert dataset.stable.dtype == bool
+        assert dataset.state.dims == ("gravity_m_s2", "hip_mass_kg", "state_index")
+        assert dataset.found_by.values[0, 0] == "looking; asking"
+        assert dataset["rows.0.error"].values.tolist() == [[0.5, 0.5]] * 5
+        assert not [name for name in dataset if "wall_s" in name or "left_out" in name]
+
+
+def test_a_row_is_what_the_stage_says_for_that_config(toy):
+    swept = toy.run("roll", GRAVITIES, "strides=[2, 3]")
+    config = toy.sweep("roll", GRAVITIES, "strides=[2, 3]").config(7)
+    report = execute(config, "roll", RunFolder(toy.runs / "elsewhere", "one"), graph=toy.graph)
+    assert swept.content[""]["way_m"].ravel()[7] == report.summary["way_m"]
+    assert set(swept.content[""]["outcome"].ravel()) == {"walked"}
+
+
+def test_points_without_an_answer_are_rows_that_say_why(toy):
+    swept = toy.run("drop", "slope_rad=[0.1, 0.35, 1.2]")
+    assert (swept.done, swept.failed) == (3, 0)
+    with opened(swept) as dataset:
+        assert dataset.outcome.values.tolist() == ["answered", "answered", "no-answer"]
+        assert str(dataset.reason.values[2]) == "too steep: 1.2"
+        assert np.isnan(dataset.period_s.values).tolist() == [False, False, True]
+        assert dataset.bounces.values.tolist() == [3, 3, 0]
+        assert np.isfinite(dataset.slips_m).sum("slips_m_index").values.tolist() == [2, 4, 0]
+    needing = toy.run("roll", "slope_rad=[0.1, 1.2]")
+    assert needing.content[""]["reason"].tolist() == ["", "it needs drop: too steep: 1.2"]
+
+
+WALKED_AGAIN = ("gravity_m_s2=1.62",)  # what these walks need is not what those of other tests need
+
+
+def plain(sentences):
+    """Sentences with ordinary spaces."""
+    return [" ".join(sentence.split()) for sentence in sentences]
+
+
+def test_an_evenly_spread_sample_of_walks_is_taken_again_and_told(toy):
+    swept = toy.run("roll", "strides=1:40:40", sets=WALKED_AGAIN)
+    again = np.isfinite(swept.content[""]["numerical_error.end_time_s"])
+    assert again.sum() == SAMPLE
+    assert again[[0, -1]].all()
+    assert np.diff(np.flatnonzero(again)).max() <= 3  # of forty points sixteen: one of two or three
+    told = {"walked_again": 16, "of": 40, "ended_otherwise": 0, "end_time_s": 1e-9, "step_period_s": 0.04}
+    assert swept.summary["numerical_error"] == pytest.approx(told)
+    assert plain(summary_lines(swept.summary)) == [
+        "Largest numerical error: 0.04 s in a period and 10⁻⁹ s at the end, by a second walk with a hundred times "
+        "tighter tolerances; 16 of 40 points were walked again."
+    ]
+
+
+def test_of_few_points_all_are_walked_again_and_those_that_end_otherwise_counted(toy):
+    swept = toy.run("roll", "strides=[5, 7, 8]", sets=WALKED_AGAIN)
+    error = swept.summary["numerical_error"]
+    assert (error["walked_again"], error["of"], error["ended_otherwise"]) == (3, 3, 1)
+    assert summary_lines(swept.summary)[0].endswith("3 of 3 points were walked again, of which 1 ended otherwise.")
+    unknown = toy.run("roll", "strides=[7]", sets=WALKED_AGAIN).summary
+    assert summary_lines(unknown)[0].startswith("Numerical errors are unknown; 1 of 1 points")
+
+
+def test_a_sweep_of_contact_walks_says_that_pads_ended_them_with_pitch_and_last_steps():
+    question = build_sweep("contact-sim", [axis_of_text("contact.stiffness=[1e5, 2e5, 3e5]")])
+    rows = {
+        "0": {"outcome": "off-pad", "pitch_m": 0.37, "step_lengths_m": [0.36, 0.35]},
+        "1": {"outcome": "off-pad", "pitch_m": 0.3, "step_lengths_m": [0.4]},
+        "2": {"outcome": "walked", "pitch_m": 0.5, "step_lengths_m": [0.5, 0.5, 0.5]},
+    }
+    found = [PointResult(key, "answered", "", json.dumps(row)) for key, row in rows.items()]
+    over_pitch = build_sweep("contact-sim", [axis_of_text("contact.pad_pitch=[0.3, 0.37, 0.5]")])
+    both = [Merge(one, load().config, np.arange(3)) for one in (question, over_pitch)]
+    for merge in both:
+        merge.put(Chunk(tuple(found), {}), {key: int(key) for key in rows})
+    (ended,), (of_pitches,) = (merge.endings() for merge in both)
+    assert (ended["outcome"], ended["walks"], ended["of"]) == ("off-pad", 2, 3)
+    assert "pitch is 0.3 to 0.37 m, the rigid gait's step length; their last steps were 0.35 to 0.4 m" in ended["said"]
+    assert "the rigid gait's" not in of_pitches["said"]
+
+
+def test_a_stage_that_does_not_walk_has_no_numerical_error(toy):
+    summary = toy.run("drop", GRAVITIES).summary
+    assert "numerical_error" not in summary
+    assert summary_lines(summary) == []
+
+
+def test_nothing_is_computed_twice(toy, marks):
+    toy.run("drop", GRAVITIES)
+    assert marks() == 5
+    assert toy.run("drop", GRAVITIES).reused == 5
+    more = toy.run("drop", "gravity_m_s2=1:9:9")
+    assert (more.reused, more.done) == (5, 9)
+    assert marks() == 9
+    other_run = toy.run("drop", GRAVITIES, sets=["strides=7"])
+    assert other_run.path.parent.name == "paper@strides=7"
+    assert other_run.reused == 5
+    assert marks() == 9
+
+
+def test_points_that_differ_in_nothing_the_stage_reads_are_computed_once(toy, marks):
+    notes = []
+    reporter = type("Listener", (sweeps.Silent,), {"note": lambda self, text: notes.append(text)})()
+    swept = toy.run("drop", GRAVITIES, "strides=[2, 3, 4]", reporter=reporter)
+    assert swept.done == 15
+    assert marks() == 5
+    assert any("drop does not read strides" in note for note in notes)
+
+
+def test_a_single_run_is_taken_over(toy, marks):
+    config = toy.sweep("drop", GRAVITIES).config(2)
+    execute(config, "drop", RunFolder(toy.runs, "alone"), graph=toy.graph)
+    assert marks() == 1
+    assert toy.run("drop", GRAVITIES).reused == 1
+    assert marks() == 5
+
+
+def test_keys_are_those_that_the_pipeline_stores_under(toy):
+    config = toy.sweep("roll", GRAVITIES).config(1)
+    report = execute(config, "roll", RunFolder(toy.runs, "alone"), graph=toy.graph)
+    keys = Keys(toy.graph).of(config, "roll")
+    assert keys == {name: artifact.read(toy.runs / "alone" / f"{name}.h5").identity.key for name in ("drop", "roll")}
+    assert report.summary == answer_in_memory(config, "roll", MemoryResults(toy.graph)).summary
+
+
+@pytest.mark.parametrize("name", ["paper", "round-feet", "kneed"])
+def test_a_point_of_any_stage_has_the_key_of_its_single_run(name, tmp_path):
+    loaded = load(Path(name))
+    stages = [stage for stage in PIPELINE.stages if not stage.draws]
+    folder = RunFolder(tmp_path, loaded.run_name)
+    steps = Executor(loaded.config, FolderResults(folder), stages).plan()
+    single = {step.stage.name: step.identity.key for step in steps}
+    assert {stage.name: Keys().of(loaded.config, stage.name)[stage.name] for stage in stages} == single
+
+
+def test_another_version_of_an_engine_computes_old_points_again(monkeypatch):
+    config = load().config
+    monkeypatch.setattr(registry, "installed", lambda: (registry.Engine("absent", "absent", "absent"),))
+    keys = []
+    for version in ("1.0", "1.1"):
+        monkeypatch.setattr(registry.Engine, "version", version)
+        keys.append(Keys().of(config, "engines"))
+    assert [name for name in keys[0] if keys[0][name] != keys[1][name]] == ["engines"]
+
+
+def test_what_several_points_need_is_computed_once(toy, marks):
+    toy.run("roll", "strides=2:9:8")
+    assert marks() == 1
+
+
+def test_a_damaged_chunk_is_computed_again(toy, marks):
+    first = toy.run("drop", GRAVITIES)
+    chunks = sorted((toy.runs / "paper" / FOLDER).iterdir())
+    for path in chunks:
+        path.write_bytes(path.read_bytes()[:-1])
+    warnings = []
+    reporter = type("Listener", (sweeps.Silent,), {"warn": lambda self, text: warnings.append(text)})()
+    again = toy.run("drop", GRAVITIES, reporter=reporter)
+    assert again.reused == 0
+    assert [warning.partition(" is damaged: ")[0] for warning in warnings] == [str(path) for path in chunks]
+    assert again.content.digest() == first.content.digest()
+    assert marks() == 5  # the same points, in the same process
+
+
+@pytest.mark.parametrize("why", [refused(Path("x"), OSError(28, "No space left on device")), KeyboardInterrupt()])
+def test_an_interrupted_sweep_goes_on_to_the_same_bits(toy, tmp_path, monkeypatch, why):
+    whole = toy.run("drop", "gravity_m_s2=1:9:40").content.digest()
+    toy.runs = tmp_path / "again"
+    kept, notes = [], []
+    reporter = type("Listener", (sweeps.Silent,), {"note": lambda self, text: notes.append(text)})()
+
+    def stopped(folder, *rest):
+        if len(kept) == 2:
+            raise why
+        kept.append(store(folder, *rest))
+
+    store = sweeps.store
+    monkeypatch.setattr(sweeps, "store", stopped)
+    with pytest.raises(type(why)):
+        toy.run("drop", "gravity_m_s2=1:9:40", chunk_s=1e-9, reporter=reporter)
+    monkeypatch.setattr(sweeps, "store", store)
+    resumed = toy.run("drop", "gravity_m_s2=1:9:40")
+    assert 0 < resumed.reused < 40
+    assert resumed.content.digest() == whole
+    told = [f"sweep: interrupted; {resumed.reused} of 40 points are kept"]
+    assert notes == (told if isinstance(why, KeyboardInterrupt) else [])
+
+
+def test_bad_points_are_told_with_their_values_before_anything_runs(toy, marks):
+    with pytest.raises(ConfigError) as caught:
+        toy.run("drop", "gravity_m_s2=[1, -2, 3]", "walker.hip_mass_kg=[1, -7]")
+    assert "at gravity_m_s2=-2, walker.hip_mass_kg=1" in caught.value.message
+    assert "walker.hip_mass_kg: -7 is out of bounds" in caught.value.message
+    assert marks() == 0
+    assert not toy.runs.exists()
+
+
+def test_a_stage_that_keeps_parts_is_swept_without_its_file(toy):
+    swept = toy.run("count", "seed=[2, 3, 4]")
+    assert swept.content[""]["total"].tolist() == [1.0, 3.0, 6.0]
+    assert not list(toy.runs.rglob("*.parts"))
+
+
+def test_only_stages_without_files_can_be_swept(toy):
+    with pytest.raises(ConfigError, match="cannot be swept"):
+        toy.sweep("picture", GRAVITIES)
+
+
+def test_lists_of_points_have_their_parameters_as_coordinates(toy):
+    swept = toy.run("drop", "gravity_m_s2=1:9", "walker.hip_mass_kg=1:5", sample="latin-hypercube:6", seed=2)
+    with opened(swept) as dataset:
+        assert dataset.period_s.dims == ("point",)
+        assert set(dataset.coords) == {"gravity_m_s2", "hip_mass_kg"}
+        assert dataset.period_s.values == pytest.approx(np.sqrt(2 / dataset.gravity_m_s2.values), rel=1e-15)
+
+
+def test_a_dry_run_says_what_is_there_and_what_the_rest_will_take(toy):
+    toy.run("drop", GRAVITIES)
+    foreseen = toy.sweep("drop", "gravity_m_s2=1:9:9").foresee(workers=2, shown=3)
+    assert (foreseen.count, foreseen.there) == (9, 5)
+    assert foreseen.points == ("gravity_m_s2=1.0", "gravity_m_s2=2.0", "gravity_m_s2=3.0")
+    assert 0.0 < foreseen.estimate_s < 1.0
+    unknown = toy.sweep("roll", GRAVITIES).foresee(2, 1)
+    assert unknown.estimate_s is None
+
+
+def test_the_table_has_a_row_for_each_point(toy):
+    swept = toy.run("drop", "slope_rad=[0.1, 1.2]", "gravity_m_s2=[2, 8]")
+    rows = list(csv.DictReader(io.StringIO(as_csv(swept.content, swept.question))))
+    assert [(row["slope_rad"], row["gravity_m_s2"]) for row in rows] == [
+        ("0.1", "2"),
+        ("0.1", "8"),
+        ("1.2", "2"),
+        ("1.2", "8"),
+    ]
+    assert [row["period_s"] for row in rows] == ["1.0", "0.5", "", ""]
+
+
+def test_the_table_has_headline_numbers_and_lists_only_if_all_is_asked_for(toy):
+    swept = toy.run("drop", "gravity_m_s2=[2, 8]")
+    short, whole = (
+        list(csv.DictReader(io.StringIO(as_csv(swept.content, swept.question, every)))) for every in (False, True)
+    )
+    assert "state_1" not in short[0]
+    assert whole[0]["state_1"] == "1.0"
+    assert short[0].keys() < whole[0].keys()
+
+
+def test_the_last_step_of_walks_of_different_length_is_each_ones_own():
+    last = last_of_each(np.array([[0.7, 0.8], [0.6, np.nan], [np.nan, np.nan]]))
+    assert last[:2].tolist() == [0.8, 0.6]
+    assert np.isnan(last[2])
+
+
+def test_the_file_says_what_was_asked(toy):
+    swept = toy.run("drop", GRAVITIES)
+    stored = artifact.read(swept.path)
+    assert stored.summary["parameters"] == {"gravity_m_s2": [1.0, 3.0, 5.0, 7.0, 9.0]}
+    assert stored.identity.config_slice["over"] == {"gravity_m_s2": [1.0, 3.0, 5.0, 7.0, 9.0]}
+    assert json.dumps(stored.summary["outcomes"]) == '{"answered": 5}'
+    assert stored.digest() == swept.content.digest()
+
+
+@pytest.mark.parametrize("stage", ["simulate", "contact-sim"])
+def test_a_walk_in_a_sweep_has_the_summary_of_the_walk_alone(stage):
+    config = load(sets=("strides=1",)).config
+    (row,) = compute_point(config, "key", sweeps.PIPELINE_AT, stage, again=True).rows
+    alone = answer_in_memory(config, stage, MemoryResults())
+    assert "trajectory" in alone.groups
+    assert json.loads(row.numbers) == by_name(untimed(alone.summary, alone.timed))
+
+
+def test_arrays_that_another_stage_draws_on_are_not_left_out():
+    config = load().config
+    assert without_outputs(config, "compare", PIPELINE) == config
+    assert without_outputs(config, "contact-sim", PIPELINE).outputs == ()

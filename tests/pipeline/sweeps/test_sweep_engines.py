@@ -1,0 +1,236 @@
+"""Workers that die, on this machine, on Dask and as jobs; what is left is there and the guilty point is told."""
+
+import os
+import signal
+import stat
+import subprocess
+import sys
+import threading
+import time
+from asyncio import CancelledError
+
+import numpy as np
+import pytest
+from process_table import THERE, is_alive, processes_below
+
+from walkerlab.errors import ConfigError, NoAnswer
+from walkerlab.pipeline.sweeps.engines import ENGINES, ONE_THREAD, JobExecutor, Order, engine_named, one_thread_each
+from walkerlab.pipeline.work import Spread
+
+LOCAL = ENGINES["local"]
+
+
+def order(workers=2, **more):
+    return Order(workers, modules=("toy_sweep.deadly",), **more)
+
+
+def seeds(swept):
+    return dict(zip(swept.content[""]["seed"].tolist(), swept.content[""]["status"].tolist(), strict=True))
+
+
+def test_a_point_that_kills_its_worker_is_marked_and_the_rest_is_there(toy):
+    swept = toy.run("deadly", "seed=5:16:12", engine=LOCAL, order=order())
+    assert {seed for seed, status in seeds(swept).items() if status != "answered"} == {7, 13}
+    said = dict(zip(swept.content[""]["seed"].tolist(), swept.content[""]["reason"].tolist(), strict=True))
+    assert said[7] == "a bug: ZeroDivisionError: a bug"
+    assert said[13].startswith("its worker died: WorkerDiedError")
+    assert "SIGKILL" in said[13]
+    error = swept.error()
+    assert error.exit_code == 1
+    assert error.message.startswith("2 of 12 points were not computed, and a bug is among the reasons")
+    assert [note.splitlines()[-1] for note in error.__notes__] == ["ZeroDivisionError: a bug"]
+    twice = swept.content[""]["twice"]
+    assert np.nansum(twice) == sum(2 * seed for seed in range(5, 17) if seed not in (7, 13))
+
+
+def test_workers_of_this_machine_may_begin_before_there_are_points():
+    with LOCAL.begun(Order(workers=2)) as begun:
+        workers = set(processes_below(os.getpid()))
+        with begun.opened(Order(workers=2)) as pool:
+            assert pool.executor.submit(os.getpid).result() in workers
+
+
+def test_only_a_forced_sweep_computes_again_what_its_workers_remember(toy, marks, tmp_path):
+    counts = []
+    with LOCAL.begun(Order(workers=1)) as begun:
+        for first, force in ((2, False), (4, False), (4, True), (4, True)):
+            toy.run("roll", f"strides={first}:{first + 1}:2", engine=begun, order=Order(1), force=force)
+            counts.append(marks())
+            for mark in (tmp_path / "marks").iterdir():
+                mark.unlink()
+    assert counts == [1, 0, 1, 1]
+
+
+def test_a_worker_that_dies_by_chance_costs_nothing(toy, tmp_path, monkeypatch):
+    monkeypatch.setenv("TOY_SWEEP_ONCE", str(tmp_path / "died"))
+    swept = toy.run("deadly", "seed=18:24:7", engine=LOCAL, order=order())
+    assert (tmp_path / "died").exists()
+    assert set(seeds(swept).values()) == {"answered"}
+
+
+def test_workers_that_cannot_start_are_told_and_not_tried_for_ever(toy):
+    with pytest.raises(NoAnswer, match="no worker lives"):
+        toy.run("deadly", "seed=1:4:4", engine=LOCAL, order=Order(1, modules=("no_such_module",)))
+
+
+SWEEPER = """
+import sys
+from pathlib import Path
+from walkerlab.config.loader import load
+from walkerlab.pipeline.store.runfolder import RunFolder
+from walkerlab.pipeline.sweeps.engines import Order
+from walkerlab.pipeline.sweeps.question import axis_of_text, build_sweep
+from walkerlab.pipeline.sweeps.sweep import SweepRun, SweepWork
+from toy_sweep.sweep_pipeline import GRAPH
+read = load()
+question = build_sweep("deadly", [axis_of_text("seed=100:179:80")])
+sweep = SweepRun(question, read, RunFolder(Path(sys.argv[1]), "paper"), GRAPH)
+order = Order(2, modules=("toy_sweep.deadly",))
+swept = sweep.run(SweepWork(order=order, chunk_s=0.05, graph="toy_sweep.sweep_pipeline:GRAPH"))
+print(swept.content.digest(), swept.failed)
+"""
+
+
+@pytest.mark.skipif(not THERE, reason="needs the kernel's table of processes")
+def test_a_killed_sweep_leaves_no_process_and_goes_on_to_the_same_bits(toy, tmp_path, monkeypatch):
+    monkeypatch.setenv("TOY_SWEEP_PAUSE", "0.02")
+    script = tmp_path / "sweeper.py"
+    script.write_text(SWEEPER)
+    command = [sys.executable, str(script), str(toy.runs)]
+    chunks = toy.runs / "paper" / "sweep-chunks"
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL)
+    deadline = time.monotonic() + 90.0
+    while not (chunks.is_dir() and len(list(chunks.glob("*.h5"))) >= 3) and time.monotonic() < deadline:
+        time.sleep(0.01)
+    below = processes_below(process.pid)
+    process.kill()
+    process.wait()
+    assert below
+    while any(is_alive(pid) for pid in below) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    assert not [pid for pid in below if is_alive(pid)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    undisturbed = toy.run("deadly", "seed=100:179:80", force=True).content.digest()
+    assert done.stdout.split() == [undisturbed, "0"]
+
+
+def test_two_sweeps_on_one_folder_at_once_come_to_the_same_bits(toy, tmp_path):
+    script = tmp_path / "sweeper.py"
+    script.write_text(SWEEPER)
+    command = [sys.executable, str(script), str(toy.runs)]
+    both = [subprocess.Popen(command, stdout=subprocess.PIPE, text=True) for _ in range(2)]
+    said = [process.communicate(timeout=120)[0].split() for process in both]
+    assert said[0] == said[1] == [toy.run("deadly", "seed=100:179:80").content.digest(), "0"]
+
+
+@pytest.mark.filterwarnings("ignore")  # of the library's own
+def test_dask_gives_the_same_and_outlives_its_workers(toy, monkeypatch):
+    distributed = pytest.importorskip("distributed", reason="the extra `dask` is not installed")
+    monkeypatch.setenv("TOY_SWEEP_PAUSE", "0.02")
+    with (
+        one_thread_each(),  # restores what Dask leaves in this process's environment
+        distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None, processes=True) as cluster,
+        distributed.Client(cluster) as client,
+    ):
+        pids = list(client.run(os.getpid).values())
+        killer = threading.Timer(1.0, lambda: [os.kill(pid, signal.SIGKILL) for pid in pids])
+        killer.start()
+        engine, _ = engine_named("dask")
+        swept = toy.run(
+            "deadly", "seed=100:219:120", engine=engine, order=order(address=client.scheduler.address), chunk_s=0.2
+        )
+        killer.join()
+        assert set(client.run(os.getpid).values()).isdisjoint(pids)
+    assert set(seeds(swept).values()) == {"answered"}
+    assert swept.content.digest() == toy.run("deadly", "seed=100:219:120", force=True).content.digest()
+
+
+def test_a_job_that_is_cancelled_or_fails_says_so_and_is_forgotten():
+    class Job:
+        def __init__(self, error):
+            self.error = error
+
+        def result(self):
+            raise self.error
+
+    executor = JobExecutor(Job)
+    for error in (CancelledError("its worker is gone"), ValueError("no result")):  # the first is no Exception
+        assert executor.submit(error).exception(timeout=10.0) is error
+    deadline = time.monotonic() + 10.0
+    while executor.jobs and time.monotonic() < deadline:
+        time.sleep(0.01)
+    assert not executor.jobs
+
+
+@pytest.mark.filterwarnings("ignore")  # of the library's own
+def test_dask_makes_a_cluster_of_its_own(toy):
+    pytest.importorskip("distributed", reason="the extra `dask` is not installed")
+    engine, address = engine_named("dask")
+    assert address == ""
+    before = [os.environ.get(name) for name in ONE_THREAD]
+    swept = toy.run("deadly", "seed=100:103:4", engine=engine, order=order(1))
+    assert set(seeds(swept).values()) == {"answered"}
+    assert [os.environ.get(name) for name in ONE_THREAD] == before
+
+
+@pytest.mark.filterwarnings("ignore")  # of the library's own
+def test_jobs_on_this_machine_give_the_same(toy, tmp_path, monkeypatch):
+    submitit = pytest.importorskip("submitit", reason="the extra `slurm` is not installed")
+    # how long submitit waits for a dead job's result on a slow network disk, three times here
+    monkeypatch.setattr(submitit.Job, "_results_timeout_s", 1)
+    options = {"cluster": "local", "timeout_min": "5"}
+    swept = toy.run("deadly", "seed=11:16:6", engine=ENGINES["slurm"], order=order(2, folder=tmp_path, options=options))
+    assert {seed for seed, status in seeds(swept).items() if status != "answered"} == {13}
+    assert "its worker died" in swept.content[""]["reason"][2]
+
+
+FAKE_SBATCH = """#!/bin/sh
+cp "$1" {folder}/submitted.sh
+echo "Submitted batch job 42"
+"""
+
+
+@pytest.mark.filterwarnings("ignore")  # of the library's own
+def test_the_job_that_slurm_is_given_asks_for_what_was_said(tmp_path, monkeypatch):
+    pytest.importorskip("submitit", reason="the extra `slurm` is not installed")
+    for name, text in (
+        ("sbatch", FAKE_SBATCH.format(folder=tmp_path)),
+        ("srun", "#!/bin/sh\n"),
+        ("sacct", "#!/bin/sh\n"),
+    ):
+        program = tmp_path / name
+        program.write_text(text)
+        program.chmod(program.stat().st_mode | stat.S_IXUSR)
+    monkeypatch.setenv("PATH", str(tmp_path), prepend=os.pathsep)
+    options = {"slurm_partition": "short", "timeout_min": "30", "python": "/opt/python"}
+    with ENGINES["slurm"].opened(Order(options=options, folder=tmp_path)) as pool:
+        assert pool.workers == 16
+        pool.executor.submit(os.getpid)
+    job = (tmp_path / "submitted.sh").read_text()
+    for line in ("--partition=short", "--time=30", "--cpus-per-task=1", "--job-name=walkerlab"):
+        assert f"#SBATCH {line}" in job
+    assert "/opt/python -u -m submitit" in job
+
+
+def test_an_engine_that_is_not_there_or_not_installed_is_said_so(monkeypatch):
+    with pytest.raises(ConfigError, match="no such engine; there are local, dask, slurm"):
+        engine_named("cloud")
+    assert engine_named("dask=tcp://10.0.0.1:8786")[1] == "tcp://10.0.0.1:8786"
+    with pytest.raises(ConfigError, match="takes no address"), LOCAL.opened(Order(address="x")):
+        pass
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(ConfigError) as caught, ENGINES["dask"].opened(Order()):
+        pass
+    assert caught.value.advice == "pip install 'walkerlab[dask]'"
+
+
+def test_chunks_grow_with_what_was_measured_and_shrink_towards_the_end():
+    work = Spread(iter(()), 10_000, list, print, 5.0)
+    assert work._batch_size(2) == 2
+    work.unit_s = 0.01
+    assert work._batch_size(2) == 500
+    work.left = 60
+    assert work._batch_size(2) == 50  # half a second of work, however little is left
+    work.unit_s = 20.0
+    assert work._batch_size(2) == 1

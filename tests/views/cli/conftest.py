@@ -1,0 +1,67 @@
+"""The command line in processes of its own: of the real pipeline and of the toy one."""
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from forks import forks
+
+import walkerlab
+
+TOY = Path(__file__).parents[2] / "pipeline" / "toy"
+ROOT = Path(walkerlab.__file__).parent.parent
+
+
+class Program:
+    """A program to be run on a folder of runs."""
+
+    def __init__(self, module, folder, *paths):
+        self.module, self.command = module, [sys.executable, "-m", module]
+        self.folder = folder
+        self.environment = {**os.environ, "PYTHONPATH": os.pathsep.join(map(str, [*paths, ROOT]))}
+
+    def __call__(self, *arguments, environment=None):
+        return forks().run(self.module, arguments, self.folder, {**self.environment, **(environment or {})})
+
+    def start(self, *arguments, environment=None, **options):
+        """Start it as a terminal does: where the tests are a script's background job they ignore Ctrl-C."""
+        return subprocess.Popen(
+            [*self.command, *map(str, arguments)],
+            cwd=self.folder,
+            env={**self.environment, **(environment or {})},
+            text=True,
+            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+            **{"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, **options},
+        )
+
+
+@pytest.fixture
+def toy(tmp_path):
+    """The command line of the toy pipeline, in an empty folder."""
+    shutil.copytree(TOY, tmp_path / "source" / "toy", ignore=shutil.ignore_patterns("__pycache__"))
+    (tmp_path / "work").mkdir()
+    return Program("toy", tmp_path / "work", tmp_path / "source")
+
+
+@pytest.fixture
+def walker(tmp_path):
+    """The real command line, in an empty folder."""
+    return Program("walkerlab", tmp_path)
+
+
+@pytest.fixture(scope="module")
+def swept(tmp_path_factory):
+    """The toy pipeline's command line in a folder with one sweep, and what that printed."""
+    folder = tmp_path_factory.mktemp("sweep")
+    shutil.copytree(TOY, folder / "source" / "toy", ignore=shutil.ignore_patterns("__pycache__"))
+    (folder / "work").mkdir()
+    toy = Program("toy", folder / "work", folder / "source")
+    over = ("--over", "gravity_m_s2=1:9:3", "--over", "slope_rad=[0.1, 1.2]")
+    done = toy("sweep", "--stage", "drop", "--jobs", "1", *over, "--json", "--csv")
+    assert done.returncode == 0, done.stderr
+    return toy, json.loads(done.stdout)

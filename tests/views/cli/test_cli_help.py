@@ -1,0 +1,168 @@
+import json
+import subprocess
+import sys
+
+import pytest
+from typer.testing import CliRunner
+
+import walkerlab
+from walkerlab.config.fields import block_of, words_of
+from walkerlab.config.schema import Config
+from walkerlab.pipeline.graph import PIPELINE, STAGES
+from walkerlab.pipeline.store.provenance import git_commit
+from walkerlab.views.cli.main import program
+
+HEAVY = (
+    "numpy",
+    "scipy",
+    "numba",
+    "h5py",
+    "matplotlib",
+    "ruamel",
+    "jinja2",
+    "filelock",
+    "rich",
+    "walkerlab.config.schema",
+)
+OPTIONS = ("--config", "-c", "--set", "--runs", "--force", "--dry-run", "--json", "--quiet", "-q", "--verbose", "-v")
+
+LOADED_BY = """
+import sys
+from walkerlab.views.cli.main import main
+sys.argv = ["walkerlab", *sys.argv[1:]]
+try:
+    main()
+except SystemExit as end:
+    assert end.code == 0, end.code
+print(*(name for name in %r if name in sys.modules), file=sys.stderr)
+"""
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["simulate", "--help"], ["status", "--help"], ["--version"]])
+def test_help_loads_no_library(arguments):
+    code = LOADED_BY % (HEAVY,)
+    done = subprocess.run([sys.executable, "-c", code, *arguments], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert done.stderr.split() == []
+    assert done.stdout
+
+
+def test_help_names_every_command(walker):
+    done = walker("--help")
+    commands = {line.split()[0] for line in done.stdout.split("Commands:")[1].splitlines() if line.strip()}
+    assert {*(stage.name for stage in STAGES), "status", "show", "schema", "clean"} <= commands
+
+
+def test_help_says_what_each_command_is_for_without_cutting_it_short(walker):
+    words = " ".join(walker("--help").stdout.split("Commands:")[1].split())
+    assert all(stage.purpose in words for stage in STAGES)
+    assert "..." not in words
+
+
+@pytest.mark.parametrize("stage", STAGES, ids=lambda stage: stage.name)
+def test_every_stage_has_the_common_options_and_strides_if_it_walks(walker, stage):
+    words = set(walker(stage.name, "--help").stdout.replace(",", " ").split())
+    assert set(OPTIONS) <= words
+    assert "--jobs" in words
+    assert ("--strides" in words) == (stage.name in ("simulate", "contact-sim", "report"))
+    assert ("--open" in words) == (stage.name == "report")
+
+
+OF_STAGES = [(stage.name, option) for stage in STAGES for option in stage.options]
+
+
+@pytest.mark.parametrize(("stage", "option"), OF_STAGES, ids=lambda entry: getattr(entry, "flag", entry))
+def test_an_option_of_a_stage_sets_a_key_and_offers_the_words_that_the_key_allows(stage, option):
+    block, _, name = option.key.rpartition(".")
+    fields = block_of(Config.model_fields[block]).model_fields if block else Config.model_fields
+    names = {field.alias or key: field for key, field in fields.items()}
+    assert block in ("", stage)
+    assert not set(option.needs) - {other.flag for other in PIPELINE[stage].options}
+    if "|" in option.metavar:
+        assert set(option.metavar.split("|")) == set(words_of(names[name].annotation))
+    else:
+        assert name in names
+
+
+def test_the_version_is_followed_by_the_commit(walker):
+    commit = git_commit()
+    known = f" (commit {commit})" if commit else ""
+    assert walker("--version").stdout == f"walkerlab {walkerlab.__version__}{known}\n"
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        [],
+        ["dance"],
+        ["simulate", "--quick"],
+        ["simulate", "--strides", "many"],
+        ["fixedpoint", "--strides", "3"],
+        ["show"],
+        ["show", "dance"],
+    ],
+)
+def test_wrong_usage_exits_2_without_traceback(walker, arguments):
+    done = walker(*arguments)
+    assert done.returncode == 2
+    assert "Traceback" not in done.stderr
+    assert not list(walker.folder.iterdir())
+
+
+def test_schema_prints_every_key_as_text_and_as_json(walker):
+    assert "walker.leg_length_m" in walker("schema").stdout
+    assert "slope_rad" in json.loads(walker("schema", "--json").stdout)["properties"]
+
+
+@pytest.mark.parametrize("arguments", [["--set", "slope=1"], ["--set", "slope_rad=.nan"], ["--config", "nowhere.yaml"]])
+def test_a_bad_config_exits_3_before_anything_runs(walker, arguments):
+    done = walker("simulate", *arguments)
+    assert done.returncode == 3
+    assert done.stderr.startswith("error: ")
+    assert done.stdout == ""
+    assert not list(walker.folder.iterdir())
+
+
+def completed(walker, typed):
+    """What bash is offered for the last word of a command line."""
+    asked = {"COMP_WORDS": typed, "COMP_CWORD": str(len(typed.split()) - 1), "_WALKERLAB_COMPLETE": "complete_bash"}
+    code = "import sys; from walkerlab.views.cli.main import main; sys.argv = ['walkerlab']; main()"
+    command = [sys.executable, "-c", code]
+    done = subprocess.run(
+        command, cwd=walker.folder, env={**walker.environment, **asked}, capture_output=True, text=True
+    )
+    return done.stdout.split()
+
+
+@pytest.mark.parametrize(
+    ("typed", "offered"),
+    [
+        ("walkerlab simulate --set slope_d", ["slope_deg="]),
+        ("walkerlab simulate --set walker.thigh.le", ["walker.thigh.length_m="]),
+        ("walkerlab continuation --over walker.hip_", ["walker.hip_mass_kg"]),
+        ("walkerlab simulate -c simp", ["simplest", "simple.yaml"]),
+        ("walkerlab simulate --stri", ["--strides"]),
+    ],
+)
+def test_a_shell_completes_keys_configs_and_options(walker, typed, offered):
+    (walker.folder / "simple.yaml").write_text("extends: paper\n", encoding="utf-8")
+    assert completed(walker, typed) == offered
+
+
+@pytest.mark.parametrize("typed", ["--slope_deg", "--slope-deg", "--hip_mass_kg"])
+def test_a_key_typed_as_an_option_is_told_with_how_it_is_set(typed):
+    done = CliRunner().invoke(program(), ["fixedpoint", typed, "3"])
+    assert done.exit_code == 2
+    assert f"{typed.lstrip('-').replace('-', '_')}=VALUE" in done.output
+    assert "--set" in done.output
+
+
+def test_of_keys_of_one_name_that_of_the_commands_own_block_is_told():
+    done = CliRunner().invoke(program(), ["basin", "--model", "contact"])
+    assert "--set basin.model=VALUE" in done.output
+
+
+def test_an_option_that_is_no_key_is_told_as_any_other():
+    done = CliRunner().invoke(program(), ["fixedpoint", "--colour", "3"])
+    assert done.exit_code == 2
+    assert "--set" not in done.output

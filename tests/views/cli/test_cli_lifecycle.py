@@ -1,0 +1,302 @@
+"""Commands that begin, repeat and remove runs, and how commands end that are cut short."""
+
+import json
+import os
+import re
+import shlex
+import signal
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from walkerlab.config.loader import load, safe_name
+from walkerlab.errors import add_run_options
+from walkerlab.views.cli.request import Request
+
+
+def test_a_config_that_init_wrote_is_accepted_and_names_its_schema(walker):
+    done = walker("init", "my walker.yaml")
+    assert done.returncode == 0
+    assert "walkerlab report -c 'my walker.yaml'" in done.stdout
+    text = (walker.folder / "my walker.yaml").read_text()
+    assert text.startswith("# yaml-language-server: $schema=.walkerlab-schema.json\n")
+    assert "# L, from foot to hip: number, from 0.001 to 1000 (m)\n  leg_length_m: 1.0\n" in text
+    assert "slope_rad" in json.loads((walker.folder / ".walkerlab-schema.json").read_text())["properties"]
+    assert (
+        load(walker.folder / "my walker.yaml").config.model_dump()
+        == load().config.model_copy(update={"name": "my-walker", "source": None}).model_dump()
+    )
+    assert walker("init", "my walker.yaml").returncode == 4
+
+
+def test_init_knows_the_types_of_walkers(walker):
+    done = walker("init", "x.yaml", "--type", "compas")
+    assert done.returncode == 3
+    assert "Did you mean compass?" in done.stderr
+
+
+def test_init_says_what_walkerlab_is_not_for(walker):
+    done = walker("init", "x.yaml", "--type", "runner")
+    assert done.returncode == 3
+    assert "no running: its walkers always have a foot on the ground" in done.stderr
+    assert "mean" not in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("walker_type", "config"), [("torso", "torso"), ("parts", "parts"), ("straight-legs", "round-feet")]
+)
+def test_init_writes_a_type_or_a_built_in_config_under_its_name(walker, walker_type, config):
+    assert walker("init", "--type", walker_type).returncode == 0
+    written = load(walker.folder / f"my-{walker_type}.yaml").config
+    assert written.model_copy(update={"name": config}) == load(Path(config)).config
+
+
+@pytest.mark.parametrize("walker_type", ["compass", "straight-legs", "kneed", "parts", "torso"])
+def test_every_key_that_init_writes_has_a_comment_above_it(walker, walker_type):
+    assert walker("init", "x.yaml", "--type", walker_type).returncode == 0
+    lines = (walker.folder / "x.yaml").read_text().splitlines()
+    values = [n for n, line in enumerate(lines) if re.match(r" *\w+: \S", line)]
+    assert len(values) > 20
+    assert [lines[n] for n in values if not lines[n - 1].lstrip().startswith("#")] == []
+
+
+@pytest.mark.parametrize(("text", "name"), [("Läufer 2", "Laufer-2"), ("a  b", "a-b"), ("-x.", "x"), ("歩", "run")])
+def test_a_file_name_gives_a_safe_run_name(text, name, tmp_path):
+    assert safe_name(text) == name
+    path = tmp_path / f"{text}.yaml"
+    path.write_text("extends: paper\n")
+    loaded = load(path)
+    assert loaded.run_name == name
+    assert f"the run is named {name}" in loaded.warnings[0]
+
+
+def test_a_longer_leg_whose_mass_stays_is_told():
+    (warning,) = load(sets=["walker.leg_length_m=1.2"]).warnings
+    assert "walker.foot_to_mass_m stays 0.5 m" in warning
+    assert load(sets=["walker.leg_length_m=1.2", "walker.foot_to_mass_m=0.6"]).warnings == ()
+
+
+def test_a_mass_that_is_moved_along_a_leg_that_stays_is_what_was_asked_for(tmp_path):
+    assert load(sets=["walker.foot_to_mass_m=0.3"]).warnings == ()
+    path = tmp_path / "mine.yaml"
+    path.write_text("extends: paper\nwalker: {foot_to_mass_m: 0.3}\n")
+    assert load(path).warnings == ()
+    assert "walker.foot_to_mass_m stays 0.3 m" in load(path, ["walker.leg_length_m=1.2"]).warnings[0]
+
+
+def test_a_run_is_a_config_and_runs_again_in_its_own_folder(toy):
+    toy("roll", "--strides", "3")
+    folder = "runs/paper@strides=3"
+    for config in (folder, f"{folder}/roll.h5"):
+        done = json.loads(toy("roll", "-c", config, "--json").stdout)
+        assert done["run_dir"] == folder
+        assert done["reused"] is True
+    changed = json.loads(toy("roll", "-c", folder, "--set", "slope_deg=2", "--json").stdout)
+    assert changed["run_dir"] == "runs/paper@strides=3,slope_deg=2"
+    assert not (toy.folder / "runs" / "paper").exists()
+
+
+def test_a_folder_without_results_is_no_config(toy):
+    (toy.folder / "empty").mkdir()
+    done = toy("roll", "-c", "empty")
+    assert done.returncode == 3
+    assert "no result to take a config from" in done.stderr
+
+
+def test_rerun_says_whether_a_result_comes_out_again(toy):
+    toy("roll")
+    artifact = "runs/paper/roll.h5"
+    done = toy("rerun", artifact)
+    assert done.returncode == 0
+    assert "is reproduced bit for bit" in done.stdout
+    source = toy.folder.parent / "source" / "toy" / "physics.py"
+    source.write_text(source.read_text().replace("math.sqrt(2", "math.sqrt(3"))
+    done = toy("rerun", artifact, "--json")
+    assert done.returncode == 5
+    assert "the code has changed since" in done.stderr
+    printed = json.loads(done.stdout)
+    assert printed["same"] is False
+    assert "is not reproduced" in printed["error"]["message"]
+
+
+def test_open_without_a_page_says_what_writes_it(toy):
+    for command in (("open",), ("status", "paper"), ("diff", "paper", "kneed")):
+        assert toy(*command).stderr.splitlines()[:2] == [
+            "error: there is no run paper.",
+            "advice: `walkerlab report` creates the run of the paper config.",
+        ]
+    toy("roll")
+    assert "there is no run papr. Did you mean paper?" in toy("open", "papr").stderr
+    done = toy("open", "paper")
+    assert done.returncode == 5
+    assert "walkerlab report -c runs/paper" in done.stderr
+
+
+def test_a_key_is_explained_in_80_columns(walker):
+    lines = walker("schema", "contact").stdout.splitlines()
+    assert "contact.stiffness" in lines
+    assert max(map(len, lines)) < 80
+    done = walker("schema", "contact.stifness")
+    assert done.returncode == 3
+    assert "Did you mean contact.stiffness?" in done.stderr
+
+
+def test_a_key_of_one_kind_of_walker_is_found_by_the_name_that_a_config_has(walker):
+    lines = walker("schema", "walker.thigh").stdout.splitlines()
+    assert "walker(kneed).thigh.length_m" in lines
+    assert walker("schema", "walker(kneed).thigh").stdout.splitlines() == lines
+
+
+def test_the_schema_of_a_key_is_that_key_alone_as_json_too(walker):
+    stiffness = json.loads(walker("schema", "contact.stiffness", "--json").stdout)
+    assert (stiffness["default"], stiffness["unit"]) == (1e5, "N/mm^e or N/m^e")
+    thigh = json.loads(walker("schema", "walker.thigh", "--json").stdout)
+    assert set(thigh["$defs"]) == {"Thigh"}
+    assert "mass_below_hip_m" in thigh["$defs"]["Thigh"]["properties"]
+    masses = json.loads(walker("schema", "walker.hip_mass_kg", "--json").stdout)["anyOf"]
+    assert [one["default"] for one in masses] == [10.0, 0.0, 0.5]
+    assert json.loads(walker("schema", "walker(kneed).hip_mass_kg", "--json").stdout)["default"] == 0.5
+    done = walker("schema", "contact.stifness", "--json")
+    assert done.returncode == 3
+    assert "contact.stiffness?" in json.loads(done.stdout)["error"]["message"]
+
+
+def test_init_makes_the_folder_and_advises_nothing_that_it_has_not(walker):
+    assert walker("init", "sub/dir/x.yaml").returncode == 0
+    assert load(walker.folder / "sub" / "dir" / "x.yaml").run_name == "x"
+    done = walker("init", "sub/dir/x.yaml/y.yaml")
+    assert done.returncode == 4
+    assert "sub/dir/x.yaml/y.yaml could not be written" in done.stderr
+    assert "--runs" not in done.stderr
+
+
+def test_a_config_that_is_not_there_is_begun_with_init(walker):
+    done = walker("fixedpoint", "-c", "mine.yaml")
+    assert done.returncode == 3
+    assert done.stderr.splitlines()[-1] == "advice: `walkerlab init` writes a config to begin with"
+
+
+def test_a_film_needs_no_name(walker):
+    done = walker("animate", "paper")
+    assert done.returncode == 3
+    assert "there is no run paper" in done.stderr
+
+
+def test_advice_can_be_typed_back(toy):
+    done = toy("show", "roll", "--strides", "3", "--set", "slope_deg=2")
+    assert "advice: `walkerlab roll --set slope_deg=2 --set strides=3` creates it." in done.stderr
+    typed = Request("simulate", sets=["start=[0, 1, 2, 3]"]).typed
+    assert add_run_options("`walkerlab status` or `walkerlab schema`", typed) == (
+        "`walkerlab status --set 'start=[0, 1, 2, 3]'` or `walkerlab schema`"
+    )
+
+
+def test_the_slope_is_set_once(toy):
+    done = toy("drop", "--set", "slope_deg=2", "--set", "slope_rad=0.1")
+    assert done.returncode == 3
+    assert "the slope is given already, as slope_deg" in done.stderr
+
+
+def test_clean_all_leaves_no_empty_folders(toy):
+    toy("roll")
+    toy("roll", "--strides", "3")
+    (toy.folder / "runs" / "paper" / "notes.txt").write_text("mine")
+    removed = json.loads(toy("clean", "--all", "--yes", "--json").stdout)["removed"]
+    assert len(removed) == 4
+    assert [path.name for path in (toy.folder / "runs").iterdir()] == ["paper"]
+
+
+def test_a_request_to_end_is_an_interrupt_with_an_object_that_names_the_run(toy, tmp_path):
+    begun = tmp_path / "begun"
+    environment = {"TOY_BEGUN": str(begun), "TOY_GO_ON": str(tmp_path / "never")}
+    with toy.start("drop", "--json", environment=environment) as process:
+        while not begun.exists():
+            assert process.poll() is None
+        os.kill(process.pid, signal.SIGTERM)
+        assert process.wait(timeout=30) == 130
+        value = json.loads(process.stdout.read())
+    assert value["run_dir"] == "runs/paper"
+    assert value["error"]["exit_code"] == 130
+
+
+def test_a_closed_pipe_ends_quietly(walker):
+    with walker.start("schema") as process:
+        process.stdout.close()
+        assert process.wait(timeout=30) in (0, 141)
+        assert process.stderr.read() == ""
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no full device here")
+def test_a_full_stdout_is_told(walker):
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run(
+            [*walker.command, "schema"], cwd=walker.folder, env=walker.environment, stdout=full, stderr=subprocess.PIPE
+        )
+    assert done.returncode == 4
+    assert b"error: the output could not be written" in done.stderr
+    assert b"Traceback" not in done.stderr
+
+
+def test_init_on_a_full_disk_leaves_nothing_cut_short(walker):
+    command = f"ulimit -f 1; exec {shlex.join(walker.command)} init x.yaml"
+    done = subprocess.run(["bash", "-c", command], cwd=walker.folder, env=walker.environment, capture_output=True)
+    assert done.returncode == 4
+    assert b"x.yaml could not be written" in done.stderr
+    assert list(walker.folder.iterdir()) == []
+
+
+def test_a_pipe_is_written_into_and_not_replaced(walker):
+    os.mkfifo(walker.folder / "pipe")
+    with walker.start("draw", "simplest", "--to", "svg", "-o", "pipe", stdout=subprocess.DEVNULL) as process:
+        drawn = (walker.folder / "pipe").read_bytes()
+        assert process.wait(timeout=60) == 0
+    assert drawn.startswith(b"<?xml")
+    assert drawn.rstrip().endswith(b"</svg>")
+    assert (walker.folder / "pipe").is_fifo()
+
+
+def test_a_link_is_followed_and_not_replaced(walker):
+    (walker.folder / "link.svg").symlink_to("walker.svg")
+    assert walker("draw", "simplest", "-o", "link.svg").returncode == 0
+    assert (walker.folder / "link.svg").is_symlink()
+    assert (walker.folder / "walker.svg").read_text().startswith("<?xml")
+
+
+@pytest.mark.parametrize(
+    ("target", "said"),
+    [
+        ("mine.yaml", "mine.yaml is an input of this command"),
+        ("base.yaml", "base.yaml is an input of this command"),
+        (".", ". is a folder"),
+    ],
+)
+def test_a_drawing_replaces_neither_what_it_is_drawn_from_nor_a_folder(walker, target, said):
+    (walker.folder / "base.yaml").write_text("extends: paper\n")
+    (walker.folder / "mine.yaml").write_text("extends: base.yaml\n")
+    done = walker("draw", "mine.yaml", "--to", "svg", "-o", target)
+    assert done.returncode == 3
+    assert said in done.stderr
+    assert "Traceback" not in done.stderr
+    assert (walker.folder / "mine.yaml").read_text() == "extends: base.yaml\n"
+    assert (walker.folder / "base.yaml").read_text() == "extends: paper\n"
+
+
+def test_names_that_are_no_text_are_escaped_where_they_are_printed(walker):
+    odd = os.fsdecode(b"r\xff")
+    for command in (("status", "--runs", odd), ("draw", "simplest", "-o", f"{odd}.svg"), ("export", odd, "7")):
+        done = walker(*command)
+        assert "Traceback" not in done.stderr, done.stderr
+        assert "r\\udcff" in done.stdout + done.stderr
+    assert (walker.folder / f"{odd}.svg").is_file()
+
+
+def test_letters_that_the_terminal_lacks_are_escaped(walker):
+    done = walker("schema", "slope_rad", environment={"PYTHONIOENCODING": "ascii"})
+    assert (done.returncode, "Traceback" in done.stderr) == (0, False)
+
+
+def test_a_closed_stdout_ends_quietly(walker):
+    command = f"exec {shlex.join(walker.command)} schema >&-"
+    done = subprocess.run(["bash", "-c", command], cwd=walker.folder, env=walker.environment, capture_output=True)
+    assert (done.returncode, done.stderr) == (0, b"")

@@ -1,0 +1,86 @@
+"""JSON values as text for people, and how far a stage is."""
+
+from pathlib import Path
+
+import pytest
+
+from walkerlab.errors import NoAnswer
+from walkerlab.pipeline.runner import StageReport
+from walkerlab.views.cli import console
+from walkerlab.views.cli.console import Console, StageLine
+from walkerlab.views.cli.request import Request
+from walkerlab.views.cli.stage import printed
+from walkerlab.views.report.tables import LONGEST_CELL
+from walkerlab.views.report.text import described_summary, table
+
+SENTENCES = "One gait cycle of the rigid model, to scale. " * 5
+
+
+def test_a_column_of_sentences_is_named_below_the_table_and_not_in_it():
+    rows = [{"number": 2, "svg": "figures/figure-02.svg", "caption": SENTENCES}, {"svg": "own.svg", "caption": "-"}]
+    lines = list(described_summary({"figures": rows}))
+    assert lines[1].split() == ["number", "svg"]
+    assert lines[2].split() == ["2", "figures/figure-02.svg"]
+    assert lines[-1].strip() == "with --json also: caption"
+    assert max(map(len, lines)) < LONGEST_CELL
+
+
+def test_a_table_of_sentences_alone_is_shown():
+    assert table([{"caption": SENTENCES}])[1] == SENTENCES.rstrip()
+
+
+@pytest.fixture
+def clock(monkeypatch):
+    """A clock that is set by hand, from 0 s."""
+    now = [0.0]
+    monkeypatch.setattr(console.time, "monotonic", lambda: now[0])
+    return now
+
+
+def test_no_time_is_estimated_until_a_tenth_is_done_in_some_seconds(clock):
+    line = StageLine(Console(quiet=True), "tune", "", None)
+    line.start("tune: cells", 100)
+    told = []
+    for clock[0], done in ((1.0, 5), (2.0, 15), (4.0, 20), (8.0, 40), (12.0, 60)):
+        line.advance(done - line.done)
+        told.append(line.seconds_left())
+    assert told[:2] == [None, None]
+    assert told[2:] == pytest.approx([16.0, 14.4, 8.0])  # by the rates from 5 to 20, from 15 to 40 and from 20 to 60
+
+
+def test_a_slow_begin_does_not_count_once_the_pace_is_known(clock):
+    line = StageLine(Console(quiet=True), "sweep", "", None)
+    line.start("sweep", 400)
+    for clock[0], done in ((8.0, 2), (12.0, 42), (16.0, 82), (20.0, 122)):
+        line.advance(done - line.done)
+    assert line.seconds_left() == pytest.approx((400 - 122) / 10.0)
+
+
+def test_a_stage_that_takes_longer_than_the_last_time_is_not_said_to_end_at_once(clock):
+    line = StageLine(Console(quiet=True), "fixedpoint", "", expected_s=5.0)
+    clock[0] = 3.0
+    assert line.pace() == "3 s, about 2 s left"
+    clock[0] = 9.0
+    assert line.pace() == "9 s"
+
+
+def test_the_time_left_comes_down_while_a_long_part_is_at_work(clock):
+    line = StageLine(Console(quiet=True), "engines", "", None)
+    line.start("engines", 4)
+    for clock[0] in (10.0, 20.0):
+        line.advance()
+    told = []
+    for clock[0] in (24.0, 32.0, 39.0, 41.0):
+        told.append(line.seconds_left())
+    assert told == [16.0, 8.0, 1.0, None]
+
+
+@pytest.mark.parametrize(("summary", "stored"), [({}, False), ({"period_s": 0.7}, True)])
+def test_that_there_is_no_answer_at_all_is_not_called_stored(summary, stored):
+    said = {"message": "none is installed", "advice": "Install one."}
+    summary = {**summary, "no_answer": said}
+    artifact = Path("runs/paper/drop.h5")
+    report = StageReport(
+        "drop", artifact.parent, artifact, False, 0.0, (), summary, (), NoAnswer(said["message"], said["advice"])
+    )
+    assert (f"stored in {artifact}" in printed(Request("drop"), report)) == stored

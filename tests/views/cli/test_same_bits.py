@@ -1,0 +1,26 @@
+"""One config, one machine: the same results to the last bit, whatever the process and however many of them."""
+
+from walkerlab.pipeline.store import artifact
+
+CONFIG = """
+extends: paper
+name: same
+strides: 1
+tune: {cells: 3, rigid_limit: false}
+"""
+
+
+def test_results_and_drawings_are_the_same_with_one_job_and_with_two(walker):
+    (walker.folder / "same.yaml").write_text(CONFIG)
+    for jobs in ("1", "2"):
+        for arguments in (("tune", "--jobs", jobs), ("plot",)):
+            done = walker(*arguments, "-c", "same.yaml", "--runs", jobs, "--quiet")
+            assert done.returncode == 0, done.stderr
+    one, two = (walker.folder / jobs / "same" for jobs in ("1", "2"))
+    names = {path.name for path in one.glob("*.h5")}
+    assert names == {f"{stage}.h5" for stage in ("fixedpoint", "simulate", "contact-sim", "tune", "compare", "plot")}
+    for name in names:
+        assert artifact.read(one / name).digest() == artifact.read(two / name).digest(), name
+    figures = sorted((one / "figures").iterdir())
+    assert len(figures) > 10
+    assert [path.name for path in figures if path.read_bytes() != (two / "figures" / path.name).read_bytes()] == []

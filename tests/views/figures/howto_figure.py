@@ -1,0 +1,16 @@
+"""The figure that docs/adding.md adds as an example, made of what stands there."""
+
+import re
+from pathlib import Path
+
+PAGE = (Path(__file__).parents[3] / "docs" / "adding.md").read_text(encoding="utf-8")
+
+
+def example():
+    """The figure; it has words only where they are written into a file."""
+    names = {}
+    exec(re.search(r"```python\n(from walkerlab\.figures\.canvas.*?)```", PAGE, re.DOTALL)[1], names)
+    return names["FIGURE"]
+
+
+FIGURE = example()

@@ -1,0 +1,25 @@
+"""A basin of attraction made by hand, laid out by the stage itself."""
+
+import numpy as np
+from synthetic_walks import stored
+
+from walkerlab.config.loader import load
+from walkerlab.outcome import Outcome
+from walkerlab.physics.orbits.basin import UNREACHED
+from walkerlab.pipeline.stages.basin import WalkEnds, group_of, summary, window_of
+
+CONFIG = load(None, ["basin.cells=[4,3]"]).config
+Z = [0.17, -0.6, -0.86]
+
+
+def basin(attractor, aperiodic=False, config=CONFIG, steps=7):
+    """Cells walk where they have an attractor or -2, for none; the others fall."""
+    window = window_of(config, Z)
+    attractor = np.resize(attractor, window.size)
+    walks = attractor != UNREACHED
+    found = WalkEnds(
+        np.where(walks, Outcome.WALKED, Outcome.FELL), np.maximum(attractor, UNREACHED), np.where(walks, steps, 1)
+    )
+    attractors = [{"period": 1}, {"period": 2}]
+    said = summary(config.basin, window, found, walks.astype(float).reshape(window.cells), attractors, aperiodic)
+    return {"basin": stored("basin", {"basin": group_of(config.basin, window, found, walks)}, said)}

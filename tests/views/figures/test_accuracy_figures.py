@@ -1,0 +1,83 @@
+"""Error against run time: every run is drawn, failures too, and nothing below what the reference knows."""
+
+import numpy as np
+import pytest
+from matplotlib.colors import to_hex
+from synthetic_methods import RUNS, SCENES, measured_methods
+
+from walkerlab.evidence.benchmarks import figures as costs
+from walkerlab.evidence.benchmarks.figures import LOOKS, legend_entries, method_series
+from walkerlab.physics.solvers.registry import METHODS
+from walkerlab.views.figures.canvas import styled
+
+FIGURES = [figure for figure in costs.FIGURES if figure.name.startswith("accuracy")]
+RIGID = FIGURES[0]
+AGREEMENT = 9e-16
+
+
+def drawn_lines(figure=RIGID):
+    with styled():
+        left, right = figure.draw(measured_methods())[0].axes
+    return left.lines, right.lines
+
+
+def points(lines, crosses):
+    chosen = [line for line in lines if (line.get_marker() == "x") == crosses]
+    return sorted((x, y) for line in chosen for x, y in zip(*line.get_data(), strict=True))
+
+
+def test_there_is_a_figure_for_each_scene():
+    assert [figure.name for figure in FIGURES] == [f"accuracy-{scene}" for scene in SCENES]
+
+
+def test_every_run_that_reached_the_end_is_drawn_against_time_and_against_right_hand_sides():
+    reached = [run for run in RUNS if run[3] is not None]
+    for lines, cost in zip(drawn_lines(), (4, 5), strict=True):
+        expected = sorted((run[cost], max(run[3], AGREEMENT)) for run in reached)
+        np.testing.assert_allclose(points(lines, crosses=False), expected)
+
+
+def test_runs_that_did_not_reach_the_end_stay_visible_above_all_others():
+    left, _ = drawn_lines()
+    failed = points(left, crosses=True)
+    assert [x for x, _ in failed] == sorted(run[4] for run in RUNS if run[3] is None)
+    assert min(y for _, y in failed) > max(y for _, y in points(left, crosses=False))
+
+
+def test_the_legend_has_a_cross_only_where_a_run_did_not_reach_the_end():
+    every = list(method_series(SCENES[0], measured_methods()))
+    whole = [one for one in every if one.runs["reached"].all()]
+    assert 0 < len(whole) < len(every)
+    for shown, there in ((every, True), (whole, False)):
+        assert ("end not reached" in [entry.get_label() for entry in legend_entries(shown, AGREEMENT)]) is there
+
+
+def test_the_caption_tells_the_conclusion_the_reference_and_the_failures():
+    caption = RIGID.caption(measured_methods())
+    for said in ("at 1e-06, dop853 is fastest", "heyoka-taylor", "scipy-rk45 at 1e-09 (budget-exhausted)", "(slid)"):
+        assert said in caption
+
+
+def test_the_caption_says_what_a_method_is_measured_by_that_is_the_reference_too():
+    results = measured_methods()
+    assert "itself is measured by" not in RIGID.caption(results)
+    results["accuracy"].summary["reference"]["rigid"] = {
+        "method": "radau5",
+        "second_method": "dop853",
+        "agreement": 1e-12,
+    }
+    assert "radau5 itself is measured by dop853." in RIGID.caption(results)
+
+
+def test_every_method_of_the_registry_has_a_look_of_its_own():
+    assert set(METHODS) <= set(LOOKS)
+    looks = [(to_hex(look.colour), str(look.style)) for look in LOOKS.values()]
+    assert len(set(looks)) == len(looks)
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_a_scene_that_was_not_measured_is_left_out_and_says_so(scene):
+    others = measured_methods([other for other in SCENES if other != scene])
+    figure = FIGURES[SCENES.index(scene)]
+    assert figure.why_left_out(others, {}) == f"accuracy: the scene {scene} was not measured"
+    assert figure.why_left_out({}, {}) == "it needs accuracy"

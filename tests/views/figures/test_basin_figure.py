@@ -1,0 +1,85 @@
+"""Figure 15 and the report's section on basins, of a grid made by hand."""
+
+import numpy as np
+import pytest
+from synthetic_basin import CONFIG, basin
+
+from walkerlab.config.loader import load
+from walkerlab.physics.orbits.basin import UNREACHED
+from walkerlab.pipeline.store import artifact
+from walkerlab.pipeline.store.content import Content
+from walkerlab.views.figures import stage as plot
+from walkerlab.views.figures.maps import FIGURE_15 as FIGURE
+from walkerlab.views.figures.maps import attractor_name, sides_of
+from walkerlab.views.report.results import Results
+from walkerlab.views.report.sections.families import basin as section
+
+
+def test_walks_that_have_settled_from_their_first_step_on_are_drawn():
+    assert FIGURE.drawn(basin([0, UNREACHED], steps=0)).png.startswith(b"\x89PNG")
+
+
+def test_it_says_how_much_of_the_window_walks_and_where_to():
+    results = basin([0, 0, 1, UNREACHED])
+    drawing = FIGURE.drawn(results)
+    assert drawing.png.startswith(b"\x89PNG")
+    assert "75 % of the window walk" in drawing.caption
+    assert "The gait of 1 step is reached from 6 cells, after 7 steps in the median." in drawing.caption
+    for label in ("gait of 1 step", "gait of 2 steps", "fell", "rigid gait of one step"):
+        assert label in drawing.svg.decode()
+    assert drawing.svg == FIGURE.drawn(results).svg
+
+
+def test_walks_that_settle_nowhere_are_told_apart():
+    drawing = FIGURE.drawn(basin([-2, UNREACHED], aperiodic=True))
+    assert "never repeats itself" in drawing.svg.decode()
+    assert "no walk settles on a gait" in drawing.svg.decode()
+    assert "6 cells still walk after 300 steps" in drawing.caption
+
+
+def test_of_three_coordinates_the_middle_plane_is_drawn():
+    config = load(None, ["basin.plane=[theta_2,dtheta_1,dtheta_2]", "basin.cells=[3,3,3]"]).config
+    assert "of which the middle plane is shown" in FIGURE.drawn(basin([0, UNREACHED], config=config)).caption
+
+
+def test_attractors_of_one_period_have_letters():
+    rows = [{"period": 1}, {"period": 3}, {"period": 3}]
+    assert [attractor_name(number, rows) for number in range(3)] == [
+        "gait of 1 step",
+        "gait of 3 steps (a)",
+        "gait of 3 steps (b)",
+    ]
+
+
+def test_cells_are_drawn_around_their_middles():
+    assert sides_of(np.array([0.5, 1.5, 2.5])) == (0.0, 3.0)
+
+
+def test_without_a_basin_it_says_how_to_make_one():
+    why = FIGURE.why_left_out({}, {"basin": "it was not asked for; `walkerlab basin` makes it"})
+    assert why == "it needs basin: it was not asked for; `walkerlab basin` makes it"
+
+
+def test_the_report_has_its_shares_and_attractors():
+    made = section(Results(CONFIG, basin([0, 0, 1, UNREACHED]), (), ()))
+    assert "75 % of the window walk" in made.blocks[0].text
+    assert [row[1].text for row in next(iter(made.blocks[1].groups.values()))] == ["6", "3"]
+    assert section(Results(CONFIG, {}, (), ())) is None
+
+
+@pytest.mark.parametrize("stage", ["plot", "report"])
+def test_drawings_take_it_in_once_it_is_there(stage):
+    from walkerlab.pipeline.graph import PIPELINE
+
+    assert "basin" in PIPELINE[stage].if_current
+
+
+def test_its_own_command_draws_it_at_once(tmp_path):
+    made = basin([0, 0, 1, UNREACHED])["basin"]
+    artifact.write(tmp_path / "basin.h5", Content(made.groups, made.summary), made.identity, made.provenance)
+    (path,) = plot.draw_at_once("basin", tmp_path, anew=True)
+    assert path == tmp_path / "figures" / "figure-15.svg"
+    assert path.read_bytes() == FIGURE.drawn({"basin": made}).svg
+    path.write_text("as it was")
+    assert plot.draw_at_once("basin", tmp_path, anew=False) == [path]
+    assert path.read_text() == "as it was"

@@ -1,0 +1,281 @@
+"""What leaves a run for use elsewhere: figures, tables, trajectories, films."""
+
+import csv
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray
+from PIL import Image
+from synthetic_families import families
+from synthetic_methods import everything
+from synthetic_walks import both_models
+
+from walkerlab.api import open_run
+from walkerlab.config.loader import load
+from walkerlab.config.reads import only
+from walkerlab.config.schema import Config
+from walkerlab.config.writer import to_yaml
+from walkerlab.errors import ConfigError, StaleError
+from walkerlab.pipeline.graph import PIPELINE
+from walkerlab.pipeline.progress import Silent
+from walkerlab.pipeline.store.artifact import read, write
+from walkerlab.pipeline.store.content import Content
+from walkerlab.pipeline.store.provenance import begin
+from walkerlab.pipeline.store.runfolder import Record, RunFolder
+from walkerlab.views.cli.console import Console
+from walkerlab.views.cli.exports import Film, Target, export_from, walk_in, write_film
+from walkerlab.views.figures import illustration
+from walkerlab.views.figures import stage as plot
+from walkerlab.views.figures.style import WIDTH
+from walkerlab.views.report.tex import in_tex
+
+QUIET = Console(quiet=True)
+
+
+@pytest.fixture
+def run(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    folder = tmp_path / "runs" / "paper"
+    folder.mkdir(parents=True)
+    for name, result in both_models().items():
+        extra = {"table3": {"t_left": {"unit": "s", "corrected": 0.7}}} if name == "compare" else {}
+        content = Content(result.groups, {**result.summary, **extra})
+        write(folder / f"{name}.h5", content, result.identity, begin(load().config, {}))
+    made = RunFolder.at(folder)
+    made.write_record(Record("paper", "", to_yaml(load().config)))  # without, all results are read to know the config
+    return made
+
+
+@pytest.mark.parametrize(
+    ("kind", "start"),
+    [("pdf", b"%PDF"), ("svg", b"<?xml"), ("png", b"\x89PNG"), ("eps", b"%!PS-Adobe"), ("tiff", b"II")],
+)
+def test_a_figure_in_every_format(run, kind, start):
+    path = export_from(run, "figure-07", Target(kind, None), 516.0, "", QUIET)
+    assert path.name == f"paper-figure-07.{kind}"
+    assert path.read_bytes().startswith(start)
+
+
+def test_every_figure_is_the_pages_in_another_size(run, monkeypatch):
+    monkeypatch.setattr(illustration, "POINT", 1.0)
+    results = {**everything(), **families()}
+    for name, result in results.items():
+        write(run.artifact(name), Content(result.groups, result.summary), result.identity, begin(load().config, {}))
+    drawn = plot.run(only(Config(), PIPELINE["plot"].takes), results, Silent(), run.path).summary["figures"]
+    names = [Path(entry["svg"]).stem for entry in drawn]
+    assert {"figure-07", "figure-09", "figure-10", "figure-13", "stability-step"} <= set(names)
+    for name in names:
+        path = export_from(run, name, Target("svg", None), WIDTH, "", QUIET)
+        assert path.read_bytes() == (run.path / "figures" / f"{name}.svg").read_bytes(), name
+
+
+def test_a_figure_of_outdated_results_says_so(run, capsys):
+    export_from(run, "figure-07", Target("svg", None), 516.0, "", Console())
+    assert "outdated results, which are drawn all the same: compare, contact-sim and simulate;" in (
+        capsys.readouterr().err
+    )
+
+
+def test_a_figure_is_as_wide_as_is_asked_for(run, tmp_path):
+    for points in (252.0, 300.0):
+        file = Target("png", tmp_path / f"{points}.png")
+        with Image.open(export_from(run, "figure-07", file, points, "", QUIET)) as image:
+            assert image.size[0] == pytest.approx(points / 72.0 * 300.0, abs=1.0)
+
+
+@pytest.mark.parametrize("kind", ["png", "tiff"])
+def test_pixels_are_as_many_an_inch_as_are_asked_for(run, kind):
+    with Image.open(export_from(run, "figure-07", Target(kind, None), 252.0, "", QUIET, dpi=600)) as image:
+        assert image.size[0] == pytest.approx(3.5 * 600.0, abs=1.0)
+        assert image.info["dpi"] == pytest.approx((600.0, 600.0), abs=0.1)
+
+
+def test_fonts_of_a_pdf_are_embedded_as_truetype(run):
+    data = export_from(run, "figure-07", Target("pdf", None), 252.0, "", QUIET).read_bytes()
+    assert b"/Type3" not in data.replace(b" ", b"")
+    assert b"/FontFile2" in data.replace(b" ", b"")
+
+
+def test_format_and_file_mean_the_same_everywhere(run, tmp_path):
+    assert export_from(run, "trajectory", Target(None, None), 252.0, "simulate", QUIET).name == (
+        "paper-simulate-trajectory.csv"
+    )
+    for target in (Target("svg", tmp_path / "mine"), Target(None, tmp_path / "mine.svg")):
+        path = export_from(run, "figure-07", target, 252.0, "", QUIET)
+        assert path == target.output
+        assert path.read_bytes().startswith(b"<?xml")
+    with pytest.raises(ConfigError, match="two formats"):
+        export_from(run, "figure-07", Target("pdf", tmp_path / "mine.svg"), 252.0, "", QUIET)
+    film = write_film(run, Target("gif", None), Film("simulate", 1, 5, 1.0), QUIET)
+    assert film.name == "paper-simulate.gif"
+
+
+def test_nothing_is_overwritten_in_silence(run, capsys):
+    target = Target("csv", Path("walk.csv"))
+    for model, told in (("simulate", ""), ("simulate", ""), ("contact-sim", "walk.csv existed and was replaced.")):
+        export_from(run, "trajectory", target, 252.0, model, Console())
+        assert told in capsys.readouterr().err
+
+
+def test_a_trajectory_as_csv_is_the_stored_one(run):
+    path = export_from(run, "trajectory", Target("csv", None), 516.0, "simulate", QUIET)
+    with path.open() as file:
+        head, *rows = csv.reader(file)
+    stored = both_models()["simulate"]["trajectory"]
+    assert head[0] == "time (s)"
+    assert np.array([float(row[0]) for row in rows]).tolist() == stored["time"].tolist()
+    column = head.index("angle 1 (rad)")
+    assert [float(row[column]) for row in rows] == stored["angle"][:, 0].tolist()
+
+
+def test_a_trajectory_as_netcdf_opens_without_a_group(run):
+    path = export_from(run, "trajectory", Target("nc", None), 516.0, "contact-sim", QUIET)
+    with xarray.open_dataset(path, engine="h5netcdf") as dataset:
+        assert dataset["angle"].dims == ("time", "leg")
+        assert dataset["time"].attrs["units"] == "s"
+
+
+def test_a_table_for_latex_guards_its_letters(run):
+    text = export_from(run, "table-3", Target("tex", None), 516.0, "", QUIET).read_text()
+    assert r"left step period, $t_\mathrm{left}$ (s) & 0.70000 \\" in text
+    assert in_tex("x_p, dtheta_1") == r"$x_p$, $\dot{\theta}_1$"
+    assert in_tex("θ̇₁ (rad/s)") == r"$\dot{\theta}_{1}$ (rad/s)"
+    assert in_tex("end_time_s") == r"end\_time\_s"
+    assert in_tex("50 %") == r"50 \%"
+    assert in_tex("m/s^2, 10^-4") == "m/s$^{2}$, 10$^{-4}$"
+
+
+@pytest.mark.parametrize("name", ["7", "07", "figure-7", "fig 7"])
+def test_a_figure_is_known_by_its_number(run, name):
+    assert export_from(run, name, Target("svg", None), 516.0, "", QUIET).name == "paper-figure-07.svg"
+
+
+def test_what_a_run_has_is_listed_for_a_name_that_there_is_not(run):
+    with pytest.raises(ConfigError) as refused:
+        export_from(run, "figur", Target("pdf", None), 516.0, "", QUIET)
+    assert "figure-07" in refused.value.advice
+    assert refused.value.advice.endswith("\n  table-3\n  what-was-left-out-of-this-scene\n  trajectory")
+    assert "figure-13" not in refused.value.advice
+
+
+def test_what_a_figure_needs_is_made_by_the_stage_that_is_named(run):
+    for name, command in (("figure-13", "continuation"), ("stability-step", "stability --full")):
+        with pytest.raises(StaleError) as refused:
+            export_from(run, name, Target("pdf", None), 516.0, "", QUIET)
+        assert refused.value.advice == f"`walkerlab {command} -c {run.typed}` makes what it needs."
+
+
+def test_a_walk_of_its_own_is_meant_where_there_is_no_contact_walk(run):
+    assert walk_in(run) == "contact-sim"
+    run.artifact("contact-sim").unlink()
+    assert walk_in(run) == "simulate"
+
+
+@pytest.mark.parametrize(
+    ("what", "kind", "error", "said"),
+    [
+        ("tabl", "tex", ConfigError, "nothing is called tabl. Did you mean table"),
+        ("table-1", "tex", ConfigError, "compares with the paper's walker"),
+        ("figure-07", "csv", ConfigError, "cannot be written as csv"),
+        ("figure-11", "pdf", StaleError, "cannot be drawn"),
+    ],
+)
+def test_what_cannot_be_exported_is_told(run, what, kind, error, said):
+    with pytest.raises(error, match=said):
+        export_from(run, what, Target(kind, None), 516.0, "", QUIET)
+
+
+def test_a_film_has_a_picture_for_every_moment(run, tmp_path):
+    path = write_film(
+        run, Target(str(tmp_path / "walk.gif"), None), Film("contact-sim", steps=1, rate=10, slower=1.0), QUIET
+    )
+    with Image.open(path) as film:
+        assert film.n_frames == pytest.approx(7, abs=1)
+        assert film.size == (640, 360)
+        first = np.asarray(film.convert("L"))
+        film.seek(5)
+        assert (np.asarray(film.convert("L")) != first).any()
+
+
+def test_a_film_of_another_kind_is_refused(run, tmp_path, monkeypatch):
+    monkeypatch.setenv("PATH", str(tmp_path))
+    for name, said in (("walk.avi", "an animation cannot be written as avi"), ("walk.mp4", "needs ffmpeg")):
+        with pytest.raises(ConfigError, match=said):
+            write_film(run, Target(str(tmp_path / name), None), Film("simulate", 1, 10, 1.0), QUIET)
+
+
+def test_ffmpeg_gets_the_pictures(run, tmp_path, monkeypatch):
+    tool = tmp_path / "ffmpeg"
+    tool.write_text("#!/bin/sh\n/bin/cat | /usr/bin/wc -c\n")
+    tool.chmod(0o755)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    path = write_film(run, Target("mp4", tmp_path / "walk.mp4"), Film("simulate", 1, 5, 1.0), QUIET)
+    assert int(path.read_bytes()) % (640 * 360 * 3) == 0
+
+
+DAMAGES = {
+    "cut short": lambda data: data[:-1],
+    "emptied": lambda _data: b"",
+    "a bit flipped": lambda data: data[:600] + bytes([data[600] ^ 1]) + data[601:],
+}
+READERS = {
+    "figure": lambda run: export_from(run, "figure-06", Target("svg", None), 516.0, "", QUIET),
+    "trajectory": lambda run: export_from(run, "trajectory", Target("csv", None), 516.0, "contact-sim", QUIET),
+    "film": lambda run: write_film(run, Target(None, Path("walk.gif")), Film("contact-sim", 1, 10, 1.0), QUIET),
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+@pytest.mark.parametrize("reader", READERS)
+def test_a_damaged_result_is_told_as_such_with_what_makes_it_anew(run, reader, damage):
+    path = run.artifact("contact-sim")
+    path.write_bytes(DAMAGES[damage](path.read_bytes()))
+    with pytest.raises(StaleError) as refused:
+        READERS[reader](run)
+    assert refused.value.message.startswith(f"{path} is damaged: ")
+    assert refused.value.advice == f"`walkerlab contact-sim -c {run.path}` recomputes it."
+    assert refused.value.exit_code == 5
+
+
+def test_damage_of_what_is_not_needed_does_not_matter(run):
+    run.artifact("simulate").write_bytes(b"")
+    assert export_from(run, "trajectory", Target("csv", None), 516.0, "contact-sim", QUIET).is_file()
+
+
+def test_a_damaged_result_is_told_from_python_too(run):
+    opened = open_run(run.path)
+    run.artifact("compare").write_bytes(b"")
+    assert "compare" in opened.stages
+    with pytest.raises(StaleError, match=r"compare\.h5 is damaged"):
+        opened.result("compare")
+
+
+def test_an_export_writes_over_no_result(run):
+    before = run.artifact("simulate").read_bytes()
+    for owned in ("simulate.h5", "later.h5", ".run.json"):
+        with pytest.raises(ConfigError, match="belongs to the results of the run"):
+            export_from(run, "trajectory", Target("csv", run.path / owned), WIDTH, "simulate", QUIET)
+    assert run.artifact("simulate").read_bytes() == before
+    assert export_from(run, "trajectory", Target("csv", run.path / "mine.csv"), WIDTH, "simulate", QUIET).is_file()
+
+
+def test_what_is_exported_of_an_outdated_result_comes_with_a_warning(run, capsys):
+    export_from(run, "trajectory", Target("csv", None), WIDTH, "simulate", Console())
+    assert f"warning: {run.artifact('simulate')} is out of date: " in capsys.readouterr().err
+
+
+def test_a_film_of_an_older_result_is_refused_in_words_where_it_lacks_what_is_drawn(run):
+    stored = read(run.artifact("simulate"))
+    known = {key: value for key, value in stored.identity.config_slice.items() if key != "push_off"}
+    write(run.artifact("simulate"), stored, replace(stored.identity, config_slice=known), stored.provenance)
+    with pytest.raises(StaleError, match=r"simulate\.h5 is outdated and lacks 'push_off'") as caught:
+        write_film(run, Target("gif", None), Film("simulate", 1, 5, 1.0), QUIET)
+    assert "walkerlab simulate -c" in caught.value.advice
+
+
+def test_what_there_is_to_export_is_a_list(run):
+    with pytest.raises(ConfigError) as caught:
+        export_from(run, "99", Target(None, None), WIDTH, "simulate", QUIET)
+    assert {"  figure-07", "  trajectory"} <= set(caught.value.advice.splitlines())

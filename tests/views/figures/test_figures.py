@@ -1,0 +1,318 @@
+"""What the figures show, and when they are drawn."""
+
+import functools
+import hashlib
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from matplotlib.colors import to_hex
+from synthetic_methods import everything
+from synthetic_walks import both_models, compared, contact, rigid, rigid_alone, stored, without
+
+from walkerlab.evidence.paper.figures import PAPER_ERROR, PHASE_LOOK, TIME_LOOK
+from walkerlab.pipeline.store.content import Group, Variable
+from walkerlab.views.figures import stick_diagram, walks
+from walkerlab.views.figures.canvas import styled
+from walkerlab.views.figures.illustration import WORDS, Illustration
+from walkerlab.views.figures.registry import FIGURES as ALL_FIGURES
+from walkerlab.views.figures.style import CONTACT, RIGID
+
+SVG = "{http://www.w3.org/2000/svg}"
+ELSEWHERE = {"tune", "continuation", "basin", "engines", "robustness"}
+FIGURES = [figure for figure in ALL_FIGURES if ELSEWHERE.isdisjoint(need.stage for need in figure.needs)]
+PAPER_FIGURES = [figure for figure in FIGURES if figure.number is not None]
+NUMBERED = {figure.number: figure for figure in PAPER_FIGURES}
+NAMES = [figure.name for figure in FIGURES]
+
+
+def why_left_out(results, absent):
+    reasons = {figure.number: figure.why_left_out(results, absent) for figure in PAPER_FIGURES}
+    return {number: why for number, why in reasons.items() if why is not None}
+
+
+def drawable(results):
+    return [figure.number for figure in PAPER_FIGURES if figure.why_left_out(results, {}) is None]
+
+
+def plotted(figure, results):
+    with styled():
+        return figure.draw(results)[0]
+
+
+def lines_of(axes, look):
+    """The lines of a look's colour and width that show data."""
+    return [
+        line
+        for line in axes.lines
+        if to_hex(line.get_color()).upper() == look.colour and line.get_linewidth() == look.width
+    ]
+
+
+def test_figures_of_both_models_are_those_of_the_paper():
+    assert drawable(both_models()) == [2, 6, 7, 8, 9, 10]
+
+
+def test_figures_of_a_rigid_only_run_are_2_7_9_10():
+    assert drawable(rigid_alone()) == [2, 7, 9, 10]
+
+
+def test_a_figure_that_is_left_out_says_why():
+    why = why_left_out(rigid_alone(), {"contact-sim": "the config has no contact block"})
+    assert why == {6: "it needs contact-sim: the config has no contact block", 8: "it needs compare"}
+
+
+def test_states_that_no_one_asked_for_leave_the_energies_to_be_drawn():
+    results = rigid_alone(simulate=without(rigid(), "trajectory", "angle", "velocity"))
+    assert drawable(results) == [10]
+    assert why_left_out(results, {})[7] == "simulate: 'states' is not among the config's outputs"
+
+
+def test_energies_that_no_one_asked_for_leave_the_motion_to_be_drawn():
+    results = rigid_alone(simulate=without(rigid(), "trajectory", "kinetic_J"))
+    assert drawable(results) == [2, 7, 9]
+
+
+def test_a_walk_without_a_step_has_no_gait_cycle_but_can_be_drawn_in_time():
+    results = rigid_alone(simulate=rigid(1, outcome="no-heel-strike", completed=0))
+    assert drawable(results) == [7, 9, 10]
+    assert why_left_out(results, {})[2] == "simulate: no step was completed"
+    assert NUMBERED[7].caption(results).endswith("The rigid model took 0 steps (no-heel-strike).")
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_walk_that_ended_where_it_began_can_be_drawn():
+    results = rigid_alone(simulate=first_sample_of(rigid(1, outcome="rejected", completed=0)))
+    for figure in (NUMBERED[7], NUMBERED[9], NUMBERED[10]):
+        assert "0 steps (rejected)" in figure.drawn(results).caption
+
+
+def first_sample_of(result):
+    trajectory = {
+        name: Variable(variable.values[:1], variable.dims, variable.units, variable.long_name)
+        for name, variable in result["trajectory"].variables.items()
+    }
+    return stored("simulate", {"trajectory": Group(trajectory)}, result.summary)
+
+
+def test_models_that_completed_no_step_together_have_no_difference_in_phase():
+    results = both_models(compare=compared(aligned=False))
+    assert why_left_out(results, {}) == {8: "compare: no step was completed by both models"}
+
+
+def test_figures_of_the_paper_are_called_and_filed_by_its_numbers():
+    assert [figure.name for figure in PAPER_FIGURES] == [f"figure-{figure.number:02d}" for figure in PAPER_FIGURES]
+    assert PAPER_FIGURES[0].called == "figure 2"
+    assert len(set(NAMES)) == len(NAMES)
+
+
+def test_a_figure_that_the_paper_has_not_is_called_by_its_name():
+    assert Illustration("run-time", (), dict.popitem).called == "figure run-time"
+
+
+def test_every_figure_has_its_words_and_every_word_a_figure():
+    assert [figure.name for figure in ALL_FIGURES if not figure.title or figure.title.endswith(".")] == []
+    shared = {"cycle", "counted", "figure-17", "push-off-or-hip", "sweep", "went"}  # and the words of a sweep
+    files = {path.stem for path in WORDS.folder.glob("*.j2")}
+    assert files - shared == {figure.words or figure.name for figure in ALL_FIGURES}
+
+
+@functools.cache
+def drawn_once():
+    return {figure.name: figure.drawn(everything()) for figure in FIGURES}
+
+
+OWN_SETTINGS = "font.size: 20\nlines.linewidth: 9\nsvg.fonttype: path\naxes.grid: True\nfigure.dpi: 300\n"
+DRAW_ELSEWHERE = """
+import hashlib, sys
+from synthetic_methods import everything
+from walkerlab.views.figures.registry import FIGURES
+for figure in FIGURES:
+    if any(need.stage in ("tune", "continuation", "basin", "engines", "robustness") for need in figure.needs):
+        continue
+    drawing = figure.drawn(everything())
+    print(figure.name, hashlib.sha256(drawing.svg + drawing.png).hexdigest())
+assert "matplotlib.pyplot" not in sys.modules, "pyplot has state, and opens windows"
+"""
+
+
+def test_same_results_give_same_bytes_whatever_the_process_and_the_users_matplotlib(tmp_path):
+    (tmp_path / "matplotlibrc").write_text(OWN_SETTINGS)
+    here, package = Path(__file__).parent, Path(__file__).parents[3]
+    environment = {
+        **os.environ,
+        "MATPLOTLIBRC": str(tmp_path),
+        "PYTHONPATH": os.pathsep.join([str(here), str(package)]),
+    }
+    done = subprocess.run(
+        [sys.executable, "-c", DRAW_ELSEWHERE], env=environment, capture_output=True, text=True, check=False
+    )
+    assert done.stderr == ""
+    assert done.stdout == drawn_here()
+
+
+def drawn_here():
+    digests = {name: hashlib.sha256(drawing.svg + drawing.png).hexdigest() for name, drawing in drawn_once().items()}
+    return "".join(f"{name} {digest}\n" for name, digest in digests.items())
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_svg_keeps_text_as_text_and_has_no_date(name):
+    drawing = drawn_once()[name]
+    texts = {"".join(text.itertext()) for text in ElementTree.fromstring(drawing.svg).iter(f"{SVG}text")}
+    assert any(re.search(r" \((m|mm|s|m/s|rad|rad/s|J|N)\)$", text) for text in texts)
+    assert b"<dc:date>" not in drawing.svg
+    assert drawing.png.startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_captions_are_sentences_with_numbers(name):
+    caption = drawn_once()[name].caption
+    assert caption.endswith(".")
+    assert any(letter.isdigit() for letter in caption)
+    assert "nan" not in caption
+
+
+def test_heel_strikes_of_both_models_are_marked_on_every_axis_in_time():
+    results = both_models()
+    expected = {
+        RIGID.colour: results["simulate"]["steps"]["touch_time_s"].tolist(),
+        CONTACT.colour: results["contact-sim"]["steps"]["touch_time_s"].tolist(),
+    }
+    for figure in (NUMBERED[7], NUMBERED[10]):
+        for axes in plotted(figure, results).axes:
+            for colour, times in expected.items():
+                (uprights,) = [lines for lines in axes.collections if to_hex(lines.get_color()[0]).upper() == colour]
+                assert [[tuple(end) for end in line] for line in uprights.get_segments()] == [
+                    [(time, 0.0), (time, 1.0)] for time in times
+                ]
+
+
+def test_lines_in_time_are_the_stored_angles_and_velocities():
+    results = both_models()
+    axes = plotted(NUMBERED[7], results).axes
+    for row, (name, leg) in enumerate((("angle", 0), ("angle", 1), ("velocity", 0), ("velocity", 1))):
+        for stage, look in (("simulate", RIGID), ("contact-sim", CONTACT)):
+            (line,) = lines_of(axes[row], look)
+            trajectory = results[stage]["trajectory"]
+            np.testing.assert_array_equal(line.get_xdata(), trajectory["time"])
+            np.testing.assert_array_equal(line.get_ydata(), trajectory[name][:, leg])
+
+
+def test_legs_are_shaded_while_they_carry():
+    axes = plotted(NUMBERED[7], rigid_alone()).axes
+    for leg, one in enumerate(axes[:2]):
+        spans = [(patch.get_x(), patch.get_x() + patch.get_width()) for patch in one.patches]
+        np.testing.assert_allclose(spans, [(0.7 * step, 0.7 * (step + 1)) for step in range(1 - leg, 10, 2)], atol=1e-9)
+
+
+def test_a_long_walk_shows_five_strides_and_says_so():
+    results = rigid_alone(simulate=rigid(24))
+    figure = plotted(NUMBERED[7], results)
+    (line,) = lines_of(figure.axes[0], RIGID)
+    assert line.get_xdata()[-1] == pytest.approx(10 * 0.7)
+    caption = NUMBERED[7].caption(results)
+    assert "(the first 5 strides)" in caption
+    assert caption.endswith("The rigid model walked 24 steps.")
+
+
+def test_a_fall_is_told():
+    results = both_models(**{"contact-sim": contact(3, outcome="fell")})
+    assert "the contact model took 3 steps (fell)" in NUMBERED[7].caption(results)
+
+
+def test_errors_are_shown_at_the_time_and_at_the_phase_they_belong_to():
+    results = both_models()
+    axes = plotted(NUMBERED[8], results).axes
+    (raw,) = lines_of(axes[0], TIME_LOOK)
+    np.testing.assert_array_equal(raw.get_ydata(), np.abs(results["compare"]["errors"]["raw_angle_error_rad"][:, 0]))
+    steps = lines_of(axes[3], PHASE_LOOK)
+    aligned = results["compare"]["aligned"]["aligned_velocity_error_rad_s"]
+    assert len(steps) == 10
+    for step, line in enumerate(steps):
+        assert line.get_xdata()[0] == pytest.approx(0.7 * step)
+        assert line.get_xdata()[-1] == pytest.approx(0.7 * (step + 1))
+        np.testing.assert_array_equal(line.get_ydata(), np.abs(aligned[step, :, 1]))
+
+
+def test_the_papers_error_is_a_line_within_sight():
+    for axes in plotted(NUMBERED[8], both_models()).axes:
+        (line,) = lines_of(axes, PAPER_ERROR)
+        bottom, top = axes.get_ylim()
+        assert axes.get_yscale() == "log"
+        assert set(line.get_ydata()) == {1e-4}
+        assert bottom < 1e-4 < top
+
+
+def test_limit_cycles_of_both_legs_have_the_same_scales():
+    one, other = plotted(NUMBERED[9], both_models()).axes
+    assert one.get_xlim() == other.get_xlim()
+    assert one.get_ylim() == other.get_ylim()
+
+
+def test_the_last_stride_is_drawn_as_the_model_looks_and_the_whole_walk_thin():
+    results = both_models()
+    axes = plotted(NUMBERED[9], results).axes[0]
+    (last,) = lines_of(axes, RIGID)
+    trajectory = results["simulate"]["trajectory"]
+    shown = trajectory["time"] >= 8 * 0.7
+    np.testing.assert_array_equal(last.get_xdata(), trajectory["angle"][shown, 0])
+    assert any(line.get_xdata().size == trajectory["time"].size for line in axes.lines)
+
+
+def test_a_constant_energy_looks_constant():
+    axes = plotted(NUMBERED[10], rigid_alone()).axes[2]
+    bottom, top = axes.get_ylim()
+    assert top - bottom > 0.5
+    assert bottom < 150.24 < top
+
+
+def test_marks_do_not_widen_the_scales():
+    bottom, top = plotted(NUMBERED[10], rigid_alone()).axes[0].get_ylim()
+    assert bottom > 2.5
+    assert top < 5.5
+
+
+def test_impacts_do_not_set_the_scale_of_the_mechanical_energy():
+    results = both_models()
+    axes = plotted(NUMBERED[10], both_models(**{"contact-sim": with_peak(results["contact-sim"])})).axes
+    assert axes[2].get_ylim() == plotted(NUMBERED[10], results).axes[2].get_ylim()
+
+
+def with_peak(result):
+    energy = result["trajectory"]["mechanical_J"].copy()
+    energy[100] += 50.0
+    trajectory = result["trajectory"]
+    variables = {**trajectory.variables, "mechanical_J": Variable(energy, ("time",), "J", "mechanical energy")}
+    return stored("contact-sim", {**result.groups, "trajectory": Group(variables)}, result.summary)
+
+
+def test_the_cycle_ends_where_its_second_step_does():
+    sticks = stick_diagram.sticks_of(rigid_alone()["simulate"])
+    at_strikes, between = sticks.postures()
+    np.testing.assert_allclose(sticks.time[at_strikes], [0.0, 0.7, 1.4], atol=1e-12)
+    assert sticks.time[between].max() < 1.4
+
+
+def test_the_legend_of_limit_cycles_has_the_marks_of_both_models():
+    results = both_models()
+    figure = plotted(NUMBERED[9], results)
+    marks = {(line.get_marker(), line.get_markerfacecolor()) for line in figure.legends[0].get_lines()}
+    for look in (RIGID, CONTACT):
+        assert {(look.marker, look.colour), (look.marker, "white")} <= marks
+
+
+def test_two_runs_over_one_another_have_an_axis_for_each_leg():
+    first, second = both_models(), both_models(simulate=rigid(6))
+    trajectories = [run["simulate"]["trajectory"] for run in (first, second)]
+    with styled():
+        figure = walks.draw_overlay([("simulate", trajectories)], ("one", "other"))
+    for leg, axes in enumerate(figure.axes[:2]):
+        assert len({line.get_color() for line in axes.lines}) == len(axes.lines) == 2
+        for line, trajectory in zip(axes.lines, trajectories, strict=True):
+            np.testing.assert_array_equal(line.get_ydata(), trajectory["angle"][:, leg])

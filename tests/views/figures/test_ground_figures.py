@@ -1,0 +1,70 @@
+"""The ground's forces and what it takes, from walks made by hand."""
+
+import numpy as np
+import pytest
+from synthetic_walks import WEIGHT, both_models, contact, stored, without
+
+from walkerlab.pipeline.store.content import Group, Variable
+from walkerlab.views.figures.canvas import styled
+from walkerlab.views.figures.ground import FIGURES, losses
+from walkerlab.views.figures.style import CONTACT
+from walkerlab.views.figures.walks import walk_of
+
+FORCES, LOST = FIGURES
+
+
+def plotted(figure, results):
+    with styled():
+        return figure.draw(results)[0]
+
+
+def test_friction_stands_within_the_cone_of_its_coefficients():
+    cone = plotted(FORCES, both_models()).axes[1]
+    bounds = [line for line in cone.lines if len(line.get_xdata()) == 2 and line.get_xdata()[0] == 0.0]
+    slopes = sorted(float(line.get_ydata()[1] / line.get_xdata()[1]) for line in bounds if line.get_ydata()[1])
+    assert slopes == pytest.approx([-0.9, -0.7, 0.7, 0.9])
+    dots = [line for line in cone.lines if line.get_marker() == "."]
+    assert {float(x) for line in dots for x in line.get_xdata()} == {WEIGHT}
+    assert {float(y) for line in dots for y in line.get_ydata()} == {0.2 * WEIGHT}
+    assert "at most 0.2 of the normal force" in FORCES.caption(both_models())
+
+
+def test_a_step_loses_what_its_beginning_took_whatever_lies_between_two_samples():
+    lost = losses(walk_of(contact(), CONTACT))
+    assert [label for label, _ in lost] == ["damping of the ground", "friction"]
+    (damping, friction) = lost.values()
+    np.testing.assert_allclose(damping, [0.0, *[1.0] * 9], atol=1e-12)
+    np.testing.assert_allclose(friction, 0.1 * damping, atol=1e-12)
+    said = LOST.caption(both_models())
+    assert "1.1 J in the mean: 90.9 % to damping of the ground, 9.09 % to friction" in said
+
+
+def test_what_drives_a_walker_is_no_loss_and_hides_none():
+    """A push-off gives back what a step loses: the energy stays, and straight legs have no knees to lose it."""
+    walk = contact()
+    gone = walk["trajectory"]
+    given = Variable(150.0 - gone["total_energy_J"], ("time",), "J", "given")
+    level = Variable(np.full(given.values.size, 150.0), ("time",), "J", "energy")
+    driven = {**gone.variables, "push_off_J": given, "total_energy_J": level}
+    found = losses(walk_of(stored("contact-sim", {**walk.groups, "trajectory": Group(driven)}, walk.summary), CONTACT))
+    passive = losses(walk_of(walk, CONTACT))
+    assert [*found] == [*passive]
+    np.testing.assert_allclose([*found.values()], [*passive.values()], atol=1e-12)
+
+
+def test_bars_stand_on_one_another():
+    (axes,) = plotted(LOST, both_models()).axes
+    tops = [bar.get_y() + bar.get_height() for bar in axes.patches]
+    assert max(tops) == pytest.approx(1.1)
+
+
+@pytest.mark.parametrize("steps", [1, 2, 10])
+def test_steps_are_counted_in_whole_numbers(steps):
+    (axes,) = plotted(LOST, both_models(**{"contact-sim": contact(steps)})).axes
+    assert all(float(tick).is_integer() for tick in axes.get_xticks())
+
+
+def test_what_was_not_stored_is_not_drawn():
+    results = both_models(**{"contact-sim": without(contact(), "trajectory", "normal_force_N", "total_energy_J")})
+    assert FORCES.why_left_out(results, {}) == "contact-sim: 'forces' is not among the config's outputs"
+    assert LOST.why_left_out(results, {}) == "contact-sim: 'energies' is not among the config's outputs"

@@ -1,0 +1,64 @@
+"""The maps of stability: every cell in its place and colour, and what has no error is not drawn as if it had one."""
+
+import numpy as np
+from matplotlib.colors import to_hex
+from synthetic_maps import ENDS, stability_maps
+
+from walkerlab.outcome import OUTCOME_TEXTS, Outcome
+from walkerlab.views.figures.canvas import styled
+from walkerlab.views.figures.maps import STABILITY, VERDICT_COLOURS, edges
+
+STICTION, STEP = STABILITY
+
+
+def meshes(figure):
+    with styled():
+        left, right, _ = figure.draw(stability_maps())[0].axes
+    return [[mesh for mesh in axes.collections if mesh.get_array() is not None] for axes in (left, right)]
+
+
+def colours(mesh):
+    """The colour of each cell; None where nothing is drawn."""
+    values = mesh.get_array()
+    shown = [to_hex(colour) for colour in mesh.to_rgba(values).reshape(-1, 4)]
+    hidden = np.ma.getmaskarray(values).ravel()
+    cells = [None if out else colour for colour, out in zip(shown, hidden, strict=True)]
+    return np.array(cells, dtype=object).reshape(values.shape)
+
+
+def test_cells_meet_and_their_middles_are_the_values():
+    found = edges(np.array([1.0, 10.0, 100.0]))
+    np.testing.assert_allclose(found, 10.0 ** np.array([-0.5, 0.5, 1.5, 2.5]))
+
+
+def test_outcomes_have_the_colours_of_the_other_map():
+    left, _ = meshes(STICTION)
+    expected = [OUTCOME_TEXTS[Outcome(outcome)].colour.lower() for outcome, _, _ in ENDS]
+    assert colours(left[0]).tolist() == [expected] * 3
+
+
+def test_errors_are_drawn_where_both_runs_end_alike_only():
+    _, (errors, unanswered, otherwise) = meshes(STICTION)
+    assert [colour is not None for colour in colours(errors)[0]] == [True, False, False]
+    assert [colour is not None for colour in colours(unanswered)[0]] == [False, False, True]
+    assert [colour is not None for colour in colours(otherwise)[0]] == [False, True, False]
+
+
+def test_a_fixed_step_that_diverges_has_no_error():
+    (verdicts,), (errors, diverged) = meshes(STEP)
+    expected = [VERDICT_COLOURS[name].lower() for name in ("fine", "wrong silently", "diverges")]
+    assert colours(verdicts)[:, 0].tolist() == expected
+    assert [colour is not None for colour in colours(errors)[:, 0]] == [True, True, False]
+    assert [colour is not None for colour in colours(diverged)[:, 0]] == [False, False, True]
+
+
+def test_captions_count_the_cells():
+    said = STICTION.caption(stability_maps())
+    assert "walked 3, off-pad 3, budget-exhausted 3 cells" in said
+    assert "3 cells end otherwise" in said
+    assert "fine 3, wrong silently 3, diverges 3 cells" in STEP.caption(stability_maps())
+
+
+def test_without_maps_they_are_left_out_and_say_so():
+    absent = {"stability-maps": "it was not asked for"}
+    assert STEP.why_left_out({}, absent) == "it needs stability-maps: it was not asked for"

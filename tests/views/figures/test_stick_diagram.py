@@ -1,0 +1,196 @@
+"""The geometry of the stick diagrams: legs keep their length, feet stand where they stand."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from matplotlib.colors import to_hex, to_rgb
+from synthetic_walks import LEG_LENGTH, SLOPE, STEP_LENGTH, both_models, contact, rigid, rigid_alone
+
+from walkerlab.views.figures.canvas import styled
+from walkerlab.views.figures.stick_diagram import (
+    FIGURE_2,
+    FIGURE_6,
+    FILM_NEEDS,
+    entries,
+    film_times,
+    pictures,
+    stick_diagram,
+    sticks_of,
+)
+from walkerlab.views.figures.style import LEGS, VERMILLION
+
+ROUNDING = 1e-12
+
+
+@pytest.fixture(params=["simulate", "contact-sim"])
+def sticks(request):
+    return sticks_of(both_models()[request.param])
+
+
+def test_legs_keep_their_length(sticks):
+    lengths = np.linalg.norm(sticks.feet - sticks.hip[:, None], axis=-1)
+    np.testing.assert_allclose(lengths, LEG_LENGTH, atol=ROUNDING)
+
+
+def test_the_hip_does_not_jump_when_legs_change_roles(sticks):
+    apart = np.linalg.norm(np.diff(sticks.hip, axis=0), axis=1)
+    at_once = np.diff(sticks.time) < 1e-9
+    assert apart[at_once].max(initial=0.0) < ROUNDING
+    assert apart.max() < 0.05
+
+
+def test_feet_come_down_one_step_length_ahead(sticks):
+    for step, strike in enumerate(sticks.strikes[:2]):
+        row = np.searchsorted(sticks.time, strike)
+        landed = sticks.feet[row, step % 2]
+        np.testing.assert_allclose(landed, [(step + 1) * STEP_LENGTH, 0.0], atol=1e-9)
+
+
+def test_the_plane_descends_in_walking_direction():
+    sticks = sticks_of(rigid_alone()["simulate"])
+    x, y = sticks.in_plane(np.array([STEP_LENGTH, 0.0]))
+    assert np.arctan2(-y, x) == pytest.approx(SLOPE)
+    assert np.hypot(x, y) == pytest.approx(STEP_LENGTH)
+
+
+def test_a_cycle_that_was_not_completed_is_shown_to_its_end():
+    results = rigid_alone(simulate=rigid(2, outcome="fell", completed=1))
+    sticks = sticks_of(results["simulate"])
+    at_strikes, between = sticks.postures()
+    assert sticks.time[at_strikes].tolist() == pytest.approx([0.0, 0.7])
+    assert sticks.time[between].max() == sticks.time[-1]
+    assert "not completed" in FIGURE_2.caption(results)
+
+
+def test_the_slope_is_told_above_the_torso_which_has_a_name():
+    bare = sticks_of(rigid_alone()["simulate"])
+    sticks = replace(bare, head=bare.hip + np.array([0.0, 0.4 * LEG_LENGTH]))
+    with styled():
+        figure, axes = stick_diagram(sticks)
+        figure.draw_without_rendering()
+    (label,) = [text for text in axes.texts if text.get_text().startswith("walking direction")]
+    bottom = axes.transData.inverted().transform(label.get_window_extent())[0, 1]
+    assert bottom > sticks.in_plane(sticks.head)[:, 1].max()
+    assert axes.get_ylim()[1] > axes.transData.inverted().transform(label.get_window_extent())[1, 1]
+    assert "torso" in [entry.get_label() for entry in entries(sticks)]
+    assert "torso" not in [entry.get_label() for entry in entries(bare)]
+
+
+def drawn(figure, results):
+    with styled():
+        return figure.draw(results)[0].axes[0]
+
+
+def test_lengths_are_drawn_to_scale():
+    assert drawn(FIGURE_2, rigid_alone()).get_aspect() == 1.0
+
+
+def test_both_legs_of_every_posture_are_drawn_in_their_colours():
+    axes = drawn(FIGURE_2, rigid_alone())
+    at_strikes, between = sticks_of(rigid_alone()["simulate"]).postures()
+    for look in LEGS:
+        assert sum(line.get_color() == look.colour for line in axes.lines) == at_strikes.size + between.size
+
+
+def test_pads_in_sight_are_drawn_in_their_legs_colours():
+    axes = drawn(FIGURE_6, both_models())
+    left, right = axes.get_xlim()
+    pads = both_models()["contact-sim"]["terrain"]
+    for leg, look in enumerate(LEGS):
+        outlines = [patch.get_path().vertices for patch in axes.patches if patch.get_hatch() and of(patch, look)]
+        expected = [
+            pad_left
+            for pad_left, pad_right, owner in zip(pads["left_m"], pads["right_m"], pads["leg"], strict=True)
+            if owner == leg + 1 and pad_right > left and pad_left < right
+        ]
+        assert [outline[0, 0] for outline in outlines] == pytest.approx(expected, abs=1e-3)
+
+
+def of(patch, look):
+    return to_hex(patch.get_edgecolor()).upper() == look.colour
+
+
+def test_without_pads_the_ground_is_a_plane_and_the_caption_says_when_it_carries():
+    results = both_models(**{"contact-sim": contact(pads=False)})
+    assert not [patch for patch in drawn(FIGURE_6, results).patches if patch.get_hatch()]
+    assert "once it has passed the stance foot" in FIGURE_6.caption(results)
+    assert "lane of pads" in FIGURE_6.caption(both_models())
+
+
+def coloured(picture, look):
+    """How many of a picture's pixels have a leg's colour."""
+    return int((picture == np.round(255.0 * np.array(to_rgb(look.colour))).astype(np.uint8)).all(axis=2).sum())
+
+
+def film_frame(result, pads=None, **changed):
+    (picture,) = pictures(replace(sticks_of(result), **changed), np.array([0.3]), pads)
+    return picture
+
+
+def test_a_film_shows_the_arcs_of_round_feet():
+    flat, round_feet = (film_frame(rigid(), radius=radius) for radius in (0.0, 0.2))
+    for look in LEGS:
+        assert coloured(round_feet, look) > coloured(flat, look) + 50
+
+
+def test_a_film_of_a_walk_on_pads_shows_them_and_no_plane():
+    result = contact()
+    plane, on_pads = film_frame(result), film_frame(result, result.groups["terrain"])
+    tinted = [int((np.ptp(picture, axis=2) > 10).sum()) for picture in (plane, on_pads)]
+    assert tinted[1] > tinted[0] + 200
+
+
+def test_a_film_of_a_walk_that_falls_shows_the_fall_and_stays_there_for_a_second():
+    walk = sticks_of(contact(1, outcome="fell"))
+    late = replace(walk, time=walk.time * 1.5)  # after the last landing it goes on
+    times = film_times(late, None, 25, 1.0)
+    assert times[-25:].tolist() == [late.time[-1]] * 25
+    assert film_times(late, 1, 25, 1.0)[-1] < late.strikes[0]  # the first step alone was asked for
+    assert film_times(replace(late, ending=""), None, 25, 1.0)[-1] < late.time[-1]
+    falling, fallen = pictures(late, late.time[-1:] * np.array([0.999, 1.0]))
+    assert (falling != fallen).any()  # the clock says that it fell
+
+
+@pytest.mark.parametrize("landings", [1, 4, 5, 10])
+def test_a_film_of_a_walk_that_falls_shows_its_last_four_steps_and_the_fall(landings):
+    period = 0.5
+    walk = replace(sticks_of(rigid(landings + 1, period, completed=landings)), ending="fell")
+    times = film_times(walk, None, 25, 1.0)
+    assert times[0] == pytest.approx(period * max(0, landings - 4))
+    assert times[-1] == walk.time[-1] > period * landings
+
+
+def test_a_walk_that_falls_in_its_first_step_has_a_film():
+    fall = rigid(1, outcome="fell", completed=0)
+    assert FILM_NEEDS["simulate"].missing_in({"simulate": fall}, {}) is None
+    walk = sticks_of(fall)
+    times = film_times(walk, None, 25, 1.0)
+    assert (times[0], times[-1]) == (0.0, walk.time[-1])
+    assert len([*pictures(walk, times[-1:])]) == 1
+
+
+def test_a_film_draws_rough_ground_once_more_so_high_that_it_is_seen():
+    begins, rough = np.array([-1.0, 0.2, 0.6]), np.array([0.0, 0.002, -0.001])
+    even, uneven = (film_frame(rigid(), ground=(begins, heights)) for heights in (0.0 * rough, rough))
+    red = np.round(255.0 * np.array(to_rgb(VERMILLION))).astype(np.uint8)
+    rows = [np.flatnonzero((picture == red).all(axis=2).any(axis=1)) for picture in (even, uneven)]
+    assert rows[0].size == 0
+    assert np.ptp(rows[1]) > 20
+
+
+def test_the_leg_behind_pushes_off_just_after_each_landing():
+    driven = replace(sticks_of(both_models()["simulate"]), pushes=True)
+    for strike in driven.strikes[:-1]:
+        behind = driven.feet[np.searchsorted(driven.time, strike), :, 0].argmin()
+        assert [driven.pushing(strike + late) for late in (0.0, 0.05, 0.2)] == [behind, behind, None]
+    assert driven.pushing(0.0) is None
+    assert replace(driven, pushes=False).pushing(driven.strikes[0]) is None
+
+
+def test_a_film_shows_the_push_off():
+    walk = sticks_of(both_models()["simulate"])
+    at = np.array([walk.strikes[0] + 0.02])
+    (still,), (pushed,) = (list(pictures(replace(walk, pushes=pushes), at)) for pushes in (False, True))
+    changed = np.any(still != pushed, axis=2)
+    assert 100 < changed.sum() < 0.01 * changed.size

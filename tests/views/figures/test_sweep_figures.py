@@ -1,0 +1,106 @@
+"""Figures of sweeps over two parameters: lines where one has few values, a map where both have many."""
+
+import numpy as np
+import pytest
+
+from walkerlab.errors import ConfigError
+from walkerlab.pipeline.store.content import Group, Variable
+from walkerlab.views.figures.canvas import styled
+from walkerlab.views.figures.maps import is_logarithmic
+from walkerlab.views.figures.sweep import choose, illustration, lines, maps, one_over_another
+from walkerlab.views.report.sweep_page import refuse_unheard
+
+PARAMETERS = ("slope_deg", "hip_mass_kg")
+
+
+def swept(slopes, masses, answered=True):
+    """A multiplier that grows with the slope past one, on a grid; without an answer at its first point if told so."""
+    slope, mass = np.linspace(1.0, 5.0, slopes), np.linspace(5.0, 15.0, masses)
+    radius = 0.3 * slope[:, None] + 0.01 * mass
+    radius[0, 0] = radius[0, 0] if answered else np.nan
+    status = np.where(np.isnan(radius), "no answer", "answered").astype(object)
+    outcome = np.where(np.isnan(radius), "none", "walked").astype(object)
+    return Group(
+        {
+            "slope_deg": Variable(slope, ("slope_deg",), "deg", "slope"),
+            "hip_mass_kg": Variable(mass, ("hip_mass_kg",), "kg", "mass of the hip"),
+            "spectral_radius": Variable(radius, PARAMETERS, "1", "largest magnitude of a multiplier", missing=True),
+            "status": Variable(status, PARAMETERS, "", "status"),
+            "outcome": Variable(outcome, PARAMETERS, "", "outcome"),
+        }
+    )
+
+
+def drawn(made, group):
+    with styled():
+        return made(group, PARAMETERS, ["spectral_radius"])
+
+
+@pytest.mark.parametrize(("slopes", "masses"), [(9, 3), (3, 9)])
+def test_each_value_of_the_parameter_that_has_few_is_a_line(slopes, masses):
+    group = swept(slopes, masses)
+    figure = drawn(lines, group)
+    curves = [line for line in figure.axes[0].lines if line.get_marker() == "o"]
+    values = group["spectral_radius"]
+    expected = values.T if masses == 3 else values
+    np.testing.assert_array_equal([line.get_ydata() for line in curves], expected)
+    (legend,) = figure.legends
+    said = [text.get_text() for text in legend.get_texts()]
+    assert said[-1] == "largest multiplier 1"
+    assert said[0] == ("hip mass 5 kg" if masses == 3 else "slope 1 deg")
+
+
+def test_a_map_ends_where_values_were_sampled_and_its_white_line_has_a_legend():
+    figure = drawn(maps, swept(9, 8))
+    axes = figure.axes[0]
+    assert (axes.get_xlim(), axes.get_ylim()) == ((1.0, 5.0), (5.0, 15.0))
+    assert set(np.linspace(1.0, 5.0, 9)) <= {*axes.get_xticks(), *axes.get_xticks(minor=True)}
+    (legend,) = figure.legends
+    assert [text.get_text() for text in legend.get_texts()] == ["largest multiplier 1"]
+
+
+def test_the_caption_tells_how_gaps_look():
+    for masses, said in (
+        (3, "Marks at the bottom: no answer there."),
+        (8, "Where there is no answer the map is grey."),
+    ):
+        group = swept(9, masses, answered=False)
+        made = illustration(group, "fixedpoint", PARAMETERS, PARAMETERS, ["spectral_radius"]).drawn({})
+        assert said in made.caption
+        assert made.svg.startswith(b"<?xml")
+
+
+def test_a_logarithmic_range_has_a_logarithmic_axis_however_narrow():
+    for low, high in ((1.0, 3.0), (1.0, 1.001), (1e-3, 1e5)):
+        assert is_logarithmic(np.geomspace(low, high, 7), span=1.0)
+        assert not is_logarithmic(np.linspace(low, high, 7), span=1.0)
+
+
+def test_pictures_of_walks_begin_with_the_last_steps_period_and_length():
+    names = ("slip_per_step_m", "max_penetration_m", "last_step_length_m", "last_step_period_s")
+    group = Group({name: Variable(np.arange(3.0), ("x",), "1", name) for name in names})
+    assert choose(group, ("x",), ["x"])[:2] == ["last_step_period_s", "last_step_length_m"]
+
+
+def test_a_name_that_no_first_result_has_is_refused_and_headlines_and_nested_ones_are_not():
+    known = ("steps", "last_step_period_s", "gaits.3.period_s")
+    refuse_unheard("contact-sim", {f"--show {name}": name for name in known}, ["steps"])
+    with pytest.raises(ConfigError, match="--show nonsense: no such quantity"):
+        refuse_unheard("contact-sim", {"--show nonsense": "nonsense"}, ["steps"])
+
+
+def test_one_quantity_is_drawn_over_another():
+    x = Variable(np.arange(3.0), ("x",), "1", "x")
+    speed, cost = np.array([0.2, 0.5, 0.4]), np.array([0.03, 0.01, 0.02])
+    words = Variable(np.array(["answered"] * 3, object), ("x",), "", "status")
+    group = Group({
+        "x": x, "status": words, "outcome": words,
+        "speed_m_s": Variable(speed, ("x",), "m/s", "speed"), "cost_of_transport": Variable(cost, ("x",), "1", "cost"),
+    })  # fmt: skip
+    with styled():
+        axes = one_over_another(group, ("x",), ["cost_of_transport"], "speed_m_s").axes[0]
+    (curve,) = axes.lines
+    np.testing.assert_array_equal((curve.get_xdata(), curve.get_ydata()), (speed, cost))
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("speed (m/s)", "cost of transport")
+    made = illustration(group, "fixedpoint", ["x"], ("x",), ["cost_of_transport"], "speed_m_s").drawn({})
+    assert made.caption.startswith("Cost over speed, for values of x: 3 answered.")

@@ -1,0 +1,52 @@
+"""Headline numbers: that a stage has them, and which those of an unknown stage are."""
+
+import pytest
+
+import walkerlab
+from walkerlab.pipeline.graph import STAGES
+from walkerlab.pipeline.headlines import HEADLINES, MOST, QUANTITIES, has_quantity, headlines
+from walkerlab.pipeline.runs import headline_values
+from walkerlab.pipeline.store import artifact
+from walkerlab.pipeline.sweeps.chunk import by_name
+
+
+@pytest.mark.parametrize(
+    ("stage", "answer", "lacking"),
+    [
+        ("fixedpoint", walkerlab.find_gait, {"knee_strike_s"}),
+        ("simulate", lambda: walkerlab.simulate(strides=1), set()),
+        ("contact-sim", lambda: walkerlab.simulate(strides=1, contact=walkerlab.contact()), set()),
+    ],
+)
+def test_a_stage_has_its_headline_numbers_but_those_of_knees(stage, answer, lacking):
+    summary = answer().summary
+    assert set(headline_values(stage, summary)) == set(HEADLINES[stage]) - lacking
+    if stage != "fixedpoint":
+        assert headline_values(stage, summary)["last_step_period_s"] == summary["step_periods_s"][-1]
+
+
+LEVEL = {"slope_deg": 0, "push_off.impulse_N_s": 0.2, "walker.hip.torque_N_m": 0.15}
+
+
+@pytest.mark.parametrize("stage", QUANTITIES)
+def test_every_number_of_a_point_of_a_sweep_can_be_asked_for(stage, tmp_path):
+    strides = None if stage == "fixedpoint" else 1
+    path = walkerlab.run(stage, "kneed", LEVEL, tmp_path, strides=strides).artifact
+    summary = artifact.read(path).summary
+    numbers = {name for name, value in by_name(summary).items() if isinstance(value, int | float)}
+    assert [name for name in numbers if not has_quantity(stage, name)] == []
+    assert {"speed_m_s", "froude", "cost_of_transport"} <= numbers
+    assert summary["froude"] == pytest.approx(summary["speed_m_s"] / (9.81 * 1.0) ** 0.5, rel=1e-12)
+
+
+def test_headlines_are_of_stages_that_there_are_and_few():
+    assert HEADLINES.keys() <= {stage.name for stage in STAGES}
+    assert max(map(len, HEADLINES.values())) <= MOST
+    assert all(has_quantity(stage, name) for stage in QUANTITIES for name in HEADLINES[stage])
+    assert not has_quantity("fixedpoint", "froud")
+
+
+def test_a_stage_of_ones_own_has_its_first_numbers_for_headlines():
+    names = ["of.0", *(f"n{place}" for place in range(20))]
+    assert headlines("mine", names) == names[1 : MOST + 1]
+    assert headlines("basin", ["outcomes.walked", "share_walking"]) == ["share_walking", "outcomes.walked"]

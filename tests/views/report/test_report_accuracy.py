@@ -1,0 +1,158 @@
+"""The section on error against run time: every method, every failure, every reference."""
+
+import pytest
+from synthetic_results import config, fixedpoint, stored
+
+from walkerlab.views.report.blocks import Statements
+from walkerlab.views.report.results import Results
+from walkerlab.views.report.sections.accuracy import section
+from walkerlab.views.report.tables import Table
+from walkerlab.views.report.words import words
+
+
+def row(method, tolerance, error, wall_s, outcome="walked", scene="rigid"):
+    return {
+        "scene": scene,
+        "method": method,
+        "tolerance": tolerance,
+        "outcome": outcome,
+        "error": error,
+        "wall_s": wall_s,
+        "least_wall_s": 0.9 * wall_s,
+        "largest_wall_s": 1.4 * wall_s,
+        "repeats_of_wall_s": 1 if wall_s > 0.1 else 7,
+        "rhs_evaluations": 1234,
+    }
+
+
+ROWS = [
+    row("dop853", 1e-3, 2e-5, 5e-5),
+    row("dop853", 1e-12, 7e-15, 2e-4),
+    row("scipy-bdf", 1e-3, None, 0.3, "slid"),
+    row("scipy-bdf", 1e-5, 3e-4, 0.2),
+    row("radau5", 1e-3, 4e-4, 5e-3, scene="contact"),
+    row("radau5", 1e-11, 3e-13, 5e-2, scene="contact"),
+]
+SUMMARY = {
+    "rows": ROWS,
+    "repeats": 7,
+    "budget": 200_000,
+    "reference": {
+        "rigid": {
+            "method": "heyoka-taylor",
+            "second_method": "dop853",
+            "agreement": 9e-16,
+            "from_outside": True,
+            "tolerance": 0.0,
+            "rhs_evaluations": 0,
+        },
+        "contact": {
+            "method": "radau5",
+            "second_method": "dop853",
+            "agreement": 1e-12,
+            "from_outside": False,
+            "tolerance": 1e-11,
+            "rhs_evaluations": 1_200_000,
+        },
+    },
+    "best": {"rigid": {"1e-3": "dop853", "1e-6": "dop853"}, "contact": {"1e-3": "radau5"}},
+    "conclusions": {"rigid": "rigid: at 1e-03, dop853 is fastest.", "contact": "contact: at 1e-03, radau5 is fastest."},
+    "not_run": [
+        {"scene": "rigid", "method": "scipy-bdf", "tolerance": tolerance, "why": "too much work"}
+        for tolerance in (1e-7, 1e-9)
+    ],
+    "environment": {"processor": "x86_64", "cores": 2, "python": "3.11"},
+}
+
+
+@pytest.fixture
+def made():
+    return section(Results(config(), {"accuracy": stored("accuracy", {}, SUMMARY)}))
+
+
+def tables(made):
+    return {
+        block.caption: {
+            (title, line[0].text): [cell.text.replace("\u00a0", " ") for cell in line[1:]]
+            for title, lines in block.groups.items()
+            for line in lines
+        }
+        for block in made.blocks
+        if isinstance(block, Table)
+    }
+
+
+def test_without_the_result_there_is_no_section():
+    assert section(Results(config(), {"fixedpoint": fixedpoint()})) is None
+
+
+def test_each_method_has_its_least_time_for_each_error_and_its_smallest_error(made):
+    costs = tables(made)["Shortest run time for each error, by method"]
+    assert costs["rigid", "dop853"][:4] == ["0.05 (0.045 to 0.07)", "0.2 (0.18 to 0.28)", "7 × 10⁻¹⁵", "1,234"]
+    assert costs["rigid", "scipy-bdf"][:3] == ["200", "–", "0.0003"]
+    assert costs["contact", "radau5"][:2] == ["5 (4.5 to 7)", "50 (45 to 70)"]
+
+
+def test_an_error_below_what_the_reference_is_known_to_is_told_as_a_bound(made):
+    costs = tables(made)["Shortest run time for each error, by method"]
+    assert costs["contact", "radau5"][2] == "≤ 10⁻¹²"
+
+
+def test_a_run_that_ended_otherwise_is_told_with_its_outcome(made):
+    costs = tables(made)["Shortest run time for each error, by method"]
+    assert costs["rigid", "scipy-bdf"][-1] == "slid at 10⁻³"
+
+
+def test_the_fastest_methods_are_marked(made):
+    made_of = next(block for block in made.blocks if isinstance(block, Table)).groups
+    assert {line[0].text: line[0].tone for line in next(iter(made_of.values()))} == {
+        "dop853": "good",
+        "scipy-bdf": None,
+    }
+
+
+def test_conclusions_stand_beside_their_scenes(made):
+    findings = next(block for block in made.blocks if isinstance(block, Statements))
+    assert [(item.about, item.text) for item in findings.items] == [
+        ("rigid", "At 1e-03, dop853 is fastest."),
+        ("contact", "At 1e-03, radau5 is fastest."),
+    ]
+
+
+def test_the_section_comes_to_the_fastest_methods(made):
+    assert made.finding == "Fastest: dop853 on rigid; radau5 on contact."
+
+
+def test_references_come_with_what_is_known_of_them(made):
+    assert tables(made)["References"]["", "rigid"] == [
+        "heyoka-taylor",
+        "heyoka, at machine precision",
+        "dop853",
+        "9 × 10⁻¹⁶",
+    ]
+    assert tables(made)["References"]["", "contact"][1] == "ours, at 10⁻¹¹, 1,200,000 right-hand sides"
+
+
+def test_a_reference_of_our_own_is_not_said_to_be_from_outside(made):
+    (note,) = [block.note for block in made.blocks if getattr(block, "caption", "") == "References"]
+    assert "On rigid heyoka computes the reference: an independent program" in note
+    assert "On contact both methods are our own" in note
+    assert "scipy-bdf on rigid, with an error of 0.0003." in note
+
+
+def test_a_budget_that_is_used_up_is_explained_as_such():
+    used_up = {**SUMMARY, "rows": [*ROWS, row("dop853", 1e-8, None, 0.1, "budget-exhausted", scene="contact")]}
+    made = section(Results(config(), {"accuracy": stored("accuracy", {}, used_up)}))
+    costs = next(block for block in made.blocks if isinstance(block, Table))
+    assert costs.groups["contact"][-1][-1].text == "budget used up at 10⁻⁸"
+    assert "Each run is limited to 200,000 right-hand sides" in costs.note
+    assert "dop853 exhausts this budget at tight tolerances" in costs.note
+
+
+def test_what_was_not_run_is_said_once_for_each_reason(made):
+    assert tables(made)["Not run"]["", "rigid"] == ["scipy-bdf", "10⁻⁷ and 10⁻⁹", "too much work"]
+
+
+def test_that_the_rigid_scene_does_not_start_on_its_gait_is_said():
+    said = words("accuracy.introduction", {"repeats": 7, "rigid_velocity_factor": 0.98})
+    assert "starts with angular velocities scaled by 0.98" in said

@@ -1,0 +1,58 @@
+"""What the report says of families of gaits."""
+
+from dataclasses import replace
+
+from synthetic_results import config, families, families_that_move, simulate
+
+from walkerlab.config.loader import load
+from walkerlab.views.report.results import Results
+from walkerlab.views.report.sections import families as section
+from walkerlab.views.report.sections.families import CLEAR, apart, gait_diagram
+from walkerlab.views.report.words import words
+
+
+def test_a_run_without_families_has_no_such_section():
+    assert section.section(Results(load().config)) is None
+
+
+def test_the_finding_is_the_stable_range_and_the_paragraph_has_the_chaos_and_its_end():
+    made = section.section(Results(load().config, families()))
+    (paragraph, table) = made.blocks
+    assert "stable from 1\u00a0deg to 4\u00a0deg" in made.finding
+    assert "0.2 a step" in paragraph.text
+    assert "leaves its attractor and falls." in paragraph.text
+    assert [cell.text for cell in next(iter(table.groups.values()))[0]][:4] == ["flip", "rigid", "1", "4"]
+
+
+def test_what_the_ground_ends_is_told_of_gaits_of_one_step_and_of_basins():
+    summary = dict(families()["continuation"].summary)
+    told = {"model": "contact", "value": 3.2, "outcome": "off-pad"}
+    summary["endings"] = [
+        {**told, "period": 1, "said": "Above 3.2 deg it trips."},
+        {**told, "period": 2, "said": "Above 3.3 deg it trips."},
+    ]
+    said = section.findings(summary)
+    assert "Above 3.2 deg it trips." in said
+    assert "Above 3.3 deg it trips." not in said
+    ended = [{"said": "3 of 9 walks slid away.", "ground": True}, {"said": "2 of 9 walks fell.", "ground": False}]
+    assert words.parts("basin.grounds", {"endings": ended}) == ["3 of 9 walks slid away."]
+    assert words.parts("basin.grounds", {}) == []
+
+
+def test_the_diagram_marks_gaits_whose_motion_is_stored():
+    walk = simulate()
+    made = gait_diagram(Results(config(), {"continuation": families_that_move(walk)}))
+    first, second = made.gaits
+    assert (first.stable, second.stable) == (True, False)
+    assert first.x < second.x
+    assert first.walker.track["t"].size > 2
+    assert [first.slope_rad, second.slope_rad] == [0.02, 0.09]
+    assert gait_diagram(Results(config(), families())) is None
+
+
+def test_no_mark_covers_another_and_stable_gaits_keep_theirs():
+    walk = simulate()
+    (mark, _) = gait_diagram(Results(config(), {"continuation": families_that_move(walk)})).gaits
+    near, far = replace(mark, x=mark.x + 0.9 * CLEAR), replace(mark, x=mark.x + CLEAR)
+    assert apart([mark, near, far]) == (mark, far)
+    assert apart([replace(mark, stable=False), near, far]) == (near,)

@@ -1,0 +1,141 @@
+"""A whole report of real results, kept short: sections and the results made by hand know the keys that stages store."""
+
+import functools
+
+import pytest
+import synthetic_results as made
+from html_page import Page
+
+from walkerlab.config.loader import load
+from walkerlab.errors import ConfigError
+from walkerlab.evidence.benchmarks import ladder, references
+from walkerlab.evidence.benchmarks.trials import ContactTrial, RigidTrial
+from walkerlab.evidence.verification import known_problems, stability
+from walkerlab.evidence.verification.catalogue import package_cases
+from walkerlab.pipeline.graph import PIPELINE
+from walkerlab.pipeline.runner import execute
+from walkerlab.pipeline.store import artifact
+from walkerlab.pipeline.store.runfolder import RunFolder
+from walkerlab.views.cli import exports
+from walkerlab.views.cli.console import Console
+from walkerlab.views.cli.exports import Target, export_from, page_tables
+from walkerlab.views.figures import illustration
+from walkerlab.views.figures.style import WIDTH
+from walkerlab.views.report.registry import SECTIONS
+from walkerlab.views.report.results import Results
+
+SETS = ("strides=1", "tune.cells=2")
+JUDGED = ("paper", "rigid-no-hip-mass")
+STAGES = PIPELINE["report"].inputs(load().config)
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    """The report of the paper's config: two steps, four cells of the map, two cases, two methods."""
+    with pytest.MonkeyPatch.context() as patch:
+        cases = tuple(case for case in package_cases() if case.name in JUDGED)
+        assert len(cases) == len(JUDGED)
+        patch.setattr(stability, "judged", lambda own: cases)
+        patch.setattr(known_problems, "PROBLEMS", known_problems.PROBLEMS[:1])
+        for trial in (RigidTrial, ContactTrial):
+            patch.setattr(trial, "methods", property(lambda self: ("dop853", "radau5")))
+        patch.setattr(ladder, "OWN_LADDER", (1e-3, 1e-6))
+        patch.setattr(ladder, "MAX_REPEATS", 1)
+        patch.setattr(references, "TIGHTEST_CONTACT", {"dop853": 1e-8, "radau5": 1e-9})
+        loaded = load(None, SETS)
+        folder = RunFolder(tmp_path_factory.mktemp("runs"), loaded.run_name)
+        return loaded.config, folder, execute(loaded.config, "report", folder)
+
+
+@pytest.fixture(scope="module")
+def results(run):
+    """What the report was made of."""
+    config, folder, _ = run
+    return Results(config, {name: artifact.read(folder.artifact(name)) for name in STAGES})
+
+
+def test_every_stage_ran_and_the_page_is_there(run):
+    _, folder, report = run
+    assert report.no_answer is None
+    assert {done.stage for done in report.steps if done.action == "run"} == {
+        stage.name for stage in PIPELINE.needed_for("report", load().config)
+    }
+    page = Page((folder.path / report.summary["html"]).read_text(encoding="utf-8"))
+    assert len(report.summary["tables"]) > 10
+    assert len(report.summary["figures"]) > 8
+    assert not {"None", "nan", "inf"} & set(page.text.split())
+
+
+def test_every_table_of_the_pages_is_exported_by_its_caption(run, tmp_path, monkeypatch):
+    _, folder, report = run
+    # each export makes all pages again, from the same results
+    monkeypatch.setattr(exports, "page_tables", functools.cache(page_tables))
+    heads = set()
+    for number, caption in enumerate(report.summary["tables"]):
+        texts = []
+        for kind in ("csv", "tex"):
+            file = tmp_path / f"{number}.{kind}"
+            texts.append(export_from(folder, caption, Target(None, file), 252.0, "", Console(quiet=True)).read_text())
+        heads.add(texts[0].splitlines()[0])
+        assert texts[1].startswith(
+            "% \\usepackage{booktabs, siunitx}\n\\begin{table}\n\\centering\n\\caption{" + caption[:5]
+        )
+        assert not set("θωφμλ₁₂⁻−×") & set(texts[1])
+    assert len(heads) > 10
+    with pytest.raises(ConfigError) as refused:
+        export_from(folder, "no-such-thing", Target(None, None), 252.0, "", Console(quiet=True))
+    assert "the-contact-models-walk" in refused.value.advice
+
+
+def test_a_number_in_an_exported_table_is_in_the_unit_of_its_head(run):
+    tables = page_tables(run[1])
+    cells = [cell for table in tables.values() for rows in table.groups.values() for row in rows for cell in row]
+    numbers = [cell for cell in cells if isinstance(cell.datum, float) and cell.text.isascii()]
+    assert len(numbers) > 50
+    for cell in numbers:
+        assert cell.datum == pytest.approx(float(cell.text), rel=0.06), cell
+
+
+def test_an_exported_figure_has_all_that_the_page_has(run, tmp_path, monkeypatch):
+    monkeypatch.setattr(illustration, "POINT", 1.0)
+    for number in ("07", "09", "10"):
+        file = Target("svg", tmp_path / f"{number}.svg")
+        drawn = export_from(run[1], f"figure-{number}", file, WIDTH, "", Console(quiet=True)).read_bytes()
+        assert drawn == (run[1].path / "figures" / f"figure-{number}.svg").read_bytes()
+
+
+ON_DEMAND = (
+    "families",
+    "basin",
+    "engines.section",
+    "robustness",
+)  # sections of stages that only their own commands run
+
+
+def test_what_only_its_own_command_makes_is_no_part_of_a_report(results):
+    makers = [make for make in SECTIONS if make.__module__.endswith(ON_DEMAND)]
+    assert len(makers) == len(ON_DEMAND)
+    assert [make(results) for make in makers] == [None] * len(ON_DEMAND)
+
+
+NOT_IN_RESULTS = ("figures", "left_out")  # drawings, and what there is nothing of
+OF_EVERY_REPORT = [
+    make for make in SECTIONS if not make.__module__.endswith(ON_DEMAND) and make.__name__ not in NOT_IN_RESULTS
+]
+
+
+@pytest.mark.parametrize(
+    "make", OF_EVERY_REPORT, ids=lambda make: f"{make.__module__.rpartition('.')[2]}.{make.__name__}"
+)
+def test_a_section_has_something_to_show_of_real_results(results, run, make):
+    section = make(results)
+    assert section is not None
+    assert section.blocks
+
+
+@pytest.mark.parametrize("stage", made.EVERYTHING)
+def test_results_made_by_hand_have_no_key_that_real_ones_lack(results, stage):
+    by_hand, real = made.EVERYTHING[stage](), results.stored[stage]
+    assert set(by_hand.summary) <= set(real.summary)
+    for name, group in by_hand.groups.items():
+        assert set(group.variables) <= set(real.groups[name].variables)

@@ -1,0 +1,156 @@
+"""Error against run time of every method on every scene of the config, over a ladder of tolerances."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict
+from typing import Any
+
+from walkerlab.config.reads import SceneConfig
+from walkerlab.config.walkers import is_passive_compass
+from walkerlab.evidence.benchmarks.conditions import environment, hinge_left_out, plain_power
+from walkerlab.evidence.benchmarks.ladder import (
+    MAX_REPEATS,
+    RUN_BUDGET,
+    Ascent,
+    MethodRow,
+    ascend,
+    complete_ascents,
+    make_row,
+    omitted_tolerances,
+)
+from walkerlab.evidence.benchmarks.references import End, Reference, WalkEndsError, second_end
+from walkerlab.evidence.benchmarks.trials import USER_SCRIPT, RigidTrial, Trial
+from walkerlab.evidence.benchmarks.words import words
+from walkerlab.evidence.paper.walker import compass_or_none
+from walkerlab.labels import labels_of
+from walkerlab.physics.hybrid.recorded_walk import with_scaled_rates
+from walkerlab.pipeline.progress import Progress
+from walkerlab.pipeline.stages.walk import rigid_start
+from walkerlab.pipeline.store.columns import rows_group
+from walkerlab.pipeline.store.content import Content
+from walkerlab.scene.rigid import rigid_walker
+
+ERROR_LEVELS = (1e-3, 1e-6, 1e-9)
+RIGID_TRIAL_STEPS, CONTACT_STEPS, NEAR_RIGID_STEPS = 10, 10, 4
+SLOW_CONTACT_STEPS = 4  # of other walkers than the compass, whose right-hand side is several times as long
+OMISSIONS_OFF_COMPASS = (
+    {"what": "accuracy of the scene contact-near-rigid", "why": "only the compass has it", "saves": "a minute"},
+    {"what": "libraries' longest runs on the contact model", "why": "they run in Python", "saves": "minutes"},
+)
+START_RATE_FACTOR = 0.98  # of the gait's angular velocities, so that no step repeats the one before
+
+
+def run(config: SceneConfig, inputs: Mapping[str, Content], progress: Progress, jobs: int = 1) -> Content:
+    """Measure every method on every scene.
+
+    jobs  processes for reference solutions and for postponed library runs; all other runs are timed one after the
+          other, with nothing else running
+    """
+    trials: list[Trial] = []
+    second_ends: list[End] = []
+    ascents: list[Ascent] = []
+    compass = is_passive_compass(config)
+    left_out = hinge_left_out(config, "methods") + (
+        [] if compass or config.contact is None else list(OMISSIONS_OFF_COMPASS)
+    )
+    for trial in trials_of_scene(config, inputs):
+        progress.start(f"accuracy: {trial.name}", len(trial.methods))
+        try:
+            second_ends.append(second_end(trial))
+        except WalkEndsError as problem:
+            left_out.append(omitted_scene(trial, problem))
+            continue
+        trials.append(trial)
+        for method in trial.methods:
+            ascents.append(ascend(trial, method))
+            progress.advance()
+    progress.start("accuracy: long runs")
+    first_ends, ascents = complete_ascents(trials, ascents, jobs, long_runs=compass)
+    references: dict[str, Reference] = {}
+    for trial, first, second in zip(trials, first_ends, second_ends, strict=True):
+        if isinstance(first, WalkEndsError):
+            left_out.append(omitted_scene(trial, first))
+        else:
+            references[trial.name] = Reference(first, second)
+    ascents = [ascent for ascent in ascents if ascent.trial.name in references]
+    rows = [make_row(ascent, run, references[ascent.trial.name]) for ascent in ascents for run in ascent.runs]
+    not_run = [entry for ascent in ascents for entry in omitted_tolerances(ascent)]
+    summary = {**summarise(rows, not_run, references, jobs), "left_out": left_out}
+    groups = {
+        f"{scene}/rows": rows_group([row for row in rows if row.scene == scene], labels_of(MethodRow))
+        for scene in references
+    }
+    return Content(groups, summary, timed=("best", "conclusions", "environment"))
+
+
+def omitted_scene(trial: Trial, why: WalkEndsError) -> dict[str, Any]:
+    start = f"started with velocities scaled by {START_RATE_FACTOR}, " if isinstance(trial, RigidTrial) else ""
+    return {"what": f"accuracy of the scene {trial.name}", "why": f"{start}{why}"}
+
+
+def trials_of_scene(config: SceneConfig, inputs: Mapping[str, Content]) -> Iterator[Trial]:
+    """Yield the walks to measure on: rigid, on compliant ground, and for the compass also near the rigid limit."""
+    length, state = rigid_start(config, inputs)
+    walker = rigid_walker(config)
+    start = with_scaled_rates(walker, state, START_RATE_FACTOR, START_RATE_FACTOR)
+    yield RigidTrial(walker, start, RIGID_TRIAL_STEPS, compass_or_none(config, config.equations))
+    if config.contact is None:
+        return
+    # contact code is loaded only for scenes that have contact
+    from walkerlab.evidence.benchmarks.contact_trials import contact_trial, near_rigid_trial
+
+    if not is_passive_compass(config):
+        yield contact_trial(config, state, length, SLOW_CONTACT_STEPS)
+        return
+    yield contact_trial(config, state, length, CONTACT_STEPS)
+    yield near_rigid_trial(config, state, length, NEAR_RIGID_STEPS)
+
+
+def summarise(
+    rows: Sequence[MethodRow], not_run: list[dict[str, Any]], references: Mapping[str, Reference], jobs: int
+) -> dict[str, Any]:
+    parts = ("method", "second_method", "agreement", "state", "from_outside", "tolerance", "rhs_evaluations")
+    return {
+        "rows": [asdict(row) for row in rows],
+        "repeats": MAX_REPEATS,
+        "rigid_velocity_factor": START_RATE_FACTOR,
+        "budget": RUN_BUDGET,
+        "reference": {
+            name: {part: getattr(reference, part) for part in parts} for name, reference in references.items()
+        },
+        "best": {scene: best_methods(rows, scene) for scene in references},
+        "conclusions": {scene: conclusion(rows, scene) for scene in references},
+        "not_run": not_run,
+        "environment": environment() | {"processes": jobs},
+    }
+
+
+def good_enough(rows: Sequence[MethodRow], scene: str, level: float) -> list[MethodRow]:
+    """Fastest run of each method that reaches an error of `level` on a scene, fastest method first."""
+    fastest: dict[str, MethodRow] = {}
+    for row in sorted(rows, key=lambda row: row.wall_s):
+        if row.scene == scene and row.error is not None and row.error <= level:
+            fastest.setdefault(row.method, row)
+    return list(fastest.values())
+
+
+def best_methods(rows: Sequence[MethodRow], scene: str) -> dict[str, str]:
+    """Fastest method for each error level that some method reaches."""
+    fastest = {plain_power(level): good_enough(rows, scene, level) for level in ERROR_LEVELS}
+    return {level: runs[0].method for level, runs in fastest.items() if runs}
+
+
+def conclusion(rows: Sequence[MethodRow], scene: str) -> str:
+    """Describe in one sentence which method is fastest at which error, and by what factor over the best library."""
+    levels = []
+    for level in ERROR_LEVELS:
+        runs = good_enough(rows, scene, level)
+        family = runs[0].method.split("-")[0] if runs else ""
+        libraries = (
+            run
+            for run in runs
+            if run.method.split("-")[0] != family
+            and run.method.startswith(("scipy", "cvode"))
+            and run.method != USER_SCRIPT  # its right-hand side is not ours
+        )
+        levels.append((level, runs[0] if runs else None, next(libraries, None)))
+    return words("accuracy.conclusion", scene, levels)

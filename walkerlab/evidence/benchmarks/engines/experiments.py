@@ -1,0 +1,330 @@
+"""The three experiments in other engines: same law, own law, no contact; each compared with our own walk."""
+
+import math
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from statistics import median
+from typing import Any
+
+import numpy as np
+
+from walkerlab.evidence.benchmarks.engines import runs
+from walkerlab.evidence.benchmarks.engines.adapter import EngineContact, Integrator, OwnContact, Stepping
+from walkerlab.evidence.benchmarks.engines.process import OwnProcess, TaskLost
+from walkerlab.evidence.benchmarks.engines.registry import Engine
+from walkerlab.evidence.benchmarks.engines.rows import OURS, OWN_LAW, SAME_LAW, EngineRow, SwingRow, TuningRow
+from walkerlab.evidence.benchmarks.engines.scenes import EngineScene
+from walkerlab.outcome import Outcome
+from walkerlab.physics.ground.energy import kinetic_energy, potential_energy
+from walkerlab.physics.ground.friction import friction_coefficient
+from walkerlab.physics.ground.resting import resting_foot
+from walkerlab.physics.ground.terrain import STANCE_FOOT
+from walkerlab.physics.ground.walker import changed_forms, folded, on_ground, unfolded
+from walkerlab.physics.hybrid.contact_result import ContactWalkResult, walk_contact
+from walkerlab.physics.hybrid.contact_state import knees_at_start
+from walkerlab.physics.solvers.registry import Tolerances
+from walkerlab.physics.solvers.system import Floats, derivative
+
+SAME_LAW_STEPS = (4e-4, 2e-4, 1e-4, 5e-5, 2.5e-5, 1.25e-5, 6.25e-6, 3.125e-6)  # s
+OWN_LAW_STEPS = (2e-3, 1e-3, 5e-4, 2.5e-4, 1.25e-4, 6.25e-5)  # s
+SWING_STEPS = (8e-3, 4e-3, 2e-3, 1e-3)  # s
+ADAPTIVE_TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8)  # where steps are adapted
+ERROR_GOAL = 1e-5  # error on the same law from which on nothing finer is run
+SETTLED_CHANGE = 1e-4  # relative change of the period on an engine's own law, after which nothing finer is run
+LARGEST_STEP_S = 0.01  # where they are
+START_FACTORS = (0.95, 0.99)  # of the gait's velocities
+TUNING_STEP_S = 2e-5
+COMPARED_TOUCHES, OWN_TOUCHES = 2, 10
+INTO_NEXT_STEP = 0.9  # share of the step after the last touch at which states are compared
+SWING_S = 0.48
+CREEP_LOAD = 0.1  # tangential over normal force, about the mean of a walk
+RUN_TIMEOUT_S = 120.0  # with a run, before its process is ended
+OUR_METHOD = "radau5"
+OUR_LADDER = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
+ADAMS_RTOL = 1e-7  # of the walk that engines' own contact is held against
+REFERENCES = (("radau5", 1e-11), ("dop853", 1e-12))
+UNLIMITED_BUDGET = 100_000_000  # right-hand sides
+UNLIMITED_S = 1e9
+STEP_ALLOWANCE = 2  # times as long as the walk under ADAMS's law another may take
+OUR_REPEATS = 3
+
+
+@dataclass(frozen=True)
+class Truth:
+    """Our walk of a scene at tight tolerance, by two methods.
+
+    end        state at `until_s`
+    agreement  largest difference between the two methods
+    walk       ten steps, for periods
+    """
+
+    until_s: float
+    end: Floats
+    touches_s: Floats
+    agreement: float
+    walk: ContactWalkResult
+
+
+def simulate(
+    scene: EngineScene, method: str, rtol: float, steps: int, until_s: float | None = None
+) -> ContactWalkResult:
+    """Walk the scene with this project's solver; with `until_s` the state at that time is sampled."""
+    tolerances = Tolerances(method, rtol, 1e-2 * rtol, UNLIMITED_BUDGET, track_energy=False)
+    return walk_contact(scene.ours, scene.ground, False, STANCE_FOOT, scene.start, tolerances, steps, until_s)
+
+
+def make_truth(scene: EngineScene) -> Truth | None:
+    """Compute the reference of a scene; None if the walk ends before states can be compared."""
+    walk = simulate(scene, *REFERENCES[0], OWN_TOUCHES)
+    if walk.touch_time_s.size <= COMPARED_TOUCHES:
+        return None
+    last, following = walk.touch_time_s[COMPARED_TOUCHES - 1 : COMPARED_TOUCHES + 1]
+    until = float(last + INTO_NEXT_STEP * (following - last))
+    reference, second = (
+        simulate(scene, *method_and_rtol, COMPARED_TOUCHES + 1, until) for method_and_rtol in REFERENCES
+    )
+    end, second_end = sampled_end(reference), sampled_end(second)
+    assert end is not None, "the walk goes on beyond that time"
+    assert second_end is not None, "so it does by the other method"
+    return Truth(until, end, reference.touch_time_s[:COMPARED_TOUCHES], float(np.max(np.abs(end - second_end))), walk)
+
+
+def sampled_end(result: ContactWalkResult) -> Floats | None:
+    """State at a walk's second sample, the first being its start; None if not reached."""
+    reached = result.samples is not None and len(result.samples.states) > 1
+    return np.asarray(result.samples.states[1]) if result.samples is not None and reached else None
+
+
+@dataclass(frozen=True)
+class EngineExperiment:
+    """One engine, or this project, in one experiment on one scene."""
+
+    scene: EngineScene
+    engine: str
+    version: str
+    experiment: str
+    truth: Truth | None = None  # what runs are compared with, if they are
+
+    def row(
+        self, integrator: str, stepping: Stepping, answer: runs.WalkAnswer | TaskLost, start: float = 1.0
+    ) -> EngineRow:
+        """Evaluate a run, or record why it was lost.
+
+        On the same law the errors are those of the end state and of touch times. On own contact the error is that of
+        the last period, of completed walks from the gait itself.
+
+        integrator  or contact model on an engine's own law
+        start       velocities of the start over those of the gait
+        """
+        head = (self.scene.name, self.engine, self.version, self.experiment, integrator, start)
+        step_s, tolerance = stepping.step_s, stepping.tolerance
+        if isinstance(answer, TaskLost):
+            outcome = Outcome.BUDGET_EXHAUSTED if answer.timed_out else Outcome.SOLVER_FAILED
+            nothing = (None, None, None, None, None, None)
+            return EngineRow(*head, step_s, tolerance, *nothing, 0, outcome.label, answer.why)
+        period_s = length_m = slip_m = error = touch_error = None
+        touches, truth = answer.touches_s, self.truth
+        if touches.size >= 2:
+            period_s, length_m = float(np.diff(touches)[-1]), float(np.diff(answer.along_m)[-1])
+            if answer.slips_m.size == touches.size:  # else its foot did not lift
+                slip_m = float(answer.slips_m[-1])
+        if truth is not None and self.experiment == OWN_LAW:
+            if period_s is not None and answer.outcome == Outcome.WALKED.label and start == 1.0:
+                error = abs(period_s - truth.walk.periods_s[-1])
+        elif truth is not None:
+            if answer.end is not None and np.isfinite(answer.end).all():
+                error = float(np.max(np.abs(answer.end - truth.end)))
+            if touches.size >= COMPARED_TOUCHES:
+                touch_error = float(np.max(np.abs(touches[:COMPARED_TOUCHES] - truth.touches_s)))
+        if tolerance is not None or self.experiment == SAME_LAW:
+            step_s = answer.time_s / max(1, answer.steps)
+        numbers = error, touch_error, answer.wall_s, period_s, length_m, slip_m
+        return EngineRow(*head, step_s, tolerance, *numbers, touches.size, answer.outcome)
+
+
+def our_walk(
+    scene: EngineScene, rtol: float, touches: int, until_s: float | None = None, repeats: int = 1
+) -> runs.WalkAnswer:
+    """Time our own walk over `touches` steps, or until a time within the next step."""
+    walls = []
+    for _ in range(repeats):
+        start_s = time.process_time()
+        result = simulate(scene, OUR_METHOD, rtol, touches + (until_s is not None), until_s)
+        walls.append(time.process_time() - start_s)
+    times, along, slips = result.touch_time_s[:touches], result.touch_along_m[:touches], result.slip_m[:touches]
+    steps, time_s = int(result.work[1]), float(result.end_time_s)
+    return runs.WalkAnswer(result.outcome.label, sampled_end(result), times, along, slips, steps, time_s, median(walls))
+
+
+def our_rows(scene: EngineScene, truth: Truth, version: str) -> Iterator[EngineRow]:
+    """Yield our runs over a ladder of tolerances, then walks under ADAMS's law from the starts of own contact."""
+    same_law = EngineExperiment(scene, OURS, version, SAME_LAW, truth)
+    our_walk(scene, OUR_LADDER[0], COMPARED_TOUCHES, truth.until_s)
+    for rtol in OUR_LADDER:
+        answer = our_walk(scene, rtol, COMPARED_TOUCHES, truth.until_s, OUR_REPEATS)
+        yield same_law.row(OUR_METHOD, Stepping(OUR_METHOD, 0.0, rtol), answer)
+    own_law = EngineExperiment(scene, OURS, version, OWN_LAW)
+    for factor in (1.0, *START_FACTORS):
+        answer = our_walk(scene.started(factor), ADAMS_RTOL, OWN_TOUCHES)
+        yield own_law.row("impact", Stepping(OUR_METHOD, 0.0, ADAMS_RTOL), answer, factor)
+
+
+def steppings(name: str, integrator: Integrator, steps_s: Sequence[float]) -> list[Stepping]:
+    """An integrator's step sizes, or tolerances where it adapts them, from coarse to fine."""
+    if integrator.adapts:
+        return [Stepping(name, LARGEST_STEP_S, tolerance) for tolerance in ADAPTIVE_TOLERANCES]
+    return [Stepping(name, h) for h in steps_s]
+
+
+def contact_target(scene: EngineScene) -> EngineContact | None:
+    """Linearise the walker's contact under its weight on one foot; None on frictionless ground."""
+    from scipy.optimize import brentq
+
+    walker = scene.ours
+    law, friction = walker.normal, walker.friction
+    if friction.largest == 0.0:
+        return None
+    mass, g = walker.mass, walker.gravity_down
+    foot = resting_foot(mass * g, mass, law.stiffness, law.exponent, law.damping)
+    creep = brentq(lambda v: -friction_coefficient(friction, v)[0] - CREEP_LOAD, 0.0, friction.rising_until, xtol=1e-18)
+    sliding = -friction_coefficient(friction, friction.sliding_from)[0]
+    return EngineContact(mass, g, foot.depth, law.exponent, foot.damping_ratio, sliding, CREEP_LOAD, creep)
+
+
+@dataclass(frozen=True)
+class EngineOnScene:
+    """One engine on one scene, in a process of its own."""
+
+    engine: Engine
+    scene: EngineScene
+    truth: Truth
+    process: OwnProcess
+
+    def walk(
+        self, called: str, stepping: Stepping, most: int, own: OwnContact | None = None, start: float = 1.0
+    ) -> tuple[EngineRow, runs.WalkAnswer | TaskLost]:
+        """Walk on our law, or on the engine's own contact.
+
+        called  integrator or contact model, as the row names it
+        most    step budget
+        start   velocities over those of the gait
+        """
+        law, until_s = (SAME_LAW, self.truth.until_s) if own is None else (OWN_LAW, UNLIMITED_S)
+        scene = self.scene.started(start)
+        task = runs.WalkTask(self.engine.name, stepping, scene, OWN_TOUCHES, until_s, own, most)
+        answer = self.process.do(task.run, RUN_TIMEOUT_S)
+        experiment = EngineExperiment(self.scene, self.engine.name, self.engine.version, law, self.truth)
+        return experiment.row(called, stepping, answer, start), answer
+
+    def same_law(self) -> Iterator[EngineRow]:
+        """Yield runs of each integrator on our law, from coarse to fine."""
+        for name, integrator in self.engine.adapter().INTEGRATORS.items():
+            if integrator.for_contact_only:
+                continue
+            for stepping in steppings(name, integrator, SAME_LAW_STEPS):
+                if not integrator.adapts and math.ceil(self.truth.until_s / stepping.step_s) > integrator.most_steps:
+                    continue
+                row, answer = self.walk(name, stepping, integrator.most_steps)
+                yield row
+                late = isinstance(answer, TaskLost) and answer.timed_out
+                if late or (row.error is not None and row.error < ERROR_GOAL):
+                    break
+
+    def tuned(self, contact: str, target: EngineContact) -> tuple[OwnContact, list[TuningRow]] | TaskLost:
+        """Tune a contact model to the scene's contact and measure how close it comes."""
+        name, sliding = self.engine.name, 1.5 * self.scene.ours.friction.sliding_from
+        answer = self.process.do(runs.TuningTask(name, contact, target, TUNING_STEP_S, sliding).run, RUN_TIMEOUT_S)
+        if isinstance(answer, TaskLost):
+            return answer
+        measured = (
+            ("penetration at rest", "m", target.penetration, answer.penetration),
+            ("damping ratio", "1", target.damping_ratio, answer.damping_ratio),
+            ("sliding friction", "1", target.friction, answer.friction),
+            ("creep velocity", "m/s", target.creep_velocity, answer.creep_velocity),
+        )
+        about = self.scene.name, name, contact, dict(answer.own.settings)
+        return answer.own, [TuningRow(*about, *numbers) for numbers in measured]
+
+    def own_law(self, contact: str, own: OwnContact) -> Iterator[EngineRow]:
+        """Yield runs on own contact over step sizes from the gait, then from other starts at the second finest step.
+
+        Adaptive walks from the gait share one step budget; no walk is begun that would exceed it.
+        """
+        name = self.engine.adapter().CONTACTS[contact]
+        integrator = self.engine.adapter().INTEGRATORS[name]
+        most = integrator.most_steps if integrator.adapts else STEP_ALLOWANCE * integrator.most_steps
+        before, completed, spent = None, [], 0
+        usual_s = float(self.truth.walk.touch_time_s[-1])
+        for stepping in steppings(name, integrator, [h for h in OWN_LAW_STEPS if usual_s / h <= integrator.most_steps]):
+            row, answer = self.walk(contact, stepping, most, own)
+            yield row
+            completed.append(stepping)
+            steps = answer.steps if not isinstance(answer, TaskLost) else most if answer.timed_out else 0
+            spent += steps
+            if steps >= most or (integrator.adapts and spent + steps > most):
+                return
+            if before is not None and has_settled(before, row):
+                break
+            before = row
+        for stepping in completed[-2:][:1]:
+            yield from (self.walk(contact, stepping, most, own, factor)[0] for factor in START_FACTORS)
+
+    def swings(self) -> tuple[list[SwingRow], list[TaskLost]]:
+        """Simulate the hinged walker's passive swing with each integrator."""
+        scene, engine, model = self.scene, self.engine, runs.pinned_model(self.scene)
+        n = len(model.chain)
+        start = np.array((*scene.start[2 : 2 + n], *scene.start[4 + n :]))
+        truth, energy = swing_truth(scene, start)
+        rows: list[SwingRow] = []
+        lost: list[TaskLost] = []
+        for integrator, entry in engine.adapter().INTEGRATORS.items():
+            before: float | None = None
+            for stepping in steppings(integrator, entry, SWING_STEPS):
+                swing = model, scene.ours.slope, start, SWING_S, entry.most_steps
+                answer = self.process.do(runs.SwingTask(engine.name, stepping, *swing).run, RUN_TIMEOUT_S)
+                if isinstance(answer, TaskLost):
+                    lost.append(answer)
+                    break
+                error = float(np.max(np.abs(answer.end - truth)))
+                drift = abs(energy(answer.end) - energy(start))
+                order = math.log2(before / error) if before and error and not entry.adapts else None
+                who, how = (scene.name, engine.name, integrator, entry.order), (stepping.step_s, stepping.tolerance)
+                rows.append(SwingRow(*who, *how, error, drift, order, answer.wall_s))
+                before = error
+        return rows, lost
+
+
+def has_settled(coarse: EngineRow, fine: EngineRow) -> bool:
+    """Whether two completed walks agree in period."""
+    if coarse.error is None or fine.error is None or coarse.period_s is None or fine.period_s is None:
+        return False
+    return abs(fine.period_s / coarse.period_s - 1.0) <= SETTLED_CHANGE
+
+
+def swing_truth(scene: EngineScene, start: Floats, until_s: float = SWING_S) -> tuple[Floats, Any]:
+    """Swing by our equations with SciPy's DOP853: its end, and a function for the mechanical energy of a state."""
+    from scipy.integrate import solve_ivp
+
+    knee = knees_at_start(scene.ours, STANCE_FOOT, scene.start)
+    passive = changed_forms(scene.ours, push_off=0.0, laws=0.0)
+    system = on_ground(passive, (False, False), knee, hinged=True)
+    whole = passive.forms[1, 0]
+
+    def rate(t: float, y: Floats) -> Any:
+        f = np.zeros(y.size)
+        derivative(system, t, y, f)
+        return f
+
+    def energy(y: Floats) -> float:
+        return float(kinetic_energy(whole, y) + potential_energy(whole, y))
+
+    y = folded(system.form, start)
+    solution = solve_ivp(rate, (0.0, until_s), y, method="DOP853", rtol=1e-13, atol=1e-14)
+    return unfolded(system.form, solution.y[:, -1], start.size), energy
+
+
+def least_wall(rows: Sequence[EngineRow], error: float) -> float | None:
+    """Shortest run time (s) among runs with at most this error."""
+    good = [row for row in rows if row.error is not None and row.error <= error]
+    return min((row.wall_s for row in good if row.wall_s is not None), default=None)

@@ -1,0 +1,253 @@
+"""Apply the walking rules to an engine's walk from outside: touches, lifts, pads, knees and outcome.
+
+An engine yields states at the ends of its steps only. Within a step a foot's height is taken as the cubic through its
+values and velocities, so a touch is located to fourth order in the step.
+"""
+
+import math
+import sys
+from dataclasses import dataclass
+
+import numpy as np
+
+from walkerlab.evidence.benchmarks.engines.scenes import EngineScene
+from walkerlab.outcome import Outcome
+from walkerlab.physics.ground.external import feet_and_forces
+from walkerlab.physics.ground.knees import FLEXED, lock_knee
+from walkerlab.physics.ground.pulse import pulse_left
+from walkerlab.physics.ground.terrain import STANCE_FOOT, cell_at, cell_edges, has_ground_in_cell
+from walkerlab.physics.ground.walker import BENT, LOCKED, RELEASED, FootMotion, locked_knees, on_ground
+from walkerlab.physics.hybrid import contact_events, contact_state, contact_transitions
+from walkerlab.physics.hybrid.contact_loop import LONGEST_FLIGHT, LONGEST_STEP
+from walkerlab.physics.hybrid.contact_state import new_walk_state
+from walkerlab.physics.hybrid.endings import FALLEN_HIP, GOES_ON
+from walkerlab.physics.solvers.scipy_methods import entry_point
+from walkerlab.physics.solvers.system import Floats
+
+Feet = tuple[FootMotion, FootMotion]
+CROSSING_HALVINGS = 60
+DIVERGED_M = 1e4  # m: where only the feet of a run that has lost its numbers get to
+
+
+@dataclass(frozen=True, order=True)
+class Turn:
+    """A knee's lock or release: at which share of a step, and by which event function."""
+
+    share: float
+    event: int
+
+
+class RuleFollower:
+    """State of a walk under the walking rules, updated after each step of the engine.
+
+    scene       with the currently locked knees
+    walk_state  memory of the walk
+    outcome     None while the walk continues
+    turn        lock or release within the last step, which is then discarded
+    watches     whether knees are monitored
+    """
+
+    def __init__(self, scene: EngineScene, steps: int, q: Floats, v: Floats, *, carries: bool = True) -> None:
+        """Start a walk of at most `steps` steps with both feet on the ground.
+
+        carries  whether our contact law acts; otherwise the engine has its own, and only drives act
+        """
+        self.walk_state = new_walk_state(scene.ours, scene.ground.terrain, STANCE_FOOT, steps, scene.start)
+        self._ground = self.walk_state.has_ground if carries else np.zeros(2, np.int8)
+        self.time_s = self.grounded_s = 0.0
+        self.outcome: Outcome | None = None
+        self.turn: Turn | None = None
+        self.watches = True
+        self._feet: Feet
+        self._see(scene, q, v)
+        # both stand on the ground, inside or outside by rounding
+        first, second = (foot._replace(height=min(foot.height, -sys.float_info.min)) for foot in self._feet)
+        self._feet = first, second
+        self._edges = [self._edges_of(foot) for foot in range(2)]
+
+    def _see(self, scene: EngineScene, q: Floats, v: Floats) -> None:
+        """Bind the compiled function to a scene's model, with the arguments that stay the same, and evaluate it."""
+        size, state = scene.model.size, self.walk_state
+        # what it reads of them is the walk state's own and changes with it
+        system = on_ground(scene.walker, self._ground, progress=state.progress)
+        self.scene, self._fixed = scene, (system, scene.model.chain)
+        self._motion, self._forces, self._none = np.zeros((2, 4)), np.zeros(size), np.zeros(0)
+        self._call = entry_point(
+            feet_and_forces, *self._fixed, 0.0, np.zeros(size), np.zeros(size), self._motion, self._forces
+        )
+        self._feet, self._bends = self.feet(q, v), self._bends_in(q, v)
+
+    def feet(self, q: Floats, v: Floats) -> Feet:
+        """Motion of both feet; q and v are contiguous arrays."""
+        self._call(*self._fixed, 0.0, q, v, self._motion, self._none)
+        first, second = self._motion.tolist()
+        return FootMotion(*first), FootMotion(*second)
+
+    def forces(self, time_s: float, q: Floats, v: Floats) -> Floats:
+        """Generalised forces on the walker, in memory that the next call overwrites."""
+        self._call(*self._fixed, time_s, q, v, self._motion, self._forces)
+        return self._forces
+
+    def _bends_in(self, q: Floats, v: Floats) -> list[tuple[float, float]]:
+        """Extension (rad) and its rate (rad/s) of each knee, zero for a locked knee."""
+        return [(float(q[place]), float(v[place])) if place >= 0 else (0.0, 0.0) for place in self.scene.knee_places]
+
+    def _edges_of(self, foot: int) -> tuple[float, float]:
+        """Edges (m) of the pad or gap under a foot; infinite on ordinary ground."""
+        terrain = self.scene.ground.terrain
+        if not terrain.has_pads:
+            return -math.inf, math.inf
+        return cell_edges(terrain, foot, int(self.walk_state.cells[foot]))
+
+    def follow(self, time_s: float, q: Floats, v: Floats) -> bool:
+        """Update with the state at a step's end; returns whether the ground under a foot may have changed."""
+        before, now = self._feet, self.feet(q, v)
+        if not all(-DIVERGED_M < place < DIVERGED_M for foot in now for place in (foot.along, foot.height)):
+            self._end(int(Outcome.SOLVER_FAILED))
+            return False
+        if self._bends:
+            bends = self._bends_in(q, v)
+            if self.watches:
+                self.turn = self._turning(time_s - self.time_s, now, bends)
+                if self.turn is not None:
+                    return False
+            self._bends = bends
+        # whether a foot has crossed the ground or a pad's edge, or passed the other
+        (x0, h0, *_), (x1, h1, *_), (y0, k0, *_), (y1, k1, *_) = *before, *now
+        (left0, right0), (left1, right1) = self._edges
+        happened = (h0 < 0.0) != (k0 < 0.0) or (h1 < 0.0) != (k1 < 0.0) or (x0 < x1) != (y0 < y1)
+        happened = happened or not (left0 <= y0 < right0 and left1 <= y1 < right1)
+        if happened:
+            self._apply_events(time_s, before, now, q, v)
+        self._feet, self.time_s = now, time_s
+        self._judge(now, q, v)
+        return happened
+
+    def _apply_events(self, time_s: float, before: Feet, now: Feet, q: Floats, v: Floats) -> None:
+        walk_state, terrain, form = self.walk_state, self.scene.ground.terrain, self.scene.ours.whole
+        for foot in range(2) if terrain.has_pads else ():
+            cell = cell_at(terrain, foot, now[foot].along)
+            if cell == walk_state.cells[foot]:
+                continue
+            walk_state.cells[foot], walk_state.has_ground[foot] = cell, has_ground_in_cell(cell)
+            self._edges[foot] = self._edges_of(foot)
+            if walk_state.has_ground[foot] and now[foot].height < 0.0:
+                self._end(int(Outcome.OFF_PAD))
+        if (before[0].along < before[1].along) != (now[0].along < now[1].along):
+            walk_state.sides[contact_events.PASSING] = 1 if now[1].along > now[0].along else -1
+            for foot in range(2):
+                contact_transitions.find_ground(terrain, walk_state, foot, contact_state.is_above(walk_state, foot))
+        h = time_s - self.time_s
+        for foot in range(2):
+            above = now[foot].height >= 0.0
+            if (before[foot].height >= 0.0) == above:
+                continue
+            walk_state.sides[foot * contact_events.PER_FOOT + contact_events.HEIGHT] = 1 if above else -1
+            old, new = before[foot], now[foot]
+            share = crossing(old.height, old.vertical_velocity, new.height, new.vertical_velocity, h)
+            feet_at_event = foot_within_step(before[0], now[0], share, h), foot_within_step(before[1], now[1], share, h)
+            y = tuple(self.scene.about_centre(q - (1.0 - share) * h * v, v).tolist())
+            if above:
+                contact_transitions.lift(form, terrain, walk_state, feet_at_event, foot, y)
+            else:
+                self._end(
+                    contact_transitions.touch(
+                        form, terrain, walk_state, feet_at_event, foot, self.time_s + share * h, y
+                    )
+                )
+        completed = walk_state.progress.steps == walk_state.touch_time.size
+        if completed and not contact_state.is_to_lift(walk_state):
+            self._end(int(Outcome.WALKED))
+
+    def _turning(self, h: float, now: Feet, bends: list[tuple[float, float]]) -> Turn | None:
+        """First lock or release of a knee within a step of h (s), or None."""
+        walk_state, turns = self.walk_state, []
+        stance = walk_state.progress.stance
+        pushing_s = pulse_left(self._fixed[0], self.time_s)
+        if walk_state.progress.release == contact_state.AT_PULSE_END:
+            if pushing_s <= h:
+                turns.append(Turn(pushing_s / h, contact_events.PULSE_END))
+        elif walk_state.progress.release and now[stance].vertical_velocity >= 0.0 and pushing_s > h:
+            walk_state.progress.release = contact_state.AT_PULSE_END
+        elif walk_state.progress.release and now[stance].vertical_velocity >= 0.0:
+            sinking = max(0.0, -self._feet[stance].vertical_velocity)
+            share = sinking / (sinking + now[stance].vertical_velocity) if sinking > 0.0 else 0.0
+            turns.append(Turn(share, int(stance) * contact_events.PER_FOOT + contact_events.VERTICAL_VELOCITY))
+        for knee, (old, bend) in enumerate(zip(self._bends, bends, strict=True)):
+            if walk_state.knee[knee] == RELEASED and bend[0] < -FLEXED:
+                walk_state.knee[knee] = BENT
+            elif walk_state.knee[knee] == BENT and bend[0] >= 0.0:
+                turns.append(Turn(crossing(*old, *bend, h), contact_events.EXTENSION + knee))
+        return min(turns, default=None)
+
+    @property
+    def is_outdated(self) -> bool:
+        """Whether a touch has released a knee that the engine's model still has locked."""
+        return int(np.count_nonzero(self.walk_state.knee == LOCKED)) != len(self.scene.locked)
+
+    def go_on(self, q: Floats, v: Floats) -> tuple[Floats, Floats]:
+        """Apply the pending lock or release of a knee to this state.
+
+        Returns coordinates and velocities for a model with the present locks.
+        """
+        walker, walk_state, y = self.scene.ours, self.walk_state, self.scene.about_centre(q, v)
+        if self.turn is not None and contact_events.EXTENSION <= self.turn.event < contact_events.PULSE_END:
+            contact_transitions.knee_stops(walker.stop, walk_state, self.turn.event, self.time_s)
+            y = lock_knee(walker.whole, walker.forms[0, locked_knees(walk_state.knee)], y).state
+        elif self.turn is not None:
+            contact_transitions.release(walk_state, 1 - int(walk_state.progress.stance))
+        self.turn = None
+        scene = self.scene.with_knees_locked(walk_state.knee)
+        q, v = scene.from_base(tuple(y.tolist()))
+        self._see(scene, q, v)
+        return q, v
+
+    def _end(self, outcome: int) -> None:
+        """Record an outcome unless there already is one."""
+        if outcome != GOES_ON and self.outcome is None:
+            self.outcome = Outcome(outcome)
+
+    def _judge(self, now: Feet, q: Floats, v: Floats) -> None:
+        ground, has_ground = self.scene.ground, self.walk_state.has_ground
+        tau, t = ground.frame.pendulum_time, self.time_s
+        inside = (now[0].height < 0.0 and has_ground[0] != 0, now[1].height < 0.0 and has_ground[1] != 0)
+        if inside[0] or inside[1]:
+            self.grounded_s = t
+            stance = self.walk_state.progress.stance
+            far = contact_events.farthest_slide(ground.terrain)
+            if inside[stance] and abs(now[stance].along - self.walk_state.foothold[stance]) > far:
+                y = tuple(self.scene.about_centre(q, v).tolist())
+                material = contact_state.material_along(self.scene.ours.whole, stance, now[stance].along, y)
+                if abs(material - self.walk_state.touched[stance]) > far:
+                    self._end(int(Outcome.SLID))
+        elif t - self.grounded_s > LONGEST_FLIGHT * tau:
+            self._end(int(Outcome.LIFTED_OFF))
+        if q[1] < FALLEN_HIP * ground.frame.leg_length:
+            self._end(int(Outcome.FELL))
+        elif t - self.walk_state.progress.last_touch > LONGEST_STEP * tau:
+            self._end(int(Outcome.NO_HEEL_STRIKE))
+
+
+def crossing(x0: float, v0: float, x1: float, v1: float, h: float) -> float:
+    """Share of a step of h (s) at which the cubic through values and rates at its ends crosses zero."""
+    low, high = 0.0, 1.0
+    for _ in range(CROSSING_HALVINGS):
+        middle = 0.5 * (low + high)
+        if (cubic(x0, v0, x1, v1, h, middle) >= 0.0) == (x0 >= 0.0):
+            low = middle
+        else:
+            high = middle
+    return high
+
+
+def foot_within_step(old: FootMotion, new: FootMotion, share: float, h: float) -> FootMotion:
+    """Foot at a share of a step: height by the cubic, all other values interpolated linearly."""
+    straight = FootMotion(*(a + share * (b - a) for a, b in zip(old, new, strict=True)))
+    height = cubic(old.height, old.vertical_velocity, new.height, new.vertical_velocity, h, share)
+    return straight._replace(height=height)
+
+
+def cubic(x0: float, v0: float, x1: float, v1: float, h: float, s: float) -> float:
+    """Value at share s of the cubic through values and slopes at both ends of a step."""
+    r = 1.0 - s
+    return r * r * ((1.0 + 2.0 * s) * x0 + s * h * v0) + s * s * ((3.0 - 2.0 * s) * x1 - r * h * v1)

@@ -1,0 +1,146 @@
+"""Engine-independent model of a walker: a tree of rigid bodies in a plane, under tilted gravity."""
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from walkerlab.physics.mechanics.assembly import Anchor, masses, neighbours
+from walkerlab.physics.mechanics.parts import Assembly, Knee, Position
+from walkerlab.physics.solvers.system import Floats
+
+Freedom = Literal["along", "height", "turn"]
+FLOATING: tuple[Freedom, ...] = ("along", "height", "turn")
+HINGED: tuple[Freedom, ...] = ("turn",)
+UPRIGHT: tuple[Freedom, ...] = ("along", "height")
+SMALLEST_INERTIA = 1e-13  # of mass times length squared: engines refuse a body without inertia
+SMALLEST_BALL_M = 5e-4  # for point feet, which engines do not have; larger than any penetration
+
+
+@dataclass(frozen=True)
+class Link:
+    """Rigid link, lumped from bodies that move together and the particles on them.
+
+    parent        index of its parent in `links`; -1 for the base
+    parent_point  hinge in the parent's frame (m); for the base the point moved by the root's freedoms
+    point         hinge in the link's own frame (m)
+    """
+
+    name: str
+    mass_kg: float
+    centre_m: Position
+    inertia_kg_m2: float
+    parent: int
+    parent_point_m: Position
+    point_m: Position
+
+
+@dataclass(frozen=True)
+class Ball:
+    """A foot: a ball on a link, and the height of its ground."""
+
+    link: int
+    centre_m: Position
+    radius_m: float
+    ground_m: float  # a point foot gets a tiny ball, and ground that much lower
+
+
+@dataclass(frozen=True)
+class PlanarModel:
+    """Tree of links.
+
+    links     base first, every link after its parent
+    freedoms  of the base relative to the world
+    balls     feet
+    gravity   m/s^2, along the slope and towards it
+    chain     (bodies, links) maps relative angles, base first, to each body's absolute one (assembly's order)
+    """
+
+    links: tuple[Link, ...]
+    freedoms: tuple[Freedom, ...]
+    balls: tuple[Ball, ...]
+    gravity_along: float
+    gravity_down: float
+    chain: Floats
+
+    @property
+    def size(self) -> int:
+        return len(self.freedoms) + len(self.links) - 1
+
+
+def translate(point: Position, shift: Position) -> Position:
+    return (point[0] + shift[0], point[1] + shift[1])
+
+
+def planar_model(
+    assembly: Assembly,
+    base: Anchor,
+    freedoms: tuple[Freedom, ...],
+    gravity: tuple[float, float],
+    welds: Collection[Knee] = (),
+) -> PlanarModel:
+    """Build the tree of an assembly from a point of its base outwards, depth first.
+
+    gravity  along the slope and towards it, m/s^2
+    welds    locked knees, whose shank and thigh form one link
+    """
+    root = base.body
+    welded = [{knee.thigh, knee.shank} for knee in welds]
+    # of each link: its bodies, and where their frames' origins are in its own; and how it hangs from its parent
+    members: list[list[tuple[str, Position]]] = [[(root, (0.0, 0.0))]]
+    hinges: list[tuple[int, Position, Position]] = [(-1, (0.0, 0.0), base.at_m)]
+    frames: dict[str, tuple[int, Position]] = {root: (0, (0.0, 0.0))}
+    rows = {root: np.eye(1, len(assembly.bodies))[0]}
+
+    def grow(name: str) -> None:
+        link, shift = frames[name]
+        for neighbour, leaving, entering in neighbours(assembly, name):
+            if neighbour in rows:
+                continue
+            hinge, rows[neighbour] = translate(leaving, shift), rows[name].copy()
+            if {name, neighbour} in welded:
+                frames[neighbour] = link, (hinge[0] - entering[0], hinge[1] - entering[1])
+                members[link].append((neighbour, frames[neighbour][1]))
+            else:
+                frames[neighbour] = len(members), (0.0, 0.0)
+                rows[neighbour][len(members)] = 1.0
+                members.append([(neighbour, (0.0, 0.0))])
+                hinges.append((link, hinge, entering))
+            grow(neighbour)
+
+    grow(root)
+    chain = np.ascontiguousarray(np.array([rows[body.name] for body in assembly.bodies])[:, : len(members)])
+    links = tuple(lump_bodies(assembly, *link) for link in zip(members, hinges, strict=True))
+    balls = []
+    for foot in assembly.feet:
+        link, shift = frames[foot.body]
+        balls.append(Ball(link, translate(foot.centre_m, shift), *ball_and_ground(foot.radius_m)))
+    return PlanarModel(links, freedoms, tuple(balls), *gravity, chain)
+
+
+def ball_and_ground(radius_m: float) -> tuple[float, float]:
+    """Radius of a foot's ball and height of the ground under it (m)."""
+    ball = max(radius_m, SMALLEST_BALL_M)
+    return ball, radius_m - ball
+
+
+def lump_bodies(
+    assembly: Assembly, members: Sequence[tuple[str, Position]], hinge: tuple[int, Position, Position]
+) -> Link:
+    """Combine bodies that move together, and the particles on them, into a link."""
+    parent, parent_point, point = hinge
+    particles = [
+        (mass, translate(at.at_m, shift))
+        for name, shift in members
+        for mass, at in masses(assembly)
+        if at.body == name and mass > 0.0
+    ]
+    weights, places = np.array([mass for mass, _ in particles]), np.array([at for _, at in particles])
+    total = float(weights.sum())
+    centre = weights @ places / total
+    inertia = sum(assembly.bodies[assembly.index(name)].inertia_kg_m2 for name, _ in members)
+    inertia += float(weights @ ((places - centre) ** 2).sum(axis=1))
+    least = SMALLEST_INERTIA * total * max(float(np.hypot(*(np.array(point) - centre))), SMALLEST_BALL_M) ** 2
+    at = (float(centre[0]), float(centre[1]))
+    return Link(members[0][0], total, at, max(inertia, least), parent, parent_point, point)

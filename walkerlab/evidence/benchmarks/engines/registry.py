@@ -1,0 +1,72 @@
+"""Registry of the supported engines: name, package and adapter module."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.metadata
+import importlib.util
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, cast
+
+if TYPE_CHECKING:
+    from walkerlab.evidence.benchmarks.engines.adapter import Adapter, Simulation
+
+EXTRA = "pip install 'walkerlab[engines]'"
+
+
+@dataclass(frozen=True)
+class Engine:
+    """An engine.
+
+    name     in output, and of its adapter module
+    module   import name of its package
+    package  distribution name
+    """
+
+    name: str
+    module: str
+    package: str
+
+    @property
+    def is_installed(self) -> bool:
+        """Whether the engine can be imported; does not import it."""
+        return importlib.util.find_spec(self.module) is not None
+
+    @property
+    def install_line(self) -> str:
+        """Shell command that installs it."""
+        return f"pip install {self.package}"
+
+    @property
+    def version(self) -> str:
+        """Version of the installed package; "unknown" for a module without a distribution."""
+        try:
+            return importlib.metadata.version(self.package)
+        except importlib.metadata.PackageNotFoundError:
+            return "unknown"
+
+    def adapter(self) -> Adapter:
+        return cast("Adapter", importlib.import_module(f"walkerlab.evidence.benchmarks.engines.{self.name}"))
+
+    @property
+    def simulation(self) -> type[Simulation]:
+        return cast("type[Simulation]", getattr(self.adapter(), f"{self.name.capitalize()}Run"))
+
+
+ENGINES = {
+    engine.name: engine
+    for engine in (
+        Engine("mujoco", "mujoco", "mujoco"),
+        Engine("drake", "pydrake", "drake"),
+        Engine("exudyn", "exudyn", "exudyn"),
+    )
+}
+
+
+def installed() -> tuple[Engine, ...]:
+    return tuple(engine for engine in ENGINES.values() if engine.is_installed)
+
+
+def installed_versions() -> dict[str, str]:
+    """Return the version of each installed engine."""
+    return {engine.name: engine.version for engine in installed()}

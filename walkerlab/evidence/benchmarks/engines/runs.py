@@ -1,0 +1,285 @@
+"""Tasks for an engine's process: a walk, a swing without ground, and a ball and a block on its own contact."""
+
+import math
+import time
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from walkerlab.evidence.benchmarks.engines import planar
+from walkerlab.evidence.benchmarks.engines.adapter import EngineContact, OwnContact, Simulation, Stepping
+from walkerlab.evidence.benchmarks.engines.follow import RuleFollower
+from walkerlab.evidence.benchmarks.engines.registry import ENGINES
+from walkerlab.evidence.benchmarks.engines.scenes import EngineScene
+from walkerlab.outcome import Outcome
+from walkerlab.physics.ground.terrain import STANCE_FOOT
+from walkerlab.physics.hybrid.contact_state import steps_with_lift
+from walkerlab.physics.mechanics.assembly import Anchor
+from walkerlab.physics.solvers.system import Floats
+
+TIME_ROUNDING = 1e-9
+UNLIMITED_STEPS = 10_000_000  # steps
+STEADY_STEP_FACTOR = 5  # so many times longer steps serve where only a steady end counts
+
+
+@dataclass(frozen=True)
+class WalkAnswer:
+    """A walk in an engine.
+
+    end      final state of the free walker; None unless the walk was completed
+    touches  (steps,) s; along: (steps,) m; slips: (steps,) m, without the last step if its foot did not lift
+    steps    of the engine
+    time_s   simulated
+    wall_s   processor time of the loop, in a process of its own
+    """
+
+    outcome: str
+    end: Floats | None
+    touches_s: Floats
+    along_m: Floats
+    slips_m: Floats
+    steps: int
+    time_s: float
+    wall_s: float
+
+
+@dataclass(frozen=True)
+class WalkTask:
+    """A walk with an engine's integrator, on our contact law or the engine's.
+
+    touches  after which the walk ends
+    until_s  latest end, s
+    own      the engine's tuned contact; None for our law
+    most     step budget of the engine
+    """
+
+    engine: str
+    stepping: Stepping
+    scene: EngineScene
+    touches: int
+    until_s: float
+    own: OwnContact | None
+    most: int
+
+    def run(self) -> WalkAnswer:
+        walk = EngineWalk(self)
+        walk.go()
+        rules, walk_state = walk.rules, walk.rules.walk_state
+        outcome = rules.outcome
+        if outcome is None:
+            outcome = Outcome.WALKED if walk.is_over else Outcome.BUDGET_EXHAUSTED
+        end = rules.scene.about_centre(walk.q, walk.v) if outcome is Outcome.WALKED else None
+        steps, lifted = int(walk_state.progress.steps), steps_with_lift(walk_state)
+        touches = walk_state.touch_time[:steps].copy(), walk_state.touch_along[:steps].copy()
+        slips = walk_state.slip[:lifted].copy()
+        return WalkAnswer(outcome.label, end, *touches, slips, walk.steps, walk.time_s, walk.wall_s)
+
+
+class EngineWalk:
+    """Walk in an engine as a sequence of models, one between each lock or release of a knee and the next."""
+
+    def __init__(self, task: WalkTask) -> None:
+        self.task, self.engine = task, ENGINES[task.engine]
+        self.q, self.v = task.scene.from_base(task.scene.start)
+        self.rules = RuleFollower(task.scene, task.touches, self.q, self.v, carries=task.own is None)
+        self.steps, self.time_s, self.wall_s = 0, 0.0, 0.0
+
+    @property
+    def is_over(self) -> bool:
+        """Whether the end time is reached."""
+        return self.time_s >= (1.0 - TIME_ROUNDING) * self.task.until_s
+
+    def go(self) -> None:
+        """Walk to the end; a step in which a knee locks or is released is repeated up to that instant."""
+        rules = self.rules
+        while rules.outcome is None and not self.is_over and self.steps < self.task.most:
+            self._simulate(self.task.until_s)
+            if rules.turn is not None:
+                rules.watches = False
+                wait_s = rules.turn.share * (self.seen_s - self.time_s)
+                if wait_s > TIME_ROUNDING * self.task.stepping.step_s:
+                    self._simulate(self.time_s + wait_s)
+                rules.watches = True
+            if rules.turn is not None or rules.is_outdated:
+                self.q, self.v = rules.go_on(self.q, self.v)
+
+    def _simulate(self, until_s: float) -> None:
+        """Simulate from the present state to `until_s`, by a whole number of steps where they are fixed."""
+        task, rules, span = self.task, self.rules, until_s - self.time_s
+        stepping = task.stepping
+        if not self.engine.adapter().INTEGRATORS[stepping.integrator].adapts:
+            stepping = replace(stepping, step_s=span / math.ceil((1.0 - TIME_ROUNDING) * span / stepping.step_s))
+        offset_s = self.time_s
+
+        def forces(time_s: float, q: Floats, v: Floats) -> Floats:
+            return rules.forces(offset_s + time_s, q, v)
+
+        driven = task.scene.ours.driven or task.scene.ours.whole.sprung
+        outside = forces if task.own is None or driven else None
+        engine = self.engine.simulation(rules.scene.model, stepping, self.q, self.v, outside, task.own)
+
+        def hand_over_ground() -> None:
+            for foot in range(2):
+                engine.carry(foot, bool(rules.walk_state.has_ground[foot]))
+
+        def on_step(time_s: float, q: Floats, v: Floats) -> bool:
+            self.seen_s = offset_s + time_s
+            changed = rules.follow(self.seen_s, q, v)
+            if rules.turn is not None and rules.watches:
+                return False
+            self.steps += 1
+            self.time_s, self.q, self.v = self.seen_s, q.copy(), v.copy()
+            if changed:
+                hand_over_ground()
+            return rules.outcome is None and not (changed and rules.is_outdated)
+
+        hand_over_ground()
+        start_s = time.process_time()
+        engine.run(task.most - self.steps, span, on_step)
+        self.wall_s += time.process_time() - start_s
+
+
+@dataclass(frozen=True)
+class SwingAnswer:
+    end: Floats  # (2 n) absolute angles and velocities
+    wall_s: float
+
+
+@dataclass(frozen=True)
+class SwingTask:
+    """Free swing of the walker hinged to the ground at its stance foot."""
+
+    engine: str
+    stepping: Stepping
+    model: planar.PlanarModel
+    slope: float
+    start: Floats  # (2 n) absolute angles (rad) and velocities (rad/s)
+    until_s: float
+    most: int
+
+    def run(self) -> SwingAnswer:
+        chain = self.model.chain
+        absolute = np.column_stack((self.start[: len(chain)] + self.slope, self.start[len(chain) :]))
+        q, v = np.linalg.lstsq(chain, absolute, rcond=None)[0].T
+        engine = ENGINES[self.engine].simulation(self.model, self.stepping, q, v)
+        start_s = time.process_time()
+        motion = record_motion(engine, self.most, self.until_s)
+        wall = time.process_time() - start_s
+        end = np.concatenate((chain @ motion.q[-1] - self.slope, chain @ motion.v[-1]))
+        return SwingAnswer(end, wall)
+
+
+class EngineMotion(NamedTuple):
+    """Times (steps,), coordinates and velocities (steps, n) at the ends of an engine's steps."""
+
+    t: Floats
+    q: Floats
+    v: Floats
+
+
+def record_motion(engine: Simulation, steps: int, until_s: float) -> EngineMotion:
+    """Simulate, recording the state at the end of each step."""
+    records: list[tuple[float, Floats, Floats]] = []
+
+    def on_step(time_s: float, q: Floats, v: Floats) -> bool:
+        records.append((time_s, q.copy(), v.copy()))
+        return True
+
+    engine.run(steps, until_s, on_step)
+    return EngineMotion(*(np.array(column) for column in zip(*records, strict=True)))
+
+
+def pinned_model(scene: EngineScene) -> planar.PlanarModel:
+    """Model of the scene's walker hinged at the centre of its stance foot."""
+    foot = scene.assembly.feet[STANCE_FOOT]
+    base = Anchor(foot.body, foot.centre_m)
+    return planar.planar_model(scene.assembly, base, planar.HINGED, scene.gravity, scene.locked)
+
+
+@dataclass(frozen=True)
+class TuningAnswer:
+    """Measured properties of an engine's own contact, to compare with the target."""
+
+    own: OwnContact
+    penetration: float  # m, of the ball at rest
+    damping_ratio: float  # of the ball about its rest
+    friction: float  # of the block that slides
+    creep_velocity: float  # m/s, of the block that stands on an incline
+
+
+@dataclass(frozen=True)
+class TuningTask:
+    """Tune an engine's own contact and measure it with a dropped ball and a sliding block.
+
+    step_s  of recorded motions
+    """
+
+    engine: str
+    contact: str
+    target: EngineContact
+    step_s: float
+    sliding_velocity: float  # m/s
+
+    def run(self) -> TuningAnswer:
+        bench = Bench(self, ENGINES[self.engine].adapter().tuned(self.contact, self.target))
+        depth = bench.at_rest()
+        ratio = bench.damping_ratio(depth)
+        return TuningAnswer(bench.own, depth, ratio, bench.friction(depth), bench.creep(depth))
+
+
+class Bench:
+    """A heavy ball that cannot turn, on level or inclined ground: bouncing ball and sliding block in one."""
+
+    def __init__(self, task: TuningTask, own: OwnContact) -> None:
+        """Derive from the target `omega` and `settling_s`, several times the slower time constant."""
+        self.task, self.own, self.target = task, own, task.target
+        self.omega, ratio = math.sqrt(self.target.gravity / self.target.penetration), self.target.damping_ratio
+        slow = self.omega * (ratio - math.sqrt(ratio * ratio - 1.0)) if ratio > 1.0 else self.omega * ratio
+        self.settling_s = 8.0 / slow
+
+    def after(self, time_s: float, h: float, along: float, depth: float, velocity: tuple[float, float]) -> EngineMotion:
+        """Simulate the ball for `time_s` from `depth` (m) inside the ground, pulled by `along` times its weight.
+
+        h  step (s)
+        """
+        target, adapter = self.target, ENGINES[self.task.engine].adapter()
+        link = planar.Link("ball", target.mass, (0.0, 0.0), target.mass, -1, (0.0, 0.0), (0.0, 0.0))
+        ball = planar.Ball(0, (0.0, 0.0), *planar.ball_and_ground(0.0))
+        model = planar.PlanarModel((link,), planar.UPRIGHT, (ball,), along * target.gravity, target.gravity, np.eye(1))
+        name = adapter.CONTACTS[self.own.model]
+        stepping = Stepping(name, h, TIME_ROUNDING if adapter.INTEGRATORS[name].adapts else None)
+        engine = ENGINES[self.task.engine].simulation(
+            model, stepping, np.array((0.0, -depth)), np.array(velocity), own=self.own
+        )
+        engine.carry(0, True)
+        return record_motion(engine, UNLIMITED_STEPS, max(2, round(time_s / h)) * h)
+
+    def at_rest(self) -> float:
+        """Penetration (m) at rest of a ball dropped from the surface."""
+        return -float(self.after(self.settling_s, STEADY_STEP_FACTOR * self.task.step_s, 0.0, 0.0, (0.0, 0.0)).q[-1, 1])
+
+    def damping_ratio(self, depth: float) -> float:
+        """Damping ratio of the oscillator fitted to the ball's accelerations about rest."""
+        omega = self.omega
+        motion = self.after(self.settling_s / 4.0, self.task.step_s, 0.0, depth, (0.0, -0.02 * depth * omega))
+        x, v = (motion.q[:, 1] + depth) / depth, motion.v[:, 1] / (depth * omega)
+        # means of two ends of a step stand for its middle, whatever the engine's own rule
+        middle = np.column_stack((x[1:] + x[:-1], v[1:] + v[:-1])) / 2.0
+        (k, c), *_ = np.linalg.lstsq(middle, -np.diff(motion.v[:, 1]) / np.diff(motion.t), rcond=None)
+        stiffness, damping = k / depth, c / (depth * omega)
+        return float(damping / (2.0 * math.sqrt(stiffness))) if stiffness > 0.0 else 0.0
+
+    def friction(self, depth: float) -> float:
+        """Deceleration over gravity of a sliding block, once its penetration has settled."""
+        target, settled = self.target, self.settling_s
+        start = self.task.sliding_velocity + target.friction * target.gravity * 1.25 * settled
+        motion = self.after(1.25 * settled, self.task.step_s, 0.0, depth, (start, 0.0))
+        watched = -1 - len(motion.v) // 5
+        fall = motion.v[watched, 0] - motion.v[-1, 0]
+        return float(fall / ((motion.t[-1] - motion.t[watched]) * target.gravity))
+
+    def creep(self, depth: float) -> float:
+        """Creep velocity (m/s) of a block standing on an incline."""
+        target, h = self.target, STEADY_STEP_FACTOR * self.task.step_s
+        return float(self.after(self.settling_s, h, target.creep_load, depth, (target.creep_velocity, 0.0)).v[-1, 0])

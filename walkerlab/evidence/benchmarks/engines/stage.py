@@ -1,0 +1,257 @@
+"""Stage `engines`: our law in other engines' integrators, then their own contact; error against run time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+import numpy as np
+
+from walkerlab import __version__
+from walkerlab.config.reads import SceneConfig
+from walkerlab.errors import NoAnswer
+from walkerlab.evidence.benchmarks.conditions import environment, hinge_left_out, plain_power
+from walkerlab.evidence.benchmarks.engines import experiments
+from walkerlab.evidence.benchmarks.engines.experiments import EngineOnScene
+from walkerlab.evidence.benchmarks.engines.process import OwnProcess, TaskLost
+from walkerlab.evidence.benchmarks.engines.registry import ENGINES, EXTRA, installed
+from walkerlab.evidence.benchmarks.engines.rows import OURS, OWN_LAW, SAME_LAW, EngineRow, SwingRow, TuningRow
+from walkerlab.evidence.benchmarks.engines.scenes import scenes
+from walkerlab.evidence.benchmarks.words import words
+from walkerlab.labels import labels_of
+from walkerlab.pipeline.progress import Progress
+from walkerlab.pipeline.stages.walk import rigid_start
+from walkerlab.pipeline.store.columns import rows_group
+from walkerlab.pipeline.store.content import Content
+
+RATIO_LEVELS = (1e-3, 1e-5)
+THREE_DIGITS = 5e-4  # relative
+
+
+@dataclass
+class EngineFindings:
+    """Results of the stage, collected row by row."""
+
+    rows: list[EngineRow] = field(default_factory=list)
+    swings: list[SwingRow] = field(default_factory=list)
+    tuning: list[TuningRow] = field(default_factory=list)
+    truths: dict[str, experiments.Truth] = field(default_factory=dict)
+    left_out: list[dict[str, str]] = field(default_factory=list)
+
+    def add(self, findings: EngineFindings) -> None:
+        for name in ("rows", "swings", "tuning", "left_out"):
+            getattr(self, name).extend(getattr(findings, name))
+
+
+def run(config: SceneConfig, inputs: Mapping[str, Content], progress: Progress, jobs: int = 1) -> Content:
+    """Measure every installed engine on every scene, `jobs` at a time; raises NoAnswer if none is installed."""
+    engines = installed()
+    findings = EngineFindings(left_out=[*missing_engines(), *hinge_left_out(config, "engines")])
+    if not engines:
+        raise NoAnswer("engines: no engine is installed", f"Install them: {EXTRA}")
+    rigid = inputs["fixedpoint"].summary if "fixedpoint" in inputs else None
+    for scene in scenes(config, *rigid_start(config, inputs)):
+        truth = experiments.make_truth(scene)
+        if truth is None:
+            why = "the walk under ADAMS's law ends too early to be compared"
+            findings.left_out.append({"what": f"engines on the scene {scene.name}", "why": why})
+            continue
+        findings.truths[scene.name] = truth
+        progress.start(f"engines: {scene.name}", len(engines) + 1)
+        findings.rows += experiments.our_rows(scene, truth, __version__)
+        progress.advance()
+        pairs = [EngineOnScene(engine, scene, truth, OwnProcess()) for engine in engines]
+        for measured in measure_all(pairs, jobs):
+            findings.add(measured)
+            progress.advance()
+    if not findings.truths:
+        raise NoAnswer("engines: no scene walks under ADAMS's law", "Start closer to a gait (start: fixed-point).")
+    return make_content(findings, rigid)
+
+
+def measure_all(pairs: Sequence[EngineOnScene], jobs: int) -> Iterator[EngineFindings]:
+    """Yield each engine's results, `jobs` engines at a time; an interruption kills the running engines."""
+    with ThreadPoolExecutor(max(1, jobs)) as pool:
+        try:
+            yield from pool.map(measure, pairs)
+        except BaseException:
+            for pair in pairs:
+                pair.process.abandon()
+            raise
+
+
+def missing_engines() -> list[dict[str, str]]:
+    """List missing engines, with the command that installs each."""
+    return [
+        {"what": f"engine {engine.name}", "why": f"not installed: {engine.install_line}"}
+        for engine in ENGINES.values()
+        if not engine.is_installed
+    ]
+
+
+def measure(pair: EngineOnScene) -> EngineFindings:
+    findings, name = EngineFindings(), pair.engine.name
+    target = experiments.contact_target(pair.scene)
+    with pair.process:
+        findings.swings, lost = pair.swings()
+        findings.left_out += [{"what": f"a swing in {name}", "why": failure.why} for failure in lost]
+        findings.rows += pair.same_law()
+        if target is None:
+            findings.left_out.append({"what": f"own contact of {name}", "why": "the ground has no friction"})
+            return findings
+        for contact in pair.engine.adapter().CONTACTS:
+            tuned = pair.tuned(contact, target)
+            if isinstance(tuned, TaskLost):
+                findings.left_out.append({"what": f"contact {contact} of {name}", "why": tuned.why})
+                continue
+            own, rows = tuned
+            findings.tuning += rows
+            findings.rows += pair.own_law(contact, own)
+    return findings
+
+
+def make_content(findings: EngineFindings, rigid: Mapping[str, Any] | None) -> Content:
+    """Build groups and summary.
+
+    rigid  summary of `fixedpoint`, if the start or the pads depend on it
+    """
+    rows, truths = findings.rows, findings.truths
+    stored = (("rows", EngineRow, rows), ("swings", SwingRow, findings.swings), ("tuning", TuningRow, findings.tuning))
+    groups = {name: rows_group(table, labels_of(kind)) for name, kind, table in stored if table}
+    engines = [engine for engine in installed() if any(row.engine == engine.name for row in rows)]
+    of_rigid = {f"rigid_{key}": rigid[key] for key in ("period_s", "step_length_m")} if rigid is not None else {}
+    summary = {
+        "rows": [asdict(row) for row in rows],
+        "swings": [asdict(row) for row in findings.swings],
+        "tuning": [{**asdict(row), "residual": row.residual} for row in findings.tuning],
+        "reference": {
+            name: {
+                "until_s": truth.until_s,
+                "agreement": truth.agreement,
+                "period_s": float(truth.walk.periods_s[-1]),
+                "step_length_m": float(truth.walk.lengths_m[-1]),
+                "steps": truth.walk.steps,
+                "outcome": truth.walk.outcome.label,
+                **of_rigid,
+            }
+            for name, truth in truths.items()
+        },
+        "versions": {engine.name: engine.version for engine in engines},
+        "cannot_express": {engine.name: list(engine.adapter().CANNOT_EXPRESS) for engine in engines},
+        "closest": {name: closest(rows, name) for name in truths},
+        "three_digits_step_s": {name: three_digits(rows, name, truth) for name, truth in truths.items()},
+        "convergence": {name: convergence(rows, name) for name in truths},
+        "integrators": {
+            engine.name: {name: asdict(integrator) for name, integrator in engine.adapter().INTEGRATORS.items()}
+            for engine in engines
+        },
+        "contacts": {engine.name: dict(engine.adapter().CONTACTS) for engine in engines},
+        "ratios": {name: ratios(rows, name) for name in truths},
+        "conclusions": {name: conclusions(rows, name, truth) for name, truth in truths.items()},
+        "environment": environment(),
+        "left_out": findings.left_out,
+    }
+    return Content(groups, summary, timed=("ratios", "conclusions", "environment"))
+
+
+def series_by_name(rows: Sequence[EngineRow], scene: str, experiment: str) -> dict[str, list[EngineRow]]:
+    """Rows of an experiment started on the gait, by engine and integrator (or contact), from coarse to fine."""
+    series: dict[str, list[EngineRow]] = {}
+    for row in rows:
+        if row.scene == scene and row.experiment == experiment and row.engine != OURS and row.start == 1.0:
+            series.setdefault(f"{row.engine} {row.integrator}", []).append(row)
+    return series
+
+
+def ratios(rows: Sequence[EngineRow], scene: str) -> dict[str, dict[str, float]]:
+    """Run time of each engine over ours on the same law, for each error level that both reach."""
+    our_rows = [row for row in rows if row.scene == scene and row.experiment == SAME_LAW and row.engine == OURS]
+    by_engine: dict[str, list[EngineRow]] = {}
+    for series in series_by_name(rows, scene, SAME_LAW).values():
+        by_engine.setdefault(series[0].engine, []).extend(series)
+    factors: dict[str, dict[str, float]] = {}
+    for level in RATIO_LEVELS:
+        ours_s = experiments.least_wall(our_rows, level)
+        for engine, runs in by_engine.items():
+            engine_s = experiments.least_wall(runs, level)
+            if ours_s is not None and engine_s is not None:
+                factors.setdefault(plain_power(level), {})[engine] = engine_s / ours_s
+    return factors
+
+
+def closest(rows: Sequence[EngineRow], scene: str) -> dict[str, Any] | None:
+    """Contact whose finest walk comes closest to ADAMS's law; None if no walk reaches the end."""
+    finest = [series[-1] for series in series_by_name(rows, scene, OWN_LAW).values()]
+    reached = [row for row in finest if row.error is not None and row.steps == experiments.OWN_TOUCHES]
+    if not reached:
+        return None
+    best = min(reached, key=lambda row: float(row.error or 0.0))
+    return {"engine": best.engine, "contact": best.integrator, "step_s": best.step_s, "period_error_s": best.error}
+
+
+def three_digits(rows: Sequence[EngineRow], scene: str, truth: experiments.Truth) -> dict[str, dict[str, float]]:
+    """Largest step (s) with three correct digits of the last period, by experiment and name.
+
+    Digits are relative to the reference on the same law, and to the finest run on an engine's own.
+    """
+    steps: dict[str, dict[str, float]] = {SAME_LAW: {}, OWN_LAW: {}}
+    exact = float(np.diff(truth.touches_s)[-1])
+    for experiment in steps:
+        for name, runs in series_by_name(rows, scene, experiment).items():
+            target = exact if experiment == SAME_LAW else runs[-1].period_s
+            step = largest_good_step(runs, experiment, target)
+            if step is not None:
+                steps[experiment][name] = step
+    return steps
+
+
+def largest_good_step(runs: Sequence[EngineRow], experiment: str, target: float | None) -> float | None:
+    """Largest step, going up from the finest, with three correct digits; None without a coarser step to confirm it."""
+    good = None
+    if target is None:
+        return None
+    for row in reversed(runs):
+        if row.outcome != "walked" or row.period_s is None or abs(row.period_s / target - 1.0) > THREE_DIGITS:
+            break
+        good = row.step_s
+    finest_only = experiment == OWN_LAW and good == runs[-1].step_s
+    return None if finest_only else good
+
+
+def convergence(rows: Sequence[EngineRow], scene: str) -> dict[str, dict[str, float]]:
+    """Effect of the last refinement, by experiment and name.
+
+    On the same law the factor by which the error shrinks, on own contact the change of the period (s).
+    """
+    effects: dict[str, dict[str, float]] = {SAME_LAW: {}, OWN_LAW: {}}
+    for experiment, by_name in effects.items():
+        for name, runs in series_by_name(rows, scene, experiment).items():
+            if len(runs) < 2 or not runs[-2].error or not runs[-1].error:
+                continue
+            fine, coarse = runs[-1], runs[-2]
+            factor = float(coarse.error or 0.0) / float(fine.error or 1.0)
+            change = abs(float(fine.period_s or 0.0) - float(coarse.period_s or 0.0))
+            by_name[name] = factor if experiment == SAME_LAW else change
+    return effects
+
+
+def conclusions(rows: Sequence[EngineRow], scene: str, truth: experiments.Truth) -> dict[str, str]:
+    """A paragraph for each experiment."""
+    same, own = (series_by_name(rows, scene, experiment) for experiment in (SAME_LAW, OWN_LAW))
+    sizes, changes, shares = three_digits(rows, scene, truth), convergence(rows, scene), ratios(rows, scene)
+    by_level = {label: shares.get(label, {}) for label in map(plain_power, RATIO_LEVELS)}
+    engines = list(dict.fromkeys(runs[0].engine for runs in same.values()))
+    falling = {name: by for name, by in changes[SAME_LAW].items() if same[name][-1].tolerance is None}
+    finest, settled = (
+        [runs[-1] for runs in own.values()],
+        [name for name in changes[OWN_LAW] if experiments.has_settled(*own[name][-2:])],
+    )
+    best, period = closest(rows, scene), float(truth.walk.periods_s[-1])
+    return {
+        SAME_LAW: words(
+            "engines.same_law", by_level, engines, sizes[SAME_LAW], falling, plain_power(experiments.ERROR_GOAL)
+        ),
+        OWN_LAW: words("engines.own_law", best, finest, period, changes[OWN_LAW], settled, sizes[OWN_LAW]),
+    }

@@ -1,0 +1,181 @@
+"""Runs of one method on one scene, tolerance by tolerance: timing, budgets and when to stop."""
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from statistics import median
+from typing import Annotated, Any
+
+import numpy as np
+
+from walkerlab.evidence.benchmarks.references import End, Reference, WalkEndsError, first_end
+from walkerlab.evidence.benchmarks.trials import Trial, TrialRun
+from walkerlab.labels import Label
+from walkerlab.physics.solvers.registry import METHODS
+from walkerlab.pipeline.workers import in_order
+
+RUN_BUDGET = 200_000  # right-hand sides of any run, which ends the hopeless ones
+SHORT_RUN_BUDGET = 25_000  # of a library's run that is timed among the others; longer ones come after all of those
+LAST_RUN_SIZE = (
+    12_000  # of a library's run that is the last of its ladder: a walk in Python takes a hundred times as long
+)
+WARM_UP_BUDGET = 2_000  # after which everything is compiled and loaded
+MAX_REPEATS, REPEAT_TIME_S = 7, 0.3
+OWN_LADDER = tuple(10.0**-digits for digits in range(3, 13))
+LIBRARY_LADDER = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11)
+ERROR_LABEL = Label("1", "largest difference of the end state from the reference, SI units", absent=0.0)
+
+
+@dataclass(frozen=True)
+class MethodRun:
+    tolerance: float
+    result: TrialRun
+    walls_s: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Ascent:
+    """Runs of one method up its ladder of tolerances.
+
+    unfinished  whether the next tolerance takes long and is postponed
+    """
+
+    trial: Trial
+    method: str
+    ladder: tuple[float, ...]
+    runs: tuple[MethodRun, ...]
+    unfinished: bool
+
+
+@dataclass(frozen=True)
+class MethodRow:
+    scene: str
+    method: Annotated[str, Label("1", "method")]
+    tolerance: Annotated[float, Label("1", "relative tolerance")]
+    outcome: Annotated[str, Label("1", "outcome")]
+    error: Annotated[float | None, ERROR_LABEL]
+    against: Annotated[str, Label("1", "method of the end that it is measured by")]  # another one
+    within_reference: bool  # whether the error is below what the reference is known to, and so only a bound
+    wall_s: Annotated[float, Label("s", "median run time", timing=True)]
+    least_wall_s: Annotated[float, Label("s", "least run time", timing=True)]
+    largest_wall_s: Annotated[float, Label("s", "largest run time", timing=True)]
+    repeats_of_wall_s: Annotated[int, Label("1", "timed repeats", timing=True, name="repeats")]
+    rhs_evaluations: Annotated[int, Label("1", "right-hand sides")]
+    accepted: Annotated[int, Label("1", "accepted steps")]
+    rejected: Annotated[int, Label("1", "rejected steps")]
+
+    @property
+    def reached(self) -> Annotated[int, Label("1", "whether the end state was reached")]:
+        """1 if the run has an error, 0 otherwise."""
+        return int(self.error is not None)
+
+
+def ascend(trial: Trial, method: str) -> Ascent:
+    """Run one tolerance after the other until a run is too expensive."""
+    own = method in METHODS and METHODS[method].compiled
+    ladder, short, last = (
+        (OWN_LADDER, RUN_BUDGET, RUN_BUDGET)
+        if own
+        else (LIBRARY_LADDER, min(SHORT_RUN_BUDGET, RUN_BUDGET), LAST_RUN_SIZE)
+    )
+    trial.prepare(method, ladder[0], WARM_UP_BUDGET)()
+    runs: list[MethodRun] = []
+    for tolerance in ladder:
+        run = measure(trial, method, tolerance, short)
+        if run.result.outcome == "budget-exhausted" and short < RUN_BUDGET:
+            return Ascent(trial, method, ladder, tuple(runs), unfinished=True)
+        runs.append(run)
+        if run.result.rhs_evaluations >= last:
+            break
+    return Ascent(trial, method, ladder, tuple(runs), unfinished=False)
+
+
+def complete_ascents(
+    trials: Sequence[Trial], ascents: Sequence[Ascent], jobs: int, long_runs: bool = True
+) -> tuple[list[End | WalkEndsError], list[Ascent]]:
+    """Compute the references' first ends and the postponed runs, in `jobs` processes.
+
+    long_runs  whether to make the postponed runs
+
+    Returns an end, or the reason for its absence, for each trial; and the completed ascents.
+    """
+    # longest first: near the rigid limit ground is the stiffest for the explicit method that references are made with
+    ends = [partial(try_first_end, trial) for trial in reversed(trials)]
+    postponed = [ascent for ascent in ascents if ascent.unfinished and long_runs]
+    long_runs_postponed = [
+        partial(long_run, ascent.trial, ascent.method, ascent.ladder[len(ascent.runs)]) for ascent in postponed
+    ]
+    calls: list[Callable[[], Any]] = [*ends, *long_runs_postponed]
+    results = in_order(calls, jobs)
+    first_ends: list[End | WalkEndsError] = [next(results) for _ in trials][::-1]
+    return first_ends, [
+        replace(ascent, runs=(*ascent.runs, next(results)), unfinished=False)
+        if ascent.unfinished and long_runs
+        else ascent
+        for ascent in ascents
+    ]
+
+
+def try_first_end(trial: Trial) -> End | WalkEndsError:
+    try:
+        return first_end(trial)
+    except WalkEndsError as problem:
+        return problem
+
+
+def long_run(trial: Trial, method: str, tolerance: float) -> MethodRun:
+    """Make a postponed run; it may be in a fresh process, so it warms up first."""
+    trial.prepare(method, tolerance, WARM_UP_BUDGET)()
+    return measure(trial, method, tolerance, RUN_BUDGET)
+
+
+def measure(trial: Trial, method: str, tolerance: float, budget: int) -> MethodRun:
+    """Time a walk up to `REPEATS` times within `REPEAT_TIME_S`."""
+    walk = trial.prepare(method, tolerance, budget)
+    first_s, result = time_walk(walk)
+    walls = [first_s] if first_s > REPEAT_TIME_S else []
+    while len(walls) < MAX_REPEATS and (not walls or sum(walls) + walls[-1] <= REPEAT_TIME_S):
+        walls.append(time_walk(walk)[0])
+    return MethodRun(tolerance, result, tuple(walls))
+
+
+def time_walk(walk: Callable[[], TrialRun]) -> tuple[float, TrialRun]:
+    start = time.perf_counter()
+    result = walk()
+    return time.perf_counter() - start, result
+
+
+def make_row(ascent: Ascent, run: MethodRun, reference: Reference) -> MethodRow:
+    end, result = reference.for_method(ascent.method), run.result
+    error = float(np.max(np.abs(result.state - end.state))) if result.state.size else None
+    below_agreement = error is not None and error <= reference.agreement
+    return MethodRow(
+        scene=ascent.trial.name,
+        method=ascent.method,
+        tolerance=run.tolerance,
+        outcome=result.outcome,
+        error=error,
+        against=end.method,
+        within_reference=below_agreement,
+        wall_s=median(run.walls_s),
+        least_wall_s=min(run.walls_s),
+        largest_wall_s=max(run.walls_s),
+        repeats_of_wall_s=len(run.walls_s),
+        rhs_evaluations=result.rhs_evaluations,
+        accepted=result.accepted,
+        rejected=result.rejected,
+    )
+
+
+def omitted_tolerances(ascent: Ascent) -> list[dict[str, Any]]:
+    """List the tolerances that were not run, with reasons."""
+    if ascent.unfinished:
+        why = f"more than {SHORT_RUN_BUDGET} right-hand sides, each in Python"
+    else:
+        last = ascent.runs[-1]
+        why = f"already {last.result.outcome} with {last.result.rhs_evaluations} right-hand sides at {last.tolerance:g}"
+    return [
+        {"scene": ascent.trial.name, "method": ascent.method, "tolerance": rtol, "why": why}
+        for rtol in ascent.ladder[len(ascent.runs) :]
+    ]

@@ -1,0 +1,119 @@
+"""Walks on which methods are measured: fixed start and step count, and one end state to compare."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from walkerlab.evidence.benchmarks.user_script import walk_as_a_script
+from walkerlab.evidence.paper.appendix_a import RigidWalker
+from walkerlab.outcome import Outcome
+from walkerlab.physics.hybrid.rigid_record import unwatched
+from walkerlab.physics.hybrid.rigid_walk import EVENTS as RIGID_EVENTS
+from walkerlab.physics.hybrid.rigid_walk import new_heel_strikes, walk
+from walkerlab.physics.kernels import uncompiled
+from walkerlab.physics.mechanics.rigid_model import RigidModel
+from walkerlab.physics.solvers.registry import METHODS, Tolerances, finder_for
+from walkerlab.physics.solvers.stepping import ACCEPTED, H_NEXT, REJECTED, RHS, clear_counts
+from walkerlab.physics.solvers.system import Floats
+
+if TYPE_CHECKING:
+    from walkerlab.physics.ground.walker import ContactWalker
+    from walkerlab.physics.hybrid.contact_events import JudgedGround
+
+USER_SCRIPT = "scipy-dop853-numpy"
+ATOL_PER_RTOL = 1e-2
+
+
+@dataclass(frozen=True)
+class TrialRun:
+    outcome: str
+    state: Floats  # at the end, empty if it was not reached
+    rhs_evaluations: int
+    accepted: int
+    rejected: int
+
+
+@dataclass(frozen=True)
+class RigidTrial:
+    """Walk of the rigid model; its end state follows the last impact."""
+
+    walker: RigidModel
+    start: tuple[float, ...]
+    steps: int
+    compass: RigidWalker | None = None  # the walker as Appendix A has it, which a user's script is for
+    name: str = "rigid"
+
+    @property
+    def methods(self) -> tuple[str, ...]:
+        """All methods of the registry, and a user's script where there is one."""
+        return (*METHODS, USER_SCRIPT) if self.compass is not None else tuple(METHODS)
+
+    def prepare(self, method: str, rtol: float, budget: int) -> Callable[[], TrialRun]:
+        """Return a function that walks with a method, ready to be timed; its calls share their memory."""
+        atol = rtol * ATOL_PER_RTOL
+        if method == USER_SCRIPT:
+            assert self.compass is not None, "the script is not among this walker's methods"
+            compass = self.compass
+
+            def as_a_script() -> TrialRun:
+                state, evaluations = walk_as_a_script(compass, self.start, self.steps, rtol, atol, budget)
+                ended = Outcome.BUDGET_EXHAUSTED if state is None else Outcome.WALKED
+                return TrialRun(ended.label, np.zeros(0) if state is None else state, evaluations, 0, 0)
+
+            return as_a_script
+        n, entry = len(self.walker.zero_state), METHODS[method]
+        solver = entry.new(n, rtol, atol, budget)
+        finder = finder_for(solver, RIGID_EVENTS, n)
+        walker, observer = np.asarray(self.walker), unwatched()
+        strikes = new_heel_strikes(self.steps, n, self.walker.kneed)
+        stride = walk if entry.compiled else uncompiled(walk)
+
+        def run() -> TrialRun:
+            clear_counts(solver)
+            solver.clock[H_NEXT] = 0.0
+            status, _ = stride(walker, solver, finder, observer, np.array(self.start), strikes)
+            return make_run(Outcome(status), strikes.after[-1], solver.counts)
+
+        return run
+
+
+@dataclass(frozen=True)
+class ContactTrial:
+    """Walk on compliant ground; its end state is that of the last touch."""
+
+    walker: ContactWalker
+    ground: JudgedGround
+    start: tuple[float, ...]
+    steps: int
+    name: str
+
+    @property
+    def methods(self) -> tuple[str, ...]:
+        return tuple(METHODS)
+
+    def prepare(self, method: str, rtol: float, budget: int) -> Callable[[], TrialRun]:
+        from walkerlab.physics.ground.terrain import STANCE_FOOT
+        from walkerlab.physics.hybrid.contact_result import walk_contact
+
+        scene = self.walker, self.ground, False, STANCE_FOOT, self.start
+        tolerances = Tolerances(method, rtol, rtol * ATOL_PER_RTOL, budget, track_energy=False)
+
+        def run() -> TrialRun:
+            result = walk_contact(*scene, tolerances, self.steps, None)
+            return make_run(result.outcome, np.array(result.end_state), result.work)
+
+        return run
+
+
+Trial = RigidTrial | ContactTrial
+"""A walk to measure methods by."""
+
+
+def make_run(outcome: Outcome, state: Floats, counts: Any) -> TrialRun:
+    """Build a run's record; without `Outcome.WALKED` it has no end state."""
+    end = state.copy() if outcome is Outcome.WALKED else np.zeros(0)
+    return TrialRun(outcome.label, end, int(counts[RHS]), int(counts[ACCEPTED]), int(counts[REJECTED]))

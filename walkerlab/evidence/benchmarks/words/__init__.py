@@ -1,0 +1,13 @@
+"""Templates for the conclusions on run times and errors, one file per stage."""
+
+from pathlib import Path
+
+from walkerlab.views.prose import Prose, f
+
+
+def plainly(number: float) -> str:
+    """Format three digits without a power of ten."""
+    return f"{float(f'{number:.3g}'):g}"
+
+
+words = Prose(Path(__file__).parent, (f, plainly), {})

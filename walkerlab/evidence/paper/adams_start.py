@@ -1,0 +1,132 @@
+"""The paper's ADAMS start (Table 2) in both models, and why that walk ends."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from walkerlab.evidence.paper.measured import TIGHT
+from walkerlab.evidence.paper.printed import adams_start_as_printed
+from walkerlab.evidence.paper.prose import prose
+from walkerlab.outcome import Outcome
+from walkerlab.physics.ground.walker import ContactWalker
+from walkerlab.physics.hybrid.comparison import Array
+from walkerlab.physics.hybrid.contact_result import ContactWalkResult, sampled_energies, sampled_feet
+from walkerlab.physics.hybrid.endings import FALLEN_HIP
+from walkerlab.physics.hybrid.recorded_walk import take_walk
+from walkerlab.physics.hybrid.rigid_measures import energies, reactions
+from walkerlab.physics.mechanics.rigid_model import RigidModel
+from walkerlab.physics.solvers.system import State
+
+FALLING = 4  # samples through which a falling hip's height is fitted as a cubic
+
+
+@dataclass(frozen=True)
+class AdamsStart:
+    """The ADAMS start in the rigid model.
+
+    state         rad and rad/s
+    slope         rad
+    energy        J, kinetic and potential, from the stance foot
+    weight        N
+    normal_force  N, of the ground at the start
+    pull_from     s, time from which the ground would have to pull; None if never
+    heel_strikes  number
+    end           outcome of the walk
+    end_time      s
+    """
+
+    state: State
+    slope: float
+    energy: float
+    weight: float
+    normal_force: float
+    pull_from: float | None
+    heel_strikes: int
+    end: str
+    end_time: float
+
+
+@dataclass(frozen=True)
+class AdamsWalk:
+    """The ADAMS start in the contact model.
+
+    terrain             of the contact model's ground
+    rigid               the same start in the rigid model, both feet on the config's slope
+    airborne_from       s, time from which no foot of the contact model touches; None if never
+    later_normal_force  N, largest one of the contact model once the rigid model's ground would have to pull
+    normal              (samples, leg) N, normal forces of the contact model
+    mechanical          (samples,) J, kinetic and potential energy of the contact model
+    """
+
+    terrain: str
+    rigid: AdamsStart
+    walk: ContactWalkResult
+    airborne_from: float | None
+    later_normal_force: float | None
+    normal: NDArray[np.float64]
+    mechanical: NDArray[np.float64]
+
+    @property
+    def reason(self) -> str:
+        """Why the walk ends, with numbers."""
+        return prose("adams_start.reason", self, int(self.walk.touch_time_s.size))
+
+
+def adams_start(walker: RigidModel, state: State) -> AdamsStart:
+    """Walk a step of the rigid model from Table 2's ADAMS start."""
+    walk = take_walk(walker, TIGHT, state, 1, sampled=True)
+    assert walk.samples is not None
+    time, states, start = walk.samples.time_s, walk.samples.state, np.array([state])
+    end = float(time[-1])
+    if walk.outcome is Outcome.FELL:  # the fall comes after the last sample, so extrapolate
+        hip = np.cos(states[-FALLING:, 1] + walker.slope) - FALLEN_HIP
+        end = float(np.polynomial.Polynomial.fit(hip, time[-FALLING:], FALLING - 1)(0.0))
+    return AdamsStart(
+        state=state,
+        slope=walker.slope,
+        energy=float(energies(walker, start).sum()),
+        weight=float(walker.mass * walker.gravity),
+        normal_force=float(reactions(walker, start)[0, 1]),
+        pull_from=first_below_zero(time, reactions(walker, states)[:, 1]),
+        heel_strikes=walk.steps,
+        end=walk.outcome.label,
+        end_time=end,
+    )
+
+
+def adams_walk(
+    walker: RigidModel, walk: Callable[[State], ContactWalkResult], contact: ContactWalker, terrain: str
+) -> AdamsWalk:
+    """Walk the contact model from Table 2's ADAMS start: the printed stance angle and velocities on the walker's slope.
+
+    walk     walks the contact model from a rigid start state, with samples
+    terrain  config name of its ground
+    """
+    _, theta_2, omega_1, omega_2 = adams_start_as_printed()
+    rigid = adams_start(walker, (-2.0 * walker.slope - theta_2, theta_2, omega_1, omega_2))
+    result = walk(rigid.state)
+    assert result.samples is not None
+    time, normal = result.samples.time_s, sampled_feet(contact, result.samples)[:, :, 2]
+    total = normal.sum(axis=1)
+    airborne = time[(total <= 0.0) & (time > 0.0)]
+    later = np.zeros(0) if rigid.pull_from is None else total[time >= rigid.pull_from]
+    return AdamsWalk(
+        terrain=terrain,
+        rigid=rigid,
+        walk=result,
+        airborne_from=float(airborne[0]) if airborne.size else None,
+        later_normal_force=float(later.max()) if later.size else None,
+        normal=normal,
+        mechanical=sampled_energies(contact, result.samples)[:, :2].sum(axis=1),
+    )
+
+
+def first_below_zero(time: Array, values: Array) -> float | None:
+    """Time at which sampled values first cross zero downwards, interpolated; None if they do not."""
+    below = np.flatnonzero(values < 0.0)
+    if below.size == 0:
+        return None
+    around = [int(below[0]), max(int(below[0]) - 1, 0)]
+    return float(np.interp(0.0, values[around], time[around]))

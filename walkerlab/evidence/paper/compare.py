@@ -1,0 +1,333 @@
+"""Stage `compare`: both models compared with each other and, for the paper's walker, with every number it prints."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from walkerlab.config.reads import CompareConfig
+from walkerlab.config.schema import Equations
+from walkerlab.evidence.paper.compared_releases import LOCK_OMISSION, compare_releases
+from walkerlab.evidence.paper.departures import departures
+from walkerlab.evidence.paper.errata import Erratum, errata
+from walkerlab.evidence.paper.law import is_own_walker
+from walkerlab.evidence.paper.measured import (
+    CYCLES,
+    ContactMeasurements,
+    Errors,
+    Measured,
+    RigidMeasurements,
+    characteristics,
+    measure_rigid_model,
+    over_last_steps,
+)
+from walkerlab.evidence.paper.printed import fixed_point_as_printed
+from walkerlab.evidence.paper.rows import NumberVerdict, count_verdicts, paper_rows, table_1, table_2, table_3
+from walkerlab.evidence.paper.study import study_the_paper
+from walkerlab.evidence.paper.walker import compass
+from walkerlab.labels import labels_of
+from walkerlab.physics.hybrid import comparison
+from walkerlab.physics.hybrid.recorded_walk import as_state
+from walkerlab.pipeline.progress import Progress
+from walkerlab.pipeline.stages.walk import LEG, STEP, TIME, last_step, legs, over_time
+from walkerlab.pipeline.store.columns import numbered, rows_group
+from walkerlab.pipeline.store.content import Content, Group, Variable
+from walkerlab.scene.contact import GAIT_TOLERANCES, contact_scene, require_contact, start_state
+
+STEPS_PER_STRIDE = 2  # steps
+START_TOLERANCE = 1e-6  # rad and rad/s: a start this far from the fixed point is another one
+EQUATION_SETS: tuple[Equations, ...] = ("as-printed", "corrected")
+PAPER_OMISSION = {
+    "what": "the paper's numbers, tables and errata",
+    "why": "they apply only to the paper's walker on even ground",
+}
+ALIGNMENTS = ("raw", "aligned", "between_impacts", "settled")
+QUANTITY_KEYS: dict[str, comparison.Quantity] = {"max_angle_error_rad": "angle", "max_velocity_error_rad_s": "velocity"}
+PHASE, ROW = "phase", "row"
+MODEL_NAMES = {
+    "as_printed": "rigid model, equations as printed",
+    "corrected": "rigid model, corrected equations",
+    "contact": "contact model",
+}
+COLUMN_NAMES = {
+    **MODEL_NAMES,
+    "quantity": "quantity",
+    "unit": "unit of the row's values",
+    "where": "location in the paper",
+    "paper": "in the paper",
+    "used": "as used here",
+    "paper_matlab": "the paper's MATLAB model",
+    "paper_adams": "the paper's MSC ADAMS model",
+    "paper_percent": "difference rate as printed",
+    "paper_matlab_text": "the paper's MATLAB model, as text",
+    "paper_adams_text": "the paper's MSC ADAMS model, as text",
+    "paper_percent_text": "difference rate, as text",
+    "percent_of_matlab": "difference in percent of the MATLAB value",
+    "percent_of_adams": "difference in percent of the ADAMS value",
+    "printed": "as printed",
+    "verdict": ", ".join(NumberVerdict),
+    "evidence": "evidence",
+}
+"""Long names of the columns in the paper's numbers and tables."""
+
+
+def run(config: CompareConfig, inputs: Mapping[str, Content], progress: Progress) -> Content:
+    """Compare the walks of both models and, if walker and ground are the paper's, both models with the paper."""
+    papers = is_own_walker(config) and config.ground.even
+    progress.start("compare", 3 if papers else 2)
+    motion = compare_motion(motion_of(inputs["simulate"]), motion_of(inputs["contact-sim"]))
+    walks = {"rigid": inputs["simulate"].summary, "contact": inputs["contact-sim"].summary}
+    errors = {model: walk["numerical_error"] for model, walk in walks.items() if "numerical_error" in walk}
+    shared = motion.summary | ({"numerical_error": errors} if errors else {})
+    progress.advance()
+    if papers:
+        groups, summary = against_the_paper(config, inputs, motion, progress)
+    else:
+        groups, summary = {}, models_compared(config, inputs)
+    progress.advance()
+    left_out = [*summary.pop("left_out"), *motion.left_out]
+    return Content({**groups, **motion.groups}, {**summary, **shared, "left_out": left_out})
+
+
+def against_the_paper(
+    config: CompareConfig, inputs: Mapping[str, Content], motion: Comparison, progress: Progress
+) -> tuple[dict[str, Group], dict[str, Any]]:
+    """Compare both models with the paper's numbers, tables and errata; returns groups and summary."""
+    study = study_the_paper()
+    progress.advance()
+    measured = measure(config, inputs, motion)
+    judged_rows, paper_errata = tuple(paper_rows(measured, study)), errata(study)
+    rows = [vars(row) for row in judged_rows]
+    tables = {"table1": table_1(measured, study), "table2": table_2(measured), "table3": table_3(measured)}
+    groups = {name: numbers_group(list(table.values()), table) for name, table in tables.items()}
+    groups |= {"paper_numbers": numbers_group(rows), "errata": rows_group(paper_errata, labels_of(Erratum))}
+    return groups, {
+        "paper_numbers": rows,
+        "verdicts": count_verdicts(judged_rows),
+        **tables,
+        "errata": [vars(erratum) for erratum in paper_errata],
+        "departures": list(measured.departures.contact),
+        "left_out": left_out(inputs, measured),
+    }
+
+
+def models_compared(config: CompareConfig, inputs: Mapping[str, Content]) -> dict[str, Any]:
+    """Summarise the walks of both models, and for knees the walks with either release."""
+    gait, rigid, contact = (inputs[name].summary for name in ("fixedpoint", "simulate", "contact-sim"))
+    releases = compare_releases(config, as_state(gait["state"]), float(contact["pitch_m"]))
+    return {
+        "steps": {
+            "rigid": last_step(rigid),
+            "contact": {**last_step(contact), "slip_m": contact["slip_per_step_m"]},
+            "gait": {
+                "period_s": gait.get("period_s"),
+                "length_m": gait.get("step_length_m"),
+                **({"knee_strike_s": gait["knee_strike_s"]} if "knee_strike_s" in gait else {}),
+            },
+        },
+        "outcomes": {"rigid": rigid["outcome"], "contact": contact["outcome"]},
+        "dissipated_J": contact["dissipated_J"],
+        "departures": list(departures(config, start_moved=False).contact),
+        **({} if releases is None else {"releases": releases}),
+        "left_out": [PAPER_OMISSION, *(() if releases is None else LOCK_OMISSION)],
+    }
+
+
+def stored_variable(walk: Content, group: str, name: str) -> comparison.Array | None:
+    """Variable of a stored walk, or None."""
+    variables = walk.groups.get(group, Group({}))
+    return variables[name] if name in variables.variables else None
+
+
+def times_of_steps(walk: Content, name: str) -> comparison.Array:
+    """Times (s) stored per step of a walk; empty if there are none."""
+    times = stored_variable(walk, "steps", name)
+    return np.zeros(0) if times is None else times
+
+
+def motion_of(walk: Content) -> comparison.Motion | None:
+    """Motion of the legs in a stored walk; None if states were not stored or the walk ended at once."""
+    angle = stored_variable(walk, "trajectory", "angle")
+    if angle is None or len(angle) < 2:
+        return None
+    trajectory, strikes = walk["trajectory"], times_of_steps(walk, "knee_strike_time_s")
+    touches = times_of_steps(walk, "touch_time_s")
+    motion = comparison.Motion(trajectory["time"], angle, trajectory["velocity"], touches, strikes[strikes > 0.0])
+    return comparison.sampled_at_strikes(motion)
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Difference between the walks of both models.
+
+    errors    by alignment, where there is something to compare
+    orbit     distance between each leg's orbits, or None
+    left_out  comparisons left out, and why
+    """
+
+    errors: Errors
+    orbit: list[float] | None = None
+    groups: Mapping[str, Group] = field(default_factory=dict)
+    left_out: tuple[dict[str, str], ...] = ()
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """Largest errors of both legs by alignment; None where there is nothing to compare."""
+        errors: dict[str, Any] = {}
+        for name, quantity in QUANTITY_KEYS.items():
+            per_leg = {way: self.errors[way].largest(quantity) if way in self.errors else None for way in ALIGNMENTS}
+            errors[name] = {way: max(both) if both else None for way, both in per_leg.items()} | {"per_leg": per_leg}
+        orbit = None if self.orbit is None else max(self.orbit)
+        return {**errors, "orbit_distance": orbit, "orbit_distance_per_leg": self.orbit}
+
+
+def compare_motion(rigid: comparison.Motion | None, contact: comparison.Motion | None) -> Comparison:
+    """Subtract the rigid walk from the contact walk: in time, in phase, and as orbits."""
+    if rigid is None or contact is None:
+        why = "there are no states of both walks: outputs omits them, or a walk ended at once"
+        return Comparison({}, left_out=({"what": "differences of the walks", "why": why},))
+    steps, orbit = min(rigid.steps, contact.steps), None
+    time, raw = comparison.difference_in_time(contact, rigid)
+    errors = {"raw": raw}
+    groups = {"errors": Group({**over_time(time=time), **legs(), **differences("raw", raw, (TIME, LEG), "time")})}
+    missing = ("differences in phase and between the orbits", "step")
+    if steps:
+        missing = ("differences of the last stride and between the orbits", "stride")
+        phases = np.linspace(0.0, 1.0, comparison.PHASES)
+        aligned = comparison.difference_in_phase(contact, rigid, phases)
+        smooth = comparison.between_impacts(contact, rigid, phases)
+        errors |= {"aligned": aligned, "between_impacts": select(aligned, smooth)}
+        coordinates = {
+            **numbered(len(aligned.angle), STEP, "step number"),
+            PHASE: Variable(phases, (PHASE,), "1", "time within the step over the step's period"),
+            **legs(),
+        }
+        in_phase = differences("aligned", aligned, (STEP, PHASE, LEG), "phase")
+        groups["aligned"] = Group({**coordinates, **in_phase}, {"impact_phase": comparison.IMPACT_PHASE})
+        if steps >= STEPS_PER_STRIDE:
+            last = slice(-STEPS_PER_STRIDE, None)
+            errors["settled"] = select(select(aligned, last), smooth[last])
+            distances = comparison.orbit_distances(contact, rigid)
+            text = "Hausdorff distance of the last stride's orbits, angle and velocity in units of the rigid orbit's "
+            groups["orbit"] = Group({**legs(), "orbit_distance": Variable(distances, (LEG,), "1", f"{text}ranges")})
+            orbit = distances.tolist()
+    what, needed = missing
+    lacking = {"what": what, "why": f"no {needed} was completed by both models"}
+    return Comparison(errors, orbit, groups, () if steps >= STEPS_PER_STRIDE else (lacking,))
+
+
+def select(difference: comparison.WalkDifference, where: Any) -> comparison.WalkDifference:
+    return comparison.WalkDifference(difference.angle[where], difference.velocity[where])
+
+
+def differences(
+    way: str, difference: comparison.WalkDifference, dims: tuple[str, ...], alignment: str
+) -> dict[str, Variable]:
+    """Differences at the same time or phase, as variables."""
+    meaning = f"contact less rigid model, at the same {alignment}"
+    return {
+        f"{way}_angle_error_rad": Variable(difference.angle, dims, "rad", f"angle, {meaning}"),
+        f"{way}_velocity_error_rad_s": Variable(difference.velocity, dims, "rad/s", f"velocity, {meaning}"),
+    }
+
+
+def measure(config: CompareConfig, inputs: Mapping[str, Content], motion: Comparison) -> Measured:
+    """Measure everything that the paper's numbers are compared with."""
+    sets = inputs["fixedpoint"].summary["equation_sets"]
+    gaits = {name: sets[name] for name in EQUATION_SETS if "state" in sets.get(name, {})}
+    models: dict[str, RigidMeasurements] = {
+        name: measure_rigid_model(compass(config, name), as_state(gait["state"])) for name, gait in gaits.items()
+    }
+    contact, model = measure_contact_model(config, inputs["contact-sim"]), models.get(config.equations)
+    start_moved = contact.start is not None and (
+        model is None or bool(np.abs(np.subtract(contact.start, model.state)).max() > START_TOLERANCE)
+    )
+    return Measured(
+        walker=compass(config, config.equations),
+        equations=config.equations,
+        models=models,
+        spectral_radii={name: float(gait["spectral_radius"]) for name, gait in gaits.items()},
+        contact=contact,
+        errors=motion.errors,
+        departures=departures(config, start_moved),
+    )
+
+
+def measure_contact_model(config: CompareConfig, walk: Content) -> ContactMeasurements:
+    """Measure what is compared with the paper's ADAMS model."""
+    summary, pitch = walk.summary, float(walk.summary["pitch_m"])
+    periods, lengths = np.array(summary["step_periods_s"]), np.array(summary["step_lengths_m"])
+    stride = STEPS_PER_STRIDE * (lengths.size // STEPS_PER_STRIDE)
+    angle, joules = (stored_variable(walk, "trajectory", name) for name in ("angle", "mechanical_J"))
+    touches = times_of_steps(walk, "touch_time_s")
+    energy = None if joules is None else over_last_steps(walk["trajectory"]["time"], joules, touches)
+    # from x_p with its printed digits, both feet on the config's slope
+    _, theta_2, omega_1, omega_2 = fixed_point_as_printed()
+    scene = contact_scene(config, pitch, pitch)
+    start = start_state(scene, (-2.0 * config.slope_rad - theta_2, theta_2, omega_1, omega_2))
+    from_x_p = scene.walk(start, 2 * CYCLES, GAIT_TOLERANCES)
+    return ContactMeasurements(
+        law=require_contact(config),
+        foot_radius=config.walker.foot_radius_m,
+        summary=summary,
+        # leg 0 swings first, as in the rigid model's state
+        start=None if angle is None else as_state([*angle[0], *walk["trajectory"]["velocity"][0]]),
+        table_3=characteristics(periods, lengths, None if energy is None else energy.mean),
+        step_length=float(lengths[stride - STEPS_PER_STRIDE : stride].mean()) if stride else None,
+        energy=energy,
+        from_x_p=(from_x_p.steps, from_x_p.outcome.label),
+    )
+
+
+def left_out(inputs: Mapping[str, Content], measured: Measured) -> list[dict[str, str]]:
+    """List the comparisons with the paper that could not be made, with reasons."""
+    sets = inputs["fixedpoint"].summary["equation_sets"]
+    missing = [
+        {"what": f"columns of the {name} equations", "why": str(sets.get(name, {}).get("reason", "no gait was found"))}
+        for name in EQUATION_SETS
+        if name not in measured.models
+    ]
+    contact = measured.contact
+    if contact.table_3.t_cycle is None:
+        why = f"a stride takes two steps, but the walk ended after {contact.steps} ({contact.outcome})"
+        missing.append({"what": "a stride of the contact model in Table 3", "why": why})
+    if contact.table_3.E_avg is None:
+        why = "no step was completed" if contact.steps == 0 else "outputs omits energies"
+        missing.append({"what": "energy of the contact model", "why": why})
+    return missing
+
+
+def numbers_group(rows: Sequence[Mapping[str, Any]], names: Sequence[str] | Mapping[str, Any] = ()) -> Group:
+    """Build a group with the paper's numbers and those of the models.
+
+    A model's column holds only the rows with a value; its own coordinate lists these rows. Texts cover all rows.
+
+    names  symbols of the rows, if they have any
+    """
+    unit = "see the column of units"
+    variables = numbered(len(rows), ROW, "row")
+    if names:
+        variables["name"] = texts(list(names), "symbol of the row")
+    for name in rows[0]:
+        values, meaning = [row[name] for row in rows], COLUMN_NAMES[name]
+        if name in MODEL_NAMES:
+            variables[f"{name}_text"] = texts(["" if x is None else f"{x:.10g}" for x in values], f"{meaning}, as text")
+            rows_with_value = [row for row, value in enumerate(values) if value is not None]
+            if rows_with_value:
+                dim = f"{name}_{ROW}"
+                variables[dim] = Variable(np.array(rows_with_value), (dim,), "1", f"rows with a number: {meaning}")
+                variables[name] = Variable(
+                    np.array([values[row] for row in rows_with_value], float), (dim,), unit, meaning
+                )
+        elif isinstance(values[0], str):
+            variables[name] = texts(values, meaning)
+        else:
+            variables[name] = Variable(np.array(values, dtype=float), (ROW,), unit, meaning)
+    return Group(variables)
+
+
+def texts(values: Sequence[str], long_name: str) -> Variable:
+    return Variable(np.array(values, dtype=object), (ROW,), "", long_name)

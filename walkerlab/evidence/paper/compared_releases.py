@@ -1,0 +1,69 @@
+"""Contact walks from one gait that differ only in when the trailing knee is released.
+
+Each is compared with the corresponding rigid model: released during compression the trailing knee is rigid in the
+impact, released at first touch it is free.
+"""
+
+from dataclasses import replace
+from typing import Any
+
+from walkerlab.config.reads import ContactConfig
+from walkerlab.physics.ground.walker import changed_forms
+from walkerlab.physics.hybrid.contact_result import ContactWalkResult, by_channel
+from walkerlab.physics.hybrid.recorded_walk import take_walk
+from walkerlab.physics.mechanics.rigid import standing
+from walkerlab.physics.solvers.registry import Tolerances
+from walkerlab.physics.solvers.system import State
+from walkerlab.pipeline.stages.walk import last_step, numbers_of
+from walkerlab.scene.contact import ContactScene, contact_scene, start_state
+from walkerlab.scene.parts import assembly_of, drive_parameters
+
+RELEASES = {"compression": False, "touch": True}
+"""Whether the knee is released at the leading foot's first touch, by the config's name for the release."""
+CONTACT_STEPS = 20  # enough to settle on another gait, or to fall
+RIGID_STEPS = 200
+RIGID_TOLERANCES, CONTACT_TOLERANCES = (
+    Tolerances("dop853", 1e-8, 1e-10, 2_000_000),
+    Tolerances("radau5", 1e-8, 1e-10, 2_000_000),
+)
+LOCK_OMISSION = (
+    {
+        "what": "ideal against compliant lock",
+        "why": "a walk has one lock; try the other by `walkerlab contact-sim --set walker.knee.lock=compliant`",
+        "saves": "compiling the contact walk a second time",
+    },
+)
+
+
+def compare_releases(config: ContactConfig, state: State, pitch_m: float) -> dict[str, Any] | None:
+    """Walk up to 20 steps from a gait with each release; None without knees, or if they wait for a push-off.
+
+    state    of the rigid model
+    pitch_m  unit of lengths
+    """
+    scene = contact_scene(config, pitch_m, pitch_m)
+    if not scene.walker.kneed or config.push_off.impulse_N_s != 0.0:
+        return None
+    releases = {}
+    for name, at_touch in RELEASES.items():
+        released = replace(scene, walker=changed_forms(scene.walker, release_at_touch=at_touch))
+        walk = released.walk(start_state(scene, state), CONTACT_STEPS, CONTACT_TOLERANCES)
+        model = standing(assembly_of(config.walker, rigid=True), config.gravity_m_s2, config.slope_rad, not at_touch)
+        rigid = take_walk(model.changed(**drive_parameters(config)), RIGID_TOLERANCES, state, RIGID_STEPS)
+        last = {"period_s": float(rigid.periods_s[-1]), "length_m": float(rigid.lengths_m[-1])} if rigid.steps else {}
+        of_rigid = {"outcome": rigid.outcome.label, "steps": rigid.steps, "of": RIGID_STEPS, **last}
+        releases[name] = {**walk_report(scene, walk), "rigid": of_rigid}
+    return releases
+
+
+def walk_report(scene: ContactScene, walk: ContactWalkResult) -> dict[str, Any]:
+    """Summarise a walk: outcome, last step, knee strike, and dissipation per step by channel."""
+    steps, lost = walk.steps, by_channel(scene.walker, walk.dissipated_J)
+    return {
+        "outcome": walk.outcome.label,
+        "steps": steps,
+        "of": CONTACT_STEPS,
+        "knee_strike_s": None,
+        **last_step(numbers_of(walk)),
+        "dissipated_J_per_step": {name: joules / steps for name, joules in lost.items()} if steps else None,
+    }

@@ -1,0 +1,30 @@
+"""Errata of the paper, with evidence and measurements (made in `study`)."""
+
+import re
+from dataclasses import dataclass, fields
+from typing import Annotated
+
+from walkerlab.evidence.paper.prose import prose
+from walkerlab.evidence.paper.study import PaperStudy
+from walkerlab.labels import Label
+
+
+@dataclass(frozen=True)
+class Erratum:
+    """An error of the paper."""
+
+    where: Annotated[str, Label("", "where the paper errs")]
+    printed: Annotated[str, Label("", "as printed")]
+    right: Annotated[str, Label("", "as it should be")]
+    evidence: Annotated[str, Label("", "by which argument")]
+    measured: Annotated[str, Label("", "numbers of that argument, from this run")]
+
+
+ERRATUM_PARTS = [field.name for field in fields(Erratum)]
+ERRATUM_PATTERN = re.compile(" ".join(rf"{name}: (?P<{name}>.*?)" for name in ERRATUM_PARTS) + r"(?= where: |$)")
+"""Matches an erratum in the rendered template."""
+
+
+def errata(study: PaperStudy) -> tuple[Erratum, ...]:
+    """All errata, by theme and then in the order of the paper's sections."""
+    return tuple(Erratum(**found.groupdict()) for found in ERRATUM_PATTERN.finditer(prose("errata.errata", study)))

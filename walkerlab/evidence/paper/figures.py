@@ -1,0 +1,140 @@
+"""Figures on the paper's claim: 8, the difference between both models' walks, and 12, the rigid limit."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import numpy as np
+
+from walkerlab.evidence.paper.printed import LARGEST_ERROR
+from walkerlab.views.figures.canvas import add_legend, blank, cost_axis, entry, error_axis, label_of, power_of_ten
+from walkerlab.views.figures.illustration import Drawn, Need, Results, paper_figure
+from walkerlab.views.figures.style import BLACK, BLUE, GREY, ORANGE, RIGID, VERMILLION, Look
+from walkerlab.views.figures.walks import (
+    COMPARE_STAGE,
+    NO_STATES,
+    RIGID_STAGE,
+    STEPS_TAKEN_RIGID,
+    TUNE_STAGE,
+    claims_in,
+    line,
+    shown,
+    strike_entry,
+    time_axes,
+    walk_of,
+)
+
+TIME_LOOK: Final = Look("difference at the same time", VERMILLION, (0.0, (3.2, 1.4)), 1.2, "", order=3)
+PHASE_LOOK: Final = Look("at the same phase of a step", BLACK, "-", 1.2, "", order=4)
+PAPER_ERROR: Final = Look("largest error in the paper", GREY, ":", 1.6, "", order=2)
+AXIS_MARGIN = 3.0
+"""Factor between the extreme errors and the ends of the axis."""
+ZERO_CROSSING = 1e-3
+"""Smallest error shown, as a share of the largest: errors vanish where the difference changes sign."""
+LEG_QUANTITIES = (
+    ("a", "angle", "angle_error_rad"),
+    ("b", "angular velocity", "velocity_error_rad_s"),
+)
+"""Compared quantities: letter, name, variable of the errors (stored raw and aligned)."""
+RAW_ERRORS = Need(COMPARE_STAGE, "errors", ("time", *(f"raw_{name}" for _, _, name in LEG_QUANTITIES)), NO_STATES)
+ALIGNED_ERRORS = Need(
+    COMPARE_STAGE,
+    "aligned",
+    ("phase", *(f"aligned_{name}" for _, _, name in LEG_QUANTITIES)),
+    "no step was completed by both models",
+)
+
+
+def draw_differences(results: Results) -> Drawn:
+    """Plot the errors of each leg's angle and angular velocity over the rigid walk's steps, on logarithmic scales.
+
+    The caption gets the largest errors in time and in phase, and the paper's.
+    """
+    (rigid,), _ = shown([walk_of(results[RIGID_STAGE], RIGID)])
+    raw, aligned = (results[COMPARE_STAGE][need.group] for need in (RAW_ERRORS, ALIGNED_ERRORS))
+    claimed, early = bool(claims_in(results)), raw["time"] <= rigid.time[-1]
+    figure, axes = time_axes(4, 1.55, [rigid])
+    rows = [(*quantity, leg) for quantity in LEG_QUANTITIES for leg in (0, 1)]
+    for panel, (letter, words, name, leg) in zip(axes, rows, strict=True):
+        raw_error = np.abs(raw[f"raw_{name}"][early, leg])
+        aligned_error = np.abs(aligned[f"aligned_{name}"][: rigid.strikes.size, :, leg])
+        line(panel, raw["time"][early], raw_error, TIME_LOOK)
+        for begin, end, error in zip((0.0, *rigid.strikes), rigid.strikes, aligned_error, strict=False):
+            line(panel, begin + (end - begin) * aligned["phase"], error, PHASE_LOOK)
+        largest = max(float(raw_error.max()), float(aligned_error.max()))
+        bottom, top = ZERO_CROSSING * largest, AXIS_MARGIN * largest
+        if claimed:
+            panel.axhline(LARGEST_ERROR.value, **PAPER_ERROR.line)
+            bottom, top = min(LARGEST_ERROR.value / AXIS_MARGIN, bottom), max(AXIS_MARGIN * LARGEST_ERROR.value, top)
+        panel.set_yscale("log", subs=[])
+        panel.yaxis.set_major_formatter(power_of_ten)
+        panel.set(ylim=(bottom, top), ylabel=label_of("error", raw.variables[f"raw_{name}"].units))
+        panel.set_title(f"({letter}{leg + 1}) {words} of leg {leg + 1}")
+    looks = [TIME_LOOK, PHASE_LOOK, *([PAPER_ERROR] if claimed else [])]
+    add_legend(figure, [*(entry(look.label, **look.line) for look in looks), strike_entry(rigid.look)])
+    caption_values = []
+    for _, words, name in LEG_QUANTITIES:
+        at_once, in_phase = np.abs(raw[f"raw_{name}"]).max(), np.abs(aligned[f"aligned_{name}"]).max()
+        caption_values.append((words, at_once, in_phase, raw.variables[f"raw_{name}"].units))
+    return figure, (caption_values, LARGEST_ERROR.text if claimed else "")
+
+
+ALIGNED_ANGLE, NUMERICAL_ERROR, RUN_TIME = "angle_error_rad", "numerical_time_s", "wall_s"
+LIMITS: Final = (("limit/all", "(a) feet as they are"), ("limit/all-point-foot", "(b) point feet"))
+ERROR_LOOKS: Final = {
+    "raw_angle_error_rad": Look("angle at the same time (rad)", VERMILLION, ":", 1.2, "v"),
+    ALIGNED_ANGLE: Look("angle in phase (rad)", BLUE, "-", 1.6, "o"),
+    "velocity_error_rad_s": Look("angular velocity in phase (rad/s)", ORANGE, "--", 1.4, "s"),
+    NUMERICAL_ERROR: Look("numerical error, last touch (s)", GREY, "-.", 1.0, "x"),
+}
+LIMIT_NEED = Need(TUNE_STAGE, LIMITS[0][0], (RUN_TIME, *ERROR_LOOKS), "there is no gait to take to the rigid limit")
+CLAIM_LINE: Final[dict[str, Any]] = {"color": BLACK, "linestyle": (0.0, (1.0, 2.0)), "linewidth": 1.0}
+CONFIG_MARKER: Final[dict[str, Any]] = {
+    "color": BLACK,
+    "linestyle": "",
+    "marker": "o",
+    "markersize": 9,
+    "fillstyle": "none",
+}
+MIN_ERROR = 1e-14
+"""Shown for a numerical error of zero, which a logarithmic axis cannot show."""
+
+
+def draw_limit(results: Results) -> Drawn:
+    """Plot errors over run time, one point per setting, from the config's contact to the most rigid one.
+
+    The caption gets the totals, also with point feet, the paper's claim, and whether the walker pushes off.
+    """
+    figure, claimed = blank(3.6), bool(claims_in(results))
+    # the series with point feet is absent for walkers whose feet roll in both models
+    stored = results[TUNE_STAGE].groups
+    stored_series = [
+        (stored[name], title) for name, title in LIMITS if name in stored and ALIGNED_ANGLE in stored[name].variables
+    ]
+    panels = figure.subplots(1, len(stored_series), sharex=True, sharey=True, squeeze=False)[0]
+    for axes, (rows, title) in zip(panels, stored_series, strict=True):
+        for name, look in ERROR_LOOKS.items():
+            values = np.maximum(np.abs(rows[name]), MIN_ERROR)
+            axes.plot(rows[RUN_TIME], values, **look.line, marker=look.marker, markersize=4)
+            if name != NUMERICAL_ERROR:
+                axes.plot(rows[RUN_TIME][:1], values[:1], **CONFIG_MARKER)
+        cost_axis(axes)
+        error_axis(axes)
+        axes.set(title=title if len(stored_series) > 1 else "", xlabel="run time of the walk (s)")
+        if claimed:
+            axes.axhline(LARGEST_ERROR.value, **CLAIM_LINE)
+    panels[0].set_ylabel("error")
+    key = [entry(look.label, **look.line, marker=look.marker, markersize=4) for look in ERROR_LOOKS.values()]
+    if claimed:
+        key.append(entry("the paper's claim", **CLAIM_LINE))
+    add_legend(figure, [*key, entry("the config's contact", **CONFIG_MARKER)])
+    first, *point_feet = [rows[ALIGNED_ANGLE] for rows, _ in stored_series]
+    claim = LARGEST_ERROR.text if claimed else ""
+    pushes = results[TUNE_STAGE].identity.config_slice["push_off"]["impulse_N_s"] != 0.0
+    return figure, (first[0], first[-1], point_feet[0][-1] if point_feet else None, claim, pushes)
+
+
+FIGURES = (
+    paper_figure(8, (RAW_ERRORS, ALIGNED_ERRORS, STEPS_TAKEN_RIGID), draw_differences),
+    paper_figure(12, (LIMIT_NEED,), draw_limit),
+)

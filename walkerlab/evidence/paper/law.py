@@ -1,0 +1,28 @@
+"""The study's contribution to scenes (see scene/studies.py): its walker, and Appendix A's sign error as a torque.
+
+Every result of the rigid model depends on this file, so the rest of the study is kept in others.
+"""
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from walkerlab.config.numbers import same
+from walkerlab.config.walkers import CompassWalker, is_passive_compass
+from walkerlab.physics.mechanics.rigid_model import STANCE, SWING, RigidModel
+
+
+def is_own_walker(config: Any) -> bool:
+    """Whether a config has the paper's walker, up to rounding of its values."""
+    walker, paper = config.walker, CompassWalker()
+    return is_passive_compass(config) and all(
+        same(getattr(walker, name), getattr(paper, name)) for name in CompassWalker.model_fields
+    )
+
+
+def as_printed(model: RigidModel) -> RigidModel:
+    """Return a compass whose centrifugal torque on the stance leg, C_21 dtheta_1, has the sign printed in (A.5)."""
+    return model.changed(unpaired=-2.0 * model.A[STANCE, SWING])
+
+
+LAWS: Mapping[str, Callable[[RigidModel], RigidModel]] = {"as-printed": as_printed}
+"""Changes of a walker's model, by the config's name for a set of equations."""

@@ -1,0 +1,24 @@
+"""Parts of the paper's adjustment that a config leaves out, known before anything is loaded or run."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from walkerlab.config.walkers import is_passive_compass
+from walkerlab.evidence.paper.law import is_own_walker
+from walkerlab.scene.omissions import Entry, omission
+
+if TYPE_CHECKING:
+    from walkerlab.config.reads import RigidConfig
+
+COMPASS_ONLY = "the paper uses it for its compass only"
+
+
+def adjustment_omissions(config: RigidConfig) -> tuple[Entry, ...]:
+    """Return the omissions for a walker other than the paper's compass."""
+    entries = []
+    if not is_passive_compass(config):
+        entries.append(omission("the first step with a hinged stance foot", COMPASS_ONLY, "two walks"))
+    if not is_own_walker(config):
+        entries.append(omission("the paper's start of its ADAMS model", "only that compass has it", "a walk"))
+    return tuple(entries)

@@ -1,0 +1,200 @@
+"""Numbers that the paper prints, with their sources, and the walker they describe."""
+
+from dataclasses import dataclass
+from decimal import ROUND_DOWN, ROUND_HALF_UP, Decimal
+from typing import Final
+
+from walkerlab.config.contact import Contact
+from walkerlab.evidence.paper.appendix_a import RigidWalker
+from walkerlab.physics.ground.resting import RestingFoot, resting_foot
+
+COORDINATES: Final = ("theta_1", "theta_2", "dtheta_1", "dtheta_2")
+COORDINATE_UNITS: Final = ("rad", "rad", "rad/s", "rad/s")
+
+
+@dataclass(frozen=True)
+class Printed:
+    """A number of the paper.
+
+    where    equation, table, figure or section
+    text     as printed, which shows its last digit
+    """
+
+    where: str
+    quantity: str
+    unit: str
+    text: str
+
+    @property
+    def value(self) -> float:
+        """Value in the printed unit."""
+        return float(number(self.text))
+
+    @property
+    def last_digit(self) -> float:
+        """One unit in the last printed digit."""
+        exponent = number(self.text).as_tuple().exponent
+        return 10.0 ** int(exponent)
+
+    @property
+    def rounding(self) -> tuple[float, float]:
+        """Smallest and largest value that rounds to it."""
+        half = 0.5 * self.last_digit
+        return self.value - half, self.value + half
+
+    def agreement(self, value: float | None) -> str:
+        """How a value agrees to the printed digits: 'rounded', 'cut off', or '' if it does not."""
+        if value is None:
+            return ""
+        expected, decimal = number(self.text), Decimal(repr(float(value)))
+        last = Decimal(1).scaleb(int(expected.as_tuple().exponent))
+        if decimal.quantize(last, ROUND_HALF_UP) == expected:
+            return "rounded"
+        return "cut off" if decimal.quantize(last, ROUND_DOWN) == expected else ""
+
+
+NUMBER_WORDS: Final = {"one": "1", "five": "5", "zero": "0"}
+
+
+def number(text: str) -> Decimal:
+    """Parse a text such as '-0.60', '+41%', '< 1 %', '10^5', '1e-4' or 'five'."""
+    plain = text.replace("less than", "").strip("<+% ")
+    return Decimal(NUMBER_WORDS.get(plain, plain.replace("10^", "1e")))
+
+
+X_P: Final = tuple(
+    Printed("eq. 11, Table 2", f"x_p, {name}", unit, text)
+    for name, unit, text in zip(COORDINATES, COORDINATE_UNITS, ("-0.2022", "0.1674", "-0.60", "-0.84"), strict=True)
+)
+
+TABLE_1: Final = (
+    Printed("Table 1", "length of legs, L", "m", "1"),
+    Printed("Table 1", "mass of legs, m", "kg", "5"),
+    Printed("Table 1", "mass of hip, MH", "kg", "10"),
+    Printed("Table 1", "gravity, g", "m/s^2", "9.81"),
+)
+
+
+@dataclass(frozen=True)
+class PrintedRow:
+    name: str
+    matlab: Printed
+    adams: Printed
+
+
+@dataclass(frozen=True)
+class StartRow(PrintedRow):
+    percent: Printed
+
+    @property
+    def raised(self) -> float:
+        return self.adams.value / self.matlab.value
+
+    @property
+    def percent_of_matlab(self) -> float:
+        """Increase in magnitude from MATLAB to ADAMS, relative to the MATLAB value, in percent."""
+        return self._percent_of(self.matlab)
+
+    @property
+    def percent_of_adams(self) -> float:
+        """The same, relative to the ADAMS value, in percent."""
+        return self._percent_of(self.adams)
+
+    def _percent_of(self, base: Printed) -> float:
+        return 100.0 * (abs(self.adams.value) - abs(self.matlab.value)) / abs(base.value)
+
+
+TABLE_2: Final = tuple(
+    StartRow(
+        name,
+        matlab,
+        Printed("Table 2", f"{name}, MSC ADAMS", matlab.unit, adams),
+        Printed(where, f"{name}, difference rate", "%", percent),
+    )
+    for name, matlab, adams, where, percent in (
+        ("theta_1", X_P[0], "-0.2021", "Table 2", "+0.1%"),
+        ("theta_2", X_P[1], "0.1670", "Table 2", "+0.15%"),
+        ("dtheta_1", X_P[2], "-1.02", "Table 2, section 4", "+41%"),
+        ("dtheta_2", X_P[3], "-3.20", "Table 2, section 4", "+74%"),
+    )
+)
+"""The MATLAB column is x_p; section 4 repeats the percentages of the velocities."""
+
+
+TABLE_3: Final = tuple(
+    PrintedRow(
+        name,
+        Printed("Table 3", f"{quantity}, {name}, MATLAB", unit, matlab),
+        Printed("Table 3", f"{quantity}, {name}, MSC ADAMS", unit, adams),
+    )
+    for name, quantity, unit, matlab, adams in (
+        ("t_left", "left step period", "s", "0.60", "0.59"),
+        ("t_right", "right step period", "s", "0.79", "0.77"),
+        ("t_cycle", "one cycle period", "s", "1.39", "1.38"),
+        ("v_com", "average velocity", "m/s", "0.0246", "0.0248"),
+        ("E_avg", "average mechanical energy (5 steps)", "J", "150.13", "150.14"),
+    )
+)
+T_LEFT, T_RIGHT, T_CYCLE, V_COM, E_AVG = TABLE_3
+
+EIGENVALUES: Final = Printed("section 3.3", "largest eigenvalue of P of a stable gait", "1", "less than one")
+LEG_INERTIA: Final = Printed("section 4, Fig. 4a", "inertia of the links", "kg m^2", "zero")
+FOOT_RADIUS: Final = Printed("section 4, Fig. 3", "radius of the foot points", "mm", "1")
+STIFFNESS: Final = Printed("section 4, Fig. 4b", "stiffness of the contact", "not given", "10^5")
+DAMPING: Final = Printed("section 4, Fig. 4b", "damping of the contact", "not given", "90")
+STATIC_FRICTION: Final = Printed("section 4, Fig. 4b", "static friction", "1", "0.9")
+DYNAMIC_FRICTION: Final = Printed("section 4, Fig. 4b", "dynamic friction", "1", "0.7")
+LOST_BALANCE: Final = Printed("section 4", "steps until balance was lost, from MATLAB's initial conditions", "1", "one")
+STRIDES: Final = Printed("section 5, Fig. 7", "gait cycles walked", "1", "five")
+LARGEST_ERROR: Final = Printed("section 5, Fig. 8", "largest error, angles and velocities", "rad, rad/s", "10^-4")
+"""One value for angles and velocities."""
+STEP_LENGTH: Final = Printed("section 5", "length of one complete step", "m", "0.0342")
+VELOCITY_DIFFERENCE: Final = Printed("section 5", "difference of the average velocities", "%", "less than 1%")
+
+EQUATION_NUMBERS: Final = (*range(1, 42), *range(55, 59))
+"""Numbers of the equations of Appendix A."""
+
+
+def fixed_point_as_printed() -> tuple[float, float, float, float]:
+    """x_p of eq. 11."""
+    theta_1, theta_2, omega_1, omega_2 = (entry.value for entry in X_P)
+    return theta_1, theta_2, omega_1, omega_2
+
+
+def adams_start_as_printed() -> tuple[float, float, float, float]:
+    """The start of the ADAMS model, Table 2."""
+    theta_1, theta_2, omega_1, omega_2 = (row.adams.value for row in TABLE_2)
+    return theta_1, theta_2, omega_1, omega_2
+
+
+def slope_of(theta_1: Printed, theta_2: Printed) -> tuple[float, float]:
+    """Slope (rad) on which both feet of a printed state stand, and its uncertainty due to rounding."""
+    return -0.5 * (theta_1.value + theta_2.value), 0.25 * (theta_1.last_digit + theta_2.last_digit)
+
+
+def walker_of_the_paper(c21_sign: float) -> RigidWalker:
+    """Walker of Table 1 on the slope of x_p, with the masses at mid-leg.
+
+    c21_sign  CORRECTED or AS_PRINTED
+    """
+    length, mass, hip, gravity = (entry.value for entry in TABLE_1)
+    return RigidWalker(length, 0.5 * length, mass, hip, LEG_INERTIA.value, gravity, slope_of(*X_P[:2])[0], c21_sign)
+
+
+def printed_speed(cycle: float) -> float:
+    """Printed step length over the time (s) of a cycle, as in section 5 (m/s)."""
+    return STEP_LENGTH.value / cycle
+
+
+def speed_difference(matlab_cycle: float, adams_cycle: float) -> float:
+    """Relative difference (%) of the speeds that follow from cycles of these times (s)."""
+    matlab, adams = printed_speed(matlab_cycle), printed_speed(adams_cycle)
+    return 100.0 * abs(adams - matlab) / matlab
+
+
+def readings_of_fig_4b() -> tuple[RestingFoot, RestingFoot]:
+    """Rest of the paper's walker on its contact parameters, read in N, mm and s, and in SI."""
+    _, leg, hip, gravity = (entry.value for entry in TABLE_1)
+    mass, adams = hip + 2.0 * leg, Contact(stiffness=STIFFNESS.value, damping=DAMPING.value).in_si()
+    in_adams = resting_foot(mass * gravity, mass, adams.stiffness, adams.exponent, adams.damping)
+    return in_adams, resting_foot(mass * gravity, mass, STIFFNESS.value, 1.0, DAMPING.value)

@@ -1,0 +1,14 @@
+"""Templates for texts about the paper, with its printed values and their direct consequences at hand.
+
+A package of its own: only results of modules that import it depend on its words.
+"""
+
+import math
+from pathlib import Path
+
+from walkerlab.config.contact import MM_PER_M
+from walkerlab.evidence.paper import printed
+from walkerlab.views.prose import Prose, f
+
+KNOWN = vars(printed) | {"pi": math.pi, "MM_PER_M": MM_PER_M}
+prose = Prose(Path(__file__).parent, (f,), {name: value for name, value in KNOWN.items() if not name.startswith("_")})

@@ -1,0 +1,304 @@
+"""The paper's numbers with verdicts, in order, and its three tables next to our measurements."""
+
+import math
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any, Literal
+
+from walkerlab.config.contact import MM_PER_M
+from walkerlab.evidence.paper import printed
+from walkerlab.evidence.paper.contradictions import contradictions, percent_left_open
+from walkerlab.evidence.paper.measured import CYCLES, Measured
+from walkerlab.evidence.paper.printed import Printed, speed_difference
+from walkerlab.evidence.paper.prose import prose
+from walkerlab.evidence.paper.study import PaperStudy
+from walkerlab.physics.hybrid.comparison import Quantity
+
+EQUATION_NAMES = ("as-printed", "corrected")
+WALKER_PARAMETERS = ("leg_length", "leg_mass", "hip_mass", "gravity")
+
+
+class NumberVerdict(StrEnum):
+    """Verdict on a printed value; each value has one."""
+
+    INPUT = "input"  # used as given
+    REPRODUCED = "reproduced"  # agrees to the printed digits
+    EXPLAINED = "explained"  # does not agree, or not alone, for a measured reason
+    CONTRADICTED = "contradicted"  # by other values of the paper; overrides all other verdicts
+    NOT_REPRODUCED = "not-reproduced"  # does not agree; includes values of ADAMS, which was not run
+
+
+@dataclass(frozen=True)
+class JudgedNumber:
+    """A printed number and the measured ones, in the printed unit; None where a model has no such value."""
+
+    where: str
+    quantity: str
+    unit: str
+    printed: str
+    as_printed: float | None
+    corrected: float | None
+    contact: float | None
+    verdict: str
+    evidence: str
+
+
+INPUT, REPRODUCED, EXPLAINED, CONTRADICTED, NOT_REPRODUCED = NumberVerdict
+Scene = Literal["rigid", "contact", "any"]
+"""The model whose scene must be the paper's for a mismatch to count; "any" if the paper's own values decide."""
+
+
+def count_verdicts(rows: Iterable[JudgedNumber]) -> dict[str, int]:
+    """Values by verdict, and `refuted`, which repeats the last two until 0.3 is released."""
+    verdicts = Counter(row.verdict for row in rows)
+    by_class = {verdict.value: verdicts[verdict] for verdict in NumberVerdict}
+    return {**by_class, "refuted": verdicts[CONTRADICTED] + verdicts[NOT_REPRODUCED]}
+
+
+def paper_rows(measured: Measured, study: PaperStudy) -> Iterator[JudgedNumber]:
+    """Yield all rows in the paper's order."""
+    judge, contact, walker = Judge(measured, study), measured.contact, measured.walker
+    for entry, parameter in zip(printed.TABLE_1, WALKER_PARAMETERS, strict=True):
+        yield judge.input(entry, float(getattr(walker, parameter)), "rigid")
+    for coordinate, entry in enumerate(printed.X_P):
+        yield judge.fixed_point(entry, coordinate)
+    yield judge.eigenvalue()
+    yield judge.input(printed.LEG_INERTIA, walker.leg_inertia, "rigid")
+    yield judge.input(printed.FOOT_RADIUS, contact.foot_radius * MM_PER_M, "contact")
+    for entry, value in ((printed.STIFFNESS, contact.law.stiffness), (printed.DAMPING, contact.law.damping)):
+        yield judge.input(entry, value, "contact", prose("evidence.unitless", contact))
+    yield judge.input(printed.STATIC_FRICTION, contact.law.static_friction, "contact")
+    yield judge.input(printed.DYNAMIC_FRICTION, contact.law.dynamic_friction, "contact")
+    yield judge.lost_balance()
+    for coordinate, row in enumerate(printed.TABLE_2):
+        yield judge.adams_start(row.adams, coordinate)
+        yield judge.percent(row, coordinate)
+    yield judge.strides()
+    yield judge.error()
+    yield judge.step_length()
+    yield judge.velocity_difference()
+    for result in printed.TABLE_3:
+        yield from judge.table_3(result)
+
+
+@dataclass(frozen=True)
+class Judge:
+    """Judges the paper's numbers by measurements on a config's scene and on the paper's own."""
+
+    measured: Measured
+    study: PaperStudy
+
+    def row(
+        self,
+        entry: Printed,
+        rigid: Mapping[str, float],
+        contact: float | None,
+        verdict: NumberVerdict,
+        scene: Scene,
+        evidence: str,
+    ) -> JudgedNumber:
+        """Build a row from a printed value and those of the rigid model, by set of equations, and of the contact model.
+
+        verdict  on the paper's own scene, unless another value of the paper contradicts this one
+        """
+        departures = self.measured.departures
+        differs = "; ".join(departures.rigid if scene == "rigid" else departures.contact)
+        if (contradiction := contradictions().get(entry)) is not None:
+            verdict, scene, evidence = CONTRADICTED, "any", f"{contradiction}. {evidence[:1].upper()}{evidence[1:]}"
+        if differs and scene == "any":
+            evidence += f" The verdict refers to the paper's own numbers, not to this scene ({differs})."
+        elif differs and verdict not in (INPUT, REPRODUCED):
+            verdict, evidence = EXPLAINED, f"Not the paper's scene ({differs}): {evidence}"
+        about, (as_printed, corrected) = (
+            (entry.where, entry.quantity, entry.unit, entry.text),
+            map(rigid.get, EQUATION_NAMES),
+        )
+        return JudgedNumber(*about, as_printed, corrected, contact, verdict.value, evidence)
+
+    @property
+    def raised(self) -> list[float | None]:
+        """Increase in magnitude (%) of each coordinate of the contact model's start over the rigid gait's."""
+        gait, start = self.measured.models.get(self.measured.equations), self.measured.contact.start
+        if gait is None or start is None:
+            return [None] * len(printed.COORDINATES)
+        pairs = zip(start, gait.state, strict=True)
+        return [None if ours == 0.0 else 100.0 * (initial / ours - 1.0) for initial, ours in pairs]
+
+    def input(self, entry: Printed, value: float, scene: Scene, evidence: str = "") -> JudgedNumber:
+        """Judge a parameter of both models, or of the contact model alone."""
+        rigid = dict.fromkeys(EQUATION_NAMES, value) if scene == "rigid" else {}
+        verdict = INPUT if math.isclose(value, entry.value, rel_tol=1e-12) else EXPLAINED
+        return self.row(entry, rigid, value, verdict, scene, evidence or prose("evidence.input", value, entry.unit))
+
+    def fixed_point(self, entry: Printed, coordinate: int) -> JudgedNumber:
+        values = {name: model.state[coordinate] for name, model in self.measured.models.items()}
+        agreements = {name: entry.agreement(value) for name, value in values.items()}
+        text = prose("evidence.fixed_point", values, agreements)
+        return self.row(entry, values, None, verdict_if(any(agreements.values())), "rigid", text)
+
+    def eigenvalue(self) -> JudgedNumber:
+        entry, radii = printed.EIGENVALUES, self.measured.spectral_radii
+        stable = bool(radii) and max(radii.values()) < entry.value
+        return self.row(entry, radii, None, verdict_if(stable), "rigid", prose("evidence.eigenvalue", radii))
+
+    def lost_balance(self) -> JudgedNumber:
+        """Judge the loss of balance from MATLAB's initial conditions."""
+        steps, outcome = self.measured.contact.from_x_p
+        right = None if self.measured.departures.rigid else self.measured.models.get("corrected")
+        short = None if right is None else 100.0 * (1.0 - printed.X_P[3].value / right.state[3])
+        text = prose("evidence.lost_balance", steps, 2 * CYCLES, outcome, short)
+        agrees = outcome != "walked" and steps == printed.LOST_BALANCE.value
+        return self.row(printed.LOST_BALANCE, {}, float(steps), verdict_if(agrees), "contact", text)
+
+    def percent(self, row: printed.StartRow, coordinate: int) -> JudgedNumber:
+        """Judge a percentage of Table 2, which is arithmetic, whatever the config."""
+        entry = row.percent
+        verdict = REPRODUCED if entry.agreement(row.percent_of_matlab) else EXPLAINED
+        left_open = None if entry in contradictions() else percent_left_open(row)
+        text = prose("evidence.percent", row, left_open, self.measured.contact, self.raised[2:])
+        return self.row(entry, {}, self.raised[coordinate], verdict, "any", text)
+
+    def adams_start(self, entry: Printed, coordinate: int) -> JudgedNumber:
+        """Judge a coordinate of the ADAMS start: an input where the contact model starts from it."""
+        contact = self.measured.contact
+        value = None if contact.start is None else contact.start[coordinate]
+        verdict = INPUT if entry.agreement(value) else NOT_REPRODUCED
+        text = prose("evidence.adams_start", self.study, coordinate < 2, contact, self.raised[2:])
+        return self.row(entry, {}, value, verdict, "contact", text)
+
+    def strides(self) -> JudgedNumber:
+        """Judge the five gait cycles, which the rigid models walk as well."""
+        entry, contact = printed.STRIDES, self.measured.contact
+        rigid = {name: float(model.steps // 2) for name, model in self.measured.models.items()}
+        completed = contact.steps // 2
+        text = prose("evidence.strides", contact, completed, contact.outcome == "walked" and completed < entry.value)
+        return self.row(entry, rigid, float(completed), INPUT, "contact", text)
+
+    def error(self) -> JudgedNumber:
+        """Judge the largest error of Fig. 8, for angles and angular velocities together."""
+        entry, study, differences = printed.LARGEST_ERROR, self.study, self.measured.errors
+        late = abs(printed.T_LEFT.matlab.value - printed.T_LEFT.adams.value)
+        quantities: tuple[tuple[Quantity, float, str], ...] = (
+            ("angle", study.fastest * late, "rad"),
+            ("velocity", study.largest_jump, "rad/s"),
+        )
+        errors_by_quantity = [
+            (f"{off:.2g} {unit}", unit, {way: difference.largest(quantity) for way, difference in differences.items()})
+            for quantity, off, unit in quantities
+        ]
+        text = prose("evidence.error", late, self.measured.equations, errors_by_quantity)
+        way = "aligned" if "aligned" in differences else "raw"
+        largest = max((max(errors[way]) for _, _, errors in errors_by_quantity if way in errors), default=None)
+        return self.row(entry, {}, largest, NOT_REPRODUCED, "any", text)
+
+    def step_length(self) -> JudgedNumber:
+        entry, contact = printed.STEP_LENGTH, self.measured.contact.step_length
+        lengths = {name: model.step_length for name, model in self.measured.models.items()}
+        longest = max((*lengths.values(), *(() if contact is None else (contact,))), default=None)
+        text = prose("evidence.step_length", lengths, contact, longest)
+        agrees = any(entry.agreement(length) for length in lengths.values())
+        return self.row(entry, lengths, contact, verdict_if(agrees), "rigid", text)
+
+    def velocity_difference(self) -> JudgedNumber:
+        """Judge the difference of the average velocities; the paper's own arithmetic is in the evidence."""
+        entry, contact = printed.VELOCITY_DIFFERENCE, self.measured.contact.table_3.v_com
+        speeds = {name: model.table_3.v_com for name, model in self.measured.models.items()}
+        percentages = {
+            name: 100.0 * abs(contact - rigid) / abs(rigid)
+            for name, rigid in speeds.items()
+            if rigid and contact is not None
+        }
+        left, right, cycle = printed.T_LEFT, printed.T_RIGHT, printed.T_CYCLE
+        by_cycle = speed_difference(cycle.matlab.value, cycle.adams.value)
+        sums = speed_difference(left.matlab.value + right.matlab.value, left.adams.value + right.adams.value)
+        text = prose("evidence.velocity_difference", percentages, by_cycle, sums)
+        agrees = bool(percentages) and max(percentages.values()) < entry.value
+        return self.row(entry, percentages, None, verdict_if(agrees), "contact", text)
+
+    def table_3(self, row: printed.PrintedRow) -> Iterator[JudgedNumber]:
+        """Judge a row of Table 3: MATLAB by the rigid model, ADAMS by the contact model."""
+        measured, study = self.measured, self.study
+        values = {name: getattr(model.table_3, row.name) for name, model in measured.models.items()}
+        rigid = {name: value for name, value in values.items() if value is not None}
+        contact: float | None = getattr(measured.contact.table_3, row.name)
+        # both step periods share one cause, so the evidence has both
+        names = ("t_left", "t_right") if row in (printed.T_LEFT, printed.T_RIGHT) else (row.name,)
+        means = {"five": study.five_steps_energy, "ten": study.from_x_p.E_avg} if row is printed.E_AVG else {}
+        matching_means = [steps for steps, mean in means.items() if row.matlab.agreement(mean)]
+        # an energy that is a mean over another number of steps follows from the misprint, which does not conserve it
+        verdict = EXPLAINED if matching_means else NOT_REPRODUCED
+        text = prose("evidence.matlab", row, measured, names, study, matching_means)
+        agrees = any(row.matlab.agreement(value) for value in rigid.values())
+        yield self.row(row.matlab, rigid, contact, REPRODUCED if agrees else verdict, "rigid", text)
+        text = prose("evidence.adams", row, measured, names)
+        yield self.row(row.adams, rigid, contact, verdict_if(bool(row.adams.agreement(contact))), "contact", text)
+
+
+def verdict_if(agrees: bool) -> NumberVerdict:
+    return REPRODUCED if agrees else NOT_REPRODUCED
+
+
+Table = dict[str, dict[str, Any]]
+"""Rows by name, as columns; None where a model has no such value."""
+
+MIDDLE = "section 2: 'in the middle of the legs'"
+
+
+def table_1(measured: Measured, study: PaperStudy) -> Table:
+    """Parameters as printed, with their source, and as used."""
+    walker, inertia, radius = measured.walker, printed.LEG_INERTIA, printed.FOOT_RADIUS
+    length, mass, hip, gravity = printed.TABLE_1
+    rows = (
+        ("L", "length of the legs", "m", length.value, walker.leg_length, length.where),
+        ("m", "mass of a leg", "kg", mass.value, walker.leg_mass, mass.where),
+        ("MH", "mass of the hip", "kg", hip.value, walker.hip_mass, hip.where),
+        ("g", "gravity", "m/s^2", gravity.value, walker.gravity, gravity.where),
+        ("a", "foot to mass of the leg", "m", 0.5 * length.value, walker.foot_to_mass, MIDDLE),
+        ("J", "inertia of a leg", "kg m^2", inertia.value, walker.leg_inertia, inertia.where),
+        ("r", "radius of the foot", "m", radius.value / MM_PER_M, measured.contact.foot_radius, radius.where),
+        ("phi", "slope", "rad", study.slope, walker.slope, "not stated: from the angles of x_p"),
+    )
+    return {
+        symbol: {"quantity": quantity, "unit": unit, "paper": paper, "used": used, "where": where}
+        for symbol, quantity, unit, paper, used, where in rows
+    }
+
+
+def table_2(measured: Measured) -> Table:
+    """Initial values, and the percentages relative to either column."""
+    table, start = {}, measured.contact.start
+    for place, (coordinate, row) in enumerate(zip(printed.COORDINATES, printed.TABLE_2, strict=True)):
+        states = {name: model.state[place] for name, model in measured.models.items()}
+        table[coordinate] = {
+            **number_columns(row, states, None if start is None else start[place]),
+            "paper_percent": row.percent.value,
+            "paper_percent_text": row.percent.text,
+            "percent_of_matlab": row.percent_of_matlab,
+            "percent_of_adams": row.percent_of_adams,
+        }
+    return table
+
+
+def table_3(measured: Measured) -> Table:
+    """Characteristics of both models."""
+    table = {}
+    for row in printed.TABLE_3:
+        rigid = {name: getattr(model.table_3, row.name) for name, model in measured.models.items()}
+        table[row.name] = number_columns(row, rigid, getattr(measured.contact.table_3, row.name))
+    return table
+
+
+def number_columns(row: printed.PrintedRow, rigid: Mapping[str, float | None], contact: float | None) -> dict[str, Any]:
+    """Columns of both printed numbers, of the rigid model by set of equations, and of the contact model."""
+    return {
+        "unit": row.matlab.unit,
+        "paper_matlab": row.matlab.value,
+        "paper_matlab_text": row.matlab.text,
+        "paper_adams": row.adams.value,
+        "paper_adams_text": row.adams.text,
+        "as_printed": rigid.get("as-printed"),
+        "corrected": rigid.get("corrected"),
+        "contact": contact,
+    }

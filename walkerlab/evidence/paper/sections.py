@@ -1,0 +1,189 @@
+"""Report sections on the paper: each printed value and our own, its tables and its errata."""
+
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import partial
+from typing import Any
+
+from walkerlab.labels import with_unit
+from walkerlab.views.report.answers import last_steps
+from walkerlab.views.report.blocks import PAPER, PageBlock, Paragraph, Section, Shares, Statement, Statements
+from walkerlab.views.report.numbers import count, number
+from walkerlab.views.report.outcomes import off_by
+from walkerlab.views.report.results import Results
+from walkerlab.views.report.symbols import in_signs
+from walkerlab.views.report.tables import Cell, Column, Table, Tone, grouped, table
+from walkerlab.views.report.words import words
+
+Row = Mapping[str, Any]
+
+TONES: dict[str, Tone] = {
+    "input": "given",
+    "reproduced": "good",
+    "explained": "fair",
+    "contradicted": "bad",
+    "not-reproduced": "plain",
+}
+"""Verdicts on printed values, and their appearance."""
+
+TEXT_SUFFIX = "_text"
+"""Suffix of the key of a printed number's text."""
+MODEL_COLUMNS = {"as_printed": "as printed", "corrected": "corrected", "contact": "contact model"}
+"""Columns compared with the paper's numbers."""
+
+
+def numbers(results: Results) -> Section | None:
+    rows = paper_numbers(results)
+    if not rows:
+        return None
+    meanings = words.terms("paper.verdicts").items()
+    statements = tuple(
+        Statement(f"{spell_verdict(name).capitalize()}:", meaning, tone=TONES[name]) for name, meaning in meanings
+    )
+    departs = words("paper.departs", results.departures) if results.departures else ""
+    blocks = (Paragraph(departs, "fair"), Statements(statements, "lines"), numbers_table(rows))
+    finding = words("paper.finding", by_verdict(row["verdict"] for row in rows))
+    return Section.of("paper-numbers", "The paper’s numbers", blocks, finding, PAPER)
+
+
+def numbers_table(rows: Sequence[Row]) -> Table:
+    """Table of the paper's numbers by location, with columns for the models that have values."""
+    models = [key for key in MODEL_COLUMNS if any(row.get(key) is not None for row in rows)]
+    columns = (
+        Column("quantity", lambda row: name_with_unit(row["quantity"], row.get("unit"))),
+        Column("printed", "printed", in_signs, numeric=True),
+        *(Column(MODEL_COLUMNS[key], key, number, numeric=True) for key in models),
+        Column("verdict", "verdict", lambda verdict: Cell(spell_verdict(verdict), TONES.get(verdict, "plain"))),
+        Column("evidence", "evidence", in_signs, wide=True),
+    )
+    caption = "What the paper prints, and what its equations give"
+    return table(caption, columns, grouped(rows, "where"), wordy=True, by="where")
+
+
+def by_verdict(verdicts: Iterable[str]) -> dict[str, int]:
+    counts = Counter(verdicts)
+    return {name: counts[name] for name in TONES}
+
+
+def spell_verdict(verdict: str) -> str:
+    return verdict.replace("-", " ")
+
+
+def name_with_unit(name: str, unit: str | None) -> str:
+    return in_signs(with_unit(name, "unit not given" if unit == "not given" else unit or ""))
+
+
+def paper_numbers(results: Results) -> Sequence[Row]:
+    """Rows from `compare`; empty if it did not run."""
+    rows: Sequence[Row] = results.summary("compare").get("paper_numbers", ())
+    return rows
+
+
+def tables(results: Results) -> Section | None:
+    summary = results.summary("compare")
+    tables_shown = (table_of(key, summary.get(key) or {}) for key in words.terms("paper.tables"))
+    return Section.of("tables", "The paper’s tables", tables_shown, page=PAPER)
+
+
+def table_of(key: str, rows: Any) -> Table:
+    """Table of the paper's numbers, or one of its tables, by its key in the summary of `compare`."""
+    captions = words.terms("paper.tables")
+    if key not in captions:
+        return numbers_table(rows)
+    return paper_table(captions[key], rows, words.terms("paper.notes").get(key, ""))
+
+
+def paper_table(caption: str, rows: Mapping[str, Row], note: str) -> Table:
+    """Build a table with symbols and units as row names; columns without values are omitted.
+
+    Printed numbers are shown as the paper's text, to its digits.
+    """
+    has_quantities = any("quantity" in row for row in rows.values())
+    columns, heads = [Column("symbol" if has_quantities else "quantity", "row")], words.terms("paper.heads")
+    for key in dict.fromkeys(key for row in rows.values() for key, value in row.items() if value is not None):
+        if key == "unit" or key.endswith(TEXT_SUFFIX):
+            continue
+        texts = any(isinstance(row.get(key), str) for row in rows.values())
+        as_text = texts or any(f"{key}{TEXT_SUFFIX}" in row for row in rows.values())
+        written = in_signs if as_text else partial(number, digits=3 if "percent" in key else 6)
+        source = key if texts or not as_text else f"{key}{TEXT_SUFFIX}"
+        columns.append(Column(heads.get(key, key.replace("_", " ")), source, written, numeric=not texts))
+    names = {symbol: f"{name}, {symbol}" for symbol, name in words.terms("paper.quantities").items()}
+    return table(
+        caption,
+        columns,
+        [{"row": name_with_unit(names.get(symbol, symbol), row.get("unit")), **row} for symbol, row in rows.items()],
+        note=note,
+    )
+
+
+ERRATUM_HEADS = {
+    "where": "where",
+    "printed": "printed",
+    "right": "right",
+    "evidence": "evidence",
+    "measured": "measured here",
+}
+"""Column heads of the stored errata."""
+ERRATUM_COLUMNS = [Column(head, name, in_signs, wide=name != "where") for name, head in ERRATUM_HEADS.items()]
+
+
+def errors(results: Results) -> Section | None:
+    rows = errata(results)
+    block = table("What is printed, and what is right", ERRATUM_COLUMNS, rows, wordy=True)
+    finding = f"{count(len(rows), 'error')} and gaps of the paper, with evidence."
+    return Section.of("errata", "Errata of the paper", (block,), finding, PAPER)
+
+
+def errata(results: Results) -> Sequence[Row]:
+    """Errata from `compare`; empty if it did not run."""
+    rows: Sequence[Row] = results.summary("compare").get("errata", ())
+    return rows
+
+
+def paper_section(results: Results) -> Section | None:
+    """Show verdicts on the paper's values and its gravest errors; None for another scene."""
+    rows = results.claims
+    if not rows:
+        return None
+    finding = words("paper.finding", by_verdict(row["verdict"] for row in rows))
+    return Section("printed", "What the paper prints", tuple(fates(results, rows)), finding)
+
+
+def fates(results: Results, rows: Sequence[Row]) -> Iterator[PageBlock]:
+    """Yield the paper's values by verdict and location, and its gravest errors."""
+    all_errata = errata(results)
+    places = {name: Counter(row["where"] for row in rows if row["verdict"] == name) for name in TONES}
+    parts = tuple((spell_verdict(name), counts.total(), TONES[name]) for name, counts in places.items() if counts)
+    yield Shares(f"Of {count(len(rows), 'value')} that the paper prints", parts)
+    totals = Counter(row["where"] for row in rows)
+    statements = (
+        Statement(f"{spell_verdict(name).capitalize()}:", words("verdict.places", counts, totals), tone=TONES[name])
+        for name, counts in places.items()
+        if counts
+    )
+    yield Statements(tuple(statements), "lines")
+    headlines = words.terms("verdict.headlines").items()
+    gravest = [
+        (headline, erratum)
+        for place, headline in headlines
+        for erratum in all_errata
+        if erratum["where"].startswith(place)
+    ]
+    if gravest:
+        yield Paragraph(words("verdict.reasons"))
+        statements = (
+            Statement(in_signs(f"{headline} ({erratum['where']}):"), words("verdict.gravest", erratum), tone="fair")
+            for headline, erratum in gravest
+        )
+        yield Statements(tuple(statements), "columns")
+
+
+def answer(summary: Row) -> list[str | Table]:
+    """Report the verdicts on the paper's values or, for another walker, how the models differ."""
+    errors = summary.get("numerical_error", {})
+    error_lines = [f"numerical error of the {model} walk: {off_by(error)}." for model, error in errors.items()]
+    if "verdicts" in summary:
+        head = words("paper.finding", by_verdict(row["verdict"] for row in summary["paper_numbers"]))
+        return [head, numbers_table(summary["paper_numbers"]), *error_lines]
+    return [words("models.answer", summary["outcomes"]), last_steps(summary, errors), *error_lines]

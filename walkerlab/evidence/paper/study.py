@@ -1,0 +1,112 @@
+"""Measurements on the paper's own walker and slope, for its errata; independent of the config."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from walkerlab.evidence.paper import measured, printed
+from walkerlab.evidence.paper.adams_start import AdamsStart, adams_start
+from walkerlab.evidence.paper.appendix_a import AS_PRINTED, CORRECTED, RigidWalker, assembled
+from walkerlab.evidence.paper.misprints import (
+    MISPRINTED,
+    fixed_point,
+    foothold_speed_after_impact,
+    height_over_slope,
+    inertia_at_impact,
+)
+from walkerlab.physics.hybrid.recorded_walk import as_state, take_walk
+from walkerlab.physics.solvers.system import State
+
+SETTLING_STEPS = 150  # from x_p to its fixed point: disturbances shrink by 0.6 a step
+FOOT_VELOCITY = (0.3, -0.2)  # m/s, of the foot in the check of (A.9) to (A.24)
+
+
+@dataclass(frozen=True)
+class PaperStudy:
+    """Measurements, in SI units.
+
+    as_printed, corrected  gaits to which walks from x_p converge
+    from_x_p               Table 3 of five gait cycles from x_p with its printed digits, equations as printed
+    five_steps_energy      J, time mean over the first five of these ten steps
+    fastest                rad/s, largest angular velocity of the gait as printed
+    largest_jump           rad/s, largest change of an angular velocity at its heel strike
+    swing_foot_height      m, over the slope, where (A.55) as printed places the swing foot of x_p
+    foothold_speed         m/s, of the new stance foot after the impact of (A.55) as printed, on the gait as printed
+    both_misprints         fixed point with those of (A.5) and (A.55); None if there is none nearby
+    kinetic_energy         J, of one state: from the masses' velocities, and from D_e with either order of coordinates
+    """
+
+    slope: float
+    slope_rounding: float
+    as_printed: measured.RigidMeasurements
+    corrected: measured.RigidMeasurements
+    from_x_p: measured.Characteristics
+    five_steps_energy: float
+    fastest: float
+    largest_jump: float
+    swing_foot_height: float
+    foothold_speed: float
+    both_misprints: State | None
+    kinetic_energy: Mapping[str, float]
+    adams: AdamsStart
+
+
+def study_the_paper() -> PaperStudy:
+    """Walk the paper's walker from its printed states; takes milliseconds once compiled."""
+    wrong, right = printed.walker_of_the_paper(AS_PRINTED), printed.walker_of_the_paper(CORRECTED)
+    x_p = printed.fixed_point_as_printed()
+    as_printed, corrected = settle(wrong), settle(right)
+    one_step = take_walk(assembled(wrong), measured.TIGHT, as_printed, 1, sampled=True)
+    cycles = take_walk(assembled(wrong), measured.TIGHT, x_p, 2 * measured.CYCLES, sampled=True)
+    five_steps = take_walk(assembled(wrong), measured.TIGHT, x_p, measured.ENERGY_STEPS)
+    assert one_step.samples is not None
+    slope, rounding = printed.slope_of(*printed.X_P[:2])
+    adams_slope, _ = printed.slope_of(printed.TABLE_2[0].adams, printed.TABLE_2[1].adams)
+    return PaperStudy(
+        slope=slope,
+        slope_rounding=rounding,
+        as_printed=measured.measure_rigid_model(wrong, as_printed),
+        corrected=measured.measure_rigid_model(right, corrected),
+        from_x_p=measured.characteristics(cycles.periods_s, cycles.lengths_m, cycles.mean_energy),
+        five_steps_energy=five_steps.mean_energy,
+        fastest=float(np.abs(one_step.samples.state[:, 2:]).max()),
+        largest_jump=float(np.abs(one_step.after[0, [3, 2]] - one_step.before[0, 2:]).max()),
+        swing_foot_height=height_over_slope(wrong, *x_p[:2], MISPRINTED),
+        foothold_speed=foothold_speed_after_impact(wrong, as_state(one_step.before[0]), MISPRINTED),
+        both_misprints=fixed_point(wrong, as_printed, MISPRINTED),
+        kinetic_energy=kinetic_energy_by_order(right),
+        adams=adams_start(assembled(right._replace(slope=adams_slope)), printed.adams_start_as_printed()),
+    )
+
+
+def settle(walker: RigidWalker) -> State:
+    """Stable gait to which walks from x_p converge."""
+    walk = take_walk(assembled(walker), measured.TIGHT, printed.fixed_point_as_printed(), SETTLING_STEPS)
+    if walk.steps < SETTLING_STEPS:
+        raise ArithmeticError(f"x_p does not walk: {walk.outcome.label} after {walk.steps} steps")
+    return walk.final_state
+
+
+def kinetic_energy_by_order(walker: RigidWalker) -> dict[str, float]:
+    """Kinetic energies (J) at x_p with a moving foot: of the masses, and of D_e with angles or foot first."""
+    theta_1, theta_2, omega_1, omega_2 = printed.fixed_point_as_printed()
+    D = inertia_at_impact(walker, theta_1, theta_2)
+    angles_first = np.array([omega_1, omega_2, *FOOT_VELOCITY])
+    foot_first = np.array([*FOOT_VELOCITY, omega_1, omega_2])
+    L, a = walker.leg_length, walker.foot_to_mass
+    foot = np.array(FOOT_VELOCITY)
+    along_stance = -omega_2 * np.array([math.cos(theta_2), math.sin(theta_2)])
+    along_swing = omega_1 * np.array([math.cos(theta_1), math.sin(theta_1)])
+    hip = foot + L * along_stance
+    moving = [
+        (walker.leg_mass, foot + a * along_stance),
+        (walker.hip_mass, hip),
+        (walker.leg_mass, hip + (L - a) * along_swing),
+    ]
+    return {
+        "masses": float(sum(0.5 * mass * velocity @ velocity for mass, velocity in moving)),
+        "angles_first": float(0.5 * angles_first @ D @ angles_first),
+        "foot_first": float(0.5 * foot_first @ D @ foot_first),
+    }

@@ -1,0 +1,397 @@
+"""Stage `tune`: the paper's parameter adjustment for any walker; whether it is needed, how large it is, and why."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from walkerlab.config.reads import TuneConfig
+from walkerlab.config.walkers import is_passive_compass
+from walkerlab.evidence.paper.adams_start import AdamsWalk, adams_walk
+from walkerlab.evidence.paper.law import is_own_walker
+from walkerlab.evidence.paper.left_out import adjustment_omissions
+from walkerlab.evidence.paper.printed import TABLE_2
+from walkerlab.evidence.paper.tune_limit import limit_findings, limit_groups, limit_summary
+from walkerlab.labels import Label
+from walkerlab.outcome import Outcome
+from walkerlab.physics.ground.terrain import STANCE_FOOT
+from walkerlab.physics.ground.walker import ContactWalker
+from walkerlab.physics.hybrid.contact_result import ContactWalkResult, by_channel, sampled_feet
+from walkerlab.physics.hybrid.recorded_walk import as_state, take_walk, with_scaled_rates
+from walkerlab.physics.mechanics.rigid_model import STANCE, SWING, RigidModel
+from walkerlab.physics.orbits import scaled_starts
+from walkerlab.physics.orbits.contact_gait import GaitAnswer
+from walkerlab.physics.orbits.contact_map import angled_bodies, contact_step, turning_bodies
+from walkerlab.physics.orbits.rigid_limit import leg_motion
+from walkerlab.physics.orbits.step_map import Cycle
+from walkerlab.physics.solvers.registry import ENDLESS, Tolerances
+from walkerlab.physics.solvers.system import State
+from walkerlab.pipeline.progress import Progress, track
+from walkerlab.pipeline.stages.numerical_error import numerical_error
+from walkerlab.pipeline.stages.rigid_groups import leg_variables
+from walkerlab.pipeline.stages.walk import (
+    OUTCOMES,
+    TIME,
+    count_outcomes,
+    legs,
+    numbers_of,
+    of_steps,
+    over_time,
+    rigid_start,
+)
+from walkerlab.pipeline.store.columns import numbered, real_and_imaginary, rows_group
+from walkerlab.pipeline.store.content import Content, Group, Variable
+from walkerlab.pipeline.workers import in_order
+from walkerlab.scene.contact import (
+    SAMPLES_PER_PENDULUM_TIME,
+    ContactScene,
+    contact_gait,
+    require_contact,
+    scene_on_pads,
+    start_state,
+    tolerances_of,
+)
+from walkerlab.scene.rigid import rigid_walker, state_names
+from walkerlab.scene.scaled import for_a_map, starts_of
+from walkerlab.scene.walk_outcomes import Pads, describe_endings
+
+RIGID_SETTINGS = Tolerances("dop853", 1e-10, 1e-12, ENDLESS)
+AS_IT_STANDS = (1.0, 1.0)
+# knees or rolling feet make walks several times slower than the compass's, so their map and margins are coarser
+COMPASS_CELLS, OTHER_CELLS, COARSE_MARGINS = 61, 21, {"step": 0.05, "largest": 2.0}
+SEARCH_ADVICE = "Widen the search (tune.swing_factors, tune.stance_factors, tune.cells) or choose another contact."
+WALK_QUANTITIES = ("outcome", "advice", "steps", "step_periods_s", "step_lengths_m", "end_time_s")
+"""Quantities reported of each walk of the procedure."""
+
+
+def run(config: TuneConfig, inputs: Mapping[str, Content], progress: Progress, jobs: int = 1) -> Content:
+    """Adjust the start; that none walks is a result. Raises NoAnswer if the pads need a gait that does not exist."""
+    rigid_step, rigid_state = rigid_start(config, inputs)
+    rigid_gait = inputs["fixedpoint"].summary  # the start may be far from any gait
+    gait = contact_gait(config, rigid_step, as_state(rigid_gait["state"]))
+    scene = replace(scene_on_pads(config, rigid_step, rigid_state, gait), pinned=False)
+    tune = TuneRun(config, scene, rigid_state, gait)
+    tune.find(progress, jobs)
+    stored, report = groups(tune), summary(tune) | {"left_out": list(adjustment_omissions(config))}
+    if gait.gait is not None and config.tune.rigid_limit:
+        limit = limit_findings(config, scene, gait.gait, rigid_gait, tune.rigid_walk, progress)
+        if limit is not None:
+            stored |= limit_groups(limit)
+            report |= limit_summary(limit)
+    return Content(stored, report)
+
+
+class TuneRun:
+    """State and results of the stage.
+
+    names       of the rigid start's coordinates
+    steps       per walk
+    hinge       whether the paper's procedure hinges the first step, as for its compass
+    walks       of the procedure: `hinged`, with a revolute joint at the first stance foot; `released`, without it;
+                and `adjusted`, from the adjusted start, if any
+    printed     summaries of these walks
+    adjustment  smallest change of the velocities that walks, or None
+    """
+
+    def __init__(self, config: TuneConfig, scene: ContactScene, rigid_state: State, gait: GaitAnswer) -> None:
+        self.config, self.scene, self.rigid_state, self.gait = config, scene, rigid_state, gait
+        self.names, self.steps = state_names(config), 2 * config.strides
+        self.tolerances = tolerances_of(config, self.steps)
+        self.rigid: RigidModel = rigid_walker(config)
+        self.hinge = is_passive_compass(config)
+        self.starts = starts_of(scene, self.rigid, rigid_state, self.steps, gait, self.tolerances)
+        self.walks: dict[str, ContactWalkResult] = {}
+        self.printed: dict[str, dict[str, Any]] = {}
+        self.margins: list[scaled_starts.Margin] = []
+        self.adjusted_state: State | None = None
+        self.paper: AdamsWalk | None = None  # only for the paper's compass
+
+    def find(self, progress: Progress, jobs: int) -> None:
+        """Walk the procedure, compute map, adjustment and margins, and walk from the paper's start."""
+        settings = self.config.tune
+        cells = settings.cells or (COMPASS_CELLS if self.hinge else OTHER_CELLS)
+        swing, stance = (np.linspace(*ends, cells) for ends in (settings.swing_factors, settings.stance_factors))
+        progress.start("tune: procedure")
+        self.rigid_walk = take_walk(self.rigid, RIGID_SETTINGS, self.rigid_state, self.steps, sampled=True)
+        if self.hinge:
+            self.take("hinged", self.rigid_state)
+        self.take("released", self.rigid_state)
+        self.as_it_stands = self.starts.walk(*AS_IT_STANDS)
+        quick = for_a_map(self.starts, self.as_it_stands.evaluations)
+        rows = in_order([partial(scaled_starts.contact_row, quick, swing, float(factor)) for factor in stance], jobs)
+        cells_by_row = [*track(progress, "tune: map", swing.size * stance.size, rows, swing.size)]
+        self.contact_map = scaled_starts.as_map(swing, stance, cells_by_row)
+        progress.start("tune: rigid map and margins")
+        self.rigid_map = scaled_starts.rigid_map(self.rigid, self.rigid_state, swing, stance, self.steps)
+        self.adjustment = self.adjusted(quick)
+        if self.adjustment is not None:
+            factors = self.adjustment.swing, self.adjustment.stance
+            self.margins = scaled_starts.margins(self.starts, factors, **({} if self.hinge else COARSE_MARGINS))
+            self.adjusted_state = with_scaled_rates(self.rigid, self.rigid_state, *factors)
+            self.take("adjusted", self.adjusted_state)
+        if is_own_walker(self.config):
+            terrain = require_contact(self.config).terrain
+            self.paper = adams_walk(self.rigid, self.walk, self.scene.walker, terrain)
+
+    def adjusted(self, quick: scaled_starts.ScaledStarts) -> scaled_starts.Adjustment | None:
+        """Smallest change of the velocities that walks; None if no change does."""
+        cells = self.contact_map
+        if self.as_it_stands.walks:
+            return scaled_starts.Adjustment(*AS_IT_STANDS, self.as_it_stands)
+        if not cells.walking.size:
+            return None
+        swing, stance = (float(np.ptp(factors)) / (factors.size - 1) for factors in (cells.swing, cells.stance))
+        return scaled_starts.smallest_change(self.starts, quick, cells.walking, (swing, stance))
+
+    @property
+    def gait_factors(self) -> tuple[float, float] | None:
+        """Position of the gait on the map, from the end of the adjusted walk; None if it cannot be determined.
+
+        Velocities of the last step, once the rear foot has lifted, over those of the rigid start.
+        """
+        walk, n = self.walks.get("adjusted"), len(self.rigid_state) // 2
+        first = self.rigid_state[n + SWING], self.rigid_state[n + STANCE]
+        if walk is None or walk.steps < 2 or walk.samples is None or 0.0 in first:
+            return None
+        time, normal = walk.samples.time_s, sampled_feet(self.scene.walker, walk.samples)[:, :, 2]
+        landed = walk.steps % 2  # leg 0 lands first
+        swing = 1 - landed
+        lifted = np.flatnonzero((time > walk.touch_time_s[-2]) & (normal[:, swing] <= 0.0) & (normal[:, landed] > 0.0))
+        if not lifted.size:
+            return None
+        rates = leg_motion(walk.samples.states[lifted[:1]], self.scene.walker)[1][0]
+        return float(rates[swing] / first[0]), float(rates[landed] / first[1])
+
+    def walk(self, state: State, pinned: bool = False, tolerances: Tolerances | None = None) -> ContactWalkResult:
+        """Walk the contact model from a rigid state as contact-sim does, by default at the config's tolerances."""
+        scene = replace(self.scene, pinned=pinned)
+        interval = scene.ground.frame.pendulum_time / SAMPLES_PER_PENDULUM_TIME
+        return scene.walk(start_state(scene, state), self.steps, tolerances or self.tolerances, interval)
+
+    def take(self, name: str, state: State) -> None:
+        """Record a walk of the procedure, and its numerical error if it has an answer."""
+        walk = self.walks[name] = self.walk(state, name == "hinged")
+        report = self.printed[name] = walk_summary(walk)
+        if walk.outcome.answered:
+            report["numerical_error"] = numerical_error(
+                report, self.tolerances, lambda tighter: walk_summary(self.walk(state, name == "hinged", tighter))
+            )
+
+
+def walk_summary(walk: ContactWalkResult) -> dict[str, Any]:
+    quantities = numbers_of(walk)
+    return {key: quantities[key] for key in WALK_QUANTITIES}
+
+
+def summary(tune: TuneRun) -> dict[str, Any]:
+    paper, pitch, ends = tune.paper, tune.scene.pitch_m, count_outcomes(tune.contact_map.outcome)
+    pads = Pads((pitch, pitch), laid=str(require_contact(tune.config).pad_pitch))
+    return {
+        "table2": table_2(tune),
+        "gait": gait_summary(tune),
+        "adjustment": adjustment_summary(tune),
+        **({} if paper is None else {"paper_start": papers_start(paper)}),
+        "procedure": {**tune.printed, "adjusted": tune.printed.get("adjusted")},
+        "map": {
+            "cells": int(tune.contact_map.outcome.size),
+            "walks_share": tune.contact_map.share(),
+            "contact": ends,
+            "rigid": count_outcomes(tune.rigid_map.outcome),
+            "endings": describe_endings(ends, tune.config, True, pads),
+        },
+        "slope_rad": tune.scene.walker.slope,
+        "pitch_m": pitch,
+    }
+
+
+def papers_start(paper: AdamsWalk) -> dict[str, Any]:
+    """Summarise the walk from the paper's start, and that start in the rigid model."""
+    return {
+        "outcome": paper.walk.outcome.label,
+        "reason": paper.reason,
+        "steps": paper.walk.steps,
+        "state": list(paper.rigid.state),
+        "energy_J": paper.rigid.energy,
+        "weight_N": paper.rigid.weight,
+        "normal_force_N": paper.rigid.normal_force,
+        "pull_from_s": paper.rigid.pull_from,
+        "airborne_from_s": paper.airborne_from,
+        "end_time_s": paper.walk.end_time_s,
+    }
+
+
+def table_2(tune: TuneRun) -> dict[str, dict[str, Any]]:
+    """The start before and after adjustment with percentages and, for the paper's compass, the printed values."""
+    rows, adjusted = {}, tune.adjusted_state
+    for k, (name, value) in enumerate(zip(tune.names, tune.rigid_state, strict=True)):
+        row: dict[str, Any] = {"unit": "rad" if k < len(tune.names) // 2 else "rad/s"}
+        if tune.paper is not None:
+            row |= {
+                "paper_matlab": TABLE_2[k].matlab.value,
+                "paper_adams": TABLE_2[k].adams.value,
+                "paper_percent": TABLE_2[k].percent.value,
+                "paper_percent_of_matlab": TABLE_2[k].percent_of_matlab,
+                "paper_percent_of_adams": TABLE_2[k].percent_of_adams,
+            }
+        ours = None if adjusted is None else adjusted[k]
+        rows[name] = {
+            **row,
+            "ours_rigid": value,
+            "ours_adjusted": ours,
+            "ours_percent_of_rigid": None if ours is None else percent(ours, value, value),
+            "ours_percent_of_adjusted": None if ours is None else percent(ours, value, ours),
+        }
+    return rows
+
+
+def percent(value: float, other: float, base: float) -> float | None:
+    """Increase in magnitude over `other`, in percent of `base`; None for a base of zero."""
+    return 100.0 * (abs(value) - abs(other)) / abs(base) if base else None
+
+
+def gait_summary(tune: TuneRun) -> dict[str, Any]:
+    """Gait of the contact model, or why there is none."""
+    gait = tune.gait.gait
+    report = {"found": gait is not None, "reason": tune.gait.reason, "advice": tune.gait.advice}
+    if gait is None:
+        return report
+    step = contact_step(gait)
+    return {
+        **report,
+        "state": gait.z.tolist(),
+        "state_is": [f"{text} ({unit})" for text, unit in section_coordinates(tune.scene)],
+        "section": "the swing foot passes the stance foot, where no foot touches or lifts",
+        "period_s": step.period_s,
+        "step_length_m": step.length_m,
+        "multipliers": [[float(value.real), float(value.imag)] for value in gait.multipliers],
+        "spectral_radius": float(abs(gait.multipliers[0])),
+        "stable": gait.stable,
+        "slip_m": step.slip_m,
+        "residual": gait.residual,
+        "lost_J": by_channel(tune.scene.walker, step.dissipated_J),
+        "height_lost_J": step.driven.gravity,
+        "work_per_step_J": step.driven.per_step(1),
+        "cost_of_transport": step.driven.cost_of_transport(step.length_m),
+        "balance_J": float(step.dissipated_J.sum() - step.driven.given),
+    }
+
+
+def section_coordinates(scene: ContactScene) -> list[tuple[str, str]]:
+    """Descriptions and units of a gait's coordinates on its section."""
+    walker, names = scene.walker, [body.name for body in scene.assembly.bodies]
+
+    def of(quantity: str, unit: str, bodies: tuple[int, ...]) -> list[tuple[str, str]]:
+        roles = ["stance" if body in walker.legs[STANCE_FOOT] else "swing" for body in bodies]
+        bare = [names[body].rstrip(" 0123456789") for body in bodies]
+        return [(f"{quantity} of the {role} {name}", unit) for role, name in zip(roles, bare, strict=True)]
+
+    return [
+        ("height of the centre of mass over the slope", "m"),
+        *of("angle", "rad", angled_bodies(walker, STANCE_FOOT)),
+        ("velocity of the centre of mass along the slope", "m/s"),
+        ("velocity of the centre of mass normal to the slope", "m/s"),
+        *of("angular velocity", "rad/s", turning_bodies(walker, STANCE_FOOT)),
+    ]
+
+
+def adjustment_summary(tune: TuneRun) -> dict[str, Any]:
+    """Smallest change that walks, whether any is needed, and the margins around it."""
+    change = tune.adjustment
+    report: dict[str, Any] = {"needed": not tune.as_it_stands.walks, "found": change is not None}
+    if change is None:
+        on_gait = " and settled on the gait" if tune.gait.gait is not None else ""
+        reason = f"none of {tune.contact_map.outcome.size} starts walked {tune.steps} steps{on_gait}"
+        return {**report, "reason": reason, "advice": tune.gait.advice or SEARCH_ADVICE}
+    margins = {}
+    for margin in tune.margins:
+        fails = margin.fails
+        beyond = None if fails is None else Outcome(fails.outcome)
+        margins[margin.name] = {
+            "factor": margin.factor,
+            "percent": 100.0 * (margin.factor - 1.0),
+            "beyond": None if beyond is None else "not settled" if beyond is Outcome.WALKED else beyond.label,
+            "steps_beyond": None if fails is None else fails.steps,
+        }
+    return {
+        **report,
+        "scale_dtheta1": change.swing,
+        "scale_dtheta2": change.stance,
+        "distance": change.distance,
+        "walked_steps": change.trial.steps,
+        "margins": margins,
+    }
+
+
+def groups(tune: TuneRun) -> dict[str, Group]:
+    stored, walker = {"map": map_group(tune)}, tune.scene.walker
+    if tune.margins:
+        labels = {"name": Label("", "what is scaled"), "factor": Label("1", "the last that walks")}
+        stored["margins"] = rows_group(tune.margins, labels, "margin", "number")
+    if tune.gait.gait is not None:
+        stored["gait"] = gait_group(tune.gait.gait, tune.scene)
+    rigid = tune.rigid_walk.samples
+    if rigid is not None and rigid.time_s.size:
+        in_time = {**legs(), **over_time(time=rigid.time_s), **leg_variables(rigid)}
+        stored["rigid_start"] = Group({**in_time, **of_steps(tune.rigid_walk.touch_time_s)})
+    for name, walk in tune.walks.items():
+        if walk.samples is not None and walk.samples.time_s.size:
+            stored[name] = Group({**legs_in_time(walk, walker), **of_steps(walk.touch_time_s)})
+    if tune.paper is not None:
+        energy = {"mechanical_J": Variable(tune.paper.mechanical, (TIME,), "J", "kinetic and potential energy")}
+        forces = over_time(normal_force_N=tune.paper.normal)
+        stored["paper_start"] = Group({**legs_in_time(tune.paper.walk, walker), **forces, **energy})
+    return stored
+
+
+def legs_in_time(walk: ContactWalkResult, walker: ContactWalker) -> dict[str, Variable]:
+    """Angles and velocities of the legs; empty without samples."""
+    if walk.samples is None:
+        return {}
+    angle, velocity = leg_motion(walk.samples.states, walker)
+    return {**legs(), **over_time(time=walk.samples.time_s, angle=angle, velocity=velocity)}
+
+
+def map_group(tune: TuneRun) -> Group:
+    """Outcome and steps of both models over the two factors."""
+    cells, rigid, swing, stance = tune.contact_map, tune.rigid_map, "swing_factor", "stance_factor"
+    over = {
+        "outcome": (cells.outcome, "outcome of the contact model's walk, see attribute outcomes"),
+        "steps": (cells.steps, "steps of the contact model"),
+        "settled": (cells.settled, "1 if the last step is the contact gait's within two percent"),
+        "rigid_outcome": (rigid.outcome, "outcome of the rigid model's walk"),
+        "rigid_steps": (rigid.steps, "steps of the rigid model"),
+    }
+    factor = "factor on the {} leg's initial angular velocity"
+    attrs: dict[str, Any] = {"outcomes": OUTCOMES, "steps_wanted": tune.steps}
+    change = tune.adjustment
+    if change is not None:
+        attrs |= {"adjusted_swing_factor": change.swing, "adjusted_stance_factor": change.stance}
+    factors = tune.gait_factors
+    if factors is not None:
+        attrs |= {"gait_swing_factor": factors[0], "gait_stance_factor": factors[1]}
+    return Group(
+        {
+            swing: Variable(cells.swing, (swing,), "1", factor.format("swing")),
+            stance: Variable(cells.stance, (stance,), "1", factor.format("stance")),
+            **{name: Variable(values, (stance, swing), "1", text) for name, (values, text) in over.items()},
+        },
+        attrs,
+    )
+
+
+def gait_group(gait: Cycle, scene: ContactScene) -> Group:
+    coordinates = section_coordinates(scene)
+    names = np.array([f"{text} ({unit})" for text, unit in coordinates], dtype=object)
+    units = ", ".join(unit for _, unit in coordinates)
+    pairs = ("coordinate", "along")
+    return Group(
+        {
+            "coordinate": Variable(names, ("coordinate",), "", "coordinate"),
+            "state": Variable(gait.z, ("coordinate",), units, "gait on the section"),
+            "derivative": Variable(gait.DP, pairs, "per unit of the coordinate", "derivative of the step map"),
+            **numbered(gait.z.size, "multiplier", "number"),
+            **real_and_imaginary("multiplier", gait.multipliers, ("multiplier",), "multiplier"),
+        }
+    )

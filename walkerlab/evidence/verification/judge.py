@@ -1,0 +1,148 @@
+"""Judging of cases: each is walked, at a ten times tighter tolerance again, by another method and as its twin."""
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from walkerlab.config.schema import Config
+from walkerlab.config.stability import Case
+from walkerlab.evidence.verification.catalogue import config_of
+from walkerlab.evidence.verification.ordinary import Choice, choices
+from walkerlab.evidence.verification.scaling import scaled, to_twin
+from walkerlab.evidence.verification.starts import ContactStart, JudgedWalk, Start, case_tolerances, prepare_start
+from walkerlab.evidence.verification.verdict import BUDGET_USED, CaseResult, Measure, NotMeasured, finite, promised
+from walkerlab.outcome import Outcome
+from walkerlab.physics.solvers.registry import METHODS, Method, method_named
+from walkerlab.pipeline.workers import in_order
+
+TIGHTER_FACTOR = 0.1
+SAMPLED_STEPS = 100  # longer walks are not sampled
+LIBRARY_METHODS: Final = ("scipy-bdf", "scipy-radau")
+"""Asked where our other method gives up; multistep first, since its formulas are neither of ours."""
+LIBRARY_BUDGET: Final = 30_000  # right-hand sides; a library's walks run in Python
+
+
+@dataclass(frozen=True)
+class Second:
+    """A case walked by a second method.
+
+    method  empty if none reached an answer
+    tried   methods that failed before, with their outcomes
+    """
+
+    method: str
+    walk: JudgedWalk | None
+    tried: str
+
+
+@dataclass(frozen=True)
+class CaseCell:
+    """A case to judge and to try with ordinary methods, in any process.
+
+    config  of a scene's case; None for a case of the paper's compass
+    """
+
+    case: Case
+    config: Config | None = None
+
+    def run(self) -> tuple[CaseResult | Choice, ...]:
+        """Return the verdict, then the ordinary methods' results."""
+        config = self.config or config_of(self.case)
+        return (judge(self.case, config), *choices(self.case, config))
+
+
+def run_cells(cells: Sequence[CaseCell], jobs: int) -> Iterator[tuple[CaseResult | Choice, ...]]:
+    """Yield results in case order. One case per model runs first to compile; the rest run longest first."""
+    models = [cell.case.model for cell in cells]
+    first = [models.index(model) for model in ("contact", "rigid") if model in models]
+    return in_order([cell.run for cell in cells], jobs, first, lambda place: -cells[place].case.budget)
+
+
+def judge(case: Case, config: Config) -> CaseResult:
+    """Walk a case and judge it; walks of more than `SAMPLED_STEPS` steps are not sampled."""
+    about = case.name, case.family, case.model, case.reason, case.expected
+    start = prepare_start(config, case)
+    if start is None:
+        return CaseResult(*about, Outcome.REJECTED.label, 0, 0.0, 0, 0.0, (), second_tried="no start exists")
+    methods = case_tolerances(start, case)
+    began = time.perf_counter()
+    walk = start.walk(case, methods, sampled=case.steps <= SAMPLED_STEPS)
+    wall_s = time.perf_counter() - began
+    findings: list[Measure | NotMeasured] = [
+        Measure("values that are not finite", float(np.count_nonzero(~np.isfinite(walk.numbers))), 0.0),
+        Measure(f"{start.kept} over energy", finite(walk.residual_J / start.energy), case.balance),
+        Measure(BUDGET_USED, walk.rhs_evaluations / case.budget, 1.0 + 20.0 / case.budget),
+        *start.measures(walk, case),
+    ]
+    remarks: list[str] = []
+    second = Second("", None, f"the walk itself ended as {walk.outcome.label}")
+    if walk.outcome.answered:
+        short = start.again(case)
+        second = second_walk(
+            methods.method,
+            case.budget,
+            lambda method, budget: start.walk(short, replace(methods, method=method.name, budget=budget)),
+        )
+        for what, again in repeat_walks(start, config, short, second):
+            findings += time_difference(what, walk, again, case, methods.rtol)
+            differs = again.outcome is not walk.outcome and again.outcome.label not in case.expected
+            if differs and short.steps == case.steps:
+                remarks.append(f"{what}: {again.outcome.label}, not {walk.outcome.label}")
+    if isinstance(start, ContactStart):
+        findings.append(start.momentum(walk, case))
+    numbers = int(walk.touches.size), finite(walk.residual_J), walk.rhs_evaluations, wall_s
+    measures = tuple(finding for finding in findings if isinstance(finding, Measure))
+    missing = tuple(finding for finding in findings if isinstance(finding, NotMeasured))
+    said = tuple(remarks)
+    return CaseResult(*about, walk.outcome.label, *numbers, measures, said, second.method, second.tried, missing)
+
+
+def repeat_walks(start: Start, config: Config, case: Case, second: Second) -> list[tuple[str, JudgedWalk]]:
+    """Walks that must agree with the first, with their descriptions."""
+    again = [("ten times tighter tolerance", start.walk(case, case_tolerances(start, case, TIGHTER_FACTOR)))]
+    if second.walk is not None:
+        again.append((second.method, second.walk))
+    if case.twin:
+        scale = to_twin(config)
+        twin_case = case.model_copy(update={"lowered_m": case.lowered_m * scale.length})
+        twin = prepare_start(scaled(config, scale), twin_case)
+        if twin is not None:
+            again.append(("twin", twin.walk(case, case_tolerances(twin, case))))
+    return again
+
+
+def time_difference(what: str, first: JudgedWalk, second: JudgedWalk, case: Case, rtol: float) -> list[Measure]:
+    """Difference of two walks' touch times, or of their end times if they have no touches; empty if there are none."""
+    steps = min(first.touches.size, second.touches.size, case.compared_steps)
+    if steps:
+        difference = float(np.max(np.abs(first.touches[:steps] - second.touches[:steps])))
+    elif first.end is None or second.end is None:
+        return []
+    else:
+        difference = abs(first.end - second.end)
+    limit = promised(case, rtol, first.accepted + second.accepted)
+    return [Measure(f"difference in time from {what}, in pendulum times", finite(difference), limit)]
+
+
+def other_methods(case_tolerances: str) -> tuple[Method, ...]:
+    """Methods besides the configured one: ours first, then the libraries'."""
+    ours = [name for name, method in METHODS.items() if method.compiled]
+    return tuple(method_named(name) for name in dict.fromkeys((*ours, *LIBRARY_METHODS)) if name != case_tolerances)
+
+
+def second_walk(case_tolerances: str, budget: int, walk: Callable[[Method, int], JudgedWalk]) -> Second:
+    """Walk with other methods until one reaches an answer.
+
+    budget  right-hand sides of our own methods
+    walk    walks the case with a method and a budget
+    """
+    tried: list[str] = []
+    for method in other_methods(case_tolerances):
+        result = walk(method, budget if method.compiled else min(budget, LIBRARY_BUDGET))
+        if result.outcome.answered:
+            return Second(method.name, result, ", ".join(tried))
+        tried.append(f"{method.name} {result.outcome.label}")
+    return Second("", None, ", ".join(tried))

@@ -1,0 +1,277 @@
+"""Problems with known answers, run through the contact code; their references do not use that code.
+
+Balls, blocks, rods and wheels are modelled as walkers of two bodies and two feet, of which the second body and
+possibly a foot take no part. The rules that end walks are disabled; a run ends at a given time.
+"""
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from typing import Annotated, Final
+
+import numpy as np
+
+from walkerlab.config.contact import Contact
+from walkerlab.evidence.verification import references
+from walkerlab.labels import Label
+from walkerlab.outcome import Outcome
+from walkerlab.physics.energy_channels import LOST
+from walkerlab.physics.ground.compliant import contact_walker
+from walkerlab.physics.ground.friction import Coulomb
+from walkerlab.physics.ground.normal_force import NormalLaw
+from walkerlab.physics.ground.resting import resting_foot
+from walkerlab.physics.ground.terrain import checkerboard
+from walkerlab.physics.ground.walker import ContactWalker, one_foot_motion
+from walkerlab.physics.hybrid.contact_events import Frame, JudgedGround
+from walkerlab.physics.hybrid.contact_loop import LONGEST_FLIGHT, LONGEST_STEP
+from walkerlab.physics.hybrid.contact_result import new_observer, walk_on
+from walkerlab.physics.hybrid.contact_state import new_walk_state
+from walkerlab.physics.mechanics.parts import Assembly, BallFoot, Body, Position, Revolute
+from walkerlab.physics.solvers.registry import Tolerances
+from walkerlab.physics.solvers.system import Floats, State
+from walkerlab.scene.contact import normal_law
+
+UNBOUNDED_M = 1e7  # m, an area without edges, and a hip that cannot fall
+OUT_OF_REACH: Position = (0.0, 1e3)  # m, where a foot is that takes no part
+PROBLEM_BUDGET = 2_000_000  # right-hand sides
+SAMPLE_COUNT = 4000
+BODY_HEIGHT, BODY_ANGLE, ALONG_RATE, HEIGHT_RATE, ANGLE_RATE = 1, 2, 4, 5, 6  # of the first body, in the state
+GRAVITY: Final = 9.81
+CENTRE: Final = (0.0, 0.0)
+PAPER_LAW: Final = normal_law(Contact())
+PAPER_FRICTION: Final = Coulomb(0.9, 0.7, 0.1, 1.0)
+
+
+@dataclass(frozen=True)
+class ParticleRun:
+    """Sampled trajectory of the first body."""
+
+    times: Floats  # (samples,) s
+    states: Floats  # (samples, 8)
+    end: State
+    dissipated: Floats  # (5,) J, in the order of account.LOSSES
+
+
+def rig(
+    mass: float,
+    inertia: float,
+    normal: NormalLaw,
+    friction: Coulomb = PAPER_FRICTION,
+    feet: tuple[Position, Position] = (CENTRE, OUT_OF_REACH),
+    slope: float = 0.0,
+) -> ContactWalker:
+    """Build one body, with its centre of mass at its frame's origin and point feet fixed to it.
+
+    The idle second body is hinged at that centre and has the same inertia but no mass.
+    """
+    assembly = Assembly(
+        bodies=(Body("body", mass, CENTRE, inertia), Body("idle", 0.0, CENTRE, inertia)),
+        joints=(Revolute("hinge", "body", CENTRE, "idle", CENTRE),),
+        feet=(BallFoot("first", "body", feet[0], 0.0), BallFoot("second", "body", feet[1], 0.0)),
+    )
+    return contact_walker(assembly, normal, friction, GRAVITY, slope)
+
+
+def rig_state(position: Position, velocity: Position, angle: float = 0.0, rate: float = 0.0) -> State:
+    """State of the rig from the position and velocity of its centre of mass in the slope's frame."""
+    return (*position, angle, 0.0, *velocity, rate, 0.0)
+
+
+def run_until(
+    walker: ContactWalker, start: State, duration_s: float, rtol: float = 1e-9, atol: float = 1e-12
+) -> ParticleRun:
+    """Simulate for a time with evenly spaced samples; raises ArithmeticError if the run ends early."""
+    frame = Frame(-UNBOUNDED_M, 2.0 * duration_s / LONGEST_FLIGHT, True)
+    ground = JudgedGround(checkerboard(UNBOUNDED_M, (0.0, 0.0)), frame)
+    walk_state = new_walk_state(walker, ground.terrain, 1, 1, start)
+    walk_state.at_zero[:] = 0
+    walk_state.progress.last_touch = duration_s - LONGEST_STEP * frame.pendulum_time
+    observer = new_observer(
+        walker, walk_state, start, np.arange(SAMPLE_COUNT, dtype=np.float64) * duration_s / SAMPLE_COUNT
+    )
+    stopped = walk_on(walker, ground, Tolerances("radau5", rtol, atol, PROBLEM_BUDGET), walk_state, observer, start)
+    if stopped.outcome is not Outcome.NO_HEEL_STRIKE:
+        raise ArithmeticError(f"ended as {stopped.outcome.label} at {stopped.time_s:.4g} s of {duration_s:.4g} s")
+    recorded = int(observer.tally.recorded)
+    times, states = observer.samples.time_s[:recorded].copy(), observer.samples.states[:recorded].copy()
+    return ParticleRun(times, states, stopped.state, observer.account[LOST].copy())
+
+
+@dataclass(frozen=True)
+class Known:
+    """Computed quantity and its reference.
+
+    limit  largest relative error, justified by `why_limit`
+    """
+
+    name: Annotated[str, Label("", "name of the problem")]
+    quantity: Annotated[str, Label("", "what is compared, with its unit")]
+    value: Annotated[float, Label("1", "by the contact code, in the quantity's unit")]
+    reference: Annotated[float, Label("1", "by another route, in the quantity's unit")]
+    source: str
+    limit: float
+    why_limit: str
+    wall_s: float
+
+    @property
+    def error(self) -> Annotated[float, Label("1", "difference over reference")]:
+        """Relative to the reference."""
+        return abs(self.value - self.reference) / abs(self.reference)
+
+    @property
+    def ok(self) -> bool:
+        return bool(math.isfinite(self.error) and self.error <= self.limit)
+
+
+def solve_problem(
+    name: str,
+    quantity: str,
+    run: Callable[[], float],
+    reference_by: Callable[[], float],
+    source: str,
+    limit: float,
+    why: str,
+) -> Known:
+    """Solve a problem by both routes; a run that fails gets an error that fails.
+
+    run    through the contact code
+    other  reference; for the other arguments see `Known`
+    """
+    started = time.perf_counter()
+    reference = reference_by()
+    try:
+        value = run()
+    except ArithmeticError:
+        value = math.copysign(1e300, reference)
+    return Known(name, quantity, value, reference, source, limit, why, time.perf_counter() - started)
+
+
+SPRING: Final = NormalLaw(1.0e6, 1.0, 0.0, 1.0e-4)
+LIGHT_LAW: Final = PAPER_LAW._replace(damping=9.0e2)
+THICK_LAW: Final = PAPER_LAW._replace(damping=9.0e3)
+DROP, BOUNCES = 0.1, 5
+BLOCK_MASS = 20.0
+
+
+def bouncing_ball_period() -> float:
+    """Mean time (s) between landings over five bounces on an undamped linear spring."""
+    ball = rig(1.0, 0.1, SPRING)
+    first = math.sqrt(2.0 * DROP / GRAVITY)
+    period = references.linear_bounce_period(1.0, SPRING.stiffness, DROP, GRAVITY)
+    run = run_until(ball, rig_state((0.0, DROP), (0.0, 0.0)), first + (BOUNCES - 0.5) * period)
+    y = run.states[-1]
+    time_to_landing = (
+        y[HEIGHT_RATE] + math.sqrt(y[HEIGHT_RATE] ** 2 + 2.0 * GRAVITY * y[BODY_HEIGHT])
+    ) / GRAVITY  # in free flight
+    return (float(run.times[-1] + time_to_landing) - first) / BOUNCES
+
+
+def restitution(law: NormalLaw, speed: float) -> float:
+    """Restitution of a ball with the walker's mass that lands at `speed` (m/s)."""
+    ball = rig(BLOCK_MASS, 1.0, law)
+    height = 1e-3
+    start = rig_state((0.0, height), (0.0, -math.sqrt(speed**2 - 2.0 * GRAVITY * height)))
+    flying = [y for y in run_until(ball, start, 0.02).states if y[BODY_HEIGHT] > 0.0 and y[HEIGHT_RATE] > 0.0]
+    if not flying:
+        return 0.0
+    y = flying[0]
+    return math.sqrt(y[HEIGHT_RATE] ** 2 + 2.0 * GRAVITY * y[BODY_HEIGHT]) / speed
+
+
+def block_speed(slope: float, start_speed: float) -> float:
+    """Speed (m/s) of a block on a slope one second after it had `start_speed`."""
+    law = PAPER_LAW
+    foot = resting_foot(BLOCK_MASS * GRAVITY * math.cos(slope), BLOCK_MASS, law.stiffness, law.exponent, law.damping)
+    block = rig(BLOCK_MASS, 1.0, law, slope=slope)
+    return float(run_until(block, rig_state((0.0, -foot.depth), (start_speed, 0.0)), 1.0).end[ALONG_RATE])
+
+
+SPOKES, WHEEL_SLOPE, HUB_INERTIA = 8, 0.08, 1e-3
+STIFF: Final = NormalLaw(1.0e9, 1.0, 3.0e5, 1.0e-7)
+STICKY: Final = Coulomb(2.0, 2.0, 1.0e-4, 1.0e-3)
+ROUNDS = 14
+
+
+def rimless_wheel_speed() -> float:
+    """Angular speed (rad/s) with a spoke normal to the slope, of a steadily rolling wheel.
+
+    Two spokes at a time, from one upright spoke to the next; then the wheel is in the same position, one spoke further.
+    """
+    turn = 2.0 * math.pi / SPOKES
+    ahead = (math.sin(turn), -math.cos(turn))
+    wheel = rig(1.0, HUB_INERTIA, STIFF, STICKY, ((0.0, -1.0), ahead), WHEEL_SLOPE)
+    speed = 0.9 * references.wheel_upright_speed(SPOKES, WHEEL_SLOPE, GRAVITY, HUB_INERTIA)
+    for _ in range(ROUNDS):
+        height = 1.0 - GRAVITY * math.cos(WHEEL_SLOPE) / STIFF.stiffness
+        start = rig_state((0.0, height), (speed, 0.0), -WHEEL_SLOPE, -speed)
+        run = run_until(wheel, start, turn / speed, 1e-8, 1e-11)
+        angle = -(run.states[:, BODY_ANGLE] + WHEEL_SLOPE)
+        speed = float(np.interp(turn, angle, -run.states[:, ANGLE_RATE]))
+    return speed
+
+
+ROD_ANGLE, ROD_FRICTION, ROD_STIFFNESS = 1.0, 4.0, 1.0e8
+
+
+def painleve_growth_rate() -> float:
+    """Rate (1/s) at which the end of a sliding rod digs in, from evenly spaced penetrations.
+
+    For d = a + b cosh(s t), the differences D over equal times tau obey D(t + tau) + D(t - tau) = 2 cosh(s tau) D(t).
+    """
+    end = (math.cos(ROD_ANGLE), -math.sin(ROD_ANGLE))
+    ground, friction = NormalLaw(ROD_STIFFNESS, 1.0, 0.0, 1.0e-4), Coulomb(ROD_FRICTION, ROD_FRICTION, 0.1, 1.0)
+    rod = rig(1.0, 1.0 / 3.0, ground, friction, (end, OUT_OF_REACH))
+    rate = references.painleve_growth_rate(ROD_ANGLE, ROD_FRICTION, 1.0, ROD_STIFFNESS)
+    run = run_until(rod, rig_state((0.0, math.sin(ROD_ANGLE)), (50.0, 0.0)), 6.0 / rate, 1e-11, 1e-16)
+    samples = np.linspace(0.4 * run.times.size, run.times.size - 1, 4).astype(int)
+    samples = samples[0] + (samples[1] - samples[0]) * np.arange(4)
+    samples = samples[samples < run.times.size]
+    tau = float(run.times[samples[1]] - run.times[samples[0]])
+    first, middle, last = np.diff([-one_foot_motion(rod.whole, 0, run.states[index]).height for index in samples])
+    return math.acosh(0.5 * (last + first) / middle) / tau
+
+
+PROBLEMS: Final = (
+    partial(
+        solve_problem, "bouncing ball", "time between landings, s", bouncing_ball_period,
+        partial(references.linear_bounce_period, 1.0, SPRING.stiffness, DROP, GRAVITY),
+        "closed form: free flight and half a period of the spring", 1e-7, "the tolerance, over five bounces",
+    ),
+    partial(
+        solve_problem, "ball dropped on the IMPACT law", "restitution at 0.5 m/s, a hundredth of the paper's damping",
+        partial(restitution, LIGHT_LAW, 0.5),
+        partial(references.restitution, BLOCK_MASS, 0.5, LIGHT_LAW, GRAVITY),
+        "SciPy DOP853 on the law as written in its manual", 1e-6, "a thousand times the tolerance",
+    ),
+    partial(
+        solve_problem, "ball dropped on thicker ground", "restitution at 0.5 m/s, a tenth of the paper's damping",
+        partial(restitution, THICK_LAW, 0.5),
+        partial(references.restitution, BLOCK_MASS, 0.5, THICK_LAW, GRAVITY),
+        "SciPy DOP853 on the law as written in its manual", 1e-6, "a thousand times the tolerance",
+    ),
+    partial(
+        solve_problem, "block on an incline that holds it", "creep speed at 0.2 rad, m/s",
+        partial(block_speed, 0.2, 0.0),
+        partial(references.creep_speed, 0.2, PAPER_FRICTION.static, PAPER_FRICTION.stiction_velocity),
+        "root of the friction law's cubic, SciPy brentq", 1e-7, "the tolerance",
+    ),
+    partial(
+        solve_problem, "block on too steep an incline", "speed at 0.8 rad a second after 2 m/s, m/s",
+        partial(block_speed, 0.8, 2.0),
+        lambda: 2.0 + references.sliding_acceleration(0.8, PAPER_FRICTION.dynamic, GRAVITY),
+        "closed form: g (sin - mu cos)", 1e-7, "the tolerance",
+    ),
+    partial(
+        solve_problem, "rimless wheel of eight spokes", "steady speed with a spoke upright at 0.08 rad, rad/s",
+        rimless_wheel_speed,
+        partial(references.wheel_upright_speed, SPOKES, WHEEL_SLOPE, GRAVITY, HUB_INERTIA),
+        "McGeer 1990: closed form for rigid spokes", 1e-3, "the ground under the spokes yields and creeps a little",
+    ),
+    partial(
+        solve_problem, "Painleve's rod", "rate at which its end digs in at friction 4, 1/s", painleve_growth_rate,
+        partial(references.painleve_growth_rate, ROD_ANGLE, ROD_FRICTION, 1.0, ROD_STIFFNESS),
+        "closed form, linearised", 1e-3, "the rod turns a little as it digs in",
+    ),
+)  # fmt: skip

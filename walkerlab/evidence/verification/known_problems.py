@@ -1,0 +1,21 @@
+"""Stage `known-problems`: problems with known answers, run through the contact code; independent of the scene."""
+
+from collections.abc import Mapping
+from dataclasses import asdict
+
+from walkerlab.evidence.verification.known import PROBLEMS, Known
+from walkerlab.labels import labels_of
+from walkerlab.pipeline.progress import Progress, track
+from walkerlab.pipeline.store.columns import rows_group
+from walkerlab.pipeline.store.content import Content
+
+
+def run(_config: object, _inputs: Mapping[str, Content], progress: Progress) -> Content:
+    """Solve every problem; wrong answers are stored, and reported by `stability`."""
+    rows = []
+    for problem in track(progress, "known problems", len(PROBLEMS), PROBLEMS):
+        known = problem()
+        rows.append({**asdict(known), "error": known.error, "ok": known.ok})
+    right = sum(row["ok"] for row in rows)
+    group = rows_group(rows, labels_of(Known), "problem", "number of the row")
+    return Content({"known": group}, {"known": rows, "passed": right, "failed": len(rows) - right})

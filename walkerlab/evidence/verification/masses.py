@@ -1,0 +1,151 @@
+"""Momentum and energy of walkers computed from their point masses, independently of the equations of motion."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from walkerlab.evidence.verification.verdict import finite
+from walkerlab.physics.mechanics.assembly import Anchor, levers, masses
+from walkerlab.physics.mechanics.parts import Assembly
+from walkerlab.physics.mechanics.rigid import hip_of, places_of
+from walkerlab.physics.mechanics.rigid_model import STANCE, SWING
+from walkerlab.physics.solvers.system import Floats
+
+
+class Masses:
+    """A walker's masses, relative to a point that moves with it: by default the centre of mass.
+
+    mass     (masses,) kg
+    levers   (masses, bodies, 2) m, from the point
+    inertia  (bodies,) kg m^2, of the bodies about their own centres of mass
+    """
+
+    def __init__(self, assembly: Assembly, about: Anchor | None = None) -> None:
+        point_masses = list(masses(assembly))
+        root = about or point_masses[0][1]
+        self.mass = np.array([mass for mass, _ in point_masses])
+        self.levers = np.array([levers(assembly, root, at) for _, at in point_masses])
+        if about is None:
+            self.levers = self.levers - np.average(self.levers, axis=0, weights=self.mass)
+        self.inertia = np.array([body.inertia_kg_m2 for body in assembly.bodies])
+
+    def moving(self, psi: Floats, rate: Floats) -> tuple[Floats, Floats]:
+        """Positions and velocities (..., masses, 2) relative to the point, at angles and rates (..., bodies)."""
+        arms = rotate(self.levers, psi[..., None, :])
+        swept = np.stack([-arms[..., 1], arms[..., 0]], axis=-1) * rate[..., None, :, None]
+        return arms.sum(axis=-2), swept.sum(axis=-2)
+
+
+def rotate(d: Floats, psi: Floats) -> Floats:
+    """Rotate levers (..., bodies, 2) with their bodies."""
+    s, c = np.sin(psi), np.cos(psi)
+    return np.stack([c * d[..., 0] - s * d[..., 1], s * d[..., 0] + c * d[..., 1]], axis=-1)
+
+
+@dataclass(frozen=True)
+class Moving:
+    """Masses and bodies of a walker at an instant; the origin is on the ground under the stance foot.
+
+    mass      (masses,) kg
+    place     (masses, 2) m
+    velocity  (masses, 2) m/s
+    inertia   (bodies,) kg m^2, about the bodies' own centres of mass
+    rate      (bodies,) rad/s
+    hip       (2,) m
+    contact   (2,) m, point of the swing foot that would touch
+    """
+
+    mass: Floats
+    place: Floats
+    velocity: Floats
+    inertia: Floats
+    rate: Floats
+    hip: Floats
+    contact: Floats
+
+    @property
+    def kinetic(self) -> float:
+        """Kinetic energy (J)."""
+        return float(0.5 * self.mass @ (self.velocity**2).sum(axis=1) + 0.5 * self.inertia @ self.rate**2)
+
+    def about(self, point: Floats, on_masses: Floats, on_bodies: Floats) -> float:
+        """Angular momentum about a point (kg m^2/s), with the weights of masses and bodies."""
+        arm = self.place - point
+        orbital = self.mass * (arm[:, 0] * self.velocity[:, 1] - arm[:, 1] * self.velocity[:, 0])
+        return float(on_masses @ orbital + on_bodies @ (self.inertia * self.rate))
+
+
+class RigidMasses:
+    """A walker's masses in states of the rigid model."""
+
+    def __init__(self, assembly: Assembly, slope: float) -> None:
+        """Take levers from the centre of the stance foot's arc; slope in rad."""
+        foot, other, hip = assembly.feet[STANCE], assembly.feet[SWING], hip_of(assembly)
+        root = Anchor(foot.body, foot.centre_m)
+        self.assembly, self.slope, self.radius = assembly, slope, foot.radius_m
+        self.members = places_of(assembly).members
+        self.masses = Masses(assembly, root)
+        self.owner = [assembly.index(at.body) for _, at in masses(assembly)]
+        self.to_hip = levers(assembly, root, Anchor(hip.parent, hip.parent_point_m))
+        self.to_foot = levers(assembly, root, Anchor(other.body, other.centre_m))
+
+    def at(self, state: Floats) -> Moving:
+        """Masses in a state of the rigid model (2 n)."""
+        n = self.members.shape[1]
+        psi, rate = self.members @ state[:n] + self.slope, self.members @ state[n:]
+        centre, rolling = np.array([0.0, self.radius]), np.array([-self.radius * state[n + STANCE], 0.0])
+        place, velocity = self.masses.moving(psi, rate)
+        hip, contact = centre + rotate(self.to_hip, psi).sum(axis=0), rotate(self.to_foot, psi).sum(axis=0)
+        mass, inertia = self.masses.mass, self.masses.inertia
+        return Moving(mass, centre + place, rolling + velocity, inertia, rate, hip, contact)
+
+    def momenta(self, state: Floats, new: bool) -> tuple[float, float]:
+        """Angular momenta conserved by a heel strike (kg m^2/s).
+
+        The whole walker's about the new foothold; and that of the lifting leg, with its share of coupled bodies, about
+        the hip.
+
+        new  whether the state is after the change of stance foot
+        """
+        moving, leg = self.at(state), self.assembly.legs[SWING if new else STANCE]
+        names = [body.name for body in self.assembly.bodies]
+        share = np.array([1.0 if name in leg else 0.0 for name in names])
+        for coupling in self.assembly.couplings:
+            turning = (weight for name, weight in zip(coupling.of, coupling.weights, strict=True) if name in leg)
+            share[names.index(coupling.body)] = sum(turning)
+        foothold = np.zeros(2) if new else moving.contact
+        whole = moving.about(foothold, np.ones(len(self.owner)), np.ones(share.size))
+        return whole, moving.about(moving.hip, share[self.owner], share)
+
+    def moment_of(self, push_off: float, state: Floats) -> float:
+        """Angular impulse (kg m^2/s) about the new foothold of a push-off (N s) from the rear contact to the hip."""
+        moving = self.at(state)
+        along, up = push_off * moving.hip / np.hypot(*moving.hip)
+        return float(moving.contact[1] * along - moving.contact[0] * up)
+
+    def momentum_change(self, before: Floats, after: Floats, push_off: float = 0.0) -> float:
+        """Largest relative change of these momenta in heel strikes; states (strikes, 2 n).
+
+        The angular impulse of a push-off (N s) is accounted for.
+        """
+        change, size = 0.0, 1e-300
+        for old, new in zip(before, after, strict=True):
+            momenta_before, momenta_after = (
+                np.array(self.momenta(old, new=False)),
+                np.array(self.momenta(new, new=True)),
+            )
+            momenta_before[0] += self.moment_of(push_off, old)
+            change, size = (
+                max(change, *np.abs(momenta_after - momenta_before)),
+                max(size, *np.abs(momenta_before), *np.abs(momenta_after)),
+            )
+        return finite(change / size)
+
+    def energy_won(self, before: Floats, after: Floats) -> float:
+        """Largest gain of kinetic energy (J) in heel strikes; 0 if all lose energy."""
+        gains = [self.at(new).kinetic - self.at(old).kinetic for old, new in zip(before, after, strict=True)]
+        return max(0.0, *gains)
+
+    def feet_off_the_slope(self, before: Floats) -> float:
+        """Largest distance (m) of the landing foot from the slope."""
+        return float(max(abs(self.at(state).contact[1]) for state in before))

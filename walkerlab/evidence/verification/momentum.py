@@ -1,0 +1,170 @@
+"""Momentum balance on compliant ground: a walk's change of momentum against the impulse of ground and gravity.
+
+Momenta are computed from positions and velocities of the masses, not from the equations of motion; impulses from the
+ground's forces at sampled states. Where forces vary quickly, as in a touch of milliseconds, sampling is refined until
+the sums settle.
+"""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from walkerlab.config.reads import RigidConfig, WalksConfig
+from walkerlab.config.stability import Case
+from walkerlab.evidence.verification.masses import Masses
+from walkerlab.evidence.verification.scaling import pendulum_time
+from walkerlab.evidence.verification.verdict import MAGNIFIED, Measure, NotMeasured, finite, promised
+from walkerlab.physics.ground.friction import steepest_change
+from walkerlab.physics.hybrid.contact_record import ContactSamples
+from walkerlab.physics.hybrid.contact_result import sampled_feet
+from walkerlab.physics.solvers.registry import Tolerances
+from walkerlab.physics.solvers.stepping import ACCEPTED
+from walkerlab.physics.solvers.system import Floats, State
+from walkerlab.scene.contact import ContactScene
+from walkerlab.scene.parts import assembly_of
+
+MEASURE: Final = "momentum not from ground and gravity, over the walker's"
+BALANCE_STEPS: Final = 2  # so that there is an impact, and what comes of it
+INITIAL_INTERVALS: Final = 256  # to begin with
+MAX_PASSES: Final = 9  # each looks four times as closely where it is needed
+MAX_INTERVALS: Final = 30_000  # beyond which nothing is looked at more closely
+SETTLED_SHARE: Final = (
+    1e-6  # of the walker's momentum: what an interval's sum may still change by, over the number of them
+)
+MAX_UNKNOWN: Final = 1e-3  # of the walker's momentum, beyond which a balance says nothing
+
+
+@dataclass(frozen=True)
+class Balance:
+    """Momentum against impulse, each as a share of the walker's momentum.
+
+    residual    largest over time, both directions and the angular part
+    unsure      error bound of the impulses' sums
+    unresolved  friction's impulse that depends on slips below the tolerance
+    steps       of the solver
+    """
+
+    residual: float
+    unsure: float
+    unresolved: float
+    steps: int
+
+
+def momentum_finding(config: WalksConfig, scene: ContactScene, start: State, case: Case) -> Measure | NotMeasured:
+    """Compare momentum with impulse, or state why it cannot be judged.
+
+    Errors of single steps are not magnified by the walk: the balance holds along the computed path.
+    """
+    if scene.pinned:
+        return NotMeasured(MEASURE, "the hinge transmits forces as well")
+    balance = momentum_balance(config, scene, start, case)
+    unknown = balance.unsure + balance.unresolved
+    if unknown > MAX_UNKNOWN:
+        shares = {
+            "the impulse sums do not settle": balance.unsure,
+            "friction depends on slip velocities below the tolerance": balance.unresolved,
+        }
+        why = " and ".join(reason for reason, share in shares.items() if share > 0.5 * MAX_UNKNOWN)
+        return NotMeasured(MEASURE, why)
+    limit = promised(case, config.solver.contact.rtol, balance.steps) / MAGNIFIED + unknown
+    return Measure(MEASURE, finite(balance.residual), limit)
+
+
+def momentum_balance(config: WalksConfig, scene: ContactScene, start: State, case: Case) -> Balance:
+    """Compare momentum with impulse over the first steps of a case."""
+    mass, leg = config.walker.total_mass_kg, config.walker.leg_length_m
+    rates = np.abs(start[len(start) // 2 :])
+    speed = max(leg / pendulum_time(config), *rates[:2], leg * float(rates[2:].max()))
+    scale = mass * np.array([speed, speed, speed * leg])
+    settings, steps = config.solver.contact, min(case.steps, BALANCE_STEPS)
+    tolerances = Tolerances(settings.method, settings.rtol, settings.atol, case.budget)
+    walk = scene.walk(start, steps, tolerances)
+    grid = np.linspace(0.0, walk.end_time_s, INITIAL_INTERVALS + 1)
+    if scene.walker.whole.push_off != 0.0:
+        pulse = scene.walker.whole.push_off_duration * np.linspace(0.0, 1.0, 9)
+        pushed = (walk.touch_time_s[:, None] + pulse).ravel()
+        grid = np.union1d(grid, pushed[pushed < walk.end_time_s])
+    for _ in range(MAX_PASSES):
+        samples = scene.walk(start, steps, tolerances, with_middles(grid)).samples
+        assert samples is not None, "the walk was looked at"
+        rates = impulse_rate(samples, scene, config, walk.touch_time_s) / scale
+        change = unsettled(samples.time_s, rates)
+        wanting = change > SETTLED_SHARE / grid.size
+        if not wanting.any() or grid.size > MAX_INTERVALS:
+            break
+        grid = split(samples.time_s, wanting)
+    assert samples is not None, "it was looked at"
+    momenta = momentum(samples, config) / scale
+    differences = np.abs(momenta - momenta[0] - impulse(samples.time_s, rates))
+    accepted = int(walk.work[ACCEPTED])
+    # in a state between the solver's own the slip is known to its tolerance, with another sign in every step
+    slip = tolerances.atol + tolerances.rtol * speed
+    push = steepest_change(scene.walker.friction, slip) * config.gravity_m_s2 * walk.end_time_s / speed
+    return Balance(float(differences.max()), float(change.sum()), push / max(1, accepted) ** 0.5, accepted)
+
+
+def with_middles(grid: Floats) -> Floats:
+    """Ends and midpoints of intervals."""
+    return np.sort(np.concatenate([grid, 0.5 * (grid[1:] + grid[:-1])]))
+
+
+def split(times: Floats, wanting: NDArray[np.bool_]) -> Floats:
+    """Ends of intervals, given with their midpoints, after those marked by `wanting` are cut into four."""
+    first, middle, last = times[:-1:2], times[1::2], times[2::2]
+    halves = np.concatenate([middle, 0.5 * (first + middle), 0.5 * (middle + last)])
+    return np.sort(np.concatenate([times[::2], halves[np.tile(wanting, 3)]]))
+
+
+def impulse(times: Floats, rate: Floats) -> Floats:
+    """Integrate a rate by Simpson's rule up to each interval's end: (times, components)."""
+    widths = np.diff(times[::2])[:, None]
+    pieces = widths / 6.0 * (rate[:-1:2] + 4.0 * rate[1::2] + rate[2::2])
+    return np.concatenate([np.zeros((1, rate.shape[1])), np.cumsum(pieces, axis=0)])
+
+
+def unsettled(times: Floats, rate: Floats) -> Floats:
+    """Change of each interval's integral when its midpoint is included, in the worst component."""
+    widths = np.diff(times[::2])[:, None]
+    change = widths / 6.0 * (rate[:-1:2] - 2.0 * rate[1::2] + rate[2::2])
+    return np.asarray(np.abs(change).max(axis=1))
+
+
+def impulse_rate(samples: ContactSamples, scene: ContactScene, config: RigidConfig, touches: Floats) -> Floats:
+    """Force along and normal to the slope (N), and torque about a point of the slope (N m).
+
+    Sums ground, gravity and, from the times of touches (steps,) on, push-offs.
+    """
+    along, height, normal, friction, _ = np.moveaxis(sampled_feet(scene.walker, samples), 2, 0)
+    slope = config.slope_rad
+    weight = config.walker.total_mass_kg * config.gravity_m_s2 * np.array([np.sin(slope), -np.cos(slope)])
+    torque = (along * normal - height * friction).sum(axis=1) + cross(samples.states[:, :2], weight)
+    rates = np.column_stack([friction.sum(axis=1) + weight[0], normal.sum(axis=1) + weight[1], torque])
+    form, samples_range = scene.walker.whole, np.arange(samples.time_s.size)
+    if form.push_off != 0.0:
+        pushing, y = 1 - samples.stance, samples.states
+        foot = np.column_stack([along[samples_range, pushing], height[samples_range, pushing]])
+        angles = y[:, 2 : y.shape[1] // 2] + slope
+        s, c, x, up = np.sin(angles), np.cos(angles), form.hip_x[: angles.shape[1]], form.hip_y[: angles.shape[1]]
+        line = y[:, :2] + np.column_stack([c @ x - s @ up, s @ x + c @ up]) - foot
+        u = np.clip((samples.time_s[:, None] - touches) / form.push_off_duration, 0.0, 1.0)
+        bell = 30.0 * ((u * (1.0 - u)) ** 2).sum(axis=1) * form.push_off / form.push_off_duration
+        push = (bell / np.hypot(*line.T))[:, None] * line
+        rates += np.column_stack([push, cross(foot, push)])
+    return rates
+
+
+def momentum(samples: ContactSamples, config: RigidConfig) -> Floats:
+    """Momentum along and normal to the slope (kg m/s) and about a point of it (kg m^2/s), at intervals' ends."""
+    y = samples.states[::2]
+    n, walker_masses = y.shape[1] // 2 - 2, Masses(assembly_of(config.walker))
+    rate = y[:, 4 + n :]
+    place, velocity = walker_masses.moving(y[:, 2 : 2 + n] + config.slope_rad, rate)
+    r, v = y[:, None, 0:2] + place, y[:, None, 2 + n : 4 + n] + velocity
+    return np.column_stack([walker_masses.mass @ v, cross(r, v) @ walker_masses.mass + rate @ walker_masses.inertia])
+
+
+def cross(r: Floats, v: Floats) -> Floats:
+    """Planar cross product, (...)."""
+    return np.asarray(r[..., 0] * v[..., 1] - r[..., 1] * v[..., 0])

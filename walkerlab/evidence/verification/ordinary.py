@@ -1,0 +1,176 @@
+"""Ordinary methods on the same scenes: SciPy at its default tolerance, and a game engine's fixed step.
+
+The contact scene is one differential equation without events, as written without knowledge of switching points and
+pad edges. It is integrated to the end of this project's walk and compared with that walk at a tight tolerance, whatever
+the case specifies. The rigid scene is a user's script with an event function.
+"""
+
+import time
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from walkerlab.config.reads import RigidConfig, WalksConfig
+from walkerlab.config.stability import Case
+from walkerlab.config.walkers import is_passive_compass
+from walkerlab.evidence.benchmarks.user_script import walk_as_a_script
+from walkerlab.evidence.paper.appendix_a import RigidWalker
+from walkerlab.evidence.paper.walker import compass_or_none
+from walkerlab.evidence.verification.scaling import pendulum_time
+from walkerlab.evidence.verification.starts import ContactStart, RigidStart, prepare_start
+from walkerlab.evidence.verification.verdict import finite
+from walkerlab.physics.ground.on_pads import OnPads
+from walkerlab.physics.ground.walker import on_ground
+from walkerlab.physics.hybrid.contact_result import ContactWalkResult
+from walkerlab.physics.hybrid.recorded_walk import RigidWalkResult
+from walkerlab.physics.solvers.registry import Tolerances
+from walkerlab.physics.solvers.scipy_methods import OutOfBudgetError, counting_rhs
+from walkerlab.physics.solvers.semi_implicit_euler import DIVERGED, semi_implicit_euler
+from walkerlab.physics.solvers.stepping import BUDGET, COUNTS, RHS
+from walkerlab.physics.solvers.system import Floats
+
+MAX_ORDINARY_EVALUATIONS: Final = 20_000  # right-hand sides
+FINE_ERROR: Final = 1e-2  # of a leg, of a radian, of their rates in pendulum times
+SCIPY_DEFAULT: Final = (1e-3, 1e-6)  # tolerances of solve_ivp
+DIVERGED_ERROR: Final = 10.0  # the same
+COMPARED_STEPS: Final = 2
+SCIPY_METHODS: Final = ("RK45", "LSODA", "Radau")
+FIXED_STEPS_S: Final = (1e-3, 1e-4)
+REFERENCE_SETTINGS: Final = ("radau5", 1e-8, 1e-10)  # method, rtol, atol
+MIN_REFERENCE_BUDGET: Final = 1_000_000  # at least
+RIGID_REFERENCE_SETTINGS: Final = ("dop853", 1e-12, 1e-14)
+
+
+@dataclass(frozen=True)
+class Choice:
+    """One method on one case.
+
+    verdict  fine, wrong silently, gives up, diverges
+    error    of the final state; None if it was not reached
+    """
+
+    case: str
+    method: str
+    verdict: str
+    error: float | None
+    rhs_evaluations: int
+    wall_s: float
+
+
+def choices(case: Case, config: WalksConfig) -> tuple[Choice, ...]:
+    """Run every ordinary method on a case.
+
+    Empty if the case has no start or does not move, if no equation without events describes its ground, or for another
+    walker than a compass: a script without events has no knee that locks, and Appendix A no other walker.
+    """
+    if not is_passive_compass(config):
+        return ()
+    short = case.model_copy(
+        update={"steps": min(case.steps, COMPARED_STEPS), "budget": max(case.budget, MIN_REFERENCE_BUDGET)}
+    )
+    start = prepare_start(config, short)
+    compass = compass_or_none(config, config.equations)
+    if isinstance(start, RigidStart) and compass is not None:
+        walk = start.walk(short, Tolerances(*RIGID_REFERENCE_SETTINGS, short.budget)).record
+        if not walk.steps:
+            return ()
+        units = np.array([1.0, 1.0, *[1.0 / pendulum_time(config)] * 2])
+        arrival = Arrival(case.name, float(walk.touch_time_s[-1]), np.array(walk.final_state), units)
+        return tuple(scipy_script(arrival, compass, walk, name) for name in SCIPY_METHODS)
+    if not isinstance(start, ContactStart) or start.scene.pinned or start.scene.ground.terrain.order_matters:
+        return ()
+    walk = start.walk(short, Tolerances(*REFERENCE_SETTINGS, short.budget)).record
+    arrival = arrival_of(case.name, walk, natural_units(config))
+    if arrival.time_s == 0.0:
+        return ()
+    by_library = [scipy_walk(arrival, start, name) for name in SCIPY_METHODS]
+    return (*by_library, *(euler(arrival, start, h) for h in FIXED_STEPS_S))
+
+
+@dataclass(frozen=True)
+class Arrival:
+    """End of a case's walk, to judge methods by.
+
+    units  of each component of the state
+    """
+
+    case: str
+    time_s: float
+    state: Floats
+    units: Floats
+
+    def judged(self, method: str, y: Floats | None, count: int, wall_s: float) -> Choice:
+        """Judge the end state of a method; None if it was not reached."""
+        if y is None:
+            return Choice(self.case, method, "gives up", None, count, wall_s)
+        error = finite(float(np.max(np.abs((y - self.state) / self.units))))
+        scale = max(1.0, float(np.max(np.abs(self.state / self.units))))
+        if error > DIVERGED_ERROR * scale or float(np.max(np.abs(y[: y.size // 2]))) >= DIVERGED:
+            return Choice(self.case, method, "diverges", None, count, wall_s)
+        return Choice(
+            self.case, method, "fine" if error <= FINE_ERROR * scale else "wrong silently", error, count, wall_s
+        )
+
+
+def arrival_of(case: str, walk: ContactWalkResult, units: Floats) -> Arrival:
+    return Arrival(case, walk.end_time_s, np.array(walk.end_state), units)
+
+
+def natural_units(config: RigidConfig) -> Floats:
+    """Units of the state's components: legs, radians, and these per pendulum time."""
+    lengths = np.array([config.walker.leg_length_m] * 2 + [1.0] * 2)
+    return np.concatenate([lengths, lengths / pendulum_time(config)])
+
+
+@contextmanager
+def silenced() -> Iterator[None]:
+    """Suppress libraries' warnings, and leave the block on exceptions with which they give up."""
+    with (
+        warnings.catch_warnings(),
+        np.errstate(all="ignore"),
+        suppress(OutOfBudgetError, ValueError, np.linalg.LinAlgError),
+    ):
+        warnings.simplefilter("ignore")
+        yield
+
+
+def scipy_script(arrival: Arrival, compass: RigidWalker, walk: RigidWalkResult, method: str) -> Choice:
+    """Walk with a method of SciPy's solve_ivp at default settings, with an event function for heel strikes."""
+    began = time.perf_counter()
+    y, count = None, MAX_ORDINARY_EVALUATIONS
+    with silenced():
+        y, count = walk_as_a_script(compass, walk.start, walk.steps, *SCIPY_DEFAULT, MAX_ORDINARY_EVALUATIONS, method)
+    return arrival.judged(f"SciPy {method}", y, count, time.perf_counter() - began)
+
+
+def scipy_walk(arrival: Arrival, ready: ContactStart, method: str) -> Choice:
+    """Walk with a method of SciPy's solve_ivp at default settings."""
+    from scipy.integrate import solve_ivp
+
+    system = OnPads(on_ground(ready.scene.walker, (True, True)), ready.scene.ground.terrain)
+    start = np.array(ready.start)
+    counts = np.zeros(COUNTS, np.int64)
+    counts[BUDGET] = MAX_ORDINARY_EVALUATIONS
+    right_hand_side = counting_rhs(counts, system, start.size)
+    began = time.perf_counter()
+    y = None
+    with silenced():
+        solution = solve_ivp(right_hand_side, (0.0, arrival.time_s), start, method=method)
+        if solution.success:
+            y = solution.y[:, -1]
+    return arrival.judged(f"SciPy {method}", y, int(counts[RHS]), time.perf_counter() - began)
+
+
+def euler(arrival: Arrival, ready: ContactStart, h: float, cap: int = MAX_ORDINARY_EVALUATIONS) -> Choice:
+    """Walk by semi-implicit Euler with at most `cap` steps of h (s)."""
+    system = OnPads(on_ground(ready.scene.walker, (True, True)), ready.scene.ground.terrain)
+    y = np.array(ready.start)
+    began = time.perf_counter()
+    steps = int(semi_implicit_euler(system, y, np.empty_like(y), arrival.time_s, h, cap))
+    wall_s = time.perf_counter() - began
+    late = steps == cap and steps * h < arrival.time_s * (1.0 - 1e-9) and bool(np.all(np.abs(y) < DIVERGED))
+    return arrival.judged(f"semi-implicit Euler, {h:g} s", None if late else y, steps, wall_s)

@@ -1,0 +1,98 @@
+"""Stage `stability`: extreme cases and known problems, judged by measures that the walk itself does not use."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from typing import Any, TypeGuard
+
+from walkerlab.config.reads import CompassCasesConfig, SceneCasesConfig, WalksConfig, keys_of
+from walkerlab.config.schema import Config
+from walkerlab.evidence.verification.catalogue import all_cases, scene_cases
+from walkerlab.evidence.verification.judge import CaseCell, run_cells
+from walkerlab.evidence.verification.left_out import verification_omissions
+from walkerlab.evidence.verification.ordinary import FINE_ERROR, MAX_ORDINARY_EVALUATIONS, Choice
+from walkerlab.evidence.verification.verdict import CaseResult
+from walkerlab.labels import labels_of
+from walkerlab.pipeline.progress import Progress, track
+from walkerlab.pipeline.stages.walk import rigid_start
+from walkerlab.pipeline.store.columns import rows_group
+from walkerlab.pipeline.store.content import Content
+from walkerlab.scene.contact import scene_on_pads
+from walkerlab.scene.studies import is_studied
+
+
+def run(
+    config: CompassCasesConfig | SceneCasesConfig, inputs: Mapping[str, Content], progress: Progress, jobs: int = 1
+) -> Content:
+    """Judge the catalogue and the config's own cases, try ordinary methods, and report the known problems.
+
+    For a walker other than the paper's compass the catalogue consists of variations of the scene.
+
+    Raises ConfigError if two cases share a name.
+    """
+    if has_scene_cases(config):
+        variations = scene_cases(with_numbers(config, inputs))
+        all_cases(config.stability.cases, [case for case, _ in variations])
+        cells = [*(CaseCell(*case) for case in variations), *map(CaseCell, config.stability.cases)]
+    else:
+        cells = [*map(CaseCell, all_cases(config.stability.cases))]
+    results_by_case = track(progress, "stability", len(cells), run_cells(cells, jobs))
+    items: list[CaseResult | Choice] = [result for results in results_by_case for result in results]
+    cases = [item for item in items if isinstance(item, CaseResult)]
+    problems = inputs["known-problems"]
+    summary = summarise(cases, problems.summary["known"], [item for item in items if isinstance(item, Choice)])
+    group = rows_group(cases, labels_of(CaseResult), "case", "number of the row")
+    return Content(
+        {"cases": group, "known": problems["known"]}, {**summary, "left_out": list(verification_omissions(config))}
+    )
+
+
+def has_scene_cases(config: CompassCasesConfig | SceneCasesConfig) -> TypeGuard[SceneCasesConfig]:
+    """Whether the walker is not the paper's compass."""
+    return not is_studied(config)
+
+
+def with_numbers(config: WalksConfig, inputs: Mapping[str, Content]) -> Config:
+    """Scene with start and pitch of pads given as numbers, shared by its cases."""
+    step, start = rigid_start(config, inputs)
+    scene = Config().model_copy(update={key: getattr(config, key) for key in keys_of(WalksConfig)} | {"start": start})
+    contact = config.contact
+    if contact is None or contact.terrain != "checkerboard":
+        return scene
+    pitch = scene_on_pads(config, step, start).pitch_m
+    return scene.model_copy(update={"contact": contact.model_copy(update={"pad_pitch": pitch})})
+
+
+def summarise(
+    cases: Sequence[CaseResult], known: Sequence[Mapping[str, Any]], ordinary: Sequence[Choice]
+) -> dict[str, Any]:
+    """Build the summary; a failure adds `no_answer`.
+
+    known  the known problems, as stored by their stage
+    """
+    failed = [*(case.name for case in cases if not case.ok), *(row["name"] for row in known if not row["ok"])]
+    total = len(cases) + len(known)
+    summary = {
+        "cases": [case_row(case) for case in cases],
+        "known": list(known),
+        "passed": total - len(failed),
+        "failed": len(failed),
+        # an ordinary method that did not arrive has no error
+        "ordinary": [{name: value for name, value in asdict(row).items() if value is not None} for row in ordinary],
+        "ordinary_cap": MAX_ORDINARY_EVALUATIONS,
+        "ordinary_fine": FINE_ERROR,
+    }
+    if failed:
+        message = f"{len(failed)} of {total} did not end as expected: {', '.join(failed)}"
+        advice = "`walkerlab report` explains failures in red; `walkerlab stability --json` has every measure."
+        summary["no_answer"] = {"message": message, "advice": advice}
+    return summary
+
+
+def case_row(case: CaseResult) -> dict[str, Any]:
+    row = {name: value for name, value in asdict(case).items() if name not in ("findings", "remarks")}
+    row |= {name: list(row[name]) for name in ("expected", "not_measured")}
+    measures = [
+        {"measure": measure.measure, "value": measure.value, "limit": measure.limit, "ok": measure.ok}
+        for measure in case.findings
+    ]
+    return {**row, "ok": case.ok, "note": "; ".join(case.failures), "measures": measures}

@@ -1,0 +1,182 @@
+"""Starts of cases: a walker in its initial state, how it walks in either model, and what its walk must conserve."""
+
+from dataclasses import dataclass
+from functools import cache
+from typing import Any, ClassVar
+
+import numpy as np
+
+from walkerlab.config.reads import WalksConfig
+from walkerlab.config.stability import Case
+from walkerlab.evidence.verification.masses import RigidMasses
+from walkerlab.evidence.verification.momentum import MEASURE, momentum_finding
+from walkerlab.evidence.verification.scaling import pendulum_time
+from walkerlab.evidence.verification.verdict import Measure, NotMeasured, finite
+from walkerlab.outcome import Outcome
+from walkerlab.physics.hybrid.contact_result import ContactWalkResult
+from walkerlab.physics.hybrid.recorded_walk import RigidWalkResult, as_state, take_walk
+from walkerlab.physics.mechanics.rigid_model import RigidModel, swing_foot
+from walkerlab.physics.orbits.fixed_point import RigidGait, find_gaits
+from walkerlab.physics.solvers.registry import Tolerances
+from walkerlab.physics.solvers.stepping import ACCEPTED, RHS
+from walkerlab.physics.solvers.system import Floats, State
+from walkerlab.scene.contact import ContactScene, contact_gait, contact_scene, start_state, wants_own_pitch
+from walkerlab.scene.parts import assembly_of
+from walkerlab.scene.rigid import rigid_walker
+
+CENTRE_HEIGHT = 1  # index into the state of the free walker
+STRIKE_TOLERANCE = 1e-9  # share of the momentum by which a heel strike may seem to change it
+SAMPLE_RATE = 40
+REGAIN_TOLERANCE = (
+    1e-3  # of the balance asked for: by how much what was dissipated may seem to fall, for the quadrature
+)
+
+
+@dataclass(frozen=True)
+class JudgedWalk:
+    """A walk of either model to be judged, with times in pendulum times of its walker.
+
+    end         end time; None in the rigid model, whose walks end at a heel strike
+    residual_J  of the energy balance, or energy drift within a swing
+    numbers     values that must be finite
+    """
+
+    outcome: Outcome
+    touches: Floats
+    end: float | None
+    residual_J: float  # noqa: N815
+    rhs_evaluations: int
+    accepted: int
+    numbers: Floats
+    record: Any
+
+
+@dataclass(frozen=True)
+class CaseStart:
+    """A walker in the initial state of a case.
+
+    energy  m g L and the initial energy (J), the scale of residuals
+    kept    name of the residual
+    """
+
+    kept: ClassVar[str]
+    config: WalksConfig
+    start: State
+    energy: float
+
+
+@dataclass(frozen=True)
+class RigidStart(CaseStart):
+    kept: ClassVar[str] = "energy drift within a swing"
+    walker: RigidModel
+
+    def again(self, case: Case) -> Case:
+        """Shorten a repeated walk to the steps whose times are compared."""
+        return case.model_copy(update={"steps": min(case.steps, max(case.compared_steps, 1))})
+
+    def walk(self, case: Case, tolerances: Tolerances, sampled: bool = False) -> JudgedWalk:  # noqa: ARG002
+        """Walk a case; only heel strikes are judged, so nothing is sampled."""
+        walk = take_walk(self.walker, tolerances, self.start, case.steps)
+        numbers = np.concatenate([walk.touch_time_s, walk.before.ravel(), walk.after.ravel()])
+        touches, work = walk.touch_time_s / pendulum_time(self.config), walk.work
+        cost = work.rhs_evaluations, work.accepted
+        off = walk.energy_balance_residual if self.walker.sprung else walk.energy_drift
+        return JudgedWalk(walk.outcome, touches, None, off, *cost, numbers, walk)
+
+    def measures(self, walk: JudgedWalk, _case: Case) -> list[Measure]:
+        """Measure what heel strikes must conserve."""
+        record: RigidWalkResult = walk.record
+        if not record.steps:
+            return []
+        strikes = RigidMasses(assembly_of(self.config.walker, rigid=True), self.config.slope_rad)
+        distance = strikes.feet_off_the_slope(record.before) / self.walker.leg_length
+        push = float(self.walker.push_off)
+        momentum_change = strikes.momentum_change(record.before, record.after, push)
+        gain = 0.0 if push else strikes.energy_won(record.before, record.after) / self.energy
+        return [
+            Measure(
+                "distance of the feet from the slope at heel strike, in leg lengths", finite(distance), STRIKE_TOLERANCE
+            ),
+            Measure("momentum changed by a heel strike", momentum_change, STRIKE_TOLERANCE),
+            Measure("energy gained at a heel strike", finite(gain), STRIKE_TOLERANCE),
+        ]
+
+
+@dataclass(frozen=True)
+class ContactStart(CaseStart):
+    kept: ClassVar[str] = "energy balance residual"
+    scene: ContactScene
+
+    def again(self, case: Case) -> Case:
+        """Repeat the whole walk, since outcomes are compared too."""
+        return case
+
+    def walk(self, case: Case, tolerances: Tolerances, sampled: bool = False) -> JudgedWalk:
+        scene, unit = self.scene, pendulum_time(self.config)
+        interval = scene.ground.frame.pendulum_time / SAMPLE_RATE if sampled else None
+        walk = scene.walk(self.start, case.steps, tolerances, interval)
+        numbers = np.concatenate([walk.end_state, walk.touch_time_s, walk.touch_along_m, walk.dissipated_J])
+        touches, end = walk.touch_time_s / unit, walk.end_time_s / unit
+        cost = int(walk.work[RHS]), int(walk.work[ACCEPTED])
+        return JudgedWalk(walk.outcome, touches, end, walk.energy_balance_residual_J, *cost, numbers, walk)
+
+    def measures(self, walk: JudgedWalk, case: Case) -> list[Measure]:
+        """Measure, on a sampled walk, whether friction and damping return energy."""
+        record: ContactWalkResult = walk.record
+        if record.samples is None or record.samples.dissipated_J.shape[0] < 2:
+            return []
+        falls = -np.diff(record.samples.dissipated_J[:, :2], axis=0)
+        back = finite(max(0.0, float(np.max(falls))) / self.energy)
+        return [Measure("energy regained from friction and damping", back, REGAIN_TOLERANCE * case.balance)]
+
+    def momentum(self, walk: JudgedWalk, case: Case) -> Measure | NotMeasured:
+        """Momentum balance of a walk that has an answer and a duration."""
+        if not walk.outcome.answered or walk.record.end_time_s <= 0.0:
+            return NotMeasured(MEASURE, f"the walk ended as {walk.outcome.label}")
+        return momentum_finding(self.config, self.scene, self.start, case)
+
+
+Start = RigidStart | ContactStart
+
+
+def case_tolerances(start: Start, case: Case, tighter: float = 1.0) -> Tolerances:
+    """The config's method, with its tolerances multiplied by `tighter`, within the case's budget."""
+    solver = start.config.solver
+    settings = solver.rigid if isinstance(start, RigidStart) else solver.contact
+    return Tolerances(settings.method, tighter * settings.rtol, tighter * settings.atol, case.budget)
+
+
+@cache
+def gait_of(walker: RigidModel, seed: int) -> RigidGait | None:
+    """Find a walker's gait; cached, since most cases of a catalogue are one walker on other ground."""
+    return find_gaits(walker, seed).gait
+
+
+def prepare_start(config: WalksConfig, case: Case) -> Start | None:
+    """Prepare the start of a case; None if it, or the pads' pitch, depends on a gait that does not exist."""
+    walker = rigid_walker(config)
+    if isinstance(config.start, str):
+        gait = gait_of(walker, config.seed)
+        if gait is None:
+            return None
+        state, length = as_state(gait.state), float(gait.step_length)
+    else:
+        state, length = config.start, abs(float(swing_foot(walker, config.start)[1]))
+    if case.model == "rigid":
+        speed = walker.leg_length * max(abs(rate) for rate in state[len(state) // 2 :])
+        energy = float(walker.mass * (walker.gravity * walker.leg_length + 0.5 * speed**2))
+        return RigidStart(config, state, energy, walker)
+    pitch = length
+    if config.contact is not None and wants_own_pitch(config.contact):
+        contact = contact_gait(config, length, state).gait
+        if contact is None:
+            return None
+        pitch = contact.step.length_m
+    scene = contact_scene(config, length, pitch)
+    y = start_state(scene, state)
+    y = (*y[:CENTRE_HEIGHT], y[CENTRE_HEIGHT] - case.lowered_m, *y[CENTRE_HEIGHT + 1 :])
+    leg, rates, law = config.walker.leg_length_m, y[len(y) // 2 :], scene.walker.normal
+    speed = float(np.max(np.abs([*rates[:2], *(leg * rate for rate in rates[2:])])))
+    stored = 2.0 * law.stiffness * max(0.0, case.lowered_m) ** (law.exponent + 1.0) / (law.exponent + 1.0)
+    energy = scene.walker.mass * (config.gravity_m_s2 * leg + 0.5 * speed**2) + stored
+    return ContactStart(config, y, energy, scene)

@@ -1,0 +1,333 @@
+"""Compilation and caching of kernels by numba: no machine code for parts alone, and one process compiles each kernel.
+
+This uses private parts of numba. If a version lacks one, `absent` lists it and kernels use numba's public interface,
+with the same results.
+"""
+
+import functools
+import hashlib
+import importlib
+import sys
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numba
+from numba import types
+
+from walkerlab.physics.kernel_cache import PACKAGE, cache_folder, lock_of, watchers
+
+compiling: list[tuple["KernelCache", str]] = []
+"""Kernels that this process is compiling, with their signatures; each is called by the one before it."""
+absent: list[str] = []
+"""Private parts that this version of numba lacks; kernels then use only its public interface."""
+
+
+def private_class(name: str, *members: str) -> Any:
+    """Import a private class of numba by its full name; list it in `absent` if it or one of `members` is missing."""
+    module, _, kind = name.rpartition(".")
+    try:
+        imported = getattr(importlib.import_module(module), kind)
+    except (ImportError, AttributeError):
+        absent.append(name)
+        return object
+    absent.extend(f"{name}.{member}" for member in members if not hasattr(imported, member))
+    return imported
+
+
+CompileResultCacheImpl = private_class("numba.core.caching.CompileResultCacheImpl", "_locator_classes", "locator")
+FunctionCache = private_class("numba.core.caching.FunctionCache", "_impl_class", "load_overload", "save_overload")
+IndexDataCacheFile = private_class("numba.core.caching.IndexDataCacheFile", "_load_index")
+IPythonCacheLocator = private_class("numba.core.caching.IPythonCacheLocator", "from_function")
+UserProvidedCacheLocator = private_class(
+    "numba.core.caching.UserProvidedCacheLocator", "from_function", "get_suitable_cache_subpath"
+)
+JITCodeLibrary = private_class(
+    "numba.core.codegen.JITCodeLibrary",
+    "codegen",
+    "get_pointer_to_function",
+    "_ensure_finalized",
+    "_optimize_final_module",
+    "_finalize_final_module",
+    "_finalize_dynamic_globals",
+)
+Compiler = private_class("numba.core.compiler.Compiler", "compile_extra")
+CompilerBase = private_class("numba.core.compiler.CompilerBase", "define_pipelines")
+Flags = private_class("numba.core.compiler.Flags", "_values")
+DefaultPassBuilder = private_class("numba.core.compiler.DefaultPassBuilder", "define_nopython_pipeline")
+Record = private_class("numba.core.types.npytypes.Record", "mangling_args")
+
+
+def layout_symbol(record: Any) -> tuple[str, tuple[str, ...]]:
+    """Return a record type's name in symbols of machine code, the same in every process.
+
+    Numba uses a counter instead: two processes can then give parts compiled for different records the same symbol, and
+    a third process that loads both runs one in place of the other.
+    """
+    return "Record", (hashlib.sha256(record.name.encode()).hexdigest()[:16],)
+
+
+if hasattr(Record, "mangling_args"):
+    Record.mangling_args = property(layout_symbol)
+
+# Numba imports scipy.linalg with its first kernel to see whether it is installed, which takes longer than loading all
+# compiled kernels. It is installed; numba imports it again where a function multiplies matrices, which no kernel does.
+BLAS = "scipy.linalg.cython_blas"
+if BLAS not in sys.modules:
+    sys.modules[BLAS] = None  # type: ignore[assignment]
+    try:
+        importlib.import_module("numba.np.arraymath")._HAVE_BLAS = True  # type: ignore[attr-defined]
+    except ImportError:
+        absent.append("numba.np.arraymath")
+    finally:
+        del sys.modules[BLAS]
+
+if absent:
+    warnings.warn(
+        f"numba {numba.__version__} lacks {', '.join(absent)}: compiling takes longer and is not reported. Results are "
+        "the same; a version of numba that pyproject.toml allows compiles faster.",
+        RuntimeWarning,
+        stacklevel=2,
+    )
+
+
+class KernelLocator(UserProvidedCacheLocator):  # type: ignore[misc, valid-type]
+    """Locator of kernels in `cache_folder`: depends on a file's content, not on its age or on where it is installed."""
+
+    def __init__(self, py_func: Any, py_file: str) -> None:
+        """Choose the cache folder of a function's file."""
+        super().__init__(py_func, py_file)
+        file = Path(py_file)
+        own = file.is_relative_to(PACKAGE)
+        below = file.relative_to(PACKAGE).parent if own else self.get_suitable_cache_subpath(py_file)
+        self._cache_path = str(cache_folder() / below)
+
+    def get_source_stamp(self) -> str:
+        """Digest of the file that the code is compiled from."""
+        return hashlib.sha256(Path(self._py_file).read_bytes()).hexdigest()
+
+    @classmethod
+    def from_function(cls, py_func: Any, py_file: str) -> Any:
+        """Create a locator for a function in a file, with or without NUMBA_CACHE_DIR."""
+        return super(UserProvidedCacheLocator, cls).from_function(py_func, py_file)
+
+
+class KernelCacheImpl(CompileResultCacheImpl):  # type: ignore[misc, valid-type]
+    """Cache of files in `cache_folder`, and of notebook cells, which have no file, in IPython's folder."""
+
+    _locator_classes = (KernelLocator, IPythonCacheLocator)
+
+
+class KernelIndex(IndexDataCacheFile):  # type: ignore[misc, valid-type]
+    """Index of a kernel's stored code; empty if it holds types that this process cannot import.
+
+    Numba reads the types of all stored versions of a kernel, including those for systems of other programs.
+    """
+
+    def _load_index(self) -> Any:
+        try:
+            return super()._load_index()
+        except (ImportError, AttributeError):
+            return {}
+
+
+class StoredKernel(FunctionCache):  # type: ignore[misc, valid-type]
+    """Machine code of a kernel on disk."""
+
+    _impl_class = KernelCacheImpl
+
+    def __init__(self, py_func: Any) -> None:
+        """Open the on-disk cache of a function, creating its folder."""
+        super().__init__(py_func)
+        locator = self._impl.locator
+        self._cache_file = KernelIndex(self._cache_path, self._impl.filename_base, locator.get_source_stamp())
+
+
+class KernelCache:
+    """Cache of a kernel as numba uses it: of several processes that call the kernel at once, only one compiles it."""
+
+    def __init__(self, py_func: Any) -> None:
+        """Prepare the cache of a function; the first call opens it."""
+        self._function = py_func
+        self.kernel = py_func.__name__
+        self._locks: dict[str, Any] = {}
+
+    @functools.cached_property
+    def stored(self) -> StoredKernel:
+        """Code on disk."""
+        return StoredKernel(self._function)
+
+    def load_overload(self, signature: Any, context: Any) -> Any:
+        """Load stored code after waiting for any process that compiles it; None if this process must compile it."""
+        code = self.stored.load_overload(signature, context)
+        if code is not None or str(signature) in self._locks:
+            return code
+        for notify in watchers:
+            notify(self.kernel)
+        lock = lock_of(f"{self.kernel} {signature}")
+        lock.acquire()
+        code = self.stored.load_overload(signature, context)
+        if code is None:
+            self._locks[str(signature)] = lock
+            compiling.append((self, str(signature)))
+        else:
+            _release(lock)
+        return code
+
+    def save_overload(self, signature: Any, data: Any) -> None:
+        """Store compiled code."""
+        try:
+            with lock_of(self.kernel):  # one index for all signatures
+                self.stored.save_overload(signature, data)
+        finally:
+            self.finish(str(signature))
+
+    def finish(self, signature: str) -> None:
+        """End the compilation of a signature, successful or not."""
+        lock = self._locks.pop(signature, None)
+        if lock is not None:
+            compiling.remove((self, signature))
+        _release(lock)
+
+
+def _release(lock: Any) -> None:
+    """Release a kernel's lock, if any, and notify watchers of the kernel whose compilation continues."""
+    if lock is not None:
+        lock.release()
+    for notify in watchers:
+        notify(compiling[-1][0].kernel if compiling else "")
+
+
+class QuickFlags(Flags):  # type: ignore[misc, valid-type]
+    """Compiler flags that compare only flags that are set.
+
+    Numba looks operators up by flags and compares every flag that exists.
+    """
+
+    def __eq__(self, other: object) -> bool:
+        """Whether the same flags are set to the same values."""
+        return isinstance(other, QuickFlags) and self._values == other._values
+
+    def __hash__(self) -> int:
+        """Hash the names of the flags that are set."""
+        return hash(frozenset(self._values))
+
+
+class KernelCompiler(Compiler):  # type: ignore[misc, valid-type]
+    """Numba's compiler without vectorised loops, which releases the kernel's lock if it fails."""
+
+    def __init__(self, *arguments: Any) -> None:
+        """Take the arguments of numba's compiler."""
+        super().__init__(*arguments)
+        self.state.flags = QuickFlags(self.state.flags)
+
+    def compile_extra(self, func: Any) -> Any:
+        """Compile a function."""
+        vectorize = numba.config.LOOP_VECTORIZE
+        numba.config.LOOP_VECTORIZE = 0
+        try:
+            return super().compile_extra(func)
+        except BaseException:  # release the kernel's lock before any error or signal goes on to the caller
+            if compiling and compiling[-1][0].kernel == func.__name__:
+                cache, signature = compiling[-1]
+                cache.finish(signature)
+            raise
+        finally:
+            numba.config.LOOP_VECTORIZE = vectorize
+
+
+class _Refreshed:
+    """Context of numba that is not refreshed again: the kernel's own compiler has done so."""
+
+    def __init__(self, context: Any) -> None:
+        self._context = context
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._context, name)
+
+    def refresh(self) -> None:
+        """Do nothing."""
+
+
+class _NumberTyping(_Refreshed):
+    """Typing context that resolves each operator and function of numbers only once.
+
+    Numba tries all overloads for arrays, sets and strings at every call.
+    """
+
+    signatures: dict[Any, Any] = {}  # noqa: RUF012 - shared by all parts
+
+    def resolve_function_type(self, function: Any, arguments: tuple[Any, ...], keywords: dict[str, Any]) -> Any:
+        """Return the signature of a call, or None if there is no overload."""
+        if keywords or not all(isinstance(argument, types.Number) for argument in arguments):
+            return self._context.resolve_function_type(function, arguments, keywords)
+        if (function, arguments) not in self.signatures:
+            resolved = self._context.resolve_function_type(function, arguments, keywords)
+            if resolved is None:
+                return None
+            self.signatures[function, arguments] = resolved
+        return self.signatures[function, arguments]
+
+
+class _WithoutEnvironment:
+    """Code generator that ignores the environment of functions without machine code."""
+
+    def __init__(self, codegen: Any) -> None:
+        self._codegen = codegen
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._codegen, name)
+
+    def set_env(self, name: str, environment: Any) -> None:
+        """Ignore the environment."""
+
+
+class _PartLibrary(JITCodeLibrary):  # type: ignore[misc, valid-type]
+    """Code of a part, linked into kernels, which are optimised as a whole; it has no machine code of its own.
+
+    Numba also optimises and emits every part on its own, which takes a third of the compile time.
+    """
+
+    @property
+    def codegen(self) -> Any:
+        return _WithoutEnvironment(self._codegen)
+
+    def get_pointer_to_function(self, name: str) -> int:  # noqa: ARG002
+        self._ensure_finalized()
+        return 0
+
+    def _optimize_final_module(self) -> None:
+        pass
+
+    def _finalize_final_module(self) -> None:
+        self._finalize_dynamic_globals()
+        self._finalized = True
+
+
+class PartCompiler(CompilerBase):  # type: ignore[misc, valid-type]
+    """Numba's passes with a `_PartLibrary`."""
+
+    def __init__(self, typing: Any, target: Any, *rest: Any) -> None:
+        """Reuse the contexts that the kernel's compiler has refreshed."""
+        super().__init__(_Refreshed(typing), _Refreshed(target), *rest)
+        self.state.typingctx, self.state.flags = _NumberTyping(typing), QuickFlags(self.state.flags)
+
+    def define_pipelines(self) -> list[Any]:
+        """Return numba's pipeline."""
+        state = self.state
+        if state.library is None:
+            state.library = _PartLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
+        return [DefaultPassBuilder.define_nopython_pipeline(state)]
+
+
+def cached_plainly(function: Callable[..., Any], flags: dict[str, Any]) -> Any:
+    """Compile and cache a function by numba's public interface, also in `cache_folder`."""
+    compiled = numba.njit(**flags)(function)
+    chosen = numba.config.CACHE_DIR
+    numba.config.CACHE_DIR = str(cache_folder())
+    try:
+        compiled.enable_caching()
+    finally:
+        numba.config.CACHE_DIR = chosen
+    return compiled

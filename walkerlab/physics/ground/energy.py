@@ -1,0 +1,84 @@
+"""Energies of the walker on compliant ground, and the power that its contacts turn into heat."""
+
+from typing import Any
+
+from walkerlab.physics.ground.hinges import spring_energy, stop_energy
+from walkerlab.physics.ground.normal_force import elastic_energy
+from walkerlab.physics.ground.pulse import push_on
+from walkerlab.physics.ground.walker import (
+    OF_BODIES,
+    GroundModel,
+    OnGround,
+    foot_force,
+    foot_motion,
+    half_size,
+    one_foot_motion,
+    over_ground,
+    sines_cosines,
+)
+from walkerlab.physics.kernels import kernel_part, matrix, vector
+from walkerlab.physics.mechanics import tree
+from walkerlab.physics.mechanics.tree import add_inertia, projections
+
+
+@kernel_part
+def kinetic_energy(form: GroundModel, y: Any) -> float:
+    """Kinetic energy (J)."""
+    # what is added to r here is not wanted
+    s, c, r, M = vector(OF_BODIES), vector(OF_BODIES), vector(OF_BODIES), matrix(OF_BODIES)
+    half, total = half_size(form), 0.0
+    omega = y[half + form.places : 2 * half]
+    sines_cosines(form, y, s, c)
+    add_inertia(form, form.bodies, s, c, omega, M, r)
+    for i in range(form.places):
+        total += form.mass * (y[half + i] * y[half + i])
+    return 0.5 * total + tree.kinetic_energy(form.bodies, M, omega)
+
+
+@kernel_part
+def potential_energy(form: GroundModel, y: Any) -> float:
+    """Potential energy of gravity (J) from the slope frame's origin."""
+    s, c, F, U = vector(OF_BODIES), vector(OF_BODIES), vector(OF_BODIES), vector(OF_BODIES)
+    sines_cosines(form, y, s, c)
+    projections(form.arm_x, form.arm_y, form.bodies, s, c, F, U)
+    if form.places > 0:
+        return tree.potential_energy(form, form.bodies, y[0], y[1], F, U)
+    return tree.potential_energy(form, form.bodies, form.root_along, form.root_height, F, U)
+
+
+@kernel_part
+def foot_elastic_energy(system: OnGround, foot: int, y: Any) -> float:
+    """Elastic energy (J) in the ground under a foot that it carries."""
+    return elastic_energy(-over_ground(system, foot, one_foot_motion(system.form, foot, y)).height, system.normal)
+
+
+@kernel_part
+def total_energy(system: OnGround, y: Any) -> float:
+    """Mechanical energy (J) of the energy balance: kinetic, potential from a fixed origin, elastic."""
+    total = kinetic_energy(system.form, y) + potential_energy(system.form, y)
+    for foot in range(2):
+        if system.has_ground[foot] != 0:
+            total += foot_elastic_energy(system, foot, y)
+    return total + stop_energy(system, y) + spring_energy(system, y)
+
+
+@kernel_part
+def push_power(system: OnGround, t: float, y: Any) -> float:
+    """Power (W) that the push-off gives."""
+    if system.form.push_off == 0.0:
+        return 0.0
+    s, c, foot = vector(OF_BODIES), vector(OF_BODIES), 1 - system.progress.stance
+    sines_cosines(system.form, y, s, c)
+    push, motion = push_on(system, t, foot, s, c), foot_motion(system.form, foot, s, c, y)
+    return push.along * motion.slip + push.upward * motion.vertical_velocity
+
+
+@kernel_part
+def dissipated_power(system: OnGround, foot: int, y: Any) -> tuple[float, float, float]:
+    """Power (W) lost under a foot in the normal direction, (F_n - k d^e) d', and to friction; the normal force (N)."""
+    motion = over_ground(system, foot, one_foot_motion(system.form, foot, y))
+    if motion.height >= 0.0:
+        return 0.0, 0.0, 0.0
+    force = foot_force(system, motion)
+    damping = -(force.normal.force - force.normal.spring) * motion.vertical_velocity
+    return damping, -force.along * motion.slip, force.normal.force

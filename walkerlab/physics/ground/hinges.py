@@ -1,0 +1,128 @@
+"""Torques at hinges on compliant ground: each has a spring, damper and drive, and each knee a stop besides."""
+
+from typing import Any
+
+from walkerlab.physics.ground.knees import ahead
+from walkerlab.physics.ground.walker import FIRST_KNEE, STOPPING, OnGround, half_size
+from walkerlab.physics.kernels import kernel_part
+from walkerlab.physics.mechanics.hinges import (
+    HIP_ROW,
+    HingeTorque,
+    add_hinge_gradients,
+    add_hinge_torque,
+    hinge_energy,
+    hinge_law,
+    hinge_torque,
+    is_sprung,
+    legs_apart,
+)
+
+
+@kernel_part
+def sign_of(system: OnGround, row: int) -> float:
+    """-1 for the hip while the first leg stands, whose body is ahead of the other by the array; otherwise 1."""
+    return -1.0 if row == HIP_ROW and system.progress.stance == 0 else 1.0
+
+
+@kernel_part
+def angle_at(system: OnGround, row: int, y: Any) -> tuple[float, float]:
+    """How far a hinge's body is ahead of the other (rad), and how fast it gets further (rad/s).
+
+    Of the hip it is the swing leg's: at a touch the legs change places.
+    """
+    form, sign = system.form, sign_of(system, row)
+    return sign * ahead(form, row, y, form.places), sign * ahead(form, row, y, half_size(form) + form.places)
+
+
+@kernel_part
+def is_stopping(system: OnGround, row: int) -> bool:
+    """Whether a hinge is a knee in its stop."""
+    return row >= FIRST_KNEE and system.knee[row - FIRST_KNEE] == STOPPING
+
+
+@kernel_part
+def torque_at(system: OnGround, row: int, y: Any) -> HingeTorque:
+    """The torque at a hinge: of its spring, damper and drive, and of its stop."""
+    angle, rate = angle_at(system, row, y)
+    own = hinge_torque(hinge_law(system.form, row), angle, rate)
+    if not is_stopping(system, row):
+        return own
+    stop = hinge_torque(system.stop, angle, rate)
+    return HingeTorque(
+        own.torque + stop.torque, own.elastic + stop.elastic, own.by_angle + stop.by_angle, own.by_rate + stop.by_rate
+    )
+
+
+@kernel_part
+def bodies_at(system: OnGround, row: int) -> tuple[int, int]:
+    """The body that a hinge's torque turns back, and the other one."""
+    body, other = system.form.hinges[row, 0], system.form.hinges[row, 1]
+    return (other, body) if sign_of(system, row) < 0.0 else (body, other)
+
+
+@kernel_part
+def add_torques(system: OnGround, y: Any, r: Any) -> None:
+    """Add the torques (N m) at all hinges to r (n,)."""
+    for row in range(len(system.form.hinges)):
+        if is_sprung(system.form, row) or is_stopping(system, row):
+            body, other = bodies_at(system, row)
+            add_hinge_torque(torque_at(system, row, y), body, other, r)
+
+
+@kernel_part
+def add_gradients(system: OnGround, y: Any, by_angle: Any, by_rate: Any) -> None:
+    """Add the derivatives of those torques by the angles and their velocities to by_angle and by_rate (n, n)."""
+    for row in range(len(system.form.hinges)):
+        if is_sprung(system.form, row) or is_stopping(system, row):
+            body, other = bodies_at(system, row)
+            add_hinge_gradients(torque_at(system, row, y), body, other, by_angle, by_rate)
+
+
+@kernel_part
+def stop_energy(system: OnGround, y: Any) -> float:
+    """Elastic energy (J) in the knees' stops."""
+    total = 0.0
+    for row in range(FIRST_KNEE, len(system.form.hinges)):
+        if is_stopping(system, row):
+            total += hinge_energy(system.stop, angle_at(system, row, y)[0])
+    return total
+
+
+@kernel_part
+def stop_power(system: OnGround, y: Any) -> float:
+    """Power (W) that the knees' stops dissipate."""
+    total = 0.0
+    for row in range(FIRST_KNEE, len(system.form.hinges)):
+        if is_stopping(system, row):
+            angle, rate = angle_at(system, row, y)
+            now = hinge_torque(system.stop, angle, rate)
+            total += (now.torque - now.elastic) * rate
+    return total
+
+
+@kernel_part
+def spring_energy(system: OnGround, y: Any) -> float:
+    """Elastic energy (J) of the springs at all hinges."""
+    total = 0.0
+    for row in range(len(system.form.hinges)):
+        if is_sprung(system.form, row):
+            total += hinge_energy(hinge_law(system.form, row), angle_at(system, row, y)[0])
+    return total
+
+
+@kernel_part
+def spring_power(system: OnGround, y: Any) -> float:
+    """Power (W) that springs, dampers and drives give and do not store."""
+    total = 0.0
+    for row in range(len(system.form.hinges)):
+        if is_sprung(system.form, row):
+            angle, rate = angle_at(system, row, y)
+            now = hinge_torque(hinge_law(system.form, row), angle, rate)
+            total += (now.elastic - now.torque) * rate
+    return total
+
+
+@legs_apart.case(OnGround)
+def legs_apart_on_ground(system: OnGround, y: Any) -> tuple[float, float]:
+    """The uppermost bodies of both legs."""
+    return angle_at(system, HIP_ROW, y)

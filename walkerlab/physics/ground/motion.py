@@ -1,0 +1,202 @@
+"""Equations of motion of the walker on compliant ground, and their exact derivatives."""
+
+from typing import Any
+
+from walkerlab.physics.ground.hinges import add_gradients, add_torques
+from walkerlab.physics.ground.pulse import push_gradient, push_on
+from walkerlab.physics.ground.walker import (
+    OF_BODIES,
+    GroundModel,
+    OnGround,
+    foot_force,
+    foot_motion,
+    half_size,
+    over_ground,
+    sines_cosines,
+)
+from walkerlab.physics.kernels import forced_inline, kernel_part, matrix, vector
+from walkerlab.physics.mechanics.links import Counted, factor_linked, solve_linked
+from walkerlab.physics.mechanics.tree import (
+    add_gravity,
+    add_gravity_gradient,
+    add_inertia,
+    add_inertia_gradients,
+    projections,
+)
+from walkerlab.physics.solvers.system import block, derivative, jacobian
+
+
+@block.case(OnGround)
+def coordinate_and_rate(system: OnGround) -> tuple[float, float]:
+    """Two: there are as many velocities as coordinates."""
+    return (0.0, 0.0)
+
+
+@forced_inline
+def foot_wrench(system: OnGround, t: float, foot: int, s: Any, c: Any, y: Any, r: Any) -> tuple[float, float]:
+    """Force of ground and push-off on a foot, along and normal to the slope (N); adds its torques (N m) to r (n,)."""
+    form, push = system.form, push_on(system, t, foot, s, c)
+    along, normal = push.along, push.upward
+    if system.has_ground[foot] != 0:
+        motion = over_ground(system, foot, foot_motion(form, foot, s, c, y))
+        if motion.height < 0.0:
+            force = foot_force(system, motion)
+            along += force.along
+            normal += force.normal.force
+    if along == 0.0 and normal == 0.0:
+        return 0.0, 0.0
+    F, U = vector(OF_BODIES), vector(OF_BODIES)
+    projections(form.foot_x[foot], form.foot_y[foot], form.bodies, s, c, F, U)
+    for k in range(form.bodies):
+        r[k] += along * (form.rolling[foot, k] - U[k]) + normal * F[k]
+    return along, normal
+
+
+@forced_inline
+def all_forces(system: OnGround, t: float, s: Any, c: Any, y: Any, M: Any, r: Any) -> tuple[float, float]:
+    """Force of ground and push-off along and normal to the slope (N); M (n, n) and all torques (N m) into r (n,).
+
+    They are those of the feet, of the centrifugal terms, of the knees' stops, of the hip and, about a hinge, of
+    gravity.
+    """
+    form = system.form
+    n, half = form.bodies, half_size(form)
+    for k in range(n):
+        r[k] = 0.0
+    if form.places == 0:
+        F, U = vector(OF_BODIES), vector(OF_BODIES)
+        projections(form.arm_x, form.arm_y, n, s, c, F, U)
+        add_gravity(form, n, F, U, r)
+    along, normal = 0.0, 0.0
+    for foot in range(2):
+        force = foot_wrench(system, t, foot, s, c, y, r)
+        along += force[0]
+        normal += force[1]
+    add_torques(system, y, r)
+    add_inertia(form, n, s, c, y[half + form.places : 2 * half], M, r)
+    return along, normal
+
+
+@derivative.case(OnGround)
+def on_ground_derivative(system: OnGround, t: float, y: Any, f: Any) -> None:
+    """Newton for the centre of mass, unless the root is hinged, and the tree's equations for the angles."""
+    form = system.form
+    n, half, first = form.bodies, half_size(form), form.places
+    s, c, r, M = vector(OF_BODIES), vector(OF_BODIES), vector(OF_BODIES), matrix(OF_BODIES)
+    sines_cosines(form, y, s, c)
+    along, normal = all_forces(system, t, s, c, y, M, r)
+    links = Counted(form.E, form.arm_x[:n])
+    factor_linked(links, 0, M)
+    solve_linked(links, 0, M, r)
+    for i in range(half):
+        f[i] = y[half + i]
+    if first > 0:
+        f[half] = form.gravity_along + along / form.mass
+        f[half + 1] = normal / form.mass - form.gravity_down
+    for k in range(n):
+        f[half + first + k] = r[k]
+
+
+@kernel_part
+def motion_gradient(form: GroundModel, foot: int, F: Any, U: Any, y: Any, j: int) -> tuple[float, float, float]:
+    """Derivatives of a foot's penetration, penetration rate and slip along number j of the state.
+
+    F, U  (n,) projections of the levers to the foot
+    """
+    p, half = form.places, half_size(form)
+    moves = j >= half
+    k = (j - half if moves else j) - p
+    if k < 0:
+        if k == -1:
+            return (0.0, -1.0, 0.0) if moves else (-1.0, 0.0, 0.0)
+        return 0.0, 0.0, 1.0 if moves else 0.0
+    if moves:
+        return 0.0, -F[k], form.rolling[foot, k] - U[k]
+    omega = y[half + p + k]
+    return -F[k], omega * U[k], -omega * F[k]
+
+
+@kernel_part
+def add_foot_gradients(system: OnGround, t: float, foot: int, s: Any, c: Any, y: Any, J: Any) -> None:
+    """Add the derivatives of a foot's force and torques to the acceleration rows of J, before masses divide them."""
+    form, push = system.form, push_on(system, t, foot, s, c)
+    motion = over_ground(system, foot, foot_motion(form, foot, s, c, y))
+    inside, pushed = system.has_ground[foot] != 0 and motion.height < 0.0, push.above != 0.0
+    if not inside and not pushed:
+        return
+    F, U, p, half = vector(OF_BODIES), vector(OF_BODIES), form.places, half_size(form)
+    projections(form.foot_x[foot], form.foot_y[foot], form.bodies, s, c, F, U)
+    along, normal = push.along, push.upward
+    if inside:
+        force = foot_force(system, motion)
+        along += force.along
+        normal += force.normal.force
+        for j in range(2 * half):
+            # how penetration, its rate and the slip change along coordinate or velocity j
+            deeper, deeper_rate, faster = motion_gradient(form, foot, F, U, y, j)
+            by_j = force.normal.by_penetration * deeper + force.normal.by_rate * deeper_rate
+            add_column(form, foot, j, force.coefficient * by_j + force.by_slip * faster, by_j, F, U, J)
+    for k in range(form.bodies):
+        J[half + p + k, p + k] -= along * F[k] + normal * U[k]
+        if pushed:
+            by_angle = push_gradient(form, push, foot, s, c, k)
+            add_column(form, foot, p + k, by_angle[0], by_angle[1], F, U, J)
+
+
+@kernel_part
+def add_column(form: GroundModel, foot: int, j: int, along: float, normal: float, F: Any, U: Any, J: Any) -> None:
+    """Add to column j of J what a force on a foot changes by, along and normal to the slope; and its torques."""
+    p, half = form.places, half_size(form)
+    if p > 0:
+        J[half, j] += along
+        J[half + 1, j] += normal
+    for k in range(form.bodies):
+        J[half + p + k, j] += along * (form.rolling[foot, k] - U[k]) + normal * F[k]
+
+
+@kernel_part
+def add_torque_gradients(system: OnGround, s: Any, c: Any, y: Any, alpha: Any, by_angle: Any, by_rate: Any) -> None:
+    """Add the derivatives (n, n) of the torques but the ground's, less M alpha at fixed alpha, by angles and rates."""
+    form = system.form
+    n, p, half = form.bodies, form.places, half_size(form)
+    if p == 0:
+        F, U = vector(OF_BODIES), vector(OF_BODIES)
+        projections(form.arm_x, form.arm_y, n, s, c, F, U)
+        add_gravity_gradient(form, n, F, U, by_angle)
+    add_gradients(system, y, by_angle, by_rate)
+    add_inertia_gradients(form, n, s, c, y[half + p : 2 * half], alpha, by_angle, by_rate)
+
+
+@jacobian.case(OnGround)
+def on_ground_jacobian(system: OnGround, t: float, y: Any, J: Any) -> None:
+    """Derivatives of the equations of motion, exact up to the switching points of the force law."""
+    form = system.form
+    n, p, half = form.bodies, form.places, half_size(form)
+    s, c, alpha, M, by_torque = (
+        vector(OF_BODIES), vector(OF_BODIES), vector(OF_BODIES), matrix(OF_BODIES), matrix(OF_BODIES),
+    )  # fmt: skip
+    for i in range(half):
+        for j in range(2 * half):
+            J[i, j], J[half + i, j] = 1.0 if j == i + half else 0.0, 0.0
+    sines_cosines(form, y, s, c)
+    all_forces(system, t, s, c, y, M, alpha)
+    links = Counted(form.E, form.arm_x[:n])
+    factor_linked(links, 0, M)
+    solve_linked(links, 0, M, alpha)
+    for k in range(n):  # row k: the angular accelerations by a torque on body k
+        for l in range(n):
+            by_torque[k, l] = 1.0 if k == l else 0.0
+        solve_linked(links, 0, M, by_torque[k])
+    for foot in range(2):
+        add_foot_gradients(system, t, foot, s, c, y, J)
+    add_torque_gradients(system, s, c, y, alpha, J[half + p :, p:half], J[half + p :, half + p :])
+    for j in range(2 * half):
+        for k in range(n):
+            alpha[k] = J[half + p + k, j]
+        for k in range(n):
+            total = 0.0
+            for l in range(n):
+                total += by_torque[l, k] * alpha[l]
+            J[half + p + k, j] = total
+        for i in range(p):
+            J[half + i, j] /= form.mass

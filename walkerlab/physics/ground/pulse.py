@@ -1,0 +1,69 @@
+"""The push-off on compliant ground: a pulse of force at the trailing foot, along the line from there to the hip.
+
+It begins at the touch of the other foot, has the push-off's impulse P, and with u the part of its duration D that has
+passed its force is 30 u^2 (1 - u)^2 P / D, smooth where it begins and ends.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+from walkerlab.physics.ground.walker import GroundModel, OnGround
+from walkerlab.physics.kernels import kernel_part
+
+
+@kernel_part
+def pulse_force(system: OnGround, t: float) -> float:
+    """Force (N) of the pulse at a time; 0 where none lasts."""
+    if system.form.push_off == 0.0 or system.progress.steps == 0:
+        return 0.0
+    u = (t - system.progress.last_touch) / system.form.push_off_duration
+    if u <= 0.0 or u >= 1.0:
+        return 0.0
+    return 30.0 * (u * (1.0 - u)) ** 2 * system.form.push_off / system.form.push_off_duration
+
+
+@kernel_part
+def pulse_left(system: OnGround, t: float) -> float:
+    """How much longer (s) a pulse lasts; nothing where none does."""
+    if system.form.push_off == 0.0 or system.progress.steps == 0:
+        return 0.0
+    return max(0.0, system.progress.last_touch + system.form.push_off_duration - t)
+
+
+class Push(NamedTuple):
+    """A pulse as it acts now on a foot."""
+
+    along: float  # N
+    upward: float  # N
+    ahead: float  # m, from where the foot touches to the hip
+    above: float  # m
+
+
+@kernel_part
+def push_on(system: OnGround, t: float, foot: int, s: Any, c: Any) -> Push:
+    """What pushes a foot at a time; no force where no pulse lasts."""
+    form, force = system.form, pulse_force(system, t) if foot != system.progress.stance else 0.0
+    if force == 0.0:
+        return Push(0.0, 0.0, 0.0, 0.0)
+    ahead, above = 0.0, form.radius[foot]
+    for k in range(form.bodies):
+        forward, upward = lever_to_hip(form, foot, s, c, k)
+        ahead += forward
+        above += upward
+    over_length = force / math.sqrt(ahead * ahead + above * above)
+    return Push(over_length * ahead, over_length * above, ahead, above)
+
+
+@kernel_part
+def lever_to_hip(form: GroundModel, foot: int, s: Any, c: Any, k: int) -> tuple[float, float]:
+    """A body's part (m) of the way from a foot's centre to the hip, along the slope and over it."""
+    x, y = form.hip_x[k] - form.foot_x[foot, k], form.hip_y[k] - form.foot_y[foot, k]
+    return c[k] * x - s[k] * y, s[k] * x + c[k] * y
+
+
+@kernel_part
+def push_gradient(form: GroundModel, push: Push, foot: int, s: Any, c: Any, k: int) -> tuple[float, float]:
+    """Derivatives (N/rad) of a push along and upward by a body's angle: its line turns, its force is the same."""
+    forward, upward = lever_to_hip(form, foot, s, c, k)
+    turned = (push.along * forward + push.upward * upward) / (push.ahead * push.ahead + push.above * push.above)
+    return -turned * push.above, turned * push.ahead

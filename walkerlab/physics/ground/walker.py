@@ -1,0 +1,319 @@
+"""A walker on compliant ground: an assembled tree with ball feet, in the forms that it takes while it walks.
+
+Coordinates in the slope's frame: along the slope (positive downhill) and height over it, m; the bodies' absolute
+angles from the vertical, rad. State: (along, height, theta_1 .. theta_n, and the velocities of all these), of the
+centre of mass. While a knee is locked by an ideal lock thigh and shank are one body, theta = S z with a column of S for
+the bodies that turn together: the constants of the tree become S'AS, S'BS and S'c, every lever and radius S'd, and what
+walks is an ordinary walker of fewer bodies. While the first stance foot is hinged the root is the hinge, and the state
+is that of the angles alone.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from walkerlab.physics.ground.friction import friction_coefficient
+from walkerlab.physics.ground.normal_force import NormalForce, NormalLaw, impact_normal_force
+from walkerlab.physics.kernels import by_reference, kernel_part, vector
+from walkerlab.physics.mechanics import tree
+from walkerlab.physics.mechanics.hinges import HIP_ROW
+from walkerlab.physics.mechanics.tree import lever_motion
+from walkerlab.physics.solvers.system import Floats, Integers, State
+
+MAX_BODIES = 8
+OF_BODIES = (0.0,) * MAX_BODIES  # scratch is made like these
+OF_STATES = (0.0,) * (4 + 2 * MAX_BODIES)
+NO_FOOT = -1
+FIRST_KNEE = HIP_ROW + 1  # row of its hinge
+# what a knee is doing
+RELEASED, BENT, STOPPING, LOCKED = 0, 1, 2, 3
+
+
+@tree.read_at_once
+class GroundModel(tree.Mechanism):  # type: ignore[misc]  # as its base
+    """The walker as it moves while its knees are as they are, hinged or free, SI: a structured scalar.
+
+    Its arrays have room for MAX_BODIES, so that one compiled walk serves all walkers; n of the places are used. Its
+    hinges are the hip, with the uppermost body of the first leg ahead of the second's, and each knee, with the shank
+    ahead of the thigh: thigh and shank are the same body while they move as one. E has one reduction.
+    """
+
+    bodies: int  # [n]
+    places: int  # how many coordinates of the root come before the angles: 2, or none of a hinge
+    hinged: int  # the foot that is; NO_FOOT
+    kneed: bool
+    release_at_touch: bool  # of the trailing knee: at the other foot's touch, not when that foot stops sinking in
+    foot_x: Floats  # (2, n) m, levers from the root to the centres of the ball feet, in the bodies' frames
+    foot_y: Floats
+    rolling: Floats  # (2, n) m, the ball's radius for its own body, else zero
+    radius: Floats  # (2,) m
+    hip_x: Floats  # (n,) m, levers from the root to the hip
+    hip_y: Floats
+    push_off_duration: float  # s
+    onto: Integers  # (all bodies,) which of these bodies each is
+    first: Integers  # (n,) the first of the bodies that each of these is
+    root_along: float  # m, where the hinge is
+    root_height: float
+
+    @property
+    def knees(self) -> Integers:
+        """Shank and thigh of either leg (2, 2)."""
+        bodies: Integers = self.hinges[FIRST_KNEE:]
+        return bodies
+
+
+SHAPES: dict[str, tuple[int, ...]] = {
+    **tree.mechanism_shapes(MAX_BODIES, 1, 3),
+    **dict.fromkeys(("hip_x", "hip_y", "onto", "first"), (MAX_BODIES,)),
+    **dict.fromkeys(("foot_x", "foot_y", "rolling"), (2, MAX_BODIES)),
+    "radius": (2,),
+}
+FORM = tree.record_type(GroundModel, SHAPES)
+
+
+class ContactWalker(NamedTuple):
+    """Everything that stays the same while it walks."""
+
+    forms: Any  # (2, 4) of Form: free or hinged; which knees are locked, as `locked_knees` numbers them
+    normal: NormalLaw
+    friction: Any  # a FrictionLaw
+    stop: Any  # of the knees: IdealLock or a KneeStop
+    legs: Integers  # (2, bodies of a leg) from the hip down
+
+    @property
+    def whole(self) -> GroundModel:
+        """With all its bodies, free, no knee locked."""
+        form: GroundModel = self.forms[0, 0]
+        return form
+
+    @property
+    def size(self) -> int:
+        """How many numbers the state of the whole walker has."""
+        return int(4 + 2 * self.whole.bodies)
+
+    @property
+    def mass(self) -> float:
+        """kg."""
+        return float(self.whole.mass)
+
+    @property
+    def slope(self) -> float:
+        """rad."""
+        return float(self.whole.slope)
+
+    @property
+    def gravity_along(self) -> float:
+        """m/s^2, along the slope."""
+        return float(self.whole.gravity_along)
+
+    @property
+    def gravity_down(self) -> float:
+        """m/s^2, towards the slope."""
+        return float(self.whole.gravity_down)
+
+    @property
+    def driven(self) -> bool:
+        """Whether anything but gravity gives it energy."""
+        return self.whole.driven
+
+    @property
+    def gravity(self) -> float:
+        """m/s^2."""
+        return math.hypot(self.gravity_along, self.gravity_down)
+
+    @property
+    def kneed(self) -> bool:
+        """Whether it has knees."""
+        return bool(self.whole.kneed)
+
+
+def changed_forms(walker: ContactWalker, **fields: Any) -> ContactWalker:
+    """The walker with other values of some fields of all its forms."""
+    forms = walker.forms.copy()
+    tree.write_fields(forms, fields)
+    return walker._replace(forms=forms)
+
+
+@tree.read_at_once
+class WalkProgress(np.record):  # type: ignore[misc]  # NumPy's stubs call one of its bases final
+    """How far a walk has come: a structured scalar that the rules of a walk write to."""
+
+    stance: int  # the foot that carries the step at hand
+    steps: int  # how many have been taken
+    last_touch: float  # s, when the last of them was
+    airborne_since: float  # s, when a foot was on the ground last
+    stopped_at: float  # s, up to where it has been integrated
+    release: int  # when the trailing knee is to be released: see hybrid/contact_state.py
+    passes_switching: bool  # whether the integration step at hand may go past switching points
+
+
+PROGRESS = tree.record_type(WalkProgress, {})
+
+
+def new_progress(stance: int = 1, steps: int = 0, last_touch: float = 0.0) -> WalkProgress:
+    """The progress of a walk that one foot carries, after some steps, the last of them at a time (s)."""
+    progress: WalkProgress = tree.new_record(PROGRESS, stance=stance, steps=steps, last_touch=last_touch)
+    return progress
+
+
+@by_reference
+class OnGround(NamedTuple):
+    """The walker in one of its forms, with what may change while it moves so: in memory of the walk's own."""
+
+    form: GroundModel
+    normal: NormalLaw
+    friction: Any
+    stop: Any
+    has_ground: Any  # (2,) whether there is ground under a foot
+    knee: Any  # (2,) what each knee is doing
+    level: Any  # (2,) m, height over the slope of the ground for each foot
+    progress: WalkProgress
+
+
+def on_ground(
+    walker: ContactWalker,
+    has_ground: Any,
+    knee: Any = (RELEASED, RELEASED),
+    hinged: bool = False,
+    level: Any = (0.0, 0.0),
+    progress: WalkProgress | None = None,
+) -> OnGround:
+    """The walker in the form that its knees give it.
+
+    has_ground  (2,) whether there is ground under a foot
+    knee        (2,) what each knee is doing
+    level       (2,) m, height of the ground for each foot
+    progress    of the walk; without it foot 1 carries the first step
+    """
+    memory = np.asarray(has_ground, np.int8), np.asarray(knee, np.int8), np.asarray(level, float)
+    form = walker.forms[int(hinged), locked_knees(knee)]
+    progress = new_progress() if progress is None else progress
+    return OnGround(form, walker.normal, walker.friction, walker.stop, *memory, progress)
+
+
+@kernel_part
+def locked_knees(knee: Any) -> int:
+    """The number of the form whose knees are locked as these, (2,) by what each is doing: 0 none, 1, 2, 3 both."""
+    return (1 if knee[0] == LOCKED else 0) + (2 if knee[1] == LOCKED else 0)
+
+
+class FootMotion(NamedTuple):
+    """Where a foot's lowest point is and how it moves."""
+
+    along: float  # m
+    height: float  # m over the slope, negative inside the ground
+    slip: float  # m/s, velocity along the slope of the material point there
+    vertical_velocity: float  # m/s, velocity of the height
+
+
+@kernel_part
+def half_size(form: GroundModel) -> int:
+    """How many coordinates there are: where the velocities begin in the state."""
+    return form.places + form.bodies
+
+
+@kernel_part
+def sines_cosines(form: GroundModel, y: Any, s: Any, c: Any) -> None:
+    """Sines and cosines (n,) of the bodies' angles from the slope's normal, into s and c."""
+    tree.sines_cosines(form, form.bodies, y[form.places : half_size(form)], s, c)
+
+
+@kernel_part
+def foot_motion(form: GroundModel, foot: int, s: Any, c: Any, y: Any) -> FootMotion:
+    """Position and velocity of the lowest point of a ball foot; the slip is that of the ball's own material there."""
+    n, half = form.bodies, half_size(form)
+    along, height, slip, vertical_velocity = form.root_along, form.root_height, 0.0, 0.0
+    if form.places > 0:
+        along, height, slip, vertical_velocity = y[0], y[1], y[half], y[half + 1]
+    omega = y[half + form.places : 2 * half]
+    ahead, above, ahead_rate, above_rate = lever_motion(form.foot_x[foot], form.foot_y[foot], n, s, c, omega)
+    for k in range(n):
+        slip += omega[k] * form.rolling[foot, k]
+    height += above - form.radius[foot]
+    return FootMotion(along + ahead, height, slip + ahead_rate, vertical_velocity + above_rate)
+
+
+@kernel_part
+def one_foot_motion(form: GroundModel, foot: int, y: Any) -> FootMotion:
+    """A foot in a state of a form."""
+    s, c = vector(OF_BODIES), vector(OF_BODIES)
+    sines_cosines(form, y, s, c)
+    return foot_motion(form, foot, s, c, y)
+
+
+@kernel_part
+def feet_motion(form: GroundModel, y: Any) -> tuple[FootMotion, FootMotion]:
+    """Both feet in a state of a form."""
+    s, c = vector(OF_BODIES), vector(OF_BODIES)
+    sines_cosines(form, y, s, c)
+    return foot_motion(form, 0, s, c, y), foot_motion(form, 1, s, c, y)
+
+
+@kernel_part
+def over_ground(system: OnGround, foot: int, motion: FootMotion) -> FootMotion:
+    """A foot's motion with its height over the ground that is there for it."""
+    return FootMotion(motion.along, motion.height - system.level[foot], motion.slip, motion.vertical_velocity)
+
+
+class FootForce(NamedTuple):
+    """What the ground does to a foot."""
+
+    along: float  # N, friction
+    normal: NormalForce
+    by_slip: float  # N s/m, derivative of the friction
+    coefficient: float  # friction over normal force, with its sign
+
+
+@kernel_part
+def foot_force(laws: Any, motion: FootMotion) -> FootForce:
+    """Force of the ground on a foot that is inside it; by the laws of a walker or of its system."""
+    normal = impact_normal_force(-motion.height, -motion.vertical_velocity, laws.normal)
+    mu, mu_slope = friction_coefficient(laws.friction, motion.slip)
+    return FootForce(mu * normal.force, normal, mu_slope * normal.force, mu)
+
+
+def folded(form: GroundModel, x: Any) -> Floats:
+    """The form's state, or a column of its tangent, from that of all bodies about the same root.
+
+    Bodies that are one turn alike up to rounding; of each group the first tells.
+    """
+    return np.asarray(x)[places_in_whole(form, len(x))]
+
+
+def unfolded(form: GroundModel, y: Any, size: int) -> Floats:
+    """State of all bodies (size,) about the same root: bodies that are one turn alike."""
+    p, n, every = int(form.places), int(form.bodies), size // 2 - int(form.places)
+    onto = form.onto[:every]
+    return np.asarray(y)[[*range(p), *(p + onto), *range(p + n, 2 * p + n), *(2 * p + n + onto)]]
+
+
+def places_in_whole(form: GroundModel, size: int) -> list[int]:
+    """Where the numbers of a form's state stand in that of all bodies about the same root."""
+    p, half, first = int(form.places), size // 2, form.first[: form.bodies]
+    return [*range(p), *(p + first), *range(half, half + p), *(half + p + first)]
+
+
+@kernel_part
+def store_whole(form: GroundModel, y: Any, whole: Any) -> None:
+    """Write the state y of a form into `whole`, as that of the whole walker, free: the hinge tells the rest."""
+    n, p, half = form.bodies, form.places, half_size(form)
+    middle = whole.size // 2
+    for i in range(2, middle):
+        body = form.onto[i - 2]
+        whole[i], whole[middle + i] = y[p + body], y[half + p + body]
+    if p > 0:
+        whole[0], whole[1], whole[middle], whole[middle + 1] = y[0], y[1], y[half], y[half + 1]
+        return
+    s, c = vector(OF_BODIES), vector(OF_BODIES)
+    sines_cosines(form, y, s, c)
+    along, height, speed, vertical_velocity = lever_motion(form.arm_x, form.arm_y, n, s, c, y[half : half + n])
+    whole[0], whole[1] = form.root_along + along / form.mass, form.root_height + height / form.mass
+    whole[middle], whole[middle + 1] = speed / form.mass, vertical_velocity / form.mass
+
+
+def floating_state(form: GroundModel, y: Any, size: int) -> State:
+    """The state (size,) of the whole walker, free, of a form's state y."""
+    whole = np.zeros(size)
+    store_whole(form, y, whole)
+    return tuple(whole.tolist())

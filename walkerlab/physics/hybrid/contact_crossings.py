@@ -1,0 +1,189 @@
+"""The event functions whose zeros are the events of a walk on compliant ground, sampled along a step.
+
+Some change what the ground does (touch, lift, a pad's edge, feet passing each other, the fall). Of these the walk knows
+on which side of zero they are, and the event is that they leave it: of events at one time none can hide another. The
+others are switching points of the force law, where its derivatives jump: a step that ends there keeps the method's
+order.
+"""
+
+from typing import Any
+
+from walkerlab.physics.ground.friction import sample_switching, switching_count
+from walkerlab.physics.ground.knees import extension, extension_rate
+from walkerlab.physics.ground.normal_force import grip
+from walkerlab.physics.ground.terrain import cell_edges
+from walkerlab.physics.ground.walker import (
+    BENT,
+    OF_BODIES,
+    STOPPING,
+    FootMotion,
+    GroundModel,
+    OnGround,
+    foot_motion,
+    over_ground,
+    sines_cosines,
+)
+from walkerlab.physics.hybrid.contact_events import (
+    EXTENSION,
+    EXTENSION_RATE,
+    FALL,
+    FRICTION_SWITCHES,
+    FULL_DAMPING,
+    HEIGHT,
+    LEFT_EDGE,
+    MATERIAL,
+    PASSING,
+    PER_FOOT,
+    RELEASE,
+    RIGHT_EDGE,
+    SLIDE,
+    VERTICAL_VELOCITY,
+    JudgedGround,
+    farthest_slide,
+)
+from walkerlab.physics.hybrid.contact_state import AT_COMPRESSION, WalkState, material_along
+from walkerlab.physics.hybrid.endings import FALLEN_HIP
+from walkerlab.physics.kernels import kernel_part, vector
+from walkerlab.physics.solvers.events import NO_CROSSING, CrossingFinder, first_crossing, way_from_zero
+
+NO_SIDE = 0  # of an event function that may cross zero either way
+ROUNDING = 1e-14  # m, rad or their rates: what event functions are zero to
+CLEARLY_MOVED = 1e-12  # the same, over a step: what they move away from zero by, if not by rounding alone
+
+
+@kernel_part
+def hip_height(form: GroundModel, s: Any, c: Any, y: Any) -> float:
+    """Height of the hip over the slope (m)."""
+    height = y[1] if form.places > 0 else form.root_height
+    for k in range(form.bodies):
+        height += s[k] * form.hip_x[k] + c[k] * form.hip_y[k]
+    return height
+
+
+@kernel_part
+def sample_event_functions(
+    system: OnGround, ground: JudgedGround, walk_state: WalkState, y: Any, node: int, finder: CrossingFinder
+) -> None:
+    """Values of all event functions at one node of a step, where the state is y."""
+    form, terrain, values = system.form, ground.terrain, finder.values
+    s, c = vector(OF_BODIES), vector(OF_BODIES)
+    sines_cosines(form, y, s, c)
+    values[PASSING, node] = 0.0
+    for foot in range(2):
+        first, motion = foot * PER_FOOT, over_ground(system, foot, foot_motion(form, foot, s, c, y))
+        sample_foot(system, motion, cell_edges(terrain, foot, walk_state.cells[foot]), first, node, finder)
+        values[first + MATERIAL, node] = material_along(form, foot, motion.along, y)
+        values[PASSING, node] += motion.along if foot == 1 else -motion.along
+    stance = walk_state.progress.stance
+    values[FALL, node] = hip_height(form, s, c, y) - walk_state.level[stance] - FALLEN_HIP * ground.frame.leg_length
+    away = values[stance * PER_FOOT + MATERIAL, node] - walk_state.touched[stance]
+    values[SLIDE, node] = farthest_slide(terrain) ** 2 - away**2
+    for knee in range(2):
+        values[EXTENSION + knee, node] = extension(form, knee, y)
+        values[EXTENSION_RATE + knee, node] = extension_rate(form, knee, y)
+
+
+@kernel_part
+def sample_foot(
+    system: OnGround, motion: FootMotion, edges: tuple[float, float], first: int, j: int, finder: CrossingFinder
+) -> None:
+    """One foot's event functions at node j."""
+    values = finder.values
+    values[first + HEIGHT, j] = motion.height
+    values[first + VERTICAL_VELOCITY, j] = motion.vertical_velocity
+    values[first + LEFT_EDGE, j] = motion.along - edges[0]
+    values[first + RIGHT_EDGE, j] = edges[1] - motion.along
+    values[first + RELEASE, j] = grip(-motion.height, -motion.vertical_velocity, system.normal)
+    values[first + FULL_DAMPING, j] = motion.height + system.normal.full_damping_penetration
+    sample_switching(system.friction, motion.slip, values, first + FRICTION_SWITCHES, j)
+
+
+@kernel_part
+def knee_crossing(walk_state: WalkState, finder: CrossingFinder) -> tuple[float, int]:
+    """Fraction of the step at which a knee locks, latches or is to be released, and which event function's that is.
+
+    A bent knee gets straight; one in its stop turns back; the stance foot stops sinking in.
+    """
+    best, event = NO_CROSSING, -1
+    for knee in range(2):
+        at, index = NO_CROSSING, EXTENSION + knee
+        if walk_state.knee[knee] == BENT:
+            at = leaves_side(finder, index, -1, walk_state.at_zero[index] != 0)
+        elif walk_state.knee[knee] == STOPPING:
+            index = EXTENSION_RATE + knee
+            at = leaves_side(finder, index, 1, walk_state.at_zero[index] != 0)
+        if at < best:
+            best, event = at, index
+    if walk_state.progress.release == AT_COMPRESSION:
+        index = walk_state.progress.stance * PER_FOOT + VERTICAL_VELOCITY
+        at = leaves_side(finder, index, -1, walk_state.at_zero[index] != 0)
+        if at < best:
+            best, event = at, index
+    return best, event
+
+
+@kernel_part
+def earliest_crossing(
+    system: OnGround, ground: JudgedGround, walk_state: WalkState, watch_order: bool, finder: CrossingFinder
+) -> tuple[float, int]:
+    """Fraction of the sampled step at which the first event lies, and which event function's; NO_CROSSING if none.
+
+    watch_order  whether it matters that the feet pass each other
+    """
+    sides, at_zero, has_ground = walk_state.sides, walk_state.at_zero, walk_state.has_ground
+    best, event = NO_CROSSING, -1
+    for foot in range(2):
+        if foot == system.form.hinged:
+            continue
+        first = foot * PER_FOOT
+        # above the ground there is no force to switch: what a foot's law does after its touch is the next step's
+        inside = has_ground[foot] != 0 and sides[first + HEIGHT] < 0
+        last = RELEASE
+        if inside and ground.frame.locate_switching and not walk_state.progress.passes_switching:
+            last = FRICTION_SWITCHES + switching_count(system.friction)
+        for index in range(first, first + last):
+            if not ground.terrain.has_pads and (index == first + LEFT_EDGE or index == first + RIGHT_EDGE):
+                continue
+            at = leaves_side(finder, index, sides[index], at_zero[index] != 0)
+            if at < best:
+                best, event = at, index
+        if foot == walk_state.progress.stance and sides[first + HEIGHT] < 0 and has_ground[foot] != 0:
+            at = leaves_side(finder, SLIDE, sides[SLIDE], at_zero[SLIDE] != 0)
+            if at < best:
+                best, event = at, SLIDE
+    if watch_order:
+        at = leaves_side(finder, PASSING, sides[PASSING], at_zero[PASSING] != 0)
+        if at < best:
+            best, event = at, PASSING
+    at, index = knee_crossing(walk_state, finder)
+    if at < best:
+        best, event = at, index
+    at = leaves_side(finder, FALL, sides[FALL], at_zero[FALL] != 0)
+    if at < best:
+        best, event = at, FALL
+    return best, event
+
+
+@kernel_part
+def leaves_side(finder: CrossingFinder, event: int, side: int, zero_at_start: bool) -> float:
+    """Fraction at which an event function crosses to the other side of zero than it is known to be on.
+
+    At once if it is there already: the step before, which ended for another event, went past its zero, or on it. Of one
+    that is zero at the start the way it goes tells, and rounding alone, which has not moved it from zero, does not: a
+    foot whose hinge is released, say, may still sink in. One that its own event left at zero has gone its way already,
+    and is back only where it is on the other side all along.
+    """
+    value = finder.values[event, 0]
+    at_zero = zero_at_start or abs(value) < ROUNDING
+    if side != NO_SIDE:
+        if at_zero:
+            value = way_from_zero(finder, event, CLEARLY_MOVED)
+            if value == 0.0:
+                return NO_CROSSING
+        beyond = side * value < 0.0
+        if zero_at_start:
+            for j in range(1, finder.nodes.size):
+                beyond = beyond and side * finder.values[event, j] < 0.0
+        if beyond:
+            return 0.0
+    return first_crossing(finder, event, -side, 0.0, at_zero)

@@ -1,0 +1,56 @@
+"""Events of a walk on compliant ground: which there are, and what they are judged by.
+
+Events are numbered, and so are the rows of the finder that hold their event functions: PER_FOOT rows for foot 0, as
+many for foot 1, then those of the walker and of its knees. Event `foot * PER_FOOT + HEIGHT` is a touch or a lift.
+
+They are module constants: kernels take members of an IntEnum for objects, and compile a third longer.
+"""
+
+from typing import NamedTuple
+
+from walkerlab.physics.ground.terrain import Terrain
+from walkerlab.physics.kernels import by_reference, kernel_part
+
+# event functions of each foot
+HEIGHT, LEFT_EDGE, RIGHT_EDGE, RELEASE, FULL_DAMPING = range(5)
+FRICTION_SWITCHES = 5  # up to four, of the friction law
+MATERIAL, VERTICAL_VELOCITY = 9, 10  # no events: where the foot's material is, and how fast its height grows
+PER_FOOT = 11
+# event functions of the walker
+PASSING, FALL, SLIDE = range(2 * PER_FOOT, 2 * PER_FOOT + 3)
+# event functions of both knees: how far beyond straight, and how fast it gets there
+EXTENSION, EXTENSION_RATE = SLIDE + 1, SLIDE + 3
+EVENT_FUNCTIONS = SLIDE + 5
+PULSE_END = EVENT_FUNCTIONS  # has no event function: the clock tells
+NO_EVENT = -1
+LEGS_TURN = EVENT_FUNCTIONS  # row of the rate between the legs, which is no event
+ROWS = EVENT_FUNCTIONS + 1
+FARTHEST_SLIDE = 0.25  # of the stride measure, of a stance foot's material from where it touched
+
+
+class Frame(NamedTuple):
+    """Measures of the walker that events are judged by."""
+
+    leg_length: float  # m
+    pendulum_time: float  # s, sqrt(L/g)
+    locate_switching: bool  # end steps at the switching points of the force law
+
+
+@by_reference
+class JudgedGround(NamedTuple):
+    """What a walk happens on and is judged by."""
+
+    terrain: Terrain
+    frame: Frame
+
+
+@kernel_part
+def farthest_slide(terrain: Terrain) -> float:
+    """How far a loaded stance foot may slip (m)."""
+    return FARTHEST_SLIDE * terrain.stride_measure
+
+
+@kernel_part
+def is_switching(event: int) -> bool:
+    """Whether an event is a mere switching point of the force law."""
+    return event < 2 * PER_FOOT and RELEASE <= event % PER_FOOT < MATERIAL

@@ -1,0 +1,100 @@
+"""What a knee that locks, latches or is released does to the walk: velocities, energy, the tangent."""
+
+from typing import Any
+
+import numpy as np
+
+from walkerlab.physics.energy_channels import KNEE_STOP, KNEE_STRIKES
+from walkerlab.physics.ground.hinges import stop_energy
+from walkerlab.physics.ground.knees import lock_knee
+from walkerlab.physics.ground.motion import motion_gradient
+from walkerlab.physics.ground.walker import (
+    OF_BODIES,
+    STOPPING,
+    ContactWalker,
+    GroundModel,
+    OnGround,
+    folded,
+    new_progress,
+    sines_cosines,
+    unfolded,
+)
+from walkerlab.physics.hybrid.contact_events import EXTENSION, EXTENSION_RATE, HEIGHT, PER_FOOT, PULSE_END
+from walkerlab.physics.hybrid.contact_record import ContactObserver
+from walkerlab.physics.kernels import vector
+from walkerlab.physics.mechanics.tree import projections
+from walkerlab.physics.solvers.events import shift_column
+from walkerlab.physics.solvers.scipy_methods import right_hand_side
+from walkerlab.physics.solvers.stepping import T
+from walkerlab.physics.solvers.system import Floats
+
+
+def change_form(
+    walker: ContactWalker, before: OnGround, after: OnGround, event: int, observer: ContactObserver, method: Any
+) -> Floats:
+    """The state in the form after an event that locked or released a knee; what it cost is noted, the tangent jumps.
+
+    So it does where a step's touch has the torque between the legs change them. Of a walker that pushes off, whose
+    pulse is as old as the touch, the tangent is that of walks that touch together from then on.
+
+    A lock is a plastic impact; what a latch holds in its spring is lost; a release changes no velocity.
+
+    method  stands where the walk came back, with the state in the form before
+    """
+    y, t = method.y, float(method.clock[T])
+    whole = walker.forms[int(before.form.places == 0), 0]
+    size = int(2 * (whole.places + whole.bodies))
+    x = unfolded(before.form, y, size)
+    if event < EXTENSION and event % PER_FOOT == HEIGHT:  # a step's touch: the other leg stood before
+        before = before._replace(progress=new_progress(stance=1 - after.progress.stance))
+    locks = EXTENSION <= event < PULSE_END
+    new = x
+    if locks:
+        new, lost, _ = lock_knee(whole, after.form, x)
+        observer.account[KNEE_STRIKES] += lost
+        if event >= EXTENSION_RATE:
+            stopping = before.knee.copy()
+            stopping[(event - EXTENSION) % 2] = STOPPING
+            before = before._replace(knee=stopping)
+            observer.account[KNEE_STOP] += stop_energy(before, y)
+    z = folded(after.form, new)
+    Phi = observer.tangent.Phi
+    if Phi.shape[1] > 0:
+        rate, rate_after = rate_of(before, y, size, t), rate_of(after, z, size, t)
+        columns = unfolded(before.form, Phi[: y.size], size)
+        waits = np.zeros(Phi.shape[1])
+        if event != PULSE_END:
+            gradient = event_gradient(whole, event, x)
+            waits = -(gradient @ columns) / (gradient @ rate)
+        if event < EXTENSION and before.form.push_off != 0.0 and event % PER_FOOT == HEIGHT:
+            rate_after = np.zeros(size)
+        for column, wait in zip(columns.T, waits, strict=True):
+            shift_column(column, 0, rate, wait)
+        if locks:
+            columns = lock_knee(whole, after.form, x, columns).columns
+        for column, wait in zip(columns.T, waits, strict=True):
+            shift_column(column, 0, rate_after, -wait)
+        Phi[: z.size] = folded(after.form, columns)
+    return z
+
+
+def rate_of(system: OnGround, y: Floats, size: int, t: float) -> Floats:
+    """dy/dt of all bodies (size,) at a time (s)."""
+    rate = np.zeros(y.size)
+    right_hand_side(system, t, y, rate)
+    return unfolded(system.form, rate, size)
+
+
+def event_gradient(whole: GroundModel, event: int, x: Floats) -> Floats:
+    """Derivative by the state of all bodies of a knee's extension or a foot's height, or of the rate of either."""
+    gradient, p, half = np.zeros(x.size), int(whole.places), x.size // 2
+    if event >= EXTENSION:
+        first = half + p if event >= EXTENSION_RATE else p
+        knee = (event - EXTENSION) % 2
+        gradient[first + whole.knees[knee]] = 1.0, -1.0
+        return gradient
+    foot, row = event // PER_FOOT, 0 if event % PER_FOOT == HEIGHT else 1
+    s, c, F, U = vector(OF_BODIES), vector(OF_BODIES), vector(OF_BODIES), vector(OF_BODIES)
+    sines_cosines(whole, x, s, c)
+    projections(whole.foot_x[foot], whole.foot_y[foot], whole.bodies, s, c, F, U)
+    return -np.array([motion_gradient(whole, foot, F, U, x, j)[row] for j in range(x.size)])

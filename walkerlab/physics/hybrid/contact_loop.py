@@ -1,0 +1,276 @@
+"""Walking on compliant ground: integrate to the next event, let it change what the ground does, go on.
+
+Compiled as a whole for the project's own methods; the same source runs in Python with a library's integrator.
+"""
+
+from typing import Any, NamedTuple
+
+from walkerlab.physics.ground.pulse import pulse_left
+from walkerlab.physics.ground.terrain import Terrain, is_uneven
+from walkerlab.physics.ground.walker import OnGround, locked_knees
+from walkerlab.physics.hybrid.contact_crossings import earliest_crossing, sample_event_functions
+from walkerlab.physics.hybrid.contact_events import NO_EVENT, PASSING, PULSE_END, Frame, JudgedGround, is_switching
+from walkerlab.physics.hybrid.contact_record import ContactObserver, note_work, observe
+from walkerlab.physics.hybrid.contact_state import AT_PULSE_END, WalkState, is_above, is_to_lift
+from walkerlab.physics.hybrid.contact_transitions import apply_event, note_flexion, release
+from walkerlab.physics.hybrid.endings import (
+    BUDGET_EXHAUSTED,
+    CHANGES_FORM,
+    GOES_ON,
+    LIFTED_OFF,
+    NO_HEEL_STRIKE,
+    SOLVER_FAILED,
+    WALKED,
+)
+from walkerlab.physics.kernels import callable_kernel, kernel, kernel_part
+from walkerlab.physics.mechanics.hinges import HIP_ROW, is_sprung
+from walkerlab.physics.solvers.events import CrossingFinder
+from walkerlab.physics.solvers.stepping import (
+    H_NEXT,
+    OUT_OF_BUDGET,
+    STEP_DONE,
+    T_OLD,
+    T,
+    advance,
+    begin,
+    prepare_dense,
+    rewind,
+    sample,
+)
+
+NEVER = -1
+AT_LIFT = -2  # stop once the foot that carried the last step has lifted
+LONGEST_STEP = 10.0  # pendulum times within which a step must end
+LONGEST_FLIGHT = 0.25  # pendulum times without any foot on the ground
+EVENT_TIME = 1e-12  # s, how exactly an event is located
+REFINEMENTS = 4
+REWINDS = 24  # of one step; where rounding moves an event with each try, the step's end is the event
+DOUBTS = 12  # rewinds of one step after which an event that its end does not bear out does not count
+
+
+@callable_kernel
+def scan(
+    system: OnGround, ground: JudgedGround, walk_state: WalkState, watch_order: bool, finder: CrossingFinder
+) -> tuple[float, int]:
+    """Fraction of a step, sampled at the nodes, at which the first event lies, and which it is.
+
+    The event functions stay in `finder.values`. The fraction is NO_CROSSING if there is no event.
+    """
+    for node in range(finder.nodes.size):
+        sample_event_functions(system, ground, walk_state, finder.states[node], node, finder)
+    return earliest_crossing(system, ground, walk_state, watch_order, finder)
+
+
+class EventSearch(NamedTuple):
+    """The search for the time of an event, by steps that end where it is expected."""
+
+    target: float  # s, how far the next step may lead
+    event: int  # the event that is sought, or was met last
+    latest: float  # s, end of the step in which it showed first: it is not sought beyond
+    arriving: bool  # whether the target is its expected time
+    refinements: int  # of that time
+    rewinds: int  # of the step at hand
+    stands: bool  # whether the last step stands; if not it is taken again, up to the new target
+    happens: bool  # whether the event is at its end
+
+
+@kernel
+def walk_in_form(
+    system: OnGround,
+    ground: JudgedGround,
+    method: Any,
+    finder: CrossingFinder,
+    observer: ContactObserver,
+    walk_state: WalkState,
+    until: int,
+) -> tuple[int, int]:
+    """Walk from where the method stands until the walk state is full, the hinge is released, or the walk ends.
+
+    Each turn takes a step, looks for an event in it, and takes it again if it is to end elsewhere. A step that stands
+    is observed and judged; then the event at its end changes what the walk remembers.
+
+    until  how many steps after which it also stops when the feet pass each other, or NEVER; or AT_LIFT: a walk whose
+           walk state is full goes on until the foot that carried its last step has lifted
+
+    Returns the outcome's number, or CHANGES_FORM, and the last event that it met.
+    """
+    begin(method, system, method.clock[T], method.y, method.clock[H_NEXT])
+    search = seek(deadline(system, ground.frame, walk_state, method.clock[T]), NO_EVENT)
+    watch_order = ground.terrain.order_matters or until >= 0 or is_uneven(ground.terrain)
+    while steps_are_left(walk_state, until):
+        status = advance(method, system, search.target)
+        if status != STEP_DONE:
+            return (BUDGET_EXHAUSTED if status == OUT_OF_BUDGET else SOLVER_FAILED), search.event
+        prepare_dense(method, system)
+        sample(method, system, finder.nodes, finder.states)
+        fraction, event = scan(system, ground, walk_state, watch_order, finder)
+        search = aim(search, walk_state, method, finder, fraction, event)
+        if not search.stands:
+            rewind(method, system)
+            continue
+        walk_state.progress.passes_switching = False
+        observe(observer, method, system, finder, walk_state)
+        note_flexion(system.form, walk_state, method.y)
+        outcome = judge(system, ground.frame, method.clock[T], walk_state)
+        if outcome == GOES_ON:
+            forget_zeros(walk_state, method.clock[T] - method.clock[T_OLD])
+            if search.happens:
+                outcome = react(system, ground.terrain, observer, walk_state, method, search.event, until)
+        if outcome != GOES_ON:
+            return outcome, search.event
+        if walk_state.progress.release == AT_PULSE_END and pulse_left(system, method.clock[T]) <= EVENT_TIME:
+            release(walk_state, 1 - walk_state.progress.stance)
+            return CHANGES_FORM, PULSE_END
+        search = seek(deadline(system, ground.frame, walk_state, method.clock[T]), search.event)
+    return WALKED, search.event
+
+
+@kernel_part
+def steps_are_left(walk_state: WalkState, until: int) -> bool:
+    """Whether the walk state has room for a step, or waits for the lift that ends the last one."""
+    return walk_state.progress.steps < walk_state.touch_time.size or (until == AT_LIFT and is_to_lift(walk_state))
+
+
+@kernel_part
+def seek(target: float, event: int) -> EventSearch:
+    """Look for the next event, from a step that stands up to a time (s); `event` was the last one."""
+    return EventSearch(target, event, target, False, 0, 0, False, False)
+
+
+@kernel_part
+def aim(
+    search: EventSearch, walk_state: WalkState, method: Any, finder: CrossingFinder, fraction: float, event: int
+) -> EventSearch:
+    """Decide whether the last step stands, and whether its event happens, or how far it is to lead instead.
+
+    fraction  of the step, at which the event lies; above 1 if there is none in it
+    """
+    start, end = method.clock[T_OLD], method.clock[T]
+    if fraction <= 1.0:
+        return approach(search, walk_state, start, end, fraction, event)
+    if search.arriving and end >= search.target:
+        return confirm(search, start, time_to_zero(method, finder, search.event))
+    return EventSearch(end, search.event, end, False, 0, 0, True, False)
+
+
+@kernel_part
+def approach(
+    search: EventSearch, walk_state: WalkState, start: float, end: float, fraction: float, event: int
+) -> EventSearch:
+    """Let the step from start to end (s) lead only up to the event in it; it stands if the event is at its end.
+
+    So it does where rounding moves the event with each try.
+    """
+    latest = search.latest if search.arriving else end
+    refinements = search.refinements if search.arriving and event == search.event else 0
+    wait = max(fraction * (end - start), EVENT_TIME)
+    early = start + wait < end - EVENT_TIME
+    if early and refinements <= REFINEMENTS and search.rewinds < REWINDS:
+        return EventSearch(start + wait, event, latest, True, refinements + 1, search.rewinds + 1, False, False)
+    if early and is_switching(event):
+        # its event function is no polynomial on this step: on half of it, it is nearer to one
+        if search.rewinds < REWINDS:
+            return EventSearch(0.5 * (start + end), event, latest, False, 0, search.rewinds + 1, False, False)
+        # nor on a short one: the step may pass it over, but nothing else that is in it
+        walk_state.progress.passes_switching = True
+        return EventSearch(end, event, latest, False, 0, 0, False, False)
+    return EventSearch(end, event, latest, True, refinements, search.rewinds, True, True)
+
+
+@kernel_part
+def confirm(search: EventSearch, start: float, wait: float) -> EventSearch:
+    """Let the event happen at the end of a step that just did not reach it, or lead the step on by `wait` (s)."""
+    happens = abs(wait) <= EVENT_TIME
+    doubtful = search.refinements <= REFINEMENTS and search.rewinds < DOUBTS
+    target, refinements, rewinds = search.target + wait, search.refinements + 1, search.rewinds + 1
+    if not happens and doubtful and start < target <= search.latest:
+        return EventSearch(target, search.event, search.latest, True, refinements, rewinds, False, False)
+    return EventSearch(search.target, search.event, search.latest, True, refinements, rewinds, True, happens)
+
+
+@kernel_part
+def forget_zeros(walk_state: WalkState, h: float) -> None:
+    """After a step of h (s) no event function counts as zero any more; of events at one time each is found once."""
+    if h > 2.0 * EVENT_TIME:
+        for i in range(walk_state.at_zero.size):
+            walk_state.at_zero[i] = 0
+
+
+@kernel_part
+def react(
+    system: OnGround,
+    terrain: Terrain,
+    observer: ContactObserver,
+    walk_state: WalkState,
+    method: Any,
+    event: int,
+    until: int,
+) -> int:
+    """Let the event at the end of the last step change the walk; returns how the walk goes on, or ends."""
+    steps, locked = walk_state.progress.steps, locked_knees(walk_state.knee)
+    outcome = apply_event(system, terrain, observer, walk_state, event, method.clock[T], method.y)
+    if outcome != GOES_ON:
+        return outcome
+    stepped = walk_state.progress.steps > steps
+    if stepped:
+        note_work(observer, system, method.y)
+    if (stepped and is_hinged(system)) or (event == PASSING and 0 <= until <= walk_state.progress.steps):
+        return WALKED
+    # where the motion jumps the tangent does, too: in another form, and where a hip's legs change
+    if locked_knees(walk_state.knee) != locked or (stepped and jumps_at_touch(system)):
+        return CHANGES_FORM
+    if not is_switching(event):
+        begin(method, system, method.clock[T], method.y, method.clock[H_NEXT])
+    return GOES_ON
+
+
+@kernel_part
+def is_hinged(system: OnGround) -> bool:
+    """Whether a hinge carries the walker, until its first step releases it."""
+    return system.form.places == 0
+
+
+@kernel_part
+def jumps_at_touch(system: OnGround) -> bool:
+    """Whether a step's touch may change what acts on the walker at once: the hip's legs change, a push-off begins."""
+    return is_sprung(system.form, HIP_ROW) or system.form.push_off != 0.0
+
+
+@kernel_part
+def deadline(system: OnGround, frame: Frame, walk_state: WalkState, t: float) -> float:
+    """When the walk ends if nothing happens before: too long a step, or too long a flight (s); or when a pulse does."""
+    by_step = walk_state.progress.last_touch + LONGEST_STEP * frame.pendulum_time
+    by_flight = walk_state.progress.airborne_since + LONGEST_FLIGHT * frame.pendulum_time
+    left = pulse_left(system, t)
+    return min(by_step, by_flight, t + left) if left > EVENT_TIME else min(by_step, by_flight)
+
+
+@kernel_part
+def time_to_zero(method: Any, finder: CrossingFinder, event: int) -> float:
+    """How much later than the end of the last step an event function is zero (s), by its slope there."""
+    last = finder.nodes.size - 1
+    h = method.clock[T] - method.clock[T_OLD]
+    change = finder.values[event, last] - finder.values[event, last - 1]
+    span = (finder.nodes[last] - finder.nodes[last - 1]) * h
+    if change == 0.0:
+        return 0.0
+    wait = -finder.values[event, last] * span / change
+    return max(-0.5 * h, min(0.5 * h, wait))
+
+
+@kernel_part
+def judge(system: OnGround, frame: Frame, t: float, walk_state: WalkState) -> int:
+    """End the walk if it has flown or taken too long at time t (s); note until when a foot was on the ground.
+
+    The event at the step's end has not changed the walk state yet: a foot that leaves there was on the ground before.
+    """
+    grounded = is_hinged(system)
+    for foot in range(2):
+        grounded = grounded or (walk_state.has_ground[foot] != 0 and not is_above(walk_state, foot))
+    if grounded:
+        walk_state.progress.airborne_since = t
+    if t >= walk_state.progress.last_touch + LONGEST_STEP * frame.pendulum_time:
+        return NO_HEEL_STRIKE
+    if t >= walk_state.progress.airborne_since + LONGEST_FLIGHT * frame.pendulum_time:
+        return LIFTED_OFF
+    return GOES_ON

@@ -1,0 +1,254 @@
+"""What is recorded of a walk on compliant ground besides its steps: samples, energy balance, the tangent."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from walkerlab.physics.energy_channels import (
+    DAMPING,
+    EDGES,
+    ENTRIES,
+    FORWARD,
+    FRICTION,
+    GIVEN,
+    HIP,
+    KNEE_STOP,
+    LOST,
+    PUSH_OFF,
+    TORQUE,
+)
+from walkerlab.physics.ground.energy import dissipated_power, foot_elastic_energy, push_power, total_energy
+from walkerlab.physics.ground.hinges import spring_energy, spring_power, stop_power
+from walkerlab.physics.ground.walker import OF_STATES, STOPPING, OnGround, one_foot_motion, over_ground, store_whole
+from walkerlab.physics.hybrid.contact_events import HEIGHT, LEGS_TURN, PER_FOOT, VERTICAL_VELOCITY
+from walkerlab.physics.hybrid.contact_state import WalkState
+from walkerlab.physics.hybrid.contact_tangent import Tangent, carry_tangent
+from walkerlab.physics.hybrid.hip_torque import torque_work
+from walkerlab.physics.kernels import by_reference, by_type_or_default, callable_kernel, kernel_part, matrix, vector
+from walkerlab.physics.mechanics.hinges import HIP_ROW, hinge_law
+from walkerlab.physics.mechanics.tree import read_at_once, record_type
+from walkerlab.physics.solvers.events import RISING, CrossingFinder, first_crossing
+from walkerlab.physics.solvers.radau5 import Radau5
+from walkerlab.physics.solvers.stepping import T_OLD, T, interpolate, sample
+
+# the start of a step and the nodes of a Radau quadrature on it, with its weights
+Quadrature = tuple[tuple[float, ...], tuple[float, ...]]
+OF_ORDER_5: Quadrature = (
+    (0.0, 0.15505102572168219, 0.6449489742783178, 1.0),
+    (0.0, 0.37640306270046725, 0.5124858261884216, 0.1111111111111111),
+)
+OF_ORDER_9: Quadrature = (
+    (0.0, 0.05710419611451768, 0.2768430136381238, 0.5835904323689168, 0.8602401356562195, 1.0),
+    (0.0, 0.14371356079122594, 0.28135601514946207, 0.31182652297574126, 0.22310390108357075, 0.04),
+)
+
+
+@by_reference
+class ContactSamples(NamedTuple):
+    """A walk at rising times."""
+
+    time_s: Any  # (samples,)
+    states: Any  # (samples, 4 + 2 n) of the whole walker
+    has_ground: Any  # (samples, 2)
+    stance: Any  # (samples,)
+    knees: Any  # (samples, 2) what each knee is doing
+    level: Any  # (samples, 2) m, height over the slope of the ground for each foot
+    account: Any  # (samples, entries) J
+
+    @property
+    def dissipated_J(self) -> Any:
+        """(samples, 5) in the order of account.LOSSES."""
+        return self.account[:, LOST]
+
+    @property
+    def driven_J(self) -> Any:
+        """(samples, 2) given by push-off and hip."""
+        return self.account[:, GIVEN]
+
+
+@read_at_once
+class ContactTally(np.record):  # type: ignore[misc]  # NumPy's stubs call one of its bases final
+    """Counts and extremes of a walk, and the energy that it began with: a structured scalar that kernels write to."""
+
+    recorded: int  # samples
+    max_penetration: float  # m
+    residual: float  # J, the largest of the energy balance
+    start_energy: float  # J, its potential from a fixed origin
+    energy_below: float  # J, the same with its potential from the slope below the walker
+    start_spring: float  # J, the part of the hip's spring
+
+
+CONTACT_TALLY = record_type(ContactTally, {})
+
+
+@by_reference
+class ContactObserver(NamedTuple):
+    """Samples, energy balance and tangent of a walk; what is not wanted has no room and costs a look."""
+
+    track_energy: bool  # whether to keep the energy balance
+    samples: ContactSamples
+    account: Any  # (entries,) J, so far
+    account_at_touch: Any  # (entries,) J, until the last step's touch
+    tally: ContactTally
+    tangent: Tangent  # derivative of the state with respect to where it started, if wanted
+
+
+@kernel_part
+def observe(
+    observer: ContactObserver, method: Any, system: OnGround, finder: CrossingFinder, walk_state: WalkState
+) -> None:
+    """Take note of the last step, which stands and whose event functions are sampled."""
+    record_samples(observer, method, system, walk_state)
+    if observer.track_energy:
+        balance(observer, method, system)
+        note_torque(observer, method, system, finder)
+        for foot in range(2):
+            if system.has_ground[foot] != 0:
+                note_depth(observer, method, system, finder, foot)
+    if observer.tangent.Phi.shape[1] > 0:
+        carry_tangent(observer.tangent, method, system)
+
+
+@kernel_part
+def record_samples(observer: ContactObserver, method: Any, system: OnGround, walk_state: WalkState) -> None:
+    """The samples that fall into the last step."""
+    t, h = method.clock[T_OLD], method.clock[T] - method.clock[T_OLD]
+    samples, index = observer.samples, observer.tally.recorded
+    y = vector(OF_STATES)[: method.y.size]
+    while index < samples.time_s.size and samples.time_s[index] <= method.clock[T]:
+        fraction = (samples.time_s[index] - t) / h
+        interpolate(method, system, fraction, y)
+        store_whole(system.form, y, samples.states[index])
+        for entry in range(ENTRIES):
+            samples.account[index, entry] = observer.account[entry]
+        add_work_until(method, system, fraction, samples.account[index])
+        for k in range(2):
+            samples.knees[index, k] = walk_state.knee[k]
+            samples.has_ground[index, k] = walk_state.has_ground[k]
+            samples.level[index, k] = walk_state.level[k]
+        samples.stance[index] = walk_state.progress.stance
+        index += 1
+    observer.tally.recorded = index
+
+
+@kernel_part
+def balance(observer: ContactObserver, method: Any, system: OnGround) -> None:
+    """What the last step took and gave, and how well the energy balances at its end."""
+    account = observer.account
+    add_work_until(method, system, 1.0, account)
+    lost = -account[PUSH_OFF] - account[HIP]
+    for entry in range(PUSH_OFF):
+        lost += account[entry]
+    residual = end_energy(system, method.y) + lost - observer.tally.start_energy
+    observer.tally.residual = max(observer.tally.residual, abs(residual))
+
+
+@kernel_part
+def note_torque(observer: ContactObserver, method: Any, system: OnGround, finder: CrossingFinder) -> None:
+    """Work of the hip's constant torque in the last step."""
+    torque = hinge_law(system.form, HIP_ROW).torque
+    if torque != 0.0:
+        given = torque_work(torque, method, system, finder, LEGS_TURN, 1.0)
+        observer.account[TORQUE] += given.net
+        observer.account[FORWARD] += given.positive
+
+
+@kernel_part
+def note_work(observer: ContactObserver, system: OnGround, y: Any) -> None:
+    """A step has ended: what was given until now belongs to steps that were taken, and what the hip's spring gave."""
+    for entry in range(ENTRIES):
+        observer.account_at_touch[entry] = observer.account[entry]
+    observer.account_at_touch[HIP] += observer.tally.start_spring - spring_energy(system, y)
+
+
+@kernel_part
+def note_depth(observer: ContactObserver, method: Any, system: OnGround, finder: CrossingFinder, foot: int) -> None:
+    """How deep a foot got in the last step: at its end, or where it stopped sinking in."""
+    end, first = finder.nodes.size - 1, foot * PER_FOOT
+    deepest = -finder.values[first + HEIGHT, end]
+    if finder.values[first + VERTICAL_VELOCITY, 0] < 0.0 < finder.values[first + VERTICAL_VELOCITY, end]:
+        at = first_crossing(finder, first + VERTICAL_VELOCITY, RISING, 0.0, False)
+        y = vector(OF_STATES)[: method.y.size]
+        interpolate(method, system, min(at, 1.0), y)
+        deepest = max(deepest, -over_ground(system, foot, one_foot_motion(system.form, foot, y)).height)
+    observer.tally.max_penetration = max(observer.tally.max_penetration, deepest)
+
+
+@kernel_part
+def observe_edge(observer: ContactObserver, system: OnGround, foot: int, y: Any) -> None:
+    """A foot left its pad: the spring under it is gone, and what it held with it."""
+    if system.has_ground[foot] != 0 and observer.track_energy:
+        observer.account[EDGES] += foot_elastic_energy(system, foot, y)
+
+
+@callable_kernel
+def end_energy(system: OnGround, y: Any) -> float:
+    """Mechanical energy (J) at the end of the last step."""
+    return total_energy(system, y)
+
+
+@by_type_or_default
+def quadrature(method: Any) -> Quadrature:
+    """The rule that sums up what a step of a method took and gave: as exact as the best dense output."""
+    return OF_ORDER_9
+
+
+@quadrature.case(Radau5)
+def of_collocation(method: Radau5) -> Quadrature:
+    """That of the method's own order."""
+    return OF_ORDER_5
+
+
+@kernel_part
+def add_work_until(method: Any, system: OnGround, fraction: float, account: Any) -> None:
+    """Add to an account (entries,) what the first part of the last step took and gave (J)."""
+    nodes, weights = quadrature(method)
+    fractions, states = vector(nodes), matrix(OF_STATES)
+    for i in range(len(nodes)):
+        fractions[i] = fraction * nodes[i]
+    sample(method, system, fractions, states)
+    span = fraction * (method.clock[T] - method.clock[T_OLD])
+    add_work(system, states, nodes, weights, method.clock[T_OLD], span, account)
+
+
+@callable_kernel
+def add_work(
+    system: OnGround,
+    states: Any,
+    nodes: tuple[float, ...],
+    weights: tuple[float, ...],
+    begin: float,
+    span: float,
+    account: Any,
+) -> None:
+    """The same of a time `span` (s) from `begin` on, with the states at its nodes."""
+    for foot in range(2):
+        if system.has_ground[foot] != 0:
+            damping, friction = foot_work(system, states, weights, foot, span)
+            account[DAMPING] += damping
+            account[FRICTION] += friction
+    stopping = system.knee[0] == STOPPING or system.knee[1] == STOPPING
+    for i in range(1, len(nodes)):
+        weight = span * weights[i]
+        if stopping:
+            account[KNEE_STOP] += weight * stop_power(system, states[i])
+        account[HIP] += weight * spring_power(system, states[i])
+        account[PUSH_OFF] += weight * push_power(system, begin + nodes[i] * span, states[i])
+
+
+@kernel_part
+def foot_work(system: OnGround, states: Any, weights: tuple[float, ...], foot: int, span: float) -> tuple[float, float]:
+    """Work (J) lost under a foot that there is ground for.
+
+    Where the force law has let go, what is lost is what the spring gives up, whose powers of the penetration no
+    quadrature likes; steps end where it lets go.
+    """
+    damping, friction, let_go, last = 0.0, 0.0, True, len(weights) - 1
+    for i in range(1, len(weights)):
+        power = dissipated_power(system, foot, states[i])
+        damping += span * weights[i] * power[0]
+        friction += span * weights[i] * power[1]
+        let_go = let_go and (i == last or power[2] == 0.0)
+    if let_go:
+        damping = foot_elastic_energy(system, foot, states[0]) - foot_elastic_energy(system, foot, states[last])
+    return damping, friction

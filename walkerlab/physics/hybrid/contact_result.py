@@ -1,0 +1,360 @@
+"""A whole walk on compliant ground: hinged first step if wanted, then free, with everything observed on the way."""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from walkerlab.outcome import Outcome
+from walkerlab.physics.energy_channels import ENTRIES, KNEE_STRIKES, LOSSES, LOST, PUSH_OFF, TORQUE
+from walkerlab.physics.ground.energy import kinetic_energy, potential_energy, total_energy
+from walkerlab.physics.ground.hinges import spring_energy
+from walkerlab.physics.ground.terrain import Terrain, is_uneven
+from walkerlab.physics.ground.walker import (
+    OF_BODIES,
+    ContactWalker,
+    FootMotion,
+    OnGround,
+    feet_motion,
+    floating_state,
+    folded,
+    foot_force,
+    on_ground,
+    sines_cosines,
+    unfolded,
+)
+from walkerlab.physics.hybrid.contact_crossings import hip_height
+from walkerlab.physics.hybrid.contact_events import HEIGHT, PER_FOOT, ROWS, JudgedGround
+from walkerlab.physics.hybrid.contact_jumps import change_form
+from walkerlab.physics.hybrid.contact_loop import AT_LIFT, NEVER, walk_in_form
+from walkerlab.physics.hybrid.contact_record import CONTACT_TALLY, ContactObserver, ContactSamples
+from walkerlab.physics.hybrid.contact_state import WalkState, material_along, new_walk_state, steps_with_lift
+from walkerlab.physics.hybrid.contact_tangent import new_tangent
+from walkerlab.physics.hybrid.endings import CHANGES_FORM, FALLEN_HIP
+from walkerlab.physics.hybrid.walk_record import DrivenWork, WalkRecord, WalkWork
+from walkerlab.physics.kernels import kernel, uncompiled, vector
+from walkerlab.physics.mechanics.tree import new_record
+from walkerlab.physics.solvers.registry import Tolerances, finder_for, method_named, sharing
+from walkerlab.physics.solvers.stepping import ACCEPTED, JACOBIANS, REJECTED, RHS, T
+from walkerlab.physics.solvers.system import Floats, State
+
+ROUNDING = 1e-14  # of a start's coordinates and velocities
+USUAL_STEP = 3.0  # pendulum times that most steps are shorter than
+# Residuals over rtol times energy and work exchanged: random walks leave at most 0.5 by radau5 at any rtol from 1e-2 to
+# 1e-9 (scripts/contact_campaign.py prints those of its walks), and 9 by the libraries' multistep methods; cases of the
+# stability catalogue, of which ground of 1e14 N/m is the worst, leave at most 9.
+UNEXPLAINED = 100.0
+SET_STIFF = "set solver.contact.method to radau5."
+FINEST = 1e-10  # rtol below which a walk's rounding, and no longer its tolerance, makes the residual
+
+
+@dataclass(frozen=True)
+class Stopped:
+    """How, where and at what cost a walk stopped."""
+
+    outcome: Outcome
+    time_s: float
+    state: State  # of the whole walker, free
+    work: NDArray[np.int64]
+
+
+def sampled_energies(walker: ContactWalker, samples: ContactSamples) -> Floats:
+    """Kinetic, potential and total energy (J) of every sample, (samples, 3)."""
+    energies = np.zeros((samples.time_s.size, 3))
+    fill_energies(on_ground(walker, (False, False)), samples, energies)
+    return energies
+
+
+def sampled_feet(walker: ContactWalker, samples: ContactSamples) -> Floats:
+    """Position along and height over the ground (m), normal force and friction (N), slip (m/s), (samples, foot, 5)."""
+    feet = np.zeros((samples.time_s.size, 2, 5))
+    fill_feet(walker, samples, feet)
+    return feet
+
+
+@kernel
+def fill_energies(system: OnGround, samples: ContactSamples, energies: Any) -> None:
+    """`sampled_energies` of a walker with all bodies, free, whose ground and knees are set to those of each sample."""
+    for i in range(samples.states.shape[0]):
+        for k in range(2):
+            system.has_ground[k], system.knee[k] = samples.has_ground[i, k], samples.knees[i, k]
+            system.level[k] = samples.level[i, k]
+        energies[i, 0] = kinetic_energy(system.form, samples.states[i])
+        energies[i, 1] = potential_energy(system.form, samples.states[i])
+        energies[i, 2] = total_energy(system, samples.states[i])
+
+
+@kernel
+def fill_feet(walker: ContactWalker, samples: ContactSamples, feet: Any) -> None:
+    """`sampled_feet` into an array of zeros."""
+    for i in range(samples.states.shape[0]):
+        motions = feet_motion(walker.forms[0, 0], samples.states[i])
+        for foot in range(2):
+            along, height, slip, vertical_velocity = motions[foot]
+            height -= samples.level[i, foot]
+            feet[i, foot, 0], feet[i, foot, 1], feet[i, foot, 4] = along, height, slip
+            if samples.has_ground[i, foot] != 0 and height < 0.0:
+                force = foot_force(walker, FootMotion(along, height, slip, vertical_velocity))
+                feet[i, foot, 2], feet[i, foot, 3] = force.normal.force, force.along
+
+
+@dataclass(frozen=True, eq=False)
+class ContactWalkResult(WalkRecord):
+    """A walk on compliant ground."""
+
+    slip_m: Floats  # (steps,) of the stance foot's material; without the last step if its foot did not lift
+    rolling_m: Floats  # likewise, how far the stance foot rolled
+    end_state: State
+    max_penetration_m: float
+    energy_balance_residual_J: float
+    explained_residual_J: float  # what the tolerance explains of it at most
+    dissipated_J: Floats  # (5,)
+    samples: ContactSamples | None
+    method: str  # by which it was integrated
+
+    @property
+    def advice(self) -> str:
+        """What the outcome means and what to try next."""
+        stiff = method_named(self.method).stiff
+        if self.outcome is Outcome.BUDGET_EXHAUSTED and not stiff:
+            return (
+                f"The walk exhausted its evaluation budget by {self.method}, which stiff ground holds to short steps "
+                f"at any tolerance; {SET_STIFF}"
+            )
+        if self.energy_balance_residual_J <= self.explained_residual_J:
+            return super().advice
+        return (
+            f"The energy balance does not close: it is off by {self.energy_balance_residual_J:.3g} J, of which the "
+            f"solver's tolerance explains {self.explained_residual_J:.2g} J at most, so the walk is wrong; "
+            + ("tighten solver.contact.rtol or choose another solver.contact.method." if stiff else SET_STIFF)
+            + " If that does not help, the program is at fault."
+        )
+
+
+def new_observer(
+    walker: ContactWalker,
+    walk_state: WalkState,
+    y: State,
+    times: Floats | None = None,
+    track_energy: bool = True,
+    directions: int = 0,
+) -> ContactObserver:
+    """An observer of a walk from state y.
+
+    times         (samples,) rising, in s; no samples without them
+    track_energy  whether to keep the energy balance
+    directions    how many directions of the start to carry along as the tangent
+    """
+    times = np.zeros(0) if times is None else times
+    samples = times.size
+    tally = new_record(CONTACT_TALLY)
+    if track_energy or walker.whole.sprung:
+        here = on_ground(walker, walk_state.has_ground, level=walk_state.level, progress=walk_state.progress)
+        tally.start_energy, tally.start_spring = total_energy(here, y), spring_energy(here, y)
+        tally.energy_below = tally.start_energy + walker.mass * walker.gravity_along * y[0]
+    room = ContactSamples(
+        times,
+        np.zeros((samples, walker.size)),
+        np.zeros((samples, 2), np.int8),
+        np.zeros(samples, np.int64),
+        np.zeros((samples, 2), np.int8),
+        np.zeros((samples, 2)),
+        np.zeros((samples, ENTRIES)),
+    )
+    tangent = new_tangent(walker.size, directions)
+    return ContactObserver(track_energy, room, np.zeros(ENTRIES), np.zeros(ENTRIES), tally, tangent)
+
+
+def in_walk(walker: ContactWalker, walk_state: WalkState, hinged: bool = False) -> OnGround:
+    """The walker in the form that a walk has it in, which changes what it remembers."""
+    at = walk_state
+    return on_ground(walker, at.has_ground, at.knee, hinged, at.level, at.progress)
+
+
+def walk_on(
+    walker: ContactWalker,
+    ground: JudgedGround,
+    tolerances: Tolerances,
+    walk_state: WalkState,
+    observer: ContactObserver,
+    start: State,
+    until: int = NEVER,
+    hinged: bool = False,
+) -> Stopped:
+    """Walk on from a walk state that is at hand, in one form after another as knees lock and are released.
+
+    start   state of the whole walker, free
+    until   that of `walk_in_form`
+    hinged  whether the stance foot is, until the first step is taken: then the walk ends
+
+    Returns where it stopped, and how: `SOLVER_FAILED`, too, where the energy balance does not close.
+    """
+    walk = walk_in_form if tolerances.compiled else uncompiled(walk_in_form)
+    system = in_walk(walker, walk_state, hinged)
+    tangent = observer.tangent.Phi
+    half, root = len(start) // 2, 2 if hinged else 0
+    y = folded(system.form, (*start[root:half], *start[half + root :]))
+    if tangent.shape[1] > 0:
+        tangent[: y.size] = folded(system.form, tangent)
+    lead = tolerances.new(y.size)
+    lead.clock[T] = walk_state.progress.stopped_at
+    by_size, finder = {y.size: lead}, finder_for(lead, ROWS, walker.size)
+    while True:
+        if y.size not in by_size:
+            by_size[y.size] = sharing(tolerances.new(y.size), lead.clock, lead.counts)
+        method = by_size[y.size]
+        method.y[:] = y
+        ended, event = walk(system, ground, method, finder, observer, walk_state, until)
+        if ended != CHANGES_FORM:
+            break
+        before, system = system, in_walk(walker, walk_state, hinged)
+        y = change_form(walker, before, system, event, observer, method)
+    if tangent.shape[1] > 0:
+        tangent[:] = unfolded(system.form, tangent[: method.y.size], walker.size)
+    end = floating_state(system.form, method.y, walker.size)
+    walk_state.progress.stopped_at = lead.clock[T]
+    return Stopped(balanced(ended, observer, tolerances), float(lead.clock[T]), end, lead.counts[:4].copy())
+
+
+def walk_contact(
+    walker: ContactWalker,
+    ground: JudgedGround,
+    hinged: bool,
+    stance: int,
+    start: State,
+    tolerances: Tolerances,
+    steps: int,
+    sampling: float | Floats | None,
+) -> ContactWalkResult:
+    """Walk up to `steps` steps.
+
+    hinged      whether the stance foot of the first step is
+    stance      the foot that carries the first step
+    start       state of the free walker (4 + 2 n); its angles and angular velocities start a hinged one
+    tolerances  how to integrate
+    sampling    time between samples, their times (samples,), rising, in s, or None for none
+
+    The room for samples doubles until the whole walk fits. A start that lies on the ground already is rejected.
+    """
+    frame, s, c = ground.frame, vector(OF_BODIES), vector(OF_BODIES)
+    sines_cosines(walker.whole, start, s, c)
+    if hip_height(walker.whole, s, c, start) < FALLEN_HIP * frame.leg_length:
+        walk_state = new_walk_state(walker, ground.terrain, stance, steps, start)
+        here = Stopped(Outcome.REJECTED, 0.0, start, np.zeros(4, np.int64))
+        return gather(here, walk_state, new_observer(walker, walk_state, start), walker, ground.terrain, tolerances)
+    room = int(USUAL_STEP * steps * frame.pendulum_time / sampling) + 2 if isinstance(sampling, float) else 0
+    while True:
+        walk_state = new_walk_state(walker, ground.terrain, stance, steps, start)
+        times = sampling * np.arange(room, dtype=np.float64) if isinstance(sampling, float) else sampling
+        observer = new_observer(walker, walk_state, start, times, tolerances.track_energy)
+        stopped = run_parts(walker, ground, hinged, start, tolerances, observer, walk_state)
+        if room == 0 or observer.tally.recorded < room:
+            return gather(stopped, walk_state, observer, walker, ground.terrain, tolerances)
+        room *= 2
+
+
+def run_parts(
+    walker: ContactWalker,
+    ground: JudgedGround,
+    hinged: bool,
+    start: State,
+    tolerances: Tolerances,
+    observer: ContactObserver,
+    walk_state: WalkState,
+) -> Stopped:
+    """The hinged step, if there is one, then the free walk.
+
+    A walk that took all its steps goes on, unobserved, until the foot that carried the last one has lifted.
+    """
+    y, spent = start, np.zeros(4, np.int64)
+    if hinged:
+        first = walk_on(walker, ground, tolerances, walk_state, observer, start, hinged=True)
+        y, spent = first.state, first.work
+        release_hinge(walker, walk_state, y)
+        if first.outcome is not Outcome.WALKED:
+            return first
+        walk_state.progress.airborne_since = first.time_s
+    stopped = walk_on(walker, ground, tolerances, walk_state, observer, y)
+    if stopped.outcome is Outcome.WALKED:
+        unseen = new_observer(walker, walk_state, stopped.state, track_energy=False)
+        left = replace(tolerances, budget=tolerances.budget - int(stopped.work[RHS]))
+        walk_on(walker, ground, left, walk_state, unseen, stopped.state, AT_LIFT)
+    return replace(stopped, work=spent + stopped.work)
+
+
+def by_channel(walker: ContactWalker, dissipated: Floats) -> dict[str, float]:
+    """What was dissipated (J), by name; the knees' channels only where there are knees."""
+    pairs = zip(LOSSES, dissipated.tolist(), strict=True)
+    return {loss.key: joules for place, (loss, joules) in enumerate(pairs) if walker.kneed or place < KNEE_STRIKES}
+
+
+def release_hinge(walker: ContactWalker, walk_state: WalkState, y: State) -> None:
+    """A hinged foot has neither slipped nor rolled until now; it is on the ground, about to leave."""
+    foot, steps = int(walker.forms[1, 0]["hinged"]), walk_state.progress.steps
+    walk_state.slip[:steps], walk_state.rolling[:steps] = 0.0, 0.0
+    walk_state.touched[foot] = material_along(walker.whole, foot, feet_motion(walker.whole, y)[foot].along, y)
+    walk_state.slipped[foot], walk_state.rolled[foot] = 0.0, 0.0
+    walk_state.at_zero[foot * PER_FOOT + HEIGHT] = 1
+
+
+def explained_residual(observer: ContactObserver, tolerances: Tolerances) -> float:
+    """How large a residual of the energy balance (J) the tolerance explains; a larger one is a fault.
+
+    It is UNEXPLAINED times rtol times energy and work exchanged: the energy at the start, kinetic, elastic, and
+    potential over the slope below, and all that has been dissipated since.
+    """
+    exchanged = observer.tally.energy_below + np.abs(observer.account[:TORQUE]).sum()
+    return float(UNEXPLAINED * max(tolerances.rtol, FINEST) * exchanged)
+
+
+def balanced(ended: int, observer: ContactObserver, tolerances: Tolerances) -> Outcome:
+    """How a walk ended: `SOLVER_FAILED`, however it did, if its energy balance does not close.
+
+    This detects faults and estimates no error: a walk may be off by far more than its balance.
+    """
+    closes = observer.tally.residual <= explained_residual(observer, tolerances)
+    return Outcome(ended) if closes else Outcome.SOLVER_FAILED
+
+
+def driven_work(walker: ContactWalker, along: float, up: float, account: Floats) -> DrivenWork:
+    """What was given on a way that led so far along the slope and up (m); account (entries,) J."""
+    gravity = walker.mass * (walker.gravity_along * along - walker.gravity_down * up)
+    return DrivenWork(walker.mass * walker.gravity, gravity, *account[PUSH_OFF:].tolist())
+
+
+def gather(
+    stopped: Stopped,
+    walk_state: WalkState,
+    observer: ContactObserver,
+    walker: ContactWalker,
+    terrain: Terrain,
+    tolerances: Tolerances,
+) -> ContactWalkResult:
+    """The result of a walk from what was written on the way."""
+    done, lifted, seen = int(walk_state.progress.steps), steps_with_lift(walk_state), int(observer.tally.recorded)
+    samples = ContactSamples(*(each[:seen] for each in observer.samples)) if observer.samples.time_s.size else None
+    strikes = walk_state.knee_strike[:done]
+    along, up = (
+        (float(walk_state.touch_along[done - 1]), float(walk_state.touch_height[done - 1])) if done else (0.0, 0.0)
+    )
+    known = np.where(strikes < 0.0, np.nan, strikes)
+    return ContactWalkResult(
+        foothold_height_m=walk_state.touch_height[:done] if is_uneven(terrain) else None,
+        outcome=stopped.outcome,
+        touch_time_s=walk_state.touch_time[:done],
+        touch_along_m=walk_state.touch_along[:done],
+        knee_strike_time_s=known if walker.kneed else None,
+        end_time_s=stopped.time_s,
+        work=WalkWork(*(int(stopped.work[count]) for count in (RHS, ACCEPTED, REJECTED, JACOBIANS))),
+        slip_m=walk_state.slip[:lifted],
+        rolling_m=walk_state.rolling[:lifted],
+        end_state=stopped.state,
+        max_penetration_m=float(observer.tally.max_penetration),
+        energy_balance_residual_J=float(observer.tally.residual),
+        explained_residual_J=explained_residual(observer, tolerances),
+        dissipated_J=observer.account[LOST].copy(),
+        driven=driven_work(walker, along, up, observer.account_at_touch),
+        samples=samples,
+        method=tolerances.method,
+    )

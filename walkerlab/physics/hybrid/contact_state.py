@@ -1,0 +1,170 @@
+"""The memory of a walk on compliant ground: which foot stands, what has touched, where each event function is known."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from walkerlab.physics.ground.knees import FLEXED, extension
+from walkerlab.physics.ground.terrain import Terrain, cell_at, has_ground_in_cell, starts_with_ground
+from walkerlab.physics.ground.walker import (
+    BENT,
+    LOCKED,
+    RELEASED,
+    ContactWalker,
+    FootMotion,
+    GroundModel,
+    WalkProgress,
+    feet_motion,
+    new_progress,
+)
+from walkerlab.physics.hybrid.contact_events import (
+    EVENT_FUNCTIONS,
+    FALL,
+    HEIGHT,
+    LEFT_EDGE,
+    PASSING,
+    PER_FOOT,
+    RIGHT_EDGE,
+    SLIDE,
+)
+from walkerlab.physics.kernels import by_reference, kernel_part
+from walkerlab.physics.solvers.system import State
+
+# when the trailing knee is to be released: no more, as the leading foot stops sinking in, or as the push-off ends
+NOT_DUE, AT_COMPRESSION, AT_PULSE_END = range(3)
+ROUNDING = 1e-14  # of a start's coordinates and velocities
+
+
+@by_reference
+class WalkState(NamedTuple):
+    """The memory of a walk: its rules read and write it, and its result is gathered from it."""
+
+    touch_time: Any  # (steps,) s
+    touch_along: Any  # (steps,) m
+    touch_height: Any  # (steps,) m, of the foothold over the slope
+    slip: Any  # (steps,) m, net slip of the stance foot of each step; of the last one until now, while `is_to_lift`
+    rolling: Any  # (steps,) m, how far it rolled
+    has_ground: Any  # (2,) whether there is ground under a foot
+    level: Any  # (2,) m, height over the slope of the ground for each foot
+    cells: Any  # (2,) which cell of its lane a foot is over
+    left_cells: Any  # (2,) the cell where it last stood
+    foothold: Any  # (2,) m, where it touched
+    touched: Any  # (2,) m, where its material was then, as `material_along` has it
+    slipped: Any  # (2,) m, how far it slipped from its touch to its latest lift
+    rolled: Any  # (2,) m, how far it rolled
+    leaving: Any  # (2,) whether a foot is still to lift from the step that it carried
+    knee: Any  # (2,) what each knee is doing
+    knee_strike: Any  # (steps + 1,) s, when the knee of the step's swing leg locked; -1 if it has not
+    sides: Any  # (event functions,) on which side of zero each event function is known to be
+    at_zero: Any  # (event functions,) which event functions the last event left at zero
+    progress: WalkProgress
+
+
+def new_walk_state(walker: ContactWalker, terrain: Terrain, stance: int, steps: int, y: State) -> WalkState:
+    """The walk state of a walk of `steps` steps that starts from y with both feet on the ground."""
+    feet = feet_motion(walker.whole, y)
+    cells = np.array([cell_at(terrain, foot, feet[foot].along) for foot in range(2)], np.int64)
+    has_ground = np.zeros(2, np.int8)
+    for foot in range(2):
+        on_pad = has_ground_in_cell(int(cells[foot]))
+        has_ground[foot] = on_pad and starts_with_ground(terrain, foot == stance)
+    sides, at_zero = known_sides(walker, feet, stance, y)
+    return WalkState(
+        touch_time=np.zeros(steps),
+        touch_along=np.zeros(steps),
+        touch_height=np.zeros(steps),
+        slip=np.zeros(steps),
+        rolling=np.zeros(steps),
+        has_ground=has_ground,
+        level=np.zeros(2),
+        cells=cells,
+        left_cells=cells.copy(),
+        foothold=np.array([motion.along for motion in feet]),
+        touched=np.array([material_along(walker.whole, foot, feet[foot].along, y) for foot in range(2)]),
+        slipped=np.zeros(2),
+        rolled=np.zeros(2),
+        knee=knees_at_start(walker, stance, y),
+        knee_strike=np.full(steps + 1, -1.0),
+        leaving=np.zeros(2, np.int8),
+        sides=sides,
+        at_zero=at_zero,
+        progress=new_progress(stance),
+    )
+
+
+def knees_at_start(walker: ContactWalker, stance: int, y: State) -> NDArray[np.int8]:
+    """What each knee is doing (2,): that of the stance leg is locked, the other is not."""
+    knee = np.full(2, RELEASED, np.int8)
+    if walker.kneed:
+        knee[stance] = LOCKED
+        if extension(walker.whole, 1 - stance, y) < -FLEXED:
+            knee[1 - stance] = BENT
+    return knee
+
+
+def known_sides(
+    walker: ContactWalker, feet: tuple[FootMotion, FootMotion], stance: int, y: State
+) -> tuple[NDArray[np.int8], NDArray[np.int8]]:
+    """On which side of zero every event function is at the start, and which are at zero, by rounding at most.
+
+    Of these the velocity tells the side. A foot on the ground at rest is in it; of feet side by side at rest the stance
+    foot is the one ahead.
+    """
+    sides, at_zero = np.zeros(EVENT_FUNCTIONS, np.int8), np.zeros(EVENT_FUNCTIONS, np.int8)
+    sides[[FALL, SLIDE]] = 1
+    n, whole = int(walker.whole.bodies), walker.whole
+    size = float(max(np.abs(whole.foot_x[0]).max(), np.abs(whole.foot_y[0]).max()))
+    speed = max(abs(float(x)) for x in y[2 + n :])
+    for foot in range(2):
+        first = foot * PER_FOOT
+        sides[[first + LEFT_EDGE, first + RIGHT_EDGE]] = 1
+        signs = (feet[foot].height, feet[foot].vertical_velocity)
+        sides[first + HEIGHT], at_zero[first + HEIGHT] = side_of(signs, (size, speed), -1)
+    rates = [feet[k].slip - float(whole.rolling[k, :n] @ np.array(y[4 + n :])) for k in range(2)]
+    order = (feet[1].along - feet[0].along, rates[1] - rates[0])
+    sides[PASSING], at_zero[PASSING] = side_of(order, (size, speed), 1 if stance == 1 else -1)
+    return sides, at_zero
+
+
+def side_of(value_and_rate: tuple[float, float], scales: tuple[float, float], otherwise: int) -> tuple[int, bool]:
+    """On which side of zero something is, or goes to if it is zero to rounding; whether it is zero."""
+    for number, scale in zip(value_and_rate, scales, strict=True):
+        if abs(number) > ROUNDING * scale:
+            return (1 if number > 0.0 else -1), number is not value_and_rate[0]
+    return otherwise, True
+
+
+@kernel_part
+def material_along(form: GroundModel, foot: int, along: float, y: Any) -> float:
+    """Where a foot at `along` (m) would be had it not rolled: what this changes by is slip.
+
+    The velocity of the material point at the bottom of the ball is that of the contact point plus radius times angular
+    velocity; so is its way the contact point's plus radius times the change of the angle.
+    """
+    for k in range(form.bodies):
+        along += form.rolling[foot, k] * y[form.places + k]
+    return along
+
+
+@kernel_part
+def is_above(walk_state: WalkState, foot: int) -> bool:
+    """Whether a foot is above the ground."""
+    return walk_state.sides[foot * PER_FOOT + HEIGHT] > 0
+
+
+@kernel_part
+def is_ahead(walk_state: WalkState, foot: int) -> bool:
+    """Whether a foot is further along than the other; known where the order of the feet is watched."""
+    return (walk_state.sides[PASSING] > 0) == (foot == 1)
+
+
+@kernel_part
+def is_to_lift(walk_state: WalkState) -> bool:
+    """Whether the foot that carried the last step is still to lift from it."""
+    return walk_state.leaving[1 - walk_state.progress.stance] != 0
+
+
+def steps_with_lift(walk_state: WalkState) -> int:
+    """How many steps have a slip and a rolling, which end where their foot lifts: all, or all but the last."""
+    return int(walk_state.progress.steps) - int(is_to_lift(walk_state))

@@ -1,0 +1,111 @@
+"""How a walk on compliant ground changes with its start: the variational equations along the steps taken.
+
+On each step the derivative Phi of the state obeys dPhi/dt = J(t) Phi. It is solved by the three-stage Radau collocation
+method on the same step, with J at the stages: for radau5 that is the exact derivative of the step itself. The force law
+is continuous at its switching points and at touch and lift, so no jump enters there; where a knee locks or is released
+one does. A foot that leaves its pad under load would need one, and a gait has none.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from walkerlab.physics.ground.walker import OF_STATES
+from walkerlab.physics.kernels import by_reference, kernel_part, vector
+from walkerlab.physics.solvers.linear import factor, solve
+from walkerlab.physics.solvers.radau5 import C
+from walkerlab.physics.solvers.stepping import T_OLD, T, interpolate
+from walkerlab.physics.solvers.system import jacobian
+
+THIS_SIDE = 4e-12  # s, a few event-time uncertainties
+ROOT6 = 6.0**0.5
+# Radau IIA, Hairer and Wanner II (5.6)
+A = np.array(
+    [
+        [(88.0 - 7.0 * ROOT6) / 360.0, (296.0 - 169.0 * ROOT6) / 1800.0, (-2.0 + 3.0 * ROOT6) / 225.0],
+        [(296.0 + 169.0 * ROOT6) / 1800.0, (88.0 + 7.0 * ROOT6) / 360.0, (-2.0 - 3.0 * ROOT6) / 225.0],
+        [(16.0 - ROOT6) / 36.0, (16.0 + ROOT6) / 36.0, 1.0 / 9.0],
+    ]
+)
+
+
+@by_reference
+class Tangent(NamedTuple):
+    """The derivative Phi and the memory to carry it along, with room for the whole walker's state of n numbers.
+
+    While the walker moves as one of fewer bodies the first rows are in use.
+    """
+
+    Phi: Any  # (n, directions); no directions if the tangent is not wanted
+    stages: Any  # (4, n, n) Jacobians at the three stages, and one more to extrapolate with
+    system: Any  # (3 n, 3 n)
+    pivots: Any  # (3 n,)
+    rates: Any  # (3 n,) stage derivatives of one direction
+
+
+def new_tangent(n: int, directions: int) -> Tangent:
+    """Memory for `directions` directions of a system of n equations; none for zero directions."""
+    m = n if directions else 0
+    return Tangent(
+        np.zeros((n, directions)),
+        np.zeros((4, m, m)),
+        np.zeros((3 * m, 3 * m)),
+        np.zeros(3 * m, np.int64),
+        np.zeros(3 * m),
+    )
+
+
+@kernel_part
+def jacobian_at(method: Any, system: Any, fraction: float, J: Any) -> None:
+    """The Jacobian at a fraction of the last step into J."""
+    y = vector(OF_STATES)[: method.y.size]
+    interpolate(method, system, fraction, y)
+    jacobian(system, method.clock[T_OLD] + fraction * (method.clock[T] - method.clock[T_OLD]), y, J)
+
+
+@kernel_part
+def carry_tangent(tangent: Tangent, method: Any, system: Any) -> None:
+    """Carry Phi over the last step of `method`."""
+    n, h = method.y.size, method.clock[T] - method.clock[T_OLD]
+    for i in range(2):
+        jacobian_at(method, system, C[i], tangent.stages[i])
+    jacobian_at_end(tangent, method, system)
+    for i in range(3):
+        for j in range(3):
+            for row in range(n):
+                for column in range(n):
+                    same = 1.0 if i == j and row == column else 0.0
+                    tangent.system[i * n + row, j * n + column] = same - h * A[i, j] * tangent.stages[i, row, column]
+    factor(tangent.system, tangent.pivots, 3 * n)
+    for direction in range(tangent.Phi.shape[1]):
+        carry_direction(tangent, n, direction, h)
+
+
+@kernel_part
+def jacobian_at_end(tangent: Tangent, method: Any, system: Any) -> None:
+    """The Jacobian at the step's end, seen from within the step: extrapolated from two states shortly before.
+
+    A step that ends at a switching point of the force law ends on either side of it, and the Jacobian jumps there.
+    """
+    near = min(0.25, THIS_SIDE / (method.clock[T] - method.clock[T_OLD]))
+    for i in range(2):
+        jacobian_at(method, system, 1.0 - (1 + i) * near, tangent.stages[2 + i])
+    n = method.y.size
+    for row in range(n):
+        for column in range(n):
+            tangent.stages[2, row, column] += tangent.stages[2, row, column] - tangent.stages[3, row, column]
+
+
+@kernel_part
+def carry_direction(tangent: Tangent, n: int, direction: int, h: float) -> None:
+    """One column of Phi (n,): stage derivatives K = J (Phi + h A K), then the step's sum."""
+    for i in range(3):
+        for row in range(n):
+            total = 0.0
+            for k in range(n):
+                total += tangent.stages[i, row, k] * tangent.Phi[k, direction]
+            tangent.rates[i * n + row] = total
+    solve(tangent.system, tangent.pivots, tangent.rates, 0, 3 * n)
+    for row in range(n):
+        change = A[2, 0] * tangent.rates[row] + A[2, 1] * tangent.rates[n + row] + A[2, 2] * tangent.rates[2 * n + row]
+        tangent.Phi[row, direction] += h * change

@@ -1,0 +1,301 @@
+"""What a walk on compliant ground remembers, and what an event changes in it: the rules of steps, pads and falls."""
+
+from typing import Any
+
+from walkerlab.physics.ground.knees import FLEXED, IdealLock, extension
+from walkerlab.physics.ground.pulse import pulse_left
+from walkerlab.physics.ground.terrain import (
+    Terrain,
+    foothold_height,
+    has_ground_in_air,
+    has_ground_in_cell,
+    height_of_pad,
+    is_uneven,
+)
+from walkerlab.physics.ground.walker import (
+    BENT,
+    LOCKED,
+    RELEASED,
+    STOPPING,
+    FootMotion,
+    GroundModel,
+    OnGround,
+    feet_motion,
+    over_ground,
+)
+from walkerlab.physics.hybrid.contact_events import (
+    EXTENSION,
+    EXTENSION_RATE,
+    FALL,
+    HEIGHT,
+    LEFT_EDGE,
+    PASSING,
+    PER_FOOT,
+    RIGHT_EDGE,
+    SLIDE,
+    VERTICAL_VELOCITY,
+    farthest_slide,
+)
+from walkerlab.physics.hybrid.contact_record import ContactObserver, observe_edge
+from walkerlab.physics.hybrid.contact_state import (
+    AT_COMPRESSION,
+    AT_PULSE_END,
+    NOT_DUE,
+    WalkState,
+    is_above,
+    is_ahead,
+    material_along,
+)
+from walkerlab.physics.hybrid.endings import BENT_KNEE, FELL, GOES_ON, OFF_PAD, SLID, STUBBED
+from walkerlab.physics.kernels import by_type_or_default, kernel_part
+
+AHEAD = 0.25  # of the stride measure: how far ahead a step must land
+AT_SURFACE = 1e-11  # m: how far off the surface a foot may be, by the error of an event's time, that is at it
+TRIP = 0.25  # of the stride measure: how far from where it stood a foot must come down to have tripped
+
+
+@kernel_part
+def apply_event(
+    system: OnGround, terrain: Terrain, observer: ContactObserver, walk_state: WalkState, event: int, t: float, y: Any
+) -> int:
+    """Let an event change the walk state; returns an outcome if it ends the walk."""
+    if event == FALL:
+        return FELL
+    if event == SLIDE:
+        return SLID
+    walk_state.at_zero[event] = 1
+    if event >= EXTENSION:
+        knee_stops(system.stop, walk_state, event, t)
+        return GOES_ON
+    first, second = feet_motion(system.form, y)
+    feet = over_ground(system, 0, first), over_ground(system, 1, second)
+    if event == PASSING:
+        walk_state.sides[PASSING] = -walk_state.sides[PASSING]
+        outcome = GOES_ON
+        for foot in range(2):
+            # equal legs of a hinged step pass each other on the surface: rounding neither lifts a foot nor holds one
+            at_surface = abs(feet[foot].height) < AT_SURFACE
+            above = feet[foot].vertical_velocity > 0.0 if at_surface else is_above(walk_state, foot)
+            find_ground(terrain, walk_state, foot, above)
+            if (above or walk_state.has_ground[foot] == 0) and next_foothold_counts(terrain, walk_state, foot):
+                outcome = set_foothold(system, terrain, observer, walk_state, feet[foot], foot, y)
+        return outcome
+    foot = event // PER_FOOT
+    kind = event % PER_FOOT
+    if kind == HEIGHT:
+        walk_state.sides[event] = -walk_state.sides[event]
+        if is_above(walk_state, foot):
+            lift(system.form, terrain, walk_state, feet, foot, y)
+            if next_foothold_counts(terrain, walk_state, foot):
+                return set_foothold(system, terrain, observer, walk_state, feet[foot], foot, y)
+        else:
+            return touch(system.form, terrain, walk_state, feet, foot, t, y)
+    elif kind == LEFT_EDGE or kind == RIGHT_EDGE:
+        walk_state.at_zero[event] = 0
+        walk_state.at_zero[foot * PER_FOOT + (LEFT_EDGE if kind == RIGHT_EDGE else RIGHT_EDGE)] = 1
+        walk_state.cells[foot] += 1 if kind == RIGHT_EDGE else -1
+        if not has_ground_in_cell(walk_state.cells[foot]):
+            observe_edge(observer, system, foot, y)
+            walk_state.has_ground[foot] = 0
+            return GOES_ON
+        pad = height_of_pad(terrain, foot, walk_state.cells[foot])
+        set_level(system, observer, walk_state, feet[foot], foot, pad, y)
+        if is_above(walk_state, foot):
+            walk_state.has_ground[foot] = 1
+        else:
+            return OFF_PAD
+    elif kind == VERTICAL_VELOCITY:
+        walk_state.at_zero[event] = 0
+        if pulse_left(system, t) > 0.0:
+            walk_state.progress.release = AT_PULSE_END
+        else:
+            release(walk_state, 1 - foot)
+    return GOES_ON
+
+
+@kernel_part
+def set_level(
+    system: OnGround,
+    observer: ContactObserver,
+    walk_state: WalkState,
+    motion: FootMotion,
+    foot: int,
+    level: float,
+    y: Any,
+) -> None:
+    """The ground for a foot, in whose ground it moves so, gets another height (m); what its spring held is lost."""
+    if level == walk_state.level[foot]:
+        return
+    height = motion.height + walk_state.level[foot] - level
+    if not is_above(walk_state, foot):
+        observe_edge(observer, system, foot, y)
+    walk_state.level[foot] = level
+    walk_state.sides[foot * PER_FOOT + HEIGHT] = 1 if height > 0.0 else -1
+    walk_state.at_zero[foot * PER_FOOT + HEIGHT] = 0
+
+
+@kernel_part
+def next_foothold_counts(terrain: Terrain, walk_state: WalkState, foot: int) -> bool:
+    """Whether the ground for a foot that nothing carries is to take the height of its next foothold, if it has not."""
+    if terrain.has_pads or not is_uneven(terrain) or foot == walk_state.progress.stance:
+        return False
+    level = foothold_height(terrain, walk_state.progress.steps + 1)
+    return is_ahead(walk_state, foot) and walk_state.level[foot] != level
+
+
+@kernel_part
+def set_foothold(
+    system: OnGround,
+    terrain: Terrain,
+    observer: ContactObserver,
+    walk_state: WalkState,
+    motion: FootMotion,
+    foot: int,
+    y: Any,
+) -> int:
+    """The ground for a swing foot takes the height of its next foothold, and carries it once it has been above it."""
+    set_level(system, observer, walk_state, motion, foot, foothold_height(terrain, walk_state.progress.steps + 1), y)
+    walk_state.has_ground[foot] = 1 if is_above(walk_state, foot) else 0
+    return GOES_ON if is_above(walk_state, foot) or terrain.order_matters else STUBBED
+
+
+@kernel_part
+def find_ground(terrain: Terrain, walk_state: WalkState, foot: int, above: bool) -> None:
+    """A foot above the surface may find ground, or lose it, as the feet change places or roles."""
+    if above:
+        stands = foot == walk_state.progress.stance
+        has_ground = has_ground_in_air(terrain, walk_state.has_ground[foot] != 0, stands, is_ahead(walk_state, foot))
+        walk_state.has_ground[foot] = 1 if has_ground else 0
+
+
+@kernel_part
+def lift(
+    form: GroundModel,
+    terrain: Terrain,
+    walk_state: WalkState,
+    feet: tuple[FootMotion, FootMotion],
+    foot: int,
+    y: Any,
+) -> None:
+    """A foot rose above the ground: from its stance, or out of a scuff."""
+    stands = foot == walk_state.progress.stance
+    if stands or walk_state.leaving[foot] != 0:
+        note_slip(form, walk_state, feet, foot, y)
+        if not stands:
+            step = walk_state.progress.steps - 1
+            walk_state.slip[step], walk_state.rolling[step] = walk_state.slipped[foot], walk_state.rolled[foot]
+        walk_state.leaving[foot] = 0
+    find_ground(terrain, walk_state, foot, True)
+
+
+@kernel_part
+def note_slip(form: GroundModel, walk_state: WalkState, feet: tuple[FootMotion, FootMotion], foot: int, y: Any) -> None:
+    """How far a foot has slipped and rolled since it touched."""
+    slip = material_along(form, foot, feet[foot].along, y) - walk_state.touched[foot]
+    walk_state.slipped[foot] = slip
+    walk_state.rolled[foot] = feet[foot].along - walk_state.foothold[foot] - slip
+
+
+@kernel_part
+def touch(
+    form: GroundModel,
+    terrain: Terrain,
+    walk_state: WalkState,
+    feet: tuple[FootMotion, FootMotion],
+    foot: int,
+    t: float,
+    y: Any,
+) -> int:
+    """A foot came down on ground.
+
+    It ends the step if it is the swing foot, on another pad than it left and far enough ahead. A swing foot that comes
+    down on the pad it left, away from where it stood, has tripped over it: it scuffs.
+    """
+    stance = walk_state.progress.stance
+    if walk_state.has_ground[foot] == 0:
+        return GOES_ON
+    material = material_along(form, foot, feet[foot].along, y)
+    if foot == stance:
+        return SLID if abs(material - walk_state.touched[foot]) > farthest_slide(terrain) else GOES_ON
+    measure = terrain.stride_measure
+    if terrain.has_pads and walk_state.cells[foot] == walk_state.left_cells[foot]:
+        away = abs(feet[foot].along - walk_state.foothold[foot] - walk_state.rolled[foot])
+        return OFF_PAD if away > TRIP * measure else GOES_ON
+    if feet[foot].along - feet[stance].along < AHEAD * measure:
+        return GOES_ON
+    if not is_straight(form, walk_state, foot):
+        return BENT_KNEE
+    step = walk_state.progress.steps
+    walk_state.touch_time[step] = t
+    walk_state.touch_along[step] = feet[foot].along
+    walk_state.touch_height[step] = walk_state.level[foot]
+    if not is_above(walk_state, stance):
+        note_slip(form, walk_state, feet, stance, y)
+        walk_state.leaving[stance] = 1
+    walk_state.slip[step], walk_state.rolling[step] = walk_state.slipped[stance], walk_state.rolled[stance]
+    walk_state.foothold[foot] = feet[foot].along
+    walk_state.touched[foot] = material
+    walk_state.left_cells[foot] = walk_state.cells[foot]
+    walk_state.leaving[foot] = 0
+    walk_state.progress.last_touch = t
+    walk_state.progress.stance = foot
+    walk_state.progress.steps = step + 1
+    find_ground(terrain, walk_state, stance, is_above(walk_state, stance))
+    follow_strike(form, walk_state, stance)
+    return GOES_ON
+
+
+@by_type_or_default
+def catches(stop: Any) -> bool:
+    """Whether a knee that gets straight locks at once; a compliant stop turns it back first."""
+    return False
+
+
+@catches.case(IdealLock)
+def lock_catches(stop: IdealLock) -> bool:
+    """It does."""
+    return True
+
+
+@kernel_part
+def knee_stops(stop: Any, walk_state: WalkState, event: int, t: float) -> None:
+    """A knee got straight: it locks, or meets its stop, where it latches when it turns back."""
+    if event < EXTENSION_RATE and not catches(stop):
+        walk_state.knee[(event - EXTENSION) % 2] = STOPPING
+        return
+    walk_state.at_zero[event] = 0
+    walk_state.knee[(event - EXTENSION) % 2] = LOCKED
+    walk_state.knee_strike[walk_state.progress.steps] = t
+
+
+@kernel_part
+def release(walk_state: WalkState, knee: int) -> None:
+    """A knee is free again: its shank turns on its own."""
+    walk_state.progress.release = NOT_DUE
+    walk_state.knee[knee] = RELEASED
+
+
+@kernel_part
+def is_straight(form: GroundModel, walk_state: WalkState, foot: int) -> bool:
+    """Whether a foot may come down: its knee is locked, if it has one."""
+    return not form.kneed or walk_state.knee[foot] == LOCKED
+
+
+@kernel_part
+def follow_strike(form: GroundModel, walk_state: WalkState, trailing: int) -> None:
+    """The other foot has touched: the trailing knee is released, at once or when the leading foot stops sinking in."""
+    if form.kneed:
+        if form.release_at_touch and form.push_off != 0.0:
+            walk_state.progress.release = AT_PULSE_END
+        elif form.release_at_touch:
+            release(walk_state, trailing)
+        else:
+            walk_state.progress.release = AT_COMPRESSION
+
+
+@kernel_part
+def note_flexion(form: GroundModel, walk_state: WalkState, y: Any) -> None:
+    """A released knee that has bent is caught when it straightens."""
+    for knee in range(2):
+        if walk_state.knee[knee] == RELEASED and extension(form, knee, y) < -FLEXED:
+            walk_state.knee[knee] = BENT

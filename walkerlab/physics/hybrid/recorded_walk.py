@@ -1,0 +1,303 @@
+"""A walk of the rigid model with all that is asked of it: heel strikes, samples, and how far its assumptions held.
+
+Long walks are taken a few dozen steps at a time, so that memory is needed for results only.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from walkerlab.outcome import Outcome
+from walkerlab.physics.hybrid.rigid_record import Observer, RigidTally, new_observer, observe_start
+from walkerlab.physics.hybrid.rigid_walk import (
+    EVENTS,
+    LONGEST_SWING,
+    SHORTEST_LANDING,
+    hip_above_fall,
+    new_heel_strikes,
+    walk,
+)
+from walkerlab.physics.hybrid.walk_record import Array, DrivenWork, WalkRecord, WalkWork
+from walkerlab.physics.kernels import uncompiled
+from walkerlab.physics.mechanics.hinges import HIP_ROW, hinge_energy, hinge_law
+from walkerlab.physics.mechanics.impact import push_off_work
+from walkerlab.physics.mechanics.rigid_model import (
+    AT_STRIKE,
+    BENT,
+    STANCE,
+    Mode,
+    RigidModel,
+    energies,
+    energy_at_touch,
+    linked,
+    step_lengths,
+    swing_foot,
+)
+from walkerlab.physics.solvers.registry import Tolerances, finder_for
+from walkerlab.physics.solvers.stepping import ACCEPTED, BUDGET, JACOBIANS, REJECTED, RHS, clear_counts
+from walkerlab.physics.solvers.system import State
+
+STEPS_AT_ONCE = 64
+BUDGET_OF_A_STEP = 50_000  # right-hand sides; the tightest tolerance there is needs about 700
+MOST_FRICTION = 1.0  # coefficient; rubber on dry concrete has about as much
+SAMPLES_PER_UNIT_TIME = 64  # in sqrt(L/g)
+CLOSEST_SAMPLES = 1e-2  # of the time between samples; one nearer to a heel strike is dropped
+
+
+class Samples(NamedTuple):
+    """A walk in time: a regular grid, and both sides of every heel strike."""
+
+    time_s: Array  # (samples,) strictly rising; the state before a heel strike is one rounding earlier than after
+    state: Array  # (samples, 2 n) rad, rad/s, swing leg first
+    step: NDArray[np.int64]  # (samples,) from 0
+    bent: NDArray[np.bool_]  # (samples,) whether the swing leg's knee is free
+
+
+@dataclass(frozen=True, eq=False)
+class RigidWalkResult(WalkRecord):
+    """A walk of the rigid model."""
+
+    start: State
+    before: Array  # (steps, 2 n) states just before the touches
+    after: Array  # (steps, 2 n) just after, roles changed
+    min_normal_force: float  # N, of the ground on the stance foot
+    max_friction_ratio: float  # tangential over normal force, where the ground pushes; 0 if nowhere
+    max_scuff_depth: float  # m, of the swing foot below the slope
+    min_normal_impulse: float | None  # N s, of the ground in a strike of knee or heel; None without a step
+    max_impulse_ratio: float  # tangential over normal impulse, where the ground pushes; 0 if nowhere
+    energy_balance_residual: float  # J, of all energies, works and losses of the steps taken
+    lost_in_strikes: float  # J
+    energy_drift: float  # J, between least and most of it within a swing; the largest of all swings
+    mean_energy: float  # J, time mean; potential from the contact point at each step's touch
+    samples: Samples | None
+
+    @property
+    def objections(self) -> tuple[str, ...]:
+        """What the model assumes of the ground along this walk and hardly any ground can give."""
+        found = []
+        if self.min_normal_force < 0.0:
+            found.append(f"the ground would have to pull with {-self.min_normal_force:.3g} N")
+        if self.min_normal_impulse is not None and self.min_normal_impulse < 0.0:
+            found.append(f"the ground would have to pull with {-self.min_normal_impulse:.3g} N s in a strike")
+        if self.max_friction_ratio > MOST_FRICTION:
+            found.append(
+                f"the stance foot would slip: it takes a friction coefficient of {self.max_friction_ratio:.3g}, and "
+                f"hardly any ground gives more than {MOST_FRICTION:g}"
+            )
+        return tuple(found)
+
+    @property
+    def final_state(self) -> State:
+        """State after the last heel strike; the start if there was none."""
+        return as_state(self.after[-1]) if self.steps else self.start
+
+
+def as_state(values: Any) -> State:
+    """Numbers as compiled code takes a state."""
+    return tuple(float(value) for value in values)
+
+
+def take_walk(
+    walker: RigidModel,
+    tolerances: Tolerances,
+    start: State,
+    steps: int,
+    sampled: bool = False,
+    advance: Callable[[int], None] | None = None,
+    heights: Array | None = None,
+    step_length: float | None = None,
+) -> RigidWalkResult:
+    """Walk `steps` steps from `start`, or until the walk ends.
+
+    tolerances   how to integrate; no step is given more right-hand sides than any step needs
+    sampled      whether states in time are wanted
+    advance      told how many more steps were taken
+    heights      (steps + 1,) m, of the footholds over the slope, the start's first; even ground without
+    step_length  m, of the gait; the start's foot distance without. On uneven ground a foot that lands less than a
+                 quarter of it ahead of the other ends the walk as a fall
+
+    A negative normal force does not stop the walk, since the model assumes it away, but the outcome says so.
+    """
+    recorder = Recorder(walker, tolerances, start, sampled)
+    recorder.heights = heights
+    rises = np.zeros(steps + 1) if heights is None else np.diff(heights, prepend=heights[0])
+    if rises.any():
+        judged_by = abs(swing_foot(walker, start)[1]) if step_length is None else step_length
+        recorder.nearest = SHORTEST_LANDING * judged_by
+    if hip_above_fall(walker, start) < 0.0:
+        return recorder.finished(Outcome.REJECTED)
+    status = Outcome.WALKED
+    while recorder.steps < steps and status == Outcome.WALKED:
+        taken = recorder.steps
+        status = recorder.walk_on(rises[taken : taken + STEPS_AT_ONCE + 1])
+        if advance is not None:
+            advance(recorder.steps - taken)
+    return recorder.finished(status)
+
+
+class Recorder:
+    """Walks on from where it is, and keeps what was seen."""
+
+    def __init__(self, walker: RigidModel, tolerances: Tolerances, start: State, sampled: bool) -> None:
+        """Stand at `start`, at time 0."""
+        self.walker, self.sampled, self.budget = walker, sampled, tolerances.budget
+        self.method = method = tolerances.new(len(walker.zero_state))
+        self.start = self.state = start
+        self.heights: Array | None = None
+        self.nearest = 0.0
+        self.time, self.steps, self.grid_index = 0.0, 0, 0
+        self.interval = math.sqrt(walker.leg_length / walker.gravity) / SAMPLES_PER_UNIT_TIME
+        self.finder = finder_for(method, EVENTS, len(walker.zero_state))
+        # a library's method is integrated with in Python
+        self.walk: Callable[..., tuple[int, int]] = walk if tolerances.compiled else uncompiled(walk)
+        self.numbers, self.kneed = len(walker.zero_state), walker.kneed
+        self.seen = new_observer(np.zeros(0), self.numbers)
+        self.tally: RigidTally = self.seen.tally[()]
+        self.counts = np.zeros_like(method.counts)
+        no_states = np.zeros((0, self.numbers))
+        self.strikes, self.before, self.after, self.knees = [np.zeros(0)], [no_states], [no_states], [np.zeros(0)]
+        self.pieces: list[Samples] = []
+
+    def walk_on(self, rises: Array) -> Outcome:
+        """Take up to so many more steps as footholds rise (m) over the present one, whose own rise is the first."""
+        steps = rises.size - 1
+        seen, times = new_heel_strikes(steps, self.numbers, self.kneed, rises, self.nearest), np.zeros(0)
+        if self.sampled:  # as many as the steps may reach, from the start of the first of them
+            most = math.ceil(steps * LONGEST_SWING * SAMPLES_PER_UNIT_TIME) + 1
+            times = self.interval * np.arange(self.grid_index, self.grid_index + most, dtype=np.float64) - self.time
+        observer = new_observer(times, self.numbers)
+        clear_counts(self.method)
+        self.method.counts[BUDGET] = min(steps * BUDGET_OF_A_STEP, self.budget - int(self.counts[RHS]))
+        status, taken = self.walk(
+            np.asarray(self.walker), self.method, self.finder, observer, np.array(self.state), seen
+        )
+        self.counts += self.method.counts
+        total, part = self.tally, observer.tally[()]
+        for name in ("min_normal_force", "min_impulse"):
+            total[name] = min(total[name], part[name])
+        for name in ("max_friction_ratio", "max_scuff_depth", "energy_drift", "max_impulse_ratio"):
+            total[name] = max(total[name], part[name])
+        for name in ("strike_loss", "forward_work", "energy_integral", "duration"):
+            total[name] += part[name]
+        strikes, before, after = seen.time[:taken] + self.time, seen.before[:taken], seen.after[:taken]
+        knees = seen.knee_time + self.time
+        if self.sampled:
+            self.pieces.append(self._samples(observer, strikes, before, after, knees))
+        for kept, new in ((self.strikes, strikes), (self.before, before), (self.after, after)):
+            kept.append(new)
+        if self.kneed:
+            self.knees.append(knees[:taken])
+        self.steps += taken
+        if taken:
+            self.state, self.time = as_state(after[-1]), float(strikes[-1])
+        return Outcome(status)
+
+    def _mean_energy(self, strikes: Array, after: Array) -> float:
+        """Time mean of the energy (J), in each step from the contact point at its touch."""
+        zeros = energy_at_touch(self.walker, np.append(self.start[STANCE], after[:, STANCE]))
+        if self.tally.duration == 0.0:
+            return float(sum(energies(self.walker, self.start)) - zeros[0])
+        durations = np.diff(strikes, prepend=0.0, append=max(float(self.tally.duration), self.time))
+        return float((self.tally.energy_integral - zeros @ durations) / float(self.tally.duration))
+
+    def _driven_work(self, before: Array, after: Array, gravity: float) -> tuple[DrivenWork, float]:
+        """What was given over the steps taken, by gravity that much (J); and what does not balance (J).
+
+        A push-off works before its strike, which loses what that leaves. The balance gives the damper's work, which
+        the states before and after strikes do not tell.
+        """
+        walker, rows = self.walker, range(len(self.walker.hinges))
+        laws = [hinge_law(walker, row) for row in rows]
+        starts = np.vstack((self.start, after[:-1])) if self.steps else before
+        apart = [[each[:, body] - each[:, other] for body, other in walker.hinges] for each in (starts, before)]
+        torque = float(laws[HIP_ROW].torque * (apart[1][HIP_ROW] - apart[0][HIP_ROW]).sum())
+        stored = [hinge_energy(laws[row], apart[1][row]) - hinge_energy(laws[row], apart[0][row]) for row in rows]
+        hip = torque - float(np.sum(stored))
+        # what the springs give is among the works
+        unsprung = walker.changed(laws=0.0) if walker.sprung else walker
+        ends = [sum(energies(unsprung, y)) - energy_at_touch(unsprung, y[STANCE]) for y in (self.start, self.state)]
+        left = float(ends[1] - ends[0] - gravity - hip + self.tally.strike_loss)
+        hip, left = (hip + left, 0.0) if any(law.damping for law in laws) else (hip, left)
+        push = float(push_off_work(walker, before).sum()) if walker.push_off else 0.0
+        weight, forward = float(walker.mass * walker.gravity), float(self.tally.forward_work)
+        return DrivenWork(weight, gravity, push, hip, torque, forward), abs(left)
+
+    def _samples(self, observer: Observer, strikes: Array, before: Array, after: Array, knees: Array) -> Samples:
+        """The grid's samples with both sides of the heel strikes put between them."""
+        found = int(observer.tally[()].recorded)
+        grid = self.interval * np.arange(self.grid_index, self.grid_index + found, dtype=np.float64)
+        self.grid_index += found
+        events = np.append(strikes, self.time) if self.steps else strikes
+        kept = far_from(grid, np.sort(events), CLOSEST_SAMPLES * self.interval)
+        swing = self.steps + np.arange(strikes.size)
+        time = np.concatenate((grid[kept], np.nextafter(strikes, -np.inf), strikes))
+        state = np.concatenate((observer.states[:found][kept], before, after))
+        step = np.concatenate((self.steps + observer.steps[:found][kept], swing, swing + 1))
+        # a knee that has not struck yet is free
+        until = np.append(np.where(knees > self.time, knees, np.inf), np.inf)
+        bent = time < until[step - self.steps] if self.kneed else np.zeros(time.size, np.bool_)
+        order = np.argsort(time)
+        return Samples(time[order], state[order], step[order], bent[order])
+
+    def finished(self, outcome: Outcome) -> RigidWalkResult:
+        """All that was seen."""
+        if self.tally.duration == 0.0:  # a swing that begins observes its own start
+            observe_start(self.seen, Mode(self.walker, BENT), self.start)
+        end_time = self.time if outcome == Outcome.WALKED else float(self.tally.duration)
+        if outcome == Outcome.WALKED and self.tally.min_normal_force < 0.0:
+            outcome = Outcome.LIFTED_OFF
+        strikes, before, after = (np.concatenate(kept) for kept in (self.strikes, self.before, self.after))
+        lengths = step_lengths(self.walker, np.vstack((self.start, after))[:-1], before)
+        climbed = 0.0 if self.heights is None else float(self.heights[self.steps])
+        gravity = float(self.walker.mass) * float(
+            self.walker.gravity_along * lengths.sum() - self.walker.gravity_down * climbed
+        )
+        driven, residual = self._driven_work(before, after, gravity)
+        return RigidWalkResult(
+            outcome=outcome,
+            touch_time_s=strikes,
+            touch_along_m=np.cumsum(lengths),
+            knee_strike_time_s=np.concatenate(self.knees) if self.kneed else None,
+            end_time_s=end_time,
+            work=WalkWork(*(int(self.counts[count]) for count in (RHS, ACCEPTED, REJECTED, JACOBIANS))),
+            foothold_height_m=None if self.heights is None else self.heights[1 : self.steps + 1],
+            driven=driven,
+            energy_balance_residual=residual,
+            lost_in_strikes=float(self.tally.strike_loss) + driven.push_off,
+            start=self.start,
+            before=before,
+            after=after,
+            min_normal_force=float(self.tally.min_normal_force),
+            max_friction_ratio=float(self.tally.max_friction_ratio),
+            max_scuff_depth=float(self.tally.max_scuff_depth),
+            min_normal_impulse=float(self.tally.min_impulse) if self.steps else None,
+            max_impulse_ratio=float(self.tally.max_impulse_ratio),
+            energy_drift=float(self.tally.energy_drift),
+            mean_energy=self._mean_energy(strikes, after),
+            samples=joined(self.pieces) if self.pieces else None,
+        )
+
+
+def with_scaled_rates(walker: RigidModel, state: State, swing: float, stance: float) -> State:
+    """A state just after heel strike with the velocities of swing and stance leg scaled."""
+    n = len(state) // 2
+    rates = [(stance if place == STANCE else swing) * rate for place, rate in enumerate(state[n:])]
+    return (*state[:n], *linked(walker, AT_STRIKE, rates).tolist())
+
+
+def far_from(times: Array, events: Array, distance: float) -> NDArray[np.bool_]:
+    """Which of `times` are further than `distance` from each of the rising `events`."""
+    if events.size == 0:
+        return np.ones(times.size, np.bool_)
+    behind = np.searchsorted(events, times).clip(max=events.size - 1)
+    before = (behind - 1).clip(min=0)
+    return np.asarray(np.minimum(np.abs(times - events[behind]), np.abs(times - events[before])) > distance)
+
+
+def joined(pieces: list[Samples]) -> Samples:
+    """One record of several that follow each other."""
+    return Samples(*map(np.concatenate, zip(*pieces, strict=True)))

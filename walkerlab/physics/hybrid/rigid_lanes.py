@@ -1,0 +1,389 @@
+"""Many walks of the rigid model, side by side in lanes: each with its own step size, a new start as soon as one ends.
+
+All lanes take a Runge-Kutta step together. A lane that may have met a heel strike or a fall in it is looked at alone:
+the event is located on Hermite's quintic of its event function, the step is taken again up to there, and Newton's last
+correction does the rest. What becomes of a walk does not depend on which walks are beside it.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from walkerlab.physics.hybrid.endings import (
+    BUDGET_EXHAUSTED,
+    FALLEN_HIP,
+    FELL,
+    GOES_ON,
+    NO_HEEL_STRIKE,
+    REJECTED,
+    SOLVER_FAILED,
+)
+from walkerlab.physics.hybrid.rigid_walk import LONGEST_SWING, hip_above_fall, hull
+from walkerlab.physics.kernels import by_type, kernel, kernel_part, vector
+from walkerlab.physics.mechanics.hinges import HIP_ROW, SpringDamper, hinge_law, hinge_torque
+from walkerlab.physics.mechanics.impact import heel_strike
+from walkerlab.physics.mechanics.rigid_model import RigidModel, feet_on_slope
+from walkerlab.physics.mechanics.trigonometry import sine_cosine
+from walkerlab.physics.solvers.dop853 import GROW_MOST, SAFETY, SHRINK_MOST
+from walkerlab.physics.solvers.events import NO_CROSSING, CrossingFinder, new_crossing_finder
+from walkerlab.physics.solvers.hermite import Jet, Quintic, first_fall, hermite, value_of
+from walkerlab.physics.solvers.lane_steps import ERROR_3, ERROR_5, combine, derivative, error_sums, stages_of
+from walkerlab.physics.solvers.lanes import (
+    WIDTH,
+    Lanes,
+    any_positive,
+    choose,
+    load_lanes,
+    store_lanes,
+    teach_arithmetic,
+)
+from walkerlab.physics.solvers.system import State
+
+# rows of a batch's memory, each with one number a lane
+START, START_RATE, END, END_RATE = 0, 4, 8, 12  # state and derivative at the ends of the step tried last
+STEP, TRIED, TIME, LEFT = 16, 17, 18, 19  # next step, step tried last, time, time until a heel strike must have come, s
+ARRIVING, FIRST, TRIES, EVENT, USUAL = 20, 21, 22, 23, 24
+ROWS = 25
+SLOT_OF_START, STEPS_TAKEN = 0, 1  # rows of whole numbers
+
+NOBODY = -1
+FIRST_STEP = 0.1  # pendulum times
+ARRIVED = 1e-5  # pendulum times between the end of a step and the heel strike that a Taylor expansion bridges
+REFINEMENTS = 6
+MAX_TRIES = 20_000  # of steps in one swing
+SMALLEST_STEP = 1e-13  # pendulum times
+NO_ERROR = 1e-300
+
+
+class TwoLegs(NamedTuple):
+    """The rigid model of two straight legs, with what lanes need of it."""
+
+    model: RigidModel
+    A: tuple[float, ...]  # (4,) constants of rigid_model.py, row by row
+    B: tuple[float, ...]
+    arm_x: tuple[float, ...]  # (2,)
+    arm_y: tuple[float, ...]
+    hip: SpringDamper
+    unpaired: float  # kg m^2; values of the model, which loops need not load again
+    mass: float  # kg
+    radius: float  # m
+    gravity_along: float  # m/s^2
+    gravity_down: float
+    slope: float  # rad
+    lean: float  # rad
+    upright: float  # rad, the stance leg's angle from the slope's normal with the hip above its foot's centre
+    fallen: float  # rad from there, beyond which the hip is too low
+    pendulum_time: float  # s
+
+
+def two_legs(model: RigidModel) -> TwoLegs | None:
+    """The model as that of two straight legs; None if it has more bodies."""
+    if len(model.arm_x) != 2 or model.kneed:
+        return None
+    x, y = model.hip_x, model.hip_y
+    lowest = (FALLEN_HIP * model.leg_length - model.radius) / math.hypot(x, y)
+
+    held: dict[str, Any] = {name: tuple(model[name].ravel().tolist()) for name in ("A", "B", "arm_x", "arm_y")}
+    for name in ("unpaired", "mass", "radius", "gravity_along", "gravity_down", "slope", "lean"):
+        held[name] = float(model[name])
+    return TwoLegs(
+        model,
+        **held,
+        hip=hinge_law(model, HIP_ROW),
+        upright=math.atan2(x, y),
+        fallen=math.acos(max(-1.0, lowest)),
+        pendulum_time=math.sqrt(model.leg_length / model.gravity),
+    )
+
+
+@derivative.case(TwoLegs, forced_inline=True)
+def swing_derivative(system: TwoLegs, t: float, y: Any) -> Any:
+    """The equations of motion of rigid_model.py for two bodies, written out: of floats or of lanes."""
+    R, along, down = system.radius, system.gravity_along, system.gravity_down
+    s_1, c_1 = sine_cosine(y[0] + system.slope)
+    s_2, c_2 = sine_cosine(y[1] + system.slope)
+    F_1, U_1 = c_1 * system.arm_x[0] - s_1 * system.arm_y[0], s_1 * system.arm_x[0] + c_1 * system.arm_y[0]
+    F_2, U_2 = c_2 * system.arm_x[1] - s_2 * system.arm_y[1], s_2 * system.arm_x[1] + c_2 * system.arm_y[1]
+    cos_d, sin_d = c_1 * c_2 + s_1 * s_2, s_1 * c_2 - c_1 * s_2
+    squared_1, squared_2 = y[2] * y[2], y[3] * y[3]
+    r_1, r_2 = -along * U_1 - down * F_1, -along * U_2 - down * F_2
+    M_12, M_22 = system.A[2] * cos_d + system.B[2] * sin_d, system.A[3] + 0.0 * cos_d
+    if R != 0.0:
+        pulled = system.mass * along + squared_1 * F_1 + squared_2 * F_2
+        r_2 = r_2 - R * pulled
+        M_12, M_22 = M_12 + R * U_1, M_22 + 2.0 * R * U_2 + system.mass * R * R
+    turning = system.A[2] * sin_d - system.B[2] * cos_d
+    r_2 = r_2 + squared_1 * (turning + system.unpaired * sin_d)
+    r_1 = r_1 - squared_2 * turning
+    hip = hinge_torque(system.hip, y[0] - y[1], y[2] - y[3]).torque
+    r_1, r_2 = r_1 - hip, r_2 + hip
+    inverse = 1.0 / system.A[0]
+    factor = M_12 * inverse
+    alpha_2 = (r_2 - factor * r_1) / (M_22 - factor * M_12)
+    return (y[2], y[3], r_1 * inverse - factor * alpha_2, alpha_2)
+
+
+class LaneMemory(NamedTuple):
+    """What a batch needs besides its starts and results, however many walks it has."""
+
+    rtol: float
+    atol: float
+    rows: Any  # (ROWS, WIDTH)
+    slots: Any  # (2, WIDTH) number of the start, and steps taken
+    finder: CrossingFinder
+
+
+def new_lane_memory(rtol: float, atol: float) -> LaneMemory:
+    """Memory for batches at these tolerances."""
+    teach_arithmetic()
+    return LaneMemory(
+        rtol, atol, np.zeros((ROWS, WIDTH)), np.full((2, WIDTH), NOBODY, np.int64), new_crossing_finder(5)
+    )
+
+
+class Fates(NamedTuple):
+    """How the walks of a batch ended; written."""
+
+    outcome: Any  # (n,)
+    steps: Any  # (n,) taken
+
+
+def new_fates(n: int) -> Fates:
+    """Room for n walks."""
+    return Fates(np.zeros(n, np.int64), np.zeros(n, np.int64))
+
+
+@by_type
+def struck(observer: Any, walk: int, step: int, t: float, y: Any) -> int:
+    """Take note of a heel strike at time t (s) with state y after it; returns GOES_ON or the outcome's number.
+
+    walk  number of the start
+    step  from 0
+    """
+
+
+@kernel
+def walk_lanes(walker: TwoLegs, memory: LaneMemory, observer: Any, starts: Any, fates: Fates) -> None:
+    """Walk from every start, until the observer ends the walk or it ends by itself.
+
+    starts  (n, 4) states, both feet on the slope
+    """
+    slots = memory.slots
+    waiting = 0
+    for lane in range(WIDTH):
+        waiting = refill(walker, memory, starts, fates, lane, waiting)
+    walking = True
+    while walking:
+        if try_steps(walker, memory):
+            walking = False
+            for lane in range(WIDTH):
+                if slots[SLOT_OF_START, lane] == NOBODY:
+                    continue
+                if memory.rows[EVENT, lane] > 0.0:
+                    outcome = look_at(walker, memory, observer, lane)
+                    if outcome != GOES_ON:
+                        fates.outcome[slots[SLOT_OF_START, lane]] = outcome
+                        fates.steps[slots[SLOT_OF_START, lane]] = slots[STEPS_TAKEN, lane]
+                        waiting = refill(walker, memory, starts, fates, lane, waiting)
+                walking = walking or slots[SLOT_OF_START, lane] != NOBODY
+
+
+@kernel_part
+def refill(walker: TwoLegs, memory: LaneMemory, starts: Any, fates: Fates, lane: int, waiting: int) -> int:
+    """Give a lane the next start that is one; returns how many starts have been given out."""
+    while waiting < starts.shape[0]:
+        y = (starts[waiting, 0], starts[waiting, 1], starts[waiting, 2], starts[waiting, 3])
+        waiting += 1
+        if hip_above_fall(walker.model, y) >= 0.0:
+            memory.slots[SLOT_OF_START, lane], memory.slots[STEPS_TAKEN, lane] = waiting - 1, 0
+            begin_swing(walker, memory, lane, 0.0, y, FIRST_STEP * walker.pendulum_time)
+            return waiting
+        fates.outcome[waiting - 1], fates.steps[waiting - 1] = REJECTED, 0
+    memory.slots[SLOT_OF_START, lane] = NOBODY
+    begin_swing(walker, memory, lane, 0.0, (0.0, 0.0, 0.0, 0.0), 0.0)
+    return waiting
+
+
+@kernel_part
+def begin_swing(walker: TwoLegs, memory: LaneMemory, lane: int, t: float, y: State, h: float) -> None:
+    """Have a lane start a swing from state y at time t (s), with a step h."""
+    rows = memory.rows
+    rate = derivative(walker, t, y)
+    for i in range(4):
+        rows[START + i, lane], rows[START_RATE + i, lane] = y[i], rate[i]
+    rows[STEP, lane], rows[TIME, lane] = h, t
+    rows[LEFT, lane] = LONGEST_SWING * walker.pendulum_time
+    rows[ARRIVING, lane], rows[FIRST, lane], rows[TRIES, lane] = 0.0, 1.0, 0.0
+
+
+@kernel_part
+def four(rows: Any, row: int) -> tuple[Lanes, Lanes, Lanes, Lanes]:
+    """Four rows as a state in lanes."""
+    return (
+        load_lanes(rows, row),
+        load_lanes(rows, row + 1),
+        load_lanes(rows, row + 2),
+        load_lanes(rows, row + 3),
+    )
+
+
+@kernel_part
+def try_steps(walker: TwoLegs, memory: LaneMemory) -> bool:
+    """Try a step in every lane; where nothing can have happened the lane moves on. Returns whether others need a look.
+
+    A lane needs one if an event may lie in its step, if it arrives at one, if its time is over or its steps are too
+    many or too small.
+    """
+    rows = memory.rows
+    y, k1 = four(rows, START), four(rows, START_RATE)
+    left, tries = load_lanes(rows, LEFT), load_lanes(rows, TRIES) + 1.0
+    h = min(load_lanes(rows, STEP), left)
+    used, end, end_rate = stages_of(walker, 0.0, y, k1, h)
+    error_5, error_3 = error_sums(memory, y, end, combine(ERROR_5, used), combine(ERROR_3, used))
+    error = abs(h) * error_5 / math.sqrt(4.0 * (error_5 + 0.01 * error_3) + NO_ERROR)
+    change = SAFETY / math.sqrt(math.sqrt(math.sqrt(error + NO_ERROR)))
+    change = min(GROW_MOST, max(SHRINK_MOST, change))
+    accepted = 1.0 - error
+    over = NO_ERROR - (left - h)
+    pendulum_time = walker.pendulum_time
+    stuck = max(tries - MAX_TRIES, SMALLEST_STEP * pendulum_time - abs(h))
+    attention = max(may_end(walker, y, end, h), over, load_lanes(rows, ARRIVING))
+    event = choose(stuck, 1.0, choose(accepted, choose(attention, 1.0, 0.0), 0.0))
+    quiet = choose(event, 0.0, accepted)
+    for i in range(4):
+        store_lanes(choose(quiet, end[i], y[i]), rows, START + i)
+        store_lanes(choose(quiet, end_rate[i], k1[i]), rows, START_RATE + i)
+        store_lanes(end[i], rows, END + i)
+        store_lanes(end_rate[i], rows, END_RATE + i)
+    gone = choose(quiet, h, 0.0)
+    store_lanes(h * change, rows, STEP)
+    store_lanes(h, rows, TRIED)
+    store_lanes(load_lanes(rows, TIME) + gone, rows, TIME)
+    store_lanes(left - gone, rows, LEFT)
+    store_lanes(choose(quiet, 0.0, load_lanes(rows, FIRST)), rows, FIRST)
+    store_lanes(tries, rows, TRIES)
+    store_lanes(event, rows, EVENT)
+    return any_positive(event)
+
+
+@kernel_part
+def may_end(walker: TwoLegs, y: Any, end: Any, h: Lanes) -> Lanes:
+    """Positive where a step from y to `end` may hold a heel strike or a fall; see `rigid_walk.may_end`."""
+    ahead = hull(y[0] - y[1], h * (y[2] - y[3]), end[0] - end[1], h * (end[2] - end[3]))
+    start, stop = feet_on_slope(walker, y[0], y[1]), feet_on_slope(walker, end[0], end[1])
+    guard = hull(start, h * (y[2] + y[3]), stop, h * (end[2] + end[3]))
+    return max(min(ahead[1], -guard[0]), abs(end[1] + walker.slope - walker.upright) - walker.fallen)
+
+
+@kernel_part
+def look_at(walker: TwoLegs, memory: LaneMemory, observer: Any, lane: int) -> int:
+    """Do what the step of a lane asks for; returns GOES_ON, or the outcome's number if its walk is over."""
+    rows = memory.rows
+    if rows[TRIES, lane] >= MAX_TRIES:
+        return BUDGET_EXHAUSTED
+    if abs(rows[TRIED, lane]) < SMALLEST_STEP * walker.pendulum_time:
+        return SOLVER_FAILED
+    if rows[ARRIVING, lane] > 0.0:
+        return arrive(walker, memory, observer, lane)
+    strike, fall = strike_in_step(walker, memory, lane), fall_in_step(walker, memory, lane)
+    if fall < strike:
+        return FELL
+    if strike <= 1.0:
+        rows[ARRIVING, lane], rows[USUAL, lane] = 1.0, rows[STEP, lane]
+        rows[STEP, lane] = max(strike * rows[TRIED, lane], 2.0 * SMALLEST_STEP)
+        return GOES_ON
+    if rows[LEFT, lane] <= rows[TRIED, lane]:
+        return NO_HEEL_STRIKE
+    move_on(memory, lane)
+    return GOES_ON
+
+
+@kernel_part
+def move_on(memory: LaneMemory, lane: int) -> None:
+    """Accept the step of one lane."""
+    rows = memory.rows
+    for i in range(4):
+        rows[START + i, lane], rows[START_RATE + i, lane] = rows[END + i, lane], rows[END_RATE + i, lane]
+    rows[TIME, lane] += rows[TRIED, lane]
+    rows[LEFT, lane] -= rows[TRIED, lane]
+    rows[FIRST, lane] = 0.0
+
+
+@kernel_part
+def arrive(walker: TwoLegs, memory: LaneMemory, observer: Any, lane: int) -> int:
+    """Strike if the step has led to the slope, else take the rest of the way."""
+    rows, slots = memory.rows, memory.slots
+    move_on(memory, lane)
+    pendulum_time = walker.pendulum_time
+    rate = rows[START + 2, lane] + rows[START + 3, lane]
+    guard = feet_on_slope(walker, rows[START, lane], rows[START + 1, lane])
+    wait = -guard / rate if rate != 0.0 else 0.0
+    if abs(wait) > ARRIVED * pendulum_time and rows[ARRIVING, lane] <= REFINEMENTS:
+        rows[ARRIVING, lane] += 1.0
+        usual = abs(rows[USUAL, lane])
+        rows[STEP, lane] = max(-usual, min(usual, wait))
+        return GOES_ON
+    y, new = vector(walker.model.zero_state), vector(walker.model.zero_state)
+    bridge(rows, lane, wait, y)
+    heel_strike(walker.model, y, new)
+    step, t = slots[STEPS_TAKEN, lane], rows[TIME, lane] + wait
+    slots[STEPS_TAKEN, lane] += 1
+    outcome = struck(observer, slots[SLOT_OF_START, lane], step, t, new)
+    if outcome == GOES_ON:
+        begin_swing(walker, memory, lane, t, (new[0], new[1], new[2], new[3]), rows[USUAL, lane])
+    return outcome
+
+
+@kernel_part
+def bridge(rows: Any, lane: int, wait: float, y: Any) -> None:
+    """The state a moment later into y: a Taylor expansion, of second order in the angles that the guard is made of."""
+    for i in range(2):
+        omega, alpha = rows[START + 2 + i, lane], rows[START_RATE + 2 + i, lane]
+        y[i] = rows[START + i, lane] + wait * (omega + 0.5 * wait * alpha)
+        y[2 + i] = omega + wait * alpha
+
+
+@kernel_part
+def event_function(rows: Any, at: int, lane: int, swing: float, stance: float) -> Jet:
+    """swing theta_1 + stance theta_2 and its first two derivatives in time, at the start or end of a lane's step."""
+    return (
+        swing * rows[at, lane] + stance * rows[at + 1, lane],
+        swing * rows[at + 2, lane] + stance * rows[at + 3, lane],
+        swing * rows[at + 6, lane] + stance * rows[at + 7, lane],
+    )
+
+
+@kernel_part
+def in_step(memory: LaneMemory, lane: int, swing: float, stance: float, constant: float) -> Quintic:
+    """swing theta_1 + stance theta_2 + constant over a lane's step."""
+    rows = memory.rows
+    a = event_function(rows, START, lane, swing, stance)
+    b = event_function(rows, END, lane, swing, stance)
+    return hermite(rows[TRIED, lane], (a[0] + constant, a[1], a[2]), (b[0] + constant, b[1], b[2]))
+
+
+@kernel_part
+def strike_in_step(walker: TwoLegs, memory: LaneMemory, lane: int) -> float:
+    """Fraction of a lane's step at which the swing foot strikes with its leg ahead; NO_CROSSING if it does not."""
+    guard = in_step(memory, lane, 1.0, 1.0, feet_on_slope(walker, 0.0, 0.0))
+    at_start = memory.rows[FIRST, lane] > 0.0
+    strike = first_fall(memory.finder, guard, at_start, 0.0)
+    if strike > 1.0:
+        return NO_CROSSING
+    ahead = in_step(memory, lane, 1.0, -1.0, 0.0)
+    while strike <= 1.0 and value_of(ahead, strike) <= 0.0:
+        strike = first_fall(memory.finder, guard, at_start, strike + 1e-12)
+    return strike
+
+
+@kernel_part
+def fall_in_step(walker: TwoLegs, memory: LaneMemory, lane: int) -> float:
+    """Fraction of a lane's step at which the hip comes below half a leg; NO_CROSSING if it is above at the end."""
+    from_upright = walker.slope - walker.upright
+    angle = memory.rows[END + 1, lane] + from_upright
+    if abs(angle) <= walker.fallen:
+        return NO_CROSSING
+    side = 1.0 if angle > 0.0 else -1.0
+    height = in_step(memory, lane, 0.0, -side, walker.fallen - side * from_upright)
+    return first_fall(memory.finder, height, False, 0.0)

@@ -1,0 +1,82 @@
+"""Energies and forces along a recorded walk of the rigid model."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from walkerlab.physics.hybrid.recorded_walk import RigidWalkResult, Samples
+from walkerlab.physics.hybrid.walk_record import Array
+from walkerlab.physics.kernels import kernel
+from walkerlab.physics.mechanics import rigid_model
+from walkerlab.physics.mechanics.rigid_model import BENT, STANCE, STRAIGHT, SWING, Mode, RigidModel, ground_reaction
+
+
+def energies(walker: RigidModel, states: Array) -> Array:
+    """Kinetic and potential energy (samples, 2) of states (samples, 2 n) in J, from the current stance foot."""
+    out = np.zeros((len(states), 2))
+    fill_energies(walker, np.ascontiguousarray(states), out)
+    return out
+
+
+def reactions(walker: RigidModel, states: Array, bent: NDArray[np.bool_] | None = None) -> Array:
+    """Force of the ground on the stance foot (samples, 2) in N: along the slope, and normal to it.
+
+    bent  (samples,) whether the swing leg's knee is free; None if it never is
+    """
+    out = np.zeros((len(states), 2))
+    free = np.zeros(len(states), np.bool_) if bent is None else bent
+    fill_reactions(walker, np.ascontiguousarray(states), free, out)
+    return out
+
+
+@kernel
+def fill_energies(walker: RigidModel, states: Any, out: Any) -> None:
+    """Write the energies of `states` (samples, 2 n) into `out` (samples, 2)."""
+    for i in range(states.shape[0]):
+        out[i, 0], out[i, 1] = rigid_model.energies(walker, states[i])
+
+
+@kernel
+def fill_reactions(walker: RigidModel, states: Any, bent: Any, out: Any) -> None:
+    """Write the ground's forces at `states` (samples, 2 n), where the swing knee is `bent` or not, into `out`."""
+    for i in range(states.shape[0]):
+        out[i, 0], out[i, 1] = ground_reaction(Mode(walker, BENT if bent[i] else STRAIGHT), states[i])
+
+
+@dataclass(frozen=True)
+class Places:
+    """Points of the walker at samples, in m along the slope from the first foothold and over it."""
+
+    contact: Array  # (samples, 2) where the stance foot touches
+    hip: Array  # (samples, 2)
+    swing_foot: Array  # (samples, 2) its lowest point
+    knees: Array | None  # (samples, 2, 2) of swing and stance leg; None without knees
+
+
+def places(walker: RigidModel, knee_m: tuple[float, float] | None, walk: RigidWalkResult, samples: Samples) -> Places:
+    """Where the walker's points are.
+
+    knee_m  the knee in its thigh's frame; None without knees
+    """
+    n = len(walker.arm_x)
+    psi = samples.state[:, :n] + walker.slope
+    touches = np.append(0.0, walk.touch_along_m)[samples.step]
+    set_down = np.concatenate(([walk.start[STANCE]], walk.after[:, STANCE]))[samples.step]
+    rolled = -walker.radius * (samples.state[:, STANCE] - set_down)
+    contact = np.column_stack((touches + rolled, walk.ground_m[samples.step]))
+    centre = contact + np.array([0.0, walker.radius])
+    hip = centre + turned(psi[:, [STANCE]], [walker.hip_x], [walker.hip_y])
+    foot = centre + turned(psi, walker.foot_x, walker.foot_y) - [0.0, walker.radius]
+    knees = None
+    if knee_m is not None:
+        knees = np.stack([hip + turned(psi[:, [leg]], knee_m[:1], knee_m[1:]) for leg in (SWING, STANCE)], axis=1)
+    return Places(contact, hip, foot, knees)
+
+
+def turned(psi: Array, lever_x: Any, lever_y: Any) -> Array:
+    """Sum (samples, 2) of the bodies' levers at their angles psi (samples, n) from the slope's normal."""
+    s, c = np.sin(psi), np.cos(psi)
+    x, y = np.array(lever_x), np.array(lever_y)
+    return np.column_stack((c @ x - s @ y, s @ x + c @ y))

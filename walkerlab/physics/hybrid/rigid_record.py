@@ -1,0 +1,215 @@
+"""Records of a rigid walk besides its heel strikes: samples, energies, and how far the model's assumptions hold."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from walkerlab.physics.hybrid.hip_torque import torque_work
+from walkerlab.physics.kernels import by_reference, kernel_part, vector
+from walkerlab.physics.mechanics.hinges import HIP_ROW, hinge_law
+from walkerlab.physics.mechanics.impact import push_off
+from walkerlab.physics.mechanics.rigid_model import Mode, energies, ground_reaction, momentum, swing_foot
+from walkerlab.physics.mechanics.tree import new_record, read_at_once, record_type
+from walkerlab.physics.solvers.events import CrossingFinder
+from walkerlab.physics.solvers.stepping import T_OLD, T, interpolate, sample
+
+NO_FORCE = 1e300  # above any normal force
+REFINEMENTS = 3  # parabolas fitted around a maximum, each eight times narrower than the last
+# composite Simpson rule on eighths
+SIMPSON = (1.0 / 24.0, 4.0 / 24.0, 2.0 / 24.0, 4.0 / 24.0, 2.0 / 24.0, 4.0 / 24.0, 2.0 / 24.0, 4.0 / 24.0, 1.0 / 24.0)
+
+
+@read_at_once
+class RigidTally(np.record):  # type: ignore[misc]  # NumPy's stubs call one of its bases final
+    """Counts, extremes and energies of a walk, written by kernels.
+
+    Extremes cover the whole walk. Energies are measured from the stance foot and, except for the drift, belong to the
+    current swing. `strike_loss` and `forward_work` cover completed steps, `step_*` the current step.
+    """
+
+    recorded: int  # samples
+    min_normal_force: float  # N
+    max_friction_ratio: float  # tangential over normal force
+    max_scuff_depth: float  # m
+    energy_drift: float  # J, the largest of all swings
+    min_impulse: float  # N s, normal
+    max_impulse_ratio: float  # tangential over normal impulse
+    min_energy: float  # J
+    max_energy: float  # J
+    energy: float  # J, the latest
+    energy_integral: float  # J s, over the walk
+    duration: float  # s, of the walk
+    strike_loss: float  # J, kinetic energy lost in strikes
+    forward_work: float  # J, positive work of the hip's constant torque
+    step_strike_loss: float  # J
+    step_forward_work: float  # J
+
+
+RIGID_TALLY = record_type(RigidTally, {})
+
+
+@by_reference
+class Observer(NamedTuple):
+    """Record of a walk besides its heel strikes; empty unless `watching`."""
+
+    watching: bool
+    times: Any  # (samples,) s, rising
+    states: Any  # (samples, 2 n)
+    steps: Any  # (samples,) the step of each sample
+    tally: Any  # () array of RIGID_TALLY: passing a structured scalar to a kernel takes as long as a step
+
+
+def new_observer(times: Any, state_size: int) -> Observer:
+    """Create an observer with memory for samples of states (state_size,) at `times` (s, rising)."""
+    tally = new_record(RIGID_TALLY, min_normal_force=NO_FORCE, min_impulse=NO_FORCE)
+    return Observer(True, times, np.zeros((times.size, state_size)), np.zeros(times.size, np.int64), np.asarray(tally))
+
+
+def unwatched() -> Observer:
+    """Create an observer that records nothing."""
+    return new_observer(np.zeros(0), 0)._replace(watching=False)
+
+
+@kernel_part
+def observe_start(observer: Observer, mode: Mode, y: Any) -> None:
+    """Record the start of a swing, whose energy the swing must keep."""
+    if observer.watching:
+        kinetic, potential = energies(mode.model, y)
+        tally = observer.tally[()]
+        tally.min_energy = kinetic + potential
+        tally.max_energy = kinetic + potential
+        record_extremes(tally, mode, y)
+
+
+@kernel_part
+def observe_strike(observer: Observer, mode: Mode, heel: bool, before: Any, after: Any) -> None:
+    """Record the energy lost in a knee or heel strike and the impulse on the new stance foot.
+
+    The impulse is the change of momentum without the push-off's part. A heel strike ends the current step.
+    """
+    if observer.watching:
+        model, tally = mode.model, observer.tally[()]
+        along, normal = momentum(model, before)
+        along_after, normal_after = momentum(model, after)
+        along, impulse = along_after - along, normal_after - normal
+        tally.step_strike_loss += energies(model, before)[0] - energies(model, after)[0]
+        if heel:
+            if model.push_off != 0.0:
+                push = push_off(model, after)
+                along, impulse = along - push.along, impulse - push.upward
+                tally.max_impulse_ratio = max(tally.max_impulse_ratio, abs(push.along) / push.upward)
+            tally.strike_loss += tally.step_strike_loss
+            tally.forward_work += tally.step_forward_work
+            tally.step_strike_loss = 0.0
+            tally.step_forward_work = 0.0
+        tally.min_impulse = min(tally.min_impulse, impulse)
+        if impulse > 0.0:
+            tally.max_impulse_ratio = max(tally.max_impulse_ratio, abs(along) / impulse)
+
+
+@kernel_part
+def assumptions(mode: Mode, y: Any) -> tuple[float, float, float]:
+    """Measures of the model's assumptions (section 3.1 of the paper); each is worst where it is largest.
+
+    Pull of the ground (N), friction ratio where the ground pushes, depth of the swing foot (m).
+    """
+    along, normal = ground_reaction(mode, y)
+    ratio = abs(along) / normal if normal > 0.0 else 0.0
+    return -normal, ratio, -swing_foot(mode.model, y)[0]
+
+
+@kernel_part
+def assumptions_at(method: Any, mode: Mode, fraction: float) -> tuple[float, float, float]:
+    """`assumptions` at a fraction of the last step."""
+    y = vector(mode.model.zero_state)
+    interpolate(method, mode, fraction, y)
+    return assumptions(mode, y)
+
+
+@kernel_part
+def keep_worst(tally: Any, measures: tuple[float, float, float]) -> None:
+    """Update the extremes with the measures of `assumptions`."""
+    tally.min_normal_force = min(tally.min_normal_force, -measures[0])
+    tally.max_friction_ratio = max(tally.max_friction_ratio, measures[1])
+    tally.max_scuff_depth = max(tally.max_scuff_depth, measures[2])
+
+
+@kernel_part
+def record_extremes(tally: Any, mode: Mode, y: Any) -> tuple[float, float, float]:
+    """Update the extremes and the energies with state y; returns its `assumptions`."""
+    measures = assumptions(mode, y)
+    keep_worst(tally, measures)
+    kinetic, potential = energies(mode.model, y)
+    tally.energy = kinetic + potential
+    tally.min_energy = min(tally.min_energy, tally.energy)
+    tally.max_energy = max(tally.max_energy, tally.energy)
+    tally.energy_drift = max(tally.energy_drift, tally.max_energy - tally.min_energy)
+    return measures
+
+
+@kernel_part
+def vertex(before: float, middle: float, after: float) -> float:
+    """Maximum (-1 to 1) of the parabola through values at -1, 0 and 1; 2 if it has none there."""
+    bend = before - 2.0 * middle + after
+    return 0.5 * (before - after) / bend if bend < 0.0 else 2.0
+
+
+@kernel_part
+def ascend_to_worst(
+    tally: Any, method: Any, mode: Mode, measure: int, middle: float, spacing: float, last: float
+) -> None:
+    """Follow a measure of `assumptions` to its maximum near fraction `middle` of the step, by ever narrower parabolas.
+
+    last  the fractions stay below it
+    """
+    for _ in range(REFINEMENTS):
+        before = assumptions_at(method, mode, middle - spacing)
+        centre = assumptions_at(method, mode, middle)
+        after = assumptions_at(method, mode, middle + spacing)
+        shift = vertex(before[measure], centre[measure], after[measure])
+        if abs(shift) > 1.0:
+            return
+        middle += shift * spacing
+        keep_worst(tally, assumptions_at(method, mode, middle))
+        spacing *= 0.125
+        middle = min(max(middle, spacing), last - spacing)
+
+
+@kernel_part
+def observe(
+    observer: Observer, method: Any, mode: Mode, finder: CrossingFinder, row: int, fraction: float, step: int
+) -> None:
+    """Record the last integration step up to `fraction` of it; its dense output is ready.
+
+    Keeps the samples in it; takes the extremes and the energy's integral from its eighths.
+
+    row  a free row of the finder's values
+    """
+    tally = observer.tally[()]
+    torque = hinge_law(mode.model, HIP_ROW).torque
+    if torque != 0.0:
+        sample(method, mode, finder.nodes, finder.states)
+        tally.step_forward_work += torque_work(torque, method, mode, finder, row, fraction).positive
+    t, h = method.clock[T_OLD], method.clock[T] - method.clock[T_OLD]
+    t_end, spacing = t + fraction * h, 0.125 * fraction
+    mean_energy = SIMPSON[0] * tally.energy
+    y = vector(mode.model.zero_state)
+    before = middle = assumptions_at(method, mode, 0.0)
+    for eighth in range(1, 9):
+        interpolate(method, mode, spacing * eighth, y)
+        after = record_extremes(tally, mode, y)
+        mean_energy += SIMPSON[eighth] * tally.energy
+        for measure in range(3):
+            if eighth > 1 and abs(vertex(before[measure], middle[measure], after[measure])) <= 1.0:
+                ascend_to_worst(tally, method, mode, measure, spacing * (eighth - 1), spacing, fraction)
+        before, middle = middle, after
+    tally.energy_integral += mean_energy * fraction * h
+    tally.duration += fraction * h
+    index = tally.recorded
+    while index < observer.times.size and observer.times[index] <= t_end:
+        interpolate(method, mode, (observer.times[index] - t) / h, y)
+        for i in range(len(y)):
+            observer.states[index, i] = y[i]
+        observer.steps[index] = step
+        index += 1
+    tally.recorded = index

@@ -1,0 +1,331 @@
+"""Walking with the rigid model: swing phases that end in heel strikes, observed or not.
+
+A leg with a knee swings bent until the knee strikes, then straight. Columns behind the state change with it: flow, then
+saltation at the events. Compiled as a whole for the project's own methods;
+the same source runs in Python with a library's integrator.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from walkerlab.physics.hybrid.endings import (
+    BENT_KNEE,
+    BUDGET_EXHAUSTED,
+    FALLEN_HIP,
+    FELL,
+    KNEE_STRUCK,
+    NO_HEEL_STRIKE,
+    SOLVER_FAILED,
+    WALKED,
+)
+from walkerlab.physics.hybrid.rigid_record import Observer, observe, observe_start, observe_strike
+from walkerlab.physics.kernels import callable_kernel, kernel, kernel_part, vector
+from walkerlab.physics.mechanics.impact import strike
+from walkerlab.physics.mechanics.rigid_model import (
+    AT_STRIKE,
+    BENT,
+    NO_SHANK,
+    STANCE,
+    STRAIGHT,
+    SWING,
+    Mode,
+    RigidModel,
+    feet_on_slope,
+    hip_height,
+    swing_foot,
+    swing_foot_motion,
+)
+from walkerlab.physics.solvers.events import (
+    FALLING,
+    NO_CROSSING,
+    RISING,
+    CrossingFinder,
+    first_crossing,
+    shift_column,
+    value_at,
+)
+from walkerlab.physics.solvers.stepping import (
+    H_NEXT,
+    OUT_OF_BUDGET,
+    STEP_DONE,
+    T_OLD,
+    T,
+    advance,
+    begin,
+    prepare_dense,
+    rewind,
+    sample,
+)
+from walkerlab.physics.solvers.system import derivative
+
+LONGEST_SWING = 10.0  # pendulum times sqrt(L/g) within which a heel strike must come
+HULL_ROOM = 0.125
+SHORTEST_LANDING = 0.25  # of the gait's step length, ahead of the stance foot, on uneven ground
+RELEASED = 1e-6  # of the first step; a knee in line and at its thigh's rate crosses by rounding within 1e-9 of it
+# event functions, rows of the finder
+HEEL_STRIKE, FALL, AHEAD, KNEE = range(4)
+LEGS_TURN = 4  # no event: the rate between the legs
+EVENTS = 5
+
+
+@kernel_part
+def is_bent(system: Mode) -> bool:
+    """Whether a knee is free, whose strike ends the phase."""
+    return system.phase == BENT and system.model.shank != NO_SHANK
+
+
+@kernel_part
+def knee_angle(model: RigidModel, y: Any, first: int) -> float:
+    """Angle of the swing shank beyond its thigh from y[first] on, negative while flexed (rad); or its rate."""
+    return y[first + model.shank] - y[first + model.thigh]
+
+
+@kernel_part
+def hip_above_fall(model: RigidModel, y: Any) -> float:
+    """Height of the hip over the slope less what counts as fallen (m)."""
+    return hip_height(model, y) - FALLEN_HIP * model.leg_length
+
+
+@kernel_part
+def may_end(system: Mode, method: Any, at_start: bool) -> bool:
+    """Whether the last step may hold an event: false through most of a swing.
+
+    A heel strike needs the swing leg ahead of the stance leg and its foot to come down onto the slope; a knee strike
+    needs the knee to stretch. The event functions' values and rates at the step's ends are known.
+    """
+    model, old, y, h = system.model, method.y_old, method.y, method.clock[T] - method.clock[T_OLD]
+    if hip_above_fall(model, y) < 0.0:
+        return True
+    n = len(model.arm_x)
+    if is_bent(system):
+        start, end = knee_angle(model, old, 0), knee_angle(model, y, 0)
+        start_rate, end_rate = h * knee_angle(model, old, n), h * knee_angle(model, y, n)
+        if hull(start, start_rate, end, end_rate, at_start)[1] >= 0.0:
+            return True
+    before, now = foot_function(system, old, old[n : 2 * n]), foot_function(system, y, y[n : 2 * n])
+    ahead = hull(before[1], h * before[3], now[1], h * now[3])
+    return ahead[1] > 0.0 and hull(before[0], h * before[2], now[0], h * now[2])[0] <= 0.0
+
+
+@kernel_part
+def foot_function(system: Mode, y: Any, turn: Any) -> tuple[float, float, float, float]:
+    """What falls through zero as the swing foot comes down, what is positive with it ahead, and how both change.
+
+    Of a straight leg over even ground both are linear in the angles, and scuffing near mid-swing is no zero; otherwise
+    they are the foot's height over its next foothold, and its place.
+
+    turn  (n,) and more: angular velocities, or a column
+    """
+    model, swing, stance = system.model, turn[SWING], turn[STANCE]
+    if is_bent(system) or system.rise != 0.0:
+        height, ahead, upward, apart = swing_foot_motion(model, y, turn)
+        return height - system.rise, ahead, upward, apart
+    return feet_on_slope(model, y[SWING], y[STANCE]), y[SWING] - y[STANCE], swing + stance, swing - stance
+
+
+@kernel_part
+def hull(start: float, start_rate: float, end: float, end_rate: float, zero_at_start: bool = False) -> Any:
+    """Bounds of an event function within a step, from its values and rates per step at the ends.
+
+    Those of the Bernstein coefficients of Hermite's cubic, an eighth of their spread further apart: what the cubic
+    leaves out is far less. Without the first one they tell of what a zero at the start leaves when divided out.
+    """
+    second, third = start + start_rate / 3.0, end - end_rate / 3.0
+    first = second if zero_at_start else start
+    least, most = min(first, second, third, end), max(first, second, third, end)
+    room = HULL_ROOM * (most - least)
+    return least - room, most + room
+
+
+@kernel_part
+def sample_events(system: Mode, y: Any, node: int, finder: CrossingFinder) -> None:
+    """Values of the event functions at one node of a step, where the state is y."""
+    foot = foot_function(system, y, y[len(system.model.arm_x) :])
+    finder.values[HEEL_STRIKE, node], finder.values[AHEAD, node] = foot[0], foot[1]
+    finder.values[FALL, node] = hip_above_fall(system.model, y)
+    if is_bent(system):
+        finder.values[KNEE, node] = knee_angle(system.model, y, 0)
+
+
+@callable_kernel
+def events_in_step(system: Mode, finder: CrossingFinder, at_start: bool) -> tuple[float, float, float]:
+    """Fractions of a sampled step at which the swing foot comes down ahead, the walker falls, and the knee strikes."""
+    for node in range(finder.nodes.size):
+        sample_events(system, finder.states[node], node, finder)
+    on_ground = at_start and system.behind == system.rise
+    strike = first_crossing(finder, HEEL_STRIKE, FALLING, 0.0, on_ground)
+    while strike <= 1.0 and value_at(finder, AHEAD, strike) <= 0.0:
+        strike = first_crossing(finder, HEEL_STRIKE, FALLING, strike + 1e-12, on_ground)
+    fall, struck = first_crossing(finder, FALL, FALLING, 0.0, False), NO_CROSSING
+    if is_bent(system):
+        struck = first_crossing(finder, KNEE, RISING, RELEASED if at_start else 0.0, at_start)
+    return strike, fall, struck
+
+
+@kernel_part
+def take_step(
+    model: RigidModel, method: Any, finder: CrossingFinder, observer: Any, t: float, y: Any, step: int, strikes: Any
+) -> tuple[int, float]:
+    """One step: a swing from time t (s) on, and the heel strike.
+
+    y        the walker's state at the start, with columns behind it if the method has room for them; overwritten with
+             where it led
+    strikes  the walk's HeelStrikes, whose footholds are told; the time of this step's knee strike is written
+
+    Returns WALKED and the time of the heel strike, whose state before it is the method's; or what happened, and when.
+    """
+    latest = t + LONGEST_SWING * math.sqrt(model.leg_length / model.gravity)
+    phase = BENT if model.shank != NO_SHANK else STRAIGHT
+    behind, rise = -strikes.rise[step], strikes.rise[step + 1]
+    while True:
+        system = Mode(model, phase, behind, rise)
+        status = swing_phase(method, system, finder, observer, t, y, latest, step)
+        if status != WALKED and status != KNEE_STRUCK:
+            return status, method.clock[T]
+        if status == WALKED and strikes.nearest > 0.0 and swing_foot(model, method.y)[1] < strikes.nearest:
+            return FELL, method.clock[T]
+        t = pass_event(method, system, y)
+        observe_strike(observer, system, status == WALKED, method.y, y)
+        if status == WALKED:
+            return WALKED, t
+        strikes.knee_time[step] = t
+        phase = STRAIGHT
+
+
+@kernel_part
+def swing_phase(
+    method: Any, system: Mode, finder: CrossingFinder, observer: Any, t: float, y: Any, latest: float, step: int
+) -> int:
+    """Integrate up to the strike that ends a phase: of the knee that is free in it, or else of the heel.
+
+    It is over at the time `latest` (s) if not before. A phase that follows a heel strike begins with the foot on the
+    slope, and the knee in line: that is the strike before, none of this phase.
+    """
+    limit, coming = latest, False
+    at_start = is_bent(system) or system.model.shank == NO_SHANK
+    begin(method, system, t, y, method.clock[H_NEXT])
+    observe_start(observer, system, y)
+    while method.clock[T] < limit:
+        status = advance(method, system, limit)
+        if status != STEP_DONE:
+            return BUDGET_EXHAUSTED if status == OUT_OF_BUDGET else SOLVER_FAILED
+        if coming:
+            continue
+        near = may_end(system, method, at_start)
+        if near or observer.watching:
+            prepare_dense(method, system)
+        strike, fall, struck = NO_CROSSING, NO_CROSSING, NO_CROSSING
+        if near:
+            sample(method, system, finder.nodes, finder.states)
+            strike, fall, struck = events_in_step(system, finder, at_start)
+        if observer.watching:
+            observe(observer, method, system, finder, LEGS_TURN, min(1.0, strike, fall, struck), step)
+        if fall < min(strike, struck):
+            return FELL
+        if is_bent(system) and strike < struck:
+            return BENT_KNEE
+        if min(strike, struck) <= 1.0:
+            coming = True
+            limit = method.clock[T_OLD] + min(strike, struck) * (method.clock[T] - method.clock[T_OLD])
+            rewind(method, system)
+        at_start = False
+    if not coming:
+        return NO_HEEL_STRIKE
+    return KNEE_STRUCK if is_bent(system) else WALKED
+
+
+@kernel_part
+def event_value(system: Mode, y: Any, turn: Any) -> tuple[float, float]:
+    """The event function of the strike that ends a phase, and how it changes; `turn` as in `foot_function`."""
+    if is_bent(system):
+        return knee_angle(system.model, y, 0), knee_angle(system.model, turn, 0)
+    value, _, change, _ = foot_function(system, y, turn)
+    return value, change
+
+
+@kernel_part
+def pass_event(method: Any, system: Mode, new: Any) -> float:
+    """From the end of a phase, where the method stands, across the strike that ends it; returns its time (s).
+
+    Newton's last correction of the time comes first; the method's own state is that just before the strike then. A
+    column Phi changes by the shift in time of the strike itself, too (saltation): J (Phi + f wait), less f+ wait after
+    a knee strike; after a heel strike it stays on the section.
+
+    new  state after the strike, and columns; written
+    """
+    model, y = system.model, method.y
+    n, knee = len(model.arm_x), is_bent(system)
+    before, f, waits = vector(model.zero_state), vector(model.zero_state), vector(model.zero_state)
+    for i in range(2 * n):
+        before[i] = y[i]
+    derivative(system, method.clock[T], before, f)
+    value, rate = event_value(system, y, y[n : 2 * n])
+    wait = -value / rate if rate != 0.0 else 0.0
+    for i in range(2 * n):
+        y[i] += wait * f[i]
+        before[i] = y[i]
+    t = method.clock[T] + wait
+    if len(y) > 2 * n:
+        derivative(system, t, before, f)
+        _, rate = event_value(system, y, y[n : 2 * n])
+        for column in range(1, len(y) // (2 * n)):
+            at = 2 * n * column
+            _, change = event_value(system, y, y[at : at + n])
+            waits[column] = -change / rate
+            shift_column(y, at, f, waits[column])
+    strike(model, STRAIGHT if knee else AT_STRIKE, not knee, y, new)
+    if knee and len(y) > 2 * n:
+        for i in range(2 * n):
+            before[i] = new[i]
+        derivative(Mode(model, STRAIGHT, system.behind, system.rise), t, before, f)
+        for column in range(1, len(y) // (2 * n)):
+            shift_column(new, 2 * n * column, f, -waits[column])
+    return t
+
+
+class HeelStrikes(NamedTuple):
+    """The heel strikes of a walk, step by step; states have as many columns behind them as the walk."""
+
+    time: Any  # (steps,) s
+    before: Any  # (steps, m) states just before them
+    after: Any  # (steps, m) just after, roles changed
+    knee_time: Any  # (steps,) s, of the knee strikes before them, if there are knees
+    rise: Any  # (steps + 1,) m, of each foothold over the one before, of the present one first: given
+    nearest: float  # m, ahead of the stance foot: a foot that lands nearer ends the walk; 0 on even ground
+
+
+def new_heel_strikes(steps: int, m: int, kneed: bool = True, rise: Any = None, nearest: float = 0.0) -> HeelStrikes:
+    """Room for some heel strikes, with states of m numbers, and for the knee strikes before them if there are knees.
+
+    rise, nearest  as `HeelStrikes` has them; even ground without
+    """
+    before, after = np.zeros((2, steps, m))
+    even = np.zeros(steps + 1) if rise is None else rise
+    return HeelStrikes(np.zeros(steps), before, after, np.zeros(steps if kneed else 0), even, nearest)
+
+
+@kernel
+def walk(
+    walker: Any, method: Any, finder: CrossingFinder, observer: Observer, y: Any, strikes: HeelStrikes
+) -> tuple[int, int]:
+    """Walk until `strikes` is full or the walk ends.
+
+    walker  (), a RigidModel in an array: compiled code takes it in a tenth of the time of a tuple
+    y       (m,) the state (2 n) at time 0, with columns behind it if the method has room for them; overwritten with
+            where the last heel strike led
+
+    Returns the outcome's number and how many steps were taken.
+    """
+    model = walker[()]
+    t = 0.0
+    for step in range(strikes.time.size):
+        status, t = take_step(model, method, finder, observer, t, y, step, strikes)
+        if status != WALKED:
+            return status, step
+        strikes.time[step] = t
+        for i in range(y.size):
+            strikes.before[step, i] = method.y[i]
+            strikes.after[step, i] = y[i]
+    return WALKED, strikes.time.size

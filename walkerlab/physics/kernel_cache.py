@@ -1,0 +1,138 @@
+"""Folder of compiled kernels: one for each state of the sources, version of numba and processor.
+
+Numba's cache does not notice changes of a called function in another file. The folder's name therefore holds a digest
+of all sources that kernels can use, and an edited function never runs stale. Caches of other programs are not touched.
+"""
+
+import contextlib
+import functools
+import hashlib
+import os
+import re
+import shutil
+import sys
+import tempfile
+import time
+import warnings
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+from walkerlab.code_digest import Sources, digest_of
+
+PHYSICS = Path(__file__).parent
+PACKAGE = PHYSICS.parent
+# the only packages that may hold compiled functions (tested)
+KERNEL_HOMES = ("solvers", "mechanics", "ground", "hybrid", "orbits")
+HOLDS_KERNELS = re.compile(rb"walkerlab\.physics\.kernels|numba|\.case\(")
+KEPT_GENERATIONS = 8
+UNUSED_S = 30 * 86_400.0  # older generations that no process has opened for so long may be deleted
+
+
+class CacheWarning(RuntimeWarning):
+    """Compiled code is stored in another folder than the chosen one."""
+
+
+watchers: list[Callable[[str], None]] = []
+"""Called with the name of the kernel that this process compiles or waits for, and with '' at the end."""
+
+
+@contextlib.contextmanager
+def watch_compilation(watcher: Callable[[str], None]) -> Iterator[None]:
+    """Call `watcher` when compilations start and end within the context; see `watchers`."""
+    watchers.append(watcher)
+    try:
+        yield
+    finally:
+        watchers.remove(watcher)
+
+
+def sources_digest() -> str:
+    """Digest (hex) of all files that hold kernels and of everything these import."""
+    sources = Sources()
+    homes = (path for home in KERNEL_HOMES for path in (PHYSICS / home).rglob("*.py"))
+    files = (path.relative_to(PACKAGE.parent) for path in homes if HOLDS_KERNELS.search(path.read_bytes()))
+    names = [".".join(path.with_suffix("").parts) for path in files]
+    modules = sources.closure(f"{PACKAGE.name}.physics.kernels", *names)
+    return digest_of((module.name, module.text) for module in modules if module.name != PACKAGE.name)
+
+
+def processor_name() -> str:
+    """Name of the processor that code is compiled for, with a digest of its features."""
+    # imported here and below so that checking whether the folder is writable loads no compiler
+    import numba
+    from llvmlite import binding as llvm
+
+    name = numba.config.CPU_NAME or llvm.get_host_cpu_name()
+    features = numba.config.CPU_FEATURES
+    if features is None:
+        features = llvm.get_host_cpu_features().flatten()
+    return f"{name}-{hashlib.sha256(features.encode()).hexdigest()[:8]}"
+
+
+def cache_root() -> Path:
+    """Folder of all compiled code: $WALKERLAB_CACHE, else the user's cache folder, else a temporary one.
+
+    Warns once per process if the first choice is not writable.
+    """
+    chosen = os.environ.get("WALKERLAB_CACHE")
+    usual = Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser() / "walkerlab"
+    return _first_usable((Path(chosen), usual) if chosen else (usual,))
+
+
+@functools.cache
+def _first_usable(candidates: tuple[Path, ...]) -> Path:
+    for folder in candidates:
+        with contextlib.suppress(OSError):
+            folder.mkdir(parents=True, exist_ok=True)
+            with tempfile.TemporaryFile(dir=folder):
+                break
+    else:
+        folder = Path(tempfile.mkdtemp(prefix="walkerlab-cache-"))
+    if folder != candidates[0]:
+        lost = "" if folder in candidates else ", which later processes do not find"
+        message = f"{candidates[0]} cannot be written into: compiled code is kept in {folder}{lost}"
+        warnings.warn(f"{message}. WALKERLAB_CACHE chooses another folder.", CacheWarning, stacklevel=3)
+    return folder
+
+
+@functools.cache
+def cache_folder() -> Path:
+    """Return this processor's folder for this state of the sources.
+
+    The first call of a process creates it if necessary and then deletes folders that were not used for long.
+    """
+    import numba
+
+    root, host = cache_root(), processor_name()
+    compiler = f"py{sys.version_info.major}{sys.version_info.minor}-numba{numba.__version__}"
+    folder = root / f"kernels-{sources_digest()[:16]}-{compiler}-{host}"
+    if not folder.is_dir():
+        folder.mkdir(exist_ok=True)
+        _remove_unused(list(root.glob(f"kernels-*-{host}")))
+    os.utime(folder)
+    return folder
+
+
+def _remove_unused(generations: list[Path]) -> None:
+    """Delete folders that were not used for long, except the latest few; a process that uses one compiles again."""
+    last_used: dict[Path, float] = {}  # s since the epoch
+    for folder in generations:
+        with contextlib.suppress(OSError):  # another process may have deleted it
+            last_used[folder] = folder.stat().st_mtime
+    for folder in sorted(last_used, key=last_used.__getitem__, reverse=True)[KEPT_GENERATIONS:]:
+        if time.time() - last_used[folder] > UNUSED_S:
+            shutil.rmtree(folder, ignore_errors=True)
+
+
+def nothing_compiled_yet() -> bool:
+    """Whether this state of the sources has no compiled code: the first run on a machine, or after a change."""
+    return next(cache_folder().rglob("*.nbc"), None) is None
+
+
+def lock_of(name: str) -> Any:
+    """Create a lock between processes in the folder of compiled code."""
+    # imported here because a process that finds everything compiled takes no lock
+    from filelock import FileLock
+
+    return FileLock(cache_folder() / f"{hashlib.sha256(name.encode()).hexdigest()[:16]}.lock")

@@ -1,0 +1,292 @@
+"""Compiled functions, and functions whose bodies are chosen by the type of their first argument."""
+
+import functools
+import hashlib
+from collections.abc import Callable
+from typing import Any, TypeVar, cast
+
+import numba
+import numpy as np
+from llvmlite import ir
+from numba.core import cgutils, types
+from numba.core.typing.templates import AbstractTemplate, AttributeTemplate, infer_getattr, infer_global, signature
+from numba.extending import (
+    NativeValue,
+    intrinsic,
+    lower_builtin,
+    lower_getattr_generic,
+    models,
+    register_model,
+    typeof_impl,
+    unbox,
+)
+from numba.np.arrayobj import make_array, populate_array
+
+from walkerlab.physics.compiler import KernelCache, KernelCompiler, PartCompiler, absent, cached_plainly
+
+# The compiler may not contract or reorder arithmetic, so that code compiled twice computes the same to the last bit.
+# No reference counts (_nrt): kernels allocate nothing and borrow arrays from their caller, and counting would take as
+# long as the arithmetic.
+FLAGS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"nsz"}, "_nrt": False}
+# Python never calls parts of a kernel
+PART_FLAGS: dict[str, Any] = {**FLAGS, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+if not absent:
+    PART_FLAGS["pipeline_class"] = PartCompiler
+# passing lanes through memory costs as much as the arithmetic on them
+ALWAYS_INLINE_FLAGS: dict[str, Any] = {**PART_FLAGS, "forceinline": True}
+F = TypeVar("F", bound=Callable[..., Any])
+C = TypeVar("C", bound=type)
+
+
+def kernel(function: F) -> F:
+    """Compile `function` on its first call and keep the machine code on disk for later processes."""
+    if absent:
+        return cast(F, cached_plainly(function, FLAGS))
+    compiled = numba.njit(pipeline_class=KernelCompiler, **FLAGS)(function)
+    # as enable_caching does, but with the kernels' own cache
+    compiled._cache = KernelCache(function)
+    return cast(F, compiled)
+
+
+def kernel_part(function: F) -> F:
+    """Leave `function` as it is in Python, and compile it into the kernels that call it."""
+    compile_as(function, lambda *_: (function, PART_FLAGS))
+    return function
+
+
+def callable_kernel(function: F) -> F:
+    """As `kernel_part`, and called from Python as a kernel."""
+    whole = kernel(function)
+
+    @functools.wraps(function)
+    def enter(*arguments: Any) -> Any:
+        return whole(*arguments)
+
+    compile_as(enter, lambda *_: (function, PART_FLAGS))
+    return cast(F, enter)
+
+
+def forced_inline(function: F) -> F:
+    """As `kernel_part`, with a copy of its code in every caller, however large."""
+    compile_as(function, lambda *_: (function, ALWAYS_INLINE_FLAGS))
+    return function
+
+
+def compile_as(function: Any, body_for: Callable[..., tuple[Callable[..., Any], dict[str, Any]]]) -> None:
+    """Let compiled calls of `function` use a body chosen from the argument types; each body is compiled once.
+
+    body_for  returns the body and its compiler flags for numba's types of the arguments
+    """
+    parts: dict[Any, Any] = {}
+    compiled: dict[Any, Any] = {}
+
+    class Template(AbstractTemplate):  # type: ignore[misc]
+        key = function
+
+        def generic(self, arguments: Any, keywords: Any) -> Any:
+            body, flags = body_for(*arguments)
+            if body not in parts:
+                parts[body] = numba.njit(**flags)(body)
+            called: Any = types.Dispatcher(parts[body]).get_call_type(self.context, arguments, keywords)
+            compiled[called.args] = parts[body].get_overload(called.args)
+            return called
+
+        def get_impl_key(self, called: Any) -> Any:
+            return compiled[called.args]
+
+    infer_global(function, types.Function(Template))
+
+
+def uncompiled(compiled: F) -> F:
+    """Return the Python function of a kernel, for methods that are not compiled."""
+    return cast(F, cast(Any, compiled).py_func)
+
+
+class ByType:
+    """Function whose body is chosen by the type of its first argument, in Python and in compiled code."""
+
+    __name__: str
+
+    def __init__(self, declaration: Callable[..., Any]) -> None:
+        """Take name and documentation from `declaration`."""
+        functools.update_wrapper(self, declaration)
+        self._bodies: dict[type, Callable[..., Any]] = {}
+        self._forced_inline: set[type] = set()
+        self._default: Callable[..., Any] | None = None
+
+    def __call__(self, chooser: Any, *rest: Any) -> Any:
+        """Run the body for the type of `chooser`."""
+        return self._body_for(type(chooser), str(type(chooser)))(chooser, *rest)
+
+    def __contains__(self, chosen: type) -> bool:
+        """Whether a body is registered for a type."""
+        return chosen in self._bodies
+
+    def case(self, chosen: type, forced_inline: bool = False) -> Callable[[F], F]:
+        """Register the decorated function as the body for first arguments of type `chosen`.
+
+        forced_inline  copy its code into every caller, however large
+        """
+
+        def register(body: F) -> F:
+            self._bodies[chosen] = body
+            if forced_inline:
+                self._forced_inline.add(chosen)
+            return body
+
+        return register
+
+    def default(self, body: F) -> F:
+        """Register the decorated function as the body for first arguments of all other types."""
+        self._default = body
+        return body
+
+    def compiled_body(self, kind: Any, *_: Any) -> tuple[Callable[..., Any], dict[str, Any]]:
+        """Return the body for numba's type of a first argument, and its compiler flags."""
+        chosen = getattr(kind, "instance_class", type(None))
+        return self._body_for(chosen, str(kind)), ALWAYS_INLINE_FLAGS if chosen in self._forced_inline else PART_FLAGS
+
+    def _body_for(self, chosen: type, label: str) -> Callable[..., Any]:
+        body = self._bodies.get(chosen, self._default)
+        if body is None:
+            name = chosen.__name__ if hasattr(chosen, "_fields") else label
+            # numba passes on errors of other classes than its own unchanged
+            raise TypeError(f"{self.__name__} has no body for {name}: register one with @{self.__name__}.case(...)")
+        return body
+
+
+def by_type(declaration: Callable[..., Any]) -> ByType:
+    """Declare a function with one body per type of its first argument (a NamedTuple class).
+
+    The choice is made while compiling, so variants that a scene does not use cost nothing.
+    """
+    chosen = ByType(declaration)
+
+    compile_as(chosen, chosen.compiled_body)
+    return chosen
+
+
+def by_type_or_default(declaration: Callable[..., Any]) -> ByType:
+    """As `by_type`; the declaration's own body serves all types without a registered one."""
+    chosen = by_type(declaration)
+    chosen.default(declaration)
+    return chosen
+
+
+class ByAddress(types.Type):
+    """Numba's type of a NamedTuple that is passed by its address: see `by_reference`."""
+
+    def __init__(self, held: Any) -> None:
+        """Create the type of a reference to a NamedTuple of numba type `held`."""
+        self.held, self.instance_class = held, held.instance_class
+        super().__init__(f"reference to {held.name}")
+
+    @property
+    def mangling_args(self) -> tuple[str, tuple[()]]:
+        """A short symbol name. The full one, with all field types, is longer than most functions."""
+        return f"{self.instance_class.__name__}_{hashlib.sha256(self.name.encode()).hexdigest()[:16]}", ()
+
+
+def by_reference(chosen: C) -> C:
+    """Let kernels pass a NamedTuple class by address; Python creates its values, kernels only read their fields.
+
+    Otherwise numba turns a record of twenty arrays into a hundred arguments, and most of the compile time goes into
+    packing and unpacking them.
+    """
+
+    def reference(value: Any, purpose: Any) -> ByAddress:
+        fields = [typeof_impl(field, purpose) for field in value]
+        return ByAddress(types.containers.BaseTuple.from_types(fields, chosen))
+
+    typeof_impl.register(chosen)(reference)
+    return chosen
+
+
+@register_model(ByAddress)
+class _ReferenceModel(models.PrimitiveModel):  # type: ignore[misc]
+    def __init__(self, manager: Any, kind: ByAddress) -> None:
+        super().__init__(manager, kind, manager.lookup(kind.held).get_value_type().as_pointer())
+
+
+@infer_getattr
+class _ReferencedFields(AttributeTemplate):  # type: ignore[misc]
+    key = ByAddress
+
+    def generic_resolve(self, kind: ByAddress, name: str) -> Any:
+        return kind.held[kind.held.fields.index(name)] if name in kind.held.fields else None
+
+
+@lower_getattr_generic(ByAddress)  # type: ignore[untyped-decorator]
+def _load_field(_context: Any, builder: Any, kind: ByAddress, value: Any, name: str) -> Any:
+    return builder.load(cgutils.gep_inbounds(builder, value, 0, kind.held.fields.index(name)))
+
+
+@unbox(ByAddress)  # type: ignore[untyped-decorator]
+def _unbox_reference(kind: ByAddress, value: Any, c: Any) -> Any:
+    held = c.unbox(kind.held, value)
+    return NativeValue(cgutils.alloca_once_value(c.builder, held.value), held.is_error, held.cleanup)
+
+
+def vector(like: Any) -> Any:
+    """Allocate scratch (n,) that lives until the calling function returns; write it before reading.
+
+    like  value whose type fixes the length n: a tuple, or an array inside a structured scalar
+
+    In Python it holds NaN, so that reading unwritten scratch shows.
+    """
+    return np.full(len(like), np.nan)
+
+
+def matrix(like: Any) -> Any:
+    """Allocate scratch (n, n), as `vector` does."""
+    return np.full((len(like), len(like)), np.nan)
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def zeros(context: Any, like: Any) -> Any:
+    """Return a tuple of len(like) zeros; compiled code without reference counts cannot return arrays."""
+
+    def generate(context: Any, builder: Any, called: Any, _arguments: Any) -> Any:
+        return context.get_constant_generic(builder, called.return_type, (0.0,) * called.return_type.count)
+
+    return types.containers.UniTuple(types.float64, like.shape[0])(like), generate
+
+
+def _on_the_stack(function: Callable[..., Any], dimensions: int) -> None:
+    """Make compiled calls of `function(like)` return memory of the caller's frame.
+
+    An intrinsic behind an overload would return memory of the overload's frame.
+    """
+
+    class Scratch(AbstractTemplate):  # type: ignore[misc]
+        key = function
+
+        def generic(self, arguments: Any, keywords: Any) -> Any:  # noqa: ARG002 - numba calls it so
+            return signature(types.Array(types.float64, dimensions, "C"), *arguments)
+
+    infer_global(function)(Scratch)
+
+    def generate(context: Any, builder: Any, called: Any, _arguments: Any) -> Any:
+        like = called.args[0]
+        length = like.count if isinstance(like, types.containers.BaseTuple) else like.shape[0]
+
+        def number(value: int) -> Any:
+            return context.get_constant(types.intp, value)
+
+        memory = cgutils.alloca_once(builder, ir.ArrayType(ir.DoubleType(), length**dimensions))
+        array = make_array(called.return_type)(context, builder)
+        populate_array(
+            array,
+            data=builder.bitcast(memory, array.data.type),
+            shape=[number(length)] * dimensions,
+            strides=[number(8 * length), number(8)][2 - dimensions :],
+            itemsize=number(8),
+            meminfo=None,
+        )
+        return array._getvalue()
+
+    lower_builtin(function, types.Any)(generate)
+
+
+_on_the_stack(vector, 1)
+_on_the_stack(matrix, 2)

@@ -1,0 +1,148 @@
+"""From parts to the constants of the equations of motion.
+
+Choose a point of the tree, the root. Every other point lies at root + sum over bodies k of R(theta_k) d_k, where the
+levers d_k are constants of the assembly and theta_k the bodies' absolute angles. The kinetic energy then needs only
+
+    A_kl = sum m d_k . d_l (+ inertia on the diagonal),   B_kl = sum m d_k . (rotated d_l),   c_k = sum m d_k
+
+over all masses m. With the centre of mass as root c vanishes, and translation and rotation part. With Delta =
+theta_l - theta_k the equations of motion about a root at rest are
+
+    M_kl = A_kl cos Delta + B_kl sin Delta
+    M alpha = torques + sum over l of omega_l^2 (A_kl sin Delta - B_kl cos Delta)
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from walkerlab.physics.mechanics.parts import Assembly, Position
+from walkerlab.physics.solvers.system import Floats
+
+
+class Tree(NamedTuple):
+    """Constants of a tree of n bodies about its root."""
+
+    mass: float  # kg
+    A: Floats  # (n, n) kg m^2
+    B: Floats
+    arm_x: Floats  # (n,) c, kg m: first moments about the root, zero if that is the centre of mass
+    arm_y: Floats
+
+    def merged(self, members: Floats) -> dict[str, Any]:
+        """Fields of a mechanism whose bodies (n) each stand for those of the tree that turn as one.
+
+        members  (bodies, n) 1 where a body belongs to one of them
+        """
+        A, B = (members.T @ pairs @ members for pairs in (self.A, self.B))
+        return {"A": A, "B": B, "arm_x": self.arm_x @ members, "arm_y": self.arm_y @ members, "mass": self.mass}
+
+
+def reduction(rows: Mapping[int, Floats], n: int) -> Floats:
+    """E (n, n) by the followers' weights."""
+    E = np.eye(n)
+    for follower, row in rows.items():
+        E[follower] = row
+    return E
+
+
+@dataclass(frozen=True)
+class Anchor:
+    """A point of the tree: a body's name and a position in its frame."""
+
+    body: str
+    at_m: Position
+
+
+def levers(assembly: Assembly, root: Anchor, point: Anchor) -> Floats:
+    """Levers d (bodies, 2) in m: `point` lies at root + sum over k of R(theta_k) d[k].
+
+    Raises KeyError for an unknown body, ValueError if hinges do not lead from the root's body to the point's.
+    """
+    for end in (root, point):
+        assembly.index(end.body)
+    d = np.zeros((len(assembly.bodies), 2))
+    here = np.array(root.at_m)
+    for body, leaving, entering in path(assembly, root.body, point.body):
+        d[assembly.index(body)] += np.array(leaving) - here
+        here = np.array(entering)
+    d[assembly.index(point.body)] += np.array(point.at_m) - here
+    return d
+
+
+def path(assembly: Assembly, start: str, goal: str) -> list[tuple[str, Position, Position]]:
+    """Hinges from body `start` to body `goal`: (body left, point left from, point entered in the next body)."""
+    reached: dict[str, list[tuple[str, Position, Position]]] = {start: []}
+    frontier = [start]
+    while frontier:
+        body = frontier.pop()
+        for other, leaving, entering in neighbours(assembly, body):
+            if other not in reached:
+                reached[other] = [*reached[body], (body, leaving, entering)]
+                frontier.append(other)
+    if goal not in reached:
+        raise ValueError(f"no hinges lead from body {start!r} to body {goal!r}; add a Revolute between them")
+    return reached[goal]
+
+
+def neighbours(assembly: Assembly, body: str) -> Iterator[tuple[str, Position, Position]]:
+    """Bodies hinged to `body`, with the hinge's point in each."""
+    for joint in assembly.joints:
+        if joint.parent == body:
+            yield joint.child, joint.parent_point_m, joint.child_point_m
+        if joint.child == body:
+            yield joint.parent, joint.child_point_m, joint.parent_point_m
+
+
+def masses(assembly: Assembly) -> Iterator[tuple[float, Anchor]]:
+    """Every mass (kg) of the assembly and where it sits."""
+    for body in assembly.bodies:
+        yield body.mass_kg, Anchor(body.name, body.centre_m)
+    for particle in assembly.particles:
+        yield particle.mass_kg, Anchor(particle.body, particle.at_m)
+
+
+def total_mass(assembly: Assembly) -> float:
+    """Mass of the whole assembly (kg)."""
+    return sum(mass for mass, _ in masses(assembly))
+
+
+def tree_about(assembly: Assembly, root: Anchor) -> Tree:
+    """Constants of the equations of motion with a material point as root."""
+    mass_levers = [(mass, levers(assembly, root, at)) for mass, at in masses(assembly)]
+    return tree_of(assembly, mass_levers)
+
+
+def tree_about_centre(assembly: Assembly) -> tuple[Tree, tuple[Floats, ...]]:
+    """Constants with the centre of mass as root, and the levers (bodies, 2) from there to each foot's centre."""
+    root = Anchor(assembly.bodies[0].name, assembly.bodies[0].centre_m)
+    mass_levers = [(mass, levers(assembly, root, at)) for mass, at in masses(assembly)]
+    centre = sum(mass * d for mass, d in mass_levers) / total_mass(assembly)
+    feet = tuple(levers(assembly, root, Anchor(foot.body, foot.centre_m)) - centre for foot in assembly.feet)
+    return tree_of(assembly, [(mass, d - centre) for mass, d in mass_levers]), feet
+
+
+def tree_of(assembly: Assembly, mass_levers: list[tuple[float, Floats]]) -> Tree:
+    """Sum the levers of all masses into the constants."""
+    A = np.diag([body.inertia_kg_m2 for body in assembly.bodies])
+    B = np.zeros_like(A)
+    c = np.zeros((len(assembly.bodies), 2))
+    for mass, d in mass_levers:
+        rotated = np.column_stack((-d[:, 1], d[:, 0]))
+        A = A + mass * d @ d.T
+        B = B + mass * d @ rotated.T
+        c = c + mass * d
+    return Tree(total_mass(assembly), A, B, c[:, 0], c[:, 1])
+
+
+def followers(assembly: Assembly) -> dict[int, Floats]:
+    """Weights (bodies,) by which the bodies of couplings follow others."""
+    rows = {}
+    for coupling in assembly.couplings:
+        row = np.zeros(len(assembly.bodies))
+        for other, weight in zip(coupling.of, coupling.weights, strict=True):
+            row[assembly.index(other)] += weight
+        rows[assembly.index(coupling.body)] = row
+    return rows

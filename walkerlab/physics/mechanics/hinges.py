@@ -1,0 +1,95 @@
+"""Torques at hinges, for both models: what acts between two bodies by the angle between them and its rate.
+
+A law is a type with a body in `hinge_torque` and in `hinge_energy`. Its torque turns the first body back and the second
+one forward; what it loses is (torque - elastic part) times the rate.
+
+Hinges are rows of two arrays in both models' record: `hinges` has the two bodies, `laws` the numbers of a SpringDamper.
+The first row is the hip, the others are the knees that can bend: the swing leg's in the rigid model, both on compliant
+ground, where each has a stop besides.
+"""
+
+from typing import Any, NamedTuple
+
+from walkerlab.physics.kernels import by_type_or_default, forced_inline, kernel_part
+
+
+@by_type_or_default
+def legs_apart(system: Any, y: Any) -> tuple[float, float]:
+    """By how much the swing leg is ahead of the stance leg (rad), and how fast it gets further ahead (rad/s)."""
+    return 0.0, 0.0
+
+
+class HingeTorque(NamedTuple):
+    """Torque against the angle by which a body is ahead of another, and its derivatives."""
+
+    torque: float  # N m
+    elastic: float  # N m, the part that stores energy
+    by_angle: float  # N m
+    by_rate: float  # N m s
+
+
+@by_type_or_default
+def hinge_torque(law: Any, angle: float, rate: float) -> HingeTorque:
+    """Torque of a law at an angle (rad) and its rate: none of a law that acts in no time, such as an ideal lock."""
+    return HingeTorque(0.0, 0.0, 0.0, 0.0)
+
+
+@by_type_or_default
+def hinge_energy(law: Any, angle: float) -> float:
+    """Elastic energy (J) of a law at an angle (rad)."""
+    return 0.0
+
+
+class SpringDamper(NamedTuple):
+    """A spring that is relaxed at an angle of zero, a damper, and a constant torque that turns the first body on."""
+
+    stiffness: float  # N m/rad
+    damping: float  # N m s/rad
+    torque: float  # N m
+
+
+@hinge_torque.case(SpringDamper, forced_inline=True)
+def spring_damper_torque(law: SpringDamper, angle: float, rate: float) -> HingeTorque:
+    """Linear in both."""
+    elastic = law.stiffness * angle
+    return HingeTorque(elastic + law.damping * rate - law.torque, elastic, law.stiffness, law.damping)
+
+
+@hinge_energy.case(SpringDamper, forced_inline=True)
+def spring_energy(law: SpringDamper, angle: float) -> float:
+    """That of the spring."""
+    return 0.5 * law.stiffness * angle * angle
+
+
+LAW_NUMBERS = len(SpringDamper._fields)
+HIP_ROW = 0  # row of the hinge between the legs
+HINGE_ROWS = {"hip": slice(HIP_ROW, HIP_ROW + 1), "knees": slice(HIP_ROW + 1, None)}
+
+
+@forced_inline
+def hinge_law(model: Any, row: int) -> SpringDamper:
+    """The spring, damper and torque at a hinge, in the order in which the config has their numbers."""
+    return SpringDamper(model.laws[row, 0], model.laws[row, 1], model.laws[row, 2])
+
+
+@forced_inline
+def is_sprung(model: Any, row: int) -> bool:
+    """Whether any of them acts at a hinge."""
+    return model.laws[row, 0] != 0.0 or model.laws[row, 1] != 0.0 or model.laws[row, 2] != 0.0
+
+
+@forced_inline
+def add_hinge_torque(now: HingeTorque, body: int, other: int, r: Any) -> None:
+    """Add a hinge's torques (N m) on both bodies to r (n,)."""
+    r[body] -= now.torque
+    r[other] += now.torque
+
+
+@kernel_part
+def add_hinge_gradients(now: HingeTorque, body: int, other: int, by_angle: Any, by_rate: Any) -> None:
+    """Add the derivatives of those torques by the angles and by their velocities to by_angle and by_rate (n, n)."""
+    for row, sign in ((other, 1.0), (body, -1.0)):
+        by_angle[row, body] += sign * now.by_angle
+        by_angle[row, other] -= sign * now.by_angle
+        by_rate[row, body] += sign * now.by_rate
+        by_rate[row, other] -= sign * now.by_rate

@@ -1,0 +1,286 @@
+"""Plastic impacts: velocities before, projected in the metric of the masses on what the new constraints allow.
+
+With velocities u of all masses before and u+ = Z z+ after, Z of the new constraints, Z' M (u+ - u) = 0. Coordinates
+are those of the tree about the foot that stands afterwards: velocity (v_x, v_y) of its centre, along the slope and
+normal to it, and the bodies' angular velocities.
+
+Source: (A.57) of the paper with the impulse projected away.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from walkerlab.physics.kernels import forced_inline, kernel_part, matrix, vector
+from walkerlab.physics.mechanics.links import factor_linked, solve_linked
+from walkerlab.physics.mechanics.rigid_model import (
+    AT_STRIKE,
+    BENT,
+    NO_SHANK,
+    STANCE,
+    STRAIGHT,
+    SWING,
+    RigidModel,
+    equations,
+    hip_height,
+)
+from walkerlab.physics.mechanics.tree import add_inertia, projections, sines_cosines
+from walkerlab.physics.mechanics.trigonometry import sine_cosine
+from walkerlab.physics.solvers.system import Floats
+
+
+@kernel_part
+def heel_strike(model: RigidModel, y: Any, new: Any) -> None:
+    """Write the state after the heel strike that y leads to, roles changed, into `new`.
+
+    y  the state, and as many columns behind it as there are: directions, whose images `new` gets
+    """
+    strike(model, AT_STRIKE, True, y, new)
+
+
+@kernel_part
+def knee_strike(model: RigidModel, y: Any, new: Any) -> None:
+    """As `heel_strike`, after the swing leg's knee has come into line and locked."""
+    strike(model, STRAIGHT, False, y, new)
+
+
+@kernel_part
+def strike(model: RigidModel, phase: int, other_foot: bool, y: Any, new: Any) -> None:
+    """A plastic impact on the constraints of E[phase].
+
+    other_foot  the swing foot stands afterwards; else the foot that stood goes on standing
+    """
+    like = model.arm_x
+    n, R = len(like), model.radius
+    s, c, F, U, p, M, factors = (
+        vector(like), vector(like), vector(like), vector(like), vector(like), matrix(like), matrix(like),
+    )  # fmt: skip
+    foot_F, foot_U = vector(like), vector(like)
+    sines_cosines(model, n, y, s, c)
+    projections(model.foot_x, model.foot_y, n, s, c, foot_F, foot_U)
+    # velocity of the centre of the foot that stands afterwards, along the slope and normal to it
+    along, upward = -R * y[n + STANCE], 0.0
+    if other_foot:
+        for l in range(n):
+            along -= foot_U[l] * y[n + l]
+            upward += foot_F[l] * y[n + l]
+    for k in range(n):
+        place = model.roles[k] if other_foot else k
+        new[k], new[n + k] = y[place], y[n + place]
+    equations(model, new, s, c, F, U, M, p)
+    for k in range(n):
+        for l in range(n):
+            factors[k, l] = M[k, l]
+    factor_linked(model, phase, factors)
+    pushed = other_foot and model.push_off != 0.0
+    twist = push_off(model, new).angular if pushed else 0.0
+    project(model, phase, M, factors, F, U, new[n : 2 * n], along, upward, twist, p)
+    jump, turned = vector(like), vector(like)
+    for k in range(n):
+        jump[k] = p[k] - new[n + k]
+        new[n + k] = p[k]
+    jump_along, jump_upward = -R * p[STANCE] - along, -upward
+    for at in range(2 * n, len(y), 2 * n):
+        along, upward = -R * y[at + n + STANCE], 0.0
+        if other_foot:
+            for l in range(n):
+                along -= foot_F[l] * y[at + l] * y[n + l] + foot_U[l] * y[at + n + l]
+                upward += foot_F[l] * y[at + n + l] - foot_U[l] * y[at + l] * y[n + l]
+        for k in range(n):
+            place = model.roles[k] if other_foot else k
+            new[at + k], new[at + n + k] = y[at + place], y[at + n + place]
+        twist = 0.0
+        if pushed:
+            push = push_off(model, new)
+            twist = push.by_trailing * new[at + SWING] + push.by_leading * new[at + STANCE]
+        turn, rate = new[at : at + n], new[at + n : at + 2 * n]
+        mass_change(model, s, c, turn, jump, jump_along, jump_upward, turned)
+        project_change(model, phase, M, factors, F, U, rate, along, upward, twist, turned, p)
+        for k in range(n):
+            new[at + n + k] = p[k]
+
+
+class RootedTree(NamedTuple):
+    """A tree of n bodies about its root, in the terms of `project`: what a mechanism of either model gives it."""
+
+    E: Floats  # (phases, n, n)
+    A: Floats  # (n, n) kg m^2
+    B: Floats
+    arm_x: Floats  # (n,) kg m
+    arm_y: Floats
+    mass: float  # kg
+    radius: float  # m, of the foot that rolls; 0 where the root is at rest or the centre of mass
+    slope: float  # rad
+
+
+class Lock(NamedTuple):
+    """A joint's lock: a plastic impact that leaves the root's motion as it is."""
+
+    velocities: Floats  # (n,) rad/s, after it
+    lost: float  # J
+    changes: Floats  # (n, columns) rad/s, images of the columns
+
+
+def lock(tree: RootedTree, angles: Floats, omega: Floats, turns: Floats, rates: Floats) -> Lock:
+    """Project angular velocities (n,) on what E[0] allows, by the impact of `strike`; the root takes no part.
+
+    angles        (n,) rad, from the vertical
+    turns, rates  (n, columns) directions of the state before: changes of the angles and of their velocities
+    """
+    n = len(omega)
+    s, c, F, U, p = np.zeros((5, n))
+    M, changes, turned = np.zeros((n, n)), np.zeros(rates.shape), np.zeros(rates.shape)
+    sines_cosines(tree, n, angles, s, c)
+    add_inertia(tree, n, s, c, omega, M, p)
+    factors = M.copy()
+    factor_linked(tree, 0, factors)
+    project(tree, 0, M, factors, F, U, omega, 0.0, 0.0, 0.0, p)
+    if rates.shape[1] > 0:
+        mass_change(tree, s, c, turns, p - omega, 0.0, 0.0, turned)
+        project_change(tree, 0, M, factors, F, U, rates, 0.0, 0.0, 0.0, turned, changes)
+    return Lock(p, float(0.5 * (M @ omega) @ (omega - p)), changes)
+
+
+class PushOffImpulse(NamedTuple):
+    """An impulse at the trailing foot, along the line from there to the hip."""
+
+    along: float  # N s, along the slope
+    upward: float  # N s, normal to it
+    angular: float  # N m s, on the leading leg about its foot: an impulse through the hip turns nothing else
+    by_trailing: float  # N m s, its derivatives by the angles of both legs
+    by_leading: float
+
+
+@kernel_part
+def push_off(model: RigidModel, new: Any) -> PushOffImpulse:
+    """The push-off of a heel strike, by the state after it."""
+    s_t, c_t = sine_cosine(new[SWING] + model.slope)
+    s_l, c_l = sine_cosine(new[STANCE] + model.slope)
+    R = model.radius
+    # from where each foot touches to the hip, along the slope and normal to it
+    x_t, y_t = c_t * model.hip_x - s_t * model.hip_y, s_t * model.hip_x + c_t * model.hip_y + R
+    x_l, y_l = c_l * model.hip_x - s_l * model.hip_y, s_l * model.hip_x + c_l * model.hip_y + R
+    length = math.hypot(x_t, y_t)
+    share = model.push_off / length
+    angular = share * (x_l * y_t - y_l * x_t)
+    by_trailing = share * (x_l * x_t + y_l * (y_t - R)) - angular * x_t * R / (length * length)
+    by_leading = -share * ((y_l - R) * y_t + x_l * x_t)
+    return PushOffImpulse(share * x_t, share * y_t, angular, by_trailing, by_leading)
+
+
+def push_off_work(model: RigidModel, before: Floats) -> Floats:
+    """Work (strikes,) in J of the push-offs at heel strikes, each done just before its strike.
+
+    The walker is free of the ground then, its knees locked and its torso coupled: an impulse P along e gives
+    P^2 / 2 J M^-1 J', with J the velocity along e of the trailing contact point, or of the hip on the same line.
+    Angular velocities leave of M the apparent mass at the hip, m - C' I^-1 C, with moments C and inertia I about it.
+
+    before  (strikes, 2 n) states just before the strikes
+
+    Source: Kuo (2002), whose legs without mass leave P^2 / (2 m).
+    """
+    n, E = len(model.arm_x), model.E[STRAIGHT]
+    Z = E[:, np.diag(E) != 0.0]
+    A, B, arm_x, arm_y = (each.copy() for each in (model.A, model.B, model.arm_x, model.arm_y))
+    # the trailing leg hangs from the hip as the leading one does, and seen from there nothing hangs from it
+    leg = [SWING] if model.shank == NO_SHANK else [SWING, int(model.shank)]
+    own = A[np.ix_(leg, leg)].sum()
+    for pairs in (A, B):
+        pairs[STANCE, :], pairs[:, STANCE] = 0.0, 0.0
+    A[STANCE, STANCE], arm_x[STANCE], arm_y[STANCE] = own, arm_x[leg].sum(), arm_y[leg].sum()
+    psi = before[:, :n] + model.slope
+    s, c, turned = np.sin(psi), np.cos(psi), psi[:, None, :] - psi[:, :, None]
+    inertia = Z.T @ (A * np.cos(turned) + B * np.sin(turned)) @ Z
+    moments = Z.T @ np.stack((-s * arm_x - c * arm_y, c * arm_x - s * arm_y), axis=2)
+    apparent = model.mass * np.eye(2) - moments.transpose(0, 2, 1) @ np.linalg.solve(inertia, moments)
+    s_t, c_t = s[:, STANCE], c[:, STANCE]
+    to_hip = np.stack((c_t * model.hip_x - s_t * model.hip_y, s_t * model.hip_x + c_t * model.hip_y + model.radius), 1)
+    impulse = model.push_off * to_hip / np.linalg.norm(to_hip, axis=1, keepdims=True)
+    return np.asarray(0.5 * (impulse[:, None, :] @ np.linalg.solve(apparent, impulse[:, :, None]))[:, 0, 0])
+
+
+def pushed_at_hip(model: RigidModel, y: Any, impulse: float) -> NDArray[np.float64]:
+    """The state (2 n) just after a heel strike y, changed by an impulse (N s) at the hip along the slope.
+
+    The new stance foot stays where it is. It comes after the release of the trailing knee, which is free.
+    """
+    n, new, phase = len(model.arm_x), np.array(y, float), BENT if model.kneed else STRAIGHT
+    s, c, F, U, p = np.zeros((5, n))
+    M = np.zeros((n, n))
+    equations(model, new, s, c, F, U, M, p)
+    p[:] = 0.0
+    p[STANCE] = -impulse * hip_height(model, new)
+    factor_linked(model, phase, M)
+    solve_linked(model, phase, M, p)
+    new[n:] += p
+    return new
+
+
+@forced_inline
+def project(
+    model: Any, phase: int, M: Any, factors: Any, F: Any, U: Any, omega: Any, along: float, upward: float, twist: float,
+    p: Any,
+) -> None:  # fmt: skip
+    """Write the velocities after a plastic impact on the constraints of E[phase] into p (n,).
+
+    model                 a tree of either model about the root that the constraints leave
+    M, factors            (n, n) kg m^2, and what `factor_linked` makes of it
+    F, U                  (n,) kg m, projections of the first moments
+    omega, along, upward  (n,) rad/s and m/s, velocities before of the bodies and of the root
+    twist                 N m s, an impulse on the stance leg
+    """
+    momenta(model, M, F, U, omega, along, upward, p)
+    p[STANCE] += twist
+    solve_linked(model, phase, factors, p)
+
+
+@forced_inline
+def project_change(
+    model: Any, phase: int, M: Any, factors: Any, F: Any, U: Any, rate: Any, along: float, upward: float, twist: float,
+    turned: Any, p: Any,
+) -> None:  # fmt: skip
+    """As `project`, of a change of the velocities, with the change of the momenta (n,) by the angles in `turned`."""
+    momenta(model, M, F, U, rate, along, upward, p)
+    for k in range(len(model.arm_x)):
+        p[k] -= turned[k]
+    p[STANCE] += twist
+    solve_linked(model, phase, factors, p)
+
+
+@forced_inline
+def momenta(model: Any, M: Any, F: Any, U: Any, omega: Any, along: float, upward: float, p: Any) -> None:
+    """Z' M u into p (n,), with the angular velocities omega (n,).
+
+    M is M' of rigid_model.py, whose part in the rolling of angular velocities is taken out again.
+    """
+    n, R = len(model.arm_x), model.radius
+    sliding = along + R * omega[STANCE]
+    for k in range(n):
+        total = upward * F[k] - sliding * U[k]
+        for l in range(n):
+            total += M[k, l] * omega[l]
+        p[k] = total
+    p[STANCE] -= R * model.mass * sliding
+
+
+@forced_inline
+def mass_change(model: Any, s: Any, c: Any, turn: Any, jump: Any, along: float, upward: float, p: Any) -> None:
+    """Z' dM w into p (n,): the change of the masses' matrix as the bodies turn, times a jump w of the velocities.
+
+    turn  (n,) how the angles change
+    """
+    n = len(model.arm_x)
+    F, U = vector(model.arm_x), vector(model.arm_x)
+    projections(model.arm_x, model.arm_y, n, s, c, F, U)
+    pulled = 0.0
+    for k in range(n):
+        turn_k = turn[k]
+        total = -F[k] * turn_k * along - U[k] * turn_k * upward
+        for l in range(n):
+            cos_d, sin_d = c[l] * c[k] + s[l] * s[k], s[l] * c[k] - c[l] * s[k]
+            total += (model.B[k, l] * cos_d - model.A[k, l] * sin_d) * (turn[l] - turn_k) * jump[l]
+        p[k] = total
+        pulled += F[k] * turn_k * jump[k]
+    p[STANCE] += model.radius * pulled

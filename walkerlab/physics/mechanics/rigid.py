@@ -1,0 +1,166 @@
+"""From parts to the rigid model: which bodies stand, swing and follow, and what changes at heel strike."""
+
+import math
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from walkerlab.physics.mechanics.assembly import Anchor, followers, levers, reduction, tree_about
+from walkerlab.physics.mechanics.parts import Assembly, Revolute
+from walkerlab.physics.mechanics.rigid_model import NO_SHANK, STANCE, SWING, RigidModel, new_rigid_model, on_slope
+from walkerlab.physics.solvers.system import Floats
+
+ALIKE = 1e-12  # relative difference up to which two legs are alike
+
+
+@dataclass(frozen=True)
+class BodyPlaces:
+    """Which bodies of an assembly make up each body of the rigid model, whose stance leg stays straight."""
+
+    names: tuple[str, ...]  # of the angles, without their 'theta_'
+    members: Floats  # (bodies, n) 1 where a body belongs to a place
+    roles: tuple[int, ...]  # which place each is taken from at heel strike
+    knees: tuple[tuple[int, int], ...]  # (shank, thigh) of the swing leg
+
+
+def standing(assembly: Assembly, gravity: float, slope: float, knee_locked_at_strike: bool = True) -> RigidModel:
+    """The rigid model of an assembly on a slope (rad), as `on_level_ground` makes it."""
+    return on_slope(on_level_ground(assembly, gravity, knee_locked_at_strike), slope)
+
+
+def on_level_ground(assembly: Assembly, gravity: float, knee_locked_at_strike: bool) -> RigidModel:
+    """The rigid model of an assembly; gravity in m/s^2.
+
+    knee_locked_at_strike  whether the trailing knee is rigid during the heel strike and released just after it
+
+    Raises ValueError, in words for the user, for parts that make no walker with two like legs.
+    """
+    refuse_unlike_legs(assembly)
+    hip = hip_of(assembly)
+    places = places_of(assembly)
+    foot = assembly.feet[STANCE]
+    root = Anchor(foot.body, foot.centre_m)
+    to_foot = places.members.T @ levers(
+        assembly, root, Anchor(assembly.feet[SWING].body, assembly.feet[SWING].centre_m)
+    )
+    to_hip = places.members.T @ levers(assembly, root, Anchor(hip.parent, hip.parent_point_m))
+    hanging = -to_hip[STANCE]  # from the hip to the centre of the foot's arc in a straight leg
+    torso, knees = torso_rows(assembly, places), knee_rows(places)
+    n = len(places.names)
+    free = () if knee_locked_at_strike else tuple(shank for shank, _ in places.knees)
+    tree, members = tree_about(assembly, root), places.members
+    section_indices = (STANCE, n + SWING, n + STANCE, *(n + shank for shank in free))
+    in_line = {**torso, **knees}
+    reductions = [reduction(rows, n) for rows in (torso, in_line, torso if free else in_line)]
+    shank, thigh = places.knees[0] if places.knees else (NO_SHANK, NO_SHANK)
+    return new_rigid_model(
+        n,
+        **tree.merged(members),
+        foot_x=to_foot[:, 0],
+        foot_y=to_foot[:, 1],
+        E=reductions,
+        hinges=[(SWING, STANCE), *places.knees],
+        roles=places.roles,
+        section=[*section_indices, *[0] * (n + 1 - len(section_indices))],
+        coordinates=len(section_indices),
+        thigh=thigh,
+        shank=shank,
+        radius=foot.radius_m,
+        hip_x=to_hip[STANCE, 0],
+        hip_y=to_hip[STANCE, 1],
+        lean=math.atan2(hanging[0], -hanging[1]),
+        leg_length=foot.radius_m - hanging[1],
+        gravity=gravity,
+        gravity_down=gravity,
+    )
+
+
+def places_of(assembly: Assembly) -> BodyPlaces:
+    """Swing leg (thigh), straight stance leg, what else swings, and what belongs to both legs."""
+    swinging, stance = assembly.legs
+    shared = tuple(body.name for body in assembly.bodies if body.name not in (*swinging, *stance))
+    groups = [(swinging[0],), stance, *((name,) for name in swinging[1:]), *((name,) for name in shared)]
+    members = np.zeros((len(assembly.bodies), len(groups)))
+    for place, group in enumerate(groups):
+        for name in group:
+            members[assembly.index(name), place] = 1.0
+    more = len(swinging) - 1
+    knee_of = {knee.shank: knee.thigh for knee in assembly.knees}
+    return BodyPlaces(
+        names=("1", "2", *(f"1_{name.split()[0]}" for name in swinging[1:]), *(name.split()[0] for name in shared)),
+        members=members,
+        roles=(STANCE, SWING, *((STANCE,) * more), *range(2 + more, len(groups))),
+        knees=tuple((2 + k, place_of(groups, knee_of[name])) for k, name in enumerate(swinging[1:])),
+    )
+
+
+def place_of(groups: list[tuple[str, ...]], name: str) -> int:
+    """Which group a body is in."""
+    return next(place for place, group in enumerate(groups) if name in group)
+
+
+def torso_rows(assembly: Assembly, places: BodyPlaces) -> dict[int, Floats]:
+    """Weights by which coupled places follow others."""
+    members = places.members
+    return {int(np.argmax(members[body])): row @ members for body, row in followers(assembly).items()}
+
+
+def knee_rows(places: BodyPlaces) -> dict[int, Floats]:
+    """Weights by which the parts of a straight swing leg follow its thigh."""
+    return {shank: np.eye(len(places.names))[thigh] for shank, thigh in places.knees}
+
+
+def hip_of(assembly: Assembly) -> Revolute:
+    """The hinge between the legs, with the stance leg as its parent."""
+    first, second = (leg[0] for leg in assembly.legs)
+    hinge = assembly.hinge(second, first)
+    if hinge is None:
+        raise ValueError(f"no hinge joins the legs {first!r} and {second!r} at a hip; add one between them")
+    return hinge
+
+
+def knee_of(assembly: Assembly) -> tuple[float, float] | None:
+    """Where a thigh's frame has its knee (m); None without knees."""
+    hinges = (assembly.hinge(knee.thigh, knee.shank) for knee in assembly.knees)
+    return next((hinge.parent_point_m for hinge in hinges if hinge is not None), None)
+
+
+def refuse_unlike_legs(assembly: Assembly) -> None:
+    """Raise ValueError unless both legs have the same parts in the same order, joined by knees, and a foot each."""
+    first, second = assembly.legs
+    if not first or len(first) != len(second):
+        raise ValueError("both legs need the same bodies, from the hip down: legs: [[…], […]]")
+    if len(first) > 2:
+        raise ValueError("a leg has at most a thigh and a shank, with one knee between them")
+    if set(first) & set(second):
+        raise ValueError(f"{', '.join(sorted(set(first) & set(second)))} belongs to both legs; list a body for one")
+    feet = tuple(foot.body for foot in assembly.feet)
+    if len(feet) != 2 or feet[0] not in first or feet[1] not in second:
+        raise ValueError("a walker has two feet, the first on a body of the first leg, the second on one of the second")
+    knees = {(knee.thigh, knee.shank) for knee in assembly.knees}
+    for leg in assembly.legs:
+        for above, below in pairwise(leg):
+            if (above, below) not in knees:
+                raise ValueError(f"{below!r} hangs from {above!r} without a knee that locks: the leg could not stand")
+    coupled = {coupling.body for coupling in assembly.couplings}
+    for body in assembly.bodies:
+        if body.name not in (*first, *second) and body.name not in coupled:
+            raise ValueError(f"body {body.name!r} belongs to no leg and no coupling holds it")
+    one, other = (leg_measures(assembly, k) for k in range(2))
+    if not np.allclose(one, other, rtol=ALIKE, atol=ALIKE * np.abs(one).max()):
+        raise ValueError("the two legs differ; a walker whose legs change roles needs two that are alike")
+
+
+def leg_measures(assembly: Assembly, k: int) -> Floats:
+    """Mass, inertia, centre of mass and foot of a leg, as seen from its hip."""
+    leg, foot = assembly.legs[k], assembly.feet[k]
+    hip = hip_of(assembly)
+    at_hip = Anchor(hip.parent, hip.parent_point_m) if k == 1 else Anchor(hip.child, hip.child_point_m)
+    own = [assembly.index(name) for name in leg]
+    measures = [foot.radius_m, *levers(assembly, at_hip, Anchor(foot.body, foot.centre_m))[own].ravel()]
+    for name in leg:
+        body = assembly.bodies[assembly.index(name)]
+        measures += [body.mass_kg, body.inertia_kg_m2]
+        measures += [*levers(assembly, at_hip, Anchor(name, body.centre_m))[own].ravel()]
+    return np.array(measures)

@@ -1,0 +1,395 @@
+"""A walker standing on one foot that is pinned to the ground or rolls on it without slip.
+
+The centre of the foot's arc is the tree's root; it moves along the slope by -R times the stance leg's angle, and R = 0
+is a hinge. With M, r, F and U of tree.py and s the stance leg:
+
+    M'_kl = M_kl + R (U_k d_ls + U_l d_ks) + m R^2 d_ks d_ls
+    r'_k = r_k - d_ks R (sum over l of omega_l^2 F_l + m g_along)
+
+Bodies that follow others (a locked shank its thigh, a torso the bisector of the legs) are a reduction theta = E z with
+a constant E, which turns M' alpha = r' into E' M' E dz' = E' r'.
+
+Body 0 is the swing leg (its thigh), body 1 the stance leg, which stays straight; then the swing leg's shank, then what
+belongs to both legs.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from walkerlab.physics.kernels import forced_inline, kernel_part, matrix, vector, zeros
+from walkerlab.physics.mechanics import tree
+from walkerlab.physics.mechanics.hinges import (
+    HingeTorque,
+    add_hinge_gradients,
+    add_hinge_torque,
+    hinge_energy,
+    hinge_law,
+    hinge_torque,
+    is_sprung,
+    legs_apart,
+)
+from walkerlab.physics.mechanics.links import factor_linked, solve_linked, spread
+from walkerlab.physics.mechanics.tree import (
+    add_gravity,
+    add_gravity_gradient,
+    add_inertia,
+    add_inertia_gradients,
+    lever_motion,
+    projections,
+    sines_cosines,
+)
+from walkerlab.physics.mechanics.trigonometry import sine_cosine
+from walkerlab.physics.solvers.system import Floats, Integers, block, derivative, jacobian
+
+SWING, STANCE, SHANK = 0, 1, 2
+# rows of E: while the swing knee is free, with the swing leg straight, and in the heel strike
+BENT, STRAIGHT, AT_STRIKE = 0, 1, 2
+NO_SHANK = -1
+
+
+@tree.read_at_once
+class RigidModel(tree.Mechanism):  # type: ignore[misc]  # as its base
+    """Everything that stays the same while the rigid model walks, SI: a structured scalar, of n bodies by its type.
+
+    E has three reductions: BENT, STRAIGHT, AT_STRIKE.
+    """
+
+    foot_x: Floats  # (n,) m, levers from the stance foot's centre to the swing foot's, body by body
+    foot_y: Floats
+    roles: Integers  # (n,) which body takes each place after the heel strike
+    section: Integers  # (n + 1,) places in the state of the section's coordinates, the stance leg's angle first
+    coordinates: int  # [d] of the section
+    thigh: int  # places of the swing knee's bodies among them; NO_SHANK for legs without knees
+    shank: int
+    unpaired: float  # kg m^2, of a torque on the stance leg that no hinge gives: see `add_unpaired_torque`
+    radius: float  # [R] m, of either foot; 0 is a point
+    hip_x: float  # m, to the hip, which belongs to the stance leg
+    hip_y: float
+    lean: float  # rad, angle of the line from hip to foot centre in a straight leg
+    leg_length: float  # [L] m, hip to sole
+    gravity: float  # [g] m/s^2
+    zero_state: Floats  # (2 n,) zeros: the bodies' angles from the vertical and their velocities
+
+    @property
+    def section_indices(self) -> tuple[int, ...]:
+        """Places (d) in the state of the section's coordinates."""
+        return tuple(self.section[: self.coordinates].tolist())
+
+    @property
+    def kneed(self) -> bool:
+        """Whether the swing leg has a knee."""
+        return bool(self.shank != NO_SHANK)
+
+    @property
+    def passive(self) -> bool:
+        """Whether nothing but gravity acts on it, not even a spring or a damper."""
+        return not self.sprung and not self.driven
+
+    def __eq__(self, other: object) -> bool:
+        """Whether all numbers are the same."""
+        return isinstance(other, RigidModel) and self.dtype == other.dtype and self.tobytes() == other.tobytes()
+
+    def __hash__(self) -> int:
+        """Of all numbers."""
+        return hash(self.tobytes())
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Its copy in another process, read-only too: kernels are compiled anew for what can be written to."""
+        return RigidModel.changed, (np.asarray(self),)
+
+    def changed(self, **fields: Any) -> "RigidModel":
+        """A copy with other values of some fields, that nobody can write to."""
+        memory: Any = np.empty((), self.dtype)
+        memory[()] = self
+        tree.write_fields(memory, fields)
+        memory.flags.writeable = False
+        read_only: RigidModel = memory[()]
+        return read_only
+
+
+def new_rigid_model(n: int, **fields: Any) -> RigidModel:
+    """The rigid model of n bodies with these fields; the others are zero."""
+    shapes = {
+        **tree.mechanism_shapes(n, 3, len(fields["hinges"])),
+        **dict.fromkeys(("foot_x", "foot_y", "roles"), (n,)),
+        "section": (n + 1,),
+        "zero_state": (2 * n,),
+    }
+    blank: Any = np.zeros((), tree.record_type(RigidModel, shapes))
+    model: RigidModel = blank[()]
+    return model.changed(**fields)
+
+
+def on_slope(model: RigidModel, slope: float) -> RigidModel:
+    """The same walker on another slope (rad)."""
+    along, down = model.gravity * math.sin(slope), model.gravity * math.cos(slope)
+    return model.changed(slope=slope, gravity_along=along, gravity_down=down)
+
+
+class Mode(NamedTuple):
+    """The walker between events, alone or with how its motion changes along directions of its start.
+
+    Its state (2 n,) are the bodies' angles and their velocities; behind it come as many columns (2 n,) as there is room
+    for in what a method integrates: the variational equations.
+    """
+
+    model: RigidModel
+    phase: int  # BENT or STRAIGHT
+    # m, heights over the present foothold: of that which the swing foot leaves, and of that on which it is to land
+    behind: float = 0.0
+    rise: float = 0.0
+
+
+@block.case(Mode)
+def state_or_column(system: Mode) -> Any:
+    """A state, or a column."""
+    return zeros(system.model.zero_state)
+
+
+@forced_inline
+def equations(model: RigidModel, y: Any, s: Any, c: Any, F: Any, U: Any, M: Any, r: Any) -> None:
+    """M' (n, n) in kg m^2 and r' (n,) in N m at the state y, with all that they are made of."""
+    n, R = len(model.arm_x), model.radius
+    omega = y[n : 2 * n]
+    sines_cosines(model, n, y, s, c)
+    projections(model.arm_x, model.arm_y, n, s, c, F, U)
+    for k in range(n):
+        r[k] = 0.0
+    add_gravity(model, n, F, U, r)
+    add_inertia(model, n, s, c, omega, M, r)
+    for row in range(len(model.hinges)):
+        if is_sprung(model, row):
+            add_hinge_torque(torque_at(model, row, y), model.hinges[row, 0], model.hinges[row, 1], r)
+    add_unpaired_torque(model, s, c, omega, r)
+    if R != 0.0:
+        pulled = model.mass * model.gravity_along
+        for k in range(n):
+            pulled += omega[k] * omega[k] * F[k]
+            M[STANCE, k] += R * U[k]
+            M[k, STANCE] += R * U[k]
+        r[STANCE] -= R * pulled
+        M[STANCE, STANCE] += model.mass * R * R
+
+
+@forced_inline
+def torque_at(model: RigidModel, row: int, y: Any) -> HingeTorque:
+    """The torque of the spring, damper and drive at a hinge."""
+    n, body, other = len(model.arm_x), model.hinges[row, 0], model.hinges[row, 1]
+    return hinge_torque(hinge_law(model, row), y[body] - y[other], y[n + body] - y[n + other])
+
+
+@legs_apart.case(Mode)
+def legs_apart_standing(system: Mode, y: Any) -> tuple[float, float]:
+    """The uppermost bodies of both legs."""
+    n = len(system.model.arm_x)
+    return y[SWING] - y[STANCE], y[n + SWING] - y[n + STANCE]
+
+
+@forced_inline
+def add_unpaired_torque(model: RigidModel, s: Any, c: Any, omega: Any, r: Any) -> None:
+    """Add a torque (N m) on the stance leg, by the swing leg's angular velocity squared, that nothing answers.
+
+    It is centrifugal, unpaired sin(theta_1 - theta_2) omega_1^2, without a counterpart on the swing leg, so it does not
+    keep the energy. Walkers of Lagrange's equations have none of it.
+    """
+    if model.unpaired != 0.0:
+        r[STANCE] += model.unpaired * omega[SWING] * omega[SWING] * (s[SWING] * c[STANCE] - c[SWING] * s[STANCE])
+
+
+@forced_inline
+def add_unpaired_gradients(model: RigidModel, s: Any, c: Any, omega: Any, by_angle: Any, by_rate: Any) -> None:
+    """Add its derivatives by the angles and by their velocities."""
+    if model.unpaired != 0.0:
+        cos_d, sin_d = c[SWING] * c[STANCE] + s[SWING] * s[STANCE], s[SWING] * c[STANCE] - c[SWING] * s[STANCE]
+        turning = model.unpaired * omega[SWING] * omega[SWING] * cos_d
+        by_angle[STANCE, SWING] += turning
+        by_angle[STANCE, STANCE] -= turning
+        by_rate[STANCE, SWING] += 2.0 * model.unpaired * omega[SWING] * sin_d
+
+
+@derivative.case(Mode)
+def mode_derivative(system: Mode, t: float, y: Any, f: Any) -> None:
+    """The equations of motion as a first-order system, and the variational equations of the columns behind."""
+    model = system.model
+    like, phase = model.arm_x, system.phase
+    n = len(like)
+    s, c, F, U, alpha, M = vector(like), vector(like), vector(like), vector(like), vector(like), matrix(like)
+    equations(model, y, s, c, F, U, M, alpha)
+    factor_linked(model, phase, M)
+    solve_linked(model, phase, M, alpha)
+    for k in range(n):
+        f[k], f[n + k] = y[n + k], alpha[k]
+    if len(y) > 2 * n:
+        by_angle, by_rate = matrix(like), matrix(like)
+        torque_gradients(model, y, s, c, alpha, by_angle, by_rate)
+        for at in range(2 * n, len(y), 2 * n):
+            # alpha serves as the column's right-hand side: d alpha of E' M' E d alpha = E' (dr - dM' alpha)
+            for k in range(n):
+                total = 0.0
+                for l in range(n):
+                    total += by_angle[k, l] * y[at + l] + by_rate[k, l] * y[at + n + l]
+                alpha[k] = total
+            solve_linked(model, phase, M, alpha)
+            for k in range(n):
+                f[at + k], f[at + n + k] = y[at + n + k], alpha[k]
+
+
+@forced_inline
+def torque_gradients(model: RigidModel, y: Any, s: Any, c: Any, alpha: Any, by_angle: Any, by_rate: Any) -> None:
+    """Derivatives (n, n) of r' - M' alpha at fixed alpha with respect to the angles and to their velocities."""
+    n, R = len(model.arm_x), model.radius
+    omega, F, U = y[n : 2 * n], vector(model.arm_x), vector(model.arm_x)
+    projections(model.arm_x, model.arm_y, n, s, c, F, U)
+    for k in range(n):
+        for l in range(n):
+            by_angle[k, l], by_rate[k, l] = 0.0, 0.0
+        by_angle[k, k] = -R * F[k] * alpha[STANCE]
+    add_gravity_gradient(model, n, F, U, by_angle)
+    add_inertia_gradients(model, n, s, c, omega, alpha, by_angle, by_rate)
+    for row in range(len(model.hinges)):
+        if is_sprung(model, row):
+            now = torque_at(model, row, y)
+            add_hinge_gradients(now, model.hinges[row, 0], model.hinges[row, 1], by_angle, by_rate)
+    add_unpaired_gradients(model, s, c, omega, by_angle, by_rate)
+    if R != 0.0:
+        for l in range(n):
+            by_angle[STANCE, l] -= R * (F[l] * alpha[l] - omega[l] * omega[l] * U[l])
+            by_rate[STANCE, l] -= 2.0 * R * omega[l] * F[l]
+
+
+@jacobian.case(Mode)
+def mode_jacobian(system: Mode, t: float, y: Any, J: Any) -> None:
+    """Derivatives of the equations of motion: the rates of unit columns, one direction a column."""
+    model = system.model
+    like, phase = model.arm_x, system.phase
+    n = len(like)
+    s, c, F, U, alpha, M = vector(like), vector(like), vector(like), vector(like), vector(like), matrix(like)
+    by_angle, by_rate = matrix(like), matrix(like)
+    equations(model, y, s, c, F, U, M, alpha)
+    factor_linked(model, phase, M)
+    solve_linked(model, phase, M, alpha)
+    torque_gradients(model, y, s, c, alpha, by_angle, by_rate)
+    for j in range(2 * n):
+        for k in range(n):
+            J[k, j] = 1.0 if j == n + k else 0.0
+            alpha[k] = by_angle[k, j] if j < n else by_rate[k, j - n]
+        solve_linked(model, phase, M, alpha)
+        for k in range(n):
+            J[n + k, j] = alpha[k]
+
+
+@kernel_part
+def ground_reaction(system: Mode, y: Any) -> tuple[float, float]:
+    """Force of the ground on the stance foot (N): along the slope (positive in walking direction) and normal to it."""
+    model = system.model
+    n = len(model.arm_x)
+    s, c, F, U, f = (
+        vector(model.arm_x),
+        vector(model.arm_x),
+        vector(model.arm_x),
+        vector(model.arm_x),
+        vector(model.zero_state),
+    )
+    sines_cosines(model, n, y, s, c)
+    projections(model.arm_x, model.arm_y, n, s, c, F, U)
+    derivative(system, 0.0, y, f)
+    along = -model.mass * (model.radius * f[n + STANCE] + model.gravity_along)
+    normal = model.mass * model.gravity_down
+    for k in range(n):
+        squared = y[n + k] * y[n + k]
+        along -= U[k] * f[n + k] + F[k] * squared
+        normal += F[k] * f[n + k] - U[k] * squared
+    return along, normal
+
+
+@kernel_part
+def momentum(model: RigidModel, y: Any) -> tuple[float, float]:
+    """Linear momentum (kg m/s): along the slope and normal to it."""
+    n = len(model.arm_x)
+    s, c = vector(model.arm_x), vector(model.arm_x)
+    sines_cosines(model, n, y, s, c)
+    _, _, along, normal = lever_motion(model.arm_x, model.arm_y, n, s, c, y[n : 2 * n])
+    return along - model.mass * model.radius * y[n + STANCE], normal
+
+
+@kernel_part
+def energies(model: RigidModel, y: Any) -> tuple[float, float]:
+    """Kinetic and potential energy (J), the latter from where the foot touches with its leg normal to the slope.
+
+    The potential energy is gravity's and that of the springs at the hinges.
+    """
+    n = len(model.arm_x)
+    s, c, F, U, r, M = (
+        vector(model.arm_x), vector(model.arm_x), vector(model.arm_x), vector(model.arm_x), vector(model.arm_x),
+        matrix(model.arm_x),
+    )  # fmt: skip
+    equations(model, y, s, c, F, U, M, r)
+    rolled = -model.radius * (y[STANCE] + model.slope)
+    potential = tree.potential_energy(model, n, rolled, model.radius, F, U)
+    for row in range(len(model.hinges)):
+        potential += hinge_energy(hinge_law(model, row), y[model.hinges[row, 0]] - y[model.hinges[row, 1]])
+    return tree.kinetic_energy(n, M, y[n : 2 * n]), potential
+
+
+def energy_at_touch(model: RigidModel, touched: Any) -> Any:
+    """Potential energy (J), as `energies` counts it, of the walker's mass at the contact point of a step's touch.
+
+    touched  rad, angle of the stance leg at the touch; or (...,) of several
+    """
+    return model.mass * model.gravity_along * model.radius * (touched + model.slope)
+
+
+@kernel_part
+def swing_foot(model: RigidModel, y: Any) -> tuple[float, float]:
+    """How high the swing foot's lowest point is over the slope, and how far it is ahead of the stance foot's (m)."""
+    height, ahead, _, _ = swing_foot_motion(model, y, y)
+    return height, ahead
+
+
+@kernel_part
+def swing_foot_motion(model: RigidModel, y: Any, turn: Any) -> tuple[float, float, float, float]:
+    """`swing_foot`, and how both change as the bodies turn: rates (m/s) where `turn` are angular velocities."""
+    n = len(model.arm_x)
+    s, c = vector(model.arm_x), vector(model.arm_x)
+    sines_cosines(model, n, y, s, c)
+    ahead, height, apart, upward = lever_motion(model.foot_x, model.foot_y, n, s, c, turn)
+    return height, ahead, upward, apart
+
+
+@kernel_part
+def hip_height(model: RigidModel, y: Any) -> float:
+    """Height of the hip over the slope (m)."""
+    s, c = sine_cosine(y[STANCE] + model.slope)
+    return model.radius + s * model.hip_x + c * model.hip_y
+
+
+@kernel_part
+def feet_on_slope(model: Any, swing: Any, stance: Any) -> Any:
+    """Sum (rad) of the straight legs' angles from the slope's normal: zero with both feet on even ground.
+
+    It falls through zero at heel strike. (9-2) prints theta_1 = -theta_2, which holds only for angles from the normal.
+
+    swing, stance  rad, angles from the vertical: numbers, arrays or lanes
+    """
+    return swing + stance + 2.0 * (model.slope + model.lean)
+
+
+def step_lengths(model: RigidModel, starts: Any, ends: Any) -> Floats:
+    """Distances (steps,) in m along the slope from touch to touch, by first and last states (steps, 2 n) of steps."""
+    psi = ends[:, : len(model.arm_x)] + model.slope
+    ahead = np.cos(psi) @ model.foot_x - np.sin(psi) @ model.foot_y
+    return np.asarray(ahead - model.radius * (ends[:, STANCE] - starts[:, STANCE]))
+
+
+def kinetic_energy(model: RigidModel, y: Any) -> float:
+    """Kinetic energy (J)."""
+    return energies(model, y)[0]
+
+
+def linked(model: RigidModel, phase: int, values: Any) -> Floats:
+    """Values (n,) of all bodies, those of the followers from those that they follow."""
+    every = np.array(values, float)
+    spread(model, phase, every)
+    return every

@@ -1,0 +1,201 @@
+"""The equations of motion of a tree of bodies about its root, for both models: matrices, torques, energies, gradients.
+
+With the projections of the first moments c_k on the slope and its normal, F_k = (R(psi_k) c_k)_x and
+U_k = (R(psi_k) c_k)_y, psi the angles from the slope's normal, and Delta = theta_l - theta_k,
+
+    M_kl = A_kl cos Delta + B_kl sin Delta
+    r_k = sum over l of omega_l^2 (A_kl sin Delta - B_kl cos Delta) - g_along U_k - g_down F_k
+
+the latter two terms about a root at rest. What the root's own motion adds is each model's: a rolling foot's in
+rigid_model.py, Newton's law for the centre of mass in ground/motion.py.
+
+`tree` is a Mechanism: the `RigidModel` or a `GroundModel` on compliant ground. n is the number of bodies, known
+while compiling where the tree's type tells.
+"""
+
+from collections.abc import Mapping
+from inspect import get_annotations
+from operator import itemgetter
+from typing import Any, TypeVar
+
+import numpy as np
+
+from walkerlab.physics.kernels import forced_inline
+from walkerlab.physics.mechanics.hinges import HINGE_ROWS, HIP_ROW, LAW_NUMBERS
+from walkerlab.physics.mechanics.trigonometry import sine_cosine
+from walkerlab.physics.solvers.system import Floats, Integers
+
+R = TypeVar("R", bound=type)
+
+
+def read_at_once(kind: R) -> R:
+    """Have the annotated fields of a class of records be read as they lie in memory.
+
+    NumPy's own look-up of a field takes several times as long, and walks are prepared and measured in Python.
+    """
+    fields: dict[str, Any] = {name: property(itemgetter(name)) for name in kind.__annotations__}
+    fields |= {"__getattribute__": object.__getattribute__, "__getitem__": np.void.__getitem__}
+    for name, read in fields.items():
+        setattr(kind, name, read)
+    return kind
+
+
+def record_type(kind: type, shapes: Mapping[str, tuple[int, ...]]) -> Any:
+    """NumPy's type of a structured scalar with the fields of a class, whose numbers have eight bytes each."""
+    fields = [
+        (name, np.int64 if of in (Integers, int, bool) else np.float64, shapes.get(name, ()))
+        for each in (*kind.__bases__, kind)
+        for name, of in get_annotations(each).items()
+    ]
+    return np.dtype((kind, fields))
+
+
+def new_record(kind: Any, **fields: Any) -> Any:
+    """A structured scalar of a type from `record_type` that kernels write to; fields not named are zero."""
+    record = np.zeros((), kind)[()]
+    for name, value in fields.items():
+        record[name] = value
+    return record
+
+
+@read_at_once
+class Mechanism(np.record):  # type: ignore[misc]  # NumPy's stubs call one of its bases final
+    """Constants of a tree of n bodies about its root, its hinges and what acts on it, for both models, SI."""
+
+    A: Floats  # (n, n) kg m^2, of mechanics/assembly.py
+    B: Floats
+    arm_x: Floats  # (n,) c, kg m: first moments about the root, zero if that is the centre of mass
+    arm_y: Floats
+    E: Floats  # (phases, n, n) the reductions of links.py; a body that follows others has zero on the diagonal
+    hinges: Integers  # (rows, 2) the body that a hinge's torque turns back, and the other one
+    laws: Floats  # (rows, 3) numbers of the SpringDamper at each hinge
+    push_off: float  # N s, along the trailing leg: at once or from a step's touch on
+    mass: float  # kg
+    gravity_along: float  # m/s^2
+    gravity_down: float  # m/s^2, towards the slope
+    slope: float  # [phi] rad, positive downhill in walking direction
+
+    @property
+    def hip(self) -> Floats:
+        """Numbers of the SpringDamper between the legs."""
+        numbers: Floats = self.laws[HIP_ROW]
+        return numbers
+
+    @property
+    def sprung(self) -> bool:
+        """Whether a spring, a damper or a torque acts at any hinge."""
+        return bool(self.laws.any())
+
+    @property
+    def driven(self) -> bool:
+        """Whether anything but gravity gives it energy."""
+        return bool(self.push_off != 0.0 or self.laws[:, -1].any())
+
+
+def mechanism_shapes(n: int, phases: int, rows: int) -> dict[str, tuple[int, ...]]:
+    """Shapes of a Mechanism's arrays for n bodies, some phases and rows of hinges."""
+    pairs, arms = dict.fromkeys(("A", "B"), (n, n)), dict.fromkeys(("arm_x", "arm_y"), (n,))
+    return {**pairs, **arms, "E": (phases, n, n), "hinges": (rows, 2), "laws": (rows, LAW_NUMBERS)}
+
+
+def write_fields(mechanisms: Any, fields: Mapping[str, Any]) -> None:
+    """Write fields into one or more mechanisms; names of HINGE_ROWS stand for the laws at those hinges."""
+    for name, value in fields.items():
+        if name in HINGE_ROWS:
+            mechanisms["laws"][..., HINGE_ROWS[name], :] = value
+        else:
+            mechanisms[name] = value
+
+
+@forced_inline
+def sines_cosines(tree: Any, n: int, theta: Any, s: Any, c: Any) -> None:
+    """Sines and cosines (n,) of the bodies' angles from the slope's normal, into s and c; theta from the vertical."""
+    for k in range(n):
+        s[k], c[k] = sine_cosine(theta[k] + tree.slope)
+
+
+@forced_inline
+def projections(lever_x: Any, lever_y: Any, n: int, s: Any, c: Any, F: Any, U: Any) -> None:
+    """Levers or moments (n,) seen along the slope and normal to it, into F and U."""
+    for k in range(n):
+        F[k] = c[k] * lever_x[k] - s[k] * lever_y[k]
+        U[k] = s[k] * lever_x[k] + c[k] * lever_y[k]
+
+
+@forced_inline
+def lever_motion(lever_x: Any, lever_y: Any, n: int, s: Any, c: Any, omega: Any) -> tuple[float, float, float, float]:
+    """Where a point is from the root along the slope and over it (m), by its levers, and its rates (m/s)."""
+    along, height, along_rate, height_rate = 0.0, 0.0, 0.0, 0.0
+    for k in range(n):
+        forward, upward = c[k] * lever_x[k] - s[k] * lever_y[k], s[k] * lever_x[k] + c[k] * lever_y[k]
+        along += forward
+        height += upward
+        along_rate -= upward * omega[k]
+        height_rate += forward * omega[k]
+    return along, height, along_rate, height_rate
+
+
+@forced_inline
+def add_gravity(tree: Any, n: int, F: Any, U: Any, r: Any) -> None:
+    """Add the torques of gravity (N m) about a root at rest to r (n,); F and U of the first moments."""
+    for k in range(n):
+        r[k] -= tree.gravity_along * U[k] + tree.gravity_down * F[k]
+
+
+@forced_inline
+def add_inertia(tree: Any, n: int, s: Any, c: Any, omega: Any, M: Any, r: Any) -> None:
+    """M (n, n) in kg m^2 into M, and the centrifugal terms (N m) added to r (n,)."""
+    for k in range(n):
+        M[k, k] = tree.A[k, k]
+        for l in range(k):
+            A, B = tree.A[k, l], tree.B[k, l]
+            cos_d, sin_d = c[l] * c[k] + s[l] * s[k], s[l] * c[k] - c[l] * s[k]
+            M[k, l] = A * cos_d + B * sin_d
+            M[l, k] = M[k, l]
+            turning = A * sin_d - B * cos_d
+            r[k] += omega[l] * omega[l] * turning
+            r[l] -= omega[k] * omega[k] * turning
+
+
+@forced_inline
+def add_gravity_gradient(tree: Any, n: int, F: Any, U: Any, by_angle: Any) -> None:
+    """Add the derivatives of the torques of gravity with respect to the angles to by_angle (n, n)."""
+    for k in range(n):
+        by_angle[k, k] += tree.gravity_down * U[k] - tree.gravity_along * F[k]
+
+
+@forced_inline
+def add_inertia_gradients(
+    tree: Any, n: int, s: Any, c: Any, omega: Any, alpha: Any, by_angle: Any, by_rate: Any
+) -> None:
+    """Add the derivatives of (centrifugal terms - M alpha) at fixed alpha by the angles and their velocities (n, n)."""
+    for k in range(n):
+        own = 0.0
+        for l in range(n):
+            A, B = tree.A[k, l], tree.B[k, l]
+            cos_d, sin_d = c[l] * c[k] + s[l] * s[k], s[l] * c[k] - c[l] * s[k]
+            turning = A * sin_d - B * cos_d
+            between = omega[l] * omega[l] * (A * cos_d + B * sin_d) + alpha[l] * turning
+            own -= between
+            by_angle[k, l] += between
+            by_rate[k, l] += 2.0 * omega[l] * turning
+        by_angle[k, k] += own
+
+
+@forced_inline
+def kinetic_energy(n: int, M: Any, omega: Any) -> float:
+    """Kinetic energy (J) of the bodies' turning, with a mass matrix M (n, n)."""
+    total = 0.0
+    for k in range(n):
+        for l in range(n):
+            total += M[k, l] * omega[k] * omega[l]
+    return 0.5 * total
+
+
+@forced_inline
+def potential_energy(tree: Any, n: int, along: float, height: float, F: Any, U: Any) -> float:
+    """Potential energy of gravity (J) with the root at a place along the slope and a height over it (m)."""
+    total = tree.mass * (tree.gravity_down * height - tree.gravity_along * along)
+    for k in range(n):
+        total += tree.gravity_down * U[k] - tree.gravity_along * F[k]
+    return total

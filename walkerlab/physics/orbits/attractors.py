@@ -1,0 +1,221 @@
+"""Attractors of a step map over a parameter, and their largest Lyapunov exponents.
+
+The largest Lyapunov exponent is the mean logarithmic growth per step of a tangent vector under the step map's exact
+derivative. Its uncertainty is the standard error of block means, each block several correlation times long; a walk with
+too few blocks is repeated at twice the length. The uncertainty is at least 1/steps: slower growth cannot be resolved.
+
+Source: Benettin, Galgani, Giorgilli, Strelcyn, Meccanica 15 (1980).
+"""
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from walkerlab.outcome import Outcome
+from walkerlab.physics.orbits.bifurcations import eigenvector
+from walkerlab.physics.orbits.families import Seed
+from walkerlab.physics.orbits.step_map import Cycle, StepMap
+from walkerlab.physics.solvers.system import Floats
+
+MAX_PERIOD = 48  # steps; longer cycles count as aperiodic
+REPEAT_DISTANCE = 1e-5  # distance below which points are equal
+# distance of points that still converge, and their ratio of distances, last to first third
+NEAR_REPEAT, MAX_APPROACH_RATIO = 1e-3, 0.8
+GAIT_OFFSET = 1e-2  # offset from an unstable gait, as a share of the largest coordinate
+MAX_BLOCKS, MIN_BLOCKS, BLOCK_LENGTH = 64, 10, 5.0  # numbers for one walk; length in correlation times
+MAX_WALKS = 8  # per exponent
+MAX_DRIFT = 4.0  # difference of a walk's halves, in standard errors of the whole, i.e. two of their own
+SUBSTEPS = 8
+LOSS_HALVINGS = 6
+MAX_CLOSE_RETURNS = 4  # per period
+
+
+@dataclass(frozen=True, eq=False)
+class Attractor:
+    """The attractor of a walk at a value of the parameter."""
+
+    value: float
+    period: int  # steps after which it repeats; 0 if aperiodic
+    periods_s: Floats  # (kept,) durations of steps on it
+    angles: Floats  # (kept,) rad, as in `MappedStep`
+    last: Floats  # (d,) a point on it
+
+
+@dataclass(frozen=True)
+class Lyapunov:
+    value: float
+    exponent: float
+    uncertainty: float
+
+
+def may_diverge(exponents: Sequence[Lyapunov], value: float) -> bool:
+    """Whether neighbours may diverge at a value: false if the nearest measured exponents are not positive."""
+    below = [exponent for exponent in exponents if exponent.value <= value][-1:]
+    above = [exponent for exponent in exponents if exponent.value >= value][:1]
+    return not exponents or any(exponent.exponent > exponent.uncertainty for exponent in (*below, *above))
+
+
+@dataclass(frozen=True, eq=False)
+class AttractorBranch:
+    """Attractors at successive values of the parameter, until the walk fails."""
+
+    found: tuple[Attractor, ...] = ()
+    lost_at: float | None = None  # first value at which the walk failed; None if it never did
+    reason: str = ""  # outcome of the failed walk
+
+
+def find_period(points: Floats) -> int:
+    """Return after how many steps points (steps, d) repeat or converge to a cycle; 0 if they do neither."""
+    for period in range(1, min(MAX_PERIOD, points.shape[0] // 2) + 1):
+        apart = np.max(np.abs(points[period:] - points[:-period]), axis=1)
+        third = apart.size // 3
+        before, after = apart[: third + 1].max(), apart[apart.size - third - 1 :].max()
+        if apart.max() < REPEAT_DISTANCE or (apart.max() < NEAR_REPEAT and after < MAX_APPROACH_RATIO * before):
+            return period
+    return 0
+
+
+def settle(step_map: StepMap, z: Floats, value: float, transient: int, kept: int) -> Attractor | Outcome:
+    """Return the attractor of a walk from z, or the outcome if it fails within `transient + kept` steps."""
+    walk = step_map.iterate(z, value, transient + kept, None)
+    if walk.outcome is not Outcome.WALKED:
+        return walk.outcome
+    points = walk.points[transient:]
+    return Attractor(value, find_period(points), walk.periods_s[transient:], walk.angles[transient:], points[-1])
+
+
+def sweep_attractor(
+    step_map: StepMap,
+    z: Floats,
+    values: Iterable[float],
+    transient: int,
+    kept: int,
+    advance: Callable[[], None] = lambda: None,
+) -> AttractorBranch:
+    """Follow the attractor that contains z at the first value from value to value.
+
+    If a walk from one attractor does not settle at the next value, smaller steps are tried. The value at which the
+    attractor is lost is narrowed by halving, so that it does not depend on the grid of values.
+    """
+    attractors: list[Attractor] = []
+    for value in values:
+        settled = settle(step_map, z, float(value), transient, kept)
+        if isinstance(settled, Outcome) and attractors:
+            for between in np.linspace(attractors[-1].value, float(value), SUBSTEPS + 1)[1:]:
+                settled = settle(step_map, z, float(between), transient, kept)
+                if isinstance(settled, Outcome):
+                    break
+                z = settled.last
+        advance()
+        if isinstance(settled, Outcome):
+            lost = float(value)
+            for _ in range(LOSS_HALVINGS if attractors else 0):
+                middle = 0.5 * (attractors[-1].value + lost)
+                halfway = settle(step_map, attractors[-1].last, middle, transient, kept)
+                if isinstance(halfway, Outcome):
+                    lost, settled = middle, halfway
+                else:
+                    attractors.append(halfway)
+            return AttractorBranch(tuple(attractors), lost, settled.label)
+        attractors.append(settled)
+        z = settled.last
+    return AttractorBranch(tuple(attractors), None, "")
+
+
+def leave_by_flip(step_map: StepMap, gait: Cycle, transient: int, kept: int) -> Attractor | Outcome:
+    flipping = min(gait.multipliers.real)
+    aside = GAIT_OFFSET * np.max(np.abs(gait.z)) * eigenvector(gait.DP, flipping)
+    return settle(step_map, gait.z + aside, gait.value, transient, kept)
+
+
+def largest_exponent(step_map: StepMap, z: Floats, value: float, transient: int, steps: int) -> Lyapunov | None:
+    """Return the largest Lyapunov exponent of the attractor of a walk from z; None if the walk fails.
+
+    transient  steps that turn the tangent into the direction of fastest growth
+    steps      to average over
+
+    Just beyond a flip a walk leaves the unstable gait as slowly as its tangent grows. A walk that repeats while its
+    tangent grows is therefore pushed off the gait, and one whose halves differ is continued.
+    """
+    for _ in range(MAX_WALKS):
+        walk = step_map.iterate(z, value, transient + steps, np.full(z.size, 1.0 / math.sqrt(z.size)))
+        if walk.outcome is not Outcome.WALKED:
+            return None
+        growth = np.log(np.maximum(walk.lengths[transient:], np.finfo(float).tiny))
+        repeats = find_period(walk.points[transient:]) > 0
+        blocks = MIN_BLOCKS if repeats else min(MAX_BLOCKS, independent_blocks(growth))
+        exponent, error = float(growth.mean()), standard_error(growth, max(MIN_BLOCKS, blocks))
+        drift = abs(float(growth[: steps // 2].mean() - growth[steps // 2 :].mean()))
+        if repeats and exponent <= 0.0 and drift < 1.0 / steps:
+            break
+        error = max(error, 1.0 / steps)
+        if not repeats and drift < MAX_DRIFT * error and blocks >= MIN_BLOCKS:
+            break
+        steps *= 1 + (blocks < MIN_BLOCKS)
+        z = (1.0 + GAIT_OFFSET * (repeats and exponent > 0.0)) * walk.points[-1]
+    return Lyapunov(value, exponent, error)
+
+
+def independent_blocks(series: Floats) -> int:
+    """Return how many blocks of several correlation times a series (n,) holds.
+
+    The correlation time sums the autocorrelation over all lags before the first that is not positive.
+    """
+    off = series - series.mean()
+    spectrum = np.abs(np.fft.rfft(off, 2 * off.size)) ** 2
+    correlation = np.fft.irfft(spectrum)[: off.size]
+    lags = int(np.argmax(correlation <= 0.0)) or off.size
+    lasting = 2.0 * correlation[:lags].sum() / correlation[0] - 1.0
+    return int(series.size / (BLOCK_LENGTH * lasting))
+
+
+def standard_error(series: Floats, blocks: int) -> float:
+    means = np.array([block.mean() for block in np.array_split(series, blocks)])
+    return float(means.std(ddof=1)) / math.sqrt(blocks)
+
+
+def feigenbaum_ratios(flips: list[float]) -> list[float]:
+    """Return ratios of successive distances between the flips of a cascade; they tend to 4.669."""
+    gaps = np.diff(np.array(flips))
+    return [float(gap / next_gap) for gap, next_gap in pairwise(gaps)]
+
+
+def close_returns(step_map: StepMap, attractor: Attractor, periods: Iterable[int], steps: int) -> list[Seed]:
+    """Return points of an attractor that nearly repeat after given periods, as seeds of unstable gaits.
+
+    steps  length of the walk to search
+    """
+    walk = step_map.iterate(attractor.last, attractor.value, steps, None)
+    points, seeds = walk.points, []
+    for period in periods:
+        if points.shape[0] <= period:
+            continue
+        misses = np.linalg.norm(points[period:] - points[:-period], axis=1)
+        for _ in range(MAX_CLOSE_RETURNS):
+            nearest = int(np.argmin(misses))
+            seeds.append(Seed(points[nearest], attractor.value, period))
+            misses[max(0, nearest - 2 * period) : nearest + 2 * period] = np.inf
+    return seeds
+
+
+def settle_elsewhere(
+    step_map: StepMap, attractor: Attractor, starts: int, spread: float, transient: int, generator: np.random.Generator
+) -> list[Seed]:
+    """Return other periodic gaits that walks from scattered starts near an attractor settle on.
+
+    starts  number of walks
+    spread  standard deviation of the starts' coordinates, as a share of the largest coordinate
+    """
+    seeds: list[Seed] = []
+    periods = {attractor.period}
+    scale = spread * float(np.max(np.abs(attractor.last)))
+    for _ in range(starts):
+        start = attractor.last + scale * generator.standard_normal(attractor.last.size)
+        attained = settle(step_map, start, attractor.value, transient, 2 * MAX_PERIOD)
+        if not isinstance(attained, Outcome) and attained.period and attained.period not in periods:
+            periods.add(attained.period)
+            seeds.append(Seed(attained.last, attractor.value, attained.period))
+    return seeds

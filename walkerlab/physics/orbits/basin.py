@@ -1,0 +1,286 @@
+"""Basins of attraction of the rigid walker: the attractor that each start reaches, in how many steps, or how it fails.
+
+All walks are of the similar walker of unit size, on the section just after heel strike, z = (theta_2, dtheta_1,
+dtheta_2). Attractors are found by long walks from many starts. A walk has reached an attractor once it is within a
+distance from which, as tested, every walk returns to it.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from walkerlab.outcome import Outcome
+from walkerlab.physics.hybrid.endings import GOES_ON, REJECTED, WALKED
+from walkerlab.physics.hybrid.rigid_lanes import Fates, TwoLegs, new_fates, new_lane_memory, struck, walk_lanes
+from walkerlab.physics.hybrid.rigid_walk import hip_above_fall
+from walkerlab.physics.mechanics.rigid_model import RigidModel
+from walkerlab.physics.orbits.rigid_map import RigidStepper, state_on_section, states_on_section, strike_section
+from walkerlab.physics.solvers.registry import Tolerances
+from walkerlab.physics.solvers.system import Floats, Integers
+
+RTOL, ATOL = 1e-6, 1e-8  # of the walks in a basin: errors of 1e-7 per step
+CYCLE_RTOL, CYCLE_ATOL = 1e-11, 1e-13  # of the walks that give attractors
+SECTION_SIZE = 3
+UNREACHED = -1  # instead of an attractor's index
+MAX_CYCLE_PERIOD = 32  # steps; longer cycles count as aperiodic
+CYCLE_DISTANCE = 1e-7  # distance below which states are equal
+SETTLING_STEPS = 2_000  # before walks are checked
+FIRST_STARTS = 64  # starts that walk this long before any attractor is known
+RESETTLING_STEPS = 400  # at tight tolerances, continuing the first walks
+RETURN_STEPS = 1_000  # in which walks near an attractor must come ten times closer
+MAX_SETTLED_WALKS = 32  # settled walks to follow further
+CAPTURE = 1e-3  # largest distance at which an attractor counts as reached
+NARROWING, NARROWINGS = 0.25, 6
+STARTS_PER_POINT = 24  # of an attractor, which must all return to it
+# steps between checks for capture; right-hand sides for these
+STEPS_PER_LOOK, BATCH_BUDGET = 16, 4_000_000
+
+# A unit walker: two straight legs walk all starts in lanes, other walkers one start at a time.
+Walker = TwoLegs | RigidModel
+
+
+class Capture(NamedTuple):
+    """An observer that ends walks near an attractor, or after their maximum number of steps."""
+
+    points: Any  # (m, 3) points of attractors
+    owner: Any  # (m,) index of each point's attractor
+    reach: Any  # (m,) squared distance of capture
+    most: int  # steps
+    attractor: Any  # (n,) output: index or UNREACHED
+    last: Any  # (n, 3) output: last point of each walk
+
+
+@struck.case(Capture)
+def check_capture(observer: Capture, walk: int, step: int, t: float, y: Any) -> int:
+    for i in range(3):
+        observer.last[walk, i] = y[i + 1]
+    for k in range(observer.owner.size):
+        a, b, c = y[1] - observer.points[k, 0], y[2] - observer.points[k, 1], y[3] - observer.points[k, 2]
+        if a * a + b * b + c * c < observer.reach[k]:
+            observer.attractor[walk] = observer.owner[k]
+            return WALKED
+    return WALKED if step + 1 >= observer.most else GOES_ON
+
+
+@dataclass(frozen=True, eq=False)
+class PeriodicAttractor:
+    """A periodic attractor."""
+
+    points: Floats  # (period, 3) on the section in the order of a walk, beginning with the smallest angle
+    reach: float  # distance from which all walks return to it; zero if none was found
+
+    @property
+    def period(self) -> int:
+        return len(self.points)
+
+
+@dataclass(frozen=True, eq=False)
+class Attractors:
+    """Attractors of walks from a set of starts."""
+
+    cycles: tuple[PeriodicAttractor, ...] = ()  # ordered by period
+    aperiodic: bool = False  # whether some walks continue without repeating
+
+    def capture(self, n: int, most: int, share: float = 1.0) -> Capture:
+        """Return an observer of n walks of at most `most` steps; `share` scales the distances of capture."""
+        points = np.concatenate([np.zeros((0, SECTION_SIZE)), *(cycle.points for cycle in self.cycles)])
+        owner = np.repeat(np.arange(len(self.cycles)), [cycle.period for cycle in self.cycles])
+        reach = np.array([(share * self.cycles[index].reach) ** 2 for index in owner])
+        return Capture(points, owner, reach, most, np.full(n, UNREACHED, np.int64), np.zeros((n, SECTION_SIZE)))
+
+
+@dataclass(frozen=True, eq=False)
+class WalkEnds:
+    """Ends of walks, (n,) each: outcome, attractor or UNREACHED, and the number of steps."""
+
+    outcome: Integers
+    attractor: Integers
+    steps: Integers
+
+
+@dataclass(frozen=True, eq=False)
+class Arrivals(WalkEnds):
+    last: Floats  # (n, 3)
+
+
+def walk_to_attractor(
+    walker: Walker,
+    attractors: Attractors,
+    z: Floats,
+    most: int,
+    share: float = 1.0,
+    tolerances: tuple[float, float] = (RTOL, ATOL),
+) -> Arrivals:
+    """Walk from section coordinates z (n, 3) to an attractor, a failure, or `most` steps."""
+    fates: Fates = new_fates(len(z))
+    capture = attractors.capture(len(z), most, share)
+    if isinstance(walker, RigidModel):
+        walk_one_by_one(walker, capture, z, fates, tolerances)
+    else:
+        walk_lanes(walker, new_lane_memory(*tolerances), capture, states_on_section(walker.model, z), fates)
+    return Arrivals(fates.outcome, capture.attractor, fates.steps, capture.last)
+
+
+def walk_one_by_one(
+    walker: RigidModel, capture: Capture, starts: Floats, fates: Fates, tolerances: tuple[float, float]
+) -> None:
+    """Do the same as `walk_lanes` for any walker, checking for capture after each batch of steps."""
+    shooting, section = RigidStepper(walker, Tolerances("dop853", *tolerances, BATCH_BUDGET)), strike_section(walker)
+    for number, start in enumerate(starts):
+        z, steps = start, 0
+        outcome = REJECTED if hip_above_fall(walker, state_on_section(walker, start)) < 0.0 else WALKED
+        while outcome == WALKED and steps < capture.most:
+            part = shooting.walk(section, z, min(STEPS_PER_LOOK, capture.most - steps), derived=False)
+            outcome, points, steps_taken = int(part.outcome), part.z, part.time.size
+            near = ((points[:, None] - capture.points) ** 2).sum(axis=2) < capture.reach
+            if near.any():
+                steps_taken = int(np.argmax(near.any(axis=1))) + 1
+                capture.attractor[number] = capture.owner[np.argmax(near[steps_taken - 1])]
+                outcome = WALKED
+            if steps_taken:
+                capture.last[number] = z = points[steps_taken - 1]
+            steps += steps_taken
+            if near.any():
+                break
+        fates.outcome[number], fates.steps[number] = outcome, steps
+
+
+def find_attractors(walker: Walker, starts: Floats, seed: int) -> Attractors:
+    """Find the attractors of walks from section coordinates `starts` (n, 3).
+
+    The first starts walk the full length; later ones only if they do not reach an attractor known by then.
+
+    walker  the unit walker
+    seed    of the random starts around attractors
+    """
+
+    def with_reaches(cycles: Sequence[Floats]) -> tuple[PeriodicAttractor, ...]:
+        generator = np.random.default_rng(seed)
+        return tuple(PeriodicAttractor(points, find_reach(walker, points, cycles, generator)) for points in cycles)
+
+    cycles, aperiodic = find_cycles(walker, starts[:FIRST_STARTS], Attractors())
+    reached = with_reaches(cycles)
+    more, also_aperiodic = find_cycles(walker, starts[FIRST_STARTS:], Attractors(reached))
+    new = [cycle for cycle in more if not any(same_cycle(cycle, cycle_before) for cycle_before in cycles)]
+    if new:
+        reached = with_reaches(order_cycles([*cycles, *new]))
+    return Attractors(reached, aperiodic or also_aperiodic)
+
+
+def find_cycles(walker: Walker, starts: Floats, known: Attractors) -> tuple[list[Floats], bool]:
+    """Return the new cycles that walks settle on, and whether any walk settles on none."""
+    tight = (CYCLE_RTOL, CYCLE_ATOL)
+    rough = walk_to_attractor(walker, known, starts, SETTLING_STEPS)
+    elsewhere = np.flatnonzero((rough.outcome == Outcome.WALKED) & (rough.attractor == UNREACHED))
+    points = rough.last[elsewhere]
+    _, first = np.unique(np.round(points / (10.0 * CYCLE_DISTANCE)), axis=0, return_index=True)
+    distinct = points[np.sort(first)][:MAX_SETTLED_WALKS]
+    settled = walk_to_attractor(walker, Attractors(), distinct, RESETTLING_STEPS, tolerances=tight)
+    cycles: list[Floats] = []
+    aperiodic = False
+    for point in settled.last[settled.outcome == Outcome.WALKED]:
+        cycle = cycle_through(walker, point)
+        if cycle is None:
+            aperiodic = True
+        elif not any(same_cycle(cycle, previous) for previous in cycles):
+            cycles.append(cycle)
+    return order_cycles(cycles), aperiodic
+
+
+def order_cycles(cycles: Sequence[Floats]) -> list[Floats]:
+    return sorted(cycles, key=lambda points: (len(points), *points[0]))
+
+
+def cycle_through(walker: Walker, point: Floats) -> Floats | None:
+    """Return the cycle (period, 3) of a walk from a point (3,), smallest angle first; None if aperiodic."""
+    orbit = [point]
+    for _ in range(MAX_CYCLE_PERIOD):
+        step = walk_to_attractor(walker, Attractors(), orbit[-1][None, :], 1, tolerances=(CYCLE_RTOL, CYCLE_ATOL))
+        if step.outcome[0] != Outcome.WALKED:
+            return None
+        orbit.append(step.last[0])
+        if np.abs(orbit[-1] - point).max() < CYCLE_DISTANCE:
+            points = np.array(orbit[:-1])
+            return np.roll(points, -int(np.argmin(points[:, 0])), axis=0)
+    return None
+
+
+def same_cycle(first: Floats, second: Floats) -> bool:
+    return len(first) == len(second) and bool(np.abs(first - second).max() < 100.0 * CYCLE_DISTANCE)
+
+
+def find_reach(walker: Walker, points: Floats, cycles: Sequence[Floats], generator: np.random.Generator) -> float:
+    """Return a distance from a cycle within which walks from all directions returned to it; zero if there is none.
+
+    It is well below the distance to other cycles.
+    """
+    others = [other for other in cycles if other is not points]
+    gap = min((float(np.linalg.norm(p - other, axis=1).min()) for other in others for p in points), default=np.inf)
+    reach = min(CAPTURE, 0.25 * gap)
+    directions = generator.normal(size=(len(points) * STARTS_PER_POINT, SECTION_SIZE))
+    directions /= np.linalg.norm(directions, axis=1)[:, None]
+    for _ in range(NARROWINGS):
+        around = np.repeat(points, STARTS_PER_POINT, axis=0) + reach * directions
+        this = Attractors((PeriodicAttractor(points, reach),))
+        back = walk_to_attractor(walker, this, around, RETURN_STEPS, share=0.1)
+        if (back.attractor == 0).all():
+            return reach
+        reach *= NARROWING
+    return 0.0
+
+
+@dataclass(frozen=True)
+class Window:
+    """A grid of starts over some coordinates of the section, SI units."""
+
+    axes: tuple[int, ...]  # indices into (theta_2, dtheta_1, dtheta_2)
+    lower: tuple[float, ...]  # lower bound along each axis
+    upper: tuple[float, ...]  # upper bound along each axis
+    cells: tuple[int, ...]  # number along each axis
+    rest: tuple[float, ...]  # (3,) the section's coordinates; those of the axes are replaced
+
+    @property
+    def size(self) -> int:
+        return int(np.prod(self.cells))
+
+    def along(self, axis: int) -> Floats:
+        """Return the cell centres along an axis, given by its index in `axes`."""
+        width = (self.upper[axis] - self.lower[axis]) / self.cells[axis]
+        middles: Floats = np.arange(self.cells[axis], dtype=np.float64) + 0.5
+        return self.lower[axis] + width * middles
+
+    def starts(self, cells: Integers, inside: Floats | None = None) -> Floats:
+        """Return section coordinates (n, 3) of cells by flat index, the last axis fastest.
+
+        inside  (n, axes) position within each cell, from -1/2 to 1/2; centres by default
+        """
+        z = np.tile(np.array(self.rest), (len(cells), 1))
+        for place, (axis, index) in enumerate(zip(self.axes, np.unravel_index(cells, self.cells), strict=True)):
+            width = (self.upper[place] - self.lower[place]) / self.cells[place]
+            offset = 0.0 if inside is None else inside[:, place]
+            z[:, axis] = self.lower[place] + width * (index + 0.5 + offset)
+        return z
+
+    def draw(self, n: int, generator: np.random.Generator) -> Floats:
+        """Draw section coordinates (n, 3) uniformly from the window."""
+        z = np.tile(np.array(self.rest), (n, 1))
+        z[:, list(self.axes)] = generator.uniform(self.lower, self.upper, (n, len(self.axes)))
+        return z
+
+
+def edge_cells(classes: NDArray[Any]) -> Integers:
+    """Return the flat indices of cells that have a neighbour of another class along an axis."""
+    from scipy import ndimage  # only needed here
+
+    neighbours = ndimage.generate_binary_structure(classes.ndim, 1)
+    minima = ndimage.minimum_filter(classes, footprint=neighbours, mode="nearest")
+    return np.flatnonzero(minima != ndimage.maximum_filter(classes, footprint=neighbours, mode="nearest"))
+
+
+def subcell_centres(refine: int, axes: int) -> Floats:
+    """Return the centres (refine^axes, axes) of a cell's subcells, from -1/2 to 1/2."""
+    middles = (np.arange(refine) + 0.5) / refine - 0.5
+    return np.stack(np.meshgrid(*[middles] * axes, indexing="ij"), axis=-1).reshape(-1, axes)

@@ -1,0 +1,179 @@
+"""Bifurcations of gaits: folds, flips and tori as zeros of test functions, and the branch beyond a flip.
+
+Test functions of the derivative DP of n steps: det(DP - 1) for a fold, det(DP + 1) for a flip, and for a torus
+det(DP ^ DP - 1), where the bialternate product DP ^ DP acts on pairs of directions and has products of pairs of
+multipliers as eigenvalues. Each is smooth along a branch, so fast root finders converge.
+
+Source: Kuznetsov, Elements of applied bifurcation theory, sections 5.4 (normal form of the flip), 10.2 and 10.3.
+"""
+
+import math
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from walkerlab.outcome import Outcome
+from walkerlab.physics.orbits.continuation import CurvePoint, Segment, root_along
+from walkerlab.physics.orbits.newton import Evaluated
+from walkerlab.physics.orbits.step_map import Cycle, StepMap, add_parameter_derivative, walk_steps
+from walkerlab.physics.solvers.system import Floats
+
+Kind = Literal["fold", "flip", "torus"]
+BIFURCATION_KINDS: tuple[Kind, ...] = ("fold", "flip", "torus")
+NORMAL_FORM_STEP = 1e-3  # step of the normal form's differences; coordinates are of magnitude one
+FORM_REFINEMENTS = 4
+FIRST_MULTIPLIER_DROP = 0.2  # by which the multiplier of a new branch's first point is below 1
+PAIR_TOLERANCE = 1e-4  # distance from the unit circle within which multipliers form a critical pair
+
+
+class GaitEquations:
+    """P^n(z) - z = 0 over x = (z, p / scale)."""
+
+    def __init__(self, step_map: StepMap, period: int, scale: float) -> None:
+        self.step_map, self.period, self.scale = step_map, period, scale
+
+    def __call__(self, x: Floats) -> Evaluated[Cycle]:
+        cycle = walk_steps(self.step_map, x[:-1], self.value(x), self.period)
+        evaluated = add_parameter_derivative(self.step_map, cycle).mismatch()
+        return evaluated._replace(jacobian=np.column_stack((evaluated.jacobian, self.scale * evaluated.data.Dp)))
+
+    def value(self, x: Floats) -> float:
+        return self.scale * float(x[-1])
+
+
+def on_pairs(DP: Floats) -> Floats:
+    """Return the action of DP (d, d) on pairs of directions, a square matrix of size d (d - 1) / 2."""
+    first, second = np.triu_indices(DP.shape[0], 1)
+    straight = DP[np.ix_(first, first)] * DP[np.ix_(second, second)]
+    crossed = DP[np.ix_(first, second)] * DP[np.ix_(second, first)]
+    return np.asarray(straight - crossed)
+
+
+def critical_value(kind: Kind, DP: Floats) -> float:
+    acting = on_pairs(DP) if kind == "torus" else DP
+    return float(np.linalg.det(acting + (1.0 if kind == "flip" else -1.0) * np.eye(len(acting))))
+
+
+@dataclass(frozen=True)
+class Bifurcation:
+    """A point where a branch folds, or its gait gives rise to one of twice the period or to a torus."""
+
+    kind: Kind
+    value: float  # of the parameter
+    multiplier: complex
+    point: CurvePoint[Cycle]
+    segment: Segment[Cycle] = field(repr=False)  # of the branch
+
+    @property
+    def gait(self) -> Cycle:
+        return self.point.evaluated.data
+
+    def lies_between(self, first: Cycle, second: Cycle) -> bool:
+        """Whether the bifurcation lies between these two neighbours on the branch."""
+        ends = (self.segment.first, self.segment.second)
+        return {id(end.evaluated.data.z) for end in ends} == {id(first.z), id(second.z)}
+
+
+def locate_bifurcation(segment: Segment[Cycle], kind: Kind, scale: float) -> Bifurcation | None:
+    tests = [critical_value(kind, end.evaluated.data.DP) for end in (segment.first, segment.second)]
+    if tests[0] * tests[1] >= 0.0:
+        return None
+    point = root_along(segment, lambda solved: critical_value(kind, solved.evaluated.data.DP))
+    if point is None:
+        return None
+    multipliers = point.evaluated.data.multipliers
+    if kind == "torus":
+        on_circle = [m for m in multipliers if m.imag > 0.0 and abs(abs(m) - 1.0) < PAIR_TOLERANCE]
+        if not on_circle:  # two real multipliers with product one: a saddle, not a bifurcation
+            return None
+        multiplier = complex(on_circle[0])
+    else:
+        target = 1.0 if kind == "fold" else -1.0
+        multiplier = complex(min(multipliers, key=lambda m: abs(m - target)))
+    return Bifurcation(kind, scale * float(point.x[-1]), multiplier, point, segment)
+
+
+@dataclass(frozen=True)
+class FlipForm:
+    """The flip on its centre manifold: xi -> -(1 + rate s) xi + cubic xi^3, s the branch's arclength."""
+
+    direction: Floats  # (d,) eigenvector to -1, of unit length
+    adjoint: Floats  # (d,) left eigenvector, adjoint . direction = 1
+    bend: Floats  # (d,) second-order part of the centre manifold: z = z* + xi direction + xi^2 bend
+    cubic: float
+    rate: float
+
+    @property
+    def amplitude(self) -> float:
+        """Amplitude xi at which the new gait's multiplier, 1 - 4 cubic xi^2, is FIRST_MULTIPLIER_DROP below 1."""
+        return math.sqrt(0.25 * FIRST_MULTIPLIER_DROP / abs(self.cubic))
+
+
+def eigenvector(A: Floats, value: float) -> Floats:
+    _, _, rows = np.linalg.svd(A - value * np.eye(A.shape[0]))
+    return np.asarray(rows[-1])
+
+
+def flip_form(equations: GaitEquations, flip: Bifurcation) -> FlipForm | None:
+    """Compute the normal form at a flip by differences of exact steps; None if a probe fails."""
+    A = flip.point.evaluated.data.DP
+    v, w = eigenvector(A, -1.0), eigenvector(A.T, -1.0)
+    w = w / (w @ v)
+    segment = flip.segment
+    s, gap = float(segment.first.tangent @ (flip.point.x - segment.first.x)), 1e-3 * segment.length
+    neighbours = [segment.at(s + h) for h in (-gap, gap)]
+    passing = [float(w @ point.evaluated.data.DP @ v) for point in neighbours if isinstance(point, CurvePoint)]
+    if len(passing) < 2:
+        return None
+    rate = (passing[0] - passing[1]) / (2.0 * gap)  # at which the multiplier crosses -1 along the branch
+    form, probe = None, NORMAL_FORM_STEP
+    for _ in range(FORM_REFINEMENTS):
+        terms = _cubic(equations, flip, v, w, probe)
+        if terms is None:
+            return form
+        form = FlipForm(v, w, *terms, rate)
+        if probe <= 0.5 * form.amplitude:
+            break
+        probe = 0.2 * form.amplitude
+    return form
+
+
+def _cubic(equations: GaitEquations, flip: Bifurcation, v: Floats, w: Floats, h: float) -> tuple[Floats, float] | None:
+    z, p = flip.point.x[:-1], equations.value(flip.point.x)
+    A = flip.point.evaluated.data.DP
+
+    def probe(direction: Floats) -> tuple[Floats, Floats] | None:
+        cycles = [walk_steps(equations.step_map, z + sign * h * direction, p, equations.period) for sign in (1, -1)]
+        if any(cycle.outcome is not Outcome.WALKED for cycle in cycles):
+            return None
+        return cycles[0].DP @ v, cycles[1].DP @ v
+
+    along = probe(v)
+    if along is None:
+        return None
+    B_vv = (along[0] - along[1]) / (2.0 * h)
+    C_vvv = (along[0] - 2.0 * (A @ v) + along[1]) / h**2
+    inner = np.asarray(np.linalg.solve(np.eye(v.size) - A, B_vv), np.float64)
+    size = float(np.linalg.norm(inner))
+    across = probe(inner / size)
+    if across is None:
+        return None
+    B_inner = size * (across[0] - across[1]) / (2.0 * h)
+    cubic = float(w @ (C_vvv + 3.0 * B_inner)) / 6.0
+    return (0.5 * inner, cubic) if cubic != 0.0 else None
+
+
+def predict_doubled(flip: Bifurcation, form: FlipForm, share: float = 1.0) -> tuple[Floats, Floats, float]:
+    """Predict the branch of twice the period near a flip, for `correct`.
+
+    share  of the normal form's amplitude
+
+    Returns the guess x (d + 1,), the normal of the plane of constant amplitude, and the amplitude.
+    """
+    xi = share * form.amplitude
+    s = form.cubic * xi * xi / form.rate
+    guess = flip.point.x + s * flip.point.tangent
+    guess[:-1] += xi * form.direction + xi * xi * form.bend
+    normal = np.append(form.adjoint, 0.0)
+    return guess, normal / np.linalg.norm(normal), xi

@@ -1,0 +1,169 @@
+"""Search for the contact model's own gait: walk from a rigid start to the section, then Newton's method.
+
+If that fails, the gait is followed from nearly rigid ground, where the rigid gait is a good guess, to the actual force
+laws, in steps as large as Newton's method allows.
+"""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from walkerlab.outcome import Outcome
+from walkerlab.physics.ground.terrain import STANCE_FOOT
+from walkerlab.physics.ground.walker import ContactWalker
+from walkerlab.physics.hybrid.contact_events import PASSING, JudgedGround
+from walkerlab.physics.hybrid.contact_result import new_observer, walk_on
+from walkerlab.physics.hybrid.contact_state import new_walk_state
+from walkerlab.physics.orbits.contact_map import OwnPads, coordinates_of
+from walkerlab.physics.orbits.continuation import Follower, FollowerState, Strides
+from walkerlab.physics.orbits.newton import Effort, NotConverged
+from walkerlab.physics.orbits.step_map import Cycle, gait_near
+from walkerlab.physics.solvers.registry import Tolerances
+from walkerlab.physics.solvers.system import Floats, State
+
+WARM_UP_STEPS = (4, 2, 0)  # steps to walk before Newton's method
+SEARCH_STEP_BUDGET = 40_000  # right-hand sides
+CONTACT_EFFORT = Effort(1e-10, most=10, shortest=1e-3, growth=2.0, rounding=1.0)
+# factors between nearly rigid ground and the actual one
+MAX_STIFFENING, MAX_CREEP_FACTOR = 100.0, 30.0
+# fractions of the way from nearly rigid to actual ground
+FIRST_STRIDE, RIGIDITY_STRIDES = 0.25, Strides(1.0, 0.02, 2)
+
+
+@dataclass(frozen=True)
+class GaitAnswer:
+    gait: Cycle | None
+    reason: str  # how it was found, or why there is none
+    advice: str = ""
+
+
+def find_gait_from(walker: ContactWalker, ground: JudgedGround, tolerances: Tolerances, start: State) -> GaitAnswer:
+    """Find the contact gait near a state of the free walker with both feet on the ground.
+
+    Never raises if there is no gait: the answer states the reason and advice.
+    """
+    excluded = why_no_gait(walker)
+    if excluded:
+        return GaitAnswer(None, *excluded)
+    tolerances = replace(tolerances, budget=SEARCH_STEP_BUDGET)
+    failure = "the start does not even let the feet pass each other"
+    for steps, z in section_points(walker, ground, tolerances, start):
+        gait = solve_gait_on(OwnPads(lambda _: walker, ground, tolerances, ground.terrain.stride_measure), z)
+        if isinstance(gait, Cycle):
+            return GaitAnswer(gait, f"Newton's method after {steps} steps from the start")
+        failure = f"Newton's method found none after {steps} steps from the start: {gait}"
+    followed = follow_from_rigid(walker, ground, tolerances, start)
+    if followed.gait is not None:
+        return followed
+    return GaitAnswer(None, f"{failure}; {followed.reason}", followed.advice)
+
+
+def why_no_gait(walker: ContactWalker) -> tuple[str, str] | None:
+    """Return why conservation of momentum and energy exclude a gait on this ground, and advice; None if they do not."""
+    if walker.slope <= 0.0 and not walker.driven:
+        return "a walker that does not descend loses energy with every step", "Let the slope descend: slope_deg > 0."
+    friction, required = walker.friction.largest, abs(math.tan(walker.slope))
+    if friction == 0.0 and not walker.driven:
+        return (
+            "without friction nothing holds the walker back: it gathers speed along the slope",
+            f"Give the feet friction: contact.friction: coulomb, contact.static_friction above {required:.3g}.",
+        )
+    if friction < required:
+        return (
+            f"static friction {friction:.3g} is below the slope's {required:.3g}: "
+            "on average the ground cannot hold the walker's weight along the slope",
+            "Raise contact.static_friction, or choose a gentler slope.",
+        )
+    return None
+
+
+def section_points(
+    walker: ContactWalker, ground: JudgedGround, tolerances: Tolerances, start: State
+) -> Iterator[tuple[int, Floats]]:
+    """Yield points of the section on a walk from the start, each with its number of steps."""
+    for steps in WARM_UP_STEPS:
+        walk_state = new_walk_state(walker, ground.terrain, STANCE_FOOT, steps + 1, start)
+        observer = new_observer(walker, walk_state, start)
+        enough = replace(tolerances, budget=(steps + 1) * tolerances.budget)
+        stopped = walk_on(walker, ground, enough, walk_state, observer, start, steps)
+        if stopped.outcome is Outcome.WALKED and walk_state.at_zero[PASSING]:
+            yield steps, coordinates_of(walker, np.array(stopped.state), int(walk_state.progress.stance))
+        elif walk_state.progress.steps > steps:
+            return
+
+
+def solve_gait_on(pads: OwnPads, z: Floats, rigidity: float = 0.0) -> Cycle | str:
+    gait = gait_near(pads, z, rigidity, CONTACT_EFFORT)
+    if isinstance(gait, NotConverged):
+        if gait.singular:
+            return "its matrix is singular, since a multiplier is 1"
+        if gait.outcome is None or gait.outcome is Outcome.WALKED:
+            return "it did not converge"
+        if gait.outcome is Outcome.REJECTED:
+            return "its push-off lasts until the feet pass each other, or longer"
+        return f"a step ended as {gait.outcome.label}"
+    if gait.step.length_m <= 0.0:
+        return f"it led to a walk that does not advance, with steps of {gait.step.length_m:.3g} m"
+    return gait
+
+
+def with_scaled_laws(walker: ContactWalker, stiffness: float, damping: float, creep: float) -> ContactWalker:
+    """Return the walker with stiffness, damping and friction velocities of the ground scaled by these factors.
+
+    The penetration of full damping shrinks with the static penetration, so that the damping ratio is unchanged.
+    """
+    normal = walker.normal
+    changed = normal._replace(
+        stiffness=normal.stiffness * stiffness,
+        damping=normal.damping * damping,
+        full_damping_penetration=normal.full_damping_penetration * stiffness ** (-1.0 / normal.exponent),
+    )
+    return walker._replace(normal=changed, friction=walker.friction.with_creep(creep))
+
+
+def with_rigidity(walker: ContactWalker, rigidity: float) -> ContactWalker:
+    """Return the walker on ground of a rigidity from 0, its own, to 1, nearly rigid."""
+    stiffer = MAX_STIFFENING**rigidity
+    return with_scaled_laws(walker, stiffer, math.sqrt(stiffer), MAX_CREEP_FACTOR**-rigidity)
+
+
+def follow_from_rigid(walker: ContactWalker, ground: JudgedGround, tolerances: Tolerances, start: State) -> GaitAnswer:
+    def gait_at(rigidity: float, z: Floats, pitch_m: float) -> Cycle | str:
+        return solve_gait_on(OwnPads(partial(with_rigidity, walker), ground, tolerances, pitch_m), z, rigidity)
+
+    points = section_points(with_rigidity(walker, 1.0), ground, tolerances, start)
+    hint = "" if walker.whole.push_off == 0.0 else "Shorten the push-off (push_off.duration_s). "
+    tried = (gait_at(1.0, z, ground.terrain.stride_measure) for _, z in points)
+    last = next((gait for gait in tried if isinstance(gait, Cycle)), None)
+    if last is None:
+        return GaitAnswer(
+            None,
+            "nearly rigid ground has no gait either",
+            f"{hint}Damp or stiffen the contact, try a gentler slope, or, on pads, contact.terrain: after-mid-swing.",
+        )
+    gaits = {0.0: last}
+
+    def softer(state: float, expected: Floats) -> Floats | None:
+        near = gait_at(1.0 - state, expected[:-1], expected[-1])
+        if not isinstance(near, Cycle):
+            return None
+        gaits[state] = near
+        return append_length(near)
+
+    state = Follower(softer, FollowerState(0.0, FIRST_STRIDE, ((0.0, append_length(last)),)), RIGIDITY_STRIDES).to(1.0)
+    if state.at == 1.0:
+        return GaitAnswer(gaits[1.0], "followed from nearly rigid ground")
+    rigidity = 1.0 - state.at
+    return GaitAnswer(
+        None,
+        f"followed from nearly rigid ground the gait is lost at {MAX_STIFFENING**rigidity:.3g} times the stiffness "
+        f"and creep {MAX_CREEP_FACTOR**rigidity:.3g} times slower than requested",
+        f"{hint}Stiffen or damp the contact, lower its stiction velocity, or choose a gentler slope.",
+    )
+
+
+def append_length(gait: Cycle) -> Floats:
+    return np.append(gait.z, gait.lengths_m)

@@ -1,0 +1,398 @@
+"""Step map of the contact model, on a section where no foot is touching down or lifting off.
+
+On the section the swing foot passes the stance foot: one foot stands, the transients of its touch-down have decayed,
+and the other swings freely. Just after touch-down the state still moves on the fast time scale of the contact, which
+makes a poor section. Coordinates, ordered by the legs' roles: height of the centre of mass, angles of the legs' bodies
+except the uppermost of the swing leg, which the section determines, velocity along and normal to the slope, and the
+rates of all bodies that turn independently; six for two straight legs. The stance knee is locked, the swing knee free.
+The position along the slope is not a coordinate.
+
+One step maps the section to itself with the legs' roles exchanged.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from copy import copy
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from walkerlab.outcome import Outcome
+from walkerlab.physics.energy_channels import LOST
+from walkerlab.physics.ground.knees import IdealLock
+from walkerlab.physics.ground.terrain import STANCE_FOOT, Terrain, after_mid_swing, checkerboard, has_ground_in_air
+from walkerlab.physics.ground.walker import (
+    ContactWalker,
+    OnGround,
+    feet_motion,
+    folded,
+    on_ground,
+    sines_cosines,
+    unfolded,
+)
+from walkerlab.physics.hybrid.contact_events import PASSING, JudgedGround
+from walkerlab.physics.hybrid.contact_jumps import rate_of
+from walkerlab.physics.hybrid.contact_loop import NEVER
+from walkerlab.physics.hybrid.contact_result import Stopped, driven_work, in_walk, new_observer, walk_on
+from walkerlab.physics.hybrid.contact_state import WalkState, material_along, new_walk_state
+from walkerlab.physics.hybrid.walk_record import DrivenWork
+from walkerlab.physics.mechanics.links import Counted, factor_linked, solve_linked
+from walkerlab.physics.mechanics.tree import add_inertia
+from walkerlab.physics.orbits.step_map import (
+    CACHE_SIZE,
+    Cycle,
+    DisturbedWalk,
+    MappedStep,
+    Monitor,
+    StepMap,
+    Stepper,
+    failed_step,
+)
+from walkerlab.physics.solvers.registry import Tolerances
+from walkerlab.physics.solvers.system import Floats, State
+
+# indices into the state: position along the slope, height, bodies' angles; velocities follow in the same order
+ALONG, HEIGHT, ANGLES = 0, 1, 2
+NEWTON_STEPS = 20
+
+
+@dataclass(frozen=True)
+class SectionStep(MappedStep):
+    slip_m: float  # net, from touch-down to lift-off: the landing foot's so far plus the other foot's from here on
+    rolling_m: float  # likewise
+    dissipated_J: Floats  # (5,) by damping, friction, edges, knee strikes and knee stops
+    driven: DrivenWork
+    work: NDArray[np.int64]  # right-hand sides, accepted, rejected, Jacobians
+
+
+def turning_bodies(walker: ContactWalker, stance: int) -> tuple[int, ...]:
+    """Bodies that turn independently, the swing leg's first; the shank below the locked stance knee does not."""
+    locked = walker.whole.knees[stance, 0] if walker.kneed else None
+    return (*walker.legs[1 - stance], *(body for body in walker.legs[stance] if body != locked))
+
+
+def angled_bodies(walker: ContactWalker, stance: int) -> tuple[int, ...]:
+    """Bodies whose angles are coordinates; a latched compliant stop gives the stance knee an angle of its own."""
+    free = turning_bodies(walker, stance)[1:]
+    if walker.kneed and not isinstance(walker.stop, IdealLock):
+        return (*free, int(walker.whole.knees[stance, 0]))
+    return free
+
+
+def fill_followers(walker: ContactWalker, stance: int, angles: Floats, fixed: tuple[int, ...]) -> Floats:
+    """Fill in the angles (n), or changes of angles, of coupled bodies that are not `fixed`."""
+    whole, n = walker.whole, angles.size
+    shank, thigh = whole.knees[stance]
+    if walker.kneed and shank not in fixed:
+        angles[shank] = angles[thigh]
+    for body in range(n):
+        if whole.E[0, body, body] == 0.0 and body not in fixed:
+            angles[body] = whole.E[0, body, :n] @ angles
+    return angles
+
+
+def feet_apart(walker: ContactWalker, angles: Floats) -> tuple[float, Floats]:
+    """Return how far foot 0 is ahead of foot 1 (m), and the derivatives by the bodies' angles (n)."""
+    s, c = np.sin(angles + walker.slope), np.cos(angles + walker.slope)
+    x, y = ((lever[0] - lever[1])[: angles.size] for lever in (walker.whole.foot_x, walker.whole.foot_y))
+    return float(c @ x - s @ y), -(s * x + c * y)
+
+
+def state_on_section(walker: ContactWalker, z: Floats, stance: int) -> State:
+    """Return the walker's state at section coordinates, standing on leg `stance` at along = 0."""
+    n = int(walker.whole.bodies)
+    turning, angled = turning_bodies(walker, stance), angled_bodies(walker, stance)
+    state = np.zeros(4 + 2 * n)
+    state[HEIGHT], (state[2 + n], state[3 + n]) = z[0], z[1 + len(angled) : 3 + len(angled)]
+    rates = np.zeros(n)
+    rates[list(turning)] = z[3 + len(angled) :]
+    state[4 + n :] = fill_followers(walker, stance, rates, turning)
+    angles, upper = np.zeros(n), turning[0]
+    angles[list(angled)] = z[1 : 1 + len(angled)]
+    angles[upper] = angles[walker.legs[stance][0]]
+    turned = fill_followers(walker, stance, np.eye(n)[upper], (upper, *angled))
+    for _ in range(NEWTON_STEPS):  # turn the swing leg's uppermost body until the feet pass each other
+        angles = fill_followers(walker, stance, angles, (upper, *angled))
+        apart, gradient = feet_apart(walker, angles)
+        move = -apart / float(gradient @ turned)
+        angles[upper] += move
+        if abs(move) < 1e-15:
+            break
+    state[ANGLES : ANGLES + n] = fill_followers(walker, stance, angles, (upper, *angled))
+    return tuple(float(x) for x in state)
+
+
+def coordinates_of(walker: ContactWalker, state: Floats, stance: int) -> Floats:
+    n = int(walker.whole.bodies)
+    angles = [ANGLES + body for body in angled_bodies(walker, stance)]
+    rates = [4 + n + body for body in turning_bodies(walker, stance)]
+    return np.asarray(state)[[HEIGHT, *angles, 2 + n, 3 + n, *rates]]
+
+
+def section_tangents(walker: ContactWalker, state: State, stance: int) -> Floats:
+    """Derivative (4 + 2 n, coordinates) of `state_on_section` at the state that it returned."""
+    n = int(walker.whole.bodies)
+    turning, angled = turning_bodies(walker, stance), angled_bodies(walker, stance)
+    along = np.zeros((4 + 2 * n, 3 + len(angled) + len(turning)))
+    _, gradient = feet_apart(walker, np.array(state[ANGLES : ANGLES + n]))
+    fixed = (turning[0], *angled)
+    upper = fill_followers(walker, stance, np.eye(n)[turning[0]], fixed)
+    along[HEIGHT, 0] = 1.0
+    for column, body in enumerate(angled, 1):
+        turned = fill_followers(walker, stance, np.eye(n)[body], fixed)
+        along[ANGLES : ANGLES + n, column] = turned - upper * (gradient @ turned) / (gradient @ upper)
+    along[2 + n, 1 + len(angled)] = along[3 + n, 2 + len(angled)] = 1.0
+    for column, body in enumerate(turning, 3 + len(angled)):
+        along[4 + n :, column] = fill_followers(walker, stance, np.eye(n)[body], turning)
+    return along
+
+
+def step_from_section(
+    walker: ContactWalker, ground: JudgedGround, tolerances: Tolerances, z: Floats, pitch_m: float, derived: bool = True
+) -> SectionStep:
+    """Walk from section to section; REJECTED if a push-off lasts beyond the section.
+
+    z        section coordinates, the height measured from the current foothold
+    pitch_m  pad pitch
+    derived  whether to compute the derivative
+    """
+    stance, laid = STANCE_FOOT, ground
+    start = state_on_section(walker, z, stance)
+    if ground.terrain.has_pads:  # with the standing foot in the middle of a pad
+        foothold = feet_motion(walker.whole, start)[stance].along
+        laid = JudgedGround(checkerboard(pitch_m, (foothold + pitch_m, foothold)), ground.frame)
+    walk_state = walk_state_on_section(walker, laid, start, 2)
+    observer = new_observer(walker, walk_state, start, directions=z.size if derived else 0)
+    if derived:
+        observer.tangent.Phi[:, :] = section_tangents(walker, start, stance)
+    stopped = walk_on(walker, laid, tolerances, walk_state, observer, start, 1)
+    end, landed = np.array(stopped.state), 1 - stance
+    along = feet_motion(walker.whole, stopped.state)[landed].along
+    slipped = material_along(walker.whole, landed, along, stopped.state) - float(walk_state.touched[landed])
+    rolled = along - float(walk_state.foothold[landed]) - slipped
+    DP = np.zeros((z.size, 0))
+    if derived:  # project the flow's derivative onto the section, along the flow
+        system = in_walk(walker, walk_state)
+        rate = rate_of(system, folded(system.form, end), end.size, stopped.time_s)
+        gradient, n = np.zeros(end.size), int(walker.whole.bodies)
+        gradient[ANGLES : ANGLES + n] = feet_apart(walker, end[ANGLES : ANGLES + n])[1]
+        Phi = observer.tangent.Phi
+        on_section = Phi - np.outer(rate, gradient @ Phi) / (gradient @ rate)
+        DP = np.column_stack([coordinates_of(walker, column, landed) for column in on_section.T])
+    advance, rose = (float(end[place] - start[place]) for place in (ALONG, HEIGHT))
+    spacing = float(walk_state.touch_along[0] - walk_state.foothold[stance] - walk_state.slip[0])
+    half = min(1.0, max(-1.0, 0.5 * spacing / ground.frame.leg_length))
+    pulse = walker.whole.push_off_duration if walker.whole.push_off != 0.0 else 0.0
+    cut_off = stopped.time_s - walk_state.touch_time[0] < pulse
+    return SectionStep(
+        Outcome.REJECTED if cut_off and stopped.outcome is Outcome.WALKED else stopped.outcome,
+        coordinates_of(walker, end, landed),
+        DP,
+        stopped.time_s,
+        advance,
+        math.asin(half) - walker.slope,
+        float(walk_state.touch_time[0]),
+        float(walk_state.slip[0] + slipped),
+        float(walk_state.rolling[0] + rolled),
+        observer.account[LOST].copy(),
+        driven_work(walker, advance, rose, observer.account),
+        stopped.work,
+    )
+
+
+def walk_from_section(
+    walker: ContactWalker, ground: JudgedGround, tolerances: Tolerances, z: Floats, heights: Floats, push: float
+) -> DisturbedWalk:
+    """Walk from the section over footholds of given heights, with a push at the hip at the first touch-down.
+
+    heights  (steps + 1,) m, beginning with the current foothold
+    push     N s, along the slope
+    """
+    start, steps = state_on_section(walker, z, STANCE_FOOT), heights.size - 1
+    over = np.append(heights[0], heights) - heights[0]
+    laid = ground._replace(terrain=ground.terrain._replace(heights=over)) if over.any() else ground
+    walk_state = walk_state_on_section(walker, laid, start, steps + 1)
+
+    def go_on(walk_state: WalkState, state: State, until: int = NEVER) -> Stopped:
+        return walk_on(walker, laid, tolerances, walk_state, new_observer(walker, walk_state, state), state, until)
+
+    stopped = Stopped(Outcome.WALKED, 0.0, start, np.zeros(4, np.int64))
+    if push != 0.0:
+        stopped = go_on(shorten(walk_state, 1), start)
+        pushed = pushed_at_hip(on_ground(walker, walk_state.has_ground, walk_state.knee), walker, stopped.state, push)
+        stopped = replace(stopped, state=pushed)
+    if stopped.outcome is Outcome.WALKED:
+        stopped = go_on(walk_state, stopped.state, steps)
+    if stopped.outcome is Outcome.WALKED:
+        stance = int(walk_state.progress.stance)
+        z = coordinates_of(walker, np.array(stopped.state), stance)
+        z[0] -= walk_state.level[stance]
+        stopped = go_on(walk_state, stopped.state)
+    touched = int(walk_state.progress.steps)
+    times, places = walk_state.touch_time[:touched], walk_state.touch_along[:touched]
+    return DisturbedWalk(stopped.outcome, np.diff(times), np.diff(places), z)
+
+
+def shorten(walk_state: WalkState, steps: int) -> WalkState:
+    fields = ("touch_time", "touch_along", "touch_height", "slip", "rolling")
+    return walk_state._replace(**{name: getattr(walk_state, name)[:steps] for name in fields})
+
+
+def pushed_at_hip(system: OnGround, walker: ContactWalker, state: State, impulse: float) -> State:
+    """Apply an impulse (N s) at the hip along the slope to a state of the free walker."""
+    form, new = system.form, np.array(state)
+    y = folded(form, new)
+    n, half = int(form.bodies), int(form.places + form.bodies)
+    s, c, r = np.zeros((3, n))
+    M = np.zeros((n, n))
+    sines_cosines(form, y, s, c)
+    add_inertia(form, n, s, c, y[half + 2 :], M, r)
+    r[:] = -impulse * (s * form.hip_x[:n] + c * form.hip_y[:n])
+    links = Counted(form.E, form.arm_x[:n])
+    factor_linked(links, 0, M)
+    solve_linked(links, 0, M, r)
+    y[half] += impulse / form.mass
+    y[half + 2 :] += r
+    return tuple(unfolded(form, y, walker.size).tolist())
+
+
+def walk_state_on_section(walker: ContactWalker, ground: JudgedGround, start: State, steps: int) -> WalkState:
+    """Return the walk state for `steps` touch-downs: one foot stands, and the other swings past it."""
+    stance, swing = STANCE_FOOT, 1 - STANCE_FOOT
+    walk_state = new_walk_state(walker, ground.terrain, stance, steps, start)
+    feet = feet_motion(walker.whole, start)
+    walk_state.at_zero[:] = 0
+    walk_state.at_zero[PASSING] = 1
+    walk_state.sides[PASSING] = 1 if swing == 1 else -1
+    walk_state.has_ground[swing] = feet[swing].height > 0.0 and has_ground_in_air(
+        ground.terrain, bool(walk_state.has_ground[swing]), False, True
+    )
+    walk_state.left_cells[swing] = walk_state.cells[swing] - 1
+    walk_state.foothold[swing] = feet[stance].along - ground.frame.leg_length
+    return walk_state
+
+
+@dataclass(frozen=True)
+class WalkerOnGround:
+    walker: ContactWalker
+    ground: JudgedGround
+
+
+class ContactMap(StepMap):
+    """Step map of a walker on compliant ground, scaled by leg length and pendulum time.
+
+    Pads let the swing foot of straight legs through; families are therefore followed on ground that the swing foot
+    touches only ahead of the stance foot. `watch` reports where pads of the gait's own step length would trip it.
+    """
+
+    monitors = (
+        Monitor("slip_m", "m", "largest net slip of a foot from touch to lift"),
+        Monitor("tripped", "1", "whether pads of its own step length trip the swing foot", 0.5),
+    )
+    probe = 1e-6  # stiff ground yields by less than 0.01 mm
+
+    def __init__(
+        self,
+        walker_at: Callable[[float], WalkerOnGround | None],
+        scale: float,
+        tolerances: Tolerances,
+        step_length_m: float,
+        like: WalkerOnGround,
+    ) -> None:
+        """Prepare the step map of a family of walkers.
+
+        walker_at      walker and ground at a value of the parameter; None where the value makes no walker
+        scale          magnitude of significant changes of the parameter
+        tolerances     solver settings of a step
+        step_length_m  reference step length of the terrain
+        like           any one of the walkers; its leg length and pendulum time are the units
+        """
+        self._at = lru_cache(CACHE_SIZE)(walker_at)
+        self.scale, self.tolerances, self._measure = scale, tolerances, step_length_m
+        self._on_pads = like.ground.terrain.has_pads
+        angled, turning = angled_bodies(like.walker, STANCE_FOOT), turning_bodies(like.walker, STANCE_FOOT)
+        rates = (f"rate_{body}" for body in turning)
+        self.names = ("height", *(f"angle_{body}" for body in angled), "along_rate", "height_rate", *rates)
+        L, tau = like.ground.frame.leg_length, like.ground.frame.pendulum_time
+        self._units = np.array([L, *[1.0] * len(angled), L / tau, L / tau, *[1.0 / tau] * len(turning)])
+
+    def scale_section(self, z: Floats) -> Floats:
+        return np.asarray(z / self._units)
+
+    def _terrain(self, site: WalkerOnGround) -> Terrain:
+        own = site.ground.terrain
+        return after_mid_swing(self._measure) if own.has_pads else own
+
+    def _walk(self, site: WalkerOnGround, z: Floats, derived: bool, terrain: Terrain | None = None) -> SectionStep:
+        terrain = terrain or self._terrain(site)
+        ground = site.ground._replace(terrain=terrain)
+        return step_from_section(site.walker, ground, self.tolerances, z * self._units, terrain.stride_measure, derived)
+
+    def step(self, z: Floats, p: float, derived: bool = True) -> MappedStep:
+        site = self._at(p)
+        if site is None:
+            return failed_step(None, z.size)
+        step = self._walk(site, z, derived)
+        if step.outcome is not Outcome.WALKED:
+            return failed_step(step.outcome, z.size)
+        DP = step.DP * self._units / self._units[:, None] if derived else step.DP
+        return replace(step, z=step.z / self._units, DP=DP)
+
+    def watch(self, z: Floats, p: float, steps: int) -> Floats:
+        site = self._at(p)
+        assert site is not None, "what is watched was walked"
+        slip, tripped, start = 0.0, 0.0, z
+        for _ in range(steps):
+            step = self._walk(site, start, False)
+            slip, start = max(slip, abs(step.slip_m)), step.z / self._units
+            if self._on_pads and steps == 1:
+                on_pads = self._walk(site, z, False, checkerboard(step.length_m, (0.0, 0.0)))
+                tripped = float(on_pads.outcome is not Outcome.WALKED)
+        return np.array([slip, tripped])
+
+    def disturbed(self, z: Floats, p: float, heights_m: Floats, push_N_s: float = 0.0) -> DisturbedWalk:
+        """Walk over footholds (m) from the touch-down after z, where a push is applied."""
+        site = self._at(p)
+        assert site is not None, "what is disturbed has a gait"
+        ground = site.ground._replace(terrain=self._terrain(site))
+        endless = replace(self.tolerances, budget=self.tolerances.budget * heights_m.size)
+        walk = walk_from_section(site.walker, ground, endless, z * self._units, heights_m, push_N_s)
+        return replace(walk, z=walk.z / self._units)
+
+    def cost_of_transport(self, z: Floats, p: float) -> float | None:
+        step = self.step(z, p, derived=False)
+        return step.driven.cost_of_transport(step.length_m) if isinstance(step, SectionStep) else None
+
+    def leg_and_pendulum(self, p: float) -> tuple[float, float]:
+        site = self._at(p)
+        assert site is not None, "what is measured has a gait"
+        return site.ground.frame.leg_length, site.ground.frame.pendulum_time
+
+    def at(self, tolerances: Tolerances) -> ContactMap:
+        changed = copy(self)
+        changed.tolerances = tolerances
+        return changed
+
+
+class OwnPads(Stepper):
+    """Stepper of a walker on compliant ground, in SI, whose pads are re-laid for the length of the last step."""
+
+    def __init__(
+        self, walker_at: Callable[[float], ContactWalker], ground: JudgedGround, tolerances: Tolerances, pitch_m: float
+    ) -> None:
+        self.walker_at, self.ground, self.tolerances, self.pitch_m = walker_at, ground, tolerances, pitch_m
+
+    def step(self, z: Floats, p: float, derived: bool = True) -> MappedStep:
+        step = step_from_section(self.walker_at(p), self.ground, self.tolerances, z, self.pitch_m, derived)
+        if step.outcome is Outcome.WALKED:
+            self.pitch_m = step.length_m
+        return step
+
+
+def contact_step(gait: Cycle) -> SectionStep:
+    assert isinstance(gait.step, SectionStep), "a gait of the contact model"
+    return gait.step

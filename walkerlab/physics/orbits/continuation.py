@@ -1,0 +1,221 @@
+"""Continuation of solutions over a parameter: from value to value, or along their curve through its folds.
+
+Both predict the next solution and correct it by Newton's method. From value to value the predictor is a polynomial
+through the last solutions. A curve is the set of solutions of `m` equations in `m + 1` unknowns: the predictor follows
+the tangent and the corrector stays on the plane normal to it, so that a fold is a regular point.
+
+Source: Keller, Numerical solution of bifurcation and nonlinear eigenvalue problems (1977); Kuznetsov, Elements of
+applied bifurcation theory, chapter 10.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Generic, NamedTuple
+
+import numpy as np
+
+from walkerlab.outcome import Outcome
+from walkerlab.physics.orbits.newton import (
+    MAX_NEWTON_EVALUATIONS,
+    Data,
+    Effort,
+    Equations,
+    Evaluated,
+    NotConverged,
+    newton,
+)
+from walkerlab.physics.solvers.system import Floats
+
+FEW_CORRECTIONS = 3
+RESOLUTION = 1e-14  # of arclength
+# (abscissa, solution) pairs, latest last.
+Points = tuple[tuple[float, Floats], ...]
+
+
+class Strides(NamedTuple):
+    """Limits of the stride over the parameter, and how many points the predictor uses."""
+
+    widest: float
+    narrowest: float
+    remembered: int
+
+
+class FollowerState(NamedTuple):
+    """How far a solution has been followed, and the state from which it continues."""
+
+    at: float
+    stride: float
+    points: Points
+
+
+class Follower:
+    """Follows a solution over a rising parameter; earlier progress is cached."""
+
+    def __init__(
+        self,
+        solve: Callable[[float, Floats], Floats | None],
+        first: FollowerState,
+        strides: Strides,
+        abscissa: Callable[[float], float] = float,
+    ) -> None:
+        """Begin with the solution `first`.
+
+        solve     return the solution (m,) at a value, given a prediction; None if it fails
+        abscissa  variable in which the solution is smooth, as a function of the parameter
+        """
+        self._solve, self._strides, self._abscissa, self._ways = solve, strides, abscissa, [first]
+
+    def to(self, target: float) -> FollowerState:
+        """Follow the solution to the parameter's value `target`, or to where it is lost.
+
+        Strides do not depend on the target until the last, so the cached ones serve every target.
+        """
+        state = self._ways[0]
+        for state in self._ways:  # grows during the loop
+            following = state.at + state.stride
+            if following >= target or state.stride < self._strides.narrowest:
+                break
+            if state is self._ways[-1]:
+                self._ways.append(self._advance(state, following))
+        while state.at < target and state.stride >= self._strides.narrowest:
+            state = self._advance(state, min(target, state.at + state.stride))
+        return state
+
+    def _advance(self, state: FollowerState, ahead: float) -> FollowerState:
+        abscissa = self._abscissa(ahead)
+        solution = self._solve(ahead, interpolate(state.points, abscissa))
+        if solution is None:
+            return state._replace(stride=0.5 * state.stride)
+        points = (*state.points, (abscissa, solution))[-self._strides.remembered :]
+        return FollowerState(ahead, min(self._strides.widest, 1.2 * state.stride), points)
+
+
+def interpolate(points: Points, x: float) -> Floats:
+    total = np.zeros_like(points[0][1])
+    for i, (x_i, y_i) in enumerate(points):
+        weight = 1.0
+        for j, (x_j, _) in enumerate(points):
+            if j != i:
+                weight *= (x - x_j) / (x_i - x_j)
+        total += weight * y_i
+    return total
+
+
+@dataclass(frozen=True)
+class CurvePoint(Generic[Data]):
+    x: Floats
+    tangent: Floats  # of unit length
+    evaluated: Evaluated[Data]
+    corrections: int
+
+
+def correct(
+    equations: Equations[Data], guess: Floats, normal: Floats, tolerance: float, most: int = MAX_NEWTON_EVALUATIONS
+) -> CurvePoint[Data] | NotConverged:
+    """Solve for the point of a curve on the plane through `guess` with that normal."""
+
+    def on_plane(x: Floats) -> Evaluated[Data]:
+        evaluated = equations(x)
+        value = np.append(evaluated.value, normal @ (x - guess))
+        return evaluated._replace(value=value, jacobian=np.vstack((evaluated.jacobian, normal)))
+
+    solution = newton(on_plane, guess, Effort(tolerance, most))
+    if isinstance(solution, NotConverged):
+        return solution
+    try:
+        direction = np.linalg.solve(solution.evaluated.jacobian, np.eye(guess.size)[-1])
+    except np.linalg.LinAlgError:
+        return NotConverged(Outcome.WALKED, singular=True)
+    return CurvePoint(solution.x, direction / np.linalg.norm(direction), solution.evaluated, solution.corrections)
+
+
+@dataclass(frozen=True)
+class StepControl:
+    """Limits of one step."""
+
+    first: float = 0.01  # arclength, also of the next two
+    shortest: float = 1e-8
+    longest: float = 0.05
+    turn: float = 0.97  # cosine of the largest angle between tangents of neighbours
+    tolerance: float = 1e-12  # on the equations
+
+
+def step_along(
+    equations: Equations[Data],
+    last: CurvePoint[Data],
+    length: float,
+    control: StepControl,
+    acceptable: Callable[[CurvePoint[Data]], bool] = lambda _: True,
+    before: CurvePoint[Data] | None = None,
+) -> tuple[CurvePoint[Data], float] | NotConverged:
+    """Return the next point of a curve after `last`, and the length of the step after it.
+
+    acceptable  additional condition of the caller on the new point
+    before      point before `last`, if any: it gives the curvature
+    """
+    lost = NotConverged(Outcome.WALKED)
+    bend = np.zeros_like(last.x)  # curvature: change of the tangent per arclength
+    if before is not None:
+        bend = np.asarray((last.tangent - before.tangent) / np.linalg.norm(last.x - before.x))
+    while length >= control.shortest:
+        guess = last.x + length * last.tangent + 0.5 * length**2 * bend
+        point = correct(equations, guess, last.tangent, control.tolerance)
+        if isinstance(point, CurvePoint):
+            correction = float(np.linalg.norm(point.x - guess))
+            if point.tangent @ last.tangent > control.turn and correction < 0.5 * length and acceptable(point):
+                longer = 1.6 if point.corrections <= FEW_CORRECTIONS else 1.0
+                return point, min(control.longest, longer * length)
+        else:
+            lost = point
+        length *= 0.5
+    return lost
+
+
+@dataclass(frozen=True)
+class Segment(Generic[Data]):
+    """The curve between two neighbours, as a function of the distance along the first one's tangent."""
+
+    equations: Equations[Data]
+    first: CurvePoint[Data]
+    second: CurvePoint[Data]
+    tolerance: float
+
+    @property
+    def length(self) -> float:
+        return float(self.first.tangent @ (self.second.x - self.first.x))
+
+    def at(self, s: float) -> CurvePoint[Data] | NotConverged:
+        share = s / self.length
+        bend = self.second.x - self.first.x - self.length * self.first.tangent
+        guess = self.first.x + s * self.first.tangent + share * share * bend
+        return correct(self.equations, guess, self.first.tangent, self.tolerance, 2 * MAX_NEWTON_EVALUATIONS)
+
+
+class _OffTheCurve(Exception):  # noqa: N818 (the end of one search, not an error)
+    """The corrector found no point between two neighbours."""
+
+
+def root_along(segment: Segment[Data], measure: Callable[[CurvePoint[Data]], float]) -> CurvePoint[Data] | None:
+    """Return the point of a segment where `measure` changes sign; None if the curve is lost.
+
+    Brent's method on the corrected curve.
+    """
+    # Imported late: only curves need it.
+    from scipy.optimize import brentq
+
+    points: dict[float, CurvePoint[Data]] = {0.0: segment.first, segment.length: segment.second}
+
+    def measure_at(s: float) -> float:
+        if s not in points:
+            point = segment.at(s)
+            if isinstance(point, NotConverged):
+                raise _OffTheCurve
+            points[s] = point
+        return measure(points[s])
+
+    try:
+        root = brentq(measure_at, 0.0, segment.length, xtol=RESOLUTION, rtol=4.0 * np.finfo(float).eps)
+        measure_at(root)
+    except (_OffTheCurve, ValueError):
+        return None
+    return points[root]

@@ -1,0 +1,365 @@
+"""Families of gaits over a parameter: branches, their bifurcations, and the cascades beyond their flips.
+
+A branch is followed from a gait in both directions until it leaves the span or is lost. At each flip the branch of
+twice the period is entered along the eigenvector to -1, at the amplitude given by the flip's normal form.
+"""
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from walkerlab.outcome import OUTCOME_TEXTS, Outcome
+from walkerlab.physics.orbits.bifurcations import (
+    BIFURCATION_KINDS,
+    Bifurcation,
+    FlipForm,
+    GaitEquations,
+    critical_value,
+    flip_form,
+    locate_bifurcation,
+    predict_doubled,
+)
+from walkerlab.physics.orbits.continuation import CurvePoint, Segment, StepControl, correct, step_along
+from walkerlab.physics.orbits.newton import Effort, NotConverged
+from walkerlab.physics.orbits.step_map import Cycle, Monitor, StepMap, gait_near
+from walkerlab.physics.solvers.system import Floats
+
+SAME_STATE = 1e-6  # distance below which states are equal
+AMPLITUDE_HALVINGS = 12  # when entering a doubled branch
+MAX_MULTIPLIER_CHANGE = 0.6  # between neighbours, for multipliers near the unit circle
+CRITICAL_RANGE = 1.6  # magnitudes up to this, or its inverse, are near the unit circle
+SEED_EVALUATIONS = 20  # of Newton's method
+CLOSED_LOOP = "comes round to where it began"
+NO_WALKER = "no walker has the parameter's next value"
+END_OF_SPAN = "end of the span"
+EDGE_TOLERANCE = 1e-12  # relative to the span
+# per branch; growth of a disturbance over a cycle, beyond which gaits cannot be resolved
+MAX_BRANCH_POINTS, MAX_CYCLE_GROWTH = 400, 1e4
+
+
+@dataclass(frozen=True)
+class ValueSpan:
+    least: float
+    most: float
+
+    @property
+    def size(self) -> float:
+        return self.most - self.least
+
+    def __contains__(self, value: float) -> bool:
+        return self.least <= value <= self.most
+
+    def nearest(self, value: float) -> float:
+        return min(max(value, self.least), self.most)
+
+
+BRANCH_CONTROL = StepControl()
+
+
+@dataclass(frozen=True)
+class BranchEnd:
+    value: float
+    reason: str
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """Value on a branch at which a monitored assumption begins or ceases to hold."""
+
+    monitor: Monitor
+    value: float
+
+
+@dataclass(frozen=True, eq=False)
+class GaitBranch:
+    period: int
+    points: tuple[Cycle, ...]
+    ends: tuple[BranchEnd, BranchEnd]
+    bifurcations: tuple[Bifurcation, ...]
+    crossings: tuple[Crossing, ...]
+
+    @property
+    def closed(self) -> bool:
+        return self.ends[1].reason == CLOSED_LOOP
+
+    @cached_property
+    def values(self) -> Floats:
+        return np.array([point.value for point in self.points])
+
+    @property
+    def stable_ranges(self) -> tuple[tuple[float, float], ...]:
+        stretches: list[list[float]] = []
+        values = [self.ends[0].value]  # of the current stable stretch
+        stable = self.points[0].stable
+        for gait, following in pairwise(self.points):
+            if gait.stable:
+                values.append(gait.value)
+            if gait.stable != following.stable:
+                on_it = (b.value for b in self.bifurcations if b.lies_between(gait, following))
+                edge = next(on_it, 0.5 * (gait.value + following.value))
+                if stable:
+                    stretches.append([*values, edge])
+                values, stable = [edge], following.stable
+        if stable:
+            stretches.append([*values, self.points[-1].value, self.ends[1].value])
+        return tuple((min(stretch), max(stretch)) for stretch in stretches)
+
+    def closes_on(self, flip: Bifurcation) -> list[bool]:
+        reach = (2.0 * np.ptp(values) + 1e-12 for values in (self.values[:2], self.values[-2:]))
+        near = [bool(abs(end.value - flip.value) <= far) for end, far in zip(self.ends, reach, strict=True)]
+        closing = (flip.kind == "flip" and end.reason.startswith("closes") for end in self.ends)
+        return [closes and is_near for closes, is_near in zip(closing, near, strict=True)]
+
+    @property
+    def flipped_outside(self) -> bool:
+        """Whether the whole branch lies beyond a flip that is not on it: one multiplier below -1 throughout."""
+        on_it = any(bifurcation.kind == "flip" for bifurcation in self.bifurcations)
+        return not on_it and critical_value("flip", self.points[0].DP) < 0.0
+
+
+class Seed(NamedTuple):
+    """Section coordinates z (d,) near a gait of `steps` steps at a value of the parameter."""
+
+    z: Floats
+    value: float
+    steps: int = 1
+
+
+@dataclass(frozen=True)
+class BranchFollower:
+    """Follows the branches of one model over one span."""
+
+    step_map: StepMap
+    span: ValueSpan
+    control: StepControl = BRANCH_CONTROL
+    most: int = MAX_BRANCH_POINTS  # maximum number of points on a branch
+    advance: Callable[[], None] = lambda: None  # called after each point
+
+    def family(self, seeds: Iterable[Seed], periods: int, known: tuple[GaitBranch, ...] = ()) -> tuple[GaitBranch, ...]:
+        """Return `known`, every other branch through the seeds, and the cascades beyond their flips.
+
+        periods  maximum number of steps of a gait
+        """
+        branches = list(known)
+        for seed in seeds:
+            start = self.solve_at(seed.z, seed.value, seed.steps)
+            if start is None:
+                continue
+            gait = start.evaluated.data
+            like = [branch for branch in branches if branch.period == seed.steps]
+            sooner = any(np.abs(step.z - gait.z).max() < SAME_STATE for step in gait.steps[:-1])
+            if sooner or any(self.lies_on(branch, gait) for branch in like):
+                continue
+            rising = start if start.tangent[-1] > 0.0 else replace(start, tangent=-start.tangent)
+            branch_ahead = self.trace(rising, seed.steps)
+            if not branch_ahead.closed:
+                behind = self.trace(replace(rising, tangent=-rising.tangent), seed.steps)
+                branch_ahead = GaitBranch(
+                    seed.steps,
+                    (*reversed(behind.points[1:]), *branch_ahead.points),
+                    (behind.ends[1], branch_ahead.ends[1]),
+                    (*reversed(behind.bifurcations), *branch_ahead.bifurcations),
+                    (*reversed(behind.crossings), *branch_ahead.crossings),
+                )
+            # a known branch has no points between its flip and its first gait, so `lies_on` may miss it
+            if not any(self.lies_on(branch_ahead, branch.points[0]) for branch in like):
+                branches.append(branch_ahead)
+        for branch in branches:  # grows during the loop
+            if 2 * branch.period <= periods and branch not in known:
+                branches.extend(self.follow_doubled(branch, branches))
+        return tuple(close_on_flips(branch, branches) for branch in branches)
+
+    def equations(self, period: int) -> GaitEquations:
+        return GaitEquations(self.step_map, period, self.span.size)
+
+    def solve_at(self, z: Floats, value: float, period: int) -> CurvePoint[Cycle] | None:
+        x, tolerance = np.append(z, value / self.span.size), self.control.tolerance
+        solution = correct(self.equations(period), x, np.eye(x.size)[-1], tolerance, SEED_EVALUATIONS)
+        return None if isinstance(solution, NotConverged) else solution
+
+    def lies_on(self, branch: GaitBranch, gait: Cycle) -> bool:
+        """Whether a gait is on a branch already, starting at any of its steps."""
+        value, effort = gait.value, Effort(self.control.tolerance, SEED_EVALUATIONS)
+        starts = [gait.z, *(step.z for step in gait.steps)]
+        for first, second in pairwise(branch.points):
+            low, high = sorted((first.value, second.value))
+            if low == high or not low <= value <= high:
+                continue
+            share = (value - first.value) / (second.value - first.value)
+            guess = first.z + share * (second.z - first.z)
+            neighbour = gait_near(self.step_map, guess, value, effort, branch.period)
+            if isinstance(neighbour, Cycle) and min(np.abs(neighbour.z - z).max() for z in starts) < SAME_STATE:
+                return True
+        return False
+
+    def follow_doubled(self, parent: GaitBranch, known: Iterable[GaitBranch]) -> list[GaitBranch]:
+        branches: list[GaitBranch] = []
+        for flip in parent.bifurcations:
+            like = [branch for branch in (*known, *branches) if branch.period == 2 * parent.period]
+            if flip.kind != "flip" or any(any(branch.closes_on(flip)) for branch in like):
+                continue
+            form = flip_form(self.equations(parent.period), flip)
+            start = None if form is None else self.enter_doubled(flip, form, parent.period)
+            if start is not None:
+                branch = self.trace(start, 2 * parent.period)
+                first = BranchEnd(flip.value, f"flip of the gait of {parent.period} {steps_word(parent.period)}")
+                branches.append(replace(branch, ends=(first, branch.ends[1])))
+        return branches
+
+    def enter_doubled(self, flip: Bifurcation, form: FlipForm, period: int) -> CurvePoint[Cycle] | None:
+        """Return the first gait of twice the period, at the normal form's amplitude; None if it is lost.
+
+        Its tangent points away from the flip: the halves of the cycle move apart along it.
+        """
+        for halving in range(AMPLITUDE_HALVINGS):
+            guess, normal, xi = predict_doubled(flip, form, 0.5**halving)
+            point = correct(self.equations(2 * period), guess, normal, self.control.tolerance)
+            if isinstance(point, CurvePoint) and np.linalg.norm(point.x - guess) < 0.5 * xi:
+                half = self.equations(period)(point.x)
+                parting = half.value @ (half.jacobian @ point.tangent)
+                return point if parting > 0.0 else replace(point, tangent=-point.tangent)
+        return None
+
+    def trace(self, start: CurvePoint[Cycle], period: int) -> GaitBranch:
+        equations = self.equations(period)
+        points, before, last, end = [self.point(start)], None, start, None
+        bifurcations, crossings = list[Bifurcation](), list[Crossing]()
+        step = self.control.first
+        if period > 1:
+            step = min(step, 0.5 * float(np.linalg.norm(half_cycle_difference(start.evaluated.data))))
+        while end is None:
+            if len(points) >= self.most:
+                end = BranchEnd(points[-1].value, f"{self.most} points are used up")
+                break
+            following = self.next_point(equations, last, step, before)
+            if isinstance(following, BranchEnd):
+                end = following
+                break
+            solved, step, end = following
+            if passes_through(Segment(equations, last, solved, self.control.tolerance), start, self.control.turn):
+                end, solved = BranchEnd(points[0].value, CLOSED_LOOP), start
+            if period % 2 == 0 and halves_meet(last.evaluated.data, solved.evaluated.data):
+                end = BranchEnd(points[-1].value, f"closes on the gait of {period // 2} {steps_word(period // 2)}")
+                break
+            segment = Segment(equations, last, solved, self.control.tolerance)
+            located = (locate_bifurcation(segment, kind, equations.scale) for kind in BIFURCATION_KINDS)
+            bifurcations += [left for left in located if left is not None]
+            points.append(self.point(solved))
+            left, right = points[-2:]
+            for monitor, ahead, after in zip(self.step_map.monitors, left.monitors, right.monitors, strict=True):
+                if monitor.limit is not None and (ahead - monitor.limit) * (after - monitor.limit) < 0.0:
+                    share = (monitor.limit - ahead) / (after - ahead)
+                    crossings.append(Crossing(monitor, left.value + share * (right.value - left.value)))
+            if end is None and abs(points[-1].multipliers[0]) > MAX_CYCLE_GROWTH:
+                end = BranchEnd(points[-1].value, f"a disturbance grows more than {MAX_CYCLE_GROWTH:g}-fold a cycle")
+            before, last = last, solved
+        if end.reason == CLOSED_LOOP:  # begin at an unstable gait, so that no stable stretch is split
+            begin = min(range(len(points) - 1), key=lambda k: (points[k].stable, points[k].value))
+            points = [*points[begin:-1], *points[: begin + 1]]
+            end = replace(end, value=points[0].value)
+        first = BranchEnd(points[0].value, end.reason if end.reason == CLOSED_LOOP else "start")
+        return GaitBranch(period, tuple(points), (first, end), tuple(bifurcations), tuple(crossings))
+
+    def multiplier_check(self, last: CurvePoint[Cycle]) -> Callable[[CurvePoint[Cycle]], bool]:
+        """Return a check that multipliers near the unit circle moved little, so that no two crossings are missed."""
+        critical = [m for m in last.evaluated.data.multipliers if 1.0 / CRITICAL_RANGE < abs(m) < CRITICAL_RANGE]
+
+        def near(point: CurvePoint[Cycle]) -> bool:
+            after = point.evaluated.data.multipliers
+            return all(min(abs(m - new) for new in after) < MAX_MULTIPLIER_CHANGE for m in critical)
+
+        return near
+
+    def next_point(
+        self, equations: GaitEquations, last: CurvePoint[Cycle], step: float, before: CurvePoint[Cycle] | None
+    ) -> tuple[CurvePoint[Cycle], float, BranchEnd | None] | BranchEnd:
+        """Return the next point, the next step length, and the branch's end if it is reached.
+
+        A step that leaves the span is cut at its edge, since beyond it there may be no walker. Returns only the end if
+        there is no further point.
+        """
+        ahead, acceptable = last.x + step * last.tangent, self.multiplier_check(last)
+        edge = self.span.nearest(equations.value(ahead))
+        if edge != equations.value(ahead):
+            if abs(edge - equations.value(last.x)) <= EDGE_TOLERANCE * self.span.size:
+                return BranchEnd(edge, END_OF_SPAN)
+            at_edge = self.at_edge(equations, last, ahead)
+            if at_edge is not None and at_edge.tangent @ last.tangent > self.control.turn and acceptable(at_edge):
+                return at_edge, step, BranchEnd(edge, END_OF_SPAN)
+        following = step_along(equations, last, step, self.control, acceptable, before)
+        if isinstance(following, NotConverged):
+            return BranchEnd(equations.value(last.x), describe_loss(following))
+        solved, step = following
+        value = equations.value(solved.x)
+        if value in self.span:
+            return solved, step, None
+        at_edge = self.at_edge(equations, last, solved.x)
+        if at_edge is None:
+            return solved, step, BranchEnd(value, END_OF_SPAN)
+        return at_edge, step, BranchEnd(self.span.nearest(value), END_OF_SPAN)
+
+    def at_edge(self, equations: GaitEquations, last: CurvePoint[Cycle], beyond: Floats) -> CurvePoint[Cycle] | None:
+        """Solve for the gait at the edge of the span, on the way from `last` to a point (d + 1,) beyond."""
+        start, value = equations.value(last.x), equations.value(beyond)
+        edge = self.span.nearest(value)
+        guess = last.x + (edge - start) / (value - start) * (beyond - last.x)
+        guess[-1] = edge / self.span.size
+        point = correct(equations, guess, np.eye(guess.size)[-1], self.control.tolerance)
+        if isinstance(point, NotConverged):
+            return None
+        return point if point.tangent @ last.tangent > 0.0 else replace(point, tangent=-point.tangent)
+
+    def point(self, solved: CurvePoint[Cycle]) -> Cycle:
+        self.advance()
+        gait = solved.evaluated.data
+        return replace(gait, monitors=self.step_map.watch(gait.z, gait.value, len(gait.steps)))
+
+
+def passes_through(segment: Segment[Cycle], gait: CurvePoint[Cycle], turn: float) -> bool:
+    """Whether a gait lies between two neighbours on a curve with the same direction.
+
+    turn  cosine of the largest angle between the tangents
+    """
+    first = segment.first
+    along = float(first.tangent @ (gait.x - first.x))
+    if not 0.0 < along <= segment.length or gait.tangent @ first.tangent < turn:
+        return False
+    near = segment.at(along)
+    return isinstance(near, CurvePoint) and bool(np.abs(near.x - gait.x).max() < SAME_STATE)
+
+
+def steps_word(n: int) -> str:
+    return "step" if n == 1 else "steps"
+
+
+def half_cycle_difference(gait: Cycle) -> Floats:
+    """Return the difference between a gait's states half a cycle apart; zero for a gait of half as many steps."""
+    return np.asarray(gait.steps[len(gait.steps) // 2 - 1].z - gait.z)
+
+
+def halves_meet(last: Cycle, gait: Cycle) -> bool:
+    """Whether a branch has reached the gait of half as many steps: the cycle's halves coincide or have swapped."""
+    parted = half_cycle_difference(gait)
+    return bool(np.abs(parted).max() < SAME_STATE or half_cycle_difference(last) @ parted < 0.0)
+
+
+def close_on_flips(branch: GaitBranch, branches: Iterable[GaitBranch]) -> GaitBranch:
+    flips = [b for parent in branches for b in parent.bifurcations if 2 * parent.period == branch.period]
+    ends = []
+    for place, end in enumerate(branch.ends):
+        near = [flip.value for flip in flips if branch.closes_on(flip)[place]]
+        ends.append(replace(end, value=min(near, key=lambda value: abs(value - end.value))) if near else end)
+    return branch if tuple(ends) == branch.ends else replace(branch, ends=(ends[0], ends[1]))
+
+
+def describe_loss(lost: NotConverged) -> str:
+    if lost.outcome is Outcome.WALKED:
+        return "Newton's method finds no further gait"
+    if lost.outcome is None:
+        return NO_WALKER
+    aside = "" if lost.outcome is Outcome.REJECTED else f"{lost.outcome.label}: "
+    return f"{aside}{OUTCOME_TEXTS[lost.outcome].why}"

@@ -1,0 +1,230 @@
+"""Search for all families of one model over a span: branches with cascades, attractors, chaos, and a plane's curves.
+
+The search works on seeds and a step map of either model; only its thoroughness depends on the model.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+
+from walkerlab.physics.orbits.attractors import (
+    Attractor,
+    AttractorBranch,
+    Lyapunov,
+    close_returns,
+    largest_exponent,
+    leave_by_flip,
+    settle_elsewhere,
+    sweep_attractor,
+)
+from walkerlab.physics.orbits.continuation import StepControl
+from walkerlab.physics.orbits.families import BranchFollower, GaitBranch, Seed, ValueSpan
+from walkerlab.physics.orbits.step_map import StepMap
+from walkerlab.physics.orbits.two_parameters import (
+    CURVE_CONTROL,
+    BifurcationCurve,
+    Plane,
+    Regions,
+    find_regions,
+    follow_curve,
+)
+from walkerlab.physics.solvers.system import Floats
+
+BEFORE_FLIP = 0.02  # of the span: the attractor is followed from this far before the first flip
+# parameter values, periods to search for, length of the walks
+OTHER_GAIT_VALUES, OTHER_PERIODS, CLOSE_RETURN_STEPS = 12, (3, 5, 6), 4000
+# at each value: number, standard deviation, and steps to settle
+SCATTERED, SCATTER_WIDTH, SCATTER_STEPS = 40, 0.1, 400
+CURVE_POINTS = 120
+RIGID, CONTACT = "rigid", "contact"
+
+
+class Listener(Protocol):
+    """Receives the progress of a search."""
+
+    def start(self, label: str, total: int | None = None) -> None: ...
+
+    def advance(self, n: int = 1) -> None: ...
+
+
+@dataclass(frozen=True)
+class Thoroughness:
+    """Effort and limits of a search."""
+
+    values: int  # of the parameter at which to look for attractors
+    transient: int  # steps before reaching an attractor
+    kept: int  # steps on the attractor
+    exponents: int  # values at which to measure the Lyapunov exponent
+    averaged: int  # steps to average it over
+    branch_control: StepControl  # along branches
+    curve_control: StepControl  # along curves of bifurcations
+    periods: int  # maximum period of gaits
+    curve_periods: int  # maximum period of gaits whose bifurcations are followed over a plane
+    other_gaits: bool  # whether to search for gaits of other periods and for the regions of a plane
+
+
+# The tolerance matches the contact model's derivatives, accurate to about 1e-8.
+CURVES_ON_GROUND = StepControl(first=0.03, shortest=1e-4, longest=0.1, turn=0.95, tolerance=1e-8)
+THOROUGHNESS = {
+    RIGID: Thoroughness(240, 500, 96, 16, 1500, StepControl(), CURVE_CONTROL, 64, 4, other_gaits=True),
+    CONTACT: Thoroughness(
+        24, 40, 16, 4, 100, StepControl(tolerance=1e-9, shortest=1e-4), CURVES_ON_GROUND, 4, 1, other_gaits=False
+    ),
+}
+
+
+NO_ATTRACTORS = AttractorBranch()
+
+
+@dataclass(frozen=True, eq=False)
+class Family:
+    """Results for one model; without a map if there was no gait to begin from."""
+
+    model: str
+    step_map: StepMap | None
+    branches: tuple[GaitBranch, ...] = ()
+    attractors: AttractorBranch = NO_ATTRACTORS
+    exponents: tuple[Lyapunov, ...] = ()
+    curves: tuple[BifurcationCurve, ...] = ()  # of bifurcations, over the plane of two parameters
+    regions: Regions | None = None  # attractors over that plane
+
+
+@dataclass(frozen=True)
+class FamilySearch:
+    """A search for all gaits of a model over a span, with up to `periods` steps and `points` points per branch."""
+
+    model: str
+    step_map: StepMap
+    span: ValueSpan
+    seeds: Sequence[Seed]
+    periods: int
+    points: int
+    listener: Listener
+    plane: Plane | None = None
+
+    @property
+    def thoroughness(self) -> Thoroughness:
+        return THOROUGHNESS[self.model]
+
+    @cached_property
+    def follower(self) -> BranchFollower:
+        control = self.thoroughness.branch_control
+        return BranchFollower(self.step_map, self.span, control, self.points, self.listener.advance)
+
+    def announce(self, what: str, total: int | None = None) -> None:
+        self.listener.start(f"continuation: {what}".format(model=f"the {self.model} model"), total)
+
+    def branches(self) -> Family:
+        self.announce("branches of {model}")
+        return Family(self.model, self.step_map, self.follower.family(self.seeds, self.periods))
+
+    def family(self, generator: np.random.Generator) -> Family:
+        """Run the whole search.
+
+        generator  of scattered starts
+        """
+        results = self.branches()
+        if self.periods > 1:
+            results = self.add_attractors(results)
+        if self.thoroughness.other_gaits and results.attractors.found:
+            results = self.add_other_gaits(results, generator)
+        return results if self.plane is None else self.add_plane(results, self.plane)
+
+    def add_attractors(self, family: Family) -> Family:
+        """Add the attractors beyond the first flip of a stable branch, and their exponents.
+
+        They are followed from just before that flip or, if it lies outside the span, from an end of the span.
+        """
+        span, how = self.span, self.thoroughness
+        flipping = first_flip(family.branches)
+        if flipping is not None:
+            flip, start = flipping
+            begin, end = max(span.least, flip - BEFORE_FLIP * span.size), span.most
+        else:
+            family, first = self.doubled_outside(family)
+            if first is None:
+                return family
+            start, begin = first.last, first.value
+            end = span.most if begin - span.least < span.most - begin else span.least
+        values = np.linspace(begin, end, how.values)
+        self.announce("attractor of {model}", how.values)
+        attractors = sweep_attractor(self.step_map, start, values, how.transient, how.kept, self.listener.advance)
+        if not attractors.found:
+            return replace(family, attractors=attractors)
+        if end < begin:
+            attractors = replace(attractors, found=attractors.found[::-1])
+        chosen = attractors.found[:: max(1, len(attractors.found) // how.exponents)]
+        self.announce("Lyapunov exponents of {model}", len(chosen))
+        exponents = []
+        for attractor in chosen:
+            exponents.append(largest_exponent(self.step_map, attractor.last, attractor.value, how.kept, how.averaged))
+            self.listener.advance()
+        measured = tuple(exponent for exponent in exponents if exponent is not None)
+        return replace(family, attractors=attractors, exponents=measured)
+
+    def doubled_outside(self, family: Family) -> tuple[Family, Attractor | None]:
+        """Add gaits of 2, 4, 8, ... steps of branches beyond a flip outside the span, and find their attractor.
+
+        Both are searched for at the branch's ends: a walk leaves the gait there for the attractor, whose close returns
+        are the seeds. The second result is the attractor at the smallest of these values, None if there is none.
+        """
+        how = self.thoroughness
+        self.announce("gaits of {model} beyond flips outside the span")
+        ends = [
+            branch.points[place] for branch in family.branches if branch.period == 1 and branch.flipped_outside
+            for place in (0, -1)
+        ]  # fmt: skip
+        reached = [leave_by_flip(self.step_map, end, how.transient, how.kept) for end in ends]
+        attractors = [attractor for attractor in reached if isinstance(attractor, Attractor) and attractor.period != 1]
+        if not attractors:
+            return family, None
+        doublings = [2**k for k in range(1, self.periods.bit_length())]
+        seeds = [seed for a in attractors for seed in close_returns(self.step_map, a, doublings, how.averaged)]
+        branches = self.follower.family(seeds, self.periods, family.branches)
+        return replace(family, branches=branches), min(attractors, key=lambda attractor: attractor.value)
+
+    def add_other_gaits(self, family: Family, generator: np.random.Generator) -> Family:
+        sampled = []
+        for chaotic in (False, True):
+            attractors = [attractor for attractor in family.attractors.found if (attractor.period == 0) is chaotic]
+            sampled += attractors[:: max(1, len(attractors) // OTHER_GAIT_VALUES)]
+        self.announce("other gaits of {model}", len(sampled))
+        seeds: list[Seed] = []
+        for attractor in sampled:
+            if attractor.period == 0:
+                seeds += close_returns(self.step_map, attractor, OTHER_PERIODS, CLOSE_RETURN_STEPS)
+            seeds += settle_elsewhere(self.step_map, attractor, SCATTERED, SCATTER_WIDTH, SCATTER_STEPS, generator)
+            self.listener.advance()
+        self.announce("branches of other gaits of {model}")
+        return replace(family, branches=self.follower.family(seeds, self.periods, family.branches))
+
+    def add_plane(self, family: Family, plane: Plane) -> Family:
+        span, advance, how = self.span, self.listener.advance, self.thoroughness
+        self.announce("curves of bifurcations of {model}")
+        curves = [
+            follow_curve(bifurcation, branch.period, span, plane, CURVE_POINTS, advance, how.curve_control)
+            for branch in family.branches
+            for bifurcation in branch.bifurcations
+            if branch.period <= how.curve_periods and bifurcation.kind != "torus"
+        ]
+        regions = None
+        if self.thoroughness.other_gaits:
+            self.announce("regions of the plane of two parameters")
+            regions = find_regions(family.branches, span, plane, advance)
+        return replace(family, curves=tuple(curve for curve in curves if curve is not None), regions=regions)
+
+
+def first_flip(branches: Sequence[GaitBranch]) -> tuple[float, Floats] | None:
+    """Return the smallest value at which a period-1 gait flips, and the stable gait nearest to it."""
+    flips = [
+        (bifurcation.value, branch) for branch in branches if branch.period == 1
+        for bifurcation in branch.bifurcations if bifurcation.kind == "flip"
+    ]  # fmt: skip
+    for flip, branch in sorted(flips, key=lambda bifurcation: bifurcation[0]):
+        stable = [point for point in branch.points if point.stable]
+        if stable:
+            return flip, min(stable, key=lambda point: abs(point.value - flip)).z
+    return None

@@ -1,0 +1,425 @@
+"""Search for the periodic gaits of a rigid walker; each gait is solved to rounding and measured.
+
+Three searches, all on the similar walker of unit size. The two gaits of the small-slope theory are followed to the
+walker's slope. The step map is solved from random starting values, as in the paper (section 3.3), and from more of them
+if that finds nothing: for some walkers few starts reach a heel strike. If a driven walker still has no gait, gaits of
+the passive walker are followed as the drive grows.
+"""
+
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache, partial
+
+import numpy as np
+
+from walkerlab.physics.hybrid.recorded_walk import take_walk
+from walkerlab.physics.hybrid.rigid_walk import LONGEST_SWING
+from walkerlab.physics.mechanics.rigid_model import (
+    STANCE,
+    SWING,
+    RigidModel,
+    feet_on_slope,
+    on_slope,
+    swing_foot_motion,
+)
+from walkerlab.physics.orbits.continuation import Follower, FollowerState, Strides, interpolate
+from walkerlab.physics.orbits.newton import Effort, NotConverged
+from walkerlab.physics.orbits.rigid_map import (
+    EXACT_STEPS,
+    NEW_GAIT,
+    RigidMap,
+    RigidStepper,
+    state_on_section,
+    strike_section,
+)
+from walkerlab.physics.orbits.similarity import Units, unit_walker
+from walkerlab.physics.orbits.small_slope import SmallSlopeSeed, seeds
+from walkerlab.physics.orbits.step_map import Cycle, Stepper, gait_near
+from walkerlab.physics.solvers.registry import Tolerances
+from walkerlab.physics.solvers.system import Floats, State
+
+RANDOM_START = "random start"
+# rad, half the angle between the legs; a smaller one means standing, on level ground or from a random start
+SMALLEST_ANGLE = 1e-5
+ANGLE_NOISE = 1e-3  # relative to the angle between the legs at heel strike; samples do not resolve less
+SAME_GAIT = 1e-5  # relative distance below which states are the same gait
+# of steps during the search; gaits are solved with EXACT_STEPS
+SEARCH_TOLERANCES = Tolerances("dop853", 1e-7, 1e-10, 20_000)
+# target, and limit for an acceptable gait: on a steep slope rounding is larger
+SOLVED_RESIDUAL, MAX_RESIDUAL = 1e-14, 1e-11
+MAX_GAIT_EVALUATIONS, SHORTEST_MOVE = 60, 2.0**-8  # of Newton's method
+# following from a vanishing slope
+SLOPE_STRIDES = Strides(math.log(2.0), math.log(1.001), 3)  # of the logarithm of the slope's cube root
+FOLLOWING_EVALUATIONS = 20
+FOLLOWING_TOLERANCE = 1e-6  # relative residual; cannot be tight, since a multiplier tends to 1 as the slope vanishes
+# maximum distance from the prediction; beyond it the gait belongs to another branch
+MAX_STATE_JUMP, MAX_PERIOD_JUMP = 0.05, 0.02
+MAX_RETREATS = 5  # halvings of the seed's amplitude, whose error shrinks with the amplitude's square
+# angle between the legs (rad), angular velocities (sqrt(g/L)) of swing and stance leg, and of a shank whose knee was
+# free at heel strike
+MIN_START, MAX_START = np.array([0.0, -1.0, -1.0, -1.0]), np.array([1.2, 1.0, 0.0, 1.0])
+START_RANGES = f"legs up to {MAX_START[0]:g} rad apart, rates up to {MAX_START[1]:g} sqrt(g/L)"
+
+
+@dataclass(frozen=True)
+class RigidGait:
+    """A gait and the quantities of one of its steps, SI units."""
+
+    state: State  # just after the heel strike
+    period: float  # s
+    step_length: float  # m
+    multipliers: tuple[complex, ...]  # eigenvalues of the step map's derivative, largest first
+    residual: float  # rad, largest component of P(x) - x, velocities times sqrt(L/g), from a separate step
+    energy: float  # J, time mean over the step, relative to the stance foot
+    energy_drift: float  # J, maximum minus minimum
+    min_normal_force: float  # N
+    max_friction_ratio: float | None  # None if the ground never pushes
+    max_scuff_depth: float  # m
+    min_normal_impulse: float  # N s, of the ground in heel and knee strikes
+    max_impulse_ratio: float | None  # None if the ground never pushes
+    trailing_foot_rises: bool  # after the heel strike
+    knee_strike: float | None  # s; None for legs without knees
+    work: dict[str, float]  # J per step, by source
+    cost_of_transport: float  # work divided by weight times distance
+    froude: float  # speed over sqrt(g L)
+    swings: int = 1  # how often the swing leg passes the stance leg in a step
+    feet_meet: bool = False  # on the ground in mid-swing
+    found_by: tuple[str, ...] = ()  # the searches that led to it
+    z: tuple[float, ...] = ()  # section coordinates of the unit walker
+
+    @property
+    def speed(self) -> float:
+        return self.step_length / self.period
+
+    @property
+    def spectral_radius(self) -> float:
+        return abs(self.multipliers[0])
+
+    @property
+    def stable(self) -> bool:
+        return self.spectral_radius < 1.0
+
+    @property
+    def objections(self) -> tuple[str, ...]:
+        """Reasons why no ground can support this gait; empty for a physical gait, stable or not."""
+        reasons = []
+        if self.min_normal_force < 0.0:
+            reasons.append(f"the ground would have to pull with {-self.min_normal_force:.3g} N")
+        if self.min_normal_impulse < 0.0:
+            reasons.append(f"the ground would have to pull with {-self.min_normal_impulse:.3g} N s in a strike")
+        if not self.trailing_foot_rises:
+            reasons.append("the trailing foot would have to pass through the ground")
+        if self.feet_meet:
+            reasons.append("its feet meet on the ground in mid-swing, where the slightest disturbance may end the step")
+        return tuple(reasons)
+
+
+def feet_meet(walker: RigidModel, swing: Floats) -> bool:
+    """Whether the swing foot comes down exactly at the stance foot, where the step map is discontinuous.
+
+    Any further ahead, it would strike.
+
+    swing  (samples, 2 n) states with both legs straight
+    """
+    over, ahead = feet_on_slope(walker, swing[:, SWING], swing[:, STANCE]), swing[:, SWING] - swing[:, STANCE]
+    down = np.flatnonzero((over[:-1] > 0.0) & (over[1:] <= 0.0))
+    where = ahead[down] + np.diff(ahead)[down] * over[down] / (over[down] - over[down + 1])
+    return bool(np.any(np.abs(where) < ANGLE_NOISE * abs(ahead[-1])))
+
+
+def measure_gait(walker: RigidModel, units: Units, gait: Cycle) -> RigidGait | None:
+    """Walk one step of a gait of the unit walker and measure it in SI; None if the step fails."""
+    start = state_on_section(walker, gait.z)
+    step = take_walk(walker, EXACT_STEPS, start, 1, sampled=True)
+    if step.steps == 0 or step.samples is None:
+        return None
+    swing = step.samples.state[step.samples.step == 0]
+    apart = swing[:, SWING] - swing[:, STANCE]
+    rate, n = 1.0 / units.time, len(start) // 2
+    return RigidGait(
+        state=(*start[:n], *(omega * rate for omega in start[n:])),
+        period=float(step.periods_s[0]) * units.time,
+        step_length=float(step.lengths_m[0]) * units.length,
+        multipliers=tuple(gait.multipliers.tolist()),
+        residual=max(abs(end - begin) for end, begin in zip(step.final_state, start, strict=True)),
+        energy=step.mean_energy * units.energy,
+        energy_drift=step.energy_drift * units.energy,
+        min_normal_force=step.min_normal_force * units.force,
+        max_friction_ratio=step.max_friction_ratio or None,
+        max_scuff_depth=step.max_scuff_depth * units.length,
+        min_normal_impulse=(step.min_normal_impulse or 0.0) * units.force * units.time,
+        max_impulse_ratio=step.max_impulse_ratio or None,
+        trailing_foot_rises=bool(swing_foot_motion(walker, start, start[len(start) // 2 :])[2] >= 0.0),
+        work={name: work * units.energy for name, work in step.driven.per_step(1).items()},
+        cost_of_transport=step.driven.cost_of_transport(float(step.lengths_m[0])),
+        froude=float(step.lengths_m[0] / step.periods_s[0]),
+        swings=int(np.count_nonzero(np.diff(np.signbit(apart)))),
+        feet_meet=feet_meet(walker, swing[~step.samples.bent[step.samples.step == 0]]),
+        knee_strike=None if step.knee_strike_time_s is None else float(step.knee_strike_time_s[0]) * units.time,
+        z=tuple(gait.z.tolist()),
+    )
+
+
+@dataclass(frozen=True)
+class SearchSettings:
+    """Effort of a search."""
+
+    random_starts: int = 100  # starting values to draw
+    further_starts: int = 1000  # more to draw if no gait is found
+
+
+SEED_SOURCE = "followed from a vanishing slope"
+PASSIVE_SLOPES = (0.02, 0.05)  # rad, slopes on which to search for passive gaits to follow to a driven one
+DRIVE_SOURCE = f"followed from passive gaits as a last resort (slopes of {', '.join(map(str, PASSIVE_SLOPES))} rad)"
+
+
+@dataclass(frozen=True)
+class GaitSearch:
+    """Result of a search."""
+
+    gaits: tuple[RigidGait, ...]  # every period-1 gait, by period
+    chosen: int | None  # index of the gait to walk; None if no gait is physical
+    reason: str  # for the choice, or why there is none
+    random_hits: tuple[int, ...] = ()  # for each gait, the number of random starts that led to it
+    random_starts: int = 0  # number drawn
+    lost: tuple[str, ...] = ()  # why gaits that were followed did not reach this walker
+    followed: str = SEED_SOURCE  # where they were followed from
+
+    @property
+    def method(self) -> str:
+        """Describe the search; it may miss a very unstable gait."""
+        starts = f"{self.random_starts} random starts ({START_RANGES}, steps of at most {LONGEST_SWING:g} sqrt(L/g))"
+        return f"{self.followed}, and by Newton's method from {starts}"
+
+    @property
+    def gait(self) -> RigidGait | None:
+        return None if self.chosen is None else self.gaits[self.chosen]
+
+
+def find_gaits(walker: RigidModel, seed: int = 0, settings: SearchSettings = SearchSettings()) -> GaitSearch:
+    """Find the period-1 gaits of `walker`.
+
+    seed  of the random starting values
+    """
+    if walker.slope <= 0.0 and walker.unpaired == 0.0 and not walker.driven:
+        return GaitSearch((), None, NO_DESCENT)
+    search = Search(walker)
+    generator = np.random.default_rng(seed)
+    search.follow_seeds()
+    search.draw(generator, settings.random_starts)
+    if not search.found and not search.walker.passive:
+        search.follow_drive(generator, settings.random_starts)
+    if not search.found:
+        search.draw(generator, settings.further_starts)
+    return search.result()
+
+
+NO_DESCENT = (
+    "every heel strike takes energy, and on a slope that does not descend nothing gives it back; "
+    "standing still is no gait"
+)
+NO_SEED_TEXT = {
+    True: "small-slope theory yields no starting gait for this walker",
+    False: "without its drive this walker has no gait to follow to this slope",
+}
+MAX_DRIVE_POINTS = 60
+
+
+class SlopeBranch:
+    """A gait as a function of the slope: y = (theta_2 + phi, dtheta_1, dtheta_2) / s and T over s^2, s = phi^(1/3).
+
+    Both gaits of the small-slope theory are smooth in s^2, so polynomials through the last points predict the next.
+    """
+
+    def __init__(self, step_map: Stepper, seed: SmallSlopeSeed) -> None:
+        self.step_map, self.seed = step_map, seed
+
+    def follow(self, slope: float) -> tuple[float, Floats | None]:
+        """Return how far (rad) the gait can be followed towards `slope` > 0, and z (3,) there; None if it is lost."""
+        s = float(np.cbrt(slope))
+        follower = self.seed_follower if s > np.cbrt(self.seed.slope) else self.start_follower(s)
+        if follower is None:
+            return 0.0, None
+        state = follower.to(math.log(s))
+        if state.at < math.log(s):
+            return math.exp(3.0 * state.at), None
+        return slope, unscale(s, state.points[-1][1])
+
+    @cached_property
+    def seed_follower(self) -> Follower | None:
+        return self.start_follower(float(np.cbrt(self.seed.slope)))
+
+    def start_follower(self, s: float) -> Follower | None:
+        """Return a follower from the gait at s or, if the seed is too inaccurate there, closer to the limit."""
+        seed, s_seed = self.seed, float(np.cbrt(self.seed.slope))
+        limit = (0.0, np.array([*seed.limit, seed.period]))
+        rough = (limit, (s_seed**2, scale_gait(s_seed, seed.z, seed.period)))
+        for _ in range(MAX_RETREATS + 1):
+            gait = self.gait_at(math.log(s), interpolate(rough, s * s))
+            if gait is not None:
+                first = FollowerState(math.log(s), SLOPE_STRIDES.widest, (limit, (s * s, gait)))
+                return Follower(self.gait_at, first, SLOPE_STRIDES, lambda log_s: math.exp(2.0 * log_s))
+            s *= 0.5
+        return None
+
+    def gait_at(self, log_s: float, expected: Floats) -> Floats | None:
+        s = math.exp(log_s)
+        effort = Effort(FOLLOWING_TOLERANCE * s, FOLLOWING_EVALUATIONS, SHORTEST_MOVE)
+        gait = gait_near(self.step_map, unscale(s, expected), s**3, effort)
+        if isinstance(gait, NotConverged):
+            return None
+        y = scale_gait(s, gait.z, gait.step.period_s)
+        moved = np.abs(y - expected)
+        near = moved[:3].max() <= MAX_STATE_JUMP * np.abs(y[:3]).max() and moved[3] <= MAX_PERIOD_JUMP * y[3]
+        return y if near else None
+
+
+def unscale(s: float, y: Floats) -> Floats:
+    return np.array([s * y[0] - s**3, s * y[1], s * y[2]])
+
+
+def scale_gait(s: float, z: Floats, period: float) -> Floats:
+    return np.array([(z[0] + s**3) / s, z[1] / s, z[2] / s, period])
+
+
+@lru_cache(maxsize=16)
+def slope_branches(walker: RigidModel) -> tuple[SlopeBranch, ...]:
+    """Return the gaits of small-slope theory, cached for all slopes of one walker; `walker` on level ground."""
+    looking = over_slope(walker, SEARCH_TOLERANCES)
+    return tuple(SlopeBranch(looking, seed) for seed in seeds(walker))
+
+
+def over_slope(walker: RigidModel, tolerances: Tolerances) -> RigidMap:
+    return RigidMap(partial(on_slope, walker), 1.0, walker, tolerances)
+
+
+def with_partial_drive(walker: RigidModel, slope: float, share: float) -> RigidModel:
+    """Return the walker with a share of its drive, on a slope (rad) interpolated to its own.
+
+    It is passive and on `slope` for a share of 0.
+    """
+    parts = {name: share * walker[name] for name in ("laws", "push_off")}
+    return on_slope(walker.changed(**parts), slope + share * (walker.slope - slope))
+
+
+@dataclass
+class GaitRecord:
+    cycle: Cycle
+    gait: RigidGait
+    by: list[str]
+
+
+class Search:
+    def __init__(self, walker: RigidModel) -> None:
+        self.walker, self.units = unit_walker(walker)
+        self.found: list[GaitRecord] = []
+        self.lost: list[str] = []
+        self.drawn = 0
+        self.followed = SEED_SOURCE if walker.passive else DRIVE_SOURCE
+        self.looking = RigidStepper(self.walker, SEARCH_TOLERANCES)
+        self.step_map = over_slope(self.walker, EXACT_STEPS)
+
+    def follow_seeds(self) -> None:
+        if self.walker.slope <= 0.0 or not self.walker.passive:
+            return
+        for branch in slope_branches(on_slope(self.walker, 0.0)):
+            (slope, z), name = branch.follow(self.walker.slope), branch.seed.name
+            if z is None:
+                self.lost.append(f"the gait from the {name} is lost at a slope of {slope:.3g} rad")
+            elif not self.keep(z, name):
+                self.lost.append(f"the gait from the {name} cannot be solved to rounding")
+
+    def follow_drive(self, generator: np.random.Generator, starts: int) -> None:
+        # Imported late: only needed if other searches fail.
+        from walkerlab.physics.orbits.families import BranchFollower, Seed, ValueSpan
+
+        goal = self.walker
+        own = (goal.slope,) if goal.slope > 0.0 else ()
+        for slope in (*own, *PASSIVE_SLOPES):
+            passive = Search(with_partial_drive(goal, slope, 0.0))
+            passive.follow_seeds()
+            passive.draw(generator, starts)
+            family = RigidMap(partial(with_partial_drive, goal, slope), 1.0, goal)
+            follower = BranchFollower(family, ValueSpan(0.0, 1.0), most=MAX_DRIVE_POINTS)
+            name, lost = f"passive gait at {slope:.3g} rad", "is lost at {:.0%} of the way to this slope and drive"
+            followed = follower.family([Seed(record.cycle.z, 0.0) for record in passive.found], 1)
+            for branch in followed:
+                end = max(branch.points, key=lambda point: point.value)
+                if end.value < 1.0 - SAME_GAIT or not self.keep(end.z, name):
+                    self.lost.append(f"the {name} {lost.format(end.value)}")
+            if passive.found and not followed:
+                self.lost.append(f"the {name} {lost.format(0.0)}")
+            if self.found:
+                return
+
+    def draw(self, generator: np.random.Generator, count: int) -> None:
+        """Solve the step map from random starting values, skipping those that lead to known gaits."""
+        d = int(self.walker.coordinates)
+        self.drawn += count
+        starts = generator.uniform(MIN_START[:d], MAX_START[:d], (count, d))
+        starts[:, 0] = 0.5 * (starts[:, 0] - feet_on_slope(self.walker, 0.0, 0.0))
+        known = [(record.cycle.z, record.cycle.DP) for record in self.found]
+        results = self.looking.solve_starts(strike_section(self.walker), known, starts)
+        for z, gait in zip(starts, results, strict=True):
+            if gait >= 0:
+                self.found[gait].by.append(RANDOM_START)
+            elif gait == NEW_GAIT and not self.stands(z):
+                self.keep(z, RANDOM_START)
+
+    def stands(self, z: Floats) -> bool:
+        return bool(abs(feet_on_slope(self.walker, z[0], z[0])) < 2.0 * SMALLEST_ANGLE)
+
+    def keep(self, z: Floats, by: str) -> bool:
+        """Solve for the gait near z to rounding and add it to the results; False if there is none."""
+        if self.record_hit(z, by):
+            return True
+        effort = Effort(SOLVED_RESIDUAL, MAX_GAIT_EVALUATIONS, SHORTEST_MOVE, rounding=MAX_RESIDUAL / SOLVED_RESIDUAL)
+        cycle = gait_near(self.step_map, z, float(self.walker.slope), effort)
+        if isinstance(cycle, NotConverged) or (self.walker.slope == 0.0 and self.stands(cycle.z)):
+            return False
+        if self.record_hit(cycle.z, by):
+            return True
+        gait = measure_gait(self.walker, self.units, cycle)
+        if gait is None or gait.residual > MAX_RESIDUAL:
+            return False
+        self.found.append(GaitRecord(cycle, gait, [by]))
+        return True
+
+    def record_hit(self, z: Floats, by: str) -> bool:
+        """Whether z is a gait that was found before; if so, record the search that found it again."""
+        for record in self.found:
+            if np.abs(record.cycle.z - z).max() < SAME_GAIT * np.abs(z).max():
+                record.by.append(by)
+                return True
+        return False
+
+    def result(self) -> GaitSearch:
+        records = sorted(self.found, key=lambda each: each.gait.period)
+        gaits = tuple(replace(each.gait, found_by=tuple(dict.fromkeys(each.by))) for each in records)
+        hits = tuple(each.by.count(RANDOM_START) for each in records)
+        chosen, reason = choose_gait(gaits)
+        if not gaits:
+            followed = f"{self.followed}, {'; '.join(self.lost)}" if self.lost else NO_SEED_TEXT[self.walker.passive]
+            starts = f"none of {self.drawn} random starting values ({START_RANGES})"
+            reason = f"none found: {followed}; {starts} led to a gait by Newton's method"
+        return GaitSearch(gaits, chosen, reason, hits, self.drawn, tuple(self.lost), self.followed)
+
+
+def preference(gait: RigidGait) -> tuple[bool, int, float]:
+    """Sort key, smallest for the gait to walk: stable, without back-and-forth swings, fastest decay.
+
+    A leg that swings back passes its foot through the ground, which the model ignores.
+    """
+    return not gait.stable, gait.swings, gait.spectral_radius
+
+
+def choose_gait(gaits: tuple[RigidGait, ...]) -> tuple[int | None, str]:
+    """Choose the gait to walk among the physical ones by `preference`; return its index and the reason."""
+    walkable = [index for index, gait in enumerate(gaits) if not gait.objections]
+    if not walkable:
+        objections = dict.fromkeys(objection for gait in gaits for objection in gait.objections)
+        return None, "the gaits found there are not physical: " + "; ".join(objections)
+    best = min(walkable, key=lambda index: preference(gaits[index]))
+    if gaits[best].stable:
+        return best, "it is stable"
+    return best, "no gait is stable at this slope; this is the least unstable of the physical ones"

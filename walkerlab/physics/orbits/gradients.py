@@ -1,0 +1,215 @@
+"""Derivatives of gait quantities with respect to a walker parameter, by the implicit function theorem.
+
+With z the section's coordinates and P the step map, dz/dp = (I - A)^-1 dP/dp; every quantity of the gait then changes
+along (dz/dp, 1). Derivatives by p are difference quotients of exact steps along this direction; that of a multiplier
+follows from A's by its left and right eigenvectors. The difference between two step sizes estimates the error, and the
+step is halved while that reduces errors that are not yet small.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass
+from functools import cache, partial
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from walkerlab.outcome import Outcome
+from walkerlab.physics.orbits.robustness import GaitOnMap, derivative, response
+from walkerlab.physics.orbits.step_map import MappedStep, multipliers_of
+from walkerlab.physics.solvers.system import Floats
+
+# Differentiable quantities with units.
+#
+# The norms are of the step period for a floor drop; the scaled one is in pendulum times per leg length of the walker.
+GAIT_QUANTITIES: Final[Mapping[str, str]] = {
+    "period_s": "s",
+    "step_length_m": "m",
+    "speed_m_s": "m/s",
+    "spectral_radius": "1",
+    "gait_sensitivity_norm": "s/m",
+    "gait_sensitivity_norm_scaled": "1",
+    "cost_of_transport": "1",
+}
+STEP_QUANTITY_COUNT = 3  # the first ones, which a single step gives
+MIN_EIGENVECTOR_PRODUCT = 1e-6  # |l' r| of the largest multiplier's eigenvectors, below which multipliers coincide
+STEP_FACTOR = 1.5  # step of a difference quotient, in fifth roots of the relative tolerance
+APPROACH_STEPS = (1e-4, 1e-2)  # shares of that, to find the direction of the family
+STEP_SIZES = (2.0, 1.0, 0.5, 0.25, 0.125)  # shares of that, tried in turn
+SMALL_ERROR = 1e-3  # relative error that needs no smaller step
+LOST_ERROR = 0.1  # relative error above which a derivative is lost in rounding
+
+
+@dataclass(frozen=True)
+class Gradient:
+    """A derivative; `why` states why there is none, or that rounding dominates it."""
+
+    value: float | None
+    error: float | None
+    why: str = ""
+
+    @property
+    def small(self) -> bool:
+        return self.value is None or self.error is None or self.error <= SMALL_ERROR * abs(self.value)
+
+    def halves(self, other: Gradient | None) -> bool:
+        return other is None or (self.error is not None and self.error < 0.5 * (other.error or 0.0))
+
+
+def gait_quantities(gait: GaitOnMap, wanted: Collection[str] = GAIT_QUANTITIES) -> dict[str, float] | None:
+    """Compute the quantities of a gait by name, without norms if it is unstable; None if its step fails.
+
+    wanted  quantities to compute; those that a single step does not give cost more steps
+    """
+    step = gait.step_map.step(gait.z, gait.p)
+    if step.outcome is not Outcome.WALKED:
+        return None
+    radius = float(np.abs(multipliers_of(step.DP)).max())
+    quantities = dict(zip(GAIT_QUANTITIES, (*step_quantities(step), radius), strict=False))
+    for names, of in WALK_QUANTITIES.items():
+        values = None if set(names).isdisjoint(wanted) else of(gait._replace(A=step.DP))
+        quantities |= {} if values is None else dict(zip(names, values, strict=True))
+    return quantities
+
+
+def step_quantities(step: MappedStep) -> tuple[float, float, float]:
+    return step.period_s, step.length_m, step.length_m / step.period_s
+
+
+def sensitivity_norms(gait: GaitOnMap) -> tuple[float, float] | None:
+    """Return the norm of the step period for a floor drop, in SI and scaled; None for an unstable gait."""
+    answer = response(gait, "floor-drop")
+    if answer is None:
+        return None
+    length, time = gait.step_map.leg_and_pendulum(gait.p)
+    return float(answer[0][0]), float(answer[0][0]) * length / time
+
+
+def transport_cost(gait: GaitOnMap) -> tuple[float] | None:
+    cost = gait.step_map.cost_of_transport(gait.z, gait.p)
+    return None if cost is None else (cost,)
+
+
+# Functions for quantities that a single step does not give, by the names of their values.
+WALK_QUANTITIES: Final[Mapping[tuple[str, ...], Callable[[GaitOnMap], tuple[float, ...] | None]]] = {
+    ("gait_sensitivity_norm", "gait_sensitivity_norm_scaled"): sensitivity_norms,
+    ("cost_of_transport",): transport_cost,
+}
+
+
+def gradients(gait: GaitOnMap, scale: float, wanted: Collection[str] = GAIT_QUANTITIES) -> dict[str, Gradient]:
+    """Differentiate a gait's quantities by the parameter of its step map; empty if neighbouring steps fail.
+
+    scale   magnitude of significant changes of the parameter
+    wanted  the quantities, see `gait_quantities`
+    """
+    h, along = STEP_FACTOR * gait.step_map.tolerances.rtol**0.2 * scale, np.zeros(gait.z.size)
+    for part in APPROACH_STEPS:
+        closer = family_direction(gait, part * h, along)
+        if closer is None:
+            return {}
+        along = closer
+    best, coarse = dict[str, Gradient](), None
+    for size in STEP_SIZES:
+        fine = differentiate(gait, size * h, along, wanted)
+        if fine is not None and coarse is not None:
+            better = {
+                name: gradient
+                for name, gradient in combine_steps(gait.A, fine, coarse).items()
+                if gradient.halves(best.get(name))
+            }
+            best |= better
+            if not better or all(gradient.small for gradient in best.values()):
+                break
+        coarse = fine
+    return best
+
+
+def combine_steps(A: Floats, fine: Derivatives, coarse: Derivatives) -> dict[str, Gradient]:
+    """Combine the derivatives at two step sizes: values of the finer one, errors from the difference."""
+    combined = {
+        name: make_gradient(value, abs(value - coarse.numbers[name]))
+        for name, value in fine.numbers.items()
+        if name in coarse.numbers
+    }
+    return combined | {"spectral_radius": radius_gradient(A, fine.A, coarse.A - fine.A)}
+
+
+class Derivatives(NamedTuple):
+    numbers: dict[str, float]
+    A: Floats
+
+
+def family_direction(gait: GaitOnMap, h: float, guess: Floats) -> Floats | None:
+    """Return the derivative of the gait's z (d,) by the parameter, from steps near z along a guess of it.
+
+    On compliant ground a step from z itself would not do for a walker of other dimensions: its foot would be in the
+    air, or deep in the ground.
+    """
+
+    def step_from(off: float) -> Floats | None:
+        step = gait.step_map.step(gait.z + off * guess, gait.p + off, derived=False)
+        return step.z if step.outcome is Outcome.WALKED else None
+
+    moved = derivative(step_from, h)
+    return None if moved is None else np.asarray(np.linalg.solve(np.eye(guess.size) - gait.A, moved - gait.A @ guess))
+
+
+def differentiate(gait: GaitOnMap, h: float, guess: Floats, wanted: Collection[str]) -> Derivatives | None:
+    """Compute difference quotients of step h along the family; None if neighbouring steps fail."""
+    along = family_direction(gait, h, guess)
+    if along is None:
+        return None
+
+    @cache
+    def neighbour(off: float) -> tuple[GaitOnMap, MappedStep]:
+        step = gait.step_map.step(gait.z + off * along, gait.p + off)
+        return gait._replace(z=gait.z + off * along, p=gait.p + off, A=step.DP), step
+
+    def step_values(off: float) -> Floats | None:
+        _, step = neighbour(off)
+        return np.append(step_quantities(step), step.DP) if step.outcome is Outcome.WALKED else None
+
+    def walk_values(off: float, of: Callable[[GaitOnMap], tuple[float, ...] | None]) -> Floats | None:
+        changed_gait, step = neighbour(off)
+        values = of(changed_gait) if step.outcome is Outcome.WALKED else None
+        return None if values is None else np.array(values)
+
+    changed = derivative(step_values, h)
+    if changed is None:
+        return None
+    numbers = dict(zip(GAIT_QUANTITIES, changed[:STEP_QUANTITY_COUNT].tolist(), strict=False))
+    for names, of in WALK_QUANTITIES.items():
+        slopes = None if set(names).isdisjoint(wanted) else derivative(partial(walk_values, of=of), h)
+        numbers |= {} if slopes is None else dict(zip(names, slopes.tolist(), strict=True))
+    return Derivatives(numbers, changed[STEP_QUANTITY_COUNT:].reshape(gait.A.shape))
+
+
+def make_gradient(value: float, error: float) -> Gradient:
+    """Return a derivative, marked as lost if its error is comparable to its value."""
+    lost = error > LOST_ERROR * abs(value) and value != 0.0
+    return Gradient(float(value), float(error), "lost in rounding" if lost else "")
+
+
+def radius_gradient(A: Floats, change: Floats, error: Floats) -> Gradient:
+    values, right = np.linalg.eig(A)
+    left = np.linalg.inv(right) if np.linalg.cond(right) < 1.0 / MIN_EIGENVECTOR_PRODUCT else None
+    largest = int(np.argmax(np.abs(values)))
+    others = [
+        value for value in values if abs(value - values[largest]) > 0.0 and abs(value.conj() - values[largest]) > 0.0
+    ]
+    meets = any(abs(abs(value) - abs(values[largest])) < MIN_EIGENVECTOR_PRODUCT for value in others)
+    if left is None or meets or values[largest] == 0.0:
+        return Gradient(None, None, "multipliers meet")
+    towards = values[largest].conjugate() / abs(values[largest])
+    slope = (towards * (left[largest] @ change @ right[:, largest])).real
+    # absolute values: errors of A's elements may cancel by chance
+    off = np.abs(left[largest]) @ np.abs(error) @ np.abs(right[:, largest])
+    return make_gradient(float(slope), float(off))
+
+
+def relative_gradient(value: float, parameter: float, quantity: float) -> float | None:
+    """Return the relative change of a quantity per relative change of the parameter; None if either is zero."""
+    return None if parameter == 0.0 or math.isclose(quantity, 0.0, abs_tol=1e-300) else value * parameter / quantity

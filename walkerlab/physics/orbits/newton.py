@@ -1,0 +1,93 @@
+"""Newton's method for gaits of either model and for points on their branches."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Generic, NamedTuple, TypeVar
+
+import numpy as np
+
+from walkerlab.outcome import Outcome
+from walkerlab.physics.solvers.system import Floats
+
+Data = TypeVar("Data")
+MAX_NEWTON_EVALUATIONS = 8
+# residuals up to this many tolerances are rounding if a move does not halve them
+ROUNDING_FACTOR = 100.0
+
+
+class Evaluated(NamedTuple, Generic[Data]):
+    """Value and derivative of the equations at a point."""
+
+    outcome: Outcome | None  # WALKED if there is a value
+    value: Floats  # (m,)
+    jacobian: Floats  # (m, m), or (m, m + 1) for a curve
+    data: Data  # the caller's own data
+
+    @property
+    def residual(self) -> float:
+        """Largest component of the value; infinite without a value."""
+        return max(map(abs, self.value.tolist())) if self.outcome is Outcome.WALKED else np.inf
+
+
+# m equations with their derivative at x, in m unknowns for a point, m + 1 for a curve.
+Equations = Callable[[Floats], Evaluated[Data]]
+
+
+@dataclass(frozen=True)
+class Solution(Generic[Data]):
+    x: Floats
+    evaluated: Evaluated[Data]
+    corrections: int
+
+
+@dataclass(frozen=True)
+class NotConverged:
+    """Why Newton's method failed."""
+
+    outcome: Outcome | None  # WALKED if the equations could be evaluated; None where the parameter makes no walker
+    singular: bool = False  # whether the Jacobian was singular, i.e. a multiplier is 1
+
+
+class Effort(NamedTuple):
+    """Accuracy of a solution and the limits of its search."""
+
+    tolerance: float  # on the residual
+    most: int = MAX_NEWTON_EVALUATIONS  # evaluations of the equations
+    shortest: float = 1.0  # share of a move below which it is not halved
+    growth: float = 1.0  # ratio of residuals from which on a move is halved
+    rounding: float = ROUNDING_FACTOR  # see there
+
+
+def newton(equations: Equations[Data], guess: Floats, effort: Effort) -> Solution[Data] | NotConverged:
+    """Solve m equations in m unknowns from a guess (m,).
+
+    Returns the solution, or the outcome with which the equations failed or did not converge.
+    """
+    tolerance, most, shortest, growth, rounding = effort
+    x, current, corrections, evaluations = guess, equations(guess), 0, 1
+    residual = current.residual
+    while tolerance < residual < np.inf:
+        try:
+            move = np.linalg.solve(current.jacobian, -current.value)
+        except np.linalg.LinAlgError:
+            return NotConverged(Outcome.WALKED, singular=True)
+        share = 1.0
+        while True:
+            if evaluations >= most:
+                return NotConverged(Outcome.WALKED)
+            ahead = equations(x + share * move)
+            evaluations += 1
+            remaining = ahead.residual
+            if 0.5 * residual <= remaining < np.inf and min(residual, remaining) <= rounding * tolerance:
+                better = remaining < residual
+                return (
+                    Solution(x + share * move, ahead, corrections + 1) if better else Solution(x, current, corrections)
+                )
+            if remaining < growth * residual or share <= shortest:
+                break
+            share *= 0.5
+        x, current, residual, corrections = x + share * move, ahead, remaining, corrections + 1
+    if current.outcome is Outcome.WALKED:
+        return Solution(x, current, corrections)
+    # a move to parameters without a walker does not condemn the guess
+    return NotConverged(Outcome.WALKED if current.outcome is None and corrections else current.outcome)

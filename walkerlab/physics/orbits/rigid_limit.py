@@ -1,0 +1,233 @@
+"""Convergence of the contact model to the rigid one as parameters of its contact approach the rigid limit.
+
+The parameters are stiffness k, damping c and stiction velocity v_s. The penetration d_max of full damping shrinks with
+the static penetration as k grows, and the friction velocity v_d with v_s. A push-off is shortened if all three vary.
+"""
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from walkerlab.physics.ground.terrain import STANCE_FOOT
+from walkerlab.physics.ground.walker import ContactWalker, changed_forms
+from walkerlab.physics.hybrid.comparison import (
+    PHASES,
+    Motion,
+    between_impacts,
+    difference_in_phase,
+    difference_in_time,
+    sampled_at_strikes,
+)
+from walkerlab.physics.hybrid.contact_events import JudgedGround
+from walkerlab.physics.hybrid.contact_result import ContactWalkResult, walk_contact
+from walkerlab.physics.orbits.contact_gait import CONTACT_EFFORT, with_scaled_laws
+from walkerlab.physics.orbits.contact_map import OwnPads, contact_step
+from walkerlab.physics.orbits.step_map import Cycle, gait_near
+from walkerlab.physics.solvers.registry import Tolerances
+from walkerlab.physics.solvers.system import Floats, State
+
+METHOD, LIMIT_BUDGET = "radau5", 50_000_000
+GAIT_TOLERANCE, CHECK_TOLERANCE = 1e-10, 1e-11
+# of timed walks, and of walks that measure their numerical error
+WALK_TOLERANCE, WALK_CHECK = 1e-8, 1e-10
+ABSOLUTE_FACTOR = 0.01  # absolute over relative tolerance
+TIMED_WALKS = 3
+SERIES_EFFORT = CONTACT_EFFORT._replace(most=30)
+# of sqrt(d / g), d the static penetration: a push-off this short ends while the other foot is still landing
+PUSH_OFF_FACTOR = 0.1
+
+
+class ContactFactors(NamedTuple):
+    """Factors on the contact parameters of the config."""
+
+    series: str
+    rigidity: float  # 1 for the config's contact, growing towards the limit
+    stiffness: float
+    damping: float
+    stiction: float
+
+
+ALL_SERIES, ALL_POINT_SERIES = "all", "all, point foot"
+STICTION_SERIES, STIFFNESS_SERIES = "stiction velocity", "stiffness"
+DAMPING_SERIES, NORMAL_SERIES = "damping", "stiffness and damping"
+HALF_DECADES = math.sqrt(10.0)
+# Number of settings, ratio of rigidity between neighbours, and exponents of rigidity in the three factors.
+SERIES_SETTINGS = {
+    ALL_SERIES: (9, HALF_DECADES, (1.0, 0.5, -1.0)),
+    ALL_POINT_SERIES: (9, HALF_DECADES, (1.0, 0.5, -1.0)),
+    STICTION_SERIES: (15, 2.0, (0.0, 0.0, -1.0)),
+    STIFFNESS_SERIES: (6, HALF_DECADES, (1.0, 0.0, 0.0)),
+    DAMPING_SERIES: (6, HALF_DECADES, (0.0, 1.0, 0.0)),
+    NORMAL_SERIES: (9, HALF_DECADES, (1.0, 0.5, 0.0)),
+}
+
+
+def series_settings(name: str, every: int = 1) -> list[ContactFactors]:
+    """Return contact settings from the config's towards the rigid limit, every `every`-th of them."""
+    count, ratio, powers = SERIES_SETTINGS[name]
+    rigidities = [ratio**step for step in range(0, count, every)]
+    return [ContactFactors(name, rigidity, *(rigidity**power for power in powers)) for rigidity in rigidities]
+
+
+def apply_setting(walker: ContactWalker, setting: ContactFactors) -> ContactWalker:
+    """Return the walker on the ground of a setting, with a brief push-off in series towards the rigid limit.
+
+    A longer push-off lifts the leading foot again, however rigid the ground, and leads to another limit.
+    """
+    changed, law = with_scaled_laws(walker, *setting[2:]), walker.normal
+    if setting.series not in (ALL_SERIES, ALL_POINT_SERIES) or setting.rigidity == 1.0:
+        return changed
+    static = (walker.mass * walker.gravity / law.stiffness) ** (1.0 / law.exponent)
+    brief = PUSH_OFF_FACTOR * math.sqrt(static / (walker.gravity * setting.stiffness))
+    return changed_forms(changed, push_off_duration=min(brief, float(walker.whole.push_off_duration)))
+
+
+@dataclass(frozen=True)
+class Distance:
+    """Differences of a setting's gait and walk from the rigid ones, with their numerical errors.
+
+    Quantities of the walk are None where no walk is compared.
+    """
+
+    setting: ContactFactors
+    period: float
+    length: float
+    slip: float
+    period_error: float
+    length_error: float
+    numerical_period: float  # s, change of the period at a ten times tighter tolerance
+    angle: float | None = None  # rad, maximum difference between impacts, at equal phase
+    velocity: float | None = None  # rad/s, the same
+    raw_angle: float | None = None  # rad, maximum difference at equal time
+    raw_velocity: float | None = None
+    numerical_time: float | None = None  # s, change of the last touch-down's time at a hundred times tighter tolerance
+    evaluations: int | None = None
+    wall_s: float | None = None  # s, processor time of the walk, minimum of several
+
+
+@dataclass(frozen=True)
+class Limit:
+    """Ground and rigid reference of a series: the rigid gait and the walk from the rigid start."""
+
+    ground: JudgedGround
+    period_s: float
+    length_m: float
+    motion: Motion
+    steps: int  # of the walk
+    sampling: float  # s
+    every: int = 1  # use every n-th setting of a series
+
+    def series(
+        self, name: str, walker: ContactWalker, gait: Cycle, start: Callable[[ContactWalker], State] | None = None
+    ) -> list[Distance]:
+        """Return the distances along a series, until a gait is lost; each gait is solved for from the one before.
+
+        start  start of the walk for a walker, to compare whole walks as well
+        """
+        distances: list[Distance] = []
+        for setting in series_settings(name, self.every):
+            changed = apply_setting(walker, setting)
+            near = self.gait(changed, gait, GAIT_TOLERANCE)
+            if near is None:
+                break
+            gait, step, check = near, contact_step(near), self.gait(changed, near, CHECK_TOLERANCE)
+            off = step.period_s - self.period_s
+            distance = Distance(
+                setting,
+                step.period_s,
+                step.length_m,
+                step.slip_m,
+                off,
+                step.length_m - self.length_m,
+                abs(off if check is None else check.period_s - step.period_s),
+            )
+            distances.append(distance if start is None else self.compare_walk(distance, changed, start(changed)))
+        return distances
+
+    def gait(self, walker: ContactWalker, near: Cycle, tolerance: float) -> Cycle | None:
+        """Solve for the gait on this ground near that of another setting; None if it fails."""
+        pads = OwnPads(lambda _: walker, self.ground, solver_settings(tolerance), near.step.length_m)
+        solution = gait_near(pads, near.z, 0.0, SERIES_EFFORT)
+        return solution if isinstance(solution, Cycle) else None
+
+    def compare_walk(self, distance: Distance, walker: ContactWalker, start: State) -> Distance:
+        def walk(tolerance: float, sampling: float | None) -> ContactWalkResult:
+            solver = solver_settings(tolerance)
+            return walk_contact(walker, self.ground, False, STANCE_FOOT, start, solver, self.steps, sampling)
+
+        sampled, check = walk(WALK_TOLERANCE, self.sampling), walk(WALK_CHECK, None)
+        times = []
+        for _ in range(TIMED_WALKS):
+            started = time.process_time()
+            walk(WALK_TOLERANCE, None)
+            times.append(time.process_time() - started)
+        steps = sampled.touch_time_s.size
+        if sampled.samples is None or steps == 0 or steps != check.touch_time_s.size:
+            return distance
+        legs = leg_motion(sampled.samples.states, walker)
+        motion = sampled_at_strikes(Motion(sampled.samples.time_s, *legs, sampled.touch_time_s, sampled.knee_strikes_s))
+        phases = np.linspace(0.0, 1.0, PHASES)
+        aligned = difference_in_phase(motion, self.motion, phases)
+        smooth = between_impacts(motion, self.motion, phases)
+        _, raw = difference_in_time(motion, self.motion)
+        return replace(
+            distance,
+            angle=float(np.abs(aligned.angle[smooth]).max()),
+            velocity=float(np.abs(aligned.velocity[smooth]).max()),
+            raw_angle=max(raw.largest("angle")),
+            raw_velocity=max(raw.largest("velocity")),
+            numerical_time=float(abs(sampled.touch_time_s[-1] - check.touch_time_s[-1])),
+            evaluations=int(sampled.work[0]),
+            wall_s=min(times),
+        )
+
+
+def leg_motion(states: Floats, walker: ContactWalker) -> tuple[Floats, Floats]:
+    """Return angles and angular velocities (samples, leg) of the legs; for kneed legs, of the thighs."""
+    upper, half = walker.legs[:, 0], states.shape[1] // 2
+    return states[:, 2 + upper], states[:, half + 2 + upper]
+
+
+def solver_settings(tolerance: float) -> Tolerances:
+    return Tolerances(METHOD, tolerance, ABSOLUTE_FACTOR * tolerance, LIMIT_BUDGET)
+
+
+def observed_orders(distances: list[Distance]) -> list[float]:
+    """Return the order of convergence of the period from each three successive settings."""
+    if len(distances) < 3:
+        return []
+    ratio = distances[1].setting.rigidity / distances[0].setting.rigidity
+    changes = np.abs(np.diff([distance.period for distance in distances]))
+    changes = np.maximum(changes, np.finfo(float).tiny)
+    orders: list[float] = (np.log(changes[:-1] / changes[1:]) / math.log(ratio)).tolist()
+    return orders
+
+
+@dataclass(frozen=True)
+class Extrapolation:
+    """Extrapolated limit of the period, and the difference between the last two estimates (s)."""
+
+    period: float
+    uncertainty: float
+
+
+def extrapolate(distances: list[Distance]) -> Extrapolation | None:
+    """Extrapolate the period by Aitken's method from the last resolved settings; None if they do not converge.
+
+    Settings from the first change of the period below its numerical error on are ignored.
+    """
+    periods = np.array([distance.period for distance in distances])
+    errors = np.array([distance.numerical_period for distance in distances])
+    unresolved = np.flatnonzero(np.abs(np.diff(periods)) <= errors[1:])
+    periods = periods[: unresolved[0] + 1] if unresolved.size else periods
+    if periods.size < 4:
+        return None
+    changes = np.diff(periods[-4:])
+    if changes[0] == 0.0 or (np.abs(changes[1:]) >= np.abs(changes[:-1])).any():
+        return None
+    before, last = periods[-2:] + changes[1:] ** 2 / (changes[:-1] - changes[1:])
+    return Extrapolation(float(last), float(abs(last - before)))

@@ -1,0 +1,408 @@
+"""Step map of the rigid model with its exact derivative, computed on the similar walker of unit size.
+
+A gait's state lies on the section 'both feet on the slope, just after heel strike'. Its coordinates z are the stance
+leg's angle, which determines the swing leg's, and the rates of all bodies that turn independently: swing leg, stance
+leg, and a shank whose knee was free during the impact. A compass has (theta_2, dtheta_1, dtheta_2).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from copy import copy
+from functools import cached_property, lru_cache
+from threading import local
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from walkerlab.outcome import Outcome
+from walkerlab.physics.hybrid.recorded_walk import as_state, take_walk
+from walkerlab.physics.hybrid.rigid_record import Observer, unwatched
+from walkerlab.physics.hybrid.rigid_walk import EVENTS, SHORTEST_LANDING, HeelStrikes, new_heel_strikes, take_step, walk
+from walkerlab.physics.kernels import kernel, kernel_part, matrix, vector
+from walkerlab.physics.mechanics.impact import pushed_at_hip
+from walkerlab.physics.mechanics.rigid_model import (
+    AT_STRIKE,
+    STANCE,
+    STRAIGHT,
+    SWING,
+    RigidModel,
+    feet_on_slope,
+    momentum,
+    step_lengths,
+)
+from walkerlab.physics.orbits.similarity import Units, unit_walker
+from walkerlab.physics.orbits.step_map import (
+    CACHE_SIZE,
+    DisturbedWalk,
+    Iterates,
+    MappedStep,
+    Monitor,
+    StepMap,
+    failed_step,
+)
+from walkerlab.physics.solvers.events import CrossingFinder
+from walkerlab.physics.solvers.linear import factor, solve
+from walkerlab.physics.solvers.registry import ENDLESS, Tolerances, finder_for
+from walkerlab.physics.solvers.stepping import BUDGET, H_NEXT, clear_counts
+from walkerlab.physics.solvers.system import Floats, Integers, State
+
+WalkerAt = Callable[[float], RigidModel | None]
+STEP_WALKED = int(Outcome.WALKED)
+# Scale of the variational columns. They are exactly linear and need fewer digits than the state.
+#
+# With an absolute tolerance of a tenth of the relative one they keep about three digits less, which halves the steps.
+TANGENT_SCALE = 2.0**-13
+SECTION_NAMES = ("theta_2", "dtheta_1", "dtheta_2", "dtheta_1_shank")
+EXACT_STEPS = Tolerances("dop853", 1e-13, 1e-13, 20_000)
+LONG_WALKS = Tolerances("dop853", 1e-9, 1e-11, ENDLESS)  # for attractors
+MONITORED_STEPS = Tolerances("dop853", 1e-13, 1e-13, ENDLESS)
+STEPS_PER_BATCH = 8  # with one derivative
+SHORTEST_STEP = 0.05  # in sqrt(L/g); a shorter 'step' is standing, also a fixed point
+# Newton's method from random starts
+MAX_START_EVALUATIONS, SMALLEST_MOVE = 40, 2.0**-6  # evaluations; share of a move below which it is not halved
+NO_RESIDUAL, NEAR_RESIDUAL = 1e300, 1e-6
+# to a known gait; share of it left after a move with that gait's derivative
+RECOGNITION_DISTANCE, RECOGNITION_RESIDUAL = 0.1, 0.1
+# instead of the index of a known gait
+NEW_GAIT, NO_GAIT = -1, -2
+
+
+class StrikeSection(NamedTuple):
+    """States of a walker just after heel strike, y = start + z basis, with scaled-down variational columns."""
+
+    walker: Any  # (), record for compiled code
+    start: Any  # (2 n (1 + d),) the state at z = 0, with its variational columns
+    basis: Any  # (d, 2 n)
+    places: Any  # (d (1 + d),) indices of z in the state, then in each column
+
+
+@lru_cache(CACHE_SIZE)
+def strike_section(walker: RigidModel) -> StrikeSection:
+    """Return the section of a walker (its legs are straight there)."""
+    straight, at_strike, d = walker.E[STRAIGHT], walker.E[AT_STRIKE], int(walker.coordinates)
+    n, places = len(straight), walker.section[:d]
+    origin, basis = np.zeros(2 * n), np.zeros((d, 2 * n))
+    origin[:n] = -feet_on_slope(walker, 0.0, 0.0) * straight[:, SWING]
+    basis[0, :n] = straight[:, STANCE] - straight[:, SWING]
+    basis[1:, n:] = at_strike[:, places[1:] - n].T
+    columns = np.add.outer(places, 2 * n * np.arange(1, d + 1))
+    return StrikeSection(
+        np.asarray(walker), np.append(origin, TANGENT_SCALE * basis), basis, np.append(places, columns)
+    )
+
+
+def state_on_section(walker: RigidModel, z: Any) -> State:
+    """Return the state (2 n) at section coordinates z (d,)."""
+    return tuple(states_on_section(walker, z).tolist())
+
+
+def states_on_section(walker: RigidModel, z: Any) -> Floats:
+    """Return the states (n, 2 n) at section coordinates z (n, d); also takes a single z (d,)."""
+    section = strike_section(walker)
+    return np.asarray(section.start[: len(walker.zero_state)] + np.asarray(z) @ section.basis)
+
+
+def coordinates_of(walker: RigidModel, y: Any) -> Floats:
+    """Return the section coordinates (d,) of a state (2 n) just after heel strike."""
+    return np.asarray(y, float)[walker.section[: walker.coordinates]]
+
+
+class Steps(NamedTuple):
+    """Completed steps from a point of the section."""
+
+    outcome: Outcome  # of the last step attempted
+    time: Floats  # (steps,) of the heel strikes, in units of the walker
+    z: Floats  # (steps, d) section coordinates after each
+    DP: Floats  # (steps, d, d) derivatives with respect to the start; empty unless requested
+    strikes: HeelStrikes  # the heel strikes
+
+
+class Memory(NamedTuple):
+    varied: Any  # method for the equations with a variational column for each coordinate
+    finder: CrossingFinder
+    observer: Observer
+    y: Any  # (2 n (1 + d),) the state with its variational columns
+    strikes: HeelStrikes  # of one step
+    pivots: Any  # (d,)
+
+
+class RigidStepper(local):
+    """Step map of walkers of one kind, with the memory to evaluate it; each thread has its own."""
+
+    def __init__(self, like: RigidModel, tolerances: Tolerances) -> None:
+        size, d = len(like.zero_state), int(like.coordinates)
+        self.plain, varied = tolerances.new(size), tolerances.new(size * (1 + d))
+        finder = finder_for(self.plain, EVENTS, size)
+        self.memory = Memory(
+            varied, finder, unwatched(), np.zeros(size * (1 + d)), new_heel_strikes(1, 0), np.zeros(d, np.int64)
+        )
+
+    def walk(
+        self,
+        section: StrikeSection,
+        z: Floats,
+        steps: int = 1,
+        derived: bool = True,
+        rises: Floats | None = None,
+        nearest: float = 0.0,
+        start: Floats | None = None,
+    ) -> Steps:
+        """Walk from z (d,), with the derivative unless `derived` is false, which saves a third of the work.
+
+        rises, nearest  see HeelStrikes, in units of the walker; even ground by default
+        start           (2 n,) state off the section to walk from instead, without a derivative
+        """
+        memory = self.memory
+        method = memory.varied if derived else self.plain
+        d, size = section.basis.shape
+        y = section.start[: method.y.size].copy()
+        y[:size] = y[:size] + z @ section.basis if start is None else start
+        method.counts[:BUDGET] = 0
+        method.clock[H_NEXT] = 0.0
+        strikes: HeelStrikes = new_heel_strikes(steps, y.size, rise=rises, nearest=nearest)
+        status, completed = walk(section.walker, method, memory.finder, memory.observer, y, strikes)
+        ahead = strikes.after[:completed].take(section.places if derived else section.places[:d], axis=1)
+        DP = ahead[:, d:].reshape(completed, d if derived else 0, d) / TANGENT_SCALE
+        return Steps(Outcome(status), strikes.time[:completed], ahead[:, :d], DP, strikes)
+
+    def solve_starts(self, section: StrikeSection, gaits: list[tuple[Floats, Floats]], starts: Floats) -> Integers:
+        """Run Newton's method from starts (starts, d), overwritten with the last states tried.
+
+        gaits  known gaits, as state (d,) and derivative (d, d) of the step map
+
+        Returns (starts,) the index of the known gait that each converges to, NEW_GAIT for another solution, or NO_GAIT.
+        """
+        d = starts.shape[1]
+        z, DP = np.zeros((len(gaits), d)), np.zeros((len(gaits), d, d))
+        for k, gait in enumerate(gaits):
+            z[k], DP[k] = gait
+        results = np.zeros(len(starts), np.int64)
+        solve_from_starts(section, self.memory, KnownGaits(z, np.linalg.pinv(np.eye(d) - DP)), starts, results)
+        return results
+
+
+class KnownGaits(NamedTuple):
+    """Gaits that the search recognises without solving for them again."""
+
+    z: Any  # (gaits, d)
+    inverse: Any  # (gaits, d, d) of I - DP there
+
+
+@kernel
+def solve_from_starts(section: StrikeSection, memory: Memory, known: KnownGaits, starts: Any, results: Any) -> None:
+    for k in range(len(starts)):
+        results[k] = solve_from(section.walker[()], section, memory, known, starts[k])
+
+
+@kernel_part
+def solve_from(model: RigidModel, section: StrikeSection, memory: Memory, known: KnownGaits, z: Any) -> int:
+    """Run Newton's method from z (d,), overwritten with the last state tried.
+
+    A move is halved until it reduces the residual. A start that reaches no heel strike, or stands still, is given up. A
+    known gait is recognised if it is close and one move with its derivative removes most of the distance.
+    """
+    method, y, places = memory.varied, memory.y, section.places
+    (d, size), like = section.basis.shape, model.section
+    best, move, system = vector(like), vector(like), matrix(like)
+    least, share = NO_RESIDUAL, 1.0
+    clear_counts(method)
+    for _ in range(MAX_START_EVALUATIONS):
+        for i in range(y.size):
+            y[i] = section.start[i]
+        for i in range(size):
+            for j in range(d):
+                y[i] += z[j] * section.basis[j, i]
+        method.clock[H_NEXT] = 0.0
+        status, t = take_step(model, method, memory.finder, memory.observer, 0.0, y, 0, memory.strikes)
+        residual = NO_RESIDUAL
+        if status == STEP_WALKED and t >= SHORTEST_STEP:
+            residual = 0.0
+            for i in range(d):
+                residual = max(residual, abs(y[places[i]] - z[i]))
+        if residual < least:
+            least, share = residual, 1.0
+            if residual <= NEAR_RESIDUAL:
+                return NEW_GAIT
+            for i in range(d):
+                best[i], move[i] = z[i], y[places[i]] - z[i]
+            for gait in range(len(known.z)):
+                distance, remaining = 0.0, 0.0
+                for i in range(d):
+                    off = z[i] - known.z[gait, i]
+                    distance = max(distance, abs(off))
+                    for j in range(d):
+                        off += known.inverse[gait, i, j] * move[j]
+                    remaining = max(remaining, abs(off))
+                if distance < RECOGNITION_DISTANCE and remaining < RECOGNITION_RESIDUAL * distance:
+                    return gait
+            for i in range(d):
+                for j in range(d):
+                    system[i, j] = (1.0 if i == j else 0.0) - y[places[d * (i + 1) + j]] / TANGENT_SCALE
+            if not factor(system, memory.pivots, d):
+                return NO_GAIT
+            solve(system, memory.pivots, move, 0, d)
+        else:
+            share *= 0.5
+            if least == NO_RESIDUAL or share < SMALLEST_MOVE:
+                return NO_GAIT
+        for i in range(d):
+            z[i] = best[i] + share * move[i]
+    return NO_GAIT
+
+
+class RigidMap(StepMap):
+    """Step map of the rigid model in section coordinates of the similar walker of unit size."""
+
+    monitors = (
+        Monitor("min_normal_force_N", "N", "least normal force on the stance foot", 0.0),
+        Monitor("max_friction_ratio", "1", "largest ratio of tangential to normal force"),
+        Monitor("max_scuff_depth_m", "m", "depth of the swing foot below the slope"),
+    )
+
+    tolerances = MONITORED_STEPS
+    probe = 2e-5
+
+    def __init__(self, walker_at: WalkerAt, scale: float, like: RigidModel, exact: Tolerances = EXACT_STEPS) -> None:
+        """Prepare the step map of a family of walkers.
+
+        walker_at  the walker at a value of the parameter; None where the value makes no walker
+        scale      magnitude of significant changes of the parameter
+        like       any one of the walkers
+        exact      solver settings of a step
+        """
+
+        @lru_cache(CACHE_SIZE)
+        def unit_at(p: float) -> SimilarWalker | None:
+            walker = walker_at(p)
+            if walker is None:
+                return None
+            unit, units = unit_walker(walker)
+            section, n = strike_section(unit), len(unit.arm_x)
+            feet = np.array((section.start[:n] + unit.slope, section.basis[0, :n], unit.foot_x, unit.foot_y)).T
+            return SimilarWalker(unit, units, section, feet.tolist(), float(unit.radius), float(-section.start[SWING]))
+
+        self._unit_at = unit_at
+        self.scale = scale
+        self.names = SECTION_NAMES[: int(like.coordinates)]
+        self._like, self._exact = like, RigidStepper(like, exact)
+
+    @cached_property
+    def _quick(self) -> RigidStepper:
+        return RigidStepper(self._like, LONG_WALKS)
+
+    def step(self, z: Floats, p: float, derived: bool = True) -> MappedStep:
+        unit = self._unit_at(p)
+        if unit is None:
+            return failed_step(None, z.size)
+        step = self._exact.walk(unit.section, z, derived=derived)
+        if step.outcome is not Outcome.WALKED or step.time[0] < SHORTEST_STEP:
+            standing = step.outcome is Outcome.WALKED
+            return failed_step(Outcome.NO_HEEL_STRIKE if standing else step.outcome, z.size)
+        ahead, period_s, DP = step.z[0], float(step.time[0]) * unit.units.time, step.DP[0]
+        angle = float(ahead[0])
+        length_m = unit.step_length(float(z[0]), angle) * unit.units.length
+        return MappedStep(Outcome.WALKED, ahead, DP, period_s, length_m, angle, period_s)
+
+    def watch(self, z: Floats, p: float, steps: int) -> Floats:
+        unit = self._unit_at(p)
+        assert unit is not None, "what is watched was walked"
+        walker, units = unit.walker, unit.units
+        walked = take_walk(walker, MONITORED_STEPS, state_on_section(walker, z), steps)
+        extremes = (walked.min_normal_force, walked.max_friction_ratio, walked.max_scuff_depth)
+        return np.array(extremes) * (units.force, 1.0, units.length)
+
+    def disturbed(self, z: Floats, p: float, heights_m: Floats, push_N_s: float = 0.0) -> DisturbedWalk:
+        """Walk from a gait z over footholds (m), after a push just after the heel strike at z."""
+        unit = self._unit_at(p)
+        assert unit is not None, "what is disturbed has a gait"
+        walker, units, section, start = (
+            unit.walker,
+            unit.units,
+            unit.section,
+            np.array(state_on_section(unit.walker, z)),
+        )
+        start = pushed_at_hip(walker, start, push_N_s / units.impulse) if push_N_s != 0.0 else start
+        step_length = unit.step_length(float(z[0]), float(z[0]))
+        rises = np.diff(heights_m, prepend=heights_m[0]) / units.length
+        nearest = SHORTEST_LANDING * step_length if rises.any() else 0.0
+        walk = self._exact.walk(section, z, rises.size - 1, False, rises, nearest, start)
+        before, after = (states[: len(walk.time)] for states in (walk.strikes.before, walk.strikes.after))
+        lengths = step_lengths(walker, np.vstack((start, after))[:-1], before)
+        durations = np.diff(walk.time, prepend=0.0) * units.time
+        return DisturbedWalk(walk.outcome, durations, lengths * units.length, walk.z[-1] if walk.z.size else z)
+
+    def cost_of_transport(self, z: Floats, p: float) -> float | None:
+        unit = self._unit_at(p)
+        if unit is None:
+            return None
+        walk = take_walk(unit.walker, EXACT_STEPS, state_on_section(unit.walker, z), 1)
+        return float(walk.driven.cost_of_transport(walk.lengths_m[0])) if walk.steps else None
+
+    def ground_after_push(self, z: Floats, p: float, push_N_s: float, steps: int) -> tuple[float, float]:
+        """Return the ground's response to a push at the hip; negative values mean that it would have to pull.
+
+        The first is its normal impulse (N s) in the push, the second its minimum normal force (N) in the steps after
+        it.
+        """
+        unit = self._unit_at(p)
+        assert unit is not None, "what is pushed has a gait"
+        walker, units, start = unit.walker, unit.units, state_on_section(unit.walker, z)
+        pushed = as_state(pushed_at_hip(walker, start, push_N_s / units.impulse))
+        impulse = momentum(walker, pushed)[1] - momentum(walker, start)[1]
+        walk = take_walk(walker, MONITORED_STEPS, pushed, steps)
+        return impulse * units.impulse, walk.min_normal_force * units.force
+
+    def leg_and_pendulum(self, p: float) -> tuple[float, float]:
+        unit = self._unit_at(p)
+        assert unit is not None, "what is measured has a gait"
+        return unit.units.length, unit.units.time
+
+    def at(self, tolerances: Tolerances) -> RigidMap:
+        changed = copy(self)
+        changed.tolerances, changed._exact = tolerances, RigidStepper(self._like, tolerances)
+        return changed
+
+    def iterate(self, z: Floats, p: float, steps: int, tangent: Floats | None) -> Iterates:
+        """Walk at moderate accuracy: on a chaotic attractor errors grow whatever the tolerance."""
+        unit, none = self._unit_at(p), np.zeros(0)
+        if unit is None:
+            return Iterates(Outcome.REJECTED, np.zeros((0, z.size)), none, none, none)
+        units, section = unit.units, unit.section
+        if tangent is None:
+            walk = self._quick.walk(section, z, steps, derived=False)
+            periods = np.diff(walk.time, prepend=0.0) * units.time
+            return Iterates(walk.outcome, walk.z, none, periods, walk.z[:, 0])
+        outcome = Outcome.WALKED
+        points, growth, times = list[Floats](), list[Floats](), list[Floats]()
+        while outcome is Outcome.WALKED and len(points) * STEPS_PER_BATCH < steps:
+            part = self._quick.walk(section, z, min(STEPS_PER_BATCH, steps - len(points) * STEPS_PER_BATCH))
+            outcome, images = part.outcome, part.DP @ tangent
+            sizes = np.linalg.norm(images, axis=1)
+            points.append(part.z)
+            growth.append(sizes / np.append(1.0, sizes[:-1]) if sizes.size else sizes)
+            times.append(np.diff(part.time, prepend=0.0))
+            if part.time.size:
+                z, tangent = part.z[-1], images[-1] / sizes[-1]
+        all_points = np.concatenate(points)
+        return Iterates(
+            outcome, all_points, np.concatenate(growth), np.concatenate(times) * units.time, all_points[:, 0]
+        )
+
+
+class SimilarWalker(NamedTuple):
+    walker: RigidModel
+    units: Units
+    section: StrikeSection
+    feet: list[list[float]]  # for each body: angle from the slope's normal at z = 0, its derivative by theta_2, levers
+    radius: float
+    apart: float  # rad, minus the sum of the legs' angles with both feet on the slope
+
+    def step_length(self, before: float, after: float) -> float:
+        """Return the length of a step from the stance leg's angles just after its first and last heel strike."""
+        behind = 0.0  # distance from the old stance foot to the landing foot
+        for start, turning, x, y in self.feet:
+            psi = start + after * turning
+            behind += math.cos(psi) * x - math.sin(psi) * y
+        return self.radius * (before + after + self.apart) - behind

@@ -1,0 +1,178 @@
+"""Robustness of a gait: sensitivity to a floor drop and a push, the largest survivable ones, and rough ground.
+
+Gait sensitivity norm: with z the section's coordinates after a step and e an indicator of it, minus the gait's,
+
+    z' = A z + B d,  e' = C z + D d,  norm = sqrt(D^2 + sum over k >= 0 of (C A^k B)^2)
+
+for a disturbance d of one step. A drop leaves the even section for two steps; the first terms of the sum are therefore
+difference quotients of exact walks, and the even section's derivative gives the rest.
+
+Source: Hobbelen and Wisse, A disturbance rejection measure for limit cycle walkers: the gait sensitivity norm, IEEE
+Transactions on Robotics 23 (2007).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from walkerlab.outcome import Outcome
+from walkerlab.physics.hybrid.walk_record import rough_heights
+from walkerlab.physics.orbits.similarity import Units
+from walkerlab.physics.orbits.step_map import DisturbedWalk, StepMap, multipliers_of
+from walkerlab.physics.solvers.system import Floats
+
+Disturbance = Literal["floor-drop", "hip-push"]
+DISTURBANCES: tuple[Disturbance, ...] = ("floor-drop", "hip-push")
+INDICATORS = ("step_period", "step_length", "speed")
+DIRECT_STEPS = 2  # steps with difference quotients
+CENTRAL_4TH = ((-2, 1.0 / 12.0), (-1, -8.0 / 12.0), (1, 8.0 / 12.0), (2, -1.0 / 12.0))
+FORWARD_4TH = ((0, -25.0 / 12.0), (1, 4.0), (2, -3.0), (3, 4.0 / 3.0), (4, -0.25))
+# Offsets and weights of fourth-order formulas for a first derivative.
+FORMULAS = (CENTRAL_4TH, FORWARD_4TH, tuple((-offset, -weight) for offset, weight in FORWARD_4TH))
+# grid of the search and accuracy of its bisection, in units of the disturbance
+SEARCH_GRID, BISECTION_WIDTH = 1.0 / 5000.0, 1e-6
+MAX_DISTURBANCE = 0.5  # in units of the disturbance
+
+
+class GaitOnMap(NamedTuple):
+    """A gait of one step: its step map and parameter, section coordinates, the derivative there, and its units."""
+
+    step_map: StepMap
+    p: float
+    z: Floats  # (d,)
+    A: Floats  # (d, d)
+    units: Units
+
+    def unit_of(self, disturbance: Disturbance) -> float:
+        """Return the unit of a drop (m) or of a push (N s)."""
+        return self.units.length if disturbance == "floor-drop" else self.units.impulse
+
+
+def derivative(function: Callable[[float], Floats | None], step: float) -> Floats | None:
+    """Differentiate a function at 0 to fourth order; one-sided if one side has no value, None if neither has."""
+    for formula in FORMULAS:
+        values = [value for offset, _ in formula if (value := function(offset * step)) is not None]
+        if len(values) == len(formula):
+            return np.asarray(np.tensordot([weight / step for _, weight in formula], values, 1))
+    return None
+
+
+def sensitivity_norm(A: Floats, B: Floats, C: Floats, D: Floats) -> Floats | None:
+    """Return norms (indicators,) of e' = C z + D d, z' = A z + B d; None for an unstable gait.
+
+    A  (d, d)
+    B  (d,)
+    C  (indicators, d)
+    D  (steps, indicators) changes of the steps before the section's derivative applies
+    """
+    if np.abs(multipliers_of(A)).max() >= 1.0:
+        return None
+    # sum of z z' over all steps: X = A X A' + B B'
+    d = len(B)
+    summed = np.linalg.solve(np.eye(d * d) - np.kron(A, A), np.outer(B, B).ravel()).reshape(d, d)
+    later = np.einsum("ij,jk,ik->i", C, summed, C)
+    return np.asarray(np.sqrt((D**2).sum(axis=0) + np.maximum(later, 0.0)))
+
+
+@dataclass(frozen=True)
+class Sensitivity:
+    """Responses of period, length and speed to a disturbance, SI: (3,) each."""
+
+    norm: Floats
+    direct: Floats  # of the disturbed step itself
+    error: Floats  # of the norm, from two step sizes
+
+
+def indicators(walk: DisturbedWalk) -> Floats:
+    return np.column_stack((walk.durations_s, walk.lengths_m, walk.lengths_m / walk.durations_s))
+
+
+def walk_disturbed(gait: GaitOnMap, disturbance: Disturbance, size: float, steps: int) -> DisturbedWalk:
+    """Walk from the gait with a disturbed first step: a drop (m) that persists, or a push (N s)."""
+    if disturbance == "hip-push":
+        return gait.step_map.disturbed(gait.z, gait.p, np.zeros(steps + 1), size)
+    return gait.step_map.disturbed(gait.z, gait.p, np.append(0.0, np.full(steps, -size)))
+
+
+def sensitivity(gait: GaitOnMap, disturbance: Disturbance) -> Sensitivity | None:
+    """Return the norms of a gait for a disturbance; None if it is unstable, or neighbouring steps fail."""
+    fine, coarse = (response(gait, disturbance, times) for times in (1.0, 2.0))
+    return None if fine is None or coarse is None else Sensitivity(*fine, np.abs(fine[0] - coarse[0]))
+
+
+def response(gait: GaitOnMap, disturbance: Disturbance, times: float = 1.0) -> tuple[Floats, Floats] | None:
+    """Return the norms and the response of the disturbed step, by differences of `times` the usual step size."""
+    d, h = gait.z.size, times * gait.step_map.probe
+
+    def after(size: float) -> Floats | None:
+        walk = walk_disturbed(gait, disturbance, size, DIRECT_STEPS)
+        return np.append(indicators(walk), walk.z) if walk.outcome is Outcome.WALKED else None
+
+    def next_step(move: Floats) -> Floats | None:
+        walk = gait.step_map.disturbed(gait.z + move, gait.p, np.zeros(2))
+        return indicators(walk)[0] if walk.outcome is Outcome.WALKED else None
+
+    changed = derivative(after, h * gait.unit_of(disturbance))
+    columns = [derivative(lambda size, unit=unit: next_step(size * unit), h) for unit in np.eye(d)]  # type: ignore[misc]
+    if changed is None or any(column is None for column in columns):
+        return None
+    D = changed[:-d].reshape(DIRECT_STEPS, len(INDICATORS))
+    norm = sensitivity_norm(gait.A, changed[-d:], np.column_stack(columns), D)  # type: ignore[arg-type]
+    return None if norm is None else (norm, D[0])
+
+
+def largest_survived(stands: Callable[[float], bool], unit: float) -> float:
+    """Return the largest disturbance up to which all smaller ones are survived.
+
+    unit  of the disturbance: the grid is a fraction of it, and the search stops at half of it
+    """
+    steps = round(MAX_DISTURBANCE / SEARCH_GRID)
+    low = next((k - 1 for k in range(1, steps + 1) if not stands(k * SEARCH_GRID * unit)), steps)
+    if low == steps:
+        return MAX_DISTURBANCE * unit
+    below, above = low * SEARCH_GRID * unit, (low + 1) * SEARCH_GRID * unit
+    while above - below > BISECTION_WIDTH * unit:
+        middle = 0.5 * (below + above)
+        below, above = (middle, above) if stands(middle) else (below, middle)
+    return below
+
+
+def largest_disturbance(gait: GaitOnMap, disturbance: Disturbance, sign: float, steps: int) -> float:
+    def stands(size: float) -> bool:
+        return walk_disturbed(gait, disturbance, sign * size, steps + 1).outcome is Outcome.WALKED
+
+    return largest_survived(stands, gait.unit_of(disturbance))
+
+
+def steps_on_rough_ground(gait: GaitOnMap, roughness_m: float, seed: tuple[int, ...], most: int) -> int:
+    """Count the steps of a walk from the gait over normally distributed heights, at most `most`."""
+    return int(gait.step_map.disturbed(gait.z, gait.p, rough_heights(roughness_m, seed, most)).durations_s.size)
+
+
+@dataclass(frozen=True)
+class RoughWalks:
+    """Mean length of walks on rough ground."""
+
+    mean_steps: float  # as far as the sample allows
+    standard_error: float | None  # as far as the sample allows
+    walks: int
+    capped: int  # walks that reached the maximum number of steps
+    # the mean of all walks; steps over failures; steps if no walk failed
+    method: Literal["all-failed", "censored", "lower-bound"]
+
+
+def rough_walks(steps: Floats, most: int) -> RoughWalks:
+    """Estimate the mean number of steps from walks (walks,) that were stopped at `most` steps."""
+    capped = int(np.count_nonzero(steps >= most))
+    failed, total = steps.size - capped, float(steps.sum())
+    if failed == 0:
+        return RoughWalks(total, None, steps.size, capped, "lower-bound")
+    if capped:
+        return RoughWalks(total / failed, total / failed / math.sqrt(failed), steps.size, capped, "censored")
+    error = float(steps.std(ddof=1)) / math.sqrt(failed) if failed > 1 else None
+    return RoughWalks(total / failed, error, steps.size, 0, "all-failed")

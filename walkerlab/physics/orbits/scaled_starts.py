@@ -1,0 +1,228 @@
+"""Starts with scaled angular velocities: how far they may change, and the smallest change that walks.
+
+In the paper both velocities were raised by hand until the contact model walked. Here a start is a pair of factors
+(s_1, s_2) on the velocities of swing and stance leg; (1, 1) is the unchanged rigid start.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+from typing import NamedTuple
+
+import numpy as np
+
+from walkerlab.outcome import Outcome
+from walkerlab.physics.ground.terrain import STANCE_FOOT
+from walkerlab.physics.ground.walker import ContactWalker
+from walkerlab.physics.hybrid.contact_events import JudgedGround
+from walkerlab.physics.hybrid.contact_result import ContactWalkResult, walk_contact
+from walkerlab.physics.hybrid.recorded_walk import take_walk, with_scaled_rates
+from walkerlab.physics.mechanics.rigid_model import RigidModel
+from walkerlab.physics.solvers.registry import ENDLESS, Tolerances
+from walkerlab.physics.solvers.stepping import RHS
+from walkerlab.physics.solvers.system import Floats, Integers, State
+
+START_TOLERANCES = Tolerances("radau5", 1e-7, 1e-9, 10_000_000)
+RIGID_TOLERANCES = Tolerances("dop853", 1e-7, 1e-9, ENDLESS)
+SETTLED_SHARE = 0.02  # of the gait's period and step length
+MARGIN_STEP = 0.02  # spacing of factors until one fails
+SMALLEST_FACTOR, LARGEST_FACTOR = 0.0, 4.0
+MARGIN_HALVINGS = 14
+ZOOMS, ZOOM_CELLS = 4, 4  # successively finer grids around the best start, and cells to either side
+ZOOM_OFFSETS = np.array(list(product(range(-ZOOM_CELLS, ZOOM_CELLS + 1), repeat=2)))
+
+
+class StartTrial(NamedTuple):
+    outcome: int
+    steps: int
+    settled: bool  # whether its last step matches the gait's period and length within 2 %
+    evaluations: int  # right-hand sides
+
+    @property
+    def walks(self) -> bool:
+        return self.outcome == Outcome.WALKED and self.settled
+
+
+@dataclass(frozen=True)
+class ScaledStarts:
+    walker: ContactWalker
+    ground: JudgedGround
+    place: State  # (2 + n) position and angles of the start
+    by_swing: State  # (2 + n) velocities due to the swing leg's angular velocity
+    by_stance: State  # (2 + n) velocities due to the stance leg's
+    steps: int
+    gait: tuple[float, float] | None  # period (s) and step length (m) to settle on; None if not required
+    tolerances: Tolerances = START_TOLERANCES
+
+    def start(self, swing: float, stance: float) -> State:
+        rates = (swing * a + stance * b for a, b in zip(self.by_swing, self.by_stance, strict=True))
+        return (*self.place, *rates)
+
+    def walk(self, swing: float, stance: float) -> StartTrial:
+        walk = self.walk_from(self.start(swing, stance))
+        settled = walk.outcome is Outcome.WALKED and (self.gait is None or self.settling_steps(walk) is not None)
+        return StartTrial(walk.outcome, walk.touch_time_s.size, settled, int(walk.work[RHS]))
+
+    def walk_from(self, start: State) -> ContactWalkResult:
+        return walk_contact(self.walker, self.ground, False, STANCE_FOOT, start, self.tolerances, self.steps, None)
+
+    def settling_steps(self, walk: ContactWalkResult) -> int | None:
+        """Return the steps after which all periods and lengths match the gait; None if the last do not."""
+        if self.gait is None:
+            return None
+        period, length = self.gait
+        off_period, off_length = np.abs(walk.periods_s - period), np.abs(walk.lengths_m - length)
+        off = np.flatnonzero((off_period > SETTLED_SHARE * period) | (off_length > SETTLED_SHARE * abs(length)))
+        first = int(off[-1]) + 1 if off.size else 0
+        return first if first < walk.periods_s.size else None
+
+    def coarser(self, rtol: float, atol: float, budget: int) -> ScaledStarts:
+        """Return the same starts at the lower accuracy of a map, without locating switching points."""
+        quick = JudgedGround(self.ground.terrain, self.ground.frame._replace(locate_switching=False))
+        return replace(self, ground=quick, tolerances=Tolerances(self.tolerances.method, rtol, atol, budget))
+
+
+def scaled_starts(
+    walker: ContactWalker,
+    ground: JudgedGround,
+    start_of: Callable[[float, float], State],
+    steps: int,
+    gait: tuple[float, float] | None,
+) -> ScaledStarts:
+    """Build the scaled starts of a scene.
+
+    start_of  the free walker's start for factors on the two angular velocities; linear in them
+    """
+    still, swing, stance = start_of(0.0, 0.0), start_of(1.0, 0.0), start_of(0.0, 1.0)
+    half = len(still) // 2
+    return ScaledStarts(walker, ground, still[:half], swing[half:], stance[half:], steps, gait)
+
+
+@dataclass(frozen=True)
+class Margin:
+    name: str  # velocities that are scaled, down or up
+    factor: float  # last one that walks
+    fails: StartTrial | None  # first failure beyond; None up to the limit
+
+
+SCALING_DIRECTIONS = (
+    ("dtheta_1 down", -1.0, 0.0),
+    ("dtheta_1 up", 1.0, 0.0),
+    ("dtheta_2 down", 0.0, -1.0),
+    ("dtheta_2 up", 0.0, 1.0),
+    ("both down", -1.0, -1.0),
+    ("both up", 1.0, 1.0),
+)
+
+
+def margins(
+    starts: ScaledStarts,
+    around: tuple[float, float] = (1.0, 1.0),
+    step: float = MARGIN_STEP,
+    largest: float = LARGEST_FACTOR,
+) -> list[Margin]:
+    """Return how far the velocities of a start that walks may be scaled, alone and together, before it fails.
+
+    step     spacing of factors until one fails; then the last interval is halved
+    largest  maximum factor
+    """
+    results = []
+    for name, *direction in SCALING_DIRECTIONS:
+        sign = 1.0 if max(direction) > 0.0 else -1.0
+        limit = largest - 1.0 if sign > 0.0 else 1.0 - SMALLEST_FACTOR
+        good, bad, failure, halvings = 0.0, limit, None, 0
+        while good < limit and halvings <= MARGIN_HALVINGS:
+            change = min(good + step, limit) if failure is None else 0.5 * (good + bad)
+            trial = starts.walk(around[0] * (1.0 + change * direction[0]), around[1] * (1.0 + change * direction[1]))
+            if trial.walks:
+                good = change
+            else:
+                bad, failure = change, trial
+            halvings += failure is not None
+        results.append(Margin(name, 1.0 + sign * good, failure))
+    return results
+
+
+@dataclass(frozen=True)
+class Adjustment:
+    swing: float
+    stance: float
+    trial: StartTrial
+
+    @property
+    def distance(self) -> float:
+        """Euclidean distance of the factors from (1, 1)."""
+        return math.hypot(self.swing - 1.0, self.stance - 1.0)
+
+
+def smallest_change(
+    starts: ScaledStarts, quick: ScaledStarts, candidates: np.ndarray, cell: tuple[float, float]
+) -> Adjustment | None:
+    """Find the walking start nearest to (1, 1), on successively finer grids around the nearest in a map.
+
+    starts      at the config's tolerances, which the result satisfies
+    quick       at the map's tolerances
+    candidates  (n, 2) factors that walk according to the map
+    cell        spacing of the map
+    """
+    order = np.argsort(np.hypot(*(candidates - 1.0).T), kind="stable")
+    for swing, stance in candidates[order]:
+        if not starts.walk(float(swing), float(stance)).walks:
+            continue
+        best, spacing = (float(swing), float(stance)), np.array(cell)
+        for _ in range(ZOOMS):
+            spacing = spacing / ZOOM_CELLS
+            grid = np.array(best) + spacing * ZOOM_OFFSETS
+            distance = np.hypot(*(grid - 1.0).T)
+            nearer = np.flatnonzero(distance < math.hypot(best[0] - 1.0, best[1] - 1.0) - 1e-12)
+            nearest_first = grid[nearer[np.argsort(distance[nearer], kind="stable")]].tolist()
+            both = ((a, b) for a, b in nearest_first if quick.walk(a, b).walks and starts.walk(a, b).walks)
+            best = next(both, best)
+        return Adjustment(*best, starts.walk(*best))
+    return None
+
+
+# ---- map of scaled starts, in the contact model and in the rigid model -----------------------------------------------
+
+
+@dataclass(frozen=True)
+class StartMap:
+    """Results over factors of both velocities; rows are factors of the stance leg."""
+
+    swing: Floats  # (columns,) factors on the swing leg's velocity
+    stance: Floats  # (rows,) factors on the stance leg's velocity
+    outcome: Integers  # (rows, columns)
+    steps: Integers  # (rows, columns)
+    settled: Integers  # (rows, columns) 1 if the last step matches the gait
+
+    @property
+    def walking(self) -> Floats:
+        """Factors (n, 2) of the cells that walk and settle."""
+        rows, columns = np.nonzero((self.outcome == Outcome.WALKED) & (self.settled == 1))
+        return np.column_stack((self.swing[columns], self.stance[rows]))
+
+    def share(self) -> float:
+        return float(self.walking.shape[0]) / self.outcome.size
+
+
+def contact_row(starts: ScaledStarts, swing: Floats, stance: float) -> Integers:
+    trials = [starts.walk(float(factor), float(stance)) for factor in swing]
+    return np.array([(trial.outcome, trial.steps, trial.settled) for trial in trials], np.int64)
+
+
+def rigid_map(walker: RigidModel, state: State, swing: Floats, stance: Floats, steps: int) -> StartMap:
+    """Compute the same map for the rigid model; where its ground would have to pull, the outcome is `lifted-off`."""
+
+    def cell(factor_1: float, factor_2: float) -> tuple[int, int, bool]:
+        walk = take_walk(walker, RIGID_TOLERANCES, with_scaled_rates(walker, state, factor_1, factor_2), steps)
+        return int(walk.outcome), walk.steps, walk.steps == steps
+
+    rows = [[cell(swing_factor, stance_factor) for swing_factor in swing.tolist()] for stance_factor in stance.tolist()]
+    return as_map(swing, stance, list(np.array(rows, np.int64)))
+
+
+def as_map(swing: Floats, stance: Floats, rows: Sequence[Integers]) -> StartMap:
+    return StartMap(swing, stance, *np.moveaxis(np.stack(rows), 2, 0))

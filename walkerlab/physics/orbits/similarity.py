@@ -1,0 +1,56 @@
+"""Similarity: every walker is a walker of unit leg length, mass and gravity, measured in its own units.
+
+Searches use the unit walker, so that starting ranges, tolerances and thresholds suit all walkers.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from walkerlab.physics.mechanics.hinges import SpringDamper
+from walkerlab.physics.mechanics.rigid_model import RigidModel, on_slope
+
+
+class Units(NamedTuple):
+    length: float  # m
+    mass: float  # kg
+    time: float  # s, sqrt(L / g)
+
+    @property
+    def energy(self) -> float:
+        return self.mass * (self.length / self.time) ** 2
+
+    @property
+    def force(self) -> float:
+        return self.mass * self.length / self.time**2
+
+    @property
+    def impulse(self) -> float:
+        return self.mass * self.length / self.time
+
+    def of(self, unit: str) -> float:
+        """Return the SI value of a unit named as in the config, 1 for pure numbers. Raises KeyError for other units."""
+        inertia, damping = self.mass * self.length**2, self.energy * self.time
+        basic = {"": 1.0, "1": 1.0, "m": self.length, "kg": self.mass, "s": self.time}
+        derived = {"kg m^2": inertia, "N s": self.impulse, "N m": self.energy}
+        return (basic | derived | {"N m/rad": self.energy, "N m s/rad": damping})[unit]
+
+
+def unit_walker(walker: RigidModel) -> tuple[RigidModel, Units]:
+    """Return the similar walker with L = g = 1 and a total mass of 1, and its units."""
+    length, mass = float(walker.leg_length), float(walker.mass)
+    if length == mass == walker.gravity == 1.0:
+        return walker, Units(1.0, 1.0, 1.0)
+    units = Units(length, mass, math.sqrt(length / walker.gravity))
+    inertia, moment = 1.0 / (mass * length * length), 1.0 / (mass * length)
+    scales = {
+        **dict.fromkeys(("A", "B", "unpaired"), inertia),
+        **dict.fromkeys(("arm_x", "arm_y"), moment),
+        "laws": np.array(SpringDamper(1.0 / units.energy, 1.0 / (units.energy * units.time), 1.0 / units.energy)),
+        "push_off": 1.0 / units.impulse,
+        **dict.fromkeys(("radius", "foot_x", "foot_y", "hip_x", "hip_y"), 1.0 / length),
+    }
+    scaled = {name: scale * walker[name] for name, scale in scales.items()}
+    unit = walker.changed(mass=1.0, leg_length=1.0, gravity=1.0, **scaled)
+    return on_slope(unit, walker.slope), units

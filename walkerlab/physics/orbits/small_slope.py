@@ -1,0 +1,240 @@
+"""The two gaits of a compass walker in the limit of a vanishing slope, used as seeds of the search for gaits.
+
+At small angles the swing phase is linear, D(0) ddq = diag(-m b g, K g) q, with one oscillating and one growing mode,
+and the heel strike is a constant linear map. Two kinds of period-1 motion remain as the slope phi goes to zero.
+
+Long period: the step is symmetric about mid-swing, and both legs turn at the same rate at heel strike, which to leading
+order changes nothing. The energy it does lose, M (L omega alpha)^2 / 2 at an angle alpha between the legs, equals the
+descent of a step, M g L alpha phi; omega is proportional to alpha, hence phi = kappa alpha^3.
+
+Short period: the swing foot comes down while still moving forward, and the whole motion is proportional to phi. The
+factor grows without bound as the feet's mass vanishes; then this gait also grows as the cube root of phi.
+
+Source: Garcia, Chatterjee, Ruina, Coleman, The simplest walking model: stability, complexity, and scaling, J. Biomech.
+Eng. 120 (1998), section 4 and appendix, here with legs that have mass.
+"""
+
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from walkerlab.physics.mechanics.impact import heel_strike
+from walkerlab.physics.mechanics.rigid_model import (
+    STRAIGHT,
+    RigidModel,
+    equations,
+    kinetic_energy,
+    linked,
+    on_slope,
+    swing_foot,
+)
+from walkerlab.physics.solvers.system import Floats, State
+
+LONG_PERIOD, SHORT_PERIOD = "long-period seed", "short-period seed"
+SCAN = 400  # samples to bracket roots with
+LOSS_ANGLE = 1e-3  # rad, small compared to one and large compared to rounding
+LONG_AMPLITUDE = 0.05  # angle between the legs at which the long-period seed is good to a percent
+SHORT_AMPLITUDE = 0.002
+MAX_GROWTH = 30.0  # growth exponent of a fall over half a step, beyond which no digit of the start is left
+# linear in (z, 1) on a slope of one radian: the state, z itself, and theta_1 + theta_2
+STATE_OF = np.array([[-1.0, 0.0, 0.0, -2.0], [1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]])
+SECTION_ROWS = np.eye(3, 4)
+FEET_DOWN = np.array([1.0, 1.0, 0.0, 0.0])
+THETA_2 = np.array([1.0, 0.0, 0.0])
+
+
+class SmallSlopeSeed(NamedTuple):
+    name: str
+    slope: float  # rad
+    z: Floats  # (3,) theta_2, dtheta_1, dtheta_2 after the heel strike
+    period: float  # s, in the limit
+    limit: Floats  # (3,) z / slope^(1/3) in the limit
+
+
+class Modes(NamedTuple):
+    """The linear swing phase: ddq = V diag(-swing^2, fall^2) V^-1 q."""
+
+    swing: float  # rad/s, of the oscillating mode
+    fall: float  # 1/s, of the growing mode
+    V: Floats  # (2, 2), one mode per column, oscillating first
+
+
+def linear_modes(walker: RigidModel) -> Modes | None:
+    """Return the modes of the swing phase about upright legs; None if the legs have too little inertia."""
+    legs, n, level = leg_columns(walker), len(walker.arm_x), on_slope(walker, 0.0)
+    inertias, (s, c, F, U, r) = np.empty((n, n)), np.empty((5, n))
+    equations(level, level.zero_state, s, c, F, U, inertias, r)
+    M, K = legs.T @ inertias @ legs, walker.gravity * legs.T @ np.diag(walker.arm_y) @ legs
+    # det(K - x M) = first x^2 - 2 half x + last
+    first, last = np.linalg.det(M), np.linalg.det(K)
+    half = 0.5 * (K[0, 0] * M[1, 1] + K[1, 1] * M[0, 0]) - K[0, 1] * M[0, 1]
+    if not last < 0.0 < first:
+        return None
+    root = half + math.copysign(math.sqrt(half * half - first * last), half)  # times first, without cancellation
+    oscillating, growing = sorted((root / first, last / root))
+    swinging, falling = K - oscillating * M, K - growing * M
+    V = np.array([[swinging[1, 1], -falling[0, 1]], [-swinging[0, 1], falling[0, 0]]])
+    return Modes(math.sqrt(-oscillating), math.sqrt(growing), V)
+
+
+def leg_columns(walker: RigidModel) -> Floats:
+    """Return the angles (n, 2) of all bodies for a unit angle of the swing leg, and of the stance leg."""
+    return np.array([linked(walker, STRAIGHT, unit) for unit in np.eye(len(walker.arm_x))[:2]]).T
+
+
+def seeds(walker: RigidModel) -> tuple[SmallSlopeSeed, ...]:
+    """Return the small-slope gaits of `walker`, whatever its own slope.
+
+    There are none unless upright legs balance, so that gaits shrink with the slope.
+    """
+    modes = None if walker.kneed or walker.lean != 0.0 or walker.arm_x.any() else linear_modes(walker)
+    try:
+        long = None if modes is None else long_period_seed(walker, modes)
+        if modes is None or long is None:
+            return ()
+        short = short_period_seed(walker, modes, long.period)
+    except FloatingPointError:  # with all masses in one place a heel strike is undetermined
+        return ()
+    return (long,) if short is None else (long, short)
+
+
+def long_period_seed(walker: RigidModel, modes: Modes) -> SmallSlopeSeed | None:
+    """Return the symmetric gait at LONG_AMPLITUDE; None if the walker falls before its legs meet again."""
+    half = symmetric_half_period(modes)
+    if half is None or modes.fall * half > MAX_GROWTH:
+        return None
+    at_end = np.array([math.sin(modes.swing * half) / modes.swing, math.sinh(modes.fall * half) / modes.fall])
+    rates_at_end = np.array([math.cos(modes.swing * half), math.cosh(modes.fall * half)])
+    total = modes.V[0] + modes.V[1]
+    # weights of the modes, from both feet on the slope at the end, scaled to a unit angle between the legs
+    weights = np.array([total[1] * at_end[1], -total[0] * at_end[0]])
+    weights /= (modes.V[0] - modes.V[1]) @ (weights * at_end)
+    omega = float((modes.V @ (weights * rates_at_end)).mean())
+    return cube_root_seed(LONG_PERIOD, walker, np.array([0.5, omega, omega]), 2.0 * half)
+
+
+def cube_root_seed(name: str, walker: RigidModel, per_angle: Floats, period: float) -> SmallSlopeSeed:
+    """Return the gait at LONG_AMPLITUDE that grows as the cube root of the slope.
+
+    per_angle  (3,) theta_2 + phi, dtheta_1, dtheta_2 after heel strike per unit angle between the legs
+    period     duration of a step, s
+    """
+    kappa = slope_for_loss(walker, per_angle)
+    slope = kappa * LONG_AMPLITUDE**3
+    z = LONG_AMPLITUDE * per_angle - np.array([slope, 0.0, 0.0])
+    return SmallSlopeSeed(name, slope, z, period, per_angle / np.cbrt(kappa))
+
+
+@np.errstate(divide="raise", invalid="raise")
+def slope_for_loss(walker: RigidModel, per_angle: Floats) -> float:
+    """Return the slope that balances the heel strike's loss, divided by the cube of the angle between the legs.
+
+    In the limit the gait ends a step as it began, with both legs at the same rates.
+    """
+    flat, angle = on_slope(walker, 0.0), LOSS_ANGLE
+    omega = angle * float(per_angle[2])
+    before = leg_state(flat, (0.5 * angle, -0.5 * angle), (omega, omega))
+    after = apply_strike(flat, before)
+    lost = kinetic_energy(flat, before) - kinetic_energy(flat, after)
+    length = swing_foot(flat, before)[1] + flat.radius * angle
+    return float(lost / (flat.mass * flat.gravity * length * angle**3))
+
+
+@np.errstate(divide="raise", invalid="raise")
+def apply_strike(walker: RigidModel, state: State) -> Floats:
+    after = np.zeros(len(state))
+    heel_strike(walker, np.array(state), after)
+    return after
+
+
+def leg_state(walker: RigidModel, theta: tuple[float, float], omega: tuple[float, float]) -> State:
+    legs = leg_columns(walker)
+    return tuple(float(x) for x in (*(legs @ theta), *(legs @ omega)))
+
+
+def symmetric_half_period(modes: Modes) -> float | None:
+    """Return the first time h > 0 (s) after mid-swing with theta_1 + theta_2 = 0 and dtheta_1 = dtheta_2."""
+    total, apart = modes.V[0] + modes.V[1], modes.V[0] - modes.V[1]
+
+    def mismatch(h: Floats) -> Floats:
+        swinging = total[0] * np.sin(modes.swing * h) / modes.swing * apart[1]
+        falling = total[1] * np.tanh(modes.fall * h) / modes.fall * apart[0] * np.cos(modes.swing * h)
+        return np.asarray((swinging - falling) / h)
+
+    return first_root(mismatch, 2.0 * math.pi / modes.swing)
+
+
+def short_period_seed(walker: RigidModel, modes: Modes, longest: float) -> SmallSlopeSeed | None:
+    """Return the gait of period below `longest` (s) proportional to the slope; None if there is none."""
+    try:
+        conditions = step_conditions(walker, modes)
+        period = first_root(lambda t: np.asarray(np.linalg.det(conditions(t)) / t), longest)
+        if period is None:
+            return None
+        rows = conditions(np.array(period))[:3]
+        z = np.asarray(np.linalg.solve(rows[:, :3], -rows[:, 3]), np.float64)
+    except np.linalg.LinAlgError:  # with all masses in one place a heel strike is undetermined
+        return None
+    if z[0] <= -1.0:
+        return None
+    slope = 0.5 * SHORT_AMPLITUDE / float(z[0] + 1.0)
+    per_angle = 0.5 * (z + THETA_2) / (z[0] + 1.0)
+    if slope_for_loss(walker, per_angle) * SHORT_AMPLITUDE**3 > slope:
+        return cube_root_seed(SHORT_PERIOD, walker, per_angle, period)
+    return SmallSlopeSeed(SHORT_PERIOD, slope, slope * z, period, np.zeros(3))
+
+
+def step_conditions(walker: RigidModel, modes: Modes) -> Callable[[Floats], Floats]:
+    """Linearise one step on a slope of one radian, for many durations at once.
+
+    Returns a function of durations t (s) that gives matrices (..., 4, 4) on (z, 1): three rows require that z repeats
+    after t, one that both feet are down. A solution exists where the determinant vanishes.
+    """
+    flat, n = on_slope(walker, 0.0), len(walker.arm_x)
+    swing, fall, inverse = modes.swing, modes.fall, np.linalg.inv(modes.V)
+    strike = np.zeros((3, 4))  # the heel strike at vanishing angles, including the exchange of roles
+    strike[0, 0] = 1.0
+    for leg, omega in enumerate(((1.0, 0.0), (0.0, 1.0))):
+        strike[1:, 2 + leg] = apply_strike(flat, leg_state(flat, (0.0, 0.0), omega))[n : n + 2]
+    # equilibrium: a leg with a rolling foot balances off the vertical on a slope of one radian
+    legs = leg_columns(flat)
+    pull = np.array([0.0, flat.mass * flat.gravity * flat.radius])
+    rest = np.zeros((4, 4))
+    rest[:2, 3] = np.linalg.solve(flat.gravity * legs.T @ np.diag(flat.arm_y) @ legs, pull)
+
+    def combine_modes(oscillating: Floats, growing: Floats) -> Floats:
+        weights = np.stack((oscillating, growing), axis=-1)[..., None, :]
+        return np.asarray(modes.V * weights @ inverse, np.float64)
+
+    def conditions(t: Floats) -> Floats:
+        sine, cosine = np.sin(swing * t), np.cos(swing * t)
+        growing, grown = np.sinh(fall * t), np.cosh(fall * t)
+        flow = np.empty((*t.shape, 4, 4))  # from a state to the one t later
+        flow[..., :2, :2] = flow[..., 2:, 2:] = combine_modes(cosine, grown)
+        flow[..., :2, 2:] = combine_modes(sine / swing, growing / fall)
+        flow[..., 2:, :2] = combine_modes(-swing * sine, fall * growing)
+        end = flow @ (STATE_OF - rest) + rest
+        bordered = np.empty_like(flow)
+        bordered[..., :3, :] = SECTION_ROWS - strike @ end
+        bordered[..., 3, :] = FEET_DOWN @ end
+        bordered[..., 3, 3] += 2.0
+        return bordered
+
+    return conditions
+
+
+def first_root(f: Callable[[Floats], Floats], longest: float) -> float | None:
+    """Return the smallest root of f in (0, longest) by successively finer samples; None if f keeps its sign."""
+    # exclude the end, where the short gait's conditions degenerate into the long one's
+    samples = longest * np.arange(1, SCAN) / SCAN
+    while True:
+        values = f(samples)
+        turns = np.flatnonzero(values[:-1] * values[1:] <= 0.0)
+        if turns.size == 0:
+            return None
+        low, high = float(samples[turns[0]]), float(samples[turns[0] + 1])
+        if high - low <= 1e-14 * high:
+            return 0.5 * (low + high)
+        samples = np.linspace(low, high, SCAN)

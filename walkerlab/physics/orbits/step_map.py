@@ -1,0 +1,239 @@
+"""Step map of a walker from section to section over one parameter, and its gaits, for either model.
+
+`rigid_map.RigidMap` is the rigid model; `contact_map.ContactMap` is a walker on compliant ground. A period-n gait is a
+fixed point of n steps, `walk_steps`, whose derivative is the product of the steps' derivatives.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property, lru_cache, partial
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from walkerlab.outcome import Outcome
+from walkerlab.physics.orbits.newton import Effort, Evaluated, NotConverged, newton
+from walkerlab.physics.solvers.registry import Tolerances
+from walkerlab.physics.solvers.system import Floats
+
+PARAMETER_STEP = 1e-3  # of the parameter, in difference formulas
+CACHE_SIZE = 4096  # per step map
+CENTRAL_2ND: tuple[tuple[int, float], ...] = ((-1, -0.5), (1, 0.5))
+# Offsets and weights of second-order formulas for a first derivative.
+FORWARD_2ND: tuple[tuple[int, float], ...] = ((0, -1.5), (1, 2.0), (2, -0.5))
+identity = lru_cache(np.eye)  # shared: never written to
+no_values = partial(np.zeros, 0)
+
+
+@dataclass(frozen=True)
+class Monitor:
+    """A quantity whose limit the model assumes but does not enforce."""
+
+    name: str
+    unit: str
+    meaning: str
+    limit: float | None = None
+
+
+@dataclass(frozen=True)
+class MappedStep:
+    """One step from section to section."""
+
+    outcome: Outcome | None
+    z: Floats  # (d,) section coordinates at the end
+    DP: Floats  # (d, d) derivative with respect to the start, if requested
+    period_s: float
+    length_m: float  # distance walked
+    angle: float  # rad, stance leg just after the step's heel strike
+    strike_s: float  # time of that heel strike, from the start of the step
+
+
+@dataclass(frozen=True)
+class Iterates:
+    """A walk on the section with a tangent vector."""
+
+    outcome: Outcome
+    points: Floats  # (steps, d) section coordinates after each step
+    lengths: Floats  # (steps,) factor by which each step stretches the tangent; empty without a tangent
+    periods_s: Floats  # (steps,) durations
+    angles: Floats  # (steps,) rad, as in `MappedStep`
+
+
+@dataclass(frozen=True)
+class DisturbedWalk:
+    """A walk from the section over uneven ground, or after a push."""
+
+    outcome: Outcome  # WALKED if every step was completed
+    durations_s: Floats  # (steps,) between heel strikes
+    lengths_m: Floats  # (steps,) distances
+    z: Floats  # (d,) last point on the section
+
+
+class Stepper(Protocol):
+    def step(self, z: Floats, p: float, derived: bool = True) -> MappedStep:
+        """Take a step from z (d,) at parameter p, with its derivative; the outcome is None where p makes no walker."""
+
+
+class StepMap(Stepper, Protocol):
+    """A walker's step from section to section, with everything that following its families needs."""
+
+    names: tuple[str, ...]  # section coordinates, all of magnitude one
+    monitors: tuple[Monitor, ...]  # quantities that `watch` measures
+    scale: float  # magnitude of significant changes of the parameter
+    tolerances: Tolerances  # solver settings of a step
+    probe: float  # disturbance, in units of the walker, small enough for a linear response
+
+    def watch(self, z: Floats, p: float, steps: int) -> Floats:
+        """Return the worst value of each monitor (monitors,) over some steps."""
+
+    def disturbed(self, z: Floats, p: float, heights_m: Floats, push_N_s: float = 0.0) -> DisturbedWalk:
+        """Walk from z (d,) over footholds, after an impulse at the hip along the slope.
+
+        heights_m  (steps + 1,) of the footholds, beginning with the current one
+        """
+
+    def cost_of_transport(self, z: Floats, p: float) -> float | None:
+        """Return work divided by weight times distance of a step from z (d,); None if it fails."""
+
+    def leg_and_pendulum(self, p: float) -> tuple[float, float]:
+        """Return leg length (m) and pendulum time (s) of the walker at p."""
+
+    def at(self, tolerances: Tolerances) -> StepMap: ...
+
+    def iterate(self, z: Floats, p: float, steps: int, tangent: Floats | None) -> Iterates:
+        """Walk up to `steps` steps, transporting a tangent (d,) if there is one."""
+        completed, lengths, outcome = list[MappedStep](), list[float](), Outcome.WALKED
+        for _ in range(steps):
+            step = self.step(z, p, tangent is not None)
+            outcome = Outcome.REJECTED if step.outcome is None else step.outcome
+            if outcome is not Outcome.WALKED:
+                break
+            z = step.z
+            completed.append(step)
+            if tangent is not None:
+                image = step.DP @ tangent
+                lengths.append(float(np.linalg.norm(image)))
+                tangent = image / lengths[-1]
+        waits = [0.0, *(step.period_s - step.strike_s for step in completed)]
+        return Iterates(
+            outcome,
+            np.array([step.z for step in completed]).reshape(-1, z.size),
+            np.array(lengths),
+            np.array([wait + step.strike_s for wait, step in zip(waits, completed, strict=False)]),
+            np.array([step.angle for step in completed]),
+        )
+
+
+def differentiate_by_parameter(step_map: StepMap, z: Floats, p: float) -> tuple[Outcome | None, Floats]:
+    """Return the outcome of steps from z (d,) near p, and the derivative (d,) of the step with respect to p.
+
+    A second-order difference of exact steps, one-sided at the parameter's limits. It only steers predictors and
+    Newton's method and enters no result.
+    """
+    h = PARAMETER_STEP * (min(step_map.scale, abs(p)) if p != 0.0 else step_map.scale)
+    for formula in (CENTRAL_2ND, FORWARD_2ND, tuple((-offset, -weight) for offset, weight in FORWARD_2ND)):
+        steps = [step_map.step(z, p + offset * h, derived=False) for offset, _ in formula]
+        outcomes = [step.outcome for step in steps]
+        if None in outcomes or Outcome.REJECTED in outcomes:
+            continue
+        outcome = next((outcome for outcome in outcomes if outcome is not Outcome.WALKED), Outcome.WALKED)
+        return outcome, sum((weight / h * step.z for step, (_, weight) in zip(steps, formula, strict=True)), 0.0 * z)
+    return None, 0.0 * z
+
+
+def failed_step(outcome: Outcome | None, d: int) -> MappedStep:
+    return MappedStep(outcome, np.zeros(d), np.eye(d), 0.0, 0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Cycle:
+    """Consecutive steps; for a gait they return to their start."""
+
+    outcome: Outcome | None  # of the last step
+    value: float  # of the parameter
+    z: Floats  # (d,) start
+    steps: tuple[MappedStep, ...]  # completed steps
+    DP: Floats  # (d, d) derivative of the end by z
+    Dp: Floats = field(default_factory=no_values)  # (d,) derivative of the end by the parameter, if requested
+    monitors: Floats = field(default_factory=no_values)  # worst values over the steps; only on a branch
+
+    def mismatch(self) -> Evaluated[Cycle]:
+        """Return P^n(z) - z, which a gait makes zero, with its derivative by z."""
+        off = self.steps[-1].z - self.z if self.outcome is Outcome.WALKED else self.z
+        return Evaluated(self.outcome, off, self.DP - identity(self.z.size), self)
+
+    @property
+    def residual(self) -> float:
+        return self.mismatch().residual
+
+    @cached_property
+    def multipliers(self) -> NDArray[np.complex128]:
+        return multipliers_of(self.DP)
+
+    @property
+    def stable(self) -> bool:
+        return bool(abs(self.multipliers[0]) < 1.0)
+
+    @property
+    def step(self) -> MappedStep:
+        (step,) = self.steps
+        return step
+
+    @property
+    def period_s(self) -> float:
+        return math.fsum(step.period_s for step in self.steps)
+
+    @property
+    def periods_s(self) -> Floats:
+        """Durations (n,) of a gait's steps from heel strike to heel strike, independent of the section."""
+        waits = [step.period_s - step.strike_s for step in self.steps]
+        return np.array([waits[k - 1] + step.strike_s for k, step in enumerate(self.steps)])
+
+    @property
+    def lengths_m(self) -> Floats:
+        return np.array([step.length_m for step in self.steps])
+
+    @property
+    def angles(self) -> Floats:
+        """Angles (n,) of the stance leg just after each heel strike (rad)."""
+        return np.array([step.angle for step in self.steps])
+
+
+def walk_steps(step_map: Stepper, z: Floats, p: float, n: int) -> Cycle:
+    steps: list[MappedStep] = []
+    position, DP = z, identity(z.size)
+    for _ in range(n):
+        step = step_map.step(position, p)
+        if step.outcome is not Outcome.WALKED:
+            return Cycle(step.outcome, p, z, tuple(steps), DP)
+        position, DP = step.z, step.DP @ DP if steps else step.DP
+        steps.append(step)
+    return Cycle(Outcome.WALKED, p, z, tuple(steps), DP)
+
+
+def add_parameter_derivative(step_map: StepMap, cycle: Cycle) -> Cycle:
+    """Return the cycle with its derivative by the parameter, or with the outcome of a neighbouring step that fails."""
+    position, Dp = cycle.z, 0.0 * cycle.z
+    for step in cycle.steps:
+        outcome, by_parameter = differentiate_by_parameter(step_map, position, cycle.value)
+        if outcome is not Outcome.WALKED:
+            return replace(cycle, outcome=outcome, Dp=Dp)
+        position, Dp = step.z, step.DP @ Dp + by_parameter
+    return replace(cycle, Dp=Dp)
+
+
+def gait_near(step_map: Stepper, z: Floats, p: float, effort: Effort, n: int = 1) -> Cycle | NotConverged:
+    """Solve for the gait of n steps near z (d,) at p by Newton's method."""
+    solved = newton(lambda z: walk_steps(step_map, z, p, n).mismatch(), z, effort)
+    return solved if isinstance(solved, NotConverged) else solved.evaluated.data
+
+
+def multipliers_of(DP: Floats) -> NDArray[np.complex128]:
+    """Return the eigenvalues, largest first; of a complex pair, the one with positive imaginary part first."""
+    values = np.linalg.eigvals(DP).astype(np.complex128)
+    order: Sequence[int] = sorted(range(values.size), key=lambda i: (-abs(values[i]), -values[i].imag))
+    return np.asarray(values[list(order)])

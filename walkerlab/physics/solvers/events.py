@@ -1,0 +1,229 @@
+"""Zero crossings of event functions within a step, including several crossings in one step.
+
+An event function on a step is a polynomial through its values on the dense output. A polynomial in Bernstein form lies
+in the hull of its coefficients: coefficients of one sign prove that there is no crossing, and bisection isolates the
+crossings otherwise. A sign check at the ends of a step would miss double crossings.
+
+A crossing is a change of sign; an event function that touches zero and turns back does not cross. The last event leaves
+its event function at zero. This zero at the start is divided out, so that it is not found again and does not hide a
+crossing right after it. If several event functions cross in one step, the caller takes the earliest.
+
+Source: Farouki, The Bernstein polynomial basis: a centennial retrospective, CAGD 29 (2012), sections 3.4 and 5.
+"""
+
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.polynomial import polynomial
+
+from walkerlab.physics.kernels import by_reference, kernel_part
+
+NO_CROSSING = 2.0
+FALLING, RISING = -1, 1
+MIN_PIECE = 2.0**-48
+RESOLUTION = 2.0**-52  # of a crossing within its piece
+DEPTH = 64  # pieces on the stack
+
+
+@by_reference
+class CrossingFinder(NamedTuple):
+    """Memory and matrices for event functions sampled at `nodes` (fractions of a step)."""
+
+    nodes: Any  # (degree + 1,)
+    to_bernstein: Any  # (degree + 1, degree + 1) maps values at the nodes to Bernstein coefficients
+    states: Any  # (degree + 1, state_size) at the nodes, filled by the caller
+    values: Any  # (event functions, degree + 1), filled by the caller
+    stack: Any  # (DEPTH, degree + 1) coefficients of the pieces still to search
+    ends: Any  # (DEPTH, 2) fractions at which those pieces begin and end
+
+
+def new_crossing_finder(degree: int, event_functions: int = 1, state_size: int = 0) -> CrossingFinder:
+    """Create a finder for steps whose dense output has degree `degree`."""
+    nodes, to_bernstein = sampling(degree)
+    size = degree + 1
+    shapes = ((size, state_size), (event_functions, size), (DEPTH, size), (DEPTH, 2))
+    return CrossingFinder(nodes, to_bernstein, *map(np.zeros, shapes))
+
+
+@lru_cache
+def sampling(degree: int) -> tuple[Any, Any]:
+    """Compute nodes (degree + 1,) and the matrix from values there to Bernstein coefficients."""
+    size = degree + 1
+    nodes = 0.5 * (1.0 - np.cos(np.pi * np.arange(size) / degree))
+    basis = np.zeros((size, size))
+    one = np.array([1.0])
+    for i in range(size):
+        binomial = np.prod([(degree - j) / (j + 1.0) for j in range(i)])
+        term = polynomial.polymul(one, polynomial.polypow([0.0, 1.0], i))
+        term = polynomial.polymul(term, polynomial.polypow([1.0, -1.0], degree - i))
+        basis[:, i] = binomial * polynomial.polyval(nodes, term)
+    nodes[-1] = 1.0
+    return nodes, np.linalg.inv(basis)
+
+
+@kernel_part
+def first_crossing(finder: CrossingFinder, event: int, direction: int, after: float, zero_at_start: bool) -> float:
+    """Find the fraction of the step at which an event function first changes sign; NO_CROSSING if it does not.
+
+    event          row of `finder.values`
+    direction      FALLING, RISING, or 0 for both
+    after          ignore crossings before this fraction
+    zero_at_start  the event function is zero at the step's start: divide that zero out
+    """
+    if not spans_zero(finder, event):
+        return NO_CROSSING
+    return crossing_of_piece(finder, set_root_piece(finder, event, zero_at_start), direction, after)
+
+
+@kernel_part
+def crossing_of_piece(finder: CrossingFinder, size: int, direction: int, after: float) -> float:
+    """Find the first crossing of the polynomial at the bottom of the stack, with `size` Bernstein coefficients."""
+    stack, ends = finder.stack, finder.ends
+    ends[0, 0], ends[0, 1] = 0.0, 1.0
+    top = 0
+    while top >= 0:
+        low, high = ends[top, 0], ends[top, 1]
+        signs = sign_changes(stack, top, size)
+        if high <= after or signs == 0:
+            top -= 1
+            continue
+        if (signs == 1 and low >= after) or high - low < MIN_PIECE:
+            top -= 1
+            rising = stack[top + 1, 0] < 0.0
+            turned = (stack[top + 1, 0] < 0.0) != (stack[top + 1, size - 1] < 0.0)
+            if turned and direction != (FALLING if rising else RISING):
+                return regula_falsi(stack, top + 1, size, low, high)
+            continue
+        split(stack, top, size)
+        middle = 0.5 * (low + high)
+        ends[top, 0], ends[top, 1] = middle, high
+        ends[top + 1, 0], ends[top + 1, 1] = low, middle
+        top += 1
+    return NO_CROSSING
+
+
+@kernel_part
+def value_at(finder: CrossingFinder, event: int, fraction: float) -> float:
+    """Evaluate a sampled event function at a fraction of the step."""
+    return evaluate(finder.stack, 0, set_root_piece(finder, event, False), fraction)
+
+
+@kernel_part
+def spans_zero(finder: CrossingFinder, event: int) -> bool:
+    """Whether an event function may cross: false if it stays further from zero than it varies."""
+    smallest, largest = finder.values[event, 0], finder.values[event, 0]
+    for i in range(1, finder.nodes.size):
+        smallest = min(smallest, finder.values[event, i])
+        largest = max(largest, finder.values[event, i])
+    room = 8.0 * (largest - smallest)
+    return smallest <= room and largest >= -room
+
+
+@kernel_part
+def set_root_piece(finder: CrossingFinder, event: int, zero_at_start: bool) -> int:
+    """Write the whole step's coefficients to the bottom of the stack; returns their number."""
+    stack, size = finder.stack, finder.nodes.size
+    for i in range(size):
+        total = 0.0
+        for j in range(size):
+            total += finder.to_bernstein[i, j] * finder.values[event, j]
+        stack[0, i] = total
+    return without_zero_at_start(stack, size) if zero_at_start else size
+
+
+@kernel_part
+def without_zero_at_start(stack: Any, size: int) -> int:
+    """Divide a zero at the start out of the polynomial at the bottom of the stack; returns its new size."""
+    degree = size - 1
+    for i in range(1, size):
+        stack[0, i - 1] = stack[0, i] * degree / i
+    return degree
+
+
+@kernel_part
+def way_from_zero(finder: CrossingFinder, event: int, clearly: float) -> float:
+    """Direction of an event function that is zero at the step's start, as a number of its sign; 0 if it stays there.
+
+    The error of the last event's time leaves a small value at the start, which is subtracted.
+
+    clearly  minimum slope (per step) of a coefficient that decides
+    """
+    size = set_root_piece(finder, event, False)
+    for i in range(1, size):
+        slope = (finder.stack[0, i] - finder.stack[0, 0]) * (size - 1) / i
+        if abs(slope) > clearly:
+            return float(slope)
+    return 0.0
+
+
+@kernel_part
+def sign_changes(stack: Any, piece: int, size: int) -> int:
+    """Count sign changes of a piece's coefficients; zero counts as positive."""
+    changes = 0
+    for i in range(1, size):
+        if (stack[piece, i] < 0.0) != (stack[piece, i - 1] < 0.0):
+            changes += 1
+    return changes
+
+
+@kernel_part
+def split(stack: Any, piece: int, size: int) -> None:
+    """Bisect a piece by de Casteljau: its left half goes on top of the stack, its right half replaces it."""
+    for i in range(size):
+        stack[piece + 1, i] = stack[piece, i]
+    for level in range(1, size):
+        stack[piece, size - level] = stack[piece + 1, size - 1]
+        for i in range(size - 1, level - 1, -1):
+            stack[piece + 1, i] = 0.5 * (stack[piece + 1, i - 1] + stack[piece + 1, i])
+    stack[piece, 0] = stack[piece + 1, size - 1]
+
+
+@kernel_part
+def regula_falsi(stack: Any, piece: int, size: int, low: float, high: float) -> float:
+    """Find the only crossing of a piece by the Illinois variant, as a fraction of the step."""
+    a, b = 0.0, 1.0
+    value_a, value_b = stack[piece, 0], stack[piece, size - 1]
+    side = 0
+    for _ in range(100):
+        if b - a <= 2.0 * RESOLUTION or value_a == value_b:
+            break
+        # rounding may put the secant's zero on an end; keep it inside so that the bracket shrinks
+        c = min(max((a * value_b - b * value_a) / (value_b - value_a), a + RESOLUTION), b - RESOLUTION)
+        value_c = evaluate(stack, piece, size, c)
+        if value_c == 0.0:
+            a, b = c, c
+        elif (value_c < 0.0) == (value_b < 0.0):
+            b, value_b = c, value_c
+            value_a = 0.5 * value_a if side == -1 else value_a
+            side = -1
+        else:
+            a, value_a = c, value_c
+            value_b = 0.5 * value_b if side == 1 else value_b
+            side = 1
+    return low + 0.5 * (a + b) * (high - low)
+
+
+@kernel_part
+def evaluate(stack: Any, piece: int, size: int, x: float) -> float:
+    """Evaluate a piece at x (0 to 1) by nested products."""
+    degree = size - 1
+    u, power, binomial = 1.0 - x, 1.0, 1.0
+    total = stack[piece, 0] * u
+    for i in range(1, degree):
+        power *= x
+        binomial = binomial * (degree - i + 1) / i
+        total = (total + power * binomial * stack[piece, i]) * u
+    return total + power * x * stack[piece, degree]
+
+
+@kernel_part
+def shift_column(columns: Any, at: int, rate: Any, wait: float) -> None:
+    """Move a variational column from fixed time to the event's time, or back: Phi + f wait (saltation).
+
+    columns  array that holds the column from index `at` on; written
+    rate     (n,) f, time derivative of the state
+    wait     derivative of the event's time with respect to the column's parameter; negative after a jump, to go back
+    """
+    for i in range(len(rate)):
+        columns[at + i] += rate[i] * wait

@@ -1,0 +1,106 @@
+"""Hermite interpolation of an event function over a step, for crossings that another step then refines.
+
+It needs values and two derivatives at both ends, which an explicit method has for free; dense output costs stages.
+"""
+
+from walkerlab.physics.kernels import kernel_part
+from walkerlab.physics.solvers.events import (
+    FALLING,
+    NO_CROSSING,
+    CrossingFinder,
+    crossing_of_piece,
+    without_zero_at_start,
+)
+
+Jet = tuple[float, float, float]
+"""A value with its first two derivatives in time."""
+Quintic = tuple[float, float, float, float, float, float]
+"""Bernstein coefficients over the step."""
+LAST_MOVE = 1e-4  # of the step; Newton's error is about the square of its last move
+MAX_ITERATIONS = 50
+
+
+@kernel_part
+def hermite(h: float, start: Jet, end: Jet) -> Quintic:
+    """Quintic over a step h (s) with these values and derivatives at its ends."""
+    slope, bend = 0.2 * h * start[1], 0.05 * h * h * start[2]
+    last_slope, last_bend = 0.2 * h * end[1], 0.05 * h * h * end[2]
+    return (
+        start[0],
+        start[0] + slope,
+        start[0] + 2.0 * slope + bend,
+        end[0] - 2.0 * last_slope + last_bend,
+        end[0] - last_slope,
+        end[0],
+    )
+
+
+@kernel_part
+def value_of(quintic: Quintic, x: float) -> float:
+    """Evaluate a quintic at fraction x of the step."""
+    return value_and_slope(in_powers(quintic), x)[0]
+
+
+@kernel_part
+def in_powers(quintic: Quintic) -> Quintic:
+    """Convert to coefficients of powers of the fraction, lowest first."""
+    b0, b1, b2, b3, b4, b5 = quintic
+    return (
+        b0,
+        5.0 * (b1 - b0),
+        10.0 * (b2 - 2.0 * b1 + b0),
+        10.0 * (b3 - b0 + 3.0 * (b1 - b2)),
+        5.0 * (b4 + b0 - 4.0 * (b3 + b1) + 6.0 * b2),
+        b5 - b0 + 5.0 * (b1 - b4) + 10.0 * (b3 - b2),
+    )
+
+
+@kernel_part
+def value_and_slope(powers: Quintic, x: float) -> tuple[float, float]:
+    """Evaluate a polynomial and its derivative at x from coefficients of powers."""
+    c0, c1, c2, c3, c4, c5 = powers
+    value = c0 + x * (c1 + x * (c2 + x * (c3 + x * (c4 + x * c5))))
+    slope = c1 + x * (2.0 * c2 + x * (3.0 * c3 + x * (4.0 * c4 + x * (5.0 * c5))))
+    return value, slope
+
+
+@kernel_part
+def first_fall(finder: CrossingFinder, quintic: Quintic, zero_at_start: bool, after: float) -> float:
+    """Fraction of the step at which a quintic first falls through zero; NO_CROSSING if it does not.
+
+    after  ignore crossings before this fraction
+
+    Coefficients of one sign prove that there is no crossing, a single change from positive to negative that there is
+    one; `crossing_of_piece` treats the rest.
+    """
+    changes = 0
+    for i in range(1 if zero_at_start else 0, 5):
+        changes += (quintic[i] < 0.0) != (quintic[i + 1] < 0.0)
+    if changes == 0:
+        return NO_CROSSING
+    if changes == 1 and not zero_at_start and after == 0.0:
+        return only_crossing(quintic) if quintic[0] >= 0.0 else NO_CROSSING
+    for i in range(6):
+        finder.stack[0, i] = quintic[i]
+    size = without_zero_at_start(finder.stack, 6) if zero_at_start else 6
+    return crossing_of_piece(finder, size, FALLING, after)
+
+
+@kernel_part
+def only_crossing(quintic: Quintic) -> float:
+    """Find the zero of a quintic with a single, falling crossing: Newton from the end, safeguarded by bisection."""
+    powers = in_powers(quintic)
+    low, high, x = 0.0, 1.0, 1.0
+    for _ in range(MAX_ITERATIONS):
+        value, slope = value_and_slope(powers, x)
+        if value < 0.0:
+            high = x
+        else:
+            low = x
+        new = x - value / slope if slope < 0.0 else low
+        if not low < new < high:
+            new = 0.5 * (low + high)
+        x, change = new, abs(new - x)
+        if change < LAST_MOVE:
+            break
+    return x

@@ -1,0 +1,124 @@
+"""Registry of integration methods, and the settings to integrate with."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+from walkerlab.physics.solvers import cvode
+from walkerlab.physics.solvers.dop853 import new_dop853
+from walkerlab.physics.solvers.events import CrossingFinder, new_crossing_finder
+from walkerlab.physics.solvers.radau5 import new_radau5
+from walkerlab.physics.solvers.scipy_methods import DENSE_DEGREE, ScipyMethod
+
+
+@dataclass(frozen=True)
+class Method:
+    """An integration method.
+
+    name      as in configs
+    new       factory: (number of equations, rtol, atol, budget of right-hand sides)
+    stiff     whether it suits stiff problems
+    orders    minimum and maximum; equal unless the method varies its order
+    compiled  whether whole walks compile with it; walks with a library's method run in Python
+    """
+
+    name: str
+    new: Callable[[int, float, float, int], Any]
+    stiff: bool
+    orders: tuple[int, int]
+    compiled: bool = False
+
+
+def scipy_factory(class_name: str, takes_jacobian: bool = True) -> Callable[[int, float, float, int], ScipyMethod]:
+    """Return a factory for methods with a class of scipy.integrate; scipy is imported on first use.
+
+    takes_jacobian  whether the class uses the Jacobian
+    """
+
+    def new_solver(*problem: Any, **options: Any) -> Any:
+        from scipy import integrate
+
+        return getattr(integrate, class_name)(*problem, **options)
+
+    return partial(ScipyMethod, new_solver, takes_jacobian)
+
+
+def cvode_factory(family: str) -> Callable[[int, float, float, int], ScipyMethod]:
+    """Return a factory for methods with one of CVODE's families, "BDF" or "Adams"."""
+    return partial(ScipyMethod, partial(cvode.CvodeSolver, family), True)
+
+
+OWN = (
+    Method("dop853", new_dop853, stiff=False, orders=(8, 8), compiled=True),
+    Method("radau5", new_radau5, stiff=True, orders=(5, 5), compiled=True),
+)
+SCIPY = (
+    Method("scipy-rk45", scipy_factory("RK45", takes_jacobian=False), stiff=False, orders=(5, 5)),
+    Method("scipy-dop853", scipy_factory("DOP853", takes_jacobian=False), stiff=False, orders=(8, 8)),
+    Method("scipy-lsoda", scipy_factory("LSODA"), stiff=True, orders=(1, 12)),
+    Method("scipy-radau", scipy_factory("Radau"), stiff=True, orders=(5, 5)),
+    Method("scipy-bdf", scipy_factory("BDF"), stiff=True, orders=(1, 5)),
+)
+CVODE = (
+    Method("cvode-bdf", cvode_factory("BDF"), stiff=True, orders=(1, 5)),
+    Method("cvode-adams", cvode_factory("Adams"), stiff=False, orders=(1, 12)),
+)
+METHODS = {method.name: method for method in (*OWN, *SCIPY, *(CVODE if cvode.is_installed() else ()))}
+
+
+def method_named(name: str) -> Method:
+    """Return a method by name; raise KeyError with all names if there is none."""
+    if name in METHODS:
+        return METHODS[name]
+    if any(method.name == name for method in CVODE):
+        raise KeyError(f"{name} needs CVODE, which is not installed: pip install scikit-sundae")
+    raise KeyError(f"no method named {name!r}; methods: {', '.join(METHODS)}")
+
+
+ENDLESS = 2**62
+"""Budget of a walk whose right-hand sides are limited per step instead."""
+
+
+@dataclass(frozen=True)
+class Tolerances:
+    """Method and tolerances of a walk's integration.
+
+    method        name of the method
+    rtol, atol    tolerances on the error of a step
+    budget        right-hand sides per walk
+    track_energy  whether a contact walk is checked by its energy balance; comparisons of methods do without
+    """
+
+    method: str
+    rtol: float
+    atol: float
+    budget: int
+    track_energy: bool = True
+
+    @property
+    def compiled(self) -> bool:
+        """See `Method.compiled`."""
+        return method_named(self.method).compiled
+
+    def new(self, n: int) -> Any:
+        """Create the method with memory for n equations."""
+        return method_named(self.method).new(n, self.rtol, self.atol, self.budget)
+
+
+def sharing(method: Any, clock: Any, counts: Any) -> Any:
+    """Return the method with the clock and counts of another one: both integrate the same walk in turns."""
+    if isinstance(method, ScipyMethod):
+        method.clock, method.counts = clock, counts
+        return method
+    return method._replace(clock=clock, counts=counts)
+
+
+def dense_degree(method: Any) -> int:
+    """Degree of a method's dense output."""
+    return DENSE_DEGREE if isinstance(method, ScipyMethod) else len(method.dense)
+
+
+def finder_for(method: Any, event_functions: int, state_size: int) -> CrossingFinder:
+    """Create a crossing finder for a method's dense output and event functions of states (state_size,)."""
+    return new_crossing_finder(dense_degree(method), event_functions, state_size)

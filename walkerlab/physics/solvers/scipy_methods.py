@@ -1,0 +1,184 @@
+"""Integrators of SciPy and SUNDIALS behind the functions of `stepping`, for comparison and as a check.
+
+The right-hand side is compiled; the walk itself runs in Python from the same source.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+import numba
+import numpy as np
+
+from walkerlab.physics.kernels import kernel
+from walkerlab.physics.solvers.stepping import (
+    ACCEPTED,
+    BUDGET,
+    COUNTS,
+    H_NEXT,
+    JACOBIANS,
+    OUT_OF_BUDGET,
+    RHS,
+    STEP_DONE,
+    STEP_TOO_SMALL,
+    T_OLD,
+    T,
+    advance,
+    begin,
+    interpolate,
+    prepare_dense,
+    rewind,
+    sample,
+)
+from walkerlab.physics.solvers.system import Integers, derivative, jacobian
+
+DENSE_DEGREE = 7
+"""Degree of all methods' dense output, or higher."""
+
+
+class OutOfBudgetError(Exception):
+    """Raised within a library's step when the budget of right-hand sides is exhausted."""
+
+
+@kernel
+def right_hand_side(system: Any, t: float, y: Any, dy: Any) -> None:
+    """See `derivative`."""
+    derivative(system, t, y, dy)
+
+
+@kernel
+def jacobian_matrix(system: Any, t: float, y: Any, J: Any) -> None:
+    """See `jacobian`."""
+    jacobian(system, t, y, J)
+
+
+def entry_point(function: Any, *arguments: Any) -> Callable[..., None]:
+    """Return a kernel's machine code for arguments of these types, without the cost of dispatch."""
+    code: Callable[..., None] = function.compile(tuple(numba.typeof(argument) for argument in arguments))
+    return code
+
+
+class ScipyMethod:
+    """Integrator of a library with the fields that `stepping` requires."""
+
+    def __init__(
+        self, new_solver: Callable[..., Any], takes_jacobian: bool, n: int, rtol: float, atol: float, budget: int
+    ) -> None:
+        """Prepare for n equations; `begin` creates the solver.
+
+        new_solver      factory with the signature of the classes of scipy.integrate
+        takes_jacobian  whether the solver uses the Jacobian
+        """
+        self.new_solver, self.takes_jacobian = new_solver, takes_jacobian
+        self.rtol, self.atol = rtol, atol
+        self.clock = np.zeros(3)
+        self.y_old, self.y = np.zeros(n), np.zeros(n)
+        self.counts = np.zeros(COUNTS, np.int64)
+        self.counts[BUDGET] = budget
+        self.solver: Any = None
+        self.dense: Any = None
+
+
+def counting_rhs(counts: Integers, system: Any, n: int) -> Callable[[float, Any], Any]:
+    """Return the compiled right-hand side as libraries call it; it counts calls and raises OutOfBudgetError."""
+    probe = np.zeros(n)
+    code = entry_point(right_hand_side, system, 0.0, probe, probe)
+
+    def fun(t: float, y: Any) -> Any:
+        if counts[RHS] >= counts[BUDGET]:
+            raise OutOfBudgetError
+        counts[RHS] += 1
+        dy = np.empty(n)
+        code(system, t, np.ascontiguousarray(y), dy)
+        return dy
+
+    return fun
+
+
+def counting_jacobian(method: ScipyMethod, system: Any, n: int) -> Callable[[float, Any], Any]:
+    """Return the compiled Jacobian as libraries call it; it counts calls."""
+    code = entry_point(jacobian_matrix, system, 0.0, np.zeros(n), np.zeros((n, n)))
+
+    def jac(t: float, y: Any) -> Any:
+        method.counts[JACOBIANS] += 1
+        J = np.empty((n, n))
+        code(system, t, y, J)
+        return J
+
+    return jac
+
+
+@begin.case(ScipyMethod)
+def begin_scipy(method: ScipyMethod, system: Any, t: float, y: Any, h: float) -> None:
+    """Create a new solver, which chooses its first step."""
+    n = method.y.size
+    method.y[:] = y
+    method.clock[T_OLD] = method.clock[T] = t
+    options: dict[str, Any] = {"rtol": max(method.rtol, 2.3e-14), "atol": method.atol}
+    if method.takes_jacobian:
+        options["jac"] = counting_jacobian(method, system, n)
+    method.dense = None
+    try:
+        method.solver = method.new_solver(counting_rhs(method.counts, system, n), t, method.y.copy(), np.inf, **options)
+    except OutOfBudgetError:
+        method.solver = None
+
+
+@advance.case(ScipyMethod)
+def advance_scipy(method: ScipyMethod, system: Any, t_end: float) -> int:
+    """Take the rest of the solver's last step if it was cut short or rewound, otherwise its next step."""
+    clock = method.clock
+    if method.dense is None or method.solver.t <= clock[T]:
+        status = step_solver(method)
+        if status != STEP_DONE:
+            return status
+    solver = method.solver
+    clock[T_OLD], clock[T] = clock[T], min(solver.t, t_end)
+    method.y_old[:] = method.y
+    method.y[:] = solver.y if clock[T] == solver.t else method.dense(clock[T])
+    return STEP_DONE
+
+
+def step_solver(method: ScipyMethod) -> int:
+    """Take one step of a size that the solver chooses; returns a status as `advance` does."""
+    if method.solver is None:
+        return OUT_OF_BUDGET
+    try:
+        # a trial step may overflow; the library then takes a shorter one
+        with np.errstate(over="ignore", invalid="ignore"):
+            method.solver.step()
+        if method.solver.status == "failed":
+            return STEP_TOO_SMALL
+        # dense output may evaluate the right-hand side and exhaust the budget
+        method.dense = method.solver.dense_output()
+    except OutOfBudgetError:
+        return OUT_OF_BUDGET
+    method.counts[ACCEPTED] += 1
+    method.clock[H_NEXT] = method.solver.t - method.solver.t_old
+    return STEP_DONE
+
+
+@rewind.case(ScipyMethod)
+def rewind_scipy(method: ScipyMethod, system: Any) -> None:
+    """Keep the dense output of the step; `advance` then evaluates it at the event."""
+    method.clock[T] = method.clock[T_OLD]
+    method.y[:] = method.y_old
+
+
+@prepare_dense.case(ScipyMethod)
+def prepare_dense_scipy(method: ScipyMethod, system: Any) -> None:
+    """Nothing to do: `step_solver` has stored the dense output."""
+
+
+@interpolate.case(ScipyMethod)
+def interpolate_scipy(method: ScipyMethod, system: Any, fraction: float, y: Any) -> None:
+    """Evaluate the library's dense output."""
+    t_old, t = method.clock[T_OLD], method.clock[T]
+    y[:] = method.dense(t_old + fraction * (t - t_old))[: y.size]
+
+
+@sample.case(ScipyMethod)
+def sample_scipy(method: ScipyMethod, system: Any, fractions: Any, states: Any) -> None:
+    """Evaluate the library's dense output at all fractions in one call."""
+    t_old, t = method.clock[T_OLD], method.clock[T]
+    columns = method.dense(t_old + fractions * (t - t_old))[: states.shape[1]]
+    states[: len(fractions), : len(columns)] = columns.T

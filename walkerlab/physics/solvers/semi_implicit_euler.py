@@ -1,0 +1,36 @@
+"""Semi-implicit Euler with a fixed step, as in game engines: new velocities first, then positions from them.
+
+First order, without error estimate or events; used only for comparison.
+"""
+
+import math
+from typing import Any
+
+from walkerlab.physics.kernels import kernel
+from walkerlab.physics.solvers.system import derivative
+
+DIVERGED = 1e12  # a component of the state beyond this means that the run diverged
+
+
+@kernel
+def semi_implicit_euler(system: Any, y: Any, rate: Any, end: float, h: float, most_steps: int) -> int:
+    """Integrate y (n,) in place from time 0 to `end` (s) with steps of h (s), the last one shorter.
+
+    rate  (n,) scratch
+
+    The first half of y holds positions, the second half their velocities. Returns the number of steps taken, which stop
+    before `end` after `most_steps` or when a component of the state diverges or is not a number.
+    """
+    half = y.size // 2
+    steps = math.ceil(end / h * (1.0 - 1e-12))
+    for step in range(min(steps, most_steps)):
+        span = min(h, end - step * h)
+        derivative(system, step * h, y, rate)
+        for i in range(half):
+            y[half + i] += span * rate[half + i]
+        for i in range(half):
+            y[i] += span * y[half + i]
+        for i in range(y.size):
+            if not abs(y[i]) < DIVERGED:
+                return step + 1
+    return min(steps, most_steps)

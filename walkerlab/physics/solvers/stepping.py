@@ -1,0 +1,62 @@
+"""Interface of integration methods: functions whose bodies are chosen by the type of the method.
+
+A method is a NamedTuple that owns its memory, so that nothing is allocated while it runs. All have these fields:
+
+rtol, atol   tolerances on the error of a step
+clock        (3,) start of the last step, its end, and the next step to try, s
+y_old, y     (n,) states at start and end of the last step
+counts       (5,) see the indices below
+dense        (d, n) coefficients of dense output of degree d; a library's method has its own object
+"""
+
+from typing import Any
+
+from walkerlab.physics.kernels import by_type, by_type_or_default, kernel_part
+
+# indices into `clock`
+T_OLD, T, H_NEXT = 0, 1, 2
+# indices into `counts`
+RHS, ACCEPTED, REJECTED, JACOBIANS, BUDGET = 0, 1, 2, 3, 4
+COUNTS = 5
+# results of `advance`
+STEP_DONE, OUT_OF_BUDGET, STEP_TOO_SMALL = 0, 1, 2
+SMALLEST_STEP = 1e-15
+
+
+@by_type
+def begin(method: Any, system: Any, t: float, y: Any, h: float) -> None:
+    """Start, or start again after an event, from state y (n,) at time t (s); for h = 0 the method chooses its step."""
+
+
+@by_type
+def advance(method: Any, system: Any, t_end: float) -> int:
+    """Take one accepted step, not beyond t_end (s), and keep the previous state in `y_old`; returns a status."""
+
+
+@by_type
+def rewind(method: Any, system: Any) -> None:
+    """Go back to the start of the last step, to take it again up to an event."""
+
+
+@by_type
+def prepare_dense(method: Any, system: Any) -> None:
+    """Make `interpolate` ready for the last step."""
+
+
+@by_type
+def interpolate(method: Any, system: Any, fraction: float, y: Any) -> None:
+    """Write the state at `fraction` (0 to 1) of the last step, or its first components, into y."""
+
+
+@by_type_or_default
+def sample(method: Any, system: Any, fractions: Any, states: Any) -> None:
+    """Write the states at fractions (m,) of the last step, or their first components, into rows of states (m, ...)."""
+    for k in range(len(fractions)):
+        interpolate(method, system, fractions[k], states[k, : method.y.size])
+
+
+@kernel_part
+def clear_counts(method: Any) -> None:
+    """Reset all counts except the budget."""
+    for i in range(BUDGET):
+        method.counts[i] = 0

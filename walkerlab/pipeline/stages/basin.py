@@ -1,0 +1,330 @@
+"""Basins of attraction: which starts walk, and which attractor each reaches in how many steps."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial, reduce
+from typing import Any
+
+import numpy as np
+
+from walkerlab.config.basin import COORDINATES, Basin
+from walkerlab.config.reads import BasinConfig, RigidConfig
+from walkerlab.config.walkers import contact_required_error
+from walkerlab.errors import ConfigError
+from walkerlab.outcome import Outcome
+from walkerlab.physics.hybrid.recorded_walk import as_state
+from walkerlab.physics.hybrid.rigid_lanes import two_legs
+from walkerlab.physics.mechanics.rigid_model import RigidModel
+from walkerlab.physics.orbits.basin import (
+    ATOL,
+    RTOL,
+    UNREACHED,
+    Attractors,
+    WalkEnds,
+    Walker,
+    Window,
+    edge_cells,
+    find_attractors,
+    subcell_centres,
+    walk_to_attractor,
+)
+from walkerlab.physics.orbits.rigid_map import state_on_section
+from walkerlab.physics.orbits.scaled_starts import ScaledStarts
+from walkerlab.physics.orbits.similarity import unit_walker
+from walkerlab.physics.solvers.system import Floats
+from walkerlab.pipeline.progress import Progress
+from walkerlab.pipeline.stages.numerical_error import evenly_spread, tightened
+from walkerlab.pipeline.stages.walk import OUTCOMES, count_outcomes
+from walkerlab.pipeline.store.checkpoint import Checkpoint
+from walkerlab.pipeline.store.content import Content, Group, Variable
+from walkerlab.pipeline.work import WorkUnit, complete
+from walkerlab.scene.contact import (
+    ContactScene,
+    contact_gait,
+    require_contact,
+    scene_on_pads,
+    start_state,
+    tolerances_of,
+)
+from walkerlab.scene.rigid import rigid_walker
+from walkerlab.scene.walk_outcomes import Pads, describe_endings
+
+HALF_WIDTH = (0.15, 0.25, 0.25)  # of the default window, rad and sqrt(g/L)
+SAMPLE = 100  # cells whose walks are repeated
+DRAWN = 4_000  # starts of the search for attractors
+SIGMAS = 3.0  # of the Gaussian window, from its middle to the box's sides
+FAILED = UNREACHED - 1  # class of a cell that does not walk
+UNITS = ("rad", "rad/s", "rad/s")
+TEXTS = ("angle of the stance leg", "angular velocity of the swing leg", "angular velocity of the stance leg")
+
+
+def run(
+    config: BasinConfig, inputs: Mapping[str, Content], progress: Progress, *, checkpoint: Checkpoint, jobs: int = 1
+) -> Content:
+    """Walk from every cell that the checkpoint lacks, then from subcells of cells at the basin's edge.
+
+    checkpoint  cells of an earlier run
+    jobs        processes
+
+    Raises ConfigError for the contact model without a contact block, NoAnswer if its pads are to fit a gait that
+    there is not.
+    """
+    gait, rigid = inputs["fixedpoint"].summary, rigid_walker(config)
+    if len(rigid.section_indices) != len(COORDINATES):
+        raise ConfigError(
+            f"basin takes walkers with {len(COORDINATES)} coordinates just after heel strike; this one has "
+            f"{len(rigid.section_indices)}.",
+            "Lock the knees in the heel strike: --set walker.knee.at_heel_strike=locked.",
+        )
+    window = window_of(config, [float(gait["state"][place]) for place in rigid.section_indices])
+    progress.start("basin: attractors")
+    question = question_of(config, inputs, window, rigid)
+    begun, shared_from = time.perf_counter(), question.shared_from
+    every = range(window.size)
+    units = units_of("cells", every, question.cells_at_once, 1, partial(ends_of, question, window))
+    ends, walks = complete(units, checkpoint, "basin", progress, jobs, shared_from)
+    found = WalkEnds(*np.concatenate([np.reshape(part, (3, -1)) for part in ends], axis=1).astype(np.int64))
+    walked = found.outcome == Outcome.WALKED
+    edges = edge_cells(np.where(walked, found.attractor, FAILED).reshape(window.cells))
+    walking = walked.astype(float)
+    if config.basin.refine > 1 and edges.size:
+        refine = config.basin.refine
+        walks_of_cell, shares = refine ** len(window.axes), partial(shares_of, question, window, refine)
+        units = units_of("edge", edges.tolist(), question.edges_at_once, walks_of_cell, shares)
+        of_edges, more = complete(units, checkpoint, "basin: edges", progress, jobs, shared_from)
+        walking[edges], walks = np.concatenate(of_edges), walks + more
+    rate = {"trajectories_per_s": walks / (time.perf_counter() - begun)} if walks else {}
+    aperiodic = isinstance(question, RigidQuestion) and question.attractors.aperiodic
+    reached = attractors_of(question, rigid)
+    said = summary(config.basin, window, found, walking.reshape(window.cells), reached, aperiodic)
+    pads = None
+    if isinstance(question, ContactQuestion):
+        pads = Pads((question.scene.pitch_m, question.scene.pitch_m), laid=str(require_contact(config).pad_pitch))
+    said |= {
+        "numerical_error": sample_again(question, window, found),
+        "endings": describe_endings(said["outcomes"], config, config.basin.model == "contact", pads),
+        "edge_cells": int(edges.size),
+        **margin_of(config, window, found, gait),
+        **rate,
+    }
+    return Content({"basin": group_of(config.basin, window, found, walking)}, said, timed=("trajectories_per_s",))
+
+
+def sample_again(question: Question, window: Window, found: WalkEnds) -> dict[str, int]:
+    """Count cells of an even sample whose walk ends differently at tighter tolerances."""
+    cells = np.array(evenly_spread(window.size, SAMPLE))
+    again = question.tightened().walked(window.starts(cells))
+    otherwise = (again.outcome != found.outcome[cells]) | (again.attractor != found.attractor[cells])
+    return {"walked_again": int(cells.size), "of": window.size, "ended_otherwise": int(np.count_nonzero(otherwise))}
+
+
+def window_of(config: BasinConfig, z: list[float]) -> Window:
+    """Build the config's grid around the gait's section coordinates z (3)."""
+    settings = config.basin
+    axes = tuple(COORDINATES.index(name) for name in settings.plane)
+    rate = math.sqrt(config.gravity_m_s2 / config.walker.leg_length_m)
+    half = (HALF_WIDTH[0], HALF_WIDTH[1] * rate, HALF_WIDTH[2] * rate)
+    lower = settings.lower or tuple(z[axis] - half[axis] for axis in axes)
+    upper = settings.upper or tuple(z[axis] + half[axis] for axis in axes)
+    if any(b <= a for a, b in zip(lower, upper, strict=True)):
+        raise ConfigError("basin.lower lies above the window's other side.", "Give basin.upper too.")
+    return Window(axes, lower, upper, settings.cells, (z[0], z[1], z[2]))
+
+
+def question_of(config: BasinConfig, inputs: Mapping[str, Content], window: Window, rigid: RigidModel) -> Question:
+    """Build the model whose walks are classified, with its attractors."""
+    if config.basin.model == "contact":
+        return contact_question(config, inputs, rigid)
+    unit, units = unit_walker(rigid)
+    legs = two_legs(unit)
+    walker = unit if legs is None else legs
+    scale = (1.0, units.time, units.time)
+    generator = np.random.default_rng(config.seed)
+    drawn = np.concatenate([np.array([window.rest]), window.draw(DRAWN, generator)])
+    attractors = find_attractors(walker, drawn * np.array(scale), config.seed)
+    question = RigidQuestion(walker, scale, attractors, config.basin.steps)
+    one_by_one = replace(question, cells_at_once=500, edges_at_once=50, shared_from=10_000)
+    return question if legs is not None else one_by_one
+
+
+def contact_question(config: BasinConfig, inputs: Mapping[str, Content], rigid: RigidModel) -> ContactQuestion:
+    """Build the same for the contact model, at the tolerances of `tune`'s map."""
+    if config.contact is None:
+        raise contact_required_error("basin.model: contact", config.walker, "Add one.")
+    # Imported here: it loads interpolation code, which the rigid model does not need.
+    from walkerlab.scene.scaled import for_a_map, starts_of
+
+    gait, steps = inputs["fixedpoint"].summary, config.basin.contact_steps
+    step_length_m, state = float(gait["step_length_m"]), as_state(gait["state"])
+    answer = contact_gait(config, step_length_m, state)
+    scene = replace(scene_on_pads(config, step_length_m, state, answer), pinned=False)
+    starts = starts_of(scene, rigid, state, steps, answer, tolerances_of(config, steps))
+    return ContactQuestion(scene, rigid, for_a_map(starts, starts.walk(1.0, 1.0).evaluations))
+
+
+def group_of(settings: Basin, window: Window, found: WalkEnds, walking: Floats) -> Group:
+    """Build the group of the grid."""
+    dims: tuple[str, ...] = tuple(settings.plane)
+    variables: dict[str, Variable] = {
+        name: Variable(window.along(place), (name,), UNITS[axis], TEXTS[axis])
+        for place, (name, axis) in enumerate(zip(dims, window.axes, strict=True))
+    }
+
+    def over(values: Any, text: str) -> Variable:
+        return Variable(np.ascontiguousarray(values).reshape(window.cells), dims, "1", text)
+
+    settled = np.where(found.attractor == UNREACHED, 0, found.steps)
+    variables |= {
+        "outcome": over(found.outcome, "how the walk ended, see attribute outcomes"),
+        "attractor": over(found.attractor, "number of the attractor that was reached; -1 for none"),
+        "steps": over(found.steps, "steps taken"),
+        "steps_to_settle": over(settled, "steps until the attractor was reached; 0 where none was"),
+        "walking": over(walking, "share of the cell that walks; of cells at edges from their parts"),
+    }
+    rest = {f"at_{name}": value for name, value in zip(COORDINATES, window.rest, strict=True)}
+    return Group(variables, {"outcomes": OUTCOMES, "model": settings.model, **rest})
+
+
+def attractors_of(question: Question, rigid: RigidModel) -> list[dict[str, Any]]:
+    """Return period and a state (SI) of each attractor."""
+    if isinstance(question, ContactQuestion):
+        own = question.starts.gait
+        return [] if own is None else [{"period": 1, "period_s": own[0], "step_length_m": own[1]}]
+    rows = []
+    for cycle in question.attractors.cycles:
+        state = state_on_section(rigid, tuple((cycle.points[0] / np.array(question.scale)).tolist()))
+        rows.append({"period": cycle.period, "state": list(state), "reached_within": cycle.reach})
+    return rows
+
+
+def summary(
+    settings: Basin, window: Window, found: WalkEnds, walking: Floats, attractors: list[dict[str, Any]], aperiodic: bool
+) -> dict[str, Any]:
+    """Summarise the grid and the attractors that are reached."""
+    walked = found.outcome == Outcome.WALKED
+    for number, row in enumerate(attractors):
+        there = walked & (found.attractor == number)
+        row["cells"] = int(np.count_nonzero(there))
+        if row["cells"]:
+            row["median_steps_to_settle"] = float(np.median(found.steps[there]))
+    sides = zip(settings.plane, window.lower, window.upper, strict=True)
+    rest = zip(COORDINATES, window.rest, strict=True)
+    return {
+        "model": settings.model,
+        "plane": list(settings.plane),
+        "cells": list(settings.cells),
+        "window": {name: [low, high] for name, low, high in sides},
+        "held": {name: value for name, value in rest if name not in settings.plane},
+        "share_walking": float(walking.mean()),
+        "share_walking_gaussian": float(np.sum(walking * gaussian(window))),
+        "outcomes": count_outcomes(found.outcome),
+        "attractors": attractors,
+        "aperiodic": aperiodic,
+        "unsettled_cells": int(np.count_nonzero(walked & (found.attractor == UNREACHED))),
+        "steps_wanted": settings.steps if settings.model == "rigid" else settings.contact_steps,
+    }
+
+
+def gaussian(window: Window) -> Floats:
+    """Return weights of the cells with sum 1: a centred normal distribution, SIGMAS from the middle to the sides."""
+    off = ((np.arange(cells) + 0.5 - 0.5 * cells) / (0.5 * cells / SIGMAS) for cells in window.cells)
+    weights = reduce(np.multiply.outer, (np.exp(-0.5 * sigmas**2) for sigmas in off))
+    return np.asarray(weights / weights.sum())
+
+
+def margin_of(config: RigidConfig, window: Window, found: WalkEnds, gait: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the distance from a stable gait to the nearest cell that does not walk, in rad and sqrt(g/L).
+
+    Accurate to the size of a cell; empty if the gait is unstable or the window holds no such cell.
+    """
+    failing = np.flatnonzero(found.outcome != Outcome.WALKED)
+    if not gait["stable"] or not failing.size:
+        return {}
+    time_unit = math.sqrt(config.walker.leg_length_m / config.gravity_m_s2)
+    away = (window.starts(failing) - np.array(window.rest)) * np.array((1.0, time_unit, time_unit))
+    return {"margin": float(np.sqrt((away**2).sum(axis=1)).min())}
+
+
+@dataclass(frozen=True, eq=False)
+class RigidQuestion:
+    """Starts of the rigid model.
+
+    walker  the unit walker
+    scale   (3) factors from SI to the unit walker's section coordinates
+    """
+
+    walker: Walker
+    scale: tuple[float, float, float]
+    attractors: Attractors
+    steps: int
+    cells_at_once: int = 10_000
+    edges_at_once: int = 1_000
+    shared_from: int = 200_000  # number of walks above which starting processes pays
+    tolerances: tuple[float, float] = (RTOL, ATOL)
+
+    def walked(self, z: Floats) -> WalkEnds:
+        """Walk from section coordinates z (n, 3), SI."""
+        scaled = z * np.array(self.scale)
+        return walk_to_attractor(self.walker, self.attractors, scaled, self.steps, tolerances=self.tolerances)
+
+    def tightened(self) -> RigidQuestion:
+        """The same at a hundred times tighter tolerances."""
+        rtol, atol = self.tolerances
+        return replace(self, tolerances=(rtol / 100.0, atol / 100.0))
+
+
+@dataclass(frozen=True, eq=False)
+class ContactQuestion:
+    """Starts of the contact model: rigid states with the stance foot just touching, rolling without slip."""
+
+    scene: ContactScene
+    rigid: RigidModel
+    starts: ScaledStarts
+    cells_at_once: int = 100
+    edges_at_once: int = 10
+    shared_from: int = 500
+
+    def walked(self, z: Floats) -> WalkEnds:
+        """Walk from section coordinates z (n, 3), SI."""
+        rows = [self.walk((float(a), float(b), float(c))) for a, b, c in z]
+        return WalkEnds(*np.array(rows, np.int64).reshape(-1, 3).T)
+
+    def walk(self, z: tuple[float, float, float]) -> tuple[int, int, int]:
+        """Return outcome, attractor and steps of one walk."""
+        state = state_on_section(self.rigid, z)
+        walk = self.starts.walk_from(start_state(self.scene, state))
+        settled = self.starts.settling_steps(walk) if walk.outcome is Outcome.WALKED else None
+        return (walk.outcome, UNREACHED, walk.touch_time_s.size) if settled is None else (walk.outcome, 0, settled)
+
+    def tightened(self) -> ContactQuestion:
+        """The same at a hundred times tighter tolerances."""
+        return replace(self, starts=replace(self.starts, tolerances=tightened(self.starts.tolerances)[0]))
+
+
+Question = RigidQuestion | ContactQuestion
+
+
+def units_of(
+    name: str, cells: Sequence[int], at_once: int, walks: int, run: Callable[[Sequence[int]], list[float]]
+) -> list[WorkUnit]:
+    """Divide cells into units of `at_once`, each named by its first cell; a cell takes `walks` walks."""
+    groups = (cells[first : first + at_once] for first in range(0, len(cells), at_once))
+    return [WorkUnit(f"{name} {group[0]}", walks * len(group), partial(run, group)) for group in groups]
+
+
+def ends_of(question: Question, window: Window, cells: Sequence[int]) -> list[float]:
+    """Return outcomes, attractors and steps of cells, walked from their middles, as one flat list."""
+    found = question.walked(window.starts(np.array(cells)))
+    return [float(number) for number in (*found.outcome, *found.attractor, *found.steps)]
+
+
+def shares_of(question: Question, window: Window, refine: int, cells: Sequence[int]) -> list[float]:
+    """Return the walking share of each cell, from the middles of its subcells."""
+    inside = subcell_centres(refine, len(window.axes))
+    found = question.walked(window.starts(np.repeat(cells, len(inside)), np.tile(inside, (len(cells), 1))))
+    walking = (found.outcome == Outcome.WALKED).reshape(len(cells), -1)
+    return [float(share) for share in walking.mean(axis=1)]

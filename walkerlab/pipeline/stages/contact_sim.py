@@ -1,0 +1,222 @@
+"""The contact model: an assembled walker on compliant ground, walked from the rigid model's start state."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from walkerlab.config.reads import ContactSimConfig
+from walkerlab.physics.energy_channels import SAMPLED
+from walkerlab.physics.ground.compliant import hinge_of
+from walkerlab.physics.ground.terrain import STANCE_FOOT
+from walkerlab.physics.hybrid.contact_record import ContactSamples
+from walkerlab.physics.hybrid.contact_result import ContactWalkResult, by_channel, sampled_energies, sampled_feet
+from walkerlab.physics.mechanics.rigid import places_of
+from walkerlab.physics.mechanics.walkers import TORSO
+from walkerlab.physics.solvers.registry import Tolerances
+from walkerlab.physics.solvers.system import Floats
+from walkerlab.pipeline.progress import Progress
+from walkerlab.pipeline.stages.walk import (
+    content_of_walk,
+    legs,
+    numbers_of,
+    over_time,
+    pace_of,
+    rigid_start,
+    steps_of,
+    turning,
+)
+from walkerlab.pipeline.store.columns import numbered
+from walkerlab.pipeline.store.content import Content, Group, Variable
+from walkerlab.scene.contact import (
+    SAMPLES_PER_PENDULUM_TIME,
+    ContactScene,
+    contact_scene,
+    require_contact,
+    scene_measures,
+    scene_on_pads,
+    start_state,
+    tolerances_of,
+)
+from walkerlab.scene.footholds import foothold_heights
+from walkerlab.scene.omissions import contact_walk_omissions
+
+RESOLVED = 0.1  # maximum tolerance over stiction velocity that resolves slips
+HALF_ANGLE = 0.2  # rad, between the legs in the walk that compiles the kernels
+SCUFFED = (
+    "A straight swing leg cannot pass the stance leg on a plane: its foot scuffs. Give it room with "
+    "contact.terrain: after-mid-swing, or checkerboard."
+)
+
+
+def run(config: ContactSimConfig, inputs: Mapping[str, Content], progress: Progress, again: bool = True) -> Content:
+    """Walk `config.strides` strides; raises NoAnswer if the solver fails.
+
+    again  whether to repeat the walk for its numerical error, which takes about twice as long
+    """
+    rigid_step, rigid_state = rigid_start(config, inputs)
+    scene = scene_on_pads(config, rigid_step, rigid_state)
+    start, steps = start_state(scene, rigid_state), 2 * config.strides
+    tolerances = tolerances_of(config, steps)
+    interval = scene.ground.frame.pendulum_time / SAMPLES_PER_PENDULUM_TIME if config.outputs else None
+    heights = foothold_heights(config.ground, steps + 1)
+    tell_unresolved_slip(tolerances.atol, scene, progress)
+
+    def walk(tolerances: Tolerances, sampled: bool) -> ContactWalkResult:
+        progress.start("contact-sim" if sampled else "contact-sim: numerical error", 1)
+        taken = scene.walk(start, steps, tolerances, interval if sampled else None, heights)
+        progress.advance()
+        return taken
+
+    stored, said = partial(groups, config, scene), partial(summary, config, scene)
+    return content_of_walk("contact-sim", walk, tolerances, stored, said, progress, again)
+
+
+def compile_kernels(config: ContactSimConfig) -> None:
+    """Compile all kernels of `run` by a walk with a minimal evaluation budget."""
+    scene = contact_scene(config, config.walker.leg_length_m * 2.0 * float(np.sin(HALF_ANGLE)))
+    places = places_of(scene.assembly).names
+    angles = [HALF_ANGLE if name == "2" else -HALF_ANGLE if name.startswith("1") else 0.0 for name in places]
+    standing = start_state(scene, (*angles, *(0.0 for _ in places)))
+    interval = scene.ground.frame.pendulum_time if config.outputs else None
+    groups(config, scene, scene.walk(standing, 1, replace(tolerances_of(config, 1), budget=1), interval))
+
+
+def tell_unresolved_slip(atol: float, scene: ContactScene, progress: Progress) -> None:
+    """Warn if the tolerance on velocities (m/s) is too coarse for the friction law."""
+    rising = scene.walker.friction.rising_until
+    if atol > RESOLVED * rising:
+        progress.note(
+            f"contact-sim: lower solver.contact.atol ({atol:g} m/s): it is large beside contact.stiction_velocity, up "
+            f"to which friction rises ({rising:g} m/s), so friction and how the walk ends may be chance"
+        )
+
+
+def summary(config: ContactSimConfig, scene: ContactScene, walk: ContactWalkResult) -> dict[str, Any]:
+    """Summarise the walk."""
+    scuffed = require_contact(config).terrain == "plane" and walk.outcome.stumbled and not scene.walker.kneed
+    strikes = walk.knee_strike_time_s
+    return {
+        **numbers_of(walk),
+        **pace_of(config, walk),
+        "advice": SCUFFED if scuffed else walk.advice,
+        "max_penetration_m": walk.max_penetration_m,
+        "slip_per_step_m": mean_of(walk.slip_m),
+        "slips_m": walk.slip_m.tolist(),
+        "rolling_per_step_m": mean_of(walk.rolling_m),
+        "rolling_m": walk.rolling_m.tolist(),
+        "energy_balance_residual_J": walk.energy_balance_residual_J,
+        "dissipated_J": by_channel(scene.walker, walk.dissipated_J),
+        # until 0.3 the older name of the knees' strikes, -1 where a knee did not lock
+        **(
+            {} if strikes is None or not strikes.size else {"knee_strikes_s": np.nan_to_num(strikes, nan=-1.0).tolist()}
+        ),
+        "jacobians": walk.work.jacobians,
+        "slope_rad": scene.walker.slope,
+        **scene_measures(scene),
+        "left_out": list(contact_walk_omissions(config)),
+    }
+
+
+def mean_of(values: Floats) -> float | None:
+    """Return the mean over steps; None without steps."""
+    return float(np.mean(values)) if values.size else None
+
+
+def groups(config: ContactSimConfig, scene: ContactScene, walk: ContactWalkResult) -> dict[str, Group]:
+    """Build the groups of the artifact."""
+    stored: dict[str, Group] = {}
+    if walk.steps:
+        stored["steps"] = Group(steps_of(walk, slip_m=walk.slip_m, rolling_m=walk.rolling_m))
+    if scene.ground.terrain.has_pads:
+        stored["terrain"] = pads_group(scene.ground.terrain.stride_measure, walk.end_state[0])
+    if walk.samples is not None:
+        stored["trajectory"] = trajectory_group(config, scene, walk, walk.samples)
+    return stored
+
+
+def pads_group(pitch: float, end: float) -> Group:
+    """Build the group of pads from behind the start to beyond the walk's end."""
+    numbers = np.arange(-2, int(np.ceil(end / pitch)) + 3)
+    return Group(
+        {
+            **numbered(numbers.size, "pad", "pad number"),
+            "left_m": Variable(numbers * pitch - 0.5 * pitch, ("pad",), "m", "where the pad begins, along the slope"),
+            "right_m": Variable(numbers * pitch + 0.5 * pitch, ("pad",), "m", "where the pad ends, along the slope"),
+            "leg": Variable(2 - numbers % 2, ("pad",), "1", "leg whose lane the pad lies in"),
+        }
+    )
+
+
+def trajectory_group(
+    config: ContactSimConfig, scene: ContactScene, walk: ContactWalkResult, samples: ContactSamples
+) -> Group:
+    """Build the group of samples that `outputs` selects."""
+    variables = {**over_time(time=samples.time_s, stance_leg=samples.stance + 1), **legs()}
+    feet = sampled_feet(scene.walker, samples)
+    if "states" in config.outputs:
+        variables |= state_variables(scene, samples.states)
+        variables |= over_time(foot_along_m=feet[:, :, 0], foot_height_m=feet[:, :, 1] + samples.level)
+    if "energies" in config.outputs:
+        footholds = np.append(feet[:1, STANCE_FOOT, 0], walk.touch_along_m)
+        step = np.searchsorted(walk.touch_time_s, samples.time_s, side="right")
+        variables |= energy_variables(scene, samples, footholds[step], walk.ground_m[step])
+    if "forces" in config.outputs:
+        depth = np.where(samples.has_ground > 0, np.maximum(0.0, -feet[:, :, 1]), 0.0)
+        variables |= over_time(
+            normal_force_N=feet[:, :, 2],
+            friction_force_N=feet[:, :, 3],
+            penetration_m=depth,
+            slip_velocity_m_s=feet[:, :, 4],
+        )
+    return Group(variables)
+
+
+def state_variables(scene: ContactScene, y: Floats) -> dict[str, Variable]:
+    """Return motion of legs, shanks and torso, and positions of hip and knees."""
+    walker, whole = scene.walker, scene.walker.whole
+    names = [body.name for body in scene.assembly.bodies]
+    n = len(names)
+    angle, velocity, tilted = y[:, 2 : 2 + n], y[:, 4 + n :], y[:, 2 : 2 + n] + walker.slope
+    s, c = np.sin(tilted), np.cos(tilted)
+    upper = [leg[0] for leg in walker.legs]
+    along = y[:, 0] + c @ whole.hip_x[:n] - s @ whole.hip_y[:n]
+    height = y[:, 1] + s @ whole.hip_x[:n] + c @ whole.hip_y[:n]
+    of_legs = {"angle": angle[:, upper], "velocity": velocity[:, upper]}
+    found = over_time(**of_legs, hip_along_m=along, hip_height_m=height)
+    if walker.kneed:
+        shanks, thighs = whole.knees.T.tolist()
+        found |= turning("shank", angle[:, shanks], velocity[:, shanks])
+        knees = np.zeros((2, len(y), 2))
+        for leg, (thigh, shank) in enumerate(zip(thighs, shanks, strict=True)):
+            hip = hinge_of(scene.assembly, names[thigh], names[thighs[1 - leg]])
+            knee = hinge_of(scene.assembly, names[thigh], names[shank])
+            ahead, up = knee[0] - hip[0], knee[1] - hip[1]
+            knees[0, :, leg] = along + c[:, thigh] * ahead - s[:, thigh] * up
+            knees[1, :, leg] = height + s[:, thigh] * ahead + c[:, thigh] * up
+        found |= over_time(knee_along_m=knees[0], knee_height_m=knees[1])
+    if TORSO in names:
+        found |= turning(TORSO, angle[:, names.index(TORSO)], velocity[:, names.index(TORSO)])
+    return found
+
+
+def energy_variables(scene: ContactScene, samples: ContactSamples, foothold: Floats, up: Floats) -> dict[str, Variable]:
+    """Energies as the paper plots them, from the current foothold, and the energy balance from a fixed origin.
+
+    foothold, up  (samples,) m, where along the slope the stance foot touched, and over it
+    """
+    kinetic, potential, total = sampled_energies(scene.walker, samples).T
+    given = samples.driven_J.T
+    lost, walker = samples.dissipated_J, scene.walker
+    at_foothold = walker.mass * (walker.gravity_down * up - walker.gravity_along * foothold)
+    return over_time(
+        kinetic_J=kinetic,
+        potential_J=potential - at_foothold,
+        mechanical_J=total - at_foothold,
+        total_energy_J=total,
+        **{loss.variable: lost[:, place] for place, loss in SAMPLED.items()},
+        **({"push_off_J": given[0], "hip_J": given[1]} if given.any() else {}),
+        residual_J=total + lost.sum(axis=1) - given.sum(axis=0) - total[:1],
+    )

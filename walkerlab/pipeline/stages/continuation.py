@@ -1,0 +1,438 @@
+"""Families of gaits over a parameter: branches, bifurcations, cascades and chaos."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from functools import partial
+from typing import Any, Final
+
+import numpy as np
+
+from walkerlab.config.continuation import Span
+from walkerlab.config.reads import ContactConfig, ContinuationConfig
+from walkerlab.config.walkers import contact_required_error
+from walkerlab.errors import ConfigError, NoAnswer
+from walkerlab.outcome import outcome_of
+from walkerlab.physics.orbits.attractors import feigenbaum_ratios, may_diverge
+from walkerlab.physics.orbits.bifurcations import Bifurcation
+from walkerlab.physics.orbits.families import Crossing, GaitBranch, Seed, ValueSpan, steps_word
+from walkerlab.physics.orbits.family_search import CONTACT, RIGID, THOROUGHNESS, Family, FamilySearch
+from walkerlab.physics.orbits.fixed_point import find_gaits
+from walkerlab.physics.orbits.newton import Effort
+from walkerlab.physics.orbits.step_map import Cycle, StepMap, gait_near
+from walkerlab.physics.orbits.two_parameters import Plane
+from walkerlab.pipeline.progress import Progress
+from walkerlab.pipeline.stages.family_groups import groups
+from walkerlab.pipeline.stages.numerical_error import SAMPLE, USUAL, evenly_spread, tightened
+from walkerlab.pipeline.store.content import Content
+from walkerlab.scene.families import contact_map, model_differs, rigid_map, rigid_walkers, unused_key_error
+from walkerlab.scene.parameter import Parameter, parameter_of
+from walkerlab.scene.rigid import rigid_walker
+from walkerlab.scene.walk_outcomes import ground_causes, without_pads
+
+Begun = tuple[list[Seed], Callable[[ContactConfig], StepMap]]
+"""Seeds, and the step map over the parameter of a config."""
+LOOKED_AT = 5  # values in the span, ends included, where the search looks for gaits
+TIGHTEST = Effort(1e-13)  # for the numerical error
+OF_A_GAIT = ("step_period_s", "step_length_m")  # quantities with a numerical error
+
+
+@dataclass(frozen=True)
+class FamilyQuestion:
+    """A parameter of a config and the span to follow gaits over."""
+
+    config: ContinuationConfig
+    parameter: Parameter
+    span: ValueSpan
+
+    def looked_at(self) -> list[float]:
+        """Values where the search looks for gaits: the config's own first."""
+        own = self.parameter.value_in(self.config)
+        spread = np.linspace(self.span.least, self.span.most, LOOKED_AT)
+        return [*([own] if own in self.span else []), *(float(one) for one in spread)]
+
+    @property
+    def models(self) -> tuple[str, ...]:
+        """Requested models."""
+        model = self.config.continuation.model
+        return (RIGID, CONTACT) if model == "both" else (model,)
+
+    @property
+    def second(self) -> FamilyQuestion | None:
+        """The same over the second key; None without one."""
+        block = self.config.continuation.second
+        return None if block is None else question_over(block, self.config, "continuation", "second")
+
+    def refuse_ends(self, *block: str) -> None:
+        """Raise ConfigError for an end of the span that the config rejects."""
+        for name, value in (("from", self.span.least), ("to", self.span.most)):
+            if self.parameter.config_at(self.config, value) is None:
+                raise self.parameter.refusal(self.config, value, (*block, name))
+
+    def touches(self, model: str) -> bool:
+        """Whether a model changes over the span."""
+        return model_differs(model, self.config, self.parameter, (self.span.least, self.span.most))
+
+    def touched(self, key: str) -> tuple[str, ...]:
+        """Return the requested models that the parameter affects; raises ConfigError if there is none."""
+        touched = tuple(model for model in self.models if self.touches(model))
+        if not touched:
+            raise unused_key_error(f"continuation.{key}", self.parameter.key, self.models)
+        return touched
+
+
+def question_over(block: Span, config: ContinuationConfig, *path: str) -> FamilyQuestion:
+    """Build the question of a config block at a path of keys."""
+    parameter = parameter_of(block.over, config, (*path, "over"))
+    return FamilyQuestion(config, parameter, ValueSpan(block.least, block.most))
+
+
+def run(config: ContinuationConfig, _inputs: Mapping[str, Content], progress: Progress, again: bool = True) -> Content:
+    """Follow the requested families.
+
+    again  whether some gaits are solved for a second time, for the numerical error
+
+    Raises ConfigError for a key that is no number of the model, NoAnswer for a span without a gait.
+    """
+    block, found, alone = config.continuation, [], []
+    asked = question_over(block, config, "continuation")
+    parameter = asked.parameter
+    for model in models_of(asked):
+        search = search_of(model, asked, progress)
+        family = Family(model, None) if search is None else search.family(np.random.default_rng(config.seed))
+        alone += [alone_at(branch, model, parameter) for branch in family.branches if len(branch.points) == 1]
+        found.append(replace(family, branches=tuple(one for one in family.branches if len(one.points) > 1)))
+    said, second = summary(found, asked, again), asked.second
+    said["left_out"] += alone
+    content = Content(groups(found, said, config, parameter, None if second is None else second.parameter), said)
+    if not any(family.branches for family in found):
+        raise NoAnswer(
+            f"no gait was found with {parameter.key} from {block.least:g} to {block.most:g} {parameter.unit}: "
+            f"none at any of {len(asked.looked_at())} values looked at",
+            "Choose another span (--from, --to), or change what else the config fixes.",
+            content,
+        )
+    return content
+
+
+def refuse(config: ContinuationConfig) -> None:
+    """Raise ConfigError for an invalid question."""
+    models_of(question_over(config.continuation, config, "continuation"))
+
+
+def models_of(asked: FamilyQuestion) -> tuple[str, ...]:
+    """Return the models to follow.
+
+    Raises ConfigError for one that the config has not, for keys that touch none or cannot have the ends of their spans,
+    and for a second key that is the first, or whose range leaves out the config's own value.
+    """
+    config, second = asked.config, asked.second
+    if asked.models != (RIGID,) and config.contact is None:
+        raise contact_required_error("the contact model", config.walker, "Use --model rigid.")
+    asked.refuse_ends("continuation")
+    if second is not None:
+        second.refuse_ends("continuation", "second")
+        own, span, name = second.parameter.value_in(config), second.span, second.parameter.key
+        if second.parameter.path == asked.parameter.path:
+            raise ConfigError(
+                f"continuation.second: {name} is already the number that gaits are followed over", "Choose another key."
+            )
+        if own not in span:
+            raise ConfigError(
+                f"continuation.second: {name} is {own:g} in the config, outside {span.least:g} to {span.most:g}",
+                "Curves begin at the config's own value; choose a range around it.",
+            )
+        second.touched("second")
+    return asked.touched("over")
+
+
+def search_of(model: str, asked: FamilyQuestion, progress: Progress) -> FamilySearch | None:
+    """Search a model's families, over a plane if there is a second key; None without a first gait."""
+    begun, second, block = SEEDS[model](asked, progress), asked.second, asked.config.continuation
+    if begun is None:
+        return None
+    seeds, map_of = begun
+    plane = None
+    if second is not None and second.touches(model):
+        parameter, config = second.parameter, asked.config
+        plane = Plane(parameter.over(config, map_of), second.span, parameter.value_in(config))
+    periods = min(block.periods, THOROUGHNESS[model].periods)
+    return FamilySearch(model, map_of(asked.config), asked.span, seeds, periods, block.points, progress, plane)
+
+
+def rigid_seeds(asked: FamilyQuestion, progress: Progress) -> Begun:
+    """Find all one-step gaits of the rigid model at some values."""
+    walker_at, seeds = rigid_walkers(asked.config, asked.parameter), list[Seed]()
+    progress.start("continuation: gaits of the rigid model")
+    for value in asked.looked_at():
+        walker = walker_at(value)
+        if walker is not None:
+            seeds += [Seed(np.array(gait.z), value) for gait in find_gaits(walker, asked.config.seed).gaits]
+    return seeds, partial(rigid_map, parameter=asked.parameter, scale=asked.span.size)
+
+
+def contact_seeds(asked: FamilyQuestion, progress: Progress) -> Begun | None:
+    """Find the first gait of the contact model at some values; None if there is none."""
+    from walkerlab.scene.contact import gait_off_pads
+
+    progress.start("continuation: a gait of the contact model")
+    for value in asked.looked_at():
+        changed = asked.parameter.config_at(asked.config, value)
+        if changed is None or changed.contact is None:
+            continue
+        rigid = find_gaits(rigid_walker(changed), changed.seed).gait
+        if rigid is None:
+            continue
+        found = gait_off_pads(changed, rigid.step_length, rigid.state)
+        if found.gait is None:
+            progress.note(f"contact model at {value:g} {asked.parameter.unit}: {found.reason}")
+            continue
+        map_of = partial(
+            contact_map, parameter=asked.parameter, scale=asked.span.size, step_length_m=found.gait.step.length_m
+        )
+        return [Seed(map_of(asked.config).scale_section(found.gait.z), value)], map_of
+    return None
+
+
+SEEDS: Final[Mapping[str, Callable[[FamilyQuestion, Progress], Begun | None]]] = {
+    RIGID: rigid_seeds,
+    CONTACT: contact_seeds,
+}
+
+
+def summary(found: Sequence[Family], asked: FamilyQuestion, again: bool) -> dict[str, Any]:
+    """Summarise the families, with values in the unit of the requested key; `again` as in `run`."""
+    config, parameter = asked.config, asked.parameter
+
+    def rows(of_model: Callable[[Family], Iterable[Mapping[str, Any]]]) -> list[dict[str, Any]]:
+        return [{"model": one.model, **row} for one in found for row in of_model(one)]
+
+    return {
+        "over": parameter.key,
+        "unit": parameter.unit,
+        "from": config.continuation.least,
+        "to": config.continuation.most,
+        "branches": rows(branch_rows),
+        "bifurcations": rows(bifurcation_rows),
+        "first_doubling": {one.model: flip for one in found if (flip := first_doubling(one.branches)) is not None},
+        "lyapunov": rows(lambda one: map(asdict, one.exponents)),
+        "cascades": rows(cascade_rows),
+        "limits": rows(limit_rows),
+        "numerical_error": {one.model: error for one in found if again and (error := sample_again(one)) is not None},
+        "endings": rows(partial(ending_rows, parameter=parameter, config=config)),
+        "attractors": rows(lambda one: [attractor_summary(one)] if one.attractors.found else []),
+        "curves": rows(curve_rows),
+        "regions": rows(region_rows),
+        "left_out": left_out(found, asked),
+    }
+
+
+def branch_rows(family: Family) -> Iterator[dict[str, Any]]:
+    """Return rows of a model's branches: their values, stable parts and ends."""
+    for branch in family.branches:
+        ranges = branch.stable_ranges
+        widest = max(ranges, key=lambda pair: pair[1] - pair[0], default=None)
+        yield {
+            "period": branch.period,
+            "from": branch.ends[0].value,
+            "to": branch.ends[1].value,
+            "points": len(branch.points),
+            "stable_range": None if widest is None else list(widest),
+            "stable_ranges": [list(pair) for pair in ranges],
+            "ends": [{"value": end.value, "reason": end.reason} for end in branch.ends],
+        }
+
+
+def bifurcation_rows(family: Family) -> Iterator[dict[str, Any]]:
+    """Return rows of a model's bifurcations, branch by branch."""
+    for number, branch in enumerate(family.branches):
+        for one in branch.bifurcations:
+            yield {
+                "kind": one.kind,
+                "period": branch.period,
+                "value": one.value,
+                "multiplier": [one.multiplier.real, one.multiplier.imag],
+                "branch": number,
+            }
+
+
+def first_doubling(branches: Sequence[GaitBranch]) -> float | None:
+    """Return the first flip where a one-step gait loses stability; None if there is none.
+
+    branches  of one model; one that is unstable on both sides of a flip does not count
+    """
+    flips = [
+        one.value
+        for branch in branches
+        if branch.period == 1
+        for one in branch.bifurcations
+        if one.kind == "flip" and any(math.isclose(one.value, end) for pair in branch.stable_ranges for end in pair)
+    ]
+    return min(flips, default=None)
+
+
+def limit_rows(family: Family) -> Iterator[dict[str, Any]]:
+    """Return rows of crossings where a model's assumptions cease to hold."""
+    for branch in family.branches:
+        for crossing in branch.crossings:
+            monitor = crossing.monitor
+            limit = {"what": monitor.meaning, "limit": monitor.limit}
+            yield {"period": branch.period, "value": crossing.value, **limit}
+
+
+def sample_again(family: Family) -> dict[str, Any] | None:
+    """Return the change of some gaits at tighter tolerances, spread evenly over all branches; None without gaits.
+
+    They are solved for again, so that what Newton's method left over counts, too.
+    """
+    step_map, every = family.step_map, [(branch, point) for branch in family.branches for point in branch.points]
+    if step_map is None or not every:
+        return None
+    tighter, by = tightened(step_map.tolerances)
+    otherwise = step_map.at(tighter)
+    again = [
+        (point, gait_near(otherwise, point.z, point.value, TIGHTEST, branch.period))
+        for branch, point in (every[place] for place in evenly_spread(len(every), SAMPLE))
+    ]
+    changes = [
+        (np.max(np.abs(gait.periods_s - point.periods_s)), np.max(np.abs(gait.lengths_m - point.lengths_m)))
+        for point, gait in again
+        if isinstance(gait, Cycle)
+    ]
+    counts = {"walked_again": len(again), "of": len(every), "ended_otherwise": len(again) - len(changes)}
+    largest = dict(zip(OF_A_GAIT, np.max(changes, axis=0).tolist(), strict=True)) if changes else {}
+    return {**counts, **largest, **({} if by == USUAL else {"by": by})}
+
+
+def ending_rows(family: Family, parameter: Parameter, config: ContactConfig) -> Iterator[dict[str, Any]]:
+    """Describe how walks along the branches end, and the role of the ground."""
+    for branch in family.branches:
+        gait = f"the {family.model} model's gait of {branch.period} {steps_word(branch.period)}"
+        for end in branch.ends:
+            outcome = end.reason.partition(":")[0]
+            if outcome_of(outcome) is not None:
+                why = ground_causes(outcome, config, family.model == CONTACT)
+                said = " ".join([f"At {end.value:.5g} {parameter.unit} {gait} ends ({end.reason}).", *why])
+                yield {"period": branch.period, "value": end.value, "outcome": outcome, "said": said}
+        for crossing in branch.crossings:
+            if crossing.monitor.name == "tripped":
+                side = side_beyond(branch, crossing, family.step_map)
+                said = (
+                    f"{side} about {crossing.value:.2g} {parameter.unit} {gait} trips over pads of its own step "
+                    f"length: the pads end walks there, not the gait. Try {without_pads(config)}."
+                )
+                yield {"period": branch.period, "value": crossing.value, "outcome": "off-pad", "said": said}
+
+
+def side_beyond(branch: GaitBranch, crossing: Crossing, step_map: StepMap | None) -> str:
+    """Return on which side of a crossing the monitored quantity exceeds its limit."""
+    assert step_map is not None, "a branch is followed with one"
+    place, limit = list(step_map.monitors).index(crossing.monitor), crossing.monitor.limit
+    nearest = min(branch.points, key=lambda point: abs(point.value - crossing.value))
+    beyond = limit is not None and nearest.monitors[place] > limit
+    return "Above" if beyond == (nearest.value > crossing.value) else "Below"
+
+
+def cascade_rows(family: Family) -> Iterator[dict[str, Any]]:
+    """Return rows of period-doubling cascades with the ratios of distances between flips."""
+    for first in family.branches:
+        if any(is_born_in(first, flip, other) for other in family.branches for flip in other.bifurcations):
+            continue
+        flips = chain(first, family.branches)
+        if len(flips) > 1:
+            ratios = feigenbaum_ratios(flips)
+            ends = {"accumulates_at": flips[-1] + (flips[-1] - flips[-2]) / (ratios[-1] - 1.0)} if ratios else {}
+            yield {"period": first.period, "flips": flips, "ratios": ratios, **ends}
+
+
+def chain(branch: GaitBranch, branches: Sequence[GaitBranch]) -> list[float]:
+    """Iterate over chains of flips: of a branch, of the branch born there, and so on."""
+    flips = [one for one in branch.bifurcations if one.kind == "flip"]
+    for flip in flips:
+        for child in branches:
+            if is_born_in(child, flip, branch):
+                return [flip.value, *chain(child, branches)]
+    return [flip.value for flip in flips[:1]]
+
+
+def is_born_in(child: GaitBranch, flip: Bifurcation, parent: GaitBranch) -> bool:
+    """Whether either end of a branch is a flip of another branch."""
+    if flip.kind != "flip" or child.period != 2 * parent.period:
+        return False
+    return child.ends[0].value == flip.value or any(child.closes_on(flip))
+
+
+def attractor_summary(family: Family) -> dict[str, Any]:
+    """Describe the range of the attractor and its fate.
+
+    Just beyond a flip walks leave the gait slowly: what has not repeated itself by then counts as aperiodic only where
+    neighbours may part, and neither a gait that was followed is stable nor a cascade still doubles.
+    """
+    attractors, exponents = family.attractors, family.exponents
+    periodic = [pair for branch in family.branches for pair in branch.stable_ranges]
+    periodic += [(row["flips"][0], row["accumulates_at"]) for row in cascade_rows(family) if "accumulates_at" in row]
+    aperiodic = [
+        one.value
+        for one in attractors.found
+        if one.period == 0
+        and may_diverge(exponents, one.value)
+        and not any(min(pair) <= one.value <= max(pair) for pair in periodic)
+    ]
+    return {
+        "from": attractors.found[0].value,
+        "to": attractors.found[-1].value,
+        "aperiodic_from": min(aperiodic, default=None),
+        "lost_at": attractors.lost_at,
+        "ended": attractors.reason,
+        "periods": sorted({one.period for one in attractors.found}),
+    }
+
+
+def curve_rows(family: Family) -> Iterator[dict[str, Any]]:
+    """Return rows of bifurcation curves over the plane: their ends and the reasons."""
+    for curve in family.curves:
+        points = list(zip(curve.first.tolist(), curve.second.tolist(), strict=True))
+        yield {
+            "kind": curve.kind,
+            "period": curve.period,
+            "points": len(points),
+            "begins": list(points[0]),
+            "ends": list(points[-1]),
+            "reasons": [end.reason for end in curve.ends],
+        }
+
+
+def region_rows(family: Family) -> Iterator[dict[str, Any]]:
+    """Return the share of the plane of each kind of attractor."""
+    if family.regions is not None:
+        periods, counts = np.unique(family.regions.period, return_counts=True)
+        for period, cells in zip(periods.tolist(), counts.tolist(), strict=True):
+            yield {"period": period, "share": cells / family.regions.period.size}
+
+
+def alone_at(branch: GaitBranch, model: str, parameter: Parameter) -> dict[str, str]:
+    """Report a gait that continues in neither direction, since the step map is discontinuous there."""
+    (gait,) = branch.points
+    what = f"a gait of the {model} model at {gait.value:.5g} {parameter.unit} ({gait.period_s:.4g} s)"
+    return {"what": what, "why": f"it goes on neither way: {branch.ends[1].reason}", "saves": ""}
+
+
+def left_out(found: Sequence[Family], asked: FamilyQuestion) -> list[dict[str, str]]:
+    """Report a family that was not followed, and why."""
+    followed, entries, second = {one.model: one for one in found}, [], asked.second
+    for model in asked.models:
+        if model not in followed:
+            entries.append((f"the {model} model's gaits", f"{asked.parameter.key} does not touch that model"))
+        elif not followed[model].branches:
+            entries.append((f"the {model} model's gaits", "no gait was found in the span to begin from"))
+        elif model == CONTACT and asked.config.continuation.periods > THOROUGHNESS[CONTACT].periods:
+            what = f"the contact model's gaits of more than {THOROUGHNESS[CONTACT].periods} steps"
+            entries.append((what, "its flips are located too coarsely, to about 1e-7, to follow them further"))
+    entries += [
+        (f"the {one.model} model's plane of both keys", "the second key does not touch that model")
+        for one in found
+        if second is not None and one.branches and not second.touches(one.model)
+    ]
+    return [{"what": what, "why": why, "saves": ""} for what, why in entries]

@@ -1,0 +1,197 @@
+"""Groups of families of gaits: branches with bifurcations, attractors, curves and sampled walks."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from itertools import pairwise
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+from walkerlab.config.ground import Footholds
+from walkerlab.config.reads import ContactConfig
+from walkerlab.config.schema import Output
+from walkerlab.labels import Label
+from walkerlab.physics.orbits.families import GaitBranch
+from walkerlab.physics.orbits.family_search import RIGID, Family
+from walkerlab.physics.orbits.rigid_map import state_on_section
+from walkerlab.physics.orbits.similarity import unit_walker
+from walkerlab.physics.orbits.step_map import Cycle, Monitor
+from walkerlab.physics.orbits.two_parameters import BifurcationCurve, Regions
+from walkerlab.physics.solvers.registry import ENDLESS, Tolerances
+from walkerlab.physics.solvers.system import Floats
+from walkerlab.pipeline.stages.numerical_error import evenly_spread
+from walkerlab.pipeline.stages.rigid_groups import trajectory_group
+from walkerlab.pipeline.stages.walk import only_at
+from walkerlab.pipeline.store.columns import columns, labelled, real_and_imaginary
+from walkerlab.pipeline.store.content import Attribute, Group, Variable
+from walkerlab.scene.parameter import Parameter
+from walkerlab.scene.rigid import rigid_scene
+
+MOTIONS_OF_BRANCH, LONGEST = 12, 4  # walked gaits of a branch; maximum period of a walked gait
+STRIDE = 2  # steps until the legs have their first roles again
+TOLERANCES = Tolerances("dop853", 1e-9, 1e-11, ENDLESS)
+ALL_OUTPUTS: Final[tuple[Output, ...]] = ("states", "energies", "forces")
+EVERY = 3  # interval of stored samples between heel strikes
+
+MODEL, KIND = Label("", "model"), Label("", "fold, flip or torus")
+PERIOD = Label("1", "steps of the gait")
+STANCE = Label("rad", "stance leg just after each heel strike", name="stance_angle")
+CURVES = {"model": MODEL, "kind": Label("", "fold or flip"), "period": PERIOD}
+BIFURCATIONS = {"kind": KIND, "period": PERIOD, "branch": Label("1", "number of the branch")}
+EXPONENTS = {"exponent": Label("1", "largest exponent per step"), "uncertainty": Label("1", "its standard error")}
+POINTS = {
+    "stable": Label("1", "whether disturbances die out"),
+    "periods_s": Label("s", "durations of the steps", ("step",), name="step_period"),
+    "lengths_m": Label("m", "lengths of the steps", ("step",), name="step_length"),
+    "angles": replace(STANCE, dims=("step",)),
+    "z": Label("1", "section coordinates", ("coordinate",), name="section"),
+}
+ATTRACTORS = {
+    "period": Label("1", "steps after which it repeats; 0: never"),
+    "periods_s": Label("s", "durations of steps on it", ("visit",), name="step_period"),
+    "angles": replace(STANCE, dims=("visit",)),
+}
+SETTLED: Final = "steps after which walks repeat themselves; 0: never, -1: none goes on"
+MARKS = {
+    "after": Label("1", "point before a bifurcation; -1: none", name="mark_after"),
+    "kind": replace(KIND, name="mark_kind"),
+    "periods": Label("s", "durations of the steps there", ("step",), name="mark_step_period"),
+    "angles": Label("rad", "stance leg just after each heel strike there", ("step",), name="mark_stance_angle"),
+}
+
+
+def groups(
+    found: Sequence[Family], said: Mapping[str, Any], config: ContactConfig, parameter: Parameter,
+    second: Parameter | None,
+) -> dict[str, Group]:  # fmt: skip
+    """Build a group for each branch and curve, and for each model's bifurcations, exponents and attractor.
+
+    said    the summary, of which branches, bifurcations and curves are stored as tables too
+    second  key of the plane, if there is one
+    """
+    value = {"value": Label(parameter.unit, parameter.key)}
+    stored: dict[str, Group] = {}
+
+    def over(plane: BifurcationCurve | Regions, *dims: str) -> dict[str, Variable]:
+        """Return coordinates of both parameters."""
+        axes = zip(("value", "second"), (plane.first, plane.second), (parameter, second), dims, strict=True)
+        return {name: labelled(values, Label(one.unit, one.key), dim) for name, values, one, dim in axes if one}
+
+    if said["branches"]:
+        ends = {"from": Label(parameter.unit, "where it begins"), "to": Label(parameter.unit, "where it ends")}
+        overview = columns(said["branches"], {"model": MODEL, "period": PERIOD, **ends}, "branch")
+        stored["branches"] = Group(overview, {"over": parameter.key})
+    if said["curves"]:
+        stored["curves"] = Group(columns(said["curves"], CURVES, "curve"))
+    for one in found:
+        if one.step_map is None:
+            continue
+        own: dict[str, Group] = {}
+        for number, curve in enumerate(one.curves):
+            own[f"curve_{number}"] = Group(over(curve, "point", "point"), {"kind": curve.kind, "period": curve.period})
+        if one.regions is not None:
+            periods = Variable(one.regions.period, ("first", "second"), "1", SETTLED)
+            own["regions"] = Group({**over(one.regions, "first", "second"), "period": periods})
+        for number, branch in enumerate(one.branches):
+            marks = [*birth_of(branch, one.branches), *marks_on(branch)]
+            own[f"branch_{number}"] = branch_group(branch, marks, one.step_map.monitors, value)
+        rows = [row for row in said["bifurcations"] if row["model"] == one.model]
+        if rows:
+            multipliers = [complex(*row["multiplier"]) for row in rows]
+            both = real_and_imaginary("multiplier", multipliers, ("bifurcation",), "critical multiplier")
+            own["bifurcations"] = Group({**columns(rows, value | BIFURCATIONS, "bifurcation"), **both})
+        if one.exponents:
+            own["lyapunov"] = Group(columns(one.exponents, value | EXPONENTS, "sample"))
+        if one.attractors.found:
+            own["attractor"] = Group(columns(one.attractors.found, value | ATTRACTORS, "sample"))
+        if one.model == RIGID:
+            own |= motions(one.branches, config, parameter)
+        stored |= {f"{one.model}/{name}": group for name, group in own.items()}
+    return stored
+
+
+class Mark(NamedTuple):
+    """A bifurcation on a branch: the index of the point before it, and the gait's steps."""
+
+    after: int
+    kind: str
+    value: float
+    periods: Floats  # durations of the steps there (s)
+    angles: Floats  # of the stance leg just after each heel strike there (rad)
+
+
+def marks_on(branch: GaitBranch) -> list[Mark]:
+    """Return the bifurcations of a branch in their order along it."""
+    return [
+        Mark(index, one.kind, one.value, one.gait.periods_s, one.gait.angles)
+        for index, (before, after) in enumerate(pairwise(branch.points))
+        for one in branch.bifurcations if one.lies_between(before, after)
+    ]  # fmt: skip
+
+
+def birth_of(branch: GaitBranch, branches: Sequence[GaitBranch]) -> list[Mark]:
+    """Return the flip where a branch begins, with its parent's gait repeated twice."""
+    for parent in branches:
+        for one in parent.bifurcations:
+            if one.kind == "flip" and 2 * parent.period == branch.period and one.value == branch.ends[0].value:
+                return [Mark(-1, one.kind, one.value, np.tile(one.gait.periods_s, 2), np.tile(one.gait.angles, 2))]
+    return []
+
+
+def branch_group(
+    branch: GaitBranch, marks: Sequence[Mark], monitors: Sequence[Monitor], value: Mapping[str, Label]
+) -> Group:
+    """Build the group of a branch: its gaits in order, and its bifurcations.
+
+    value  label of the parameter's values
+    """
+    points = branch.points
+    multipliers = [point.multipliers for point in points]
+    variables = {
+        **columns(points, {**value, **POINTS}, "point"),
+        **real_and_imaginary("multiplier", multipliers, ("point", "multiplier"), "multiplier"),
+    }
+    for place, monitor in enumerate(monitors):
+        label = Label(monitor.unit, monitor.meaning)
+        variables[monitor.name] = labelled([point.monitors[place] for point in points], label, "point")
+    if marks:
+        labels = MARKS | {"value": Label(value["value"].unit, "where it is", name="mark_value")}
+        variables |= columns(marks, labels, "mark")
+    attrs: dict[str, Attribute] = {
+        "period": branch.period,
+        "begins": branch.ends[0].reason,
+        "ends": branch.ends[1].reason,
+    }
+    return Group(variables, attrs)
+
+
+def motions(branches: Sequence[GaitBranch], config: ContactConfig, parameter: Parameter) -> dict[str, Group]:
+    """Build groups of sampled walks of some gaits of each rigid branch: branch_0/motion_7."""
+    return {
+        f"branch_{number}/motion_{place}": group
+        for number, branch in enumerate(branches)
+        if branch.period <= LONGEST
+        for place in evenly_spread(len(branch.points), MOTIONS_OF_BRANCH)
+        for group in motion(branch.points[place], branch.period, config, parameter)
+    }
+
+
+def motion(point: Cycle, period: int, config: ContactConfig, parameter: Parameter) -> Iterator[Group]:
+    """Walk a gait and yield its group as `simulate` stores it; nothing if the config rejects the value."""
+    changed = parameter.config_at(config, point.value)
+    if changed is None:
+        return
+    scene = rigid_scene(changed, Footholds(), ALL_OUTPUTS)
+    unit, units = unit_walker(scene.walker)
+    section, n = state_on_section(unit, point.z), len(scene.walker.arm_x)
+    start = (*section[:n], *(rate / units.time for rate in section[n:]))
+    steps = max(period, STRIDE)
+    walk = scene.walk(start, steps, TOLERANCES, sampled=True)
+    if walk.steps < steps or walk.samples is None:
+        return
+    changes = np.flatnonzero(np.diff(walk.samples.step))
+    kept = np.unique(np.concatenate((np.arange(0, walk.samples.time_s.size, EVERY), changes, changes + 1)))
+    seen = trajectory_group(scene, walk, only_at(walk.samples, kept))
+    yield replace(seen, attrs={"value": point.value, "slope_rad": changed.slope_rad, "steps": period})

@@ -1,0 +1,137 @@
+"""Periodic gaits of the rigid model, with the corrected equations and with those printed in the paper."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from walkerlab.config.drives import drives_of, springs_of
+from walkerlab.config.reads import FixedPointConfig, RigidConfig
+from walkerlab.errors import NoAnswer
+from walkerlab.labels import Label
+from walkerlab.physics.orbits.fixed_point import GaitSearch, RigidGait, find_gaits
+from walkerlab.pipeline.progress import Progress, track
+from walkerlab.pipeline.store.columns import real_and_imaginary, rows_group, values_by_column
+from walkerlab.pipeline.store.content import Content, Group, Variable
+from walkerlab.scene.rigid import rigid_walker, state_names
+from walkerlab.scene.studies import equation_sets
+
+GAIT = "gait"
+NUMBERS = {
+    "period": Label("s", "duration of a step", name="period_s"),
+    "step_length": Label("m", "length of a step along the slope", name="step_length_m"),
+    "spectral_radius": Label("1", "largest magnitude of a multiplier"),
+    "stable": Label("1", "whether small disturbances die out"),
+    "residual": Label("rad", "what is left of P(x) - x, velocities times sqrt(L/g)"),
+    "energy": Label("J", "time mean of the energy from the stance foot", name="energy_J"),
+    "energy_drift": Label("J", "spread of the energy within the swing", name="energy_drift_J"),
+    "speed": Label("m/s", "step length over period", name="speed_m_s"),
+    "froude": Label("1", "speed over sqrt(g L), L the leg length"),
+    "cost_of_transport": Label("1", "work spent over weight and distance"),
+    "min_normal_force": Label("N", "least normal force on the stance foot", name="min_normal_force_N"),
+    "max_friction_ratio": Label("1", "largest ratio of tangential to normal force"),
+    "min_normal_impulse": Label(
+        "N s", "least normal impulse of the ground in a strike of heel or knee", name="min_normal_impulse_N_s"
+    ),
+    "max_impulse_ratio": Label("1", "largest ratio of tangential to normal impulse in a strike"),
+    "max_scuff_depth": Label("m", "depth of the swing foot below the slope", name="max_scuff_depth_m"),
+}
+"""Quantities of a gait that are stored and printed, fields of `RigidGait`."""
+OF_KNEES = {"knee_strike": Label("s", "time of the knee strike after the heel strike", name="knee_strike_s")}
+STATE = Label("rad, rad/s", "state just after heel strike", ("coordinate",))
+
+
+def run(config: FixedPointConfig, _inputs: Mapping[str, Content], progress: Progress) -> Content:
+    """Find the gaits of both sets of equations; raises NoAnswer if the config's set has no physical one."""
+    sets = equation_sets(config)
+    searches: dict[str, GaitSearch] = {
+        equations: find_gaits(rigid_walker(config, equations), config.seed)
+        for equations in track(progress, "fixedpoint", len(sets), sets)
+    }
+    chosen = searches[config.equations]
+    content = Content(
+        {f"{name}/gaits": gaits_group(search, config) for name, search in searches.items() if search.gaits},
+        summary(config, searches),
+    )
+    if chosen.gait is None:
+        nothing = "no gait was found" if chosen.random_starts and not chosen.gaits else "no gait"
+        raise NoAnswer(f"{nothing} at a slope of {config.slope_rad:.4g} rad: {chosen.reason}", advice(config), content)
+    return content
+
+
+def advice(config: RigidConfig) -> str:
+    """Advise on a slope without a gait."""
+    walk_anyway = (
+        f"to walk there all the same, give a start state (start: [{', '.join(state_names(config))}]), and the "
+        "contact model a pitch of its pads (contact.pad_pitch: a number)"
+    )
+    drives = "push_off.impulse_N_s or walker.hip.torque_N_m"
+    if config.push_off.impulse_N_s or config.walker.hip.torque_N_m:
+        tried = f"What drives the walker may be too strong or too weak for it there: try another {drives}"
+    elif config.slope_rad <= 0.0:
+        tried = f"Let the slope descend in walking direction (slope_deg above 0), or drive the walker ({drives})"
+    else:
+        tried = "Gaits on other slopes are followed by `walkerlab continuation`"
+    return f"{tried}; {walk_anyway}."
+
+
+def summary(config: RigidConfig, searches: Mapping[str, GaitSearch]) -> dict[str, Any]:
+    """Summarise the chosen gait of the config's equations, and both sets side by side."""
+    sets = {}
+    for equations, search in searches.items():
+        gaits = [
+            {**gait_summary(gait), "chosen": index == search.chosen, "objection": "; ".join(gait.objections)}
+            for index, gait in enumerate(search.gaits)
+        ]
+        sets[equations] = {
+            **({} if search.gait is None else gait_summary(search.gait)),
+            "equations": equations,
+            "slope_rad": config.slope_rad,
+            "gaits_found": len(gaits),
+            "gaits": gaits,
+            "reason": search.reason,
+            "sought": search.method,
+            "random_starts": search.random_starts,
+            "random_hits": list(search.random_hits),
+            "lost": list(search.lost),
+        }
+    driven = {"driven_by": list(drives_of(config)), "springs": list(springs_of(config))}
+    return {**sets[config.equations], **driven, "state_names": list(state_names(config)), "equation_sets": sets}
+
+
+def numbers_of(gait: RigidGait) -> dict[str, Label]:
+    """Return the labels of a gait's quantities, with or without knees."""
+    return NUMBERS if gait.knee_strike is None else NUMBERS | OF_KNEES
+
+
+def gait_summary(gait: RigidGait) -> dict[str, Any]:
+    """Describe one gait in SI units."""
+    return {
+        "state": list(gait.state),
+        "multipliers": [[value.real, value.imag] for value in gait.multipliers],
+        **values_by_column(gait, numbers_of(gait)),
+        "work_per_step_J": gait.work,
+        "found_by": list(gait.found_by),
+    }
+
+
+def gaits_group(search: GaitSearch, config: RigidConfig) -> Group:
+    """Build the group of all gaits, one row each."""
+    gaits = search.gaits
+    multipliers = [gait.multipliers for gait in gaits]
+    found_by = np.array(["; ".join(gait.found_by) for gait in gaits])
+    objections = np.array(["; ".join(gait.objections) for gait in gaits])
+    variables = {
+        **rows_group(gaits, {"state": STATE, **numbers_of(gaits[0])}, GAIT, "gait, shortest period first").variables,
+        **real_and_imaginary("multiplier", multipliers, (GAIT, "multiplier"), "multiplier"),
+        "coordinate": Variable(np.array(state_names(config)), ("coordinate",), "", "coordinate of the state"),
+        "random_hits": Variable(np.array(search.random_hits), (GAIT,), "1", "random starting values that led here"),
+        "found_by": Variable(found_by, (GAIT,), "", "searches that led here"),
+        "objections": Variable(objections, (GAIT,), "", "why the gait cannot be walked"),
+    }
+    attrs: dict[str, Any] = {
+        "slope_rad": config.slope_rad,
+        "reason": search.reason,
+        "random_starts": search.random_starts,
+    }
+    return Group(variables, attrs if search.chosen is None else {**attrs, "chosen": search.chosen})

@@ -1,0 +1,89 @@
+"""Groups of a rigid walk: its steps, and samples over time."""
+
+from typing import Any
+
+import numpy as np
+
+from walkerlab.physics.hybrid.recorded_walk import RigidWalkResult, Samples
+from walkerlab.physics.hybrid.rigid_measures import energies, places, reactions
+from walkerlab.physics.mechanics.rigid_model import STANCE, energy_at_touch
+from walkerlab.pipeline.stages.walk import COORDINATE, legs, over_time, steps_of, turning
+from walkerlab.pipeline.store.content import Group, Variable
+from walkerlab.scene.rigid import RigidScene
+
+
+def groups(scene: RigidScene, walk: RigidWalkResult) -> dict[str, Group]:
+    """Return the non-empty groups of a walk by name."""
+    stored = {}
+    if walk.steps:
+        set_down = np.append(walk.start[STANCE], walk.after[:-1, STANCE])
+        rolling = scene.walker.radius * (set_down - walk.before[:, STANCE])
+        columns = steps_of(walk, rolling_m=rolling, state_before=walk.before, state_after=walk.after)
+        names = Variable(np.array(scene.names), (COORDINATE,), "", "coordinate of the state")
+        stored["steps"] = Group({**columns, COORDINATE: names})
+    if walk.samples is not None and walk.samples.time_s.size:
+        stored["trajectory"] = trajectory_group(scene, walk, walk.samples)
+    return stored
+
+
+def trajectory_group(scene: RigidScene, walk: RigidWalkResult, samples: Samples) -> Group:
+    """Build the group of samples that `outputs` selects, with both sides of each heel strike."""
+    stance = stance_leg(samples)
+    variables = {**over_time(time=samples.time_s, stance_leg=stance + 1, step=samples.step), **legs()}
+    if "states" in scene.outputs:
+        variables |= leg_variables(samples)
+        variables |= body_variables(scene, samples, stance)
+        variables |= place_variables(scene, walk, samples, stance)
+    if "energies" in scene.outputs:
+        kinetic, potential = energies(scene.walker, samples.state).T
+        touched = np.append(walk.start[STANCE], walk.after[:, STANCE])
+        potential -= energy_at_touch(scene.walker, touched)[samples.step]
+        variables |= over_time(kinetic_J=kinetic, potential_J=potential, mechanical_J=kinetic + potential)
+    if "forces" in scene.outputs:
+        friction, normal = (
+            reorder_by_leg(np.column_stack((np.zeros_like(force), force)), stance)
+            for force in reactions(scene.walker, samples.state, samples.bent).T
+        )
+        variables |= over_time(normal_force_N=normal, friction_force_N=friction)
+    return Group(variables)
+
+
+def stance_leg(samples: Samples) -> Any:
+    """Return the stance leg (samples,): leg 0 swings in even steps, leg 1 in odd ones."""
+    return 1 - samples.step % 2
+
+
+def leg_variables(samples: Samples) -> dict[str, Variable]:
+    """Return angles and velocities by leg; the legs change roles at every heel strike."""
+    n, stance = samples.state.shape[1] // 2, stance_leg(samples)
+    angle, velocity = samples.state[:, :2], samples.state[:, n : n + 2]
+    return over_time(angle=reorder_by_leg(angle, stance), velocity=reorder_by_leg(velocity, stance))
+
+
+def reorder_by_leg(by_role: Any, stance: Any) -> Any:
+    """Reorder values (samples, 2) from swing and stance leg to leg 0 and leg 1."""
+    return np.take_along_axis(by_role, np.where(stance[:, None] == 1, [[0, 1]], [[1, 0]]), axis=1)
+
+
+def body_variables(scene: RigidScene, samples: Samples, stance: Any) -> dict[str, Variable]:
+    """Return angles and velocities of shanks and torso."""
+    n = samples.state.shape[1] // 2
+    found: dict[str, Variable] = {}
+    for k, name in enumerate(scene.names[2:n], 2):
+        angle, rate = samples.state[:, k], samples.state[:, n + k]
+        if name.startswith("theta_1_"):  # the stance leg's shank is in line with its thigh
+            angle = reorder_by_leg(np.column_stack((angle, samples.state[:, 1])), stance)
+            rate = reorder_by_leg(np.column_stack((rate, samples.state[:, n + 1])), stance)
+        found |= turning(name.split("_")[-1], angle, rate)
+    return found
+
+
+def place_variables(scene: RigidScene, walk: RigidWalkResult, samples: Samples, stance: Any) -> dict[str, Variable]:
+    """Return positions of hip, knees and feet along the slope from the first foothold, and above it."""
+    at = places(scene.walker, scene.knee_m, walk, samples)
+    points = {"foot": np.stack((at.swing_foot, at.contact), axis=1)} | ({} if at.knees is None else {"knee": at.knees})
+    found = over_time(hip_along_m=at.hip[:, 0], hip_height_m=at.hip[:, 1])
+    for name, point in points.items():
+        along, height = (reorder_by_leg(point[:, :, axis], stance) for axis in range(2))
+        found |= over_time(**{f"{name}_along_m": along, f"{name}_height_m": height})
+    return found

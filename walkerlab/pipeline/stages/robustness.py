@@ -1,0 +1,318 @@
+"""Robustness of a gait in both models: the disturbances it survives, and the parameters that affect it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict
+from functools import partial
+from typing import Any, Final
+
+import numpy as np
+
+from walkerlab.config.drives import drives_of
+from walkerlab.config.fields import leaves
+from walkerlab.config.ground import Footholds
+from walkerlab.config.reads import RobustnessConfig
+from walkerlab.config.schema import Config
+from walkerlab.config.walkers import contact_required_error
+from walkerlab.config.writer import slope_in_degrees
+from walkerlab.errors import ConfigError, NoAnswer
+from walkerlab.labels import Label
+from walkerlab.physics.hybrid.recorded_walk import as_state
+from walkerlab.physics.hybrid.walk_record import rough_heights
+from walkerlab.physics.orbits.family_search import CONTACT, RIGID
+from walkerlab.physics.orbits.gradients import GAIT_QUANTITIES, Gradient, gait_quantities, relative_gradient
+from walkerlab.physics.orbits.rigid_map import EXACT_STEPS, RigidMap
+from walkerlab.physics.orbits.robustness import (
+    DISTURBANCES,
+    INDICATORS,
+    GaitOnMap,
+    largest_disturbance,
+    rough_walks,
+    sensitivity,
+    steps_on_rough_ground,
+)
+from walkerlab.physics.solvers.system import Floats
+from walkerlab.pipeline.progress import Progress, track
+from walkerlab.pipeline.stages.rigid_groups import groups as groups_of_walk
+from walkerlab.pipeline.store.checkpoint import Checkpoint
+from walkerlab.pipeline.store.columns import rows_group
+from walkerlab.pipeline.store.content import Content, Group, Variable
+from walkerlab.pipeline.work import WorkUnit, complete
+from walkerlab.pipeline.workers import in_order
+from walkerlab.scene.families import model_reads, unused_key_error
+from walkerlab.scene.parameter import SLOPE, SLOPE_DEG, SLOPE_RAD, parameter_of, why_no_parameter
+from walkerlab.scene.rigid import rigid_scene
+from walkerlab.scene.subject import ModelUnderTest, find_model_gait
+
+Rows = list[dict[str, Any]]
+
+WALKS_AT_ONCE: Final = 25
+STEPS_DRAWN: Final = 8
+MAX_STEPS: Final = {RIGID: 2_000_000, CONTACT: 40_000}
+"""Maximum number of steps on one rough ground, all walks together."""
+GIVEN: Final = ("normal_impulse_N_s", "min_normal_force_N")
+"""Ground reactions during and after a push, as `RigidMap.ground_after_push` returns them."""
+UNITS: Final = {"floor-drop": "m", "hip-push": "N s"}
+OF: Final = dict(zip(INDICATORS, ("s", "m", "m/s"), strict=True))
+MODEL: Final = {"model": Label("", "which model walks")}
+NONE_BESIDE: Final = Gradient(None, None, "walks beside the gait end, or the config refuses them")
+LABELS: Final[dict[str, dict[str, Label]]] = {
+    "gait_sensitivity_norm": {
+        "disturbance": Label("", "what the first step is disturbed by"),
+        "indicator": Label("", "what of the steps is measured"),
+        "value": Label("SI", "gait sensitivity norm, in the units of indicator and disturbance"),
+        "direct": Label("SI", "change of the disturbed step itself"),
+        "error": Label("SI", "of the norm, from quotients over two step sizes"),
+    },
+    "largest_step": {
+        "down_m": Label("m", "largest step down after which the walk goes on"),
+        "up_m": Label("m", "largest step up after which the walk goes on"),
+    },
+    "largest_push": {
+        "forward_N_s": Label("N s", "largest push forward at the hip after which the walk goes on"),
+        "backward_N_s": Label("N s", "largest push backward"),
+        **{
+            f"{way}_{name}": Label(unit, f"{what} of the largest push {way}; negative where the ground would pull")
+            for way in ("forward", "backward")
+            for name, unit, what in (
+                (GIVEN[0], "N s", "normal impulse of the ground at the instant"),
+                (GIVEN[1], "N", "minimum of the ground's normal force in the steps after the instant"),
+            )
+        },
+    },
+    "rough_ground": {
+        "roughness_m": Label("m", "standard deviation of the footholds' heights"),
+        "mean_steps": Label("1", "mean number of steps to failure, or a bound from below"),
+        "walks": Label("1", "walks"),
+        "capped": Label("1", "walks that were cut off"),
+        "method": Label("", "how the mean was found"),
+    },
+    "sensitivity": {
+        "of": Label("", "what changes"),
+        "to": Label("", "number of the config"),
+        "value": Label("SI", "derivative, in the units of both"),
+    },
+}
+"""Labels of the rows of each part of the answer, besides the model."""
+
+
+def run(
+    config: RobustnessConfig,
+    inputs: Mapping[str, Content],
+    progress: Progress,
+    *,
+    checkpoint: Checkpoint,
+    jobs: int = 1,
+) -> Content:
+    """Study each model; raises NoAnswer with partial results for an unstable gait, which has no norm.
+
+    checkpoint  walks of an earlier run
+    jobs        processes
+
+    Raises ConfigError for a question that cannot be meant.
+    """
+    refuse(config)
+    found: dict[str, Any] = {"gaits": [], **{name: [] for name in LABELS}}
+    unstable, steps = [], {}
+    for subject in subjects(config, inputs, progress):
+        here = subject.at()
+        # the rigid model's gradients and largest disturbances are faster than starting a process
+        jobs_but_for_walks = jobs if subject.model == CONTACT else 1
+        numbers = gait_quantities(here)
+        assert numbers is not None, "a gait that was found walks"
+        found["gaits"].append({"model": subject.model, **numbers})
+        found["sensitivity"] += sensitivities(subject, config.robustness.to, numbers, progress, jobs_but_for_walks)
+        if numbers["spectral_radius"] >= 1.0:
+            unstable.append(subject.model)
+            continue
+        found["gait_sensitivity_norm"] += norms(subject.model, here)
+        rough_walks, label = [*rough(subject, config)], f"robustness: {subject.model} model"
+        units, processes = [*single(subject, config), *rough_walks], jobs if rough_walks else jobs_but_for_walks
+        # the gait's own quantities have compiled all kernels
+        done, _ = complete(units, checkpoint, label, progress, processes, compiled=True)
+        (down,), (up,), (forward, *ahead), (backward, *behind), *walks = done
+        of, wanted = {"model": subject.model}, {"steps": config.robustness.steps}
+        found["largest_step"].append({**of, "down_m": down, "up_m": up, **wanted})
+        found["largest_push"].append({**of, "forward_N_s": forward, "backward_N_s": backward, **wanted})
+        pushes = found["largest_push"][-1]
+        for way, given in (("forward", ahead), ("backward", behind)):
+            pushes |= zip((f"{way}_{name}" for name in GIVEN), given or (None, None), strict=True)
+        every = np.array([taken for some in walks for taken in some])
+        steps[subject.model] = every.reshape(-1, config.robustness.walks)
+        found["rough_ground"] += rough_rows(subject.model, config, steps[subject.model])
+    groups = {name: rows_group(found[name], MODEL | labels) for name, labels in LABELS.items() if found[name]}
+    if steps and config.robustness.roughness_m:
+        groups |= {"rough_steps": rough_steps(config, steps), **rough_walk(config, inputs)}
+    content = Content(groups, {**found, "steps": config.robustness.steps})
+    if unstable:
+        why = f"the gait of the {' and the '.join(unstable)} model is unstable: it has no sensitivity norm"
+        raise NoAnswer(
+            why, "Choose a slope with a stable gait: `walkerlab continuation` shows where they are.", content
+        )
+    return content
+
+
+def refuse(config: RobustnessConfig) -> None:
+    """Raise ConfigError for an invalid question."""
+    asked = config.robustness
+    if asked.model in (CONTACT, "both") and config.contact is None:
+        raise contact_required_error(f"robustness.model: {asked.model}", config.walker, "Add one, or ask for rigid.")
+    for place, key in enumerate(asked.to):
+        parameter_of(key, config, ("robustness", "to", place))
+        if not any(model_reads(model, config, key) for model in models_of(config)):
+            raise unused_key_error("robustness.to", key, models_of(config))
+    half = 0.5 * config.walker.leg_length_m
+    for roughness in asked.roughness_m:
+        if roughness > half:
+            raise ConfigError(
+                f"robustness.roughness_m: {roughness:g} m is more than half a leg, {half:g} m: no step survives it.",
+                "Give millimetres as 0.001.",
+            )
+
+
+def subjects(config: RobustnessConfig, inputs: Mapping[str, Content], progress: Progress) -> Iterator[ModelUnderTest]:
+    """Return the requested models with their gaits."""
+    progress.start("robustness: gaits")
+    gait = inputs["fixedpoint"].summary
+    for model in models_of(config):
+        yield find_model_gait(model, config, gait, progress.note)
+
+
+def models_of(config: RobustnessConfig) -> tuple[str, ...]:
+    """Return the requested models."""
+    asked = config.robustness.model or (RIGID if config.contact is None else "both")
+    return (RIGID, CONTACT) if asked == "both" else (asked,)
+
+
+def norms(model: str, here: GaitOnMap) -> Iterator[dict[str, Any]]:
+    """Return rows of sensitivity norms, one for each disturbance and indicator."""
+    for disturbance in DISTURBANCES:
+        answer, units, of = sensitivity(here, disturbance), here.units, UNITS[disturbance]
+        if answer is None:
+            continue
+        to_pure = here.unit_of(disturbance) / np.array((units.time, units.length, units.length / units.time))
+        for k, (indicator, unit) in enumerate(OF.items()):
+            yield {
+                "model": model,
+                "disturbance": disturbance,
+                "indicator": indicator,
+                "value": float(answer.norm[k]),
+                "direct": float(answer.direct[k]),
+                "unit": f"{unit}/({of})" if " " in of else f"{unit}/{of}",
+                "scaled": float(answer.norm[k] * to_pure[k]),
+                "error": float(answer.error[k]),
+            }
+
+
+def single(subject: ModelUnderTest, config: RobustnessConfig) -> Iterator[WorkUnit]:
+    """Return the searches for the largest drop and push of either sign."""
+    for disturbance in DISTURBANCES:
+        for sign in (1.0, -1.0):
+            run = partial(single_of, subject, disturbance, sign, config.robustness.steps)
+            yield WorkUnit(f"{subject.model} {disturbance} {sign:g}", 1, run)
+
+
+def single_of(subject: ModelUnderTest, disturbance: Any, sign: float, steps: int) -> list[float]:
+    """Find the largest disturbance of a sign; after a push also the ground reactions, as `GIVEN` names them."""
+    size = largest_disturbance(subject.at(exact=False), disturbance, sign, steps)
+    if disturbance == "hip-push" and isinstance(rigid := subject.at().step_map, RigidMap):
+        return [size, *rigid.ground_after_push(subject.z, SLOPE.value_in(subject.config), sign * size, steps)]
+    return [size]
+
+
+def rough(subject: ModelUnderTest, config: RobustnessConfig) -> Iterator[WorkUnit]:
+    """Iterate over batches of walks on rough ground."""
+    asked, most = config.robustness, cap(subject.model, config)
+    for roughness in asked.roughness_m:
+        for first in range(0, asked.walks, WALKS_AT_ONCE):
+            walks = range(first, min(first + WALKS_AT_ONCE, asked.walks))
+            run = partial(rough_of, subject, roughness, config.seed, walks, most)
+            yield WorkUnit(f"{subject.model} rough {roughness:g} {first}", len(walks), run)
+
+
+def cap(model: str, config: RobustnessConfig) -> int:
+    """Return the maximum number of steps of a walk on rough ground."""
+    return min(config.robustness.max_steps, max(1, MAX_STEPS[model] // config.robustness.walks))
+
+
+def rough_of(subject: ModelUnderTest, roughness: float, seed: int, walks: range, most: int) -> list[float]:
+    """Count steps of some walks; each has its own ground, independent of the process."""
+    here = subject.at(exact=False)
+    return [float(steps_on_rough_ground(here, roughness, (seed, walk), most)) for walk in walks]
+
+
+def rough_steps(config: RobustnessConfig, steps: Mapping[str, Floats]) -> Group:
+    """Build the group of the steps of every walk."""
+    roughness, caps = np.array(config.robustness.roughness_m), np.array([cap(model, config) for model in steps])
+    about = "steps that a walk took; one that went on to the last step that was looked at has as many"
+    return Group(
+        {
+            "model": Variable(np.array([*steps]), ("model",), "", "which model walks"),
+            "roughness_m": Variable(roughness, ("roughness",), "m", "standard deviation of the heights"),
+            "cut_off_at": Variable(caps, ("model",), "1", "the last step that was looked at"),
+            "steps": Variable(np.array([*steps.values()]), ("model", "roughness", "walk"), "1", about),
+        }
+    )
+
+
+def rough_walk(config: RobustnessConfig, inputs: Mapping[str, Content]) -> dict[str, Group]:
+    """Sample the beginning of the rigid model's first walk on the roughest ground, for a figure."""
+    gait = inputs["fixedpoint"].summary
+    _, *heights = rough_heights(max(config.robustness.roughness_m), (config.seed, 0), STEPS_DRAWN).tolist()
+    scene = rigid_scene(config, Footholds(heights_m=tuple(heights)), ("states",))
+    walk = scene.walk(
+        as_state(gait["state"]), STEPS_DRAWN, EXACT_STEPS, sampled=True, step_length=float(gait["step_length_m"])
+    )
+    return {f"rough_walk/{name}": group for name, group in groups_of_walk(scene, walk).items()}
+
+
+def rough_rows(model: str, config: RobustnessConfig, steps: Floats) -> Rows:
+    """Summarise the numbers of steps (roughness, walk) on each rough ground."""
+    most, rows = cap(model, config), []
+    for roughness, taken in zip(config.robustness.roughness_m, steps, strict=True):
+        seen = asdict(rough_walks(taken, most))
+        told = {name: value for name, value in seen.items() if value is not None}
+        rows.append({"model": model, "roughness_m": roughness, **told, "cut_off_at": most})
+    return rows
+
+
+def sensitivities(
+    subject: ModelUnderTest, wanted: tuple[str, ...], numbers: Mapping[str, float], progress: Progress, jobs: int
+) -> Rows:
+    """Return rows of derivatives by decreasing relative effect; parameters that are 0 come last."""
+    keys = numbers_read(subject, wanted)
+    label, rows = f"robustness: gradients of the {subject.model} model", list[dict[str, Any]]()
+    found = in_order([partial(gradients_of, subject, key) for key in keys], jobs)
+    for key, of_key in track(progress, label, len(keys), zip(keys, found, strict=True)):
+        parameter = parameter_of(key, subject.config)
+        value = parameter.value_in(subject.config)
+        for name, gradient in (of_key or dict.fromkeys(numbers, NONE_BESIDE)).items():
+            if name in numbers:
+                share = None if gradient.value is None else relative_gradient(gradient.value, value, numbers[name])
+                told = {} if gradient.value is None else {"error": float(gradient.error or 0.0)}
+                told |= {} if share is None else {"relative": share}
+                unit = (
+                    GAIT_QUANTITIES[name] if parameter.unit == "1" else f"{GAIT_QUANTITIES[name]} per {parameter.unit}"
+                )
+                rows.append(
+                    {"model": subject.model, "of": name, "to": key, "value": gradient.value, "unit": unit, **told}
+                    | ({"why": gradient.why} if gradient.why else {})
+                )
+    return sorted(rows, key=lambda row: (row["value"] is None, "relative" not in row, -abs(row.get("relative", 0.0))))
+
+
+def gradients_of(subject: ModelUnderTest, key: str) -> dict[str, Gradient]:
+    """Return derivatives by one key; a passive walker's cost of transport is the sine of the slope."""
+    known = () if drives_of(subject.config) else ("cost_of_transport",)
+    wanted = [name for name in GAIT_QUANTITIES if name not in known]
+    return subject.gradients(parameter_of(key, subject.config), wanted)
+
+
+def numbers_read(subject: ModelUnderTest, wanted: tuple[str, ...] = ()) -> tuple[str, ...]:
+    """Return the requested parameters, or all, that the model reads, by dotted key."""
+    own = {".".join(path): field for path, field in leaves(Config, held=subject.config)}
+    in_degrees = slope_in_degrees(subject.config.slope_rad) is not None
+    written = {SLOPE_RAD: SLOPE_DEG} if in_degrees else {}
+    every = (written.get(key, key) for key in own if not why_no_parameter(key, subject.config, own))
+    return tuple(key for key in wanted or every if model_reads(subject.model, subject.config, key))

@@ -1,0 +1,54 @@
+"""Walk of the rigid model from its fixed point or a given start."""
+
+from collections.abc import Mapping
+from functools import partial
+from typing import Any
+
+from walkerlab.config.reads import SimulateConfig
+from walkerlab.physics.hybrid.recorded_walk import RigidWalkResult
+from walkerlab.physics.solvers.registry import ENDLESS, Tolerances
+from walkerlab.pipeline.progress import Progress
+from walkerlab.pipeline.stages.rigid_groups import groups
+from walkerlab.pipeline.stages.walk import content_of_walk, numbers_of, pace_of, rigid_start
+from walkerlab.pipeline.store.content import Content
+from walkerlab.scene.omissions import rigid_walk_omissions
+from walkerlab.scene.rigid import rigid_scene
+
+
+def run(config: SimulateConfig, inputs: Mapping[str, Content], progress: Progress, again: bool = True) -> Content:
+    """Walk `config.strides` strides; raises NoAnswer if the integrator fails.
+
+    again  whether to repeat the walk for its numerical error, which takes about twice as long
+    """
+    scene, settings = rigid_scene(config, config.ground, config.outputs), config.solver.rigid
+    tolerances = Tolerances(settings.method, settings.rtol, settings.atol, ENDLESS)
+    (length, start), steps = rigid_start(config, inputs), 2 * config.strides
+    of_gait = length if "fixedpoint" in inputs else None
+
+    def walk(tolerances: Tolerances, sampled: bool) -> RigidWalkResult:
+        progress.start("simulate" if sampled else "simulate: numerical error", steps)
+        return scene.walk(start, steps, tolerances, sampled, progress.advance, of_gait)
+
+    of_scene, of_config = partial(groups, scene), partial(summary, config)
+    return content_of_walk("simulate", walk, tolerances, of_scene, of_config, progress, again)
+
+
+def summary(config: SimulateConfig, walk: RigidWalkResult) -> dict[str, Any]:
+    """Summarise the walk."""
+    return {
+        **numbers_of(walk),
+        **pace_of(config, walk),
+        "start_state": list(walk.start),
+        "final_state": list(walk.final_state),
+        "energy_drift_J": walk.energy_drift,
+        "energy_balance_residual_J": walk.energy_balance_residual,
+        "lost_in_strikes_J": walk.lost_in_strikes,
+        "mean_energy_J": walk.mean_energy,
+        "min_normal_force_N": walk.min_normal_force,
+        "max_friction_ratio": walk.max_friction_ratio or None,
+        "max_scuff_depth_m": walk.max_scuff_depth,
+        "objections": list(walk.objections),
+        "equations": config.equations,
+        "slope_rad": config.slope_rad,
+        "left_out": list(rigid_walk_omissions(config)),
+    }

@@ -1,0 +1,251 @@
+"""Common parts of stages that walk: the start, stored groups, the summary and the numerical error.
+
+Both models store a walk under the same names, in the same shapes, with the same meanings; what a model has not is
+absent. Of a long walk's samples all of its beginning and end are stored, and between them what shows each step.
+"""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from walkerlab.config.reads import SceneConfig, SimulateConfig
+from walkerlab.errors import NoAnswer
+from walkerlab.labels import Label
+from walkerlab.outcome import Outcome
+from walkerlab.physics.energy_channels import SAMPLED
+from walkerlab.physics.hybrid.recorded_walk import as_state
+from walkerlab.physics.hybrid.walk_record import WalkRecord
+from walkerlab.physics.solvers.registry import Tolerances
+from walkerlab.physics.solvers.system import State
+from walkerlab.pipeline.progress import Progress
+from walkerlab.pipeline.stages.numerical_error import numerical_error
+from walkerlab.pipeline.store.columns import labelled, numbered
+from walkerlab.pipeline.store.content import Content, Group, Variable
+from walkerlab.pipeline.store.footholds import UNEVEN
+
+FIRST_STEPS, LAST_STEPS = 200, 20
+"""Number of steps up to which every sample is stored."""
+MAX_BETWEEN = 50_000
+"""Maximum number of samples of the other steps, besides both sides of every heel strike."""
+STEP, TIME, LEG, COORDINATE = "step", "time", "leg", "coordinate"
+OF_STEPS: Final = {
+    "touch_time_s": Label("s", "time of the touch that ends the step"),
+    "period_s": Label("s", "time from touch to touch"),
+    "length_m": Label("m", "distance along the slope from touch to touch"),
+    "touch_along_m": Label("m", "where that touch is, along the slope from the first foothold"),
+    UNEVEN: Label("m", "height of the foothold of that touch over the slope"),
+    "knee_strike_time_s": Label("s", "time at which the swing leg's knee locked"),
+    "slip_m": Label("m", "net slip of the stance foot's material from its touch to its lift"),
+    "rolling_m": Label("m", "how far the stance foot rolled from its touch to its lift"),
+    "state_before": Label("rad, rad/s", "state just before that touch", (COORDINATE,)),
+    "state_after": Label("rad, rad/s", "state just after it, roles changed", (COORDINATE,)),
+}
+WITH_GAPS: Final = ("knee_strike_time_s", "slip_m", "rolling_m")  # a knee may not lock, nor the last stance foot lift
+OVER_TIME: Final = {
+    "time": Label("s", "time"),
+    "step": Label("1", "step number"),
+    "stance_leg": Label("1", "leg whose touch began the step"),
+    "angle": Label("rad", "angle of the leg from the vertical"),
+    "velocity": Label("rad/s", "angular velocity of the leg"),
+    "hip_along_m": Label("m", "position of the hip along the slope"),
+    "hip_height_m": Label("m", "height of the hip over the slope"),
+    "knee_along_m": Label("m", "position of the knee along the slope"),
+    "knee_height_m": Label("m", "height of the knee over the slope"),
+    "foot_along_m": Label("m", "position of the foot along the slope"),
+    "foot_height_m": Label("m", "height of the foot's lowest point over the slope"),
+    "normal_force_N": Label("N", "normal force of the ground on the foot"),
+    "friction_force_N": Label("N", "force of the ground on the foot along the slope, positive downhill"),
+    "penetration_m": Label("m", "depth of the foot in the ground that carries it"),
+    "slip_velocity_m_s": Label("m/s", "velocity of the foot's lowest material point"),
+    "kinetic_J": Label("J", "kinetic energy"),
+    "potential_J": Label("J", "potential energy, zero at the step's foothold"),
+    "mechanical_J": Label("J", "kinetic, potential (zero at the step's foothold) and elastic energy"),
+    "total_energy_J": Label("J", "kinetic, potential from a fixed origin, and elastic energy"),
+    **{loss.variable: Label("J", loss.meaning) for loss in SAMPLED.values()},
+    "push_off_J": Label("J", "given by the push-off so far"),
+    "hip_J": Label("J", "given by torque and damper of the hip so far"),
+    "residual_J": Label("J", "total energy plus what was lost less what was given, less the start's"),
+}
+OUTCOMES: Final = ", ".join(f"{outcome.value} {outcome.label}" for outcome in Outcome)
+"""Meanings of the outcome codes on a map."""
+
+
+def count_outcomes(outcomes: NDArray[np.int64]) -> dict[str, int]:
+    """Count a map's walks by outcome."""
+    numbers, counts = np.unique(outcomes, return_counts=True)
+    return {Outcome(int(number)).label: int(count) for number, count in zip(numbers, counts, strict=True)}
+
+
+def rigid_start(config: SimulateConfig | SceneConfig, inputs: Mapping[str, Content]) -> tuple[float, State]:
+    """Return the reference step length (m) and the rigid start state of the config or the gait."""
+    if "fixedpoint" in inputs:
+        gait = inputs["fixedpoint"].summary
+        state = gait["state"] if config.start == "fixed-point" else config.start
+        return float(gait["step_length_m"]), as_state(state)
+    if config.start == "fixed-point":
+        raise ValueError("neither a start state nor a fixed point")
+    state = as_state(config.start)
+    return 2.0 * config.walker.leg_length_m * float(np.sin(0.5 * abs(state[1] - state[0]))), state
+
+
+def content_of_walk(
+    stage: str,
+    walk: Callable[[Tolerances, bool], Any],
+    tolerances: Tolerances,
+    groups: Callable[[Any], dict[str, Group]],
+    summary: Callable[[Any], dict[str, Any]],
+    progress: Progress,
+    again: bool,
+) -> Content:
+    """Walk, store samples (thinned for long walks), and repeat the walk for the numerical error.
+
+    walk     takes it with tolerances, sampled if that is asked for, and returns a `WalkRecord` with `samples`
+    groups   the datasets of a walk
+    summary  what is printed of it
+    again    whether the second walk is wanted, which takes about as long as two or three
+
+    Raises NoAnswer, with what there is, if the integrator gives none.
+    """
+    taken = walk(tolerances, True)
+    if taken.samples is not None:
+        taken = replace(taken, samples=thinned(taken.samples, taken.touch_time_s, progress))
+    stored, said = groups(taken), summary(taken)
+    if not taken.outcome.answered:
+        why = f"{stage}: {taken.outcome.label} after {taken.steps} steps, {taken.end_time_s:.4g} s"
+        raise NoAnswer(why, said["advice"], Content(stored, said))
+    if again:
+        said["numerical_error"] = numerical_error(said, tolerances, lambda tighter: summary(walk(tighter, False)))
+    return Content(stored, said)
+
+
+def thinned(samples: Any, ends: NDArray[np.float64], progress: Progress) -> Any:
+    """Return the samples to store: all of an ordinary walk.
+
+    samples  a NamedTuple of arrays whose first axis is time, `time_s` among them
+    ends     (steps,) s, times at which steps ended
+    """
+    if ends.size <= FIRST_STEPS + LAST_STEPS:
+        return samples
+    step = np.searchsorted(ends, samples.time_s, side="right")
+    stored = (step < FIRST_STEPS) | (step >= ends.size - LAST_STEPS)
+    changes = np.flatnonzero(np.diff(step))
+    stored[changes] = stored[changes + 1] = True
+    between = np.flatnonzero(~stored)
+    stored[between[:: max(1, -(-between.size // MAX_BETWEEN))]] = True
+    progress.note(
+        f"{ends.size} steps: of {step.size} samples {np.count_nonzero(stored)} are stored, all of the first "
+        f"{FIRST_STEPS} and the last {LAST_STEPS} steps, fewer of those between; both sides of every heel strike are "
+        "among them"
+    )
+    return only_at(samples, stored)
+
+
+def only_at(samples: Any, kept: NDArray[Any]) -> Any:
+    """Select samples of a walk."""
+    return type(samples)(*(each[kept] for each in samples))
+
+
+def over_time(**values: ArrayLike) -> dict[str, Variable]:
+    """Build variables over time, named as in `OVER_TIME`, from values (samples,) or (samples, 2) by leg."""
+    return {name: labelled(found, OVER_TIME[name], *(TIME, LEG)[: np.ndim(found)]) for name, found in values.items()}
+
+
+def turning(name: str, angle: ArrayLike, velocity: ArrayLike) -> dict[str, Variable]:
+    """Build angle and velocity of a torso (samples,) or of shanks (samples, 2)."""
+    labels = Label("rad", f"angle of the {name} from the vertical"), Label("rad/s", f"angular velocity of the {name}")
+    dims = (TIME, LEG)[: np.ndim(angle)]
+    return {
+        f"{name}_angle": labelled(angle, labels[0], *dims),
+        f"{name}_velocity": labelled(velocity, labels[1], *dims),
+    }
+
+
+def legs() -> dict[str, Variable]:
+    """Build the coordinate of the legs, numbered 1 and 2 whatever their role."""
+    return {LEG: Variable(np.array([1, 2]), (LEG,), "1", "leg: 1 swings first, 2 stands first")}
+
+
+def of_steps(touch_time_s: ArrayLike, **values: ArrayLike | None) -> dict[str, Variable]:
+    """Build variables over steps, named as in `OF_STEPS`; empty for a walk without a step.
+
+    None is left out; nan, and what the last steps do not have, is a gap.
+    """
+    count = np.size(touch_time_s)
+    if count == 0:
+        return {}
+    columns = numbered(count, STEP, "step number")
+    for name, found in {"touch_time_s": touch_time_s, **values}.items():
+        if found is not None:
+            gaps = name in WITH_GAPS
+            rows = np.append(found, np.full(count - np.size(found), np.nan)) if gaps else found
+            columns[name] = labelled(rows, OF_STEPS[name], STEP, gaps=gaps)
+    return columns
+
+
+def steps_of(walk: WalkRecord, **values: ArrayLike | None) -> dict[str, Variable]:
+    """Build columns of a walk's steps: those common to both models, and additional ones."""
+    known = {
+        "period_s": walk.periods_s,
+        "length_m": walk.lengths_m,
+        "touch_along_m": walk.touch_along_m,
+        UNEVEN: walk.foothold_height_m,
+        "knee_strike_time_s": walk.knee_strike_time_s,
+    }
+    return of_steps(walk.touch_time_s, **known, **values)
+
+
+def pace_of(config: SceneConfig | SimulateConfig, walk: WalkRecord) -> dict[str, float]:
+    """Return mean speed (m/s) from the first foothold to the last touch, and its Froude number; empty without a step.
+
+    config  of which leg length L and gravity g are
+    """
+    if not walk.steps:
+        return {}
+    speed = float(walk.touch_along_m[-1] / walk.touch_time_s[-1])
+    return {"speed_m_s": speed, "froude": speed / math.sqrt(config.gravity_m_s2 * config.walker.leg_length_m)}
+
+
+def driven_by(walk: WalkRecord) -> dict[str, Any]:
+    """Return the work of each drive per step and the cost of transport; empty for a walk that covers no distance."""
+    distance = float(walk.touch_along_m[-1]) if walk.steps else 0.0
+    if distance <= 0.0:
+        return {}
+    driven = walk.driven
+    return {"work_per_step_J": driven.per_step(walk.steps), "cost_of_transport": driven.cost_of_transport(distance)}
+
+
+def numbers_of(walk: WalkRecord) -> dict[str, Any]:
+    """Summarise a walk of either model; knee quantities only for walkers with knees."""
+    strikes = walk.knee_strike_time_s
+    known = {} if strikes is None else {"knee_strike_times_s": [None if np.isnan(t) else t for t in strikes.tolist()]}
+    return {
+        "outcome": walk.outcome.label,
+        "advice": walk.advice,
+        "steps": walk.steps,
+        "step_periods_s": walk.periods_s.tolist(),
+        "step_lengths_m": walk.lengths_m.tolist(),
+        "touch_times_s": walk.touch_time_s.tolist(),
+        **known,
+        **driven_by(walk),
+        "end_time_s": walk.end_time_s,
+        "rhs_evaluations": walk.work.rhs_evaluations,
+        "accepted_steps": walk.work.accepted,
+        "rejected_steps": walk.work.rejected,
+    }
+
+
+def last_step(walk: Mapping[str, Any]) -> dict[str, Any]:
+    """Return period (s), length (m) and knee strike time (s) of a walk's last step; None without a step.
+
+    walk  its numbers, as `numbers_of`
+    """
+    periods, lengths, strikes = walk["step_periods_s"], walk["step_lengths_m"], walk.get("knee_strike_times_s")
+    step = {"period_s": periods[-1] if periods else None, "length_m": lengths[-1] if lengths else None}
+    if not strikes:
+        return step
+    begun = walk["touch_times_s"][-2] if len(strikes) > 1 else 0.0
+    return {**step, "knee_strike_s": None if strikes[-1] is None else strikes[-1] - begun}

@@ -1,0 +1,217 @@
+"""Artifacts: results of stages as HDF5 files, written atomically and verified on reading."""
+
+import hashlib
+import json
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+from walkerlab.config.canonical import canonical_json
+from walkerlab.pipeline.store import hdf5
+from walkerlab.pipeline.store.content import Attribute, Content, Digest, Group, Variable
+from walkerlab.pipeline.store.files import file_digest, read_bounded, refuse_full_disk, replacing, write_atomically
+from walkerlab.pipeline.store.key import SCHEMA_VERSION, Identity
+from walkerlab.pipeline.store.provenance import Provenance
+
+NOT_THERE = "not there yet"
+"""Reason for running a stage without a stored result."""
+
+LIMIT_BYTES = 1 << 30
+"""Maximum size of an artifact; larger files are not read."""
+
+# Appended after the HDF5 data: damaged files must be detected before the HDF5 library reads them, since it frees memory
+# twice on some.
+SEAL = re.compile(rb"\nwalkerlab sha256 ([0-9a-f]{64})\n")
+SEAL_BYTES = 83
+
+
+NESTED = ("config_slice", "input_keys", "library_versions", "input_digests")
+"""Fields of an identity and a provenance that are stored as JSON."""
+ROOT_ATTRIBUTES = frozenset(one.name for one in (*fields(Identity), *fields(Provenance))) | {
+    "title", "Conventions", "stage_key", "summary_json", "summary_timed", "content_digest", "complete"
+}  # fmt: skip
+"""Attributes of every artifact's root; a content with arrays at the root may add some."""
+
+
+class Damaged(Exception):  # noqa: N818 - a finding about a file, not a failure of this program
+    """A file is not a trustworthy artifact; the message says why."""
+
+
+class OtherLayout(Damaged):
+    """A file is an artifact of another version of this program; needs no warning."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Stored(Content):
+    """Content of an artifact with its identity and provenance.
+
+    seal  sha256 of the file, provenance and timings included
+    """
+
+    identity: Identity
+    provenance: Provenance
+    seal: str
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Whether a file is the artifact of a key.
+
+    reason    for rejecting it; empty if accepted
+    artifact  as read, also if it has another key; None if missing or damaged
+    damaged   whether the file exists but cannot be trusted
+    """
+
+    accepted: bool
+    reason: str
+    artifact: Stored | None = None
+    damaged: bool = False
+
+
+def write(path: Path, content: Content, identity: Identity, provenance: Provenance) -> Stored:
+    """Store a result at `path`, atomically replacing the old one.
+
+    Raises StorageError if the system refuses; the old file is then intact.
+    """
+    root = root_attributes(content, identity, provenance, content.complete, content.digest())
+    own = content.groups[""].attrs if "" in content.groups else {}
+    if not own.keys().isdisjoint(ROOT_ATTRIBUTES):
+        raise ValueError(f"attributes of the root that say something else: {sorted(own)}")
+    image = hdf5.image(content.groups, {**root, **own})
+    seal = hashlib.sha256(image).hexdigest()
+    write_atomically(path, image, f"\nwalkerlab sha256 {seal}\n".encode())
+    parts = content.groups, content.summary, content.timed
+    return Stored(*parts, complete=content.complete, identity=identity, provenance=provenance, seal=seal)
+
+
+@dataclass(frozen=True)
+class InTurn:
+    """A content with one group whose variables are made one by one, to save memory.
+
+    coordinates  variables that are coordinates of dimensions
+    variables    all of them, ordered by name
+    size         approximate total, bytes
+    """
+
+    summary: Mapping[str, Any]
+    attrs: Mapping[str, Attribute]
+    coordinates: Mapping[str, Variable]
+    variables: Iterable[tuple[str, Variable]]
+    size: int
+
+
+def write_in_turn(
+    path: Path, content: InTurn, identity: Identity, provenance: Provenance, complete: bool = True
+) -> None:
+    """Store as `write`, but one variable at a time.
+
+    Raises StorageError if the system refuses; the old file is then intact.
+    """
+    labelled = Content({}, content.summary)
+    digest = Digest(labelled.summary, labelled.timed)
+    digest.enter("", content.attrs)
+
+    def told() -> Iterator[tuple[str, Variable]]:
+        yield from content.coordinates.items()
+        for name, variable in content.variables:
+            digest.add(name, variable)
+            if name not in content.coordinates:
+                yield name, variable
+
+    with replacing(path) as temporary:
+        # check for space first: the HDF5 library cannot close a file that it cannot write
+        refuse_full_disk(temporary, content.size)
+        hdf5.write_in_turn(
+            temporary,
+            told(),
+            lambda: {**root_attributes(labelled, identity, provenance, complete, digest.hex()), **content.attrs},
+        )
+        seal = file_digest(temporary)
+        with temporary.open("ab") as file:
+            file.write(f"\nwalkerlab sha256 {seal}\n".encode())
+
+
+def read(path: Path) -> Stored:
+    """Read and verify the artifact at `path`.
+
+    Raises FileNotFoundError if there is none, and Damaged if it is truncated, altered or hostile.
+    """
+    try:
+        data = read_bounded(path, LIMIT_BYTES)
+        image, end = data[:-SEAL_BYTES], SEAL.fullmatch(data[-SEAL_BYTES:])
+        if end is None:
+            raise Damaged(
+                "it does not end with the seal of a finished artifact: cut short, or not written by walkerlab"
+            )
+        if hashlib.sha256(image).hexdigest().encode() != end[1]:
+            raise Damaged("it was altered after it was finished")
+        return assembled(*hdf5.parse(image), end[1].decode())
+    except (FileNotFoundError, Damaged):
+        raise
+    except OSError as error:
+        raise Damaged(f"it cannot be read: {error.strerror or error}") from error
+    except Exception as error:
+        # any error of a library on untrusted bytes means that the file is damaged
+        raise Damaged(f"it is not an artifact: {error or type(error).__name__}") from error
+
+
+def check(path: Path, key: str | None = None, stage: str | None = None) -> Verdict:
+    """Check that the file at `path` is intact and belongs to `key` and `stage`, if given; never raises."""
+    try:
+        artifact = read(path)
+    except (FileNotFoundError, NotADirectoryError):
+        return Verdict(False, NOT_THERE)
+    except OtherLayout as error:
+        return Verdict(False, str(error))
+    except Damaged as error:
+        return Verdict(False, f"damaged: {error}", damaged=True)
+    if stage not in (None, artifact.identity.stage):
+        return Verdict(False, f"damaged: it is a result of {artifact.identity.stage}, not of {stage}", damaged=True)
+    if key not in (None, artifact.identity.key):
+        return Verdict(False, "made for another key", artifact)
+    return Verdict(True, "", artifact)
+
+
+def root_attributes(
+    content: Content, identity: Identity, provenance: Provenance, complete: bool, digest: str
+) -> dict[str, Attribute]:
+    """Return the attributes at the root of the file."""
+    facts = {name: value for name, value in {**vars(identity), **vars(provenance)}.items() if value is not None}
+    return {
+        "title": f"walkerlab {identity.stage}",
+        "Conventions": hdf5.CONVENTIONS,
+        **{name: canonical_json(dict(value)) if name in NESTED else value for name, value in facts.items()},
+        "stage_key": identity.key,
+        "summary_json": json.dumps(content.summary, ensure_ascii=False, allow_nan=False),
+        "summary_timed": canonical_json(content.timed),
+        "content_digest": digest,
+        "complete": complete,
+    }
+
+
+def assembled(groups: Mapping[str, Group], root: Mapping[str, Any], seal: str) -> Stored:
+    """Build an artifact from a file's parts; raises Damaged if digest or key do not match."""
+    if root.get("schema_version") != SCHEMA_VERSION:
+        raise OtherLayout(f"its layout is version {root.get('schema_version')}, this program's is {SCHEMA_VERSION}")
+    own = {name: value for name, value in root.items() if name not in ROOT_ATTRIBUTES}
+    if "" in groups:
+        groups = {**groups, "": Group(groups[""].variables, own)}
+    facts = {name: json.loads(value) if name in NESTED else value for name, value in root.items()}
+    identity = Identity(**{one.name: facts[one.name] for one in fields(Identity)})
+    provenance = Provenance(**{one.name: facts[one.name] for one in fields(Provenance) if one.name in facts})
+    artifact = Stored(
+        groups,
+        json.loads(root["summary_json"]),
+        tuple(json.loads(root["summary_timed"])),
+        identity=identity,
+        provenance=provenance,
+        complete=root["complete"],
+        seal=seal,
+    )
+    if artifact.digest() != root["content_digest"]:
+        raise Damaged("its content does not have the digest that it was stored with")
+    if identity.key != root["stage_key"]:
+        raise Damaged("its key is not that of the config, inputs and code it names")
+    return artifact

@@ -1,0 +1,64 @@
+"""Find and remove this program's files in a run folder; other files stay."""
+
+import contextlib
+from collections.abc import Iterable
+from pathlib import Path
+
+from walkerlab.pipeline.store.artifact import Damaged, read
+from walkerlab.pipeline.store.files import TEMPORARY, storing
+from walkerlab.pipeline.store.index import indexed_files
+from walkerlab.pipeline.store.runfolder import LOCK, RECORD, RunFolder
+
+DRAWN = ("figures/figure-*.svg", "figures/figure-*.png", "report.html", "report-*.html")
+"""Files that drawing stages write, in case their index is lost."""
+CHUNKS, FIGURES = "sweep-chunks", "figures"
+SWEPT = ("sweep-*.h5", "sweep-*.csv", f"{CHUNKS}/*.h5", "sweep.html", "figures/sweep-*.svg", "figures/sweep-*.png")
+STATE_ENDINGS = (".h5", ".parts")
+COMPARED = ("figures/diff-*.svg", "figures/diff-*.png")
+
+
+def files_of(folder: RunFolder, stages: Iterable[str]) -> list[Path]:
+    """Return existing files: artifacts of these stages, files that they list, and leftovers of killed writers."""
+    found = {path for pattern in (*DRAWN, *SWEPT, *COMPARED, f"**/{TEMPORARY}") for path in folder.path.glob(pattern)}
+    inside = folder.path.resolve()
+    for stage in stages:
+        found |= {folder.artifact(stage), folder.checkpoint(stage)}
+        with contextlib.suppress(OSError, Damaged):
+            listed = indexed_files(read(folder.artifact(stage)))
+            found |= {folder.path / name for name in listed if (inside / name).resolve().is_relative_to(inside)}
+    return sorted(path for path in found if path.is_file() or path.is_symlink())
+
+
+def owner_of(path: Path, stages: Iterable[str]) -> RunFolder | None:
+    """Return the run whose result, listed file or record a file is; None for the user's own files."""
+    whole = path.resolve()
+    for place in (whole.parent, whole.parent.parent):
+        folder = RunFolder.at(place)
+        if folder.record() is None and not any(place.glob("*.h5")):
+            continue
+        is_state = whole.parent == place and (whole.suffix in STATE_ENDINGS or whole.name in (RECORD, LOCK))
+        if is_state or whole in {one.resolve() for one in files_of(folder, stages)}:
+            return folder
+    return None
+
+
+def remove(folder: RunFolder, files: Iterable[Path]) -> None:
+    """Remove files of a run folder, its record and its empty subfolders; call it under the lock.
+
+    Raises StorageError if the system refuses.
+    """
+    for path in (*files, folder.path / RECORD):
+        with storing(path):
+            path.unlink(missing_ok=True)
+    for emptied in (folder.figures, folder.path / CHUNKS):
+        with contextlib.suppress(OSError):
+            emptied.rmdir()
+
+
+def remove_if_empty(folder: RunFolder) -> None:
+    """Remove a run folder that holds only its lock; call it after releasing the lock."""
+    lock = folder.path / LOCK
+    if list(folder.path.iterdir()) == [lock]:
+        with contextlib.suppress(OSError):
+            lock.unlink()
+            folder.path.rmdir()

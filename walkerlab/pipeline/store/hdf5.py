@@ -1,0 +1,252 @@
+"""Conversion of contents to and from the bytes of an HDF5 file that xarray opens."""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from walkerlab.pipeline.store.content import Attribute, Group, Variable
+
+# What netCDF readers take for a dimension without a coordinate; the number is its length, by their convention.
+BARE_DIMENSION = "This is a netCDF dimension but not a netCDF variable."
+CONVENTIONS = "CF-1.11"
+"""Metadata conventions of the files, for netCDF readers."""
+TEXT = h5py.string_dtype()
+MAX_LEVELS = 16
+STRINGS_AT_ONCE = 64
+LEAST_BYTES = 32
+"""Minimum size of a group's member in a file; bounds their number, circular links included."""
+
+
+def image(content: Mapping[str, Group], root: Mapping[str, Attribute]) -> bytes:
+    """The bytes of an HDF5 file with these groups, by path, and these root attributes.
+
+    Made in memory, so that a full disk is met by an ordinary write and not inside the HDF5 library.
+    """
+    # No file of that name is touched: the memory driver has no backing store.
+    with h5py.File("image", "w", driver="core", backing_store=False) as file:
+        file.attrs.update(root)
+        for path, group in sorted(content.items()):
+            target = file.require_group(path) if path else file
+            target.attrs.update(group.attrs)
+            write_variables(target, sorted(group.variables.items(), key=lambda item: item[1].dims != (item[0],)))
+        file.flush()
+        return bytes(file.id.get_file_image())
+
+
+def write_in_turn(
+    path: Path, variables: Iterable[tuple[str, Variable]], root: Callable[[], Mapping[str, Attribute]]
+) -> None:
+    """Write a file whose variables at the root come one by one, coordinates first, and after them its attributes.
+
+    Raises OSError if the system refuses.
+    """
+    with h5py.File(path, "w") as file:
+        write_variables(file, variables)
+        file.attrs.update(root())
+
+
+class GroupOnDisk(Group):
+    """Variables at the root of an intact file, each read on access."""
+
+    def __init__(self, file: Path) -> None:
+        """Read the names."""
+        object.__setattr__(self, "variables", VariablesOnDisk(file))
+        object.__setattr__(self, "attrs", {})
+
+
+class VariablesOnDisk(Mapping[str, Variable]):
+    """Variables at the root of a file, by name."""
+
+    def __init__(self, file: Path) -> None:
+        """Read the names and positions."""
+        self.file = file
+        with h5py.File(file) as opened:
+            members = dict(opened)
+            self._by_address = names_of(members)
+            self._names = [
+                name for name, one in members.items() if isinstance(one, h5py.Dataset) and not is_bare_dimension(one)
+            ]
+        self._read = lru_cache(maxsize=8)(self._read_anew)
+
+    def __getitem__(self, name: str) -> Variable:
+        """Read a variable."""
+        return self._read(name)
+
+    def __iter__(self) -> Iterator[str]:
+        """Iterate over the names."""
+        return iter(self._names)
+
+    def __len__(self) -> int:
+        """Return the number of variables."""
+        return len(self._names)
+
+    def _read_anew(self, name: str) -> Variable:
+        with h5py.File(self.file) as opened:
+            return read_variable(name, opened[name], self._by_address, Budget(self.file.stat().st_size))
+
+
+def write_variables(target: Any, variables: Iterable[tuple[str, Variable]]) -> None:
+    """Write variables one by one, coordinates first; a dimension without one is stored as a bare length."""
+    for name, variable in variables:
+        dataset = write_variable(target, name, variable)
+        if variable.dims == (name,):
+            dataset.make_scale(name)
+            continue
+        for axis, (dim, size) in enumerate(zip(variable.dims, variable.values.shape, strict=True)):
+            if dim not in target:
+                target.create_dataset(dim, shape=(size,), dtype="i1").make_scale(f"{BARE_DIMENSION}{size:10d}")
+            dataset.dims[axis].attach_scale(target[dim])
+
+
+def write_variable(target: Any, name: str, variable: Variable) -> Any:
+    """Write one array with its labels."""
+    kind = variable.values.dtype.kind
+    # booleans as bytes, marked as xarray does: netCDF has no such type
+    dtype = {"O": TEXT, "f": "<f8", "i": "<i8", "b": "i1"}[kind]
+    dataset = target.create_dataset(name, data=variable.values, dtype=dtype)
+    marks = {mark: 1 for mark in ("timing", "missing") if getattr(variable, mark)}
+    labels = {"units": variable.units, "long_name": variable.long_name}
+    dataset.attrs.update(labels | ({"dtype": "bool"} if kind == "b" else {}) | marks)
+    return dataset
+
+
+def parse(data: bytes) -> tuple[dict[str, Group], dict[str, Attribute]]:
+    """The groups, by path, and the root attributes in the bytes of a file; for bytes that nobody vouches for.
+
+    Nothing is read that declares more than the file can hold. Raises ValueError for what `image` does not write,
+    and whatever the HDF5 library raises for what is no HDF5.
+    """
+    with h5py.File(h5py.h5f.open_file_image(data)) as file:
+        return dict(walk_groups(file, "", Budget(len(data)))), read_attributes(file)
+
+
+class Budget:
+    """Remaining bytes that a file of a given size can declare."""
+
+    def __init__(self, size: int) -> None:
+        """Start with the size of the file, in bytes."""
+        self.left = size
+
+    def spend(self, size: int) -> None:
+        """Raise ValueError if more is declared than the file holds."""
+        self.left -= size
+        if self.left < 0:
+            raise ValueError("it declares more data than the file holds")
+
+
+def walk_groups(parent: Any, path: str, budget: Budget) -> Iterator[tuple[str, Group]]:
+    """Iterate over all groups below a group by path, children first."""
+    if path.count("/") >= MAX_LEVELS:
+        raise ValueError("its groups are nested too deeply")
+    variables: dict[str, Variable] = {}
+    members: dict[str, Any] = {}
+    for name in parent:
+        budget.spend(LEAST_BYTES)
+        if not isinstance(parent.get(name, getlink=True), h5py.HardLink):
+            raise ValueError(f"it holds a link, {name!r}")
+        members[name] = parent[name]
+    names = names_of(members)
+    for name, member in members.items():
+        if isinstance(member, h5py.Group):
+            yield from walk_groups(member, f"{path}/{name}" if path else name, budget)
+        elif not is_bare_dimension(member):
+            variables[name] = read_variable(name, member, names, budget)
+    if path:
+        yield path, Group(variables, read_attributes(parent))
+    elif variables:
+        yield path, Group(variables)
+
+
+def is_bare_dimension(dataset: Any) -> bool:
+    """Whether a dataset is a bare dimension."""
+    return "NAME" in dataset.attrs and read_text(dataset, "NAME").startswith(BARE_DIMENSION)
+
+
+def names_of(members: Mapping[str, Any]) -> dict[int, str]:
+    """Map addresses to names; looking up the name of a referenced scale would search the whole file."""
+    return {h5py.h5o.get_info(member.id).addr: name for name, member in members.items()}
+
+
+def read_variable(name: str, dataset: Any, names: Mapping[int, str], budget: Budget) -> Variable:
+    """Read one array with its labels; `names` of the group's members by address."""
+    values = read_values(name, dataset, budget)
+    if read_text(dataset, "dtype", "") == "bool":
+        values = values.astype(np.bool_)
+    scales = [] if dataset.is_scale else [h5py.h5o.get_info(axis[0].id).addr for axis in dataset.dims]
+    if not all(scale in names for scale in scales):
+        raise ValueError(f"a dimension of {name!r} is not in its group")
+    return Variable(
+        values,
+        dims=(name,) if dataset.is_scale else tuple(names[scale] for scale in scales),
+        units=read_text(dataset, "units"),
+        long_name=read_text(dataset, "long_name"),
+        timing="timing" in dataset.attrs,
+        missing="missing" in dataset.attrs,
+    )
+
+
+def read_values(name: str, dataset: Any, budget: Budget) -> NDArray[Any]:
+    """Read the values of a dataset after checking its declared size."""
+    layout = dataset.id.get_create_plist()
+    if layout.get_layout() not in (h5py.h5d.CONTIGUOUS, h5py.h5d.COMPACT) or layout.get_external_count():
+        raise ValueError(f"the layout of {name!r} is not one that is written here")
+    if dataset.shape is None:
+        raise ValueError(f"{name!r} has no shape")
+    dtype = dataset.dtype
+    budget.spend(int(dataset.size) * int(dtype.itemsize))
+    if is_text(dtype):
+        return read_strings(dataset, budget)
+    if dtype not in (np.dtype("<f8"), np.dtype("<i8"), np.dtype("i1")):
+        raise ValueError(f"{name!r} has type {dtype}, which is not written here")
+    return np.asarray(dataset[()])
+
+
+def read_strings(dataset: Any, budget: Budget) -> NDArray[Any]:
+    """Read the strings of a dataset, a few at a time: many may point to one long text."""
+    if dataset.ndim == 0:
+        return np.array(dataset[()].decode(), dtype=object)
+    values = np.empty(dataset.shape, dtype=object)
+    # along the last dimension, of which a sweep of one parameter has all its points
+    for row in np.ndindex(dataset.shape[:-1]):
+        for start in range(0, dataset.shape[-1], STRINGS_AT_ONCE):
+            part = (*row, slice(start, start + STRINGS_AT_ONCE))
+            texts = dataset[part]
+            budget.spend(sum(len(text) for text in texts))
+            values[part] = [text.decode() for text in texts]
+    return values
+
+
+def read_attributes(holder: Any) -> dict[str, Attribute]:
+    """Read the attributes of a group as Python types; raises ValueError for other types."""
+    found: dict[str, Attribute] = {}
+    for name in holder.attrs:
+        declared = holder.attrs.get_id(name)
+        known = declared.dtype in (np.dtype("<f8"), np.dtype("<i8"), np.dtype("?")) or is_text(declared.dtype)
+        if declared.shape != () or not known:
+            raise ValueError(f"its attribute {name!r} is of a type that is not written here")
+        value = holder.attrs[name]
+        found[name] = value if isinstance(value, str) else value.item()
+    return found
+
+
+def read_text(holder: Any, name: str, default: str | None = None) -> str:
+    """Read a text attribute; `default` if it is absent."""
+    if default is not None and name not in holder.attrs:
+        return default
+    value = holder.attrs[name]
+    if isinstance(value, bytes):
+        return value.decode()
+    if not isinstance(value, str):
+        raise ValueError(f"its attribute {name!r} is no text")
+    return value
+
+
+def is_text(dtype: Any) -> bool:
+    """Whether a type in a file is variable-length text."""
+    text = h5py.check_string_dtype(dtype)
+    return text is not None and text.length is None

@@ -1,0 +1,97 @@
+"""Provenance of results: software, machine, time and command; recorded, but not part of the key."""
+
+from __future__ import annotations
+
+import datetime
+import importlib.metadata
+import platform
+import shlex
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import walkerlab
+from walkerlab.config.schema import Config
+from walkerlab.config.writer import to_yaml
+from walkerlab.pipeline.store.commit import commit_of_package
+from walkerlab.pipeline.store.files import as_text
+
+LIBRARIES = ("numpy", "scipy", "numba", "llvmlite", "h5py", "pydantic", "ruamel.yaml", "matplotlib", "jinja2")
+"""Libraries that numbers and figures may depend on."""
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """Origin of a result.
+
+    config         the resolved config, as YAML text
+    command_line   as typed
+    seed           of everything random
+    started_utc, ended_utc   ISO 8601
+    platform       operating system, processor, Python
+    package_version, library_versions
+    git_commit     of the source tree that the package runs from or was built from, '-dirty' if it was changed, if known
+    input_digests  digest of each input's content, by stage
+    """
+
+    config: str
+    command_line: str
+    seed: int
+    started_utc: str
+    ended_utc: str
+    platform: str
+    package_version: str
+    library_versions: Mapping[str, str]
+    git_commit: str | None = None
+    input_digests: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def took_s(self) -> float:
+        """Run time, s."""
+        begun, ended = map(datetime.datetime.fromisoformat, (self.started_utc, self.ended_utc))
+        return (ended - begun).total_seconds()
+
+    def until_now(self) -> Provenance:
+        """Return the same, ended now."""
+        return replace(self, ended_utc=utc_now())
+
+
+def begin(config: Config, input_digests: Mapping[str, str]) -> Provenance:
+    """Begin the provenance of a stage that starts now in this process."""
+    program = Path(sys.argv[0]).name
+    now = utc_now()
+    return Provenance(
+        config=to_yaml(config),
+        command_line=shlex.join(["walkerlab" if program == "__main__.py" else program, *map(as_text, sys.argv[1:])]),
+        seed=config.seed,
+        started_utc=now,
+        ended_utc=now,
+        platform=f"{platform.platform()}, {platform.machine()}, {platform.python_implementation()} "
+        f"{platform.python_version()}",
+        package_version=walkerlab.__version__,
+        library_versions=library_versions(),
+        git_commit=git_commit(),
+        input_digests=dict(input_digests),
+    )
+
+
+def utc_now() -> str:
+    """Return the time in ISO 8601 to the millisecond."""
+    return datetime.datetime.now(datetime.UTC).isoformat(timespec="milliseconds")
+
+
+def library_versions() -> dict[str, str]:
+    """Return versions of the installed libraries from their metadata, importing none."""
+    versions = {}
+    for name in LIBRARIES:
+        try:
+            versions[name] = importlib.metadata.version(name)
+        except importlib.metadata.PackageNotFoundError:
+            continue
+    return versions
+
+
+def git_commit() -> str | None:
+    """Return the commit that this package runs from or was built from; None if unknown."""
+    return commit_of_package(Path(walkerlab.__file__).parent)

@@ -1,0 +1,139 @@
+"""Folder of a run: its files and the lock under which they are written."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import shlex
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from walkerlab.errors import LockedError
+from walkerlab.pipeline.store.files import make_folder, read_bounded, remove_leftovers, storing, write_atomically
+
+RECORD, LOCK = ".run.json", ".lock"
+RECORD_BYTES = 1 << 20
+"""Maximum size of a record."""
+
+
+@dataclass(frozen=True)
+class Record:
+    """Record of the config of a run folder's results; results reused from another run name that run.
+
+    run      the folder's name when it was written
+    source   origin of the config, as in `RunFolder`
+    config   resolved config of the results, as YAML text
+    changes  as in `RunFolder`
+    """
+
+    run: str
+    source: str
+    config: str
+    changes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class RunFolder:
+    """runs/<name>/ of one run.
+
+    runs_dir  the folder of all runs
+    name      of the run; path-safe
+    source    of its config: a path relative to `runs_dir`, or a built-in config; empty if unknown
+    changes   KEY=VALUE of each key in which the config differs from its source
+    """
+
+    runs_dir: Path
+    name: str
+    source: str = ""
+    changes: tuple[str, ...] = ()
+
+    @classmethod
+    def at(cls, path: Path) -> RunFolder:
+        """Return the run in a folder, with recorded source and changes."""
+        whole = path if path.name not in ("", "..") else path.resolve()
+        record = cls(whole.parent, whole.name).record()
+        if record is None:
+            return cls(whole.parent, whole.name, "", changes_in(whole.name))
+        return cls(whole.parent, whole.name, record.source, record.changes)
+
+    @property
+    def path(self) -> Path:
+        """The folder."""
+        return self.runs_dir / self.name
+
+    @property
+    def given(self) -> str:
+        """The folder as a path that cannot be mistaken for a name."""
+        text = str(self.path)
+        return text if os.sep in text else f".{os.sep}{text}"
+
+    @property
+    def typed(self) -> str:
+        """The folder, quoted for a shell."""
+        return shlex.quote(self.given)
+
+    @property
+    def figures(self) -> Path:
+        """The folder of its figures."""
+        return self.path / "figures"
+
+    def artifact(self, stage: str) -> Path:
+        """Return the file of a stage's result."""
+        return self.path / f"{stage}.h5"
+
+    def checkpoint(self, stage: str) -> Path:
+        """Return the checkpoint file of an incomplete result."""
+        return self.path / f"{stage}.parts"
+
+    def record(self) -> Record | None:
+        """Read the run record; None if it is missing or unreadable."""
+        try:
+            said = json.loads(read_bounded(self.path / RECORD, RECORD_BYTES))
+            run, changes = str(said["run"]), said.get("changes")
+            listed = changes_in(run) if changes is None else tuple(map(str, changes))
+            return Record(run, str(said["source"]), str(said["config"]), listed)
+        except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError):
+            return None
+
+    def write_record(self, record: Record) -> None:
+        """Write the run record; raises StorageError if the system refuses."""
+        write_atomically(self.path / RECORD, json.dumps(asdict(record), indent=1).encode())
+
+    @contextlib.contextmanager
+    def locked(self, wait: bool = True, say: Callable[[str], None] | None = None) -> Iterator[None]:
+        """Hold the folder's lock, which the system releases when this process ends.
+
+        Creates the folder if needed and removes leftovers of killed writers.
+
+        wait  whether to wait for another process; `say` is then called with a message
+
+        Raises LockedError if another process holds the lock and `wait` is false, StorageError if the folder or
+        the lock file cannot be created.
+        """
+        # Imported here: a run that reuses everything takes no lock.
+        from filelock import FileLock, Timeout
+
+        make_folder(self.path)
+        lock = FileLock(self.path / LOCK)
+        with storing(self.path / LOCK):
+            try:
+                lock.acquire(timeout=0)
+            except Timeout:
+                held = f"another walkerlab process is working in {self.path}"
+                if not wait:
+                    raise LockedError(f"{held}.", "Leave out --no-wait to wait for it.") from None
+                if say is not None:
+                    say(f"waiting: {held}")
+                lock.acquire()
+        try:
+            remove_leftovers(self.path)
+            yield
+        finally:
+            lock.release()
+
+
+def changes_in(name: str) -> tuple[str, ...]:
+    """Return the changes in a folder's name, for folders without a record."""
+    return tuple(filter(None, name.partition("@")[2].split(",")))

@@ -1,0 +1,198 @@
+"""Points of a sweep: computed in any process and stored in chunks, files named by their content."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib
+import json
+import re
+import traceback
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from pathlib import Path
+from typing import Annotated, Any, Final, Literal
+
+from walkerlab.config.schema import Config
+from walkerlab.errors import WalkerlabError
+from walkerlab.labels import Label, labels_of
+from walkerlab.pipeline.executor import answer_in_memory
+from walkerlab.pipeline.graph import STRIDES, Graph
+from walkerlab.pipeline.results import MemoryResults
+from walkerlab.pipeline.store import artifact
+from walkerlab.pipeline.store.artifact import Damaged, OtherLayout
+from walkerlab.pipeline.store.columns import rows_group
+from walkerlab.pipeline.store.content import Content, untimed
+from walkerlab.pipeline.store.key import Identity
+from walkerlab.pipeline.store.provenance import Provenance
+from walkerlab.pipeline.store.runfolder import RunFolder
+
+Status = Literal["answered", "no-answer", "failed"]
+Labels = Mapping[str, tuple[str, str]]
+
+FOLDER: Final = "sweep-chunks"
+NOT_OF_THE_POINT: Final = ("left_out", "no_answer")
+MEMORIES: Final = 2
+"""Number of memories that a process keeps."""
+UNFIT: Final = re.compile(r"[^A-Za-z0-9_.+-]")
+
+
+@dataclass(frozen=True)
+class PointResult:
+    """Result of one point."""
+
+    key: Annotated[str, Label("", "key of the stage's result, hex")]
+    status: Annotated[
+        Status, Label("", "answered; no-answer: the stage found none; failed: the computation was not completed")
+    ]
+    reason: Annotated[str, Label("", "why there is no answer; empty if there is one")]
+    numbers: Annotated[str, Label("", "the stage's summary by name, as JSON and without run times")] = "{}"
+    wall_s: Annotated[float, Label("s", "time it took", timing=True)] = 0.0
+    bug: str = ""
+    """Traceback of a bug that stopped the computation; empty without one."""
+
+
+@dataclass(frozen=True)
+class Chunk:
+    """Rows of some points, with unit and meaning of quantities that the stage labels."""
+
+    rows: tuple[PointResult, ...]
+    labels: Labels
+
+
+@lru_cache(maxsize=MEMORIES)
+def memory_for(graph: str, forced: str) -> MemoryResults:  # noqa: ARG001 - one memory for each forced sweep
+    """Return this process's memory of inputs, kept from chunk to chunk; arguments as in `compute_point`."""
+    module, _, name = graph.partition(":")
+    return MemoryResults(getattr(importlib.import_module(module), name))
+
+
+def compute_point(config: Config, key: str, graph: str, target: str, again: bool, forced: str = "") -> Chunk:
+    """Compute one point in this process; a failure becomes its result.
+
+    key     of the result
+    graph   import path of the pipeline, module:NAME
+    again   whether its walk is repeated for the numerical error
+    forced  identifies a sweep that reuses no earlier result; empty for others
+    """
+    memory = memory_for(graph, forced)
+    stages = memory.keys.graph
+    try:
+        config = without_outputs(config, target, stages)
+        answer = answer_in_memory(config, target, memory, again=again or STRIDES not in stages[target].options)
+    except WalkerlabError as error:
+        return Chunk((PointResult(key, "failed", error.message),), {})
+    except Exception as error:
+        why = f"a bug: {type(error).__name__}: {error}"
+        return Chunk((PointResult(key, "failed", why, bug=traceback.format_exc()),), {})
+    return chunk_of(key, answer)
+
+
+def join_points(points: Sequence[tuple[Chunk, float]]) -> Chunk:
+    """Join chunks of one point each, adding their run times (s)."""
+    rows = tuple(replace(row, wall_s=wall_s) for point, wall_s in points for row in point.rows)
+    return Chunk(rows, {name: label for point, _ in points for name, label in point.labels.items()})
+
+
+def chunk_of(key: str, answer: Content) -> Chunk:
+    """Convert a stage's answer to a chunk of one point."""
+    numbers = json.dumps(by_name(untimed(answer.summary, answer.timed)), allow_nan=False, separators=(",", ":"))
+    status: Status = "answered" if answer.no_answer is None else "no-answer"
+    reason = "" if answer.no_answer is None else answer.no_answer.message
+    return Chunk((PointResult(key, status, reason, numbers),), labels_in(answer))
+
+
+def by_name(summary: Mapping[str, Any]) -> dict[str, Any]:
+    """Flatten a summary to numbers, texts and regular lists of numbers.
+
+    Nested values get dotted names: `dissipated_J.friction`, `gaits.0.period_s`.
+    """
+    found: dict[str, Any] = {}
+
+    def take(name: str, value: Any) -> None:
+        if isinstance(value, bool | int | float | str):
+            found[name] = value
+        elif isinstance(value, Mapping):
+            for key, inner in value.items():
+                take(f"{name}.{UNFIT.sub('_', key)}", inner)
+        elif isinstance(value, list) and value:
+            if all(isinstance(item, str) for item in value):
+                found[name] = "; ".join(value)
+            elif is_regular(value):
+                found[name] = value
+            else:
+                take(name, {str(number): item for number, item in enumerate(value)})
+
+    for key, value in summary.items():
+        if key not in NOT_OF_THE_POINT:
+            take(UNFIT.sub("_", key), value)
+    return found
+
+
+def is_regular(value: list[Any]) -> bool:
+    """Whether a list is a regular array of numbers."""
+    if all(isinstance(item, bool | int | float) for item in value):
+        return True
+    lists = [item for item in value if isinstance(item, list) and item]
+    return len(lists) == len(value) and len({len(item) for item in lists}) == 1 and all(map(is_regular, lists))
+
+
+def without_outputs(config: Config, target: str, graph: Graph) -> Config:
+    """Return the config without time series of the target's walk; its summary does not depend on them.
+
+    They stay if another stage needs them.
+    """
+    asking = [stage.name for stage in graph.needed_for(target, config) if "outputs" in stage.reads]
+    return config.model_copy(update={"outputs": ()}) if asking == [target] else config
+
+
+def labels_in(content: Content) -> dict[str, tuple[str, str]]:
+    """Return unit and meaning of the summary's quantities that are also a variable in a group."""
+    found = {}
+    for group in content.groups.values():
+        for name in content.summary.keys() & group.variables.keys():
+            found[name] = (group.variables[name].units, group.variables[name].long_name)
+    return found
+
+
+def store(folder: RunFolder, stage: str, code_digest: str, chunk: Chunk, begun: Provenance) -> None:
+    """Store a chunk without its failed points; raises StorageError if the system refuses."""
+    rows = [row for row in chunk.rows if row.status != "failed"]
+    if not rows:
+        return
+    points = rows_group(rows, labels_of(PointResult), "point", "point of the chunk")
+    content = Content({"points": points}, {"labels": {name: list(label) for name, label in chunk.labels.items()}})
+    inside = hashlib.sha256("\n".join(row.key for row in rows).encode()).hexdigest()
+    name = f"{stage}-{code_digest[:8]}-{inside[:16]}.h5"
+    identity = Identity("sweep-chunk", {"of": stage, "name": name}, {}, code_digest)
+    path = folder.path / FOLDER / name
+    path.parent.mkdir(exist_ok=True)
+    artifact.write(path, content, identity, begun.until_now())
+
+
+def stored_chunks(
+    runs_dir: Path, stage: str, code_digest: str, wanted: Mapping[str, Any], warn: Callable[[str], None]
+) -> Iterator[Chunk]:
+    """Iterate over the stored results of a stage under its present code, in all run folders.
+
+    wanted  keys of single runs to include; chunks are included whole
+    warn    called for damaged chunks
+    """
+    for path in sorted(runs_dir.glob(f"*/{FOLDER}/{stage}-{code_digest[:8]}-*.h5")):
+        try:
+            content = artifact.read(path)
+            columns = [content["points"][name].tolist() for name in labels_of(PointResult)]
+        except (FileNotFoundError, OtherLayout):
+            continue
+        except (Damaged, KeyError) as error:
+            warn(f"{path} is damaged: {error}; its points are computed again")
+            continue
+        labels = {name: (unit, text) for name, (unit, text) in content.summary["labels"].items()}
+        yield Chunk(tuple(PointResult(*row) for row in zip(*columns, strict=True)), labels)
+    for path in sorted(runs_dir.glob(f"*/{stage}.h5")):
+        try:
+            stored = artifact.read(path)
+        except (OSError, Damaged):
+            continue
+        if stored.identity.key in wanted:
+            yield chunk_of(stored.identity.key, stored)

@@ -1,0 +1,215 @@
+"""Engines that compute chunks: each makes a concurrent.futures executor."""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import importlib
+import os
+import threading
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import Executor, Future
+from dataclasses import dataclass, field, replace
+from multiprocessing import current_process
+from pathlib import Path
+from typing import Any
+
+from walkerlab.errors import ConfigError
+from walkerlab.pipeline.workers import WorkerPool
+
+GUARD = 'From Python, call it under `if __name__ == "__main__":` in a file. The engine `local` needs no such guard.'
+ONE_THREAD = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+
+
+@dataclass(frozen=True)
+class Order:
+    """Options of an engine.
+
+    workers  processes; 0 for the engine's default
+    address  of a running scheduler; empty to start one
+    modules  that workers will need
+    folder   for the engine's files
+    options  specific to the engine, by name
+    """
+
+    workers: int = 0
+    address: str = ""
+    modules: tuple[str, ...] = ()
+    folder: Path = Path()
+    options: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Pool:
+    """A running executor.
+
+    workers  number of chunks that it computes at once
+    """
+
+    executor: Executor
+    workers: int
+
+
+@dataclass(frozen=True)
+class SweepEngine:
+    """An engine.
+
+    opened   context that gives a pool and closes it
+    chunk_s  target duration of a chunk, s: long compared with the engine's overhead
+    """
+
+    opened: Callable[[Order], contextlib.AbstractContextManager[Pool]]
+    chunk_s: float
+
+    @contextlib.contextmanager
+    def begun(self, order: Order) -> Iterator[SweepEngine]:
+        """Return the engine for one sweep; local workers already import their modules while points are prepared."""
+        if self.opened is not local:
+            yield self
+            return
+        with local(order) as pool:
+            pool.executor.start_all()  # type: ignore[attr-defined]
+            yield replace(self, opened=lambda _order: contextlib.nullcontext(pool))
+
+
+@contextlib.contextmanager
+def local(order: Order) -> Iterator[Pool]:
+    """Run workers on this machine, one thread each."""
+    refuse_address("local", order)
+    workers = order.workers or os.cpu_count() or 1
+    modules = ("walkerlab.pipeline.sweeps.chunk", *order.modules)
+    with WorkerPool(workers, modules, dict.fromkeys(ONE_THREAD, "1")) as executor:
+        yield Pool(executor, workers)
+
+
+@contextlib.contextmanager
+def one_thread_each() -> Iterator[None]:
+    """Let processes started inside compute in one thread."""
+    before = {name: os.environ.get(name) for name in ONE_THREAD}
+    os.environ.update(dict.fromkeys(ONE_THREAD, "1"))
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
+
+
+@contextlib.contextmanager
+def dask(order: Order) -> Iterator[Pool]:
+    """Use a Dask cluster at an address, or start one on this machine."""
+    distributed = extra("distributed", "dask")
+    # Dask copies these variables into this process's environment whenever it starts or replaces a worker.
+    with one_thread_each(), contextlib.ExitStack() as stack:
+        if order.address:
+            client = stack.enter_context(distributed.Client(order.address))
+        else:
+            workers = order.workers or os.cpu_count() or 1
+            try:
+                cluster = distributed.LocalCluster(
+                    n_workers=workers, threads_per_worker=1, dashboard_address=None, processes=True
+                )
+            except RuntimeError as error:
+                raise ConfigError(f"--engine dask: its processes did not start: {error}", GUARD) from error
+            stack.enter_context(cluster)
+            client = stack.enter_context(distributed.Client(cluster))
+        # Worker deaths are handled chunk by chunk, as in every engine; Dask's own executor reports an error for a
+        # result whose worker dies before handing it over.
+        executor = JobExecutor(functools.partial(client.submit, retries=0, pure=False))
+        try:
+            yield Pool(executor, order.workers or max(1, len(client.scheduler_info()["workers"])))
+        finally:
+            client.cancel(list(executor.jobs))
+
+
+@contextlib.contextmanager
+def slurm(order: Order) -> Iterator[Pool]:
+    """Submit a Slurm job for each chunk; `cluster=local` runs them on this machine, for trials."""
+    submitit = extra("submitit", "slurm")
+    refuse_address("slurm", order)
+    options: dict[str, Any] = {name: int(text) if text.isdigit() else text for name, text in order.options.items()}
+    cluster = str(options.pop("cluster", "slurm"))
+    python = options.pop("python", None)
+    try:
+        made = submitit.AutoExecutor(
+            order.folder / "jobs", cluster=cluster, **({"slurm_python": python} if python else {})
+        )
+        made.update_parameters(**{"name": "walkerlab", "timeout_min": 60, "cpus_per_task": 1} | options)
+    except (RuntimeError, TypeError, ValueError, NotImplementedError) as error:
+        raise ConfigError(f"--engine slurm: {error}", "--engine-option cluster=local tries it out here.") from error
+    executor = JobExecutor(made.submit)
+    try:
+        yield Pool(executor, order.workers or 16)
+    finally:
+        for job in list(executor.jobs):
+            with contextlib.suppress(OSError):  # the job may have ended meanwhile
+                if not job.done():
+                    job.cancel(check=False)
+
+
+class JobExecutor(Executor):
+    """Executor over a library's jobs; a thread waits for each."""
+
+    def __init__(self, start: Callable[..., Any]) -> None:
+        """Store how to start a job.
+
+        start  called with a function and its arguments, returns a job whose `result()` waits
+        """
+        self._start = start
+        self.jobs: set[Any] = set()
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        """Submit one job."""
+        future: Future[Any] = Future()
+        job = self._start(fn, *args, **kwargs)
+        self.jobs.add(job)
+
+        def wait() -> None:
+            try:
+                result = job.result()
+            except BaseException as error:  # a cancelled job raises no Exception
+                future.set_exception(error)
+            else:
+                future.set_result(result)
+            self.jobs.discard(job)
+
+        threading.Thread(target=wait, daemon=True).start()
+        return future
+
+
+def refuse_address(name: str, order: Order) -> None:
+    """Raise ConfigError if an engine that takes no address got one."""
+    if order.address:
+        raise ConfigError(f"--engine {name}={order.address}: {name} takes no address.", "Only dask does.")
+
+
+def extra(module: str, name: str) -> Any:
+    """Import a library of one of the package's extras; raises ConfigError if it is not installed."""
+    try:
+        return importlib.import_module(module)
+    except ImportError as error:
+        raise ConfigError(
+            f"--engine {name} needs {module}, which is not installed.", f"pip install 'walkerlab[{name}]'"
+        ) from error
+
+
+ENGINES: dict[str, SweepEngine] = {
+    "local": SweepEngine(local, chunk_s=5.0),
+    "dask": SweepEngine(dask, chunk_s=10.0),
+    "slurm": SweepEngine(slurm, chunk_s=60.0),
+}
+
+
+def engine_named(text: str) -> tuple[SweepEngine, str]:
+    """Return the engine and the address of NAME or NAME=ADDRESS; raises ConfigError for an unknown name."""
+    name, _, address = text.partition("=")
+    if name not in ENGINES:
+        raise ConfigError(f"--engine {text}: no such engine; there are {', '.join(ENGINES)}.")
+    # the test that multiprocessing itself uses: a process that it starts runs the script first
+    if text == "dask" and getattr(current_process(), "_inheriting", False):
+        raise ConfigError(
+            "--engine dask: the processes that Dask starts run the calling script, which would sweep once more.", GUARD
+        )
+    return ENGINES[name], address

@@ -1,0 +1,260 @@
+"""Content of a sweep's file: parameters as coordinates, the stage's quantities as variables over them."""
+
+import json
+import sys
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from itertools import chain
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from walkerlab.config.schema import Config
+from walkerlab.labels import ERROR_OF_EACH_STEP, axis_label, unit_by_name
+from walkerlab.physics.solvers.system import Integers
+from walkerlab.pipeline.headlines import LAST_OF, headlines
+from walkerlab.pipeline.store.artifact import InTurn
+from walkerlab.pipeline.store.content import Content, Variable
+from walkerlab.pipeline.store.csv_text import csv_text
+from walkerlab.pipeline.sweeps.chunk import Chunk
+from walkerlab.pipeline.sweeps.question import SweptStage, described
+from walkerlab.scene.walk_outcomes import Pads, describe_endings
+
+CONTACT, PAD_PITCH = "contact-sim", "contact.pad_pitch"
+
+
+OWN: Final = {
+    "outcome": "how it ended: the stage's own outcome, else whether it has an answer",
+    "status": "answered, no-answer, or failed: not computed",
+    "reason": "why there is no answer",
+}
+"""Columns of every point, besides the stage's quantities."""
+STATES: Final = ("state", "start_state", "final_state")
+TEXT_BYTES: Final = 6
+"""Size of a short text in a file relative to its size in memory."""
+
+
+class SweepVariable:
+    """Column of a number, a list of numbers or a text for each of `size` results."""
+
+    def __init__(self, size: int, shape: tuple[int, ...], text: bool) -> None:
+        """Start empty; `shape` is that of one value."""
+        self.kinds: set[type] = set()
+        self.text = text
+        self.values: NDArray[Any] = np.full((size, *shape), "" if text else np.nan, object if text else float)
+
+    def put(self, places: Integers, values: Sequence[Any]) -> None:
+        """Store values of some results; the column grows for a value of a larger shape."""
+        if self.text:
+            # equal texts share one object
+            self.values[places] = [sys.intern(value) for value in values]
+            return
+        try:
+            array = np.array(values)
+        except ValueError:  # lists of different lengths
+            for k, value in enumerate(values):
+                self.put(places[k : k + 1], [value])
+            return
+        if array.ndim != self.values.ndim:
+            return  # a list where others have a number cannot be stored
+        self.kinds.update(types_in(values) if array.dtype.kind == "i" else {array.dtype.type})
+        shape = tuple(max(old, new) for old, new in zip(self.values.shape[1:], array.shape[1:], strict=True))
+        if shape != self.values.shape[1:]:
+            old = self.values
+            self.values = np.full((len(old), *shape), np.nan)
+            self.values[tuple(slice(0, length) for length in old.shape)] = old
+        own: tuple[Any, ...] = (places, *(slice(0, length) for length in array.shape[1:]))
+        self.values[own] = array
+
+    def typed(self) -> NDArray[Any]:
+        """Return the values in their own type if there are no gaps, otherwise as floats with gaps."""
+        if self.text or np.isnan(self.values).any():
+            return self.values
+        if self.kinds == {np.bool_}:
+            return self.values.astype(bool)
+        return self.values.astype(np.int64) if self.kinds == {int} else self.values
+
+
+def types_in(values: Sequence[Any]) -> set[type]:
+    """Return the types of the numbers in a nested list."""
+    inner = [item for value in values if isinstance(value, list) for item in value]
+    own = {type(value) for value in values if not isinstance(value, list)}
+    return own | types_in(inner) if inner else own
+
+
+class Merge:
+    """Merges the rows of a sweep's results into one column per quantity.
+
+    config   the one that is varied
+    inverse  which result each point has
+    """
+
+    def __init__(self, question: SweptStage, config: Config, inverse: Integers) -> None:
+        """Start without rows."""
+        self.question, self.config, self.inverse = question, config, inverse
+        self.there = np.zeros(int(inverse.max()) + 1, bool)
+        self.labels: dict[str, tuple[str, str]] = {}
+        self.columns: dict[str, SweepVariable] = {}
+
+    def put(self, chunk: Chunk, places: Mapping[str, int]) -> None:
+        """Store the rows of a chunk that belong to this sweep."""
+        self.labels.update(chunk.labels)
+        wanted = [row for row in chunk.rows if row.key in places]
+        at = [places[row.key] for row in wanted]
+        rows = []
+        for row in wanted:
+            numbers = json.loads(row.numbers)
+            own = {"outcome": numbers.get("outcome") or row.status, "status": row.status, "reason": row.reason}
+            last = {name: numbers[whole][-1] for name, whole in LAST_OF.items() if whole in numbers}
+            rows.append({**numbers, **last, **own})
+        self.there[at] = True
+        for name in dict.fromkeys(chain.from_iterable(rows)):
+            have = [k for k, row in enumerate(rows) if name in row]
+            first = rows[have[0]][name]
+            text = isinstance(first, str)
+            if name not in self.columns:
+                self.columns[name] = SweepVariable(self.there.size, () if text else np.shape(first), text)
+            column = self.columns[name]
+            have = [k for k in have if isinstance(rows[k][name], str) == column.text]
+            column.put(np.array([at[k] for k in have], int), [rows[k][name] for k in have])
+
+    @property
+    def numbers(self) -> Collection[str]:
+        """Names of quantities with one number per result."""
+        return [name for name, column in self.columns.items() if not column.text and column.values.ndim == 1]
+
+    def of(self, name: str) -> NDArray[Any] | None:
+        """Return the points' values of a quantity, NaN or '' for a gap; None if no point has it."""
+        return self.columns[name].values[self.inverse] if name in self.columns else None
+
+    def content(self) -> InTurn:
+        """Return the content to store; call it once."""
+        question = self.question
+        parameters = dict(coordinates(question, self.config))
+        statuses = self.columns["status"].values[self.inverse]
+        summary = {
+            "of": question.stage,
+            "parameters": {name: list(axis.values) for name, axis in zip(question.names, question.axes, strict=True)},
+            "layout": question.layout,
+            "points": len(question),
+            "done": int(np.sum(statuses != "failed")),
+            "failed": int(np.sum(statuses == "failed")),
+            "outcomes": count_texts(self.columns["outcome"].values[self.inverse]),
+            **self.numerical_error(),
+        }
+        ended = self.endings()
+        summary |= {"endings": ended} if ended else {}
+        attrs = {"coordinates": " ".join(question.names)} if question.layout == "list" else {}
+        scales = {name: one for name, one in parameters.items() if one.dims == (name,)}
+        size = sum(one.values.nbytes * (TEXT_BYTES if one.text else 1) for one in self.columns.values())
+        # a quantity that is also a parameter is stored as its coordinate
+        names = sorted({*parameters, *self.columns})
+        variables = ((name, parameters[name] if name in parameters else self.variable(name)) for name in names)
+        return InTurn(summary, attrs, scales, variables, size)
+
+    def endings(self) -> list[dict[str, Any]]:
+        """Describe how the walks ended and the role of the ground; empty for a stage that does not walk."""
+        question, config = self.question, self.config
+        outcomes = self.columns["outcome"].values[self.inverse]
+        pads, pitch = None, self.of("pitch_m")
+        off, lengths = outcomes == "off-pad", self.of("step_lengths_m")
+        if pitch is not None and off.any():
+            last = np.zeros(0) if lengths is None else last_of_each(lengths[off])
+            steps = last[np.isfinite(last)]
+            varied = PAD_PITCH in (axis.key for axis in question.axes)
+            laid = "" if config.contact is None or varied else config.contact.pad_pitch
+            pads = Pads(ends_of(pitch[off]), ends_of(steps) if steps.size else None, str(laid))
+        return describe_endings(count_texts(outcomes), config, question.stage == CONTACT, pads)
+
+    def numerical_error(self) -> dict[str, Any]:
+        """The largest numerical errors of the walks that were taken again, how many those are, and of how many.
+
+        `ended_otherwise` counts those that came to another end, whose error is unknown.
+        Nothing for a stage that does not walk.
+        """
+        found = {key: self.of(f"numerical_error.{key}") for key in ("end_time_s", *ERROR_OF_EACH_STEP.values())}
+        reasons, ends = self.of("numerical_error.reason"), found["end_time_s"]
+        otherwise = 0 if reasons is None else int(np.sum(reasons != ""))
+        known = 0 if ends is None else int(np.sum(np.isfinite(ends)))
+        if otherwise + known == 0:
+            return {}
+        largest = {key: float(np.nanmax(values)) for key, values in found.items() if values is not None}
+        told = {"walked_again": known + otherwise, "of": len(self.inverse), "ended_otherwise": otherwise, **largest}
+        return {"numerical_error": told}
+
+    def variable(self, name: str) -> Variable:
+        """Remove and return a variable over the points, so that no two copies exist."""
+        column = self.columns.pop(name)
+        values = column.typed()[self.inverse]
+        extra = values.shape[1:]
+        own = tuple(f"{name}_index{axis if len(extra) > 1 else ''}" for axis in range(len(extra)))
+        last = name.rpartition(".")[2]
+        if column.text:
+            unit, text = "", OWN.get(name, name)
+        elif last in STATES:
+            unit, text = "rad, rad/s", last.replace("_", " ")
+        elif last in self.labels:
+            unit, text = self.labels[last]
+        else:
+            unit, text = unit_by_name(last), axis_label(name)
+        gaps = values.dtype.kind == "f" and bool(np.isnan(values).any())
+        return Variable(values.reshape(self.question.shape + extra), self.question.dims + own, unit, text, missing=gaps)
+
+
+def last_of_each(rows: NDArray[Any]) -> NDArray[Any]:
+    """Return the last number of each row (..., numbers), ignoring trailing gaps; NaN for an empty row."""
+    known = np.isfinite(rows).sum(axis=-1, keepdims=True)
+    last = np.take_along_axis(rows, np.maximum(known - 1, 0), axis=-1)
+    return np.asarray(np.where(known > 0, last, np.nan)[..., 0])
+
+
+def ends_of(values: NDArray[Any]) -> tuple[float, float]:
+    """Return minimum and maximum."""
+    return float(values.min()), float(values.max())
+
+
+def coordinates(question: SweptStage, config: Any) -> Iterable[tuple[str, Variable]]:
+    """Build the parameters' variables."""
+    for name, axis in zip(question.names, question.axes, strict=True):
+        unit, text = described(config, axis.key)
+        values = axis.values
+        numbers = all(isinstance(value, int | float) and not isinstance(value, bool) for value in values)
+        array = np.array(values, float) if numbers else np.array([str(value) for value in values], object)
+        dims = question.dims if question.layout == "list" else (name,)
+        yield name, Variable(array, dims, unit if numbers else "", text)
+
+
+def count_texts(texts: NDArray[Any]) -> dict[str, int]:
+    """Count equal texts."""
+    names, counts = np.unique(texts.astype(str), return_counts=True)
+    return {str(name): int(count) for name, count in zip(names, counts, strict=True)}
+
+
+def as_csv(content: Content, question: SweptStage, every: bool = False) -> str:
+    """Format a CSV table of the points: parameters, outcome and headline quantities.
+
+    every  all numbers and texts instead; lists take columns
+    """
+    group, dimensions = content[""], len(question.shape)
+    columns: dict[str, list[Any]] = {}
+    for place, (name, axis) in enumerate(zip(question.names, question.axes, strict=True)):
+        columns[name] = [axis.values[question.places(index)[place]] for index in range(len(question))]
+    variables = dict(group.variables)
+    if not every:
+        found = headlines(question.stage, (name for name, one in variables.items() if len(one.dims) == dimensions))
+        variables = {name: variables[name] for name in dict.fromkeys(("outcome", *found, "reason"))}
+    for name, variable in variables.items():
+        if name not in columns:
+            columns.update(flat_columns(name, variable, dimensions))
+    return csv_text([*columns], zip(*columns.values(), strict=True)).decode()
+
+
+def flat_columns(name: str, variable: Variable, dimensions: int) -> Iterable[tuple[str, list[Any]]]:
+    """Format a variable as columns, one for each entry of a list; gaps are empty."""
+    values = variable.values
+    points, own = values.shape[:dimensions], values.shape[dimensions:]
+    rows = values.reshape((int(np.prod(points)), *own))
+    for place in np.ndindex(own):
+        column = rows[(slice(None), *place)].tolist()
+        ending = "".join(f"_{number}" for number in place)
+        yield f"{name}{ending}", ["" if value != value else value for value in column]

@@ -1,0 +1,304 @@
+"""Run a sweep: reuse stored points, compute the others and write one file."""
+
+import contextlib
+import hashlib
+import time
+from collections.abc import Callable, Collection, Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from secrets import token_hex
+from typing import Any
+
+import numpy as np
+
+from walkerlab.config.canonical import canonical_json
+from walkerlab.config.loader import LoadedConfig
+from walkerlab.config.problems import SHOWN_PROBLEMS
+from walkerlab.config.schema import Config
+from walkerlab.errors import ConfigError, NoAnswer, WalkerlabError
+from walkerlab.pipeline.graph import PIPELINE, Graph
+from walkerlab.pipeline.identity import Keys
+from walkerlab.pipeline.progress import Progress, Reporter, Silent
+from walkerlab.pipeline.runs import claim, refuse_another_config
+from walkerlab.pipeline.stages.numerical_error import SAMPLE, evenly_spread
+from walkerlab.pipeline.store import artifact, provenance
+from walkerlab.pipeline.store.content import Content, Group
+from walkerlab.pipeline.store.files import make_folder
+from walkerlab.pipeline.store.hdf5 import GroupOnDisk
+from walkerlab.pipeline.store.key import Identity
+from walkerlab.pipeline.store.runfolder import RunFolder
+from walkerlab.pipeline.sweeps.chunk import Chunk, PointResult, compute_point, join_points, store, stored_chunks
+from walkerlab.pipeline.sweeps.engines import ENGINES, Order, SweepEngine
+from walkerlab.pipeline.sweeps.question import SweptStage
+from walkerlab.pipeline.sweeps.result import Merge
+from walkerlab.pipeline.work import Spread, WorkUnit
+
+PIPELINE_AT = "walkerlab.pipeline.graph:PIPELINE"
+
+
+@dataclass(frozen=True)
+class SweepWork:
+    """Options of computing a sweep.
+
+    engine   that computes the points
+    order    options of the engine
+    chunk_s  target duration of a chunk, s; None for the engine's default
+    wait     wait for another process that works in the folder
+    force    compute every point, stored or not
+    graph    import path of the pipeline, module:NAME
+    check    called with the names of quantities once a point has an answer; may raise
+    """
+
+    engine: SweepEngine = ENGINES["local"]
+    order: Order = field(default_factory=Order)
+    chunk_s: float | None = None
+    wait: bool = True
+    force: bool = False
+    graph: str = PIPELINE_AT
+    check: Callable[[Collection[str]], None] = lambda _names: None
+
+
+@dataclass(frozen=True)
+class Swept:
+    """Result of a sweep.
+
+    path     its file
+    summary  of the file
+    reused   number of points whose result existed
+    wall_s   total time
+    bugs     tracebacks of bugs that stopped points
+    """
+
+    question: SweptStage
+    path: Path
+    summary: Mapping[str, Any]
+    reused: int
+    wall_s: float
+    bugs: tuple[str, ...] = ()
+
+    @property
+    def content(self) -> Content:
+        """Content of the file."""
+        return artifact.read(self.path)
+
+    @property
+    def group(self) -> Group:
+        """Variables over the points, each read from the file on access."""
+        return GroupOnDisk(self.path)
+
+    @property
+    def done(self) -> int:
+        """Number of points with a result, answered or not."""
+        return int(self.summary["done"])
+
+    @property
+    def failed(self) -> int:
+        """Number of points whose computation failed."""
+        return int(self.summary["failed"])
+
+    def error(self) -> WalkerlabError:
+        """Return the error for points that were not computed; the others are stored."""
+        said = f"{self.failed} of {len(self.question)} points were not computed"
+        why = f"`reason` in {self.path} says why."
+        if not self.bugs:
+            return NoAnswer(f"{said}; {why}", "The same command tries them again and keeps the rest.")
+        error = WalkerlabError(
+            f"{said}, and a bug is among the reasons; {why}", "Please report the traceback; the rest is stored."
+        )
+        for bug in self.bugs:
+            error.add_note(bug)
+        return error
+
+
+@dataclass(frozen=True)
+class Foreseen:
+    """Plan of a sweep.
+
+    points     descriptions of the first points
+    count      number of points
+    there      number of points with a stored result
+    estimate_s time for the rest, s; None if no such point was timed
+    """
+
+    path: Path
+    points: tuple[str, ...]
+    count: int
+    there: int
+    estimate_s: float | None
+
+
+class SweepRun:
+    """A sweep whose points are all valid."""
+
+    def __init__(self, question: SweptStage, loaded: LoadedConfig, folder: RunFolder, graph: Graph = PIPELINE) -> None:
+        """Check every point by the schema.
+
+        Raises ConfigError for points that are no configs and for a stage that has no result without files.
+        """
+        refuse_unknown_stage(question.stage, graph)
+        self.question, self.folder, self.loaded = question, folder, loaded
+        self.keys = Keys(graph)
+        keys = np.frombuffer(b"".join(self.checked_keys()), dtype="S32")
+        unique, self.inverse = np.unique(keys, return_inverse=True)
+        self.places = {key.ljust(32, b"\0").hex(): place for place, key in enumerate(unique.tolist())}
+        # first of the points that share a key
+        self.first = np.full(len(unique), len(keys))
+        np.minimum.at(self.first, self.inverse, np.arange(len(keys)))
+        over = {axis.key: list(axis.values) for axis in question.axes}
+        base = loaded.config.model_dump(mode="json", exclude={"sweep"})
+        self.slice = {"of": question.stage, "over": over, "layout": question.layout, "config": base}
+        digest = hashlib.sha256(canonical_json(self.slice).encode()).hexdigest()[:8]
+        self.path = folder.path / f"sweep-{question.stage}-{'-'.join(question.names)[:60]}-{digest}.h5"
+
+    def config(self, index: int) -> Config:
+        """Build one point's config, on demand since a sweep may have a million points."""
+        return self.loaded.variant(self.question.settings(index))
+
+    def checked_keys(self) -> list[bytes]:
+        """Return the stage key of every point (32 bytes each), in order.
+
+        Raises ConfigError that names the invalid points with their values, each reason once.
+        """
+        found: list[bytes] = []
+        problems: dict[str, str] = {}
+        for index in range(len(self.question)):
+            try:
+                found.append(bytes.fromhex(self.keys.of(self.config(index), self.question.stage)[self.question.stage]))
+            except ConfigError as error:
+                at = f"at {self.question.said(index)}: " if len(self.question.axes) > 1 else ""
+                problems.setdefault(error.message, f"{at}{error.message}")
+                if len(problems) == SHOWN_PROBLEMS:
+                    problems["more"] = "and perhaps more"
+                    break
+        if problems:
+            raise ConfigError("\n".join(problems.values()), "Nothing was run; leave these values out.")
+        return found
+
+    def unread(self) -> Iterator[str]:
+        """Iterate over parameters that neither the stage nor its inputs read."""
+        base = self.keys.of(self.config(0), self.question.stage)
+        for number, axis in enumerate(self.question.axes):
+            settings = self.question.settings(0)
+            settings[number] = axis.setting(len(axis.values) - 1)
+            if axis.values[-1] != axis.values[0]:
+                with contextlib.suppress(ConfigError):  # that corner is invalid
+                    if self.keys.of(self.loaded.variant(settings), self.question.stage) == base:
+                        yield axis.key
+
+    def foresee(self, workers: int, shown: int) -> Foreseen:
+        """Return the plan without changing a file; raises ConfigError as `run` does."""
+        refuse_another_config(self.folder, self.loaded.config)
+        there = np.zeros(len(self.places), bool)
+        rows: list[PointResult] = []
+        for chunk in self._stored(Silent().warn):
+            rows += chunk.rows
+            there[[self.places[row.key] for row in chunk.rows if row.key in self.places]] = True
+        count = len(self.question)
+        missing = int(np.sum(~there))
+        walls = [row.wall_s for row in rows if row.wall_s > 0.0]
+        estimate: float | None = 0.0
+        if missing:
+            estimate = float(np.median(walls)) * missing / max(1, workers) if walls else None
+        said = tuple(self.question.said(index) for index in range(min(shown, count)))
+        return Foreseen(self.path, said, count, int(there[self.inverse].sum()), estimate)
+
+    def run(self, work: SweepWork, reporter: Reporter | None = None) -> Swept:
+        """Compute the points without a stored result and write the sweep's file.
+
+        Raises ConfigError if the folder holds results of another config, LockedError (only without `wait`),
+        StorageError, and NoAnswer if no worker lives.
+        """
+        started = time.perf_counter()
+        reporter = reporter or Silent()
+        for key in self.unread():
+            reporter.note(f"sweep: {self.question.stage} does not read {key}; points that differ in it alone are one")
+        make_folder(self.folder.path)
+        with self.folder.locked(work.wait, reporter.note):
+            claim(self.folder, self.loaded.config)
+            merge = Merge(self.question, self.loaded.config, self.inverse)
+            for chunk in () if work.force else self._stored(reporter.warn):
+                merge.put(chunk, self.places)
+            reused = int(merge.there[self.inverse].sum())
+            if reused:
+                reporter.note(f"sweep: {reused} of {len(self.question)} points exist already")
+            begun = provenance.begin(self.loaded.config, {})
+            progress = reporter.begin(
+                "sweep", f"{len(self.question) - reused} of {len(self.question)} points to compute"
+            )
+            try:
+                bugs = self._compute(merge, work, reporter, progress, begun)
+            except KeyboardInterrupt:
+                kept = int(merge.there[self.inverse].sum())
+                reporter.note(f"sweep: interrupted; {kept} of {len(self.question)} points are kept")
+                raise
+            finally:
+                progress.end("")
+            content = merge.content()
+            identity = Identity("sweep", self.slice, {}, self.code_digest)
+            complete = content.summary["failed"] == 0
+            artifact.write_in_turn(self.path, content, identity, begun.until_now(), complete)
+        return Swept(self.question, self.path, content.summary, reused, time.perf_counter() - started, bugs)
+
+    @property
+    def code_digest(self) -> str:
+        """Digest of the stage's code."""
+        return self.keys.code_digest(self.question.stage)
+
+    def _stored(self, warn: Callable[[str], None]) -> Iterator[Chunk]:
+        return stored_chunks(self.folder.runs_dir, self.question.stage, self.code_digest, self.places, warn)
+
+    def _compute(
+        self, merge: Merge, work: SweepWork, reporter: Reporter, progress: Progress, begun: provenance.Provenance
+    ) -> tuple[str, ...]:
+        """Compute the missing points; return tracebacks of bugs, one for each place in the code."""
+        missing = np.sort(self.first[~merge.there])
+        if not missing.size:
+            return ()
+        bugs: dict[str, str] = {}
+        progress.start("sweep", int(missing.size))
+        stage, digest = self.question.stage, self.code_digest
+
+        def keep(chunk: Chunk) -> None:
+            store(self.folder, stage, digest, chunk, begun)
+            merge.put(chunk, self.places)
+            if any(row.status == "answered" for row in chunk.rows):
+                work.check(merge.numbers)
+            for bug in (row.bug for row in chunk.rows if row.bug):
+                place = bug.rpartition("\n  ")[0]  # without the message, which differs from point to point
+                if place not in bugs:
+                    reporter.warn(f"a bug stopped a point of the sweep; the others go on.\n{bug}")
+                    bugs[place] = bug
+            progress.advance(len(chunk.rows))
+
+        def give_up(unit: WorkUnit, error: BaseException) -> None:
+            why = f"its worker died: {type(error).__name__}: {error}"
+            keep(Chunk((PointResult(unit.name, "failed", why),), {}))
+
+        todo, chunk_s = self._units(missing.tolist(), work), work.chunk_s or work.engine.chunk_s
+        spread = Spread(todo, int(missing.size), lambda _units, points: keep(join_points(points)), give_up, chunk_s)
+        with work.engine.opened(work.order) as pool:
+            spread.run(pool.executor, pool.workers)
+        return tuple(bugs.values())
+
+    def _units(self, indices: list[int], work: SweepWork) -> Iterator[WorkUnit]:
+        """Iterate over the points to compute; walks of a sample are repeated for their numerical error."""
+        stage, forced = self.question.stage, token_hex() if work.force else ""
+        sample = set(np.sort(self.first)[evenly_spread(self.first.size, SAMPLE)].tolist())
+        for index in indices:
+            config = self.config(index)
+            key = self.keys.of(config, stage)[stage]
+            yield WorkUnit(key, 1, partial(compute_point, config, key, work.graph, stage, index in sample, forced))
+
+
+def refuse_unknown_stage(name: str, graph: Graph) -> None:
+    """Raise ConfigError for a stage that cannot be swept."""
+    can = [stage.name for stage in graph.stages if not stage.draws]
+    if name not in can:
+        raise ConfigError(f"--stage {name}: cannot be swept.", f"Stages that can: {', '.join(can)}.")
+
+
+def modules_of(stage: str, config: Any, graph: Graph) -> tuple[str, ...]:
+    """Return the modules needed to compute a stage; raises ConfigError for a stage that cannot be swept."""
+    refuse_unknown_stage(stage, graph)
+    return tuple(one.module for one in graph.needed_for(stage, config))

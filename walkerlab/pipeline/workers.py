@@ -1,0 +1,308 @@
+"""Worker processes: `in_order` for a list of calls, `WorkerPool` for calls that arrive one by one.
+
+A worker is a separate interpreter that receives calls and returns their results. It never runs the caller's script, so
+scripts without a guard, code from standard input and notebooks can use workers. Workers end with their parent, however
+that ends; the parent handles keyboard interrupts.
+"""
+
+import contextlib
+import importlib
+import os
+import pickle
+import queue
+import signal
+import subprocess
+import sys
+import threading
+import traceback
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import partial
+from multiprocessing import Pipe
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import Any, TypeVar
+
+from walkerlab.errors import WalkerlabError
+from walkerlab.physics.kernel_cache import cache_root
+from walkerlab.pipeline.interrupts import raise_on
+
+PATIENCE_S = 5.0
+"""Time for a worker to end before it is killed."""
+START = """
+import signal, sys
+signal.signal(signal.SIGINT, signal.SIG_IGN)
+sys.path[:] = {path!r}
+from walkerlab.pipeline.workers import serve
+serve({line}, {modules!r})
+"""
+
+R = TypeVar("R")
+Hear = Callable[[Any], None]
+
+
+class WorkerDiedError(WalkerlabError):
+    """A worker crashed or was killed before it answered."""
+
+    exit_code = 4
+
+    def __init__(self, exit_code: int) -> None:
+        """Describe the end of a worker.
+
+        exit_code  of the process, negative for a signal
+        """
+        how = signal.Signals(-exit_code).name if exit_code < 0 else f"exit code {exit_code}"
+        super().__init__(
+            f"a worker process ended before it had answered ({how}).",
+            "What it printed may say why. If it was killed, perhaps memory was short: --jobs 1 needs less.",
+        )
+        self.exit_code_of_worker = exit_code
+
+    def __reduce__(self) -> tuple[type, tuple[int]]:
+        """Support pickling."""
+        return type(self), (self.exit_code_of_worker,)
+
+
+class WorkerTimeoutError(Exception):
+    """A worker did not answer in time."""
+
+
+@dataclass(frozen=True)
+class Told:
+    """Message of a running call."""
+
+    value: Any
+
+
+@dataclass(frozen=True)
+class Answer:
+    """Result of a call: its value, or the error that it raised."""
+
+    value: Any = None
+    error: Exception | None = None
+
+
+class Worker:
+    """A process that runs one call after the other."""
+
+    def __init__(
+        self,
+        modules: Sequence[str] = (),
+        environment: Mapping[str, str] | None = None,
+        folder: Path | None = None,
+        quiet: bool = False,
+    ) -> None:
+        """Start the process.
+
+        modules      to import at once, before the first call
+        environment  variables that differ from this process's
+        folder       working folder; default: this process's
+        quiet        discard its output
+        """
+        self._line, theirs = Pipe()
+        path = [os.path.abspath(entry) for entry in sys.path]  # noqa: PTH100 (entries are texts, '' the folder here)
+        code = START.format(path=path, line=theirs.fileno(), modules=tuple(modules))
+        output = subprocess.DEVNULL if quiet else None
+        self.process = subprocess.Popen(
+            [sys.executable, "-P", "-c", code],
+            pass_fds=(theirs.fileno(),),
+            stdin=subprocess.DEVNULL,
+            stdout=output,
+            stderr=output,
+            cwd=folder,
+            # all processes share one folder of compiled code
+            env={**os.environ, "WALKERLAB_CACHE": str(cache_root()), **(environment or {})},
+        )
+        theirs.close()
+
+    def do(self, call: Callable[[], R], hear: Hear | None = None, timeout_s: float | None = None) -> R:
+        """Run a call in the worker; returns its value or raises its error.
+
+        hear       receives the call's messages
+        timeout_s  maximum time between two messages, s
+
+        Raises WorkerDiedError and WorkerTimeoutError.
+        """
+        work = pickle.dumps(call)
+        with contextlib.suppress(OSError):  # a dead worker shows in the missing answer
+            self._line.send_bytes(work)
+        while isinstance(message := self._received(timeout_s), Told):
+            if hear is not None:
+                hear(message.value)
+        if message.error is not None:
+            raise message.error
+        value: R = message.value
+        return value
+
+    def _received(self, timeout_s: float | None) -> Told | Answer:
+        try:
+            if not self._line.poll(timeout_s):
+                raise WorkerTimeoutError
+            message: Told | Answer = self._line.recv()
+        except (EOFError, OSError):
+            raise WorkerDiedError(self.ended()) from None
+        return message
+
+    @property
+    def alive(self) -> bool:
+        """Whether the process runs."""
+        return self.process.poll() is None
+
+    def leave(self) -> None:
+        """Ask the process to drop its call and end."""
+        self.process.terminate()
+
+    def ended(self) -> int:
+        """Wait for its end, kill it if it does not end in time, and return its exit code."""
+        try:
+            return self.process.wait(PATIENCE_S)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            return self.process.wait()
+
+    def close(self) -> None:
+        """End it."""
+        self.leave()
+        self.ended()
+        self._line.close()
+
+
+class WorkerPool(Executor):
+    """Executor whose workers start as needed, replace dead ones, and end with the pool."""
+
+    def __init__(self, size: int, modules: Sequence[str] = (), environment: Mapping[str, str] | None = None) -> None:
+        """Set up at most `size` workers without starting one; `modules` and `environment` as in `Worker`."""
+        self.size = size
+        self._new_worker = partial(Worker, modules, environment)
+        self._threads = ThreadPoolExecutor(size)  # each waits for one worker
+        self._lock = threading.Lock()
+        self._idle: list[Worker] = []
+        self._busy: list[Worker] = []
+        self._closed = False
+
+    def start_all(self) -> None:
+        """Start all workers now, so that they import their modules meanwhile."""
+        with self._lock:
+            self._idle += [self._new_worker() for _ in range(self.size - len(self._idle) - len(self._busy))]
+
+    def start(self, call: Callable[[], R], hear: Hear | None = None) -> Future[R]:
+        """Run a call in the next free worker; `hear` receives its messages in another thread."""
+        return self._threads.submit(self._do, call, hear)
+
+    def submit(self, fn: Callable[..., R], /, *args: Any, **kwargs: Any) -> Future[R]:
+        """Run a function in the next free worker."""
+        return self.start(partial(fn, *args, **kwargs))
+
+    def _do(self, call: Callable[[], R], hear: Hear | None) -> R:
+        with self._lock:
+            if self._closed:
+                raise WorkerDiedError(-signal.SIGTERM)
+            self._idle = [worker for worker in self._idle if worker.alive]
+            worker = self._idle.pop() if self._idle else self._new_worker()
+            self._busy.append(worker)
+        try:
+            return worker.do(call, hear)
+        finally:
+            with self._lock:
+                self._busy.remove(worker)
+                self._idle.append(worker)
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        """End the workers; with `wait`, after they have finished their calls."""
+        self._threads.shutdown(wait=wait, cancel_futures=cancel_futures)
+        with self._lock:
+            self._closed = True
+            workers = [*self._idle, *self._busy]
+        for worker in workers:
+            worker.leave()
+        for worker in workers:
+            worker.ended()
+        self._threads.shutdown()  # no thread listens any more
+        for worker in workers:
+            worker.close()
+
+    def __exit__(self, *_: object) -> None:
+        """End the workers at once."""
+        self.shutdown(wait=False, cancel_futures=True)
+
+
+def in_order(
+    calls: Sequence[Callable[[], R]], jobs: int, first: Sequence[int] = (), rank: Callable[[int], float] = float
+) -> Iterator[R]:
+    """Iterate over the results of independent calls, in order.
+
+    jobs   processes
+    first  indices of calls to run in this process beforehand, so that kernels are compiled once
+    rank   of an index; calls of lowest rank start first, so that no long call runs alone at the end
+    """
+    if jobs <= 1 or len(calls) <= 1:
+        for call in calls:
+            yield call()
+        return
+    ready = {place: calls[place]() for place in first}
+    with WorkerPool(min(jobs, len(calls))) as pool:
+        others = {place: pool.start(calls[place]) for place in sorted({*range(len(calls))} - {*first}, key=rank)}
+        for place in range(len(calls)):
+            yield ready[place] if place in ready else others[place].result()
+
+
+# The rest runs in the worker.
+
+
+class LeaveError(BaseException):
+    """This process is asked to end and to drop its call."""
+
+
+def tell(value: Any) -> None:
+    """Send a message to the parent process."""
+    assert _lines, "only calls in a worker can tell"
+    _lines[0].send(Told(value))
+
+
+_lines: list[Connection] = []
+"""In a worker: the connection to its parent."""
+
+
+def serve(number: int, modules: Sequence[str]) -> None:
+    """Run calls until this process is told to end.
+
+    number  descriptor of the connection to the parent
+    """
+    os.set_inheritable(number, False)
+    line = Connection(number)
+    _lines.append(line)
+    calls: queue.SimpleQueue[bytes] = queue.SimpleQueue()
+    threading.Thread(target=receive, args=(line, calls), daemon=True).start()
+    # before the first call, a signal just ends the process
+    for module in modules:
+        importlib.import_module(module)
+    with contextlib.suppress(LeaveError):
+        raise_on(signal.SIGTERM, LeaveError)
+        while True:
+            line.send_bytes(answer(calls.get()))
+    # the call is dropped; a second signal, as from terminal and parent, just ends the process
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+
+
+def receive(line: Connection, calls: queue.SimpleQueue[bytes]) -> None:
+    """Queue incoming calls, and end this process once the parent is gone."""
+    with contextlib.suppress(EOFError, OSError):
+        while True:
+            calls.put(line.recv_bytes())
+    os._exit(1)
+
+
+def answer(work: bytes) -> bytes:
+    """Run a pickled call; return its pickled answer, with a description of errors that cannot be pickled."""
+    try:
+        return pickle.dumps(Answer(pickle.loads(work)()))
+    except Exception as error:
+        said = f"In a worker process:\n{traceback.format_exc()}"
+        error.add_note(said)
+        try:
+            failed = pickle.dumps(Answer(error=error))
+            pickle.loads(failed)
+        except Exception:  # an exception may be made of anything
+            return pickle.dumps(Answer(error=RuntimeError(said)))
+        return failed

@@ -1,0 +1,56 @@
+"""`walkerlab clean`: remove the results of a run."""
+
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import typer
+
+from walkerlab.pipeline.store.clean import CHUNKS, FIGURES, files_of, remove, remove_if_empty
+from walkerlab.pipeline.store.runfolder import RunFolder
+from walkerlab.views.cli.failures import print_result
+from walkerlab.views.cli.request import Request
+
+
+def clean_folders(request: Request, every: bool, stages: Sequence[str], yes: bool) -> None:
+    """Delete the files of these stages from run folders, once confirmed, and folders left empty.
+
+    every  clean all runs instead of the request's
+
+    Raises typer.BadParameter without a terminal to confirm on, LockedError (with `--no-wait`) and StorageError.
+    """
+    if every:
+        there = sorted(path.name for path in request.runs.iterdir() if path.is_dir()) if request.runs.is_dir() else []
+        folders = [RunFolder(request.runs, name) for name in there]
+    else:
+        folders = [request.folder]
+    found = {folder: files_of(folder, stages) for folder in folders}
+    files = [path for paths in found.values() for path in paths]
+    sizes = {path: path.lstat().st_size for path in files}
+    where = folders[0].path if len(folders) == 1 else request.runs
+    if files and not (yes or request.dry_run):
+        if not sys.stdin.isatty():
+            raise typer.BadParameter("cannot ask for confirmation without a terminal; give --yes", param_hint="--yes")
+        if not typer.confirm(f"Remove {len(files)} files from {where}?", err=True):
+            found, files = {}, []
+    if not request.dry_run:
+        for folder, paths in found.items():
+            if paths:
+                with folder.locked(not request.no_wait, request.console.note):
+                    remove(folder, paths)
+                remove_if_empty(folder)
+    said = "would be removed" if request.dry_run else "removed"
+    lines = [f"{said}: {one}" for one in file_lines(files, sizes)] or [f"{where}: nothing {said}"]
+    print_result(request, {"run_dir": str(where), "removed": [*map(str, files)], "dry_run": request.dry_run}, lines)
+
+
+def file_lines(files: Sequence[Path], sizes: Mapping[Path, int]) -> list[str]:
+    """Describe files, one line each, with one line for a run's figures and one for the chunks of each sweep."""
+    lines: dict[str, list[Path]] = {}
+    for path in files:
+        stem = {CHUNKS: f"{path.stem.rpartition('-')[0]}-*", FIGURES: "*"}.get(path.parent.name, path.name)
+        lines.setdefault(str(path.parent / stem), []).append(path)
+    return [
+        line if len(paths) == 1 else f"{line} ({len(paths)} files, {sum(sizes[path] for path in paths) / 1e6:.1f} MB)"
+        for line, paths in lines.items()
+    ]

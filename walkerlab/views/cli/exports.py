@@ -1,0 +1,379 @@
+"""Exports for use elsewhere: figures, tables and trajectories as files, and walks as GIF or MP4."""
+
+from __future__ import annotations
+
+import io
+import re
+import shlex
+import shutil
+import subprocess
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from walkerlab.config.problems import suggestion
+from walkerlab.config.schema import Config
+from walkerlab.errors import ConfigError, StaleError, StorageError
+from walkerlab.labels import join_words, with_unit
+from walkerlab.pipeline.executor import Executor
+from walkerlab.pipeline.graph import PIPELINE
+from walkerlab.pipeline.results import FolderResults
+from walkerlab.pipeline.runs import (
+    command,
+    config_of,
+    read_all,
+    refusing_older,
+    results_in,
+    results_to_show,
+    the_result,
+)
+from walkerlab.pipeline.store.artifact import Stored
+from walkerlab.pipeline.store.clean import owner_of
+from walkerlab.pipeline.store.csv_text import csv_text
+from walkerlab.pipeline.store.files import as_text, storing, write_through
+from walkerlab.pipeline.store.runfolder import RunFolder
+from walkerlab.views.cli.console import Console
+from walkerlab.views.report.answers import paper_table
+from walkerlab.views.report.outcomes import MODELS
+from walkerlab.views.report.tables import Table, as_csv, of_records
+from walkerlab.views.report.tex import as_tex
+
+if TYPE_CHECKING:
+    from walkerlab.views.figures.illustration import Illustration
+
+FIGURE_KINDS, TRAJECTORY_KINDS = ("pdf", "svg", "png", "eps", "tiff"), ("csv", "nc")
+WRITERS = {"csv": as_csv, "tex": as_tex}
+DRAWING_KINDS = ("svg", "pdf", "png")
+FILM_KINDS = ("gif", "mp4")
+TABLES = {"table": "paper_numbers", "table-1": "table1", "table-2": "table2", "table-3": "table3"}
+NOT_IN_NAMES = re.compile(r"[^a-z0-9]+")
+TRAJECTORY = "trajectory"
+COLUMNS = {1: 252.0, 2: 516.0}
+"""Width of one or two columns of a journal, pt."""
+DPI = 300
+"""Resolution that journals ask of pictures."""
+STORED_WITH = "Run it with outputs: [states, energies, forces]."
+"""Advice for a walk that was stored without a trajectory."""
+NUMBERED = re.compile(r"(?:fig(?:ure)?[- .]*)?0*(\d+)")
+
+
+@dataclass(frozen=True)
+class Target:
+    """Destination of an export.
+
+    to      a format, or a file name with that ending if `output` is None
+    output  the file; None derives its name from the run
+    inputs  files that the command reads, which must not be overwritten
+    """
+
+    to: str | None
+    output: Path | None
+    inputs: tuple[Path, ...] = ()
+
+    def of(self, what: str, stem: str, kinds: Sequence[str]) -> tuple[Path, str]:
+        """Return file and format; the first of `kinds` by default.
+
+        Raises ConfigError for an unknown format, for two at once, and for a file that must not be overwritten.
+        """
+        a_file = self.to is not None and self.output is None and "." in self.to
+        output = Path(str(self.to)) if a_file else self.output
+        named = "" if output is None else output.suffix.removeprefix(".")
+        kind = (None if a_file else self.to) or named or kinds[0]
+        if kind not in kinds:
+            raise ConfigError(f"{what} cannot be written as {kind}.", f"--to {', '.join(kinds)}")
+        if named in kinds and named != kind:
+            raise ConfigError(
+                f"--to {kind} and {output} name two formats.", "Leave out --to, or give the file that ending."
+            )
+        path = output or Path(f"{stem}.{kind}")
+        with storing(path):
+            self.refuse(path, kind)
+        return path, kind
+
+    def refuse(self, path: Path, kind: str) -> None:
+        """Raise ConfigError if the file is a folder, an input of the command, or a result of a run."""
+        another = "Nothing was written; name another file with -o."
+        if path.is_dir():
+            raise ConfigError(f"{path} is a folder.", f"Name a file in it: -o {shlex.quote(f'{path}/NAME.{kind}')}")
+        if path.exists() and any(one.exists() and path.samefile(one) for one in self.inputs):
+            raise ConfigError(f"{path} is an input of this command.", another)
+        owner = owner_of(path, (stage.name for stage in PIPELINE.stages))
+        if owner is not None:
+            raise ConfigError(f"{path} belongs to the results of the run {owner.path}.", another)
+
+
+def write_file(path: Path, data: bytes, console: Console) -> Path:
+    """Write a file, with a warning if that changes an existing one; StorageError if the system refuses."""
+    replaced = path.is_file() and path.read_bytes() != data
+    try:
+        write_through(path, data)
+    except StorageError as error:
+        raise StorageError(error.message, "Name another file with -o.") from error
+    if replaced:
+        console.warn(f"{path} existed and was replaced.")
+    return path
+
+
+def export_from(
+    folder: RunFolder, what: str, target: Target, width: float, model: str, console: Console, dpi: int = DPI
+) -> Path:
+    """Write one item of a run to a file, and return its path.
+
+    width  of a figure, pt; `dpi` pixels per inch for pixel formats
+    model  stage whose trajectory is exported
+
+    Raises ConfigError for an unknown item or format, StaleError for a missing result.
+    """
+    if numbered := NUMBERED.fullmatch(what):
+        what = f"figure-{int(numbered[1]):02d}"
+    make: Callable[[str], bytes]
+    kinds: Sequence[str]
+    if what == TRAJECTORY:
+        stem, kinds, make = f"{model}-{what}", TRAJECTORY_KINDS, lambda kind: trajectory(folder, model, kind, console)
+    elif what in TABLES:
+        stem, kinds, make = what, tuple(WRITERS), lambda kind: WRITERS[kind](table(folder, what, kind, console))
+    elif isinstance(found := find_item(folder, what), Table):
+        stem, kinds, make = hyphenate(what), tuple(WRITERS), lambda kind: WRITERS[kind](found)
+    else:
+        stem, kinds, make = what, FIGURE_KINDS, lambda kind: figure(folder, found, kind, (width, dpi), console)
+    path, kind = target.of(what, f"{folder.name}-{stem}", kinds)
+    return write_file(path, make(kind), console)
+
+
+def draw_walker(config: Path, target: Target, console: Console) -> Path:
+    """Draw the walker of a config with its dimensions; ConfigError for a bad config or format."""
+    # Imported here: other exports draw no walker.
+    from walkerlab.config.files import files_read, find_config
+    from walkerlab.config.loader import load
+    from walkerlab.views.figures.measures import drawn
+
+    loaded = load(config, ())
+    for warning in loaded.warnings:
+        console.warn(warning)
+    target = replace(target, inputs=tuple(files_read(find_config(config))))
+    path, kind = target.of("a walker", f"{loaded.run_name}-walker", DRAWING_KINDS)
+    return write_file(path, drawn(loaded.config.walker, as_text(path.stem), kind), console)
+
+
+def hyphenate(words: str) -> str:
+    """Turn words into a file name: lower case, with hyphens."""
+    return NOT_IN_NAMES.sub("-", words.lower().replace("'", "").replace("’", "")).strip("-")
+
+
+def caption_name(caption: str) -> str:
+    """Turn a caption's first words, up to a comma or colon, into a file name."""
+    return hyphenate(re.split("[,:]", caption)[0])
+
+
+def page_tables(folder: RunFolder) -> dict[str, Table]:
+    """Return every table of a run's page by its short caption, or by its whole one where that is ambiguous."""
+    # Imported here: figures need no page.
+    from walkerlab.views.report.registry import pages_of
+    from walkerlab.views.report.results import Results
+
+    planner, report = plan_run(folder), PIPELINE["report"]
+    results = Results(planner.config, planner.inputs(report), (), planner.missing_inputs(report))
+    sections = [section for page in pages_of(results, folder.name) for section in page.sections]
+    tables = [block for section in sections for block in section.blocks if isinstance(block, Table)]
+    short = [caption_name(one.caption) for one in tables]
+    unique = [name not in TABLES and short.count(name) == 1 for name in short]
+    return {
+        name if alone else hyphenate(one.caption): one for name, alone, one in zip(short, unique, tables, strict=True)
+    }
+
+
+def find_item(folder: RunFolder, name: str) -> Illustration | Table:
+    """Return the figure or table of a name; ConfigError that lists the run's items if there is none."""
+    # Imported here: a table needs no drawing.
+    from walkerlab.views.figures.registry import FIGURES
+
+    named = {one.name: one for one in FIGURES}
+    if name in named:
+        return named[name]
+    tables = page_tables(folder)
+    for called in (hyphenate(name), caption_name(name)):
+        if called in tables:
+            return tables[called]
+    stored, _ = read_all(folder, (stage.name for stage in PIPELINE.stages))
+    compared = stored["compare"].summary if "compare" in stored else {}
+    there = [one.name for one in FIGURES if one.why_left_out(stored, {}) is None]
+    there += [table for table, key in TABLES.items() if key in compared]
+    there += tables
+    there += [TRAJECTORY] * any(TRAJECTORY in result.groups for result in stored.values())
+    nothing = f"{folder.path} has no results yet: {command(folder, PIPELINE['report'])} computes them all."
+    advice = "\n  ".join([f"{folder.path} has", *there]) if there else nothing
+    near = suggestion(name, (*named, *TABLES, TRAJECTORY, *tables))
+    raise ConfigError(f"nothing is called {name}.{near}", advice)
+
+
+def plan_run(folder: RunFolder) -> Executor:
+    """Return an executor with the run's current results; without any if its config is no longer valid."""
+    config = config_of(folder)
+    stages = () if config is None else PIPELINE.stages
+    executor = Executor(config or Config(), FolderResults(folder, elsewhere=False), stages)
+    executor.plan()
+    return executor
+
+
+def figure(
+    folder: RunFolder, illustration: Illustration, kind: str, size: tuple[float, int], console: Console
+) -> bytes:
+    """Draw a figure as on the page; StaleError if the run lacks a result that it needs.
+
+    size  width in pt, and pixels per inch
+
+    If its results are outdated it is drawn from them, with a warning.
+    """
+    stored = results_in(folder, illustration.stages)
+    run, plot = plan_run(folder), PIPELINE["plot"]
+    taken = {name: result for name, result in run.inputs(plot).items() if isinstance(result, Stored)}
+    known = taken.keys() | run.left_out.keys()
+    outdated, _ = read_all(folder, (name for name in plot.results(run.config) if name not in known))
+    with refusing_older(folder, outdated):
+        why = illustration.why_left_out(stored, {})
+    if why is not None:
+        made = [command(folder, PIPELINE[stage]) for stage in illustration.stages if stage not in stored]
+        advice = f"{join_words(made)} {'makes' if len(made) == 1 else 'make'} what it needs." if made else ""
+        raise StaleError(f"{illustration.name} cannot be drawn: {why}.", advice)
+    left_out = stored.keys() <= taken.keys()
+    if not left_out:
+        taken |= stored | {name: result for name, result in outdated.items() if result.complete}
+    if outdated:
+        console.warn(
+            f"{folder.path} has outdated results, which are {'left out' if left_out else 'drawn all the same'}: "
+            f"{join_words(sorted(outdated))}; {command(folder, PIPELINE['report'])} makes them anew."
+        )
+    with refusing_older(folder, outdated):
+        return illustration.as_file(taken, kind, *size)
+
+
+def table(folder: RunFolder, name: str, kind: str, console: Console) -> Table:
+    """Return a table of the paper's values; ConfigError if the walker is not the paper's.
+
+    kind  csv: records by key; tex: as on the page
+    """
+    with results_to_show(folder, ["compare"], console.warn) as results:
+        summary = the_result(results, folder, "compare").summary
+    if TABLES[name] not in summary:
+        raise ConfigError(
+            f"{folder.path} has no {name}: it compares with the paper's walker, and this run's walker is another.",
+            f"Its page has {join_words(page_tables(folder))}.",
+        )
+    rows = summary[TABLES[name]]
+    if kind == "tex":
+        tex_table: Table = paper_table(TABLES[name], rows)
+        return tex_table
+    if isinstance(rows, Mapping):
+        rows = [{"quantity": quantity, **row} for quantity, row in rows.items()]
+    return of_records(rows)
+
+
+def trajectory(folder: RunFolder, model: str, kind: str, console: Console) -> bytes:
+    """Write a walk over time: a column per variable and leg (CSV), or a netCDF file."""
+    with results_to_show(folder, [model], console.warn) as results:
+        stored = the_result(results, folder, model)
+    group = stored.groups.get(TRAJECTORY)
+    if group is None:
+        raise StaleError("the walk was stored without a trajectory.", STORED_WITH)
+    if kind == "nc":
+        # Imported here: CSV needs no HDF5.
+        from walkerlab.pipeline.store import hdf5
+
+        about = {
+            "title": f"walkerlab {stored.identity.stage}",
+            "Conventions": hdf5.CONVENTIONS,
+            "content_digest": stored.digest(),
+        }
+        return hdf5.image({"/": replace(group, attrs={**group.attrs, **about})}, {})
+    columns = {}
+    for name, variable in sorted(group.variables.items(), key=lambda named: (named[0] != "time", named[0])):
+        if variable.dims == ("time",):
+            columns[with_unit(name, variable.units)] = variable.values.tolist()
+        elif variable.dims[:1] == ("time",):
+            for place, values in enumerate(variable.values.T.tolist()):
+                columns[with_unit(f"{name} {place + 1}", variable.units)] = values
+    return csv_text(list(columns), zip(*columns.values(), strict=True))
+
+
+@dataclass(frozen=True)
+class Film:
+    """Options of an animation.
+
+    model   stage whose walk is shown
+    steps   number of steps from the first; None lets `film_times` choose
+    rate    pictures per second
+    slower  slow-motion factor
+    """
+
+    model: str
+    steps: int | None
+    rate: int
+    slower: float
+
+
+def walk_in(folder: RunFolder, model: str | None = None) -> str:
+    """Return the stage to show: by default the contact model's walk, if there is one.
+
+    Raises ConfigError if `model` is not a walk.
+    """
+    if model is not None and model not in MODELS:
+        raise ConfigError(f"--model {model}: not a walk.", f"There are {', '.join(MODELS)}.")
+    rigid, contact = MODELS
+    alone = folder.artifact(rigid).is_file() and not folder.artifact(contact).is_file()
+    return model or (rigid if alone else contact)
+
+
+def write_film(folder: RunFolder, target: Target, film: Film, console: Console) -> Path:
+    """Draw a run's walk and write the animation.
+
+    Raises ConfigError for an unknown format, StaleError if there is no walk to draw, StorageError.
+    """
+    path, kind = target.of("an animation", f"{folder.name}-{film.model}", FILM_KINDS)
+    ffmpeg = shutil.which("ffmpeg")
+    if kind == "mp4" and ffmpeg is None:
+        raise ConfigError("an MP4 needs ffmpeg, which is not installed.", "Install it, or write a .gif.")
+    # Imported here: what cannot be written is told before anything is loaded that draws.
+    from walkerlab.views.figures.stick_diagram import FILM_NEEDS, film_times, pictures, sticks_of
+
+    with results_to_show(folder, [film.model], console.warn) as results:
+        walk = the_result(results, folder, film.model)
+        why = FILM_NEEDS[film.model].missing_in(results, {})
+        if why is not None:
+            raise StaleError(f"the walk cannot be drawn: {why}.", STORED_WITH)
+        sticks = sticks_of(walk)
+        at = film_times(sticks, film.steps, film.rate, film.slower)
+        line = console.begin("animate", f"{at.size} pictures")
+        line.start("drawing", int(at.size))
+
+        def count_pictures() -> Iterator[Any]:
+            for picture in pictures(sticks, at, walk.groups.get("terrain")):
+                yield picture
+                line.advance()
+
+        data = gif(count_pictures(), film.rate) if kind == "gif" else mp4(count_pictures(), film.rate, str(ffmpeg))
+        line.end("")
+    return write_file(path, data, console)
+
+
+def gif(pictures: Iterable[Any], rate: int) -> bytes:
+    """Encode the pictures as an endlessly repeating GIF."""
+    from PIL import Image
+
+    frames = [Image.fromarray(picture).quantize(64) for picture in pictures]
+    file = io.BytesIO()
+    frames[0].save(file, format="GIF", save_all=True, append_images=frames[1:], duration=round(1000 / rate), loop=0)
+    return file.getvalue()
+
+
+def mp4(pictures: Iterable[Any], rate: int, ffmpeg: str) -> bytes:
+    """Encode the pictures as an MP4 for browsers and slides; StorageError if ffmpeg fails."""
+    frames = list(pictures)
+    height, width, _ = frames[0].shape
+    raw = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}", "-r", str(rate), "-i", "-"]
+    coded = ["-pix_fmt", "yuv420p", "-movflags", "frag_keyframe+empty_moov", "-f", "mp4", "-"]
+    command = [ffmpeg, "-loglevel", "error", *raw, *coded]
+    done = subprocess.run(command, input=b"".join(map(bytes, frames)), capture_output=True, check=False)
+    if done.returncode:
+        raise StorageError(f"ffmpeg failed: {done.stderr.decode(errors='replace').strip()}", "Write a .gif instead.")
+    return done.stdout

@@ -1,0 +1,98 @@
+"""Failures at the edge: one message, one advice, one exit code; bugs keep their traceback."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import json
+import os
+import signal
+import sys
+from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from walkerlab.errors import StoppedError, StorageError, WalkerlabError, add_run_options
+from walkerlab.pipeline.interrupts import raise_on
+
+if TYPE_CHECKING:
+    from walkerlab.views.cli.request import Request
+
+FULL_DISK_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
+
+
+@contextlib.contextmanager
+def exit_on_failure(request: Request) -> Iterator[None]:
+    """Turn expected failures into a message on stderr and an exit code, and with `--json` into an object.
+
+    request  the command's request, whose run options complete the advised commands
+    """
+    raise_on(signal.SIGTERM, KeyboardInterrupt)
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # a script's background job is to ignore it
+        raise_on(signal.SIGINT, KeyboardInterrupt)
+
+    def print_failed(error: WalkerlabError) -> None:
+        """With `--json`, print the object of a failed command."""
+        if request.as_json:
+            run_dir = None if request.run_dir is None else str(request.run_dir)
+            nothing: dict[str, Any] = {"artifact": None, "reused": False, "wall_s": 0.0, "left_out": []}
+            print_json({"stage": request.command, "run_dir": run_dir, **nothing, "error": error.as_json()})
+
+    try:
+        yield
+        sys.stdout.flush()
+    except WalkerlabError as error:
+        print_failed(error)
+        print_error(error, request.typed)
+        raise typer.Exit(error.exit_code) from None
+    except KeyboardInterrupt:
+        stopped = StoppedError("interrupted", "Finished results are kept; the same command computes the rest.")
+        print_failed(stopped)
+        print(f"{stopped.message}\nadvice: {stopped.advice}", file=sys.stderr)
+        raise typer.Exit(stopped.exit_code) from None
+    except BrokenPipeError:
+        discard_output()
+        raise typer.Exit(0) from None
+    except OSError as error:
+        if error.errno not in FULL_DISK_ERRORS or error.filename is not None:
+            raise
+        discard_output()
+        print_error(
+            StorageError(f"the output could not be written: {error.strerror}.", "The results themselves are stored.")
+        )
+        raise typer.Exit(StorageError.exit_code) from None
+
+
+def discard_output() -> None:
+    """Redirect stdout to nowhere, so that flushing at exit does not fail again."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, sys.stdout.fileno())
+    os.close(nowhere)
+
+
+def print_result(
+    request: Request, value: dict[str, Any], lines: Iterable[str], error: WalkerlabError | None = None
+) -> None:
+    """Print a result as text or JSON; exit non-zero if it holds an error.
+
+    value  object for `--json`
+    lines  text for people
+    """
+    if request.as_json:
+        print_json(value if error is None else value | {"error": error.as_json()})
+    else:
+        sys.stdout.writelines(f"{line}\n" for line in lines)
+    if error is not None:
+        print_error(error, request.typed)
+        raise typer.Exit(error.exit_code)
+
+
+def print_error(error: WalkerlabError, typed: str = "") -> None:
+    print(f"error: {error.message}", file=sys.stderr)
+    if error.advice:
+        print(f"advice: {add_run_options(error.advice, typed)}", file=sys.stderr)
+
+
+def print_json(value: dict[str, Any]) -> None:
+    print(json.dumps(value, indent=2, allow_nan=False))

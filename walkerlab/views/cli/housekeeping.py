@@ -1,0 +1,72 @@
+"""Commands on stored results and configs: status, show, schema, clean."""
+
+from dataclasses import replace
+from typing import Annotated
+
+import typer
+
+from walkerlab.pipeline.graph import Graph
+from walkerlab.views.cli.failures import exit_on_failure, print_result
+from walkerlab.views.cli.request import OF_A_RUN, OF_TALK, Request, command
+
+
+def add_to(app: typer.Typer, graph: Graph) -> None:
+    names = [stage.name for stage in graph.stages]
+
+    @command(app, *OF_A_RUN, *OF_TALK)
+    def status(
+        request: Request,
+        run: Annotated[str | None, typer.Argument(metavar="[RUN]", help="Name or folder of a run.")] = None,
+        check: Annotated[bool, typer.Option("--check", help="Exit with 5 if a result is stale or missing.")] = False,
+    ) -> None:
+        """Show which results are up to date, why others are not, and all runs."""
+        from walkerlab.views.cli.stored import print_status
+
+        print_status(request, graph, check, run)
+
+    @command(app, *OF_A_RUN, *OF_TALK)
+    def show(
+        request: Request,
+        words: Annotated[
+            list[str],
+            typer.Argument(
+                metavar="[RUN] STAGE",
+                help=f"Name or folder of a run, then one of {', '.join(names)}.",
+                show_default=False,
+            ),
+        ],
+    ) -> None:
+        """Print a stage's stored result: summary, arrays and provenance."""
+        *runs, stage = words
+        if stage not in names:
+            raise typer.BadParameter(f"there is no stage {stage!r}; choose from {', '.join(names)}", param_hint="STAGE")
+        if len(runs) > 1 or (runs and request.config is not None):
+            raise typer.BadParameter("one run at a time", param_hint="RUN")
+        asked = replace(request, command=stage, config=runs[0] if runs else request.config)
+        with exit_on_failure(asked):
+            from walkerlab.pipeline.runs import run_named
+            from walkerlab.views.cli.stored import print_stored
+
+            located = replace(asked, config=run_named(runs[0], asked.runs).given) if runs else asked
+            print_stored(located, graph, stage)
+
+    @command(app, "as_json")
+    def schema(
+        request: Request,
+        key: Annotated[str, typer.Argument(metavar="[KEY]", help="A key or a block of keys; default: all.")] = "",
+    ) -> None:
+        """Print the keys of a config: type, unit, bounds, default, meaning, source."""
+        from walkerlab.config.reference import as_json_schema, as_paragraphs
+
+        print_result(request, as_json_schema(key), [as_paragraphs(key)])
+
+    @command(app, *OF_A_RUN, "dry_run", "no_wait", *OF_TALK)
+    def clean(
+        request: Request,
+        all_runs: Annotated[bool, typer.Option("--all", help="Clean every run in the folder of all runs.")] = False,
+        yes: Annotated[bool, typer.Option("--yes", "-y", help="Do not ask for confirmation.")] = False,
+    ) -> None:
+        """Delete a run's results and leftovers of killed runs; keep all other files."""
+        from walkerlab.views.cli.clean import clean_folders
+
+        clean_folders(request, all_runs, names, yes)

@@ -1,0 +1,53 @@
+"""`walkerlab init`: write a commented config to start from."""
+
+import json
+import shlex
+from pathlib import Path
+
+from walkerlab.config.files import DEFAULT, builtin_names
+from walkerlab.config.loader import load, safe_name
+from walkerlab.config.problems import beyond_scope, suggestion
+from walkerlab.config.reference import as_json_schema
+from walkerlab.config.schema import QUESTIONS, Config
+from walkerlab.config.writer import to_commented_yaml
+from walkerlab.errors import ConfigError, StorageError
+from walkerlab.pipeline.store.files import make_folder, write_atomically
+
+SCHEMA = ".walkerlab-schema.json"
+
+
+def write_config(file: Path, walker: str) -> str:
+    """Write the built-in config of a walker type as a user's config with comments, and its schema.
+
+    Raises ConfigError if there is no such type, StorageError if the file exists or cannot be written.
+    """
+    config = load(Path(template(walker))).config
+    if file.exists():
+        raise StorageError(f"{file} already exists.", "Choose another name; nothing was overwritten.")
+    default = Config()
+    untouched = [name for name in QUESTIONS if getattr(config, name) == getattr(default, name)]
+    named = config.model_copy(update={"name": safe_name(file.stem), "source": None})
+    text = f"# yaml-language-server: $schema={SCHEMA}\n{to_commented_yaml(named, untouched)}"
+    try:
+        make_folder(file.parent)
+        write_atomically(file.parent / SCHEMA, json.dumps(as_json_schema(), indent=1).encode() + b"\n")
+        write_atomically(file, text.encode())
+    except StorageError as error:
+        reason = getattr(error.__cause__, "strerror", None) or error.message
+        raise StorageError(
+            f"{file} could not be written: {reason}.", "Choose a file in a writable folder with free space."
+        ) from error
+    return f"wrote {file}, with its schema next to it; next: `walkerlab report -c {shlex.quote(str(file))}`"
+
+
+def template(walker: str) -> str:
+    """Return the built-in config of that name or walker type, the paper's first; ConfigError if there is none."""
+    types: dict[str, str] = {}
+    for name in (DEFAULT, *builtin_names()):
+        types.setdefault(load(Path(name)).config.walker.type, name)
+    named = types | {name: name for name in builtin_names()}
+    if walker not in named:
+        beyond = beyond_scope(walker)
+        said = f"; {beyond}." if beyond else f".{suggestion(walker, named)}"
+        raise ConfigError(f"there is no type of walker {walker!r}{said}", f"There are {', '.join(named)}.")
+    return named[walker]

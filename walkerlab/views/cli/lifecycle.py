@@ -1,0 +1,160 @@
+"""Commands that start, show and repeat runs: init, open, rerun, export, draw, explore, animate."""
+
+import signal
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from walkerlab.errors import StoppedError
+from walkerlab.pipeline.graph import Graph
+from walkerlab.pipeline.interrupts import raise_on
+from walkerlab.views.cli.request import OF_TALK, Request, command
+
+RunArgument = Annotated[
+    str, typer.Argument(metavar="RUN", help="A run's folder, or its name in the folder of all runs.")
+]
+FIGURES = "figure-07 or 7, trajectory, or a table by its caption; any other word lists what there is"
+Output = Annotated[
+    Path | None,
+    typer.Option(
+        "--output",
+        "-o",
+        metavar="FILE",
+        help="File to write; its ending gives the format. Default: named after the run or the config, in this folder.",
+    ),
+]
+FIRST_WALK = "default: contact-sim, or simulate where that has not run"
+
+
+def add_to(app: typer.Typer, graph: Graph) -> None:
+    @command(app, "quiet")
+    def init(
+        request: Request,
+        file: Annotated[
+            Path | None,
+            typer.Argument(metavar="[FILE]", help="The config to write; it must not exist. Default: my-TYPE.yaml."),
+        ] = None,
+        walker: Annotated[
+            str, typer.Option("--type", metavar="TYPE", help="Type of walker, or name of a built-in config.")
+        ] = "compass",
+    ) -> None:
+        """Write a commented config to start from, and a schema for checks in editors."""
+        from walkerlab.views.cli.init import write_config
+
+        message = write_config(file or Path(f"my-{walker}.yaml"), walker)
+        if not request.quiet:
+            print(message)
+
+    @command(app, "runs", "quiet", "verbose", name="open")
+    def open_run(request: Request, run: RunArgument = "paper") -> None:
+        """Show a run's page in the browser."""
+        from walkerlab.errors import StaleError
+        from walkerlab.pipeline.runs import run_named
+
+        folder = run_named(run, request.runs)
+        page = (folder.path / "report.html").resolve()
+        if not page.is_file():
+            advice = f"`walkerlab report -c {folder.typed}` writes it."
+            raise StaleError(f"{folder.path} has no page yet.", advice)
+        request.console.show(page)
+        print(page)
+
+    @command(app, *OF_TALK)
+    def rerun(
+        request: Request,
+        artifact: Annotated[Path, typer.Argument(metavar="ARTIFACT", help="A stage's result, such as simulate.h5.")],
+    ) -> None:
+        """Recompute a stored result from scratch and check that it is the same."""
+        from walkerlab.views.cli.rerun import rerun_artifact
+
+        rerun_artifact(artifact, graph, request)
+
+    @command(app, "runs")
+    def export(
+        request: Request,
+        run: RunArgument,
+        what: Annotated[str, typer.Argument(metavar="WHAT", help=FIGURES)],
+        to: Annotated[
+            str | None, typer.Option("--to", metavar="FORMAT", help="pdf, svg, png, eps, tiff, csv, tex or nc.")
+        ] = None,
+        output: Output = None,
+        columns: Annotated[int, typer.Option(min=1, max=2, help="Journal columns that a figure spans.")] = 1,
+        width: Annotated[
+            float | None,
+            typer.Option(min=72.0, max=7200.0, metavar="PT", help="Width of a figure in points; one column has 252."),
+        ] = None,
+        dpi: Annotated[int, typer.Option(min=30, max=2400, help="Pixels per inch of PNG and TIFF.")] = 300,
+        model: Annotated[str | None, typer.Option(metavar="STAGE", help=f"Whose trajectory; {FIRST_WALK}.")] = None,
+    ) -> None:
+        """Write a figure, a table or a trajectory of a run for use elsewhere."""
+        from walkerlab.pipeline.runs import run_named
+        from walkerlab.views.cli.exports import COLUMNS, Target, export_from, walk_in
+
+        folder, points = run_named(run, request.runs), width or COLUMNS[columns]
+        whose = walk_in(folder, model)
+        print(export_from(folder, what, Target(to, output), points, whose, request.console, dpi))
+
+    @command(app)
+    def draw(
+        request: Request,
+        file: Annotated[Path, typer.Argument(metavar="FILE", help="A config, or the name of a built-in one.")],
+        to: Annotated[str | None, typer.Option("--to", metavar="FORMAT", help="svg, pdf or png.")] = None,
+        output: Output = None,
+    ) -> None:
+        """Draw a config's walker to scale, with dimensions labelled by their config keys."""
+        from walkerlab.views.cli.exports import Target, draw_walker
+
+        print(draw_walker(file, Target(to, output), request.console))
+
+    @command(app, "config", "sets", "runs")
+    def explore(
+        request: Request,
+        port: Annotated[int, typer.Option("--port", min=0, max=65535, help="Port to serve on; 0: any free one.")] = 0,
+        no_browser: Annotated[bool, typer.Option("--no-browser", help="Open no browser.")] = False,
+    ) -> None:
+        """Serve an interactive page with a slider for every parameter (Ctrl-C stops it)."""
+        from walkerlab.views.explore.server import Server
+        from walkerlab.views.explore.walks import ExploredConfig
+
+        assert request.resolved
+        if signal.getsignal(signal.SIGHUP) is signal.SIG_DFL:  # sent when the terminal closes
+            raise_on(signal.SIGHUP, KeyboardInterrupt)
+        try:
+            server = Server(port, ExploredConfig(request.config, tuple(request.sets or ()), request.runs, {}))
+        except OSError as error:
+            raise typer.BadParameter(f"port {port} is not available: {error.strerror}", param_hint="--port") from None
+        try:
+            print(server.url, flush=True)
+            if not no_browser:
+                request.console.show(server.url)
+            server.serve_forever()
+        except KeyboardInterrupt:  # the intended way to stop
+            raise typer.Exit(StoppedError.exit_code) from None
+        finally:
+            server.close()
+
+    @command(app, "runs", "quiet")
+    def animate(
+        request: Request,
+        run: RunArgument,
+        to: Annotated[
+            str | None,
+            typer.Option("--to", metavar="FORMAT", help="gif, or mp4 if ffmpeg is installed; or a file name."),
+        ] = None,
+        output: Output = None,
+        model: Annotated[str | None, typer.Option(metavar="STAGE", help=f"Whose walk; {FIRST_WALK}.")] = None,
+        steps: Annotated[
+            int | None,
+            typer.Option(min=1, help="Steps to show, from the first. Default: 4; for a fall, the last 4 and the fall."),
+        ] = None,
+        rate: Annotated[int, typer.Option(min=1, max=60, help="Frames per second.")] = 25,
+        slower: Annotated[float, typer.Option(min=0.01, help="Slow motion: 2 is half speed.")] = 1.0,
+    ) -> None:
+        """Animate a run's walk."""
+        from walkerlab.pipeline.runs import run_named
+        from walkerlab.views.cli.exports import Film, Target, walk_in, write_film
+
+        folder = run_named(run, request.runs)
+        film = Film(walk_in(folder, model), steps, rate, slower)
+        print(write_film(folder, Target(to, output), film, request.console))

@@ -1,0 +1,115 @@
+"""The program: one command for each stage of the pipeline, and the house-keeping commands."""
+
+import atexit
+import gc
+import os
+import sys
+import warnings
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from typer.core import TyperGroup
+
+import walkerlab
+from walkerlab.pipeline.graph import PIPELINE, STRIDES, Graph, Stage
+from walkerlab.views.cli import housekeeping, lifecycle, sweep
+from walkerlab.views.cli import runs as whole_runs
+from walkerlab.views.cli.request import OF_A_RUN, OF_TALK, Request, command
+
+
+def main() -> None:
+    """Run the program on this process's arguments, and exit with its code."""
+    # What a command loads stays to its end: to look for garbage in it, again and again and then once more, takes longer
+    # than a warm search for gaits.
+    gc.set_threshold(300_000, 50, 100)
+    atexit.register(gc.freeze)
+    as_python_has_it = warnings.formatwarning
+
+    def worded(message: Any, category: type[Warning], filename: str, lineno: int, line: str | None = None) -> str:
+        # Imported here: help loads no compiler, and who warns has loaded it.
+        from walkerlab.physics.kernel_cache import CacheWarning
+
+        own = category is CacheWarning
+        return f"warning: {message}\n" if own else as_python_has_it(message, category, filename, lineno, line)
+
+    warnings.formatwarning = worded
+    print_whatever_there_is_to_print()
+    program()()
+
+
+def print_whatever_there_is_to_print() -> None:
+    """Have output go nowhere where it is closed, and escape what its encoding lacks, such as names that are no text."""
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:
+            setattr(sys, name, os.fdopen(os.open(os.devnull, os.O_WRONLY), "w", encoding="utf-8"))
+        getattr(sys, name).reconfigure(errors="backslashreplace")
+
+
+class Commands(TyperGroup):
+    """The commands, with their whole purpose in the list."""
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """Wrapped to the width, where click would cut."""
+        commands = {name: self.get_command(ctx, name) for name in self.list_commands(ctx)}
+        with formatter.section("Commands"):
+            formatter.write_dl(
+                [(name, str(command.help).split("\n\n")[0]) for name, command in commands.items() if command]
+            )
+
+
+def program(graph: Graph = PIPELINE) -> typer.Typer:
+    """The command line for a pipeline."""
+    app = typer.Typer(
+        name="walkerlab",
+        cls=Commands,
+        help="Passive-dynamic walking as a reproducible experiment. Without --config, the paper's walker.",
+        add_completion=True,
+        no_args_is_help=True,
+        pretty_exceptions_enable=False,
+        rich_markup_mode=None,
+    )
+    app.callback()(options_of_the_program)
+    for stage in graph.stages:
+        add_stage(app, stage, graph)
+    housekeeping.add_to(app, graph)
+    lifecycle.add_to(app, graph)
+    sweep.add_to(app, graph)
+    whole_runs.add_to(app, graph)
+    return app
+
+
+def print_version(asked: bool) -> None:
+    """Print the version with the commit that the code is from, if that is known, and exit, if asked."""
+    if asked:
+        # Imported here: nothing else that is answered on sight asks git.
+        from walkerlab.pipeline.store.commit import commit_of_package
+
+        commit = commit_of_package(Path(walkerlab.__file__).parent)
+        typer.echo(f"walkerlab {walkerlab.__version__}" + (f" (commit {commit})" if commit else ""))
+        raise typer.Exit
+
+
+def options_of_the_program(
+    version: Annotated[
+        bool, typer.Option("--version", is_eager=True, callback=print_version, help="Print the version and the commit.")
+    ] = False,
+) -> None:
+    """Nothing but `--version`, which is answered on sight."""
+
+
+def add_stage(app: typer.Typer, stage: Stage, graph: Graph) -> None:
+    """Add the command of one stage to a program, with the options that mean something to it."""
+    shared = [*OF_A_RUN, "jobs", "force", "dry_run", "no_wait", *OF_TALK]
+    if STRIDES not in stage.options:
+        shared.remove("strides")
+    shared += ["open_page"] if stage is graph.stages[-1] else []
+    shared += ["full"] if graph.campaigns_of(stage.name) else []
+    own = [option for option in stage.options if option is not STRIDES]
+
+    @command(app, *shared, name=stage.name, purpose=stage.purpose, sets=own)
+    def run(request: Request) -> None:
+        # Imported here: help loads neither a config nor an array.
+        from walkerlab.views.cli.stage import run_stage
+
+        run_stage(request, stage, graph)

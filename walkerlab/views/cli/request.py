@@ -1,0 +1,285 @@
+"""What commands are asked: the options that they share, each declared once, and the run that these mean."""
+
+import glob
+import inspect
+import os
+import re
+import shlex
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import Field, dataclass, field, fields
+from functools import cached_property
+from itertools import starmap
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from typer.core import TyperCommand
+
+from walkerlab.views.cli.console import Console
+from walkerlab.views.cli.failures import exit_on_failure
+
+# Help loads neither a config nor an array.
+if TYPE_CHECKING:
+    from walkerlab.config.loader import LoadedConfig
+    from walkerlab.config.schema import Config
+    from walkerlab.pipeline.graph import Option
+    from walkerlab.pipeline.resolve import ResolvedRun
+    from walkerlab.pipeline.store.runfolder import RunFolder
+
+RUNS = Path("runs")
+OF_KIND = re.compile(r"\([^)]*\)")
+"""The kind of a block that has several: `walker(kneed)`."""
+
+
+def keys_to_set(incomplete: str) -> list[str]:
+    """The keys of a config that begin with what was typed, each with the `=` that `--set` wants."""
+    # Imported here and below: only a shell that completes asks.
+    from walkerlab.config.reference import keys
+
+    of_kinds = (OF_KIND.sub("", row.key) for row in keys() if row.key != "extends")
+    return [f"{key}=" for key in dict.fromkeys(of_kinds) if key.startswith(incomplete)]
+
+
+def keys_to_vary(incomplete: str) -> list[str]:
+    """The same without the `=`."""
+    return [key.removesuffix("=") for key in keys_to_set(incomplete)]
+
+
+def configs_and_files(incomplete: str) -> list[str]:
+    """The built-in configs and the YAML files whose names begin with what was typed."""
+    from walkerlab.config.files import builtin_names
+
+    folder, slash, stem = incomplete.rpartition("/")
+    files = sorted(folder + slash + path.name for path in Path(folder + slash).glob(f"{glob.escape(stem)}*.yaml"))
+    return [*(name for name in builtin_names() if name.startswith(incomplete)), *files]
+
+
+class SetByOption(str):
+    """A setting KEY=VALUE from an option of its own; messages show that option as typed."""
+
+    source: str
+
+    def __new__(cls, text: str, source: str) -> "SetByOption":
+        """Make the setting, typed as `source`."""
+        setting = super().__new__(cls, text)
+        setting.source = source
+        return setting
+
+
+def option(*flags: str, default: Any = None, **about: Any) -> Any:
+    """A field of a request that commands may have as an option: its flags, and what typer is told of it."""
+    return field(default=default, metadata={"option": typer.Option(*flags, **about)})
+
+
+def as_parameter(one: Field[Any]) -> inspect.Parameter:
+    """Such a field as a parameter of a function whose signature typer reads."""
+    kind, told = inspect.Parameter.KEYWORD_ONLY, one.metadata["option"]
+    return inspect.Parameter(one.name, kind, default=one.default, annotation=Annotated[one.type, told])
+
+
+def settings_from(options: Sequence["Option"], values: Mapping[str, Any]) -> tuple[SetByOption, ...]:
+    """Return the settings that a stage's own options stand for.
+
+    values  by flag; None where an option was not given
+
+    Raises typer.BadParameter for an option without those it needs, and for bounds of another form.
+    """
+    settings = []
+    for option in options:
+        value = values[option.flag]
+        if not value and value != 0:
+            continue
+        if any(values[flag] is None for flag in option.needs):
+            raise typer.BadParameter(f"also give {' and '.join(option.needs)}", param_hint=option.flag)
+        if isinstance(value, list):
+            text, typed = bounds(option.flag, value), " ".join(f"{option.flag} {item}" for item in value)
+        else:
+            text, typed = str(value), f"{option.flag} {str(value).removesuffix('.0')}"
+        settings.append(SetByOption(f"{option.key}={text}", typed))
+    return tuple(settings)
+
+
+def bounds(flag: str, values: Sequence[str]) -> str:
+    """Return bounds NAME=A:B as a YAML block; typer.BadParameter for another form."""
+    parts = [re.fullmatch(r"([^=]+)=([^:]+):([^:]+)", value) for value in values]
+    if None in parts:
+        raise typer.BadParameter("give a name and its bounds, NAME=A:B", param_hint=flag)
+    return "{" + ", ".join(f"{part[1]}: [{part[2]}, {part[3]}]" for part in parts if part) + "}"
+
+
+def own_parameter(name: str, option: "Option") -> inspect.Parameter:
+    """Return a stage's own option as a parameter of a function whose signature typer reads."""
+    complete = keys_to_vary if option.metavar == "KEY" else None
+    declared = typer.Option(option.flag, metavar=option.metavar, help=option.help, autocompletion=complete)
+    kind: Any = list[str] if "=A:B" in option.metavar else option.type
+    annotation = Annotated[kind | None, declared]
+    return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=annotation)
+
+
+@dataclass(frozen=True)
+class Request:
+    """Options of a command; those that it does not have keep their defaults.
+
+    command  as it is typed
+    own      settings of the config from options of its own
+    """
+
+    command: str
+    own: tuple[SetByOption, ...] = ()
+    full: bool = option(
+        "--full", default=False, help="Run the long campaign too; if interrupted, it resumes the next time."
+    )
+    config: str | None = option(
+        "--config", "-c", metavar="FILE", autocompletion=configs_and_files,
+        help="Config file, built-in config, or run by its name or folder; default: paper.",
+    )  # fmt: skip
+    sets: list[str] | None = option(
+        "--set", metavar="KEY=VALUE", help="Change one key of the config; may be repeated.", autocompletion=keys_to_set
+    )
+    strides: int | None = option("--strides", metavar="N", help="Strides to walk; one stride is two steps.")
+    name: str | None = option(
+        "--name", metavar="NAME", help="Name of the run's folder; default: after config and changes."
+    )
+    runs: Path = option("--runs", default=RUNS, metavar="DIR", help="Folder of all runs.")
+    jobs: int | None = option(
+        "--jobs", metavar="N", min=1, help="Processes for independent stages and cells; default: all cores."
+    )
+    force: bool = option("--force", default=False, help="Run the stage and all it needs, up to date or not.")
+    dry_run: bool = option("--dry-run", default=False, help="Say what would be done and why; change nothing.")
+    no_wait: bool = option(
+        "--no-wait", default=False, help="Give up (exit 6) if another process works in the run folder."
+    )
+    open_page: bool = option("--open", default=False, help="Show the page in the browser as soon as it is there.")
+    every: bool = option("--all", default=False, help="Every number, not the headline numbers alone.")
+    as_json: bool = option("--json", default=False, help="Print one JSON object on stdout.")
+    quiet: bool = option("--quiet", "-q", default=False, help="No messages but warnings and errors.")
+    verbose: bool = option("--verbose", "-v", default=False, help="More messages.")
+
+    @cached_property
+    def console(self) -> Console:
+        """Where messages go."""
+        return Console(self.quiet, self.verbose, self.open_page)
+
+    @property
+    def settings(self) -> tuple[str, ...]:
+        """Every change of the config, as `--set` has it."""
+        return (*(self.sets or ()), *self.own)
+
+    @property
+    def typed(self) -> str:
+        """The options that say which run is meant, each with a blank before it; none for the paper config's own."""
+        words = [] if self.config is None else ["-c", self.config]
+        for setting in self.settings:
+            words += ["--set", setting]
+        words += [] if self.strides is None else ["--set", f"strides={self.strides}"]
+        words += [] if self.name is None else ["--name", self.name]
+        words += [] if self.runs == RUNS else ["--runs", str(self.runs)]
+        return "".join(f" {shlex.quote(word)}" for word in words)
+
+    @property
+    def processes(self) -> int:
+        """How many processes may work at once."""
+        if self.jobs is not None:
+            return self.jobs
+        return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+    @cached_property
+    def asked(self) -> "ResolvedRun":
+        """The config and its run folder, its warnings said; ConfigError if it is not usable."""
+        from walkerlab.pipeline.resolve import resolve
+
+        found = resolve(self.config, self.settings, self.strides, self.runs, self.name)
+        loaded = found.loaded
+        if loaded.config.stability.cases:
+            from walkerlab.pipeline.graph import check_cases
+
+            check_cases(loaded.config.stability.cases)
+        for warning in loaded.warnings:
+            self.console.warn(warning)
+        self.console.detail(f"config: {loaded.source}; run folder: {found.folder.path}")
+        return found
+
+    @property
+    def run_dir(self) -> Path | None:
+        """The run's folder; None as long as nothing has asked for it."""
+        return self.folder.path if "asked" in vars(self) else None
+
+    @property
+    def loaded(self) -> "LoadedConfig":
+        """The config, ready to be varied."""
+        return self.asked.loaded
+
+    @property
+    def resolved(self) -> "Config":
+        """The config itself."""
+        return self.loaded.config
+
+    @property
+    def folder(self) -> "RunFolder":
+        """The run's folder."""
+        return self.asked.folder
+
+
+OF_A_RUN = ("config", "sets", "strides", "name", "runs")
+"""The options that say which run is meant."""
+OF_TALK = ("as_json", "quiet", "verbose")
+"""The options that say how much is printed, and how."""
+
+
+class KeysAreNoOptions(TyperCommand):
+    """A command that says how a key of the config is changed where somebody types it as an option."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Read the options; an option that there is not is told with the `--set` of the key that it names, if any."""
+        try:
+            return super().parse_args(ctx, args)
+        except Exception as error:  # click's NoSuchOption, which each version of typer has in another place
+            typed = str(getattr(error, "option_name", ""))
+            name = typed.lstrip("-").replace("-", "_")
+            keys = keys_to_vary("") if name and any(option.name == "sets" for option in self.params) else []
+            keys.sort(key=lambda key: not key.startswith(f"{self.name}."))  # its own block is meant first
+            key = next((key for key in keys if name in (key, key.rpartition(".")[2])), None)
+            if key is not None:
+                said = f"There is no option {typed}, but a key of the config: --set {key}=VALUE"
+                error.message = said  # type: ignore[attr-defined]
+            raise
+
+
+def command(
+    app: typer.Typer,
+    *shared: str,
+    name: str | None = None,
+    purpose: str | None = None,
+    asks: type[Request] = Request,
+    sets: Sequence["Option"] = (),
+) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Add the decorated function to a program: it takes a request, then the options that are its own.
+
+    shared   fields of the request that are options of the command; the others keep their defaults
+    name     as it is typed; default: the function's
+    purpose  what help says; default: the function's docstring
+    asks     the request's type, whose own fields help has before those of `Request`
+    sets     options that set keys of the config, which help has first
+
+    What the function raises ends the command as `exit_on_failure` says.
+    """
+
+    def register(function: Callable[..., None]) -> Callable[..., None]:
+        typed = name or function.__name__
+        names = {f"set_{option.flag[2:]}": option for option in sets}  # `from` alone is no name of a parameter
+
+        def run(**given: Any) -> None:
+            values = {option.flag: given.pop(parameter) for parameter, option in names.items()}
+            settings = settings_from(sets, values)
+            request = asks(typed, settings, **{field: given.pop(field) for field in shared})
+            with exit_on_failure(request):
+                function(request, **given)
+
+        _, *own = inspect.signature(function, eval_str=True).parameters.values()
+        options = sorted((one for one in fields(asks) if one.name in shared), key=fields(Request).__contains__)
+        by_name = [one.replace(kind=inspect.Parameter.KEYWORD_ONLY) for one in (*own, *map(as_parameter, options))]
+        run.__signature__ = inspect.Signature([*starmap(own_parameter, names.items()), *by_name])  # type: ignore[attr-defined]
+        app.command(typed, cls=KeysAreNoOptions, help=purpose or inspect.getdoc(function))(run)
+        return function
+
+    return register

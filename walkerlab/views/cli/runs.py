@@ -1,0 +1,130 @@
+"""`walkerlab diff`: compare two runs."""
+
+from __future__ import annotations
+
+import contextlib
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from walkerlab.pipeline.graph import Graph
+from walkerlab.views.cli.failures import print_result
+from walkerlab.views.cli.request import Request, command
+
+if TYPE_CHECKING:
+    from walkerlab.pipeline.runs import Pair, RunDifference
+    from walkerlab.pipeline.store.runfolder import RunFolder
+
+SAME_CHANGE = 1e-12
+"""Relative change below which two numbers are shown as the same."""
+DIGITS = 6
+"""Significant digits of a headline number."""
+IS_ERROR = re.compile(r"residual|drift|error|balance|uncertainty")
+"""In the names of numbers that are errors: a relative change of one says nothing."""
+ROUNDING_SI = 1e-9
+"""Numbers (SI) below it are at rounding or at the solver's tolerance."""
+
+
+def add_to(app: typer.Typer, graph: Graph) -> None:
+    @command(app, "runs", "every", "as_json")
+    def diff(
+        request: Request,
+        first: Annotated[str, typer.Argument(metavar="RUN_A", help="Name or folder of a run.")],
+        second: Annotated[str, typer.Argument(metavar="RUN_B", help="Name or folder of another run.")],
+    ) -> None:
+        """Compare two runs: configs, headline values with relative change, both walks overlaid."""
+        from walkerlab.errors import StaleError
+        from walkerlab.pipeline.runs import config_of, difference, results_to_show, run_named
+
+        folders = (run_named(first, request.runs), run_named(second, request.runs))
+        names = [stage.name for stage in graph.stages]
+        with contextlib.ExitStack() as stack:
+            results = [
+                stack.enter_context(results_to_show(folder, names, request.console.warn, graph)) for folder in folders
+            ]
+            for folder, found in zip(folders, results, strict=True):
+                if not found:
+                    raise StaleError(f"{folder.path} has no results.", "Run a stage first.")
+            found_difference = difference(results[0], results[1], [config_of(folder) for folder in folders])
+            figures = draw(folders, results)
+        shown = lines(folders, found_difference, figures, request.every)
+        print_result(request, as_object(folders, found_difference, figures), shown)
+
+
+def run_labels(folders: tuple[RunFolder, RunFolder]) -> tuple[str, str]:
+    """Name two runs: by their names, or by their folders if the names are equal."""
+    first, second = folders
+    return (first.name, second.name) if first.name != second.name else (str(first.path), str(second.path))
+
+
+def draw(folders: tuple[RunFolder, RunFolder], results: list[dict[str, Any]]) -> list[Path]:
+    """Draw both walks into the first run's folder of figures."""
+    from walkerlab.pipeline.store.files import make_folder, write_atomically
+    from walkerlab.views.figures.walks import overlaid
+
+    drawn = overlaid(results[0], results[1], run_labels(folders))
+    if drawn is None:
+        return []
+    make_folder(folders[0].figures)
+    paths = [folders[0].figures / f"diff-{folders[1].name}.{kind}" for kind in ("svg", "png")]
+    for path, data in zip(paths, drawn, strict=True):
+        write_atomically(path, data)
+    return paths
+
+
+def as_object(folders: tuple[RunFolder, RunFolder], found: RunDifference, figures: list[Path]) -> dict[str, Any]:
+    return {
+        "stage": "diff",
+        "runs": [str(folder.path) for folder in folders],
+        "config": [{"key": key, "first": first, "second": second} for key, first, second in found.config],
+        "numbers": {stage: [vars(pair) for pair in pairs] for stage, pairs in found.numbers.items()},
+        "only_first": list(found.only_first),
+        "only_second": list(found.only_second),
+        "figures": [str(path) for path in figures],
+    }
+
+
+def lines(folders: tuple[RunFolder, RunFolder], found: RunDifference, figures: list[Path], every: bool) -> list[str]:
+    """Describe a difference: keys of the config, and headline values of each stage.
+
+    every  show all differing values instead
+    """
+    from walkerlab.views.report.numbers import number
+    from walkerlab.views.report.tables import aligned
+    from walkerlab.views.report.text import in_words
+
+    def as_text(value: Any) -> str:
+        return number(value, DIGITS) if isinstance(value, float) and not every else in_words(value)
+
+    names = run_labels(folders)
+    result = ["config", *aligned([["", *names], *([key, in_words(a), in_words(b)] for key, a, b in found.config)])]
+    if not found.config:
+        result[1:] = ["  the same"]
+    left = 0
+    for stage, pairs in found.numbers.items():
+        differing = [pair for pair in pairs if differs(pair)]
+        shown = differing if every else list(found.headlines[stage]) if differing else []
+        left += 0 if every else len(differing) - sum(pair in differing for pair in shown)
+        rows = [[pair.name, as_text(pair.first), as_text(pair.second), percent(pair)] for pair in shown]
+        if rows or not differing:
+            result += [stage, *(aligned([["", *names, "change"], *rows]) if rows else ["  the same"])]
+    for name, only in zip(names, (found.only_first, found.only_second), strict=True):
+        if only:
+            result.append(f"only in {name}: {', '.join(only)}")
+    more = [f"{left} other values differ; list them with --all"] if left else []
+    return [*result, *more, *(f"figure: {path}" for path in figures[1:])]
+
+
+def differs(pair: Pair) -> bool:
+    if pair.change is not None:
+        return abs(pair.change) > SAME_CHANGE
+    return bool(pair.first != pair.second)
+
+
+def percent(pair: Pair) -> str:
+    """Format a relative change in percent; empty for error measures and for values at rounding."""
+    if pair.change is None or IS_ERROR.search(pair.name) or max(abs(pair.first), abs(pair.second)) < ROUNDING_SI:
+        return ""
+    return f"{100.0 * pair.change:+.3g} %" if differs(pair) else "the same"

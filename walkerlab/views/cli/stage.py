@@ -1,0 +1,130 @@
+"""A stage's command: run it, or say what would happen; then print the result."""
+
+import itertools
+import os
+import shlex
+from dataclasses import replace
+from pathlib import Path
+
+from walkerlab.config.files import builtin_names, config_to_extend
+from walkerlab.config.layers import parse_setting
+from walkerlab.config.loader import load
+from walkerlab.config.walkers import why_rigid_alone
+from walkerlab.config.writer import to_extending_yaml
+from walkerlab.errors import ConfigError, NoAnswer
+from walkerlab.pipeline.executor import short_reason
+from walkerlab.pipeline.graph import PIPELINE, Graph, Stage
+from walkerlab.pipeline.runner import Options, StageReport, execute
+from walkerlab.pipeline.store.files import storing
+from walkerlab.views.cli.failures import print_result
+from walkerlab.views.cli.request import Request
+from walkerlab.views.report.answers import answer, verdict
+from walkerlab.views.report.tables import aligned
+
+SEARCHING = ("fixedpoint", "report")
+"""Stages that look for gaits nearby where there is none."""
+DRAWN_AT_ONCE = {stage.name for stage in PIPELINE.stages if stage.on_demand}
+
+
+def run_stage(request: Request, stage: Stage, graph: Graph) -> None:
+    """Do what the command asks and print it; typer.Exit(4) if there is no answer, else as `execute` raises."""
+    try:
+        report_on(request, stage, graph)
+    except ConfigError as error:
+        raise request.loaded.placed(error) from None
+
+
+def report_on(request: Request, stage: Stage, graph: Graph) -> None:
+    """The same; ConfigError without the place of what is wrong."""
+    options = Options(request.force, not request.no_wait, request.processes, request.full, request.dry_run)
+    config, folder = request.resolved, request.folder
+    if options.dry:
+        report = execute(config, stage.name, folder, options, graph=graph)
+        print_result(request, report.as_json() | {"dry_run": True}, planned(report))
+        return
+    report = with_nearby_gaits(execute(config, stage.name, folder, options, request.console, graph), request)
+    if stage.name == "design" and report.no_answer is None:
+        report.summary["config"] = str(write_optimum(request, report))
+    lines = printed(request, report)
+    if request.open_page and "html" in report.summary and not request.console.shown:
+        request.console.show(report.run_dir / str(report.summary["html"]))
+    print_result(request, report.as_json(), lines, report.no_answer)
+
+
+def with_nearby_gaits(report: StageReport, request: Request) -> StageReport:
+    """The report of a slope without a gait, its advice led by where gaits are met."""
+    said = report.no_answer
+    if said is None or report.stage not in SEARCHING or "no gait" not in said.message:
+        return report
+    # Imported here: most commands find their gait.
+    from walkerlab.scene.gait_suggestions import suggest_gaits
+
+    met = suggest_gaits(request.resolved, request.typed)
+    return replace(report, no_answer=NoAnswer(said.message, f"{met} {said.advice}".strip()))
+
+
+def write_optimum(request: Request, report: StageReport) -> Path:
+    """Write the optimum as a config that extends the one that was asked about, into its run folder, over no file.
+
+    Raises StorageError if the system refuses.
+    """
+    start = config_to_extend(request.config)
+    base = load(Path(start)).config
+    typed = start if start in builtin_names() else os.path.relpath(start, report.run_dir)
+    settings = [parse_setting(f"{key}={value!r}") for key, value in report.summary["best"].items()]
+    best = request.loaded.variant(settings).model_copy(update={"design": base.design})
+    text = to_extending_yaml(typed, base, best, f"{base.name}-optimum")
+    for number in itertools.count(1):
+        path = report.run_dir / ("optimum.yaml" if number == 1 else f"optimum-{number}.yaml")
+        with storing(path):
+            if not path.exists():
+                path.write_text(text, encoding="utf-8")
+            if path.read_text(encoding="utf-8") == text:
+                return path
+    raise AssertionError("there is always another name")
+
+
+def printed(request: Request, report: StageReport) -> list[str]:
+    """The result for people: what was found, where it is, and what to do next."""
+    if report.artifact is None:
+        return [f"{report.stage}: no result", *left_out_lines(request, report)]
+    # why there is no answer, and what to try, is told once: as the error
+    told_apart = ("no_answer",) if report.no_answer is None else ("no_answer", "advice")
+    own = {key: value for key, value in report.summary.items() if key not in told_apart}
+    if "html" in own:
+        page = (report.run_dir / str(own["html"])).resolve()
+        shows = f"`walkerlab open {shlex.quote(str(report.run_dir))}` shows it"
+        others = f"`walkerlab show STAGE{request.typed}` has every number"
+        where = ["", f"page: {page}", f"next: {shows}; {others}."]
+        rigid_alone = ["", why_rigid_alone(request.resolved.walker)] if request.resolved.contact is None else []
+        lines = [*verdict(report.results), *answer(report.stage, own), *rigid_alone, *where]
+    else:
+        found = answer(report.stage, own)
+        # that there is no answer is kept, too, but nobody would look there for a result
+        lines = [*found, *([""] if found else []), *([f"stored in {report.artifact}"] if own else [])]
+    if report.stage in DRAWN_AT_ONCE:
+        # Imported here: most stages draw nothing.
+        from walkerlab.views.figures.stage import draw_at_once
+
+        drawn = draw_at_once(report.stage, report.run_dir, anew=not report.reused)
+        lines += [f"figure: {path}" for path in drawn]
+    return [*lines, *left_out_lines(request, report)]
+
+
+def planned(report: StageReport) -> list[str]:
+    """What would happen, for people."""
+    rows = [[done.stage, done.action, done.reason] for done in report.steps]
+    return [f"in {report.run_dir}:", *aligned(rows), *each_left_out(report)]
+
+
+def left_out_lines(request: Request, report: StageReport) -> list[str]:
+    """What was left out, if that is asked for or nothing else is there to be told."""
+    return each_left_out(report) if request.verbose or report.artifact is None else []
+
+
+def each_left_out(report: StageReport) -> list[str]:
+    """What was left out, why, and what that saves."""
+    return [
+        f"left out: {entry.what} ({short_reason(entry.why)})" + (f"; saves {entry.saves}" if entry.saves else "")
+        for entry in report.left_out
+    ]

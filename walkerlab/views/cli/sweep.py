@@ -1,0 +1,205 @@
+"""`walkerlab sweep`: run a stage over many configs."""
+
+import importlib
+import os
+import sys
+import threading
+from collections.abc import Collection
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from walkerlab.pipeline.graph import PIPELINE, Graph
+from walkerlab.views.cli.failures import print_result
+from walkerlab.views.cli.request import OF_A_RUN, OF_TALK, Request, command, option
+from walkerlab.views.report.text import paragraph
+
+if TYPE_CHECKING:
+    from walkerlab.pipeline.sweeps.sweep import Foreseen, Swept
+
+SUMMARY_KEYS = ("of", "parameters", "points", "done", "failed", "outcomes", "endings", "numerical_error")
+"""Keys of a sweep's summary that `--json` prints."""
+LISTED_POINTS = 20
+"""Points that a dry run lists."""
+
+
+@dataclass(frozen=True)
+class SweepRequest(Request):
+    """Options of a sweep."""
+
+    over: list[str] | None = option(
+        "--over", metavar="KEY=VALUES", help="A parameter: FROM:TO:N, FROM:TO:N:log or [a, b, ...]; may be repeated."
+    )
+    stage: str | None = option("--stage", metavar="NAME", help="The stage to run.")
+    zipped: bool = option(
+        "--zip", default=False, help="Combine the n-th values into the n-th point, instead of forming the full grid."
+    )
+    sample: str | None = option(
+        "--sample", metavar="SAMPLER:N", help="Sample points instead: latin-hypercube:500, sobol:512."
+    )
+    seed: int | None = option("--seed", metavar="N", min=0, help="Seed of the sampled points; default: 1.")
+    engine: str = option(
+        "--engine", default="local", metavar="NAME", help="Where to compute: local, dask[=ADDRESS] or slurm."
+    )
+    engine_option: list[str] | None = option(
+        "--engine-option", metavar="NAME=VALUE", help="For Slurm: slurm_partition, timeout_min, cluster, ..."
+    )
+    at_once: int = option(
+        "--jobs", default=0, metavar="N", min=0, help="Chunks computed at once; 0: all cores, on Slurm 16."
+    )
+    chunk_seconds: float | None = option(
+        "--chunk-seconds", metavar="S", help="Target duration of a chunk; default: depends on the engine."
+    )
+    show: list[str] | None = option("--show", metavar="NAME", help="Quantity to plot; may be repeated.")
+    against: str | None = option("--against", metavar="NAME", help="Quantity to plot it over; default: the parameters.")
+    as_csv: bool = option(
+        "--csv",
+        default=False,
+        help="Print the points with their headline values as CSV, and store that next to the result.",
+    )
+
+
+OWN = [one.name for one in fields(SweepRequest) if one not in fields(Request)]
+
+
+def add_to(app: typer.Typer, graph: Graph) -> None:
+    @command(app, *OWN, *OF_A_RUN, "force", "dry_run", "no_wait", "every", *OF_TALK, asks=SweepRequest)
+    def sweep(request: SweepRequest) -> None:
+        """Run a stage over a range of parameters, reusing results that exist."""
+        from walkerlab.config.sweep import Sweep
+        from walkerlab.pipeline.sweeps.engines import Order, engine_named
+        from walkerlab.pipeline.sweeps.question import axis_of_text, build_sweep, refuse_unrecorded
+        from walkerlab.pipeline.sweeps.sweep import SweepRun, SweepWork, modules_of
+
+        options = dict(text.split("=", 1) for text in request.engine_option or () if "=" in text)
+        if bad := [text for text in request.engine_option or () if "=" not in text]:
+            raise typer.BadParameter(f"{bad[0]!r} is not NAME=VALUE", param_hint="--engine-option")
+        chosen, address = engine_named(request.engine)
+        loaded, over = request.loaded, request.over or ()
+        given = loaded.config.sweep or Sweep()  # what the options leave open
+        own = [(key, values, f"sweep.over.{key}") for key, values in given.over.items()]
+        question = build_sweep(
+            request.stage or given.stage,
+            [axis_of_text(text) for text in over] or own,
+            request.zipped or (given.zip and not over),
+            request.sample if request.sample is not None else "" if over else given.sample,
+            given.seed if request.seed is None else request.seed,
+        )
+        shown = {f"--show {name}": name for name in request.show or ()}
+        shown |= {f"--against {request.against}": request.against} if request.against is not None else {}
+        refuse_unrecorded(question, shown)
+        order = Order(
+            workers=request.at_once,
+            address=address,
+            modules=modules_of(question.stage, loaded.config, graph),
+            folder=request.folder.path,
+            options=options,
+        )
+        if request.dry_run:
+            foreseen = SweepRun(question, loaded, request.folder, graph)
+            show_plan(request, foreseen.foresee(request.at_once or os.cpu_count() or 1, LISTED_POINTS))
+            return
+        with chosen.begun(order) as begun:
+            run = SweepRun(question, loaded, request.folder, graph)
+            # What is needed at the end is loaded while others compute.
+            threading.Thread(target=importlib.import_module, args=("walkerlab.views.report.sweep_page",)).start()
+
+            def check(there: Collection[str]) -> None:
+                from walkerlab.views.report.sweep_page import refuse_unheard
+
+                named = {flag: name for flag, name in shown.items() if name not in question.names}
+                refuse_unheard(question.stage, named, there)
+
+            seconds, waits = request.chunk_seconds, not request.no_wait
+            work = SweepWork(begun, order, seconds, waits, request.force, where(graph), check)
+            swept = run.run(work, request.console)
+        show_result(request, swept)
+
+
+def where(graph: Graph) -> str:
+    """Return the import path of the pipeline for workers, as module:NAME."""
+    from walkerlab.pipeline.sweeps.sweep import PIPELINE_AT
+
+    if graph is PIPELINE:
+        return PIPELINE_AT
+    package = graph.stages[0].module.partition(".")[0]
+    own = [(name, module) for name, module in list(sys.modules.items()) if name.partition(".")[0] == package]
+    return next(f"{name}:{key}" for name, module in own for key, value in vars(module).items() if value is graph)
+
+
+def show_plan(request: Request, foreseen: "Foreseen") -> None:
+    missing = foreseen.count - foreseen.there
+    value = {
+        **common(request, foreseen.path, 0.0),
+        "dry_run": True,
+        "points": foreseen.count,
+        "reused": foreseen.there,
+        "to_compute": missing,
+        "estimate_s": foreseen.estimate_s,
+        "first_points": list(foreseen.points),
+    }
+    more = foreseen.count - len(foreseen.points)
+    lines = [f"  {point}" for point in foreseen.points] + ([f"  and {more} more"] if more else [])
+    known = foreseen.estimate_s
+    time = "no point of this kind has been timed yet" if known is None else f"about {format_duration(known)}"
+    counts = f"{foreseen.count} points, {foreseen.there} already computed, {missing} to compute: {time}"
+    print_result(request, value, [f"in {foreseen.path}:", *lines, counts])
+
+
+def format_duration(seconds: float) -> str:
+    if seconds < 120.0:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60:.0f} min" if seconds < 7200.0 else f"{seconds / 3600:.1f} h"
+
+
+def common(request: Request, path: Path, wall_s: float) -> dict[str, Any]:
+    """Return the keys that every command's JSON object has."""
+    return {
+        "stage": "sweep",
+        "run_dir": str(request.folder.path),
+        "artifact": str(path),
+        "wall_s": wall_s,
+        "left_out": [],
+        "file": str(path),
+    }
+
+
+def show_result(request: SweepRequest, swept: "Swept") -> None:
+    """Draw and print a sweep; typer.Exit if points are missing."""
+    from walkerlab.pipeline.store.files import write_atomically
+    from walkerlab.pipeline.sweeps.result import as_csv as table_of
+    from walkerlab.views.report.sweep_page import draw
+
+    drawn = draw(swept, request.folder, tuple(request.show or ()), request.against or "")
+    summary = swept.summary
+    value = {
+        **common(request, swept.path, swept.wall_s),
+        "reused": swept.reused,
+        **{name: summary[name] for name in SUMMARY_KEYS if name in summary},
+        "figures": [str(path) for path in drawn.figures],
+        "html": str(drawn.page),
+    }
+    lines = result_lines(swept, drawn.page)
+    if request.as_csv:
+        table = table_of(swept.content, swept.question, request.every)
+        beside = swept.path.with_suffix(".csv")
+        write_atomically(beside, table.encode())
+        value["csv"], lines = str(beside), [table.removesuffix("\n")]
+    print_result(request, value, lines, swept.error() if swept.failed else None)
+
+
+def result_lines(swept: "Swept", page: Path) -> list[str]:
+    from walkerlab.views.report.sweep_page import summary_lines
+
+    summary = swept.summary
+    outcomes = ", ".join(f"{count} {name}" for name, count in summary["outcomes"].items())
+    over = ", ".join(f"{name} ({len(set(values))})" for name, values in summary["parameters"].items())
+    return [
+        f"sweep of {summary['of']} over {over}: {summary['points']} points, {outcomes}",
+        *([f"  {swept.reused} of them already existed"] if swept.reused else []),
+        *(line for said in summary_lines(summary) for line in paragraph(said)),
+        f"  numbers  {swept.path}",
+        f"  page     {page}",
+    ]

@@ -1,0 +1,105 @@
+"""What is made of a config in the folder of all runs while the page goes on: a report, or a film."""
+
+import contextlib
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+from walkerlab.pipeline.interrupts import PATIENCE_S
+from walkerlab.views.explore.walks import Answered, ExploredConfig
+
+KINDS = ("report", "gif")
+EARLY = re.compile(r"page: (.+) \(partial")
+"""How a command says that there is a page already."""
+START = (
+    "from walkerlab.pipeline.interrupts import end_with_parent; end_with_parent(); "
+    "from walkerlab.views.cli.main import main; main()"
+)
+"""Run a command, as `python -m walkerlab` does, for as long as the server is there."""
+
+
+class Job:
+    """One at a time; commands as they are typed, so that what is made is what they make."""
+
+    def __init__(self) -> None:
+        """Nothing is asked for yet."""
+        self._process: subprocess.Popen[str] | None = None
+        self._runs = Path()
+        self._lock, self._thread = threading.Lock(), None
+        self._told: dict[str, Any] = {"running": False}
+
+    def begin(self, kind: object, question: ExploredConfig) -> Answered:
+        """Start one; status 409 while another one runs."""
+        if kind not in KINDS:
+            raise TypeError
+        with self._lock:
+            if self._told["running"]:
+                return 409, {"error": {"message": "one is being made already", "advice": "Wait until it is there."}}
+            self._told = {"running": True, "kind": kind, "said": ""}
+        threading.Thread(target=self._make, args=(str(kind), question), daemon=True).start()
+        return 200, dict(self._told)
+
+    def progress(self) -> dict[str, Any]:
+        """What was said last, and in the end where the file is."""
+        return dict(self._told)
+
+    def close(self) -> None:
+        """End what runs, and what it has started."""
+        if (process := self._process) is not None:
+            process.terminate()
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                process.wait(PATIENCE_S)
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
+
+    def _make(self, kind: str, question: ExploredConfig) -> None:
+        self._runs = runs = question.runs.resolve()
+        of_config = [*question.options, "--runs", str(runs), "--json"]
+        try:
+            if kind == "report":
+                made = self._command("report", *of_config)
+                file = Path(made["run_dir"]) / made["html"]
+            else:
+                walk = "simulate" if question.models == ["rigid"] else "contact-sim"
+                folder = Path(self._command(walk, *of_config)["run_dir"])
+                file = folder / f"{walk}.gif"
+                self._command("animate", str(folder), "--model", walk, "--to", "gif", "-o", str(file))
+            self._told = {"running": False, "kind": kind, "url": self._url(file)}
+        except (RuntimeError, OSError, KeyError, ValueError) as error:
+            self._told = {"running": False, "kind": kind, "error": {"message": str(error), "advice": ""}}
+
+    def _url(self, file: Path) -> str:
+        return "/runs/" + quote(str(file.resolve().relative_to(self._runs)))
+
+    def _command(self, *words: str) -> dict[str, Any]:
+        """What a command prints as JSON; RuntimeError with what it said last if it fails."""
+        command = [sys.executable, "-c", START, *words]
+        lines = []
+        # Into a file: a pipe that nobody reads meanwhile would fill.
+        with tempfile.TemporaryFile("w+") as output:
+            with subprocess.Popen(
+                command, stdin=subprocess.PIPE, stdout=output, stderr=subprocess.PIPE, text=True, start_new_session=True
+            ) as self._process:
+                assert self._process.stderr is not None
+                for line in self._process.stderr:
+                    lines.append(line.strip())
+                    self._told = {**self._told, "said": line.strip()}
+                    if (early := EARLY.search(line)) is not None:
+                        self._told = {**self._told, "url": self._url(Path(early[1]))}
+                status = self._process.wait()
+            output.seek(0)
+            printed = output.read()
+        if status != 0:
+            raise RuntimeError(next((line for line in lines if line.startswith("error:")), "\n".join(lines[-2:])))
+        with contextlib.suppress(json.JSONDecodeError):
+            found: dict[str, Any] = json.loads(printed)
+            return found
+        return {}

@@ -1,0 +1,128 @@
+"""The keys of a config that can be turned: what each is, and over which values a slider leads it."""
+
+import math
+from collections.abc import Iterator
+from typing import Any, Final
+
+from pydantic.fields import FieldInfo
+
+from walkerlab.config.fields import bounds_of, leaves, type_words, value_at, words_of
+from walkerlab.config.schema import Config
+from walkerlab.errors import ConfigError
+from walkerlab.pipeline.sweeps.question import described
+from walkerlab.scene.parameter import Parameter, parameter_of
+
+FIRST: Final = (
+    "slope_deg", "walker.", "push_off.impulse_N_s", "contact.stiffness", "contact.damping", "contact.static_friction",
+    "contact.dynamic_friction", "contact.stiction_velocity", "contact.terrain",
+)  # fmt: skip
+"""What is shown before anything is searched for, in this order; a dot at the end means all of a block."""
+DRIVES: Final = ("walker.hip.", "push_off.")
+"""Shown at first only where they are at work; how knees lock is searched for."""
+OF_OTHERS: Final = (
+    "name", "source", "outputs", "seed", "sweep", "design", "stability", "tune", "continuation", "basin", "robustness",
+)  # fmt: skip
+"""Keys that no walk depends on."""
+AROUND: Final = 5.0
+"""A slider leads to this many times its first value, and to as small a part of it."""
+FAR_AROUND: Final = 100.0
+"""The same for what is known by its order of magnitude."""
+BY_MAGNITUDE: Final = ("contact.stiffness", "contact.damping", "velocity", "rtol", "atol", "penetration")
+DECADES: Final = 100.0
+"""Bounds further apart than by this factor make a slider logarithmic."""
+HALVINGS: Final = 10
+"""How finely it is sought where a slider would lead to what is refused."""
+
+
+def adjustable(start: Config, config: Config) -> Iterator[dict[str, Any]]:
+    """Each number, word and switch that the walker has, with its value, as JSON.
+
+    start   the config before anything was changed, which the sliders' ends and a reset go by
+    config  the same with its changes
+    """
+    for path, field in leaves(Config, held=config):
+        key = ".".join(path)
+        if path[0] in OF_OTHERS or key in ("walker.type", "contact.units"):
+            continue
+        value, first = value_at(config, path), value_at(start, path)
+        if path == ("slope_rad",):
+            key, value, first = "slope_deg", math.degrees(value), math.degrees(first)
+        if value is not None:
+            unit, meaning = described(config, key)
+            shown = {"key": key, "value": value, "start": first, "unit": unit, "meaning": meaning}
+            turned = reach(key, first, unit, field, start)
+            yield shown | {"rank": rank(key, first) if turned else None, "bounds": bounds_of(field)} | turned
+
+
+def rank(key: str, first: Any) -> int | None:
+    """Where a key stands among those that are shown at first; None if it is searched for."""
+    if (key.startswith(DRIVES) and not first) or key.startswith("walker.knee."):
+        return None
+    return next(
+        (place for place, name in enumerate(FIRST) if key == name or (name[-1] == "." and key.startswith(name))), None
+    )
+
+
+def reach(key: str, first: Any, unit: str, field: FieldInfo, start: Config) -> dict[str, Any]:
+    """What a key's value can be turned to: one of some words, or a number on a slider; else it is typed."""
+    if isinstance(first, bool):
+        return {"words": [True, False]}
+    words = words_of(field.annotation)
+    if type_words(field.annotation) == "word" and len(words) > 1:
+        return {"words": words}
+    if not isinstance(first, int | float):
+        return {}
+    limits = {
+        name: getattr(item, name) for item in field.metadata for name in ("ge", "gt", "le", "lt") if hasattr(item, name)
+    }
+    low, high = limits.get("ge", limits.get("gt", -math.inf)), limits.get("le", limits.get("lt", math.inf))
+    ordinary, logarithmic = ordinary_size(key, unit, start), False
+    if first == 0:
+        least, most = 0.0 if low >= 0.0 else -ordinary, ordinary
+    else:
+        by = FAR_AROUND if any(part in key for part in BY_MAGNITUDE) else AROUND
+        least, most = sorted((first / by, first * by))
+        logarithmic = first > 0.0 and low >= 0.0 and high > DECADES * low
+        # what is next to nothing can become what it is on other walkers
+        most = max(most, ordinary) if logarithmic else most
+    if unit != "deg":
+        least, most = max(least, low), min(most, high)
+    parameter = gaits_by(key, start)
+    ends = [end if parameter is None else last_allowed(parameter, start, first, end) for end in (least, most)]
+    if ends[0] == ends[1]:
+        return {}
+    if whole := isinstance(first, int):
+        ends = [round(end) for end in ends]
+    return {"from": ends[0], "to": ends[1], "log": logarithmic, "whole": whole, "gaits": parameter is not None}
+
+
+def ordinary_size(key: str, unit: str, start: Config) -> float:
+    """How large a number of the walker with some unit ordinarily is; 0 if no walker says that."""
+    mass, leg, gravity = start.walker.total_mass_kg, start.walker.leg_length_m, start.gravity_m_s2
+    speed = math.sqrt(gravity * leg)
+    if key.startswith("ground."):
+        return 100.0 if unit == "1" else 0.01 * leg
+    torque = mass * gravity * leg
+    return {
+        "deg": 5.0, "m": 0.3 * leg, "kg": 0.5 * mass, "kg m^2": 0.01 * mass * leg**2, "N s": 0.1 * mass * speed,
+        "N m": 0.02 * torque, "N m/rad": 0.1 * torque, "N m s/rad": 0.02 * mass * leg * speed,
+    }.get(unit, 0.0)  # fmt: skip
+
+
+def gaits_by(key: str, start: Config) -> Parameter | None:
+    """A key as a number that gaits can be followed along; None if no model is made of it."""
+    try:
+        return parameter_of(key, start)
+    except ConfigError:
+        return None
+
+
+def last_allowed(parameter: Parameter, start: Config, first: float, end: float) -> float:
+    """The value nearest to a slider's end that is allowed beside the config's other values."""
+    if parameter.config_at(start, end) is not None:
+        return end
+    good, bad = first, end
+    for _ in range(HALVINGS):
+        middle = 0.5 * (good + bad)
+        good, bad = (good, middle) if parameter.config_at(start, middle) is None else (middle, bad)
+    return good

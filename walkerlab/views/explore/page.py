@@ -1,0 +1,53 @@
+"""The page of `walkerlab explore`: the report's player and style, and a script that asks the server."""
+
+from pathlib import Path
+
+from jinja2 import FileSystemLoader
+from markupsafe import Markup
+
+from walkerlab.config.files import DEFAULT, builtin_names
+from walkerlab.views.explore.walks import ExploredConfig
+from walkerlab.views.report import page as report
+from walkerlab.views.report.blocks import Player
+
+TEMPLATES = Path(__file__).parent / "templates"
+SEEN = (
+    "The broad walker is the rigid model, the narrow one the contact model. Each leg is a line from hip to foot;"
+    " leg 2 is hollow. The ground's forces are arrows; a red one is a push-off."
+)
+
+
+LONGEST_NAME = 60
+
+
+def started(base: ExploredConfig) -> str:
+    """What the page was started from, in words."""
+    name = base.called or base.config or DEFAULT
+    changed = f"{name} with {', '.join(base.sets)}"
+    return name if base.called or not base.sets else changed if len(changed) <= LONGEST_NAME else f"{name}, changed"
+
+
+def choices(base: ExploredConfig) -> list[str]:
+    """What else can be chosen: built-in configs, and the files in the folder that one works in."""
+    own = sorted(path.name for path in Path().glob("*.yaml"))
+    return [name for name in (*builtin_names(), *own) if name != started(base)]
+
+
+def rendered(base: ExploredConfig) -> tuple[str, str]:
+    """The page for a config, and what its header allows it to load and to run."""
+    own = (TEMPLATES / "explore.js").read_text(encoding="utf-8").strip()
+    script = f'\n"use strict";\n{report.source("player.js")}\n{own}\n'
+    environment = report.environment()
+    environment.loader = FileSystemLoader([report.TEMPLATES, TEMPLATES])
+    html = environment.get_template("explore.html.j2").render(
+        started=started(base),
+        configs=choices(base),
+        anchor="walk",
+        # Whatever is asked for later is drawn in this one.
+        block=Player("The walk.", SEEN, "The walker", (), 0.0, 1.0, 0.0, 0.0, 1.0, 1.0, (), (), (0, 0, 1, 1)),
+        # The only texts that are markup already: files of this package.
+        style=Markup(report.source("style.css") + (TEMPLATES / "explore.css").read_text(encoding="utf-8")),
+        script=Markup(script),
+    )
+    allowed = "default-src 'none'; img-src data: blob:; connect-src 'self'; style-src 'unsafe-inline'"
+    return html, f"{allowed}; script-src 'sha256-{report.digest_of(script)}'; base-uri 'none'; form-action 'none'"

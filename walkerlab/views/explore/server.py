@@ -1,0 +1,269 @@
+"""The server of `walkerlab explore`: the loopback address alone, a token, workers that compute."""
+
+import contextlib
+import json
+import os
+import secrets
+import sys
+import threading
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from functools import partial
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from mimetypes import guess_type
+from pathlib import Path
+from typing import Any
+from urllib.parse import parse_qs, unquote, urlsplit
+
+from walkerlab.errors import ConfigError
+from walkerlab.pipeline.workers import Worker, WorkerDiedError
+from walkerlab.views.explore import walks
+from walkerlab.views.explore.jobs import Job
+from walkerlab.views.explore.page import choices, rendered, started
+from walkerlab.views.explore.walks import GIVE_WAY, SUPERSEDED, Answered, ExploredConfig
+
+LONGEST_BODY = 100_000
+NICE = 15
+
+
+def failed(status: int, message: str, advice: str = "") -> Answered:
+    """An answer that is an error."""
+    return status, {"error": {"message": message, "advice": advice}}
+
+
+class Desk:
+    """One worker; of the questions that wait for it only the newest is answered."""
+
+    def __init__(self, drops: bool = False) -> None:
+        """Start it.
+
+        drops  whether a newer question ends the work on an older one
+        """
+        self.drops, self.compiling, self.compiled = drops, "", 0
+        self.worker = self._hired()
+        self._turn, self._count, self._newest = threading.Lock(), threading.Lock(), 0
+
+    def _hired(self) -> Worker:
+        worker = Worker(("walkerlab.views.explore.walks",))
+        if self.drops:  # nobody waits for it
+            os.setpriority(os.PRIO_PROCESS, worker.process.pid, NICE)
+        return worker
+
+    def ask(self, call: Callable[[], Answered]) -> Answered:
+        """Return what the call returns there, once the worker is free; status 409 if a newer question came meanwhile.
+
+        A call whose worker dies is given to another one, once: an idle worker may have died before.
+        """
+        with self._count:
+            self._newest += 1
+            number = self._newest
+        if self.drops and self._turn.locked():
+            self.worker.process.send_signal(GIVE_WAY)
+        with self._turn:
+            deaths = 0
+            # again, if what was to end the question before has come late, or if the worker died while nobody asked
+            while number == self._newest:
+                try:
+                    answer = self.worker.do(call, self._heard)
+                except WorkerDiedError as error:
+                    self.worker = self._hired()
+                    deaths += error.exit_code_of_worker != -GIVE_WAY  # not even begun
+                    if deaths > 1:
+                        return failed(500, error.message, error.advice)
+                except Exception as error:
+                    return failed(500, f"this is a bug of walkerlab: {type(error).__name__}: {error}")
+                else:
+                    if answer != SUPERSEDED:
+                        return answer
+            return SUPERSEDED
+
+    def _heard(self, kernel: str) -> None:
+        self.compiling = kernel
+        self.compiled += bool(kernel)
+
+    def close(self) -> None:
+        """End the worker at once, whatever it is at."""
+        self.worker.process.kill()
+        self.worker.ended()
+
+
+class Server(ThreadingHTTPServer):
+    """Answers questions about one config, and about the built-in ones."""
+
+    daemon_threads = True
+
+    def __init__(self, port: int, base: ExploredConfig) -> None:
+        """Listen; port 0 is any that is free."""
+        super().__init__(("127.0.0.1", port), Handler)
+        self.base, self.token, self.job = base, secrets.token_urlsafe(16), Job()
+        self.cookie = f"walkerlab-explore-{self.server_port}"
+        # what is drawn in the background keeps nobody waiting who turns a number
+        self.desk, self.background = Desk(), Desk(drops=True)
+        self._beside: threading.Thread | None = None
+
+    @property
+    def host(self) -> str:
+        """As a browser names this server."""
+        return f"127.0.0.1:{self.server_port}"
+
+    @property
+    def url(self) -> str:
+        """Where the page is, token included."""
+        return f"http://{self.host}/?token={self.token}"
+
+    def begin(self) -> None:
+        """Serve beside what else this process does."""
+        self._beside = threading.Thread(target=self.serve_forever, daemon=True)
+        self._beside.start()
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """Say what went wrong, unless it is that the one who asked has left."""
+        if not isinstance(sys.exception(), OSError):
+            super().handle_error(request, client_address)
+
+    def _repr_html_(self) -> str:
+        """The page, in a notebook."""
+        return f'<iframe src="{self.url}" width="100%" height="900" style="border: 0"></iframe>'
+
+    def close(self) -> None:
+        """End what computes, and listen no more."""
+        if self._beside is not None:
+            self.shutdown()
+        for one in (self.desk, self.background, self.job):
+            one.close()
+        self.server_close()
+
+    def question(self, body: Mapping[str, Any]) -> ExploredConfig:
+        """What a body asks about; TypeError if it has not the form of a question."""
+        changes, models = body.get("set", {}), body.get("models", list(walks.STAGES))
+        if not isinstance(changes, Mapping) or not isinstance(models, list) or not {*models} <= walks.STAGES.keys():
+            raise TypeError
+        question = replace(self.base, changes=changes, models=models)
+        named = body.get("config")
+        if named is None or named == started(self.base):
+            return question
+        if named not in choices(self.base):
+            raise TypeError
+        return replace(question, config=named, sets=())
+
+    def answer(self, path: str, body: Mapping[str, Any]) -> Answered:
+        """The answer to a question that was posted; TypeError if it has not the form of one."""
+        question = self.question(body)
+        if path == "/api/walk":
+            return self.desk.ask(partial(walks.walked, question))
+        if path == "/api/numbers":
+            return walks.numbers(question)
+        if path == "/api/along":
+            return self.background.ask(partial(walks.along, question))
+        if path == "/api/save":
+            return saved(question, body.get("name"))
+        if path == "/api/job":
+            return self.job.begin(body.get("kind"), question)
+        return failed(404, f"there is no {path}")
+
+
+def saved(question: ExploredConfig, name: Any) -> Answered:
+    """Write the config into the working folder, over no file."""
+    if not isinstance(name, str) or not name or Path(name).name != name:
+        return failed(400, "a config is saved under a name without folders, such as mine.yaml")
+    path = Path(name).with_suffix(".yaml")
+    try:
+        text = walks.as_file(question, path.stem)
+        with path.open("x", encoding="utf-8") as file:
+            file.write(text)
+    except ConfigError as error:
+        return question.refused(error)
+    except FileExistsError:
+        return failed(409, f"{path} exists already.", "Choose another name: no file is written over.")
+    except OSError as error:
+        return failed(500, f"{path} cannot be written: {error.strerror}.")
+    return 200, {"file": str(path.resolve()), "text": text}
+
+
+class Handler(BaseHTTPRequestHandler):
+    """One request."""
+
+    server: Server
+    timeout = 60
+
+    def do_GET(self) -> None:
+        """The page, the progress of what is computed, and the files that a job made."""
+        try:
+            address = urlsplit(self.path)
+            given = parse_qs(address.query).get("token", [""])[0]
+            if not self.local() or not self.allowed(given or self.cookie() or self.bearer()):
+                return None
+            if address.path == "/":
+                html, policy = rendered(self.server.base)
+                return self.send(200, html.encode(), "text/html; charset=utf-8", policy)
+            if address.path == "/api/job":
+                desk = self.server.desk
+                return self.answer(
+                    200, {**self.server.job.progress(), "compiling": desk.compiling, "compiled": desk.compiled}
+                )
+            runs = self.server.base.runs.resolve()
+            file = (runs / unquote(address.path).removeprefix("/runs/")).resolve()
+            if address.path.startswith("/runs/") and file.is_relative_to(runs) and file.is_file():
+                return self.send(200, file.read_bytes(), guess_type(file.name)[0] or "application/octet-stream")
+        except (ValueError, OSError):  # no address, or none that can be read
+            pass
+        return self.answer(*failed(404, f"there is no {self.path}"))
+
+    def do_POST(self) -> None:
+        """Answer a question."""
+        if not self.local() or not self.allowed(self.bearer()):
+            return None
+        try:
+            length = int(self.headers.get("Content-Length", 0))
+            if not 0 <= length <= LONGEST_BODY:
+                return self.answer(*failed(413, f"at most {LONGEST_BODY} bytes"))
+            self.answer(*self.server.answer(urlsplit(self.path).path, json.loads(self.rfile.read(length))))
+        except (ValueError, AttributeError, TypeError, RecursionError):
+            form = '{"set": {KEY: VALUE}, "models": ["rigid", "contact"]}'
+            self.answer(*failed(400, f"a question is JSON: {form}; its `config`, if any, is one that the page offers"))
+
+    def local(self) -> bool:
+        """Whether it is this server's own page that asks; whoever else does is told so."""
+        own = f"http://{self.server.host}"
+        if self.headers.get("Host") == self.server.host and self.headers.get("Origin", own) == own:
+            return True
+        self.answer(*failed(403, "only pages of this server may ask"))
+        return False
+
+    def cookie(self) -> str:
+        """The token in the cookie of this server: others on the same machine have their own."""
+        parts = dict(part.partition("=")[::2] for part in self.headers.get("Cookie", "").split("; "))
+        return parts.get(self.server.cookie, "")
+
+    def bearer(self) -> str:
+        """The token in the header."""
+        return self.headers.get("Authorization", "").removeprefix("Bearer ")
+
+    def allowed(self, token: str) -> bool:
+        """Whether that is the token; who has another one is told so."""
+        if secrets.compare_digest(token.encode(), self.server.token.encode()):
+            return True
+        self.answer(*failed(401, "the token of the printed address is missing", "Open the address as it was printed."))
+        return False
+
+    def answer(self, status: int, value: Mapping[str, Any]) -> None:
+        """Send an object."""
+        self.send(status, json.dumps(value, allow_nan=False).encode(), "application/json")
+
+    def send(self, status: int, body: bytes, kind: str, policy: str = "") -> None:
+        """Send a file."""
+        self.send_response(status)
+        headers = {"Content-Type": kind, "Content-Length": str(len(body)), "Cache-Control": "no-store"}
+        if status == 200 and "text/html" in kind:
+            # The links of a report, to its other pages, carry no token.
+            headers["Set-Cookie"] = f"{self.server.cookie}={self.server.token}; HttpOnly; SameSite=Strict"
+        if policy:
+            headers["Content-Security-Policy"] = policy
+        for name, value in headers.items():
+            self.send_header(name, value)
+        with contextlib.suppress(ConnectionError):  # whoever asked has left the page
+            self.end_headers()
+            self.wfile.write(body)
+
+    def log_message(self, *_: object) -> None:
+        """Nothing is said of single requests."""

@@ -1,0 +1,186 @@
+"""Blank figures, and figures as bytes that are the same whenever the figure is."""
+
+import contextlib
+import io
+import math
+import re
+import textwrap
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import matplotlib
+import matplotlib.style
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.axis import Axis
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
+
+from walkerlab.labels import with_unit
+from walkerlab.views.figures.style import NARROW, NARROW_BELOW, PNG_DPI, RC, WIDTH
+
+FILLS = 0.95
+"""Of the width that there is, at most: by a legend, a title or a label."""
+ROWS = 3
+"""Of a legend, for which a figure's height has room; it grows by those of a longer one."""
+SHRINKS = 0.7
+"""Power of its width that a figure's height follows: letters keep their size."""
+
+BETWEEN_DECADES: Final = ((15.0, (2.0, 5.0)), (100.0, (3.0,)))
+"""Multiples of a power of ten that have labels too, on axes whose ends are less than a factor apart."""
+RAISED: Final = str.maketrans("0123456789-.e", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻·ᵉ")
+LONGEST: Final = 1e4
+"""Number that is written without its exponent."""
+
+
+@contextlib.contextmanager
+def styled(width: float = WIDTH) -> Iterator[None]:
+    """Matplotlib's defaults and this project's style on top, whatever the user's own settings are.
+
+    width  of the figures, in; in narrow ones, letters are smaller and lines thinner
+    """
+    size = {"figure.figsize": (width, width)}
+    with matplotlib.style.context(["default", RC, *([NARROW] if width < NARROW_BELOW else []), size]):
+        yield
+
+
+def is_narrow() -> bool:
+    """Whether figures are of one column."""
+    return bool(matplotlib.rcParams["figure.figsize"][0] < NARROW_BELOW)
+
+
+def blank(height: float) -> Figure:
+    """A figure of the style's width and of `height` in, or of not as much less if it is narrower."""
+    width = matplotlib.rcParams["figure.figsize"][0]
+    figure = Figure(figsize=(width, height * (width / WIDTH) ** SHRINKS), layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def panels(height: float, rows: int = 1, columns: int = 1, **how: Any) -> tuple[Figure, Any]:
+    """A blank figure with axes in rows and columns, made as matplotlib's `subplots` makes them."""
+    figure = blank(height)
+    return figure, figure.subplots(rows, columns, **how)
+
+
+def label_of(words: str, unit: str) -> str:
+    """An axis in words, with its unit."""
+    return with_unit(words, re.sub(r"\^([\d.]+|e\b)", lambda power: power[1].translate(RAISED), unit))
+
+
+def label_ticks(axis: Axis) -> None:
+    """Labels of a logarithmic axis: at as many decades as there is room for, and between them where these are few."""
+    least, last = axis.get_view_interval()
+    between = next((subs for span, subs in BETWEEN_DECADES if last < min(span * least, LONGEST)), ())
+    axis.set_major_locator(LogLocator(subs=(1.0, *between)))
+    axis.set_minor_locator(NullLocator())
+    axis.set_major_formatter(FuncFormatter((lambda value, _place: f"{value:g}") if between else power_of_ten))
+
+
+def error_axis(axes: Axes) -> None:
+    """Make the vertical axis logarithmic, for errors."""
+    if np.isfinite(axes.dataLim.intervaly).all():
+        axes.set_yscale("log")
+        label_ticks(axes.yaxis)
+
+
+def cost_axis(axes: Axes) -> None:
+    """Make the horizontal axis logarithmic, for costs; a panel without any says so."""
+    if np.isfinite(axes.dataLim.intervalx).all():
+        axes.set_xscale("log")
+        label_ticks(axes.xaxis)
+    else:
+        axes.text(0.5, 0.5, "no walk came to its end", transform=axes.transAxes, ha="center")
+
+
+def power_of_ten(value: float, _place: float | None = None) -> str:
+    """A power of ten, as an axis writes its ticks.
+
+    Its exponent has signs of its own, since the small letters of a formula would be too small on a page.
+    """
+    return "10" + str(round(math.log10(value))).translate(RAISED)
+
+
+def entry(label: str, **look: Any) -> Line2D:
+    """A line, or a mark, in a legend."""
+    return Line2D([], [], label=label, **look)
+
+
+def add_legend(figure: Figure, handles: Sequence[Artist], title: str | None = None, edge: str = "upper") -> None:
+    """A legend in a band of its own above all axes, in as few rows as fit into the figure's width.
+
+    title  of what it is the legend
+    edge   "lower" puts it below all axes
+    """
+    where: dict[str, Any] = {"title": title, "alignment": "left", "loc": f"outside {edge} center"}
+    for rows in range(1, len(handles) + 1):
+        legend = figure.legend(handles=list(handles), ncols=-(-len(handles) // rows), **where)
+        box = legend.get_window_extent()
+        if rows == len(handles) or box.width < FILLS * figure.bbox.width:
+            break
+        legend.remove()
+    figure.set_figheight(figure.get_figheight() + max(0.0, 1.0 - ROWS / rows) * box.height / figure.dpi)
+
+
+def settle(figure: Figure) -> None:
+    """Lay the figure out once and for all, so that every file of it is the same drawing."""
+    engine = figure.get_layout_engine()
+    assert engine is not None, "a figure is laid out once"
+    engine.execute(figure)
+    break_lines(figure)
+    # only now do labels have their lines, and axes of equal scales the size that they are left with
+    engine.execute(figure)
+    figure.set_layout_engine(None)
+
+
+def break_lines(figure: Figure) -> None:
+    """Titles and labels that are longer than their axes go on in further lines."""
+    for axes in figure.axes:
+        box = axes.get_window_extent()
+        title = axes.set_title(axes.get_title(matplotlib.rcParams["axes.titlelocation"]))
+        for text, room in ((title, box.width), (axes.xaxis.label, box.width), (axes.yaxis.label, box.height)):
+            extent = text.get_window_extent()
+            longest = max(extent.width, extent.height)
+            if longest > FILLS * room:
+                letters = int(len(text.get_text()) * FILLS * room / longest)
+                text.set_text(textwrap.fill(text.get_text(), letters, break_long_words=False, break_on_hyphens=False))
+
+
+OF_PIXELS = ("png", "tiff")
+
+
+def as_file(figure: Figure, kind: str, name: str, title: str, dpi: int = PNG_DPI) -> bytes:
+    """The figure in a format, an SVG with text kept as text; `name` makes its ids differ from other figures'."""
+    undated: dict[str, dict[str, Any]] = {
+        "svg": {"metadata": {"Date": None, "Creator": None, "Title": title}},
+        "png": {"metadata": {"Software": None, "Title": title}},
+        "pdf": {"metadata": {"CreationDate": None, "Title": title}},
+        "eps": {},
+        "tiff": {"pil_kwargs": {"compression": "tiff_lzw"}},
+    }
+    file = io.BytesIO()
+    with matplotlib.rc_context({"svg.hashsalt": name}):
+        figure.savefig(file, format=kind, dpi=dpi if kind in OF_PIXELS else PNG_DPI, **undated[kind])
+    return file.getvalue()
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """A figure as files' bytes, with its words."""
+
+    svg: bytes
+    png: bytes
+    title: str
+    caption: str
+
+
+def files_of(
+    figure: Figure, name: str, title: str, kinds: Sequence[str] = ("svg", "png"), dpi: int = PNG_DPI
+) -> list[bytes]:
+    """A figure, plotted within the style, laid out, as a file of each kind."""
+    settle(figure)
+    return [as_file(figure, kind, name, title, dpi) for kind in kinds]

@@ -1,0 +1,386 @@
+"""Figures of families of gaits: 13 the bifurcation diagram, 14 multipliers, 16 the plane of two parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from itertools import count, cycle, pairwise
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.patches import Circle
+from numpy.typing import NDArray
+
+from walkerlab.labels import axis_label
+from walkerlab.pipeline.store.content import Group
+from walkerlab.views.figures.canvas import add_legend, entry, is_narrow, label_of, panels
+from walkerlab.views.figures.illustration import Drawn, Need, Results, paper_figure
+from walkerlab.views.figures.maps import Kind, draw_kinds
+from walkerlab.views.figures.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, VERMILLION
+
+if TYPE_CHECKING:
+    from matplotlib.typing import LineStyleType
+
+STAGE: Final = "continuation"
+NEED: Final = Need(STAGE, "branches", ("model", "period", "from", "to"), "no branch was found")
+MODELS: Final = {"rigid": BLUE, "contact": ORANGE}
+MARKS: Final = {"flip": ("o", VERMILLION), "fold": ("s", BLACK), "torus": ("D", PURPLE)}
+STYLES: Final[dict[bool, LineStyleType]] = {True: "-", False: (0.0, (2.2, 1.6))}
+FROM_FLIP: Final = 16  # points drawn from a flip to the first gait that is born there
+OTHER: Final = GREEN
+"""Of gaits that are not born of the gait of one step."""
+
+
+@dataclass(frozen=True)
+class DrawnBranch:
+    """A branch, or a curve over two parameters, with its model."""
+
+    model: str
+    group: Group
+
+    @property
+    def period(self) -> int:
+        """Steps of its gaits."""
+        return int(self.group.attrs["period"])
+
+    @property
+    def colour(self) -> str:
+        """Of the model; of other gaits than those of one step and its cascade, their own."""
+        period = self.period
+        return MODELS[self.model] if period & (period - 1) == 0 else OTHER
+
+
+def branches_of(results: Results, name: str = "branch") -> Iterator[DrawnBranch]:
+    """Every branch of a result, or every curve, in the order in which they were followed."""
+    groups = results[STAGE].groups
+    for model in MODELS:
+        for number in count():
+            if (group := groups.get(f"{model}/{name}_{number}")) is None:
+                break
+            yield DrawnBranch(model, group)
+
+
+def parameter_of(results: Results) -> str:
+    """The parameter with its unit, as an axis says it."""
+    summary = results[STAGE].summary
+    return label_of(axis_label(str(summary["over"])), str(summary["unit"]))
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A quantity of every step along a branch, bifurcations among its points.
+
+    value     (points,) of the parameter
+    quantity  (points, steps)
+    stable    (points - 1,) whether the gaits between neighbours are
+    marks     where the bifurcations are, and of which kind
+    """
+
+    value: NDArray[np.float64]
+    quantity: NDArray[np.float64]
+    stable: NDArray[np.bool_]
+    marks: tuple[tuple[int, str], ...]
+
+
+def curve_of(group: Group, name: str) -> Curve:
+    """A quantity along a branch; its stability changes at bifurcations, and else in the middle between neighbours."""
+    value, quantity, stable = group["value"], group[name], group["stable"].astype(bool)
+    if "mark_after" not in group.variables:
+        return Curve(value, quantity, stable[:-1] & stable[1:], ())
+    order = np.argsort(group["mark_after"].astype(int), kind="stable")
+    places = group["mark_after"].astype(int)[order] + 1
+    value = np.insert(value, places, group["mark_value"][order])
+    quantity = np.insert(quantity, places, group[f"mark_{name}"][order], axis=0)
+    # a bifurcation bounds what is stable and what is not
+    known, on_mark = np.insert(stable, places, True), np.insert(np.zeros(stable.size, bool), places, True)
+    between = known[:-1] & known[1:] & ~(on_mark[:-1] & on_mark[1:])
+    marks = zip(np.flatnonzero(on_mark).tolist(), group["mark_kind"][order].astype(str).tolist(), strict=True)
+    return Curve(value, quantity, between, tuple(marks))
+
+
+def draw_branch(axes: Axes, branch: DrawnBranch, name: str) -> set[str]:
+    """A quantity of every step of a branch, solid where it is stable, with its bifurcations; their kinds."""
+    curve = curve_of(branch.group, name)
+    width = 1.5 if branch.period == 1 else 1.0
+    bounds = [0, *(int(index) + 1 for index in np.flatnonzero(np.diff(curve.stable))), curve.stable.size]
+    for begin, end in pairwise(bounds):
+        if begin == end:
+            continue
+        stable = bool(curve.stable[begin])
+        thick, order = (width, 4) if stable else (0.6 * width, 3)
+        stretch = stretch_of(curve, begin, end)
+        axes.plot(*stretch, color=branch.colour, linestyle=STYLES[stable], linewidth=thick, zorder=order)
+    for place, kind in curve.marks:
+        marker, colour = MARKS[kind]
+        mark: dict[str, Any] = {"marker": marker, "markersize": 2.6, "color": colour, "markeredgewidth": 0.0}
+        values = np.full(curve.quantity.shape[1], curve.value[place])
+        axes.plot(values, curve.quantity[place], linestyle="none", **mark, zorder=6)
+    return {kind for _, kind in curve.marks}
+
+
+def stretch_of(curve: Curve, begin: int, end: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Values and quantities to be drawn from one point of a branch to another.
+
+    From the flip that a branch is born in to its first gait, quantities part as the root of the distance from the flip.
+    """
+    value, quantity = curve.value[begin : end + 1], curve.quantity[begin : end + 1]
+    if begin or (0, "flip") not in curve.marks:
+        return value, quantity
+    root = np.linspace(0.0, 1.0, FROM_FLIP, endpoint=False)
+    parting = quantity[0] + root[:, None] * (quantity[1] - quantity[0])
+    first = value[0] + root**2 * (value[1] - value[0])
+    return np.concatenate([first, value[1:]]), np.concatenate([parting, quantity[1:]])
+
+
+def clouds(results: Results) -> Iterator[tuple[str, Group]]:
+    """What walks of the models settled on."""
+    found = ((model, results[STAGE].groups.get(f"{model}/attractor")) for model in MODELS)
+    return ((model, group) for model, group in found if group is not None)
+
+
+QUANTITIES: Final = {"step_period": "step period", "stance_angle": "stance angle"}
+ROOM: Final = 0.06
+"""Beside what is stable, as a share of it: unstable branches that go far away are cut there."""
+LEAST: Final = 0.05
+"""Of the span, what the part with bifurcations is at least; of a quantity, what its axis spans at least."""
+TOLD_APART: Final = 0.04
+"""Of the axis, between labels of births."""
+BETWEEN: Final = 16
+"""Points between two of a branch, where a quantity's largest and least values are sought, and multipliers drawn."""
+
+
+def draw_branches(results: Results) -> Drawn:
+    """Both quantities over the whole span on the left, over the part with bifurcations on the right if there are some.
+
+    In a figure of one column the two parts stand under one another.
+
+    Caption: where the models' gaits of one step change, where cascades accumulate, where gaits of several steps are
+    born in folds, and the unit of all.
+    """
+    summary = results[STAGE].summary
+    branches, settled, close = list(branches_of(results)), list(clouds(results)), close_of(results)
+    parts = {"(a) all of it": None} | ({"(b) where gaits change": close} if close else {})
+    if is_narrow():
+        figure, stack = panels(5.6 * len(parts), 2 * len(parts))
+        both = stack.reshape(len(parts), 2).T
+    else:
+        figure, both = panels(5.6, 2, len(parts), squeeze=False)
+    births = births_in(branches, close) if close else []
+    kinds: set[str] = set()
+    for row, (name, words) in zip(both, QUANTITIES.items(), strict=True):
+        for axes, shown in zip(row, parts.values(), strict=True):
+            for model, cloud in settled:
+                values = np.broadcast_to(cloud["value"][:, None], cloud[name].shape)
+                colour = BLACK if model == "rigid" else GREY
+                axes.plot(values.ravel(), cloud[name].ravel(), ",", color=colour, alpha=0.5, zorder=2, rasterized=True)
+            kinds.update(*(draw_branch(axes, branch, name) for branch in branches))
+            axes.set(xlabel=parameter_of(results), ylabel=label_of(words, branches[0].group.variables[name].units))
+            if shown is not None:
+                axes.set_xlim(*shown)
+                label_births(axes, births)
+            axes.set_ylim(*bounds(results, name, shown))
+    for axes, title in zip(both[0], parts, strict=True):
+        axes.set_title(title if close else "")
+    models = {branch.model: MODELS[branch.model] for branch in branches}
+    key: list[Artist] = [entry(f"{model} model", color=colour, linewidth=1.5) for model, colour in models.items()]
+    if any(branch.colour == OTHER for branch in branches):
+        key.append(entry("other gaits", color=OTHER, linewidth=1.0))
+    key.append(entry("unstable", color=BLACK, linewidth=0.9, linestyle=STYLES[False]))
+    if settled:
+        key.append(entry("attractor", color=BLACK, linestyle="none", marker=".", markersize=3))
+    marks = {kind: mark for kind, mark in MARKS.items() if kind in kinds}
+    for kind, (marker, colour) in marks.items():
+        key.append(entry(kind, color=colour, linestyle="none", marker=marker, markersize=4))
+    add_legend(figure, key)
+    cascades = [one for one in summary["cascades"] if one["period"] == 1 and "accumulates_at" in one]
+    return figure, (summary["first_doubling"], cascades, births, "" if summary["unit"] == "1" else summary["unit"])
+
+
+def births_in(branches: Sequence[DrawnBranch], shown: tuple[float, float]) -> list[tuple[float, int]]:
+    """Where in a part of the axis gaits of several steps are born in a fold, and of how many, by their place.
+
+    Of births too close to be told apart that of the fewest steps.
+    """
+    folds = [
+        (branch.period, float(curve.value[place]))
+        for branch in branches
+        if branch.colour == OTHER
+        for curve in (curve_of(branch.group, "step_period"),)
+        for place, kind in curve.marks
+        if kind == "fold"
+    ]
+    births: list[tuple[float, int]] = []
+    for period, value in sorted(folds):
+        apart = all(abs(value - other) > TOLD_APART * (shown[1] - shown[0]) for other, _ in births)
+        if shown[0] <= value <= shown[1] and apart:
+            births.append((value, period))
+    return sorted(births)
+
+
+def label_births(axes: Axes, births: Sequence[tuple[float, int]]) -> None:
+    """Say above the axes of how many steps gaits are where they are born: some live in windows as thin as a line."""
+    if births:
+        above = axes.secondary_xaxis("top")
+        above.set_xticks([value for value, _ in births], [str(period) for _, period in births])
+        above.set_xlabel("steps of gaits that are born in folds")
+
+
+def close_of(results: Results) -> tuple[float, float] | None:
+    """The part of the axis with bifurcations, from before the first to where the attractor ends."""
+    summary = results[STAGE].summary
+    found = [one["value"] for one in summary["bifurcations"]]
+    if not found:
+        return None
+    ends = [one["to"] for one in summary["attractors"]] or [summary["to"]]
+    least, most = min(found), max(*ends, max(found))
+    room = max(ROOM * (most - least), 0.5 * (LEAST * (summary["to"] - summary["from"]) - (most - least)))
+    return max(least - room, summary["from"]), min(most + room, summary["to"])
+
+
+def bounds(results: Results, name: str, close: tuple[float, float] | None) -> tuple[float, float]:
+    """Room for what is stable and for the gaits of one step, in the part that is shown."""
+    shown: list[NDArray[Any]] = [cloud[name].ravel() for _, cloud in clouds(results)]
+    for branch in branches_of(results):
+        curve = curve_of(branch.group, name)
+        value, quantity = (finely(values) for values in (curve.value, curve.quantity))
+        wanted = np.append(np.repeat(curve.stable, BETWEEN), curve.stable[-1:])
+        if close is not None:
+            wanted &= (value >= close[0]) & (value <= close[1])
+        shown.append(quantity[wanted | (close is None and branch.period == 1)].ravel())
+    values = np.concatenate(shown)
+    if values.size == 0:
+        values = np.concatenate([branch.group[name].ravel() for branch in branches_of(results)])
+    least = LEAST * float(np.abs(values).max())
+    room = max(ROOM * float(np.ptp(values)), 0.5 * (least - float(np.ptp(values))))
+    return float(values.min()) - room, float(values.max()) + room
+
+
+def finely(along: NDArray[Any]) -> NDArray[np.float64]:
+    """What is known at points of a branch, at further ones between them."""
+    # Imported here: no other figure needs it.
+    from scipy.interpolate import PchipInterpolator
+
+    count = len(along)
+    if count == 1:
+        return np.asarray(along)
+    fine = np.linspace(0.0, count - 1.0, BETWEEN * (count - 1) + 1)
+    return np.asarray(PchipInterpolator(np.arange(count), along)(fine))
+
+
+def multipliers_of(branch: DrawnBranch) -> NDArray[np.complex128]:
+    """The multipliers along a branch, finely (points, multiplier), the largest first.
+
+    Between its points their polynomial is interpolated: where two of them meet they turn as roots do.
+    """
+    known = branch.group["multiplier_real"] + 1j * branch.group["multiplier_imag"]
+    found = np.array([np.roots(row) for row in finely(np.array([np.poly(row).real for row in known]))])
+    return np.take_along_axis(found, np.argsort(-np.abs(found), axis=1), axis=1)
+
+
+GAITS: Final[dict[str, tuple[dict[str, Any], ...]]] = {
+    "rigid": (
+        {"color": BLUE},
+        {"color": GREEN, "linestyle": "--"},
+        {"color": PURPLE, "linestyle": "-."},
+        {"color": BLACK, "linestyle": ":"},
+    ),
+    "contact": ({"color": ORANGE}, {"color": VERMILLION, "linestyle": "--"}, {"color": GREY, "linestyle": "-."}),
+}
+"""Looks of a model's gaits of one step, in the order in which they were found."""
+DOTS: Final[dict[str, Any]] = {"linestyle": "none", "marker": "o", "markersize": 1.2, "markeredgewidth": 0.0}
+FARTHEST: Final = 1.6
+"""Of the complex plane that is shown; an unstable gait's multipliers may be far outside."""
+
+
+def draw_multipliers(results: Results) -> Drawn:
+    """The complex plane on the left, magnitudes over the parameter on the right, a colour for each gait of one step.
+
+    Caption: where gaits of one step bifurcate, by model and kind, and the largest magnitude if it is beyond the axes.
+    """
+    (figure, (left, right)), largest = panels(3.6, 1, 2), 0.0
+    drawn = [branch for branch in branches_of(results) if branch.period == 1]
+    looks = {model: cycle(looks) for model, looks in GAITS.items()}
+    key = []
+    for branch in drawn:
+        value, multipliers, look = finely(branch.group["value"]), multipliers_of(branch), next(looks[branch.model])
+        left.plot(multipliers.real.ravel(), multipliers.imag.ravel(), color=look["color"], **DOTS)
+        last = multipliers[int(np.argmax(value))]
+        left.plot(last.real, last.imag, linestyle="none", marker=">", markersize=4, color=look["color"])
+        right.plot(value, np.abs(multipliers), linewidth=1.2, **look)
+        least, most = np.quantile(branch.group["step_period"], (0.0, 1.0))
+        key.append(entry(f"{branch.model} model, steps of {least:.3g} to {most:.3g} s", linewidth=1.2, **look))
+        largest = max(largest, float(np.abs(multipliers).max()))
+    left.add_patch(Circle((0.0, 0.0), 1.0, fill=False, edgecolor=GREY, linewidth=0.8))
+    left.set(xlim=(-FARTHEST, FARTHEST), ylim=(-FARTHEST, FARTHEST), aspect="equal")
+    left.set(xlabel="real part", ylabel="imaginary part", title="(a) in the complex plane")
+    right.axhline(1.0, color=GREY, linewidth=0.8)
+    right.set(
+        xlabel=parameter_of(results), ylabel="magnitude", ylim=(0.0, 2.0 * FARTHEST), title="(b) over the parameter"
+    )
+    end = entry("largest value of the span", color=BLACK, linestyle="none", marker=">", markersize=4)
+    add_legend(figure, [*key, end])
+    found: dict[tuple[str, str], list[float]] = {}
+    for one in results[STAGE].summary["bifurcations"]:
+        if one["period"] == 1:
+            found.setdefault((one["model"], one["kind"]), []).append(one["value"])
+    bifurcations = {which: sorted(values) for which, values in found.items()}
+    return figure, (bifurcations, largest if largest > FARTHEST else None)
+
+
+CURVES_NEED: Final = Need(STAGE, "curves", ("model", "period"), "no curves over two parameters (continuation.second)")
+CURVE_COLOURS: Final = {"rigid": BLACK, "contact": ORANGE}
+CURVE_STYLES: Final[dict[str, LineStyleType]] = {"flip": "-", "fold": (0.0, (3.0, 1.5))}
+WIDTHS: Final = {1: 1.4, 2: 1.0}
+FINEST: Final = 0.6
+DOUBLED: Final = {1: "#DCE9F5", 2: "#A9CCE8", 4: "#6CA6D4", 8: "#3B7DB5", 16: "#1F5488"}
+OTHER_PERIOD, APERIODIC, NOTHING = "#B5DDC0", "#F2C7A0", "#F4F4F4"
+
+
+def draw_plane(results: Results) -> Drawn:
+    """Regions by what walks settle on, and every curve over them, by model, kind and period.
+
+    Caption: what the curves divide, and how much of the plane settles on what.
+    """
+    figure, axes = panels(4.4)
+    regions = results[STAGE].groups.get("rigid/regions")
+    key: list[Artist] = []
+    shares = []
+    if regions is not None:
+        mesh = partial(axes.pcolormesh, regions["value"], regions["second"], shading="nearest", rasterized=True)
+        found = region_kinds(regions)
+        key = draw_kinds(lambda numbers, **look: mesh(numbers.T, **look), found)
+        shares = [(name, where.mean()) for _, name, where in found]
+    looks: dict[tuple[str, str], dict[str, Any]] = {}
+    for curve in branches_of(results, "curve"):
+        kind = str(curve.group.attrs["kind"])
+        look = looks[curve.model, kind] = {"color": CURVE_COLOURS[curve.model], "linestyle": CURVE_STYLES[kind]}
+        axes.plot(curve.group["value"], curve.group["second"], **look, linewidth=WIDTHS.get(curve.period, FINEST))
+        second = curve.group.variables["second"]
+        axes.set_ylabel(label_of(axis_label(second.long_name), second.units))
+    axes.set_xlabel(parameter_of(results))
+    order = sorted(looks, key=lambda one: (list(CURVE_COLOURS).index(one[0]), one[1]))
+    add_legend(figure, [*key, *(entry(f"{kind}s, {model} model", **looks[model, kind]) for model, kind in order)])
+    kinds = sorted({kind for _, kind in looks}, key=list(MARKS).index)
+    return figure, (kinds, [model for model in CURVE_COLOURS if any(model == one for one, _ in looks)], shares)
+
+
+def region_kinds(regions: Group) -> list[Kind]:
+    """Colour, name and cells of what walks settle on, of what there is."""
+    period = regions["period"]
+    other = (period > 0) & ~np.isin(period, list(DOUBLED))
+    kinds = [(colour, f"{n} step{'s' if n > 1 else ''}", period == n) for n, colour in DOUBLED.items()]
+    kinds += [
+        (OTHER_PERIOD, "another number of steps", other),
+        (APERIODIC, "never repeats itself", period == 0),
+        (NOTHING, "no walk goes on", period < 0),
+    ]
+    return [kind for kind in kinds if kind[2].any()]
+
+
+FIGURE_13 = paper_figure(13, (NEED,), draw_branches)
+FIGURE_14 = paper_figure(14, (NEED,), draw_multipliers)
+FIGURE_16 = paper_figure(16, (CURVES_NEED,), draw_plane)
+FIGURES = (FIGURE_13, FIGURE_14, FIGURE_16)

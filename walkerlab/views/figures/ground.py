@@ -1,0 +1,118 @@
+"""What the ground does: its forces, held against the friction cone, and the energy that every step loses, by cause."""
+
+from typing import Any, Final
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.patches import Patch
+from matplotlib.ticker import MaxNLocator
+
+from walkerlab.physics.energy_channels import KNEE_STRIKES, LOSSES, SAMPLED
+from walkerlab.views.figures.canvas import add_legend, blank, entry, panels
+from walkerlab.views.figures.illustration import Drawn, Illustration, Need, Results
+from walkerlab.views.figures.style import BLACK, CONTACT, GREY, LEGS
+from walkerlab.views.figures.walks import (
+    CONTACT_STAGE,
+    NO_ENERGIES,
+    STEPS_TAKEN_CONTACT,
+    TRAJECTORY,
+    Array,
+    Walk,
+    line,
+    walk_of,
+)
+
+NORMAL, FRICTION = "normal_force_N", "friction_force_N"
+FORCES = Need(CONTACT_STAGE, TRAJECTORY, (NORMAL, FRICTION), "'forces' is not among the config's outputs")
+TOTAL: Final = "total_energy_J"
+LOST: Final = {loss.variable: (loss.cause, loss.colour) for loss in SAMPLED.values()}
+GIVEN: Final = ("push_off_J", "hip_J")
+KNEES: Final = (LOSSES[KNEE_STRIKES].cause, LOSSES[KNEE_STRIKES].colour)
+ENERGY = Need(CONTACT_STAGE, TRAJECTORY, (*LOST, TOTAL), NO_ENERGIES)
+STRIDES, STEPS = 2, 40
+"""That are shown: of forces, so that impacts are told apart, and of energies."""
+OF_SAMPLES: Final = 0.99
+"""Part of the loaded samples that is in sight: an impact's force is many times the weight."""
+NOTHING: Final = 1e-3
+"""Part of what is lost that is not drawn."""
+
+
+def draw_forces(results: Results) -> Drawn:
+    """Both forces in time on the left, one against the other on the right.
+
+    Caption: how many strides are shown if not all, how steep the force gets, and how large an impact's is.
+    """
+    result = results[CONTACT_STAGE]
+    whole = walk_of(result, CONTACT)
+    walk, every = whole.first(STRIDES), whole[NORMAL]
+    loads, pulls = walk[NORMAL], walk[FRICTION]
+    # the normal force (N) up to which it is shown
+    top = 1.1 * float(np.quantile(loads[loads > 0.0], OF_SAMPLES)) if (loads > 0.0).any() else 1.0
+    figure = blank(4.4)
+    parts = figure.subplot_mosaic([["normal", "cone"], ["friction", "cone"]])
+    normal, friction, cone = parts["normal"], parts["friction"], parts["cone"]
+    key: list[Artist] = [entry(look.label, **look.line) for look in LEGS]
+    steepest = 0.0
+    # no cone where no foot feels any friction
+    for name, style in (("static", "-"), ("dynamic", "--")) if result[TRAJECTORY][FRICTION].any() else ():
+        coefficient = float(result.identity.config_slice["contact"][f"{name}_friction"])
+        bound: dict[str, Any] = {"color": BLACK, "linewidth": 1.0, "linestyle": style}
+        for sign in (-1.0, 1.0):
+            cone.plot([0.0, top], [0.0, sign * coefficient * top], **bound)
+        key.append(entry(f"{name} coefficient, {coefficient:g}", **bound))
+        steepest = max(steepest, coefficient)
+    cone.axhline(0.0, color=GREY, linewidth=0.6)
+    for leg, look in enumerate(LEGS):
+        load, pull = loads[:, leg], pulls[:, leg]
+        line(normal, walk.time, load, look)
+        line(friction, walk.time, pull, look)
+        loaded = (load > 0.0) & (load < top)
+        cone.plot(load[loaded], pull[loaded], linestyle="none", marker=".", markersize=1.6, color=look.colour, zorder=4)
+    reach = 1.1 * max(float(np.abs(pulls[loads < top]).max()), 1e-9)
+    wide = max(reach, 0.6 * steepest * top)
+    of_normal, of_friction = walk.label("normal force", NORMAL), walk.label("friction", FRICTION)
+    end = (0.0, float(walk.time[-1]))
+    normal.set(ylabel=of_normal, title="(a) normal force", xlim=end, ylim=(-0.03 * top, top))
+    friction.set(ylabel=of_friction, title="(b) friction, downhill positive", xlim=end, ylim=(-reach, reach))
+    friction.sharex(normal)
+    friction.set_xlabel("time (s)")
+    normal.tick_params(labelbottom=False)
+    cone.set(xlabel=of_normal, ylabel=of_friction, title="(c) against the friction cone")
+    cone.set(xlim=(0.0, top), ylim=(-wide, wide))
+    add_legend(figure, key)
+    borne = every > 0.1 * float(np.median(every.max(axis=1)))
+    ratio = float((np.abs(whole[FRICTION][borne]) / every[borne]).max()) if borne.any() else 0.0
+    return figure, (0 if walk is whole else STRIDES, ratio, every.max())
+
+
+def losses(walk: Walk) -> dict[tuple[str, str], Array]:
+    """Energy (J) that each step loses, by cause and its colour; what knees take is what no other cause explains."""
+    # the last samples before touches: an impact falls between two samples, and is not to be divided among two steps
+    rows = np.concatenate(([0], np.maximum(np.searchsorted(walk.time, walk.strikes) - 1, 0)))
+    by_cause = {cause: np.diff(walk[name][rows]) for name, cause in LOST.items()}
+    given = np.sum([walk[name] for name in GIVEN if name in walk.samples.variables], axis=0)
+    total = np.diff((given - walk[TOTAL])[rows])
+    by_cause[KNEES] = total - np.sum(list(by_cause.values()), axis=0)
+    return {cause: lost for cause, lost in by_cause.items() if np.abs(lost).max() >= NOTHING * np.abs(total).max()}
+
+
+def draw_losses(results: Results) -> Drawn:
+    """A bar for each step, its causes on one another; caption: how much a step loses (J), and to what."""
+    found = losses(walk_of(results[CONTACT_STAGE], CONTACT))
+    figure, axes = panels(2.9)
+    steps = np.arange(1, 1 + min(STEPS, next(iter(found.values())).size))
+    below = np.zeros(steps.size)
+    for (_, colour), lost in found.items():
+        axes.bar(steps, lost[: steps.size], 0.7, below, color=colour)
+        below += lost[: steps.size]
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
+    axes.set(xlabel="step", ylabel="energy lost (J)")
+    add_legend(figure, [Patch(facecolor=colour, label=label) for label, colour in found])
+    later = {label: float(lost[min(1, lost.size - 1) :].mean()) for (label, _), lost in found.items()}
+    return figure, (later, sum(later.values()))
+
+
+FIGURES = (
+    Illustration("ground-forces", (FORCES,), draw_forces),
+    Illustration("energy-lost", (ENERGY, STEPS_TAKEN_CONTACT), draw_losses),
+)

@@ -1,0 +1,128 @@
+"""What an illustration is: its name, its words, what it needs of the stored results, and how it is drawn."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from matplotlib.figure import Figure
+
+from walkerlab.pipeline.store.artifact import Stored
+from walkerlab.views.figures.canvas import Drawing, files_of, styled
+from walkerlab.views.figures.style import POINT
+from walkerlab.views.prose import Prose, f, percent
+
+WORDS = Prose(Path(__file__).parent / "words", (f, percent), {})
+
+Results = Mapping[str, Stored]
+"""Results by the name of their stage."""
+Drawn = tuple[Figure, tuple[Any, ...]]
+"""A figure, and what the template of its caption takes."""
+Draw = Callable[[Results], Drawn]
+
+
+@dataclass(frozen=True)
+class Need:
+    """Variables of a group of a stage's result, and in its summary the reference of a scene if one is named.
+
+    or_else  why a result may be without them, in words
+    """
+
+    stage: str
+    group: str
+    variables: tuple[str, ...]
+    or_else: str
+    scene: str = ""
+
+    def missing_in(self, results: Results, absent: Mapping[str, str]) -> str | None:
+        """Why the need is not met, in words; None if it is.
+
+        absent  why results are not there, by stage
+        """
+        if self.stage not in results:
+            why = absent.get(self.stage)
+            return f"it needs {self.stage}" + (f": {why}" if why else "")
+        result = results[self.stage]
+        group = result.groups.get(self.group)
+        there = group is not None and all(name in group.variables for name in self.variables)
+        there = there and (not self.scene or self.scene in result.summary["reference"])
+        return None if there else f"{self.stage}: {self.or_else}"
+
+
+@dataclass(frozen=True)
+class Illustration:
+    """An illustration drawn from stored results.
+
+    name    of its files, without suffix
+    needs   what it cannot be drawn without; what else is there is drawn too
+    draw    the figure, and what the caption's template takes of the results; called within the common style
+    number  the paper's; None if the paper has no such figure
+    words   file in `words/` with its title, its caption and what one sees; the figure's name if empty
+    scene   what those words are about, if a file serves several figures
+    """
+
+    name: str
+    needs: tuple[Need, ...]
+    draw: Draw
+    number: int | None = None
+    words: str = ""
+    scene: str = ""
+
+    def say(self, what: str, *values: Any) -> str:
+        """A paragraph of its words."""
+        return WORDS(f"{self.words or self.name}.{what}", *([self.scene] if self.scene else []), *values)
+
+    @property
+    def title(self) -> str:
+        """A few words, without a full stop."""
+        return self.say("title")
+
+    @property
+    def seen(self) -> str:
+        """What one sees, in a sentence or two, for those who do not see it; may be empty."""
+        return self.say("seen")
+
+    def caption(self, results: Results) -> str:
+        """One or two sentences with numbers of the results."""
+        with styled():
+            return self.say("caption", *self.draw(results)[1])
+
+    @property
+    def stages(self) -> tuple[str, ...]:
+        """The stages whose results it cannot be drawn without."""
+        return tuple(dict.fromkeys(need.stage for need in self.needs))
+
+    @property
+    def called(self) -> str:
+        """What to call it in a sentence."""
+        return f"figure {self.name if self.number is None else self.number}"
+
+    def why_left_out(self, results: Results, absent: Mapping[str, str]) -> str | None:
+        """Why it cannot be drawn, in words; None if it can.
+
+        absent  why results are not there, by stage
+        """
+        reasons = (need.missing_in(results, absent) for need in self.needs)
+        return next((reason for reason in reasons if reason is not None), None)
+
+    @property
+    def heading(self) -> str:
+        """Its title, with the paper's number."""
+        return self.title if self.number is None else f"Figure {self.number}. {self.title}"
+
+    def drawn(self, results: Results) -> Drawing:
+        """Its files and words; the same results give the same bytes."""
+        with styled():
+            figure, caption_values = self.draw(results)
+            svg, png = files_of(figure, self.name, self.heading)
+        return Drawing(svg, png, self.title, self.say("caption", *caption_values))
+
+    def as_file(self, results: Results, kind: str, width: float, dpi: int) -> bytes:
+        """The figure in a format, of a width in pt; what it has of pixels has so many an inch."""
+        with styled(POINT * width):
+            return files_of(self.draw(results)[0], self.name, self.heading, [kind], dpi)[0]
+
+
+def paper_figure(number: int, needs: tuple[Need, ...], draw: Draw) -> Illustration:
+    """A figure of the paper, drawn anew."""
+    return Illustration(f"figure-{number:02d}", needs, draw, number)

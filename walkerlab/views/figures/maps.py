@@ -1,0 +1,294 @@
+"""Maps of cells: figure 11 starts that walk, 15 basins of attraction, and where methods can be trusted."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
+from typing import Any, Final
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.colors import BoundaryNorm, ListedColormap, LogNorm
+from matplotlib.patches import Patch
+from matplotlib.ticker import LogLocator, NullLocator
+from numpy.typing import NDArray
+
+from walkerlab.config.contact import Contact
+from walkerlab.outcome import OUTCOME_TEXTS, Outcome
+from walkerlab.pipeline.store.content import Group
+from walkerlab.views.figures.canvas import add_legend, entry, label_of, label_ticks, panels, power_of_ten
+from walkerlab.views.figures.illustration import Drawn, Illustration, Need, Results, paper_figure
+from walkerlab.views.figures.style import BLACK, BLUE, GREEN, GREY, ORANGE, PALE, PURPLE, VERMILLION
+from walkerlab.views.figures.walks import TUNE_STAGE, claims_in, redoes_the_procedure
+
+WHITE: Final = "#FFFFFF"
+SKY: Final = "#56B4E9"
+LOG_SPAN: Final = 50.0
+"""Ratio of largest to least value from which on an axis of evenly spaced powers is drawn as such."""
+Kind = tuple[str, str, NDArray[np.bool_]]
+"""Cells of a kind: their colour, what they are, and which they are."""
+
+
+def discrete(colours: Sequence[str]) -> dict[str, Any]:
+    """What matplotlib is told to give each number, from 0 on, its colour."""
+    return {
+        "cmap": ListedColormap(list(colours)),
+        "norm": BoundaryNorm(np.arange(len(colours) + 1) - 0.5, len(colours)),
+    }
+
+
+def draw_kinds(draw: Callable[..., Any], kinds: Sequence[Kind]) -> list[Artist]:
+    """Each cell in the colour of its kind, by a function that draws numbers; returns the key."""
+    draw(np.argmax(np.array([where for _, _, where in kinds]), axis=0), **discrete([colour for colour, *_ in kinds]))
+    return patches((colour, label) for colour, label, _ in kinds)
+
+
+def patches(kinds: Iterable[tuple[str, str]]) -> list[Artist]:
+    """The key of colours and what they mean."""
+    return [Patch(facecolor=colour, edgecolor=GREY, linewidth=0.3, label=label) for colour, label in kinds]
+
+
+def ends_among(outcomes: Any) -> list[tuple[str, str]]:
+    """Colours and names of the outcomes that occur."""
+    return [(OUTCOME_TEXTS[one].colour, one.label) for one in map(Outcome, np.unique(outcomes).tolist())]
+
+
+def edges(centres: NDArray[Any]) -> NDArray[Any]:
+    """Bounds of cells about values, halfway between neighbours, on their own scale."""
+    scale = np.log(centres) if is_logarithmic(centres) else centres
+    if scale.size == 1:
+        found = np.array([scale[0] - 0.5, scale[0] + 0.5])
+    else:
+        middle = 0.5 * (scale[1:] + scale[:-1])
+        found = np.concatenate([[2 * scale[0] - middle[0]], middle, [2 * scale[-1] - middle[-1]]])
+    return np.exp(found) if is_logarithmic(centres) else found
+
+
+def is_logarithmic(values: NDArray[Any], span: float = LOG_SPAN) -> bool:
+    """Whether values are evenly spaced powers over a range that is so many times as wide as it begins."""
+    if values.size < 3 or values.min() <= 0.0 or values.max() / values.min() < span:
+        return False
+    gaps, plain = np.diff(np.log(np.sort(values))), np.diff(np.sort(values))
+    return bool(gaps.max() / gaps.min() < min(1.01, plain.max() / plain.min()))
+
+
+def axis_of(cells: Group, name: str) -> str:
+    """A coordinate of the cells on an axis."""
+    variable = cells.variables[name]
+    return label_of(variable.long_name, variable.units)
+
+
+SWING, STANCE = "swing_factor", "stance_factor"
+MAP = Need(
+    TUNE_STAGE, "map", (SWING, STANCE, "outcome", "steps", "rigid_outcome", "rigid_steps"), "no start was walked"
+)
+
+OUTCOMES: Final = discrete([OUTCOME_TEXTS[one].colour for one in Outcome])
+MODELS: Final = (("", "(a) contact model"), ("rigid_", "(b) rigid model"))
+STEP_LEVELS: Final = (0.5, 1.5, 2.5, 4.5)
+
+
+def draw_starts(results: Results) -> Drawn:
+    """Both models' maps on the same axes, outcome as colour, lines where more steps are walked.
+
+    Caption: how many starts walk, and the factors at which the paper's own would lie; none of these for another scene.
+    """
+    cells, summary = results[TUNE_STAGE]["map"], results[TUNE_STAGE].summary
+    across, up = cells[SWING], cells[STANCE]
+    marks: list[tuple[str, str, int, str, tuple[Any, Any]]] = [("rigid start", "o", 6, WHITE, (1.0, 1.0))]
+    for name, marker, size, face in (("adjusted", "D", 9, "none"), ("gait", "X", 6, WHITE)):
+        place = cells.attrs.get(f"{name}_{SWING}"), cells.attrs.get(f"{name}_{STANCE}")
+        if None not in place:
+            marks.append(("contact gait" if name == "gait" else "adjusted start", marker, size, face, place))
+    figure, both = panels(3.9, 1, 2, sharex=True, sharey=True)
+    swing, stance = ("link 1", "link 2") if redoes_the_procedure(results) else ("the swing leg", "the stance leg")
+    for axes, (model, title) in zip(both, MODELS, strict=True):
+        steps = cells[f"{model}steps"]
+        axes.pcolormesh(across, up, cells[f"{model}outcome"], **OUTCOMES, rasterized=True)
+        levels = [level for level in STEP_LEVELS if level < int(steps.max())]
+        if levels and steps.min() < levels[-1]:
+            axes.contour(across, up, steps, levels, colors=BLACK, linewidths=0.4)
+        axes.set(title=title, xlabel=f"factor on the velocity of {swing}")
+    both[0].set_ylabel(f"factor on the velocity of {stance}")
+    key = patches(ends_among([cells[f"{model}outcome"] for model, _ in MODELS]))
+    for label, marker, size, face, (x, y) in marks:
+        mark: dict[str, Any] = {"linestyle": "", "marker": marker, "markersize": size, "color": BLACK}
+        for axes in both:
+            axes.plot([x], [y], **mark, markerfacecolor=face, zorder=5)
+        key.append(entry(label, **mark, markerfacecolor=face))
+    both[0].set(xlim=across[[0, -1]], ylim=up[[0, -1]])
+    add_legend(figure, key)
+    rows = [summary["table2"][name] for name in ("dtheta_1", "dtheta_2")] if claims_in(results) else []
+    paper = [abs(row["paper_adams"] / row["ours_rigid"]) for row in rows]
+    return figure, (summary["map"], cells.attrs["steps_wanted"], paper)
+
+
+BASIN: Final = "basin"
+CELLS = Need(BASIN, "basin", ("outcome", "attractor", "steps_to_settle", "walking"), "no start was walked")
+ATTRACTORS: Final = (BLUE, ORANGE, GREEN, PURPLE, VERMILLION)
+NO_ATTRACTOR: Final = -1
+
+
+def draw_basins(results: Results) -> Drawn:
+    """Attractors and failures by colour on the left, steps to settle by brightness on the right.
+
+    Caption: what is walked, how much of the window walks, and to which attractors.
+    """
+    summary, cells = results[BASIN].summary, results[BASIN]["basin"]
+    plane = [str(name) for name in summary["plane"][:2]]
+    xlim, ylim = (sides_of(cells[name]) for name in plane)
+    # of a grid over three coordinates, the middle plane
+    shown = {name: cells[name] if cells[name].ndim == 2 else cells[name][:, :, cells[name].shape[2] // 2]
+             for name in ("outcome", "attractor", "steps_to_settle")}  # fmt: skip
+
+    def draw(axes: Axes, values: NDArray[Any], **how: Any) -> Any:
+        extent = (*xlim, *ylim)
+        return axes.imshow(values.T, extent=extent, origin="lower", aspect="auto", interpolation="nearest", **how)
+
+    figure, (left, right) = panels(3.9, 1, 2, sharex=True, sharey=True)
+    key = draw_kinds(partial(draw, left), fates(shown["outcome"], shown["attractor"], summary))
+    left.set_title("(a) where walks end")
+    # on a scale of powers what has settled from its first step on has the colour of one step
+    settled = np.ma.masked_where(shown["attractor"] == NO_ATTRACTOR, shown["steps_to_settle"].clip(min=1))
+    right.set_title("(b) steps to the attractor")
+    if settled.count():
+        least = float(settled.min())
+        scale = LogNorm(least, max(float(settled.max()), least + 1.0))
+        bar = figure.colorbar(draw(right, settled, cmap="viridis_r", norm=scale), ax=right)
+        bar.set_label("steps")
+        label_ticks(bar.ax.yaxis)
+    else:
+        right.text(0.5, 0.9, "no walk settles on a gait", transform=right.transAxes, ha="center")
+    x, y = (float(cells.attrs[f"at_{name}"]) for name in plane)
+    gait: dict[str, Any] = {"marker": "o", "markersize": 4.5, "color": BLACK, "markerfacecolor": WHITE}
+    for axes in (left, right):
+        axes.plot([x], [y], linestyle="", **gait)
+        axes.set(xlim=xlim, ylim=ylim, xlabel=axis_of(cells, plane[0]))
+    left.set_ylabel(axis_of(cells, plane[1]))
+    add_legend(figure, [*key, entry("rigid gait of one step", linestyle="", **gait)])
+    rows = enumerate(summary["attractors"])
+    reached = [(attractor_name(number, summary["attractors"]), row) for number, row in rows if row["cells"]]
+    return figure, (summary, reached)
+
+
+def sides_of(middles: NDArray[np.float64]) -> tuple[float, float]:
+    """Where a row of cells with these middles begins and ends."""
+    half = 0.5 * float(middles[1] - middles[0])
+    return float(middles[0]) - half, float(middles[-1]) + half
+
+
+def fates(outcome: NDArray[Any], attractor: NDArray[Any], summary: Mapping[str, Any]) -> list[Kind]:
+    """The attractors and failures that occur."""
+    attractors = summary["attractors"]
+    kinds: list[Kind] = [
+        (ATTRACTORS[number % len(ATTRACTORS)], attractor_name(number, attractors), attractor == number)
+        for number in range(len(attractors))
+    ]
+    said = "never repeats itself" if summary["aperiodic"] else "walks, not settled"
+    kinds.append(
+        (OUTCOME_TEXTS[Outcome.WALKED].colour, said, (outcome == Outcome.WALKED) & (attractor == NO_ATTRACTOR))
+    )
+    failures = [one for one in Outcome if one is not Outcome.WALKED]
+    kinds += [(OUTCOME_TEXTS[one].colour, one.label, outcome == one) for one in failures]
+    return [kind for kind in kinds if kind[2].any()]
+
+
+def attractor_name(number: int, attractors: list[dict[str, Any]]) -> str:
+    """An attractor by its period, and a letter where several have the same."""
+    period = attractors[number]["period"]
+    same = [other for other, row in enumerate(attractors) if row["period"] == period]
+    letter = f" ({'abcdefghijklmnopqrstuvwxyz'[same.index(number) % 26]})" if len(same) > 1 else ""
+    return f"gait of {period} step{'' if period == 1 else 's'}{letter}"
+
+
+MAPS: Final = "stability-maps"
+STIFFNESS, VELOCITY, STEP = "stiffness", "stiction_velocity", "step_size"
+_LAW: Final = Contact().in_si()
+PAPER: Final = (_LAW.stiffness, _LAW.stiction_velocity)
+SHARP, ROUGH = (1e-10, 1.0), (1e-6, 1.0)  # errors told apart by colour
+VERDICT_COLOURS: Final = {
+    "fine": SKY,
+    "wrong silently": VERMILLION,
+    "diverges": BLACK,
+    "gives up": ORANGE,
+    "no reference": PALE,
+}
+
+
+class OverStiffness:
+    """Two panels over stiffness and another coordinate: what becomes of walks, and their errors."""
+
+    def __init__(self, cells: Group, up: str, titles: tuple[str, str]) -> None:
+        """Both panels, still empty, the other coordinate upward."""
+        self.cells, self.edges = cells, (edges(cells[STIFFNESS]), edges(cells[up]))
+        self.figure, (self.left, self.right) = panels(3.9, 1, 2, sharex=True, sharey=True)
+        xlim, ylim = (ends[[0, -1]] for ends in self.edges)
+        for axes, title in ((self.left, titles[0]), (self.right, titles[1])):
+            axes.set(xscale="log", yscale="log", xlabel=axis_of(cells, STIFFNESS), title=title, xlim=xlim, ylim=ylim)
+            axes.xaxis.set_major_locator(LogLocator())
+            for axis in (axes.xaxis, axes.yaxis):
+                axis.set_minor_locator(NullLocator())
+                axis.set_major_formatter(power_of_ten)
+        self.left.set_ylabel(axis_of(cells, up))
+
+    def draw(self, axes: Axes, values: NDArray[Any], **look: Any) -> Any:
+        """Values of the cells."""
+        return axes.pcolormesh(*self.edges, values, **look, rasterized=True)
+
+    def draw_errors(self, there: NDArray[np.bool_], ends: tuple[float, float], others: Sequence[Kind]) -> None:
+        """Errors by brightness, where there are any, with their scale; cells of other kinds in their colours."""
+        shown = np.ma.masked_where(~there, np.clip(self.cells["error"], *ends))
+        mesh = self.draw(self.right, shown, cmap="cividis", norm=LogNorm(*ends))
+        self.figure.colorbar(mesh, ax=self.right, label="error", extend="both")
+        for colour, _, where in others:
+            if where.any():
+                alone = np.ma.masked_where(~where, np.ones(where.shape))
+                self.draw(self.right, alone, cmap=ListedColormap([colour]))
+
+
+def draw_stiction(results: Results) -> Drawn:
+    """Outcome on the left, error on the right; caption: what is walked, and how many cells come out how."""
+    cells = results[MAPS]["stiction"]
+    made = OverStiffness(cells, VELOCITY, ("(a) how the walk ends", "(b) against a tolerance ten times tighter"))
+    outcomes, compared = cells["outcome"], cells["compared"] == 1
+    made.draw(made.left, outcomes, **OUTCOMES)
+    unanswered = np.isin(outcomes, [int(Outcome.BUDGET_EXHAUSTED), int(Outcome.SOLVER_FAILED)])
+    otherwise = (VERMILLION, "(b) ends otherwise", ~compared & ~unanswered)
+    made.draw_errors(compared, SHARP, [(BLACK, "", unanswered), otherwise])
+    seen = [*ends_among(outcomes), *([otherwise[:2]] if otherwise[2].any() else [])]
+    mark: dict[str, Any] = {"marker": "o", "color": BLACK, "markerfacecolor": WHITE}
+    for axes in (made.left, made.right):
+        axes.plot(*PAPER, **mark, markersize=5.0)
+    add_legend(made.figure, [*patches(seen), entry("paper", linestyle="none", **mark)])
+    return made.figure, (results[MAPS].summary, cells.attrs)
+
+
+def draw_step(results: Results) -> Drawn:
+    """Verdict on the left, error on the right; caption: what is walked, and how many cells come out how."""
+    cells = results[MAPS]["step"]
+    names = [one.partition(" ")[2] for one in str(cells.attrs["verdicts"]).split(", ")]
+    made = OverStiffness(cells, STEP, ("(a) what becomes of the walk", "(b) error of the state at the end"))
+    verdict = np.array(names, dtype=object)[cells["verdict"]]
+    made.draw(made.left, cells["verdict"], **discrete([VERDICT_COLOURS[name] for name in names]))
+    errors = ("fine", "wrong silently")
+    others = [(VERDICT_COLOURS[name], name, verdict == name) for name in VERDICT_COLOURS if name not in errors]
+    made.draw_errors(np.isin(verdict, errors), ROUGH, others)
+    line: dict[str, Any] = {"color": GREY, "linewidth": 0.8}
+    for axes in (made.left, made.right):
+        axes.axvline(PAPER[0], **line)
+    seen = [names[int(number)] for number in np.unique(cells["verdict"])]
+    shown = [Patch(facecolor=VERDICT_COLOURS[name], label=name) for name in seen]
+    add_legend(made.figure, [*shown, entry("the paper's stiffness", **line)])
+    return made.figure, (results[MAPS].summary, cells.attrs)
+
+
+NEVER = "it has no such map"
+STICTION_NEED = Need(MAPS, "stiction", (STIFFNESS, VELOCITY, "outcome", "sharper_outcome", "compared", "error"), NEVER)
+STEP_NEED = Need(MAPS, "step", (STIFFNESS, STEP, "verdict", "error"), NEVER)
+STABILITY = (
+    Illustration("stability-stiction", (STICTION_NEED,), draw_stiction),
+    Illustration("stability-step", (STEP_NEED,), draw_step),
+)
+FIGURE_15 = paper_figure(15, (CELLS,), draw_basins)
+FIGURES = (paper_figure(11, (MAP,), draw_starts), FIGURE_15)

@@ -1,0 +1,291 @@
+"""A walker's measures to scale, named as the config names them: one leg upright, or every part in its own frame."""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import reduce
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from walkerlab.config.walkers import CompassWalker, Kneed, PartsWalker, StraightLegs
+from walkerlab.views.figures.canvas import blank, files_of, styled
+from walkerlab.views.figures.style import BLACK, BLUE, GREEN, GREY, ORANGE, PALE, POINT, VERMILLION, WIDTH
+
+AnyWalker = CompassWalker | StraightLegs | Kneed | PartsWalker
+Point = tuple[float, float]
+
+HEIGHT, SMALL = 4.6, 7.5
+"""Of the figure, in; of its letters, pt."""
+SMALL_ARC = 0.02
+"""Radius of a sole, in leg lengths, too small to show what belongs to its centre."""
+FAINT = "#C8C8C8"
+"""Colour of the other leg."""
+ARC = np.linspace(-0.6, 0.6, 41)
+BEHIND, BENT = -0.3, -0.75
+"""Angles (rad) of the other leg, and of its shank."""
+BESIDE, FIRST_LANE = 0.62, 0.24
+"""Where masses are named, behind the leg, and where the first measures of height stand, ahead of it; leg lengths."""
+LETTER, LINE = 0.0088, 0.0195
+"""Width and height of a letter, in parts of the picture's width."""
+CLEAR = 0.05
+"""Between the middles of words in a lane, leg lengths."""
+PARTS_ROOM = 1.5
+"""Height of a part's picture, in parts of the part's."""
+
+
+@dataclass(frozen=True)
+class Length:
+    """A length of the config, between two points at one height or above one another (m)."""
+
+    key: str
+    value: float
+    start: Point
+    end: Point
+
+
+@dataclass(frozen=True)
+class UprightLeg:
+    """One leg upright over its sole, which is at the origin; lengths in m.
+
+    joints  the leg's line from the hip down, without the sole
+    centre  of the sole's arc
+    masses  what the config says of each, and where it is
+    top     height of the torso's end, or of the hip
+    """
+
+    joints: tuple[Point, ...]
+    centre: Point
+    radius: float
+    lengths: tuple[Length, ...]
+    masses: tuple[tuple[tuple[str, ...], Point], ...]
+    top: float
+
+
+def said(key: str, value: float) -> str:
+    """A key with its value, as a config has them."""
+    return f"{key}: {value:g}"
+
+
+def weighing(walker: Any, prefix: str) -> tuple[str, ...]:
+    """The words of a body's mass, with its inertia if it has one; its keys begin with the prefix."""
+    inertia = value_of(walker, f"{prefix}inertia_kg_m2", 0.0)
+    mass = said(f"{prefix}mass_kg", value_of(walker, f"{prefix}mass_kg"))
+    return (mass, said(f"{prefix}inertia_kg_m2", inertia)) if inertia else (mass,)
+
+
+def value_of(walker: Any, key: str, *otherwise: float) -> float:
+    """What a config's walker has under a dotted key; otherwise ..., if that is given."""
+    *blocks, last = key.split(".")
+    return float(getattr(reduce(getattr, blocks, walker), last, *otherwise))
+
+
+def upright(walker: CompassWalker | StraightLegs | Kneed) -> UprightLeg:
+    """What is drawn of a walker of a type."""
+    radius, top, sole = walker.foot_radius_m, walker.leg_length_m, (0.0, 0.0)
+    hip, centre, joints = (0.0, top), (0.0, radius), [(0.0, top)]
+    lengths: list[Length] = []
+    masses = [(weighing(walker, "hip_"), hip)]
+
+    def measured(key: str, start: Point, end: Point) -> None:
+        lengths.append(Length(key, value_of(walker, key), start, end))
+
+    if walker.torso is not None:
+        top += walker.torso.above_hip_m
+        measured("torso.above_hip_m", (0.0, top), hip)
+        masses.append((weighing(walker, "torso."), (0.0, top)))
+    limbs = [("leg_", "hip", hip, sole)]
+    if isinstance(walker, Kneed):
+        joints.append((0.0, walker.shank.length_m))
+        limbs = [("thigh.", "hip", hip, joints[1]), ("shank.", "knee", joints[1], sole)]
+    for limb, joint, above, end in limbs:
+        if isinstance(walker, CompassWalker):
+            mass = (0.0, walker.foot_to_mass_m)
+            measured("foot_to_mass_m", mass, sole)
+        else:
+            below, ahead = f"{limb}mass_below_{joint}_m", f"{limb}mass_ahead_m"
+            mass = (value_of(walker, ahead), above[1] - value_of(walker, below))
+            measured(below, above, mass)
+            measured(ahead, (0.0, mass[1]), mass)
+        measured(f"{limb}length_m", above, end)
+        masses.append((weighing(walker, limb), mass))
+    if isinstance(walker, StraightLegs | Kneed):
+        centre = (walker.foot_centre_ahead_m, radius)
+        measured("foot_centre_ahead_m", (0.0, radius), centre)
+    measured("foot_radius_m", centre, (centre[0], 0.0))
+    return UprightLeg(tuple(joints), centre, radius, tuple(lengths), tuple(masses), top)
+
+
+def drawn(walker: AnyWalker, name: str, kind: str = "svg") -> bytes:
+    """The walker's measures as SVG, PDF or PNG; the same walker and name give the same bytes."""
+    title = f"The measures of a walker of type {walker.type}"
+    with styled():
+        figure = of_parts(walker) if isinstance(walker, PartsWalker) else of_type(walker)
+        return files_of(figure, name, title, [kind])[0]
+
+
+def of_type(walker: CompassWalker | StraightLegs | Kneed) -> Figure:
+    """One leg upright on the slope with its measures, the other one pale behind it."""
+    leg = upright(walker)
+    length, centre = leg.joints[0][1], leg.centre
+    # the joints, and where the leg's line meets its sole's arc
+    line = [*leg.joints, (0.0, centre[1] - math.sqrt(max(0.0, leg.radius**2 - centre[0] ** 2)))]
+    labels, lanes = arranged(leg)
+    # letters keep their size, so that they take parts of the width, whatever the walker's length
+    behind = letters([words for words, *_ in labels])
+    ahead = [letters([said(one.key, one.value) for one in lane]) for lane in lanes]
+    width = (BESIDE + FIRST_LANE) * length / (1.0 - LETTER * (behind + sum(ahead)))
+    width = max(width, (leg.top + 0.3 * length) * WIDTH / HEIGHT)
+    left = -BESIDE * length - LETTER * behind * width
+    heights = apart([at[1] for *_, at in labels], [LINE * width * len(words.split("\n")) for words, *_ in labels], 0.0)
+    bottom, top, ends = -0.16 * length, max(leg.top, *heights) + 0.1 * length, (left, left + width)
+    figure = blank(WIDTH * (top - bottom) / width)
+    axes = figure.add_subplot()
+    axes.set_axis_off()
+    axes.set(aspect="equal", xlim=ends, ylim=(bottom, top))
+    axes.fill_between(ends, -0.02 * length, 0.0, facecolor=PALE, edgecolor=GREY, hatch="////", linewidth=0.0)
+    axes.plot(ends, [0.0, 0.0], color=BLACK, linewidth=0.8)
+    y = -0.1 * length
+    axes.annotate("", xy=(0.25 * length, y), xytext=(-0.25 * length, y), arrowprops={"arrowstyle": "-|>"})
+    axes.text(0.28 * length, y, "walking direction", va="center", fontsize=SMALL)
+    # the other leg, off the ground behind, its knee bent if it has one
+    other, angles = [leg.joints[0]], (BEHIND, BENT)[: len(leg.joints)]
+    for angle, above, below in zip(angles, leg.joints, line[1:], strict=True):
+        other.append(turned(angle, above, below, other[-1]))
+    draw_leg(axes, other, turned(angles[-1], leg.joints[-1], centre, other[-2]), leg.radius, FAINT)
+    draw_leg(axes, line, centre, leg.radius, BLACK)
+    axes.plot([0.0, 0.0], [length, leg.top], color=BLACK, linewidth=2.0)
+    x = FIRST_LANE * length
+    for lane, wide in zip(lanes, ahead, strict=True):
+        for one in lane:
+            draw_length(axes, one, x, LETTER * width)
+        x += LETTER * wide * width
+    axes.plot(*np.transpose([at for _, at in leg.masses]), "o", markersize=8, color=GREEN, zorder=5)
+    for one in leg.lengths:
+        if one.start[1] == one.end[1]:
+            axes.plot(*np.transpose([one.start, one.end]), color=VERMILLION, linewidth=1.5)
+    for (words, colour, at), height in zip(labels, heights, strict=True):
+        axes.plot([-BESIDE * length, at[0]], [height, at[1]], color=colour, linewidth=0.5, zorder=1)
+        axes.text(-BESIDE * length, height, f"{words} ", color=colour, fontsize=SMALL, ha="right", va="center")
+    if leg.radius > SMALL_ARC * length:
+        axes.plot(*centre, marker="+", markersize=8, color=BLUE, zorder=5)
+    return figure
+
+
+def arranged(leg: UprightLeg) -> tuple[list[tuple[str, str, Point]], list[list[Length]]]:
+    """What is named behind the leg, with its colour and place, and the measures of height in lanes ahead of it."""
+    length, lanes = leg.joints[0][1], list[list[Length]]()
+    labels = [("\n".join(words), GREEN, at) for words, at in leg.masses]
+    for one in (one for one in leg.lengths if one.value):
+        level = one.start[1] == one.end[1]
+        if level or one.value <= SMALL_ARC * length:
+            labels.append((said(one.key, one.value), VERMILLION if level else BLUE, one.end))
+        elif free := [lane for lane in lanes if all(clear(one, other, length) for other in lane)]:
+            free[0].append(one)
+        else:
+            lanes.append([one])
+    return labels, lanes
+
+
+def letters(texts: Sequence[str]) -> int:
+    """Of the longest line of some texts, and of the room beside it."""
+    return max((len(line) + 2 for text in texts for line in text.split("\n")), default=0)
+
+
+def clear(one: Length, other: Length, length: float) -> bool:
+    """Whether neither two measures nor their words meet in one lane."""
+    between = 0.5 * abs(one.start[1] + one.end[1] - other.start[1] - other.end[1])
+    return between > max(0.499 * (one.value + other.value), CLEAR * length)
+
+
+def apart(heights: Sequence[float], sizes: Sequence[float], lowest: float = -math.inf) -> list[float]:
+    """The middles of words, as near to heights as they can be, further up where those below need room."""
+    found = list(heights)
+    for place in sorted(range(len(found)), key=found.__getitem__):
+        found[place] = max(found[place], lowest + 0.5 * sizes[place])
+        lowest = found[place] + 0.5 * sizes[place]
+    return found
+
+
+def draw_leg(axes: Axes, line: Sequence[Point], centre: Point, radius: float, colour: str) -> None:
+    """A leg's line from the hip over its knee down to its sole, and the sole's arc."""
+    axes.plot(*np.transpose(line), color=colour, linewidth=2.0, zorder=2)
+    axes.plot(*np.transpose(line[:-1]), linestyle="none", marker="o", markersize=6, color=colour, mfc="white", zorder=4)
+    across, up = np.subtract(line[-1], line[-2])
+    around = np.arctan2(across, -up) + ARC
+    axes.plot(centre[0] + radius * np.sin(around), centre[1] - radius * np.cos(around), color=colour, linewidth=2.0)
+    if radius == 0.0:  # a point, perhaps ahead of the leg's line
+        axes.plot(*np.transpose([line[-1], centre]), color=colour, linewidth=2.0, zorder=2)
+
+
+def turned(angle: float, origin: Point, point: Point, moved_to: Point) -> Point:
+    """A point after a turn (rad) about an origin that has moved."""
+    (across, up), s, c = np.subtract(point, origin), np.sin(angle), np.cos(angle)
+    return float(moved_to[0] + c * across - s * up), float(moved_to[1] + s * across + c * up)
+
+
+def draw_length(axes: Axes, measure: Length, x: float, letter: float) -> None:
+    """A measure from a point to one below it, and what it is."""
+    for point in (measure.start, measure.end):
+        axes.plot([point[0], x], [point[1], point[1]], color=GREY, linewidth=0.5, linestyle=":", zorder=1)
+    high, low = measure.start[1], measure.end[1]
+    axes.annotate("", xy=(x, high), xytext=(x, low), arrowprops={"arrowstyle": "<|-|>", "color": BLUE})
+    words = said(measure.key, measure.value)
+    axes.text(x + letter, 0.5 * (high + low), words, color=BLUE, fontsize=SMALL, va="center")
+
+
+def of_parts(walker: PartsWalker) -> Figure:
+    """Every body of the second leg, and those of neither, each in its own frame."""
+    shown = [body for body in walker.bodies if body.name not in walker.legs[0]]
+    figure = blank(HEIGHT)
+    for axes, body in zip(figure.subplots(1, len(shown), squeeze=False)[0], shown, strict=True):
+        axes.set(aspect="equal", title="\n".join([f"name: {body.name}", *weighing(body, "")]), xlabel="ahead (m)")
+        axes.axhline(0.0, color=GREY, linewidth=0.6, zorder=0)
+        axes.axvline(0.0, color=GREY, linewidth=0.6, zorder=0)
+        marks = list(marks_of(walker, body.name, body.centre_m))
+        bones = [at for words, _, marker, at in marks if marker == "o" and not words.startswith("centre_m")]
+        for foot in walker.feet:
+            if foot.body == body.name:
+                x, y = foot.centre_m
+                bones.append((x, y - foot.radius_m))
+                axes.plot(x + foot.radius_m * np.sin(ARC), y - foot.radius_m * np.cos(ARC), color=BLACK, linewidth=2.0)
+        axes.plot(*np.transpose(bones), color=BLACK, linewidth=2.0, zorder=1)
+        points = np.array([*bones, *(at for *_, at in marks)])
+        (left, low), (_, high) = points.min(axis=0), points.max(axis=0)
+        tall = PARTS_ROOM * max(high - low, 0.1 * walker.leg_length_m)
+        wide = tall * (WIDTH / len(shown) - 0.7) / (HEIGHT - 1.0)
+        low = 0.5 * (low + high - tall)
+        axes.set(ylim=(low, low + tall), xlim=(left - 0.25 * wide, left + 0.75 * wide))
+        line = tall * 1.35 * SMALL * POINT / (HEIGHT - 1.0)
+        heights = apart([at[1] for *_, at in marks], [line * len(words.split("\n")) for words, *_ in marks])
+        for (words, colour, marker, at), height in zip(marks, heights, strict=True):
+            axes.plot(*at, marker=marker, markersize=8, color=colour, linestyle="none", zorder=3)
+            aside = points[:, 0].max() + 0.1 * wide
+            axes.plot([at[0], aside], [at[1], height], color=colour, linewidth=0.5, zorder=2)
+            axes.text(aside, height, f" {words}".replace("\n", "\n "), color=colour, fontsize=SMALL, va="center")
+    figure.axes[0].set_ylabel("up (m)")
+    return figure
+
+
+def marks_of(walker: PartsWalker, body: str, centre: Point) -> Iterator[tuple[str, str, str, Point]]:
+    """What a config says of points of a body: words, colour, marker and place (m)."""
+
+    def at(point: Point) -> str:
+        return f"[{point[0]:g}, {point[1]:g}]"
+
+    for hinge in walker.hinges:
+        called = f"{hinge.name}{', locks' if hinge.locks else ''}\n"
+        if hinge.parent == body:
+            yield f"{called}parent_point_m: {at(hinge.parent_point_m)}", BLUE, "o", hinge.parent_point_m
+        if hinge.child == body:
+            yield f"{called}child_point_m: {at(hinge.child_point_m)}", BLUE, "o", hinge.child_point_m
+    yield f"centre_m: {at(centre)}", GREEN, "o", centre
+    for particle in walker.particles:
+        if particle.body == body:
+            words = f"particle {particle.name}\nat_m: {at(particle.at_m)}\n{said('mass_kg', particle.mass_kg)}"
+            yield words, VERMILLION, "D", particle.at_m
+    for foot in walker.feet:
+        if foot.body == body:
+            yield f"foot\ncentre_m: {at(foot.centre_m)}\n{said('radius_m', foot.radius_m)}", ORANGE, "s", foot.centre_m

@@ -1,0 +1,13 @@
+"""The illustrations there are, in the order in which they are shown, those that evidence registers among them."""
+
+from walkerlab.registration import registered
+from walkerlab.views.figures import families, ground, maps, robustness, stick_diagram, walks
+from walkerlab.views.figures.illustration import Illustration
+
+NUMBERED = (*stick_diagram.FIGURES, *walks.FIGURES, *maps.FIGURES, *families.FIGURES, *robustness.FIGURES)
+FIGURES: tuple[Illustration, ...] = (
+    *sorted((*registered("walkerlab.evidence.paper.figures", "FIGURES"), *NUMBERED), key=lambda figure: figure.name),
+    *ground.FIGURES,
+    *registered("walkerlab.evidence.benchmarks.figures", "FIGURES"),
+    *maps.STABILITY,
+)

@@ -1,0 +1,171 @@
+"""Figures of what gaits withstand: 17 over one number of the config, from a sweep; 18 walks on rough ground."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from itertools import cycle
+from typing import Any, Final
+
+import numpy as np
+from matplotlib.axes import Axes
+from numpy.typing import NDArray
+
+from walkerlab.labels import axis_label
+from walkerlab.pipeline.store.content import Group
+from walkerlab.views.figures.canvas import add_legend, blank, entry, label_of, panels
+from walkerlab.views.figures.families import MODELS
+from walkerlab.views.figures.illustration import Drawn, Illustration, Need, Results, paper_figure
+from walkerlab.views.figures.stick_diagram import FAINT, FULL, draw_postures, draw_slope, sticks_of, surrounding
+from walkerlab.views.figures.style import BLACK, BLUE, GREY, VERMILLION
+
+Values = NDArray[np.float64]
+STAGE: Final = "robustness"
+PANELS: Final[tuple[tuple[str, str, Callable[[Values], Values]], ...]] = (
+    ("sensitivity norm (s/m)", "gaits.{}.gait_sensitivity_norm", lambda norm: norm),
+    ("1 − largest multiplier", "gaits.{}.spectral_radius", lambda radius: 1.0 - radius),
+    ("largest step (mm)", "largest_step.{}.down_m", lambda step: -1e3 * step),
+    ("speed (m/s)", "gaits.{}.speed_m_s", lambda speed: speed),
+)
+"""What an axis says, the variable of a sweep with the model's place in it, and what is drawn of it."""
+SPEED: Final = "gaits.0.speed_m_s"
+OF_ACTUATIONS: Final = (
+    ("cost of transport", "gaits.0.cost_of_transport", True),
+    ("sensitivity norm (s/m)", "gaits.0.gait_sensitivity_norm", True),
+    ("largest step down (m)", "largest_step.0.down_m", False),
+)
+"""What an axis says, its variable of a sweep, and whether it is logarithmic."""
+ACTUATIONS: Final = {
+    "slope_deg": ("slope", BLACK, "o"),
+    "impulse_N_s": ("push-off", BLUE, "s"),
+    "torque_N_m": ("hip torque", VERMILLION, "^"),
+}
+"""Ways to drive a walker, as a sweep names them."""
+UP: Final = "largest_step.{}.up_m"
+PANEL_HEIGHT: Final = 1.6
+LINES: Final = {"rigid": {"linestyle": "-", "marker": "o"}, "contact": {"linestyle": "--", "marker": "s"}}
+DASHES: Final = ("-", "--", "-.", ":")
+BELOW, BESIDE = 1.7, 0.4
+"""Height of the panels under the walker, and what axes' labels take beside it at least, in."""
+
+
+def of_sweep(group: Group, parameters: Sequence[str]) -> Illustration | None:
+    """What a sweep of `robustness` is drawn as: over one number, or by ways to drive a walker; None if as any other."""
+    if can_be_drawn(group, parameters):
+        return Illustration("figure-17", (), partial(over_one_number, group, parameters[0]))
+    driven = actuations(group, parameters)
+    return None if driven is None else Illustration("push-off-or-hip", (), partial(push_off_or_hip, group, driven))
+
+
+def can_be_drawn(group: Group, parameters: Sequence[str]) -> bool:
+    """Whether a sweep is of robustness over one number, and has gaits."""
+    names = (name.format(0) for _, name, _ in PANELS)
+    return len(parameters) == 1 and all(name in group.variables for name in names)
+
+
+def over_one_number(group: Group, parameter: str, _results: Results) -> Drawn:
+    """Figure 17; caption: the number, its unit, and each model's least disturbed gait, with its norm (s/m)."""
+    x, said, unit = group[parameter].astype(float), axis_label(parameter), group.variables[parameter].units
+    models = {str(group[f"gaits.{k}.model"][0]): k for k in range(2) if f"gaits.{k}.model" in group.variables}
+    figure, axes = panels(0.6 + PANEL_HEIGHT * len(PANELS), len(PANELS), sharex=True)
+    for one, (label, name, shown) in zip(axes, PANELS, strict=True):
+        for model, k in models.items():
+            look: dict[str, Any] = {"color": MODELS[model], "markersize": 2.6, "linewidth": 1.3, **LINES[model]}
+            for place in (name, UP) if name.startswith("largest_step") else (name,):
+                values = group[place.format(k)].astype(float)
+                one.plot(x, shown(values) if place == name else 1e3 * values, **look)
+        one.set_ylabel(label)
+    axes[2].axhline(0.0, color=GREY, linewidth=0.7)
+    axes[-1].set_xlabel(label_of(said, unit))
+    add_legend(figure, [entry(f"{model} model", color=MODELS[model], **LINES[model]) for model in models])
+    norms = {model: group[PANELS[0][1].format(k)].astype(float) for model, k in models.items()}
+    best = {model: (x[np.nanargmin(norm)], np.nanmin(norm)) for model, norm in norms.items() if np.isfinite(norm).any()}
+    return figure, (said, unit, best)
+
+
+def actuations(group: Group, parameters: Sequence[str]) -> dict[str, NDArray[np.bool_]] | None:
+    """Which points of a sweep of robustness each way to drive a walker drives alone; None if they are not so."""
+    if not set(parameters) <= ACTUATIONS.keys() or len(parameters) < 2 or OF_ACTUATIONS[0][1] not in group.variables:
+        return None
+    if any(group.variables[name].dims != group.variables["outcome"].dims for name in parameters):
+        return None
+    driven = {name: group[name].astype(float) != 0.0 for name in parameters}
+    return driven if bool(np.all(np.sum([*driven.values()], axis=0) == 1)) else None
+
+
+def push_off_or_hip(group: Group, driven: Mapping[str, NDArray[np.bool_]], _results: Results) -> Drawn:
+    """What each way to drive a walker costs and withstands over its speed.
+
+    Caption: of each way speed (m/s), norm (s/m) and cost of transport of the least disturbed gait.
+    """
+    speed = group[SPEED].astype(float)
+    figure, axes = panels(0.6 + PANEL_HEIGHT * len(OF_ACTUATIONS), len(OF_ACTUATIONS), sharex=True)
+    looks = {name: {"color": colour, "marker": marker} for name, (_, colour, marker) in ACTUATIONS.items()}
+    for one, (said, name, logarithmic) in zip(axes, OF_ACTUATIONS, strict=True):
+        for parameter, points in driven.items():
+            order = np.argsort(speed[points])
+            at, values = speed[points][order], group[name].astype(float)[points][order]
+            one.plot(at, values, **looks[parameter], markersize=3.0, linewidth=1.2)
+        one.set(ylabel=said, yscale="log" if logarithmic else "linear")
+    axes[-1].set_xlabel("speed (m/s)")
+    add_legend(figure, [entry(ACTUATIONS[name][0], **looks[name]) for name in driven])
+    cost, norm = (group[name].astype(float) for _, name, _ in OF_ACTUATIONS[:2])
+    least = {name: np.flatnonzero(points)[np.nanargmin(norm[points])] for name, points in driven.items()}
+    return figure, ({ACTUATIONS[name][0]: (speed[at], norm[at], cost[at]) for name, at in least.items()},)
+
+
+def on_rough_ground(results: Results) -> Drawn:
+    """Figure 18; told: models, roughness (m) of the walk that is shown, its steps, and the walks on each ground."""
+    result = results[STAGE]
+    sticks, steps = sticks_of(result, "rough_walk/"), result["rough_steps"]
+    across = sticks.in_plane(sticks.landings)[:, 0]
+    seen = np.concatenate((sticks.hip[:, None], sticks.top[:, None], sticks.feet), axis=1)
+    left, bottom, right, top = surrounding(sticks.in_plane(seen).reshape(-1, 2), sticks.leg_length)
+    figure = blank(1.6 + 2.0 * BELOW)
+    tall = (figure.get_figwidth() - BESIDE) * (top - bottom) / (right - left)
+    figure.set_figheight(figure.get_figheight() + tall)
+    walk, heights, share = figure.subplots(3, 1, height_ratios=[tall, 0.7 * BELOW, 1.3 * BELOW])
+    walk.set(xlim=(left, right), ylim=(bottom, top), aspect="equal", ylabel="height (m)")
+    heights.sharex(walk)
+    strikes = np.searchsorted(sticks.time, np.append(0.0, sticks.strikes))
+    strikes = strikes[strikes < sticks.time.size]
+    draw_postures(walk, sticks, np.linspace(0, sticks.time.size - 1, 5 * strikes.size).astype(np.int64), FAINT)
+    draw_postures(walk, sticks, strikes, FULL)
+    draw_slope(walk, sticks)
+    heights.bar(across, 1e3 * sticks.landings[:, 1], 0.4 * np.diff(across).mean(), color=GREY)
+    heights.axhline(0.0, color=BLACK, linewidth=0.7)
+    heights.set(xlabel="horizontal position (m)", ylabel="foothold (mm)")
+    draw_shares(share, steps)
+    roughest = float(steps["roughness_m"].max())
+    models = [str(model) for model in steps["model"]]
+    key = [entry(f"{model} model", color=MODELS[model]) for model in models]
+    key += [
+        entry(f"{1e3 * r:g} mm", color=BLACK, linestyle=dash)
+        for r, dash in zip(steps["roughness_m"], cycle(DASHES), strict=False)
+    ]
+    add_legend(figure, key)
+    return figure, (models, roughest, int(sticks.strikes.size), int(steps["steps"].shape[2]))
+
+
+def draw_shares(axes: Axes, steps: Group) -> None:
+    """The share of walks that go on over the number of steps, for each model and roughness."""
+    for model, last, of_model in zip(steps["model"], steps["cut_off_at"], steps["steps"], strict=True):
+        for walks, dash in zip(of_model, cycle(DASHES), strict=False):
+            # a walk that was cut off has not failed
+            ended = np.sort(walks[walks < last])
+            going = 1.0 - np.arange(ended.size + 1) / walks.size
+            at, share = np.concatenate(([1.0], ended, [min(walks.max(), last)])), np.append(going, going[-1])
+            axes.step(at, share, where="post", color=MODELS[str(model)], linestyle=dash)
+    axes.set(xscale="log", xlabel="steps", ylabel="share still walking", ylim=(0.0, 1.02))
+
+
+FIGURE_18 = paper_figure(
+    18,
+    (
+        Need(STAGE, "rough_walk/trajectory", ("hip_along_m", "foot_along_m"), "no walk on rough ground was asked for"),
+        Need(STAGE, "rough_walk/steps", ("touch_along_m",), "the walk on rough ground takes no step"),
+        Need(STAGE, "rough_steps", ("steps",), "no walks on rough ground were asked for"),
+    ),
+    on_rough_ground,
+)
+FIGURES: Final[tuple[Any, ...]] = (FIGURE_18,)

@@ -1,0 +1,86 @@
+"""The figures: every one that there are results for, as SVG and PNG."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from walkerlab.config.reads import NamedConfig
+from walkerlab.pipeline.graph import PIPELINE
+from walkerlab.pipeline.progress import Progress
+from walkerlab.pipeline.store import artifact, index
+from walkerlab.pipeline.store.artifact import Stored
+from walkerlab.pipeline.store.content import Content
+from walkerlab.pipeline.store.files import make_folder, storing, write_atomically
+from walkerlab.scene.omissions import LeftOut
+from walkerlab.views.figures.illustration import Illustration
+from walkerlab.views.figures.registry import FIGURES
+
+FOLDER = "figures"
+
+
+def run(
+    _config: NamedConfig,
+    inputs: Mapping[str, Stored],
+    progress: Progress,
+    folder: Path,
+    left_out: Sequence[LeftOut] = (),
+) -> Content:
+    """Draw into the run's folder.
+
+    inputs    results by stage: those that there are
+    left_out  the stages without a result, and why
+
+    Raises StorageError if a figure cannot be stored.
+    """
+    make_folder(folder / FOLDER)
+    absent = {entry.what: entry.why for entry in left_out}
+    reasons = [figure.why_left_out(inputs, absent) for figure in FIGURES]
+    progress.start("plot", reasons.count(None))
+    drawn, missing = [], []
+    for figure, why in zip(FIGURES, reasons, strict=True):
+        if why is None:
+            drawn.append(draw(figure, inputs, folder))
+            progress.advance()
+        else:
+            for path in paths_of(figure).values():  # drawn by an earlier run, of results that are not there any more
+                with storing(folder / path):
+                    (folder / path).unlink(missing_ok=True)
+            # what only its own command computes, and nobody has asked for, is not left out
+            if not any(PIPELINE[name].on_demand and name not in inputs for name in figure.stages):
+                missing.append({"what": figure.called, "why": why})
+    files = [folder / str(entry[kind]) for entry in drawn for kind in ("svg", "png")]
+    # captions of measured run times are among them
+    return Content(
+        {index.GROUP: index.index(folder, files)}, {"figures": drawn, "left_out": missing}, timed=("figures",)
+    )
+
+
+def draw(figure: Illustration, results: Mapping[str, Stored], folder: Path) -> dict[str, str | int | list[str]]:
+    """Draw a figure and store its files; its words and its files' paths in the run's folder."""
+    drawing = figure.drawn(results)
+    paths = paths_of(figure)
+    write_atomically(folder / paths["svg"], drawing.svg)
+    write_atomically(folder / paths["png"], drawing.png)
+    number = {} if figure.number is None else {"number": figure.number}
+    words = {"title": figure.title, "caption": drawing.caption, "alt": figure.seen}
+    return {**number, **words, **paths, "results": list(figure.stages)}
+
+
+def draw_at_once(stage: str, folder: Path, anew: bool) -> list[Path]:
+    """Draw the figures that need a stage's result alone, and say where they are.
+
+    anew  also those that are there
+
+    Raises StorageError if a figure cannot be stored.
+    """
+    results = {stage: artifact.read(folder / f"{stage}.h5")}
+    figures = [one for one in FIGURES if one.stages == (stage,) and one.why_left_out(results, {}) is None]
+    make_folder(folder / FOLDER)
+    for figure in figures:
+        if anew or not all((folder / path).is_file() for path in paths_of(figure).values()):
+            draw(figure, results, folder)
+    return [folder / paths_of(figure)["svg"] for figure in figures]
+
+
+def paths_of(figure: Illustration) -> dict[str, str]:
+    """Where a figure's files are in the run's folder."""
+    return {kind: f"{FOLDER}/{figure.name}.{kind}" for kind in ("svg", "png")}

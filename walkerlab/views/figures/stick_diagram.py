@@ -1,0 +1,410 @@
+"""A walker to scale on its slope: figures 2 and 6, stick diagrams of one gait cycle, and moving pictures."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import partial
+from itertools import pairwise
+from typing import Any, Final
+
+import matplotlib
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch, Polygon
+from numpy.typing import NDArray
+
+from walkerlab.outcome import outcome_of
+from walkerlab.pipeline.store.artifact import Stored
+from walkerlab.pipeline.store.content import Group, Variable
+from walkerlab.pipeline.store.footholds import FAR, ground_levels
+from walkerlab.views.figures.canvas import add_legend, blank, entry, styled
+from walkerlab.views.figures.illustration import Drawn, Need, Results, paper_figure
+from walkerlab.views.figures.style import BLACK, GREY, LEGS, PURPLE, VERMILLION
+from walkerlab.views.figures.walks import (
+    CONTACT_STAGE,
+    JOINTS,
+    NO_STATES,
+    RIGID_STAGE,
+    STATES,
+    STEPS_TAKEN_CONTACT,
+    STEPS_TAKEN_RIGID,
+    TOUCHES,
+    TRAJECTORY,
+    Array,
+)
+
+CYCLE = 2
+"""Steps of a gait cycle."""
+BETWEEN = 5
+"""Postures between two heel strikes."""
+FAINT, FULL = 0.8, 2.2
+"""Widths of legs between heel strikes and at them, pt."""
+HEADROOM, FOOTROOM, SIDEROOM = 0.19, 0.13, 0.12
+"""Free space around the walker, leg lengths."""
+ARC = np.linspace(-0.6, 0.6, 25)
+ARC_MIDDLE = np.zeros(1)
+"""How much of a sole's arc is drawn, rad from the leg's line."""
+SMALL_FOOT = 0.01
+"""Radius of a sole, in leg lengths, below which it is a point to the eye."""
+AXES: Final[dict[str, Any]] = {"aspect": "equal", "xlabel": "horizontal position (m)", "ylabel": "height (m)"}
+UNDER, BESIDE, ABOVE = 0.36, 0.7, 1.05
+"""What times of landings take below the lowest foot, and axes' labels and legend beside the axes and above them, in."""
+SHAPE = 0.68
+"""Height of the axes in parts of their width, unless the walker is taller or longer."""
+NO_STEPS = Group(
+    {name: Variable(np.zeros(0), ("step",), unit, name) for name, unit in ((TOUCHES, "s"), ("touch_along_m", "m"))}
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Sticks:
+    """Where the joints of a walker are; lengths in m along the slope (downhill) and normal to it.
+
+    time     (samples,) s
+    hip      (samples, 2)
+    feet     (samples, leg, 2)
+    strikes  (steps,) s
+    landings (1 + steps, 2) where the first stance foot stands and each step's foot comes down
+    slope    rad
+    knees    (samples, leg, 2); None for straight legs
+    radius   of the soles' arcs, m; the feet are their lowest points
+    head     (samples, 2), the torso's centre of mass; None without a torso
+    ground   as `ground_levels` says
+    pushes   whether the trailing foot pushes off as the other one lands
+    ending   how the walk ended before its last step, such as fell; empty where it did not
+    """
+
+    time: Array
+    hip: Array
+    feet: Array
+    strikes: Array
+    landings: Array
+    slope: float
+    knees: Array | None = None
+    radius: float = 0.0
+    head: Array | None = None
+    ground: tuple[Array, Array] | None = None
+    pushes: bool = False
+    ending: str = ""
+
+    def pushing(self, time: float) -> int | None:
+        """The leg that pushes off at a time (s), for as long as an eye sees it; None if none does."""
+        step = int(np.searchsorted(self.strikes, time, side="right")) - 1
+        late = step < 0 or time - self.strikes[step] > SEEN_S
+        return None if late or not self.pushes else 1 - step % 2
+
+    @property
+    def top(self) -> Array:
+        """The highest point that is drawn (samples, 2): the torso's end, or the hip."""
+        return self.hip if self.head is None else self.head
+
+    @property
+    def leg_length(self) -> float:
+        """Largest distance of a foot from the hip (m)."""
+        return float(np.linalg.norm(self.feet - self.hip[:, None], axis=2).max())
+
+    @property
+    def has_soles(self) -> bool:
+        """Whether its soles are more than points to the eye."""
+        return self.radius > SMALL_FOOT * self.leg_length
+
+    def leg(self, leg: int) -> Array:
+        """A leg's line (samples, points, 2): from the hip, over its knee if it has one, to the middle of its sole."""
+        joints = [self.hip] if self.knees is None else [self.hip, self.knees[:, leg]]
+        return np.stack([*joints, self.arc(leg, joints[-1], ARC_MIDDLE)[:, 0]], axis=1)
+
+    def sole(self, leg: int) -> Array:
+        """The arc of a leg's sole (samples, points, 2)."""
+        return self.arc(leg, self.hip if self.knees is None else self.knees[:, leg], ARC)
+
+    def arc(self, leg: int, above: Array, angles: Array) -> Array:
+        """Points of a sole at angles (rad) from the line through the joint above and the arc's centre."""
+        centre = self.feet[:, leg] + np.array([0.0, self.radius])
+        down = (centre - above) / np.linalg.norm(centre - above, axis=1, keepdims=True)
+        ahead = np.stack((-down[:, 1], down[:, 0]), axis=1)
+        around = np.cos(angles)[:, None] * down[:, None] + np.sin(angles)[:, None] * ahead[:, None]
+        return np.asarray(centre[:, None] + self.radius * around)
+
+    def in_plane(self, points: Array) -> Array:
+        """Points of the slope's frame (..., 2) as horizontal and vertical position (m)."""
+        s, c = math.sin(self.slope), math.cos(self.slope)
+        along, normal = points[..., 0], points[..., 1]
+        return np.stack((c * along + s * normal, c * normal - s * along), axis=-1)
+
+    def postures(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Samples at the start and the heel strikes of the first cycle, and evenly spaced ones between.
+
+        A cycle that was not completed is shown to the end of the walk.
+        """
+        strikes = np.concatenate(([self.time[0]], self.strikes[:CYCLE]))
+        between = [np.linspace(a, b, BETWEEN + 2)[1:-1] for a, b in pairwise(strikes)]
+        if strikes.size <= CYCLE:
+            between.append(np.linspace(strikes[-1], self.time[-1], BETWEEN + 2)[1:])
+        at_strikes, others = (
+            np.abs(self.time[:, None] - times).argmin(axis=0) for times in (strikes, np.concatenate(between))
+        )
+        return at_strikes, others
+
+
+def sticks_of(result: Stored, under: str = "") -> Sticks:
+    """The joints' places as a walk has stored them, `under` a group if that is named."""
+    asked = result.identity.config_slice
+    trajectory, walker = result[f"{under}trajectory"], asked["walker"]
+    steps = result.groups.get(f"{under}steps", NO_STEPS)
+
+    def joints(name: str) -> Array:
+        return np.stack((trajectory[f"{name}_along_m"], trajectory[f"{name}_height_m"]), axis=-1)
+
+    slope, hip, head = float(asked["slope_rad"]), joints("hip"), None
+    if "torso_angle" in trajectory.variables:
+        tilted = trajectory["torso_angle"] + slope
+        head = hip + walker["torso"]["above_hip_m"] * np.stack((-np.sin(tilted), np.cos(tilted)), axis=-1)
+    knees = joints("knee") if "knee_along_m" in trajectory.variables else None
+    radius = float(walker["feet"][0]["radius_m"] if "feet" in walker else walker["foot_radius_m"])
+    if result.identity.stage != CONTACT_STAGE and walker["type"] == "compass":
+        radius = 0.0  # a compass has point feet in the rigid model, whatever its ball feet
+    ground = ground_levels(steps)
+    pushes = asked["push_off"]["impulse_N_s"] != 0.0
+    outcome = None if under else outcome_of(str(result.summary.get("outcome")))
+    ending = outcome.label if outcome is not None and outcome.stumbled else ""
+    landings = np.append(0.0, steps["touch_along_m"])
+    landings = np.column_stack((landings, np.zeros(landings.size) if ground is None else ground[1]))
+    return Sticks(
+        trajectory["time"], hip, joints("foot"), steps[TOUCHES], landings, slope, knees, radius, head, ground,
+        pushes, ending,
+    )  # fmt: skip
+
+
+def stick_diagram(sticks: Sticks) -> tuple[Figure, Axes]:
+    """The walker over its first gait cycle, without the ground, to one scale in a figure that fits."""
+    at_strikes, between = sticks.postures()
+    rows = np.concatenate((at_strikes, between))
+    seen = np.concatenate((sticks.hip[rows, None], sticks.top[rows, None], sticks.feet[rows]), axis=1)
+    left, bottom, right, top = surrounding(sticks.in_plane(seen).reshape(-1, 2), sticks.leg_length)
+    widen = max(0.0, 0.5 * ((top - bottom) / SHAPE - (right - left)))
+    left, right = left - widen, right + widen
+    figure = blank(0.0)
+    across = figure.get_figwidth() - BESIDE
+    lowest = sticks.in_plane(seen)[..., 1].min()
+    bottom = min(bottom, lowest - UNDER * (right - left) / across)
+    figure.set_figheight(ABOVE + across * (top - bottom) / (right - left))
+    axes = figure.add_subplot()
+    axes.set(xlim=(left, right), ylim=(bottom, top), **AXES)
+    draw_postures(axes, sticks, between, FAINT)
+    draw_postures(axes, sticks, at_strikes, FULL)
+    shown = slice(0, int(rows.max()) + 1)
+    axes.plot(*sticks.in_plane(sticks.hip[shown]).T, color=BLACK, linewidth=0.7, linestyle=":", zorder=2)
+    annotate(axes, sticks, sticks.top[shown])
+    return figure, axes
+
+
+def surrounding(points: Array, length: float) -> tuple[float, float, float, float]:
+    """Left, bottom, right and top of what is in sight around points (points, 2); m."""
+    left, bottom = points.min(axis=0) - np.array([SIDEROOM, FOOTROOM]) * length
+    right, top = points.max(axis=0) + np.array([SIDEROOM, HEADROOM]) * length
+    return left, bottom, right, top
+
+
+def draw_postures(axes: Axes, sticks: Sticks, rows: NDArray[np.int64], width: float) -> None:
+    """Legs, soles and torso at some samples, the legs told apart by colour, line and foot."""
+    hip = sticks.in_plane(sticks.hip[rows])
+    for leg, look in enumerate(LEGS):
+        lines, order = sticks.in_plane(sticks.leg(leg)[rows]), look.order + width
+        dots: dict[str, Any] = {"marker": look.marker, "markevery": [*range(1, lines.shape[1])]}
+        style: dict[str, Any] = {**look.line, "linewidth": width, "zorder": order}
+        axes.plot(*lines.T, **style, **dots, markersize=2.0 + width)
+        if sticks.has_soles:
+            axes.plot(*sticks.in_plane(sticks.sole(leg)[rows]).T, **{**style, "linestyle": "-"})
+    if sticks.head is not None:
+        axes.plot(
+            *np.stack((hip, sticks.in_plane(sticks.head[rows])), axis=1).T, color=BLACK, linewidth=width, zorder=7
+        )
+    axes.plot(*hip.T, linestyle="none", marker="o", markersize=3.0 + width, color=BLACK, zorder=8)
+
+
+def annotate(axes: Axes, sticks: Sticks, path: Array) -> None:
+    """Where and when feet came down, under the ground; the walking direction and the slope over the walker.
+
+    path  (samples, 2) of the walker's highest point
+    """
+    length = sticks.leg_length
+    times = np.concatenate(([0.0], sticks.strikes[:CYCLE]))
+    for landing, time in zip(sticks.landings[: CYCLE + 1], times, strict=True):
+        x, y = sticks.in_plane(landing - np.array([0.0, 0.03 * length]))
+        arrow = {"arrowstyle": "-|>", "color": GREY, "shrinkA": 0.0, "shrinkB": 0.0}
+        axes.annotate(
+            f"{time:.3g} s" if time else "start", (x, y), xytext=(0.0, -9.0), textcoords="offset points",
+            arrowprops=arrow, ha="center", va="top", fontsize=matplotlib.rcParams["xtick.labelsize"],
+        )  # fmt: skip
+    height = path[:, 1].max() + 0.09 * length
+    middle, half = 0.5 * (path[0, 0] + path[-1, 0]), 0.22 * length
+    tail, head = sticks.in_plane(np.array([[middle - half, height], [middle + half, height]]))
+    axes.annotate("", xy=tuple(head), xytext=tuple(tail), arrowprops={"arrowstyle": "-|>", "color": BLACK})
+    slope = f"walking direction, slope {sticks.slope:.4g} rad = {math.degrees(sticks.slope):.3g}°"
+    axes.annotate(slope, tuple(0.5 * (head + tail)), xytext=(0.0, 7.0), textcoords="offset points", ha="center")
+
+
+def draw_slope(axes: Axes, sticks: Sticks) -> None:
+    """The ground as a plane, or a level around each foothold, hatched underneath."""
+    left, right = axes.get_xlim()
+    depth = 0.02 * sticks.leg_length
+    ends = np.array([left, right])
+    top = -math.tan(sticks.slope) * ends
+    if sticks.ground is not None:
+        begins, heights = sticks.ground
+        edges = np.repeat(np.append(begins, begins[-1] + FAR), 2)[1:-1]
+        ends, top = sticks.in_plane(np.column_stack((edges, np.repeat(heights, 2)))).T
+    axes.plot(ends, top, color=BLACK, linewidth=0.9, zorder=2.5)
+    axes.fill_between(ends, top - depth, top, facecolor="white", edgecolor=GREY, hatch="////", linewidth=0.0, zorder=1)
+
+
+def entries(sticks: Sticks) -> list[Artist]:
+    """Legend entries of the legs and of what else the walker is made of."""
+    legs = [entry(look.label, **look.line | {"linewidth": 1.6}, marker=look.marker) for look in LEGS]
+    strike, between = entry("at heel strike", color=GREY, linewidth=FULL), entry("between", color=GREY, linewidth=FAINT)
+    hip = entry("hip", color=BLACK, linewidth=0.7, linestyle=":", marker="o", markersize=4.0)
+    torso = [] if sticks.head is None else [entry("torso", color=BLACK, linewidth=1.6)]
+    return [*legs, strike, between, hip, *torso]
+
+
+PAD_HEIGHT = 0.028
+"""Drawn height of a pad, leg lengths: nothing is below a pad's top but what the drawing puts there."""
+PADS: Final[tuple[dict[str, Any], ...]] = tuple(
+    {"facecolor": "white", "edgecolor": look.colour, "hatch": hatch, "linewidth": 0.7}
+    for look, hatch in zip(LEGS, ("////", "||||"), strict=True)
+)
+"""How the pads of the legs' lanes are drawn."""
+
+
+def draw_pads(axes: Axes, sticks: Sticks, pads: Group) -> list[Artist]:
+    """The pads of both lanes that are in sight; returns their legend entries."""
+    bottom = -PAD_HEIGHT * sticks.leg_length
+    left, right = axes.get_xlim()
+    for begin, end, leg in zip(pads["left_m"], pads["right_m"], pads["leg"], strict=True):
+        outline = sticks.in_plane(np.array([[begin, 0.0], [end, 0.0], [end, bottom], [begin, bottom]]))
+        if outline[:, 0].max() > left and outline[:, 0].min() < right:
+            axes.add_patch(Polygon(outline, closed=True, zorder=1.5, **PADS[int(leg) - 1]))
+    return [Patch(label=f"pad of leg {leg + 1}", **look) for leg, look in enumerate(PADS)]
+
+
+def draw_ground(axes: Axes, sticks: Sticks, pads: Group | None) -> list[Artist]:
+    """The pads, or the plane if there are none; returns the legend entries."""
+    if pads is not None:
+        return draw_pads(axes, sticks, pads)
+    draw_slope(axes, sticks)
+    return []
+
+
+def draw_cycle(stage: str, results: Results) -> Drawn:
+    """A model's walker on its pads, or on its plane.
+
+    Caption: how long the steps of the cycle take and how far they go, whether it was completed, and what is drawn; of
+    the contact model also the feet's radius (m), what the ground is, and the pitch of its pads (m) if it has some.
+    """
+    result = results[stage]
+    sticks, pads = sticks_of(result), result.groups.get("terrain")
+    figure, axes = stick_diagram(sticks)
+    add_legend(figure, [*entries(sticks), *draw_ground(axes, sticks, pads)])
+    strikes = sticks.strikes[:CYCLE]
+    steps = zip(np.diff(strikes, prepend=0.0), np.diff(sticks.landings[: CYCLE + 1, 0]), strict=True)
+    caption_values = list(steps), strikes.size == CYCLE, sticks.head is not None
+    if stage == RIGID_STAGE:
+        return figure, caption_values
+    pitch = None if pads is None else result.summary["pitch_m"]
+    return figure, (*caption_values, sticks.radius, result.identity.config_slice["contact"]["terrain"], pitch)
+
+
+FILM_NEEDS = {stage: Need(stage, TRAJECTORY, (*STATES, *JOINTS), NO_STATES) for stage in (RIGID_STAGE, CONTACT_STAGE)}
+"""What a film of a stage's walk cannot be drawn without; a walk that ends in its first step has a film, too."""
+FIGURE_2, FIGURE_6 = (
+    paper_figure(number, (FILM_NEEDS[stage], steps_taken), partial(draw_cycle, stage))
+    for number, stage, steps_taken in ((2, RIGID_STAGE, STEPS_TAKEN_RIGID), (6, CONTACT_STAGE, STEPS_TAKEN_CONTACT))
+)
+FIGURES = (FIGURE_2, FIGURE_6)
+
+SEEN_S, PUSH_SHARE = 0.08, 0.3
+"""How long a push-off is seen in a film, and how long it is drawn, in parts of the leg."""
+FILM_SIZE, FILM_DPI = (6.4, 3.6), 100
+"""Of a picture, in and pixels per in: both sides are even, as video formats want them."""
+STEPS_SHOWN = 4
+RELIEF, RELIEF_UNDER = 0.04, 0.075
+"""How high uneven ground is drawn once more at most, and how far below it, leg lengths."""
+
+
+def film_times(sticks: Sticks, steps: int | None, rate: int, slower: float) -> Array:
+    """Times of the pictures (s), `rate` a second, so many times slower than life; a fall is looked at for a second.
+
+    steps  the first ones; None for the first four, or for the last four and the fall if the walk ended in one
+    """
+    begin, shown = 0, STEPS_SHOWN if steps is None else steps
+    if steps is None and sticks.ending:
+        begin, shown = max(0, sticks.strikes.size - STEPS_SHOWN), sticks.strikes.size + 1
+    strikes = np.append(0.0, sticks.strikes)
+    to_its_end = shown >= strikes.size
+    end = float(sticks.time[-1] if to_its_end else strikes[shown])
+    times = np.arange(strikes[begin], end, 1.0 / (rate * slower))
+    return np.append(times, np.full(rate, end)) if sticks.ending and to_its_end else times
+
+
+def draw_relief(axes: Axes, sticks: Sticks) -> None:
+    """The levels of uneven ground again, under it and so much higher that an eye sees them, and by how much."""
+    if sticks.ground is None or not (roughest := float(np.abs(sticks.ground[1]).max())):
+        return
+    room = RELIEF * sticks.leg_length / roughest
+    ten = 10.0 ** math.floor(math.log10(room))
+    times = ten * next(digit for digit in (5.0, 2.0, 1.0) if digit * ten <= room)
+    if times <= 1.0:
+        return
+    begins, heights = sticks.ground
+    edges = np.repeat(np.append(begins, begins[-1] + FAR), 2)[1:-1]
+    under = times * np.repeat(heights, 2) - RELIEF_UNDER * sticks.leg_length
+    axes.plot(*sticks.in_plane(np.column_stack((edges, under))).T, color=VERMILLION, linewidth=0.9)
+    axes.text(
+        0.99, 0.97, f"below: the ground, its heights × {times:g}", transform=axes.transAxes, va="top", ha="right",
+        color=VERMILLION,
+    )  # fmt: skip
+
+
+def pictures(sticks: Sticks, at: Array, pads: Group | None = None) -> Iterator[NDArray[np.uint8]]:
+    """A picture (height, width, 3) for each time, on pads if there are some."""
+    lines: list[tuple[Array, dict[str, Any]]] = [
+        (sticks.leg(leg), {"color": look.colour, "linestyle": look.style}) for leg, look in enumerate(LEGS)
+    ]
+    if sticks.has_soles:
+        lines += [(sticks.sole(leg), {"color": look.colour}) for leg, look in enumerate(LEGS)]
+    if sticks.head is not None:
+        lines.append((np.stack((sticks.hip, sticks.head), axis=1), {"color": BLACK}))
+    points = np.concatenate([line for line, _ in lines], axis=1)
+    flat = points.reshape(points.shape[0], -1)
+    # between two samples, straight; both sides of a heel strike are samples, so none is cut across
+    places = np.stack([np.interp(at, sticks.time, column) for column in flat.T], axis=1)
+    shown = sticks.in_plane(places.reshape(at.size, *points.shape[1:]))
+    ends = np.cumsum([line.shape[1] for line, _ in lines])[:-1]
+    with styled():
+        figure = Figure(figsize=FILM_SIZE, dpi=FILM_DPI, layout="constrained")
+        canvas = FigureCanvasAgg(figure)
+        axes = figure.add_subplot()
+        left, bottom, right, top = surrounding(shown.reshape(-1, 2), sticks.leg_length)
+        axes.set(xlim=(left, right), ylim=(bottom, top), **AXES)
+        draw_ground(axes, sticks, pads)
+        draw_relief(axes, sticks)
+        parts = [axes.plot([], [], **look, linewidth=2.2)[0] for _, look in lines]
+        (hip,) = axes.plot([], [], linestyle="none", marker="o", markersize=6.0, color=BLACK)
+        (push,) = axes.plot([], [], color=PURPLE, linewidth=5.0, solid_capstyle="round", zorder=9)
+        clock = axes.text(0.01, 0.97, "", transform=axes.transAxes, va="top")
+        for time, places in zip(at, shown, strict=True):
+            for line, joint in zip(parts, np.split(places, ends), strict=True):
+                line.set_data(*joint.T)
+            hip.set_data(*places[:1].T)
+            leg = sticks.pushing(float(time))
+            own = np.split(places, ends)[leg or 0]
+            push.set_data(
+                *np.stack((own[-1], own[-1] + PUSH_SHARE * (own[0] - own[-1]))).T if leg is not None else ([], [])
+            )
+            over = sticks.ending and time >= sticks.time[-1]
+            clock.set_text(f"{time:.2f} s: {sticks.ending}" if over else f"{time:.2f} s")
+            canvas.draw()  # type: ignore[no-untyped-call]
+            yield np.asarray(canvas.buffer_rgba())[:, :, :3].copy()  # type: ignore[no-untyped-call]

@@ -1,0 +1,247 @@
+"""Figures of a sweep: lines over one parameter, maps over two, points over each of more."""
+
+from collections.abc import Sequence
+from functools import partial
+from typing import Any, Final
+
+import matplotlib
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
+from numpy.typing import NDArray
+
+from walkerlab.labels import axis_label
+from walkerlab.pipeline.store.content import Group
+from walkerlab.views.figures.canvas import add_legend, entry, label_of, panels
+from walkerlab.views.figures.illustration import Drawn, Illustration, Results
+from walkerlab.views.figures.maps import WHITE, edges, is_logarithmic
+from walkerlab.views.figures.style import BLUE, GREY, VERMILLION
+
+PANEL_HEIGHT: Final = 1.9
+MAP_HEIGHT: Final = 2.9
+MAX_PANELS: Final = 4
+MAX_LINES: Final = 5
+"""Values of a second parameter, each of which is a line; of more, there is a map."""
+DASHES: Final = ("-", "--", "-.")
+ONE: Final = "largest multiplier 1"
+MAX_SCATTERED: Final = 20_000
+"""Points that a panel shows one by one; of more, evenly chosen ones."""
+PREFERRED: Final[tuple[str, ...]] = (
+    "period_s", "last_step_period_s", "spectral_radius", "step_length_m", "last_step_length_m", "steps",
+    "slip_per_step_m", "max_penetration_m", "min_normal_force_N", "energy_drift_J", "end_time_s",
+)  # fmt: skip
+RADIUS: Final = "spectral_radius"
+MISSING: Final[dict[str, Any]] = {"color": VERMILLION, "marker": "|", "linestyle": "none", "markersize": 5.0}
+LABELS: Final = {RADIUS: "largest multiplier"}
+
+
+def choose(group: Group, dims: tuple[str, ...], parameters: Sequence[str]) -> list[str]:
+    """The numbers that say most by default: the well-known ones, then others that vary."""
+    varying = []
+    for name in group.variables:
+        if is_number(group, name, dims) and name not in parameters:
+            values = group[name].astype(float)
+            if np.unique(values[np.isfinite(values)]).size > 1:
+                varying.append(name)
+    known = [name for name in PREFERRED if name in varying]
+    return (known or [name for name in varying if "." not in name] or varying)[:MAX_PANELS]
+
+
+def is_number(group: Group, name: str, dims: tuple[str, ...]) -> bool:
+    """Whether a variable is one number for each point."""
+    return name in group.variables and group.variables[name].dims == dims and group[name].dtype.kind in "fib"
+
+
+def illustration(
+    group: Group,
+    stage: str,
+    parameters: Sequence[str],
+    dims: tuple[str, ...],
+    names: Sequence[str],
+    against: str = "",
+) -> Illustration:
+    """The figure of some numbers over the parameters, or over one of the numbers.
+
+    parameters  names of the coordinates
+    dims        of the points
+    names       what to draw, at least one
+    against     the number, or parameter, on the other axis; without one the parameters
+    """
+    drawing = partial(draw, group, parameters, dims, names, against)
+    return Illustration(f"sweep-{stage}", (), drawing, words="sweep", scene=f"{stage} over {', '.join(parameters)}")
+
+
+def draw(
+    group: Group,
+    parameters: Sequence[str],
+    dims: tuple[str, ...],
+    names: Sequence[str],
+    against: str,
+    _results: Results,
+) -> Drawn:
+    """Caption: what is drawn over what, how points came out, how gaps are seen, and whether there is a line of one."""
+    a_map = len(dims) == 2 and not against and not in_lines(group, dims)
+    if against:
+        figure = one_over_another(group, dims, names, against)
+    elif len(dims) != 2:
+        figure = scattered(group, parameters, dims, names)
+    else:
+        figure = (maps if a_map else lines)(group, parameters, names)
+    outcomes = zip(*np.unique(group["outcome"].astype(str), return_counts=True), strict=True)
+    marked_gaps = "" if against or len(dims) > 2 else "marks"
+    gaps = "" if np.all(group["status"] == "answered") else "map" if a_map else marked_gaps
+    what, other = ([spoken(group, name) for name in each] for each in (names, [against] if against else []))
+    return figure, (what, parameters, list(outcomes), gaps, a_map, RADIUS in names, *other)
+
+
+def one_over_another(group: Group, dims: tuple[str, ...], names: Sequence[str], against: str) -> Figure:
+    """A row for each number, over another one; the points of a single parameter are joined in its order."""
+    x = spread(group, against, dims)
+    few = np.unique(np.linspace(0, x.size - 1, min(x.size, MAX_SCATTERED)).astype(int))
+    figure, axes = panels(0.8 + PANEL_HEIGHT * len(names), len(names), sharex=True, squeeze=False)
+    for one, name in zip(axes[:, 0], names, strict=True):
+        line = "-" if len(dims) == 1 else "none"
+        y = group[name].astype(float).ravel()
+        one.plot(x[few], y[few], color=BLUE, linestyle=line, linewidth=1.2, marker="o", markersize=2.6)
+        if name == RADIUS:
+            one.axhline(1.0, color=GREY, linewidth=0.8)
+            add_legend(figure, [entry(ONE, color=GREY, linewidth=0.8)])
+        one.set_ylabel(label(group, name))
+    axes[-1, 0].set_xlabel(label(group, against))
+    return figure
+
+
+def spoken(group: Group, name: str) -> str:
+    """A variable in a sentence."""
+    return group.variables[name].long_name.replace("_", " ")
+
+
+def label(group: Group, name: str) -> str:
+    """A variable's axis: its name in words, and its unit."""
+    return label_of(LABELS.get(name, axis_label(name.rpartition(".")[2])), group.variables[name].units)
+
+
+def scattered(group: Group, parameters: Sequence[str], dims: tuple[str, ...], names: Sequence[str]) -> Figure:
+    """A row for each number, a column for each parameter; lines where the parameter orders the points."""
+    shown = list(parameters)[:MAX_PANELS]
+    rows, columns = len(names), len(shown)
+    figure, axes = panels(0.5 + PANEL_HEIGHT * rows, rows, columns, sharex="col", sharey="row", squeeze=False)
+    for column, parameter in enumerate(shown):
+        x = spread(group, parameter, dims)
+        few = np.unique(np.linspace(0, x.size - 1, min(x.size, MAX_SCATTERED)).astype(int))
+        ordered = len(dims) == 1 and column == 0 and bool(np.all(np.diff(x) > 0.0) or np.all(np.diff(x) < 0.0))
+        for one, name in zip(axes[:, column], names, strict=True):
+            y = group[name].astype(float).ravel()
+            if ordered:
+                one.plot(x, y, color=BLUE, linewidth=1.4, marker="o" if x.size <= 60 else "", markersize=2.6)
+            else:
+                dots: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 2.2}
+                one.plot(x[few], y[few], color=BLUE, **dots, rasterized=few.size > 2000)
+            finish_panel(one, group, parameter, name, x[np.isnan(y)])
+        axes[-1][column].set_xlabel(label(group, parameter))
+    for one, name in zip(axes[:, 0], names, strict=True):
+        one.set_ylabel(label(group, name))
+    if key := marked(group, names):
+        add_legend(figure, key)
+    return figure
+
+
+def spread(group: Group, parameter: str, dims: tuple[str, ...]) -> NDArray[Any]:
+    """A parameter's value at every point, flat."""
+    values = numbers(group, parameter)
+    if group.variables[parameter].dims == dims:
+        return values.ravel()
+    along = [1] * len(dims)
+    along[dims.index(parameter)] = -1
+    return np.broadcast_to(values.reshape(along), group["outcome"].shape).ravel()
+
+
+def finish_panel(axes: Axes, group: Group, parameter: str, name: str, missing: NDArray[Any]) -> None:
+    """What a number's panel over a parameter has besides its points; missing: where there is no answer."""
+    if name == RADIUS:
+        axes.axhline(1.0, color=GREY, linewidth=0.8)
+    if missing.size:
+        axes.plot(missing, np.full(missing.size, 0.02), **MISSING, transform=axes.get_xaxis_transform())
+    if is_logarithmic(np.unique(numbers(group, parameter)), span=1.0):
+        axes.set_xscale("log")
+    name_ticks(axes, group, parameter, "x")
+
+
+def marked(group: Group, names: Sequence[str]) -> list[Artist]:
+    """Legend entries of what `finish_panel` draws."""
+    gaps = any(np.isnan(group[name].astype(float)).any() for name in names)
+    one = [entry(ONE, color=GREY, linewidth=0.8)] if RADIUS in names else []
+    return [*one, *([entry("no answer", **MISSING)] if gaps else [])]
+
+
+def in_lines(group: Group, dims: tuple[str, ...]) -> bool:
+    """Whether one of two parameters has so few values that each is a line over the other one."""
+    return min(group["outcome"].shape) <= MAX_LINES and len(dims) == 2
+
+
+def lines(group: Group, parameters: Sequence[str], names: Sequence[str]) -> Figure:
+    """A row for each number, over one parameter, and in it a line for each value of the one that has fewer."""
+    across, few = sorted(parameters, key=lambda parameter: -group[parameter].size)
+    x, values = numbers(group, across), group[few].tolist()
+    looks = [{"color": matplotlib.colormaps["viridis"](0.85 * shade), "linestyle": DASHES[place % len(DASHES)]}
+             for place, shade in enumerate(np.linspace(0.0, 1.0, len(values)))]  # fmt: skip
+    figure, axes = panels(0.8 + PANEL_HEIGHT * len(names), len(names), sharex=True, squeeze=False)
+    for one, name in zip(axes[:, 0], names, strict=True):
+        found = group[name].astype(float)
+        rows = found if parameters[0] == few else found.T
+        for row, look in zip(rows, looks, strict=True):
+            one.plot(x, row, **look, linewidth=1.3, marker="o", markersize=2.4)
+        finish_panel(one, group, across, name, x[np.isnan(rows).any(axis=0)])
+        one.set_ylabel(label(group, name))
+    axes[-1, 0].set_xlabel(label(group, across))
+    unit = group.variables[few].units
+    key = []
+    for value, look in zip(values, looks, strict=True):
+        said = f"{value:.6g}" if isinstance(value, float) else str(value)
+        key.append(entry(f"{axis_label(few)} {said}{f' {unit}' if unit not in ('', '1') else ''}", **look))
+    add_legend(figure, [*key, *marked(group, names)])
+    return figure
+
+
+def name_ticks(axes: Axes, group: Group, parameter: str, which: str) -> None:
+    """Words where a parameter is no number."""
+    values = group[parameter]
+    if values.dtype.kind == "O" and group.variables[parameter].dims == (parameter,):
+        getattr(axes, f"set_{which}ticks")(np.arange(values.size), [str(value) for value in values])
+
+
+def maps(group: Group, parameters: Sequence[str], names: Sequence[str]) -> Figure:
+    """A map for each number, two in a row; the second parameter runs upward."""
+    columns = min(2, len(names))
+    rows = -(-len(names) // columns)
+    figure, axes = panels(0.4 + MAP_HEIGHT * rows, rows, columns, squeeze=False)
+    across, up = (numbers(group, parameter) for parameter in parameters)
+    for place, name in enumerate(names):
+        one = axes[place // columns][place % columns]
+        values = np.ma.masked_invalid(group[name].astype(float)).T
+        one.set_facecolor("#D9D9D9")
+        mesh = one.pcolormesh(edges(across), edges(up), values, cmap="viridis", rasterized=True)
+        figure.colorbar(mesh, ax=one, label=label(group, name))
+        if name == RADIUS and values.count() and values.min() < 1.0 < values.max() and min(values.shape) > 1:
+            one.contour(across, up, values, levels=[1.0], colors=WHITE, linewidths=1.4)
+            outlined = [withStroke(linewidth=2.6, foreground=GREY)]
+            add_legend(figure, [entry(ONE, color=WHITE, linewidth=1.4, path_effects=outlined)])
+        for axis, parameter, scale in (("x", parameters[0], across), ("y", parameters[1], up)):
+            getattr(one, f"set_{axis}label")(label(group, parameter))
+            if is_logarithmic(scale, span=1.0):
+                getattr(one, f"set_{axis}scale")("log")
+            if scale.size > 1 and group[parameter].dtype.kind != "O":
+                getattr(one, f"set_{axis}ticks")(scale, minor=True)
+                getattr(one, f"set_{axis}lim")(scale.min(), scale.max())
+            name_ticks(one, group, parameter, axis)
+    for place in range(len(names), rows * columns):
+        axes[place // columns][place % columns].set_axis_off()
+    return figure
+
+
+def numbers(group: Group, parameter: str) -> NDArray[Any]:
+    """A parameter's values as numbers; places of words."""
+    values = group[parameter]
+    return np.arange(values.size, dtype=float) if values.dtype.kind == "O" else values.astype(float)

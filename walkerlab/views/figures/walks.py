@@ -1,0 +1,369 @@
+"""The walks of both models: 5, 7 and 10 in time, 9 their limit cycles; and two runs overlaid."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from operator import is_
+from typing import Any, Final
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+from numpy.typing import NDArray
+
+from walkerlab.pipeline.headlines import claims
+from walkerlab.pipeline.store.content import Content, Group
+from walkerlab.views.figures.canvas import add_legend, entry, files_of, label_of, panels, styled
+from walkerlab.views.figures.illustration import Drawn, Need, Results, paper_figure
+from walkerlab.views.figures.style import BLUE, CONTACT, GREY, ORANGE, PALE, RIGID, Look
+
+Array = NDArray[np.float64]
+
+RIGID_STAGE, CONTACT_STAGE, COMPARE_STAGE, TUNE_STAGE = "simulate", "contact-sim", "compare", "tune"
+TRAJECTORY, STEPS = "trajectory", "steps"
+STATES = ("time", "angle", "velocity", "stance_leg")
+JOINTS = ("hip_along_m", "hip_height_m", "foot_along_m", "foot_height_m")
+ENERGIES = ("time", "kinetic_J", "potential_J", "mechanical_J")
+
+NO_STATES = "'states' is not among the config's outputs"
+NO_ENERGIES = "'energies' is not among the config's outputs"
+NO_STEP = "no step was completed"
+TOUCHES = "touch_time_s"
+
+RIGID_STATES = Need(RIGID_STAGE, TRAJECTORY, STATES, NO_STATES)
+RIGID_ENERGIES = Need(RIGID_STAGE, TRAJECTORY, ENERGIES, NO_ENERGIES)
+STEPS_TAKEN_RIGID, STEPS_TAKEN_CONTACT = (
+    Need(stage, STEPS, (TOUCHES, "touch_along_m"), NO_STEP) for stage in (RIGID_STAGE, CONTACT_STAGE)
+)
+
+PAPER_STRIDES = 5
+"""Strides that the paper's figures in time show; a longer walk's figures show its first ones."""
+STRIKE_WIDTH = 0.6
+
+
+def claims_in(results: Results) -> Sequence[Mapping[str, Any]]:
+    """Return the values that a study claims of this very scene; of any other, figures say nothing of the study."""
+    return claims(results[COMPARE_STAGE].summary) if COMPARE_STAGE in results else ()
+
+
+@dataclass(frozen=True, eq=False)
+class Walk:
+    """A walk in time.
+
+    look      of its model
+    outcome   how it ended
+    steps     how many steps it has in all
+    strikes   (shown steps,) s, times of the heel strikes
+    time      (samples,) s
+    samples   what was stored over time
+    end       number of the samples that are shown; None for all
+    """
+
+    look: Look
+    outcome: str
+    steps: int
+    strikes: Array
+    samples: Group
+    end: int | None = None
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        """A variable of the trajectory, such as 'angle' (samples, 2)."""
+        return self.samples[name][: self.end]
+
+    @property
+    def time(self) -> Array:
+        """Of the samples (s)."""
+        return self["time"]
+
+    def label(self, words: str, name: str) -> str:
+        """A variable on an axis."""
+        return label_of(words, self.samples.variables[name].units)
+
+    def first(self, strides: int) -> Walk:
+        """Its first strides; the walk itself if it has no more."""
+        strikes = self.strikes[: 2 * strides]
+        if strikes.size == self.strikes.size:
+            return self
+        end = int(np.searchsorted(self.time, strikes[-1], side="right"))
+        return replace(self, strikes=strikes, end=end)
+
+
+def walks_with(results: Results, names: tuple[str, ...]) -> list[Walk]:
+    """The walks of the models whose trajectories have some variables, the rigid model's first."""
+    both = ((RIGID_STAGE, RIGID), (CONTACT_STAGE, CONTACT))
+    there = [(stage, look) for stage, look in both if not Need(stage, TRAJECTORY, names, "").missing_in(results, {})]
+    return [walk_of(results[stage], look) for stage, look in there]
+
+
+def walk_of(result: Content, look: Look) -> Walk:
+    """The walk that a stage has stored."""
+    times = touch_times(result.groups.get(STEPS, Group({})))
+    return Walk(look, str(result.summary["outcome"]), times.size, times, result[TRAJECTORY])
+
+
+def touch_times(steps: Group) -> Array:
+    """Times of the heel strikes (s); none if no step was completed."""
+    return steps[TOUCHES] if TOUCHES in steps.variables else np.zeros(0)
+
+
+def shown(walks: list[Walk], strides: int = PAPER_STRIDES) -> tuple[list[Walk], str]:
+    """The walks' first strides, and a phrase on how much that is: '' if it is all, ' (the first 5 strides)' if not."""
+    cut = [walk.first(strides) for walk in walks]
+    return cut, "" if all(map(is_, cut, walks)) else f" (the first {strides} strides)"
+
+
+def time_axes(rows: int, row_height: float, walks: list[Walk]) -> tuple[Figure, list[Axes]]:
+    """A figure of axes that share the time axis, with the walks' heel strikes across all of them."""
+    figure, column = panels(0.85 + rows * row_height, rows, sharex=True, squeeze=False)
+    axes = list(column[:, 0])
+    for one in axes:
+        for walk in walks:
+            look, across = walk.look, one.get_xaxis_transform()
+            one.vlines(walk.strikes, 0.0, 1.0, look.colour, look.style, transform=across, lw=STRIKE_WIDTH, zorder=1.5)
+    end = max(float(walk.time[-1]) for walk in walks)
+    if end > 0.0:
+        axes[-1].set_xlim(0.0, 1.01 * end)
+    axes[-1].set_xlabel("time (s)")
+    figure.align_ylabels(axes)
+    return figure, axes
+
+
+def in_time(
+    walks: list[Walk], row_height: float, rows: Sequence[tuple[str, str, int | None, str]]
+) -> tuple[Figure, list[Axes]]:
+    """Variables of walks in time, below one another.
+
+    rows  for each the variable, what its axis says, its leg (None: it has none), and the title
+    """
+    figure, axes = time_axes(len(rows), row_height, walks)
+    for one, (name, words, leg, title) in zip(axes, rows, strict=True):
+        for walk in walks:
+            line(one, walk.time, walk[name] if leg is None else walk[name][:, leg], walk.look)
+        one.set(ylabel=walks[0].label(words, name), title=title)
+    return figure, axes
+
+
+def line(axes: Axes, x: Array, y: Array, look: Look) -> None:
+    """A series as its look has it."""
+    axes.plot(x, y, **look.line, zorder=look.order)
+
+
+def strike_entry(look: Look) -> Artist:
+    """Legend entry of a model's heel strikes: upright, as they are in the figure."""
+    label = f"heel strike, {look.label.split()[0]}"
+    return entry(label, color=look.colour, linestyle="none", marker="|", markersize=11.0, markeredgewidth=STRIKE_WIDTH)
+
+
+def legend(figure: Figure, walks: list[Walk], *more: Artist) -> None:
+    """The legend of a figure of walks, above all axes."""
+    looks = [walk.look for walk in walks]
+    models = [entry(look.label, **look.line) for look in looks]
+    add_legend(figure, [*models, *(strike_entry(look) for look in looks), *more])
+
+
+ADJUSTED = Need(TUNE_STAGE, "adjusted", ("time", "velocity"), "no start of those searched walks")
+FROM_RIGID = Need(TUNE_STAGE, "rigid_start", ("time", "velocity"), "the rigid model took no step")
+
+
+def redoes_the_procedure(results: Results) -> bool:
+    """Whether the walker is the paper's compass, whose legs are links there."""
+    return "paper_start" in results[TUNE_STAGE].summary
+
+
+def draw_adjusted(results: Results) -> Drawn:
+    """The rigid model from its start, the contact model from the adjusted one, a row for each link.
+
+    It is called as in the paper if the walker is its compass, else by what it does first. Caption: what the start was,
+    how much is shown, and whether there are links.
+    """
+    result, named = results[TUNE_STAGE], redoes_the_procedure(results)
+    outcome = str(result.summary["procedure"]["adjusted"]["outcome"])
+    whole = []
+    for group, look, end in (("rigid_start", RIGID, "walked"), ("adjusted", CONTACT, outcome)):
+        times = touch_times(result[group])
+        whole.append(Walk(look, end, times.size, times, result[group]))
+    walks, extent = shown(whole)
+    links = ("link 1", "link 2") if named else ("the leg that swings first", "the leg that stands first")
+    titles = [f"({'ab'[leg]}) angular velocity of {link}" for leg, link in enumerate(links)]
+    figure, _ = in_time(walks, 1.9, [("velocity", "velocity", leg, title) for leg, title in enumerate(titles)])
+    legend(figure, walks)
+    return figure, (result.summary["adjustment"], extent, named)
+
+
+STATES_IN_TIME = (
+    ("angle", "angle", 0, "(a1) angle of leg 1"),
+    ("angle", "angle", 1, "(a2) angle of leg 2"),
+    ("velocity", "velocity", 0, "(b1) angular velocity of leg 1"),
+    ("velocity", "velocity", 1, "(b2) angular velocity of leg 2"),
+)
+
+
+def draw_states(results: Results) -> Drawn:
+    """A row for each leg's angle and each leg's angular velocity, shaded while the leg carries the walker.
+
+    Caption: how much is shown, and how the walks went.
+    """
+    walks, extent = shown(walks_with(results, STATES))
+    first = walks[0]
+    figure, axes = in_time(walks, 1.55, STATES_IN_TIME)
+    for one, (_, _, leg, _) in zip(axes, STATES_IN_TIME, strict=True):
+        edges = np.diff((first["stance_leg"] == leg + 1).astype(int), prepend=0, append=0)
+        for begin, end in zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1), strict=True):
+            one.axvspan(first.time[begin], first.time[end - 1], color=PALE, linewidth=0.0, zorder=0.5)
+    stance = f"stance of the leg, {first.look.label.split()[0]}"
+    legend(figure, walks, Patch(facecolor=PALE, edgecolor="none", label=stance))
+    return figure, (extent, walks)
+
+
+CYCLES = 20
+"""Strides that are shown: a transient is over by then; more lines would only lie on one another."""
+LAST_STRIDE = 2
+"""Steps of it."""
+EARLIER_WIDTH = 0.5
+ARROW_LENGTH = 0.06
+"""Of an arrow on the cycle, in parts of a step's samples."""
+
+
+def draw_cycles(results: Results) -> Drawn:
+    """A phase plane for each leg, both on the same scales; caption: how much is shown, and how the walks went."""
+    walks, extent = shown(walks_with(results, STATES), CYCLES)
+    figure, axes = panels(4.2, 1, 2, sharex=True, sharey=True)
+    for leg, one in enumerate(axes):
+        for walk in walks:
+            draw_cycles_of(one, walk, leg)
+        show_direction(one, walks[0], leg)
+        one.set(title=f"({'ab'[leg]}) leg {leg + 1}", xlabel=walks[0].label("angle", "angle"))
+    axes[0].set_ylabel(walks[0].label("angular velocity", "velocity"))
+    key = [entry(walk.look.label, **walk.look.line) for walk in walks]
+    if any(walk.strikes.size > LAST_STRIDE for walk in walks):
+        key.append(entry("strides before the last", color=GREY, linewidth=EARLIER_WIDTH))
+    for look in (walk.look for walk in walks):
+        for whose, face in (("own", look.colour), ("other", "white")):
+            mark: dict[str, Any] = {"marker": look.marker, "markersize": 4.5, "color": look.colour, "mfc": face}
+            key.append(entry(f"{whose} heel strike, {look.label.split()[0]}", linestyle="none", **mark))
+    add_legend(figure, key)
+    return figure, (extent, walks)
+
+
+def draw_cycles_of(axes: Axes, walk: Walk, leg: int) -> None:
+    """The last stride as the model's look has it, those before as thin lines under it.
+
+    Marked is the state just before each heel strike of the last stride: filled if the leg's own, open if not.
+    """
+    angle, velocity, look = walk["angle"][:, leg], walk["velocity"][:, leg], walk.look
+    axes.plot(angle, velocity, color=look.colour, linewidth=EARLIER_WIDTH, zorder=look.order - 2)
+    last = walk.time >= (walk.strikes[-1 - LAST_STRIDE] if walk.strikes.size > LAST_STRIDE else 0.0)
+    line(axes, angle[last], velocity[last], look)
+    before = np.maximum(np.searchsorted(walk.time, walk.strikes[-LAST_STRIDE:]) - 1, 0)
+    own = walk["stance_leg"][before] != leg + 1
+    for rows, face in ((before[own], look.colour), (before[~own], "white")):
+        axes.plot(
+            angle[rows], velocity[rows], linestyle="none", marker=look.marker, markersize=4.5,
+            markerfacecolor=face, markeredgecolor=look.colour, zorder=look.order + 2,
+        )  # fmt: skip
+
+
+def show_direction(axes: Axes, walk: Walk, leg: int) -> None:
+    """Arrowheads in the middle of the first swing and the first stance of a leg."""
+    carries = walk["stance_leg"] == leg + 1
+    for phase in (carries, ~carries):
+        rows = np.flatnonzero(phase)
+        first = rows[: np.argmax(np.diff(rows, append=rows[-1] + 2) > 1) + 1] if rows.size else rows
+        if first.size < 3:
+            continue
+        middle, ahead = first[first.size // 2], first[first.size // 2 + max(1, int(ARROW_LENGTH * first.size))]
+        tail, head = (tuple(walk[name][row, leg] for name in ("angle", "velocity")) for row in (middle, ahead))
+        arrow = {"arrowstyle": "-|>", "color": walk.look.colour, "mutation_scale": 13.0, "shrinkA": 0.0, "shrinkB": 0.0}
+        axes.annotate("", xy=head, xytext=tail, arrowprops=arrow, zorder=7)
+
+
+ENERGIES_IN_TIME = (
+    ("kinetic_J", "energy", None, "(a) kinetic energy"),
+    ("potential_J", "energy", None, "(b) potential energy, zero at the step's foothold"),
+    ("mechanical_J", "energy", None, "(c) mechanical energy"),
+)
+SMALLEST_SPAN = 0.005
+"""Of the axis of the mechanical energy, in parts of it: a constant must look constant."""
+MARGIN = 0.08
+FEW = 0.005
+"""Part of the samples that lie within impacts, and so do not set the scale."""
+
+
+def draw_energies(results: Results) -> Drawn:
+    """A row for each energy.
+
+    Caption: how much is shown, the means of the mechanical energy, whether Table 3 has it too, whether there are
+    impacts, whether anything drives the walker, and how the walks went.
+    """
+    walks, extent = shown(walks_with(results, ENERGIES))
+    figure, axes = in_time(walks, 1.75, ENERGIES_IN_TIME)
+    ends = np.array([np.quantile(walk["mechanical_J"], (FEW, 1.0 - FEW)) for walk in walks])
+    bottom, top = float(ends[:, 0].min()), float(ends[:, 1].max())
+    lacking = max(0.0, SMALLEST_SPAN * max(abs(bottom), abs(top)) - (top - bottom))
+    room = 0.5 * lacking + MARGIN * (top - bottom)
+    axes[-1].set_ylim(bottom - room, top + room)
+    legend(figure, walks)
+    means = []
+    for walk in walks:
+        energy, durations = walk["mechanical_J"], np.diff(walk.time)
+        integral = np.sum(0.5 * (energy[1:] + energy[:-1]) * durations)
+        means.append((walk.look.label, integral / durations.sum() if durations.any() else energy[0]))
+    impacts = any(walk.look is CONTACT for walk in walks)
+    asked = results[RIGID_STAGE].identity.config_slice
+    driven = any((asked["push_off"]["impulse_N_s"], *asked["walker"]["hip"].values()))
+    return figure, (extent, means, bool(claims_in(results)), impacts, driven, walks)
+
+
+OVERLAY_ROWS: Final[tuple[tuple[str, Any, str], ...]] = (
+    ("angle", 0, "angle of leg 1 (rad)"),
+    ("angle", 1, "angle of leg 2 (rad)"),
+    ("mechanical_J", slice(None), "energy (J)"),
+)
+RUN_LOOKS: Final[tuple[dict[str, Any], ...]] = (
+    {"color": BLUE, "linewidth": 1.3},
+    {"color": ORANGE, "linewidth": 1.2, "linestyle": (0.0, (3.2, 1.4))},
+)
+
+
+def overlaid(first: Mapping[str, Content], second: Mapping[str, Content], names: tuple[str, str]) -> list[bytes] | None:
+    """SVG and PNG of two runs' walks over one another; None if they have no walk in common that was sampled.
+
+    names  of the runs
+    """
+    both = [
+        (stage, [run[stage].groups["trajectory"] for run in (first, second)])
+        for stage in (RIGID_STAGE, CONTACT_STAGE)
+        if all(stage in run and run[stage].groups.get("trajectory") for run in (first, second))
+    ]
+    if not both:
+        return None
+    with styled():
+        return files_of(draw_overlay(both, names), "diff", f"{names[0]} and {names[1]}")
+
+
+def draw_overlay(both: list[tuple[str, list[Group]]], names: tuple[str, str]) -> Figure:
+    """A column for each stage, with both runs' trajectories; a row for each leg's angle and one for the energy."""
+    rows, columns = len(OVERLAY_ROWS), len(both)
+    figure, axes = panels(0.5 + 1.9 * rows, rows, columns, sharex="col", sharey="row", squeeze=False)
+    for row, (variable, leg, label) in zip(axes, OVERLAY_ROWS, strict=True):
+        row[0].set_ylabel(label)
+        for one, (_, groups) in zip(row, both, strict=True):
+            for group, look in zip(groups, RUN_LOOKS, strict=True):
+                if variable in group.variables:
+                    one.plot(group["time"], group[variable][..., leg], **look)
+    for top, bottom, (stage, _) in zip(axes[0], axes[-1], both, strict=True):
+        top.set_title(stage)
+        bottom.set_xlabel("time (s)")
+    add_legend(figure, [entry(name, **look) for name, look in zip(names, RUN_LOOKS, strict=True)])
+    return figure
+
+
+FIGURES = (
+    paper_figure(5, (ADJUSTED, FROM_RIGID), draw_adjusted),
+    paper_figure(7, (RIGID_STATES,), draw_states),
+    paper_figure(9, (RIGID_STATES,), draw_cycles),
+    paper_figure(10, (RIGID_ENERGIES,), draw_energies),
+)

@@ -1,0 +1,73 @@
+"""Texts as Jinja templates: a file per subject with a macro per paragraph."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
+
+BLANKS = re.compile(r"[ \n]+")
+"""Where a template's lines end; the narrow and the unbreakable blanks of numbers are others."""
+BETWEEN_PARTS = re.compile(r"(?:^|[ \n])\|(?=[ \n]|$)")
+"""What sets the parts of a text apart, as in 'one | two'."""
+
+
+def parts(text: str) -> list[str]:
+    """Split a text at its | marks, dropping empty parts."""
+    return [said for part in BETWEEN_PARTS.split(text) if (said := part.strip(" \n"))]
+
+
+def f(value: float, spec: str) -> str:
+    """Format a number by a format specification, such as .4f."""
+    return format(value, spec)
+
+
+def percent(share: float, digits: int = 3) -> str:
+    return f"{100.0 * share:.{digits}g} %"
+
+
+@dataclass(frozen=True)
+class Prose:
+    """The paragraphs in a folder of templates, as plain text.
+
+    filters  functions that templates may call by name; an unknown name is an error
+    known    global values of the templates
+    """
+
+    folder: Path
+    filters: Sequence[Callable[..., Any]]
+    known: Mapping[str, Any]
+
+    @cached_property
+    def templates(self) -> Environment:
+        # Imported here: what says nothing needs no templates.
+        from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+        made = Environment(loader=FileSystemLoader(self.folder), undefined=StrictUndefined)  # plain: pages escape it
+        made.filters |= {function.__name__: function for function in self.filters}
+        made.globals |= self.known
+        return made
+
+    def __call__(self, name: str, *values: Any) -> str:
+        """Render a paragraph on one line.
+
+        name    file.macro
+        values  arguments of the macro
+        """
+        file, _, macro = name.partition(".")
+        said = getattr(self.templates.get_template(f"{file}.j2").module, macro)(*values)
+        return BLANKS.sub(" ", said).strip()
+
+    def parts(self, name: str, *values: Any) -> list[str]:
+        """Split a text at its | marks, dropping empty parts."""
+        return parts(self(name, *values))
+
+    def terms(self, name: str, *values: Any) -> dict[str, str]:
+        """Return words and meanings of a macro whose parts have the form 'word: meaning'."""
+        return {word: meaning for word, _, meaning in (part.partition(": ") for part in self.parts(name, *values))}

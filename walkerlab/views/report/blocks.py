@@ -1,0 +1,262 @@
+"""What a section is made of; texts are plain text, and become HTML in the template only."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import ClassVar, Literal, Protocol
+
+from markupsafe import Markup
+
+from walkerlab.views.report.tables import Tone
+from walkerlab.views.report.tracks import Track
+
+MAIN, PAPER, CASES, COSTS = "report.html", "report-paper.html", "report-stability.html", "report-accuracy.html"
+"""The pages: the report itself, and what is one link away."""
+
+
+class PageBlock(Protocol):
+    """A part of a section; `template` is its file in templates/blocks."""
+
+    template: ClassVar[str]
+
+
+@dataclass(frozen=True)
+class Paragraph:
+    """Running text; a tone sets it off as a statement, or as what stands there until a result is computed."""
+
+    template: ClassVar[str] = "paragraph"
+    text: str
+    tone: Tone | Literal["waiting"] = "plain"
+
+    def __bool__(self) -> bool:
+        """Whether it says anything."""
+        return bool(self.text)
+
+
+@dataclass(frozen=True)
+class Statements:
+    """Statements one after another, each with what it is about and how it came out."""
+
+    template: ClassVar[str] = "statements"
+    items: tuple[Statement, ...]
+    layout: Literal["list", "cards", "lines", "columns"] = "list"
+
+
+@dataclass(frozen=True)
+class Statement:
+    """One statement.
+
+    about  a few words, set bold
+    text   whole sentences
+    badge  how it came out, in a word; empty for none
+    """
+
+    about: str
+    text: str
+    badge: str = ""
+    tone: Tone = "plain"
+
+
+@dataclass(frozen=True)
+class Shares:
+    """Counts that make up a whole, as a bar with its key."""
+
+    template: ClassVar[str] = "shares"
+    title: str
+    parts: tuple[tuple[str, int, Tone], ...]
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A drawn figure, embedded; a gallery shows it.
+
+    title    what it shows, in a line
+    caption  how to read it
+    alt      what one sees, for those who do not see it
+    svg      the drawing, made safe; empty where it is too large
+    uri      data: with the image, for a drawing that is too large
+    name     of its files, without suffix
+    links    files beside the page that hold the drawing and its data, by what they are called
+    page     the file that it is on
+    """
+
+    title: str
+    caption: str
+    alt: str
+    svg: Markup | None = None
+    uri: str = ""
+    width: int = 0
+    height: int = 0
+    name: str = ""
+    links: tuple[tuple[str, str], ...] = ()
+    page: str = MAIN
+
+
+@dataclass(frozen=True)
+class Gallery:
+    """Figures in columns, large enough to be read; a click enlarges one."""
+
+    template: ClassVar[str] = "gallery"
+    pictures: tuple[Picture, ...]
+
+
+@dataclass(frozen=True)
+class Cards:
+    """Pages that are one link away: file, title, and what is found there in a sentence."""
+
+    template: ClassVar[str] = "cards"
+    items: tuple[tuple[str, str, str], ...]
+
+
+@dataclass(frozen=True)
+class Terms:
+    """Words and what they mean."""
+
+    template: ClassVar[str] = "terms"
+    meanings: Mapping[str, str]
+
+
+@dataclass(frozen=True)
+class Code:
+    """Text to be copied."""
+
+    template: ClassVar[str] = "code"
+    title: str
+    text: str
+
+    def __bool__(self) -> bool:
+        """Whether there is any."""
+        return bool(self.text)
+
+
+Pad = tuple[float, float, int]
+"""Where a pad begins and ends along the slope (m), and the leg in whose lane it lies."""
+
+
+@dataclass(frozen=True)
+class Walker:
+    """How one walker of a player moves, and how it is drawn.
+
+    track     its motion, thinned
+    strikes   times of its heel strikes, s
+    stills    postures, each a line through its joints in mm along and below the slope
+    pushes    whether the trailing foot pushes off as the other one lands
+    """
+
+    name: str
+    style: str
+    track: Track
+    strikes: tuple[float, ...]
+    stills: tuple[tuple[tuple[int, int], ...], ...]
+    ends: str = ""
+    pushes: bool = False
+
+    @property
+    def meta(self) -> dict[str, object]:
+        """What a script has to know to read the numbers."""
+        channels, samples = tuple(self.track.channels), int(self.track["t"].size)
+        return {
+            "name": self.name, "style": self.style, "channels": channels, "samples": samples, "strikes": self.strikes,
+            "pushes": self.pushes,
+        }  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Player:
+    """The walk, moving: stills on paper and without scripts.
+
+    alt               what is seen
+    ordinary_force   a force whose arrow is of ordinary length
+    closeup_m  height of the ground seen in the close-up of a foot
+    view       what the stills show, mm: left, top, width, height, y downwards, after the slope is tilted
+    """
+
+    template: ClassVar[str] = "player"
+    title: str
+    caption: str
+    alt: str
+    walkers: tuple[Walker, ...]
+    slope_rad: float
+    leg_m: float
+    foot_radius_m: float
+    torso_m: float
+    ordinary_force: float
+    closeup_m: float
+    pads: tuple[Pad, ...]
+    ground: tuple[tuple[float, float], ...]  # m along the slope where each level of uneven ground begins, and over it
+    view: tuple[int, int, int, int]
+
+    @property
+    def slope_deg(self) -> float:
+        """The slope in degrees."""
+        return round(math.degrees(self.slope_rad), 3)
+
+    @property
+    def scene(self) -> dict[str, object]:
+        """What a script has to know of the scene."""
+        names = ("slope_rad", "leg_m", "foot_radius_m", "torso_m", "ordinary_force", "closeup_m", "pads", "ground")
+        return {name: getattr(self, name) for name in names}
+
+
+@dataclass(frozen=True)
+class GaitMark:
+    """A point of a diagram whose gait a player can show.
+
+    x, y    where its mark is, in the diagram's own units
+    walker  how it moves; its name says what it is
+    """
+
+    x: float
+    y: float
+    stable: bool
+    walker: Walker
+    slope_rad: float
+
+
+@dataclass(frozen=True)
+class Diagram:
+    """Branches of gaits over a parameter; a mark is a gait that is loaded into the page's player.
+
+    curves  points of a line, and whether the gaits on it are stable
+    ticks   of both axes: place and text
+    """
+
+    template: ClassVar[str] = "diagram"
+    WIDTH: ClassVar[int] = 720
+    HEIGHT: ClassVar[int] = 340
+    LEFT: ClassVar[int] = 62
+    RIGHT: ClassVar[int] = 12
+    TOP: ClassVar[int] = 12
+    BOTTOM: ClassVar[int] = 46
+    title: str
+    caption: str
+    titles: tuple[str, str]
+    curves: tuple[tuple[tuple[tuple[float, float], ...], bool], ...]
+    ticks: tuple[tuple[tuple[float, str], ...], tuple[tuple[float, str], ...]]
+    gaits: tuple[GaitMark, ...]
+
+
+@dataclass(frozen=True)
+class Section:
+    """A part of a page under a heading.
+
+    anchor   its id, unique on the page
+    finding  what it comes to, in one sentence; a section that has one is folded to it
+    page     the file that it is on
+    """
+
+    anchor: str
+    title: str
+    blocks: tuple[PageBlock, ...] = ()
+    finding: str = ""
+    page: str = MAIN
+
+    @classmethod
+    def of(
+        cls, anchor: str, title: str, blocks: Iterable[PageBlock | None], finding: str = "", page: str = MAIN
+    ) -> Section | None:
+        """A section of those blocks that there are and that say something; None if there are none."""
+        said = tuple(block for block in blocks if block)
+        return cls(anchor, title, said, finding, page) if said else None

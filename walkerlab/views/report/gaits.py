@@ -1,0 +1,105 @@
+"""A gait's table, for page and terminal alike: its fixed point, multipliers and what a step takes."""
+
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
+from typing import Any
+
+from walkerlab.views.report.numbers import MINUS, NONE, fixed, number, power_of_ten, told_apart
+from walkerlab.views.report.symbols import DOT, SUBSCRIPTS, in_signs
+from walkerlab.views.report.tables import Column, Table, measured, side_by_side
+
+COORDINATE = re.compile(r"(?P<rate>d)?theta(?:_(?P<index>\d+))?(?:_(?P<body>[a-z]\w*))?")
+STATE = ("theta_1", "theta_2", "dtheta_1", "dtheta_2")
+"""The coordinates of a compass; results of other walkers name theirs."""
+SETS = {"as-printed": "as printed", "corrected": "corrected"}
+"""The sets of equations, as they are stored and as they are called."""
+
+
+def gait_table(sets: Mapping[str, Mapping[str, Any]], names: Sequence[str], note: str = "") -> Table:
+    """Fixed point and multipliers, the sets of equations side by side.
+
+    names  of the coordinates of a state
+    """
+    six = partial(fixed, decimals=6)
+    multipliers = range(max(len(gait["multipliers"]) for gait in sets.values()))
+    lines = [
+        *(Column(coordinate(name), partial(state_at, place), six) for place, name in enumerate(names)),
+        measured("step period T", "period_s", six),
+        measured("step length S", "step_length_m", six),
+        *(
+            Column(in_signs(f"{'' if place else 'multipliers '}lambda_{place + 1}"), partial(multiplier, place))
+            for place in multipliers
+        ),
+        Column("spectral radius", "spectral_radius", partial(fixed, decimals=5)),
+        Column("stable", "stable"),
+        *works(partial(number, digits=4)),
+        measured("speed", "speed_m_s", partial(fixed, decimals=4)),
+        measured("Froude number", "froude", partial(fixed, decimals=4)),
+        measured("cost of transport", "cost_of_transport", partial(fixed, decimals=5)),
+        measured("energy from the stance foot", "energy_J", partial(fixed, decimals=3)),
+        measured("energy drift", "energy_drift_J", partial(number, digits=2)),
+        measured("least normal force", "min_normal_force_N", partial(number, digits=4)),
+        Column("largest friction ratio", "max_friction_ratio", partial(fixed, decimals=4)),
+        measured("least normal impulse", "min_normal_impulse_N_s", partial(number, digits=4)),
+        Column("largest impulse ratio", "max_impulse_ratio", partial(fixed, decimals=4)),
+        measured("scuffing depth", "max_scuff_depth_m", lambda depth: number(told_apart(depth), 4)),
+        Column("residual of the step map", "residual", partial(power_of_ten, digits=2)),
+    ]
+    both = len(sets) > 1
+    # the corrected set is labelled only beside the printed one
+    gaits = {"value" if list(sets) == ["corrected"] else SETS[name]: gait for name, gait in sets.items()}
+    caption = f"Fixed point of the step map and its multipliers{', under both sets of equations' if both else ''}"
+    return side_by_side(caption, lines, gaits, note=note)
+
+
+GIVEN_BY = {"gravity": "gravity", "push_off": "the push-off", "hip": "the hip"}
+"""What gives a step its work, by the names under which it is stored."""
+
+
+ROUNDING = 1e-12
+"""Part of the largest work that counts as none."""
+
+
+def works(written: Callable[[Any], str]) -> Iterator[Column]:
+    """The work that each gives a step, of those that give more than rounding."""
+    for name, giver in GIVEN_BY.items():
+
+        def given(record: Mapping[str, Any], name: str = name) -> float | None:
+            work = record.get("work_per_step_J") or {}
+            return work[name] if work and abs(work[name]) > ROUNDING * max(map(abs, work.values())) else None
+
+        yield Column(f"work of {giver} a step (J)", given, written)
+
+
+def state_at(place: int, gait: Mapping[str, Any]) -> float:
+    """A coordinate of a gait's fixed point."""
+    return float(gait["state"][place])
+
+
+def coordinate(name: str) -> str:
+    """A coordinate with its unit."""
+    return f"{symbol(name)} ({'rad/s' if name.startswith('d') else 'rad'})"
+
+
+def symbol(name: str) -> str:
+    """A coordinate's sign, and the body that it is of: 'dtheta_1_shank' becomes 'θ̇₁, shank'."""
+    found = COORDINATE.fullmatch(name)
+    if found is None:
+        return name
+    dot = DOT if found["rate"] else ""
+    body = f", {found['body'].replace('_', ' ')}" if found["body"] else ""
+    return f"θ{dot}{(found['index'] or '').translate(SUBSCRIPTS)}{body}"
+
+
+def multiplier(place: int, gait: Mapping[str, Any]) -> str:
+    """A multiplier of a gait; a dash if it has fewer."""
+    found = gait["multipliers"]
+    return complex_number(*found[place]) if place < len(found) else NONE
+
+
+def complex_number(real: float, imaginary: float) -> str:
+    """A multiplier, as 0.3626 + 0.4603i."""
+    if imaginary == 0:
+        return fixed(real, 4)
+    return f"{fixed(real, 4)} {'+' if imaginary > 0 else MINUS} {fixed(abs(imaginary), 4)}i"

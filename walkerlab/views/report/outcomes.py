@@ -1,0 +1,55 @@
+"""The models that walk, how a walk ends, and how far its numbers are off, in words."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from walkerlab.labels import join_words
+from walkerlab.outcome import OUTCOME_TEXTS, Outcome, outcome_of
+from walkerlab.views.report.numbers import count, quantity
+from walkerlab.views.report.tables import Tone
+
+RIGID, CONTACT = "simulate", "contact-sim"
+MODELS = {RIGID: "Rigid model", CONTACT: "Contact model"}
+"""The stages that walk, and what they walk."""
+
+WALKED = Outcome.WALKED.label
+
+
+def ends(outcome: str) -> str:
+    """What a walker does in the end; an outcome that this version does not know keeps its name."""
+    known = outcome_of(outcome)
+    return f"ends as {outcome}" if known is None else OUTCOME_TEXTS[known].does
+
+
+def walks(steps: int, outcome: str) -> str:
+    """How far a walker comes, as the rest of a sentence that it begins."""
+    if outcome == WALKED:
+        return f"walks all {count(steps, 'step')}"
+    return f"walks {count(steps, 'step')} and then {ends(outcome)}" if steps else f"{ends(outcome)} in its first step"
+
+
+def tone(outcome: str) -> Tone:
+    """Whether a walk went as hoped."""
+    return "good" if outcome == WALKED else "bad"
+
+
+USUAL = "a hundred times tighter tolerances"
+"""What the second walk has, unless `by` says otherwise."""
+ERRORS = {
+    "step_period_s": ("in a period", "s"),
+    "step_length_m": ("in a length", "m"),
+    "slip_m": ("in a slip", "m"),
+    "rolling_m": ("in a rolling", "m"),
+    "knee_strike_time_s": ("in the time of a knee strike", "s"),
+    "end_time_s": ("at the end", "s"),
+    "cost_of_transport": ("in the cost of transport", "1"),
+}
+"""What `numerical_error` is of, in words, and its unit."""
+
+
+def off_by(error: Mapping[str, Any]) -> str:
+    """How far the numbers of a walk are off, and how that is known."""
+    if "reason" in error:
+        return f"unknown: {error['reason']}"
+    off = join_words(f"{quantity(error[key], unit, 1)} {what}" for key, (what, unit) in ERRORS.items() if key in error)
+    return f"{off}, by a second walk with {error.get('by', USUAL)}"

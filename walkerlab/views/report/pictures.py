@@ -1,0 +1,170 @@
+"""Drawn figures as a part of the page: their shapes and texts, small, in colours that the page decides."""
+
+import base64
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree as ET
+
+from markupsafe import Markup, escape
+
+from walkerlab.pipeline.store.content import Content
+from walkerlab.views.report.blocks import CASES, COSTS, MAIN, Picture
+
+PAGES = {"accuracy": COSTS, "stability": CASES}
+"""Where figures go whose names begin so; all others are on the report itself."""
+TYPES = {".svg": "image/svg+xml", ".png": "image/png"}
+VIEW_BOX = re.compile(rb'\bviewBox="0 0 ([\d.]+) ([\d.]+)"')
+
+
+def pictures(stored: Mapping[str, Content], folder: Path, *, numbered: bool = True) -> tuple[Picture, ...]:
+    """Every figure that `plot` lists, in its order.
+
+    folder    of the run, which the figures' paths are relative to
+    numbered  whether the paper's numbers mean something to the reader
+
+    Raises FileNotFoundError if a listed file is not there.
+    """
+    figures = stored["plot"].summary.get("figures", []) if "plot" in stored else []
+    files = fitting([(folder / figure["svg"], folder / figure["png"]) for figure in figures])
+    return tuple(picture(one, folder, file.suffix, numbered) for one, file in zip(figures, files, strict=True))
+
+
+def picture(figure: Mapping[str, Any], folder: Path, kind: str = ".svg", numbered: bool = False) -> Picture:
+    """A figure as a part of the page.
+
+    figure    its words and its files, which are relative to the folder
+    kind      the file that is embedded: a drawing becomes a part of the page, pixels an image
+    numbered  whether the reader has the paper before them
+
+    Raises FileNotFoundError if a file is not there.
+    """
+    svg = folder / figure["svg"]
+    with svg.open("rb") as file:
+        box = VIEW_BOX.search(file.read(2000))
+    # in CSS pixels, to keep its place while it loads; 0 if it does not say
+    width, height = (round(float(box[1])), round(float(box[2]))) if box else (0, 0)
+    number = f"Figure {figure['number']}. " if numbered and "number" in figure else ""
+    title = f"{number}{figure['title']}."
+    alt = f"{title} {figure.get('alt', '')}".strip()
+    embedded = folder / figure[kind.removeprefix(".")]
+    vector = embedded == svg
+    links = [(name.upper(), str(figure[name])) for name in ("svg", "png") if name in figure]
+    links += [(f"{stage}.h5", f"{stage}.h5") for stage in figure.get("results", ())]
+    return Picture(
+        title=title,
+        caption=str(figure["caption"]),
+        alt=alt,
+        svg=inline(svg, alt) if vector else None,
+        uri="" if vector else f"data:{TYPES[kind]};base64,{base64.b64encode(embedded.read_bytes()).decode()}",
+        width=width,
+        height=height,
+        name=svg.stem,
+        links=tuple(links),
+        page=PAGES.get(svg.stem.partition("-")[0], MAIN),
+    )
+
+
+MAX_BYTES = 1_400_000
+"""Of all images together; the largest drawings are embedded as pixels until they fit."""
+
+
+def fitting(drawings: Sequence[tuple[Path, Path]], most: int = MAX_BYTES) -> list[Path]:
+    """For each (SVG, PNG) the file to embed: the SVG, unless they take too much room together.
+
+    Raises FileNotFoundError if one is not there.
+    """
+    chosen = [svg for svg, _ in drawings]
+    sizes = [svg.stat().st_size for svg in chosen]
+    for index in sorted(range(len(drawings)), key=lambda index: -sizes[index]):
+        if sum(sizes) <= most:
+            break
+        png = drawings[index][1]
+        if png.stat().st_size < sizes[index]:
+            chosen[index], sizes[index] = png, png.stat().st_size
+    return chosen
+
+
+SVG, XLINK = "{http://www.w3.org/2000/svg}", "{http://www.w3.org/1999/xlink}"
+SHAPES = frozenset(
+    {"svg", "g", "path", "rect", "circle", "line", "polyline", "polygon", "text", "tspan", "use", "defs", "clipPath"}
+    | {"pattern", "image"}
+)
+"""Elements that are taken over, with these attributes; nothing that runs or fetches is among them."""
+ATTRIBUTES = frozenset(
+    {"viewBox", "d", "x", "y", "x1", "y1", "x2", "y2", "cx", "cy", "r", "width", "height", "points", "transform"}
+    | {"style", "id", "clip-path", "preserveAspectRatio", "patternUnits", "fill", "stroke"}
+)
+ROLES = {
+    "#ffffff": "--fig-paper",
+    "#000000": "--fig-ink",
+    "#ededed": "--fig-pale",
+    "#7f7f7f": "--fig-grey",
+    "#0072b2": "--rigid",
+    "#e69f00": "--contact",
+    "#009e73": "--leg-1",
+    "#cc79a7": "--leg-2",
+    "#d55e00": "--fig-red",
+}
+"""Colours of the drawings that the page may change, for the dark, and what they are called there."""
+COLOUR = re.compile(r"#[0-9a-fA-F]{6}\b")
+DIGITS = re.compile(r"(-?\d+\.\d{2})\d+")
+BLANKS = re.compile(r"\s+")
+FETCHES = re.compile(r"url\((?!#)|@import|expression|javascript:", re.IGNORECASE)
+
+
+def inline(file: Path, alt: str) -> Markup:
+    """The drawing of an SVG file as markup, described by `alt`.
+
+    Raises FileNotFoundError if it is not there, ParseError if it is no XML.
+    """
+    root = ET.fromstring(file.read_bytes())
+    values = [value for element in root.iter() for value in element.attrib.values()]
+    refers = [found for value in values for found in re.findall(r"url\(#[^)]*\)|^#.*$", value)]
+    used = {value.removeprefix("url(").strip("#)") for value in refers}
+    inside = Markup("").join(markup(child, used) for child in root)
+    box = root.get("viewBox", "0 0 1 1")
+    return Markup('<svg viewBox="{}" role="img" aria-label="{}">{}</svg>').format(box, alt, inside)
+
+
+def markup(element: ET.Element, used: set[str]) -> Markup:
+    """An element with what it holds; nothing for one that has no place in a page.
+
+    used  the ids that something refers to: others are left out
+    """
+    name = element.tag.removeprefix(SVG)
+    if name not in SHAPES:
+        return Markup("")
+    inside = spoken(element.text, name)
+    for child in element:
+        inside += markup(child, used) + spoken(child.tail, name)
+    if name in ("g", "defs") and not inside:
+        return Markup("")
+    attributes = Markup("")
+    for key, value in element.attrib.items():
+        local = "href" if key in (f"{XLINK}href", "href") else key
+        wanted = value.startswith(("#", "data:image/png;base64,")) if local == "href" else local in ATTRIBUTES
+        if wanted and (local != "id" or value in used) and not FETCHES.search(value):
+            attributes += Markup(' {}="{}"').format(Markup(local), short(local, value))
+    return Markup("<{0}{1}>{2}</{0}>").format(Markup(name), attributes, inside)
+
+
+def spoken(text: str | None, name: str) -> Markup:
+    """What an element says, if it is one that says something."""
+    return escape(text.strip()) if text and name in ("text", "tspan") else Markup("")
+
+
+def short(name: str, value: str) -> str:
+    """A value in fewer characters: places to a hundredth of a point, colours by their role."""
+    if name in ("id", "href", "clip-path"):
+        return value.strip()
+    if name == "style":
+        return BLANKS.sub(" ", COLOUR.sub(role, value)).replace("; ", ";").replace(": ", ":")
+    return BLANKS.sub(" ", DIGITS.sub(r"\1", value)).strip()
+
+
+def role(found: re.Match[str]) -> str:
+    """A colour by its role on the page; itself if it has none."""
+    name = ROLES.get(found[0].lower())
+    return found[0] if name is None else f"var({name})"

@@ -1,0 +1,72 @@
+"""What a section may draw on: the stored results of a run, the figures drawn from them, and what is missing."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import wraps
+from typing import Any
+
+from walkerlab.config.schema import Config
+from walkerlab.pipeline.headlines import claims
+from walkerlab.pipeline.store.content import Content, Group
+from walkerlab.scene.omissions import LeftOut
+from walkerlab.views.report.blocks import Picture, Section
+
+
+@dataclass(frozen=True, eq=False)
+class Results:
+    """A run as the report sees it.
+
+    config    what was asked for
+    stored    results by stage: those that are there and current
+    pictures  the figures that `plot` drew, embedded
+    absent    what has no result
+    failed    those of them that were tried and have no answer
+    pending   the stages whose results are still being computed
+    """
+
+    config: Config
+    stored: Mapping[str, Content] = field(default_factory=dict)
+    pictures: tuple[Picture, ...] = ()
+    absent: tuple[LeftOut, ...] = ()
+    pending: tuple[str, ...] = ()
+    failed: frozenset[str] = frozenset()
+
+    @property
+    def departures(self) -> Sequence[str] | None:
+        """How the scene departs from the paper's: not at all if empty; None if nobody compared them."""
+        found: Sequence[str] | None = self.summary("compare").get("departures")
+        return found
+
+    @property
+    def claims(self) -> Sequence[Mapping[str, Any]]:
+        """Judged values that a study claims of this very scene, whose numbering its reader knows; none of another."""
+        return claims(self.summary("compare"))
+
+    def summary(self, stage: str) -> Mapping[str, Any]:
+        """The summary of a stage's result; empty if there is none."""
+        return self.stored[stage].summary if stage in self.stored else {}
+
+    def group(self, stage: str, path: str) -> Group | None:
+        """A group of a stage's result; None if there is no such result or group."""
+        result = self.stored.get(stage)
+        return None if result is None else result.groups.get(path)
+
+
+SectionMaker = Callable[[Results], Section | None]
+
+
+def of_stage(stage: str, needed: str = "") -> Callable[[Callable[..., Section | None]], SectionMaker]:
+    """A section made of a stage's summary, which it is given, too; none without a result.
+
+    needed  a key of the summary without which there is nothing to say
+    """
+
+    def section_of(make: Callable[..., Section | None]) -> SectionMaker:
+        @wraps(make)
+        def section(results: Results) -> Section | None:
+            summary = results.summary(stage)
+            return make(results, summary) if (summary.get(needed) if needed else summary) else None
+
+        return section
+
+    return section_of

@@ -1,0 +1,134 @@
+"""What accuracy costs: error against run time, method by method."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
+from typing import Any
+
+from walkerlab.labels import join_words
+from walkerlab.outcome import Outcome
+from walkerlab.views.report.blocks import COSTS, Gallery, PageBlock, Paragraph, Section, Statement, Statements
+from walkerlab.views.report.numbers import NONE, number, power_of_ten, whole
+from walkerlab.views.report.results import Results, of_stage
+from walkerlab.views.report.tables import Cell, Column, Table, grouped, table
+from walkerlab.views.report.words import words
+
+Row = Mapping[str, Any]
+
+
+@of_stage("accuracy", "reference")
+def section(results: Results, summary: Row) -> Section | None:
+    """The table of methods for each scene, with conclusions, references, and what was not run."""
+    told = {scene: summary["conclusions"][scene].removeprefix(f"{scene}: ") for scene in summary["reference"]}
+    concluded = tuple(Statement(scene, text[:1].upper() + text[1:]) for scene, text in told.items())
+    references = [{"scene": scene, **entry} for scene, entry in summary["reference"].items()]
+    nearest = {scene: run for scene in summary["reference"] if (run := nearest_library(summary, scene))}
+    blocks: tuple[PageBlock, ...] = (
+        Paragraph(words("accuracy.introduction", summary)),
+        Statements(concluded),
+        costs(summary),
+        table(
+            "References",
+            REFERENCE_COLUMNS,
+            references,
+            note=words("accuracy.references", list(summary["reference"].items()), nearest),
+        ),
+        *(Gallery((picture,)) for picture in results.pictures if picture.name.startswith("accuracy")),
+        not_run(summary),
+    )
+    fastest: dict[str, list[str]] = {}
+    for scene, best in summary["best"].items():
+        fastest.setdefault(join_words(dict.fromkeys(best.values())), []).append(scene)
+    return Section.of("accuracy", "Error against run time", blocks, words("accuracy.fastest", fastest), COSTS)
+
+
+def costs(summary: Row) -> Table:
+    """What each method costs for each error, by scene."""
+    levels = sorted({float(level) for best in summary["best"].values() for level in best}, reverse=True)
+    columns = (
+        Column("method", "method"),
+        *(Column(f"ms for {power_of_ten(at, 1)}", f"{at}", with_spread, numeric=True) for at in levels),
+        Column("smallest error", "smallest_error", numeric=True),
+        Column("right-hand sides there", "rhs_evaluations", whole, numeric=True),
+        Column("end not reached", "failures", wide=True),
+    )
+    methods = {scene: list(methods_of(summary, scene, levels)) for scene in summary["reference"]}
+    note = words("accuracy.costs", summary)
+    return table("Shortest run time for each error, by method", columns, methods, note=note)
+
+
+def methods_of(summary: Row, scene: str, levels: Sequence[float]) -> Iterator[Row]:
+    """The methods of a scene, each with its least time (ms) for an error, by level, and its smallest error.
+
+    What the reference is known to bounds what can be told of an error.
+    """
+    best, known = summary["best"].get(scene, {}).values(), float(summary["reference"][scene]["agreement"])
+    for method, runs in grouped((row for row in summary["rows"] if row["scene"] == scene), "method").items():
+        ended = [run for run in runs if run["error"] is not None]
+        exact: Row = min(ended, key=lambda run: float(run["error"]), default={})
+        error = exact.get("error")
+        failed = [f"{ended_as(run)} at {power_of_ten(run['tolerance'], 1)}" for run in runs if run["error"] is None]
+        yield {
+            "method": Cell(method, "good" if method in best else None),
+            "smallest_error": number(error, 2) if error is None or error > known else f"≤ {number(known, 2)}",
+            "rhs_evaluations": exact.get("rhs_evaluations"),
+            "failures": join_words(failed),
+            **{
+                f"{level}": min(
+                    (run for run in ended if run["error"] <= level), key=lambda run: run["wall_s"], default=None
+                )
+                for level in levels
+            },
+        }
+
+
+def with_spread(run: Row | None) -> Cell:
+    """A run's median time (ms), with the least and the largest where it was repeated."""
+    if run is None:
+        return Cell(NONE)
+    median, least, largest = (number(1e3 * run[name], 3) for name in ("wall_s", "least_wall_s", "largest_wall_s"))
+    alone = run["repeats_of_wall_s"] == 1
+    return Cell(median if alone else f"{median} ({least} to {largest})", value=1e3 * run["wall_s"])
+
+
+def ended_as(run: Row) -> str:
+    """How a run ended that did not arrive."""
+    return "budget used up" if run["outcome"] == Outcome.BUDGET_EXHAUSTED.label else str(run["outcome"])
+
+
+def nearest_library(summary: Row, scene: str) -> Row | None:
+    """The run of a library's method that ends nearest to the reference; None without any."""
+    runs = [row for row in summary["rows"] if row["scene"] == scene and row["error"] is not None]
+    of_libraries = [row for row in runs if row["method"].startswith(("scipy", "cvode"))]
+    return min(of_libraries, key=lambda row: float(row["error"]), default=None)
+
+
+def whose(reference: Row) -> str:
+    """Who made a reference, and at which tolerance."""
+    if reference["from_outside"]:
+        return "heyoka, at machine precision"
+    spent = f", {whole(reference['rhs_evaluations'])} right-hand sides"
+    return f"ours, at {power_of_ten(reference['tolerance'], 1)}{spent}"
+
+
+REFERENCE_COLUMNS = (
+    Column("scene", "scene"),
+    Column("reference", "method"),
+    Column("by", whose),
+    Column("second method", "second_method"),
+    Column("difference", "agreement", partial(number, digits=2), numeric=True),
+)
+
+
+NOT_RUN_COLUMNS = (
+    Column("scene", "scene"),
+    Column("method", "method"),
+    Column("tolerances", "tolerances", lambda values: join_words(power_of_ten(value, 1) for value in values)),
+    Column("why", "why", wide=True),
+)
+
+
+def not_run(summary: Row) -> Table:
+    """The tolerances that were not tried, a row for each reason."""
+    found = grouped(summary.get("not_run", []), "scene", "method", "why").values()
+    rows = [{**entries[0], "tolerances": [float(one["tolerance"]) for one in entries]} for entries in found]
+    return table("Not run", NOT_RUN_COLUMNS, rows, wordy=True)

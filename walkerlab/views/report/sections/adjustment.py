@@ -1,0 +1,145 @@
+"""The paper's parameter adjustment: whether it was needed, how much, and what explains it."""
+
+from collections.abc import Mapping, Sequence
+from functools import partial
+from typing import Any
+
+from walkerlab.labels import join_words
+from walkerlab.views.report.blocks import COSTS, Paragraph, Section
+from walkerlab.views.report.gaits import symbol, works
+from walkerlab.views.report.numbers import NONE, fixed, length, number, quantity
+from walkerlab.views.report.outcomes import tone
+from walkerlab.views.report.results import Results, of_stage
+from walkerlab.views.report.symbols import in_signs
+from walkerlab.views.report.tables import Cell, Column, Table, measured, side_by_side, table
+from walkerlab.views.report.words import words
+
+Summary = Mapping[str, Any]
+
+
+@of_stage("tune", "adjustment")
+def section(results: Results, summary: Summary) -> Section | None:
+    """The verdict on the adjustment, with the tables behind it."""
+    changed = results.claims or summary["adjustment"]["needed"]
+    blocks = (
+        Paragraph(words("adjustment.explained", summary, results.claims)),
+        starts_table(results, summary) if changed else None,
+        gait_table(summary, results.summary("fixedpoint")) if summary["gait"]["found"] else None,
+        margins_table(summary),
+        walks_table(results, summary) if changed else None,
+    )
+    return Section.of("adjustment", "The parameter adjustment", blocks, words("adjustment.needed", summary))
+
+
+ORDER_COLUMNS = (Column("knob"), Column("observed orders, towards the limit", wide=True))
+
+
+def limit(results: Results) -> Section | None:
+    """What takes the contact model to the rigid one; None if nobody asked."""
+    summary = results.summary("tune")
+    reaches, orders = summary.get("reaches") or {}, summary.get("orders") or {}
+    pushes = results.config.push_off.impulse_N_s != 0.0
+    note = words("adjustment.factors", pushes)
+    titles = words.terms("adjustment.distances").items()
+    columns = [measured(title, key, partial(number, digits=3)) for key, title in titles]
+    settings = {f"Towards the rigid limit: {name}": found["settings"] for name, found in reaches.items()}
+    rows = [[name, ", ".join(fixed(order, 2) for order in values) or NONE] for name, values in orders.items()]
+    blocks = (
+        *(table(caption, columns, found, note=note) for caption, found in settings.items()),
+        table("How fast the period converges when one knob is turned", ORDER_COLUMNS, rows),
+    )
+    return Section.of("limit", "Towards the rigid limit", blocks, words("adjustment.reached", reaches, pushes), COSTS)
+
+
+def starts_table(results: Results, summary: Summary) -> Table:
+    """The start before and after; beside Table 2 if the paper is what is redone."""
+    rows = [{"name": name, **row} for name, row in summary["table2"].items()]
+    caption, note, head = "The start before and after the adjustment", "", "coordinate"
+    if results.claims:
+        caption, head = "Table 2 again: the start before and after the adjustment", "row"
+        note = "The paper's percentages are those of the ADAMS value, without saying so."
+    named = in_signs if results.claims else symbol
+    first = Column(head, lambda row: f"{named(row['name'])} ({row['unit']})")
+    beside = (
+        Column(title, key, partial(number, digits=3 if "percent" in key else 6), numeric=True)
+        for key, title in words.terms("adjustment.starts", results.claims).items()
+    )
+    return table(caption, (first, *beside), rows, note=note)
+
+
+LOST = {
+    "damping": ("to damping", "in the impact, all"),
+    "friction": ("to friction", "none"),
+    "knee_strikes": ("in the knee's strike", "in the strike"),
+    "knee_stop": ("in the knees' stops", "none"),
+}
+"""Where a step dissipates energy, by the names under which it is stored, and what the rigid model has instead."""
+
+
+def lost(channel: str, gait: Summary) -> float | Cell | None:
+    """What a gait dissipates in a channel (J); None of knees that take nothing."""
+    into = gait["lost_J"].get(channel)
+    return into if into or channel in ("damping", "friction") else None
+
+
+def factors(multipliers: Sequence[tuple[float, float]]) -> str:
+    """Multipliers, largest first; a complex one stands for itself and its conjugate."""
+    return join_words(
+        fixed(real, 4) + (f" ± {fixed(imag, 4)}i" if imag > 1e-9 else "") for real, imag in multipliers if imag >= 0.0
+    )
+
+
+GAIT_LINES = (
+    Column("period", "period_s", lambda value: quantity(value, "s", 7)),
+    Column("step length", "step_length_m", lambda value: quantity(value, "m", 7)),
+    Column("largest multiplier", "spectral_radius", partial(number, digits=4)),
+    Column("multipliers", "multipliers", factors),
+    Column("stable", "stable"),
+    Column("slip a step", "slip_m", length),
+    *(
+        Column(f"energy lost {said}", partial(lost, channel), partial(quantity, unit="J"))
+        for channel, (said, _) in LOST.items()
+    ),
+    *works(number),
+)
+
+
+def gait_table(summary: Summary, rigid: Summary) -> Table:
+    """The contact gait beside the rigid one."""
+    gait = summary["gait"]
+    note = f"Section of the contact gait: {gait['section']}."
+    losses = {channel: Cell(said) for channel, (_, said) in LOST.items() if lost(channel, gait) is not None}
+    beside = {**rigid, "slip_m": Cell("none"), "lost_J": losses}
+    gaits = {"contact model": gait, "rigid model": beside}
+    return side_by_side("The contact model's own gait", GAIT_LINES, gaits, note=note)
+
+
+MARGIN_COLUMNS = (
+    Column("scaled", "name", in_signs),
+    Column("last factor that walks", "factor", number, numeric=True),
+    Column("beyond", "beyond", lambda outcome: outcome or "nothing, as far as searched"),
+    Column("steps there", "steps_beyond", lambda steps: "" if steps is None else str(steps), numeric=True),
+)
+
+
+def margins_table(summary: Summary) -> Table:
+    """How far the start may be scaled."""
+    rows = [{"name": name, **margin} for name, margin in (summary["adjustment"].get("margins") or {}).items()]
+    return table("How far the start's velocities may change", MARGIN_COLUMNS, rows)
+
+
+WALK_COLUMNS = (
+    Column("walk", "walk"),
+    Column("outcome", "outcome", lambda outcome: Cell(outcome, tone(outcome))),
+    Column("steps", "steps", numeric=True),
+    measured("numerical error of a period", "numerical_error/step_period_s", partial(number, digits=1)),
+)
+
+
+def walks_table(results: Results, summary: Summary) -> Table:
+    """The procedure, walk by walk."""
+    names = words.terms("adjustment.walks", "hinged" in summary["procedure"])
+    walks = [{"walk": names[name], **walk} for name, walk in summary["procedure"].items() if walk is not None]
+    if results.claims:
+        walks.append({"walk": "from the paper's ADAMS start", **summary["paper_start"]})
+    return table("The procedure, walk by walk", WALK_COLUMNS, walks)

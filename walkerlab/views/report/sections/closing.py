@@ -1,0 +1,61 @@
+"""What closes the report: what is one link away, what its words mean, and what is not in it, and why."""
+
+from collections.abc import Iterator, Mapping, Sequence
+
+from walkerlab.config.drives import drives_of
+from walkerlab.labels import join_words
+from walkerlab.scene.omissions import LeftOut
+from walkerlab.views.report.blocks import CASES, COSTS, PAPER, Cards, Paragraph, Section, Terms
+from walkerlab.views.report.numbers import count
+from walkerlab.views.report.results import Results
+from walkerlab.views.report.tables import Column, table
+from walkerlab.views.report.words import words
+
+TITLES = {
+    PAPER: "Number by number: the paper and what is found here",
+    CASES: "Extreme cases and known problems",
+    COSTS: "Accuracy: what an error costs, and the rigid limit",
+}
+"""The pages beside the report, in their order."""
+
+
+def further(results: Results, pages: Mapping[str, Sequence[Section]]) -> Section | None:
+    """Links to the other pages, each with what it comes to in a sentence for each section, and what will be there."""
+    items = []
+    for file, found in pages.items():
+        silent = file == PAPER and not results.claims
+        items.append((file, TITLES[file], "" if silent else " ".join(filter(None, (one.finding for one in found)))))
+    waiting = (Paragraph(words("closing.pending", name), "waiting") for name in results.pending)
+    title = "Further pages" if items else "Still to come"
+    return Section.of("further", title, (Cards(tuple(items)) if items else None, *waiting))
+
+
+def glossary(results: Results) -> Section:
+    """What the words mean."""
+    told = words.terms("closing.glossary", results.config.contact is not None, drives_of(results.config))
+    return Section("glossary", "Glossary", (Terms(told),), "The words of this report, in a line each.")
+
+
+def left_out(results: Results) -> Section | None:
+    """Results that were not computed, and parts of results that were left out."""
+    parts = [LeftOut(**one) for stored in results.stored.values() for one in stored.summary.get("left_out", [])]
+    rows = list(rows_of(list(dict.fromkeys((*results.absent, *parts)))))
+    columns = [Column("what"), Column("why", wide=True), Column("saves", wide=True)]
+    missing = table("What was left out of this scene, why, and what that saves", columns, rows, wordy=True)
+    nothing = Paragraph("" if rows else "Nothing is left out: every result of the pipeline is there.")
+    finding = f"{count(len(rows), 'thing')}, each with its reason." if rows else "Nothing."
+    return Section.of("left-out", "Left out", (missing, nothing), finding)
+
+
+def rows_of(missing: Sequence[LeftOut]) -> Iterator[tuple[str, str, str]]:
+    """What is missing for one reason in a row, and in a row below it what is missing for want of that."""
+    reasons = {absent.why for absent in missing}
+    # the reason at the bottom of one such as 'it needs simulate: it needs fixedpoint: no gait'
+    causes = {absent.why: min(filter(absent.why.endswith, reasons), key=len) for absent in missing}
+    for why in dict.fromkeys(causes.values()):
+        alike = [absent for absent in missing if absent.why == why]
+        first = join_words(absent.what for absent in alike)
+        yield first, why, "; ".join(dict.fromkeys(absent.saves for absent in alike if absent.saves))
+        further = join_words(absent.what for absent in missing if absent.why != why and causes[absent.why] == why)
+        if further:
+            yield further, f"needs {first}", ""

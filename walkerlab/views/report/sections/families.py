@@ -1,0 +1,166 @@
+"""Families of gaits over a parameter, their bifurcations, a diagram whose gaits walk, and basins of attraction."""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from walkerlab.labels import axis_label, with_unit
+from walkerlab.pipeline.store.content import Group
+from walkerlab.views.report.blocks import Diagram, GaitMark, Paragraph, Section, Walker
+from walkerlab.views.report.gaits import complex_number
+from walkerlab.views.report.numbers import number, whole
+from walkerlab.views.report.results import Results, of_stage
+from walkerlab.views.report.tables import Column, Table, table
+from walkerlab.views.report.tracks import sampling_gap, track_in
+from walkerlab.views.report.words import words
+
+
+@of_stage("continuation", "branches")
+def section(results: Results, summary: Mapping[str, Any]) -> Section | None:
+    """Branches, their bifurcations and the chaos beyond; None if none were followed."""
+    first, *others = findings(summary) or [words("families.followed", summary["branches"])]
+    blocks = (Paragraph(" ".join(others)), gait_diagram(results), bifurcations(summary))
+    return Section.of("families", f"Families of gaits over {parameter(summary)}", blocks, first)
+
+
+def findings(summary: Mapping[str, Any]) -> list[str]:
+    """What there is to say, sentence by sentence."""
+    stable = {}
+    for model in ("rigid", "contact"):
+        alone = [one for one in summary["branches"] if (one["model"], one["period"]) == (model, 1)]
+        if ranges := [pair for one in alone for pair in one["stable_ranges"]]:
+            stable[model] = max(ranges, key=lambda pair: pair[1] - pair[0])
+    return words.parts("families.findings", summary, stable)
+
+
+def bifurcations(summary: Mapping[str, Any]) -> Table:
+    """Every bifurcation that was located."""
+    columns = (
+        Column("kind", "kind"),
+        Column("model", "model"),
+        Column("steps of the gait", "period", numeric=True),
+        Column(with_unit(parameter(summary), summary["unit"]), "value", lambda value: number(value, 9), numeric=True),
+        Column("critical multiplier", "multiplier", lambda parts: complex_number(*parts), numeric=True),
+    )
+    return table("Bifurcations, as zeros of their test functions", columns, summary["bifurcations"])
+
+
+def parameter(summary: Mapping[str, Any]) -> str:
+    """What the families are over."""
+    return axis_label(str(summary["over"]))
+
+
+MODEL = "rigid"
+CLEAR = 16.0
+"""Between the centres of two marks, in units of the diagram: half as much again as they are wide, for fingers."""
+GAP = 3.0
+"""Time between samples, in those of the walk itself: a gait is looked at, not measured."""
+
+
+class DiagramAxis:
+    """From numbers to places between the start and the end of an axis, with a little room beside the numbers."""
+
+    def __init__(self, values: NDArray[np.float64], start: float, end: float) -> None:
+        """Make room for the numbers."""
+        least, most = float(values.min()), float(values.max())
+        room = 0.04 * (most - least) or 1.0
+        self.least, self.most, self.start, self.end = least - room, most + room, start, end
+
+    def place(self, value: float) -> float:
+        """Where a number is."""
+        return round(self.start + (value - self.least) / (self.most - self.least) * (self.end - self.start), 1)
+
+    def ticks(self) -> tuple[tuple[float, str], ...]:
+        """Round numbers: place and text."""
+        rough = (self.most - self.least) / 5.0
+        ten = 10.0 ** math.floor(math.log10(rough))
+        step = ten * next(digit for digit in (5, 2, 1) if digit * ten <= rough)
+        numbers = range(math.ceil(self.least / step), math.floor(self.most / step) + 1)
+        return tuple((self.place(number * step), f"{number * step:.6g}") for number in numbers)
+
+
+def gait_diagram(results: Results) -> Diagram | None:
+    """Step periods over the parameter, with the gaits whose stored motion can be pointed at; None if there are none."""
+    summary = results.summary("continuation")
+    branches: list[Group] = []
+    while (branch := results.group("continuation", f"{MODEL}/branch_{len(branches)}")) is not None:
+        branches.append(branch)
+    moving = [
+        (branch, place, motion)
+        for number, branch in enumerate(branches)
+        for place in range(branch["value"].size)
+        if (motion := results.group("continuation", f"{MODEL}/branch_{number}/motion_{place}")) is not None
+    ]
+    if not moving:
+        return None
+    value = np.concatenate([branch["value"] for branch in branches])
+    period = np.concatenate([branch["step_period"].ravel() for branch in branches])
+    across = DiagramAxis(value, Diagram.LEFT, Diagram.WIDTH - Diagram.RIGHT)
+    up = DiagramAxis(period, Diagram.HEIGHT - Diagram.BOTTOM, Diagram.TOP)
+    pushes = results.config.push_off.impulse_N_s != 0.0
+    gap, unit = GAP * sampling_gap(results.config), summary["unit"]
+    marks = []
+    for branch, place, motion in moving:
+        x, y = float(branch["value"][place]), float(branch["step_period"][place][0])
+        stable = bool(branch["stable"][place])
+        track = track_in(motion)
+        if track is not None:
+            name = words("families.mark", int(motion.attrs["steps"]), x, unit, stable)
+            strikes = motion["time"][1:][np.diff(motion["step"]) > 0].round(6)
+            walker = Walker(name, MODEL, track.thinned(gap), tuple(strikes.tolist()), (), pushes=pushes)
+            marks.append(GaitMark(across.place(x), up.place(y), stable, walker, float(motion.attrs["slope_rad"])))
+    over = parameter(summary)
+    return Diagram(
+        title=f"Gaits over {over}",
+        caption=words("families.diagram"),
+        titles=(with_unit(over, unit), "duration of a step (s)"),
+        curves=tuple(curve for branch in branches for curve in curves(branch, across, up)),
+        ticks=(across.ticks(), up.ticks()),
+        gaits=apart(marks),
+    )
+
+
+def apart(marks: Sequence[GaitMark]) -> tuple[GaitMark, ...]:
+    """The marks of which none covers another, so that each can be pointed at; stable gaits go before others."""
+    kept: list[int] = []
+    for place in sorted(range(len(marks)), key=lambda place: not marks[place].stable):
+        x, y = marks[place].x, marks[place].y
+        if all(math.hypot(marks[other].x - x, marks[other].y - y) >= CLEAR for other in kept):
+            kept.append(place)
+    return tuple(marks[place] for place in sorted(kept))
+
+
+def curves(
+    branch: Group, across: DiagramAxis, up: DiagramAxis
+) -> Iterator[tuple[tuple[tuple[float, float], ...], bool]]:
+    """A line for each step of a branch's gaits and each stretch of one stability."""
+    stable = branch["stable"].astype(bool)
+    bounds = [0, *(int(place) + 1 for place in np.flatnonzero(np.diff(stable))), stable.size]
+    for begin, end in pairwise(bounds):
+        here = slice(max(0, begin - 1), end)
+        for period in branch["step_period"][here].T:
+            points = zip(branch["value"][here], period, strict=True)
+            yield tuple((across.place(float(x)), up.place(float(y))) for x, y in points), bool(stable[begin])
+
+
+ATTRACTOR_COLUMNS = (
+    Column("period (steps)", "period", whole, numeric=True),
+    Column("cells", "cells", whole, numeric=True),
+    Column("steps to reach it, median", "median_steps_to_settle", lambda steps: number(steps, 3), numeric=True),
+)
+
+
+@of_stage("basin")
+def basin(_results: Results, summary: Mapping[str, Any]) -> Section | None:
+    """What the basin came to; None if it was not asked for."""
+    told = (words("basin.shares", summary), *words.parts("basin.grounds", summary))
+    return Section.of("basin", "Basins of attraction", (*map(Paragraph, told), attractors(summary)))
+
+
+def attractors(summary: Mapping[str, Any]) -> Table:
+    """What walks settle on."""
+    return table("Attractors", ATTRACTOR_COLUMNS, summary["attractors"], note=words("basin.unsettled", summary))

@@ -1,0 +1,50 @@
+"""The periodic gait: its fixed point and multipliers under both sets of equations, and all gaits that were found."""
+
+from collections.abc import Mapping, Sequence
+from functools import partial
+from typing import Any
+
+from walkerlab.views.report.blocks import Paragraph, Section
+from walkerlab.views.report.gaits import SETS, STATE, gait_table, state_at, symbol
+from walkerlab.views.report.numbers import fixed
+from walkerlab.views.report.results import Results, of_stage
+from walkerlab.views.report.tables import Column, Table, measured, table
+from walkerlab.views.report.words import words
+
+
+@of_stage("fixedpoint")
+def section(results: Results, summary: Mapping[str, Any]) -> Section | None:
+    """The gait of this walker on this slope."""
+    names = summary.get("state_names", STATE)
+    shown = SETS if results.claims else (summary["equations"],)
+    sets = summary.get("equation_sets", {summary.get("equations"): summary})
+    found = {name: sets[name] for name in shown if name in sets}
+    gaits = {name: one for name, one in found.items() if one.get("state")}
+    every = {name: one["gaits"] for name, one in found.items() if one.get("gaits")}
+    blocks = (
+        Paragraph(words("gait.disturbances", summary)),
+        gait_table(gaits, names, note=words("gait.equations") if len(gaits) > 1 else "") if gaits else None,
+        every_gait(every, names) if any(len(one) > 1 for one in every.values()) else None,
+    )
+    return Section.of("gait", "The gait", blocks, words("gait.finding", summary))
+
+
+def every_gait(sets: Mapping[str, Sequence[Mapping[str, Any]]], names: Sequence[str]) -> Table:
+    """All gaits that were found, by set of equations, numbered, each with why it is chosen or cannot be walked."""
+    four, five = partial(fixed, decimals=4), partial(fixed, decimals=5)
+    columns = (
+        Column("gait", "gait", numeric=True),
+        measured("T", "period_s", five),
+        measured("S", "step_length_m", five),
+        *(Column(symbol(name), partial(state_at, place), four, numeric=True) for place, name in enumerate(names)),
+        Column("spectral radius", "spectral_radius", four, numeric=True),
+        Column("stable", "stable"),
+        Column("remark", lambda gait: "chosen" if gait["chosen"] else gait["objection"]),
+    )
+    gaits = {
+        "" if list(sets) == ["corrected"] else SETS[name]: [
+            {**one, "gait": place} for place, one in enumerate(found, 1)
+        ]
+        for name, found in sets.items()
+    }
+    return table("Every gait of one step that was found", columns, gaits)

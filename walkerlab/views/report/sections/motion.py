@@ -1,0 +1,137 @@
+"""What is seen: the walk, moving, with a foot in close-up and three views on one clock; and the figures."""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from walkerlab.pipeline.store.footholds import ground_levels
+from walkerlab.views.report.blocks import MAIN, Gallery, Pad, Paragraph, Player, Section, Walker
+from walkerlab.views.report.outcomes import CONTACT, MODELS, RIGID, WALKED, ends
+from walkerlab.views.report.results import Results
+from walkerlab.views.report.tracks import Array, Track, sampling_gap, track_in
+from walkerlab.views.report.words import words
+
+MAX_STEPS = 10
+STYLES = {RIGID: "rigid", CONTACT: "contact"}
+DEEPEST_IN_VIEW = 5.0
+"""Height of the close-up in largest penetrations that are not an impact's."""
+STILL_VIEW_OF_RIGID = 4e-3
+"""Height of the close-up of a foot that does not sink in, leg lengths."""
+
+
+def section(results: Results) -> Section | None:
+    """The player; None if no motion was stored."""
+    return Section.of("motion", "The walk", (player(results),))
+
+
+def player(results: Results, most: int = MAX_STEPS) -> Player | None:
+    """The first steps of both models' walks, as far as they are there; None if no motion was stored."""
+    touches = [results.summary(stage).get("touch_times_s", []) for stage in MODELS]
+    # of the model that takes longest over them
+    end = max((times[most - 1] for times in touches if len(times) >= most), default=math.inf)
+    found = {stage: track_in(results.group(stage, "trajectory")) for stage in MODELS}
+    tracks = {stage: track.until(end) for stage, track in found.items() if track is not None}
+    if not tracks:
+        return None
+    config, torso = results.config, results.config.walker.torso
+    length = config.walker.leg_length_m
+    steps = {MODELS[stage].lower(): len(results.summary(stage)["step_periods_s"]) for stage in tracks}
+    return Player(
+        title="The walk.",
+        caption=words("motion.caption", max(steps.values()), most, config.push_off.impulse_N_s != 0.0),
+        alt=words("motion.alt", steps, math.degrees(config.slope_rad)),
+        walkers=tuple(walker(results, stage, track) for stage, track in tracks.items()),
+        slope_rad=config.slope_rad,
+        leg_m=length,
+        foot_radius_m=config.walker.foot_radius_m,
+        torso_m=0.0 if torso is None else torso.above_hip_m,
+        ordinary_force=weight(tracks),
+        closeup_m=closeup(tracks.get(CONTACT), length),
+        pads=pads(results),
+        ground=ground(results),
+        view=view(tuple(tracks.values()), config.slope_rad, margin=0.1 * length),
+    )
+
+
+def walker(results: Results, stage: str, track: Track) -> Walker:
+    """A model's motion and how it ended."""
+    summary = results.summary(stage)
+    strikes = [time for time in summary["touch_times_s"] if time <= track.end + 1e-9]
+    return Walker(
+        name=MODELS[stage],
+        style=STYLES[stage],
+        track=track.thinned(sampling_gap(results.config)),
+        strikes=tuple(round(time, 6) for time in strikes),
+        stills=stills(track, strikes),
+        ends="" if summary["outcome"] == WALKED else ends(summary["outcome"]),
+        pushes=results.config.push_off.impulse_N_s != 0.0,
+    )
+
+
+def stills(track: Track, strikes: list[float]) -> tuple[tuple[tuple[int, int], ...], ...]:
+    """Postures to be seen at once, both feet down and mid-step: a line from foot over hip to foot (mm, y downwards)."""
+    times: Any = np.array([0.0, *strikes])
+    wanted = np.unique(np.concatenate((times, 0.5 * (times[:-1] + times[1:]), [track.end])))
+    rows = np.clip(np.searchsorted(track["t"], wanted), 0, track["t"].size - 1)
+    joints = [("f", "0"), ("k", "0"), ("h", ""), ("k", "1"), ("f", "1")]
+    lines = [
+        (track[f"{joint}x{leg}"], track[f"{joint}y{leg}"])
+        for joint, leg in joints
+        if f"{joint}x{leg}" in track.channels
+    ]
+    return tuple(tuple((round(1000 * float(x[row])), -round(1000 * float(y[row]))) for x, y in lines) for row in rows)
+
+
+def weight(tracks: dict[str, Track]) -> float:
+    """A force to scale arrows by (N): what the ground carries most of the time; any number if forces are unknown."""
+    loads = [float(np.median(track["n0"] + track["n1"])) for track in tracks.values() if "n0" in track.channels]
+    return max((load for load in loads if load > 0.0), default=1.0)
+
+
+def closeup(track: Track | None, length: float) -> float:
+    """Height of the close-up (m): some penetrations of a foot of the contact model that stands."""
+    if track is None or "p0" not in track.channels:
+        return STILL_VIEW_OF_RIGID * length
+    depths = np.concatenate((track["p0"], track["p1"]))
+    loaded = depths[depths > 0.0]
+    return DEEPEST_IN_VIEW * float(np.quantile(loaded, 0.98)) if loaded.size else STILL_VIEW_OF_RIGID * length
+
+
+def pads(results: Results) -> tuple[Pad, ...]:
+    """The pads that the contact model walks on; none on a plane."""
+    terrain = results.group(CONTACT, "terrain")
+    if terrain is None or "left_m" not in terrain.variables:
+        return ()
+    left, right, leg = (terrain[name].tolist() for name in ("left_m", "right_m", "leg"))
+    return tuple((round(one[0], 4), round(one[1], 4), int(one[2]) - 1) for one in zip(left, right, leg, strict=True))
+
+
+def ground(results: Results) -> tuple[tuple[float, float], ...]:
+    """Where each level of uneven ground begins along the slope, and its height (m); none on even ground."""
+    for stage in reversed(MODELS):
+        steps = results.group(stage, "steps")
+        levels = None if steps is None else ground_levels(steps)
+        if levels is not None:
+            return tuple(
+                (round(float(begin), 4), round(float(height), 6)) for begin, height in zip(*levels, strict=True)
+            )
+    return ()
+
+
+def view(tracks: tuple[Track, ...], slope: float, margin: float) -> tuple[int, int, int, int]:
+    """Left, top, width and height (mm, y downwards) of what the walkers pass through on the tilted slope."""
+    along: Array = np.concatenate([track[name] for track in tracks for name in ("fx0", "hx", "fx1")])
+    above: Array = np.concatenate([track[name] for track in tracks for name in ("fy0", "hy", "fy1")])
+    right = along * math.cos(slope) + above * math.sin(slope)
+    down = along * math.sin(slope) - above * math.cos(slope)
+    left, top = right.min() - margin, down.min() - margin
+    width, height = right.max() + margin - left, down.max() + margin - top
+    return math.floor(1000 * left), math.floor(1000 * top), math.ceil(1000 * width), math.ceil(1000 * height)
+
+
+def figures(results: Results) -> Section | None:
+    """The figures of the walks and gaits."""
+    shown = tuple(picture for picture in results.pictures if picture.page == MAIN)
+    numbered = (Paragraph(words("figures.numbered")),) if results.claims else ()
+    return Section("figures", "Figures", (*numbered, Gallery(shown))) if shown else None

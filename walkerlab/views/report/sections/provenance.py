@@ -1,0 +1,54 @@
+"""Where the numbers come from: config, software, machine, and what determines each result."""
+
+from collections.abc import Sequence
+
+from walkerlab.config.writer import to_yaml
+from walkerlab.pipeline.store.artifact import Stored
+from walkerlab.views.report.blocks import Code, Section
+from walkerlab.views.report.results import Results
+from walkerlab.views.report.tables import Column, Table, side_by_side, table
+from walkerlab.views.report.words import words
+
+
+def section(results: Results) -> Section | None:
+    """Config, and provenance of each result."""
+    made = [result for result in results.stored.values() if isinstance(result, Stored)]  # read from files
+    note = "A key is made of config, inputs and code; equal keys give equal digests. Timings are in neither."
+    blocks = (
+        Code("The config of this run, defaults included", to_yaml(results.config).strip()),
+        table("When each result was made", RESULT_COLUMNS, made),
+        software_table(made),
+        table("What determines each result, and what it holds", DIGEST_COLUMNS, made, note=note),
+        Code("Command lines", "\n".join(dict.fromkeys(result.provenance.command_line for result in made))),
+    )
+    finding = words("closing.provenance", [result.provenance for result in made])
+    return Section.of("provenance", "Where this comes from", blocks, finding)
+
+
+RESULT_COLUMNS = (
+    Column("result", lambda result: result.identity.stage),
+    Column(
+        "begun (UTC)", lambda result: result.provenance.started_utc.partition(".")[0].replace("T", " "), numeric=True
+    ),
+    Column("took (s)", lambda result: f"{result.provenance.took_s:.2f}", numeric=True),
+    Column("seed", lambda result: result.provenance.seed, numeric=True),
+    Column("complete", lambda result: result.complete),
+)
+DIGEST_COLUMNS = (
+    Column("result", lambda result: f"{result.identity.stage}.h5"),
+    Column("stage key (sha256)", lambda result: result.identity.key, wide=True),
+    Column("digest of its content", lambda result: result.digest(), wide=True),
+)
+
+
+def software_table(made: Sequence[Stored]) -> Table:
+    """Versions, and the machine; more than one column only if results differ."""
+    used: dict[tuple[tuple[str, str], ...], list[str]] = {}
+    for result in made:
+        origin = result.provenance
+        versions = {"walkerlab": origin.package_version, "commit": origin.git_commit or "unknown"}
+        versions |= {**dict(sorted(origin.library_versions.items())), "platform": origin.platform}
+        used.setdefault(tuple(versions.items()), []).append(result.identity.stage)
+    columns = {", ".join(stages) if len(used) > 1 else "version": dict(versions) for versions, stages in used.items()}
+    lines = [Column(name, name) for name in dict.fromkeys(name for versions in columns.values() for name in versions)]
+    return side_by_side("Software and machine", lines, columns, head="software", numeric=False)

@@ -1,0 +1,152 @@
+"""The walks: the numbers of the contact one, the assumptions of the rigid one, and every step of both."""
+
+from collections.abc import Mapping
+from itertools import zip_longest
+from typing import Any
+
+from walkerlab.labels import ERROR_OF_EACH_STEP
+from walkerlab.physics.energy_channels import CHANNELS
+from walkerlab.views.report.blocks import Paragraph, Section
+from walkerlab.views.report.gaits import GIVEN_BY
+from walkerlab.views.report.numbers import (
+    NONE,
+    decimals_left,
+    fixed,
+    length,
+    number,
+    power_of_ten,
+    quantity,
+    span,
+    whole,
+)
+from walkerlab.views.report.outcomes import CONTACT, MODELS, RIGID, tone
+from walkerlab.views.report.results import Results, of_stage
+from walkerlab.views.report.tables import Cell, Column, table
+from walkerlab.views.report.words import words
+
+QUANTITY_COLUMNS = (Column("quantity"), Column("value", numeric=True), Column("meaning", wide=True))
+
+
+@of_stage(CONTACT)
+def contact(results: Results, summary: Mapping[str, Any]) -> Section | None:
+    """The contact model on its ground: how it stands, walks, slips and loses energy."""
+    ground = results.config.contact
+    said = "" if ground is None else words("walks.ground", ground, ground.in_si(), summary)
+    numbers = table("The contact model's walk", QUANTITY_COLUMNS, contact_rows(summary), wordy=True)
+    residual = joules(summary["energy_balance_residual_J"])
+    found = words("walks.finding", summary, 2 * results.config.strides, residual)
+    return Section("contact", "The contact walk", (Paragraph(said), numbers), found)
+
+
+def contact_rows(summary: Mapping[str, Any]) -> list[tuple[str, str | Cell, str]]:
+    """The numbers of the contact walk that there are: name, value and meaning of each."""
+    get, lost = summary.get, summary.get("dissipated_J") or {}
+    given = get("work_per_step_J") or {}
+    values: dict[str, str | Cell] = {
+        "outcome": Cell(summary["outcome"], tone(summary["outcome"])),
+        "largest penetration": length(get("max_penetration_m")),
+        "static penetration": length(get("static_penetration_m")),
+        "damping ratio": number(get("damping_ratio"), 3),
+        "slip a step": length(get("slip_per_step_m")),
+        "slip, step by step": span([1e3 * slip for slip in get("slips_m") or ()], "mm", 3),
+        "rolling a step": length(get("rolling_per_step_m") or None),
+        **{f"work of {giver}": joules(given[name]) for name, giver in GIVEN_BY.items() if given.get(name)},
+        "speed": quantity(get("speed_m_s"), "m/s", 4),
+        "Froude number": number(get("froude"), 4),
+        "cost of transport": number(get("cost_of_transport"), 4),
+        "energy balance residual": joules(summary["energy_balance_residual_J"]),
+        **{f"energy lost {CHANNELS.get(key, key)}": joules(value) for key, value in lost.items()},
+        "work": whole(get("rhs_evaluations")),
+    }
+    meanings = words.terms("walks.meanings", summary)
+    return [
+        (name, value, meanings.get(name, meanings["energy lost"])) for name, value in values.items() if value != NONE
+    ]
+
+
+def joules(value: float, digits: int = 4) -> str:
+    """An energy that may be of the order of rounding."""
+    return f"{number(value, digits) if abs(value) >= 1e-3 or value == 0 else power_of_ten(value, 2)} J"
+
+
+HOLDS, FAILS, NOTED = Cell("holds", "good"), Cell("does not hold", "bad"), Cell("ignored", "fair")
+ROUNDING = 1e-6
+"""Relative drift of an energy that counts as constant, and depth, in leg lengths, that is no scuffing."""
+ASSUMPTION_COLUMNS = (
+    Column("assumption", "assumption"),
+    Column("measured", "measured", wide=True),
+    Column("value", "value", numeric=True),
+    Column("verdict", "verdict"),
+)
+
+
+def assumptions(results: Results) -> Section | None:
+    """What the rigid model assumes, and how far its own walk bears that out."""
+    summary = results.summary(RIGID)
+    judged, hip = [], results.config.walker.hip
+    works = hip.torque_N_m != 0.0 or hip.damping_N_m_s_per_rad != 0.0
+    for key, said in words.terms("walks.assumed").items():
+        if summary.get(key) is not None and not (key == "energy_drift_J" and works):
+            (assumption, _, measured), (value, verdict) = said.partition(": "), judgement(key, summary, results)
+            judged.append({"assumption": assumption, "measured": measured, "value": value, "verdict": verdict})
+    where = " (sections 3.1 and 3.2)" if results.claims else ""
+    caption = f"What the rigid model assumes{where}, and what its walk says"
+    shown = table(caption, ASSUMPTION_COLUMNS, judged, wordy=True)
+    return Section.of("assumptions", "Assumptions, checked", (shown,), words("walks.assumptions", judged))
+
+
+def judgement(key: str, summary: Mapping[str, Any], results: Results) -> tuple[str, Cell]:
+    """The number that an assumption is judged by, and the verdict."""
+    value, ground = summary[key], results.config.contact
+    if key == "min_normal_force_N":
+        return quantity(value, "N", 4), HOLDS if value > 0 else FAILS
+    if key == "max_friction_ratio":
+        if ground is None or not ground.has_friction:
+            return number(value, 4), Cell("needs friction", "fair")
+        return number(value, 4), HOLDS if value <= ground.static_friction else FAILS
+    if key == "max_scuff_depth_m":
+        seen = value > ROUNDING * results.config.walker.leg_length_m
+        return length(value if seen else 0.0, 3), NOTED if seen else HOLDS
+    return joules(value, 3), HOLDS if value <= ROUNDING * abs(summary.get("mean_energy_J") or 1.0) else FAILS
+
+
+FIRST, LAST = 20, 4
+"""Of a longer walk so many steps are listed from its beginning and its end."""
+SERIES = {
+    (RIGID, "step_periods_s"): "rigid T (s)",
+    (CONTACT, "step_periods_s"): "contact T (s)",
+    (RIGID, "step_lengths_m"): "rigid S (m)",
+    (CONTACT, "step_lengths_m"): "contact S (m)",
+    (CONTACT, "slips_m"): "slip of the stance foot (mm)",
+}
+"""Numbers of each step: stage and key under which they are, and title of their column."""
+
+
+def steps(results: Results) -> Section | None:
+    """The steps that were taken; None if there are none."""
+    found = {(stage, key): values for stage, key in SERIES if (values := results.summary(stage).get(key))}
+    if not found:
+        return None
+    written = [
+        [of_step(value, key, results.summary(stage)) for value in values] for (stage, key), values in found.items()
+    ]
+    taken = [(place, *step) for place, step in enumerate(zip_longest(*written, fillvalue=NONE), 1)]
+    others = len(taken) - FIRST - LAST
+    shown = taken if others <= 0 else [*taken[:FIRST], *taken[-LAST:]]
+    columns = [Column("step", numeric=True), *(Column(SERIES[one], numeric=True) for one in found)]
+    note = words("walks.steps", FIRST, others)
+    models = {stage: model.lower() for stage, model in MODELS.items()}
+    errors = {models[stage]: error for stage in models if (error := results.summary(stage).get("numerical_error"))}
+    blocks = (
+        table("Periods and lengths of the steps", columns, shown, note=note),
+        Paragraph(words("error.of_models", errors) if errors else ""),
+    )
+    periods = {models[stage]: values for (stage, key), values in found.items() if key == "step_periods_s"}
+    return Section.of("steps", "Step by step", blocks, words("walks.periods", periods))
+
+
+def of_step(value: float | None, key: str, summary: Mapping[str, Any]) -> str:
+    """A number of a step with the decimals that its numerical error leaves; a slip in mm."""
+    factor = 1e3 if key == "slips_m" else 1.0
+    error = (summary.get("numerical_error") or {}).get(ERROR_OF_EACH_STEP[key])
+    return fixed(value and factor * value, decimals_left(error and factor * error))

@@ -1,0 +1,87 @@
+"""The report: HTML pages of everything that there is a result of."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from walkerlab.config.schema import Config
+from walkerlab.pipeline.graph import PIPELINE
+from walkerlab.pipeline.progress import Progress
+from walkerlab.pipeline.store import index
+from walkerlab.pipeline.store.artifact import Stored
+from walkerlab.pipeline.store.content import Content
+from walkerlab.pipeline.store.files import storing, write_atomically
+from walkerlab.scene.omissions import STILL_COMPUTED, LeftOut
+from walkerlab.views.report.blocks import MAIN
+from walkerlab.views.report.page import Page, render
+from walkerlab.views.report.pictures import pictures
+from walkerlab.views.report.registry import pages_of
+from walkerlab.views.report.results import Results
+from walkerlab.views.report.sections.closing import TITLES
+from walkerlab.views.report.tables import Table
+
+
+def run(
+    config: Config,
+    inputs: Mapping[str, Stored],
+    progress: Progress,
+    folder: Path,
+    left_out: Sequence[LeftOut] = (),
+) -> Content:
+    """Write the report's pages into the run's folder.
+
+    inputs    results by stage: those that there are
+    left_out  the stages without a result, and why
+
+    Raises StorageError if a page cannot be stored.
+    """
+    progress.start("report", 1)
+    pending = [entry.what for entry in left_out if entry.why == STILL_COMPUTED]
+    written, results = write_pages(config, inputs, folder, left_out, pending)
+    progress.advance()
+    blocks = (block for page in written for section in page.sections for block in section.blocks)
+    return Content(
+        {index.GROUP: index.index(folder, [folder / page.file for page in written])},
+        {
+            "html": MAIN,
+            "pages": [page.file for page in written],
+            "figures": [picture.title for picture in results.pictures],
+            "tables": [block.caption for block in blocks if isinstance(block, Table)],
+        },
+    )
+
+
+def write_pages(
+    config: Config,
+    inputs: Mapping[str, Stored],
+    folder: Path,
+    left_out: Sequence[LeftOut] = (),
+    pending: Sequence[str] = (),
+) -> tuple[tuple[Page, ...], Results]:
+    """Write the pages of whatever results there are, also while others are being computed.
+
+    inputs    results by stage: those that there are
+    left_out  the stages without a result, and why
+    pending   the stages whose results are still being computed; the report says so in their place
+
+    Pages of an earlier run that there is nothing for any more are removed. Raises StorageError if one cannot be stored.
+    """
+    waited = [entry for entry in left_out if entry.what not in pending]
+    names = {entry.what for entry in waited}
+    failed = frozenset(name for name in names if has_failed(config, name, names))
+    plain = Results(config, inputs, (), tuple(waited), tuple(pending), failed)
+    results = replace(plain, pictures=pictures(inputs, folder, numbered=bool(plain.claims)))
+    pages = pages_of(results, folder.name)
+    for page in pages:
+        write_atomically(folder / page.file, render(page).encode())
+    for file in set(TITLES) - {page.file for page in pages}:
+        with storing(folder / file):
+            (folder / file).unlink(missing_ok=True)
+    return pages, results
+
+
+def has_failed(config: Config, name: str, left_out: set[str]) -> bool:
+    """Whether a stage without a result was tried itself, and not given up for want of another: it has no answer."""
+    if name not in PIPELINE["report"].inputs(config) or PIPELINE[name].why_unsuited(config) is not None:
+        return False
+    return left_out.isdisjoint(PIPELINE[name].inputs(config))

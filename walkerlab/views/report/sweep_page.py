@@ -1,0 +1,140 @@
+"""Draw the figure and write the page of a sweep."""
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from walkerlab.errors import ConfigError
+from walkerlab.pipeline.headlines import HEADLINES
+from walkerlab.pipeline.store.content import Group
+from walkerlab.pipeline.store.files import make_folder, write_atomically
+from walkerlab.pipeline.store.runfolder import RunFolder
+from walkerlab.pipeline.sweeps.question import SweptStage
+from walkerlab.pipeline.sweeps.sweep import Swept
+from walkerlab.views.figures import robustness
+from walkerlab.views.figures.sweep import choose, illustration, is_number
+from walkerlab.views.report.blocks import Gallery, Picture, Section
+from walkerlab.views.report.numbers import number
+from walkerlab.views.report.page import Page, render
+from walkerlab.views.report.pictures import picture
+from walkerlab.views.report.tables import Column, table
+from walkerlab.views.report.words import words
+
+PAGE = "sweep.html"
+MAX_ROWS = 200
+"""Points that the page lists."""
+
+
+@dataclass(frozen=True)
+class Files:
+    """Files of a drawn sweep."""
+
+    page: Path
+    figures: tuple[Path, ...]
+
+
+def draw(swept: Swept, folder: RunFolder, names: Sequence[str] = (), against: str = "") -> Files:
+    """Draw a sweep and write its page.
+
+    names    quantities to draw; by default the headline quantities
+    against  quantity on the horizontal axis; by default the parameters
+
+    Raises ConfigError for an unknown quantity, StorageError if the system refuses.
+    """
+    group, question = swept.group, swept.question
+    refuse_unknown(group, question.dims, names)
+    if against and against not in question.names:
+        refuse_unknown(group, question.dims, [against], "--against")
+    shown = [*names] or [name for name in choose(group, question.dims, question.names) if name != against]
+    own = None if names or against else robustness.of_sweep(group, question.names)
+    if own is None and shown:
+        own = illustration(group, question.stage, question.names, question.dims, shown, against)
+    paths: list[Path] = []
+    pictures: list[Picture] = []
+    if own is not None:
+        figure = own.drawn({})
+        make_folder(folder.figures)
+        paths = [folder.figures / f"{swept.path.stem}.{kind}" for kind in ("svg", "png")]
+        for path, data in zip(paths, (figure.svg, figure.png), strict=True):
+            write_atomically(path, data)
+        about = {"title": figure.title, "caption": figure.caption}
+        files = {path.suffix.removeprefix("."): path.relative_to(folder.path) for path in paths}
+        pictures.append(picture({**about, **files}, folder.path))
+    page = folder.path / PAGE
+    write_atomically(page, render(page_of(swept, pictures, shown)).encode())
+    return Files(page, tuple(paths))
+
+
+def refuse_unknown(group: Group, dims: tuple[str, ...], names: Sequence[str], option: str = "--show") -> None:
+    """Raise ConfigError for an unknown quantity of the result."""
+    for name in names:
+        if not is_number(group, name, dims):
+            there = ", ".join(one for one in group.variables if is_number(group, one, dims) and "." not in one)
+            raise ConfigError(f"{option} {name}: no such quantity in the result.", f"There are {there}.")
+
+
+def refuse_unheard(stage: str, names: Mapping[str, str], there: Collection[str]) -> None:
+    """Raise ConfigError for a quantity missing in the first results; later results may add nested ones only.
+
+    names  by option, as typed
+    """
+    known = sorted({*there, *HEADLINES.get(stage, ())} - {"outcome"})
+    for asked, name in names.items():
+        if name not in known and "." not in name:
+            listed = ", ".join(one for one in known if "." not in one)
+            raise ConfigError(f"{asked}: no such quantity in the first results.", f"There are {listed}.")
+
+
+PARAMETER_COLUMNS = (Column("name"), Column("key"), Column("unit"), Column("values"), Column("meaning", wide=True))
+
+
+def page_of(swept: Swept, pictures: Sequence[Picture], shown: Sequence[str]) -> Page:
+    """Build the page: the figure, the parameters and the first points."""
+    summary, question, group = swept.summary, swept.question, swept.group
+    outcomes = ", ".join(f"{count} {name}" for name, count in summary["outcomes"].items())
+    parameters = [
+        (name, f"`{axis.key}`", variable.units, values_summary(axis.values), variable.long_name)
+        for name, axis in zip(question.names, question.axes, strict=True)
+        for variable in [group.variables[name]]
+    ]
+    columns = [
+        *(Column(name, written=format_value, numeric=True) for name in (*question.names, *shown)),
+        *(Column("outcome"), Column("reason", wide=True)),
+    ]
+    listed = f"Of the {len(question)} points the first {MAX_ROWS} are listed. " if len(question) > MAX_ROWS else ""
+    where = f"All numbers of every point are in `{swept.path.name}`, which xarray opens as one Dataset."
+    tables = (
+        table("Parameters", PARAMETER_COLUMNS, parameters),
+        table("Points", columns, rows(group, question, shown), note=f"{listed}{where}"),
+    )
+    section = Section("points", "Numbers", (*([Gallery(tuple(pictures))] if pictures else []), *tables))
+    lead = (f"{summary['points']} points: {outcomes}.", *summary_lines(summary))
+    return Page(f"{question.stage} over {', '.join(question.names)}", (section,), lead, PAGE)
+
+
+def summary_lines(summary: Mapping[str, Any]) -> list[str]:
+    """Describe how a sweep's walks ended and their numerical error."""
+    ended = [str(one["said"]) for one in summary.get("endings", ())]
+    error = summary.get("numerical_error")
+    return ended if error is None else [*ended, words("error.of_sample", error, "points")]
+
+
+def values_summary(values: Sequence[object]) -> str:
+    """Summarise values in one phrase."""
+    listed = [f"{value:.6g}" if isinstance(value, float) else str(value) for value in values]
+    return ", ".join(listed) if len(listed) <= 8 else f"{len(listed)} values, {listed[0]} to {listed[-1]}"
+
+
+def rows(group: Group, question: SweptStage, shown: Sequence[str]) -> list[tuple[Any, ...]]:
+    """Return table rows of the first points: parameters, quantities, outcome and reason."""
+    count = min(len(question), MAX_ROWS)
+    places = [question.places(index) for index in range(count)]
+    columns: list[list[Any]] = [[axis.values[at[k]] for at in places] for k, axis in enumerate(question.axes)]
+    columns += [group[name].ravel()[:count].tolist() for name in (*shown, "outcome", "reason")]
+    return list(zip(*columns, strict=True))
+
+
+def format_value(value: Any) -> str:
+    """Format a value for a table."""
+    return number(value, 6) if isinstance(value, float) else str(value)

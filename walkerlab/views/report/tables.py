@@ -1,0 +1,232 @@
+"""One description of a table, for page, terminal, CSV and TeX: its columns, and the records whose values they show.
+
+`tex` writes it for LaTeX.
+"""
+
+import re
+import unicodedata
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import chain
+from typing import Any, ClassVar, Final, Literal
+
+from walkerlab.labels import labels_of, unit_by_name, with_unit
+from walkerlab.pipeline.store.csv_text import csv_text
+from walkerlab.views.report.numbers import NONE, number
+
+Tone = Literal["plain", "good", "fair", "bad", "given"]
+PREFIXES: Final = {"": 1.0, "m": 1e3, "µ": 1e6}
+LONGEST_CELL: Final = 100
+"""Letters; a column of records with longer cells holds sentences."""
+BARE = re.compile(r"[-−+\d.e ×⁰¹²³⁴⁵⁶⁷⁸⁹⁻\xa0\u2009\u202f]+|-?(inf|nan)")
+"""A number without unit or words."""
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A table's cell.
+
+    tone   sets the text as a badge
+    value  what the text was written from; None for none
+    """
+
+    text: str
+    tone: Tone | None = None
+    value: Any = None
+
+    @property
+    def datum(self) -> Any:
+        """What stands for it in a file: the number that it was written from, or the text; None for nothing."""
+        if isinstance(self.value, int | float) and BARE.fullmatch(self.text):
+            return self.value
+        plain = self.value if isinstance(self.value, str) else self.text
+        return None if plain in ("", NONE) else plain
+
+
+def plainly(value: Any) -> str:
+    """A text as it is, a truth value as yes or no, a dash for None."""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return NONE if value is None else str(value)
+
+
+@dataclass(frozen=True)
+class Column:
+    """What a table shows of each record: one of its columns or, where records stand side by side, one of its rows.
+
+    title    its head, with the unit
+    of       key of a record's value, `a/b` of one in a record within; or a function of the record; without one a record
+             is a row of cells
+    written  a value as text, or as a cell with a tone; a cell in the place of a value stays as it is
+    numeric  numbers, which stand under one another
+    wide     sentences, for which a terminal has no room
+    """
+
+    title: str
+    of: str | Callable[[Any], Any] | None = None
+    written: Callable[[Any], str | Cell] = plainly
+    numeric: bool = False
+    wide: bool = False
+
+    def value(self, record: Any, place: int = 0) -> Any:
+        """What a record has here; None if nothing."""
+        if self.of is None:
+            return record[place]
+        if not isinstance(self.of, str):
+            return self.of(record)
+        *within, key = self.of.split("/")
+        for name in within:
+            record = record.get(name) or {}
+        return record.get(key)
+
+    def cell(self, record: Any, place: int = 0) -> Cell:
+        """A record's cell in the column at this place."""
+        value = self.value(record, place)
+        written = value if isinstance(value, Cell) else self.written(value)
+        return written if isinstance(written, Cell) else Cell(written, value=value)
+
+
+def measured(
+    words: str, key: str, written: Callable[[Any], str | Cell] = number, *, labels: type | None = None, prefix: str = ""
+) -> Column:
+    """A column of numbers in a multiple of their unit: that of the key's label in a class of rows, or of its ending."""
+    unit = unit_by_name(key) if labels is None else labels_of(labels)[key].unit
+    factor = PREFIXES[prefix]
+
+    def scaled(record: Mapping[str, Any]) -> Any:
+        value = record.get(key)
+        return None if value is None else factor * value
+
+    return Column(with_unit(words, f"{prefix}{unit}"), scaled if prefix else key, written, numeric=True)
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table; the first cell of a row is its head.
+
+    groups rows by the head that they have in common, which may be empty
+    wordy  it has cells with sentences in them: on a narrow screen each row becomes a card of its own
+    note   what to know when reading it, below it
+    by     what the titles of its groups of rows are, where that is a column
+    """
+
+    template: ClassVar[str] = "table"
+    caption: str
+    columns: tuple[Column, ...]
+    groups: Mapping[str, Sequence[Sequence[Cell]]]
+    wordy: bool = False
+    note: str = ""
+    by: str = ""
+
+    def __bool__(self) -> bool:
+        """Whether it has a row."""
+        return any(self.groups.values())
+
+
+def table(
+    caption: str,
+    columns: Sequence[Column],
+    records: Sequence[Any] | Mapping[str, Sequence[Any]],
+    *,
+    wordy: bool = False,
+    note: str = "",
+    by: str = "",
+) -> Table:
+    """A table with a row for each record.
+
+    records  all under one head, or by the title of the group in which they stand
+
+    Raises ValueError for a record that is a row of cells and has not one for each column.
+    """
+    groups = records if isinstance(records, Mapping) else {"": records}
+    for record in chain.from_iterable(groups.values()):
+        if isinstance(record, list | tuple) and len(record) != len(columns):
+            raise ValueError(f"{record!r} has not {len(columns)} cells")
+    rows = {
+        title: [[column.cell(record, place) for place, column in enumerate(columns)] for record in found]
+        for title, found in groups.items()
+    }
+    return Table(caption, tuple(columns), rows, wordy, note, by)
+
+
+def grouped(records: Iterable[Mapping[str, Any]], *keys: str) -> dict[str, list[Mapping[str, Any]]]:
+    """Records by what they have under some keys, in words, in the order in which that comes first."""
+    found: dict[str, list[Mapping[str, Any]]] = {}
+    for record in records:
+        found.setdefault(" ".join(str(record[key]) for key in keys), []).append(record)
+    return found
+
+
+def side_by_side(
+    caption: str,
+    lines: Sequence[Column],
+    records: Mapping[str, Any],
+    *,
+    head: str = "quantity",
+    numeric: bool = True,
+    note: str = "",
+) -> Table:
+    """A table with a column for each record, and a row for each line that some record has a value for."""
+    rows = []
+    for line in lines:
+        there = {title: line.cell(record) for title, record in records.items() if line.value(record) is not None}
+        if there:
+            rows.append([line.title, *(there.get(title, Cell("")) for title in records)])
+    return table(caption, [Column(head), *(Column(title, numeric=numeric) for title in records)], rows, note=note)
+
+
+def of_records(rows: Sequence[Mapping[str, Any]], written: Callable[[Any], str] = str) -> Table:
+    """A table of all that records have, their keys as its heads; nothing where a record lacks one."""
+    names = list(dict.fromkeys(name for row in rows for name in row))
+    there = [[row.get(name) is not None for name in names] for row in rows]
+    cells = [
+        [Cell(written(row[name]) if known else "", value=row.get(name)) for name, known in zip(names, has, strict=True)]
+        for row, has in zip(rows, there, strict=True)
+    ]
+    lengths = [max(len(row[place].text) for row in cells) for place in range(len(names))]
+    room = any(length <= LONGEST_CELL for length in lengths)
+    columns = [Column(name, wide=room and length > LONGEST_CELL) for name, length in zip(names, lengths, strict=True)]
+    return table("", columns, cells)
+
+
+def flat(shown: Table, wide: bool = False) -> tuple[list[str], list[list[Cell]]]:
+    """Heads and rows of a table, the titles of its groups as a column of their own.
+
+    wide  whether columns of sentences are among them
+    """
+    kept = [place for place, column in enumerate(shown.columns) if wide or not column.wide]
+    titled = any(shown.groups)
+    heads = [*([shown.by] if titled else []), *(shown.columns[place].title for place in kept)]
+    rows = [
+        [*([Cell(title, value=title)] if titled else []), *(row[place] for place in kept)]
+        for title, found in shown.groups.items()
+        for row in found
+    ]
+    return heads, rows
+
+
+def in_lines(shown: Table) -> list[str]:
+    """A table on a terminal, without sentences."""
+    heads, rows = flat(shown)
+    texts = [[cell.text for cell in row] for row in rows]
+    return aligned([heads, *texts] if texts and any(heads) else texts)
+
+
+def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
+    """Rows of cells in columns of equal width."""
+    widths = [max(width(row[column]) for row in rows) for column in range(len(rows[0]))] if rows else []
+    return [
+        "  ".join(cell + " " * (wide - width(cell)) for cell, wide in zip(row, widths, strict=True)).rstrip()
+        for row in rows
+    ]
+
+
+def width(text: str) -> int:
+    """Columns that a text takes on a terminal: a dot above a letter takes none of its own."""
+    return sum(not unicodedata.combining(letter) for letter in text)
+
+
+def as_csv(shown: Table) -> bytes:
+    """A table's values as CSV."""
+    heads, rows = flat(shown, wide=True)
+    return csv_text(heads, ([cell.datum for cell in row] for row in rows))

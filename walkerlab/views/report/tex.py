@@ -1,0 +1,106 @@
+"""A table for LaTeX: decimals under one another, one number of digits a column, heads and caption in words."""
+
+import math
+import re
+from collections.abc import Callable, Sequence
+from typing import Any, Final
+
+from walkerlab.views.report.symbols import DOT, LETTERS, SUBSCRIPTS, SUPERSCRIPTS
+from walkerlab.views.report.tables import Table, flat
+
+DIGITS: Final = 5
+"""Significant digits of the largest number of a column or, where its numbers differ too much, of each of them."""
+CLEAREST: Final = 1e6
+"""Numbers from here on have a power of ten."""
+MISSING: Final = "--"
+PACKAGES: Final = r"% \usepackage{booktabs, siunitx}"
+DECIMAL = re.compile(r"(-?)(\d+)(?:\.(\d+))?(?:e(-?)(\d+))?")
+"""A number in a column of siunitx: sign, digits before and behind the point, sign and digits of the power of ten."""
+RAISED = re.compile(r"\\\^\{\}(-?\d+)")
+"""A power in a text whose letters are guarded already."""
+SYMBOL = re.compile(rf"\b(d?)({'|'.join(LETTERS)}|[A-Za-z])\\_([A-Za-z0-9]+)\b(?!\\_)")
+"""A quantity in plain letters, guarded already."""
+IN_MATHS = {
+    **{f"{sign}{DOT}": rf"$\dot{{\{name}}}$" for name, sign in LETTERS.items()},
+    **{sign: rf"$\{name}$" for name, sign in LETTERS.items()},
+    **{chr(low): f"$_{{{chr(plain)}}}$" for plain, low in SUBSCRIPTS.items()},
+    **{chr(high): f"$^{{{chr(plain)}}}$" for plain, high in SUPERSCRIPTS.items()},
+    **{"−": "$-$", "×": r"$\times$", "±": r"$\pm$", "≤": r"$\le$", "≥": r"$\ge$", "Δ": r"$\Delta$", "°": r"$^\circ$"},
+    **{"√": r"$\sqrt{}$", "≈": r"$\approx$", "µ": r"$\mu$", "…": r"\ldots{}"},
+}
+SIGNS = re.compile("|".join(map(re.escape, IN_MATHS)))
+"""Signs that LaTeX sets in maths only."""
+TEX = str.maketrans({letter: f"\\{letter}" for letter in "&%$#_{}"} | {"~": r"\textasciitilde{}", "^": r"\^{}"})
+
+
+def as_tex(shown: Table) -> bytes:
+    """A table's values for LaTeX with booktabs and siunitx, afloat where it has a caption; without sentences."""
+    heads, rows = flat(shown)
+    columns = [in_column(head, [row[place].datum for row in rows]) for place, head in enumerate(heads)]
+    head, *lines = [" & ".join(line) + r" \\" for line in zip(*(cells for _, cells in columns), strict=True)]
+    layout = "".join(layout for layout, _ in columns)
+    body = [rf"\begin{{tabular}}{{{layout}}}", r"\toprule", head, r"\midrule", *lines, r"\bottomrule", r"\end{tabular}"]
+    sentences = (text if text.endswith((".", "?")) else f"{text}." for text in (shown.caption, shown.note) if text)
+    if caption := " ".join(sentences):
+        body = [r"\begin{table}", r"\centering", rf"\caption{{{in_tex(caption)}}}", *body, r"\end{table}"]
+    return "\n".join([PACKAGES, *body, ""]).encode()
+
+
+def in_column(head: str, data: Sequence[Any]) -> tuple[str, list[str]]:
+    """Layout and cells of a column: with numbers in it one of siunitx, whose decimal points stand under one another."""
+    numbers = [value for value in data if is_number(value)]
+    written = written_alike(numbers)
+    cells = [written(value) if is_number(value) else in_tex(value) for value in data]
+    decimals = [cell for cell in cells if DECIMAL.fullmatch(cell)]
+    # texts that read as numbers, such as printed ones, count where they are most of a column
+    if not numbers and 2 * len(decimals) <= len(cells) - cells.count(MISSING):
+        return "l", [in_tex(head), *cells]
+    aligned = [cell if DECIMAL.fullmatch(cell) else f"{{{cell}}}" for cell in cells]
+    return f"S[table-format={room_for(decimals)}]", [f"{{{in_tex(head)}}}", *aligned]
+
+
+def is_number(value: Any) -> bool:
+    """Whether a value is a number, which a truth value is not."""
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def written_alike(numbers: Sequence[float]) -> Callable[[float], str]:
+    """How a column's numbers are written: whole ones as such, others with equal decimals or with equal digits."""
+    if all(isinstance(value, int) for value in numbers):
+        return str
+    sizes = [abs(value) for value in numbers if value != 0.0 and math.isfinite(value)] or [1.0]
+    decimals = max(0, DIGITS - 1 - math.floor(math.log10(max(sizes))))
+    # the smallest one loses a digit at most
+    if min(sizes) >= 10.0 ** (DIGITS - 2 - decimals) and max(sizes) < CLEAREST:
+        return lambda value: f"{value:z.{decimals}f}"
+    return lambda value: "0" if value == 0.0 else with_digits(value)
+
+
+def with_digits(value: float) -> str:
+    """A number with so many significant digits, zeros at its end among them."""
+    mantissa, _, exponent = f"{value:#.{DIGITS}g}".partition("e")
+    return mantissa.removesuffix(".") + (f"e{int(exponent)}" if exponent else "")
+
+
+def room_for(cells: Sequence[str]) -> str:
+    """What siunitx is told of a column: sign, digits before and behind the point, and of the power of ten."""
+    found = [part.groups(default="") for cell in cells if (part := DECIMAL.fullmatch(cell))]
+    sign, before, behind, below, power = (max(len(one[place]) for one in found) for place in range(5))
+    return f"{'-' * sign}{before}.{behind}" + (f"e{'-' * below}{power}" if power else "")
+
+
+def in_tex(value: Any) -> str:
+    """A text in LaTeX: symbols and powers set in maths, special letters guarded; a dash for None."""
+    if value is None:
+        return MISSING
+    text = SIGNS.sub(lambda found: IN_MATHS[found[0]], RAISED.sub(r"$^{\1}$", str(value).translate(TEX)))
+    return SYMBOL.sub(symbol_in_tex, text).replace("$$", "")
+
+
+def symbol_in_tex(found: re.Match[str]) -> str:
+    """A symbol with its subscript, such as t_left or dtheta_1, in maths."""
+    rate, letter, below = found.groups()
+    letter = rf"\{letter}" if letter in LETTERS else letter
+    below = below if len(below) == 1 else rf"\mathrm{{{below}}}"
+    letter = rf"\dot{{{letter}}}" if rate else letter
+    return rf"${letter}_{below}$"

@@ -1,0 +1,106 @@
+"""A walk as the page's player moves it: joints, the ground's forces, slip and energies, thinned in time."""
+
+from __future__ import annotations
+
+import base64
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from walkerlab.config.reads import RigidConfig
+from walkerlab.pipeline.store.content import Group
+
+SAMPLES_A_SECOND = 150
+LEGS = (0, 1)
+OF_THE_WALKER = {
+    "time": "t", "hip_along_m": "hx", "hip_height_m": "hy", "torso_angle": "u", "stance_leg": "s",
+    "kinetic_J": "ke", "potential_J": "pe", "mechanical_J": "me",
+}  # fmt: skip
+OF_A_LEG = {
+    "foot_along_m": "fx", "foot_height_m": "fy", "knee_along_m": "kx", "knee_height_m": "ky",
+    "angle": "a", "velocity": "v", "shank_angle": "b",
+    "normal_force_N": "n", "friction_force_N": "d", "penetration_m": "p",
+}  # fmt: skip
+"""Channels by the names of stored variables."""
+
+Array = NDArray[np.float64]
+Channels = dict[str, Array]
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """The motion of one walker, a column of numbers for each of its channels.
+
+    channels  by name, all equally long; 't' is time (s), 'h' the hip, 'f' the feet's lowest points, 'k' the knees, each
+              with x along and y above the slope (m); 'a', 'v' angle and velocity of the legs or thighs (rad, rad/s),
+              'b' of the shanks; 'n', 'd' normal force and friction (N), 'p' penetration and 'q' slip since the touch
+              (m); 'ke', 'pe', 'me' energies (J); a last digit is the leg
+    """
+
+    channels: Channels
+
+    def __getitem__(self, name: str) -> Array:
+        """A channel."""
+        return self.channels[name]
+
+    @property
+    def end(self) -> float:
+        """Time of the last sample, s."""
+        return float(self["t"][-1])
+
+    def until(self, time: float) -> Track:
+        """The part up to a time (s)."""
+        inside = self["t"] <= time + 1e-9
+        return Track({name: values[inside] for name, values in self.channels.items()})
+
+    def thinned(self, gap: float) -> Track:
+        """At most a few samples in each gap (s): its first, the one of the largest force, and both sides of a jump."""
+        time = self["t"]
+        bins = np.floor(time / gap).astype(np.int64)
+        first = np.flatnonzero(np.diff(bins, prepend=-1))
+        jumps = np.flatnonzero(np.diff(time) <= 0.0)
+        kept = {*first.tolist(), *jumps.tolist(), *(jumps + 1).tolist(), time.size - 1}
+        if "n0" in self.channels:
+            load = self["n0"] + self["n1"]
+            ends = [*first[1:].tolist(), time.size]
+            kept |= {begin + int(load[begin:end].argmax()) for begin, end in zip(first.tolist(), ends, strict=True)}
+        chosen = sorted(kept)
+        return Track({name: values[chosen] for name, values in self.channels.items()})
+
+    def packed(self) -> str:
+        """All channels, one after another, as little-endian float32 in base64."""
+        return base64.b64encode(np.concatenate(list(self.channels.values())).astype("<f4").tobytes()).decode()
+
+
+def track_in(trajectory: Group | None) -> Track | None:
+    """The motion in a stored trajectory; None if there is none, or if it does not tell where the joints are."""
+    if trajectory is None or "hip_along_m" not in trajectory.variables or trajectory["time"].size < 2:
+        return None
+    there = trajectory.variables.keys()
+    channels = {channel: trajectory[name] for name, channel in OF_THE_WALKER.items() if name in there}
+    if "stance_leg" in there:
+        channels[OF_THE_WALKER["stance_leg"]] = trajectory["stance_leg"] - 1
+    of_legs = {name: channel for name, channel in OF_A_LEG.items() if name in there}
+    channels |= {f"{channel}{leg}": trajectory[name][:, leg] for name, channel in of_legs.items() for leg in LEGS}
+    if {"penetration_m", "slip_velocity_m_s"} <= there:
+        for leg in LEGS:
+            touching = trajectory["penetration_m"][:, leg] > 0.0
+            velocity = trajectory["slip_velocity_m_s"][:, leg]
+            channels[f"q{leg}"] = slip_since_touch(trajectory["time"], velocity, touching)
+    return Track({name: np.asarray(values, dtype=np.float64) for name, values in channels.items()})
+
+
+def slip_since_touch(time: Array, velocity: Array, touching: NDArray[np.bool_]) -> Array:
+    """How far a foot has slipped since it last came down (m); zero in the air."""
+    sliding = np.where(touching, velocity, 0.0)
+    way = np.concatenate(([0.0], np.cumsum(0.5 * (sliding[1:] + sliding[:-1]) * np.diff(time))))
+    begins = touching & ~np.concatenate(([False], touching[:-1]))
+    last_begin = np.maximum.accumulate(np.where(begins, np.arange(time.size), 0))
+    return np.where(touching, way - way[last_begin], 0.0)
+
+
+def sampling_gap(config: RigidConfig) -> float:
+    """Time between samples (s): as many a pendulum time for every size of walker."""
+    return math.sqrt(9.81 / config.gravity_m_s2 * config.walker.leg_length_m) / SAMPLES_A_SECOND
