@@ -9,7 +9,7 @@ PAGE = (Path(__file__).parents[3] / "docs" / "adding.md").read_text(encoding="ut
 def example():
     """The figure; it has words only where they are written into a file."""
     names = {}
-    exec(re.search(r"```python\n(from walkerlab\.figures\.canvas.*?)```", PAGE, re.DOTALL)[1], names)
+    exec(re.search(r"```python\n(from walkerlab\.views\.figures\.canvas.*?)```", PAGE, re.DOTALL)[1], names)
     return names["FIGURE"]
 
 
