@@ -94,7 +94,7 @@ def test_an_evenly_spread_sample_of_walks_is_taken_again_and_told(toy):
     assert swept.summary["numerical_error"] == pytest.approx(told)
     assert plain(summary_lines(swept.summary)) == [
         "Largest numerical error: 0.04 s in a period and 10⁻⁹ s at the end, by a second walk with a hundred times "
-        "tighter tolerances; 16 of 40 points were walked again."
+        "tighter tolerances; 16 of 40 points were recomputed."
     ]
 
 
@@ -102,7 +102,7 @@ def test_of_few_points_all_are_walked_again_and_those_that_end_otherwise_counted
     swept = toy.run("roll", "strides=[5, 7, 8]", sets=WALKED_AGAIN)
     error = swept.summary["numerical_error"]
     assert (error["walked_again"], error["of"], error["ended_otherwise"]) == (3, 3, 1)
-    assert summary_lines(swept.summary)[0].endswith("3 of 3 points were walked again, of which 1 ended otherwise.")
+    assert summary_lines(swept.summary)[0].endswith("3 of 3 points were recomputed, of which 1 ended otherwise.")
     unknown = toy.run("roll", "strides=[7]", sets=WALKED_AGAIN).summary
     assert summary_lines(unknown)[0].startswith("Numerical errors are unknown; 1 of 1 points")
 

@@ -200,7 +200,7 @@ def test_families_are_told_in_sentences_with_their_bifurcations():
     found = {"branches": [branch, branch], "bifurcations": [flip], "first_doubling": {"rigid": 4.0}, **none}
     lines = answer("continuation", found | {"over": "slope_deg", "unit": "deg"})
     assert lines[0] == "2 branches of gaits over slope."
-    assert lines[1].replace("\u00a0", " ") == "The rigid model's gait of one step is stable from 1 deg to 4 deg."
+    assert lines[1].replace("\u00a0", " ") == "The rigid model's one-step gait is stable from 1 deg to 4 deg."
     assert lines[-1].split() == ["flip", "rigid", "1", "4", "−1.0000"]
 
 

@@ -66,8 +66,8 @@ def test_the_instant_of_release_decides_which_gait_is_walked(run):
     # the rigid model by either rule: the published gait, and the other one
     assert releases["compression"]["rigid"]["period_s"] == pytest.approx(PERIOD, abs=1e-6)
     assert releases["touch"]["rigid"]["period_s"] == pytest.approx(OTHER_PERIOD, abs=1e-5)
-    assert "decides which gait" in models.departure(results)
-    assert "the rigid model by that rule walks steps of 0.54259" in models.departure(results)
+    assert "determines the gait" in models.departure(results)
+    assert "with the same rule the rigid model takes steps of 0.54259" in models.departure(results)
 
 
 def test_the_verdict_tells_in_one_paragraph_where_the_models_part(run):

@@ -94,7 +94,7 @@ def test_without_contact_the_lead_alone_says_that_it_was_not_asked():
     said = lead(config("contact=null"), "rigid-only")
     assert said.endswith("alone. The contact model was not used: the config has no contact block.")
     assert said.lower().count("contact") == 2
-    assert lead(config(), "paper").endswith("as a rigid model and as one with contact.")
+    assert lead(config(), "paper").endswith("as a rigid model and as a contact model.")
     simplest = load(Path("simplest")).config
     assert "not used: the walker's feet have next to no mass" in lead(simplest, "simplest")
 
@@ -118,8 +118,8 @@ def test_the_page_opens_with_what_holds_what_fails_and_what_follows():
         return plain(sections(**changed)["verdict"].blocks[0].text)
 
     assert opening() == (
-        f"Both models walk all 4 steps, and the gait is stable; of the 4 values that the paper prints {SHARES}, and as "
-        "its equations have a sign error (A.5), the corrected ones are to be used."
+        f"Both models walk all 4 steps, and the gait is stable; of the 4 values that the paper prints {SHARES}. "
+        "Eq. A.5 has a sign error; use the corrected equations."
     )
     slower = {"step_periods_s": [0.7, 0.7, 0.7, 0.707]}
     other = stored("compare", {}, {"departures": ["hip_mass_kg 12 instead of 10"]})
@@ -142,7 +142,7 @@ def test_of_a_driven_walker_title_lead_and_verdict_say_what_drives_it_and_at_wha
     found = sections(sets=driven, **costly)
     cost = "its cost of transport is 0.00998 in the rigid gait and 0.0195 on compliant ground"
     assert f"The walker is {by}; {cost}." in plain(found["verdict"].blocks[0].text)
-    assert "arrows are the forces of the ground and the push-off" in texts(found["motion"])
+    assert "arrows show the ground forces and the push-off" in texts(found["motion"])
     assert "Cost of transport" in texts(found["glossary"])
     assert by in plain(lead(config(*driven), "level"))
     assert "driven" not in plain(sections()["verdict"].blocks[0].text)
@@ -166,12 +166,12 @@ def test_figures_of_the_paper_that_are_not_drawn_are_explained():
     figure = Picture("Figure 2. Sticks.", "As walked.", "Legs.")
     made = {name: make() for name, make in EVERYTHING.items()}
     (said,) = blocks(motion.figures(Results(config(), made, (figure,))), Paragraph)
-    assert "figures 1, 3 and 4 show no results" in said.text
+    assert "Figures 1, 3 and 4 show no results" in said.text
 
 
 def test_the_papers_third_table_says_whose_periods_it_has_and_over_which_time_it_takes_means():
     (_, third) = blocks(sections()["tables"], Table)
-    for part in ("last completed stride", "first step is the left one", "last five"):
+    for part in ("last completed stride", "begins with the left step", "last five"):
         assert part in third.note
 
 
@@ -467,7 +467,9 @@ def test_the_paragraph_under_the_title_lists_what_a_walker_has():
     said = plain(lead(load(Path("kneed"), [f"walker.torso={torso}"]).config, "kneed"))
     assert "a walker with kneed legs of 1 m, point feet and a torso of 0.5 kg, 2.1 kg in all, on a slope of" in said
     said = plain(lead(compass, "torso"))
-    assert "legs of 1 m and 5 kg each, a hip of 5 kg and a torso of 5 kg, on a slope of 0.0174 rad (0.997°). It" in said
+    assert (
+        "legs of 1 m and 5 kg each, a hip of 5 kg and a torso of 5 kg, on a slope of 0.0174 rad (0.997°). The" in said
+    )
     assert "torso" not in lead(kneed, "kneed")
 
 

@@ -1,1 +1,1 @@
-"""Walks asked for one setting at a time over a loopback connection: `walkerlab explore`."""
+"""The interactive page of `walkerlab explore`: walks computed on request over a loopback connection."""

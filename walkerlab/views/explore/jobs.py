@@ -1,4 +1,4 @@
-"""What is made of a config in the folder of all runs while the page goes on: a report, or a film."""
+"""Background jobs that write a report or a GIF of the current config into the runs folder."""
 
 import contextlib
 import json
@@ -18,26 +18,25 @@ from walkerlab.views.explore.walks import Answered, ExploredConfig
 
 KINDS = ("report", "gif")
 EARLY = re.compile(r"page: (.+) \(partial")
-"""How a command says that there is a page already."""
+"""Progress line with which a command announces its first page."""
 START = (
     "from walkerlab.pipeline.interrupts import end_with_parent; end_with_parent(); "
     "from walkerlab.views.cli.main import main; main()"
 )
-"""Run a command, as `python -m walkerlab` does, for as long as the server is there."""
+"""Run a command as `python -m walkerlab` does, and end it with the server."""
 
 
 class Job:
-    """One at a time; commands as they are typed, so that what is made is what they make."""
+    """Runs one job at a time, as the same command a user would type."""
 
     def __init__(self) -> None:
-        """Nothing is asked for yet."""
         self._process: subprocess.Popen[str] | None = None
         self._runs = Path()
         self._lock, self._thread = threading.Lock(), None
         self._told: dict[str, Any] = {"running": False}
 
     def begin(self, kind: object, question: ExploredConfig) -> Answered:
-        """Start one; status 409 while another one runs."""
+        """Start a job; status 409 while another one runs."""
         if kind not in KINDS:
             raise TypeError
         with self._lock:
@@ -48,11 +47,11 @@ class Job:
         return 200, dict(self._told)
 
     def progress(self) -> dict[str, Any]:
-        """What was said last, and in the end where the file is."""
+        """Return the latest progress message and, at the end, where the file is."""
         return dict(self._told)
 
     def close(self) -> None:
-        """End what runs, and what it has started."""
+        """End the running job and its child processes."""
         if (process := self._process) is not None:
             process.terminate()
             with contextlib.suppress(subprocess.TimeoutExpired):
@@ -80,7 +79,7 @@ class Job:
         return "/runs/" + quote(str(file.resolve().relative_to(self._runs)))
 
     def _command(self, *words: str) -> dict[str, Any]:
-        """What a command prints as JSON; RuntimeError with what it said last if it fails."""
+        """Run a command and return its JSON output; RuntimeError with its last message if it fails."""
         command = [sys.executable, "-c", START, *words]
         lines = []
         # Into a file: a pipe that nobody reads meanwhile would fill.

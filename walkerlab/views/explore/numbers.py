@@ -1,4 +1,4 @@
-"""The keys of a config that can be turned: what each is, and over which values a slider leads it."""
+"""The adjustable keys of a config: what each means, and the range of its slider."""
 
 import math
 from collections.abc import Iterator
@@ -16,26 +16,26 @@ FIRST: Final = (
     "slope_deg", "walker.", "push_off.impulse_N_s", "contact.stiffness", "contact.damping", "contact.static_friction",
     "contact.dynamic_friction", "contact.stiction_velocity", "contact.terrain",
 )  # fmt: skip
-"""What is shown before anything is searched for, in this order; a dot at the end means all of a block."""
+"""Keys shown before any search, in this order; a trailing dot means the whole block."""
 DRIVES: Final = ("walker.hip.", "push_off.")
-"""Shown at first only where they are at work; how knees lock is searched for."""
+"""Shown initially only if active; knee-lock keys appear in searches only."""
 OF_OTHERS: Final = (
     "name", "source", "outputs", "seed", "sweep", "design", "stability", "tune", "continuation", "basin", "robustness",
 )  # fmt: skip
-"""Keys that no walk depends on."""
+"""Keys that do not affect a walk."""
 AROUND: Final = 5.0
-"""A slider leads to this many times its first value, and to as small a part of it."""
+"""Range of a slider, as a factor on its initial value in both directions."""
 FAR_AROUND: Final = 100.0
-"""The same for what is known by its order of magnitude."""
+"""The same for keys known only by order of magnitude."""
 BY_MAGNITUDE: Final = ("contact.stiffness", "contact.damping", "velocity", "rtol", "atol", "penetration")
 DECADES: Final = 100.0
-"""Bounds further apart than by this factor make a slider logarithmic."""
+"""Ratio of bounds above which a slider is logarithmic."""
 HALVINGS: Final = 10
-"""How finely it is sought where a slider would lead to what is refused."""
+"""Bisections to find the last valid value of a slider."""
 
 
 def adjustable(start: Config, config: Config) -> Iterator[dict[str, Any]]:
-    """Each number, word and switch that the walker has, with its value, as JSON.
+    """Yield each number, choice and switch of the walker with its value, as JSON.
 
     start   the config before anything was changed, which the sliders' ends and a reset go by
     config  the same with its changes
@@ -55,7 +55,7 @@ def adjustable(start: Config, config: Config) -> Iterator[dict[str, Any]]:
 
 
 def rank(key: str, first: Any) -> int | None:
-    """Where a key stands among those that are shown at first; None if it is searched for."""
+    """Return a key's position among those shown initially, or None if it appears in searches only."""
     if (key.startswith(DRIVES) and not first) or key.startswith("walker.knee."):
         return None
     return next(
@@ -64,7 +64,7 @@ def rank(key: str, first: Any) -> int | None:
 
 
 def reach(key: str, first: Any, unit: str, field: FieldInfo, start: Config) -> dict[str, Any]:
-    """What a key's value can be turned to: one of some words, or a number on a slider; else it is typed."""
+    """Return the choices or slider range of a key; empty if its value must be typed."""
     if isinstance(first, bool):
         return {"words": [True, False]}
     words = words_of(field.annotation)
@@ -97,7 +97,7 @@ def reach(key: str, first: Any, unit: str, field: FieldInfo, start: Config) -> d
 
 
 def ordinary_size(key: str, unit: str, start: Config) -> float:
-    """How large a number of the walker with some unit ordinarily is; 0 if no walker says that."""
+    """Return the typical size of a walker's quantity with this unit; 0 if unknown."""
     mass, leg, gravity = start.walker.total_mass_kg, start.walker.leg_length_m, start.gravity_m_s2
     speed = math.sqrt(gravity * leg)
     if key.startswith("ground."):
@@ -110,7 +110,7 @@ def ordinary_size(key: str, unit: str, start: Config) -> float:
 
 
 def gaits_by(key: str, start: Config) -> Parameter | None:
-    """A key as a number that gaits can be followed along; None if no model is made of it."""
+    """Return a key as a parameter to follow gaits along; None if no model depends on it."""
     try:
         return parameter_of(key, start)
     except ConfigError:
@@ -118,7 +118,7 @@ def gaits_by(key: str, start: Config) -> Parameter | None:
 
 
 def last_allowed(parameter: Parameter, start: Config, first: float, end: float) -> float:
-    """The value nearest to a slider's end that is allowed beside the config's other values."""
+    """Return the valid value closest to a slider's end, given the config's other values."""
     if parameter.config_at(start, end) is not None:
         return end
     good, bad = first, end

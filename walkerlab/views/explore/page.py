@@ -1,4 +1,4 @@
-"""The page of `walkerlab explore`: the report's player and style, and a script that asks the server."""
+"""The page of `walkerlab explore`: the report's player and style, with a script that queries the server."""
 
 from pathlib import Path
 
@@ -21,20 +21,20 @@ LONGEST_NAME = 60
 
 
 def started(base: ExploredConfig) -> str:
-    """What the page was started from, in words."""
+    """Name the config from which the page was started."""
     name = base.called or base.config or DEFAULT
     changed = f"{name} with {', '.join(base.sets)}"
     return name if base.called or not base.sets else changed if len(changed) <= LONGEST_NAME else f"{name}, changed"
 
 
 def choices(base: ExploredConfig) -> list[str]:
-    """What else can be chosen: built-in configs, and the files in the folder that one works in."""
+    """List the other configs offered: built-in ones, and the YAML files in the working folder."""
     own = sorted(path.name for path in Path().glob("*.yaml"))
     return [name for name in (*builtin_names(), *own) if name != started(base)]
 
 
 def rendered(base: ExploredConfig) -> tuple[str, str]:
-    """The page for a config, and what its header allows it to load and to run."""
+    """Return the page's HTML and its content security policy."""
     own = (TEMPLATES / "explore.js").read_text(encoding="utf-8").strip()
     script = f'\n"use strict";\n{report.source("player.js")}\n{own}\n'
     environment = report.environment()

@@ -1,4 +1,4 @@
-"""The server of `walkerlab explore`: the loopback address alone, a token, workers that compute."""
+"""The server of `walkerlab explore`: loopback only, protected by a token, with worker processes."""
 
 import contextlib
 import json
@@ -27,15 +27,14 @@ NICE = 15
 
 
 def failed(status: int, message: str, advice: str = "") -> Answered:
-    """An answer that is an error."""
     return status, {"error": {"message": message, "advice": advice}}
 
 
 class Desk:
-    """One worker; of the questions that wait for it only the newest is answered."""
+    """A worker process that answers only the newest waiting request."""
 
     def __init__(self, drops: bool = False) -> None:
-        """Start it.
+        """Start the worker.
 
         drops  whether a newer question ends the work on an older one
         """
@@ -50,7 +49,7 @@ class Desk:
         return worker
 
     def ask(self, call: Callable[[], Answered]) -> Answered:
-        """Return what the call returns there, once the worker is free; status 409 if a newer question came meanwhile.
+        """Run the call in the worker once it is free; status 409 if a newer request arrived meanwhile.
 
         A call whose worker dies is given to another one, once: an idle worker may have died before.
         """
@@ -82,18 +81,18 @@ class Desk:
         self.compiled += bool(kernel)
 
     def close(self) -> None:
-        """End the worker at once, whatever it is at."""
+        """Kill the worker."""
         self.worker.process.kill()
         self.worker.ended()
 
 
 class Server(ThreadingHTTPServer):
-    """Answers questions about one config, and about the built-in ones."""
+    """Answers requests about one config and the built-in ones."""
 
     daemon_threads = True
 
     def __init__(self, port: int, base: ExploredConfig) -> None:
-        """Listen; port 0 is any that is free."""
+        """Listen on `port`; 0 picks a free one."""
         super().__init__(("127.0.0.1", port), Handler)
         self.base, self.token, self.job = base, secrets.token_urlsafe(16), Job()
         self.cookie = f"walkerlab-explore-{self.server_port}"
@@ -103,30 +102,29 @@ class Server(ThreadingHTTPServer):
 
     @property
     def host(self) -> str:
-        """As a browser names this server."""
+        """Host and port as a browser sends them."""
         return f"127.0.0.1:{self.server_port}"
 
     @property
     def url(self) -> str:
-        """Where the page is, token included."""
+        """Address of the page, including the token."""
         return f"http://{self.host}/?token={self.token}"
 
     def begin(self) -> None:
-        """Serve beside what else this process does."""
+        """Serve from a background thread."""
         self._beside = threading.Thread(target=self.serve_forever, daemon=True)
         self._beside.start()
 
     def handle_error(self, request: Any, client_address: Any) -> None:
-        """Say what went wrong, unless it is that the one who asked has left."""
+        """Report errors, except closed connections."""
         if not isinstance(sys.exception(), OSError):
             super().handle_error(request, client_address)
 
     def _repr_html_(self) -> str:
-        """The page, in a notebook."""
         return f'<iframe src="{self.url}" width="100%" height="900" style="border: 0"></iframe>'
 
     def close(self) -> None:
-        """End what computes, and listen no more."""
+        """End all computations and stop listening."""
         if self._beside is not None:
             self.shutdown()
         for one in (self.desk, self.background, self.job):
@@ -134,7 +132,7 @@ class Server(ThreadingHTTPServer):
         self.server_close()
 
     def question(self, body: Mapping[str, Any]) -> ExploredConfig:
-        """What a body asks about; TypeError if it has not the form of a question."""
+        """Parse a request body; TypeError if it is malformed."""
         changes, models = body.get("set", {}), body.get("models", list(walks.STAGES))
         if not isinstance(changes, Mapping) or not isinstance(models, list) or not {*models} <= walks.STAGES.keys():
             raise TypeError
@@ -147,7 +145,7 @@ class Server(ThreadingHTTPServer):
         return replace(question, config=named, sets=())
 
     def answer(self, path: str, body: Mapping[str, Any]) -> Answered:
-        """The answer to a question that was posted; TypeError if it has not the form of one."""
+        """Answer a POST request; TypeError if it is malformed."""
         question = self.question(body)
         if path == "/api/walk":
             return self.desk.ask(partial(walks.walked, question))
@@ -163,7 +161,7 @@ class Server(ThreadingHTTPServer):
 
 
 def saved(question: ExploredConfig, name: Any) -> Answered:
-    """Write the config into the working folder, over no file."""
+    """Save the config in the working folder; never overwrite a file."""
     if not isinstance(name, str) or not name or Path(name).name != name:
         return failed(400, "a config is saved under a name without folders, such as mine.yaml")
     path = Path(name).with_suffix(".yaml")
@@ -181,13 +179,13 @@ def saved(question: ExploredConfig, name: Any) -> Answered:
 
 
 class Handler(BaseHTTPRequestHandler):
-    """One request."""
+    """Handles one request."""
 
     server: Server
     timeout = 60
 
     def do_GET(self) -> None:
-        """The page, the progress of what is computed, and the files that a job made."""
+        """Send the page, the progress of a job, or a file that a job made."""
         try:
             address = urlsplit(self.path)
             given = parse_qs(address.query).get("token", [""])[0]
@@ -210,7 +208,6 @@ class Handler(BaseHTTPRequestHandler):
         return self.answer(*failed(404, f"there is no {self.path}"))
 
     def do_POST(self) -> None:
-        """Answer a question."""
         if not self.local() or not self.allowed(self.bearer()):
             return None
         try:
@@ -223,7 +220,7 @@ class Handler(BaseHTTPRequestHandler):
             self.answer(*failed(400, f"a question is JSON: {form}; its `config`, if any, is one that the page offers"))
 
     def local(self) -> bool:
-        """Whether it is this server's own page that asks; whoever else does is told so."""
+        """Whether the request comes from this server's own page; otherwise answer 403."""
         own = f"http://{self.server.host}"
         if self.headers.get("Host") == self.server.host and self.headers.get("Origin", own) == own:
             return True
@@ -231,27 +228,24 @@ class Handler(BaseHTTPRequestHandler):
         return False
 
     def cookie(self) -> str:
-        """The token in the cookie of this server: others on the same machine have their own."""
+        """Return the token in this server's cookie; each server on a machine has its own."""
         parts = dict(part.partition("=")[::2] for part in self.headers.get("Cookie", "").split("; "))
         return parts.get(self.server.cookie, "")
 
     def bearer(self) -> str:
-        """The token in the header."""
         return self.headers.get("Authorization", "").removeprefix("Bearer ")
 
     def allowed(self, token: str) -> bool:
-        """Whether that is the token; who has another one is told so."""
+        """Whether the token is right; otherwise answer 401."""
         if secrets.compare_digest(token.encode(), self.server.token.encode()):
             return True
         self.answer(*failed(401, "the token of the printed address is missing", "Open the address as it was printed."))
         return False
 
     def answer(self, status: int, value: Mapping[str, Any]) -> None:
-        """Send an object."""
         self.send(status, json.dumps(value, allow_nan=False).encode(), "application/json")
 
     def send(self, status: int, body: bytes, kind: str, policy: str = "") -> None:
-        """Send a file."""
         self.send_response(status)
         headers = {"Content-Type": kind, "Content-Length": str(len(body)), "Cache-Control": "no-store"}
         if status == 200 and "text/html" in kind:
@@ -266,4 +260,4 @@ class Handler(BaseHTTPRequestHandler):
             self.wfile.write(body)
 
     def log_message(self, *_: object) -> None:
-        """Nothing is said of single requests."""
+        """Do not log single requests."""

@@ -1,4 +1,4 @@
-"""What a question is answered with, in the worker: the stages' summaries and the motion to draw."""
+"""Answers computed in the worker: stage summaries, and motions to draw."""
 
 import json
 import shlex
@@ -27,26 +27,26 @@ from walkerlab.views.report.sections import motion
 
 STAGES = {"rigid": "simulate", "contact": "contact-sim"}
 Answered = tuple[int, dict[str, Any]]
-"""Status and object of an answer."""
+"""HTTP status and JSON object."""
 SUPERSEDED: Final[Answered] = 409, {"error": {"message": "a newer question was asked meanwhile", "advice": ""}}
 MAX_STEPS = 100
-"""What is shown of a walk: enough for a gait that is left to come to another one."""
+"""Maximum number of steps shown, enough to see one gait change into another."""
 GIVE_WAY = signal.SIGUSR1
-"""What a worker is sent that is to drop the question that it is at."""
+"""Signal that makes a worker abandon its request."""
 
 
 class SupersededError(BaseException):
-    """A newer question waits; not to be taken for a failure of what it stops."""
+    """A newer request waits. A BaseException, so that no handler mistakes it for a failure."""
 
 
 class GivingWay(Silent):
-    """The progress of what is dropped as soon as a newer question waits, between two gaits.
+    """Progress that abandons a request between two gaits once a newer one waits.
 
     Nowhere else: what a signal interrupts where it arrives, such as an import, may stay half done.
     """
 
     def __init__(self) -> None:
-        """None waits yet."""
+        """Install the handler for superseding requests."""
         self._superseded = False
         signal.signal(GIVE_WAY, self._give_way)
 
@@ -54,14 +54,14 @@ class GivingWay(Silent):
         self._superseded = True
 
     def advance(self, n: int = 1) -> None:  # noqa: ARG002
-        """Go on, if nobody waits."""
+        """Raise SupersededError if a newer request waits."""
         if self._superseded:
             raise SupersededError
 
 
 @dataclass(frozen=True)
 class ExploredConfig:
-    """A config, changed.
+    """A config with changes.
 
     config   as `--config` has it
     sets     as `--set` has them
@@ -80,30 +80,30 @@ class ExploredConfig:
 
     @property
     def options(self) -> list[str]:
-        """As they are typed after a command."""
+        """Command-line options that reproduce this config."""
         named = [] if self.config is None else ["-c", self.config]
         return [*named, *(part for text in self.all_sets for part in ("--set", text))]
 
     @property
     def all_sets(self) -> list[str]:
-        """Every change as `--set` has it."""
+        """All changes in the form of `--set`."""
         plain = {key: value if isinstance(value, str) else json.dumps(value) for key, value in self.changes.items()}
         return [*self.sets, *(f"{key}={value}" for key, value in plain.items())]
 
     @property
     def loaded(self) -> LoadedConfig:
-        """The config that is asked about, with what is doubtful of it; ConfigError if it is not usable."""
+        """The resolved config, with its warnings; ConfigError if it is invalid."""
         return resolve(self.config, self.all_sets, None, self.runs).loaded
 
     def refused(self, error: WalkerlabError) -> Answered:
-        """What is said of a config that is not usable, with the change that is to blame if one is named."""
+        """Describe why the config is invalid, naming the change responsible if it can be identified."""
         key = next((key for key in self.changes if key in error.message), next(iter(self.changes), None))
         value = None if key is None else self.changes[key]
         return 422, {"error": {"key": key, "value": value, "message": error.message, "advice": error.advice}}
 
 
 def sets_of(config: Config) -> tuple[str, ...]:
-    """What makes a config of the built-in paper config, as `--set` has it."""
+    """Return the `--set` texts that turn the built-in paper config into `config`."""
     paper = ExploredConfig(None, (), Path(), {}).loaded.config.model_dump(mode="json")
     values = config.model_dump(mode="json").items()
     return tuple(f"{key}={json.dumps(value)}" for key, value in values if key != "name" and value != paper[key])
@@ -111,12 +111,12 @@ def sets_of(config: Config) -> tuple[str, ...]:
 
 @cache
 def memory() -> MemoryResults:
-    """Return what this process remembers of earlier questions."""
+    """Results of earlier requests in this process."""
     return MemoryResults()
 
 
 def walked(question: ExploredConfig) -> Answered:
-    """The gait and the walks, with what a player has to know to show them."""
+    """Compute the gait and the walks, with the data that the player needs."""
     try:
         loaded = question.loaded
         config = loaded.config
@@ -148,7 +148,7 @@ def walked(question: ExploredConfig) -> Answered:
 
 
 def numbers(question: ExploredConfig) -> Answered:
-    """What can be turned."""
+    """List the adjustable parameters."""
     try:
         return 200, {"numbers": list(adjustable(replace(question, changes={}).loaded.config, question.loaded.config))}
     except ConfigError as error:
@@ -156,7 +156,7 @@ def numbers(question: ExploredConfig) -> Answered:
 
 
 def along(question: ExploredConfig) -> Answered:
-    """Gaits over one key: for each model the places, numbers and stability of its branches.
+    """Follow gaits over one key: values, quantities and stability along each model's branches.
 
     The question's changes hold the block `continuation`: key, ends and points. Status 409 if a newer question came.
     """
@@ -174,13 +174,13 @@ def along(question: ExploredConfig) -> Answered:
 
 
 def walkable(branch: Group) -> bool:
-    """Whether on even one gait of a branch the ground never has to pull."""
+    """Whether on any gait of a branch the ground never has to pull."""
     forces = branch.variables.get("min_normal_force_N")
     return forces is None or bool((forces.values > 0.0).any())
 
 
 def curve(branch: Group) -> dict[str, list[Any]]:
-    """The numbers along a branch, of each gait's first step."""
+    """Return the quantities along a branch, from each gait's first step."""
     period, length = branch["step_period"][:, 0], branch["step_length"][:, 0]
     multipliers = abs(branch["multiplier_real"] + 1j * branch["multiplier_imag"]).max(axis=1)
     found = {
@@ -191,7 +191,7 @@ def curve(branch: Group) -> dict[str, list[Any]]:
 
 
 def as_file(question: ExploredConfig, name: str) -> str:
-    """The config as a file that extends the one that was started from and says only what differs; ConfigError.
+    """Write the config as YAML that extends its starting point and lists only differences; ConfigError.
 
     It says all where nothing can be extended: for a walker of another type than the paper's that no file holds.
     """

@@ -1,1 +1,1 @@
-"""The figures, one file each, drawn from stored results alone; the only place where matplotlib is used."""
+"""Figures drawn from stored results, one file per subject; only this package uses matplotlib."""

@@ -1,4 +1,4 @@
-"""Blank figures, and figures as bytes that are the same whenever the figure is."""
+"""Blank figures, and reproducible files of finished figures."""
 
 import contextlib
 import io
@@ -24,22 +24,22 @@ from walkerlab.labels import with_unit
 from walkerlab.views.figures.style import NARROW, NARROW_BELOW, PNG_DPI, RC, WIDTH
 
 FILLS = 0.95
-"""Of the width that there is, at most: by a legend, a title or a label."""
+"""Maximum fraction of the available width for a legend, title or label."""
 ROWS = 3
-"""Of a legend, for which a figure's height has room; it grows by those of a longer one."""
+"""Legend rows that fit in a figure's nominal height; longer legends make it taller."""
 SHRINKS = 0.7
-"""Power of its width that a figure's height follows: letters keep their size."""
+"""Exponent that relates a figure's height to its width; letters keep their size."""
 
 BETWEEN_DECADES: Final = ((15.0, (2.0, 5.0)), (100.0, (3.0,)))
-"""Multiples of a power of ten that have labels too, on axes whose ends are less than a factor apart."""
+"""Multiples of powers of ten that are labelled on axes spanning less than this factor."""
 RAISED: Final = str.maketrans("0123456789-.e", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻·ᵉ")
 LONGEST: Final = 1e4
-"""Number that is written without its exponent."""
+"""Largest number written without an exponent."""
 
 
 @contextlib.contextmanager
 def styled(width: float = WIDTH) -> Iterator[None]:
-    """Matplotlib's defaults and this project's style on top, whatever the user's own settings are.
+    """Apply matplotlib's defaults and the project's style, whatever the user's settings.
 
     width  of the figures, in; in narrow ones, letters are smaller and lines thinner
     """
@@ -49,12 +49,12 @@ def styled(width: float = WIDTH) -> Iterator[None]:
 
 
 def is_narrow() -> bool:
-    """Whether figures are of one column."""
+    """Whether figures are one column wide."""
     return bool(matplotlib.rcParams["figure.figsize"][0] < NARROW_BELOW)
 
 
 def blank(height: float) -> Figure:
-    """A figure of the style's width and of `height` in, or of not as much less if it is narrower."""
+    """Create a figure of the style's width and `height` (inches); narrower figures are shrunk less in height."""
     width = matplotlib.rcParams["figure.figsize"][0]
     figure = Figure(figsize=(width, height * (width / WIDTH) ** SHRINKS), layout="constrained")
     FigureCanvasAgg(figure)
@@ -62,18 +62,18 @@ def blank(height: float) -> Figure:
 
 
 def panels(height: float, rows: int = 1, columns: int = 1, **how: Any) -> tuple[Figure, Any]:
-    """A blank figure with axes in rows and columns, made as matplotlib's `subplots` makes them."""
+    """Create a blank figure with a grid of axes, as matplotlib's `subplots` does."""
     figure = blank(height)
     return figure, figure.subplots(rows, columns, **how)
 
 
 def label_of(words: str, unit: str) -> str:
-    """An axis in words, with its unit."""
+    """Return an axis label with its unit."""
     return with_unit(words, re.sub(r"\^([\d.]+|e\b)", lambda power: power[1].translate(RAISED), unit))
 
 
 def label_ticks(axis: Axis) -> None:
-    """Labels of a logarithmic axis: at as many decades as there is room for, and between them where these are few."""
+    """Label a logarithmic axis at as many decades as fit, and between decades where there are few."""
     least, last = axis.get_view_interval()
     between = next((subs for span, subs in BETWEEN_DECADES if last < min(span * least, LONGEST)), ())
     axis.set_major_locator(LogLocator(subs=(1.0, *between)))
@@ -82,14 +82,14 @@ def label_ticks(axis: Axis) -> None:
 
 
 def error_axis(axes: Axes) -> None:
-    """Make the vertical axis logarithmic, for errors."""
+    """Make the vertical axis logarithmic."""
     if np.isfinite(axes.dataLim.intervaly).all():
         axes.set_yscale("log")
         label_ticks(axes.yaxis)
 
 
 def cost_axis(axes: Axes) -> None:
-    """Make the horizontal axis logarithmic, for costs; a panel without any says so."""
+    """Make the horizontal axis logarithmic; an empty panel says that it is empty."""
     if np.isfinite(axes.dataLim.intervalx).all():
         axes.set_xscale("log")
         label_ticks(axes.xaxis)
@@ -98,7 +98,7 @@ def cost_axis(axes: Axes) -> None:
 
 
 def power_of_ten(value: float, _place: float | None = None) -> str:
-    """A power of ten, as an axis writes its ticks.
+    """Format a power of ten as an axis label.
 
     Its exponent has signs of its own, since the small letters of a formula would be too small on a page.
     """
@@ -106,12 +106,11 @@ def power_of_ten(value: float, _place: float | None = None) -> str:
 
 
 def entry(label: str, **look: Any) -> Line2D:
-    """A line, or a mark, in a legend."""
     return Line2D([], [], label=label, **look)
 
 
 def add_legend(figure: Figure, handles: Sequence[Artist], title: str | None = None, edge: str = "upper") -> None:
-    """A legend in a band of its own above all axes, in as few rows as fit into the figure's width.
+    """Draw a legend in a band above all axes, in as few rows as fit.
 
     title  of what it is the legend
     edge   "lower" puts it below all axes
@@ -127,7 +126,7 @@ def add_legend(figure: Figure, handles: Sequence[Artist], title: str | None = No
 
 
 def settle(figure: Figure) -> None:
-    """Lay the figure out once and for all, so that every file of it is the same drawing."""
+    """Lay the figure out once, so that all its files show the same drawing."""
     engine = figure.get_layout_engine()
     assert engine is not None, "a figure is laid out once"
     engine.execute(figure)
@@ -138,7 +137,7 @@ def settle(figure: Figure) -> None:
 
 
 def break_lines(figure: Figure) -> None:
-    """Titles and labels that are longer than their axes go on in further lines."""
+    """Wrap titles and labels that are longer than their axes."""
     for axes in figure.axes:
         box = axes.get_window_extent()
         title = axes.set_title(axes.get_title(matplotlib.rcParams["axes.titlelocation"]))
@@ -154,7 +153,7 @@ OF_PIXELS = ("png", "tiff")
 
 
 def as_file(figure: Figure, kind: str, name: str, title: str, dpi: int = PNG_DPI) -> bytes:
-    """The figure in a format, an SVG with text kept as text; `name` makes its ids differ from other figures'."""
+    """Return the figure in a format (SVG text stays text); `name` makes its ids unique among figures."""
     undated: dict[str, dict[str, Any]] = {
         "svg": {"metadata": {"Date": None, "Creator": None, "Title": title}},
         "png": {"metadata": {"Software": None, "Title": title}},
@@ -170,7 +169,7 @@ def as_file(figure: Figure, kind: str, name: str, title: str, dpi: int = PNG_DPI
 
 @dataclass(frozen=True)
 class Drawing:
-    """A figure as files' bytes, with its words."""
+    """The files of a figure as bytes, with its texts."""
 
     svg: bytes
     png: bytes
@@ -181,6 +180,6 @@ class Drawing:
 def files_of(
     figure: Figure, name: str, title: str, kinds: Sequence[str] = ("svg", "png"), dpi: int = PNG_DPI
 ) -> list[bytes]:
-    """A figure, plotted within the style, laid out, as a file of each kind."""
+    """Plot a figure in the project's style, lay it out, and return a file of each kind."""
     settle(figure)
     return [as_file(figure, kind, name, title, dpi) for kind in kinds]

@@ -1,4 +1,4 @@
-"""Figures of families of gaits: 13 the bifurcation diagram, 14 multipliers, 16 the plane of two parameters."""
+"""Figures of families of gaits: 13 bifurcation diagram, 14 multipliers, 16 regions in the plane of two parameters."""
 
 from __future__ import annotations
 
@@ -31,30 +31,30 @@ MARKS: Final = {"flip": ("o", VERMILLION), "fold": ("s", BLACK), "torus": ("D", 
 STYLES: Final[dict[bool, LineStyleType]] = {True: "-", False: (0.0, (2.2, 1.6))}
 FROM_FLIP: Final = 16  # points drawn from a flip to the first gait that is born there
 OTHER: Final = GREEN
-"""Of gaits that are not born of the gait of one step."""
+"""Colours of gaits outside the cascade of the one-step gait."""
 
 
 @dataclass(frozen=True)
 class DrawnBranch:
-    """A branch, or a curve over two parameters, with its model."""
+    """A branch (or a curve over two parameters) with its model."""
 
     model: str
     group: Group
 
     @property
     def period(self) -> int:
-        """Steps of its gaits."""
+        """Steps per gait."""
         return int(self.group.attrs["period"])
 
     @property
     def colour(self) -> str:
-        """Of the model; of other gaits than those of one step and its cascade, their own."""
+        """Colour of the model; gaits outside the one-step gait and its cascade have their own colours."""
         period = self.period
         return MODELS[self.model] if period & (period - 1) == 0 else OTHER
 
 
 def branches_of(results: Results, name: str = "branch") -> Iterator[DrawnBranch]:
-    """Every branch of a result, or every curve, in the order in which they were followed."""
+    """Return all branches, or all curves, in the order in which they were followed."""
     groups = results[STAGE].groups
     for model in MODELS:
         for number in count():
@@ -64,14 +64,14 @@ def branches_of(results: Results, name: str = "branch") -> Iterator[DrawnBranch]
 
 
 def parameter_of(results: Results) -> str:
-    """The parameter with its unit, as an axis says it."""
+    """Axis label of the parameter, with its unit."""
     summary = results[STAGE].summary
     return label_of(axis_label(str(summary["over"])), str(summary["unit"]))
 
 
 @dataclass(frozen=True)
 class Curve:
-    """A quantity of every step along a branch, bifurcations among its points.
+    """A quantity of every step along a branch, including its bifurcations.
 
     value     (points,) of the parameter
     quantity  (points, steps)
@@ -86,7 +86,7 @@ class Curve:
 
 
 def curve_of(group: Group, name: str) -> Curve:
-    """A quantity along a branch; its stability changes at bifurcations, and else in the middle between neighbours."""
+    """Sample a quantity along a branch; stability changes at bifurcations, otherwise halfway between neighbours."""
     value, quantity, stable = group["value"], group[name], group["stable"].astype(bool)
     if "mark_after" not in group.variables:
         return Curve(value, quantity, stable[:-1] & stable[1:], ())
@@ -102,7 +102,7 @@ def curve_of(group: Group, name: str) -> Curve:
 
 
 def draw_branch(axes: Axes, branch: DrawnBranch, name: str) -> set[str]:
-    """A quantity of every step of a branch, solid where it is stable, with its bifurcations; their kinds."""
+    """Plot a quantity of every step, solid where stable, with bifurcations; return the kinds of these."""
     curve = curve_of(branch.group, name)
     width = 1.5 if branch.period == 1 else 1.0
     bounds = [0, *(int(index) + 1 for index in np.flatnonzero(np.diff(curve.stable))), curve.stable.size]
@@ -122,7 +122,7 @@ def draw_branch(axes: Axes, branch: DrawnBranch, name: str) -> set[str]:
 
 
 def stretch_of(curve: Curve, begin: int, end: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Values and quantities to be drawn from one point of a branch to another.
+    """Return the parameter values and quantities to plot between two points of a branch.
 
     From the flip that a branch is born in to its first gait, quantities part as the root of the distance from the flip.
     """
@@ -136,24 +136,24 @@ def stretch_of(curve: Curve, begin: int, end: int) -> tuple[NDArray[np.float64],
 
 
 def clouds(results: Results) -> Iterator[tuple[str, Group]]:
-    """What walks of the models settled on."""
+    """Return the attractors stored for each model."""
     found = ((model, results[STAGE].groups.get(f"{model}/attractor")) for model in MODELS)
     return ((model, group) for model, group in found if group is not None)
 
 
 QUANTITIES: Final = {"step_period": "step period", "stance_angle": "stance angle"}
 ROOM: Final = 0.06
-"""Beside what is stable, as a share of it: unstable branches that go far away are cut there."""
+"""Margin around the stable gaits, relative to their span; unstable branches are cut there."""
 LEAST: Final = 0.05
-"""Of the span, what the part with bifurcations is at least; of a quantity, what its axis spans at least."""
+"""Minimum width of the bifurcation panel relative to the span, and minimum span of an axis relative to its values."""
 TOLD_APART: Final = 0.04
-"""Of the axis, between labels of births."""
+"""Minimum distance between birth labels, relative to the axis."""
 BETWEEN: Final = 16
-"""Points between two of a branch, where a quantity's largest and least values are sought, and multipliers drawn."""
+"""Points between two branch points, to find extremes of a quantity and to draw multipliers."""
 
 
 def draw_branches(results: Results) -> Drawn:
-    """Both quantities over the whole span on the left, over the part with bifurcations on the right if there are some.
+    """Plot both quantities over the full range (left) and, if there are bifurcations, around them (right).
 
     In a figure of one column the two parts stand under one another.
 
@@ -200,7 +200,7 @@ def draw_branches(results: Results) -> Drawn:
 
 
 def births_in(branches: Sequence[DrawnBranch], shown: tuple[float, float]) -> list[tuple[float, int]]:
-    """Where in a part of the axis gaits of several steps are born in a fold, and of how many, by their place.
+    """Find the fold-born gaits of several steps in a part of the axis: position and number of steps.
 
     Of births too close to be told apart that of the fewest steps.
     """
@@ -221,7 +221,7 @@ def births_in(branches: Sequence[DrawnBranch], shown: tuple[float, float]) -> li
 
 
 def label_births(axes: Axes, births: Sequence[tuple[float, int]]) -> None:
-    """Say above the axes of how many steps gaits are where they are born: some live in windows as thin as a line."""
+    """Label fold-born gaits above the axes, since some of their windows are as thin as a line."""
     if births:
         above = axes.secondary_xaxis("top")
         above.set_xticks([value for value, _ in births], [str(period) for _, period in births])
@@ -229,7 +229,7 @@ def label_births(axes: Axes, births: Sequence[tuple[float, int]]) -> None:
 
 
 def close_of(results: Results) -> tuple[float, float] | None:
-    """The part of the axis with bifurcations, from before the first to where the attractor ends."""
+    """Return the range with bifurcations, from just before the first to the end of the attractor."""
     summary = results[STAGE].summary
     found = [one["value"] for one in summary["bifurcations"]]
     if not found:
@@ -241,7 +241,7 @@ def close_of(results: Results) -> tuple[float, float] | None:
 
 
 def bounds(results: Results, name: str, close: tuple[float, float] | None) -> tuple[float, float]:
-    """Room for what is stable and for the gaits of one step, in the part that is shown."""
+    """Set the limits so that stable gaits and one-step gaits fit in the range shown."""
     shown: list[NDArray[Any]] = [cloud[name].ravel() for _, cloud in clouds(results)]
     for branch in branches_of(results):
         curve = curve_of(branch.group, name)
@@ -259,7 +259,7 @@ def bounds(results: Results, name: str, close: tuple[float, float] | None) -> tu
 
 
 def finely(along: NDArray[Any]) -> NDArray[np.float64]:
-    """What is known at points of a branch, at further ones between them."""
+    """Interpolate values known at the points of a branch to further points between them."""
     # Imported here: no other figure needs it.
     from scipy.interpolate import PchipInterpolator
 
@@ -271,7 +271,7 @@ def finely(along: NDArray[Any]) -> NDArray[np.float64]:
 
 
 def multipliers_of(branch: DrawnBranch) -> NDArray[np.complex128]:
-    """The multipliers along a branch, finely (points, multiplier), the largest first.
+    """Sample the multipliers along a branch finely, (points, multipliers), largest first.
 
     Between its points their polynomial is interpolated: where two of them meet they turn as roots do.
     """
@@ -289,14 +289,14 @@ GAITS: Final[dict[str, tuple[dict[str, Any], ...]]] = {
     ),
     "contact": ({"color": ORANGE}, {"color": VERMILLION, "linestyle": "--"}, {"color": GREY, "linestyle": "-."}),
 }
-"""Looks of a model's gaits of one step, in the order in which they were found."""
+"""Line styles of a model's one-step gaits, in the order in which they were found."""
 DOTS: Final[dict[str, Any]] = {"linestyle": "none", "marker": "o", "markersize": 1.2, "markeredgewidth": 0.0}
 FARTHEST: Final = 1.6
-"""Of the complex plane that is shown; an unstable gait's multipliers may be far outside."""
+"""Half-width of the complex plane shown; multipliers of unstable gaits may lie far outside."""
 
 
 def draw_multipliers(results: Results) -> Drawn:
-    """The complex plane on the left, magnitudes over the parameter on the right, a colour for each gait of one step.
+    """Plot multipliers in the complex plane (left) and their magnitudes over the parameter (right), a colour per gait.
 
     Caption: where gaits of one step bifurcate, by model and kind, and the largest magnitude if it is beyond the axes.
     """
@@ -340,7 +340,7 @@ OTHER_PERIOD, APERIODIC, NOTHING = "#B5DDC0", "#F2C7A0", "#F4F4F4"
 
 
 def draw_plane(results: Results) -> Drawn:
-    """Regions by what walks settle on, and every curve over them, by model, kind and period.
+    """Plot regions by attractor, and every bifurcation curve over them, by model, kind and period.
 
     Caption: what the curves divide, and how much of the plane settles on what.
     """
@@ -368,7 +368,7 @@ def draw_plane(results: Results) -> Drawn:
 
 
 def region_kinds(regions: Group) -> list[Kind]:
-    """Colour, name and cells of what walks settle on, of what there is."""
+    """Return colour, name and cells of each attractor that occurs."""
     period = regions["period"]
     other = (period > 0) & ~np.isin(period, list(DOUBLED))
     kinds = [(colour, f"{n} step{'s' if n > 1 else ''}", period == n) for n, colour in DOUBLED.items()]

@@ -1,4 +1,4 @@
-"""What the ground does: its forces, held against the friction cone, and the energy that every step loses, by cause."""
+"""Figures of ground forces, compared with the friction cone, and of the energy lost per step, by cause."""
 
 from typing import Any, Final
 
@@ -30,15 +30,15 @@ GIVEN: Final = ("push_off_J", "hip_J")
 KNEES: Final = (LOSSES[KNEE_STRIKES].cause, LOSSES[KNEE_STRIKES].colour)
 ENERGY = Need(CONTACT_STAGE, TRAJECTORY, (*LOST, TOTAL), NO_ENERGIES)
 STRIDES, STEPS = 2, 40
-"""That are shown: of forces, so that impacts are told apart, and of energies."""
+"""Steps shown of forces (few enough to tell impacts apart) and of energies."""
 OF_SAMPLES: Final = 0.99
-"""Part of the loaded samples that is in sight: an impact's force is many times the weight."""
+"""Fraction of loaded samples in view: an impact's force is many times the weight."""
 NOTHING: Final = 1e-3
-"""Part of what is lost that is not drawn."""
+"""Fraction of the energy lost below which a cause is not drawn."""
 
 
 def draw_forces(results: Results) -> Drawn:
-    """Both forces in time on the left, one against the other on the right.
+    """Plot both forces over time (left) and against each other (right).
 
     Caption: how many strides are shown if not all, how steep the force gets, and how large an impact's is.
     """
@@ -86,7 +86,7 @@ def draw_forces(results: Results) -> Drawn:
 
 
 def losses(walk: Walk) -> dict[tuple[str, str], Array]:
-    """Energy (J) that each step loses, by cause and its colour; what knees take is what no other cause explains."""
+    """Return the energy (J) lost per step, by cause and colour; the knees account for the rest."""
     # the last samples before touches: an impact falls between two samples, and is not to be divided among two steps
     rows = np.concatenate(([0], np.maximum(np.searchsorted(walk.time, walk.strikes) - 1, 0)))
     by_cause = {cause: np.diff(walk[name][rows]) for name, cause in LOST.items()}
@@ -97,7 +97,7 @@ def losses(walk: Walk) -> dict[tuple[str, str], Array]:
 
 
 def draw_losses(results: Results) -> Drawn:
-    """A bar for each step, its causes on one another; caption: how much a step loses (J), and to what."""
+    """Plot a stacked bar per step; the caption says how much a step loses (J), and to what."""
     found = losses(walk_of(results[CONTACT_STAGE], CONTACT))
     figure, axes = panels(2.9)
     steps = np.arange(1, 1 + min(STEPS, next(iter(found.values())).size))

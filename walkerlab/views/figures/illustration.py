@@ -1,4 +1,4 @@
-"""What an illustration is: its name, its words, what it needs of the stored results, and how it is drawn."""
+"""The type of an illustration: its name, texts, required results and drawing function."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -15,15 +15,15 @@ from walkerlab.views.prose import Prose, f, percent
 WORDS = Prose(Path(__file__).parent / "words", (f, percent), {})
 
 Results = Mapping[str, Stored]
-"""Results by the name of their stage."""
+"""Results by stage."""
 Drawn = tuple[Figure, tuple[Any, ...]]
-"""A figure, and what the template of its caption takes."""
+"""A figure, and the arguments of its caption template."""
 Draw = Callable[[Results], Drawn]
 
 
 @dataclass(frozen=True)
 class Need:
-    """Variables of a group of a stage's result, and in its summary the reference of a scene if one is named.
+    """Variables required of a stage's result, and of a scene's reference in its summary if one is named.
 
     or_else  why a result may be without them, in words
     """
@@ -35,7 +35,7 @@ class Need:
     scene: str = ""
 
     def missing_in(self, results: Results, absent: Mapping[str, str]) -> str | None:
-        """Why the need is not met, in words; None if it is.
+        """Return why the requirement is not met, or None.
 
         absent  why results are not there, by stage
         """
@@ -69,36 +69,34 @@ class Illustration:
     scene: str = ""
 
     def say(self, what: str, *values: Any) -> str:
-        """A paragraph of its words."""
         return WORDS(f"{self.words or self.name}.{what}", *([self.scene] if self.scene else []), *values)
 
     @property
     def title(self) -> str:
-        """A few words, without a full stop."""
         return self.say("title")
 
     @property
     def seen(self) -> str:
-        """What one sees, in a sentence or two, for those who do not see it; may be empty."""
+        """Text alternative in one or two sentences; may be empty."""
         return self.say("seen")
 
     def caption(self, results: Results) -> str:
-        """One or two sentences with numbers of the results."""
+        """One or two sentences with numbers from the results."""
         with styled():
             return self.say("caption", *self.draw(results)[1])
 
     @property
     def stages(self) -> tuple[str, ...]:
-        """The stages whose results it cannot be drawn without."""
+        """Stages whose results are required."""
         return tuple(dict.fromkeys(need.stage for need in self.needs))
 
     @property
     def called(self) -> str:
-        """What to call it in a sentence."""
+        """Name for use in a sentence."""
         return f"figure {self.name if self.number is None else self.number}"
 
     def why_left_out(self, results: Results, absent: Mapping[str, str]) -> str | None:
-        """Why it cannot be drawn, in words; None if it can.
+        """Return why the illustration cannot be drawn, or None.
 
         absent  why results are not there, by stage
         """
@@ -107,22 +105,22 @@ class Illustration:
 
     @property
     def heading(self) -> str:
-        """Its title, with the paper's number."""
+        """Title with the paper's figure number."""
         return self.title if self.number is None else f"Figure {self.number}. {self.title}"
 
     def drawn(self, results: Results) -> Drawing:
-        """Its files and words; the same results give the same bytes."""
+        """Draw the files and texts; equal results give equal bytes."""
         with styled():
             figure, caption_values = self.draw(results)
             svg, png = files_of(figure, self.name, self.heading)
         return Drawing(svg, png, self.title, self.say("caption", *caption_values))
 
     def as_file(self, results: Results, kind: str, width: float, dpi: int) -> bytes:
-        """The figure in a format, of a width in pt; what it has of pixels has so many an inch."""
+        """Return the figure in a format and width (pt); raster parts use `dpi`."""
         with styled(POINT * width):
             return files_of(self.draw(results)[0], self.name, self.heading, [kind], dpi)[0]
 
 
 def paper_figure(number: int, needs: tuple[Need, ...], draw: Draw) -> Illustration:
-    """A figure of the paper, drawn anew."""
+    """A figure of the paper, redrawn."""
     return Illustration(f"figure-{number:02d}", needs, draw, number)

@@ -1,4 +1,4 @@
-"""Maps of cells: figure 11 starts that walk, 15 basins of attraction, and where methods can be trusted."""
+"""Maps of cells: figure 11 (starts that walk), figure 15 (basins of attraction), and where methods are reliable."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ from walkerlab.views.figures.walks import TUNE_STAGE, claims_in, redoes_the_proc
 WHITE: Final = "#FFFFFF"
 SKY: Final = "#56B4E9"
 LOG_SPAN: Final = 50.0
-"""Ratio of largest to least value from which on an axis of evenly spaced powers is drawn as such."""
+"""Ratio of largest to smallest value from which evenly spaced powers get a logarithmic axis."""
 Kind = tuple[str, str, NDArray[np.bool_]]
-"""Cells of a kind: their colour, what they are, and which they are."""
+"""Kinds of cells: colour, label, and which cells."""
 
 
 def discrete(colours: Sequence[str]) -> dict[str, Any]:
-    """What matplotlib is told to give each number, from 0 on, its colour."""
+    """Return the colour map and norm that give integers from 0 their colours."""
     return {
         "cmap": ListedColormap(list(colours)),
         "norm": BoundaryNorm(np.arange(len(colours) + 1) - 0.5, len(colours)),
@@ -39,23 +39,22 @@ def discrete(colours: Sequence[str]) -> dict[str, Any]:
 
 
 def draw_kinds(draw: Callable[..., Any], kinds: Sequence[Kind]) -> list[Artist]:
-    """Each cell in the colour of its kind, by a function that draws numbers; returns the key."""
+    """Draw each cell in the colour of its kind with `draw`; return the legend entries."""
     draw(np.argmax(np.array([where for _, _, where in kinds]), axis=0), **discrete([colour for colour, *_ in kinds]))
     return patches((colour, label) for colour, label, _ in kinds)
 
 
 def patches(kinds: Iterable[tuple[str, str]]) -> list[Artist]:
-    """The key of colours and what they mean."""
     return [Patch(facecolor=colour, edgecolor=GREY, linewidth=0.3, label=label) for colour, label in kinds]
 
 
 def ends_among(outcomes: Any) -> list[tuple[str, str]]:
-    """Colours and names of the outcomes that occur."""
+    """Return colours and labels of the outcomes that occur."""
     return [(OUTCOME_TEXTS[one].colour, one.label) for one in map(Outcome, np.unique(outcomes).tolist())]
 
 
 def edges(centres: NDArray[Any]) -> NDArray[Any]:
-    """Bounds of cells about values, halfway between neighbours, on their own scale."""
+    """Return the cell edges, halfway between neighbouring values on their own scale."""
     scale = np.log(centres) if is_logarithmic(centres) else centres
     if scale.size == 1:
         found = np.array([scale[0] - 0.5, scale[0] + 0.5])
@@ -66,7 +65,7 @@ def edges(centres: NDArray[Any]) -> NDArray[Any]:
 
 
 def is_logarithmic(values: NDArray[Any], span: float = LOG_SPAN) -> bool:
-    """Whether values are evenly spaced powers over a range that is so many times as wide as it begins."""
+    """Whether values are evenly spaced powers that span a wide enough range."""
     if values.size < 3 or values.min() <= 0.0 or values.max() / values.min() < span:
         return False
     gaps, plain = np.diff(np.log(np.sort(values))), np.diff(np.sort(values))
@@ -74,7 +73,6 @@ def is_logarithmic(values: NDArray[Any], span: float = LOG_SPAN) -> bool:
 
 
 def axis_of(cells: Group, name: str) -> str:
-    """A coordinate of the cells on an axis."""
     variable = cells.variables[name]
     return label_of(variable.long_name, variable.units)
 
@@ -90,7 +88,7 @@ STEP_LEVELS: Final = (0.5, 1.5, 2.5, 4.5)
 
 
 def draw_starts(results: Results) -> Drawn:
-    """Both models' maps on the same axes, outcome as colour, lines where more steps are walked.
+    """Plot both models' maps on equal axes, coloured by outcome, with contours of more steps.
 
     Caption: how many starts walk, and the factors at which the paper's own would lie; none of these for another scene.
     """
@@ -131,7 +129,7 @@ NO_ATTRACTOR: Final = -1
 
 
 def draw_basins(results: Results) -> Drawn:
-    """Attractors and failures by colour on the left, steps to settle by brightness on the right.
+    """Plot attractors and failures by colour (left) and steps to settle by brightness (right).
 
     Caption: what is walked, how much of the window walks, and to which attractors.
     """
@@ -173,13 +171,13 @@ def draw_basins(results: Results) -> Drawn:
 
 
 def sides_of(middles: NDArray[np.float64]) -> tuple[float, float]:
-    """Where a row of cells with these middles begins and ends."""
+    """Return the outer edges of a row of cells with these centres."""
     half = 0.5 * float(middles[1] - middles[0])
     return float(middles[0]) - half, float(middles[-1]) + half
 
 
 def fates(outcome: NDArray[Any], attractor: NDArray[Any], summary: Mapping[str, Any]) -> list[Kind]:
-    """The attractors and failures that occur."""
+    """Return the kinds of attractors and failures that occur."""
     attractors = summary["attractors"]
     kinds: list[Kind] = [
         (ATTRACTORS[number % len(ATTRACTORS)], attractor_name(number, attractors), attractor == number)
@@ -195,7 +193,7 @@ def fates(outcome: NDArray[Any], attractor: NDArray[Any], summary: Mapping[str, 
 
 
 def attractor_name(number: int, attractors: list[dict[str, Any]]) -> str:
-    """An attractor by its period, and a letter where several have the same."""
+    """Label an attractor by its period, with a letter where several share it."""
     period = attractors[number]["period"]
     same = [other for other, row in enumerate(attractors) if row["period"] == period]
     letter = f" ({'abcdefghijklmnopqrstuvwxyz'[same.index(number) % 26]})" if len(same) > 1 else ""
@@ -217,10 +215,10 @@ VERDICT_COLOURS: Final = {
 
 
 class OverStiffness:
-    """Two panels over stiffness and another coordinate: what becomes of walks, and their errors."""
+    """Two panels over stiffness and another coordinate: outcomes, and errors."""
 
     def __init__(self, cells: Group, up: str, titles: tuple[str, str]) -> None:
-        """Both panels, still empty, the other coordinate upward."""
+        """Create both panels, still empty."""
         self.cells, self.edges = cells, (edges(cells[STIFFNESS]), edges(cells[up]))
         self.figure, (self.left, self.right) = panels(3.9, 1, 2, sharex=True, sharey=True)
         xlim, ylim = (ends[[0, -1]] for ends in self.edges)
@@ -233,11 +231,10 @@ class OverStiffness:
         self.left.set_ylabel(axis_of(cells, up))
 
     def draw(self, axes: Axes, values: NDArray[Any], **look: Any) -> Any:
-        """Values of the cells."""
         return axes.pcolormesh(*self.edges, values, **look, rasterized=True)
 
     def draw_errors(self, there: NDArray[np.bool_], ends: tuple[float, float], others: Sequence[Kind]) -> None:
-        """Errors by brightness, where there are any, with their scale; cells of other kinds in their colours."""
+        """Draw errors by brightness with a colour bar, and cells of other kinds in their colours."""
         shown = np.ma.masked_where(~there, np.clip(self.cells["error"], *ends))
         mesh = self.draw(self.right, shown, cmap="cividis", norm=LogNorm(*ends))
         self.figure.colorbar(mesh, ax=self.right, label="error", extend="both")
@@ -248,7 +245,7 @@ class OverStiffness:
 
 
 def draw_stiction(results: Results) -> Drawn:
-    """Outcome on the left, error on the right; caption: what is walked, and how many cells come out how."""
+    """Plot outcome (left) and error (right); the caption names the walk and counts the outcomes."""
     cells = results[MAPS]["stiction"]
     made = OverStiffness(cells, VELOCITY, ("(a) how the walk ends", "(b) against a tolerance ten times tighter"))
     outcomes, compared = cells["outcome"], cells["compared"] == 1
@@ -265,7 +262,7 @@ def draw_stiction(results: Results) -> Drawn:
 
 
 def draw_step(results: Results) -> Drawn:
-    """Verdict on the left, error on the right; caption: what is walked, and how many cells come out how."""
+    """Plot verdict (left) and error (right); the caption names the walk and counts the verdicts."""
     cells = results[MAPS]["step"]
     names = [one.partition(" ")[2] for one in str(cells.attrs["verdicts"]).split(", ")]
     made = OverStiffness(cells, STEP, ("(a) what becomes of the walk", "(b) error of the state at the end"))

@@ -1,4 +1,4 @@
-"""A walker's measures to scale, named as the config names them: one leg upright, or every part in its own frame."""
+"""Figures of a walker's dimensions to scale, labelled with config keys: one leg upright, or each body on its own."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -18,27 +18,27 @@ AnyWalker = CompassWalker | StraightLegs | Kneed | PartsWalker
 Point = tuple[float, float]
 
 HEIGHT, SMALL = 4.6, 7.5
-"""Of the figure, in; of its letters, pt."""
+"""Width of the figure (in) and size of its letters (pt)."""
 SMALL_ARC = 0.02
-"""Radius of a sole, in leg lengths, too small to show what belongs to its centre."""
+"""Foot radius (leg lengths) below which the sole's centre has no label of its own."""
 FAINT = "#C8C8C8"
-"""Colour of the other leg."""
+"""Colour of the second leg."""
 ARC = np.linspace(-0.6, 0.6, 41)
 BEHIND, BENT = -0.3, -0.75
-"""Angles (rad) of the other leg, and of its shank."""
+"""Angles (rad) of the second leg and of its shank."""
 BESIDE, FIRST_LANE = 0.62, 0.24
-"""Where masses are named, behind the leg, and where the first measures of height stand, ahead of it; leg lengths."""
+"""Where mass labels (behind the leg) and the first height dimensions (ahead of it) stand, in leg lengths."""
 LETTER, LINE = 0.0088, 0.0195
-"""Width and height of a letter, in parts of the picture's width."""
+"""Width and height of a letter as fractions of the picture's width."""
 CLEAR = 0.05
-"""Between the middles of words in a lane, leg lengths."""
+"""Minimum distance between the centres of labels in a lane, in leg lengths."""
 PARTS_ROOM = 1.5
-"""Height of a part's picture, in parts of the part's."""
+"""Height of a body's picture relative to the body."""
 
 
 @dataclass(frozen=True)
 class Length:
-    """A length of the config, between two points at one height or above one another (m)."""
+    """A length of the config between two points that are level or above one another (m)."""
 
     key: str
     value: float
@@ -48,7 +48,7 @@ class Length:
 
 @dataclass(frozen=True)
 class UprightLeg:
-    """One leg upright over its sole, which is at the origin; lengths in m.
+    """Geometry of one leg, upright with its sole at the origin; lengths in m.
 
     joints  the leg's line from the hip down, without the sole
     centre  of the sole's arc
@@ -65,25 +65,25 @@ class UprightLeg:
 
 
 def said(key: str, value: float) -> str:
-    """A key with its value, as a config has them."""
+    """Return `key: value` as a config writes it."""
     return f"{key}: {value:g}"
 
 
 def weighing(walker: Any, prefix: str) -> tuple[str, ...]:
-    """The words of a body's mass, with its inertia if it has one; its keys begin with the prefix."""
+    """Label a body's mass, and its inertia if it has one; `prefix` begins its config keys."""
     inertia = value_of(walker, f"{prefix}inertia_kg_m2", 0.0)
     mass = said(f"{prefix}mass_kg", value_of(walker, f"{prefix}mass_kg"))
     return (mass, said(f"{prefix}inertia_kg_m2", inertia)) if inertia else (mass,)
 
 
 def value_of(walker: Any, key: str, *otherwise: float) -> float:
-    """What a config's walker has under a dotted key; otherwise ..., if that is given."""
+    """Return the value at a dotted key of the walker, or `otherwise`."""
     *blocks, last = key.split(".")
     return float(getattr(reduce(getattr, blocks, walker), last, *otherwise))
 
 
 def upright(walker: CompassWalker | StraightLegs | Kneed) -> UprightLeg:
-    """What is drawn of a walker of a type."""
+    """Return the geometry of one leg for each walker type."""
     radius, top, sole = walker.foot_radius_m, walker.leg_length_m, (0.0, 0.0)
     hip, centre, joints = (0.0, top), (0.0, radius), [(0.0, top)]
     lengths: list[Length] = []
@@ -119,7 +119,7 @@ def upright(walker: CompassWalker | StraightLegs | Kneed) -> UprightLeg:
 
 
 def drawn(walker: AnyWalker, name: str, kind: str = "svg") -> bytes:
-    """The walker's measures as SVG, PDF or PNG; the same walker and name give the same bytes."""
+    """Draw the walker's dimensions as SVG, PDF or PNG bytes; equal walkers and names give equal bytes."""
     title = f"The measures of a walker of type {walker.type}"
     with styled():
         figure = of_parts(walker) if isinstance(walker, PartsWalker) else of_type(walker)
@@ -127,7 +127,7 @@ def drawn(walker: AnyWalker, name: str, kind: str = "svg") -> bytes:
 
 
 def of_type(walker: CompassWalker | StraightLegs | Kneed) -> Figure:
-    """One leg upright on the slope with its measures, the other one pale behind it."""
+    """Draw one leg upright on the slope with its dimensions, and the second leg pale behind it."""
     leg = upright(walker)
     length, centre = leg.joints[0][1], leg.centre
     # the joints, and where the leg's line meets its sole's arc
@@ -175,7 +175,7 @@ def of_type(walker: CompassWalker | StraightLegs | Kneed) -> Figure:
 
 
 def arranged(leg: UprightLeg) -> tuple[list[tuple[str, str, Point]], list[list[Length]]]:
-    """What is named behind the leg, with its colour and place, and the measures of height in lanes ahead of it."""
+    """Return the labels behind the leg (colour, position, text) and the height dimensions, lane by lane."""
     length, lanes = leg.joints[0][1], list[list[Length]]()
     labels = [("\n".join(words), GREEN, at) for words, at in leg.masses]
     for one in (one for one in leg.lengths if one.value):
@@ -190,18 +190,18 @@ def arranged(leg: UprightLeg) -> tuple[list[tuple[str, str, Point]], list[list[L
 
 
 def letters(texts: Sequence[str]) -> int:
-    """Of the longest line of some texts, and of the room beside it."""
+    """Width of the longest line in `texts`, with a margin."""
     return max((len(line) + 2 for text in texts for line in text.split("\n")), default=0)
 
 
 def clear(one: Length, other: Length, length: float) -> bool:
-    """Whether neither two measures nor their words meet in one lane."""
+    """Whether two dimensions in one lane, and their labels, stay apart."""
     between = 0.5 * abs(one.start[1] + one.end[1] - other.start[1] - other.end[1])
     return between > max(0.499 * (one.value + other.value), CLEAR * length)
 
 
 def apart(heights: Sequence[float], sizes: Sequence[float], lowest: float = -math.inf) -> list[float]:
-    """The middles of words, as near to heights as they can be, further up where those below need room."""
+    """Place labels as close to the wanted heights as they fit, moving them up where those below need room."""
     found = list(heights)
     for place in sorted(range(len(found)), key=found.__getitem__):
         found[place] = max(found[place], lowest + 0.5 * sizes[place])
@@ -210,7 +210,7 @@ def apart(heights: Sequence[float], sizes: Sequence[float], lowest: float = -mat
 
 
 def draw_leg(axes: Axes, line: Sequence[Point], centre: Point, radius: float, colour: str) -> None:
-    """A leg's line from the hip over its knee down to its sole, and the sole's arc."""
+    """Draw a leg from the hip over the knee to the sole, with the arc of the sole."""
     axes.plot(*np.transpose(line), color=colour, linewidth=2.0, zorder=2)
     axes.plot(*np.transpose(line[:-1]), linestyle="none", marker="o", markersize=6, color=colour, mfc="white", zorder=4)
     across, up = np.subtract(line[-1], line[-2])
@@ -221,13 +221,13 @@ def draw_leg(axes: Axes, line: Sequence[Point], centre: Point, radius: float, co
 
 
 def turned(angle: float, origin: Point, point: Point, moved_to: Point) -> Point:
-    """A point after a turn (rad) about an origin that has moved."""
+    """Rotate a point (rad), then shift it to a new origin."""
     (across, up), s, c = np.subtract(point, origin), np.sin(angle), np.cos(angle)
     return float(moved_to[0] + c * across - s * up), float(moved_to[1] + s * across + c * up)
 
 
 def draw_length(axes: Axes, measure: Length, x: float, letter: float) -> None:
-    """A measure from a point to one below it, and what it is."""
+    """Draw a dimension between a point and one below it, with its label."""
     for point in (measure.start, measure.end):
         axes.plot([point[0], x], [point[1], point[1]], color=GREY, linewidth=0.5, linestyle=":", zorder=1)
     high, low = measure.start[1], measure.end[1]
@@ -237,7 +237,7 @@ def draw_length(axes: Axes, measure: Length, x: float, letter: float) -> None:
 
 
 def of_parts(walker: PartsWalker) -> Figure:
-    """Every body of the second leg, and those of neither, each in its own frame."""
+    """Draw each body of the second leg, and the bodies of neither leg, in its own frame."""
     shown = [body for body in walker.bodies if body.name not in walker.legs[0]]
     figure = blank(HEIGHT)
     for axes, body in zip(figure.subplots(1, len(shown), squeeze=False)[0], shown, strict=True):
@@ -270,7 +270,7 @@ def of_parts(walker: PartsWalker) -> Figure:
 
 
 def marks_of(walker: PartsWalker, body: str, centre: Point) -> Iterator[tuple[str, str, str, Point]]:
-    """What a config says of points of a body: words, colour, marker and place (m)."""
+    """List the points that the config defines on a body: label, colour, marker and position (m)."""
 
     def at(point: Point) -> str:
         return f"[{point[0]:g}, {point[1]:g}]"

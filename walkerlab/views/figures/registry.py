@@ -1,4 +1,4 @@
-"""The illustrations there are, in the order in which they are shown, those that evidence registers among them."""
+"""All illustrations in display order, including those that evidence registers."""
 
 from walkerlab.registration import registered
 from walkerlab.views.figures import families, ground, maps, robustness, stick_diagram, walks

@@ -1,4 +1,4 @@
-"""Figures of what gaits withstand: 17 over one number of the config, from a sweep; 18 walks on rough ground."""
+"""Figures of robustness: 17 over one parameter, from a sweep; 18 walks on rough ground."""
 
 from __future__ import annotations
 
@@ -27,30 +27,30 @@ PANELS: Final[tuple[tuple[str, str, Callable[[Values], Values]], ...]] = (
     ("largest step (mm)", "largest_step.{}.down_m", lambda step: -1e3 * step),
     ("speed (m/s)", "gaits.{}.speed_m_s", lambda speed: speed),
 )
-"""What an axis says, the variable of a sweep with the model's place in it, and what is drawn of it."""
+"""Axis label, sweep variable (with a slot for the model), and how to plot it."""
 SPEED: Final = "gaits.0.speed_m_s"
 OF_ACTUATIONS: Final = (
     ("cost of transport", "gaits.0.cost_of_transport", True),
     ("sensitivity norm (s/m)", "gaits.0.gait_sensitivity_norm", True),
     ("largest step down (m)", "largest_step.0.down_m", False),
 )
-"""What an axis says, its variable of a sweep, and whether it is logarithmic."""
+"""Axis label, sweep variable, and whether the axis is logarithmic."""
 ACTUATIONS: Final = {
     "slope_deg": ("slope", BLACK, "o"),
     "impulse_N_s": ("push-off", BLUE, "s"),
     "torque_N_m": ("hip torque", VERMILLION, "^"),
 }
-"""Ways to drive a walker, as a sweep names them."""
+"""Kinds of drive, as a sweep names them."""
 UP: Final = "largest_step.{}.up_m"
 PANEL_HEIGHT: Final = 1.6
 LINES: Final = {"rigid": {"linestyle": "-", "marker": "o"}, "contact": {"linestyle": "--", "marker": "s"}}
 DASHES: Final = ("-", "--", "-.", ":")
 BELOW, BESIDE = 1.7, 0.4
-"""Height of the panels under the walker, and what axes' labels take beside it at least, in."""
+"""Height of the panels below the walker, and minimum room for axis labels beside it, in."""
 
 
 def of_sweep(group: Group, parameters: Sequence[str]) -> Illustration | None:
-    """What a sweep of `robustness` is drawn as: over one number, or by ways to drive a walker; None if as any other."""
+    """Return how to plot a `robustness` sweep: over one parameter, or by drive; None to plot it like any other."""
     if can_be_drawn(group, parameters):
         return Illustration("figure-17", (), partial(over_one_number, group, parameters[0]))
     driven = actuations(group, parameters)
@@ -58,13 +58,13 @@ def of_sweep(group: Group, parameters: Sequence[str]) -> Illustration | None:
 
 
 def can_be_drawn(group: Group, parameters: Sequence[str]) -> bool:
-    """Whether a sweep is of robustness over one number, and has gaits."""
+    """Whether a robustness sweep varies one parameter and has gaits."""
     names = (name.format(0) for _, name, _ in PANELS)
     return len(parameters) == 1 and all(name in group.variables for name in names)
 
 
 def over_one_number(group: Group, parameter: str, _results: Results) -> Drawn:
-    """Figure 17; caption: the number, its unit, and each model's least disturbed gait, with its norm (s/m)."""
+    """Plot figure 17; the caption names the parameter and each model's least sensitive gait with its norm (s/m)."""
     x, said, unit = group[parameter].astype(float), axis_label(parameter), group.variables[parameter].units
     models = {str(group[f"gaits.{k}.model"][0]): k for k in range(2) if f"gaits.{k}.model" in group.variables}
     figure, axes = panels(0.6 + PANEL_HEIGHT * len(PANELS), len(PANELS), sharex=True)
@@ -84,7 +84,7 @@ def over_one_number(group: Group, parameter: str, _results: Results) -> Drawn:
 
 
 def actuations(group: Group, parameters: Sequence[str]) -> dict[str, NDArray[np.bool_]] | None:
-    """Which points of a sweep of robustness each way to drive a walker drives alone; None if they are not so."""
+    """Return the points of a robustness sweep driven by each drive alone; None if points combine drives."""
     if not set(parameters) <= ACTUATIONS.keys() or len(parameters) < 2 or OF_ACTUATIONS[0][1] not in group.variables:
         return None
     if any(group.variables[name].dims != group.variables["outcome"].dims for name in parameters):
@@ -94,7 +94,7 @@ def actuations(group: Group, parameters: Sequence[str]) -> dict[str, NDArray[np.
 
 
 def push_off_or_hip(group: Group, driven: Mapping[str, NDArray[np.bool_]], _results: Results) -> Drawn:
-    """What each way to drive a walker costs and withstands over its speed.
+    """Plot what each drive costs, and the disturbances it survives, over speed.
 
     Caption: of each way speed (m/s), norm (s/m) and cost of transport of the least disturbed gait.
     """
@@ -115,7 +115,7 @@ def push_off_or_hip(group: Group, driven: Mapping[str, NDArray[np.bool_]], _resu
 
 
 def on_rough_ground(results: Results) -> Drawn:
-    """Figure 18; told: models, roughness (m) of the walk that is shown, its steps, and the walks on each ground."""
+    """Plot figure 18; its caption names the models, the walk shown (roughness in m, steps) and the walks per ground."""
     result = results[STAGE]
     sticks, steps = sticks_of(result, "rough_walk/"), result["rough_steps"]
     across = sticks.in_plane(sticks.landings)[:, 0]
@@ -148,7 +148,7 @@ def on_rough_ground(results: Results) -> Drawn:
 
 
 def draw_shares(axes: Axes, steps: Group) -> None:
-    """The share of walks that go on over the number of steps, for each model and roughness."""
+    """Plot the share of walks still going over the number of steps, for each model and roughness."""
     for model, last, of_model in zip(steps["model"], steps["cut_off_at"], steps["steps"], strict=True):
         for walks, dash in zip(of_model, cycle(DASHES), strict=False):
             # a walk that was cut off has not failed

@@ -1,4 +1,4 @@
-"""The figures: every one that there are results for, as SVG and PNG."""
+"""The `plot` stage: draws every figure that has its results, as SVG and PNG."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -24,7 +24,7 @@ def run(
     folder: Path,
     left_out: Sequence[LeftOut] = (),
 ) -> Content:
-    """Draw into the run's folder.
+    """Draw the figures into the run's folder.
 
     inputs    results by stage: those that there are
     left_out  the stages without a result, and why
@@ -55,7 +55,7 @@ def run(
 
 
 def draw(figure: Illustration, results: Mapping[str, Stored], folder: Path) -> dict[str, str | int | list[str]]:
-    """Draw a figure and store its files; its words and its files' paths in the run's folder."""
+    """Draw a figure and store its files; return its texts and paths relative to the run's folder."""
     drawing = figure.drawn(results)
     paths = paths_of(figure)
     write_atomically(folder / paths["svg"], drawing.svg)
@@ -66,7 +66,7 @@ def draw(figure: Illustration, results: Mapping[str, Stored], folder: Path) -> d
 
 
 def draw_at_once(stage: str, folder: Path, anew: bool) -> list[Path]:
-    """Draw the figures that need a stage's result alone, and say where they are.
+    """Draw the figures that need only one stage's result; return their paths.
 
     anew  also those that are there
 
@@ -82,5 +82,5 @@ def draw_at_once(stage: str, folder: Path, anew: bool) -> list[Path]:
 
 
 def paths_of(figure: Illustration) -> dict[str, str]:
-    """Where a figure's files are in the run's folder."""
+    """Return the paths of a figure's files in the run's folder."""
     return {kind: f"{FOLDER}/{figure.name}.{kind}" for kind in ("svg", "png")}

@@ -1,4 +1,4 @@
-"""A walker to scale on its slope: figures 2 and 6, stick diagrams of one gait cycle, and moving pictures."""
+"""A walker to scale on its slope: figures 2 and 6, stick diagrams of one gait cycle, and animations."""
 
 import math
 from collections.abc import Iterator
@@ -37,23 +37,23 @@ from walkerlab.views.figures.walks import (
 )
 
 CYCLE = 2
-"""Steps of a gait cycle."""
+"""Steps per gait cycle."""
 BETWEEN = 5
 """Postures between two heel strikes."""
 FAINT, FULL = 0.8, 2.2
-"""Widths of legs between heel strikes and at them, pt."""
+"""Line widths of legs between heel strikes and at them, pt."""
 HEADROOM, FOOTROOM, SIDEROOM = 0.19, 0.13, 0.12
 """Free space around the walker, leg lengths."""
 ARC = np.linspace(-0.6, 0.6, 25)
 ARC_MIDDLE = np.zeros(1)
-"""How much of a sole's arc is drawn, rad from the leg's line."""
+"""Half-angle of the sole's arc drawn, rad from the leg's line."""
 SMALL_FOOT = 0.01
-"""Radius of a sole, in leg lengths, below which it is a point to the eye."""
+"""Foot radius (leg lengths) below which a sole is drawn as a point."""
 AXES: Final[dict[str, Any]] = {"aspect": "equal", "xlabel": "horizontal position (m)", "ylabel": "height (m)"}
 UNDER, BESIDE, ABOVE = 0.36, 0.7, 1.05
-"""What times of landings take below the lowest foot, and axes' labels and legend beside the axes and above them, in."""
+"""Room for landing times below the lowest foot, and for axis labels and legend, in."""
 SHAPE = 0.68
-"""Height of the axes in parts of their width, unless the walker is taller or longer."""
+"""Height of the axes relative to their width, unless the walker is taller or longer."""
 NO_STEPS = Group(
     {name: Variable(np.zeros(0), ("step",), unit, name) for name, unit in ((TOUCHES, "s"), ("touch_along_m", "m"))}
 )
@@ -61,7 +61,7 @@ NO_STEPS = Group(
 
 @dataclass(frozen=True, eq=False)
 class Sticks:
-    """Where the joints of a walker are; lengths in m along the slope (downhill) and normal to it.
+    """Joint positions of a walker; lengths in m along the slope (downhill) and normal to it.
 
     time     (samples,) s
     hip      (samples, 2)
@@ -91,37 +91,37 @@ class Sticks:
     ending: str = ""
 
     def pushing(self, time: float) -> int | None:
-        """The leg that pushes off at a time (s), for as long as an eye sees it; None if none does."""
+        """Return the leg whose push-off is visible at a time (s), or None."""
         step = int(np.searchsorted(self.strikes, time, side="right")) - 1
         late = step < 0 or time - self.strikes[step] > SEEN_S
         return None if late or not self.pushes else 1 - step % 2
 
     @property
     def top(self) -> Array:
-        """The highest point that is drawn (samples, 2): the torso's end, or the hip."""
+        """The highest point drawn (samples, 2): the torso's end, or the hip."""
         return self.hip if self.head is None else self.head
 
     @property
     def leg_length(self) -> float:
-        """Largest distance of a foot from the hip (m)."""
+        """Maximum distance between a foot and the hip (m)."""
         return float(np.linalg.norm(self.feet - self.hip[:, None], axis=2).max())
 
     @property
     def has_soles(self) -> bool:
-        """Whether its soles are more than points to the eye."""
+        """Whether the soles are large enough to be drawn as arcs."""
         return self.radius > SMALL_FOOT * self.leg_length
 
     def leg(self, leg: int) -> Array:
-        """A leg's line (samples, points, 2): from the hip, over its knee if it has one, to the middle of its sole."""
+        """Return a leg's line (samples, points, 2) from the hip over any knee to the middle of the sole."""
         joints = [self.hip] if self.knees is None else [self.hip, self.knees[:, leg]]
         return np.stack([*joints, self.arc(leg, joints[-1], ARC_MIDDLE)[:, 0]], axis=1)
 
     def sole(self, leg: int) -> Array:
-        """The arc of a leg's sole (samples, points, 2)."""
+        """Return the arc of a leg's sole (samples, points, 2)."""
         return self.arc(leg, self.hip if self.knees is None else self.knees[:, leg], ARC)
 
     def arc(self, leg: int, above: Array, angles: Array) -> Array:
-        """Points of a sole at angles (rad) from the line through the joint above and the arc's centre."""
+        """Return points of a sole at angles (rad) from the line between its centre and the joint above."""
         centre = self.feet[:, leg] + np.array([0.0, self.radius])
         down = (centre - above) / np.linalg.norm(centre - above, axis=1, keepdims=True)
         ahead = np.stack((-down[:, 1], down[:, 0]), axis=1)
@@ -129,13 +129,13 @@ class Sticks:
         return np.asarray(centre[:, None] + self.radius * around)
 
     def in_plane(self, points: Array) -> Array:
-        """Points of the slope's frame (..., 2) as horizontal and vertical position (m)."""
+        """Convert points in the slope's frame (..., 2) to horizontal and vertical position (m)."""
         s, c = math.sin(self.slope), math.cos(self.slope)
         along, normal = points[..., 0], points[..., 1]
         return np.stack((c * along + s * normal, c * normal - s * along), axis=-1)
 
     def postures(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Samples at the start and the heel strikes of the first cycle, and evenly spaced ones between.
+        """Select the samples at the start and heel strikes of the first cycle, and evenly spaced ones between.
 
         A cycle that was not completed is shown to the end of the walk.
         """
@@ -150,7 +150,7 @@ class Sticks:
 
 
 def sticks_of(result: Stored, under: str = "") -> Sticks:
-    """The joints' places as a walk has stored them, `under` a group if that is named."""
+    """Read joint positions from a stored walk, or from its group `under`."""
     asked = result.identity.config_slice
     trajectory, walker = result[f"{under}trajectory"], asked["walker"]
     steps = result.groups.get(f"{under}steps", NO_STEPS)
@@ -179,7 +179,7 @@ def sticks_of(result: Stored, under: str = "") -> Sticks:
 
 
 def stick_diagram(sticks: Sticks) -> tuple[Figure, Axes]:
-    """The walker over its first gait cycle, without the ground, to one scale in a figure that fits."""
+    """Draw the first gait cycle to scale, without the ground."""
     at_strikes, between = sticks.postures()
     rows = np.concatenate((at_strikes, between))
     seen = np.concatenate((sticks.hip[rows, None], sticks.top[rows, None], sticks.feet[rows]), axis=1)
@@ -202,14 +202,14 @@ def stick_diagram(sticks: Sticks) -> tuple[Figure, Axes]:
 
 
 def surrounding(points: Array, length: float) -> tuple[float, float, float, float]:
-    """Left, bottom, right and top of what is in sight around points (points, 2); m."""
+    """Return left, bottom, right and top of the view around points (points, 2); m."""
     left, bottom = points.min(axis=0) - np.array([SIDEROOM, FOOTROOM]) * length
     right, top = points.max(axis=0) + np.array([SIDEROOM, HEADROOM]) * length
     return left, bottom, right, top
 
 
 def draw_postures(axes: Axes, sticks: Sticks, rows: NDArray[np.int64], width: float) -> None:
-    """Legs, soles and torso at some samples, the legs told apart by colour, line and foot."""
+    """Draw legs, soles and torso at the given samples; legs differ in colour, line and foot."""
     hip = sticks.in_plane(sticks.hip[rows])
     for leg, look in enumerate(LEGS):
         lines, order = sticks.in_plane(sticks.leg(leg)[rows]), look.order + width
@@ -226,7 +226,7 @@ def draw_postures(axes: Axes, sticks: Sticks, rows: NDArray[np.int64], width: fl
 
 
 def annotate(axes: Axes, sticks: Sticks, path: Array) -> None:
-    """Where and when feet came down, under the ground; the walking direction and the slope over the walker.
+    """Label landings below the ground, and the walking direction and slope above the walker.
 
     path  (samples, 2) of the walker's highest point
     """
@@ -248,7 +248,7 @@ def annotate(axes: Axes, sticks: Sticks, path: Array) -> None:
 
 
 def draw_slope(axes: Axes, sticks: Sticks) -> None:
-    """The ground as a plane, or a level around each foothold, hatched underneath."""
+    """Draw the ground as a plane, or as a level around each foothold, hatched below."""
     left, right = axes.get_xlim()
     depth = 0.02 * sticks.leg_length
     ends = np.array([left, right])
@@ -262,7 +262,7 @@ def draw_slope(axes: Axes, sticks: Sticks) -> None:
 
 
 def entries(sticks: Sticks) -> list[Artist]:
-    """Legend entries of the legs and of what else the walker is made of."""
+    """Legend entries of the legs and of the walker's further parts."""
     legs = [entry(look.label, **look.line | {"linewidth": 1.6}, marker=look.marker) for look in LEGS]
     strike, between = entry("at heel strike", color=GREY, linewidth=FULL), entry("between", color=GREY, linewidth=FAINT)
     hip = entry("hip", color=BLACK, linewidth=0.7, linestyle=":", marker="o", markersize=4.0)
@@ -271,16 +271,16 @@ def entries(sticks: Sticks) -> list[Artist]:
 
 
 PAD_HEIGHT = 0.028
-"""Drawn height of a pad, leg lengths: nothing is below a pad's top but what the drawing puts there."""
+"""Drawn height of a pad, leg lengths; pads have no physical thickness."""
 PADS: Final[tuple[dict[str, Any], ...]] = tuple(
     {"facecolor": "white", "edgecolor": look.colour, "hatch": hatch, "linewidth": 0.7}
     for look, hatch in zip(LEGS, ("////", "||||"), strict=True)
 )
-"""How the pads of the legs' lanes are drawn."""
+"""Style of the pads in each leg's lane."""
 
 
 def draw_pads(axes: Axes, sticks: Sticks, pads: Group) -> list[Artist]:
-    """The pads of both lanes that are in sight; returns their legend entries."""
+    """Draw the visible pads of both lanes; return their legend entries."""
     bottom = -PAD_HEIGHT * sticks.leg_length
     left, right = axes.get_xlim()
     for begin, end, leg in zip(pads["left_m"], pads["right_m"], pads["leg"], strict=True):
@@ -291,7 +291,7 @@ def draw_pads(axes: Axes, sticks: Sticks, pads: Group) -> list[Artist]:
 
 
 def draw_ground(axes: Axes, sticks: Sticks, pads: Group | None) -> list[Artist]:
-    """The pads, or the plane if there are none; returns the legend entries."""
+    """Draw the pads, or the plane if there are none; return the legend entries."""
     if pads is not None:
         return draw_pads(axes, sticks, pads)
     draw_slope(axes, sticks)
@@ -299,7 +299,7 @@ def draw_ground(axes: Axes, sticks: Sticks, pads: Group | None) -> list[Artist]:
 
 
 def draw_cycle(stage: str, results: Results) -> Drawn:
-    """A model's walker on its pads, or on its plane.
+    """Draw a model's walker on its pads or plane.
 
     Caption: how long the steps of the cycle take and how far they go, whether it was completed, and what is drawn; of
     the contact model also the feet's radius (m), what the ground is, and the pitch of its pads (m) if it has some.
@@ -318,7 +318,7 @@ def draw_cycle(stage: str, results: Results) -> Drawn:
 
 
 FILM_NEEDS = {stage: Need(stage, TRAJECTORY, (*STATES, *JOINTS), NO_STATES) for stage in (RIGID_STAGE, CONTACT_STAGE)}
-"""What a film of a stage's walk cannot be drawn without; a walk that ends in its first step has a film, too."""
+"""Variables that an animation needs; a walk that ends in its first step can be animated too."""
 FIGURE_2, FIGURE_6 = (
     paper_figure(number, (FILM_NEEDS[stage], steps_taken), partial(draw_cycle, stage))
     for number, stage, steps_taken in ((2, RIGID_STAGE, STEPS_TAKEN_RIGID), (6, CONTACT_STAGE, STEPS_TAKEN_CONTACT))
@@ -326,16 +326,16 @@ FIGURE_2, FIGURE_6 = (
 FIGURES = (FIGURE_2, FIGURE_6)
 
 SEEN_S, PUSH_SHARE = 0.08, 0.3
-"""How long a push-off is seen in a film, and how long it is drawn, in parts of the leg."""
+"""How long a push-off is visible in an animation (leg-pendulum times), and its length (leg lengths)."""
 FILM_SIZE, FILM_DPI = (6.4, 3.6), 100
-"""Of a picture, in and pixels per in: both sides are even, as video formats want them."""
+"""Size (in) and resolution (pixels per in) of a frame: both sides are even, as video formats require."""
 STEPS_SHOWN = 4
 RELIEF, RELIEF_UNDER = 0.04, 0.075
-"""How high uneven ground is drawn once more at most, and how far below it, leg lengths."""
+"""Maximum height of the exaggerated ground profile, and its distance below the ground, leg lengths."""
 
 
 def film_times(sticks: Sticks, steps: int | None, rate: int, slower: float) -> Array:
-    """Times of the pictures (s), `rate` a second, so many times slower than life; a fall is looked at for a second.
+    """Return the frame times (s), `rate` a second, slowed down; a fall is held for a second.
 
     steps  the first ones; None for the first four, or for the last four and the fall if the walk ended in one
     """
@@ -350,7 +350,7 @@ def film_times(sticks: Sticks, steps: int | None, rate: int, slower: float) -> A
 
 
 def draw_relief(axes: Axes, sticks: Sticks) -> None:
-    """The levels of uneven ground again, under it and so much higher that an eye sees them, and by how much."""
+    """Draw the ground profile again below, exaggerated to be visible, with the factor."""
     if sticks.ground is None or not (roughest := float(np.abs(sticks.ground[1]).max())):
         return
     room = RELIEF * sticks.leg_length / roughest
@@ -369,7 +369,7 @@ def draw_relief(axes: Axes, sticks: Sticks) -> None:
 
 
 def pictures(sticks: Sticks, at: Array, pads: Group | None = None) -> Iterator[NDArray[np.uint8]]:
-    """A picture (height, width, 3) for each time, on pads if there are some."""
+    """Render a frame (height, width, 3) for each time, on pads if there are any."""
     lines: list[tuple[Array, dict[str, Any]]] = [
         (sticks.leg(leg), {"color": look.colour, "linestyle": look.style}) for leg, look in enumerate(LEGS)
     ]

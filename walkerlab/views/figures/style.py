@@ -1,7 +1,7 @@
-"""How things look, the same in every figure: sizes, fonts, colours, and the lines of models and legs.
+"""Sizes, fonts, colours and line styles shared by all figures.
 
-Colours are Okabe and Ito's, which colour-blind people tell apart; whatever is drawn over one another differs in
-brightness too, and in the line's style, so that figures survive a grey printer.
+Colours follow Okabe and Ito, for colour-blind readers; overlapping series also differ in brightness and line style,
+so that figures survive a grey printer.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ GREY: Final = "#7F7F7F"
 PALE: Final = "#EDEDED"
 
 WIDTH: Final = 7.2
-"""Of every figure on a page, in: two columns of a journal."""
+"""Width of a figure on the page, in: two columns of a journal."""
 POINT: Final = 1.0 / 72.0
-"""In in."""
+"""Width of one column, in."""
 PNG_DPI: Final = 160
-"""Of a page's; what is exported says its own."""
+"""Resolution of PNGs on the page; exports choose their own."""
 
 RC: Final = {
     "axes.formatter.limits": (-4, 5),
@@ -58,9 +58,9 @@ RC: Final = {
     "ytick.labelsize": 9.0,
     "ytick.major.width": 0.7,
 }
-"""On top of matplotlib's own defaults, whatever the user's matplotlibrc says; TrueType, as journals want it."""
+"""Settings on top of matplotlib's defaults, independent of the user's matplotlibrc; TrueType fonts for journals."""
 NARROW_BELOW: Final = 5.0
-"""Width of a figure, in, below which its letters are smaller and its lines thinner."""
+"""Figure width (in) below which letters and lines are reduced."""
 NARROW: Final = {
     "axes.labelsize": 7.2,
     "axes.titlesize": 7.2,
@@ -71,12 +71,12 @@ NARROW: Final = {
     "xtick.labelsize": 7.2,
     "ytick.labelsize": 7.2,
 }
-"""On top of it, for a figure of one column; of 7.2 pt, exponents have 5."""
+"""Further settings for one-column figures; exponents of 7.2 pt labels are 5 pt."""
 
 
 @dataclass(frozen=True)
 class Look:
-    """How one series is drawn: `label` in legends, `width` in pt, `marker` at its heel strikes or feet."""
+    """Style of one series: `label` in legends, `width` in pt, `marker` at its heel strikes or feet."""
 
     label: str
     colour: str
@@ -87,7 +87,7 @@ class Look:
 
     @property
     def line(self) -> dict[str, Any]:
-        """What matplotlib is told of its line."""
+        """Line properties for matplotlib."""
         return {"color": self.colour, "linestyle": self.style, "linewidth": self.width}
 
 

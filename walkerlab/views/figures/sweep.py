@@ -1,4 +1,4 @@
-"""Figures of a sweep: lines over one parameter, maps over two, points over each of more."""
+"""Figures of a sweep: lines over one parameter, maps over two, scatter plots over each of more."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -23,11 +23,11 @@ PANEL_HEIGHT: Final = 1.9
 MAP_HEIGHT: Final = 2.9
 MAX_PANELS: Final = 4
 MAX_LINES: Final = 5
-"""Values of a second parameter, each of which is a line; of more, there is a map."""
+"""Maximum number of values of a second parameter to draw as lines; more are drawn as a map."""
 DASHES: Final = ("-", "--", "-.")
 ONE: Final = "largest multiplier 1"
 MAX_SCATTERED: Final = 20_000
-"""Points that a panel shows one by one; of more, evenly chosen ones."""
+"""Points shown individually in a panel; of more, an even selection is shown."""
 PREFERRED: Final[tuple[str, ...]] = (
     "period_s", "last_step_period_s", "spectral_radius", "step_length_m", "last_step_length_m", "steps",
     "slip_per_step_m", "max_penetration_m", "min_normal_force_N", "energy_drift_J", "end_time_s",
@@ -38,7 +38,7 @@ LABELS: Final = {RADIUS: "largest multiplier"}
 
 
 def choose(group: Group, dims: tuple[str, ...], parameters: Sequence[str]) -> list[str]:
-    """The numbers that say most by default: the well-known ones, then others that vary."""
+    """Return the quantities to plot by default: the well-known ones, then others that vary."""
     varying = []
     for name in group.variables:
         if is_number(group, name, dims) and name not in parameters:
@@ -50,7 +50,7 @@ def choose(group: Group, dims: tuple[str, ...], parameters: Sequence[str]) -> li
 
 
 def is_number(group: Group, name: str, dims: tuple[str, ...]) -> bool:
-    """Whether a variable is one number for each point."""
+    """Whether a variable has one number for each point."""
     return name in group.variables and group.variables[name].dims == dims and group[name].dtype.kind in "fib"
 
 
@@ -62,7 +62,7 @@ def illustration(
     names: Sequence[str],
     against: str = "",
 ) -> Illustration:
-    """The figure of some numbers over the parameters, or over one of the numbers.
+    """Plot quantities over the parameters, or over one of the quantities.
 
     parameters  names of the coordinates
     dims        of the points
@@ -81,7 +81,7 @@ def draw(
     against: str,
     _results: Results,
 ) -> Drawn:
-    """Caption: what is drawn over what, how points came out, how gaps are seen, and whether there is a line of one."""
+    """Caption data: what is plotted over what, outcomes, how gaps appear, and whether there is a line at one."""
     a_map = len(dims) == 2 and not against and not in_lines(group, dims)
     if against:
         figure = one_over_another(group, dims, names, against)
@@ -97,7 +97,7 @@ def draw(
 
 
 def one_over_another(group: Group, dims: tuple[str, ...], names: Sequence[str], against: str) -> Figure:
-    """A row for each number, over another one; the points of a single parameter are joined in its order."""
+    """Plot each quantity in a row over another quantity, joining the points of a single parameter in order."""
     x = spread(group, against, dims)
     few = np.unique(np.linspace(0, x.size - 1, min(x.size, MAX_SCATTERED)).astype(int))
     figure, axes = panels(0.8 + PANEL_HEIGHT * len(names), len(names), sharex=True, squeeze=False)
@@ -114,17 +114,17 @@ def one_over_another(group: Group, dims: tuple[str, ...], names: Sequence[str], 
 
 
 def spoken(group: Group, name: str) -> str:
-    """A variable in a sentence."""
+    """Name a variable in a sentence."""
     return group.variables[name].long_name.replace("_", " ")
 
 
 def label(group: Group, name: str) -> str:
-    """A variable's axis: its name in words, and its unit."""
+    """Axis label of a variable, with its unit."""
     return label_of(LABELS.get(name, axis_label(name.rpartition(".")[2])), group.variables[name].units)
 
 
 def scattered(group: Group, parameters: Sequence[str], dims: tuple[str, ...], names: Sequence[str]) -> Figure:
-    """A row for each number, a column for each parameter; lines where the parameter orders the points."""
+    """Plot a row per quantity and a column per parameter, with lines where the parameter orders the points."""
     shown = list(parameters)[:MAX_PANELS]
     rows, columns = len(names), len(shown)
     figure, axes = panels(0.5 + PANEL_HEIGHT * rows, rows, columns, sharex="col", sharey="row", squeeze=False)
@@ -149,7 +149,7 @@ def scattered(group: Group, parameters: Sequence[str], dims: tuple[str, ...], na
 
 
 def spread(group: Group, parameter: str, dims: tuple[str, ...]) -> NDArray[Any]:
-    """A parameter's value at every point, flat."""
+    """Return a parameter's value at every point, flat."""
     values = numbers(group, parameter)
     if group.variables[parameter].dims == dims:
         return values.ravel()
@@ -159,7 +159,7 @@ def spread(group: Group, parameter: str, dims: tuple[str, ...]) -> NDArray[Any]:
 
 
 def finish_panel(axes: Axes, group: Group, parameter: str, name: str, missing: NDArray[Any]) -> None:
-    """What a number's panel over a parameter has besides its points; missing: where there is no answer."""
+    """Add the reference line, gaps and scales to a panel; missing: points without an answer."""
     if name == RADIUS:
         axes.axhline(1.0, color=GREY, linewidth=0.8)
     if missing.size:
@@ -170,19 +170,19 @@ def finish_panel(axes: Axes, group: Group, parameter: str, name: str, missing: N
 
 
 def marked(group: Group, names: Sequence[str]) -> list[Artist]:
-    """Legend entries of what `finish_panel` draws."""
+    """Legend entries for `finish_panel`."""
     gaps = any(np.isnan(group[name].astype(float)).any() for name in names)
     one = [entry(ONE, color=GREY, linewidth=0.8)] if RADIUS in names else []
     return [*one, *([entry("no answer", **MISSING)] if gaps else [])]
 
 
 def in_lines(group: Group, dims: tuple[str, ...]) -> bool:
-    """Whether one of two parameters has so few values that each is a line over the other one."""
+    """Whether one of two parameters has few enough values to draw each as a line."""
     return min(group["outcome"].shape) <= MAX_LINES and len(dims) == 2
 
 
 def lines(group: Group, parameters: Sequence[str], names: Sequence[str]) -> Figure:
-    """A row for each number, over one parameter, and in it a line for each value of the one that has fewer."""
+    """Plot each quantity in a row over one parameter, a line for each value of the shorter one."""
     across, few = sorted(parameters, key=lambda parameter: -group[parameter].size)
     x, values = numbers(group, across), group[few].tolist()
     looks = [{"color": matplotlib.colormaps["viridis"](0.85 * shade), "linestyle": DASHES[place % len(DASHES)]}
@@ -206,14 +206,14 @@ def lines(group: Group, parameters: Sequence[str], names: Sequence[str]) -> Figu
 
 
 def name_ticks(axes: Axes, group: Group, parameter: str, which: str) -> None:
-    """Words where a parameter is no number."""
+    """Label the ticks of a parameter that is not numeric."""
     values = group[parameter]
     if values.dtype.kind == "O" and group.variables[parameter].dims == (parameter,):
         getattr(axes, f"set_{which}ticks")(np.arange(values.size), [str(value) for value in values])
 
 
 def maps(group: Group, parameters: Sequence[str], names: Sequence[str]) -> Figure:
-    """A map for each number, two in a row; the second parameter runs upward."""
+    """Plot a map for each quantity, two per row; the second parameter runs upward."""
     columns = min(2, len(names))
     rows = -(-len(names) // columns)
     figure, axes = panels(0.4 + MAP_HEIGHT * rows, rows, columns, squeeze=False)
@@ -242,6 +242,6 @@ def maps(group: Group, parameters: Sequence[str], names: Sequence[str]) -> Figur
 
 
 def numbers(group: Group, parameter: str) -> NDArray[Any]:
-    """A parameter's values as numbers; places of words."""
+    """Return a parameter's values, or positions if they are words."""
     values = group[parameter]
     return np.arange(values.size, dtype=float) if values.dtype.kind == "O" else values.astype(float)

@@ -1,4 +1,4 @@
-"""The walks of both models: 5, 7 and 10 in time, 9 their limit cycles; and two runs overlaid."""
+"""Figures of both models' walks: 5, 7 and 10 over time, 9 the limit cycles; and two runs overlaid."""
 
 from __future__ import annotations
 
@@ -40,18 +40,18 @@ STEPS_TAKEN_RIGID, STEPS_TAKEN_CONTACT = (
 )
 
 PAPER_STRIDES = 5
-"""Strides that the paper's figures in time show; a longer walk's figures show its first ones."""
+"""Strides shown in the figures over time, as in the paper."""
 STRIKE_WIDTH = 0.6
 
 
 def claims_in(results: Results) -> Sequence[Mapping[str, Any]]:
-    """Return the values that a study claims of this very scene; of any other, figures say nothing of the study."""
+    """Return the values that a study claims for this scene; empty for other scenes."""
     return claims(results[COMPARE_STAGE].summary) if COMPARE_STAGE in results else ()
 
 
 @dataclass(frozen=True, eq=False)
 class Walk:
-    """A walk in time.
+    """A walk over time.
 
     look      of its model
     outcome   how it ended
@@ -70,20 +70,18 @@ class Walk:
     end: int | None = None
 
     def __getitem__(self, name: str) -> NDArray[Any]:
-        """A variable of the trajectory, such as 'angle' (samples, 2)."""
         return self.samples[name][: self.end]
 
     @property
     def time(self) -> Array:
-        """Of the samples (s)."""
+        """Sample times (s)."""
         return self["time"]
 
     def label(self, words: str, name: str) -> str:
-        """A variable on an axis."""
         return label_of(words, self.samples.variables[name].units)
 
     def first(self, strides: int) -> Walk:
-        """Its first strides; the walk itself if it has no more."""
+        """Return the first strides, or the whole walk if it is shorter."""
         strikes = self.strikes[: 2 * strides]
         if strikes.size == self.strikes.size:
             return self
@@ -92,31 +90,30 @@ class Walk:
 
 
 def walks_with(results: Results, names: tuple[str, ...]) -> list[Walk]:
-    """The walks of the models whose trajectories have some variables, the rigid model's first."""
+    """Return the walks whose trajectories have the given variables, the rigid model's first."""
     both = ((RIGID_STAGE, RIGID), (CONTACT_STAGE, CONTACT))
     there = [(stage, look) for stage, look in both if not Need(stage, TRAJECTORY, names, "").missing_in(results, {})]
     return [walk_of(results[stage], look) for stage, look in there]
 
 
 def walk_of(result: Content, look: Look) -> Walk:
-    """The walk that a stage has stored."""
     times = touch_times(result.groups.get(STEPS, Group({})))
     return Walk(look, str(result.summary["outcome"]), times.size, times, result[TRAJECTORY])
 
 
 def touch_times(steps: Group) -> Array:
-    """Times of the heel strikes (s); none if no step was completed."""
+    """Return the times of the heel strikes (s); empty if no step was completed."""
     return steps[TOUCHES] if TOUCHES in steps.variables else np.zeros(0)
 
 
 def shown(walks: list[Walk], strides: int = PAPER_STRIDES) -> tuple[list[Walk], str]:
-    """The walks' first strides, and a phrase on how much that is: '' if it is all, ' (the first 5 strides)' if not."""
+    """Return the walks' first strides, and ' (the first 5 strides)' for the caption if that is not the whole walk."""
     cut = [walk.first(strides) for walk in walks]
     return cut, "" if all(map(is_, cut, walks)) else f" (the first {strides} strides)"
 
 
 def time_axes(rows: int, row_height: float, walks: list[Walk]) -> tuple[Figure, list[Axes]]:
-    """A figure of axes that share the time axis, with the walks' heel strikes across all of them."""
+    """Create axes that share the time axis, with the heel strikes of all walks."""
     figure, column = panels(0.85 + rows * row_height, rows, sharex=True, squeeze=False)
     axes = list(column[:, 0])
     for one in axes:
@@ -134,7 +131,7 @@ def time_axes(rows: int, row_height: float, walks: list[Walk]) -> tuple[Figure, 
 def in_time(
     walks: list[Walk], row_height: float, rows: Sequence[tuple[str, str, int | None, str]]
 ) -> tuple[Figure, list[Axes]]:
-    """Variables of walks in time, below one another.
+    """Plot variables of walks over time, one row each.
 
     rows  for each the variable, what its axis says, its leg (None: it has none), and the title
     """
@@ -147,18 +144,16 @@ def in_time(
 
 
 def line(axes: Axes, x: Array, y: Array, look: Look) -> None:
-    """A series as its look has it."""
     axes.plot(x, y, **look.line, zorder=look.order)
 
 
 def strike_entry(look: Look) -> Artist:
-    """Legend entry of a model's heel strikes: upright, as they are in the figure."""
+    """Legend entry for a model's heel strikes, upright as in the figure."""
     label = f"heel strike, {look.label.split()[0]}"
     return entry(label, color=look.colour, linestyle="none", marker="|", markersize=11.0, markeredgewidth=STRIKE_WIDTH)
 
 
 def legend(figure: Figure, walks: list[Walk], *more: Artist) -> None:
-    """The legend of a figure of walks, above all axes."""
     looks = [walk.look for walk in walks]
     models = [entry(look.label, **look.line) for look in looks]
     add_legend(figure, [*models, *(strike_entry(look) for look in looks), *more])
@@ -169,12 +164,12 @@ FROM_RIGID = Need(TUNE_STAGE, "rigid_start", ("time", "velocity"), "the rigid mo
 
 
 def redoes_the_procedure(results: Results) -> bool:
-    """Whether the walker is the paper's compass, whose legs are links there."""
+    """Whether the walker is the paper's compass, whose legs the paper calls links."""
     return "paper_start" in results[TUNE_STAGE].summary
 
 
 def draw_adjusted(results: Results) -> Drawn:
-    """The rigid model from its start, the contact model from the adjusted one, a row for each link.
+    """Plot the rigid model from its start and the contact model from the adjusted start, a row per link.
 
     It is called as in the paper if the walker is its compass, else by what it does first. Caption: what the start was,
     how much is shown, and whether there are links.
@@ -202,7 +197,7 @@ STATES_IN_TIME = (
 
 
 def draw_states(results: Results) -> Drawn:
-    """A row for each leg's angle and each leg's angular velocity, shaded while the leg carries the walker.
+    """Plot each leg's angle and angular velocity, a row each, shaded while the leg is in stance.
 
     Caption: how much is shown, and how the walks went.
     """
@@ -219,16 +214,16 @@ def draw_states(results: Results) -> Drawn:
 
 
 CYCLES = 20
-"""Strides that are shown: a transient is over by then; more lines would only lie on one another."""
+"""Strides shown: enough for the transient to end; further lines would only overlap."""
 LAST_STRIDE = 2
-"""Steps of it."""
+"""Steps per stride."""
 EARLIER_WIDTH = 0.5
 ARROW_LENGTH = 0.06
-"""Of an arrow on the cycle, in parts of a step's samples."""
+"""Length of an arrow on the cycle, as a fraction of a step's samples."""
 
 
 def draw_cycles(results: Results) -> Drawn:
-    """A phase plane for each leg, both on the same scales; caption: how much is shown, and how the walks went."""
+    """Plot a phase plane for each leg on equal scales; the caption says how much is shown and how the walks ended."""
     walks, extent = shown(walks_with(results, STATES), CYCLES)
     figure, axes = panels(4.2, 1, 2, sharex=True, sharey=True)
     for leg, one in enumerate(axes):
@@ -249,7 +244,7 @@ def draw_cycles(results: Results) -> Drawn:
 
 
 def draw_cycles_of(axes: Axes, walk: Walk, leg: int) -> None:
-    """The last stride as the model's look has it, those before as thin lines under it.
+    """Plot the last stride in the model's style, with earlier strides as thin lines below.
 
     Marked is the state just before each heel strike of the last stride: filled if the leg's own, open if not.
     """
@@ -267,7 +262,7 @@ def draw_cycles_of(axes: Axes, walk: Walk, leg: int) -> None:
 
 
 def show_direction(axes: Axes, walk: Walk, leg: int) -> None:
-    """Arrowheads in the middle of the first swing and the first stance of a leg."""
+    """Draw arrowheads in the middle of the leg's first swing and first stance."""
     carries = walk["stance_leg"] == leg + 1
     for phase in (carries, ~carries):
         rows = np.flatnonzero(phase)
@@ -286,14 +281,14 @@ ENERGIES_IN_TIME = (
     ("mechanical_J", "energy", None, "(c) mechanical energy"),
 )
 SMALLEST_SPAN = 0.005
-"""Of the axis of the mechanical energy, in parts of it: a constant must look constant."""
+"""Minimum span of the mechanical-energy axis relative to the energy: a constant must look constant."""
 MARGIN = 0.08
 FEW = 0.005
-"""Part of the samples that lie within impacts, and so do not set the scale."""
+"""Fraction of samples inside impacts, which do not set the scale."""
 
 
 def draw_energies(results: Results) -> Drawn:
-    """A row for each energy.
+    """Plot each energy in a row.
 
     Caption: how much is shown, the means of the mechanical energy, whether Table 3 has it too, whether there are
     impacts, whether anything drives the walker, and how the walks went.
@@ -329,7 +324,7 @@ RUN_LOOKS: Final[tuple[dict[str, Any], ...]] = (
 
 
 def overlaid(first: Mapping[str, Content], second: Mapping[str, Content], names: tuple[str, str]) -> list[bytes] | None:
-    """SVG and PNG of two runs' walks over one another; None if they have no walk in common that was sampled.
+    """Draw two runs' walks overlaid, as SVG and PNG; None if they share no sampled walk.
 
     names  of the runs
     """
@@ -345,7 +340,7 @@ def overlaid(first: Mapping[str, Content], second: Mapping[str, Content], names:
 
 
 def draw_overlay(both: list[tuple[str, list[Group]]], names: tuple[str, str]) -> Figure:
-    """A column for each stage, with both runs' trajectories; a row for each leg's angle and one for the energy."""
+    """Plot a column per stage with both runs' trajectories: a row for each leg's angle, and one for the energy."""
     rows, columns = len(OVERLAY_ROWS), len(both)
     figure, axes = panels(0.5 + 1.9 * rows, rows, columns, sharex="col", sharey="row", squeeze=False)
     for row, (variable, leg, label) in zip(axes, OVERLAY_ROWS, strict=True):

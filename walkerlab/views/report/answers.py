@@ -1,4 +1,4 @@
-"""What a stage has found, for people: a headline in words, then a table with symbols, units and digits that count.
+"""Terminal answers: for each stage a headline, then tables with symbols, units and significant digits.
 
 A section of the page is imported by the answer that shows a part of it: the others are printed sooner.
 """
@@ -22,14 +22,14 @@ from walkerlab.views.report.words import words
 
 Summary = Mapping[str, Any]
 Answer = Callable[[Summary], Sequence[str | Table]]
-"""Paragraphs, and tables."""
+"""Paragraphs and tables."""
 
 SHOWN = 6
-"""So many of a long row of numbers are shown."""
+"""Values shown at the start of a long row."""
 
 
 def answer(stage: str, summary: Summary) -> list[str]:
-    """The lines for a stage's summary; a stage without words of its own has its keys, long rows cut short.
+    """Return the lines that summarise a stage's result; stages without a text of their own list their keys.
 
     No lines for a stage without a result: that is told as an error.
     """
@@ -39,7 +39,7 @@ def answer(stage: str, summary: Summary) -> list[str]:
 
 
 def laid_out(blocks: Iterable[str | Table]) -> list[str]:
-    """Paragraphs in lines, and tables with an empty line before and after them."""
+    """Wrap paragraphs, and set tables off by empty lines."""
     lines: list[str] = []
     after_table = False
     for block in blocks:
@@ -53,7 +53,7 @@ def laid_out(blocks: Iterable[str | Table]) -> list[str]:
 
 
 def fixedpoint(summary: Summary) -> list[str | Table]:
-    """The gait, under both sets of equations side by side where the digits that are shown tell their gaits apart."""
+    """Describe the gait, with both sets of equations side by side where the digits shown differ."""
     slope = f"{number(summary['slope_rad'])} rad ({number(math.degrees(summary['slope_rad']), 3)}°)"
     if "state" not in summary:
         return [f"No gait on a slope of {slope}: {summary['reason']}."]
@@ -76,12 +76,12 @@ def fixedpoint(summary: Summary) -> list[str | Table]:
 
 
 def told(title: str, key: str, digits: int = 4) -> Column:
-    """A number of a walk as a whole, with its unit."""
+    """Column for a quantity of the whole walk, with its unit."""
     return Column(title, key, lambda value: quantity(value, unit_by_name(key), digits))
 
 
 def energy_lost(dissipated: Mapping[str, float]) -> str:
-    """Where a walk dissipated its energy; empty if nowhere."""
+    """List the energy losses of a walk by cause; empty if there are none."""
     return join_words(
         f"{quantity(lost, 'J', 3)} {CHANNELS.get(name, name)}" for name, lost in dissipated.items() if lost
     )
@@ -106,7 +106,7 @@ OF_THE_WALK = (
 
 
 def walk(model: str, summary: Summary) -> list[str | Table]:
-    """How a model's walk went, step by step."""
+    """Describe a model's walk, step by step."""
     columns = [Column(title, key, numeric=True) for key, title in OF_EACH_STEP.items()]
     head, taken = f"The {model} {comes(summary['steps'], summary['outcome'])}", each_step(summary)
     if summary["step_periods_s"]:
@@ -124,7 +124,7 @@ def walk(model: str, summary: Summary) -> list[str | Table]:
 
 
 def each_step(summary: Summary) -> dict[str, Summary]:
-    """What is known of each step that is shown, by its number; an ellipsis stands for the others."""
+    """Format the steps to be shown, by number; an ellipsis replaces the middle of a long walk."""
     from walkerlab.views.report.sections.walks import of_step
 
     every = {key: found for key in OF_EACH_STEP if (found := summary.get(key))}
@@ -139,14 +139,14 @@ def each_step(summary: Summary) -> dict[str, Summary]:
 
 
 def elided(values: Sequence[Any]) -> list[Any]:
-    """The values, or of a long row the first and the last ones."""
+    """Return the values with '…' for the middle of a long row."""
     if len(values) <= 2 * SHOWN:
         return list(values)
     return [*values[:SHOWN], "…", *values[-2:]]
 
 
 def tune(summary: Summary) -> list[str | Table]:
-    """Whether other initial velocities are needed, and what the contact model's own gait is."""
+    """Say whether the start needs an adjustment, and describe the contact model's own gait."""
     from walkerlab.views.report.sections import adjustment
 
     gait = summary["gait"]
@@ -168,7 +168,7 @@ LAST_STEP = (
 
 
 def last_steps(summary: Summary, errors: Mapping[str, Summary]) -> Table:
-    """The last steps of both models beside the gait's and, with knees, those of both instants of their release.
+    """Compare both models' last steps with the gait's and, with knees, with those for each release instant.
 
     errors  numerical errors of the models' walks, by model: they leave so many digits
     """
@@ -182,7 +182,7 @@ def last_steps(summary: Summary, errors: Mapping[str, Summary]) -> Table:
 
 
 def accuracy(summary: Summary) -> list[str | Table]:
-    """Which method is fastest at which error, a line a scene."""
+    """Name the fastest method for each error level, a row per scene."""
     levels = dict.fromkeys(level for scene in summary["best"].values() for level in scene)
     columns = [Column(f"at {level}", level, lambda method: method or "no method") for level in levels]
     scenes = [{"scene": scene, **best} for scene, best in summary["best"].items()]
@@ -191,7 +191,7 @@ def accuracy(summary: Summary) -> list[str | Table]:
 
 
 def continuation(summary: Summary) -> list[str | Table]:
-    """What there is to say of the families, and every bifurcation; branches and exponents are in `show`."""
+    """Summarise the families and list every bifurcation; `show` has branches and exponents."""
     from walkerlab.views.report.sections import families
 
     branches = count(len(summary["branches"]), "branch", "branches")
@@ -200,7 +200,7 @@ def continuation(summary: Summary) -> list[str | Table]:
 
 
 def starts(summary: Summary) -> list[str | Table]:
-    """How much walks, and to what."""
+    """Report the share of starts that walk, and the attractors."""
     from walkerlab.views.report.sections.families import attractors
 
     told = (words("basin.shares", summary), *words.parts("basin.grounds", summary))
@@ -208,14 +208,13 @@ def starts(summary: Summary) -> list[str | Table]:
 
 
 def stood(summary: Summary) -> list[str | Table]:
-    """What the gait withstands, and what moves it."""
     from walkerlab.views.report.sections import robustness
 
     return [*robustness.findings(summary), *robustness.tables(summary)]
 
 
 def best_walker(summary: Summary) -> list[str | Table]:
-    """Where the optimum lies, and the config that has it."""
+    """Describe the optimum, and name its config file."""
     from walkerlab.views.report.sections.robustness import designed
 
     file = summary.get("config")
@@ -224,7 +223,7 @@ def best_walker(summary: Summary) -> list[str | Table]:
 
 
 def engines(summary: Summary) -> list[str | Table]:
-    """What was concluded of each scene; every run is in `show`."""
+    """Report the conclusions for each scene; `show` has every run."""
     told = [
         f"{scene}, {experiment}: {text}"
         for scene, concluded in summary["conclusions"].items()
@@ -236,13 +235,11 @@ def engines(summary: Summary) -> list[str | Table]:
 
 
 def plot(summary: Summary) -> list[str | Table]:
-    """The figures."""
     figures = summary["figures"]
     return [f"{count(len(figures), 'figure')} drawn.", table("", [Column("", "svg"), Column("", "title")], figures)]
 
 
 def report(summary: Summary) -> list[str | Table]:
-    """What is on the page."""
     return [f"The page has {count(len(summary['figures']), 'figure')} and {count(len(summary['tables']), 'table')}."]
 
 
@@ -267,7 +264,7 @@ ANSWERS: dict[str, Answer] = {
 
 
 def verdict(results: Mapping[str, Summary]) -> list[str]:
-    """What a whole run has found, in three paragraphs at most: the gait, both walks, and what of the paper holds."""
+    """Summarise a whole run in three paragraphs at most: gait, walks, and verdicts on the paper."""
     walked = [(model.lower(), results[stage]) for stage, model in MODELS.items() if stage in results]
     said = "; the ".join(f"{model} {comes(one['steps'], one['outcome'])}" for model, one in walked)
     judged = ("compare",) if "verdicts" in results.get("compare", {}) else ()

@@ -1,4 +1,4 @@
-"""What a section is made of; texts are plain text, and become HTML in the template only."""
+"""Building blocks of a section. Texts are plain; the templates turn them into HTML."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from walkerlab.views.report.tables import Tone
 from walkerlab.views.report.tracks import Track
 
 MAIN, PAPER, CASES, COSTS = "report.html", "report-paper.html", "report-stability.html", "report-accuracy.html"
-"""The pages: the report itself, and what is one link away."""
+"""The report and the pages linked from it."""
 
 
 class PageBlock(Protocol):
@@ -24,20 +24,19 @@ class PageBlock(Protocol):
 
 @dataclass(frozen=True)
 class Paragraph:
-    """Running text; a tone sets it off as a statement, or as what stands there until a result is computed."""
+    """Running text; its tone marks it as a statement, or as a placeholder for a pending result."""
 
     template: ClassVar[str] = "paragraph"
     text: str
     tone: Tone | Literal["waiting"] = "plain"
 
     def __bool__(self) -> bool:
-        """Whether it says anything."""
         return bool(self.text)
 
 
 @dataclass(frozen=True)
 class Statements:
-    """Statements one after another, each with what it is about and how it came out."""
+    """Statements in a row, each with a subject and a verdict."""
 
     template: ClassVar[str] = "statements"
     items: tuple[Statement, ...]
@@ -61,7 +60,7 @@ class Statement:
 
 @dataclass(frozen=True)
 class Shares:
-    """Counts that make up a whole, as a bar with its key."""
+    """Counts that make up a whole, as a bar with a key."""
 
     template: ClassVar[str] = "shares"
     title: str
@@ -70,7 +69,7 @@ class Shares:
 
 @dataclass(frozen=True)
 class Picture:
-    """A drawn figure, embedded; a gallery shows it.
+    """An embedded figure in a gallery.
 
     title    what it shows, in a line
     caption  how to read it
@@ -96,7 +95,7 @@ class Picture:
 
 @dataclass(frozen=True)
 class Gallery:
-    """Figures in columns, large enough to be read; a click enlarges one."""
+    """Figures in columns; a click enlarges one."""
 
     template: ClassVar[str] = "gallery"
     pictures: tuple[Picture, ...]
@@ -104,7 +103,7 @@ class Gallery:
 
 @dataclass(frozen=True)
 class Cards:
-    """Pages that are one link away: file, title, and what is found there in a sentence."""
+    """Links to other pages: file, title, and a one-sentence summary."""
 
     template: ClassVar[str] = "cards"
     items: tuple[tuple[str, str, str], ...]
@@ -112,7 +111,7 @@ class Cards:
 
 @dataclass(frozen=True)
 class Terms:
-    """Words and what they mean."""
+    """Terms and their meanings."""
 
     template: ClassVar[str] = "terms"
     meanings: Mapping[str, str]
@@ -120,24 +119,23 @@ class Terms:
 
 @dataclass(frozen=True)
 class Code:
-    """Text to be copied."""
+    """Text for copying."""
 
     template: ClassVar[str] = "code"
     title: str
     text: str
 
     def __bool__(self) -> bool:
-        """Whether there is any."""
         return bool(self.text)
 
 
 Pad = tuple[float, float, int]
-"""Where a pad begins and ends along the slope (m), and the leg in whose lane it lies."""
+"""Start and end of a pad along the slope (m), and the leg in whose lane it lies."""
 
 
 @dataclass(frozen=True)
 class Walker:
-    """How one walker of a player moves, and how it is drawn.
+    """Motion and style of one walker in a player.
 
     track     its motion, thinned
     strikes   times of its heel strikes, s
@@ -155,7 +153,7 @@ class Walker:
 
     @property
     def meta(self) -> dict[str, object]:
-        """What a script has to know to read the numbers."""
+        """Metadata with which the script decodes the samples."""
         channels, samples = tuple(self.track.channels), int(self.track["t"].size)
         return {
             "name": self.name, "style": self.style, "channels": channels, "samples": samples, "strikes": self.strikes,
@@ -165,7 +163,7 @@ class Walker:
 
 @dataclass(frozen=True)
 class Player:
-    """The walk, moving: stills on paper and without scripts.
+    """The animated walk; shown as stills in print and without scripts.
 
     alt               what is seen
     ordinary_force   a force whose arrow is of ordinary length
@@ -190,19 +188,18 @@ class Player:
 
     @property
     def slope_deg(self) -> float:
-        """The slope in degrees."""
         return round(math.degrees(self.slope_rad), 3)
 
     @property
     def scene(self) -> dict[str, object]:
-        """What a script has to know of the scene."""
+        """The scene as the script needs it."""
         names = ("slope_rad", "leg_m", "foot_radius_m", "torso_m", "ordinary_force", "closeup_m", "pads", "ground")
         return {name: getattr(self, name) for name in names}
 
 
 @dataclass(frozen=True)
 class GaitMark:
-    """A point of a diagram whose gait a player can show.
+    """A point of a diagram whose gait the player can show.
 
     x, y    where its mark is, in the diagram's own units
     walker  how it moves; its name says what it is
@@ -257,6 +254,6 @@ class Section:
     def of(
         cls, anchor: str, title: str, blocks: Iterable[PageBlock | None], finding: str = "", page: str = MAIN
     ) -> Section | None:
-        """A section of those blocks that there are and that say something; None if there are none."""
+        """Create a section of the non-empty blocks; None if there are none."""
         said = tuple(block for block in blocks if block)
         return cls(anchor, title, said, finding, page) if said else None

@@ -1,4 +1,4 @@
-"""A gait's table, for page and terminal alike: its fixed point, multipliers and what a step takes."""
+"""Table of a gait's fixed point, multipliers and step quantities, for page and terminal."""
 
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -11,13 +11,13 @@ from walkerlab.views.report.tables import Column, Table, measured, side_by_side
 
 COORDINATE = re.compile(r"(?P<rate>d)?theta(?:_(?P<index>\d+))?(?:_(?P<body>[a-z]\w*))?")
 STATE = ("theta_1", "theta_2", "dtheta_1", "dtheta_2")
-"""The coordinates of a compass; results of other walkers name theirs."""
+"""Coordinates of a compass; results of other walkers name theirs."""
 SETS = {"as-printed": "as printed", "corrected": "corrected"}
-"""The sets of equations, as they are stored and as they are called."""
+"""Sets of equations: stored name and display name."""
 
 
 def gait_table(sets: Mapping[str, Mapping[str, Any]], names: Sequence[str], note: str = "") -> Table:
-    """Fixed point and multipliers, the sets of equations side by side.
+    """Tabulate fixed points and multipliers, the sets of equations side by side.
 
     names  of the coordinates of a state
     """
@@ -54,15 +54,15 @@ def gait_table(sets: Mapping[str, Mapping[str, Any]], names: Sequence[str], note
 
 
 GIVEN_BY = {"gravity": "gravity", "push_off": "the push-off", "hip": "the hip"}
-"""What gives a step its work, by the names under which it is stored."""
+"""Sources of a step's work: stored name and display name."""
 
 
 ROUNDING = 1e-12
-"""Part of the largest work that counts as none."""
+"""Works below this fraction of the largest are rounding errors."""
 
 
 def works(written: Callable[[Any], str]) -> Iterator[Column]:
-    """The work that each gives a step, of those that give more than rounding."""
+    """Yield a column for each source of work, skipping rounding errors."""
     for name, giver in GIVEN_BY.items():
 
         def given(record: Mapping[str, Any], name: str = name) -> float | None:
@@ -73,17 +73,16 @@ def works(written: Callable[[Any], str]) -> Iterator[Column]:
 
 
 def state_at(place: int, gait: Mapping[str, Any]) -> float:
-    """A coordinate of a gait's fixed point."""
     return float(gait["state"][place])
 
 
 def coordinate(name: str) -> str:
-    """A coordinate with its unit."""
+    """Return a coordinate's symbol and unit."""
     return f"{symbol(name)} ({'rad/s' if name.startswith('d') else 'rad'})"
 
 
 def symbol(name: str) -> str:
-    """A coordinate's sign, and the body that it is of: 'dtheta_1_shank' becomes 'θ̇₁, shank'."""
+    """Return a coordinate's symbol and its body: 'dtheta_1_shank' becomes 'θ̇₁, shank'."""
     found = COORDINATE.fullmatch(name)
     if found is None:
         return name
@@ -93,13 +92,13 @@ def symbol(name: str) -> str:
 
 
 def multiplier(place: int, gait: Mapping[str, Any]) -> str:
-    """A multiplier of a gait; a dash if it has fewer."""
+    """Format one multiplier of a gait; a dash if it has fewer."""
     found = gait["multipliers"]
     return complex_number(*found[place]) if place < len(found) else NONE
 
 
 def complex_number(real: float, imaginary: float) -> str:
-    """A multiplier, as 0.3626 + 0.4603i."""
+    """Format a multiplier, as in 0.3626 + 0.4603i."""
     if imaginary == 0:
         return fixed(real, 4)
     return f"{fixed(real, 4)} {'+' if imaginary > 0 else MINUS} {fixed(abs(imaginary), 4)}i"

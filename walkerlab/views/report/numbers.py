@@ -1,4 +1,4 @@
-"""Numbers as the report prints them."""
+"""Number formats of the report."""
 
 import math
 from collections.abc import Iterable
@@ -8,17 +8,17 @@ from walkerlab.views.report.symbols import SUPERSCRIPTS
 MINUS = "−"
 NONE = "–"
 SPACE = "\u00a0"
-"""Between a number and what belongs to it: no line ends there."""
+"""No-break space between a number and its unit."""
 LEAST_LENGTH_M = 1e-9
-"""Walkers are centimetres to metres tall, and walks are right to some 1e-10 of that: less is no length."""
+"""Lengths below this are zero: walkers are centimetres to metres tall, and walks are accurate to 1e-10 of that."""
 PLAIN_FROM, PLAIN_BELOW = 1e-4, 1e6
-"""Magnitudes that are written without a power of ten."""
+"""Range of magnitudes written without a power of ten."""
 MAX_DECIMALS, USUAL_DECIMALS = 6, 4
-"""Of the periods (s) and lengths (m) of steps: at most, and where their error is unknown."""
+"""Decimals of step periods (s) and lengths (m): maximum, and default if the error is unknown."""
 
 
 def number(value: float | None, digits: int = 5) -> str:
-    """A number with `digits` significant digits, trailing zeros dropped; a dash for none."""
+    """Format with `digits` significant digits, without trailing zeros; a dash for None."""
     if value is None or not math.isfinite(value):
         return NONE
     if value != 0 and not PLAIN_FROM <= abs(value) < PLAIN_BELOW:
@@ -28,7 +28,7 @@ def number(value: float | None, digits: int = 5) -> str:
 
 
 def fixed(value: float | None, decimals: int) -> str:
-    """A number with so many decimals, for columns; a dash for none."""
+    """Format with a fixed number of decimals, for columns; a dash for None."""
     if value is None or not math.isfinite(value):
         return NONE
     text = f"{value:.{decimals}f}"
@@ -36,14 +36,14 @@ def fixed(value: float | None, decimals: int) -> str:
 
 
 def decimals_left(error: float | None) -> int:
-    """Decimals of a number that its error, if it is known, leaves: it is at most half a unit of the last one."""
+    """Return how many decimals an error leaves: at most half a unit of the last one."""
     if error is None:
         return USUAL_DECIMALS
     return max(0, min(MAX_DECIMALS, math.floor(-math.log10(2.0 * error)))) if error else MAX_DECIMALS
 
 
 def power_of_ten(value: float, digits: int = 3) -> str:
-    """A number as in 1.2 × 10⁻⁹ or 10⁻⁹."""
+    """Format as in 1.2 × 10⁻⁹ or 10⁻⁹."""
     mantissa, _, exponent = f"{value:.{digits - 1}e}".partition("e")
     mantissa = mantissa.rstrip("0").rstrip(".") if "." in mantissa else mantissa
     ten = f"10{str(int(exponent)).translate(SUPERSCRIPTS)}"
@@ -51,18 +51,18 @@ def power_of_ten(value: float, digits: int = 3) -> str:
 
 
 def quantity(value: float | None, unit: str, digits: int = 5) -> str:
-    """A number with its unit, as in 0.70365 s, on one line."""
+    """Format with a unit, as in 0.70365 s, without a line break."""
     text = number(value, digits)
     return text if text == NONE or unit in ("", "1") else f"{text}{SPACE}{unit}"
 
 
 def told_apart(value_m: float) -> float:
-    """A length (m); zero if it is below rounding and the solver's tolerance."""
+    """Return a length (m), or zero if it is below rounding and solver tolerance."""
     return value_m if abs(value_m) >= LEAST_LENGTH_M else 0.0
 
 
 def length(value_m: float | None, digits: int = 4) -> str:
-    """A length in the unit in which it is easiest read: m, mm or µm; 0 m below `LEAST_LENGTH_M`."""
+    """Format a length in m, mm or µm, whichever reads best; 0 m below `LEAST_LENGTH_M`."""
     if value_m is None or not math.isfinite(value_m):
         return NONE
     value_m = told_apart(value_m)
@@ -75,12 +75,12 @@ def length(value_m: float | None, digits: int = 4) -> str:
 
 
 def whole(value: int | None) -> str:
-    """An integer with its thousands set apart, as in 27,087; a dash for none."""
+    """Format an integer with thousands separators, as in 27,087; a dash for None."""
     return NONE if value is None else f"{value:,}"
 
 
 def span(values: Iterable[float], unit: str, digits: int = 5) -> str:
-    """Equal numbers as one, others as 'least to largest', with their unit."""
+    """Format a range as 'minimum to maximum' with its unit; equal values as one."""
     ordered = sorted(values)
     if not ordered:
         return NONE
@@ -90,5 +90,5 @@ def span(values: Iterable[float], unit: str, digits: int = 5) -> str:
 
 
 def count(how_many: int, what: str, several: str = "") -> str:
-    """A number of things, as in '1 step' or '10 steps'."""
+    """Format a count, as in '1 step' or '10 steps'."""
     return f"{how_many} {what if how_many == 1 else several or what + 's'}"

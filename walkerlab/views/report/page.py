@@ -1,4 +1,4 @@
-"""Pages: sections set in the template, style and script included, so that the file needs nothing but itself."""
+"""Renders sections to self-contained HTML pages that include style and script."""
 
 import base64
 import hashlib
@@ -18,7 +18,7 @@ from walkerlab.views.report.symbols import CARET, POWER, power, raised
 TEMPLATES = Path(__file__).parent / "templates"
 COMMENT = re.compile(r"^ *//.*\n", re.MULTILINE)
 TYPED = re.compile(r"`([^`]*)`")
-"""What is to be typed, or stands in a file, as texts mark it."""
+"""Code in a text, between backticks."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class Page:
 
 
 def render(page: Page) -> str:
-    """The HTML of a page.
+    """Render a page to HTML.
 
     Raises ValueError if two sections have one anchor.
     """
@@ -58,12 +58,12 @@ def render(page: Page) -> str:
 
 
 def digest_of(script: str) -> str:
-    """What a page's header knows the one script by that may run."""
+    """Return the digest by which the page's header allows its script to run."""
     return base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
 
 
 def environment(run: str = "") -> Environment:
-    """Where templates are found, that every text is escaped, and which run it is about."""
+    """Create the template environment: every text is escaped, and commands name the run."""
     made = Environment(
         loader=FileSystemLoader(TEMPLATES),
         autoescape=True,
@@ -77,7 +77,7 @@ def environment(run: str = "") -> Environment:
 
 
 def said(text: str) -> Markup:
-    """A text with what is to be typed set as code, and powers of ten written in one way."""
+    """Convert a text to markup: code between backticks, and powers of ten in one notation."""
     parts = TYPED.split(text)
     set_apart = [
         Markup("<code>%s</code>") % part if index % 2 else escape(CARET.sub(raised, POWER.sub(power, part)))
@@ -87,5 +87,5 @@ def said(text: str) -> Markup:
 
 
 def source(name: str) -> str:
-    """Read a file that goes into the page, without its lines of comment."""
+    """Read a file to embed in the page, without comment lines."""
     return COMMENT.sub("", (TEMPLATES / name).read_text(encoding="utf-8")).strip()

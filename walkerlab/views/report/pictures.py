@@ -1,4 +1,4 @@
-"""Drawn figures as a part of the page: their shapes and texts, small, in colours that the page decides."""
+"""Embeds drawn figures in the page: shapes and texts, compact, in colours that the page chooses."""
 
 import base64
 import re
@@ -13,13 +13,13 @@ from walkerlab.pipeline.store.content import Content
 from walkerlab.views.report.blocks import CASES, COSTS, MAIN, Picture
 
 PAGES = {"accuracy": COSTS, "stability": CASES}
-"""Where figures go whose names begin so; all others are on the report itself."""
+"""Pages of figures by the beginning of their name; all others are on the report itself."""
 TYPES = {".svg": "image/svg+xml", ".png": "image/png"}
 VIEW_BOX = re.compile(rb'\bviewBox="0 0 ([\d.]+) ([\d.]+)"')
 
 
 def pictures(stored: Mapping[str, Content], folder: Path, *, numbered: bool = True) -> tuple[Picture, ...]:
-    """Every figure that `plot` lists, in its order.
+    """Embed every figure listed by `plot`, in its order.
 
     folder    of the run, which the figures' paths are relative to
     numbered  whether the paper's numbers mean something to the reader
@@ -32,7 +32,7 @@ def pictures(stored: Mapping[str, Content], folder: Path, *, numbered: bool = Tr
 
 
 def picture(figure: Mapping[str, Any], folder: Path, kind: str = ".svg", numbered: bool = False) -> Picture:
-    """A figure as a part of the page.
+    """Embed one figure.
 
     figure    its words and its files, which are relative to the folder
     kind      the file that is embedded: a drawing becomes a part of the page, pixels an image
@@ -67,11 +67,11 @@ def picture(figure: Mapping[str, Any], folder: Path, kind: str = ".svg", numbere
 
 
 MAX_BYTES = 1_400_000
-"""Of all images together; the largest drawings are embedded as pixels until they fit."""
+"""Limit for all images together; the largest drawings are embedded as pixels until they fit."""
 
 
 def fitting(drawings: Sequence[tuple[Path, Path]], most: int = MAX_BYTES) -> list[Path]:
-    """For each (SVG, PNG) the file to embed: the SVG, unless they take too much room together.
+    """Choose the file to embed for each (SVG, PNG): the SVG, unless all together exceed `most` bytes.
 
     Raises FileNotFoundError if one is not there.
     """
@@ -91,7 +91,7 @@ SHAPES = frozenset(
     {"svg", "g", "path", "rect", "circle", "line", "polyline", "polygon", "text", "tspan", "use", "defs", "clipPath"}
     | {"pattern", "image"}
 )
-"""Elements that are taken over, with these attributes; nothing that runs or fetches is among them."""
+"""Elements and attributes that are copied; none of them runs or fetches anything."""
 ATTRIBUTES = frozenset(
     {"viewBox", "d", "x", "y", "x1", "y1", "x2", "y2", "cx", "cy", "r", "width", "height", "points", "transform"}
     | {"style", "id", "clip-path", "preserveAspectRatio", "patternUnits", "fill", "stroke"}
@@ -107,7 +107,7 @@ ROLES = {
     "#cc79a7": "--leg-2",
     "#d55e00": "--fig-red",
 }
-"""Colours of the drawings that the page may change, for the dark, and what they are called there."""
+"""Colours in drawings that the page may replace (dark mode), with their CSS variables."""
 COLOUR = re.compile(r"#[0-9a-fA-F]{6}\b")
 DIGITS = re.compile(r"(-?\d+\.\d{2})\d+")
 BLANKS = re.compile(r"\s+")
@@ -115,7 +115,7 @@ FETCHES = re.compile(r"url\((?!#)|@import|expression|javascript:", re.IGNORECASE
 
 
 def inline(file: Path, alt: str) -> Markup:
-    """The drawing of an SVG file as markup, described by `alt`.
+    """Return the drawing of an SVG file as markup, described by `alt`.
 
     Raises FileNotFoundError if it is not there, ParseError if it is no XML.
     """
@@ -129,7 +129,7 @@ def inline(file: Path, alt: str) -> Markup:
 
 
 def markup(element: ET.Element, used: set[str]) -> Markup:
-    """An element with what it holds; nothing for one that has no place in a page.
+    """Copy an element and its children; nothing for elements that the page does not allow.
 
     used  the ids that something refers to: others are left out
     """
@@ -151,12 +151,12 @@ def markup(element: ET.Element, used: set[str]) -> Markup:
 
 
 def spoken(text: str | None, name: str) -> Markup:
-    """What an element says, if it is one that says something."""
+    """Return the text of an element that may hold text."""
     return escape(text.strip()) if text and name in ("text", "tspan") else Markup("")
 
 
 def short(name: str, value: str) -> str:
-    """A value in fewer characters: places to a hundredth of a point, colours by their role."""
+    """Shorten an attribute: coordinates to a hundredth of a point, colours to CSS variables."""
     if name in ("id", "href", "clip-path"):
         return value.strip()
     if name == "style":
@@ -165,6 +165,6 @@ def short(name: str, value: str) -> str:
 
 
 def role(found: re.Match[str]) -> str:
-    """A colour by its role on the page; itself if it has none."""
+    """Return the CSS variable of a colour, or the colour itself."""
     name = ROLES.get(found[0].lower())
     return found[0] if name is None else f"var({name})"

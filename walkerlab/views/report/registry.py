@@ -1,7 +1,7 @@
-"""The sections of the report in their order: an entry for each, those that evidence registers among them.
+"""The sections of the report in order, including those that evidence registers.
 
-A section is a function that makes a `Section` of the results, or None if there is nothing to show. It finds what it
-needs with `Results.summary(stage)` and `Results.group(stage, path)`, which give None for a stage that did not run.
+Each entry is a function that builds a `Section` from the results, or returns None if it has nothing to show. It reads
+`Results.summary(stage)` (empty if the stage did not run) and `Results.group(stage, path)` (then None).
 """
 
 import math
@@ -57,7 +57,7 @@ SECTIONS: tuple[SectionMaker, ...] = (
 
 
 def pages_of(results: Results, run: str) -> tuple[Page, ...]:
-    """The report and the pages beside it that there is something for.
+    """Build the report and those further pages that have content.
 
     run  name of the run's folder
     """
@@ -78,7 +78,7 @@ def pages_of(results: Results, run: str) -> tuple[Page, ...]:
 
 
 def lead(config: Config, run: str) -> str:
-    """What was run: the walker, its slope and what it was to do."""
+    """Describe what was run: the walker, its slope and its task."""
     equations = config.equations if is_passive_compass(config) else ""
     change = run.partition("@")[2].replace(",", ", ")
     degrees, alone = math.degrees(config.slope_rad), why_rigid_alone(config.walker)
@@ -87,5 +87,4 @@ def lead(config: Config, run: str) -> str:
 
 
 def sections_of(results: Results, makers: tuple[SectionMaker, ...] = SECTIONS) -> tuple[Section, ...]:
-    """The sections that these results have something for."""
     return tuple(section for make in makers if (section := make(results)) is not None)

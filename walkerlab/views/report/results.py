@@ -1,4 +1,4 @@
-"""What a section may draw on: the stored results of a run, the figures drawn from them, and what is missing."""
+"""The input of all sections: a run's stored results, its figures, and what is missing."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -33,21 +33,21 @@ class Results:
 
     @property
     def departures(self) -> Sequence[str] | None:
-        """How the scene departs from the paper's: not at all if empty; None if nobody compared them."""
+        """Differences between this scene and the paper's; empty if there are none, None if not compared."""
         found: Sequence[str] | None = self.summary("compare").get("departures")
         return found
 
     @property
     def claims(self) -> Sequence[Mapping[str, Any]]:
-        """Judged values that a study claims of this very scene, whose numbering its reader knows; none of another."""
+        """Judged values that a study claims for this scene; empty for other scenes."""
         return claims(self.summary("compare"))
 
     def summary(self, stage: str) -> Mapping[str, Any]:
-        """The summary of a stage's result; empty if there is none."""
+        """Return the summary of a stage's result; empty if there is none."""
         return self.stored[stage].summary if stage in self.stored else {}
 
     def group(self, stage: str, path: str) -> Group | None:
-        """A group of a stage's result; None if there is no such result or group."""
+        """Return a group of a stage's result, or None."""
         result = self.stored.get(stage)
         return None if result is None else result.groups.get(path)
 
@@ -56,7 +56,7 @@ SectionMaker = Callable[[Results], Section | None]
 
 
 def of_stage(stage: str, needed: str = "") -> Callable[[Callable[..., Section | None]], SectionMaker]:
-    """A section made of a stage's summary, which it is given, too; none without a result.
+    """Make a section from a stage's summary, passed as a second argument; None without a result.
 
     needed  a key of the summary without which there is nothing to say
     """

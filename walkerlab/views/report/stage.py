@@ -1,4 +1,4 @@
-"""The report: HTML pages of everything that there is a result of."""
+"""The `report` stage: HTML pages of all available results."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -58,7 +58,7 @@ def write_pages(
     left_out: Sequence[LeftOut] = (),
     pending: Sequence[str] = (),
 ) -> tuple[tuple[Page, ...], Results]:
-    """Write the pages of whatever results there are, also while others are being computed.
+    """Write pages of the available results; also called while other results are being computed.
 
     inputs    results by stage: those that there are
     left_out  the stages without a result, and why
@@ -81,7 +81,7 @@ def write_pages(
 
 
 def has_failed(config: Config, name: str, left_out: set[str]) -> bool:
-    """Whether a stage without a result was tried itself, and not given up for want of another: it has no answer."""
+    """Whether a stage was tried and failed itself, rather than lacking another stage's result."""
     if name not in PIPELINE["report"].inputs(config) or PIPELINE[name].why_unsuited(config) is not None:
         return False
     return left_out.isdisjoint(PIPELINE[name].inputs(config))

@@ -1,4 +1,4 @@
-"""Formulas written in plain letters, as results hold them, in the signs that a reader expects."""
+"""Converts formulas in plain letters, as results hold them, to mathematical symbols."""
 
 import re
 
@@ -8,20 +8,19 @@ SUPERSCRIPTS = str.maketrans("0123456789+-en", "⁰¹²³⁴⁵⁶⁷⁸⁹⁺�
 DOT = "\u0307"
 
 POWER = re.compile(r"(?<![\w.])(?<!\w-)(\d+(?:\.\d+)?)e([-+]?)0*(\d+)\b")
-"""A number as programs print it, such as 1.1e-09; not the end of a name such as k-1e8."""
+"""A number in exponent notation such as 1.1e-09, but not the end of a name such as k-1e8."""
 
 
 CARET = re.compile(r"(?<=\d)\^(-?\d+)\b")
-"""A power as it is typed, such as 10^-4."""
+"""A typed power, such as 10^-4."""
 
 
 def raised(found: re.Match[str]) -> str:
-    """An exponent set high."""
     return found[1].translate(SUPERSCRIPTS)
 
 
 def power(found: re.Match[str]) -> str:
-    """A power of ten as it is written by hand: 10⁻⁴, or 1.1 × 10⁻⁹."""
+    """Format a power of ten as 10⁻⁴, or 1.1 × 10⁻⁹."""
     ten = f"10{f'{found[2]}{found[3]}'.strip('+').translate(SUPERSCRIPTS)}"
     return ten if found[1] == "1" else f"{found[1]} × {ten}"
 
@@ -41,11 +40,11 @@ RULES = (
     (re.compile(r"\+-"), lambda _: "±"),
     (re.compile(r"(?<![\w)\]-])-(?=[\w.(])|(?<= )-(?= )"), lambda _: "−"),
 )
-"""Patterns and what they become, applied in this order."""
+"""Patterns and replacements, applied in this order."""
 
 
 def in_signs(text: str) -> str:
-    """The text with Greek letters, subscripts, exponents and minus signs for their plain spellings.
+    """Replace plain spellings by Greek letters, subscripts, exponents and minus signs.
 
     'dtheta_1 = -0.60 rad/s^2' becomes 'θ̇₁ = −0.60 rad/s²'; hyphens and ranges stay what they are.
     """

@@ -1,4 +1,4 @@
-"""One description of a table, for page, terminal, CSV and TeX: its columns, and the records whose values they show.
+"""Tables for page, terminal, CSV and TeX: one description of columns and records for all formats.
 
 `tex` writes it for LaTeX.
 """
@@ -17,14 +17,14 @@ from walkerlab.views.report.numbers import NONE, number
 Tone = Literal["plain", "good", "fair", "bad", "given"]
 PREFIXES: Final = {"": 1.0, "m": 1e3, "µ": 1e6}
 LONGEST_CELL: Final = 100
-"""Letters; a column of records with longer cells holds sentences."""
+"""Characters; a column with longer cells is treated as text."""
 BARE = re.compile(r"[-−+\d.e ×⁰¹²³⁴⁵⁶⁷⁸⁹⁻\xa0\u2009\u202f]+|-?(inf|nan)")
 """A number without unit or words."""
 
 
 @dataclass(frozen=True)
 class Cell:
-    """A table's cell.
+    """A cell of a table.
 
     tone   sets the text as a badge
     value  what the text was written from; None for none
@@ -36,7 +36,7 @@ class Cell:
 
     @property
     def datum(self) -> Any:
-        """What stands for it in a file: the number that it was written from, or the text; None for nothing."""
+        """The cell's value in a file: the number behind the text, or the text; None if empty."""
         if isinstance(self.value, int | float) and BARE.fullmatch(self.text):
             return self.value
         plain = self.value if isinstance(self.value, str) else self.text
@@ -44,7 +44,6 @@ class Cell:
 
 
 def plainly(value: Any) -> str:
-    """A text as it is, a truth value as yes or no, a dash for None."""
     if isinstance(value, bool):
         return "yes" if value else "no"
     return NONE if value is None else str(value)
@@ -52,7 +51,7 @@ def plainly(value: Any) -> str:
 
 @dataclass(frozen=True)
 class Column:
-    """What a table shows of each record: one of its columns or, where records stand side by side, one of its rows.
+    """Describes how to show one value of each record: a column or, in `side_by_side`, a row.
 
     title    its head, with the unit
     of       key of a record's value, `a/b` of one in a record within; or a function of the record; without one a record
@@ -69,7 +68,7 @@ class Column:
     wide: bool = False
 
     def value(self, record: Any, place: int = 0) -> Any:
-        """What a record has here; None if nothing."""
+        """Return a record's value for this column, or None."""
         if self.of is None:
             return record[place]
         if not isinstance(self.of, str):
@@ -80,7 +79,6 @@ class Column:
         return record.get(key)
 
     def cell(self, record: Any, place: int = 0) -> Cell:
-        """A record's cell in the column at this place."""
         value = self.value(record, place)
         written = value if isinstance(value, Cell) else self.written(value)
         return written if isinstance(written, Cell) else Cell(written, value=value)
@@ -89,7 +87,7 @@ class Column:
 def measured(
     words: str, key: str, written: Callable[[Any], str | Cell] = number, *, labels: type | None = None, prefix: str = ""
 ) -> Column:
-    """A column of numbers in a multiple of their unit: that of the key's label in a class of rows, or of its ending."""
+    """Column of numbers in a multiple of their unit, taken from the label of the key or from its suffix."""
     unit = unit_by_name(key) if labels is None else labels_of(labels)[key].unit
     factor = PREFIXES[prefix]
 
@@ -119,7 +117,6 @@ class Table:
     by: str = ""
 
     def __bool__(self) -> bool:
-        """Whether it has a row."""
         return any(self.groups.values())
 
 
@@ -132,7 +129,7 @@ def table(
     note: str = "",
     by: str = "",
 ) -> Table:
-    """A table with a row for each record.
+    """Build a table with a row for each record.
 
     records  all under one head, or by the title of the group in which they stand
 
@@ -150,7 +147,7 @@ def table(
 
 
 def grouped(records: Iterable[Mapping[str, Any]], *keys: str) -> dict[str, list[Mapping[str, Any]]]:
-    """Records by what they have under some keys, in words, in the order in which that comes first."""
+    """Group records by their values of some keys, in order of first appearance."""
     found: dict[str, list[Mapping[str, Any]]] = {}
     for record in records:
         found.setdefault(" ".join(str(record[key]) for key in keys), []).append(record)
@@ -166,7 +163,7 @@ def side_by_side(
     numeric: bool = True,
     note: str = "",
 ) -> Table:
-    """A table with a column for each record, and a row for each line that some record has a value for."""
+    """Build a table with a column for each record, and a row for each line that any record has a value for."""
     rows = []
     for line in lines:
         there = {title: line.cell(record) for title, record in records.items() if line.value(record) is not None}
@@ -176,7 +173,7 @@ def side_by_side(
 
 
 def of_records(rows: Sequence[Mapping[str, Any]], written: Callable[[Any], str] = str) -> Table:
-    """A table of all that records have, their keys as its heads; nothing where a record lacks one."""
+    """Build a table of all keys of the records; cells of missing keys stay empty."""
     names = list(dict.fromkeys(name for row in rows for name in row))
     there = [[row.get(name) is not None for name in names] for row in rows]
     cells = [
@@ -190,7 +187,7 @@ def of_records(rows: Sequence[Mapping[str, Any]], written: Callable[[Any], str] 
 
 
 def flat(shown: Table, wide: bool = False) -> tuple[list[str], list[list[Cell]]]:
-    """Heads and rows of a table, the titles of its groups as a column of their own.
+    """Return heads and rows of a table, with group titles as a column of their own.
 
     wide  whether columns of sentences are among them
     """
@@ -206,14 +203,14 @@ def flat(shown: Table, wide: bool = False) -> tuple[list[str], list[list[Cell]]]
 
 
 def in_lines(shown: Table) -> list[str]:
-    """A table on a terminal, without sentences."""
+    """Format a table for a terminal, without columns of sentences."""
     heads, rows = flat(shown)
     texts = [[cell.text for cell in row] for row in rows]
     return aligned([heads, *texts] if texts and any(heads) else texts)
 
 
 def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
-    """Rows of cells in columns of equal width."""
+    """Align cells in columns."""
     widths = [max(width(row[column]) for row in rows) for column in range(len(rows[0]))] if rows else []
     return [
         "  ".join(cell + " " * (wide - width(cell)) for cell, wide in zip(row, widths, strict=True)).rstrip()
@@ -222,11 +219,10 @@ def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
 
 
 def width(text: str) -> int:
-    """Columns that a text takes on a terminal: a dot above a letter takes none of its own."""
+    """Width of a text on a terminal; combining characters take no room."""
     return sum(not unicodedata.combining(letter) for letter in text)
 
 
 def as_csv(shown: Table) -> bytes:
-    """A table's values as CSV."""
     heads, rows = flat(shown, wide=True)
     return csv_text(heads, ([cell.datum for cell in row] for row in rows))

@@ -1,4 +1,4 @@
-"""A table for LaTeX: decimals under one another, one number of digits a column, heads and caption in words."""
+"""Tables for LaTeX: aligned decimals, equal digits per column, heads and captions with symbols."""
 
 import math
 import re
@@ -9,17 +9,17 @@ from walkerlab.views.report.symbols import DOT, LETTERS, SUBSCRIPTS, SUPERSCRIPT
 from walkerlab.views.report.tables import Table, flat
 
 DIGITS: Final = 5
-"""Significant digits of the largest number of a column or, where its numbers differ too much, of each of them."""
+"""Significant digits of a column's largest number or, if its numbers differ too much, of each one."""
 CLEAREST: Final = 1e6
-"""Numbers from here on have a power of ten."""
+"""Numbers from here on are written with a power of ten."""
 MISSING: Final = "--"
 PACKAGES: Final = r"% \usepackage{booktabs, siunitx}"
 DECIMAL = re.compile(r"(-?)(\d+)(?:\.(\d+))?(?:e(-?)(\d+))?")
-"""A number in a column of siunitx: sign, digits before and behind the point, sign and digits of the power of ten."""
+"""A number in a siunitx column: sign, digits before and after the point, sign and digits of the exponent."""
 RAISED = re.compile(r"\\\^\{\}(-?\d+)")
-"""A power in a text whose letters are guarded already."""
+"""A power in a text that is already escaped."""
 SYMBOL = re.compile(rf"\b(d?)({'|'.join(LETTERS)}|[A-Za-z])\\_([A-Za-z0-9]+)\b(?!\\_)")
-"""A quantity in plain letters, guarded already."""
+"""A symbol in plain letters, already escaped."""
 IN_MATHS = {
     **{f"{sign}{DOT}": rf"$\dot{{\{name}}}$" for name, sign in LETTERS.items()},
     **{sign: rf"$\{name}$" for name, sign in LETTERS.items()},
@@ -29,12 +29,12 @@ IN_MATHS = {
     **{"√": r"$\sqrt{}$", "≈": r"$\approx$", "µ": r"$\mu$", "…": r"\ldots{}"},
 }
 SIGNS = re.compile("|".join(map(re.escape, IN_MATHS)))
-"""Signs that LaTeX sets in maths only."""
+"""Characters that LaTeX sets only in maths."""
 TEX = str.maketrans({letter: f"\\{letter}" for letter in "&%$#_{}"} | {"~": r"\textasciitilde{}", "^": r"\^{}"})
 
 
 def as_tex(shown: Table) -> bytes:
-    """A table's values for LaTeX with booktabs and siunitx, afloat where it has a caption; without sentences."""
+    """Format a table for booktabs and siunitx, as a float if it has a caption; without columns of sentences."""
     heads, rows = flat(shown)
     columns = [in_column(head, [row[place].datum for row in rows]) for place, head in enumerate(heads)]
     head, *lines = [" & ".join(line) + r" \\" for line in zip(*(cells for _, cells in columns), strict=True)]
@@ -47,7 +47,7 @@ def as_tex(shown: Table) -> bytes:
 
 
 def in_column(head: str, data: Sequence[Any]) -> tuple[str, list[str]]:
-    """Layout and cells of a column: with numbers in it one of siunitx, whose decimal points stand under one another."""
+    """Return layout and cells of a column; a numeric column is a siunitx column with aligned points."""
     numbers = [value for value in data if is_number(value)]
     written = written_alike(numbers)
     cells = [written(value) if is_number(value) else in_tex(value) for value in data]
@@ -60,12 +60,12 @@ def in_column(head: str, data: Sequence[Any]) -> tuple[str, list[str]]:
 
 
 def is_number(value: Any) -> bool:
-    """Whether a value is a number, which a truth value is not."""
+    """Whether a value is a number; booleans are not."""
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def written_alike(numbers: Sequence[float]) -> Callable[[float], str]:
-    """How a column's numbers are written: whole ones as such, others with equal decimals or with equal digits."""
+    """Choose the format of a column's numbers: integers, equal decimals, or equal significant digits."""
     if all(isinstance(value, int) for value in numbers):
         return str
     sizes = [abs(value) for value in numbers if value != 0.0 and math.isfinite(value)] or [1.0]
@@ -77,20 +77,19 @@ def written_alike(numbers: Sequence[float]) -> Callable[[float], str]:
 
 
 def with_digits(value: float) -> str:
-    """A number with so many significant digits, zeros at its end among them."""
     mantissa, _, exponent = f"{value:#.{DIGITS}g}".partition("e")
     return mantissa.removesuffix(".") + (f"e{int(exponent)}" if exponent else "")
 
 
 def room_for(cells: Sequence[str]) -> str:
-    """What siunitx is told of a column: sign, digits before and behind the point, and of the power of ten."""
+    """Return siunitx's table-format: digits before and after the point, and of the exponent."""
     found = [part.groups(default="") for cell in cells if (part := DECIMAL.fullmatch(cell))]
     sign, before, behind, below, power = (max(len(one[place]) for one in found) for place in range(5))
     return f"{'-' * sign}{before}.{behind}" + (f"e{'-' * below}{power}" if power else "")
 
 
 def in_tex(value: Any) -> str:
-    """A text in LaTeX: symbols and powers set in maths, special letters guarded; a dash for None."""
+    """Convert a text to LaTeX: symbols and powers in maths, special characters escaped; a dash for None."""
     if value is None:
         return MISSING
     text = SIGNS.sub(lambda found: IN_MATHS[found[0]], RAISED.sub(r"$^{\1}$", str(value).translate(TEX)))
@@ -98,7 +97,7 @@ def in_tex(value: Any) -> str:
 
 
 def symbol_in_tex(found: re.Match[str]) -> str:
-    """A symbol with its subscript, such as t_left or dtheta_1, in maths."""
+    """Set a symbol with its subscript, such as t_left or dtheta_1, in maths."""
     rate, letter, below = found.groups()
     letter = rf"\{letter}" if letter in LETTERS else letter
     below = below if len(below) == 1 else rf"\mathrm{{{below}}}"

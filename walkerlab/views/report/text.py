@@ -1,4 +1,4 @@
-"""JSON values as aligned text for people."""
+"""Formats JSON values as aligned text."""
 
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
@@ -8,13 +8,13 @@ from walkerlab.views.report.tables import in_lines, of_records
 
 INDENT = "  "
 COLUMNS = 100
-"""Width of a paragraph, in characters."""
+"""Line width of a paragraph, characters."""
 LONGEST_ROW, ENDS = 12, 4
-"""Of more values in a row, so many are shown of either end."""
+"""Longest row shown in full, and values shown at each end of longer ones."""
 
 
 def described_summary(summary: Mapping[str, Any], indent: str = INDENT, short: bool = False) -> Iterator[str]:
-    """One line a key; below it what is nested, rows of equal objects as a table.
+    """Yield one line per key, nested values below it, and rows of objects as a table.
 
     short  leave out the middle of long rows of numbers and of long tables
     """
@@ -31,7 +31,7 @@ def described_summary(summary: Mapping[str, Any], indent: str = INDENT, short: b
 
 
 def cut(value: Any) -> Any:
-    """A value, or of a long row its ends and how many there are."""
+    """Return a value, with the middle of a long row left out."""
     if not isinstance(value, list) or len(value) <= LONGEST_ROW:
         return value
     ends = [in_words(item) for item in (*value[:ENDS], *value[-ENDS:])]
@@ -39,19 +39,19 @@ def cut(value: Any) -> Any:
 
 
 def table(rows: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Objects as rows of a table, their keys as its head; below it what has no room there."""
+    """Tabulate objects with their keys as heads, and name the keys that are too wide."""
     cells = of_records(rows, in_words)
     long = [column.title for column in cells.columns if column.wide]
     return [*in_lines(cells), f"with --json also: {', '.join(long)}"] if long else in_lines(cells)
 
 
 def paragraph(text: str) -> list[str]:
-    """Prose in lines of equal length at most; no word is cut, however long."""
+    """Wrap prose without breaking words."""
     return textwrap.wrap(text, COLUMNS, break_long_words=False, break_on_hyphens=False)
 
 
 def in_words(value: Any) -> str:
-    """A value on one line."""
+    """Format a value on one line."""
     if value is None:
         return "-"
     if isinstance(value, bool):

@@ -1,4 +1,4 @@
-"""A walk as the page's player moves it: joints, the ground's forces, slip and energies, thinned in time."""
+"""Motion data for the page's player: joints, ground forces, slip and energies, thinned in time."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ OF_A_LEG = {
     "angle": "a", "velocity": "v", "shank_angle": "b",
     "normal_force_N": "n", "friction_force_N": "d", "penetration_m": "p",
 }  # fmt: skip
-"""Channels by the names of stored variables."""
+"""Channel names by stored variable."""
 
 Array = NDArray[np.float64]
 Channels = dict[str, Array]
@@ -31,7 +31,7 @@ Channels = dict[str, Array]
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """The motion of one walker, a column of numbers for each of its channels.
+    """The motion of one walker, an array for each channel.
 
     channels  by name, all equally long; 't' is time (s), 'h' the hip, 'f' the feet's lowest points, 'k' the knees, each
               with x along and y above the slope (m); 'a', 'v' angle and velocity of the legs or thighs (rad, rad/s),
@@ -42,21 +42,19 @@ class Track:
     channels: Channels
 
     def __getitem__(self, name: str) -> Array:
-        """A channel."""
         return self.channels[name]
 
     @property
     def end(self) -> float:
-        """Time of the last sample, s."""
         return float(self["t"][-1])
 
     def until(self, time: float) -> Track:
-        """The part up to a time (s)."""
+        """Return the part up to a time (s)."""
         inside = self["t"] <= time + 1e-9
         return Track({name: values[inside] for name, values in self.channels.items()})
 
     def thinned(self, gap: float) -> Track:
-        """At most a few samples in each gap (s): its first, the one of the largest force, and both sides of a jump."""
+        """Keep a few samples per interval (s): the first, that of the largest force, and both sides of a jump."""
         time = self["t"]
         bins = np.floor(time / gap).astype(np.int64)
         first = np.flatnonzero(np.diff(bins, prepend=-1))
@@ -70,12 +68,12 @@ class Track:
         return Track({name: values[chosen] for name, values in self.channels.items()})
 
     def packed(self) -> str:
-        """All channels, one after another, as little-endian float32 in base64."""
+        """Encode all channels, in order, as little-endian float32 in base64."""
         return base64.b64encode(np.concatenate(list(self.channels.values())).astype("<f4").tobytes()).decode()
 
 
 def track_in(trajectory: Group | None) -> Track | None:
-    """The motion in a stored trajectory; None if there is none, or if it does not tell where the joints are."""
+    """Read the motion from a stored trajectory; None if it lacks joint positions."""
     if trajectory is None or "hip_along_m" not in trajectory.variables or trajectory["time"].size < 2:
         return None
     there = trajectory.variables.keys()
@@ -93,7 +91,7 @@ def track_in(trajectory: Group | None) -> Track | None:
 
 
 def slip_since_touch(time: Array, velocity: Array, touching: NDArray[np.bool_]) -> Array:
-    """How far a foot has slipped since it last came down (m); zero in the air."""
+    """Integrate how far a foot has slipped since it last touched down (m); zero in the air."""
     sliding = np.where(touching, velocity, 0.0)
     way = np.concatenate(([0.0], np.cumsum(0.5 * (sliding[1:] + sliding[:-1]) * np.diff(time))))
     begins = touching & ~np.concatenate(([False], touching[:-1]))
@@ -102,5 +100,5 @@ def slip_since_touch(time: Array, velocity: Array, touching: NDArray[np.bool_]) 
 
 
 def sampling_gap(config: RigidConfig) -> float:
-    """Time between samples (s): as many a pendulum time for every size of walker."""
+    """Return the time between samples (s), scaled with the leg's pendulum time."""
     return math.sqrt(9.81 / config.gravity_m_s2 * config.walker.leg_length_m) / SAMPLES_A_SECOND

@@ -1,4 +1,4 @@
-"""Sentences of the report: a file of templates for each section."""
+"""Sentences of the report, from a file of templates for each section."""
 
 from pathlib import Path
 
@@ -11,7 +11,7 @@ from walkerlab.views.report.symbols import in_signs
 
 
 def in_row(text: str) -> str:
-    """The parts of a text as words in a row: 'a, b and c' of 'a | b | c'."""
+    """Join the parts of 'a | b | c' as 'a, b and c'."""
     return join_words(parts(text))
 
 
@@ -19,6 +19,6 @@ WRITTEN = (
     *(numbers.number, numbers.fixed, numbers.quantity, numbers.length, numbers.whole, numbers.span),
     *(numbers.count, join_words, numbers.power_of_ten, in_row, in_signs, ends, walks, off_by, len),
 )
-"""What the templates may call."""
+"""Functions available to the templates."""
 KNOWN = {"CHANNELS": CHANNELS, "ERRORS": ERRORS, "USUAL": USUAL}
 words = Prose(Path(__file__).parent / "templates" / "words", WRITTEN, KNOWN)

@@ -1,1 +1,1 @@
-"""The sections of the report, one a file; each is made from the results that there are, or is left out."""
+"""The sections of the report, one per file, each built from the available results."""

@@ -1,4 +1,4 @@
-"""What accuracy costs: error against run time, method by method."""
+"""The cost of accuracy: error against run time for each method."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
@@ -17,7 +17,7 @@ Row = Mapping[str, Any]
 
 @of_stage("accuracy", "reference")
 def section(results: Results, summary: Row) -> Section | None:
-    """The table of methods for each scene, with conclusions, references, and what was not run."""
+    """Tabulate the methods for each scene, with conclusions, references and omitted runs."""
     told = {scene: summary["conclusions"][scene].removeprefix(f"{scene}: ") for scene in summary["reference"]}
     concluded = tuple(Statement(scene, text[:1].upper() + text[1:]) for scene, text in told.items())
     references = [{"scene": scene, **entry} for scene, entry in summary["reference"].items()]
@@ -42,7 +42,7 @@ def section(results: Results, summary: Row) -> Section | None:
 
 
 def costs(summary: Row) -> Table:
-    """What each method costs for each error, by scene."""
+    """Tabulate the run time of each method at each error level, by scene."""
     levels = sorted({float(level) for best in summary["best"].values() for level in best}, reverse=True)
     columns = (
         Column("method", "method"),
@@ -57,7 +57,7 @@ def costs(summary: Row) -> Table:
 
 
 def methods_of(summary: Row, scene: str, levels: Sequence[float]) -> Iterator[Row]:
-    """The methods of a scene, each with its least time (ms) for an error, by level, and its smallest error.
+    """Yield the methods of a scene, each with its shortest run (ms) per error level and its smallest error.
 
     What the reference is known to bounds what can be told of an error.
     """
@@ -82,7 +82,7 @@ def methods_of(summary: Row, scene: str, levels: Sequence[float]) -> Iterator[Ro
 
 
 def with_spread(run: Row | None) -> Cell:
-    """A run's median time (ms), with the least and the largest where it was repeated."""
+    """Format a run's median time (ms), with the range if it was repeated."""
     if run is None:
         return Cell(NONE)
     median, least, largest = (number(1e3 * run[name], 3) for name in ("wall_s", "least_wall_s", "largest_wall_s"))
@@ -91,19 +91,18 @@ def with_spread(run: Row | None) -> Cell:
 
 
 def ended_as(run: Row) -> str:
-    """How a run ended that did not arrive."""
     return "budget used up" if run["outcome"] == Outcome.BUDGET_EXHAUSTED.label else str(run["outcome"])
 
 
 def nearest_library(summary: Row, scene: str) -> Row | None:
-    """The run of a library's method that ends nearest to the reference; None without any."""
+    """Return the library run that ends closest to the reference, or None."""
     runs = [row for row in summary["rows"] if row["scene"] == scene and row["error"] is not None]
     of_libraries = [row for row in runs if row["method"].startswith(("scipy", "cvode"))]
     return min(of_libraries, key=lambda row: float(row["error"]), default=None)
 
 
 def whose(reference: Row) -> str:
-    """Who made a reference, and at which tolerance."""
+    """Name the origin and tolerance of a reference."""
     if reference["from_outside"]:
         return "heyoka, at machine precision"
     spent = f", {whole(reference['rhs_evaluations'])} right-hand sides"
@@ -128,7 +127,7 @@ NOT_RUN_COLUMNS = (
 
 
 def not_run(summary: Row) -> Table:
-    """The tolerances that were not tried, a row for each reason."""
+    """Tabulate the omitted tolerances, a row per reason."""
     found = grouped(summary.get("not_run", []), "scene", "method", "why").values()
     rows = [{**entries[0], "tolerances": [float(one["tolerance"]) for one in entries]} for entries in found]
     return table("Not run", NOT_RUN_COLUMNS, rows, wordy=True)

@@ -1,4 +1,4 @@
-"""The paper's parameter adjustment: whether it was needed, how much, and what explains it."""
+"""The paper's parameter adjustment: whether it is needed, how large it is, and what explains it."""
 
 from collections.abc import Mapping, Sequence
 from functools import partial
@@ -19,7 +19,7 @@ Summary = Mapping[str, Any]
 
 @of_stage("tune", "adjustment")
 def section(results: Results, summary: Summary) -> Section | None:
-    """The verdict on the adjustment, with the tables behind it."""
+    """Report the verdict on the adjustment, with its tables."""
     changed = results.claims or summary["adjustment"]["needed"]
     blocks = (
         Paragraph(words("adjustment.explained", summary, results.claims)),
@@ -35,7 +35,7 @@ ORDER_COLUMNS = (Column("knob"), Column("observed orders, towards the limit", wi
 
 
 def limit(results: Results) -> Section | None:
-    """What takes the contact model to the rigid one; None if nobody asked."""
+    """Show how the contact model converges to the rigid one; None if not computed."""
     summary = results.summary("tune")
     reaches, orders = summary.get("reaches") or {}, summary.get("orders") or {}
     pushes = results.config.push_off.impulse_N_s != 0.0
@@ -52,7 +52,7 @@ def limit(results: Results) -> Section | None:
 
 
 def starts_table(results: Results, summary: Summary) -> Table:
-    """The start before and after; beside Table 2 if the paper is what is redone."""
+    """Tabulate the start before and after the adjustment; for the paper's scene, next to its Table 2."""
     rows = [{"name": name, **row} for name, row in summary["table2"].items()]
     caption, note, head = "The start before and after the adjustment", "", "coordinate"
     if results.claims:
@@ -73,17 +73,17 @@ LOST = {
     "knee_strikes": ("in the knee's strike", "in the strike"),
     "knee_stop": ("in the knees' stops", "none"),
 }
-"""Where a step dissipates energy, by the names under which it is stored, and what the rigid model has instead."""
+"""Energy losses per step: stored name, label, and the rigid model's counterpart."""
 
 
 def lost(channel: str, gait: Summary) -> float | Cell | None:
-    """What a gait dissipates in a channel (J); None of knees that take nothing."""
+    """Return the energy (J) that a gait loses in a channel; None for knees that lose nothing."""
     into = gait["lost_J"].get(channel)
     return into if into or channel in ("damping", "friction") else None
 
 
 def factors(multipliers: Sequence[tuple[float, float]]) -> str:
-    """Multipliers, largest first; a complex one stands for itself and its conjugate."""
+    """Format multipliers, largest first; a complex one stands for its conjugate pair."""
     return join_words(
         fixed(real, 4) + (f" ± {fixed(imag, 4)}i" if imag > 1e-9 else "") for real, imag in multipliers if imag >= 0.0
     )
@@ -105,7 +105,7 @@ GAIT_LINES = (
 
 
 def gait_table(summary: Summary, rigid: Summary) -> Table:
-    """The contact gait beside the rigid one."""
+    """Tabulate the contact gait next to the rigid one."""
     gait = summary["gait"]
     note = f"Section of the contact gait: {gait['section']}."
     losses = {channel: Cell(said) for channel, (_, said) in LOST.items() if lost(channel, gait) is not None}
@@ -123,7 +123,7 @@ MARGIN_COLUMNS = (
 
 
 def margins_table(summary: Summary) -> Table:
-    """How far the start may be scaled."""
+    """Tabulate how far the start may be scaled."""
     rows = [{"name": name, **margin} for name, margin in (summary["adjustment"].get("margins") or {}).items()]
     return table("How far the start's velocities may change", MARGIN_COLUMNS, rows)
 
@@ -137,7 +137,7 @@ WALK_COLUMNS = (
 
 
 def walks_table(results: Results, summary: Summary) -> Table:
-    """The procedure, walk by walk."""
+    """Tabulate the walks of the procedure."""
     names = words.terms("adjustment.walks", "hinged" in summary["procedure"])
     walks = [{"walk": names[name], **walk} for name, walk in summary["procedure"].items() if walk is not None]
     if results.claims:

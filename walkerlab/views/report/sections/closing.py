@@ -1,4 +1,4 @@
-"""What closes the report: what is one link away, what its words mean, and what is not in it, and why."""
+"""The end of the report: links to further pages, glossary, and what is missing and why."""
 
 from collections.abc import Iterator, Mapping, Sequence
 
@@ -16,11 +16,11 @@ TITLES = {
     CASES: "Extreme cases and known problems",
     COSTS: "Accuracy: what an error costs, and the rigid limit",
 }
-"""The pages beside the report, in their order."""
+"""Titles of the further pages, in order."""
 
 
 def further(results: Results, pages: Mapping[str, Sequence[Section]]) -> Section | None:
-    """Links to the other pages, each with what it comes to in a sentence for each section, and what will be there."""
+    """Link to the further pages, each with its sections' findings, and announce pending results."""
     items = []
     for file, found in pages.items():
         silent = file == PAPER and not results.claims
@@ -31,13 +31,12 @@ def further(results: Results, pages: Mapping[str, Sequence[Section]]) -> Section
 
 
 def glossary(results: Results) -> Section:
-    """What the words mean."""
     told = words.terms("closing.glossary", results.config.contact is not None, drives_of(results.config))
     return Section("glossary", "Glossary", (Terms(told),), "The words of this report, in a line each.")
 
 
 def left_out(results: Results) -> Section | None:
-    """Results that were not computed, and parts of results that were left out."""
+    """Tabulate results, and parts of results, that were not computed."""
     parts = [LeftOut(**one) for stored in results.stored.values() for one in stored.summary.get("left_out", [])]
     rows = list(rows_of(list(dict.fromkeys((*results.absent, *parts)))))
     columns = [Column("what"), Column("why", wide=True), Column("saves", wide=True)]
@@ -48,7 +47,7 @@ def left_out(results: Results) -> Section | None:
 
 
 def rows_of(missing: Sequence[LeftOut]) -> Iterator[tuple[str, str, str]]:
-    """What is missing for one reason in a row, and in a row below it what is missing for want of that."""
+    """Yield one row per reason: what is missing, then what depends on it."""
     reasons = {absent.why for absent in missing}
     # the reason at the bottom of one such as 'it needs simulate: it needs fixedpoint: no gait'
     causes = {absent.why: min(filter(absent.why.endswith, reasons), key=len) for absent in missing}

@@ -1,4 +1,4 @@
-"""Families of gaits over a parameter, their bifurcations, a diagram whose gaits walk, and basins of attraction."""
+"""Families of gaits over a parameter, their bifurcations, an interactive diagram, and basins of attraction."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -21,14 +21,14 @@ from walkerlab.views.report.words import words
 
 @of_stage("continuation", "branches")
 def section(results: Results, summary: Mapping[str, Any]) -> Section | None:
-    """Branches, their bifurcations and the chaos beyond; None if none were followed."""
+    """Show branches, bifurcations and chaos; None without branches."""
     first, *others = findings(summary) or [words("families.followed", summary["branches"])]
     blocks = (Paragraph(" ".join(others)), gait_diagram(results), bifurcations(summary))
     return Section.of("families", f"Families of gaits over {parameter(summary)}", blocks, first)
 
 
 def findings(summary: Mapping[str, Any]) -> list[str]:
-    """What there is to say, sentence by sentence."""
+    """Summarise the families, one sentence per item."""
     stable = {}
     for model in ("rigid", "contact"):
         alone = [one for one in summary["branches"] if (one["model"], one["period"]) == (model, 1)]
@@ -38,7 +38,6 @@ def findings(summary: Mapping[str, Any]) -> list[str]:
 
 
 def bifurcations(summary: Mapping[str, Any]) -> Table:
-    """Every bifurcation that was located."""
     columns = (
         Column("kind", "kind"),
         Column("model", "model"),
@@ -50,32 +49,29 @@ def bifurcations(summary: Mapping[str, Any]) -> Table:
 
 
 def parameter(summary: Mapping[str, Any]) -> str:
-    """What the families are over."""
     return axis_label(str(summary["over"]))
 
 
 MODEL = "rigid"
 CLEAR = 16.0
-"""Between the centres of two marks, in units of the diagram: half as much again as they are wide, for fingers."""
+"""Minimum distance between two marks in diagram units: 1.5 times their width, for touch screens."""
 GAP = 3.0
-"""Time between samples, in those of the walk itself: a gait is looked at, not measured."""
+"""Sampling interval relative to that of the walk: these gaits are only looked at."""
 
 
 class DiagramAxis:
-    """From numbers to places between the start and the end of an axis, with a little room beside the numbers."""
+    """Maps values to positions along an axis, with a margin."""
 
     def __init__(self, values: NDArray[np.float64], start: float, end: float) -> None:
-        """Make room for the numbers."""
         least, most = float(values.min()), float(values.max())
         room = 0.04 * (most - least) or 1.0
         self.least, self.most, self.start, self.end = least - room, most + room, start, end
 
     def place(self, value: float) -> float:
-        """Where a number is."""
         return round(self.start + (value - self.least) / (self.most - self.least) * (self.end - self.start), 1)
 
     def ticks(self) -> tuple[tuple[float, str], ...]:
-        """Round numbers: place and text."""
+        """Return round tick values: position and text."""
         rough = (self.most - self.least) / 5.0
         ten = 10.0 ** math.floor(math.log10(rough))
         step = ten * next(digit for digit in (5, 2, 1) if digit * ten <= rough)
@@ -84,7 +80,7 @@ class DiagramAxis:
 
 
 def gait_diagram(results: Results) -> Diagram | None:
-    """Step periods over the parameter, with the gaits whose stored motion can be pointed at; None if there are none."""
+    """Plot step periods over the parameter, with marks for gaits whose motion is stored; None without any."""
     summary = results.summary("continuation")
     branches: list[Group] = []
     while (branch := results.group("continuation", f"{MODEL}/branch_{len(branches)}")) is not None:
@@ -125,7 +121,7 @@ def gait_diagram(results: Results) -> Diagram | None:
 
 
 def apart(marks: Sequence[GaitMark]) -> tuple[GaitMark, ...]:
-    """The marks of which none covers another, so that each can be pointed at; stable gaits go before others."""
+    """Select marks that do not cover one another, stable gaits first."""
     kept: list[int] = []
     for place in sorted(range(len(marks)), key=lambda place: not marks[place].stable):
         x, y = marks[place].x, marks[place].y
@@ -137,7 +133,7 @@ def apart(marks: Sequence[GaitMark]) -> tuple[GaitMark, ...]:
 def curves(
     branch: Group, across: DiagramAxis, up: DiagramAxis
 ) -> Iterator[tuple[tuple[tuple[float, float], ...], bool]]:
-    """A line for each step of a branch's gaits and each stretch of one stability."""
+    """Yield a line for each step of a branch's gaits and each stretch of equal stability."""
     stable = branch["stable"].astype(bool)
     bounds = [0, *(int(place) + 1 for place in np.flatnonzero(np.diff(stable))), stable.size]
     for begin, end in pairwise(bounds):
@@ -156,11 +152,10 @@ ATTRACTOR_COLUMNS = (
 
 @of_stage("basin")
 def basin(_results: Results, summary: Mapping[str, Any]) -> Section | None:
-    """What the basin came to; None if it was not asked for."""
+    """Report the basins of attraction."""
     told = (words("basin.shares", summary), *words.parts("basin.grounds", summary))
     return Section.of("basin", "Basins of attraction", (*map(Paragraph, told), attractors(summary)))
 
 
 def attractors(summary: Mapping[str, Any]) -> Table:
-    """What walks settle on."""
     return table("Attractors", ATTRACTOR_COLUMNS, summary["attractors"], note=words("basin.unsettled", summary))

@@ -1,4 +1,4 @@
-"""The periodic gait: its fixed point and multipliers under both sets of equations, and all gaits that were found."""
+"""The periodic gait: fixed point and multipliers under both sets of equations, and all gaits found."""
 
 from collections.abc import Mapping, Sequence
 from functools import partial
@@ -14,7 +14,6 @@ from walkerlab.views.report.words import words
 
 @of_stage("fixedpoint")
 def section(results: Results, summary: Mapping[str, Any]) -> Section | None:
-    """The gait of this walker on this slope."""
     names = summary.get("state_names", STATE)
     shown = SETS if results.claims else (summary["equations"],)
     sets = summary.get("equation_sets", {summary.get("equations"): summary})
@@ -30,7 +29,7 @@ def section(results: Results, summary: Mapping[str, Any]) -> Section | None:
 
 
 def every_gait(sets: Mapping[str, Sequence[Mapping[str, Any]]], names: Sequence[str]) -> Table:
-    """All gaits that were found, by set of equations, numbered, each with why it is chosen or cannot be walked."""
+    """Tabulate all gaits by set of equations, with the reason why each is chosen or unphysical."""
     four, five = partial(fixed, decimals=4), partial(fixed, decimals=5)
     columns = (
         Column("gait", "gait", numeric=True),

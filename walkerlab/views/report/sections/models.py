@@ -1,4 +1,4 @@
-"""How far the two models differ, and what the knees have to do with it."""
+"""Differences between the two models, and the role of the knees."""
 
 from functools import partial
 
@@ -17,7 +17,7 @@ RELEASED = {
     "compression": "when the leading foot stops sinking in, both knees rigid in the impact",
     "touch": "at the leading foot's first touch, free in the impact",
 }
-"""The instants at which the trailing knee may be released, in words."""
+"""Instants at which the trailing knee may be released."""
 RELEASE_COLUMNS = (
     Column("trailing knee released", "released"),
     Column("steps", lambda walk: f"{walk['steps']} of {walk['of']}, {walk['outcome']}" if "steps" in walk else None),
@@ -30,7 +30,7 @@ RELEASE_COLUMNS = (
 
 
 def section(results: Results) -> Section | None:
-    """Largest differences of angles and velocities, and the distance of the orbits."""
+    """Tabulate the largest differences of angles and velocities, and the distance between the orbits."""
     summary = results.summary("compare")
     angle, velocity = summary.get("max_angle_error_rad"), summary.get("max_velocity_error_rad_s")
     if not angle or not velocity:
@@ -48,7 +48,7 @@ def section(results: Results) -> Section | None:
 
 
 def departure(results: Results) -> str:
-    """Where the contact model departs from the rigid one, and what the knees have to do with it, in a paragraph.
+    """Describe where the contact model departs from the rigid one, and the role of the knees.
 
     Empty without a comparison of this walker's models, or if the contact model took no step.
     """

@@ -1,4 +1,4 @@
-"""What is seen: the walk, moving, with a foot in close-up and three views on one clock; and the figures."""
+"""The animated walk with a close-up of a foot and three synchronised plots; and the figures."""
 
 import math
 from typing import Any
@@ -15,18 +15,17 @@ from walkerlab.views.report.words import words
 MAX_STEPS = 10
 STYLES = {RIGID: "rigid", CONTACT: "contact"}
 DEEPEST_IN_VIEW = 5.0
-"""Height of the close-up in largest penetrations that are not an impact's."""
+"""Height of the close-up relative to the largest penetration outside impacts."""
 STILL_VIEW_OF_RIGID = 4e-3
-"""Height of the close-up of a foot that does not sink in, leg lengths."""
+"""Height of the close-up for a foot that does not sink in, leg lengths."""
 
 
 def section(results: Results) -> Section | None:
-    """The player; None if no motion was stored."""
     return Section.of("motion", "The walk", (player(results),))
 
 
 def player(results: Results, most: int = MAX_STEPS) -> Player | None:
-    """The first steps of both models' walks, as far as they are there; None if no motion was stored."""
+    """Show the first steps of both models' walks; None if no motion was stored."""
     touches = [results.summary(stage).get("touch_times_s", []) for stage in MODELS]
     # of the model that takes longest over them
     end = max((times[most - 1] for times in touches if len(times) >= most), default=math.inf)
@@ -55,7 +54,6 @@ def player(results: Results, most: int = MAX_STEPS) -> Player | None:
 
 
 def walker(results: Results, stage: str, track: Track) -> Walker:
-    """A model's motion and how it ended."""
     summary = results.summary(stage)
     strikes = [time for time in summary["touch_times_s"] if time <= track.end + 1e-9]
     return Walker(
@@ -70,7 +68,7 @@ def walker(results: Results, stage: str, track: Track) -> Walker:
 
 
 def stills(track: Track, strikes: list[float]) -> tuple[tuple[tuple[int, int], ...], ...]:
-    """Postures to be seen at once, both feet down and mid-step: a line from foot over hip to foot (mm, y downwards)."""
+    """Return postures to show together, at heel strikes and mid-step: lines from foot to hip to foot (mm, y down)."""
     times: Any = np.array([0.0, *strikes])
     wanted = np.unique(np.concatenate((times, 0.5 * (times[:-1] + times[1:]), [track.end])))
     rows = np.clip(np.searchsorted(track["t"], wanted), 0, track["t"].size - 1)
@@ -84,13 +82,13 @@ def stills(track: Track, strikes: list[float]) -> tuple[tuple[tuple[int, int], .
 
 
 def weight(tracks: dict[str, Track]) -> float:
-    """A force to scale arrows by (N): what the ground carries most of the time; any number if forces are unknown."""
+    """Return a typical ground force (N) to scale arrows by; 1 if forces are unknown."""
     loads = [float(np.median(track["n0"] + track["n1"])) for track in tracks.values() if "n0" in track.channels]
     return max((load for load in loads if load > 0.0), default=1.0)
 
 
 def closeup(track: Track | None, length: float) -> float:
-    """Height of the close-up (m): some penetrations of a foot of the contact model that stands."""
+    """Return the height of the close-up (m): a few penetrations of a standing foot of the contact model."""
     if track is None or "p0" not in track.channels:
         return STILL_VIEW_OF_RIGID * length
     depths = np.concatenate((track["p0"], track["p1"]))
@@ -99,7 +97,7 @@ def closeup(track: Track | None, length: float) -> float:
 
 
 def pads(results: Results) -> tuple[Pad, ...]:
-    """The pads that the contact model walks on; none on a plane."""
+    """Return the pads that the contact model walks on; empty on a plane."""
     terrain = results.group(CONTACT, "terrain")
     if terrain is None or "left_m" not in terrain.variables:
         return ()
@@ -108,7 +106,7 @@ def pads(results: Results) -> tuple[Pad, ...]:
 
 
 def ground(results: Results) -> tuple[tuple[float, float], ...]:
-    """Where each level of uneven ground begins along the slope, and its height (m); none on even ground."""
+    """Return the start along the slope and the height of each ground level (m); empty on even ground."""
     for stage in reversed(MODELS):
         steps = results.group(stage, "steps")
         levels = None if steps is None else ground_levels(steps)
@@ -120,7 +118,7 @@ def ground(results: Results) -> tuple[tuple[float, float], ...]:
 
 
 def view(tracks: tuple[Track, ...], slope: float, margin: float) -> tuple[int, int, int, int]:
-    """Left, top, width and height (mm, y downwards) of what the walkers pass through on the tilted slope."""
+    """Return left, top, width and height (mm, y down) of the area that the walkers cross on the tilted slope."""
     along: Array = np.concatenate([track[name] for track in tracks for name in ("fx0", "hx", "fx1")])
     above: Array = np.concatenate([track[name] for track in tracks for name in ("fy0", "hy", "fy1")])
     right = along * math.cos(slope) + above * math.sin(slope)
@@ -131,7 +129,6 @@ def view(tracks: tuple[Track, ...], slope: float, margin: float) -> tuple[int, i
 
 
 def figures(results: Results) -> Section | None:
-    """The figures of the walks and gaits."""
     shown = tuple(picture for picture in results.pictures if picture.page == MAIN)
     numbered = (Paragraph(words("figures.numbered")),) if results.claims else ()
     return Section("figures", "Figures", (*numbered, Gallery(shown))) if shown else None

@@ -1,4 +1,4 @@
-"""Where the numbers come from: config, software, machine, and what determines each result."""
+"""Provenance: config, software, machine, and the key of each result."""
 
 from collections.abc import Sequence
 
@@ -11,7 +11,6 @@ from walkerlab.views.report.words import words
 
 
 def section(results: Results) -> Section | None:
-    """Config, and provenance of each result."""
     made = [result for result in results.stored.values() if isinstance(result, Stored)]  # read from files
     note = "A key is made of config, inputs and code; equal keys give equal digests. Timings are in neither."
     blocks = (
@@ -42,7 +41,7 @@ DIGEST_COLUMNS = (
 
 
 def software_table(made: Sequence[Stored]) -> Table:
-    """Versions, and the machine; more than one column only if results differ."""
+    """Tabulate software versions and platform; one column unless results differ."""
     used: dict[tuple[tuple[str, str], ...], list[str]] = {}
     for result in made:
         origin = result.provenance

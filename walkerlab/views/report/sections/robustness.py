@@ -1,4 +1,4 @@
-"""What a gait withstands, and which number of the walker moves it."""
+"""The disturbances that a gait survives, and the parameters that matter most."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -10,11 +10,11 @@ from walkerlab.views.report.tables import Column, Table, table
 from walkerlab.views.report.words import words
 
 SHOWN = 12
-"""Derivatives in the table."""
+"""Derivatives per table."""
 BUILT = ("walker.", "push_off.")
-"""How the keys begin that a builder can change."""
+"""Prefixes of the keys that a builder can change."""
 NORM = "gait_sensitivity_norm_scaled"
-"""What the parameters are ranked by: a norm in s/m falls with a longer leg by its dimension alone."""
+"""Quantity used to rank parameters; scaled, since a norm in s/m falls with leg length by its dimension alone."""
 MODEL = Column("model", "model")
 NORMS = (
     MODEL,
@@ -59,7 +59,7 @@ KEPT = (
 
 
 def designed(summary: Mapping[str, Any]) -> list[str | Table]:
-    """Where the optimum of a design lies, and what of it."""
+    """Describe the optimum of a design, with its parameters and constraints."""
     rows = [{"to": key, "best": value} for key, value in summary["best"].items()]
     kept = table("Kept within bounds", KEPT, summary["constraints"])
     return [*words.parts("design.findings", summary), table("Optimum", BEST, rows), kept]
@@ -67,14 +67,13 @@ def designed(summary: Mapping[str, Any]) -> list[str | Table]:
 
 @of_stage("robustness", "gaits")
 def section(_results: Results, summary: Mapping[str, Any]) -> Section | None:
-    """The answer; None if it was not asked for."""
     first, *others = findings(summary) or [""]
     blocks: tuple[PageBlock, ...] = (Paragraph(" ".join(others)), *tables(summary))
     return Section.of("robustness", "What the gait withstands", blocks, first)
 
 
 def findings(summary: Mapping[str, Any]) -> list[str]:
-    """What there is to say, sentence by sentence."""
+    """Summarise the findings, one sentence per item."""
     first: dict[str, Mapping[str, Any]] = {}
     for row in summary["sensitivity"]:
         if row["of"] == NORM and row["to"].startswith(BUILT) and ranks(row):
@@ -83,12 +82,12 @@ def findings(summary: Mapping[str, Any]) -> list[str]:
 
 
 def ranks(row: Mapping[str, Any]) -> bool:
-    """Whether a derivative has a relative effect that can be compared with others."""
+    """Whether a derivative has a relative effect that can be ranked."""
     return row.get("relative") is not None and not row.get("why")
 
 
 def tables(summary: Mapping[str, Any]) -> list[Table]:
-    """Norms, rough ground and what moves the gait."""
+    """Tabulate sensitivity norms, rough ground and derivatives."""
     rows = summary["sensitivity"]
     ranked = sorted((row for row in rows if ranks(row)), key=lambda row: -abs(row["relative"]))  # of both models
     built = [row for row in ranked if row["to"].startswith(BUILT)]

@@ -1,4 +1,4 @@
-"""The verdict, first of all: what has no answer, how the walkers fared, and what of the paper stands."""
+"""The opening verdict: failed stages, how the walks ended, and which claims of the paper hold."""
 
 import math
 from collections import Counter
@@ -14,7 +14,6 @@ from walkerlab.views.report.words import words
 
 
 def section(results: Results) -> Section | None:
-    """What a reader should know who reads no further."""
     walked = {model.lower(): summary for stage, model in MODELS.items() if (summary := results.summary(stage))}
     verdicts = Counter(row["verdict"] for row in results.claims)
     misprint = any(erratum["where"].startswith("A.5") for erratum in results.summary("compare").get("errata", ()))
@@ -34,7 +33,7 @@ def section(results: Results) -> Section | None:
 
 
 def failures(results: Results) -> list[str]:
-    """What has no answer, and what is missing for that reason; then results that are there and say that they fail."""
+    """List failed stages with what depends on them, then stored results that report a failure."""
     failed = [absent for absent in results.absent if absent.what in results.failed]
     others = [absent for absent in results.absent if absent.what not in results.failed]
     told = [
@@ -46,7 +45,7 @@ def failures(results: Results) -> list[str]:
 
 
 def how_all_fared(results: Results) -> Iterator[Statement]:
-    """How each walk ended, with the numbers that judged it and what to try; the gait; that no start walks."""
+    """Yield a statement for each walk (outcome, key numbers, advice), for the gait, and for a failed adjustment."""
     for stage, model in MODELS.items():
         if summary := results.summary(stage):
             config, outcome = results.config, summary["outcome"]
@@ -63,7 +62,7 @@ def how_all_fared(results: Results) -> Iterator[Statement]:
 
 
 def end_of(results: Results, stage: str) -> tuple[float | None, float | None]:
-    """When a walk ended (s), and how high the hip was then over the slope (m); None where that was not stored."""
+    """Return when a walk ended (s) and the hip's height then (m); None where not stored."""
     summary, trajectory = results.summary(stage), results.group(stage, "trajectory")
     if trajectory is None or not trajectory["time"].size:
         return summary.get("end_time_s"), None

@@ -1,4 +1,4 @@
-"""The walks: the numbers of the contact one, the assumptions of the rigid one, and every step of both."""
+"""The walks: quantities of the contact walk, assumptions of the rigid one, and the steps of both."""
 
 from collections.abc import Mapping
 from itertools import zip_longest
@@ -29,7 +29,6 @@ QUANTITY_COLUMNS = (Column("quantity"), Column("value", numeric=True), Column("m
 
 @of_stage(CONTACT)
 def contact(results: Results, summary: Mapping[str, Any]) -> Section | None:
-    """The contact model on its ground: how it stands, walks, slips and loses energy."""
     ground = results.config.contact
     said = "" if ground is None else words("walks.ground", ground, ground.in_si(), summary)
     numbers = table("The contact model's walk", QUANTITY_COLUMNS, contact_rows(summary), wordy=True)
@@ -39,7 +38,7 @@ def contact(results: Results, summary: Mapping[str, Any]) -> Section | None:
 
 
 def contact_rows(summary: Mapping[str, Any]) -> list[tuple[str, str | Cell, str]]:
-    """The numbers of the contact walk that there are: name, value and meaning of each."""
+    """List name, value and meaning of the contact walk's quantities."""
     get, lost = summary.get, summary.get("dissipated_J") or {}
     given = get("work_per_step_J") or {}
     values: dict[str, str | Cell] = {
@@ -65,13 +64,13 @@ def contact_rows(summary: Mapping[str, Any]) -> list[tuple[str, str | Cell, str]
 
 
 def joules(value: float, digits: int = 4) -> str:
-    """An energy that may be of the order of rounding."""
+    """Format an energy that may be of the order of rounding."""
     return f"{number(value, digits) if abs(value) >= 1e-3 or value == 0 else power_of_ten(value, 2)} J"
 
 
 HOLDS, FAILS, NOTED = Cell("holds", "good"), Cell("does not hold", "bad"), Cell("ignored", "fair")
 ROUNDING = 1e-6
-"""Relative drift of an energy that counts as constant, and depth, in leg lengths, that is no scuffing."""
+"""Relative energy drift, and scuffing depth in leg lengths, that count as zero."""
 ASSUMPTION_COLUMNS = (
     Column("assumption", "assumption"),
     Column("measured", "measured", wide=True),
@@ -81,7 +80,7 @@ ASSUMPTION_COLUMNS = (
 
 
 def assumptions(results: Results) -> Section | None:
-    """What the rigid model assumes, and how far its own walk bears that out."""
+    """Check the rigid model's assumptions against its own walk."""
     summary = results.summary(RIGID)
     judged, hip = [], results.config.walker.hip
     works = hip.torque_N_m != 0.0 or hip.damping_N_m_s_per_rad != 0.0
@@ -96,7 +95,7 @@ def assumptions(results: Results) -> Section | None:
 
 
 def judgement(key: str, summary: Mapping[str, Any], results: Results) -> tuple[str, Cell]:
-    """The number that an assumption is judged by, and the verdict."""
+    """Return the value by which an assumption is judged, and the verdict."""
     value, ground = summary[key], results.config.contact
     if key == "min_normal_force_N":
         return quantity(value, "N", 4), HOLDS if value > 0 else FAILS
@@ -111,7 +110,7 @@ def judgement(key: str, summary: Mapping[str, Any], results: Results) -> tuple[s
 
 
 FIRST, LAST = 20, 4
-"""Of a longer walk so many steps are listed from its beginning and its end."""
+"""Steps listed from the beginning and the end of a longer walk."""
 SERIES = {
     (RIGID, "step_periods_s"): "rigid T (s)",
     (CONTACT, "step_periods_s"): "contact T (s)",
@@ -119,11 +118,11 @@ SERIES = {
     (CONTACT, "step_lengths_m"): "contact S (m)",
     (CONTACT, "slips_m"): "slip of the stance foot (mm)",
 }
-"""Numbers of each step: stage and key under which they are, and title of their column."""
+"""Columns of the step table: stage, key and title."""
 
 
 def steps(results: Results) -> Section | None:
-    """The steps that were taken; None if there are none."""
+    """Tabulate the steps of both walks; None if there are none."""
     found = {(stage, key): values for stage, key in SERIES if (values := results.summary(stage).get(key))}
     if not found:
         return None
@@ -146,7 +145,7 @@ def steps(results: Results) -> Section | None:
 
 
 def of_step(value: float | None, key: str, summary: Mapping[str, Any]) -> str:
-    """A number of a step with the decimals that its numerical error leaves; a slip in mm."""
+    """Format a quantity of a step with the decimals that its numerical error leaves; a slip in mm."""
     factor = 1e3 if key == "slips_m" else 1.0
     error = (summary.get("numerical_error") or {}).get(ERROR_OF_EACH_STEP[key])
     return fixed(value and factor * value, decimals_left(error and factor * error))
