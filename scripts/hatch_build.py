@@ -28,7 +28,7 @@ class CommitHook(BuildHookInterface[Any]):
 
 def commit_module(root: Path) -> Any:
     """The package's own module about commits, loaded without the package."""
-    spec = importlib.util.spec_from_file_location("commit", root / "walkerlab" / "store" / "commit.py")
+    spec = importlib.util.spec_from_file_location("commit", root / "walkerlab" / "pipeline" / "store" / "commit.py")
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
