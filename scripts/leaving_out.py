@@ -120,7 +120,7 @@ def reductions() -> list[Reduction]:
     """Every reduction there is, and one that there is not."""
     whole, none = contact(), contact(outputs())
     import_stage = "import walkerlab.{}, walkerlab.pipeline.runner"
-    walking, drawing = import_stage.format("stages.simulate"), import_stage.format("figures.stage")
+    walking, drawing = import_stage.format("pipeline.stages.simulate"), import_stage.format("views.figures.stage")
     return [
         Reduction(
             "the contact model: no contact block",

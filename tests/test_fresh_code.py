@@ -45,8 +45,8 @@ def copy(tmp_path):
     """A copy of the package with two files more, and a way to run it in a process of its own."""
     package = tmp_path / "walkerlab"
     shutil.copytree(PACKAGE, package, ignore=shutil.ignore_patterns("__pycache__"))
-    (package / "orbits" / "trial_of_code.py").write_text(CALLER)
-    (package / "mechanics" / "trial_of_code.py").write_text(CALLED)
+    (package / "physics" / "orbits" / "trial_of_code.py").write_text(CALLER)
+    (package / "physics" / "mechanics" / "trial_of_code.py").write_text(CALLED)
 
     def run():
         environment = {**os.environ, "PYTHONPATH": str(tmp_path), "WALKERLAB_CACHE": str(tmp_path / "cache")}
@@ -65,7 +65,7 @@ def compiled(folder):
 
 def test_an_edited_function_of_another_file_never_runs_stale(copy):
     package, run = copy
-    called = package / "mechanics" / "trial_of_code.py"
+    called = package / "physics" / "mechanics" / "trial_of_code.py"
     before = called.stat()
     assert run()[0] == 8.0
     called.write_text(CALLED.replace("x + 1.0", "x + 2.0"))
@@ -217,7 +217,14 @@ def digest_after_an_edit(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "path", ["__init__.py", "errors.py", "paper/errata.py", "orbits/small_slope.py", "mechanics/parts.py"]
+    "path",
+    [
+        "__init__.py",
+        "errors.py",
+        "evidence/paper/errata.py",
+        "physics/orbits/small_slope.py",
+        "physics/mechanics/parts.py",
+    ],
 )
 def test_an_edit_outside_the_compiled_parts_keeps_the_compiled_code(digest_after_an_edit, path):
     before, after = digest_after_an_edit(path)
@@ -225,7 +232,14 @@ def test_an_edit_outside_the_compiled_parts_keeps_the_compiled_code(digest_after
 
 
 @pytest.mark.parametrize(
-    "path", ["solvers/dop853_tableau.py", "solvers/stepping.py", "outcome.py", "kernels.py", "compiler.py"]
+    "path",
+    [
+        "physics/solvers/dop853_tableau.py",
+        "physics/solvers/stepping.py",
+        "outcome.py",
+        "physics/kernels.py",
+        "physics/compiler.py",
+    ],
 )
 def test_an_edit_of_what_kernels_are_made_of_compiles_them_anew(digest_after_an_edit, path):
     before, after = digest_after_an_edit(path)
@@ -322,8 +336,8 @@ def valued(system: Any) -> float:
 
 def test_code_compiled_for_types_of_another_program_does_not_stand_in_the_way(copy, tmp_path):
     package, _ = copy
-    (package / "mechanics" / "trial_of_system.py").write_text(SYSTEM)
-    (package / "orbits" / "trial_of_system.py").write_text(VALUED)
+    (package / "physics" / "mechanics" / "trial_of_system.py").write_text(SYSTEM)
+    (package / "physics" / "orbits" / "trial_of_system.py").write_text(VALUED)
     (tmp_path / "foreign.py").write_text(FOREIGN)
     environment = {**os.environ, "PYTHONPATH": str(tmp_path), "WALKERLAB_CACHE": str(tmp_path / "cache")}
 

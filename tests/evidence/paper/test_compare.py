@@ -174,7 +174,7 @@ def test_another_walker_and_uneven_ground_are_not_judged_by_the_paper(compared, 
     assert said in " ".join(content.summary["departures"])
     assert not {"verdicts", "paper_numbers", "table1", "errata"} & content.summary.keys()
     assert set(content.groups) == {"errors", "aligned", "orbit"}
-    assert "they are of the paper's own walker, on even ground" in [
+    assert "they apply only to the paper's walker on even ground" in [
         entry["why"] for entry in content.summary["left_out"]
     ]
     assert content.summary["steps"]["gait"]["period_s"] > 0.0

@@ -19,7 +19,7 @@ from functools import cache
 from pathlib import Path
 
 LIBRARIES = ["h5py", "jinja2", "numba", "numpy", "ruamel.yaml", "scipy.integrate", "scipy.optimize", "typer"]
-PACKAGES = ["cli", "config", "report", "pipeline.runner", "store", "sweeps"]
+PACKAGES = ["views.cli", "config", "views.report", "pipeline.runner", "pipeline.store", "pipeline.sweeps"]
 LONGEST_S = 120
 
 
