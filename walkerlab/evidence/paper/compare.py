@@ -143,7 +143,7 @@ def stored_variable(walk: Content, group: str, name: str) -> comparison.Array | 
 
 
 def times_of_steps(walk: Content, name: str) -> comparison.Array:
-    """Times (s) stored per step of a walk; empty if there are none."""
+    """Return the times (s) of a walk's steps, empty unless stored."""
     times = stored_variable(walk, "steps", name)
     return np.zeros(0) if times is None else times
 
@@ -257,7 +257,7 @@ def measure(config: CompareConfig, inputs: Mapping[str, Content], motion: Compar
 
 
 def measure_contact_model(config: CompareConfig, walk: Content) -> ContactMeasurements:
-    """Measure what is compared with the paper's ADAMS model."""
+    """Measure the contact model's counterparts of the paper's ADAMS numbers."""
     summary, pitch = walk.summary, float(walk.summary["pitch_m"])
     periods, lengths = np.array(summary["step_periods_s"]), np.array(summary["step_lengths_m"])
     stride = STEPS_PER_STRIDE * (lengths.size // STEPS_PER_STRIDE)

@@ -34,7 +34,7 @@ class PaperStudy:
     largest_jump           rad/s, largest change of an angular velocity at its heel strike
     swing_foot_height      m, over the slope, where (A.55) as printed places the swing foot of x_p
     foothold_speed         m/s, of the new stance foot after the impact of (A.55) as printed, on the gait as printed
-    both_misprints         fixed point with those of (A.5) and (A.55); None if there is none nearby
+    both_misprints         fixed point near x_p with the misprints of (A.5) and (A.55), or None
     kinetic_energy         J, of one state: from the masses' velocities, and from D_e with either order of coordinates
     """
 

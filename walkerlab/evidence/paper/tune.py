@@ -11,7 +11,7 @@ from walkerlab.config.reads import TuneConfig
 from walkerlab.config.walkers import is_passive_compass
 from walkerlab.evidence.paper.adams_start import AdamsWalk, adams_walk
 from walkerlab.evidence.paper.law import is_own_walker
-from walkerlab.evidence.paper.left_out import adjustment_omissions
+from walkerlab.evidence.paper.omissions import adjustment_omissions
 from walkerlab.evidence.paper.printed import TABLE_2
 from walkerlab.evidence.paper.tune_limit import limit_findings, limit_groups, limit_summary
 from walkerlab.labels import Label
@@ -246,13 +246,13 @@ def table_2(tune: TuneRun) -> dict[str, dict[str, Any]]:
     return rows
 
 
-def percent(value: float, other: float, base: float) -> float | None:
-    """Increase in magnitude over `other`, in percent of `base`; None for a base of zero."""
-    return 100.0 * (abs(value) - abs(other)) / abs(base) if base else None
+def percent(value: float, reference: float, base: float) -> float | None:
+    """Increase in magnitude over `reference`, in percent of `base`; None for a base of zero."""
+    return 100.0 * (abs(value) - abs(reference)) / abs(base) if base else None
 
 
 def gait_summary(tune: TuneRun) -> dict[str, Any]:
-    """Gait of the contact model, or why there is none."""
+    """Summarise the contact model's gait, or why the search found no gait."""
     gait = tune.gait.gait
     report = {"found": gait is not None, "reason": tune.gait.reason, "advice": tune.gait.advice}
     if gait is None:

@@ -28,7 +28,7 @@ from walkerlab.physics.solvers.registry import Tolerances
 PAPER_STIFFNESS: Final = Contact().in_si().stiffness
 STIFFNESS_RANGE: Final = (1e-6 * PAPER_STIFFNESS, 1e6 * PAPER_STIFFNESS)
 STICTION_RANGE: Final = (1e-7, 10.0)  # m/s
-NO_ERROR: Final = -1.0  # in the place of an error in what is kept, whose numbers are finite
+NO_ERROR: Final = -1.0  # stands for a missing error in checkpoints, which hold only finite numbers
 PER_STICTION: Final = 10.0  # friction velocity over stiction velocity, as the paper has it
 STEP_RANGE: Final = (1e-6, 1e-2)  # s
 WALK_STEPS: Final = 4

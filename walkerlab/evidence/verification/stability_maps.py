@@ -39,9 +39,9 @@ def run(
     return Content({"stiction": stiction, "step": step}, summary_of(stiction, step))
 
 
-def stiction_group(cells: int, kept: Mapping[str, maps.Numbers]) -> Group:
+def stiction_group(cells: int, results: Mapping[str, maps.Numbers]) -> Group:
     """Outcomes of the default method over stiction velocity and stiffness."""
-    cells_by_axis = np.array([[kept[f"stiction {i} {j}"] for j in range(cells)] for i in range(cells)])
+    cells_by_axis = np.array([[results[f"stiction {i} {j}"] for j in range(cells)] for i in range(cells)])
     columns = dict(zip(STICTION_COLUMNS, np.moveaxis(cells_by_axis, 2, 0), strict=True))
     dims = ("stiction_velocity", "stiffness")
     answered = np.isin(columns["outcome"], [int(outcome) for outcome in Outcome if outcome.answered])
@@ -61,10 +61,10 @@ def stiction_group(cells: int, kept: Mapping[str, maps.Numbers]) -> Group:
     return Group(variables, {"outcomes": OUTCOMES, "steps_wanted": maps.WALK_STEPS, "budget": maps.CELL_BUDGET})
 
 
-def step_group(cells: int, kept: Mapping[str, maps.Numbers]) -> Group:
+def step_group(cells: int, results: Mapping[str, maps.Numbers]) -> Group:
     """Results of semi-implicit Euler over step size and stiffness."""
     cells_by_axis = np.array(
-        [np.reshape(kept[f"step {j}"], (cells, 2)) for j in range(cells)]
+        [np.reshape(results[f"step {j}"], (cells, 2)) for j in range(cells)]
     )  # stiffness, step, of each
     verdicts, errors = cells_by_axis.transpose(2, 1, 0)
     dims = ("step_size", "stiffness")

@@ -309,7 +309,7 @@ def swing_truth(scene: EngineScene, start: Floats, until_s: float = SWING_S) -> 
     knee = knees_at_start(scene.ours, STANCE_FOOT, scene.start)
     passive = changed_forms(scene.ours, push_off=0.0, laws=0.0)
     system = on_ground(passive, (False, False), knee, hinged=True)
-    whole = passive.forms[1, 0]
+    free_form = passive.forms[1, 0]
 
     def rate(t: float, y: Floats) -> Any:
         f = np.zeros(y.size)
@@ -317,7 +317,7 @@ def swing_truth(scene: EngineScene, start: Floats, until_s: float = SWING_S) -> 
         return f
 
     def energy(y: Floats) -> float:
-        return float(kinetic_energy(whole, y) + potential_energy(whole, y))
+        return float(kinetic_energy(free_form, y) + potential_energy(free_form, y))
 
     y = folded(system.form, start)
     solution = solve_ivp(rate, (0.0, until_s), y, method="DOP853", rtol=1e-13, atol=1e-14)

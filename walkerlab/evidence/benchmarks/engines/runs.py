@@ -20,7 +20,7 @@ from walkerlab.physics.solvers.system import Floats
 
 TIME_ROUNDING = 1e-9
 UNLIMITED_STEPS = 10_000_000  # steps
-STEADY_STEP_FACTOR = 5  # so many times longer steps serve where only a steady end counts
+STEADY_STEP_FACTOR = 5  # of the step size, where only a steady end state is needed
 
 
 @dataclass(frozen=True)
