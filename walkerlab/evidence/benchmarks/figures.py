@@ -45,7 +45,6 @@ class Series:
 
     @property
     def key(self) -> Line2D:
-        """Legend entry."""
         return entry(self.look.label, **self.line)
 
     @property

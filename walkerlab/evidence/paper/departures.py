@@ -52,7 +52,6 @@ def departures(config: CompareConfig, start_moved: bool) -> Departures:
 
 
 def describe_differences(used: Any, paper: Any, names: Iterable[str], called: str = "{}") -> Iterator[str]:
-    """Describe each key whose values differ."""
     for name in names:
         if not same(getattr(used, name), getattr(paper, name)):
             yield describe(called.format(name), getattr(used, name), getattr(paper, name))

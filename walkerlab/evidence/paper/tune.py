@@ -62,7 +62,7 @@ AS_IT_STANDS = (1.0, 1.0)
 # knees or rolling feet make walks several times slower than the compass's, so their map and margins are coarser
 COMPASS_CELLS, OTHER_CELLS, COARSE_MARGINS = 61, 21, {"step": 0.05, "largest": 2.0}
 SEARCH_ADVICE = "Widen the search (tune.swing_factors, tune.stance_factors, tune.cells) or choose another contact."
-WALK_QUANTITIES = ("outcome", "advice", "steps", "step_periods_s", "step_lengths_m", "end_time_s")
+WALK_SUMMARY_KEYS = ("outcome", "advice", "steps", "step_periods_s", "step_lengths_m", "end_time_s")
 """Quantities reported of each walk of the procedure."""
 
 
@@ -182,7 +182,7 @@ class TuneRun:
 
 def walk_summary(walk: ContactWalkResult) -> dict[str, Any]:
     quantities = numbers_of(walk)
-    return {key: quantities[key] for key in WALK_QUANTITIES}
+    return {key: quantities[key] for key in WALK_SUMMARY_KEYS}
 
 
 def summary(tune: TuneRun) -> dict[str, Any]:

@@ -32,7 +32,6 @@ B = TypeVar("B", bound=Block)
 
 
 def package_cases() -> tuple[Case, ...]:
-    """Cases that come with the package."""
     families = read_catalogue(CATALOGUE).items()
     return check_unique_names(
         [Case.model_validate({"family": name, **entry}) for name, cases in families for entry in cases]

@@ -31,7 +31,7 @@ INITIAL_INTERVALS: Final = 256
 MAX_PASSES: Final = 9  # each divides unsettled intervals in four
 MAX_INTERVALS: Final = 30_000  # not refined beyond this
 # of the walker's momentum: an interval's impulse may change by this over the number of intervals
-SETTLED_SHARE: Final = 1e-6
+SETTLED_IMPULSE_SHARE: Final = 1e-6
 MAX_UNKNOWN: Final = 1e-3  # of the walker's momentum, beyond which a balance says nothing
 
 
@@ -90,7 +90,7 @@ def momentum_balance(config: WalksConfig, scene: ContactScene, start: State, cas
         assert samples is not None, "the walk was looked at"
         rates = impulse_rate(samples, scene, config, walk.touch_time_s) / scale
         change = unsettled(samples.time_s, rates)
-        wanting = change > SETTLED_SHARE / grid.size
+        wanting = change > SETTLED_IMPULSE_SHARE / grid.size
         if not wanting.any() or grid.size > MAX_INTERVALS:
             break
         grid = split(samples.time_s, wanting)

@@ -27,7 +27,7 @@ from walkerlab.physics.orbits.newton import (
 from walkerlab.physics.solvers.system import Floats
 
 FEW_CORRECTIONS = 3
-RESOLUTION = 1e-14  # of arclength
+ROOT_RESOLUTION = 1e-14  # of arclength
 # (abscissa, solution) pairs, latest last.
 Points = tuple[tuple[float, Floats], ...]
 
@@ -214,7 +214,7 @@ def root_along(segment: Segment[Data], measure: Callable[[CurvePoint[Data]], flo
         return measure(points[s])
 
     try:
-        root = brentq(measure_at, 0.0, segment.length, xtol=RESOLUTION, rtol=4.0 * np.finfo(float).eps)
+        root = brentq(measure_at, 0.0, segment.length, xtol=ROOT_RESOLUTION, rtol=4.0 * np.finfo(float).eps)
         measure_at(root)
     except (_OffTheCurve, ValueError):
         return None

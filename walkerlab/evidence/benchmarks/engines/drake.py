@@ -57,8 +57,6 @@ def tuned(model: str, target: adapter.EngineContact) -> adapter.OwnContact:
 
 
 class DrakeRun(adapter.Simulation):
-    """A Drake simulator with its diagram and context."""
-
     def build(self, model: PlanarModel, q: Floats, v: Floats) -> None:
         from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, DiscreteContactApproximation
         from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator

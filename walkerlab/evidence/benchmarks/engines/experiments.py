@@ -296,7 +296,6 @@ class EngineOnScene:
 
 
 def has_settled(coarse: EngineRow, fine: EngineRow) -> bool:
-    """Whether two completed walks agree in period."""
     if coarse.error is None or fine.error is None or coarse.period_s is None or fine.period_s is None:
         return False
     return abs(fine.period_s / coarse.period_s - 1.0) <= SETTLED_CHANGE
