@@ -124,7 +124,7 @@ def cheapest(
         run = walk()
         if not run.state.size:
             continue
-        error = float(np.max(np.abs(run.state - reference.state)))
+        error = float(np.max(np.abs(run.state - reference.first.state)))
         if error <= level:
             return Timed(method, tolerance, error, watch(walk), run.rhs_evaluations)
     return None
@@ -166,8 +166,8 @@ def rigid_lines(watch: Stopwatch) -> Iterator[Line]:
     errors = []
     for tolerance in (1e-12, 1e-13, 1e-14):
         run = trial.prepare("dop853", tolerance, BUDGET)()
-        errors.append(float(np.max(np.abs(run.state - reference.state))))
-    known = f" (reference {reference.method}, second {reference.second_method}: {reference.agreement:.1e})"
+        errors.append(float(np.max(np.abs(run.state - reference.first.state))))
+    known = f" (reference {reference.first.method}, second {reference.second.method}: {reference.agreement:.1e})"
     line = at_most("ten rigid steps, smallest error", min(errors), "", 1e-13, 1e-14)
     yield replace(line, measured=line.measured.strip() + known)
 
@@ -278,7 +278,7 @@ def batch_lines(watch: Stopwatch) -> Iterator[Line]:
     seen, fates = Attractors().capture(many, STEPS), new_fates(many)
     memory, legs = new_lane_memory(RTOL, ATOL), two_legs(trial.walker)
     seconds = watch(lambda: walk_lanes(legs, memory, seen, np.array([trial.start] * many), fates))
-    error = float(np.max(np.abs(seen.last - reference.state[1:])))
+    error = float(np.max(np.abs(seen.last - reference.first.state[1:])))
     alone = cheapest(trial, reference, "dop853", 1e-6, watch, LADDER)
     script = cheapest(trial, reference, USER_SCRIPT, 1e-6, watch, LADDER)
     rate = many * STEPS / seconds
@@ -362,7 +362,7 @@ def join_rows(trial: ContactTrial, reference: Reference, watch: Stopwatch) -> li
         for one in (trial, smooth):
             walk = one.prepare("radau5", tolerance, BUDGET)
             run = walk()
-            error = float(np.max(np.abs(run.state - reference.state))) if run.state.size else None
+            error = float(np.max(np.abs(run.state - reference.first.state))) if run.state.size else None
             cells += [run.outcome if error is None else f"{error:.1e}", str(run.rhs_evaluations)]
             cells.append(f"{1e3 * watch(walk):.3g}")
         rows.append(cells)

@@ -29,6 +29,7 @@ ROOT = Path(__file__).parent.parent
 DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").glob("*.md"))]
 MAKER = runpy.run_path(str(ROOT / "scripts" / "refresh_docs.py"))
 LINK = re.compile(r"\]\(([^)#\s]+)(?:#[^)]*)?\)")
+ANCHOR = re.compile(r"\]\(([^)#\s]*)#([^)\s]+)\)")
 COMMAND = re.compile(r"\bwalkerlab (?:[a-z-]+)(?: [^`&|\n#]*)?")
 ANSWER_AT_ONCE = ("status", "show", "schema")
 ONLY_READ = ("init", "open", "rerun", "export", "animate", "draw")
@@ -58,6 +59,19 @@ def commands():
 def test_links_lead_to_files_that_are_there(path):
     relative = [link for link in LINK.findall(text_of(path)) if "://" not in link]
     assert [link for link in relative if not (path.parent / link).exists()] == []
+
+
+def anchors(page):
+    """Anchors of a page's headings, as GitHub makes them."""
+    text = re.sub(r"^```.*?^```$", "", text_of(page), flags=re.DOTALL | re.MULTILINE)
+    headings = re.findall(r"^#+ (.+)$", text, re.MULTILINE)
+    return {re.sub(r"[^\w -]", "", heading.lower()).strip().replace(" ", "-") for heading in headings}
+
+
+@pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: path.name)
+def test_links_lead_to_headings_that_are_there(path):
+    links = [(file, anchor) for file, anchor in ANCHOR.findall(text_of(path)) if "://" not in file]
+    assert [link for link in links if link[1] not in anchors(path.parent / link[0] if link[0] else path)] == []
 
 
 def code_to_add():

@@ -231,7 +231,7 @@ PIPELINE = Graph(
         "tune", "walkerlab.evidence.paper.tune",
         "Adjust the initial velocities until the contact model walks; say whether, how much, and why.",
         reads.TuneConfig, results_of("fixedpoint"), requires=("contact",),
-        does_without=later("walkerlab.evidence.paper.left_out", "adjustment_omissions"),
+        does_without=later("walkerlab.evidence.paper.omissions", "adjustment_omissions"),
     ),
     Stage(
         "compare", "walkerlab.evidence.paper.compare",
@@ -257,7 +257,7 @@ PIPELINE = Graph(
         "Verify extreme cases and problems with known answers.",
         reads.CompassCasesConfig, known_and_start, takes_of_scene=reads.SceneCasesConfig,
         takes_of_paper=reads.WalksConfig,
-        does_without=later("walkerlab.evidence.verification.left_out", "verification_omissions"),
+        does_without=later("walkerlab.evidence.verification.omissions", "verification_omissions"),
     ),
     Stage(
         "stability-maps", "walkerlab.evidence.verification.stability_maps",

@@ -86,9 +86,9 @@ def tolerances_of(config: GroundConfig, steps: int) -> Tolerances:
 def scene_on_pads(
     config: ContactConfig, rigid_step: float, rigid_state: State, answer: GaitAnswer | None = None
 ) -> ContactScene:
-    """Build the config's scene with pads laid; raises NoAnswer if they need a contact gait and there is none.
+    """Build the config's scene with pads laid; raises NoAnswer if they need a contact gait that is not found.
 
-    answer  of a search for that gait; by default it is searched for
+    answer  result of the search for that gait; searches by default
     """
     own = None
     if wants_own_pitch(require_contact(config)):

@@ -37,12 +37,12 @@ FOOT_SHARES = (0.02, 0.03, 0.04, 0.05)  # in leg lengths
 class SlopeRange:
     """A range of slopes with gaits, and the part of it where they are stable; None if nowhere."""
 
-    whole: tuple[float, float]
+    slopes: tuple[float, float]
     stable: tuple[float, float] | None
 
     def nearest_slope(self, target: float) -> float:
         """Return a slope slightly inside the nearer end of the range, of stable gaits if there are any."""
-        low, high = self.stable or self.whole
+        low, high = self.stable or self.slopes
         near, far = (low, high) if abs(low - target) < abs(high - target) else (high, low)
         return near + INSET * (far - near)
 
@@ -55,7 +55,7 @@ def find_slopes_with_gaits(config: Config) -> SlopeRange | None:
     for value in (*(factor * own for factor in SLOPE_FACTORS), *COMMON_SLOPES):
         if value in span and not any(candidate.stable for candidate in ranges):
             ranges += walkable_ranges(follow(rigid_walkers(config, SLOPE), span, value))
-    return min(ranges, key=lambda r: (r.stable is None, distance(r.stable or r.whole, own)), default=None)
+    return min(ranges, key=lambda r: (r.stable is None, distance(r.stable or r.slopes, own)), default=None)
 
 
 def distance(span: tuple[float, float], value: float) -> float:
@@ -78,10 +78,10 @@ def walkable_ranges(branches: tuple[GaitBranch, ...]) -> Iterator[SlopeRange]:
         if len(good) < 2:
             continue
         values = [point.value for point in good]
-        whole = (min(values), max(values))
-        ranges = [(max(low, whole[0]), min(high, whole[1])) for low, high in branch.stable_ranges]
+        slopes = (min(values), max(values))
+        ranges = [(max(low, slopes[0]), min(high, slopes[1])) for low, high in branch.stable_ranges]
         proper = [(low, high) for low, high in ranges if high > low]
-        yield SlopeRange(whole, max(proper, key=lambda ends: ends[1] - ends[0], default=None))
+        yield SlopeRange(slopes, max(proper, key=lambda ends: ends[1] - ends[0], default=None))
 
 
 def suggest_gaits(config: Config, typed: str = "") -> str:
@@ -91,17 +91,17 @@ def suggest_gaits(config: Config, typed: str = "") -> str:
     """
     if config.slope_rad <= 0.0:
         return ""
-    feet, slopes = find_gait_with_feet_ahead(config), find_slopes_with_gaits(config)
+    feet, suitable = find_gait_with_feet_ahead(config), find_slopes_with_gaits(config)
     advice = []
     if feet is not None:
         ahead_m, gait = feet
         description = "a stable gait" if gait.stable else "a gait, unstable"
         command = f"`walkerlab fixedpoint{typed} --set walker.{FOOT_KEY}={ahead_m:.3g}`"
         advice.append(f"With its feet {ahead_m:.3g} m ahead of the shanks this walker has {description}: {command}.")
-    if slopes is not None:
-        in_degrees = tuple(math.degrees(value) for value in slopes.stable or slopes.whole)
-        description = "A stable gait" if slopes.stable else "A gait, unstable,"
-        slope = slopes.nearest_slope(config.slope_rad)
+    if suitable is not None:
+        in_degrees = tuple(math.degrees(value) for value in suitable.stable or suitable.slopes)
+        description = "A stable gait" if suitable.stable else "A gait, unstable,"
+        slope = suitable.nearest_slope(config.slope_rad)
         setting = f"slope_rad={slope:.4g}" if "slope_rad=" in typed else f"slope_deg={math.degrees(slope):.3g}"
         command = f"`walkerlab fixedpoint{typed} --set {setting}`"
         advice.append(f"{description} exists from {in_degrees[0]:.3g} to {in_degrees[1]:.3g} deg: {command}.")

@@ -1,4 +1,4 @@
-"""List what the scene of a config does not compute, why, and what that saves.
+"""List results that the scene of a config omits, the reason, and the savings.
 
 The list follows from the config alone, so it is available before anything is loaded or run. scripts/benchmark.py
 measures the savings in time and bytes (docs/performance.md).
@@ -84,12 +84,12 @@ def leg_omissions(config: RigidConfig) -> Iterator[Entry]:
         yield omission("leg inertia", "walker.leg_inertia_kg_m2 is 0", saved)
 
 
-def output_omissions(wanted: tuple[Output, ...], model: str, numbers: Mapping[Output, int]) -> Iterator[Entry]:
+def output_omissions(outputs: tuple[Output, ...], model: str, numbers: Mapping[Output, int]) -> Iterator[Entry]:
     for output, count in numbers.items():
-        if output not in wanted:
+        if output not in outputs:
             what, why = f"{output} of the {model} walk in time", f"outputs does not ask for {output}"
             yield omission(what, why, f"{count} of {sum(numbers.values())} numbers a sample")
-    if not wanted:
+    if not outputs:
         yield omission(f"samples of the {model} walk", "outputs asks for nothing in time", "all states within steps")
 
 

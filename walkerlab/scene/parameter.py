@@ -30,9 +30,8 @@ class Parameter:
     path: tuple[str, ...]
 
     def value_in(self, config: ContactConfig) -> float:
-        """What the config has there."""
-        found = value_at(config, self.path)
-        return math.degrees(found) if self.key == SLOPE_DEG else float(found)
+        value = value_at(config, self.path)
+        return math.degrees(value) if self.key == SLOPE_DEG else float(value)
 
     def config_at(self, config: ContactConfig, value: float) -> Config | None:
         """Return the config at another value, with everything that follows from it; None if the schema refuses it."""
@@ -119,8 +118,8 @@ def why_no_parameter(key: str, config: ContactConfig, own: Mapping[str, FieldInf
     if key not in own:
         if any(name.startswith(f"{key}.") for name in own):
             return "is a block of keys, not a number"
-        others = {".".join(("walker", *path[1:])) for path, _ in leaves_of_other_kinds(Config)}
-        if key in others | {".".join(path) for path, _ in leaves(Config)}:
+        foreign = {".".join(("walker", *path[1:])) for path, _ in leaves_of_other_kinds(Config)}
+        if key in foreign | {".".join(path) for path, _ in leaves(Config)}:
             return f"is not a key of this walker, whose type is {config.walker.type}{suggest_key(key, own)}"
         return f"is not a key of the config{suggest_key(key, own)}"
     path = key.split(".")
@@ -143,5 +142,5 @@ def suggest_key(key: str, own: Mapping[str, FieldInfo]) -> str:
         for name, field in own.items()
         if name.split(".")[0] in MODEL_KEYS and block_of(field) is None and "number" in type_words(field.annotation)
     ]
-    meant = nearest(key, [*numbers, SLOPE_DEG])
-    return f"; did you mean {meant}?" if meant else ""
+    closest = nearest(key, [*numbers, SLOPE_DEG])
+    return f"; did you mean {closest}?" if closest else ""

@@ -51,8 +51,8 @@ class ModelUnderTest:
         _, units = unit_walker(rigid_walker(self.config))
         return GaitOnMap(step_map, p, self.z, step_map.step(self.z, p).DP, units)
 
-    def gradients(self, parameter: Parameter, wanted: Collection[str]) -> dict[str, Gradient]:
-        return gradients(self.at(parameter), abs(parameter.value_in(self.config)) or 1e-2, wanted)
+    def gradients(self, parameter: Parameter, selection: Collection[str]) -> dict[str, Gradient]:
+        return gradients(self.at(parameter), abs(parameter.value_in(self.config)) or 1e-2, selection)
 
 
 def section_coordinates(walker: RigidModel, state: Sequence[float]) -> Floats:

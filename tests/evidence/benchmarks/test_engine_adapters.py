@@ -9,15 +9,15 @@ from engine_scenes import compass, kneed
 
 from walkerlab.evidence.benchmarks.engines.adapter import Stepping
 from walkerlab.evidence.benchmarks.engines.experiments import START_FACTORS, contact_target, simulate, swing_truth
-from walkerlab.evidence.benchmarks.engines.registry import ENGINES
+from walkerlab.evidence.benchmarks.engines.registry import PHYSICS_ENGINES
 from walkerlab.evidence.benchmarks.engines.runs import Bench, SwingTask, TuningTask, WalkTask, pinned_model
 
 SWING_S, COARSE_S = 0.24, 4e-3
 
 
-@pytest.fixture(params=ENGINES)
+@pytest.fixture(params=PHYSICS_ENGINES)
 def engine(request):
-    entry = ENGINES[request.param]
+    entry = PHYSICS_ENGINES[request.param]
     pytest.importorskip(entry.module, reason=f"{entry.name} is not installed: {entry.install_line}")
     return entry
 

@@ -6,7 +6,7 @@ from scipy.integrate import solve_ivp
 
 from walkerlab.evidence.benchmarks.engines.adapter import Stepping
 from walkerlab.evidence.benchmarks.engines.planar import HINGED, planar_model
-from walkerlab.evidence.benchmarks.engines.registry import ENGINES
+from walkerlab.evidence.benchmarks.engines.registry import PHYSICS_ENGINES
 from walkerlab.evidence.benchmarks.engines.runs import SwingTask
 from walkerlab.physics.mechanics.assembly import Anchor
 from walkerlab.physics.mechanics.rigid import standing
@@ -39,9 +39,9 @@ def ours():
     return body_by_body(solve_ivp(rate, (0.0, SWING_S), START, "DOP853", rtol=1e-12, atol=1e-14).y[:, -1])
 
 
-@pytest.mark.parametrize("name", ENGINES)
+@pytest.mark.parametrize("name", PHYSICS_ENGINES)
 def test_the_swing_with_a_free_knee_converges_to_the_rigid_models_with_the_order_that_is_promised(name, ours):
-    engine = ENGINES[name]
+    engine = PHYSICS_ENGINES[name]
     pytest.importorskip(engine.module, reason=f"{name} is not installed: {engine.install_line}")
     foot = KNEED.feet[STANCE]
     gravity = float(GRAVITY * np.sin(SLOPE)), float(GRAVITY * np.cos(SLOPE))

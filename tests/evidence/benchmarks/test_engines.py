@@ -11,7 +11,7 @@ from walkerlab.evidence.benchmarks.engines import registry
 from walkerlab.evidence.benchmarks.engines import stage as engines
 from walkerlab.evidence.benchmarks.engines.experiments import ADAPTIVE_TOLERANCES, EngineOnScene
 from walkerlab.evidence.benchmarks.engines.process import TaskLost
-from walkerlab.evidence.benchmarks.engines.registry import ENGINES, Engine
+from walkerlab.evidence.benchmarks.engines.registry import PHYSICS_ENGINES, Engine
 from walkerlab.evidence.benchmarks.engines.scenes import scenes
 from walkerlab.evidence.benchmarks.engines.stage import closest, ratios, three_digits
 from walkerlab.pipeline.graph import PIPELINE
@@ -23,7 +23,7 @@ ABSENT = Engine("absent", "no_such_engine_module", "absent-engine")
 
 
 def test_an_engine_that_is_absent_is_told_with_its_install_line(monkeypatch):
-    monkeypatch.setattr(engines, "ENGINES", {"absent": ABSENT})
+    monkeypatch.setattr(engines, "PHYSICS_ENGINES", {"absent": ABSENT})
     assert engines.missing_engines() == [
         {"what": "engine absent", "why": "not installed: pip install absent-engine"},
     ]
@@ -74,7 +74,7 @@ def test_a_run_that_is_lost_is_a_row_and_what_takes_for_ever_is_not_refined(lost
 
 
 def test_every_engine_has_an_adapter_with_one_signature():
-    for engine in ENGINES.values():
+    for engine in PHYSICS_ENGINES.values():
         adapter = engine.adapter()
         assert set(adapter.CONTACTS.values()) <= set(adapter.INTEGRATORS)
         assert adapter.CANNOT_EXPRESS

@@ -19,6 +19,7 @@ from walkerlab.evidence.paper.measured import (
     over_last_steps,
 )
 from walkerlab.evidence.paper.printed import (
+    CYCLES_WALKED,
     DAMPING,
     DYNAMIC_FRICTION,
     E_AVG,
@@ -29,7 +30,6 @@ from walkerlab.evidence.paper.printed import (
     STATIC_FRICTION,
     STEP_LENGTH,
     STIFFNESS,
-    STRIDES,
     T_CYCLE,
     T_LEFT,
     T_RIGHT,
@@ -174,7 +174,7 @@ def test_x_p_is_reproduced_by_the_equations_as_printed(rows):
         assert entry.agreement(rows()[entry].as_printed)
 
 
-INPUTS = (*TABLE_1, LEG_INERTIA, FOOT_RADIUS, STIFFNESS, DAMPING, STATIC_FRICTION, DYNAMIC_FRICTION, STRIDES)
+INPUTS = (*TABLE_1, LEG_INERTIA, FOOT_RADIUS, STIFFNESS, DAMPING, STATIC_FRICTION, DYNAMIC_FRICTION, CYCLES_WALKED)
 OWN_CONTRADICTIONS = (
     *(row.percent for row in TABLE_2[1:]),
     LARGEST_ERROR,

@@ -7,7 +7,7 @@ from walkerlab.config.loader import load
 from walkerlab.config.reads import only
 from walkerlab.evidence.verification import stability_maps
 from walkerlab.evidence.verification.maps import (
-    NO_ERROR,
+    ERROR_MISSING,
     PAPER_STIFFNESS,
     VERDICT_NAMES,
     prepare_on_ground,
@@ -66,20 +66,24 @@ def test_a_fixed_step_is_fine_where_it_is_small_and_its_error_falls_with_it():
     verdicts = [VERDICT_NAMES[int(number)] for number in numbers[::2]]
     assert verdicts == ["fine", "fine", "diverges"]
     assert 0.0 < numbers[1] < 0.7 * numbers[3]  # halving the step of a method of first order or better
-    assert numbers[5] == NO_ERROR
+    assert numbers[5] == ERROR_MISSING
 
 
 def test_where_no_error_was_measured_the_map_has_a_gap():
     """Also where both runs end alike, but after different numbers of steps."""
     walked, slid = float(Outcome.WALKED), float(Outcome.SLID)
-    rows = ([walked, 4.0, walked, 1e-7, 9.0], [slid, 1.0, slid, NO_ERROR, 9.0], [walked, 4.0, slid, NO_ERROR, 9.0])
+    rows = (
+        [walked, 4.0, walked, 1e-7, 9.0],
+        [slid, 1.0, slid, ERROR_MISSING, 9.0],
+        [walked, 4.0, slid, ERROR_MISSING, 9.0],
+    )
     cells = (rows[0], rows[1], rows[2], rows[1])
     kept = {f"stiction {i} {j}": list(cells[2 * i + j]) for i in range(2) for j in range(2)}
     found = stability_maps.stiction_group(2, kept)
     np.testing.assert_array_equal(found["error"], [[1e-7, np.nan], [np.nan, np.nan]])
     assert found["compared"].tolist() == [[1, 0], [0, 0]]
     fine, diverges = float(VERDICT_NAMES.index("fine")), float(VERDICT_NAMES.index("diverges"))
-    step = stability_maps.step_group(2, {f"step {i}": [fine, 1e-5, diverges, NO_ERROR] for i in range(2)})
+    step = stability_maps.step_group(2, {f"step {i}": [fine, 1e-5, diverges, ERROR_MISSING] for i in range(2)})
     np.testing.assert_array_equal(step["error"], [[1e-5, 1e-5], [np.nan, np.nan]])
     kept = {name: list(rows[1]) for name in kept}
     none = stability_maps.summary_of(stability_maps.stiction_group(2, kept), step)

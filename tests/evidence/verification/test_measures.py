@@ -68,7 +68,7 @@ def test_momentum_with_leg_inertia_is_kept_too():
 def test_energy_won_at_a_heel_strike_is_seen(walk):
     assert MASSES.energy_won(walk.before, walk.after) == 0.0
     assert MASSES.energy_won(walk.after, walk.before[:, [1, 0, 3, 2]]) > 0.0
-    assert MASSES.at(walk.after[0]).kinetic < MASSES.at(walk.before[0]).kinetic
+    assert MASSES.pose(walk.after[0]).kinetic < MASSES.pose(walk.before[0]).kinetic
 
 
 def test_what_is_no_number_fails():

@@ -120,7 +120,7 @@ def test_kinetic_energy_summed_over_the_masses_is_that_of_the_equations(name):
     config = config_of(name)
     model, state = start_of(config)
     masses = RigidMasses(assembly_of(config.walker, rigid=True), config.slope_rad)
-    assert masses.at(state).kinetic == pytest.approx(kinetic_energy(model, tuple(state.tolist())), rel=1e-12)
+    assert masses.pose(state).kinetic == pytest.approx(kinetic_energy(model, tuple(state.tolist())), rel=1e-12)
 
 
 @pytest.mark.parametrize(("name", "sets"), [("kneed", (COMPLIANT,)), ("round-feet", ()), ("torso", ())])

@@ -383,7 +383,7 @@ def test_a_gait_is_the_same_whatever_slopes_were_asked_before():
     def starts_from_seeds(degrees):
         search = Search(assembled(on_slope(degrees)))
         search.follow_seeds()
-        return [found.cycle.z.tolist() for found in search.found], search.lost
+        return [record.cycle.z.tolist() for record in search.records], search.lost
 
     slope_branches.cache_clear()
     after_others = [starts_from_seeds(degrees) for degrees in (4.0, 0.3, 7.0, 2.0)][-1]
@@ -442,6 +442,6 @@ def test_what_is_known_of_two_gaits_hides_no_third_that_a_start_leads_to(degrees
     search = Search(walker)
     search.follow_seeds()
     search.draw(np.random.default_rng(0), 100)
-    periods = [sorted(round(found.gait.period, 6) for found in one.found) for one in (ignorant, search)]
+    periods = [sorted(round(record.gait.period, 6) for record in one.records) for one in (ignorant, search)]
     assert len(periods[0]) >= 2
     assert periods[1] == periods[0]

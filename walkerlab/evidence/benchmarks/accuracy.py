@@ -108,14 +108,22 @@ def trials_of_scene(config: SceneConfig, inputs: Mapping[str, Content]) -> Itera
 def summarise(
     rows: Sequence[MethodRow], not_run: list[dict[str, Any]], references: Mapping[str, Reference], jobs: int
 ) -> dict[str, Any]:
-    parts = ("method", "second_method", "agreement", "state", "from_outside", "tolerance", "rhs_evaluations")
     return {
         "rows": [asdict(row) for row in rows],
         "repeats": MAX_REPEATS,
         "rigid_velocity_factor": START_RATE_FACTOR,
         "budget": RUN_BUDGET,
         "reference": {
-            name: {part: getattr(reference, part) for part in parts} for name, reference in references.items()
+            name: {
+                "method": reference.first.method,
+                "second_method": reference.second.method,
+                "agreement": reference.agreement,
+                "state": reference.first.state,
+                "from_outside": reference.from_outside,
+                "tolerance": reference.first.tolerance,
+                "rhs_evaluations": reference.first.rhs_evaluations,
+            }
+            for name, reference in references.items()
         },
         "best": {scene: best_methods(rows, scene) for scene in references},
         "conclusions": {scene: conclusion(rows, scene) for scene in references},

@@ -45,11 +45,10 @@ class Series:
 
     @property
     def key(self) -> Line2D:
-        """Legend entry."""
         return entry(self.look.label, **self.line)
 
     @property
-    def walked(self) -> NDArray[np.bool_]:
+    def completed(self) -> NDArray[np.bool_]:
         """Whether each run reached the end of its walk."""
         return np.asarray(self.runs["outcome"] == "walked")
 
@@ -194,16 +193,18 @@ def draw_periods(scene: str, results: Results) -> Drawn:
     all_series, summary = list(engine_series(scene, OWN_LAW, results)), results[ENGINES_STAGE].summary
     engines, reference = [series for series in all_series if series.engine != OURS], summary["reference"][scene]
     for series in engines:
-        draw_engine(axes, series, "step_s", np.where(series.walked, series.runs["period_s"], np.nan))
+        draw_engine(axes, series, "step_s", np.where(series.completed, series.runs["period_s"], np.nan))
     levels = [axes.axhline(reference["period_s"], color=CONTACT.colour, linewidth=1.6, label="ADAMS's law")]
     if "rigid_period_s" in reference:
         level = reference["rigid_period_s"]
         levels.append(axes.axhline(level, color=GREY, linewidth=1.2, linestyle=":", label="rigid gait"))
     cost_axis(axes)
     axes.set(xlabel="step size (s)", ylabel="period of the last step (s)")
-    add_legend(figure, [*levels, *(series.key for series in engines if series.walked.any())])
+    add_legend(figure, [*levels, *(series.key for series in engines if series.completed.any())])
     failed = [
-        (series.look.label, series.runs["step_s"][~series.walked]) for series in all_series if not series.walked.all()
+        (series.look.label, series.runs["step_s"][~series.completed])
+        for series in all_series
+        if not series.completed.all()
     ]
     return figure, (summary["conclusions"][scene][OWN_LAW], failed)
 

@@ -55,8 +55,8 @@ class MethodRow:
     tolerance: Annotated[float, Label("1", "relative tolerance")]
     outcome: Annotated[str, Label("1", "outcome")]
     error: Annotated[float | None, ERROR_LABEL]
-    against: Annotated[str, Label("1", "method of the end that it is measured by")]  # another one
-    within_reference: bool  # whether the error is below what the reference is known to, and so only a bound
+    against: Annotated[str, Label("1", "method of the reference end state")]  # never the same method
+    within_reference: bool  # whether the error is below the reference's uncertainty, and so only a bound
     wall_s: Annotated[float, Label("s", "median run time", timing=True)]
     least_wall_s: Annotated[float, Label("s", "least run time", timing=True)]
     largest_wall_s: Annotated[float, Label("s", "largest run time", timing=True)]

@@ -40,29 +40,9 @@ class Reference:
     second: End
 
     @property
-    def method(self) -> str:
-        return self.first.method
-
-    @property
-    def state(self) -> Floats:
-        return self.first.state
-
-    @property
-    def second_method(self) -> str:
-        return self.second.method
-
-    @property
     def from_outside(self) -> bool:
         """Whether the first end is independent of this project's solvers, event search and equations."""
-        return self.method == taylor_reference.TAYLOR_METHOD
-
-    @property
-    def tolerance(self) -> float:
-        return self.first.tolerance
-
-    @property
-    def rhs_evaluations(self) -> int:
-        return self.first.rhs_evaluations
+        return self.first.method == taylor_reference.TAYLOR_METHOD
 
     @property
     def agreement(self) -> float:

@@ -70,7 +70,6 @@ class AdamsWalk:
 
     @property
     def reason(self) -> str:
-        """Why the walk ends, with numbers."""
         return prose("adams_start.reason", self, int(self.walk.touch_time_s.size))
 
 

@@ -107,7 +107,6 @@ def impact(
 
 
 def assembled(walker: RigidWalker) -> RigidModel:
-    """Assemble the walker's rigid model from its parts."""
     below_hip = walker.leg_length - walker.foot_to_mass
     leg = Limb(walker.leg_length, walker.leg_mass, below_hip, inertia_kg_m2=walker.leg_inertia)
     model = standing(straight_legs(leg, walker.hip_mass, Arc()), walker.gravity, walker.slope)

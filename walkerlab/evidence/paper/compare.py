@@ -15,7 +15,7 @@ from walkerlab.evidence.paper.departures import departures
 from walkerlab.evidence.paper.errata import Erratum, errata
 from walkerlab.evidence.paper.law import is_own_walker
 from walkerlab.evidence.paper.measured import (
-    CYCLES,
+    PAPER_CYCLES,
     ContactMeasurements,
     Errors,
     Measured,
@@ -137,13 +137,12 @@ def models_compared(config: CompareConfig, inputs: Mapping[str, Content]) -> dic
 
 
 def stored_variable(walk: Content, group: str, name: str) -> comparison.Array | None:
-    """Variable of a stored walk, or None."""
     variables = walk.groups.get(group, Group({}))
     return variables[name] if name in variables.variables else None
 
 
 def times_of_steps(walk: Content, name: str) -> comparison.Array:
-    """Times (s) stored per step of a walk; empty if there are none."""
+    """Return the times (s) of a walk's steps, empty unless stored."""
     times = stored_variable(walk, "steps", name)
     return np.zeros(0) if times is None else times
 
@@ -257,7 +256,7 @@ def measure(config: CompareConfig, inputs: Mapping[str, Content], motion: Compar
 
 
 def measure_contact_model(config: CompareConfig, walk: Content) -> ContactMeasurements:
-    """Measure what is compared with the paper's ADAMS model."""
+    """Measure the contact model's counterparts of the paper's ADAMS numbers."""
     summary, pitch = walk.summary, float(walk.summary["pitch_m"])
     periods, lengths = np.array(summary["step_periods_s"]), np.array(summary["step_lengths_m"])
     stride = STEPS_PER_STRIDE * (lengths.size // STEPS_PER_STRIDE)
@@ -268,7 +267,7 @@ def measure_contact_model(config: CompareConfig, walk: Content) -> ContactMeasur
     _, theta_2, omega_1, omega_2 = fixed_point_as_printed()
     scene = contact_scene(config, pitch, pitch)
     start = start_state(scene, (-2.0 * config.slope_rad - theta_2, theta_2, omega_1, omega_2))
-    from_x_p = scene.walk(start, 2 * CYCLES, GAIT_TOLERANCES)
+    from_x_p = scene.walk(start, 2 * PAPER_CYCLES, GAIT_TOLERANCES)
     return ContactMeasurements(
         law=require_contact(config),
         foot_radius=config.walker.foot_radius_m,

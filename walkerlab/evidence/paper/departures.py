@@ -16,7 +16,7 @@ CONTACT_MODEL_KEYS: Final = ("foot_radius_m",)
 SI_KEYS: Final = ("stiffness", "damping", *BOUNDS_SI)
 """Keys of the contact block whose values depend on its units."""
 UNITLESS_KEYS: Final = tuple(name for name in Contact.model_fields if name not in (*SI_KEYS, "units", "stance"))
-"""Its other keys except `stance`: the paper also has a pinned first stance (section 4)."""
+"""Remaining keys of the contact block, except `stance`: the paper also has a pinned first stance (section 4)."""
 
 
 def departures(config: CompareConfig, start_moved: bool) -> Departures:
@@ -52,7 +52,6 @@ def departures(config: CompareConfig, start_moved: bool) -> Departures:
 
 
 def describe_differences(used: Any, paper: Any, names: Iterable[str], called: str = "{}") -> Iterator[str]:
-    """Describe each key whose values differ."""
     for name in names:
         if not same(getattr(used, name), getattr(paper, name)):
             yield describe(called.format(name), getattr(used, name), getattr(paper, name))

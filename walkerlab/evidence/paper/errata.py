@@ -27,4 +27,4 @@ ERRATUM_PATTERN = re.compile(" ".join(rf"{name}: (?P<{name}>.*?)" for name in ER
 
 def errata(study: PaperStudy) -> tuple[Erratum, ...]:
     """All errata, by theme and then in the order of the paper's sections."""
-    return tuple(Erratum(**found.groupdict()) for found in ERRATUM_PATTERN.finditer(prose("errata.errata", study)))
+    return tuple(Erratum(**match.groupdict()) for match in ERRATUM_PATTERN.finditer(prose("errata.errata", study)))

@@ -16,7 +16,7 @@ from walkerlab.physics.solvers.system import State
 
 TIGHT = Tolerances("dop853", 1e-12, 1e-14, ENDLESS)
 """Errors are far below any printed digit."""
-CYCLES = 5  # walked in the paper
+PAPER_CYCLES = 5  # walked in the paper
 ENERGY_STEPS = 5  # over which the paper averages the energy
 
 
@@ -95,7 +95,7 @@ class RigidMeasurements:
 def measure_rigid_model(walker: RigidWalker, state: State) -> RigidMeasurements:
     """Walk five cycles from a gait's fixed point; energy is measured from the current stance foot."""
     model = assembled(walker)
-    walk = take_walk(model, TIGHT, state, 2 * CYCLES, sampled=True)
+    walk = take_walk(model, TIGHT, state, 2 * PAPER_CYCLES, sampled=True)
     assert walk.samples is not None
     energy = energies(model, walk.samples.state).sum(axis=1)
     return RigidMeasurements(

@@ -8,7 +8,7 @@ from walkerlab.config.contact import Contact
 from walkerlab.evidence.paper.appendix_a import RigidWalker
 from walkerlab.physics.ground.resting import RestingFoot, resting_foot
 
-COORDINATES: Final = ("theta_1", "theta_2", "dtheta_1", "dtheta_2")
+STATE_NAMES: Final = ("theta_1", "theta_2", "dtheta_1", "dtheta_2")
 COORDINATE_UNITS: Final = ("rad", "rad", "rad/s", "rad/s")
 
 
@@ -64,7 +64,7 @@ def number(text: str) -> Decimal:
 
 X_P: Final = tuple(
     Printed("eq. 11, Table 2", f"x_p, {name}", unit, text)
-    for name, unit, text in zip(COORDINATES, COORDINATE_UNITS, ("-0.2022", "0.1674", "-0.60", "-0.84"), strict=True)
+    for name, unit, text in zip(STATE_NAMES, COORDINATE_UNITS, ("-0.2022", "0.1674", "-0.60", "-0.84"), strict=True)
 )
 
 TABLE_1: Final = (
@@ -145,7 +145,7 @@ DAMPING: Final = Printed("section 4, Fig. 4b", "damping of the contact", "not gi
 STATIC_FRICTION: Final = Printed("section 4, Fig. 4b", "static friction", "1", "0.9")
 DYNAMIC_FRICTION: Final = Printed("section 4, Fig. 4b", "dynamic friction", "1", "0.7")
 LOST_BALANCE: Final = Printed("section 4", "steps until balance was lost, from MATLAB's initial conditions", "1", "one")
-STRIDES: Final = Printed("section 5, Fig. 7", "gait cycles walked", "1", "five")
+CYCLES_WALKED: Final = Printed("section 5, Fig. 7", "gait cycles walked", "1", "five")
 LARGEST_ERROR: Final = Printed("section 5, Fig. 8", "largest error, angles and velocities", "rad, rad/s", "10^-4")
 """One value for angles and velocities."""
 STEP_LENGTH: Final = Printed("section 5", "length of one complete step", "m", "0.0342")

@@ -10,7 +10,7 @@ from typing import Any, Literal
 from walkerlab.config.contact import MM_PER_M
 from walkerlab.evidence.paper import printed
 from walkerlab.evidence.paper.contradictions import contradictions, percent_left_open
-from walkerlab.evidence.paper.measured import CYCLES, Measured
+from walkerlab.evidence.paper.measured import PAPER_CYCLES, Measured
 from walkerlab.evidence.paper.printed import Printed, speed_difference
 from walkerlab.evidence.paper.prose import prose
 from walkerlab.evidence.paper.study import PaperStudy
@@ -122,7 +122,7 @@ class Judge:
         """Increase in magnitude (%) of each coordinate of the contact model's start over the rigid gait's."""
         gait, start = self.measured.models.get(self.measured.equations), self.measured.contact.start
         if gait is None or start is None:
-            return [None] * len(printed.COORDINATES)
+            return [None] * len(printed.STATE_NAMES)
         pairs = zip(start, gait.state, strict=True)
         return [None if ours == 0.0 else 100.0 * (initial / ours - 1.0) for initial, ours in pairs]
 
@@ -148,7 +148,7 @@ class Judge:
         steps, outcome = self.measured.contact.from_x_p
         right = None if self.measured.departures.rigid else self.measured.models.get("corrected")
         short = None if right is None else 100.0 * (1.0 - printed.X_P[3].value / right.state[3])
-        text = prose("evidence.lost_balance", steps, 2 * CYCLES, outcome, short)
+        text = prose("evidence.lost_balance", steps, 2 * PAPER_CYCLES, outcome, short)
         agrees = outcome != "walked" and steps == printed.LOST_BALANCE.value
         return self.row(printed.LOST_BALANCE, {}, float(steps), verdict_if(agrees), "contact", text)
 
@@ -170,7 +170,7 @@ class Judge:
 
     def strides(self) -> JudgedNumber:
         """Judge the five gait cycles, which the rigid models walk as well."""
-        entry, contact = printed.STRIDES, self.measured.contact
+        entry, contact = printed.CYCLES_WALKED, self.measured.contact
         rigid = {name: float(model.steps // 2) for name, model in self.measured.models.items()}
         completed = contact.steps // 2
         text = prose("evidence.strides", contact, completed, contact.outcome == "walked" and completed < entry.value)
@@ -269,7 +269,7 @@ def table_1(measured: Measured, study: PaperStudy) -> Table:
 def table_2(measured: Measured) -> Table:
     """Initial values, and the percentages relative to either column."""
     table, start = {}, measured.contact.start
-    for place, (coordinate, row) in enumerate(zip(printed.COORDINATES, printed.TABLE_2, strict=True)):
+    for place, (coordinate, row) in enumerate(zip(printed.STATE_NAMES, printed.TABLE_2, strict=True)):
         states = {name: model.state[place] for name, model in measured.models.items()}
         table[coordinate] = {
             **number_columns(row, states, None if start is None else start[place]),
@@ -282,7 +282,6 @@ def table_2(measured: Measured) -> Table:
 
 
 def table_3(measured: Measured) -> Table:
-    """Characteristics of both models."""
     table = {}
     for row in printed.TABLE_3:
         rigid = {name: getattr(model.table_3, row.name) for name, model in measured.models.items()}

@@ -19,7 +19,7 @@ from walkerlab.evidence.paper.misprints import (
 from walkerlab.physics.hybrid.recorded_walk import as_state, take_walk
 from walkerlab.physics.solvers.system import State
 
-SETTLING_STEPS = 150  # from x_p to its fixed point: disturbances shrink by 0.6 a step
+X_P_SETTLING_STEPS = 150  # from x_p to its fixed point: disturbances shrink by 0.6 a step
 FOOT_VELOCITY = (0.3, -0.2)  # m/s, of the foot in the check of (A.9) to (A.24)
 
 
@@ -34,7 +34,7 @@ class PaperStudy:
     largest_jump           rad/s, largest change of an angular velocity at its heel strike
     swing_foot_height      m, over the slope, where (A.55) as printed places the swing foot of x_p
     foothold_speed         m/s, of the new stance foot after the impact of (A.55) as printed, on the gait as printed
-    both_misprints         fixed point with those of (A.5) and (A.55); None if there is none nearby
+    both_misprints         fixed point near x_p with the misprints of (A.5) and (A.55), or None
     kinetic_energy         J, of one state: from the masses' velocities, and from D_e with either order of coordinates
     """
 
@@ -59,7 +59,7 @@ def study_the_paper() -> PaperStudy:
     x_p = printed.fixed_point_as_printed()
     as_printed, corrected = settle(wrong), settle(right)
     one_step = take_walk(assembled(wrong), measured.TIGHT, as_printed, 1, sampled=True)
-    cycles = take_walk(assembled(wrong), measured.TIGHT, x_p, 2 * measured.CYCLES, sampled=True)
+    cycles = take_walk(assembled(wrong), measured.TIGHT, x_p, 2 * measured.PAPER_CYCLES, sampled=True)
     five_steps = take_walk(assembled(wrong), measured.TIGHT, x_p, measured.ENERGY_STEPS)
     assert one_step.samples is not None
     slope, rounding = printed.slope_of(*printed.X_P[:2])
@@ -83,8 +83,8 @@ def study_the_paper() -> PaperStudy:
 
 def settle(walker: RigidWalker) -> State:
     """Stable gait to which walks from x_p converge."""
-    walk = take_walk(assembled(walker), measured.TIGHT, printed.fixed_point_as_printed(), SETTLING_STEPS)
-    if walk.steps < SETTLING_STEPS:
+    walk = take_walk(assembled(walker), measured.TIGHT, printed.fixed_point_as_printed(), X_P_SETTLING_STEPS)
+    if walk.steps < X_P_SETTLING_STEPS:
         raise ArithmeticError(f"x_p does not walk: {walk.outcome.label} after {walk.steps} steps")
     return walk.final_state
 

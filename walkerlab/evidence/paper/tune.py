@@ -11,7 +11,7 @@ from walkerlab.config.reads import TuneConfig
 from walkerlab.config.walkers import is_passive_compass
 from walkerlab.evidence.paper.adams_start import AdamsWalk, adams_walk
 from walkerlab.evidence.paper.law import is_own_walker
-from walkerlab.evidence.paper.left_out import adjustment_omissions
+from walkerlab.evidence.paper.omissions import adjustment_omissions
 from walkerlab.evidence.paper.printed import TABLE_2
 from walkerlab.evidence.paper.tune_limit import limit_findings, limit_groups, limit_summary
 from walkerlab.labels import Label
@@ -62,7 +62,7 @@ AS_IT_STANDS = (1.0, 1.0)
 # knees or rolling feet make walks several times slower than the compass's, so their map and margins are coarser
 COMPASS_CELLS, OTHER_CELLS, COARSE_MARGINS = 61, 21, {"step": 0.05, "largest": 2.0}
 SEARCH_ADVICE = "Widen the search (tune.swing_factors, tune.stance_factors, tune.cells) or choose another contact."
-WALK_QUANTITIES = ("outcome", "advice", "steps", "step_periods_s", "step_lengths_m", "end_time_s")
+WALK_SUMMARY_KEYS = ("outcome", "advice", "steps", "step_periods_s", "step_lengths_m", "end_time_s")
 """Quantities reported of each walk of the procedure."""
 
 
@@ -182,7 +182,7 @@ class TuneRun:
 
 def walk_summary(walk: ContactWalkResult) -> dict[str, Any]:
     quantities = numbers_of(walk)
-    return {key: quantities[key] for key in WALK_QUANTITIES}
+    return {key: quantities[key] for key in WALK_SUMMARY_KEYS}
 
 
 def summary(tune: TuneRun) -> dict[str, Any]:
@@ -246,13 +246,13 @@ def table_2(tune: TuneRun) -> dict[str, dict[str, Any]]:
     return rows
 
 
-def percent(value: float, other: float, base: float) -> float | None:
-    """Increase in magnitude over `other`, in percent of `base`; None for a base of zero."""
-    return 100.0 * (abs(value) - abs(other)) / abs(base) if base else None
+def percent(value: float, reference: float, base: float) -> float | None:
+    """Increase in magnitude over `reference`, in percent of `base`; None for a base of zero."""
+    return 100.0 * (abs(value) - abs(reference)) / abs(base) if base else None
 
 
 def gait_summary(tune: TuneRun) -> dict[str, Any]:
-    """Gait of the contact model, or why there is none."""
+    """Summarise the contact model's gait, or why the search found no gait."""
     gait = tune.gait.gait
     report = {"found": gait is not None, "reason": tune.gait.reason, "advice": tune.gait.advice}
     if gait is None:

@@ -72,10 +72,10 @@ WALK_LABELS = {
 class LimitFindings:
     """Distances by series, and the limit without creep.
 
-    walked  series in which whole walks are compared too
+    walk_series  series in which complete walks are compared as well
     """
 
-    walked: tuple[str, ...]
+    walk_series: tuple[str, ...]
     rigid_period: float
     contact_period: float
     series: dict[str, list[Distance]]
@@ -138,12 +138,12 @@ def limit_findings(
 def limit_summary(findings: LimitFindings) -> dict[str, Any]:
     """Orders of convergence, the settings that reach the paper's 1e-4 rad, and the share of each cause."""
     reaches = {}
-    for name in findings.walked:
-        walked = [distance for distance in findings.series[name] if distance.angle is not None]
-        first = next((distance for distance in walked if (distance.angle or 0.0) <= LARGEST_ERROR.value), None)
+    for name in findings.walk_series:
+        distances = [distance for distance in findings.series[name] if distance.angle is not None]
+        first = next((distance for distance in distances if (distance.angle or 0.0) <= LARGEST_ERROR.value), None)
         reaches[name] = {
             "claim_rad": LARGEST_ERROR.value,
-            "settings": [setting(distance) for distance in walked],
+            "settings": [setting(distance) for distance in distances],
             "first_within_claim": None if first is None else setting(first),
         }
     orders = {name: observed_orders(rows) for name, rows in findings.series.items()}
@@ -167,7 +167,7 @@ def causes(findings: LimitFindings) -> dict[str, Any]:
     The rest is their joint effect, and also that of creep where its limit was not reached.
     """
     total = findings.contact_period - findings.rigid_period
-    farthest = findings.series[findings.walked[-1]]
+    farthest = findings.series[findings.walk_series[-1]]
     parts: dict[str, float] = {}
     if findings.without_creep is not None:
         parts["creep_s"] = findings.contact_period - findings.without_creep.period
@@ -188,11 +188,11 @@ def limit_groups(findings: LimitFindings) -> dict[str, Group]:
     """One group per series: its settings and distances, and those of whole walks where compared."""
     groups = {}
     for name, rows in findings.series.items():
-        whole = [distance for distance in rows if distance.angle is not None and name in findings.walked]
+        complete = [distance for distance in rows if distance.angle is not None and name in findings.walk_series]
         if rows:
-            of = [distance.setting for distance in whole or rows]
+            of = [distance.setting for distance in complete or rows]
             settings = rows_group(of, FACTOR_LABELS, SETTING, "setting, from the config's contact on")
-            distances = columns(whole or rows, DISTANCE_LABELS | (WALK_LABELS if whole else {}), SETTING)
+            distances = columns(complete or rows, DISTANCE_LABELS | (WALK_LABELS if complete else {}), SETTING)
             path = f"limit/{name.replace(', ', '-').replace(' ', '-')}"
             groups[path] = Group({**settings.variables, **distances})
     return groups

@@ -32,7 +32,6 @@ B = TypeVar("B", bound=Block)
 
 
 def package_cases() -> tuple[Case, ...]:
-    """Cases that come with the package."""
     families = read_catalogue(CATALOGUE).items()
     return check_unique_names(
         [Case.model_validate({"family": name, **entry}) for name, cases in families for entry in cases]
@@ -52,9 +51,9 @@ def all_cases(own: Sequence[Case], catalogue: Sequence[Case] | None = None) -> t
     Raises ConfigError if two cases share a name.
     """
     catalogue = package_cases() if catalogue is None else catalogue
-    taken = {case.name for case in catalogue} & {case.name for case in own}
-    if taken:
-        raise ConfigError(f"The catalogue already has cases named {', '.join(sorted(taken))}.", UNIQUE_NAME_ADVICE)
+    shared = {case.name for case in catalogue} & {case.name for case in own}
+    if shared:
+        raise ConfigError(f"The catalogue already has cases named {', '.join(sorted(shared))}.", UNIQUE_NAME_ADVICE)
     return (*catalogue, *check_unique_names(own))
 
 
@@ -117,5 +116,5 @@ def change_scene(config: Config, changes: Mapping[str, Any]) -> Config:
 
 def with_key(block: B, path: str, value: Any) -> B:
     """Copy of a block in which the value at a dotted path is replaced."""
-    name, _, rest = path.partition(".")
-    return block.model_copy(update={name: with_key(getattr(block, name), rest, value) if rest else value})
+    name, _, tail = path.partition(".")
+    return block.model_copy(update={name: with_key(getattr(block, name), tail, value) if tail else value})

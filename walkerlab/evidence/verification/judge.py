@@ -73,7 +73,7 @@ def judge(case: Case, config: Config) -> CaseResult:
     wall_s = time.perf_counter() - began
     findings: list[Measure | NotMeasured] = [
         Measure("values that are not finite", float(np.count_nonzero(~np.isfinite(walk.numbers))), 0.0),
-        Measure(f"{start.kept} over energy", finite(walk.residual_J / start.energy), case.balance),
+        Measure(f"{start.residual_name} over energy", finite(walk.residual_J / start.energy), case.balance),
         Measure(BUDGET_USED, walk.rhs_evaluations / case.budget, 1.0 + 20.0 / case.budget),
         *start.measures(walk, case),
     ]
@@ -96,8 +96,8 @@ def judge(case: Case, config: Config) -> CaseResult:
     numbers = int(walk.touches.size), finite(walk.residual_J), walk.rhs_evaluations, wall_s
     measures = tuple(finding for finding in findings if isinstance(finding, Measure))
     missing = tuple(finding for finding in findings if isinstance(finding, NotMeasured))
-    said = tuple(remarks)
-    return CaseResult(*about, walk.outcome.label, *numbers, measures, said, second.method, second.tried, missing)
+    texts = tuple(remarks)
+    return CaseResult(*about, walk.outcome.label, *numbers, measures, texts, second.method, second.tried, missing)
 
 
 def repeat_walks(start: Start, config: Config, case: Case, second: Second) -> list[tuple[str, JudgedWalk]]:
@@ -115,7 +115,7 @@ def repeat_walks(start: Start, config: Config, case: Case, second: Second) -> li
 
 
 def time_difference(what: str, first: JudgedWalk, second: JudgedWalk, case: Case, rtol: float) -> list[Measure]:
-    """Difference of two walks' touch times, or of their end times if they have no touches; empty if there are none."""
+    """Measure the difference of two walks' touch times, or of their end times without touches; empty without both."""
     steps = min(first.touches.size, second.touches.size, case.compared_steps)
     if steps:
         difference = float(np.max(np.abs(first.touches[:steps] - second.touches[:steps])))

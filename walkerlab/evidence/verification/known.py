@@ -107,7 +107,7 @@ class Known:
     """
 
     name: Annotated[str, Label("", "name of the problem")]
-    quantity: Annotated[str, Label("", "what is compared, with its unit")]
+    quantity: Annotated[str, Label("", "compared quantity, with its unit")]
     value: Annotated[float, Label("1", "by the contact code, in the quantity's unit")]
     reference: Annotated[float, Label("1", "by another route, in the quantity's unit")]
     source: str

@@ -14,8 +14,8 @@ def run(_config: object, _inputs: Mapping[str, Content], progress: Progress) -> 
     """Solve every problem; wrong answers are stored, and reported by `stability`."""
     rows = []
     for problem in track(progress, "known problems", len(PROBLEMS), PROBLEMS):
-        known = problem()
-        rows.append({**asdict(known), "error": known.error, "ok": known.ok})
+        result = problem()
+        rows.append({**asdict(result), "error": result.error, "ok": result.ok})
     right = sum(row["ok"] for row in rows)
     group = rows_group(rows, labels_of(Known), "problem", "number of the row")
     return Content({"known": group}, {"known": rows, "passed": right, "failed": len(rows) - right})

@@ -28,7 +28,7 @@ from walkerlab.physics.solvers.registry import Tolerances
 PAPER_STIFFNESS: Final = Contact().in_si().stiffness
 STIFFNESS_RANGE: Final = (1e-6 * PAPER_STIFFNESS, 1e6 * PAPER_STIFFNESS)
 STICTION_RANGE: Final = (1e-7, 10.0)  # m/s
-NO_ERROR: Final = -1.0  # in the place of an error in what is kept, whose numbers are finite
+ERROR_MISSING: Final = -1.0  # stands for a missing error in checkpoints, which hold only finite numbers
 PER_STICTION: Final = 10.0  # friction velocity over stiction velocity, as the paper has it
 STEP_RANGE: Final = (1e-6, 1e-2)  # s
 WALK_STEPS: Final = 4
@@ -70,7 +70,7 @@ def stiction_cell(stiffness: float, stiction_velocity: float) -> Numbers:
     if walk.outcome.answered:
         tighter = case.model_copy(update={"budget": TIGHTER_CELL_BUDGET})
         again = start.walk(case, case_tolerances(start, tighter, TIGHTER_FACTOR))
-    error = NO_ERROR
+    error = ERROR_MISSING
     if walk.outcome is again.outcome and walk.touches.size == again.touches.size:
         ends = np.abs(np.subtract(walk.record.end_state, again.record.end_state)) / natural_units(config)
         error = finite(float(np.max(np.concatenate([np.abs(walk.touches - again.touches), ends]))))
@@ -86,12 +86,12 @@ def step_column(stiffness: float, steps_s: tuple[float, ...]) -> Numbers:
     case, config, start = prepare_on_ground(stiffness, None, COMPARED_STEPS, REFERENCE_CELL_BUDGET)
     walk = start.walk(case, Tolerances(*REFERENCE_SETTINGS, case.budget))
     if not walk.outcome.answered:
-        return [float(VERDICT_NAMES.index("no reference")), NO_ERROR] * len(steps_s)
+        return [float(VERDICT_NAMES.index("no reference")), ERROR_MISSING] * len(steps_s)
     arrival = arrival_of("map", walk.record, natural_units(config))
     numbers: Numbers = []
     for h in steps_s:
         choice = euler(arrival, start, h, MAX_FIXED_STEPS)
-        numbers += [float(VERDICT_NAMES.index(choice.verdict)), NO_ERROR if choice.error is None else choice.error]
+        numbers += [float(VERDICT_NAMES.index(choice.verdict)), ERROR_MISSING if choice.error is None else choice.error]
     return numbers
 
 

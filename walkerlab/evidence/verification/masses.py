@@ -24,7 +24,7 @@ class Masses:
         point_masses = list(masses(assembly))
         root = about or point_masses[0][1]
         self.mass = np.array([mass for mass, _ in point_masses])
-        self.levers = np.array([levers(assembly, root, at) for _, at in point_masses])
+        self.levers = np.array([levers(assembly, root, anchor) for _, anchor in point_masses])
         if about is None:
             self.levers = self.levers - np.average(self.levers, axis=0, weights=self.mass)
         self.inertia = np.array([body.inertia_kg_m2 for body in assembly.bodies])
@@ -80,16 +80,16 @@ class RigidMasses:
 
     def __init__(self, assembly: Assembly, slope: float) -> None:
         """Take levers from the centre of the stance foot's arc; slope in rad."""
-        foot, other, hip = assembly.feet[STANCE], assembly.feet[SWING], hip_of(assembly)
+        foot, trailing, hip = assembly.feet[STANCE], assembly.feet[SWING], hip_of(assembly)
         root = Anchor(foot.body, foot.centre_m)
         self.assembly, self.slope, self.radius = assembly, slope, foot.radius_m
         self.members = places_of(assembly).members
         self.masses = Masses(assembly, root)
-        self.owner = [assembly.index(at.body) for _, at in masses(assembly)]
+        self.owner = [assembly.index(anchor.body) for _, anchor in masses(assembly)]
         self.to_hip = levers(assembly, root, Anchor(hip.parent, hip.parent_point_m))
-        self.to_foot = levers(assembly, root, Anchor(other.body, other.centre_m))
+        self.to_foot = levers(assembly, root, Anchor(trailing.body, trailing.centre_m))
 
-    def at(self, state: Floats) -> Moving:
+    def pose(self, state: Floats) -> Moving:
         """Masses in a state of the rigid model (2 n)."""
         n = self.members.shape[1]
         psi, rate = self.members @ state[:n] + self.slope, self.members @ state[n:]
@@ -107,19 +107,19 @@ class RigidMasses:
 
         new  whether the state is after the change of stance foot
         """
-        moving, leg = self.at(state), self.assembly.legs[SWING if new else STANCE]
+        moving, leg = self.pose(state), self.assembly.legs[SWING if new else STANCE]
         names = [body.name for body in self.assembly.bodies]
         share = np.array([1.0 if name in leg else 0.0 for name in names])
         for coupling in self.assembly.couplings:
             turning = (weight for name, weight in zip(coupling.of, coupling.weights, strict=True) if name in leg)
             share[names.index(coupling.body)] = sum(turning)
         foothold = np.zeros(2) if new else moving.contact
-        whole = moving.about(foothold, np.ones(len(self.owner)), np.ones(share.size))
-        return whole, moving.about(moving.hip, share[self.owner], share)
+        walker_momentum = moving.about(foothold, np.ones(len(self.owner)), np.ones(share.size))
+        return walker_momentum, moving.about(moving.hip, share[self.owner], share)
 
     def moment_of(self, push_off: float, state: Floats) -> float:
         """Angular impulse (kg m^2/s) about the new foothold of a push-off (N s) from the rear contact to the hip."""
-        moving = self.at(state)
+        moving = self.pose(state)
         along, up = push_off * moving.hip / np.hypot(*moving.hip)
         return float(moving.contact[1] * along - moving.contact[0] * up)
 
@@ -143,9 +143,9 @@ class RigidMasses:
 
     def energy_won(self, before: Floats, after: Floats) -> float:
         """Largest gain of kinetic energy (J) in heel strikes; 0 if all lose energy."""
-        gains = [self.at(new).kinetic - self.at(old).kinetic for old, new in zip(before, after, strict=True)]
+        gains = [self.pose(new).kinetic - self.pose(old).kinetic for old, new in zip(before, after, strict=True)]
         return max(0.0, *gains)
 
     def feet_off_the_slope(self, before: Floats) -> float:
         """Largest distance (m) of the landing foot from the slope."""
-        return float(max(abs(self.at(state).contact[1]) for state in before))
+        return float(max(abs(self.pose(state).contact[1]) for state in before))

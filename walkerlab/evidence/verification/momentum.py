@@ -26,13 +26,12 @@ from walkerlab.scene.contact import ContactScene
 from walkerlab.scene.parts import assembly_of
 
 MEASURE: Final = "momentum not from ground and gravity, over the walker's"
-BALANCE_STEPS: Final = 2  # so that there is an impact, and what comes of it
-INITIAL_INTERVALS: Final = 256  # to begin with
-MAX_PASSES: Final = 9  # each looks four times as closely where it is needed
-MAX_INTERVALS: Final = 30_000  # beyond which nothing is looked at more closely
-SETTLED_SHARE: Final = (
-    1e-6  # of the walker's momentum: what an interval's sum may still change by, over the number of them
-)
+BALANCE_STEPS: Final = 2  # includes an impact and the motion after it
+INITIAL_INTERVALS: Final = 256
+MAX_PASSES: Final = 9  # each divides unsettled intervals in four
+MAX_INTERVALS: Final = 30_000  # not refined beyond this
+# of the walker's momentum: an interval's impulse may change by this over the number of intervals
+SETTLED_IMPULSE_SHARE: Final = 1e-6
 MAX_UNKNOWN: Final = 1e-3  # of the walker's momentum, beyond which a balance says nothing
 
 
@@ -91,7 +90,7 @@ def momentum_balance(config: WalksConfig, scene: ContactScene, start: State, cas
         assert samples is not None, "the walk was looked at"
         rates = impulse_rate(samples, scene, config, walk.touch_time_s) / scale
         change = unsettled(samples.time_s, rates)
-        wanting = change > SETTLED_SHARE / grid.size
+        wanting = change > SETTLED_IMPULSE_SHARE / grid.size
         if not wanting.any() or grid.size > MAX_INTERVALS:
             break
         grid = split(samples.time_s, wanting)

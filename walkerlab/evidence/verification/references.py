@@ -66,9 +66,9 @@ def wheel_speed(spokes: int, slope: float, gravity: float, inertia: float = 0.0)
     Source: McGeer, Passive dynamic walking (1990), section 2; Coleman (1998).
     """
     half = math.pi / spokes
-    kept = (math.cos(2.0 * half) + inertia) / (1.0 + inertia)
+    retained_share = (math.cos(2.0 * half) + inertia) / (1.0 + inertia)
     gained = 4.0 * gravity * math.sin(half) * math.sin(slope) / (1.0 + inertia)
-    return math.sqrt(kept**2 * gained / (1.0 - kept**2))
+    return math.sqrt(retained_share**2 * gained / (1.0 - retained_share**2))
 
 
 def wheel_upright_speed(spokes: int, slope: float, gravity: float, inertia: float = 0.0) -> float:

@@ -59,7 +59,6 @@ def ending(row: Row) -> Cell:
 
 
 def failures(summary: Row) -> list[str]:
-    """Describe each failure in a paragraph."""
     failed = [words("stability.failed_case", row) for row in summary["cases"] if not row["ok"]]
     return failed + [words("stability.failed_problem", row) for row in summary["known"] if not row["ok"]]
 
@@ -88,7 +87,6 @@ def by_reason(cases: Rows) -> str:
 
 
 def family_table(cases: Rows) -> Table:
-    """Count the outcomes in each family of cases."""
     counts = Counter((case["family"], case["outcome"]) for case in cases)
     return table("", [Column("family"), Column("outcome"), Column("cases")], [(*key, n) for key, n in counts.items()])
 

@@ -8,7 +8,7 @@ from walkerlab.config.reads import CompassCasesConfig, SceneCasesConfig, WalksCo
 from walkerlab.config.schema import Config
 from walkerlab.evidence.verification.catalogue import all_cases, scene_cases
 from walkerlab.evidence.verification.judge import CaseCell, run_cells
-from walkerlab.evidence.verification.left_out import verification_omissions
+from walkerlab.evidence.verification.omissions import verification_omissions
 from walkerlab.evidence.verification.ordinary import FINE_ERROR, MAX_ORDINARY_EVALUATIONS, Choice
 from walkerlab.evidence.verification.verdict import CaseResult
 from walkerlab.labels import labels_of
@@ -63,17 +63,17 @@ def with_numbers(config: WalksConfig, inputs: Mapping[str, Content]) -> Config:
 
 
 def summarise(
-    cases: Sequence[CaseResult], known: Sequence[Mapping[str, Any]], ordinary: Sequence[Choice]
+    cases: Sequence[CaseResult], problems: Sequence[Mapping[str, Any]], ordinary: Sequence[Choice]
 ) -> dict[str, Any]:
     """Build the summary; a failure adds `no_answer`.
 
-    known  the known problems, as stored by their stage
+    problems  the known problems, as stored by their stage
     """
-    failed = [*(case.name for case in cases if not case.ok), *(row["name"] for row in known if not row["ok"])]
-    total = len(cases) + len(known)
+    failed = [*(case.name for case in cases if not case.ok), *(row["name"] for row in problems if not row["ok"])]
+    total = len(cases) + len(problems)
     summary = {
         "cases": [case_row(case) for case in cases],
-        "known": list(known),
+        "known": list(problems),
         "passed": total - len(failed),
         "failed": len(failed),
         # an ordinary method that did not arrive has no error

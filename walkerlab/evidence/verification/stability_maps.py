@@ -39,13 +39,13 @@ def run(
     return Content({"stiction": stiction, "step": step}, summary_of(stiction, step))
 
 
-def stiction_group(cells: int, kept: Mapping[str, maps.Numbers]) -> Group:
+def stiction_group(cells: int, results: Mapping[str, maps.Numbers]) -> Group:
     """Outcomes of the default method over stiction velocity and stiffness."""
-    cells_by_axis = np.array([[kept[f"stiction {i} {j}"] for j in range(cells)] for i in range(cells)])
+    cells_by_axis = np.array([[results[f"stiction {i} {j}"] for j in range(cells)] for i in range(cells)])
     columns = dict(zip(STICTION_COLUMNS, np.moveaxis(cells_by_axis, 2, 0), strict=True))
     dims = ("stiction_velocity", "stiffness")
     answered = np.isin(columns["outcome"], [int(outcome) for outcome in Outcome if outcome.answered])
-    compared = answered & (columns["error"] != maps.NO_ERROR)
+    compared = answered & (columns["error"] != maps.ERROR_MISSING)
     errors = np.where(compared, columns["error"], np.nan)
     variables = {
         name: integer_variable(columns[name], dims, text) for name, text in STICTION_COLUMNS.items() if name != "error"
@@ -61,10 +61,10 @@ def stiction_group(cells: int, kept: Mapping[str, maps.Numbers]) -> Group:
     return Group(variables, {"outcomes": OUTCOMES, "steps_wanted": maps.WALK_STEPS, "budget": maps.CELL_BUDGET})
 
 
-def step_group(cells: int, kept: Mapping[str, maps.Numbers]) -> Group:
+def step_group(cells: int, results: Mapping[str, maps.Numbers]) -> Group:
     """Results of semi-implicit Euler over step size and stiffness."""
     cells_by_axis = np.array(
-        [np.reshape(kept[f"step {j}"], (cells, 2)) for j in range(cells)]
+        [np.reshape(results[f"step {j}"], (cells, 2)) for j in range(cells)]
     )  # stiffness, step, of each
     verdicts, errors = cells_by_axis.transpose(2, 1, 0)
     dims = ("step_size", "stiffness")
@@ -73,7 +73,7 @@ def step_group(cells: int, kept: Mapping[str, maps.Numbers]) -> Group:
         **axis("step_size", maps.STEP_RANGE, cells, "s", "step size"),
         **axis("stiffness", maps.STIFFNESS_RANGE, cells, "N/m^2.2", "stiffness of the ground"),
         "verdict": integer_variable(verdicts, dims, "verdict, see attribute verdicts"),
-        "error": Variable(np.where(errors == maps.NO_ERROR, np.nan, errors), dims, "1", text, missing=True),
+        "error": Variable(np.where(errors == maps.ERROR_MISSING, np.nan, errors), dims, "1", text, missing=True),
     }
     legend = ", ".join(f"{number} {verdict}" for number, verdict in enumerate(maps.VERDICT_NAMES))
     return Group(variables, {"verdicts": legend, "steps_wanted": COMPARED_STEPS, "fine": FINE_ERROR})
@@ -84,12 +84,10 @@ def axis(name: str, ends: tuple[float, float], cells: int, unit: str, text: str)
 
 
 def integer_variable(values: Any, dims: tuple[str, ...], text: str) -> Variable:
-    """Integer variable."""
     return Variable(np.asarray(values).astype(np.int64), dims, "1", text)
 
 
 def summary_of(stiction: Group, step: Group) -> dict[str, Any]:
-    """Cell counts by outcome."""
     errors = stiction["error"][stiction["compared"] == 1]
     verdicts, times = np.unique(step["verdict"], return_counts=True)
     return {

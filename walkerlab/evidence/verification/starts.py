@@ -27,9 +27,7 @@ from walkerlab.scene.rigid import rigid_walker
 CENTRE_HEIGHT = 1  # index into the state of the free walker
 STRIKE_TOLERANCE = 1e-9  # share of the momentum by which a heel strike may seem to change it
 SAMPLE_RATE = 40
-REGAIN_TOLERANCE = (
-    1e-3  # of the balance asked for: by how much what was dissipated may seem to fall, for the quadrature
-)
+REGAIN_TOLERANCE = 1e-3  # of the allowed residual: apparent decrease of dissipated energy by quadrature errors
 
 
 @dataclass(frozen=True)
@@ -55,11 +53,11 @@ class JudgedWalk:
 class CaseStart:
     """A walker in the initial state of a case.
 
-    energy  m g L and the initial energy (J), the scale of residuals
-    kept    name of the residual
+    energy         m g L and the initial energy (J), the scale of residuals
+    residual_name  name of the residual
     """
 
-    kept: ClassVar[str]
+    residual_name: ClassVar[str]
     config: WalksConfig
     start: State
     energy: float
@@ -67,7 +65,7 @@ class CaseStart:
 
 @dataclass(frozen=True)
 class RigidStart(CaseStart):
-    kept: ClassVar[str] = "energy drift within a swing"
+    residual_name: ClassVar[str] = "energy drift within a swing"
     walker: RigidModel
 
     def again(self, case: Case) -> Case:
@@ -104,7 +102,7 @@ class RigidStart(CaseStart):
 
 @dataclass(frozen=True)
 class ContactStart(CaseStart):
-    kept: ClassVar[str] = "energy balance residual"
+    residual_name: ClassVar[str] = "energy balance residual"
     scene: ContactScene
 
     def again(self, case: Case) -> Case:

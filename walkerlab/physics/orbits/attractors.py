@@ -39,8 +39,8 @@ class Attractor:
 
     value: float
     period: int  # steps after which it repeats; 0 if aperiodic
-    periods_s: Floats  # (kept,) durations of steps on it
-    angles: Floats  # (kept,) rad, as in `MappedStep`
+    periods_s: Floats  # (steps,) durations of steps on it
+    angles: Floats  # (steps,) rad, as in `MappedStep`
     last: Floats  # (d,) a point on it
 
 
@@ -78,9 +78,9 @@ def find_period(points: Floats) -> int:
     return 0
 
 
-def settle(step_map: StepMap, z: Floats, value: float, transient: int, kept: int) -> Attractor | Outcome:
-    """Return the attractor of a walk from z, or the outcome if it fails within `transient + kept` steps."""
-    walk = step_map.iterate(z, value, transient + kept, None)
+def settle(step_map: StepMap, z: Floats, value: float, transient: int, steps: int) -> Attractor | Outcome:
+    """Return the attractor of a walk from z, or the outcome if it fails within `transient + steps` steps."""
+    walk = step_map.iterate(z, value, transient + steps, None)
     if walk.outcome is not Outcome.WALKED:
         return walk.outcome
     points = walk.points[transient:]
@@ -92,7 +92,7 @@ def sweep_attractor(
     z: Floats,
     values: Iterable[float],
     transient: int,
-    kept: int,
+    steps: int,
     advance: Callable[[], None] = lambda: None,
 ) -> AttractorBranch:
     """Follow the attractor that contains z at the first value from value to value.
@@ -102,10 +102,10 @@ def sweep_attractor(
     """
     attractors: list[Attractor] = []
     for value in values:
-        settled = settle(step_map, z, float(value), transient, kept)
+        settled = settle(step_map, z, float(value), transient, steps)
         if isinstance(settled, Outcome) and attractors:
             for between in np.linspace(attractors[-1].value, float(value), SUBSTEPS + 1)[1:]:
-                settled = settle(step_map, z, float(between), transient, kept)
+                settled = settle(step_map, z, float(between), transient, steps)
                 if isinstance(settled, Outcome):
                     break
                 z = settled.last
@@ -114,7 +114,7 @@ def sweep_attractor(
             lost = float(value)
             for _ in range(LOSS_HALVINGS if attractors else 0):
                 middle = 0.5 * (attractors[-1].value + lost)
-                halfway = settle(step_map, attractors[-1].last, middle, transient, kept)
+                halfway = settle(step_map, attractors[-1].last, middle, transient, steps)
                 if isinstance(halfway, Outcome):
                     lost, settled = middle, halfway
                 else:
@@ -125,10 +125,10 @@ def sweep_attractor(
     return AttractorBranch(tuple(attractors), None, "")
 
 
-def leave_by_flip(step_map: StepMap, gait: Cycle, transient: int, kept: int) -> Attractor | Outcome:
+def leave_by_flip(step_map: StepMap, gait: Cycle, transient: int, steps: int) -> Attractor | Outcome:
     flipping = min(gait.multipliers.real)
     aside = GAIT_OFFSET * np.max(np.abs(gait.z)) * eigenvector(gait.DP, flipping)
-    return settle(step_map, gait.z + aside, gait.value, transient, kept)
+    return settle(step_map, gait.z + aside, gait.value, transient, steps)
 
 
 def largest_exponent(step_map: StepMap, z: Floats, value: float, transient: int, steps: int) -> Lyapunov | None:

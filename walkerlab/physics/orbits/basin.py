@@ -170,10 +170,10 @@ def find_attractors(walker: Walker, starts: Floats, seed: int) -> Attractors:
     return Attractors(reached, aperiodic or also_aperiodic)
 
 
-def find_cycles(walker: Walker, starts: Floats, known: Attractors) -> tuple[list[Floats], bool]:
+def find_cycles(walker: Walker, starts: Floats, attractors: Attractors) -> tuple[list[Floats], bool]:
     """Return the new cycles that walks settle on, and whether any walk settles on none."""
     tight = (CYCLE_RTOL, CYCLE_ATOL)
-    rough = walk_to_attractor(walker, known, starts, SETTLING_STEPS)
+    rough = walk_to_attractor(walker, attractors, starts, SETTLING_STEPS)
     elsewhere = np.flatnonzero((rough.outcome == Outcome.WALKED) & (rough.attractor == UNREACHED))
     points = rough.last[elsewhere]
     _, first = np.unique(np.round(points / (10.0 * CYCLE_DISTANCE)), axis=0, return_index=True)
@@ -213,12 +213,12 @@ def same_cycle(first: Floats, second: Floats) -> bool:
 
 
 def find_reach(walker: Walker, points: Floats, cycles: Sequence[Floats], generator: np.random.Generator) -> float:
-    """Return a distance from a cycle within which walks from all directions returned to it; zero if there is none.
+    """Return a distance from a cycle within which walks from all directions returned to it, or zero.
 
     It is well below the distance to other cycles.
     """
-    others = [other for other in cycles if other is not points]
-    gap = min((float(np.linalg.norm(p - other, axis=1).min()) for other in others for p in points), default=np.inf)
+    foreign = [cycle for cycle in cycles if cycle is not points]
+    gap = min((float(np.linalg.norm(p - cycle, axis=1).min()) for cycle in foreign for p in points), default=np.inf)
     reach = min(CAPTURE, 0.25 * gap)
     directions = generator.normal(size=(len(points) * STARTS_PER_POINT, SECTION_SIZE))
     directions /= np.linalg.norm(directions, axis=1)[:, None]

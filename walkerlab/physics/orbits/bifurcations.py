@@ -122,7 +122,7 @@ def flip_form(equations: GaitEquations, flip: Bifurcation) -> FlipForm | None:
     w = w / (w @ v)
     segment = flip.segment
     s, gap = float(segment.first.tangent @ (flip.point.x - segment.first.x)), 1e-3 * segment.length
-    neighbours = [segment.at(s + h) for h in (-gap, gap)]
+    neighbours = [segment.point_at(s + h) for h in (-gap, gap)]
     passing = [float(w @ point.evaluated.data.DP @ v) for point in neighbours if isinstance(point, CurvePoint)]
     if len(passing) < 2:
         return None

@@ -36,7 +36,7 @@ FIRST_STRIDE, RIGIDITY_STRIDES = 0.25, Strides(1.0, 0.02, 2)
 @dataclass(frozen=True)
 class GaitAnswer:
     gait: Cycle | None
-    reason: str  # how it was found, or why there is none
+    reason: str  # how the gait was found, or why the search failed
     advice: str = ""
 
 
@@ -154,9 +154,9 @@ def follow_from_rigid(walker: ContactWalker, ground: JudgedGround, tolerances: T
         return append_length(near)
 
     state = Follower(softer, FollowerState(0.0, FIRST_STRIDE, ((0.0, append_length(last)),)), RIGIDITY_STRIDES).to(1.0)
-    if state.at == 1.0:
+    if state.value == 1.0:
         return GaitAnswer(gaits[1.0], "followed from nearly rigid ground")
-    rigidity = 1.0 - state.at
+    rigidity = 1.0 - state.value
     return GaitAnswer(
         None,
         f"followed from nearly rigid ground the gait is lost at {MAX_STIFFENING**rigidity:.3g} times the stiffness "

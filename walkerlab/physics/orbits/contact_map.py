@@ -85,13 +85,13 @@ def angled_bodies(walker: ContactWalker, stance: int) -> tuple[int, ...]:
 
 def fill_followers(walker: ContactWalker, stance: int, angles: Floats, fixed: tuple[int, ...]) -> Floats:
     """Fill in the angles (n), or changes of angles, of coupled bodies that are not `fixed`."""
-    whole, n = walker.whole, angles.size
-    shank, thigh = whole.knees[stance]
+    form, n = walker.whole, angles.size
+    shank, thigh = form.knees[stance]
     if walker.kneed and shank not in fixed:
         angles[shank] = angles[thigh]
     for body in range(n):
-        if whole.E[0, body, body] == 0.0 and body not in fixed:
-            angles[body] = whole.E[0, body, :n] @ angles
+        if form.E[0, body, body] == 0.0 and body not in fixed:
+            angles[body] = form.E[0, body, :n] @ angles
     return angles
 
 

@@ -27,7 +27,7 @@ from walkerlab.physics.orbits.newton import (
 from walkerlab.physics.solvers.system import Floats
 
 FEW_CORRECTIONS = 3
-RESOLUTION = 1e-14  # of arclength
+ROOT_RESOLUTION = 1e-14  # of arclength
 # (abscissa, solution) pairs, latest last.
 Points = tuple[tuple[float, Floats], ...]
 
@@ -43,7 +43,7 @@ class Strides(NamedTuple):
 class FollowerState(NamedTuple):
     """How far a solution has been followed, and the state from which it continues."""
 
-    at: float
+    value: float
     stride: float
     points: Points
 
@@ -63,22 +63,22 @@ class Follower:
         solve     return the solution (m,) at a value, given a prediction; None if it fails
         abscissa  variable in which the solution is smooth, as a function of the parameter
         """
-        self._solve, self._strides, self._abscissa, self._ways = solve, strides, abscissa, [first]
+        self._solve, self._strides, self._abscissa, self._states = solve, strides, abscissa, [first]
 
     def to(self, target: float) -> FollowerState:
         """Follow the solution to the parameter's value `target`, or to where it is lost.
 
         Strides do not depend on the target until the last, so the cached ones serve every target.
         """
-        state = self._ways[0]
-        for state in self._ways:  # grows during the loop
-            following = state.at + state.stride
+        state = self._states[0]
+        for state in self._states:  # grows during the loop
+            following = state.value + state.stride
             if following >= target or state.stride < self._strides.narrowest:
                 break
-            if state is self._ways[-1]:
-                self._ways.append(self._advance(state, following))
-        while state.at < target and state.stride >= self._strides.narrowest:
-            state = self._advance(state, min(target, state.at + state.stride))
+            if state is self._states[-1]:
+                self._states.append(self._advance(state, following))
+        while state.value < target and state.stride >= self._strides.narrowest:
+            state = self._advance(state, min(target, state.value + state.stride))
         return state
 
     def _advance(self, state: FollowerState, ahead: float) -> FollowerState:
@@ -184,7 +184,7 @@ class Segment(Generic[Data]):
     def length(self) -> float:
         return float(self.first.tangent @ (self.second.x - self.first.x))
 
-    def at(self, s: float) -> CurvePoint[Data] | NotConverged:
+    def point_at(self, s: float) -> CurvePoint[Data] | NotConverged:
         share = s / self.length
         bend = self.second.x - self.first.x - self.length * self.first.tangent
         guess = self.first.x + s * self.first.tangent + share * share * bend
@@ -207,14 +207,14 @@ def root_along(segment: Segment[Data], measure: Callable[[CurvePoint[Data]], flo
 
     def measure_at(s: float) -> float:
         if s not in points:
-            point = segment.at(s)
+            point = segment.point_at(s)
             if isinstance(point, NotConverged):
                 raise _OffTheCurve
             points[s] = point
         return measure(points[s])
 
     try:
-        root = brentq(measure_at, 0.0, segment.length, xtol=RESOLUTION, rtol=4.0 * np.finfo(float).eps)
+        root = brentq(measure_at, 0.0, segment.length, xtol=ROOT_RESOLUTION, rtol=4.0 * np.finfo(float).eps)
         measure_at(root)
     except (_OffTheCurve, ValueError):
         return None

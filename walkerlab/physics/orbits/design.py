@@ -36,7 +36,7 @@ class DesignProblem:
     lower: Floats  # (variables,) bounds
     upper: Floats  # (variables,) bounds
     keep: Mapping[str, tuple[float, float]]  # bounds on other quantities
-    at: Callable[[Floats], Point | None]  # evaluate the gait at parameters (variables,); None if there is none
+    evaluate: Callable[[Floats], Point | None]  # evaluate the gait at parameters (variables,), or None
 
 
 @dataclass
@@ -58,7 +58,7 @@ def minimise(problem: DesignProblem, start: Floats) -> DesignSearch:
     def point_at(u: Floats) -> Point | None:
         x = problem.lower + np.clip(u, 0.0, 1.0) * span
         if x.tobytes() not in seen:
-            seen[x.tobytes()] = problem.at(x)
+            seen[x.tobytes()] = problem.evaluate(x)
         point = seen[x.tobytes()]
         if point is not None:
             search.x, search.point = x, point

@@ -139,12 +139,14 @@ class BranchFollower:
     most: int = MAX_BRANCH_POINTS  # maximum number of points on a branch
     advance: Callable[[], None] = lambda: None  # called after each point
 
-    def family(self, seeds: Iterable[Seed], periods: int, known: tuple[GaitBranch, ...] = ()) -> tuple[GaitBranch, ...]:
-        """Return `known`, every other branch through the seeds, and the cascades beyond their flips.
+    def family(
+        self, seeds: Iterable[Seed], periods: int, previous: tuple[GaitBranch, ...] = ()
+    ) -> tuple[GaitBranch, ...]:
+        """Return `previous`, every other branch through the seeds, and the cascades beyond their flips.
 
         periods  maximum number of steps of a gait
         """
-        branches = list(known)
+        branches = list(previous)
         for seed in seeds:
             start = self.solve_at(seed.z, seed.value, seed.steps)
             if start is None:
@@ -169,7 +171,7 @@ class BranchFollower:
             if not any(self.lies_on(branch_ahead, branch.points[0]) for branch in like):
                 branches.append(branch_ahead)
         for branch in branches:  # grows during the loop
-            if 2 * branch.period <= periods and branch not in known:
+            if 2 * branch.period <= periods and branch not in previous:
                 branches.extend(self.follow_doubled(branch, branches))
         return tuple(close_on_flips(branch, branches) for branch in branches)
 
@@ -196,10 +198,10 @@ class BranchFollower:
                 return True
         return False
 
-    def follow_doubled(self, parent: GaitBranch, known: Iterable[GaitBranch]) -> list[GaitBranch]:
+    def follow_doubled(self, parent: GaitBranch, previous: Iterable[GaitBranch]) -> list[GaitBranch]:
         branches: list[GaitBranch] = []
         for flip in parent.bifurcations:
-            like = [branch for branch in (*known, *branches) if branch.period == 2 * parent.period]
+            like = [branch for branch in (*previous, *branches) if branch.period == 2 * parent.period]
             if flip.kind != "flip" or any(any(branch.closes_on(flip)) for branch in like):
                 continue
             form = flip_form(self.equations(parent.period), flip)
@@ -247,7 +249,7 @@ class BranchFollower:
                 break
             segment = Segment(equations, last, solved, self.control.tolerance)
             located = (locate_bifurcation(segment, kind, equations.scale) for kind in BIFURCATION_KINDS)
-            bifurcations += [left for left in located if left is not None]
+            bifurcations += [bifurcation for bifurcation in located if bifurcation is not None]
             points.append(self.point(solved))
             left, right = points[-2:]
             for monitor, ahead, after in zip(self.step_map.monitors, left.monitors, right.monitors, strict=True):
@@ -328,7 +330,7 @@ def passes_through(segment: Segment[Cycle], gait: CurvePoint[Cycle], turn: float
     along = float(first.tangent @ (gait.x - first.x))
     if not 0.0 < along <= segment.length or gait.tangent @ first.tangent < turn:
         return False
-    near = segment.at(along)
+    near = segment.point_at(along)
     return isinstance(near, CurvePoint) and bool(np.abs(near.x - gait.x).max() < SAME_STATE)
 
 

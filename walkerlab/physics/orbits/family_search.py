@@ -56,7 +56,7 @@ class Thoroughness:
 
     values: int  # of the parameter at which to look for attractors
     transient: int  # steps before reaching an attractor
-    kept: int  # steps on the attractor
+    samples: int  # steps on the attractor
     exponents: int  # values at which to measure the Lyapunov exponent
     averaged: int  # steps to average it over
     branch_control: StepControl  # along branches
@@ -151,7 +151,7 @@ class FamilySearch:
             end = span.most if begin - span.least < span.most - begin else span.least
         values = np.linspace(begin, end, how.values)
         self.announce("attractor of {model}", how.values)
-        attractors = sweep_attractor(self.step_map, start, values, how.transient, how.kept, self.listener.advance)
+        attractors = sweep_attractor(self.step_map, start, values, how.transient, how.samples, self.listener.advance)
         if not attractors.found:
             return replace(family, attractors=attractors)
         if end < begin:
@@ -160,7 +160,9 @@ class FamilySearch:
         self.announce("Lyapunov exponents of {model}", len(chosen))
         exponents = []
         for attractor in chosen:
-            exponents.append(largest_exponent(self.step_map, attractor.last, attractor.value, how.kept, how.averaged))
+            exponents.append(
+                largest_exponent(self.step_map, attractor.last, attractor.value, how.samples, how.averaged)
+            )
             self.listener.advance()
         measured = tuple(exponent for exponent in exponents if exponent is not None)
         return replace(family, attractors=attractors, exponents=measured)
@@ -169,7 +171,7 @@ class FamilySearch:
         """Add gaits of 2, 4, 8, ... steps of branches beyond a flip outside the span, and find their attractor.
 
         Both are searched for at the branch's ends: a walk leaves the gait there for the attractor, whose close returns
-        are the seeds. The second result is the attractor at the smallest of these values, None if there is none.
+        are the seeds. The second result is the attractor at the smallest of these values, or None.
         """
         how = self.thoroughness
         self.announce("gaits of {model} beyond flips outside the span")
@@ -177,7 +179,7 @@ class FamilySearch:
             branch.points[place] for branch in family.branches if branch.period == 1 and branch.flipped_outside
             for place in (0, -1)
         ]  # fmt: skip
-        reached = [leave_by_flip(self.step_map, end, how.transient, how.kept) for end in ends]
+        reached = [leave_by_flip(self.step_map, end, how.transient, how.samples) for end in ends]
         attractors = [attractor for attractor in reached if isinstance(attractor, Attractor) and attractor.period != 1]
         if not attractors:
             return family, None

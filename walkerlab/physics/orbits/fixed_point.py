@@ -179,7 +179,7 @@ class GaitSearch:
 
     gaits: tuple[RigidGait, ...]  # every period-1 gait, by period
     chosen: int | None  # index of the gait to walk; None if no gait is physical
-    reason: str  # for the choice, or why there is none
+    reason: str  # for the choice, or why no gait was found
     random_hits: tuple[int, ...] = ()  # for each gait, the number of random starts that led to it
     random_starts: int = 0  # number drawn
     lost: tuple[str, ...] = ()  # why gaits that were followed did not reach this walker
@@ -207,9 +207,9 @@ def find_gaits(walker: RigidModel, seed: int = 0, settings: SearchSettings = Sea
     generator = np.random.default_rng(seed)
     search.follow_seeds()
     search.draw(generator, settings.random_starts)
-    if not search.found and not search.walker.passive:
+    if not search.records and not search.walker.passive:
         search.follow_drive(generator, settings.random_starts)
-    if not search.found:
+    if not search.records:
         search.draw(generator, settings.further_starts)
     return search.result()
 
@@ -241,8 +241,8 @@ class SlopeBranch:
         if follower is None:
             return 0.0, None
         state = follower.to(math.log(s))
-        if state.at < math.log(s):
-            return math.exp(3.0 * state.at), None
+        if state.value < math.log(s):
+            return math.exp(3.0 * state.value), None
         return slope, unscale(s, state.points[-1][1])
 
     @cached_property
@@ -312,7 +312,7 @@ class GaitRecord:
 class Search:
     def __init__(self, walker: RigidModel) -> None:
         self.walker, self.units = unit_walker(walker)
-        self.found: list[GaitRecord] = []
+        self.records: list[GaitRecord] = []
         self.lost: list[str] = []
         self.drawn = 0
         self.followed = SEED_SOURCE if walker.passive else DRIVE_SOURCE
@@ -342,14 +342,14 @@ class Search:
             family = RigidMap(partial(with_partial_drive, goal, slope), 1.0, goal)
             follower = BranchFollower(family, ValueSpan(0.0, 1.0), most=MAX_DRIVE_POINTS)
             name, lost = f"passive gait at {slope:.3g} rad", "is lost at {:.0%} of the way to this slope and drive"
-            followed = follower.family([Seed(record.cycle.z, 0.0) for record in passive.found], 1)
+            followed = follower.family([Seed(record.cycle.z, 0.0) for record in passive.records], 1)
             for branch in followed:
                 end = max(branch.points, key=lambda point: point.value)
                 if end.value < 1.0 - SAME_GAIT or not self.keep(end.z, name):
                     self.lost.append(f"the {name} {lost.format(end.value)}")
-            if passive.found and not followed:
+            if passive.records and not followed:
                 self.lost.append(f"the {name} {lost.format(0.0)}")
-            if self.found:
+            if self.records:
                 return
 
     def draw(self, generator: np.random.Generator, count: int) -> None:
@@ -358,11 +358,11 @@ class Search:
         self.drawn += count
         starts = generator.uniform(MIN_START[:d], MAX_START[:d], (count, d))
         starts[:, 0] = 0.5 * (starts[:, 0] - feet_on_slope(self.walker, 0.0, 0.0))
-        known = [(record.cycle.z, record.cycle.DP) for record in self.found]
-        results = self.looking.solve_starts(strike_section(self.walker), known, starts)
+        gaits = [(record.cycle.z, record.cycle.DP) for record in self.records]
+        results = self.looking.solve_starts(strike_section(self.walker), gaits, starts)
         for z, gait in zip(starts, results, strict=True):
             if gait >= 0:
-                self.found[gait].by.append(RANDOM_START)
+                self.records[gait].by.append(RANDOM_START)
             elif gait == NEW_GAIT and not self.stands(z):
                 self.keep(z, RANDOM_START)
 
@@ -370,7 +370,7 @@ class Search:
         return bool(abs(feet_on_slope(self.walker, z[0], z[0])) < 2.0 * SMALLEST_ANGLE)
 
     def keep(self, z: Floats, by: str) -> bool:
-        """Solve for the gait near z to rounding and add it to the results; False if there is none."""
+        """Solve for the gait near z to rounding and add it to the results; return whether it was found."""
         if self.record_hit(z, by):
             return True
         effort = Effort(SOLVED_RESIDUAL, MAX_GAIT_EVALUATIONS, SHORTEST_MOVE, rounding=MAX_RESIDUAL / SOLVED_RESIDUAL)
@@ -382,19 +382,19 @@ class Search:
         gait = measure_gait(self.walker, self.units, cycle)
         if gait is None or gait.residual > MAX_RESIDUAL:
             return False
-        self.found.append(GaitRecord(cycle, gait, [by]))
+        self.records.append(GaitRecord(cycle, gait, [by]))
         return True
 
     def record_hit(self, z: Floats, by: str) -> bool:
         """Whether z is a gait that was found before; if so, record the search that found it again."""
-        for record in self.found:
+        for record in self.records:
             if np.abs(record.cycle.z - z).max() < SAME_GAIT * np.abs(z).max():
                 record.by.append(by)
                 return True
         return False
 
     def result(self) -> GaitSearch:
-        records = sorted(self.found, key=lambda each: each.gait.period)
+        records = sorted(self.records, key=lambda each: each.gait.period)
         gaits = tuple(replace(each.gait, found_by=tuple(dict.fromkeys(each.by))) for each in records)
         hits = tuple(each.by.count(RANDOM_START) for each in records)
         chosen, reason = choose_gait(gaits)

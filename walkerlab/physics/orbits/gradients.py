@@ -44,7 +44,7 @@ LOST_ERROR = 0.1  # relative error above which a derivative is lost in rounding
 
 @dataclass(frozen=True)
 class Gradient:
-    """A derivative; `why` states why there is none, or that rounding dominates it."""
+    """A derivative; `why` states why it is missing, or that rounding dominates it."""
 
     value: float | None
     error: float | None
@@ -54,14 +54,14 @@ class Gradient:
     def small(self) -> bool:
         return self.value is None or self.error is None or self.error <= SMALL_ERROR * abs(self.value)
 
-    def halves(self, other: Gradient | None) -> bool:
-        return other is None or (self.error is not None and self.error < 0.5 * (other.error or 0.0))
+    def halves(self, coarser: Gradient | None) -> bool:
+        return coarser is None or (self.error is not None and self.error < 0.5 * (coarser.error or 0.0))
 
 
-def gait_quantities(gait: GaitOnMap, wanted: Collection[str] = GAIT_QUANTITIES) -> dict[str, float] | None:
+def gait_quantities(gait: GaitOnMap, selection: Collection[str] = GAIT_QUANTITIES) -> dict[str, float] | None:
     """Compute the quantities of a gait by name, without norms if it is unstable; None if its step fails.
 
-    wanted  quantities to compute; those that a single step does not give cost more steps
+    selection  quantities to compute; those that a single step does not give cost more steps
     """
     step = gait.step_map.step(gait.z, gait.p)
     if step.outcome is not Outcome.WALKED:
@@ -69,7 +69,7 @@ def gait_quantities(gait: GaitOnMap, wanted: Collection[str] = GAIT_QUANTITIES) 
     radius = float(np.abs(multipliers_of(step.DP)).max())
     quantities = dict(zip(GAIT_QUANTITIES, (*step_quantities(step), radius), strict=False))
     for names, of in WALK_QUANTITIES.items():
-        values = None if set(names).isdisjoint(wanted) else of(gait._replace(A=step.DP))
+        values = None if set(names).isdisjoint(selection) else of(gait._replace(A=step.DP))
         quantities |= {} if values is None else dict(zip(names, values, strict=True))
     return quantities
 
@@ -99,11 +99,11 @@ WALK_QUANTITIES: Final[Mapping[tuple[str, ...], Callable[[GaitOnMap], tuple[floa
 }
 
 
-def gradients(gait: GaitOnMap, scale: float, wanted: Collection[str] = GAIT_QUANTITIES) -> dict[str, Gradient]:
+def gradients(gait: GaitOnMap, scale: float, selection: Collection[str] = GAIT_QUANTITIES) -> dict[str, Gradient]:
     """Differentiate a gait's quantities by the parameter of its step map; empty if neighbouring steps fail.
 
     scale   magnitude of significant changes of the parameter
-    wanted  the quantities, see `gait_quantities`
+    selection  the quantities, see `gait_quantities`
     """
     h, along = STEP_FACTOR * gait.step_map.tolerances.rtol**0.2 * scale, np.zeros(gait.z.size)
     for part in APPROACH_STEPS:
@@ -113,7 +113,7 @@ def gradients(gait: GaitOnMap, scale: float, wanted: Collection[str] = GAIT_QUAN
         along = closer
     best, coarse = dict[str, Gradient](), None
     for size in STEP_SIZES:
-        fine = differentiate(gait, size * h, along, wanted)
+        fine = differentiate(gait, size * h, along, selection)
         if fine is not None and coarse is not None:
             better = {
                 name: gradient
@@ -157,7 +157,7 @@ def family_direction(gait: GaitOnMap, h: float, guess: Floats) -> Floats | None:
     return None if moved is None else np.asarray(np.linalg.solve(np.eye(guess.size) - gait.A, moved - gait.A @ guess))
 
 
-def differentiate(gait: GaitOnMap, h: float, guess: Floats, wanted: Collection[str]) -> Derivatives | None:
+def differentiate(gait: GaitOnMap, h: float, guess: Floats, selection: Collection[str]) -> Derivatives | None:
     """Compute difference quotients of step h along the family; None if neighbouring steps fail."""
     along = family_direction(gait, h, guess)
     if along is None:
@@ -182,7 +182,7 @@ def differentiate(gait: GaitOnMap, h: float, guess: Floats, wanted: Collection[s
         return None
     numbers = dict(zip(GAIT_QUANTITIES, changed[:STEP_QUANTITY_COUNT].tolist(), strict=False))
     for names, of in WALK_QUANTITIES.items():
-        slopes = None if set(names).isdisjoint(wanted) else derivative(partial(walk_values, of=of), h)
+        slopes = None if set(names).isdisjoint(selection) else derivative(partial(walk_values, of=of), h)
         numbers |= {} if slopes is None else dict(zip(names, slopes.tolist(), strict=True))
     return Derivatives(numbers, changed[STEP_QUANTITY_COUNT:].reshape(gait.A.shape))
 
@@ -197,10 +197,10 @@ def radius_gradient(A: Floats, change: Floats, error: Floats) -> Gradient:
     values, right = np.linalg.eig(A)
     left = np.linalg.inv(right) if np.linalg.cond(right) < 1.0 / MIN_EIGENVECTOR_PRODUCT else None
     largest = int(np.argmax(np.abs(values)))
-    others = [
+    distinct = [
         value for value in values if abs(value - values[largest]) > 0.0 and abs(value.conj() - values[largest]) > 0.0
     ]
-    meets = any(abs(abs(value) - abs(values[largest])) < MIN_EIGENVECTOR_PRODUCT for value in others)
+    meets = any(abs(abs(value) - abs(values[largest])) < MIN_EIGENVECTOR_PRODUCT for value in distinct)
     if left is None or meets or values[largest] == 0.0:
         return Gradient(None, None, "multipliers meet")
     towards = values[largest].conjugate() / abs(values[largest])

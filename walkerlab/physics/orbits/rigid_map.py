@@ -191,13 +191,13 @@ class KnownGaits(NamedTuple):
 
 
 @kernel
-def solve_from_starts(section: StrikeSection, memory: Memory, known: KnownGaits, starts: Any, results: Any) -> None:
+def solve_from_starts(section: StrikeSection, memory: Memory, gaits: KnownGaits, starts: Any, results: Any) -> None:
     for k in range(len(starts)):
-        results[k] = solve_from(section.walker[()], section, memory, known, starts[k])
+        results[k] = solve_from(section.walker[()], section, memory, gaits, starts[k])
 
 
 @kernel_part
-def solve_from(model: RigidModel, section: StrikeSection, memory: Memory, known: KnownGaits, z: Any) -> int:
+def solve_from(model: RigidModel, section: StrikeSection, memory: Memory, gaits: KnownGaits, z: Any) -> int:
     """Run Newton's method from z (d,), overwritten with the last state tried.
 
     A move is halved until it reduces the residual. A start that reaches no heel strike, or stands still, is given up. A
@@ -227,13 +227,13 @@ def solve_from(model: RigidModel, section: StrikeSection, memory: Memory, known:
                 return NEW_GAIT
             for i in range(d):
                 best[i], move[i] = z[i], y[places[i]] - z[i]
-            for gait in range(len(known.z)):
+            for gait in range(len(gaits.z)):
                 distance, remaining = 0.0, 0.0
                 for i in range(d):
-                    off = z[i] - known.z[gait, i]
+                    off = z[i] - gaits.z[gait, i]
                     distance = max(distance, abs(off))
                     for j in range(d):
-                        off += known.inverse[gait, i, j] * move[j]
+                        off += gaits.inverse[gait, i, j] * move[j]
                     remaining = max(remaining, abs(off))
                 if distance < RECOGNITION_DISTANCE and remaining < RECOGNITION_RESIDUAL * distance:
                     return gait
@@ -309,8 +309,8 @@ class RigidMap(StepMap):
         unit = self._unit_at(p)
         assert unit is not None, "what is watched was walked"
         walker, units = unit.walker, unit.units
-        walked = take_walk(walker, MONITORED_STEPS, state_on_section(walker, z), steps)
-        extremes = (walked.min_normal_force, walked.max_friction_ratio, walked.max_scuff_depth)
+        walk = take_walk(walker, MONITORED_STEPS, state_on_section(walker, z), steps)
+        extremes = (walk.min_normal_force, walk.max_friction_ratio, walk.max_scuff_depth)
         return np.array(extremes) * (units.force, 1.0, units.length)
 
     def disturbed(self, z: Floats, p: float, heights_m: Floats, push_N_s: float = 0.0) -> DisturbedWalk:

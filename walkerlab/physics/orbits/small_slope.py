@@ -87,7 +87,7 @@ def leg_columns(walker: RigidModel) -> Floats:
 def seeds(walker: RigidModel) -> tuple[SmallSlopeSeed, ...]:
     """Return the small-slope gaits of `walker`, whatever its own slope.
 
-    There are none unless upright legs balance, so that gaits shrink with the slope.
+    Only walkers whose upright legs balance have them: their gaits shrink with the slope.
     """
     modes = None if walker.kneed or walker.lean != 0.0 or walker.arm_x.any() else linear_modes(walker)
     try:
@@ -167,7 +167,7 @@ def symmetric_half_period(modes: Modes) -> float | None:
 
 
 def short_period_seed(walker: RigidModel, modes: Modes, longest: float) -> SmallSlopeSeed | None:
-    """Return the gait of period below `longest` (s) proportional to the slope; None if there is none."""
+    """Return the gait of period below `longest` (s) proportional to the slope, or None."""
     try:
         conditions = step_conditions(walker, modes)
         period = first_root(lambda t: np.asarray(np.linalg.det(conditions(t)) / t), longest)
@@ -201,8 +201,8 @@ def step_conditions(walker: RigidModel, modes: Modes) -> Callable[[Floats], Floa
     # equilibrium: a leg with a rolling foot balances off the vertical on a slope of one radian
     legs = leg_columns(flat)
     pull = np.array([0.0, flat.mass * flat.gravity * flat.radius])
-    rest = np.zeros((4, 4))
-    rest[:2, 3] = np.linalg.solve(flat.gravity * legs.T @ np.diag(flat.arm_y) @ legs, pull)
+    equilibrium = np.zeros((4, 4))
+    equilibrium[:2, 3] = np.linalg.solve(flat.gravity * legs.T @ np.diag(flat.arm_y) @ legs, pull)
 
     def combine_modes(oscillating: Floats, growing: Floats) -> Floats:
         weights = np.stack((oscillating, growing), axis=-1)[..., None, :]
@@ -215,7 +215,7 @@ def step_conditions(walker: RigidModel, modes: Modes) -> Callable[[Floats], Floa
         flow[..., :2, :2] = flow[..., 2:, 2:] = combine_modes(cosine, grown)
         flow[..., :2, 2:] = combine_modes(sine / swing, growing / fall)
         flow[..., 2:, :2] = combine_modes(-swing * sine, fall * growing)
-        end = flow @ (STATE_OF - rest) + rest
+        end = flow @ (STATE_OF - equilibrium) + equilibrium
         bordered = np.empty_like(flow)
         bordered[..., :3, :] = SECTION_ROWS - strike @ end
         bordered[..., 3, :] = FEET_DOWN @ end

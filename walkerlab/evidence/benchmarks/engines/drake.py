@@ -57,8 +57,6 @@ def tuned(model: str, target: adapter.EngineContact) -> adapter.OwnContact:
 
 
 class DrakeRun(adapter.Simulation):
-    """A Drake simulator with its diagram and context."""
-
     def build(self, model: PlanarModel, q: Floats, v: Floats) -> None:
         from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, DiscreteContactApproximation
         from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
@@ -157,8 +155,8 @@ def add_model(plant: Any, model: PlanarModel, own: adapter.OwnContact | None) ->
     joints: list[Any] = []
     for link in model.links:
         inertia, centre = RotationalInertia(*[link.inertia_kg_m2] * 3), np.array((*link.centre_m, 0.0))
-        whole = SpatialInertia.MakeFromCentralInertia(link.mass_kg, centre, inertia)
-        body = plant.AddRigidBody(link.name, whole)
+        body_inertia = SpatialInertia.MakeFromCentralInertia(link.mass_kg, centre, inertia)
+        body = plant.AddRigidBody(link.name, body_inertia)
         joints += join_to_parent(
             plant, model, link, plant.world_body() if link.parent < 0 else bodies[link.parent], body
         )

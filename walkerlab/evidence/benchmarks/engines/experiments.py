@@ -296,7 +296,6 @@ class EngineOnScene:
 
 
 def has_settled(coarse: EngineRow, fine: EngineRow) -> bool:
-    """Whether two completed walks agree in period."""
     if coarse.error is None or fine.error is None or coarse.period_s is None or fine.period_s is None:
         return False
     return abs(fine.period_s / coarse.period_s - 1.0) <= SETTLED_CHANGE
@@ -309,7 +308,7 @@ def swing_truth(scene: EngineScene, start: Floats, until_s: float = SWING_S) -> 
     knee = knees_at_start(scene.ours, STANCE_FOOT, scene.start)
     passive = changed_forms(scene.ours, push_off=0.0, laws=0.0)
     system = on_ground(passive, (False, False), knee, hinged=True)
-    whole = passive.forms[1, 0]
+    free_form = passive.forms[1, 0]
 
     def rate(t: float, y: Floats) -> Any:
         f = np.zeros(y.size)
@@ -317,7 +316,7 @@ def swing_truth(scene: EngineScene, start: Floats, until_s: float = SWING_S) -> 
         return f
 
     def energy(y: Floats) -> float:
-        return float(kinetic_energy(whole, y) + potential_energy(whole, y))
+        return float(kinetic_energy(free_form, y) + potential_energy(free_form, y))
 
     y = folded(system.form, start)
     solution = solve_ivp(rate, (0.0, until_s), y, method="DOP853", rtol=1e-13, atol=1e-14)

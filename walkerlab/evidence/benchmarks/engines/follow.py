@@ -68,7 +68,7 @@ class RuleFollower:
     def _see(self, scene: EngineScene, q: Floats, v: Floats) -> None:
         """Bind the compiled function to a scene's model, with the arguments that stay the same, and evaluate it."""
         size, state = scene.model.size, self.walk_state
-        # what it reads of them is the walk state's own and changes with it
+        # its progress is the walk state's own array, so it is current at every call
         system = on_ground(scene.walker, self._ground, progress=state.progress)
         self.scene, self._fixed = scene, (system, scene.model.chain)
         self._motion, self._forces, self._none = np.zeros((2, 4)), np.zeros(size), np.zeros(0)

@@ -46,8 +46,6 @@ def tuned(model: str, target: adapter.EngineContact) -> adapter.OwnContact:
 
 
 class MujocoRun(adapter.Simulation):
-    """A MuJoCo model and its data."""
-
     def build(self, model: PlanarModel, q: Floats, v: Floats) -> None:
         import mujoco
 
@@ -84,7 +82,6 @@ def force_callback(forces: adapter.Forces, data: Any) -> Any:
 
 
 def model_xml(model: PlanarModel, own: adapter.OwnContact | None) -> str:
-    """Write the model as MJCF."""
     ratio, world = "", body(model, 0, own)
     if own is not None:
         ratio = f'cone="elliptic" impratio="{own.settings["impratio"]!r}"'

@@ -131,16 +131,16 @@ def lump_bodies(
     """Combine bodies that move together, and the particles on them, into a link."""
     parent, parent_point, point = hinge
     particles = [
-        (mass, translate(at.at_m, shift))
+        (mass, translate(anchor.at_m, shift))
         for name, shift in members
-        for mass, at in masses(assembly)
-        if at.body == name and mass > 0.0
+        for mass, anchor in masses(assembly)
+        if anchor.body == name and mass > 0.0
     ]
-    weights, places = np.array([mass for mass, _ in particles]), np.array([at for _, at in particles])
+    weights, places = np.array([mass for mass, _ in particles]), np.array([place for _, place in particles])
     total = float(weights.sum())
     centre = weights @ places / total
     inertia = sum(assembly.bodies[assembly.index(name)].inertia_kg_m2 for name, _ in members)
     inertia += float(weights @ ((places - centre) ** 2).sum(axis=1))
     least = SMALLEST_INERTIA * total * max(float(np.hypot(*(np.array(point) - centre))), SMALLEST_BALL_M) ** 2
-    at = (float(centre[0]), float(centre[1]))
-    return Link(members[0][0], total, at, max(inertia, least), parent, parent_point, point)
+    x, y = float(centre[0]), float(centre[1])
+    return Link(members[0][0], total, (x, y), max(inertia, least), parent, parent_point, point)

@@ -53,7 +53,7 @@ class Engine:
         return cast("type[Simulation]", getattr(self.adapter(), f"{self.name.capitalize()}Run"))
 
 
-ENGINES = {
+PHYSICS_ENGINES = {
     engine.name: engine
     for engine in (
         Engine("mujoco", "mujoco", "mujoco"),
@@ -64,9 +64,8 @@ ENGINES = {
 
 
 def installed() -> tuple[Engine, ...]:
-    return tuple(engine for engine in ENGINES.values() if engine.is_installed)
+    return tuple(engine for engine in PHYSICS_ENGINES.values() if engine.is_installed)
 
 
 def installed_versions() -> dict[str, str]:
-    """Return the version of each installed engine."""
     return {engine.name: engine.version for engine in installed()}

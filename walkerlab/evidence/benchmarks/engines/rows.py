@@ -67,8 +67,8 @@ class TuningRow:
     settings: dict[str, float]
     quantity: Annotated[str, Label("1", "quantity")]
     unit: Annotated[str, Label("1", "its unit")]
-    target: Annotated[float, Label("1", "what it was tuned to, in the unit named beside it")]
-    reached: Annotated[float, Label("1", "what was measured, in the unit named beside it")]
+    target: Annotated[float, Label("1", "target value, in the unit of the row")]
+    reached: Annotated[float, Label("1", "measured value, in the unit of the row")]
 
     @property
     def residual(self) -> float:

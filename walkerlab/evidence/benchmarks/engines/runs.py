@@ -10,7 +10,7 @@ import numpy as np
 from walkerlab.evidence.benchmarks.engines import planar
 from walkerlab.evidence.benchmarks.engines.adapter import EngineContact, OwnContact, Simulation, Stepping
 from walkerlab.evidence.benchmarks.engines.follow import RuleFollower
-from walkerlab.evidence.benchmarks.engines.registry import ENGINES
+from walkerlab.evidence.benchmarks.engines.registry import PHYSICS_ENGINES
 from walkerlab.evidence.benchmarks.engines.scenes import EngineScene
 from walkerlab.outcome import Outcome
 from walkerlab.physics.ground.terrain import STANCE_FOOT
@@ -20,7 +20,7 @@ from walkerlab.physics.solvers.system import Floats
 
 TIME_ROUNDING = 1e-9
 UNLIMITED_STEPS = 10_000_000  # steps
-STEADY_STEP_FACTOR = 5  # so many times longer steps serve where only a steady end counts
+STEADY_STEP_FACTOR = 5  # of the step size, where only a steady end state is needed
 
 
 @dataclass(frozen=True)
@@ -80,14 +80,13 @@ class EngineWalk:
     """Walk in an engine as a sequence of models, one between each lock or release of a knee and the next."""
 
     def __init__(self, task: WalkTask) -> None:
-        self.task, self.engine = task, ENGINES[task.engine]
+        self.task, self.engine = task, PHYSICS_ENGINES[task.engine]
         self.q, self.v = task.scene.from_base(task.scene.start)
         self.rules = RuleFollower(task.scene, task.touches, self.q, self.v, carries=task.own is None)
         self.steps, self.time_s, self.wall_s = 0, 0.0, 0.0
 
     @property
     def is_over(self) -> bool:
-        """Whether the end time is reached."""
         return self.time_s >= (1.0 - TIME_ROUNDING) * self.task.until_s
 
     def go(self) -> None:
@@ -162,7 +161,7 @@ class SwingTask:
         chain = self.model.chain
         absolute = np.column_stack((self.start[: len(chain)] + self.slope, self.start[len(chain) :]))
         q, v = np.linalg.lstsq(chain, absolute, rcond=None)[0].T
-        engine = ENGINES[self.engine].simulation(self.model, self.stepping, q, v)
+        engine = PHYSICS_ENGINES[self.engine].simulation(self.model, self.stepping, q, v)
         start_s = time.process_time()
         motion = record_motion(engine, self.most, self.until_s)
         wall = time.process_time() - start_s
@@ -222,7 +221,7 @@ class TuningTask:
     sliding_velocity: float  # m/s
 
     def run(self) -> TuningAnswer:
-        bench = Bench(self, ENGINES[self.engine].adapter().tuned(self.contact, self.target))
+        bench = Bench(self, PHYSICS_ENGINES[self.engine].adapter().tuned(self.contact, self.target))
         depth = bench.at_rest()
         ratio = bench.damping_ratio(depth)
         return TuningAnswer(bench.own, depth, ratio, bench.friction(depth), bench.creep(depth))
@@ -243,13 +242,13 @@ class Bench:
 
         h  step (s)
         """
-        target, adapter = self.target, ENGINES[self.task.engine].adapter()
+        target, adapter = self.target, PHYSICS_ENGINES[self.task.engine].adapter()
         link = planar.Link("ball", target.mass, (0.0, 0.0), target.mass, -1, (0.0, 0.0), (0.0, 0.0))
         ball = planar.Ball(0, (0.0, 0.0), *planar.ball_and_ground(0.0))
         model = planar.PlanarModel((link,), planar.UPRIGHT, (ball,), along * target.gravity, target.gravity, np.eye(1))
         name = adapter.CONTACTS[self.own.model]
         stepping = Stepping(name, h, TIME_ROUNDING if adapter.INTEGRATORS[name].adapts else None)
-        engine = ENGINES[self.task.engine].simulation(
+        engine = PHYSICS_ENGINES[self.task.engine].simulation(
             model, stepping, np.array((0.0, -depth)), np.array(velocity), own=self.own
         )
         engine.carry(0, True)

@@ -73,7 +73,7 @@ class EngineScene:
     @cached_property
     def centre_levers(self) -> Floats:
         """Levers (n, 2) in m from the base to the centre of mass."""
-        weighted = [mass * levers(self.assembly, self.base, at) for mass, at in masses(self.assembly)]
+        weighted = [mass * levers(self.assembly, self.base, anchor) for mass, anchor in masses(self.assembly)]
         return np.asarray(sum(weighted) / total_mass(self.assembly))
 
     def from_base(self, y: State) -> tuple[Floats, Floats]:

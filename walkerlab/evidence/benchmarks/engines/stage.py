@@ -16,7 +16,7 @@ from walkerlab.evidence.benchmarks.conditions import environment, hinge_left_out
 from walkerlab.evidence.benchmarks.engines import experiments
 from walkerlab.evidence.benchmarks.engines.experiments import EngineOnScene
 from walkerlab.evidence.benchmarks.engines.process import OwnProcess, TaskLost
-from walkerlab.evidence.benchmarks.engines.registry import ENGINES, EXTRA, installed
+from walkerlab.evidence.benchmarks.engines.registry import EXTRA, PHYSICS_ENGINES, installed
 from walkerlab.evidence.benchmarks.engines.rows import OURS, OWN_LAW, SAME_LAW, EngineRow, SwingRow, TuningRow
 from walkerlab.evidence.benchmarks.engines.scenes import scenes
 from walkerlab.evidence.benchmarks.words import words
@@ -86,7 +86,7 @@ def missing_engines() -> list[dict[str, str]]:
     """List missing engines, with the command that installs each."""
     return [
         {"what": f"engine {engine.name}", "why": f"not installed: {engine.install_line}"}
-        for engine in ENGINES.values()
+        for engine in PHYSICS_ENGINES.values()
         if not engine.is_installed
     ]
 
@@ -238,7 +238,6 @@ def convergence(rows: Sequence[EngineRow], scene: str) -> dict[str, dict[str, fl
 
 
 def conclusions(rows: Sequence[EngineRow], scene: str, truth: experiments.Truth) -> dict[str, str]:
-    """A paragraph for each experiment."""
     same, own = (series_by_name(rows, scene, experiment) for experiment in (SAME_LAW, OWN_LAW))
     sizes, changes, shares = three_digits(rows, scene, truth), convergence(rows, scene), ratios(rows, scene)
     by_level = {label: shares.get(label, {}) for label in map(plain_power, RATIO_LEVELS)}

@@ -10,5 +10,7 @@ from walkerlab.config.contact import MM_PER_M
 from walkerlab.evidence.paper import printed
 from walkerlab.views.prose import Prose, f
 
-KNOWN = vars(printed) | {"pi": math.pi, "MM_PER_M": MM_PER_M}
-prose = Prose(Path(__file__).parent, (f,), {name: value for name, value in KNOWN.items() if not name.startswith("_")})
+PRINTED_VALUES = vars(printed) | {"pi": math.pi, "MM_PER_M": MM_PER_M}
+prose = Prose(
+    Path(__file__).parent, (f,), {name: value for name, value in PRINTED_VALUES.items() if not name.startswith("_")}
+)
