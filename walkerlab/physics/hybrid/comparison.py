@@ -1,8 +1,8 @@
-"""How far two walks differ: at the same time, at the same phase of each step, and as orbits in the phase plane.
+"""Differences between two walks: at equal times, at equal phases of each step, and as orbits in the phase plane.
 
-A clock that runs one percent fast makes the difference at the same time grow without bound, however alike the gaits
-are. At the same phase, every step's own time scaled to [0, 1], only the difference of the motions is left. The distance
-of the orbits does not know of time at all.
+A frequency error of one percent makes the difference at equal times grow without bound, however similar the gaits.
+Equal phases, with each step's time scaled to [0, 1], leave the difference of the motions. The distance between orbits
+does not depend on time.
 """
 
 from __future__ import annotations
@@ -19,22 +19,22 @@ Array = NDArray[np.float64]
 Quantity = Literal["angle", "velocity"]
 
 LEGS = 2
-JUMP = 1e-9  # of a walk's duration: samples closer than that are the two sides of a strike
-PHASES = 401  # samples of a step
-IMPACT_PHASE = 0.02  # of a step: by then a compliant impact is over
-FINENESS = 5e-3  # of an orbit's range: how finely orbits are drawn to measure between them
-AT_ONCE = 256  # points of an orbit that are measured at once
+JUMP = 1e-9  # relative to the duration of a walk: closer samples are the two sides of a strike
+PHASES = 401  # samples per step
+IMPACT_PHASE = 0.02  # phase at which a compliant impact is over
+FINENESS = 5e-3  # spacing of the points of an orbit, relative to its range
+AT_ONCE = 256  # points per block, which bounds the memory
 
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """The legs of a walk in time, SI units.
+    """Motion of the legs in time, SI units.
 
     time          (samples,) strictly rising
     angle         (samples, leg)
     velocity      (samples, leg)
     step_ends     (steps,) times of the heel strikes or touches that end the steps; the first step begins at time[0]
-    knee_strikes  (strikes,) times at which a knee locks and velocities jump; of straight legs, none
+    knee_strikes  (strikes,) times at which a knee locks and velocities jump; empty without knees
     """
 
     time: Array
@@ -45,18 +45,20 @@ class Motion:
 
     @property
     def steps(self) -> int:
-        """Completed steps."""
         return int(self.step_ends.size)
 
     @cached_property
     def _first_samples(self) -> NDArray[np.int64]:
-        """Where the smooth pieces begin: at the start, and behind every jump of the velocities."""
+        """First sample of each smooth piece: the start, and the sample after each jump of the velocities."""
         close = np.diff(self.time) < JUMP * (self.time[-1] - self.time[0])
         return np.concatenate(([0], np.flatnonzero(close) + 1))
 
     @cached_property
     def _pieces(self) -> list[tuple[CubicHermiteSpline, PchipInterpolator]]:
-        """Angles through both angles and velocities; velocities without the overshoot that an impact would cause."""
+        """Interpolants of each smooth piece.
+
+        Hermite splines for the angles; monotone splines for the velocities, which do not overshoot at an impact.
+        """
         ends = (*self._first_samples[1:], self.time.size)
         pieces = []
         for first, end in zip(self._first_samples, ends, strict=True):
@@ -66,7 +68,7 @@ class Motion:
         return pieces
 
     def at(self, times: Array) -> tuple[Array, Array]:
-        """Angles and velocities (times, leg); at a heel strike, those after it."""
+        """Compute angles and velocities (times, leg); at a heel strike, those after it."""
         angle, velocity = np.empty((times.size, LEGS)), np.empty((times.size, LEGS))
         piece_of = np.searchsorted(self.time[self._first_samples], times, side="right") - 1
         for index in np.unique(piece_of):
@@ -76,29 +78,32 @@ class Motion:
         return angle, velocity
 
     def last_before(self, end: float) -> float:
-        """The last instant before a jump at `end`; `end` itself where nothing jumps."""
+        """Return the last instant before a jump at `end`, or `end` where nothing jumps."""
         index = int(np.searchsorted(self.time, end))
         if index < self.time.size and self.time[index] == end and index in self._first_samples[1:]:
             return float(self.time[index - 1])
         return end
 
     def during(self, step: int, phases: Array) -> tuple[Array, Array]:
-        """Angles and velocities at phases of a step: 0 just after the impact that began it, 1 just before the next."""
+        """Compute angles and velocities at phases of a step.
+
+        Phase 0 is just after the impact that began it, phase 1 just before the next.
+        """
         start, end = self.span(step)
         return self.at(np.minimum(start + phases * (end - start), self.last_before(end)))
 
     def span(self, step: int) -> tuple[float, float]:
-        """When a step begins and ends (s)."""
+        """Return the start and end of a step (s)."""
         return float(self.time[0] if step == 0 else self.step_ends[step - 1]), float(self.step_ends[step])
 
     def knee_phases(self, step: int) -> Array:
-        """(strikes,) phases of a step at which a knee locks."""
+        """Return the phases (strikes,) of a step at which a knee locks."""
         start, end = self.span(step)
         inside = self.knee_strikes[(self.knee_strikes > start) & (self.knee_strikes < end)]
         return (inside - start) / (end - start)
 
     def last_stride(self) -> Motion:
-        """The last two completed steps, with both impacts; ValueError if there are not two."""
+        """Cut out the last two completed steps, with both impacts; raises ValueError if there are fewer."""
         if self.steps < 2:
             raise ValueError("no stride was completed")
         start = self.time[0] if self.steps == 2 else self.last_before(self.step_ends[-3])
@@ -110,11 +115,11 @@ class Motion:
 
 
 def sampled_at_strikes(motion: Motion) -> Motion:
-    """The motion with a sample at the end of every step, and on either side of every knee strike.
+    """Add samples at the end of every step and on both sides of every knee strike.
 
-    Where there is none, it is continued from the three samples before, and behind a knee strike from the three after,
-    unless another strike lies among them.
-    A compliant impact or an ideal lock takes less than the time between samples: interpolating across would smear it.
+    Where one is missing, it is extrapolated from the three samples before it, or after it behind a knee strike, unless
+    another strike lies among them. A compliant impact or an ideal lock takes less than the time between samples, so
+    interpolating across it would smear the jump.
     """
     side = 0.5 * JUMP * (motion.time[-1] - motion.time[0])
     added = [
@@ -139,13 +144,13 @@ def sampled_at_strikes(motion: Motion) -> Motion:
 
 
 def jumps_among(times: Array, at: float, strikes: Array, close: float) -> bool:
-    """Whether a strike other than the one at `at` (s), or closer to it than `close`, lies between it and the times."""
+    """Whether a strike, other than those closer than `close` (s) to the time `at`, lies between it and the times."""
     between = (strikes > min(times[0], at)) & (strikes < max(times[-1], at)) & (np.abs(strikes - at) > close)
     return bool(between.any())
 
 
 def continued(motion: Motion, known: slice, at: float) -> tuple[Array, Array]:
-    """Angles and velocities (leg,) at a time, by the parabola through three known samples beside it."""
+    """Extrapolate angles and velocities (leg,) to a time by the parabola through three samples."""
     times = motion.time[known]
     weights = [np.prod([(at - other) / (one - other) for other in times if other != one]) for one in times]
     return np.asarray(weights @ motion.angle[known]), np.asarray(weights @ motion.velocity[known])
@@ -153,19 +158,19 @@ def continued(motion: Motion, known: slice, at: float) -> tuple[Array, Array]:
 
 @dataclass(frozen=True, eq=False)
 class WalkDifference:
-    """One walk less another, along time, or along steps and phases; the last axis is the leg."""
+    """One walk minus another, along time, or along steps and phases; the last axis is the leg."""
 
     angle: Array
     velocity: Array
 
     def largest(self, of: Quantity) -> list[float]:
-        """(leg,) largest difference of each leg's angle (rad) or velocity (rad/s)."""
+        """Return the largest difference (leg,) of each leg's angle (rad) or velocity (rad/s)."""
         found: list[float] = np.abs(getattr(self, of)).reshape(-1, LEGS).max(axis=0).tolist()
         return found
 
 
 def difference_in_time(walk: Motion, reference: Motion) -> tuple[Array, WalkDifference]:
-    """`walk` less `reference` at the same times: at every sample of either while both walk.
+    """Compute `walk` minus `reference` at every sample time of either while both walk.
 
     Returns the times (s) and the difference.
     """
@@ -177,7 +182,7 @@ def difference_in_time(walk: Motion, reference: Motion) -> tuple[Array, WalkDiff
 
 
 def difference_in_phase(walk: Motion, reference: Motion, phases: Array) -> WalkDifference:
-    """`walk` less `reference` at the same phases (phases,) of the steps that both completed: (step, phase, leg).
+    """Compute `walk` minus `reference` at phases (phases,) of the steps that both completed: (step, phase, leg).
 
     Raises ValueError if one of them completed none.
     """
@@ -191,9 +196,10 @@ def difference_in_phase(walk: Motion, reference: Motion, phases: Array) -> WalkD
 
 
 def between_impacts(walk: Motion, reference: Motion, phases: Array) -> NDArray[np.bool_]:
-    """(step, phase) where both walks move smoothly: past the impact at a step's start, and off their knees' strikes.
+    """Mark where both walks move smoothly (step, phase): after the impact at a step's start and outside knee strikes.
 
-    Knees that lock at slightly other phases differ by the whole jump between them, however alike the motions are.
+    Between the phases at which the two walks' knees lock, the velocities differ by the whole jump, however similar the
+    motions are.
     """
     clear = np.tile(phases >= IMPACT_PHASE, (min(walk.steps, reference.steps), 1))
     for step, row in enumerate(clear):
@@ -205,10 +211,10 @@ def between_impacts(walk: Motion, reference: Motion, phases: Array) -> NDArray[n
 
 
 def orbit_distances(walk: Motion, reference: Motion) -> Array:
-    """(leg,) how far the orbits of the last stride lie apart in the plane of angle and angular velocity.
+    """Compute the distances (leg,) between the orbits of the last strides in the plane of angle and angular velocity.
 
-    Symmetric Hausdorff distance: the largest distance of a point of either orbit from the other. Each axis is measured
-    in the reference orbit's range along it, so that 0.01 is one percent of the orbit's size.
+    Symmetric Hausdorff distance: the largest distance of a point of either orbit from the other. Each axis is scaled by
+    the reference orbit's range, so that 0.01 is one percent of the orbit's size.
 
     Raises ValueError if one of them completed no stride.
     """
@@ -222,24 +228,24 @@ def orbit_distances(walk: Motion, reference: Motion) -> Array:
 
 
 def phase_plane(motion: Motion, leg: int) -> Array:
-    """(samples, 2) angle and velocity of a leg."""
+    """Return angle and velocity (samples, 2) of a leg."""
     return np.column_stack((motion.angle[:, leg], motion.velocity[:, leg]))
 
 
 def hausdorff(curve: Array, other: Array) -> float:
-    """Largest distance of a point of either polyline (points, 2) from the other."""
+    """Compute the largest distance of a point of either polyline (points, 2) from the other."""
     return max(farthest(refined(curve), other), farthest(refined(other), curve))
 
 
 def refined(curve: Array) -> Array:
-    """The polyline with points put in, so that none is further than FINENESS from the next."""
+    """Insert points into a polyline, no further apart than FINENESS."""
     along = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(curve, axis=0).T))))
     points = np.union1d(along, np.linspace(0.0, along[-1], int(along[-1] / FINENESS) + 2))
     return np.column_stack([np.interp(points, along, axis) for axis in curve.T])
 
 
 def farthest(points: Array, polyline: Array) -> float:
-    """Largest distance of one of the points (n, 2) from the polyline (m, 2)."""
+    """Compute the largest distance of one of the points (n, 2) from the polyline (m, 2)."""
     start, edge = polyline[:-1], np.diff(polyline, axis=0)
     length_squared = np.maximum((edge**2).sum(axis=1), np.finfo(float).tiny)
     largest = 0.0

@@ -40,34 +40,37 @@ from walkerlab.physics.solvers.stepping import ACCEPTED, JACOBIANS, REJECTED, RH
 from walkerlab.physics.solvers.system import Floats, State
 
 ROUNDING = 1e-14  # of a start's coordinates and velocities
-USUAL_STEP = 3.0  # pendulum times that most steps are shorter than
+USUAL_STEP = 3.0  # pendulum times; most steps are shorter
 # Residuals over rtol times energy and work exchanged: random walks leave at most 0.5 by radau5 at any rtol from 1e-2 to
 # 1e-9 (scripts/contact_campaign.py prints those of its walks), and 9 by the libraries' multistep methods; cases of the
 # stability catalogue, of which ground of 1e14 N/m is the worst, leave at most 9.
 UNEXPLAINED = 100.0
 SET_STIFF = "set solver.contact.method to radau5."
-FINEST = 1e-10  # rtol below which a walk's rounding, and no longer its tolerance, makes the residual
+FINEST = 1e-10  # rtol below which rounding, not the tolerance, determines the residual
 
 
 @dataclass(frozen=True)
 class Stopped:
-    """How, where and at what cost a walk stopped."""
+    """Outcome, time, state and cost at the end of a walk."""
 
     outcome: Outcome
     time_s: float
-    state: State  # of the whole walker, free
+    state: State  # of the free walker with all bodies
     work: NDArray[np.int64]
 
 
 def sampled_energies(walker: ContactWalker, samples: ContactSamples) -> Floats:
-    """Kinetic, potential and total energy (J) of every sample, (samples, 3)."""
+    """Compute kinetic, potential and total energy (J) of every sample, (samples, 3)."""
     energies = np.zeros((samples.time_s.size, 3))
     fill_energies(on_ground(walker, (False, False)), samples, energies)
     return energies
 
 
 def sampled_feet(walker: ContactWalker, samples: ContactSamples) -> Floats:
-    """Position along and height over the ground (m), normal force and friction (N), slip (m/s), (samples, foot, 5)."""
+    """Compute position along the slope and height over the ground (m), normal force and friction (N), slip (m/s).
+
+    Returns (samples, foot, 5).
+    """
     feet = np.zeros((samples.time_s.size, 2, 5))
     fill_feet(walker, samples, feet)
     return feet
@@ -75,7 +78,10 @@ def sampled_feet(walker: ContactWalker, samples: ContactSamples) -> Floats:
 
 @kernel
 def fill_energies(system: OnGround, samples: ContactSamples, energies: Any) -> None:
-    """`sampled_energies` of a walker with all bodies, free, whose ground and knees are set to those of each sample."""
+    """Write `sampled_energies` into `energies`.
+
+    system  free, with all bodies; its ground and knees are set to those of each sample
+    """
     for i in range(samples.states.shape[0]):
         for k in range(2):
             system.has_ground[k], system.knee[k] = samples.has_ground[i, k], samples.knees[i, k]
@@ -87,7 +93,7 @@ def fill_energies(system: OnGround, samples: ContactSamples, energies: Any) -> N
 
 @kernel
 def fill_feet(walker: ContactWalker, samples: ContactSamples, feet: Any) -> None:
-    """`sampled_feet` into an array of zeros."""
+    """Write `sampled_feet` into an array of zeros."""
     for i in range(samples.states.shape[0]):
         motions = feet_motion(walker.forms[0, 0], samples.states[i])
         for foot in range(2):
@@ -104,18 +110,18 @@ class ContactWalkResult(WalkRecord):
     """A walk on compliant ground."""
 
     slip_m: Floats  # (steps,) of the stance foot's material; without the last step if its foot did not lift
-    rolling_m: Floats  # likewise, how far the stance foot rolled
+    rolling_m: Floats  # likewise, rolling of the stance foot
     end_state: State
     max_penetration_m: float
     energy_balance_residual_J: float
-    explained_residual_J: float  # what the tolerance explains of it at most
+    explained_residual_J: float  # largest residual that the tolerance explains
     dissipated_J: Floats  # (5,)
     samples: ContactSamples | None
-    method: str  # by which it was integrated
+    method: str  # integration method
 
     @property
     def advice(self) -> str:
-        """What the outcome means and what to try next."""
+        """Meaning of the outcome and what to try next."""
         stiff = method_named(self.method).stiff
         if self.outcome is Outcome.BUDGET_EXHAUSTED and not stiff:
             return (
@@ -140,11 +146,11 @@ def new_observer(
     track_energy: bool = True,
     directions: int = 0,
 ) -> ContactObserver:
-    """An observer of a walk from state y.
+    """Create an observer of a walk from state y.
 
     times         (samples,) rising, in s; no samples without them
-    track_energy  whether to keep the energy balance
-    directions    how many directions of the start to carry along as the tangent
+    track_energy  whether to compute the energy balance
+    directions    number of directions of the start to carry along as the tangent
     """
     times = np.zeros(0) if times is None else times
     samples = times.size
@@ -167,7 +173,7 @@ def new_observer(
 
 
 def in_walk(walker: ContactWalker, walk_state: WalkState, hinged: bool = False) -> OnGround:
-    """The walker in the form that a walk has it in, which changes what it remembers."""
+    """Return the walker in its present form; it shares the memory of the walk state."""
     at = walk_state
     return on_ground(walker, at.has_ground, at.knee, hinged, at.level, at.progress)
 
@@ -182,13 +188,13 @@ def walk_on(
     until: int = NEVER,
     hinged: bool = False,
 ) -> Stopped:
-    """Walk on from a walk state that is at hand, in one form after another as knees lock and are released.
+    """Continue a walk from a walk state, changing the form as knees lock and are released.
 
-    start   state of the whole walker, free
-    until   that of `walk_in_form`
-    hinged  whether the stance foot is, until the first step is taken: then the walk ends
+    start   state of the free walker
+    until   as in `walk_in_form`
+    hinged  whether the stance foot is hinged until the first step is taken, which then ends the walk
 
-    Returns where it stopped, and how: `SOLVER_FAILED`, too, where the energy balance does not close.
+    Returns the end of the walk, with `SOLVER_FAILED` also where the energy balance does not close.
     """
     walk = walk_in_form if tolerances.compiled else uncompiled(walk_in_form)
     system = in_walk(walker, walk_state, hinged)
@@ -229,13 +235,13 @@ def walk_contact(
 ) -> ContactWalkResult:
     """Walk up to `steps` steps.
 
-    hinged      whether the stance foot of the first step is
+    hinged      whether the stance foot of the first step is hinged
     stance      the foot that carries the first step
     start       state of the free walker (4 + 2 n); its angles and angular velocities start a hinged one
-    tolerances  how to integrate
-    sampling    time between samples, their times (samples,), rising, in s, or None for none
+    tolerances  settings of the integration
+    sampling    time between samples, their times (samples,), rising, in s, or None for no samples
 
-    The room for samples doubles until the whole walk fits. A start that lies on the ground already is rejected.
+    The room for samples doubles until the whole walk fits. A start with the hip already too low is rejected.
     """
     frame, s, c = ground.frame, vector(OF_BODIES), vector(OF_BODIES)
     sines_cosines(walker.whole, start, s, c)
@@ -263,9 +269,9 @@ def run_parts(
     observer: ContactObserver,
     walk_state: WalkState,
 ) -> Stopped:
-    """The hinged step, if there is one, then the free walk.
+    """Take the hinged step, if there is one, then the free walk.
 
-    A walk that took all its steps goes on, unobserved, until the foot that carried the last one has lifted.
+    A walk that completed all its steps continues, unobserved, until the foot that carried the last one has lifted.
     """
     y, spent = start, np.zeros(4, np.int64)
     if hinged:
@@ -284,13 +290,13 @@ def run_parts(
 
 
 def by_channel(walker: ContactWalker, dissipated: Floats) -> dict[str, float]:
-    """What was dissipated (J), by name; the knees' channels only where there are knees."""
+    """Return dissipated energies (J) by name; the knees' channels only for a walker with knees."""
     pairs = zip(LOSSES, dissipated.tolist(), strict=True)
     return {loss.key: joules for place, (loss, joules) in enumerate(pairs) if walker.kneed or place < KNEE_STRIKES}
 
 
 def release_hinge(walker: ContactWalker, walk_state: WalkState, y: State) -> None:
-    """A hinged foot has neither slipped nor rolled until now; it is on the ground, about to leave."""
+    """Release a hinged foot, which has neither slipped nor rolled, on the ground and about to lift."""
     foot, steps = int(walker.forms[1, 0]["hinged"]), walk_state.progress.steps
     walk_state.slip[:steps], walk_state.rolling[:steps] = 0.0, 0.0
     walk_state.touched[foot] = material_along(walker.whole, foot, feet_motion(walker.whole, y)[foot].along, y)
@@ -299,17 +305,17 @@ def release_hinge(walker: ContactWalker, walk_state: WalkState, y: State) -> Non
 
 
 def explained_residual(observer: ContactObserver, tolerances: Tolerances) -> float:
-    """How large a residual of the energy balance (J) the tolerance explains; a larger one is a fault.
+    """Compute the largest residual of the energy balance (J) that the tolerance explains; a larger one is a fault.
 
     It is UNEXPLAINED times rtol times energy and work exchanged: the energy at the start, kinetic, elastic, and
-    potential over the slope below, and all that has been dissipated since.
+    potential over the slope below, plus all energy dissipated since.
     """
     exchanged = observer.tally.energy_below + np.abs(observer.account[:TORQUE]).sum()
     return float(UNEXPLAINED * max(tolerances.rtol, FINEST) * exchanged)
 
 
 def balanced(ended: int, observer: ContactObserver, tolerances: Tolerances) -> Outcome:
-    """How a walk ended: `SOLVER_FAILED`, however it did, if its energy balance does not close.
+    """Return the outcome of a walk, or `SOLVER_FAILED` if its energy balance does not close.
 
     This detects faults and estimates no error: a walk may be off by far more than its balance.
     """
@@ -318,7 +324,7 @@ def balanced(ended: int, observer: ContactObserver, tolerances: Tolerances) -> O
 
 
 def driven_work(walker: ContactWalker, along: float, up: float, account: Floats) -> DrivenWork:
-    """What was given on a way that led so far along the slope and up (m); account (entries,) J."""
+    """Gather the works over distances (m) along the slope and up; account (entries,) in J."""
     gravity = walker.mass * (walker.gravity_along * along - walker.gravity_down * up)
     return DrivenWork(walker.mass * walker.gravity, gravity, *account[PUSH_OFF:].tolist())
 
@@ -331,7 +337,7 @@ def gather(
     terrain: Terrain,
     tolerances: Tolerances,
 ) -> ContactWalkResult:
-    """The result of a walk from what was written on the way."""
+    """Build the result of a walk from its records."""
     done, lifted, seen = int(walk_state.progress.steps), steps_with_lift(walk_state), int(observer.tally.recorded)
     samples = ContactSamples(*(each[:seen] for each in observer.samples)) if observer.samples.time_s.size else None
     strikes = walk_state.knee_strike[:done]

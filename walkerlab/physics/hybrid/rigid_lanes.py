@@ -1,8 +1,8 @@
-"""Many walks of the rigid model, side by side in lanes: each with its own step size, a new start as soon as one ends.
+"""Walks of the rigid model side by side in lanes, each with its own step size; a lane takes a new start as a walk ends.
 
-All lanes take a Runge-Kutta step together. A lane that may have met a heel strike or a fall in it is looked at alone:
-the event is located on Hermite's quintic of its event function, the step is taken again up to there, and Newton's last
-correction does the rest. What becomes of a walk does not depend on which walks are beside it.
+All lanes take a Runge-Kutta step together. A lane whose step may hold a heel strike or a fall is then treated alone:
+the event is located on the quintic Hermite interpolant of its event function, the step is repeated up to there, and a
+last Newton correction completes it. The result of a walk does not depend on the walks in the other lanes.
 """
 
 import math
@@ -40,24 +40,24 @@ from walkerlab.physics.solvers.lanes import (
 )
 from walkerlab.physics.solvers.system import State
 
-# rows of a batch's memory, each with one number a lane
+# rows of a batch's memory, with one value per lane
 START, START_RATE, END, END_RATE = 0, 4, 8, 12  # state and derivative at the ends of the step tried last
-STEP, TRIED, TIME, LEFT = 16, 17, 18, 19  # next step, step tried last, time, time until a heel strike must have come, s
+STEP, TRIED, TIME, LEFT = 16, 17, 18, 19  # s: next step, step tried last, time, time left for a heel strike
 ARRIVING, FIRST, TRIES, EVENT, USUAL = 20, 21, 22, 23, 24
 ROWS = 25
 SLOT_OF_START, STEPS_TAKEN = 0, 1  # rows of whole numbers
 
 NOBODY = -1
 FIRST_STEP = 0.1  # pendulum times
-ARRIVED = 1e-5  # pendulum times between the end of a step and the heel strike that a Taylor expansion bridges
+ARRIVED = 1e-5  # pendulum times from the end of a step to the heel strike that a Taylor expansion bridges
 REFINEMENTS = 6
-MAX_TRIES = 20_000  # of steps in one swing
+MAX_TRIES = 20_000  # steps in one swing
 SMALLEST_STEP = 1e-13  # pendulum times
 NO_ERROR = 1e-300
 
 
 class TwoLegs(NamedTuple):
-    """The rigid model of two straight legs, with what lanes need of it."""
+    """Rigid model of two straight legs, with the values that lanes need."""
 
     model: RigidModel
     A: tuple[float, ...]  # (4,) constants of rigid_model.py, row by row
@@ -65,7 +65,7 @@ class TwoLegs(NamedTuple):
     arm_x: tuple[float, ...]  # (2,)
     arm_y: tuple[float, ...]
     hip: SpringDamper
-    unpaired: float  # kg m^2; values of the model, which loops need not load again
+    unpaired: float  # kg m^2; these values repeat the model's, so that loops need not load them
     mass: float  # kg
     radius: float  # m
     gravity_along: float  # m/s^2
@@ -78,7 +78,7 @@ class TwoLegs(NamedTuple):
 
 
 def two_legs(model: RigidModel) -> TwoLegs | None:
-    """The model as that of two straight legs; None if it has more bodies."""
+    """Return the model as one of two straight legs; None if it has more bodies."""
     if len(model.arm_x) != 2 or model.kneed:
         return None
     x, y = model.hip_x, model.hip_y
@@ -99,7 +99,7 @@ def two_legs(model: RigidModel) -> TwoLegs | None:
 
 @derivative.case(TwoLegs, forced_inline=True)
 def swing_derivative(system: TwoLegs, t: float, y: Any) -> Any:
-    """The equations of motion of rigid_model.py for two bodies, written out: of floats or of lanes."""
+    """Evaluate the equations of motion of rigid_model.py, written out for two bodies, with floats or lanes."""
     R, along, down = system.radius, system.gravity_along, system.gravity_down
     s_1, c_1 = sine_cosine(y[0] + system.slope)
     s_2, c_2 = sine_cosine(y[1] + system.slope)
@@ -125,17 +125,17 @@ def swing_derivative(system: TwoLegs, t: float, y: Any) -> Any:
 
 
 class LaneMemory(NamedTuple):
-    """What a batch needs besides its starts and results, however many walks it has."""
+    """Workspace of a batch besides its starts and results, for any number of walks."""
 
     rtol: float
     atol: float
     rows: Any  # (ROWS, WIDTH)
-    slots: Any  # (2, WIDTH) number of the start, and steps taken
+    slots: Any  # (2, WIDTH) index of the start, and steps taken
     finder: CrossingFinder
 
 
 def new_lane_memory(rtol: float, atol: float) -> LaneMemory:
-    """Memory for batches at these tolerances."""
+    """Create the workspace for batches at these tolerances."""
     teach_arithmetic()
     return LaneMemory(
         rtol, atol, np.zeros((ROWS, WIDTH)), np.full((2, WIDTH), NOBODY, np.int64), new_crossing_finder(5)
@@ -143,22 +143,21 @@ def new_lane_memory(rtol: float, atol: float) -> LaneMemory:
 
 
 class Fates(NamedTuple):
-    """How the walks of a batch ended; written."""
+    """Outcomes of the walks of a batch; written."""
 
     outcome: Any  # (n,)
     steps: Any  # (n,) taken
 
 
 def new_fates(n: int) -> Fates:
-    """Room for n walks."""
     return Fates(np.zeros(n, np.int64), np.zeros(n, np.int64))
 
 
 @by_type
 def struck(observer: Any, walk: int, step: int, t: float, y: Any) -> int:
-    """Take note of a heel strike at time t (s) with state y after it; returns GOES_ON or the outcome's number.
+    """Record a heel strike at time t (s) with state y after it; returns GOES_ON or the outcome's number.
 
-    walk  number of the start
+    walk  index of the start
     step  from 0
     """
 
@@ -191,7 +190,7 @@ def walk_lanes(walker: TwoLegs, memory: LaneMemory, observer: Any, starts: Any, 
 
 @kernel_part
 def refill(walker: TwoLegs, memory: LaneMemory, starts: Any, fates: Fates, lane: int, waiting: int) -> int:
-    """Give a lane the next start that is one; returns how many starts have been given out."""
+    """Give a lane the next valid start; returns the number of starts used."""
     while waiting < starts.shape[0]:
         y = (starts[waiting, 0], starts[waiting, 1], starts[waiting, 2], starts[waiting, 3])
         waiting += 1
@@ -207,7 +206,7 @@ def refill(walker: TwoLegs, memory: LaneMemory, starts: Any, fates: Fates, lane:
 
 @kernel_part
 def begin_swing(walker: TwoLegs, memory: LaneMemory, lane: int, t: float, y: State, h: float) -> None:
-    """Have a lane start a swing from state y at time t (s), with a step h."""
+    """Start a swing of a lane from state y at time t (s), with a step h."""
     rows = memory.rows
     rate = derivative(walker, t, y)
     for i in range(4):
@@ -219,7 +218,7 @@ def begin_swing(walker: TwoLegs, memory: LaneMemory, lane: int, t: float, y: Sta
 
 @kernel_part
 def four(rows: Any, row: int) -> tuple[Lanes, Lanes, Lanes, Lanes]:
-    """Four rows as a state in lanes."""
+    """Load four rows as a state in lanes."""
     return (
         load_lanes(rows, row),
         load_lanes(rows, row + 1),
@@ -230,9 +229,9 @@ def four(rows: Any, row: int) -> tuple[Lanes, Lanes, Lanes, Lanes]:
 
 @kernel_part
 def try_steps(walker: TwoLegs, memory: LaneMemory) -> bool:
-    """Try a step in every lane; where nothing can have happened the lane moves on. Returns whether others need a look.
+    """Try a step in every lane; returns whether some lane needs attention. Where no event is possible, accept the step.
 
-    A lane needs one if an event may lie in its step, if it arrives at one, if its time is over or its steps are too
+    A lane needs attention if its step may hold an event or arrives at one, if its time is over, or if its steps are too
     many or too small.
     """
     rows = memory.rows
@@ -269,7 +268,7 @@ def try_steps(walker: TwoLegs, memory: LaneMemory) -> bool:
 
 @kernel_part
 def may_end(walker: TwoLegs, y: Any, end: Any, h: Lanes) -> Lanes:
-    """Positive where a step from y to `end` may hold a heel strike or a fall; see `rigid_walk.may_end`."""
+    """Compute a value that is positive where a step from y to `end` may hold a heel strike or a fall."""
     ahead = hull(y[0] - y[1], h * (y[2] - y[3]), end[0] - end[1], h * (end[2] - end[3]))
     start, stop = feet_on_slope(walker, y[0], y[1]), feet_on_slope(walker, end[0], end[1])
     guard = hull(start, h * (y[2] + y[3]), stop, h * (end[2] + end[3]))
@@ -278,7 +277,7 @@ def may_end(walker: TwoLegs, y: Any, end: Any, h: Lanes) -> Lanes:
 
 @kernel_part
 def look_at(walker: TwoLegs, memory: LaneMemory, observer: Any, lane: int) -> int:
-    """Do what the step of a lane asks for; returns GOES_ON, or the outcome's number if its walk is over."""
+    """Handle the step of a lane that needs attention; returns GOES_ON, or the outcome's number if its walk is over."""
     rows = memory.rows
     if rows[TRIES, lane] >= MAX_TRIES:
         return BUDGET_EXHAUSTED
@@ -301,7 +300,7 @@ def look_at(walker: TwoLegs, memory: LaneMemory, observer: Any, lane: int) -> in
 
 @kernel_part
 def move_on(memory: LaneMemory, lane: int) -> None:
-    """Accept the step of one lane."""
+    """Accept the step of a lane."""
     rows = memory.rows
     for i in range(4):
         rows[START + i, lane], rows[START_RATE + i, lane] = rows[END + i, lane], rows[END_RATE + i, lane]
@@ -312,7 +311,7 @@ def move_on(memory: LaneMemory, lane: int) -> None:
 
 @kernel_part
 def arrive(walker: TwoLegs, memory: LaneMemory, observer: Any, lane: int) -> int:
-    """Strike if the step has led to the slope, else take the rest of the way."""
+    """Apply the heel strike if the step has reached it, else set the step to the rest of the way."""
     rows, slots = memory.rows, memory.slots
     move_on(memory, lane)
     pendulum_time = walker.pendulum_time
@@ -337,7 +336,7 @@ def arrive(walker: TwoLegs, memory: LaneMemory, observer: Any, lane: int) -> int
 
 @kernel_part
 def bridge(rows: Any, lane: int, wait: float, y: Any) -> None:
-    """The state a moment later into y: a Taylor expansion, of second order in the angles that the guard is made of."""
+    """Write the state a short time later into y by a Taylor expansion, of second order in the angles of the guard."""
     for i in range(2):
         omega, alpha = rows[START + 2 + i, lane], rows[START_RATE + 2 + i, lane]
         y[i] = rows[START + i, lane] + wait * (omega + 0.5 * wait * alpha)
@@ -346,7 +345,7 @@ def bridge(rows: Any, lane: int, wait: float, y: Any) -> None:
 
 @kernel_part
 def event_function(rows: Any, at: int, lane: int, swing: float, stance: float) -> Jet:
-    """swing theta_1 + stance theta_2 and its first two derivatives in time, at the start or end of a lane's step."""
+    """Compute swing theta_1 + stance theta_2 and its first two derivatives in time, at the start or end of a step."""
     return (
         swing * rows[at, lane] + stance * rows[at + 1, lane],
         swing * rows[at + 2, lane] + stance * rows[at + 3, lane],
@@ -356,7 +355,7 @@ def event_function(rows: Any, at: int, lane: int, swing: float, stance: float) -
 
 @kernel_part
 def in_step(memory: LaneMemory, lane: int, swing: float, stance: float, constant: float) -> Quintic:
-    """swing theta_1 + stance theta_2 + constant over a lane's step."""
+    """Interpolate swing theta_1 + stance theta_2 + constant over a lane's step."""
     rows = memory.rows
     a = event_function(rows, START, lane, swing, stance)
     b = event_function(rows, END, lane, swing, stance)
@@ -365,7 +364,7 @@ def in_step(memory: LaneMemory, lane: int, swing: float, stance: float, constant
 
 @kernel_part
 def strike_in_step(walker: TwoLegs, memory: LaneMemory, lane: int) -> float:
-    """Fraction of a lane's step at which the swing foot strikes with its leg ahead; NO_CROSSING if it does not."""
+    """Find the fraction of a lane's step of the heel strike with the leg ahead, or NO_CROSSING."""
     guard = in_step(memory, lane, 1.0, 1.0, feet_on_slope(walker, 0.0, 0.0))
     at_start = memory.rows[FIRST, lane] > 0.0
     strike = first_fall(memory.finder, guard, at_start, 0.0)
@@ -379,7 +378,7 @@ def strike_in_step(walker: TwoLegs, memory: LaneMemory, lane: int) -> float:
 
 @kernel_part
 def fall_in_step(walker: TwoLegs, memory: LaneMemory, lane: int) -> float:
-    """Fraction of a lane's step at which the hip comes below half a leg; NO_CROSSING if it is above at the end."""
+    """Find the fraction of a lane's step at which the hip falls below half a leg, or NO_CROSSING if it ends above."""
     from_upright = walker.slope - walker.upright
     angle = memory.rows[END + 1, lane] + from_upright
     if abs(angle) <= walker.fallen:
