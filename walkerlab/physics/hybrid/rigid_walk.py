@@ -63,9 +63,7 @@ from walkerlab.physics.solvers.system import derivative
 LONGEST_SWING = 10.0  # pendulum times sqrt(L/g) within which a heel strike must come
 HULL_ROOM = 0.125
 SHORTEST_LANDING = 0.25  # of the gait's step length, ahead of the stance foot, on uneven ground
-RELEASED = (
-    1e-6  # fraction of the first step; a straight knee without relative rate crosses by rounding within 1e-9 of it
-)
+SEARCH_START = 1e-6  # fraction of the first step; a straight knee at rest crosses by rounding within 1e-9 of it
 # event functions, rows of the finder
 HEEL_STRIKE, FALL, AHEAD, KNEE = range(4)
 LEGS_TURN = 4  # no event: the rate between the legs
@@ -162,7 +160,7 @@ def events_in_step(system: Mode, finder: CrossingFinder, at_start: bool) -> tupl
         strike = first_crossing(finder, HEEL_STRIKE, FALLING, strike + 1e-12, on_ground)
     fall, struck = first_crossing(finder, FALL, FALLING, 0.0, False), NO_CROSSING
     if is_bent(system):
-        struck = first_crossing(finder, KNEE, RISING, RELEASED if at_start else 0.0, at_start)
+        struck = first_crossing(finder, KNEE, RISING, SEARCH_START if at_start else 0.0, at_start)
     return strike, fall, struck
 
 

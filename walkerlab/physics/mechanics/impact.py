@@ -1,4 +1,4 @@
-"""Plastic impacts: velocities before, projected in the metric of the masses on what the new constraints allow.
+"""Plastic impacts: the velocities before, projected in the metric of the masses on those the new constraints allow.
 
 With velocities u of all masses before and u+ = Z z+ after, Z of the new constraints, Z' M (u+ - u) = 0. Coordinates
 are those of the tree about the foot that stands afterwards: velocity (v_x, v_y) of its centre, along the slope and
@@ -33,24 +33,24 @@ from walkerlab.physics.solvers.system import Floats
 
 @kernel_part
 def heel_strike(model: RigidModel, y: Any, new: Any) -> None:
-    """Write the state after the heel strike that y leads to, roles changed, into `new`.
+    """Write the state after the heel strike that ends in y, with the legs' roles exchanged, into `new`.
 
-    y  the state, and as many columns behind it as there are: directions, whose images `new` gets
+    y  the state, followed by any number of columns: directions, whose images are written into `new`
     """
     strike(model, AT_STRIKE, True, y, new)
 
 
 @kernel_part
 def knee_strike(model: RigidModel, y: Any, new: Any) -> None:
-    """As `heel_strike`, after the swing leg's knee has come into line and locked."""
+    """Write the state after the swing leg's knee has locked straight into `new`; y as in `heel_strike`."""
     strike(model, STRAIGHT, False, y, new)
 
 
 @kernel_part
 def strike(model: RigidModel, phase: int, other_foot: bool, y: Any, new: Any) -> None:
-    """A plastic impact on the constraints of E[phase].
+    """Apply a plastic impact on the constraints of E[phase].
 
-    other_foot  the swing foot stands afterwards; else the foot that stood goes on standing
+    other_foot  whether the swing foot stands afterwards; otherwise the stance foot does
     """
     like = model.arm_x
     n, R = len(like), model.radius
@@ -103,7 +103,7 @@ def strike(model: RigidModel, phase: int, other_foot: bool, y: Any, new: Any) ->
 
 
 class RootedTree(NamedTuple):
-    """A tree of n bodies about its root, in the terms of `project`: what a mechanism of either model gives it."""
+    """Tree of n bodies about its root: the fields of a mechanism of either model that `project` needs."""
 
     E: Floats  # (phases, n, n)
     A: Floats  # (n, n) kg m^2
@@ -116,7 +116,7 @@ class RootedTree(NamedTuple):
 
 
 class Lock(NamedTuple):
-    """A joint's lock: a plastic impact that leaves the root's motion as it is."""
+    """Result of a joint's lock: a plastic impact that leaves the root's motion unchanged."""
 
     velocities: Floats  # (n,) rad/s, after it
     lost: float  # J
@@ -124,7 +124,7 @@ class Lock(NamedTuple):
 
 
 def lock(tree: RootedTree, angles: Floats, omega: Floats, turns: Floats, rates: Floats) -> Lock:
-    """Project angular velocities (n,) on what E[0] allows, by the impact of `strike`; the root takes no part.
+    """Project angular velocities (n,) on those E[0] allows, by the impact of `strike` without the root.
 
     angles        (n,) rad, from the vertical
     turns, rates  (n, columns) directions of the state before: changes of the angles and of their velocities
@@ -144,22 +144,22 @@ def lock(tree: RootedTree, angles: Floats, omega: Floats, turns: Floats, rates: 
 
 
 class PushOffImpulse(NamedTuple):
-    """An impulse at the trailing foot, along the line from there to the hip."""
+    """Impulse at the trailing foot, along the line from there to the hip."""
 
     along: float  # N s, along the slope
     upward: float  # N s, normal to it
-    angular: float  # N m s, on the leading leg about its foot: an impulse through the hip turns nothing else
-    by_trailing: float  # N m s, its derivatives by the angles of both legs
+    angular: float  # N m s, on the leading leg about its foot; an impulse through the hip turns no other body
+    by_trailing: float  # N m s, its derivatives with respect to the angles of both legs
     by_leading: float
 
 
 @kernel_part
 def push_off(model: RigidModel, new: Any) -> PushOffImpulse:
-    """The push-off of a heel strike, by the state after it."""
+    """Compute the push-off of a heel strike from the state after it."""
     s_t, c_t = sine_cosine(new[SWING] + model.slope)
     s_l, c_l = sine_cosine(new[STANCE] + model.slope)
     R = model.radius
-    # from where each foot touches to the hip, along the slope and normal to it
+    # from each foot's contact point to the hip, along the slope and normal to it
     x_t, y_t = c_t * model.hip_x - s_t * model.hip_y, s_t * model.hip_x + c_t * model.hip_y + R
     x_l, y_l = c_l * model.hip_x - s_l * model.hip_y, s_l * model.hip_x + c_l * model.hip_y + R
     length = math.hypot(x_t, y_t)
@@ -171,20 +171,21 @@ def push_off(model: RigidModel, new: Any) -> PushOffImpulse:
 
 
 def push_off_work(model: RigidModel, before: Floats) -> Floats:
-    """Work (strikes,) in J of the push-offs at heel strikes, each done just before its strike.
+    """Compute the work (strikes,) in J of the push-offs at heel strikes, each done just before its strike.
 
-    The walker is free of the ground then, its knees locked and its torso coupled: an impulse P along e gives
+    The walker is free of the ground then, its knees locked and its torso coupled: an impulse P along e does the work
     P^2 / 2 J M^-1 J', with J the velocity along e of the trailing contact point, or of the hip on the same line.
-    Angular velocities leave of M the apparent mass at the hip, m - C' I^-1 C, with moments C and inertia I about it.
+    Eliminating angular velocities from M leaves the apparent mass at the hip, m - C' I^-1 C, with moments C and inertia
+    I about it.
 
     before  (strikes, 2 n) states just before the strikes
 
-    Source: Kuo (2002), whose legs without mass leave P^2 / (2 m).
+    Source: Kuo (2002); with massless legs it is P^2 / (2 m).
     """
     n, E = len(model.arm_x), model.E[STRAIGHT]
     Z = E[:, np.diag(E) != 0.0]
     A, B, arm_x, arm_y = (each.copy() for each in (model.A, model.B, model.arm_x, model.arm_y))
-    # the trailing leg hangs from the hip as the leading one does, and seen from there nothing hangs from it
+    # about the hip, the trailing leg is a leg like the leading one, and carries no other body
     leg = [SWING] if model.shank == NO_SHANK else [SWING, int(model.shank)]
     own = A[np.ix_(leg, leg)].sum()
     for pairs in (A, B):
@@ -202,9 +203,9 @@ def push_off_work(model: RigidModel, before: Floats) -> Floats:
 
 
 def pushed_at_hip(model: RigidModel, y: Any, impulse: float) -> NDArray[np.float64]:
-    """The state (2 n) just after a heel strike y, changed by an impulse (N s) at the hip along the slope.
+    """Return the state (2 n) just after a heel strike y, changed by an impulse (N s) at the hip along the slope.
 
-    The new stance foot stays where it is. It comes after the release of the trailing knee, which is free.
+    The new stance foot stays at rest. The impulse follows the release of the trailing knee, which is free.
     """
     n, new, phase = len(model.arm_x), np.array(y, float), BENT if model.kneed else STRAIGHT
     s, c, F, U, p = np.zeros((5, n))

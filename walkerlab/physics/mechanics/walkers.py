@@ -1,8 +1,8 @@
-"""The catalogue of walkers: from the measures of a type to the parts it is assembled from.
+"""Catalogue of walkers: assemblies of parts from the dimensions of each type.
 
-Every body's frame has its origin where the body hangs (hip or knee) and points up it; `ahead` is the walking direction
-with the leg upright. Leg 1 swings first, leg 2 stands first. A positive angle puts a leg's foot forward, so that a
-flexed knee has its shank at a smaller angle than its thigh.
+Every body's frame has its origin at its upper joint (hip or knee) and points up the body; `ahead` is the walking
+direction with the leg upright. Leg 1 swings first, leg 2 stands first. A positive angle puts a leg's foot forward, so
+that a flexed knee has its shank at a smaller angle than its thigh.
 """
 
 from dataclasses import dataclass, replace
@@ -18,7 +18,7 @@ HIP = (0.0, 0.0)
 
 @dataclass(frozen=True)
 class Limb:
-    """A rigid limb that hangs from its upper end, SI."""
+    """Rigid limb that hangs from its upper end, SI."""
 
     length_m: float
     mass_kg: float
@@ -27,24 +27,23 @@ class Limb:
     inertia_kg_m2: float = 0.0  # about its own centre of mass
 
     def body(self, name: str) -> Body:
-        """The limb as a body."""
         return Body(name, self.mass_kg, (self.mass_ahead_m, -self.mass_below_m), self.inertia_kg_m2)
 
 
 @dataclass(frozen=True)
 class Arc:
-    """The sole: an arc of `radius_m` that reaches the leg's length; radius zero is a point."""
+    """Sole: an arc of `radius_m` that reaches the leg's length; radius zero is a point."""
 
     radius_m: float = 0.0
     centre_ahead_m: float = 0.0
 
     def foot(self, body: str, length_m: float) -> BallFoot:
-        """The sole of a limb that is `length_m` long, sole included."""
+        """Return the sole of a limb that is `length_m` long, sole included."""
         return BallFoot(f"foot of {body}", body, (self.centre_ahead_m, self.radius_m - length_m), self.radius_m)
 
 
 def straight_legs(leg: Limb, hip_mass_kg: float, foot: Arc) -> Assembly:
-    """Two straight legs hinged at a hip that is a point mass."""
+    """Assemble two straight legs hinged at a point-mass hip."""
     return Assembly(
         bodies=tuple(leg.body(name) for name in LEGS),
         joints=(Revolute("hip", LEGS[1], HIP, LEGS[0], HIP),),
@@ -55,7 +54,7 @@ def straight_legs(leg: Limb, hip_mass_kg: float, foot: Arc) -> Assembly:
 
 
 def kneed_legs(thigh: Limb, shank: Limb, hip_mass_kg: float, foot: Arc) -> Assembly:
-    """Two legs of thigh and shank, with knees that lock straight."""
+    """Assemble two legs of thigh and shank, with knees that lock straight."""
     at_knee = (0.0, -thigh.length_m)
     knees = tuple(Revolute(f"knee {k + 1}", THIGHS[k], at_knee, SHANKS[k], HIP) for k in range(2))
     return Assembly(
@@ -69,7 +68,7 @@ def kneed_legs(thigh: Limb, shank: Limb, hip_mass_kg: float, foot: Arc) -> Assem
 
 
 def with_torso(walker: Assembly, mass_kg: float, above_hip_m: float, inertia_kg_m2: float) -> Assembly:
-    """The walker with a torso at its hip, kept on the bisector of the legs.
+    """Add a torso at the walker's hip, kept on the bisector of the legs.
 
     Source: Wisse, Schwab, van der Helm, Passive dynamic walking model with upper body, Robotica 22 (2004).
     """
