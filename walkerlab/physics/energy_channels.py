@@ -3,9 +3,9 @@
 from typing import NamedTuple
 
 # entries of the account, J so far; the last two are the work of the hip torque, a part of HIP, and its positive work
-DAMPING, FRICTION, EDGES, KNEE_STRIKES, KNEE_STOP, PUSH_OFF, HIP, TORQUE, FORWARD = range(9)
+DAMPING_LOSS, FRICTION_LOSS, EDGES, KNEE_STRIKES, KNEE_STOP, PUSH_OFF, HIP_WORK, TORQUE, FORWARD = range(9)
 ENTRIES = FORWARD + 1
-LOST, GIVEN = slice(DAMPING, PUSH_OFF), slice(PUSH_OFF, TORQUE)
+LOSS_ENTRIES, SUPPLY_ENTRIES = slice(DAMPING_LOSS, PUSH_OFF), slice(PUSH_OFF, TORQUE)
 
 
 class Loss(NamedTuple):

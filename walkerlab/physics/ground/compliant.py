@@ -63,7 +63,7 @@ def contact_walker(
     Raises ValueError, with a message for the user, for parts that cannot walk on compliant ground.
     """
     rules = knee_rules or KneeRules()
-    refuse_what_cannot_walk(assembly)
+    check_walkable(assembly)
     forms = np.zeros((2, 4), FORM)
     forms["gravity_along"], forms["gravity_down"] = gravity * math.sin(slope), gravity * math.cos(slope)
     forms["slope"], forms["kneed"], forms["release_at_touch"] = slope, bool(assembly.knees), rules.release_at_touch
@@ -71,12 +71,12 @@ def contact_walker(
         for locked in range(4):
             knees = [k for k in range(len(assembly.knees)) if locked & 1 << k]
             fill(forms[hinged, locked], assembly, root, knees, isinstance(rules.stop, IdealLock))
-    legs = legs_of(assembly)
+    legs = leg_bodies(assembly)
     forms["hinges"][..., HIP_ROW, :] = np.take_along_axis(forms["onto"], np.broadcast_to(legs[:, 0], (2, 4, 2)), axis=2)
     return ContactWalker(forms, normal, friction, rules.stop, legs)
 
 
-def refuse_what_cannot_walk(assembly: Assembly) -> None:
+def check_walkable(assembly: Assembly) -> None:
     """Raise ValueError for too many bodies, a number of feet other than two, or a knee in one leg only."""
     if len(assembly.bodies) > MAX_BODIES:
         raise ValueError(
@@ -117,11 +117,11 @@ def hip_levers(assembly: Assembly, to_foot: Floats) -> Floats:
     if not all(assembly.legs):
         return to_foot
     upper, foot = assembly.legs[STANCE_FOOT][0], assembly.feet[0]
-    hip = Anchor(upper, hinge_of(assembly, upper, assembly.legs[1 - STANCE_FOOT][0]))
+    hip = Anchor(upper, hinge_point(assembly, upper, assembly.legs[1 - STANCE_FOOT][0]))
     return to_foot + levers(assembly, Anchor(foot.body, foot.centre_m), hip)
 
 
-def hinge_of(assembly: Assembly, body: str, other: str) -> Position:
+def hinge_point(assembly: Assembly, body: str, other: str) -> Position:
     """Return the point in a body's frame where it is hinged to another; its origin if they are not hinged directly."""
     hinge = assembly.hinge(body, other)
     return (0.0, 0.0) if hinge is None else hinge.parent_point_m
@@ -135,9 +135,9 @@ def fill(form: Any, assembly: Assembly, root: Root, locked: list[int], merges: b
     knees = [(assembly.index(knee.thigh), assembly.index(knee.shank)) for knee in assembly.knees]
     straight = {shank: thigh for thigh, shank in (knees[k] for k in locked)}
     one_with = straight if merges else {}
-    kept = [body for body in range(len(assembly.bodies)) if body not in one_with]
-    onto = [kept.index(one_with.get(body, body)) for body in range(len(assembly.bodies))]
-    S, n = np.eye(len(kept))[onto], len(kept)
+    separate = [body for body in range(len(assembly.bodies)) if body not in one_with]
+    onto = [separate.index(one_with.get(body, body)) for body in range(len(assembly.bodies))]
+    S, n = np.eye(len(separate))[onto], len(separate)
     rows = {onto[body]: row @ S for body, row in followers(assembly).items()}
     rows |= {onto[shank]: np.eye(n)[onto[thigh]] for shank, thigh in straight.items() if shank not in one_with}
     rolling = np.zeros((2, len(onto)))
@@ -150,12 +150,12 @@ def fill(form: Any, assembly: Assembly, root: Root, locked: list[int], merges: b
     for name, value in (merged | {"E": reduction(rows, n)[None]}).items():
         form[name][tuple(map(slice, value.shape))] = value
     form["bodies"], form["radius"] = n, [foot.radius_m for foot in assembly.feet]
-    form["onto"][: len(onto)], form["first"][:n] = onto, kept
+    form["onto"][: len(onto)], form["first"][:n] = onto, separate
     if knees:
         form["hinges"][FIRST_KNEE:] = [(onto[shank], onto[thigh]) for thigh, shank in knees]
 
 
-def legs_of(assembly: Assembly) -> NDArray[np.int64]:
+def leg_bodies(assembly: Assembly) -> NDArray[np.int64]:
     """Return the bodies (2, bodies of a leg) of each leg; without named legs, those that carry the feet."""
     named = assembly.legs if all(assembly.legs) else tuple((foot.body,) for foot in assembly.feet)
     return np.array([[assembly.index(body) for body in leg] for leg in named])

@@ -163,19 +163,19 @@ FRICTION_LAWS: Final[dict[str, type[FrictionLaw]]] = {"coulomb": Coulomb, "none"
 """Laws by their names in the config's contact.friction."""
 
 
-def law_named(word: str, contact: Any) -> FrictionLaw:
+def create_law(word: str, contact: Any) -> FrictionLaw:
     """Create the law of that name from the parameters of a contact block in SI.
 
     Raises TypeError with the missing members if the law's class is incomplete.
     """
     law = FRICTION_LAWS[word]
-    missing = lacking(law)
+    missing = missing_members(law)
     if missing:
         raise TypeError(f"the friction law {law.__name__} ('{word}') is incomplete: it lacks {', '.join(missing)}")
     return law.of(contact)
 
 
-def lacking(law: type) -> list[str]:
+def missing_members(law: type) -> list[str]:
     """List the members of `FrictionLaw` that a law's class lacks, and the cases that are not registered for it."""
     asked = [name for name in vars(FrictionLaw) if not name.startswith("_")]
     missing = [name for name in asked if not hasattr(law, name)]

@@ -19,7 +19,7 @@ from walkerlab.physics.mechanics.hinges import (
 
 
 @kernel_part
-def sign_of(system: OnGround, row: int) -> float:
+def hip_sign(system: OnGround, row: int) -> float:
     """Return -1 for the hip while the first leg, first in its row, is the stance leg; otherwise 1."""
     return -1.0 if row == HIP_ROW and system.progress.stance == 0 else 1.0
 
@@ -30,7 +30,7 @@ def angle_at(system: OnGround, row: int, y: Any) -> tuple[float, float]:
 
     At the hip it is the angle of the swing leg ahead: at a touch the legs change roles.
     """
-    form, sign = system.form, sign_of(system, row)
+    form, sign = system.form, hip_sign(system, row)
     return sign * ahead(form, row, y, form.places), sign * ahead(form, row, y, half_size(form) + form.places)
 
 
@@ -56,7 +56,7 @@ def torque_at(system: OnGround, row: int, y: Any) -> HingeTorque:
 def bodies_at(system: OnGround, row: int) -> tuple[int, int]:
     """Return the body that a hinge's torque turns back, and the other body."""
     body, other = system.form.hinges[row, 0], system.form.hinges[row, 1]
-    return (other, body) if sign_of(system, row) < 0.0 else (body, other)
+    return (other, body) if hip_sign(system, row) < 0.0 else (body, other)
 
 
 @kernel_part

@@ -15,7 +15,7 @@ from walkerlab.physics.ground.walker import (
     sines_cosines,
 )
 from walkerlab.physics.kernels import forced_inline, kernel_part, matrix, vector
-from walkerlab.physics.mechanics.links import Counted, factor_linked, solve_linked
+from walkerlab.physics.mechanics.links import CountedModel, factor_linked, solve_linked
 from walkerlab.physics.mechanics.tree import (
     add_gravity,
     add_gravity_gradient,
@@ -84,7 +84,7 @@ def on_ground_derivative(system: OnGround, t: float, y: Any, f: Any) -> None:
     s, c, r, M = vector(OF_BODIES), vector(OF_BODIES), vector(OF_BODIES), matrix(OF_BODIES)
     sines_cosines(form, y, s, c)
     along, normal = all_forces(system, t, s, c, y, M, r)
-    links = Counted(form.E, form.arm_x[:n])
+    links = CountedModel(form.E, form.arm_x[:n])
     factor_linked(links, 0, M)
     solve_linked(links, 0, M, r)
     for i in range(half):
@@ -179,7 +179,7 @@ def on_ground_jacobian(system: OnGround, t: float, y: Any, J: Any) -> None:
             J[i, j], J[half + i, j] = 1.0 if j == i + half else 0.0, 0.0
     sines_cosines(form, y, s, c)
     all_forces(system, t, s, c, y, M, alpha)
-    links = Counted(form.E, form.arm_x[:n])
+    links = CountedModel(form.E, form.arm_x[:n])
     factor_linked(links, 0, M)
     solve_linked(links, 0, M, alpha)
     for k in range(n):  # row k: angular accelerations due to a torque on body k

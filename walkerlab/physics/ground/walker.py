@@ -30,7 +30,7 @@ FIRST_KNEE = HIP_ROW + 1  # row of its hinge
 RELEASED, BENT, STOPPING, LOCKED = 0, 1, 2, 3
 
 
-@tree.read_at_once
+@tree.fast_fields
 class GroundModel(tree.Mechanism):  # type: ignore[misc]  # as its base
     """Form of the walker, SI: its bodies with the present knees locked, hinged or free; a structured scalar.
 
@@ -65,13 +65,13 @@ class GroundModel(tree.Mechanism):  # type: ignore[misc]  # as its base
         return bodies
 
 
-SHAPES: dict[str, tuple[int, ...]] = {
+FORM_SHAPES: dict[str, tuple[int, ...]] = {
     **tree.mechanism_shapes(MAX_BODIES, 1, 3),
     **dict.fromkeys(("hip_x", "hip_y", "onto", "first"), (MAX_BODIES,)),
     **dict.fromkeys(("foot_x", "foot_y", "rolling"), (2, MAX_BODIES)),
     "radius": (2,),
 }
-FORM = tree.record_type(GroundModel, SHAPES)
+FORM = tree.record_type(GroundModel, FORM_SHAPES)
 
 
 class ContactWalker(NamedTuple):
@@ -136,7 +136,7 @@ def changed_forms(walker: ContactWalker, **fields: Any) -> ContactWalker:
     return walker._replace(forms=forms)
 
 
-@tree.read_at_once
+@tree.fast_fields
 class WalkProgress(np.record):  # type: ignore[misc]  # NumPy's stubs call one of its bases final
     """Progress of a walk: a structured scalar that the rules of a walk write to."""
 
@@ -272,7 +272,7 @@ def foot_force(laws: Any, motion: FootMotion) -> FootForce:
     return FootForce(mu * normal.force, normal, mu_slope * normal.force, mu)
 
 
-def folded(form: GroundModel, x: Any) -> Floats:
+def to_form(form: GroundModel, x: Any) -> Floats:
     """Convert a state of all bodies, or a tangent column, to that of a form about the same root.
 
     Merged bodies turn alike up to rounding; the first one's values are taken.
@@ -280,7 +280,7 @@ def folded(form: GroundModel, x: Any) -> Floats:
     return np.asarray(x)[places_in_whole(form, len(x))]
 
 
-def unfolded(form: GroundModel, y: Any, size: int) -> Floats:
+def to_full(form: GroundModel, y: Any, size: int) -> Floats:
     """Convert a form's state to that of all bodies (size,) about the same root."""
     p, n, every = int(form.places), int(form.bodies), size // 2 - int(form.places)
     onto = form.onto[:every]

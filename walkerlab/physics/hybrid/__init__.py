@@ -5,7 +5,7 @@ Rigid model (`rigid_walk`; many walks side by side in `rigid_lanes`)
     KNEE          the bent knee straightens: plastic strike, the knee locks; BENT -> STRAIGHT
     HEEL_STRIKE   the swing foot comes down with AHEAD positive: plastic strike, a push-off before it, the legs change
                   roles; a step; STRAIGHT -> BENT, or STRAIGHT without knees
-    FALL          the hip is too low: fell
+    HIP_FALL      the hip is too low: fell
     other ends    a heel strike with a bent knee, or none in time
 
 Contact model (`contact_loop`)

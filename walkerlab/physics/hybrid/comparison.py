@@ -18,12 +18,12 @@ from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 Array = NDArray[np.float64]
 Quantity = Literal["angle", "velocity"]
 
-LEGS = 2
+LEG_COUNT = 2
 JUMP = 1e-9  # relative to the duration of a walk: closer samples are the two sides of a strike
 PHASES = 401  # samples per step
 IMPACT_PHASE = 0.02  # phase at which a compliant impact is over
-FINENESS = 5e-3  # spacing of the points of an orbit, relative to its range
-AT_ONCE = 256  # points per block, which bounds the memory
+POINT_SPACING = 5e-3  # spacing of the points of an orbit, relative to its range
+BLOCK_POINTS = 256  # points per block, which bounds the memory
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,12 +69,12 @@ class Motion:
 
     def at(self, times: Array) -> tuple[Array, Array]:
         """Compute angles and velocities (times, leg); at a heel strike, those after it."""
-        angle, velocity = np.empty((times.size, LEGS)), np.empty((times.size, LEGS))
+        angle, velocity = np.empty((times.size, LEG_COUNT)), np.empty((times.size, LEG_COUNT))
         piece_of = np.searchsorted(self.time[self._first_samples], times, side="right") - 1
         for index in np.unique(piece_of):
-            here = piece_of == index
-            of_angle, of_velocity = self._pieces[index]
-            angle[here], velocity[here] = of_angle(times[here]), of_velocity(times[here])
+            inside = piece_of == index
+            angle_piece, velocity_piece = self._pieces[index]
+            angle[inside], velocity[inside] = angle_piece(times[inside]), velocity_piece(times[inside])
         return angle, velocity
 
     def last_before(self, end: float) -> float:
@@ -114,7 +114,7 @@ class Motion:
         return replace(self, time=time, angle=angle, velocity=velocity, step_ends=self.step_ends[-2:])
 
 
-def sampled_at_strikes(motion: Motion) -> Motion:
+def add_strike_samples(motion: Motion) -> Motion:
     """Add samples at the end of every step and on both sides of every knee strike.
 
     Where one is missing, it is extrapolated from the three samples before it, or after it behind a knee strike, unless
@@ -135,7 +135,7 @@ def sampled_at_strikes(motion: Motion) -> Motion:
     added = [(at, known) for at, known in added if not jumps_among(motion.time[known], at, strikes, 2.0 * side)]
     if not added:
         return motion
-    rows = [continued(motion, known, at) for at, known in added]
+    rows = [extrapolate(motion, known, at) for at, known in added]
     time = np.concatenate((motion.time, [at for at, _ in added]))
     order = np.argsort(time)
     angle = np.concatenate((motion.angle, [row[0] for row in rows]))
@@ -149,7 +149,7 @@ def jumps_among(times: Array, at: float, strikes: Array, close: float) -> bool:
     return bool(between.any())
 
 
-def continued(motion: Motion, known: slice, at: float) -> tuple[Array, Array]:
+def extrapolate(motion: Motion, known: slice, at: float) -> tuple[Array, Array]:
     """Extrapolate angles and velocities (leg,) to a time by the parabola through three samples."""
     times = motion.time[known]
     weights = [np.prod([(at - other) / (one - other) for other in times if other != one]) for one in times]
@@ -165,7 +165,7 @@ class WalkDifference:
 
     def largest(self, of: Quantity) -> list[float]:
         """Return the largest difference (leg,) of each leg's angle (rad) or velocity (rad/s)."""
-        found: list[float] = np.abs(getattr(self, of)).reshape(-1, LEGS).max(axis=0).tolist()
+        found: list[float] = np.abs(getattr(self, of)).reshape(-1, LEG_COUNT).max(axis=0).tolist()
         return found
 
 
@@ -219,8 +219,8 @@ def orbit_distances(walk: Motion, reference: Motion) -> Array:
     Raises ValueError if one of them completed no stride.
     """
     stride, reference_stride = walk.last_stride(), reference.last_stride()
-    distances = np.empty(LEGS)
-    for leg in range(LEGS):
+    distances = np.empty(LEG_COUNT)
+    for leg in range(LEG_COUNT):
         orbit, other = phase_plane(stride, leg), phase_plane(reference_stride, leg)
         scale = np.ptp(other, axis=0)
         distances[leg] = hausdorff(orbit / scale, other / scale)
@@ -234,23 +234,23 @@ def phase_plane(motion: Motion, leg: int) -> Array:
 
 def hausdorff(curve: Array, other: Array) -> float:
     """Compute the largest distance of a point of either polyline (points, 2) from the other."""
-    return max(farthest(refined(curve), other), farthest(refined(other), curve))
+    return max(farthest_distance(refine(curve), other), farthest_distance(refine(other), curve))
 
 
-def refined(curve: Array) -> Array:
+def refine(curve: Array) -> Array:
     """Insert points into a polyline, no further apart than FINENESS."""
     along = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(curve, axis=0).T))))
-    points = np.union1d(along, np.linspace(0.0, along[-1], int(along[-1] / FINENESS) + 2))
+    points = np.union1d(along, np.linspace(0.0, along[-1], int(along[-1] / POINT_SPACING) + 2))
     return np.column_stack([np.interp(points, along, axis) for axis in curve.T])
 
 
-def farthest(points: Array, polyline: Array) -> float:
+def farthest_distance(points: Array, polyline: Array) -> float:
     """Compute the largest distance of one of the points (n, 2) from the polyline (m, 2)."""
     start, edge = polyline[:-1], np.diff(polyline, axis=0)
     length_squared = np.maximum((edge**2).sum(axis=1), np.finfo(float).tiny)
     largest = 0.0
-    for first in range(0, len(points), AT_ONCE):
-        away = points[first : first + AT_ONCE, None, :] - start
+    for first in range(0, len(points), BLOCK_POINTS):
+        away = points[first : first + BLOCK_POINTS, None, :] - start
         fraction = np.clip((away * edge).sum(axis=2) / length_squared, 0.0, 1.0)
         squared = ((away - fraction[:, :, None] * edge) ** 2).sum(axis=2)
         largest = max(largest, float(np.sqrt(squared.min(axis=1).max())))

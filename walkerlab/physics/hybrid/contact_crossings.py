@@ -46,7 +46,7 @@ from walkerlab.physics.kernels import kernel_part, vector
 from walkerlab.physics.solvers.events import NO_CROSSING, CrossingFinder, first_crossing, way_from_zero
 
 NO_SIDE = 0  # for an event function that may cross zero either way
-ROUNDING = 1e-14  # m, rad or their rates: smaller values of event functions are zero
+ZERO_ROUNDING = 1e-14  # m, rad or their rates: smaller values of event functions are zero
 CLEARLY_MOVED = 1e-12  # same units: larger changes over a step are not rounding
 
 
@@ -107,19 +107,19 @@ def knee_crossing(walk_state: WalkState, finder: CrossingFinder) -> tuple[float,
     """
     best, event = NO_CROSSING, -1
     for knee in range(2):
-        at, index = NO_CROSSING, EXTENSION + knee
+        fraction, index = NO_CROSSING, EXTENSION + knee
         if walk_state.knee[knee] == BENT:
-            at = leaves_side(finder, index, -1, walk_state.at_zero[index] != 0)
+            fraction = leaves_side(finder, index, -1, walk_state.at_zero[index] != 0)
         elif walk_state.knee[knee] == STOPPING:
             index = EXTENSION_RATE + knee
-            at = leaves_side(finder, index, 1, walk_state.at_zero[index] != 0)
-        if at < best:
-            best, event = at, index
+            fraction = leaves_side(finder, index, 1, walk_state.at_zero[index] != 0)
+        if fraction < best:
+            best, event = fraction, index
     if walk_state.progress.release == AT_COMPRESSION:
         index = walk_state.progress.stance * PER_FOOT + VERTICAL_VELOCITY
-        at = leaves_side(finder, index, -1, walk_state.at_zero[index] != 0)
-        if at < best:
-            best, event = at, index
+        fraction = leaves_side(finder, index, -1, walk_state.at_zero[index] != 0)
+        if fraction < best:
+            best, event = fraction, index
     return best, event
 
 
@@ -147,23 +147,23 @@ def earliest_crossing(
         for index in range(first, first + last):
             if not ground.terrain.has_pads and (index == first + LEFT_EDGE or index == first + RIGHT_EDGE):
                 continue
-            at = leaves_side(finder, index, sides[index], at_zero[index] != 0)
-            if at < best:
-                best, event = at, index
+            fraction = leaves_side(finder, index, sides[index], at_zero[index] != 0)
+            if fraction < best:
+                best, event = fraction, index
         if foot == walk_state.progress.stance and sides[first + HEIGHT] < 0 and has_ground[foot] != 0:
-            at = leaves_side(finder, SLIDE, sides[SLIDE], at_zero[SLIDE] != 0)
-            if at < best:
-                best, event = at, SLIDE
+            fraction = leaves_side(finder, SLIDE, sides[SLIDE], at_zero[SLIDE] != 0)
+            if fraction < best:
+                best, event = fraction, SLIDE
     if watch_order:
-        at = leaves_side(finder, PASSING, sides[PASSING], at_zero[PASSING] != 0)
-        if at < best:
-            best, event = at, PASSING
-    at, index = knee_crossing(walk_state, finder)
-    if at < best:
-        best, event = at, index
-    at = leaves_side(finder, FALL, sides[FALL], at_zero[FALL] != 0)
-    if at < best:
-        best, event = at, FALL
+        fraction = leaves_side(finder, PASSING, sides[PASSING], at_zero[PASSING] != 0)
+        if fraction < best:
+            best, event = fraction, PASSING
+    fraction, index = knee_crossing(walk_state, finder)
+    if fraction < best:
+        best, event = fraction, index
+    fraction = leaves_side(finder, FALL, sides[FALL], at_zero[FALL] != 0)
+    if fraction < best:
+        best, event = fraction, FALL
     return best, event
 
 
@@ -177,7 +177,7 @@ def leaves_side(finder: CrossingFinder, event: int, side: int, zero_at_start: bo
     left at zero has already changed sides, so it returns only if it is on the other side throughout.
     """
     value = finder.values[event, 0]
-    at_zero = zero_at_start or abs(value) < ROUNDING
+    at_zero = zero_at_start or abs(value) < ZERO_ROUNDING
     if side != NO_SIDE:
         if at_zero:
             value = way_from_zero(finder, event, CLEARLY_MOVED)

@@ -23,7 +23,7 @@ EVENT_FUNCTIONS = SLIDE + 5
 PULSE_END = EVENT_FUNCTIONS  # has no event function: it is due at a fixed time
 NO_EVENT = -1
 LEGS_TURN = EVENT_FUNCTIONS  # row of the rate between the legs, which is no event
-ROWS = EVENT_FUNCTIONS + 1
+EVENT_ROWS = EVENT_FUNCTIONS + 1
 FARTHEST_SLIDE = 0.25  # of the stride measure, of a stance foot's material from where it touched
 
 

@@ -14,10 +14,10 @@ from walkerlab.physics.ground.walker import (
     ContactWalker,
     GroundModel,
     OnGround,
-    folded,
     new_progress,
     sines_cosines,
-    unfolded,
+    to_form,
+    to_full,
 )
 from walkerlab.physics.hybrid.contact_events import EXTENSION, EXTENSION_RATE, HEIGHT, PER_FOOT, PULSE_END
 from walkerlab.physics.hybrid.contact_record import ContactObserver
@@ -44,7 +44,7 @@ def change_form(
     y, t = method.y, float(method.clock[T])
     whole = walker.forms[int(before.form.places == 0), 0]
     size = int(2 * (whole.places + whole.bodies))
-    x = unfolded(before.form, y, size)
+    x = to_full(before.form, y, size)
     if event < EXTENSION and event % PER_FOOT == HEIGHT:  # a step's touch: the other leg was the stance leg
         before = before._replace(progress=new_progress(stance=1 - after.progress.stance))
     locks = EXTENSION <= event < PULSE_END
@@ -57,11 +57,11 @@ def change_form(
             stopping[(event - EXTENSION) % 2] = STOPPING
             before = before._replace(knee=stopping)
             observer.account[KNEE_STOP] += stop_energy(before, y)
-    z = folded(after.form, new)
+    z = to_form(after.form, new)
     Phi = observer.tangent.Phi
     if Phi.shape[1] > 0:
-        rate, rate_after = rate_of(before, y, size, t), rate_of(after, z, size, t)
-        columns = unfolded(before.form, Phi[: y.size], size)
+        rate, rate_after = state_rate(before, y, size, t), state_rate(after, z, size, t)
+        columns = to_full(before.form, Phi[: y.size], size)
         waits = np.zeros(Phi.shape[1])
         if event != PULSE_END:
             gradient = event_gradient(whole, event, x)
@@ -74,15 +74,15 @@ def change_form(
             columns = lock_knee(whole, after.form, x, columns).columns
         for column, wait in zip(columns.T, waits, strict=True):
             shift_column(column, 0, rate_after, -wait)
-        Phi[: z.size] = folded(after.form, columns)
+        Phi[: z.size] = to_form(after.form, columns)
     return z
 
 
-def rate_of(system: OnGround, y: Floats, size: int, t: float) -> Floats:
+def state_rate(system: OnGround, y: Floats, size: int, t: float) -> Floats:
     """Compute dy/dt of all bodies (size,) at a time (s)."""
     rate = np.zeros(y.size)
     right_hand_side(system, t, y, rate)
-    return unfolded(system.form, rate, size)
+    return to_full(system.form, rate, size)
 
 
 def event_gradient(whole: GroundModel, event: int, x: Floats) -> Floats:

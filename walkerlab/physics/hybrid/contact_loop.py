@@ -38,12 +38,12 @@ from walkerlab.physics.solvers.stepping import (
     sample,
 )
 
-NEVER = -1
+NO_LIMIT = -1
 AT_LIFT = -2  # stop once the foot that carried the last step has lifted
 LONGEST_STEP = 10.0  # pendulum times within which a step must end
 LONGEST_FLIGHT = 0.25  # pendulum times without any foot on the ground
 EVENT_TIME = 1e-12  # s, accuracy of event times
-REFINEMENTS = 4
+EVENT_REFINEMENTS = 4
 REWINDS = 24  # of one step, until its end is accepted as the event, which rounding moves with each attempt
 DOUBTS = 12  # rewinds of one step after which an event that its end does not confirm is dropped
 
@@ -167,7 +167,7 @@ def approach(
     refinements = search.refinements if search.arriving and event == search.event else 0
     wait = max(fraction * (end - start), EVENT_TIME)
     early = start + wait < end - EVENT_TIME
-    if early and refinements <= REFINEMENTS and search.rewinds < REWINDS:
+    if early and refinements <= EVENT_REFINEMENTS and search.rewinds < REWINDS:
         return EventSearch(start + wait, event, latest, True, refinements + 1, search.rewinds + 1, False, False)
     if early and is_switching(event):
         # the event function is not polynomial on this step; on half of it, it is closer to one
@@ -183,7 +183,7 @@ def approach(
 def confirm(search: EventSearch, start: float, wait: float) -> EventSearch:
     """Let the event happen at the end of a step that just failed to reach it, or extend the step by `wait` (s)."""
     happens = abs(wait) <= EVENT_TIME
-    doubtful = search.refinements <= REFINEMENTS and search.rewinds < DOUBTS
+    doubtful = search.refinements <= EVENT_REFINEMENTS and search.rewinds < DOUBTS
     target, refinements, rewinds = search.target + wait, search.refinements + 1, search.rewinds + 1
     if not happens and doubtful and start < target <= search.latest:
         return EventSearch(target, search.event, search.latest, True, refinements, rewinds, False, False)

@@ -5,16 +5,16 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from walkerlab.physics.energy_channels import (
-    DAMPING,
+    DAMPING_LOSS,
     EDGES,
     ENTRIES,
     FORWARD,
-    FRICTION,
-    GIVEN,
-    HIP,
+    FRICTION_LOSS,
+    HIP_WORK,
     KNEE_STOP,
-    LOST,
+    LOSS_ENTRIES,
     PUSH_OFF,
+    SUPPLY_ENTRIES,
     TORQUE,
 )
 from walkerlab.physics.ground.energy import dissipated_power, foot_elastic_energy, push_power, total_energy
@@ -26,7 +26,7 @@ from walkerlab.physics.hybrid.contact_tangent import Tangent, carry_tangent
 from walkerlab.physics.hybrid.hip_torque import torque_work
 from walkerlab.physics.kernels import by_reference, by_type_or_default, callable_kernel, kernel_part, matrix, vector
 from walkerlab.physics.mechanics.hinges import HIP_ROW, hinge_law
-from walkerlab.physics.mechanics.tree import read_at_once, record_type
+from walkerlab.physics.mechanics.tree import fast_fields, record_type
 from walkerlab.physics.solvers.events import RISING, CrossingFinder, first_crossing
 from walkerlab.physics.solvers.radau5 import Radau5
 from walkerlab.physics.solvers.stepping import T_OLD, T, interpolate, sample
@@ -58,15 +58,15 @@ class ContactSamples(NamedTuple):
     @property
     def dissipated_J(self) -> Any:
         """Energy dissipated, (samples, 5), in the order of account.LOSSES."""
-        return self.account[:, LOST]
+        return self.account[:, LOSS_ENTRIES]
 
     @property
     def driven_J(self) -> Any:
         """Energy supplied by push-off and hip, (samples, 2)."""
-        return self.account[:, GIVEN]
+        return self.account[:, SUPPLY_ENTRIES]
 
 
-@read_at_once
+@fast_fields
 class ContactTally(np.record):  # type: ignore[misc]  # NumPy's stubs call one of its bases final
     """Counts, extremes and initial energy of a walk: a structured scalar that kernels write to."""
 
@@ -136,7 +136,7 @@ def balance(observer: ContactObserver, method: Any, system: OnGround) -> None:
     """Record works and losses of the last step and the energy residual at its end."""
     account = observer.account
     add_work_until(method, system, 1.0, account)
-    lost = -account[PUSH_OFF] - account[HIP]
+    lost = -account[PUSH_OFF] - account[HIP_WORK]
     for entry in range(PUSH_OFF):
         lost += account[entry]
     residual = end_energy(system, method.y) + lost - observer.tally.start_energy
@@ -158,7 +158,7 @@ def note_work(observer: ContactObserver, system: OnGround, y: Any) -> None:
     """Record the work until the end of a step, which belongs to completed steps, including the hip's spring."""
     for entry in range(ENTRIES):
         observer.account_at_touch[entry] = observer.account[entry]
-    observer.account_at_touch[HIP] += observer.tally.start_spring - spring_energy(system, y)
+    observer.account_at_touch[HIP_WORK] += observer.tally.start_spring - spring_energy(system, y)
 
 
 @kernel_part
@@ -194,7 +194,7 @@ def quadrature(method: Any) -> Quadrature:
 
 
 @quadrature.case(Radau5)
-def of_collocation(method: Radau5) -> Quadrature:
+def collocation_rule(method: Radau5) -> Quadrature:
     return OF_ORDER_5
 
 
@@ -224,14 +224,14 @@ def add_work(
     for foot in range(2):
         if system.has_ground[foot] != 0:
             damping, friction = foot_work(system, states, weights, foot, span)
-            account[DAMPING] += damping
-            account[FRICTION] += friction
+            account[DAMPING_LOSS] += damping
+            account[FRICTION_LOSS] += friction
     stopping = system.knee[0] == STOPPING or system.knee[1] == STOPPING
     for i in range(1, len(nodes)):
         weight = span * weights[i]
         if stopping:
             account[KNEE_STOP] += weight * stop_power(system, states[i])
-        account[HIP] += weight * spring_power(system, states[i])
+        account[HIP_WORK] += weight * spring_power(system, states[i])
         account[PUSH_OFF] += weight * push_power(system, begin + nodes[i] * span, states[i])
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walkerlab.outcome import Outcome
-from walkerlab.physics.energy_channels import ENTRIES, KNEE_STRIKES, LOSSES, LOST, PUSH_OFF, TORQUE
+from walkerlab.physics.energy_channels import ENTRIES, KNEE_STRIKES, LOSS_ENTRIES, LOSSES, PUSH_OFF, TORQUE
 from walkerlab.physics.ground.energy import kinetic_energy, potential_energy, total_energy
 from walkerlab.physics.ground.hinges import spring_energy
 from walkerlab.physics.ground.terrain import Terrain, is_uneven
@@ -18,16 +18,16 @@ from walkerlab.physics.ground.walker import (
     OnGround,
     feet_motion,
     floating_state,
-    folded,
     foot_force,
     on_ground,
     sines_cosines,
-    unfolded,
+    to_form,
+    to_full,
 )
 from walkerlab.physics.hybrid.contact_crossings import hip_height
-from walkerlab.physics.hybrid.contact_events import HEIGHT, PER_FOOT, ROWS, JudgedGround
+from walkerlab.physics.hybrid.contact_events import EVENT_ROWS, HEIGHT, PER_FOOT, JudgedGround
 from walkerlab.physics.hybrid.contact_jumps import change_form
-from walkerlab.physics.hybrid.contact_loop import AT_LIFT, NEVER, walk_in_form
+from walkerlab.physics.hybrid.contact_loop import AT_LIFT, NO_LIMIT, walk_in_form
 from walkerlab.physics.hybrid.contact_record import CONTACT_TALLY, ContactObserver, ContactSamples
 from walkerlab.physics.hybrid.contact_state import WalkState, material_along, new_walk_state, steps_with_lift
 from walkerlab.physics.hybrid.contact_tangent import new_tangent
@@ -46,7 +46,7 @@ USUAL_STEP = 3.0  # pendulum times; most steps are shorter
 # stability catalogue, of which ground of 1e14 N/m is the worst, leave at most 9.
 UNEXPLAINED = 100.0
 SET_STIFF = "set solver.contact.method to radau5."
-FINEST = 1e-10  # rtol below which rounding, not the tolerance, determines the residual
+FINEST_RTOL = 1e-10  # rtol below which rounding, not the tolerance, determines the residual
 
 
 @dataclass(frozen=True)
@@ -59,14 +59,14 @@ class Stopped:
     work: NDArray[np.int64]
 
 
-def sampled_energies(walker: ContactWalker, samples: ContactSamples) -> Floats:
+def sample_energies(walker: ContactWalker, samples: ContactSamples) -> Floats:
     """Compute kinetic, potential and total energy (J) of every sample, (samples, 3)."""
     energies = np.zeros((samples.time_s.size, 3))
     fill_energies(on_ground(walker, (False, False)), samples, energies)
     return energies
 
 
-def sampled_feet(walker: ContactWalker, samples: ContactSamples) -> Floats:
+def sample_feet(walker: ContactWalker, samples: ContactSamples) -> Floats:
     """Compute position along the slope and height over the ground (m), normal force and friction (N), slip (m/s).
 
     Returns (samples, foot, 5).
@@ -78,7 +78,7 @@ def sampled_feet(walker: ContactWalker, samples: ContactSamples) -> Floats:
 
 @kernel
 def fill_energies(system: OnGround, samples: ContactSamples, energies: Any) -> None:
-    """Write `sampled_energies` into `energies`.
+    """Write `sample_energies` into `energies`.
 
     system  free, with all bodies; its ground and knees are set to those of each sample
     """
@@ -93,7 +93,7 @@ def fill_energies(system: OnGround, samples: ContactSamples, energies: Any) -> N
 
 @kernel
 def fill_feet(walker: ContactWalker, samples: ContactSamples, feet: Any) -> None:
-    """Write `sampled_feet` into an array of zeros."""
+    """Write `sample_feet` into an array of zeros."""
     for i in range(samples.states.shape[0]):
         motions = feet_motion(walker.forms[0, 0], samples.states[i])
         for foot in range(2):
@@ -156,8 +156,8 @@ def new_observer(
     samples = times.size
     tally = new_record(CONTACT_TALLY)
     if track_energy or walker.whole.sprung:
-        here = on_ground(walker, walk_state.has_ground, level=walk_state.level, progress=walk_state.progress)
-        tally.start_energy, tally.start_spring = total_energy(here, y), spring_energy(here, y)
+        system = on_ground(walker, walk_state.has_ground, level=walk_state.level, progress=walk_state.progress)
+        tally.start_energy, tally.start_spring = total_energy(system, y), spring_energy(system, y)
         tally.energy_below = tally.start_energy + walker.mass * walker.gravity_along * y[0]
     room = ContactSamples(
         times,
@@ -174,8 +174,8 @@ def new_observer(
 
 def in_walk(walker: ContactWalker, walk_state: WalkState, hinged: bool = False) -> OnGround:
     """Return the walker in its present form; it shares the memory of the walk state."""
-    at = walk_state
-    return on_ground(walker, at.has_ground, at.knee, hinged, at.level, at.progress)
+    memory = walk_state
+    return on_ground(walker, memory.has_ground, memory.knee, hinged, memory.level, memory.progress)
 
 
 def walk_on(
@@ -185,7 +185,7 @@ def walk_on(
     walk_state: WalkState,
     observer: ContactObserver,
     start: State,
-    until: int = NEVER,
+    until: int = NO_LIMIT,
     hinged: bool = False,
 ) -> Stopped:
     """Continue a walk from a walk state, changing the form as knees lock and are released.
@@ -200,12 +200,12 @@ def walk_on(
     system = in_walk(walker, walk_state, hinged)
     tangent = observer.tangent.Phi
     half, root = len(start) // 2, 2 if hinged else 0
-    y = folded(system.form, (*start[root:half], *start[half + root :]))
+    y = to_form(system.form, (*start[root:half], *start[half + root :]))
     if tangent.shape[1] > 0:
-        tangent[: y.size] = folded(system.form, tangent)
+        tangent[: y.size] = to_form(system.form, tangent)
     lead = tolerances.new(y.size)
     lead.clock[T] = walk_state.progress.stopped_at
-    by_size, finder = {y.size: lead}, finder_for(lead, ROWS, walker.size)
+    by_size, finder = {y.size: lead}, finder_for(lead, EVENT_ROWS, walker.size)
     while True:
         if y.size not in by_size:
             by_size[y.size] = sharing(tolerances.new(y.size), lead.clock, lead.counts)
@@ -217,10 +217,10 @@ def walk_on(
         before, system = system, in_walk(walker, walk_state, hinged)
         y = change_form(walker, before, system, event, observer, method)
     if tangent.shape[1] > 0:
-        tangent[:] = unfolded(system.form, tangent[: method.y.size], walker.size)
+        tangent[:] = to_full(system.form, tangent[: method.y.size], walker.size)
     end = floating_state(system.form, method.y, walker.size)
     walk_state.progress.stopped_at = lead.clock[T]
-    return Stopped(balanced(ended, observer, tolerances), float(lead.clock[T]), end, lead.counts[:4].copy())
+    return Stopped(check_balance(ended, observer, tolerances), float(lead.clock[T]), end, lead.counts[:4].copy())
 
 
 def walk_contact(
@@ -247,8 +247,8 @@ def walk_contact(
     sines_cosines(walker.whole, start, s, c)
     if hip_height(walker.whole, s, c, start) < FALLEN_HIP * frame.leg_length:
         walk_state = new_walk_state(walker, ground.terrain, stance, steps, start)
-        here = Stopped(Outcome.REJECTED, 0.0, start, np.zeros(4, np.int64))
-        return gather(here, walk_state, new_observer(walker, walk_state, start), walker, ground.terrain, tolerances)
+        stopped = Stopped(Outcome.REJECTED, 0.0, start, np.zeros(4, np.int64))
+        return gather(stopped, walk_state, new_observer(walker, walk_state, start), walker, ground.terrain, tolerances)
     room = int(USUAL_STEP * steps * frame.pendulum_time / sampling) + 2 if isinstance(sampling, float) else 0
     while True:
         walk_state = new_walk_state(walker, ground.terrain, stance, steps, start)
@@ -311,10 +311,10 @@ def explained_residual(observer: ContactObserver, tolerances: Tolerances) -> flo
     potential over the slope below, plus all energy dissipated since.
     """
     exchanged = observer.tally.energy_below + np.abs(observer.account[:TORQUE]).sum()
-    return float(UNEXPLAINED * max(tolerances.rtol, FINEST) * exchanged)
+    return float(UNEXPLAINED * max(tolerances.rtol, FINEST_RTOL) * exchanged)
 
 
-def balanced(ended: int, observer: ContactObserver, tolerances: Tolerances) -> Outcome:
+def check_balance(ended: int, observer: ContactObserver, tolerances: Tolerances) -> Outcome:
     """Return the outcome of a walk, or `SOLVER_FAILED` if its energy balance does not close.
 
     This detects faults and estimates no error: a walk may be off by far more than its balance.
@@ -344,13 +344,13 @@ def gather(
     along, up = (
         (float(walk_state.touch_along[done - 1]), float(walk_state.touch_height[done - 1])) if done else (0.0, 0.0)
     )
-    known = np.where(strikes < 0.0, np.nan, strikes)
+    strike_times = np.where(strikes < 0.0, np.nan, strikes)
     return ContactWalkResult(
         foothold_height_m=walk_state.touch_height[:done] if is_uneven(terrain) else None,
         outcome=stopped.outcome,
         touch_time_s=walk_state.touch_time[:done],
         touch_along_m=walk_state.touch_along[:done],
-        knee_strike_time_s=known if walker.kneed else None,
+        knee_strike_time_s=strike_times if walker.kneed else None,
         end_time_s=stopped.time_s,
         work=WalkWork(*(int(stopped.work[count]) for count in (RHS, ACCEPTED, REJECTED, JACOBIANS))),
         slip_m=walk_state.slip[:lifted],
@@ -359,7 +359,7 @@ def gather(
         max_penetration_m=float(observer.tally.max_penetration),
         energy_balance_residual_J=float(observer.tally.residual),
         explained_residual_J=explained_residual(observer, tolerances),
-        dissipated_J=observer.account[LOST].copy(),
+        dissipated_J=observer.account[LOSS_ENTRIES].copy(),
         driven=driven_work(walker, along, up, observer.account_at_touch),
         samples=samples,
         method=tolerances.method,

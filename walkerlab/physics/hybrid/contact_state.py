@@ -69,7 +69,7 @@ def new_walk_state(walker: ContactWalker, terrain: Terrain, stance: int, steps: 
     for foot in range(2):
         on_pad = has_ground_in_cell(int(cells[foot]))
         has_ground[foot] = on_pad and starts_with_ground(terrain, foot == stance)
-    sides, at_zero = known_sides(walker, feet, stance, y)
+    sides, at_zero = initial_sides(walker, feet, stance, y)
     return WalkState(
         touch_time=np.zeros(steps),
         touch_along=np.zeros(steps),
@@ -103,7 +103,7 @@ def knees_at_start(walker: ContactWalker, stance: int, y: State) -> NDArray[np.i
     return knee
 
 
-def known_sides(
+def initial_sides(
     walker: ContactWalker, feet: tuple[FootMotion, FootMotion], stance: int, y: State
 ) -> tuple[NDArray[np.int8], NDArray[np.int8]]:
     """Return the side of zero of every event function at the start, and which are zero to rounding.
@@ -120,18 +120,18 @@ def known_sides(
         first = foot * PER_FOOT
         sides[[first + LEFT_EDGE, first + RIGHT_EDGE]] = 1
         signs = (feet[foot].height, feet[foot].vertical_velocity)
-        sides[first + HEIGHT], at_zero[first + HEIGHT] = side_of(signs, (size, speed), -1)
+        sides[first + HEIGHT], at_zero[first + HEIGHT] = zero_side(signs, (size, speed), -1)
     rates = [feet[k].slip - float(whole.rolling[k, :n] @ np.array(y[4 + n :])) for k in range(2)]
     order = (feet[1].along - feet[0].along, rates[1] - rates[0])
-    sides[PASSING], at_zero[PASSING] = side_of(order, (size, speed), 1 if stance == 1 else -1)
+    sides[PASSING], at_zero[PASSING] = zero_side(order, (size, speed), 1 if stance == 1 else -1)
     return sides, at_zero
 
 
-def side_of(value_and_rate: tuple[float, float], scales: tuple[float, float], otherwise: int) -> tuple[int, bool]:
+def zero_side(value_and_rate: tuple[float, float], scales: tuple[float, float], otherwise: int) -> tuple[int, bool]:
     """Return the side of zero of a value, or of its rate if it is zero to rounding; and whether it is zero."""
-    for number, scale in zip(value_and_rate, scales, strict=True):
-        if abs(number) > START_ROUNDING * scale:
-            return (1 if number > 0.0 else -1), number is not value_and_rate[0]
+    for value, scale in zip(value_and_rate, scales, strict=True):
+        if abs(value) > START_ROUNDING * scale:
+            return (1 if value > 0.0 else -1), value is not value_and_rate[0]
     return otherwise, True
 
 

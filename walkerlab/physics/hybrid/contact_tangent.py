@@ -13,14 +13,14 @@ import numpy as np
 from walkerlab.physics.ground.walker import OF_STATES
 from walkerlab.physics.kernels import by_reference, kernel_part, vector
 from walkerlab.physics.solvers.linear import factor, solve
-from walkerlab.physics.solvers.radau5 import C
+from walkerlab.physics.solvers.radau5 import RADAU_NODES
 from walkerlab.physics.solvers.stepping import T_OLD, T, interpolate
 from walkerlab.physics.solvers.system import jacobian
 
 THIS_SIDE = 4e-12  # s, a few event-time uncertainties
 ROOT6 = 6.0**0.5
 # Radau IIA, Hairer and Wanner II (5.6)
-A = np.array(
+RADAU_WEIGHTS = np.array(
     [
         [(88.0 - 7.0 * ROOT6) / 360.0, (296.0 - 169.0 * ROOT6) / 1800.0, (-2.0 + 3.0 * ROOT6) / 225.0],
         [(296.0 + 169.0 * ROOT6) / 1800.0, (88.0 + 7.0 * ROOT6) / 360.0, (-2.0 - 3.0 * ROOT6) / 225.0],
@@ -68,14 +68,16 @@ def carry_tangent(tangent: Tangent, method: Any, system: Any) -> None:
     """Advance Phi over the last step of `method`."""
     n, h = method.y.size, method.clock[T] - method.clock[T_OLD]
     for i in range(2):
-        jacobian_at(method, system, C[i], tangent.stages[i])
+        jacobian_at(method, system, RADAU_NODES[i], tangent.stages[i])
     jacobian_at_end(tangent, method, system)
     for i in range(3):
         for j in range(3):
             for row in range(n):
                 for column in range(n):
                     same = 1.0 if i == j and row == column else 0.0
-                    tangent.system[i * n + row, j * n + column] = same - h * A[i, j] * tangent.stages[i, row, column]
+                    tangent.system[i * n + row, j * n + column] = (
+                        same - h * RADAU_WEIGHTS[i, j] * tangent.stages[i, row, column]
+                    )
     factor(tangent.system, tangent.pivots, 3 * n)
     for direction in range(tangent.Phi.shape[1]):
         carry_direction(tangent, n, direction, h)
@@ -107,5 +109,9 @@ def carry_direction(tangent: Tangent, n: int, direction: int, h: float) -> None:
             tangent.rates[i * n + row] = total
     solve(tangent.system, tangent.pivots, tangent.rates, 0, 3 * n)
     for row in range(n):
-        change = A[2, 0] * tangent.rates[row] + A[2, 1] * tangent.rates[n + row] + A[2, 2] * tangent.rates[2 * n + row]
+        change = (
+            RADAU_WEIGHTS[2, 0] * tangent.rates[row]
+            + RADAU_WEIGHTS[2, 1] * tangent.rates[n + row]
+            + RADAU_WEIGHTS[2, 2] * tangent.rates[2 * n + row]
+        )
         tangent.Phi[row, direction] += h * change

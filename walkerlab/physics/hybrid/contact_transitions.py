@@ -49,7 +49,7 @@ from walkerlab.physics.hybrid.contact_state import (
 from walkerlab.physics.hybrid.endings import BENT_KNEE, FELL, GOES_ON, OFF_PAD, SLID, STUBBED
 from walkerlab.physics.kernels import by_type_or_default, kernel_part
 
-AHEAD = 0.25  # of the stride measure: least distance ahead at which a step lands
+STEP_AHEAD = 0.25  # of the stride measure: least distance ahead at which a step lands
 AT_SURFACE = 1e-11  # m: distance from the surface within the error of an event's time
 TRIP = 0.25  # of the stride measure: distance from its stance beyond which a touch is a trip
 
@@ -224,7 +224,7 @@ def touch(
     if terrain.has_pads and walk_state.cells[foot] == walk_state.left_cells[foot]:
         away = abs(feet[foot].along - walk_state.foothold[foot] - walk_state.rolled[foot])
         return OFF_PAD if away > TRIP * measure else GOES_ON
-    if feet[foot].along - feet[stance].along < AHEAD * measure:
+    if feet[foot].along - feet[stance].along < STEP_AHEAD * measure:
         return GOES_ON
     if not is_straight(form, walk_state, foot):
         return BENT_KNEE

@@ -31,10 +31,10 @@ def torque_work(torque: float, method: Any, system: Any, finder: CrossingFinder,
     sample_rates(system, finder, row)
     y = finder.states[0, : method.y.size]
     first, _ = legs_apart(system, y)
-    angle, positive, at = first, 0.0, 0.0
-    while at < until:
-        at = min(until, first_crossing(finder, row, 0, at + BEYOND if at > 0.0 else 0.0, False))
-        interpolate(method, system, at, y)
+    angle, positive, fraction = first, 0.0, 0.0
+    while fraction < until:
+        fraction = min(until, first_crossing(finder, row, 0, fraction + BEYOND if fraction > 0.0 else 0.0, False))
+        interpolate(method, system, fraction, y)
         before = angle
         angle, _ = legs_apart(system, y)
         positive += max(0.0, torque * (angle - before))

@@ -31,9 +31,9 @@ from walkerlab.physics.mechanics.rigid_model import (
     STANCE,
     Mode,
     RigidModel,
+    apply_couplings,
     energies,
     energy_at_touch,
-    linked,
     step_lengths,
     swing_foot,
 )
@@ -43,7 +43,7 @@ from walkerlab.physics.solvers.system import State
 
 STEPS_AT_ONCE = 64
 BUDGET_OF_A_STEP = 50_000  # right-hand sides; the tightest tolerance needs about 700
-MOST_FRICTION = 1.0  # coefficient; about that of rubber on dry concrete
+MAX_FRICTION = 1.0  # coefficient; about that of rubber on dry concrete
 SAMPLES_PER_UNIT_TIME = 64  # in sqrt(L/g)
 CLOSEST_SAMPLES = 1e-2  # of the time between samples; one nearer to a heel strike is dropped
 
@@ -83,10 +83,10 @@ class RigidWalkResult(WalkRecord):
             found.append(f"the ground would have to pull with {-self.min_normal_force:.3g} N")
         if self.min_normal_impulse is not None and self.min_normal_impulse < 0.0:
             found.append(f"the ground would have to pull with {-self.min_normal_impulse:.3g} N s in a strike")
-        if self.max_friction_ratio > MOST_FRICTION:
+        if self.max_friction_ratio > MAX_FRICTION:
             found.append(
                 f"the stance foot would slip: it takes a friction coefficient of {self.max_friction_ratio:.3g}, and "
-                f"hardly any ground gives more than {MOST_FRICTION:g}"
+                f"hardly any ground gives more than {MAX_FRICTION:g}"
             )
         return tuple(found)
 
@@ -277,7 +277,7 @@ class Recorder:
             max_impulse_ratio=float(self.tally.max_impulse_ratio),
             energy_drift=float(self.tally.energy_drift),
             mean_energy=self._mean_energy(strikes, after),
-            samples=joined(self.pieces) if self.pieces else None,
+            samples=join(self.pieces) if self.pieces else None,
         )
 
 
@@ -285,7 +285,7 @@ def with_scaled_rates(walker: RigidModel, state: State, swing: float, stance: fl
     """Return a state just after heel strike with the velocities of swing and stance leg scaled."""
     n = len(state) // 2
     rates = [(stance if place == STANCE else swing) * rate for place, rate in enumerate(state[n:])]
-    return (*state[:n], *linked(walker, AT_STRIKE, rates).tolist())
+    return (*state[:n], *apply_couplings(walker, AT_STRIKE, rates).tolist())
 
 
 def far_from(times: Array, events: Array, distance: float) -> NDArray[np.bool_]:
@@ -297,6 +297,6 @@ def far_from(times: Array, events: Array, distance: float) -> NDArray[np.bool_]:
     return np.asarray(np.minimum(np.abs(times - events[behind]), np.abs(times - events[before])) > distance)
 
 
-def joined(pieces: list[Samples]) -> Samples:
+def join(pieces: list[Samples]) -> Samples:
     """Concatenate consecutive records."""
     return Samples(*map(np.concatenate, zip(*pieces, strict=True)))

@@ -27,8 +27,8 @@ from walkerlab.physics.mechanics.rigid_model import RigidModel, feet_on_slope
 from walkerlab.physics.mechanics.trigonometry import sine_cosine
 from walkerlab.physics.solvers.dop853 import GROW_MOST, SAFETY, SHRINK_MOST
 from walkerlab.physics.solvers.events import NO_CROSSING, CrossingFinder, new_crossing_finder
-from walkerlab.physics.solvers.hermite import Jet, Quintic, first_fall, hermite, value_of
-from walkerlab.physics.solvers.lane_steps import ERROR_3, ERROR_5, combine, derivative, error_sums, stages_of
+from walkerlab.physics.solvers.hermite import Jet, Quintic, evaluate_quintic, first_fall, hermite
+from walkerlab.physics.solvers.lane_steps import LANE_ERROR_3, LANE_ERROR_5, combine, derivative, error_sums, run_stages
 from walkerlab.physics.solvers.lanes import (
     WIDTH,
     Lanes,
@@ -41,19 +41,24 @@ from walkerlab.physics.solvers.lanes import (
 from walkerlab.physics.solvers.system import State
 
 # rows of a batch's memory, with one value per lane
-START, START_RATE, END, END_RATE = 0, 4, 8, 12  # state and derivative at the ends of the step tried last
-STEP, TRIED, TIME, LEFT = 16, 17, 18, 19  # s: next step, step tried last, time, time left for a heel strike
-ARRIVING, FIRST, TRIES, EVENT, USUAL = 20, 21, 22, 23, 24
-ROWS = 25
+START_STATE, START_RATE, END_STATE, END_RATE = 0, 4, 8, 12  # state and derivative at the ends of the step tried last
+NEXT_STEP, TRIED_STEP, LANE_TIME, TIME_LEFT = (
+    16,
+    17,
+    18,
+    19,
+)  # s: next step, step tried last, time, time left for a heel strike
+ARRIVALS, FIRST_TRY, TRIES, HAS_EVENT, STEP_BEFORE = 20, 21, 22, 23, 24
+LANE_ROWS = 25
 SLOT_OF_START, STEPS_TAKEN = 0, 1  # rows of whole numbers
 
 NOBODY = -1
-FIRST_STEP = 0.1  # pendulum times
-ARRIVED = 1e-5  # pendulum times from the end of a step to the heel strike that a Taylor expansion bridges
-REFINEMENTS = 6
+FIRST_LANE_STEP = 0.1  # pendulum times
+ARRIVAL_TIME = 1e-5  # pendulum times from the end of a step to the heel strike that a Taylor expansion bridges
+STRIKE_REFINEMENTS = 6
 MAX_TRIES = 20_000  # steps in one swing
-SMALLEST_STEP = 1e-13  # pendulum times
-NO_ERROR = 1e-300
+MIN_LANE_STEP = 1e-13  # pendulum times
+TINY_ERROR = 1e-300
 
 
 class TwoLegs(NamedTuple):
@@ -84,12 +89,12 @@ def two_legs(model: RigidModel) -> TwoLegs | None:
     x, y = model.hip_x, model.hip_y
     lowest = (FALLEN_HIP * model.leg_length - model.radius) / math.hypot(x, y)
 
-    held: dict[str, Any] = {name: tuple(model[name].ravel().tolist()) for name in ("A", "B", "arm_x", "arm_y")}
+    values: dict[str, Any] = {name: tuple(model[name].ravel().tolist()) for name in ("A", "B", "arm_x", "arm_y")}
     for name in ("unpaired", "mass", "radius", "gravity_along", "gravity_down", "slope", "lean"):
-        held[name] = float(model[name])
+        values[name] = float(model[name])
     return TwoLegs(
         model,
-        **held,
+        **values,
         hip=hinge_law(model, HIP_ROW),
         upright=math.atan2(x, y),
         fallen=math.acos(max(-1.0, lowest)),
@@ -138,7 +143,7 @@ def new_lane_memory(rtol: float, atol: float) -> LaneMemory:
     """Create the workspace for batches at these tolerances."""
     teach_arithmetic()
     return LaneMemory(
-        rtol, atol, np.zeros((ROWS, WIDTH)), np.full((2, WIDTH), NOBODY, np.int64), new_crossing_finder(5)
+        rtol, atol, np.zeros((LANE_ROWS, WIDTH)), np.full((2, WIDTH), NOBODY, np.int64), new_crossing_finder(5)
     )
 
 
@@ -154,7 +159,7 @@ def new_fates(n: int) -> Fates:
 
 
 @by_type
-def struck(observer: Any, walk: int, step: int, t: float, y: Any) -> int:
+def record_strike(observer: Any, walk: int, step: int, t: float, y: Any) -> int:
     """Record a heel strike at time t (s) with state y after it; returns GOES_ON or the outcome's number.
 
     walk  index of the start
@@ -179,8 +184,8 @@ def walk_lanes(walker: TwoLegs, memory: LaneMemory, observer: Any, starts: Any, 
             for lane in range(WIDTH):
                 if slots[SLOT_OF_START, lane] == NOBODY:
                     continue
-                if memory.rows[EVENT, lane] > 0.0:
-                    outcome = look_at(walker, memory, observer, lane)
+                if memory.rows[HAS_EVENT, lane] > 0.0:
+                    outcome = handle_step(walker, memory, observer, lane)
                     if outcome != GOES_ON:
                         fates.outcome[slots[SLOT_OF_START, lane]] = outcome
                         fates.steps[slots[SLOT_OF_START, lane]] = slots[STEPS_TAKEN, lane]
@@ -196,7 +201,7 @@ def refill(walker: TwoLegs, memory: LaneMemory, starts: Any, fates: Fates, lane:
         waiting += 1
         if hip_above_fall(walker.model, y) >= 0.0:
             memory.slots[SLOT_OF_START, lane], memory.slots[STEPS_TAKEN, lane] = waiting - 1, 0
-            begin_swing(walker, memory, lane, 0.0, y, FIRST_STEP * walker.pendulum_time)
+            begin_swing(walker, memory, lane, 0.0, y, FIRST_LANE_STEP * walker.pendulum_time)
             return waiting
         fates.outcome[waiting - 1], fates.steps[waiting - 1] = REJECTED, 0
     memory.slots[SLOT_OF_START, lane] = NOBODY
@@ -210,14 +215,14 @@ def begin_swing(walker: TwoLegs, memory: LaneMemory, lane: int, t: float, y: Sta
     rows = memory.rows
     rate = derivative(walker, t, y)
     for i in range(4):
-        rows[START + i, lane], rows[START_RATE + i, lane] = y[i], rate[i]
-    rows[STEP, lane], rows[TIME, lane] = h, t
-    rows[LEFT, lane] = LONGEST_SWING * walker.pendulum_time
-    rows[ARRIVING, lane], rows[FIRST, lane], rows[TRIES, lane] = 0.0, 1.0, 0.0
+        rows[START_STATE + i, lane], rows[START_RATE + i, lane] = y[i], rate[i]
+    rows[NEXT_STEP, lane], rows[LANE_TIME, lane] = h, t
+    rows[TIME_LEFT, lane] = LONGEST_SWING * walker.pendulum_time
+    rows[ARRIVALS, lane], rows[FIRST_TRY, lane], rows[TRIES, lane] = 0.0, 1.0, 0.0
 
 
 @kernel_part
-def four(rows: Any, row: int) -> tuple[Lanes, Lanes, Lanes, Lanes]:
+def load_state(rows: Any, row: int) -> tuple[Lanes, Lanes, Lanes, Lanes]:
     """Load four rows as a state in lanes."""
     return (
         load_lanes(rows, row),
@@ -235,34 +240,34 @@ def try_steps(walker: TwoLegs, memory: LaneMemory) -> bool:
     many or too small.
     """
     rows = memory.rows
-    y, k1 = four(rows, START), four(rows, START_RATE)
-    left, tries = load_lanes(rows, LEFT), load_lanes(rows, TRIES) + 1.0
-    h = min(load_lanes(rows, STEP), left)
-    used, end, end_rate = stages_of(walker, 0.0, y, k1, h)
-    error_5, error_3 = error_sums(memory, y, end, combine(ERROR_5, used), combine(ERROR_3, used))
-    error = abs(h) * error_5 / math.sqrt(4.0 * (error_5 + 0.01 * error_3) + NO_ERROR)
-    change = SAFETY / math.sqrt(math.sqrt(math.sqrt(error + NO_ERROR)))
+    y, k1 = load_state(rows, START_STATE), load_state(rows, START_RATE)
+    left, tries = load_lanes(rows, TIME_LEFT), load_lanes(rows, TRIES) + 1.0
+    h = min(load_lanes(rows, NEXT_STEP), left)
+    stages, end, end_rate = run_stages(walker, 0.0, y, k1, h)
+    error_5, error_3 = error_sums(memory, y, end, combine(LANE_ERROR_5, stages), combine(LANE_ERROR_3, stages))
+    error = abs(h) * error_5 / math.sqrt(4.0 * (error_5 + 0.01 * error_3) + TINY_ERROR)
+    change = SAFETY / math.sqrt(math.sqrt(math.sqrt(error + TINY_ERROR)))
     change = min(GROW_MOST, max(SHRINK_MOST, change))
     accepted = 1.0 - error
-    over = NO_ERROR - (left - h)
+    over = TINY_ERROR - (left - h)
     pendulum_time = walker.pendulum_time
-    stuck = max(tries - MAX_TRIES, SMALLEST_STEP * pendulum_time - abs(h))
-    attention = max(may_end(walker, y, end, h), over, load_lanes(rows, ARRIVING))
+    stuck = max(tries - MAX_TRIES, MIN_LANE_STEP * pendulum_time - abs(h))
+    attention = max(may_end(walker, y, end, h), over, load_lanes(rows, ARRIVALS))
     event = choose(stuck, 1.0, choose(accepted, choose(attention, 1.0, 0.0), 0.0))
     quiet = choose(event, 0.0, accepted)
     for i in range(4):
-        store_lanes(choose(quiet, end[i], y[i]), rows, START + i)
+        store_lanes(choose(quiet, end[i], y[i]), rows, START_STATE + i)
         store_lanes(choose(quiet, end_rate[i], k1[i]), rows, START_RATE + i)
-        store_lanes(end[i], rows, END + i)
+        store_lanes(end[i], rows, END_STATE + i)
         store_lanes(end_rate[i], rows, END_RATE + i)
-    gone = choose(quiet, h, 0.0)
-    store_lanes(h * change, rows, STEP)
-    store_lanes(h, rows, TRIED)
-    store_lanes(load_lanes(rows, TIME) + gone, rows, TIME)
-    store_lanes(left - gone, rows, LEFT)
-    store_lanes(choose(quiet, 0.0, load_lanes(rows, FIRST)), rows, FIRST)
+    advanced = choose(quiet, h, 0.0)
+    store_lanes(h * change, rows, NEXT_STEP)
+    store_lanes(h, rows, TRIED_STEP)
+    store_lanes(load_lanes(rows, LANE_TIME) + advanced, rows, LANE_TIME)
+    store_lanes(left - advanced, rows, TIME_LEFT)
+    store_lanes(choose(quiet, 0.0, load_lanes(rows, FIRST_TRY)), rows, FIRST_TRY)
     store_lanes(tries, rows, TRIES)
-    store_lanes(event, rows, EVENT)
+    store_lanes(event, rows, HAS_EVENT)
     return any_positive(event)
 
 
@@ -276,23 +281,23 @@ def may_end(walker: TwoLegs, y: Any, end: Any, h: Lanes) -> Lanes:
 
 
 @kernel_part
-def look_at(walker: TwoLegs, memory: LaneMemory, observer: Any, lane: int) -> int:
+def handle_step(walker: TwoLegs, memory: LaneMemory, observer: Any, lane: int) -> int:
     """Handle the step of a lane that needs attention; returns GOES_ON, or the outcome's number if its walk is over."""
     rows = memory.rows
     if rows[TRIES, lane] >= MAX_TRIES:
         return BUDGET_EXHAUSTED
-    if abs(rows[TRIED, lane]) < SMALLEST_STEP * walker.pendulum_time:
+    if abs(rows[TRIED_STEP, lane]) < MIN_LANE_STEP * walker.pendulum_time:
         return SOLVER_FAILED
-    if rows[ARRIVING, lane] > 0.0:
+    if rows[ARRIVALS, lane] > 0.0:
         return arrive(walker, memory, observer, lane)
     strike, fall = strike_in_step(walker, memory, lane), fall_in_step(walker, memory, lane)
     if fall < strike:
         return FELL
     if strike <= 1.0:
-        rows[ARRIVING, lane], rows[USUAL, lane] = 1.0, rows[STEP, lane]
-        rows[STEP, lane] = max(strike * rows[TRIED, lane], 2.0 * SMALLEST_STEP)
+        rows[ARRIVALS, lane], rows[STEP_BEFORE, lane] = 1.0, rows[NEXT_STEP, lane]
+        rows[NEXT_STEP, lane] = max(strike * rows[TRIED_STEP, lane], 2.0 * MIN_LANE_STEP)
         return GOES_ON
-    if rows[LEFT, lane] <= rows[TRIED, lane]:
+    if rows[TIME_LEFT, lane] <= rows[TRIED_STEP, lane]:
         return NO_HEEL_STRIKE
     move_on(memory, lane)
     return GOES_ON
@@ -303,10 +308,10 @@ def move_on(memory: LaneMemory, lane: int) -> None:
     """Accept the step of a lane."""
     rows = memory.rows
     for i in range(4):
-        rows[START + i, lane], rows[START_RATE + i, lane] = rows[END + i, lane], rows[END_RATE + i, lane]
-    rows[TIME, lane] += rows[TRIED, lane]
-    rows[LEFT, lane] -= rows[TRIED, lane]
-    rows[FIRST, lane] = 0.0
+        rows[START_STATE + i, lane], rows[START_RATE + i, lane] = rows[END_STATE + i, lane], rows[END_RATE + i, lane]
+    rows[LANE_TIME, lane] += rows[TRIED_STEP, lane]
+    rows[TIME_LEFT, lane] -= rows[TRIED_STEP, lane]
+    rows[FIRST_TRY, lane] = 0.0
 
 
 @kernel_part
@@ -315,22 +320,22 @@ def arrive(walker: TwoLegs, memory: LaneMemory, observer: Any, lane: int) -> int
     rows, slots = memory.rows, memory.slots
     move_on(memory, lane)
     pendulum_time = walker.pendulum_time
-    rate = rows[START + 2, lane] + rows[START + 3, lane]
-    guard = feet_on_slope(walker, rows[START, lane], rows[START + 1, lane])
+    rate = rows[START_STATE + 2, lane] + rows[START_STATE + 3, lane]
+    guard = feet_on_slope(walker, rows[START_STATE, lane], rows[START_STATE + 1, lane])
     wait = -guard / rate if rate != 0.0 else 0.0
-    if abs(wait) > ARRIVED * pendulum_time and rows[ARRIVING, lane] <= REFINEMENTS:
-        rows[ARRIVING, lane] += 1.0
-        usual = abs(rows[USUAL, lane])
-        rows[STEP, lane] = max(-usual, min(usual, wait))
+    if abs(wait) > ARRIVAL_TIME * pendulum_time and rows[ARRIVALS, lane] <= STRIKE_REFINEMENTS:
+        rows[ARRIVALS, lane] += 1.0
+        step_before = abs(rows[STEP_BEFORE, lane])
+        rows[NEXT_STEP, lane] = max(-step_before, min(step_before, wait))
         return GOES_ON
     y, new = vector(walker.model.zero_state), vector(walker.model.zero_state)
     bridge(rows, lane, wait, y)
     heel_strike(walker.model, y, new)
-    step, t = slots[STEPS_TAKEN, lane], rows[TIME, lane] + wait
+    step, t = slots[STEPS_TAKEN, lane], rows[LANE_TIME, lane] + wait
     slots[STEPS_TAKEN, lane] += 1
-    outcome = struck(observer, slots[SLOT_OF_START, lane], step, t, new)
+    outcome = record_strike(observer, slots[SLOT_OF_START, lane], step, t, new)
     if outcome == GOES_ON:
-        begin_swing(walker, memory, lane, t, (new[0], new[1], new[2], new[3]), rows[USUAL, lane])
+        begin_swing(walker, memory, lane, t, (new[0], new[1], new[2], new[3]), rows[STEP_BEFORE, lane])
     return outcome
 
 
@@ -338,18 +343,18 @@ def arrive(walker: TwoLegs, memory: LaneMemory, observer: Any, lane: int) -> int
 def bridge(rows: Any, lane: int, wait: float, y: Any) -> None:
     """Write the state a short time later into y by a Taylor expansion, of second order in the angles of the guard."""
     for i in range(2):
-        omega, alpha = rows[START + 2 + i, lane], rows[START_RATE + 2 + i, lane]
-        y[i] = rows[START + i, lane] + wait * (omega + 0.5 * wait * alpha)
+        omega, alpha = rows[START_STATE + 2 + i, lane], rows[START_RATE + 2 + i, lane]
+        y[i] = rows[START_STATE + i, lane] + wait * (omega + 0.5 * wait * alpha)
         y[2 + i] = omega + wait * alpha
 
 
 @kernel_part
-def event_function(rows: Any, at: int, lane: int, swing: float, stance: float) -> Jet:
+def event_function(rows: Any, row: int, lane: int, swing: float, stance: float) -> Jet:
     """Compute swing theta_1 + stance theta_2 and its first two derivatives in time, at the start or end of a step."""
     return (
-        swing * rows[at, lane] + stance * rows[at + 1, lane],
-        swing * rows[at + 2, lane] + stance * rows[at + 3, lane],
-        swing * rows[at + 6, lane] + stance * rows[at + 7, lane],
+        swing * rows[row, lane] + stance * rows[row + 1, lane],
+        swing * rows[row + 2, lane] + stance * rows[row + 3, lane],
+        swing * rows[row + 6, lane] + stance * rows[row + 7, lane],
     )
 
 
@@ -357,21 +362,21 @@ def event_function(rows: Any, at: int, lane: int, swing: float, stance: float) -
 def in_step(memory: LaneMemory, lane: int, swing: float, stance: float, constant: float) -> Quintic:
     """Interpolate swing theta_1 + stance theta_2 + constant over a lane's step."""
     rows = memory.rows
-    a = event_function(rows, START, lane, swing, stance)
-    b = event_function(rows, END, lane, swing, stance)
-    return hermite(rows[TRIED, lane], (a[0] + constant, a[1], a[2]), (b[0] + constant, b[1], b[2]))
+    a = event_function(rows, START_STATE, lane, swing, stance)
+    b = event_function(rows, END_STATE, lane, swing, stance)
+    return hermite(rows[TRIED_STEP, lane], (a[0] + constant, a[1], a[2]), (b[0] + constant, b[1], b[2]))
 
 
 @kernel_part
 def strike_in_step(walker: TwoLegs, memory: LaneMemory, lane: int) -> float:
     """Find the fraction of a lane's step of the heel strike with the leg ahead, or NO_CROSSING."""
     guard = in_step(memory, lane, 1.0, 1.0, feet_on_slope(walker, 0.0, 0.0))
-    at_start = memory.rows[FIRST, lane] > 0.0
+    at_start = memory.rows[FIRST_TRY, lane] > 0.0
     strike = first_fall(memory.finder, guard, at_start, 0.0)
     if strike > 1.0:
         return NO_CROSSING
     ahead = in_step(memory, lane, 1.0, -1.0, 0.0)
-    while strike <= 1.0 and value_of(ahead, strike) <= 0.0:
+    while strike <= 1.0 and evaluate_quintic(ahead, strike) <= 0.0:
         strike = first_fall(memory.finder, guard, at_start, strike + 1e-12)
     return strike
 
@@ -380,7 +385,7 @@ def strike_in_step(walker: TwoLegs, memory: LaneMemory, lane: int) -> float:
 def fall_in_step(walker: TwoLegs, memory: LaneMemory, lane: int) -> float:
     """Find the fraction of a lane's step at which the hip falls below half a leg, or NO_CROSSING if it ends above."""
     from_upright = walker.slope - walker.upright
-    angle = memory.rows[END + 1, lane] + from_upright
+    angle = memory.rows[END_STATE + 1, lane] + from_upright
     if abs(angle) <= walker.fallen:
         return NO_CROSSING
     side = 1.0 if angle > 0.0 else -1.0

@@ -67,15 +67,17 @@ def places(walker: RigidModel, knee_m: tuple[float, float] | None, walk: RigidWa
     rolled = -walker.radius * (samples.state[:, STANCE] - set_down)
     contact = np.column_stack((touches + rolled, walk.ground_m[samples.step]))
     centre = contact + np.array([0.0, walker.radius])
-    hip = centre + turned(psi[:, [STANCE]], [walker.hip_x], [walker.hip_y])
-    foot = centre + turned(psi, walker.foot_x, walker.foot_y) - [0.0, walker.radius]
+    hip = centre + rotate_levers(psi[:, [STANCE]], [walker.hip_x], [walker.hip_y])
+    foot = centre + rotate_levers(psi, walker.foot_x, walker.foot_y) - [0.0, walker.radius]
     knees = None
     if knee_m is not None:
-        knees = np.stack([hip + turned(psi[:, [leg]], knee_m[:1], knee_m[1:]) for leg in (SWING, STANCE)], axis=1)
+        knees = np.stack(
+            [hip + rotate_levers(psi[:, [leg]], knee_m[:1], knee_m[1:]) for leg in (SWING, STANCE)], axis=1
+        )
     return Places(contact, hip, foot, knees)
 
 
-def turned(psi: Array, lever_x: Any, lever_y: Any) -> Array:
+def rotate_levers(psi: Array, lever_x: Any, lever_y: Any) -> Array:
     """Sum the bodies' levers, rotated by their angles psi (samples, n) from the slope's normal: (samples, 2)."""
     s, c = np.sin(psi), np.cos(psi)
     x, y = np.array(lever_x), np.array(lever_y)

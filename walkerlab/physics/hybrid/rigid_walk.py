@@ -65,8 +65,8 @@ HULL_ROOM = 0.125
 SHORTEST_LANDING = 0.25  # of the gait's step length, ahead of the stance foot, on uneven ground
 SEARCH_START = 1e-6  # fraction of the first step; a straight knee at rest crosses by rounding within 1e-9 of it
 # event functions, rows of the finder
-HEEL_STRIKE, FALL, AHEAD, KNEE = range(4)
-LEGS_TURN = 4  # no event: the rate between the legs
+HEEL_STRIKE, HIP_FALL, AHEAD, KNEE = range(4)
+LEG_RATE = 4  # no event: the rate between the legs
 EVENTS = 5
 
 
@@ -144,7 +144,7 @@ def sample_events(system: Mode, y: Any, node: int, finder: CrossingFinder) -> No
     """Evaluate the event functions at one node of a step, where the state is y."""
     foot = foot_function(system, y, y[len(system.model.arm_x) :])
     finder.values[HEEL_STRIKE, node], finder.values[AHEAD, node] = foot[0], foot[1]
-    finder.values[FALL, node] = hip_above_fall(system.model, y)
+    finder.values[HIP_FALL, node] = hip_above_fall(system.model, y)
     if is_bent(system):
         finder.values[KNEE, node] = knee_angle(system.model, y, 0)
 
@@ -158,10 +158,10 @@ def events_in_step(system: Mode, finder: CrossingFinder, at_start: bool) -> tupl
     strike = first_crossing(finder, HEEL_STRIKE, FALLING, 0.0, on_ground)
     while strike <= 1.0 and value_at(finder, AHEAD, strike) <= 0.0:
         strike = first_crossing(finder, HEEL_STRIKE, FALLING, strike + 1e-12, on_ground)
-    fall, struck = first_crossing(finder, FALL, FALLING, 0.0, False), NO_CROSSING
+    fall, knee_strike = first_crossing(finder, HIP_FALL, FALLING, 0.0, False), NO_CROSSING
     if is_bent(system):
-        struck = first_crossing(finder, KNEE, RISING, SEARCH_START if at_start else 0.0, at_start)
-    return strike, fall, struck
+        knee_strike = first_crossing(finder, KNEE, RISING, SEARCH_START if at_start else 0.0, at_start)
+    return strike, fall, knee_strike
 
 
 @kernel_part
@@ -216,19 +216,19 @@ def swing_phase(
         near = may_end(system, method, at_start)
         if near or observer.watching:
             prepare_dense(method, system)
-        strike, fall, struck = NO_CROSSING, NO_CROSSING, NO_CROSSING
+        strike, fall, knee_strike = NO_CROSSING, NO_CROSSING, NO_CROSSING
         if near:
             sample(method, system, finder.nodes, finder.states)
-            strike, fall, struck = events_in_step(system, finder, at_start)
+            strike, fall, knee_strike = events_in_step(system, finder, at_start)
         if observer.watching:
-            observe(observer, method, system, finder, LEGS_TURN, min(1.0, strike, fall, struck), step)
-        if fall < min(strike, struck):
+            observe(observer, method, system, finder, LEG_RATE, min(1.0, strike, fall, knee_strike), step)
+        if fall < min(strike, knee_strike):
             return FELL
-        if is_bent(system) and strike < struck:
+        if is_bent(system) and strike < knee_strike:
             return BENT_KNEE
-        if min(strike, struck) <= 1.0:
+        if min(strike, knee_strike) <= 1.0:
             coming = True
-            limit = method.clock[T_OLD] + min(strike, struck) * (method.clock[T] - method.clock[T_OLD])
+            limit = method.clock[T_OLD] + min(strike, knee_strike) * (method.clock[T] - method.clock[T_OLD])
             rewind(method, system)
         at_start = False
     if not coming:

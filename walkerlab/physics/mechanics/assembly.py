@@ -78,10 +78,10 @@ def path(assembly: Assembly, start: str, goal: str) -> list[tuple[str, Position,
     frontier = [start]
     while frontier:
         body = frontier.pop()
-        for other, leaving, entering in neighbours(assembly, body):
-            if other not in reached:
-                reached[other] = [*reached[body], (body, leaving, entering)]
-                frontier.append(other)
+        for neighbour, leaving, entering in neighbours(assembly, body):
+            if neighbour not in reached:
+                reached[neighbour] = [*reached[body], (body, leaving, entering)]
+                frontier.append(neighbour)
     if goal not in reached:
         raise ValueError(f"no hinges lead from body {start!r} to body {goal!r}; add a Revolute between them")
     return reached[goal]
@@ -111,7 +111,7 @@ def total_mass(assembly: Assembly) -> float:
 def tree_about(assembly: Assembly, root: Anchor) -> Tree:
     """Compute the constants of the equations of motion with a material point as root."""
     mass_levers = [(mass, levers(assembly, root, at)) for mass, at in masses(assembly)]
-    return tree_of(assembly, mass_levers)
+    return sum_masses(assembly, mass_levers)
 
 
 def tree_about_centre(assembly: Assembly) -> tuple[Tree, tuple[Floats, ...]]:
@@ -120,10 +120,10 @@ def tree_about_centre(assembly: Assembly) -> tuple[Tree, tuple[Floats, ...]]:
     mass_levers = [(mass, levers(assembly, root, at)) for mass, at in masses(assembly)]
     centre = sum(mass * d for mass, d in mass_levers) / total_mass(assembly)
     feet = tuple(levers(assembly, root, Anchor(foot.body, foot.centre_m)) - centre for foot in assembly.feet)
-    return tree_of(assembly, [(mass, d - centre) for mass, d in mass_levers]), feet
+    return sum_masses(assembly, [(mass, d - centre) for mass, d in mass_levers]), feet
 
 
-def tree_of(assembly: Assembly, mass_levers: list[tuple[float, Floats]]) -> Tree:
+def sum_masses(assembly: Assembly, mass_levers: list[tuple[float, Floats]]) -> Tree:
     """Sum the levers of all masses into the constants."""
     A = np.diag([body.inertia_kg_m2 for body in assembly.bodies])
     B = np.zeros_like(A)
@@ -141,7 +141,7 @@ def followers(assembly: Assembly) -> dict[int, Floats]:
     rows = {}
     for coupling in assembly.couplings:
         row = np.zeros(len(assembly.bodies))
-        for other, weight in zip(coupling.of, coupling.weights, strict=True):
-            row[assembly.index(other)] += weight
+        for neighbour, weight in zip(coupling.of, coupling.weights, strict=True):
+            row[assembly.index(neighbour)] += weight
         rows[assembly.index(coupling.body)] = row
     return rows

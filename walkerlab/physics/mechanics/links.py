@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 from walkerlab.physics.kernels import forced_inline
 
 
-class Counted(NamedTuple):
+class CountedModel(NamedTuple):
     """Interface of models here, for one whose number of bodies is known only at run time.
 
     A model with tuples takes little more than half the time: the compiler unrolls its loops.
@@ -22,7 +22,7 @@ class Counted(NamedTuple):
 
 
 @forced_inline
-def spread(model: Any, phase: int, z: Any) -> None:
+def expand(model: Any, phase: int, z: Any) -> None:
     """Replace z (n,) by E z: a follower moves with the bodies it follows."""
     n = len(model.arm_x)
     for c in range(n):
@@ -75,4 +75,4 @@ def solve_linked(model: Any, phase: int, factors: Any, b: Any) -> None:
         b[k] *= factors[k, k]
         for j in range(k + 1, n):
             b[k] -= factors[k, j] * b[j]
-    spread(model, phase, b)
+    expand(model, phase, b)

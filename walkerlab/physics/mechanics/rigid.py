@@ -36,9 +36,9 @@ def on_level_ground(assembly: Assembly, gravity: float, knee_locked_at_strike: b
 
     Raises ValueError, with a message for the user, for parts that are not a walker with two equal legs.
     """
-    refuse_unlike_legs(assembly)
-    hip = hip_of(assembly)
-    places = places_of(assembly)
+    check_equal_legs(assembly)
+    hip = find_hip(assembly)
+    places = group_bodies(assembly)
     foot = assembly.feet[STANCE]
     root = Anchor(foot.body, foot.centre_m)
     to_foot = places.members.T @ levers(
@@ -76,7 +76,7 @@ def on_level_ground(assembly: Assembly, gravity: float, knee_locked_at_strike: b
     )
 
 
-def places_of(assembly: Assembly) -> BodyPlaces:
+def group_bodies(assembly: Assembly) -> BodyPlaces:
     """Group the bodies: swing leg (thigh), straight stance leg, other swinging bodies, and bodies of both legs."""
     swinging, stance = assembly.legs
     shared = tuple(body.name for body in assembly.bodies if body.name not in (*swinging, *stance))
@@ -86,16 +86,16 @@ def places_of(assembly: Assembly) -> BodyPlaces:
         for name in group:
             members[assembly.index(name), place] = 1.0
     more = len(swinging) - 1
-    knee_of = {knee.shank: knee.thigh for knee in assembly.knees}
+    knee_position = {knee.shank: knee.thigh for knee in assembly.knees}
     return BodyPlaces(
         names=("1", "2", *(f"1_{name.split()[0]}" for name in swinging[1:]), *(name.split()[0] for name in shared)),
         members=members,
         roles=(STANCE, SWING, *((STANCE,) * more), *range(2 + more, len(groups))),
-        knees=tuple((2 + k, place_of(groups, knee_of[name])) for k, name in enumerate(swinging[1:])),
+        knees=tuple((2 + k, group_index(groups, knee_position[name])) for k, name in enumerate(swinging[1:])),
     )
 
 
-def place_of(groups: list[tuple[str, ...]], name: str) -> int:
+def group_index(groups: list[tuple[str, ...]], name: str) -> int:
     """Return the index of the group that holds a body."""
     return next(place for place, group in enumerate(groups) if name in group)
 
@@ -111,7 +111,7 @@ def knee_rows(places: BodyPlaces) -> dict[int, Floats]:
     return {shank: np.eye(len(places.names))[thigh] for shank, thigh in places.knees}
 
 
-def hip_of(assembly: Assembly) -> Revolute:
+def find_hip(assembly: Assembly) -> Revolute:
     """Return the hinge between the legs, with the stance leg as its parent."""
     first, second = (leg[0] for leg in assembly.legs)
     hinge = assembly.hinge(second, first)
@@ -120,13 +120,13 @@ def hip_of(assembly: Assembly) -> Revolute:
     return hinge
 
 
-def knee_of(assembly: Assembly) -> tuple[float, float] | None:
+def knee_position(assembly: Assembly) -> tuple[float, float] | None:
     """Return the position of the knee in a thigh's frame (m); None without knees."""
     hinges = (assembly.hinge(knee.thigh, knee.shank) for knee in assembly.knees)
     return next((hinge.parent_point_m for hinge in hinges if hinge is not None), None)
 
 
-def refuse_unlike_legs(assembly: Assembly) -> None:
+def check_equal_legs(assembly: Assembly) -> None:
     """Raise ValueError unless both legs have the same parts in the same order, joined by knees, and a foot each."""
     first, second = assembly.legs
     if not first or len(first) != len(second):
@@ -155,7 +155,7 @@ def refuse_unlike_legs(assembly: Assembly) -> None:
 def leg_measures(assembly: Assembly, k: int) -> Floats:
     """Compute mass, inertia, centre of mass and foot of a leg, relative to its hip."""
     leg, foot = assembly.legs[k], assembly.feet[k]
-    hip = hip_of(assembly)
+    hip = find_hip(assembly)
     at_hip = Anchor(hip.parent, hip.parent_point_m) if k == 1 else Anchor(hip.child, hip.child_point_m)
     own = [assembly.index(name) for name in leg]
     measures = [foot.radius_m, *levers(assembly, at_hip, Anchor(foot.body, foot.centre_m))[own].ravel()]

@@ -30,7 +30,7 @@ from walkerlab.physics.mechanics.hinges import (
     is_sprung,
     legs_apart,
 )
-from walkerlab.physics.mechanics.links import factor_linked, solve_linked, spread
+from walkerlab.physics.mechanics.links import expand, factor_linked, solve_linked
 from walkerlab.physics.mechanics.tree import (
     add_gravity,
     add_gravity_gradient,
@@ -49,7 +49,7 @@ BENT, STRAIGHT, AT_STRIKE = 0, 1, 2
 NO_SHANK = -1
 
 
-@tree.read_at_once
+@tree.fast_fields
 class RigidModel(tree.Mechanism):  # type: ignore[misc]  # as its base
     """Constants of the rigid model, SI: a structured scalar, for n bodies by its type.
 
@@ -385,8 +385,8 @@ def kinetic_energy(model: RigidModel, y: Any) -> float:
     return energies(model, y)[0]
 
 
-def linked(model: RigidModel, phase: int, values: Any) -> Floats:
+def apply_couplings(model: RigidModel, phase: int, values: Any) -> Floats:
     """Return values (n,) of all bodies, with the followers' computed from those of the bodies they follow."""
     every = np.array(values, float)
-    spread(model, phase, every)
+    expand(model, phase, every)
     return every

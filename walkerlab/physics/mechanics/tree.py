@@ -28,7 +28,7 @@ from walkerlab.physics.solvers.system import Floats, Integers
 R = TypeVar("R", bound=type)
 
 
-def read_at_once(kind: R) -> R:
+def fast_fields(kind: R) -> R:
     """Give a class of records fast access to its annotated fields.
 
     NumPy's field look-up takes several times as long, and walks are prepared and evaluated in Python.
@@ -58,7 +58,7 @@ def new_record(kind: Any, **fields: Any) -> Any:
     return record
 
 
-@read_at_once
+@fast_fields
 class Mechanism(np.record):  # type: ignore[misc]  # NumPy's stubs call one of its bases final
     """Constants of a tree of n bodies about its root, its hinges and the forces on it, for both models, SI."""
 
