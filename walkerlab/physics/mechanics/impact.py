@@ -76,7 +76,8 @@ def strike(model: RigidModel, phase: int, other_foot: bool, y: Any, new: Any) ->
     factor_linked(model, phase, factors)
     pushed = other_foot and model.push_off != 0.0
     twist = push_off(model, new).angular if pushed else 0.0
-    project(model, phase, M, factors, F, U, new[n : 2 * n], along, upward, twist, p)
+    constraints = Constraints(phase, M, factors, F, U)
+    project(model, constraints, new[n : 2 * n], along, upward, twist, p)
     jump, turned = vector(like), vector(like)
     for k in range(n):
         jump[k] = p[k] - new[n + k]
@@ -97,7 +98,7 @@ def strike(model: RigidModel, phase: int, other_foot: bool, y: Any, new: Any) ->
             twist = push.by_trailing * new[at + SWING] + push.by_leading * new[at + STANCE]
         turn, rate = new[at : at + n], new[at + n : at + 2 * n]
         mass_change(model, s, c, turn, jump, jump_along, jump_upward, turned)
-        project_change(model, phase, M, factors, F, U, rate, along, upward, twist, turned, p)
+        project_change(model, constraints, rate, along, upward, twist, turned, p)
         for k in range(n):
             new[at + n + k] = p[k]
 
@@ -136,10 +137,11 @@ def lock(tree: RootedTree, angles: Floats, omega: Floats, turns: Floats, rates: 
     add_inertia(tree, n, s, c, omega, M, p)
     factors = M.copy()
     factor_linked(tree, 0, factors)
-    project(tree, 0, M, factors, F, U, omega, 0.0, 0.0, 0.0, p)
+    constraints = Constraints(0, M, factors, F, U)
+    project(tree, constraints, omega, 0.0, 0.0, 0.0, p)
     if rates.shape[1] > 0:
         mass_change(tree, s, c, turns, p - omega, 0.0, 0.0, turned)
-        project_change(tree, 0, M, factors, F, U, rates, 0.0, 0.0, 0.0, turned, changes)
+        project_change(tree, constraints, rates, 0.0, 0.0, 0.0, turned, changes)
     return Lock(p, float(0.5 * (M @ omega) @ (omega - p)), changes)
 
 
@@ -219,42 +221,48 @@ def pushed_at_hip(model: RigidModel, y: Any, impulse: float) -> NDArray[np.float
     return new
 
 
+class Constraints(NamedTuple):
+    """Constraints E[phase] of an impact, with the masses of a tree about the root that they leave."""
+
+    phase: int
+    M: Any  # (n, n) kg m^2
+    factors: Any  # (n, n) of `factor_linked`
+    F: Any  # (n,) kg m, projections of the first moments
+    U: Any
+
+
 @forced_inline
 def project(
-    model: Any, phase: int, M: Any, factors: Any, F: Any, U: Any, omega: Any, along: float, upward: float, twist: float,
-    p: Any,
-) -> None:  # fmt: skip
-    """Write the velocities after a plastic impact on the constraints of E[phase] into p (n,).
+    model: Any, constraints: Constraints, omega: Any, along: float, upward: float, twist: float, p: Any
+) -> None:
+    """Write the velocities after a plastic impact on constraints into p (n,).
 
-    model                 a tree of either model about the root that the constraints leave
-    M, factors            (n, n) kg m^2, and what `factor_linked` makes of it
-    F, U                  (n,) kg m, projections of the first moments
+    model                 a tree of either model
     omega, along, upward  (n,) rad/s and m/s, velocities before of the bodies and of the root
     twist                 N m s, an impulse on the stance leg
     """
-    momenta(model, M, F, U, omega, along, upward, p)
+    momenta(model, constraints.M, constraints.F, constraints.U, omega, along, upward, p)
     p[STANCE] += twist
-    solve_linked(model, phase, factors, p)
+    solve_linked(model, constraints.phase, constraints.factors, p)
 
 
 @forced_inline
 def project_change(
-    model: Any, phase: int, M: Any, factors: Any, F: Any, U: Any, rate: Any, along: float, upward: float, twist: float,
-    turned: Any, p: Any,
-) -> None:  # fmt: skip
-    """As `project`, of a change of the velocities, with the change of the momenta (n,) by the angles in `turned`."""
-    momenta(model, M, F, U, rate, along, upward, p)
+    model: Any, constraints: Constraints, rate: Any, along: float, upward: float, twist: float, turned: Any, p: Any
+) -> None:
+    """Project a change of the velocities like `project`; `turned` (n,) is the change of momenta due to the angles."""
+    momenta(model, constraints.M, constraints.F, constraints.U, rate, along, upward, p)
     for k in range(len(model.arm_x)):
         p[k] -= turned[k]
     p[STANCE] += twist
-    solve_linked(model, phase, factors, p)
+    solve_linked(model, constraints.phase, constraints.factors, p)
 
 
 @forced_inline
 def momenta(model: Any, M: Any, F: Any, U: Any, omega: Any, along: float, upward: float, p: Any) -> None:
-    """Z' M u into p (n,), with the angular velocities omega (n,).
+    """Write Z' M u into p (n,), with the angular velocities omega (n,).
 
-    M is M' of rigid_model.py, whose part in the rolling of angular velocities is taken out again.
+    M is M' of rigid_model.py, so the rolling part of the angular velocities is subtracted again.
     """
     n, R = len(model.arm_x), model.radius
     sliding = along + R * omega[STANCE]
@@ -268,9 +276,9 @@ def momenta(model: Any, M: Any, F: Any, U: Any, omega: Any, along: float, upward
 
 @forced_inline
 def mass_change(model: Any, s: Any, c: Any, turn: Any, jump: Any, along: float, upward: float, p: Any) -> None:
-    """Z' dM w into p (n,): the change of the masses' matrix as the bodies turn, times a jump w of the velocities.
+    """Write Z' dM w into p (n,): the change of the mass matrix with the angles, times a jump w of the velocities.
 
-    turn  (n,) how the angles change
+    turn  (n,) changes of the angles
     """
     n = len(model.arm_x)
     F, U = vector(model.arm_x), vector(model.arm_x)
