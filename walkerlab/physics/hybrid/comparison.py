@@ -132,28 +132,28 @@ def add_strike_samples(motion: Motion) -> Motion:
         if 3 <= place <= motion.time.size - 3 and strike not in motion.time:
             added += [(strike - side, slice(place - 3, place)), (strike, slice(place, place + 3))]
     strikes = np.concatenate((motion.step_ends, motion.knee_strikes))
-    added = [(at, known) for at, known in added if not jumps_among(motion.time[known], at, strikes, 2.0 * side)]
+    added = [(t, near) for t, near in added if not jumps_among(motion.time[near], t, strikes, 2.0 * side)]
     if not added:
         return motion
-    rows = [extrapolate(motion, known, at) for at, known in added]
-    time = np.concatenate((motion.time, [at for at, _ in added]))
+    rows = [extrapolate(motion, near, t) for t, near in added]
+    time = np.concatenate((motion.time, [t for t, _ in added]))
     order = np.argsort(time)
     angle = np.concatenate((motion.angle, [row[0] for row in rows]))
     velocity = np.concatenate((motion.velocity, [row[1] for row in rows]))
     return replace(motion, time=time[order], angle=angle[order], velocity=velocity[order])
 
 
-def jumps_among(times: Array, at: float, strikes: Array, close: float) -> bool:
-    """Whether a strike, other than those closer than `close` (s) to the time `at`, lies between it and the times."""
-    between = (strikes > min(times[0], at)) & (strikes < max(times[-1], at)) & (np.abs(strikes - at) > close)
+def jumps_among(times: Array, time: float, strikes: Array, close: float) -> bool:
+    """Whether a strike, other than those closer than `close` (s) to `time`, lies between it and the times."""
+    between = (strikes > min(times[0], time)) & (strikes < max(times[-1], time)) & (np.abs(strikes - time) > close)
     return bool(between.any())
 
 
-def extrapolate(motion: Motion, known: slice, at: float) -> tuple[Array, Array]:
+def extrapolate(motion: Motion, samples: slice, time: float) -> tuple[Array, Array]:
     """Extrapolate angles and velocities (leg,) to a time by the parabola through three samples."""
-    times = motion.time[known]
-    weights = [np.prod([(at - other) / (one - other) for other in times if other != one]) for one in times]
-    return np.asarray(weights @ motion.angle[known]), np.asarray(weights @ motion.velocity[known])
+    times = motion.time[samples]
+    weights = [np.prod([(time - node) / (own - node) for node in times if node != own]) for own in times]
+    return np.asarray(weights @ motion.angle[samples]), np.asarray(weights @ motion.velocity[samples])
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,8 +165,8 @@ class WalkDifference:
 
     def largest(self, of: Quantity) -> list[float]:
         """Return the largest difference (leg,) of each leg's angle (rad) or velocity (rad/s)."""
-        found: list[float] = np.abs(getattr(self, of)).reshape(-1, LEG_COUNT).max(axis=0).tolist()
-        return found
+        largest: list[float] = np.abs(getattr(self, of)).reshape(-1, LEG_COUNT).max(axis=0).tolist()
+        return largest
 
 
 def difference_in_time(walk: Motion, reference: Motion) -> tuple[Array, WalkDifference]:
@@ -221,9 +221,9 @@ def orbit_distances(walk: Motion, reference: Motion) -> Array:
     stride, reference_stride = walk.last_stride(), reference.last_stride()
     distances = np.empty(LEG_COUNT)
     for leg in range(LEG_COUNT):
-        orbit, other = phase_plane(stride, leg), phase_plane(reference_stride, leg)
-        scale = np.ptp(other, axis=0)
-        distances[leg] = hausdorff(orbit / scale, other / scale)
+        orbit, reference_orbit = phase_plane(stride, leg), phase_plane(reference_stride, leg)
+        scale = np.ptp(reference_orbit, axis=0)
+        distances[leg] = hausdorff(orbit / scale, reference_orbit / scale)
     return distances
 
 
@@ -232,9 +232,9 @@ def phase_plane(motion: Motion, leg: int) -> Array:
     return np.column_stack((motion.angle[:, leg], motion.velocity[:, leg]))
 
 
-def hausdorff(curve: Array, other: Array) -> float:
+def hausdorff(curve: Array, reference: Array) -> float:
     """Compute the largest distance of a point of either polyline (points, 2) from the other."""
-    return max(farthest_distance(refine(curve), other), farthest_distance(refine(other), curve))
+    return max(farthest_distance(refine(curve), reference), farthest_distance(refine(reference), curve))
 
 
 def refine(curve: Array) -> Array:

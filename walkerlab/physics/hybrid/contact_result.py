@@ -39,7 +39,6 @@ from walkerlab.physics.solvers.registry import Tolerances, finder_for, method_na
 from walkerlab.physics.solvers.stepping import ACCEPTED, JACOBIANS, REJECTED, RHS, T
 from walkerlab.physics.solvers.system import Floats, State
 
-ROUNDING = 1e-14  # of a start's coordinates and velocities
 USUAL_STEP = 3.0  # pendulum times; most steps are shorter
 # Residuals over rtol times energy and work exchanged: random walks leave at most 0.5 by radau5 at any rtol from 1e-2 to
 # 1e-9 (scripts/contact_campaign.py prints those of its walks), and 9 by the libraries' multistep methods; cases of the

@@ -78,17 +78,17 @@ class RigidWalkResult(WalkRecord):
     @property
     def objections(self) -> tuple[str, ...]:
         """Ways in which this walk demands more of the ground than real ground provides."""
-        found = []
+        reasons = []
         if self.min_normal_force < 0.0:
-            found.append(f"the ground would have to pull with {-self.min_normal_force:.3g} N")
+            reasons.append(f"the ground would have to pull with {-self.min_normal_force:.3g} N")
         if self.min_normal_impulse is not None and self.min_normal_impulse < 0.0:
-            found.append(f"the ground would have to pull with {-self.min_normal_impulse:.3g} N s in a strike")
+            reasons.append(f"the ground would have to pull with {-self.min_normal_impulse:.3g} N s in a strike")
         if self.max_friction_ratio > MAX_FRICTION:
-            found.append(
+            reasons.append(
                 f"the stance foot would slip: it takes a friction coefficient of {self.max_friction_ratio:.3g}, and "
                 f"hardly any ground gives more than {MAX_FRICTION:g}"
             )
-        return tuple(found)
+        return tuple(reasons)
 
     @property
     def final_state(self) -> State:
@@ -132,10 +132,10 @@ def take_walk(
         return recorder.finished(Outcome.REJECTED)
     status = Outcome.WALKED
     while recorder.steps < steps and status == Outcome.WALKED:
-        taken = recorder.steps
-        status = recorder.walk_on(rises[taken : taken + STEPS_AT_ONCE + 1])
+        before = recorder.steps
+        status = recorder.walk_on(rises[before : before + STEPS_AT_ONCE + 1])
         if advance is not None:
-            advance(recorder.steps - taken)
+            advance(recorder.steps - before)
     return recorder.finished(status)
 
 
@@ -186,8 +186,8 @@ class Recorder:
         knees = seen.knee_time + self.time
         if self.sampled:
             self.pieces.append(self._samples(observer, strikes, before, after, knees))
-        for kept, new in ((self.strikes, strikes), (self.before, before), (self.after, after)):
-            kept.append(new)
+        for blocks, new in ((self.strikes, strikes), (self.before, before), (self.after, after)):
+            blocks.append(new)
         if self.kneed:
             self.knees.append(knees[:taken])
         self.steps += taken
@@ -219,23 +219,23 @@ class Recorder:
         # the springs' energy is counted among the works
         unsprung = walker.changed(laws=0.0) if walker.sprung else walker
         ends = [sum(energies(unsprung, y)) - energy_at_touch(unsprung, y[STANCE]) for y in (self.start, self.state)]
-        left = float(ends[1] - ends[0] - gravity - hip + self.tally.strike_loss)
-        hip, left = (hip + left, 0.0) if any(law.damping for law in laws) else (hip, left)
+        residual = float(ends[1] - ends[0] - gravity - hip + self.tally.strike_loss)
+        hip, residual = (hip + residual, 0.0) if any(law.damping for law in laws) else (hip, residual)
         push = float(push_off_work(walker, before).sum()) if walker.push_off else 0.0
         weight, forward = float(walker.mass * walker.gravity), float(self.tally.forward_work)
-        return DrivenWork(weight, gravity, push, hip, torque, forward), abs(left)
+        return DrivenWork(weight, gravity, push, hip, torque, forward), abs(residual)
 
     def _samples(self, observer: Observer, strikes: Array, before: Array, after: Array, knees: Array) -> Samples:
         """Merge the samples on the grid with both sides of the heel strikes."""
-        found = int(observer.tally[()].recorded)
-        grid = self.interval * np.arange(self.grid_index, self.grid_index + found, dtype=np.float64)
-        self.grid_index += found
+        count = int(observer.tally[()].recorded)
+        grid = self.interval * np.arange(self.grid_index, self.grid_index + count, dtype=np.float64)
+        self.grid_index += count
         events = np.append(strikes, self.time) if self.steps else strikes
         kept = far_from(grid, np.sort(events), CLOSEST_SAMPLES * self.interval)
         swing = self.steps + np.arange(strikes.size)
         time = np.concatenate((grid[kept], np.nextafter(strikes, -np.inf), strikes))
-        state = np.concatenate((observer.states[:found][kept], before, after))
-        step = np.concatenate((self.steps + observer.steps[:found][kept], swing, swing + 1))
+        state = np.concatenate((observer.states[:count][kept], before, after))
+        step = np.concatenate((self.steps + observer.steps[:count][kept], swing, swing + 1))
         # a knee that has not struck yet is free
         until = np.append(np.where(knees > self.time, knees, np.inf), np.inf)
         bent = time < until[step - self.steps] if self.kneed else np.zeros(time.size, np.bool_)
@@ -249,7 +249,7 @@ class Recorder:
         end_time = self.time if outcome == Outcome.WALKED else float(self.tally.duration)
         if outcome == Outcome.WALKED and self.tally.min_normal_force < 0.0:
             outcome = Outcome.LIFTED_OFF
-        strikes, before, after = (np.concatenate(kept) for kept in (self.strikes, self.before, self.after))
+        strikes, before, after = (np.concatenate(blocks) for blocks in (self.strikes, self.before, self.after))
         lengths = step_lengths(self.walker, np.vstack((self.start, after))[:-1], before)
         climbed = 0.0 if self.heights is None else float(self.heights[self.steps])
         gravity = float(self.walker.mass) * float(
