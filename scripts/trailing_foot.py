@@ -27,10 +27,10 @@ from walkerlab.physics.ground.walker import (
     FootMotion,
     OnGround,
     feet_motion,
-    folded,
     foot_force,
     on_ground,
     sines_cosines,
+    to_form,
 )
 from walkerlab.physics.hybrid.contact_result import walk_contact
 from walkerlab.physics.mechanics.tree import add_inertia, projections
@@ -72,7 +72,7 @@ def at_touch(ground: Ground, name: str, slope_deg: float) -> tuple[OnGround, Flo
     y = walk_contact(trial.walker, trial.ground, False, TRAILING, trial.start, methods, 1, None).end_state
     assert not trial.walker.whole.release_at_touch, "both knees are still locked as the foot sinks in"
     system = on_ground(trial.walker, (True, True), (LOCKED, LOCKED))
-    return system, folded(system.form, y)
+    return system, to_form(system.form, y)
 
 
 def freed(system: OnGround, y: Floats) -> FootMotion:

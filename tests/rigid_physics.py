@@ -5,8 +5,8 @@ from scipy.integrate import solve_ivp
 
 from walkerlab.physics.mechanics import impact
 from walkerlab.physics.mechanics.assembly import Anchor, levers, masses
-from walkerlab.physics.mechanics.rigid import places_of
-from walkerlab.physics.mechanics.rigid_model import BENT, STANCE, STRAIGHT, SWING, Mode, energies, linked
+from walkerlab.physics.mechanics.rigid import group_bodies
+from walkerlab.physics.mechanics.rigid_model import BENT, STANCE, STRAIGHT, SWING, Mode, apply_couplings, energies
 from walkerlab.physics.solvers.system import derivative
 
 
@@ -67,12 +67,12 @@ def torque_work_of_a_step(model, start, step):
 def state_linked(model, phase, y):
     """A state with the followers where those are that they follow."""
     n = len(y) // 2
-    return (*linked(model, phase, y[:n]), *linked(model, phase, y[n:]))
+    return (*apply_couplings(model, phase, y[:n]), *apply_couplings(model, phase, y[n:]))
 
 
 def momentum_of_masses(assembly, slope, y):
     """Along the slope and normal to it (kg m/s), mass by mass, standing on the assembly's second foot."""
-    members = places_of(assembly).members
+    members = group_bodies(assembly).members
     theta, omega = members @ np.array(y).reshape(2, -1)[0], members @ np.array(y).reshape(2, -1)[1]
     foot = assembly.feet[1]
     along = np.array([np.cos(slope), -np.sin(slope)])

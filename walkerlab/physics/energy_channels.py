@@ -2,20 +2,20 @@
 
 from typing import NamedTuple
 
-# places in the account, J so far; the last two are the hip torque's part of the hip's work, and what of it is positive
-DAMPING, FRICTION, EDGES, KNEE_STRIKES, KNEE_STOP, PUSH_OFF, HIP, TORQUE, FORWARD = range(9)
+# entries of the account, J so far; the last two are the work of the hip torque, a part of HIP, and its positive work
+DAMPING_LOSS, FRICTION_LOSS, EDGES, KNEE_STRIKES, KNEE_STOP, PUSH_OFF, HIP_WORK, TORQUE, FORWARD = range(9)
 ENTRIES = FORWARD + 1
-LOST, GIVEN = slice(DAMPING, PUSH_OFF), slice(PUSH_OFF, TORQUE)
+LOSS_ENTRIES, SUPPLY_ENTRIES = slice(DAMPING_LOSS, PUSH_OFF), slice(PUSH_OFF, TORQUE)
 
 
 class Loss(NamedTuple):
-    """A way of losing energy."""
+    """Channel of energy loss."""
 
-    key: str  # under which a walk's loss is stored
-    where: str  # energy is lost
-    variable: str  # over time; none of its own where it is empty
+    key: str  # of the loss in results
+    where: str  # completes 'energy is lost'
+    variable: str  # over time; empty if the loss has no variable of its own
     meaning: str  # of the variable
-    cause: str  # in figures
+    cause: str  # as figures name it
     colour: str
 
 

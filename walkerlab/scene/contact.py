@@ -12,7 +12,7 @@ import numpy as np
 from walkerlab.config.walkers import Kneed, PartsWalker
 from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.physics.ground.compliant import KneeRules, contact_walker
-from walkerlab.physics.ground.friction import FrictionLaw, law_named
+from walkerlab.physics.ground.friction import FrictionLaw, create_law
 from walkerlab.physics.ground.knees import KneeStop
 from walkerlab.physics.ground.normal_force import NormalLaw
 from walkerlab.physics.ground.resting import RestingFoot, resting_foot
@@ -21,7 +21,7 @@ from walkerlab.physics.ground.walker import ContactWalker, changed_forms, floati
 from walkerlab.physics.hybrid.contact_events import Frame, JudgedGround
 from walkerlab.physics.hybrid.contact_result import ContactWalkResult, walk_contact
 from walkerlab.physics.mechanics.parts import Assembly
-from walkerlab.physics.mechanics.rigid import places_of
+from walkerlab.physics.mechanics.rigid import group_bodies
 from walkerlab.physics.orbits.contact_gait import GaitAnswer, find_gait_from
 from walkerlab.physics.orbits.contact_map import WalkerOnGround
 from walkerlab.physics.solvers.registry import Tolerances
@@ -171,7 +171,7 @@ def friction_law(contact: Contact) -> FrictionLaw:
     Raises ConfigError for a law added by a user that is incomplete.
     """
     try:
-        return law_named(contact.friction, contact.in_si())
+        return create_law(contact.friction, contact.in_si())
     except TypeError as error:
         raise ConfigError(f"{error}.", "docs/adding.md lists the parts of a law.") from error
 
@@ -186,7 +186,7 @@ def start_state(scene: ContactScene, rigid_state: State) -> State:
     about its centre.
     """
     walker = scene.walker
-    members = places_of(scene.assembly).members
+    members = group_bodies(scene.assembly).members
     parts = np.array(rigid_state).reshape(2, members.shape[1])
     turned = parts @ members.T
     hinged = floating_state(walker.forms[1, 0], turned.ravel(), walker.size)

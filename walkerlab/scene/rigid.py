@@ -11,7 +11,7 @@ from walkerlab.config.ground import Footholds
 from walkerlab.config.walkers import Walker
 from walkerlab.errors import ConfigError
 from walkerlab.physics.hybrid.recorded_walk import RigidWalkResult, take_walk
-from walkerlab.physics.mechanics.rigid import knee_of, on_level_ground, places_of
+from walkerlab.physics.mechanics.rigid import group_bodies, knee_position, on_level_ground
 from walkerlab.physics.mechanics.rigid_model import RigidModel, on_slope
 from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.physics.solvers.system import State
@@ -52,7 +52,7 @@ def rigid_scene(config: RigidConfig, ground: Footholds, outputs: tuple[Output, .
     return RigidScene(
         walker=rigid_walker(config),
         names=state_names(config),
-        knee_m=knee_of(assembly_of(config.walker, rigid=True)),
+        knee_m=knee_position(assembly_of(config.walker, rigid=True)),
         outputs=outputs,
         ground=ground,
     )
@@ -74,5 +74,5 @@ def level_walker(walker: Walker, gravity: float) -> RigidModel:
 
 
 def state_names(config: RigidConfig) -> tuple[str, ...]:
-    angles = tuple(f"theta_{name}" for name in places_of(assembly_of(config.walker, rigid=True)).names)
+    angles = tuple(f"theta_{name}" for name in group_bodies(assembly_of(config.walker, rigid=True)).names)
     return (*angles, *(f"d{name}" for name in angles))

@@ -9,7 +9,7 @@ from walkerlab.physics.ground.compliant import KneeRules, contact_walker
 from walkerlab.physics.ground.energy import total_energy
 from walkerlab.physics.ground.friction import Coulomb
 from walkerlab.physics.ground.normal_force import NormalLaw
-from walkerlab.physics.ground.walker import LOCKED, RELEASED, floating_state, folded, locked_knees, on_ground, unfolded
+from walkerlab.physics.ground.walker import LOCKED, RELEASED, floating_state, locked_knees, on_ground, to_form, to_full
 from walkerlab.physics.mechanics.parts import Assembly, BallFoot, Body, Revolute
 from walkerlab.physics.mechanics.walkers import Arc, Limb, kneed_legs, with_torso
 
@@ -46,9 +46,9 @@ def test_one_body_accelerates_as_the_two_that_are_held_together(assembly, knee):
     # a walker with stops keeps its bodies, and the shank follows
     expected = rate_of(on_ground(walker_of(assembly, stop=LAW), BOTH, knee), y)
     one = on_ground(walker, BOTH, knee)
-    z = folded(one.form, y)
+    z = to_form(one.form, y)
     assert z.size == y.size - 2 * sum(doing == LOCKED for doing in knee)
-    whole = unfolded(one.form, rate_of(one, z), y.size)
+    whole = to_full(one.form, rate_of(one, z), y.size)
     np.testing.assert_allclose(whole, expected, rtol=1e-10, atol=1e-9)
     assert np.abs(expected).max() > 10.0  # the ground pushes
     assert total_energy(one, z) == pytest.approx(total_energy(on_ground(walker, BOTH), y), rel=1e-12)
@@ -61,7 +61,7 @@ def test_energies_of_a_hinged_form_are_those_of_the_same_motion_afloat(assembly,
     walker = walker_of(assembly)
     y, n = state_in_line(walker, knee), int(walker.whole.bodies)
     hinged = on_ground(walker, BOTH, knee, hinged=True)
-    z = folded(hinged.form, [*y[2 : 2 + n], *y[4 + n :]])
+    z = to_form(hinged.form, [*y[2 : 2 + n], *y[4 + n :]])
     afloat = floating_state(hinged.form, z, y.size)
     assert total_energy(hinged, z) == pytest.approx(total_energy(on_ground(walker, BOTH), afloat), rel=1e-12)
 
@@ -71,7 +71,7 @@ def test_a_state_of_bodies_that_are_one_is_found_in_that_of_all_bodies():
     for knee in KNEES:
         form = walker.forms[0, locked_knees(knee)]
         z = np.arange(4.0 + 2 * form.bodies)
-        np.testing.assert_array_equal(folded(form, unfolded(form, z, walker.size)), z)
+        np.testing.assert_array_equal(to_form(form, to_full(form, z, walker.size)), z)
 
 
 def test_levers_of_bodies_that_are_one_are_summed():

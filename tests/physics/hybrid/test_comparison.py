@@ -10,13 +10,13 @@ from scipy.spatial.distance import directed_hausdorff
 from walkerlab.physics.hybrid.comparison import (
     IMPACT_PHASE,
     Motion,
+    add_strike_samples,
     between_impacts,
     difference_in_phase,
     difference_in_time,
     hausdorff,
     orbit_distances,
     phase_plane,
-    sampled_at_strikes,
 )
 
 PERIOD, STEPS, KINK = 0.7, 6, 0.05
@@ -121,14 +121,14 @@ def rough(interval, impact):
 def test_a_touch_between_samples_is_continued_from_before_and_not_smeared_by_the_impact():
     motion = rough(interval=0.003, impact=1e-4)
     smeared = motion.during(0, np.array([1.0]))[1]
-    whole = sampled_at_strikes(motion).during(0, np.array([1.0]))[1]
+    whole = add_strike_samples(motion).during(0, np.array([1.0]))[1]
     assert_allclose(whole, -1.0, atol=1e-9)
     assert abs(smeared + 1.0).min() > 0.1
 
 
 def test_a_walk_with_samples_at_its_heel_strikes_is_left_alone():
     motion = walk()
-    assert sampled_at_strikes(motion) is motion
+    assert add_strike_samples(motion) is motion
 
 
 @pytest.mark.parametrize("shift", [2.0, 4.0])
@@ -172,7 +172,7 @@ def locking(at, interval=0.003):
 
 
 def test_a_knee_strike_between_samples_is_no_smear_on_either_side():
-    motion = sampled_at_strikes(locking(0.5005))
+    motion = add_strike_samples(locking(0.5005))
     times = np.linspace(0.49, 0.51, 400)
     angle, velocity = motion.at(times)
     assert_allclose(angle[:, 0], np.abs(times - 0.5005), atol=1e-9)
@@ -181,13 +181,13 @@ def test_a_knee_strike_between_samples_is_no_smear_on_either_side():
 
 def test_a_strike_is_not_continued_across_another():
     late = replace(locking(0.9975), step_ends=np.array([0.9985]))
-    assert not np.isin([0.9975, 0.9985], sampled_at_strikes(late).time).any()
+    assert not np.isin([0.9975, 0.9985], add_strike_samples(late).time).any()
     apart = replace(locking(0.9), step_ends=np.array([0.9985]))
-    assert np.isin([0.9, 0.9985], sampled_at_strikes(apart).time).all()
+    assert np.isin([0.9, 0.9985], add_strike_samples(apart).time).all()
 
 
 def test_knees_that_lock_a_moment_apart_are_no_difference_between_impacts():
-    one, other = (sampled_at_strikes(locking(at)) for at in (0.5045, 0.5155))
+    one, other = (add_strike_samples(locking(at)) for at in (0.5045, 0.5155))
     apart = difference_in_phase(one, other, PHASES)
     smooth = between_impacts(one, other, PHASES)
     assert max(apart.largest("velocity")) == pytest.approx(2.0)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from contact_walks import scene_of, walked
 
-from walkerlab.physics.hybrid.contact_result import sampled_feet
+from walkerlab.physics.hybrid.contact_result import sample_feet
 
 
 def test_samples_do_not_change_the_walk():
@@ -17,7 +17,7 @@ def test_samples_do_not_change_the_walk():
 def test_samples_show_the_touches_where_they_were_found():
     walk, scene = walked(interval=0.001, steps=4), scene_of()
     samples = walk.samples
-    feet = sampled_feet(scene.walker, samples)
+    feet = sample_feet(scene.walker, samples)
     for step, (time, along) in enumerate(zip(walk.touch_time_s, walk.touch_along_m, strict=True)):
         foot = step % 2  # leg 1 (foot 0) swings first
         before, after = np.searchsorted(samples.time_s, time) - 1, np.searchsorted(samples.time_s, time)
@@ -32,6 +32,6 @@ def test_samples_show_the_touches_where_they_were_found():
 
 def test_deepest_penetration_is_what_the_samples_show():
     walk, scene = walked(interval=0.001, steps=4), scene_of()
-    feet = sampled_feet(scene.walker, walk.samples)
+    feet = sample_feet(scene.walker, walk.samples)
     depth = np.where(walk.samples.has_ground > 0, -feet[:, :, 1], 0.0).max()
     assert 0.8 * walk.max_penetration_m < depth <= walk.max_penetration_m * (1.0 + 1e-9)

@@ -15,7 +15,7 @@ from walkerlab.evidence.verification.known import (
 )
 from walkerlab.physics.ground.friction import Coulomb
 from walkerlab.physics.ground.normal_force import NormalLaw
-from walkerlab.physics.hybrid.contact_result import sampled_feet
+from walkerlab.physics.hybrid.contact_result import sample_feet
 
 MASS, DROP = 2.0, 0.1
 DAMPED = NormalLaw(2e5, 1.5, 40.0, 1e-4)  # lets go on the way out
@@ -37,7 +37,7 @@ def test_dampings_share_of_a_bounce_is_the_height_that_it_costs(rtol):
 
 def test_the_deepest_penetration_is_found_inside_a_step():
     walk, scene = walked(interval=2e-5, steps=2), scene_of()
-    feet = sampled_feet(scene.walker, walk.samples)
+    feet = sample_feet(scene.walker, walk.samples)
     seen = np.where(walk.samples.has_ground > 0, -feet[:, :, 1], 0.0).max()
     assert seen <= walk.max_penetration_m * (1.0 + 1e-12)
     # a parabola between samples 20 us apart at a touch of a millisecond

@@ -8,7 +8,7 @@ import pytest
 from contact_walks import FIXED_POINT, scene_of, walked
 
 from walkerlab.outcome import Outcome
-from walkerlab.physics.hybrid.contact_result import sampled_feet
+from walkerlab.physics.hybrid.contact_result import sample_feet
 
 GLUE = ("contact.static_friction=100", "contact.dynamic_friction=100")
 ROUND = ("walker.foot_radius_m=0.3", "contact.terrain=after-mid-swing")
@@ -16,7 +16,7 @@ ROUND = ("walker.foot_radius_m=0.3", "contact.terrain=after-mid-swing")
 
 def test_slip_is_the_integral_of_the_material_points_velocity():
     walk, scene = walked(interval=5e-6, steps=2, tolerance=1e-9), scene_of()
-    feet = sampled_feet(scene.walker, walk.samples)
+    feet = sample_feet(scene.walker, walk.samples)
     stood = (feet[:, 1, 1] <= 0.0) & (walk.samples.time_s < walk.touch_time_s[0] + 0.05)
     last = int(np.flatnonzero(stood)[-1])
     slip = np.trapezoid(feet[: last + 1, 1, 4], walk.samples.time_s[: last + 1])

@@ -6,13 +6,13 @@ from pathlib import Path
 from walkerlab.physics import hybrid
 from walkerlab.physics.hybrid import contact_events, rigid_walk
 
-NO_EVENTS = {"MATERIAL", "PER_FOOT", "EVENT_FUNCTIONS", "NO_EVENT", "LEGS_TURN", "ROWS", "FARTHEST_SLIDE"}
+NO_EVENTS = {"MATERIAL", "PER_FOOT", "EVENT_FUNCTIONS", "NO_EVENT", "LEGS_TURN", "EVENT_ROWS", "FARTHEST_SLIDE"}
 
 
 def test_the_page_lists_every_event_of_both_models():
     of_contact = {name for name in vars(contact_events) if name.isupper()} - NO_EVENTS
-    rigid = ("HEEL_STRIKE", "FALL", "AHEAD", "KNEE")
-    assert [getattr(rigid_walk, name) for name in rigid] == list(range(rigid_walk.LEGS_TURN))
+    rigid = ("HEEL_STRIKE", "HIP_FALL", "AHEAD", "KNEE")
+    assert [getattr(rigid_walk, name) for name in rigid] == list(range(rigid_walk.LEG_RATE))
     assert of_contact | set(rigid) <= set(re.findall(r"[A-Z_]+", hybrid.__doc__))
 
 

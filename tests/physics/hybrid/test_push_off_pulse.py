@@ -10,7 +10,7 @@ from walkerlab.outcome import Outcome
 from walkerlab.physics.ground.motion import foot_wrench
 from walkerlab.physics.ground.pulse import pulse_force
 from walkerlab.physics.ground.walker import LOCKED, OF_BODIES, new_progress, on_ground
-from walkerlab.physics.hybrid.contact_result import sampled_feet
+from walkerlab.physics.hybrid.contact_result import sample_feet
 from walkerlab.physics.orbits.contact_map import step_from_section
 from walkerlab.physics.orbits.fixed_point import find_gaits
 from walkerlab.physics.solvers.registry import Tolerances
@@ -221,7 +221,7 @@ def test_a_bounce_of_the_leading_foot_while_a_pulse_lasts_begins_none():
     touch = float(scene.walk(start, 1, WALK).touch_time_s[0])
     seen = scene.walk(start, 2, WALK, touch + np.linspace(1e-9, 0.05, 4001)).samples
     leading, trailing = 0, 1
-    feet = sampled_feet(scene.walker, seen)
+    feet = sample_feet(scene.walker, seen)
     heights, t = feet[:, :, 1], seen.time_s - touch
     assert np.count_nonzero((heights[:-1, leading] > 0.0) & (heights[1:, leading] < 0.0)) >= 1
     assert (heights[:, trailing] > 0.0).mean() > 0.5

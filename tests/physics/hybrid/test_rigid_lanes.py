@@ -9,7 +9,7 @@ from walkerlab.evidence.paper.appendix_a import CORRECTED, RigidWalker, assemble
 from walkerlab.outcome import Outcome
 from walkerlab.physics.hybrid.endings import GOES_ON, WALKED
 from walkerlab.physics.hybrid.recorded_walk import take_walk
-from walkerlab.physics.hybrid.rigid_lanes import new_fates, new_lane_memory, struck, two_legs, walk_lanes
+from walkerlab.physics.hybrid.rigid_lanes import new_fates, new_lane_memory, record_strike, two_legs, walk_lanes
 from walkerlab.physics.solvers.registry import Tolerances
 
 STEPS = 10
@@ -31,7 +31,7 @@ class Strikes(NamedTuple):
     after: Any  # (n, steps, 4) states just after them
 
 
-@struck.case(Strikes)
+@record_strike.case(Strikes)
 def keep_strike(observer, walk, step, t, y):
     observer.times[walk, step] = t
     for i in range(4):

@@ -18,10 +18,10 @@ from walkerlab.physics.mechanics.rigid_model import (
     STRAIGHT,
     SWING,
     Mode,
+    apply_couplings,
     energies,
     ground_reaction,
     kinetic_energy,
-    linked,
     mode_jacobian,
     swing_foot,
 )
@@ -263,7 +263,7 @@ def test_the_derivative_of_a_strike_is_its_slope(strike, numbers):
 @pytest.mark.parametrize("leg", [SWING, STANCE])
 def test_both_feet_touch_where_straight_legs_lean_alike(leg):
     lean = ON_STRAIGHT_LEGS.lean
-    y = linked(ON_STRAIGHT_LEGS, STRAIGHT, (0.3 - 2.0 * (SLOPE + lean), -0.3) if leg else (0.2, 0.1))
+    y = apply_couplings(ON_STRAIGHT_LEGS, STRAIGHT, (0.3 - 2.0 * (SLOPE + lean), -0.3) if leg else (0.2, 0.1))
     both = y[SWING] + y[STANCE] + 2.0 * (SLOPE + lean)
     height, _ = swing_foot(ON_STRAIGHT_LEGS, (*y, 0.0, 0.0))
     assert (abs(height) < 1e-12) == (abs(both) < 1e-12)

@@ -40,7 +40,7 @@ def matrix(stages):
     return A
 
 
-A, B, C = matrix(12), np.array(tableau.A_13), np.array(tableau.C[:12])
+A, B, C = matrix(12), np.array(tableau.A_13), np.array(tableau.NODES[:12])
 
 
 def defects(weights, order):
@@ -54,7 +54,7 @@ def test_there_are_as_many_trees_as_cayley_counted():
 def test_stages_are_consistent():
     assert A.sum(axis=1) == pytest.approx(C, abs=1e-14)
     extra = [sum(getattr(tableau, f"A_{s}")) for s in (14, 15, 16)]
-    assert extra == pytest.approx(tableau.C[13:16], abs=1e-14)
+    assert extra == pytest.approx(tableau.NODES[13:16], abs=1e-14)
 
 
 @pytest.mark.parametrize("order", range(1, 9))

@@ -10,9 +10,9 @@ from walkerlab.config.schema import CVODE_PACKAGE
 from walkerlab.config.schema import METHODS as NAMES
 from walkerlab.physics.solvers import cvode
 from walkerlab.physics.solvers import registry as registry_module
-from walkerlab.physics.solvers.registry import CVODE, METHODS, method_named
+from walkerlab.physics.solvers.registry import CVODE_METHODS, METHODS, method_named
 
-OF_CVODE = {method.name for method in CVODE}
+OF_CVODE = {method.name for method in CVODE_METHODS}
 
 
 def test_a_config_may_name_every_method_and_no_other():
@@ -20,8 +20,8 @@ def test_a_config_may_name_every_method_and_no_other():
 
 
 def test_cvode_is_there_if_its_package_is():
-    assert cvode.PACKAGE == CVODE_PACKAGE
-    there = importlib.util.find_spec(cvode.PACKAGE) is not None
+    assert cvode.SUNDIALS_PACKAGE == CVODE_PACKAGE
+    there = importlib.util.find_spec(cvode.SUNDIALS_PACKAGE) is not None
     assert set(METHODS) >= OF_CVODE if there else not set(METHODS) & OF_CVODE
 
 

@@ -26,12 +26,12 @@ def collocation(T, real, pair, c):
 
 def own_dop853():
     rows = [[], *(getattr(dop853_tableau, f"A_{stage}") for stage in range(2, 13))]
-    return square(rows, 12), np.array(dop853_tableau.A_13), np.array(dop853_tableau.C[:12])
+    return square(rows, 12), np.array(dop853_tableau.A_13), np.array(dop853_tableau.NODES[:12])
 
 
 def own_radau5():
     T = np.array([radau5.T_1, radau5.T_2, (1.0, 1.0, 0.0)])
-    return collocation(T, radau5.GAMMA, radau5.ALPHA + 1j * radau5.BETA, radau5.C)
+    return collocation(T, radau5.GAMMA, radau5.ALPHA + 1j * radau5.BETA, radau5.RADAU_NODES)
 
 
 def of_scipys_radau():

@@ -12,7 +12,7 @@ from walkerlab.evidence.paper.prose import prose
 from walkerlab.outcome import Outcome
 from walkerlab.physics.ground.walker import ContactWalker
 from walkerlab.physics.hybrid.comparison import Array
-from walkerlab.physics.hybrid.contact_result import ContactWalkResult, sampled_energies, sampled_feet
+from walkerlab.physics.hybrid.contact_result import ContactWalkResult, sample_energies, sample_feet
 from walkerlab.physics.hybrid.endings import FALLEN_HIP
 from walkerlab.physics.hybrid.recorded_walk import take_walk
 from walkerlab.physics.hybrid.rigid_measures import energies, reactions
@@ -107,7 +107,7 @@ def adams_walk(
     rigid = adams_start(walker, (-2.0 * walker.slope - theta_2, theta_2, omega_1, omega_2))
     result = walk(rigid.state)
     assert result.samples is not None
-    time, normal = result.samples.time_s, sampled_feet(contact, result.samples)[:, :, 2]
+    time, normal = result.samples.time_s, sample_feet(contact, result.samples)[:, :, 2]
     total = normal.sum(axis=1)
     airborne = time[(total <= 0.0) & (time > 0.0)]
     later = np.zeros(0) if rigid.pull_from is None else total[time >= rigid.pull_from]
@@ -118,7 +118,7 @@ def adams_walk(
         airborne_from=float(airborne[0]) if airborne.size else None,
         later_normal_force=float(later.max()) if later.size else None,
         normal=normal,
-        mechanical=sampled_energies(contact, result.samples)[:, :2].sum(axis=1),
+        mechanical=sample_energies(contact, result.samples)[:, :2].sum(axis=1),
     )
 
 

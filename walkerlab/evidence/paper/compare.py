@@ -155,7 +155,7 @@ def motion_of(walk: Content) -> comparison.Motion | None:
     trajectory, strikes = walk["trajectory"], times_of_steps(walk, "knee_strike_time_s")
     touches = times_of_steps(walk, "touch_time_s")
     motion = comparison.Motion(trajectory["time"], angle, trajectory["velocity"], touches, strikes[strikes > 0.0])
-    return comparison.sampled_at_strikes(motion)
+    return comparison.add_strike_samples(motion)
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from walkerlab.labels import Label
 from walkerlab.outcome import Outcome
 from walkerlab.physics.ground.terrain import STANCE_FOOT
 from walkerlab.physics.ground.walker import ContactWalker
-from walkerlab.physics.hybrid.contact_result import ContactWalkResult, by_channel, sampled_feet
+from walkerlab.physics.hybrid.contact_result import ContactWalkResult, by_channel, sample_feet
 from walkerlab.physics.hybrid.recorded_walk import as_state, take_walk, with_scaled_rates
 from walkerlab.physics.mechanics.rigid_model import STANCE, SWING, RigidModel
 from walkerlab.physics.orbits import scaled_starts
@@ -155,7 +155,7 @@ class TuneRun:
         first = self.rigid_state[n + SWING], self.rigid_state[n + STANCE]
         if walk is None or walk.steps < 2 or walk.samples is None or 0.0 in first:
             return None
-        time, normal = walk.samples.time_s, sampled_feet(self.scene.walker, walk.samples)[:, :, 2]
+        time, normal = walk.samples.time_s, sample_feet(self.scene.walker, walk.samples)[:, :, 2]
         landed = walk.steps % 2  # leg 0 lands first
         swing = 1 - landed
         lifted = np.flatnonzero((time > walk.touch_time_s[-2]) & (normal[:, swing] <= 0.0) & (normal[:, landed] > 0.0))

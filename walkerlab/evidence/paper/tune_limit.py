@@ -10,7 +10,7 @@ from walkerlab.evidence.paper.printed import LARGEST_ERROR
 from walkerlab.labels import Label
 from walkerlab.physics.ground.compliant import contact_walker
 from walkerlab.physics.ground.walker import ContactWalker
-from walkerlab.physics.hybrid.comparison import Motion, sampled_at_strikes
+from walkerlab.physics.hybrid.comparison import Motion, add_strike_samples
 from walkerlab.physics.hybrid.recorded_walk import RigidWalkResult
 from walkerlab.physics.orbits.rigid_limit import (
     ALL_POINT_SERIES,
@@ -101,7 +101,7 @@ def limit_findings(
     legs = leg_variables(walk.samples)
     angle, velocity = legs["angle"].values, legs["velocity"].values
     recorded = Motion(walk.samples.time_s, angle, velocity, walk.touch_time_s, walk.knee_strikes_s)
-    motion = sampled_at_strikes(recorded)
+    motion = add_strike_samples(recorded)
     limit = Limit(
         scene.ground,
         float(rigid_gait["period_s"]),

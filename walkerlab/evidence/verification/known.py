@@ -17,7 +17,7 @@ from walkerlab.config.contact import Contact
 from walkerlab.evidence.verification import references
 from walkerlab.labels import Label
 from walkerlab.outcome import Outcome
-from walkerlab.physics.energy_channels import LOST
+from walkerlab.physics.energy_channels import LOSS_ENTRIES
 from walkerlab.physics.ground.compliant import contact_walker
 from walkerlab.physics.ground.friction import Coulomb
 from walkerlab.physics.ground.normal_force import NormalLaw
@@ -96,7 +96,7 @@ def run_until(
         raise ArithmeticError(f"ended as {stopped.outcome.label} at {stopped.time_s:.4g} s of {duration_s:.4g} s")
     recorded = int(observer.tally.recorded)
     times, states = observer.samples.time_s[:recorded].copy(), observer.samples.states[:recorded].copy()
-    return ParticleRun(times, states, stopped.state, observer.account[LOST].copy())
+    return ParticleRun(times, states, stopped.state, observer.account[LOSS_ENTRIES].copy())
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ import numpy as np
 from walkerlab.evidence.verification.verdict import finite
 from walkerlab.physics.mechanics.assembly import Anchor, levers, masses
 from walkerlab.physics.mechanics.parts import Assembly
-from walkerlab.physics.mechanics.rigid import hip_of, places_of
+from walkerlab.physics.mechanics.rigid import find_hip, group_bodies
 from walkerlab.physics.mechanics.rigid_model import STANCE, SWING
 from walkerlab.physics.solvers.system import Floats
 
@@ -80,10 +80,10 @@ class RigidMasses:
 
     def __init__(self, assembly: Assembly, slope: float) -> None:
         """Take levers from the centre of the stance foot's arc; slope in rad."""
-        foot, trailing, hip = assembly.feet[STANCE], assembly.feet[SWING], hip_of(assembly)
+        foot, trailing, hip = assembly.feet[STANCE], assembly.feet[SWING], find_hip(assembly)
         root = Anchor(foot.body, foot.centre_m)
         self.assembly, self.slope, self.radius = assembly, slope, foot.radius_m
-        self.members = places_of(assembly).members
+        self.members = group_bodies(assembly).members
         self.masses = Masses(assembly, root)
         self.owner = [assembly.index(anchor.body) for _, anchor in masses(assembly)]
         self.to_hip = levers(assembly, root, Anchor(hip.parent, hip.parent_point_m))

@@ -18,7 +18,7 @@ from walkerlab.evidence.verification.scaling import pendulum_time
 from walkerlab.evidence.verification.verdict import MAGNIFIED, Measure, NotMeasured, finite, promised
 from walkerlab.physics.ground.friction import steepest_change
 from walkerlab.physics.hybrid.contact_record import ContactSamples
-from walkerlab.physics.hybrid.contact_result import sampled_feet
+from walkerlab.physics.hybrid.contact_result import sample_feet
 from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.physics.solvers.stepping import ACCEPTED
 from walkerlab.physics.solvers.system import Floats, State
@@ -135,7 +135,7 @@ def impulse_rate(samples: ContactSamples, scene: ContactScene, config: RigidConf
 
     Sums ground, gravity and, from the times of touches (steps,) on, push-offs.
     """
-    along, height, normal, friction, _ = np.moveaxis(sampled_feet(scene.walker, samples), 2, 0)
+    along, height, normal, friction, _ = np.moveaxis(sample_feet(scene.walker, samples), 2, 0)
     slope = config.slope_rad
     weight = config.walker.total_mass_kg * config.gravity_m_s2 * np.array([np.sin(slope), -np.cos(slope)])
     torque = (along * normal - height * friction).sum(axis=1) + cross(samples.states[:, :2], weight)

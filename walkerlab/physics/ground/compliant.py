@@ -1,4 +1,4 @@
-"""The walker on compliant ground assembled from a description by its parts."""
+"""Assembly of a walker on compliant ground from its parts."""
 
 import math
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-import walkerlab.physics.ground.motion  # noqa: F401 (registers the equations of what is assembled here)
+import walkerlab.physics.ground.motion  # noqa: F401 (registers the equations of motion)
 from walkerlab.physics.ground.friction import FrictionLaw
 from walkerlab.physics.ground.knees import IdealLock, KneeStop
 from walkerlab.physics.ground.normal_force import NormalLaw
@@ -29,9 +29,9 @@ from walkerlab.physics.solvers.system import Floats
 
 @dataclass(frozen=True)
 class KneeRules:
-    """How knees lock and are released on compliant ground.
+    """Rules by which knees lock and are released on compliant ground.
 
-    A walker with compliant stops keeps its bodies while its knees are locked: a stop that has latched keeps its angle.
+    A walker with compliant stops keeps all its bodies while its knees are locked: a latched stop keeps its angle.
     """
 
     stop: KneeStop | IdealLock = IdealLock()  # noqa: RUF009 (immutable)
@@ -40,10 +40,10 @@ class KneeRules:
 
 @dataclass(frozen=True)
 class Root:
-    """A point of the tree, or its centre of mass, with the constants that hold about it."""
+    """A point of the tree, or its centre of mass, with the constants about it."""
 
     tree: Tree
-    numbers: dict[str, Any]  # fields of a form that are the same whichever bodies turn together
+    numbers: dict[str, Any]  # fields that all forms share
     rows: dict[str, Floats]  # (..., n) fields that are summed over bodies that turn together
 
 
@@ -56,14 +56,14 @@ def contact_walker(
     knee_rules: KneeRules | None = None,
     hinged_foot: int = STANCE_FOOT,
 ) -> ContactWalker:
-    """The assembly on compliant ground; gravity in m/s^2, slope in rad. Foot k, and knee k, are those of leg k.
+    """Assemble a walker on compliant ground; gravity in m/s^2, slope in rad. Foot k and knee k belong to leg k.
 
     hinged_foot  the foot whose ball's centre is the hinge of the hinged forms, at along = 0
 
-    Raises ValueError, in words for the user, for parts that no walk on compliant ground can be made of.
+    Raises ValueError, with a message for the user, for parts that cannot walk on compliant ground.
     """
     rules = knee_rules or KneeRules()
-    refuse_what_cannot_walk(assembly)
+    check_walkable(assembly)
     forms = np.zeros((2, 4), FORM)
     forms["gravity_along"], forms["gravity_down"] = gravity * math.sin(slope), gravity * math.cos(slope)
     forms["slope"], forms["kneed"], forms["release_at_touch"] = slope, bool(assembly.knees), rules.release_at_touch
@@ -71,13 +71,13 @@ def contact_walker(
         for locked in range(4):
             knees = [k for k in range(len(assembly.knees)) if locked & 1 << k]
             fill(forms[hinged, locked], assembly, root, knees, isinstance(rules.stop, IdealLock))
-    legs = legs_of(assembly)
+    legs = leg_bodies(assembly)
     forms["hinges"][..., HIP_ROW, :] = np.take_along_axis(forms["onto"], np.broadcast_to(legs[:, 0], (2, 4, 2)), axis=2)
     return ContactWalker(forms, normal, friction, rules.stop, legs)
 
 
-def refuse_what_cannot_walk(assembly: Assembly) -> None:
-    """Raise ValueError for too many bodies, another number of feet than two, or a knee in one leg only."""
+def check_walkable(assembly: Assembly) -> None:
+    """Raise ValueError for too many bodies, a number of feet other than two, or a knee in one leg only."""
     if len(assembly.bodies) > MAX_BODIES:
         raise ValueError(
             f"a walker on compliant ground has at most {MAX_BODIES} bodies; this assembly has {len(assembly.bodies)}"
@@ -89,14 +89,13 @@ def refuse_what_cannot_walk(assembly: Assembly) -> None:
 
 
 def about_centre(assembly: Assembly) -> Root:
-    """The walker about its centre of mass, free."""
     tree, feet = tree_about_centre(assembly)
     hip = hip_levers(assembly, feet[0])
     return Root(tree, {"places": 2, "hinged": NO_FOOT}, levers_by_axis(feet, hip))
 
 
 def about_foot(assembly: Assembly, foot: int) -> Root:
-    """The walker about the centre of a foot's ball, hinged there: so it just touches the ground as the leg turns."""
+    """Describe the walker about the hinged centre of a foot's ball, which just touches the ground as the leg turns."""
     ball = assembly.feet[foot]
     tree = tree_about(assembly, Anchor(ball.body, ball.centre_m))
     _, from_centre = tree_about_centre(assembly)
@@ -105,40 +104,40 @@ def about_foot(assembly: Assembly, foot: int) -> Root:
 
 
 def levers_by_axis(feet: Any, hip: Floats) -> dict[str, Floats]:
-    """Levers (bodies, 2) of feet and hip as the fields of a form."""
+    """Return the levers (bodies, 2) of feet and hip as fields of a form."""
     x, y = np.moveaxis(np.array(feet), 2, 0)
     return {"foot_x": x, "foot_y": y, "hip_x": hip[:, 0], "hip_y": hip[:, 1]}
 
 
 def hip_levers(assembly: Assembly, to_foot: Floats) -> Floats:
-    """Levers (bodies, 2) in m to the hip from the point that `to_foot` leads from to the first foot.
+    """Compute levers (bodies, 2) in m to the hip from the point from which `to_foot` leads to the first foot.
 
-    Where no legs are named the first foot stands for the hip.
+    Without named legs, the first foot takes the place of the hip.
     """
     if not all(assembly.legs):
         return to_foot
     upper, foot = assembly.legs[STANCE_FOOT][0], assembly.feet[0]
-    hip = Anchor(upper, hinge_of(assembly, upper, assembly.legs[1 - STANCE_FOOT][0]))
+    hip = Anchor(upper, hinge_point(assembly, upper, assembly.legs[1 - STANCE_FOOT][0]))
     return to_foot + levers(assembly, Anchor(foot.body, foot.centre_m), hip)
 
 
-def hinge_of(assembly: Assembly, body: str, other: str) -> Position:
-    """Where a body is hinged to another, in its own frame; its origin if they are not hinged directly."""
+def hinge_point(assembly: Assembly, body: str, other: str) -> Position:
+    """Return the point in a body's frame where it is hinged to another; its origin if they are not hinged directly."""
     hinge = assembly.hinge(body, other)
     return (0.0, 0.0) if hinge is None else hinge.parent_point_m
 
 
 def fill(form: Any, assembly: Assembly, root: Root, locked: list[int], merges: bool) -> None:
-    """Write the walker about a root into `form`, with these knees locked.
+    """Write the walker about a root, with these knees locked, into `form`.
 
-    merges  whether a locked knee's thigh and shank are one body; else the shank follows at an angle of its own
+    merges  whether a locked knee's thigh and shank become one body; else the shank follows at its own angle
     """
     knees = [(assembly.index(knee.thigh), assembly.index(knee.shank)) for knee in assembly.knees]
     straight = {shank: thigh for thigh, shank in (knees[k] for k in locked)}
     one_with = straight if merges else {}
-    kept = [body for body in range(len(assembly.bodies)) if body not in one_with]
-    onto = [kept.index(one_with.get(body, body)) for body in range(len(assembly.bodies))]
-    S, n = np.eye(len(kept))[onto], len(kept)
+    separate = [body for body in range(len(assembly.bodies)) if body not in one_with]
+    onto = [separate.index(one_with.get(body, body)) for body in range(len(assembly.bodies))]
+    S, n = np.eye(len(separate))[onto], len(separate)
     rows = {onto[body]: row @ S for body, row in followers(assembly).items()}
     rows |= {onto[shank]: np.eye(n)[onto[thigh]] for shank, thigh in straight.items() if shank not in one_with}
     rolling = np.zeros((2, len(onto)))
@@ -151,12 +150,12 @@ def fill(form: Any, assembly: Assembly, root: Root, locked: list[int], merges: b
     for name, value in (merged | {"E": reduction(rows, n)[None]}).items():
         form[name][tuple(map(slice, value.shape))] = value
     form["bodies"], form["radius"] = n, [foot.radius_m for foot in assembly.feet]
-    form["onto"][: len(onto)], form["first"][:n] = onto, kept
+    form["onto"][: len(onto)], form["first"][:n] = onto, separate
     if knees:
         form["hinges"][FIRST_KNEE:] = [(onto[shank], onto[thigh]) for thigh, shank in knees]
 
 
-def legs_of(assembly: Assembly) -> NDArray[np.int64]:
-    """Bodies (2, bodies of a leg) of either leg; where none are named, those that carry the feet."""
+def leg_bodies(assembly: Assembly) -> NDArray[np.int64]:
+    """Return the bodies (2, bodies of a leg) of each leg; without named legs, those that carry the feet."""
     named = assembly.legs if all(assembly.legs) else tuple((foot.body,) for foot in assembly.feet)
     return np.array([[assembly.index(body) for body in leg] for leg in named])

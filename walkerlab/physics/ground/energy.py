@@ -1,4 +1,4 @@
-"""Energies of the walker on compliant ground, and the power that its contacts turn into heat."""
+"""Energies of the walker on compliant ground, and the powers dissipated at its contacts."""
 
 from typing import Any
 
@@ -23,8 +23,8 @@ from walkerlab.physics.mechanics.tree import add_inertia, projections
 
 @kernel_part
 def kinetic_energy(form: GroundModel, y: Any) -> float:
-    """Kinetic energy (J)."""
-    # what is added to r here is not wanted
+    """Compute the kinetic energy (J)."""
+    # r is scratch here; only M is used
     s, c, r, M = vector(OF_BODIES), vector(OF_BODIES), vector(OF_BODIES), matrix(OF_BODIES)
     half, total = half_size(form), 0.0
     omega = y[half + form.places : 2 * half]
@@ -37,7 +37,7 @@ def kinetic_energy(form: GroundModel, y: Any) -> float:
 
 @kernel_part
 def potential_energy(form: GroundModel, y: Any) -> float:
-    """Potential energy of gravity (J) from the slope frame's origin."""
+    """Compute the potential energy of gravity (J) from the slope frame's origin."""
     s, c, F, U = vector(OF_BODIES), vector(OF_BODIES), vector(OF_BODIES), vector(OF_BODIES)
     sines_cosines(form, y, s, c)
     projections(form.arm_x, form.arm_y, form.bodies, s, c, F, U)
@@ -48,13 +48,13 @@ def potential_energy(form: GroundModel, y: Any) -> float:
 
 @kernel_part
 def foot_elastic_energy(system: OnGround, foot: int, y: Any) -> float:
-    """Elastic energy (J) in the ground under a foot that it carries."""
+    """Compute the elastic energy (J) in the ground under a foot."""
     return elastic_energy(-over_ground(system, foot, one_foot_motion(system.form, foot, y)).height, system.normal)
 
 
 @kernel_part
 def total_energy(system: OnGround, y: Any) -> float:
-    """Mechanical energy (J) of the energy balance: kinetic, potential from a fixed origin, elastic."""
+    """Compute the mechanical energy (J) of the energy balance: kinetic, potential from a fixed origin, elastic."""
     total = kinetic_energy(system.form, y) + potential_energy(system.form, y)
     for foot in range(2):
         if system.has_ground[foot] != 0:
@@ -64,7 +64,7 @@ def total_energy(system: OnGround, y: Any) -> float:
 
 @kernel_part
 def push_power(system: OnGround, t: float, y: Any) -> float:
-    """Power (W) that the push-off gives."""
+    """Compute the power (W) of the push-off."""
     if system.form.push_off == 0.0:
         return 0.0
     s, c, foot = vector(OF_BODIES), vector(OF_BODIES), 1 - system.progress.stance
@@ -75,7 +75,10 @@ def push_power(system: OnGround, t: float, y: Any) -> float:
 
 @kernel_part
 def dissipated_power(system: OnGround, foot: int, y: Any) -> tuple[float, float, float]:
-    """Power (W) lost under a foot in the normal direction, (F_n - k d^e) d', and to friction; the normal force (N)."""
+    """Compute the power (W) dissipated under a foot and the normal force (N).
+
+    The parts are those lost in the normal direction, (F_n - k d^e) d', and to friction.
+    """
     motion = over_ground(system, foot, one_foot_motion(system.form, foot, y))
     if motion.height >= 0.0:
         return 0.0, 0.0, 0.0

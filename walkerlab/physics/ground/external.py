@@ -1,7 +1,7 @@
-"""The forces of ground and drives for a program that integrates the walker itself, in that program's own coordinates.
+"""Forces of ground and drives for another program that integrates the walker in its own coordinates.
 
-Coordinates: where a point of the base body is, along the slope and over it (m), then one angle a link, each measured
-from the link that it is hinged to (rad); the base's from the slope's normal. Forces are generalised in the same order.
+Coordinates: position of a point of the base body along the slope and over it (m), then one angle per link, measured
+from the link that it is hinged to (rad), the base's from the slope's normal. Forces are generalised in the same order.
 """
 
 from typing import Any
@@ -14,7 +14,7 @@ from walkerlab.physics.kernels import kernel, kernel_part, vector
 
 @kernel_part
 def absolute_state(slope: float, chain: Any, q: Any, v: Any, y: Any) -> None:
-    """The state in absolute angles into y; `chain` (n, links) holds a one where an angle is a sum over a joint."""
+    """Write the state in absolute angles into y; `chain` (n, links) is one where an angle is a sum over a joint."""
     n = chain.shape[0]
     for i in range(2):
         y[i], y[2 + n + i] = q[i], v[i]
@@ -27,12 +27,12 @@ def absolute_state(slope: float, chain: Any, q: Any, v: Any, y: Any) -> None:
 
 @kernel
 def feet_and_forces(system: OnGround, chain: Any, t: float, q: Any, v: Any, feet: Any, forces: Any) -> None:
-    """How both feet move into feet (2, 4) and, unless that is empty, the forces on the walker into forces (2 + links).
+    """Write the motion of both feet into feet (2, 4) and, unless it is empty, the forces into forces (2 + links).
 
-    They are the ground's, those at hinges, and of a push-off.
+    They are the forces of the ground, of the hinges and of a push-off.
 
     system  with all bodies, its levers of feet and hip from the base's point
-    chain   (n, links) which joints lie between the base and each body; bodies that move as one share theirs
+    chain   (n, links) whether a joint lies between the base and a body; bodies that move as one share a row
     t       s
     q, v    (2 + links) coordinates and velocities of the other program
     feet    along (m), height (m), slip (m/s), velocity of the height (m/s)

@@ -1,8 +1,8 @@
-"""Tangential force of the ground: ADAMS's Coulomb friction without true stick, or none.
+"""Friction laws of the ground: ADAMS's Coulomb friction without true stick, or none.
 
-A law is a class of its parameters with what `FrictionLaw` lists, a case of `friction_coefficient`, cases of the two
-functions behind it if the coefficient follows different formulas, and a name in `FRICTION_LAWS`. Nothing outside this
-file asks which law it is.
+A law is a class of its parameters with the members of `FrictionLaw`, a case of `friction_coefficient`, cases of the two
+functions after it if its coefficient has several formulas, and a name in `FRICTION_LAWS`. No other file depends on the
+choice of law.
 """
 
 from __future__ import annotations
@@ -15,49 +15,49 @@ from walkerlab.physics.kernels import by_type, by_type_or_default
 
 
 class FrictionLaw(Protocol):
-    """What a law declares beside its force."""
+    """Members of a law besides its force."""
 
     @classmethod
     def of(cls, contact: Any) -> Self:
-        """The law with the parameters of a contact block in SI."""
+        """Create the law from the parameters of a contact block in SI."""
 
     @property
     def largest(self) -> float:
-        """The largest coefficient."""
+        """Largest coefficient."""
 
     @property
     def rising_until(self) -> float:
-        """Slip velocity (m/s) up to which the coefficient grows; infinite if there is no friction."""
+        """Slip velocity (m/s) up to which the coefficient grows; infinite without friction."""
 
     @property
     def sliding_from(self) -> float:
         """Slip velocity (m/s) from which on the coefficient is that of a sliding foot."""
 
     def with_creep(self, factor: float) -> Self:
-        """The law whose slip velocities are this many times as large."""
+        """Return the law with its slip velocities multiplied by a factor."""
 
     def in_words(self) -> str:
-        """The law with its parameters, as the end of 'there is'."""
+        """Describe the law with its parameters, as the end of 'there is'."""
 
 
 @by_type
 def friction_coefficient(law: Any, slip: float) -> tuple[float, float]:
-    """Tangential over normal force at a slip velocity (m/s), against the slip, and its derivative (s/m)."""
+    """Compute tangential over normal force against a slip velocity (m/s), and its derivative (s/m)."""
 
 
 @by_type_or_default
 def switching_count(law: Any) -> int:
-    """How many event functions tell where the coefficient follows another formula: at most four; none if not said."""
+    """Count the event functions at changes of the formula: at most four; none by default."""
     return 0
 
 
 @by_type_or_default
 def sample_switching(law: Any, slip: float, values: Any, first: int, j: int) -> None:
-    """These event functions at a slip velocity (m/s) into values[first:, j]."""
+    """Write these event functions at a slip velocity (m/s) into values[first:, j]."""
 
 
 class Coulomb(NamedTuple):
-    """ADAMS's contact friction 'Coulomb: on', SI."""
+    """ADAMS contact friction with 'Coulomb: on', SI."""
 
     static: float  # [mu_s] at the stiction velocity
     dynamic: float  # [mu_d] from the friction velocity on
@@ -66,7 +66,6 @@ class Coulomb(NamedTuple):
 
     @classmethod
     def of(cls, contact: Any) -> Coulomb:
-        """The law with the parameters of a contact block in SI."""
         return cls(
             contact.static_friction,
             contact.dynamic_friction,
@@ -76,27 +75,22 @@ class Coulomb(NamedTuple):
 
     @property
     def largest(self) -> float:
-        """The static coefficient."""
         return self.static
 
     @property
     def rising_until(self) -> float:
-        """The stiction velocity, m/s."""
         return self.stiction_velocity
 
     @property
     def sliding_from(self) -> float:
-        """The friction velocity, m/s."""
         return self.friction_velocity
 
     def with_creep(self, factor: float) -> Coulomb:
-        """The law whose slip velocities are this many times as large."""
         return self._replace(
             stiction_velocity=factor * self.stiction_velocity, friction_velocity=factor * self.friction_velocity
         )
 
     def in_words(self) -> str:
-        """The law with its parameters, as the end of 'there is'."""
         return (
             f"Coulomb friction as ADAMS has it, with a coefficient of {self.static:g} at a slip of "
             f"{self.stiction_velocity:g} m/s and {self.dynamic:g} from {self.friction_velocity:g} m/s on"
@@ -105,7 +99,7 @@ class Coulomb(NamedTuple):
 
 @friction_coefficient.case(Coulomb)
 def coulomb_coefficient(law: Coulomb, slip: float) -> tuple[float, float]:
-    """A cubic through zero up to the stiction velocity, a second down to the dynamic coefficient, constant beyond.
+    """Evaluate a cubic through zero up to v_s, a second one down to mu_d at v_d, and mu_d beyond.
 
     A loaded foot therefore creeps, at about v_s (T/N) / (1.5 mu_s).
 
@@ -121,13 +115,13 @@ def coulomb_coefficient(law: Coulomb, slip: float) -> tuple[float, float]:
 
 @switching_count.case(Coulomb)
 def coulomb_switching_count(law: Coulomb) -> int:
-    """Either velocity, in either direction."""
+    """Return 4: two velocities, in both directions."""
     return 4
 
 
 @sample_switching.case(Coulomb)
 def sample_coulomb_switching(law: Coulomb, slip: float, values: Any, first: int, j: int) -> None:
-    """The velocities at which one formula follows another."""
+    """Write the distances of the slip velocity from those at which the formula changes."""
     values[first, j] = slip - law.stiction_velocity
     values[first + 1, j] = slip + law.stiction_velocity
     values[first + 2, j] = slip - law.friction_velocity
@@ -135,61 +129,54 @@ def sample_coulomb_switching(law: Coulomb, slip: float, values: Any, first: int,
 
 
 class Frictionless(NamedTuple):
-    """A ground that pushes but does not hold."""
+    """Ground without tangential force."""
 
     @classmethod
     def of(cls, contact: Any) -> Frictionless:  # noqa: ARG003
-        """No parameters."""
         return cls()
 
     @property
     def largest(self) -> float:
-        """No force at all."""
         return 0.0
 
     @property
     def rising_until(self) -> float:
-        """Never reached."""
         return math.inf
 
     @property
     def sliding_from(self) -> float:
-        """A foot always slides."""
         return 0.0
 
     def with_creep(self, factor: float) -> Frictionless:  # noqa: ARG002
-        """The same: there is no creep."""
         return self
 
     def in_words(self) -> str:
-        """As the end of 'there is'."""
         return "no friction"
 
 
 @friction_coefficient.case(Frictionless)
 def no_coefficient(law: Frictionless, slip: float) -> tuple[float, float]:
-    """Zero."""
     return 0.0, 0.0
 
 
 FRICTION_LAWS: Final[dict[str, type[FrictionLaw]]] = {"coulomb": Coulomb, "none": Frictionless}
-"""The laws by the words of the config's contact.friction."""
+"""Laws by their names in the config's contact.friction."""
 
 
-def law_named(word: str, contact: Any) -> FrictionLaw:
-    """The law of that word with the parameters of a contact block in SI.
+def create_law(word: str, contact: Any) -> FrictionLaw:
+    """Create the law of that name from the parameters of a contact block in SI.
 
-    TypeError if the law's class is incomplete, saying what it lacks.
+    Raises TypeError with the missing members if the law's class is incomplete.
     """
     law = FRICTION_LAWS[word]
-    missing = lacking(law)
+    missing = missing_members(law)
     if missing:
         raise TypeError(f"the friction law {law.__name__} ('{word}') is incomplete: it lacks {', '.join(missing)}")
     return law.of(contact)
 
 
-def lacking(law: type) -> list[str]:
-    """What a law's class does not have of what `FrictionLaw` lists, and the cases that are to be registered for it."""
+def missing_members(law: type) -> list[str]:
+    """List the members of `FrictionLaw` that a law's class lacks, and the cases that are not registered for it."""
     asked = [name for name in vars(FrictionLaw) if not name.startswith("_")]
     missing = [name for name in asked if not hasattr(law, name)]
     switching = (switching_count, sample_switching)
@@ -199,5 +186,5 @@ def lacking(law: type) -> list[str]:
 
 
 def steepest_change(law: FrictionLaw, slip: float) -> float:
-    """How far the coefficient may change within a slip velocity (m/s): by its slope where the foot is at rest."""
+    """Bound the change of the coefficient within a slip velocity (m/s), by its slope at rest."""
     return min(law.largest, -slip * float(friction_coefficient(law, 0.0)[1]))

@@ -1,4 +1,4 @@
-"""Torques at hinges on compliant ground: each has a spring, damper and drive, and each knee a stop besides."""
+"""Torques at hinges on compliant ground: each has a spring, damper and drive, and each knee also a stop."""
 
 from typing import Any
 
@@ -19,30 +19,29 @@ from walkerlab.physics.mechanics.hinges import (
 
 
 @kernel_part
-def sign_of(system: OnGround, row: int) -> float:
-    """-1 for the hip while the first leg stands, whose body is ahead of the other by the array; otherwise 1."""
+def hip_sign(system: OnGround, row: int) -> float:
+    """Return -1 for the hip while the first leg, first in its row, is the stance leg; otherwise 1."""
     return -1.0 if row == HIP_ROW and system.progress.stance == 0 else 1.0
 
 
 @kernel_part
 def angle_at(system: OnGround, row: int, y: Any) -> tuple[float, float]:
-    """How far a hinge's body is ahead of the other (rad), and how fast it gets further (rad/s).
+    """Return the angle of a hinge's first body ahead of its second (rad), and its rate (rad/s).
 
-    Of the hip it is the swing leg's: at a touch the legs change places.
+    At the hip it is the angle of the swing leg ahead: at a touch the legs change roles.
     """
-    form, sign = system.form, sign_of(system, row)
+    form, sign = system.form, hip_sign(system, row)
     return sign * ahead(form, row, y, form.places), sign * ahead(form, row, y, half_size(form) + form.places)
 
 
 @kernel_part
 def is_stopping(system: OnGround, row: int) -> bool:
-    """Whether a hinge is a knee in its stop."""
     return row >= FIRST_KNEE and system.knee[row - FIRST_KNEE] == STOPPING
 
 
 @kernel_part
 def torque_at(system: OnGround, row: int, y: Any) -> HingeTorque:
-    """The torque at a hinge: of its spring, damper and drive, and of its stop."""
+    """Compute the torque at a hinge: of its spring, damper and drive, and of its stop."""
     angle, rate = angle_at(system, row, y)
     own = hinge_torque(hinge_law(system.form, row), angle, rate)
     if not is_stopping(system, row):
@@ -55,9 +54,9 @@ def torque_at(system: OnGround, row: int, y: Any) -> HingeTorque:
 
 @kernel_part
 def bodies_at(system: OnGround, row: int) -> tuple[int, int]:
-    """The body that a hinge's torque turns back, and the other one."""
+    """Return the body that a hinge's torque turns back, and the other body."""
     body, other = system.form.hinges[row, 0], system.form.hinges[row, 1]
-    return (other, body) if sign_of(system, row) < 0.0 else (body, other)
+    return (other, body) if hip_sign(system, row) < 0.0 else (body, other)
 
 
 @kernel_part
@@ -71,7 +70,7 @@ def add_torques(system: OnGround, y: Any, r: Any) -> None:
 
 @kernel_part
 def add_gradients(system: OnGround, y: Any, by_angle: Any, by_rate: Any) -> None:
-    """Add the derivatives of those torques by the angles and their velocities to by_angle and by_rate (n, n)."""
+    """Add the derivatives of those torques with respect to angles and rates to by_angle and by_rate (n, n)."""
     for row in range(len(system.form.hinges)):
         if is_sprung(system.form, row) or is_stopping(system, row):
             body, other = bodies_at(system, row)
@@ -80,7 +79,7 @@ def add_gradients(system: OnGround, y: Any, by_angle: Any, by_rate: Any) -> None
 
 @kernel_part
 def stop_energy(system: OnGround, y: Any) -> float:
-    """Elastic energy (J) in the knees' stops."""
+    """Compute the elastic energy (J) in the knees' stops."""
     total = 0.0
     for row in range(FIRST_KNEE, len(system.form.hinges)):
         if is_stopping(system, row):
@@ -90,7 +89,7 @@ def stop_energy(system: OnGround, y: Any) -> float:
 
 @kernel_part
 def stop_power(system: OnGround, y: Any) -> float:
-    """Power (W) that the knees' stops dissipate."""
+    """Compute the power (W) dissipated in the knees' stops."""
     total = 0.0
     for row in range(FIRST_KNEE, len(system.form.hinges)):
         if is_stopping(system, row):
@@ -102,7 +101,7 @@ def stop_power(system: OnGround, y: Any) -> float:
 
 @kernel_part
 def spring_energy(system: OnGround, y: Any) -> float:
-    """Elastic energy (J) of the springs at all hinges."""
+    """Compute the elastic energy (J) of the springs at all hinges."""
     total = 0.0
     for row in range(len(system.form.hinges)):
         if is_sprung(system.form, row):
@@ -112,7 +111,7 @@ def spring_energy(system: OnGround, y: Any) -> float:
 
 @kernel_part
 def spring_power(system: OnGround, y: Any) -> float:
-    """Power (W) that springs, dampers and drives give and do not store."""
+    """Compute the power (W) that springs, dampers and drives supply and do not store."""
     total = 0.0
     for row in range(len(system.form.hinges)):
         if is_sprung(system.form, row):
@@ -124,5 +123,5 @@ def spring_power(system: OnGround, y: Any) -> float:
 
 @legs_apart.case(OnGround)
 def legs_apart_on_ground(system: OnGround, y: Any) -> tuple[float, float]:
-    """The uppermost bodies of both legs."""
+    """Use the uppermost bodies of both legs."""
     return angle_at(system, HIP_ROW, y)

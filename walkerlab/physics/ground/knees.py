@@ -1,4 +1,4 @@
-"""Knees on compliant ground: how far each is bent, the stop that it meets, and its lock."""
+"""Knees on compliant ground: their extension, stop and lock."""
 
 from typing import Any, NamedTuple
 
@@ -11,15 +11,15 @@ from walkerlab.physics.mechanics.hinges import HingeTorque, hinge_energy, hinge_
 from walkerlab.physics.mechanics.impact import RootedTree, lock
 from walkerlab.physics.solvers.system import Floats
 
-FLEXED = 0.01  # rad of flexion from which on a knee that straightens is caught
+FLEXED = 0.01  # rad of flexion beyond which a knee locks when it straightens
 
 
 class IdealLock(NamedTuple):
-    """The knee is straight and locks at once: a plastic impact."""
+    """Lock that acts as soon as the knee is straight: a plastic impact."""
 
 
 class KneeStop(NamedTuple):
-    """A stop by the IMPACT law that turns a knee back beyond straight."""
+    """Stop by the IMPACT law that turns a knee back beyond straight."""
 
     stiffness: float  # [k] N m/rad^e
     exponent: float  # [e]
@@ -29,31 +29,31 @@ class KneeStop(NamedTuple):
 
 @kernel_part
 def impact_law(stop: KneeStop) -> NormalLaw:
-    """The IMPACT law with a stop's numbers: of rad and N m in place of m and N."""
+    """Return the IMPACT law with a stop's parameters, in rad and N m instead of m and N."""
     return NormalLaw(stop.stiffness, stop.exponent, stop.damping, stop.full_damping_angle)
 
 
 @kernel_part
 def ahead(form: GroundModel, row: int, y: Any, first: int) -> float:
-    """How far a hinge's body is ahead of the other (rad), by the angles that begin at y[first]; or how fast."""
+    """Return the angle of a hinge's body ahead of the other (rad), from angles starting at y[first]; or its rate."""
     return y[first + form.hinges[row, 0]] - y[first + form.hinges[row, 1]]
 
 
 @kernel_part
 def extension(form: GroundModel, knee: int, y: Any) -> float:
-    """How far a knee is beyond straight (rad): negative while it is bent, zero where there is none."""
+    """Return the angle of a knee beyond straight (rad): negative while it is bent, zero without a knee."""
     return ahead(form, FIRST_KNEE + knee, y, form.places)
 
 
 @kernel_part
 def extension_rate(form: GroundModel, knee: int, y: Any) -> float:
-    """How fast a knee straightens (rad/s)."""
+    """Return the rate at which a knee straightens (rad/s)."""
     return ahead(form, FIRST_KNEE + knee, y, half_size(form) + form.places)
 
 
 @hinge_torque.case(KneeStop)
 def stop_torque(law: KneeStop, angle: float, rate: float) -> HingeTorque:
-    """The IMPACT law beyond straight."""
+    """Evaluate the IMPACT law beyond straight."""
     if angle <= 0.0:
         return HingeTorque(0.0, 0.0, 0.0, 0.0)
     torque = impact_normal_force(angle, rate, impact_law(law))
@@ -62,12 +62,11 @@ def stop_torque(law: KneeStop, angle: float, rate: float) -> HingeTorque:
 
 @hinge_energy.case(KneeStop)
 def stop_energy(law: KneeStop, angle: float) -> float:
-    """Elastic energy (J) of a stop."""
     return elastic_energy(angle, impact_law(law))
 
 
 class Locked(NamedTuple):
-    """The state of all bodies about their root after a knee has locked."""
+    """State of all bodies about their root after a knee has locked."""
 
     state: Floats
     lost: float  # J
@@ -75,10 +74,10 @@ class Locked(NamedTuple):
 
 
 def lock_knee(whole: GroundModel, form: GroundModel, x: Any, columns: Floats | None = None) -> Locked:
-    """Bring the angular velocities to those that a form allows, by a plastic impact that leaves the root as it moves.
+    """Project the angular velocities on those that a form allows, by a plastic impact that does not move the root.
 
     whole    the form of all bodies, about the root
-    form     as whose bodies they move from then on
+    form     the form in which they move afterwards
     x        (size,) state of all bodies
     columns  (size, columns) directions of that state; None for none
     """

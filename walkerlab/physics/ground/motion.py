@@ -15,7 +15,7 @@ from walkerlab.physics.ground.walker import (
     sines_cosines,
 )
 from walkerlab.physics.kernels import forced_inline, kernel_part, matrix, vector
-from walkerlab.physics.mechanics.links import Counted, factor_linked, solve_linked
+from walkerlab.physics.mechanics.links import CountedModel, factor_linked, solve_linked
 from walkerlab.physics.mechanics.tree import (
     add_gravity,
     add_gravity_gradient,
@@ -28,13 +28,13 @@ from walkerlab.physics.solvers.system import block, derivative, jacobian
 
 @block.case(OnGround)
 def coordinate_and_rate(system: OnGround) -> tuple[float, float]:
-    """Two: there are as many velocities as coordinates."""
+    """Use blocks of two: there are as many velocities as coordinates."""
     return (0.0, 0.0)
 
 
 @forced_inline
 def foot_wrench(system: OnGround, t: float, foot: int, s: Any, c: Any, y: Any, r: Any) -> tuple[float, float]:
-    """Force of ground and push-off on a foot, along and normal to the slope (N); adds its torques (N m) to r (n,)."""
+    """Compute the force of ground and push-off on a foot, along and normal to the slope (N); add its torques to r."""
     form, push = system.form, push_on(system, t, foot, s, c)
     along, normal = push.along, push.upward
     if system.has_ground[foot] != 0:
@@ -54,10 +54,9 @@ def foot_wrench(system: OnGround, t: float, foot: int, s: Any, c: Any, y: Any, r
 
 @forced_inline
 def all_forces(system: OnGround, t: float, s: Any, c: Any, y: Any, M: Any, r: Any) -> tuple[float, float]:
-    """Force of ground and push-off along and normal to the slope (N); M (n, n) and all torques (N m) into r (n,).
+    """Compute the forces of ground and push-off along and normal to the slope (N); write M (n, n) and r (n,) in N m.
 
-    They are those of the feet, of the centrifugal terms, of the knees' stops, of the hip and, about a hinge, of
-    gravity.
+    The torques r are those of the feet, the centrifugal terms, the knees' stops, the hip and, about a hinge, gravity.
     """
     form = system.form
     n, half = form.bodies, half_size(form)
@@ -79,13 +78,13 @@ def all_forces(system: OnGround, t: float, s: Any, c: Any, y: Any, M: Any, r: An
 
 @derivative.case(OnGround)
 def on_ground_derivative(system: OnGround, t: float, y: Any, f: Any) -> None:
-    """Newton for the centre of mass, unless the root is hinged, and the tree's equations for the angles."""
+    """Evaluate Newton's law for the centre of mass, unless hinged, and the tree's equations for the angles."""
     form = system.form
     n, half, first = form.bodies, half_size(form), form.places
     s, c, r, M = vector(OF_BODIES), vector(OF_BODIES), vector(OF_BODIES), matrix(OF_BODIES)
     sines_cosines(form, y, s, c)
     along, normal = all_forces(system, t, s, c, y, M, r)
-    links = Counted(form.E, form.arm_x[:n])
+    links = CountedModel(form.E, form.arm_x[:n])
     factor_linked(links, 0, M)
     solve_linked(links, 0, M, r)
     for i in range(half):
@@ -99,7 +98,7 @@ def on_ground_derivative(system: OnGround, t: float, y: Any, f: Any) -> None:
 
 @kernel_part
 def motion_gradient(form: GroundModel, foot: int, F: Any, U: Any, y: Any, j: int) -> tuple[float, float, float]:
-    """Derivatives of a foot's penetration, penetration rate and slip along number j of the state.
+    """Compute derivatives of a foot's penetration, penetration rate and slip with respect to component j of the state.
 
     F, U  (n,) projections of the levers to the foot
     """
@@ -118,7 +117,7 @@ def motion_gradient(form: GroundModel, foot: int, F: Any, U: Any, y: Any, j: int
 
 @kernel_part
 def add_foot_gradients(system: OnGround, t: float, foot: int, s: Any, c: Any, y: Any, J: Any) -> None:
-    """Add the derivatives of a foot's force and torques to the acceleration rows of J, before masses divide them."""
+    """Add the derivatives of a foot's force and torques to the rows of J, before the division by masses."""
     form, push = system.form, push_on(system, t, foot, s, c)
     motion = over_ground(system, foot, foot_motion(form, foot, s, c, y))
     inside, pushed = system.has_ground[foot] != 0 and motion.height < 0.0, push.above != 0.0
@@ -132,7 +131,7 @@ def add_foot_gradients(system: OnGround, t: float, foot: int, s: Any, c: Any, y:
         along += force.along
         normal += force.normal.force
         for j in range(2 * half):
-            # how penetration, its rate and the slip change along coordinate or velocity j
+            # derivatives of penetration, its rate and the slip along coordinate or velocity j
             deeper, deeper_rate, faster = motion_gradient(form, foot, F, U, y, j)
             by_j = force.normal.by_penetration * deeper + force.normal.by_rate * deeper_rate
             add_column(form, foot, j, force.coefficient * by_j + force.by_slip * faster, by_j, F, U, J)
@@ -145,7 +144,7 @@ def add_foot_gradients(system: OnGround, t: float, foot: int, s: Any, c: Any, y:
 
 @kernel_part
 def add_column(form: GroundModel, foot: int, j: int, along: float, normal: float, F: Any, U: Any, J: Any) -> None:
-    """Add to column j of J what a force on a foot changes by, along and normal to the slope; and its torques."""
+    """Add the derivatives of a foot's force, along and normal to the slope, and of its torques to column j of J."""
     p, half = form.places, half_size(form)
     if p > 0:
         J[half, j] += along
@@ -156,7 +155,7 @@ def add_column(form: GroundModel, foot: int, j: int, along: float, normal: float
 
 @kernel_part
 def add_torque_gradients(system: OnGround, s: Any, c: Any, y: Any, alpha: Any, by_angle: Any, by_rate: Any) -> None:
-    """Add the derivatives (n, n) of the torques but the ground's, less M alpha at fixed alpha, by angles and rates."""
+    """Add the derivatives (n, n) of the torques, except the ground's, minus M alpha at fixed alpha."""
     form = system.form
     n, p, half = form.bodies, form.places, half_size(form)
     if p == 0:
@@ -169,7 +168,7 @@ def add_torque_gradients(system: OnGround, s: Any, c: Any, y: Any, alpha: Any, b
 
 @jacobian.case(OnGround)
 def on_ground_jacobian(system: OnGround, t: float, y: Any, J: Any) -> None:
-    """Derivatives of the equations of motion, exact up to the switching points of the force law."""
+    """Compute the derivatives of the equations of motion, exact up to the switching points of the force law."""
     form = system.form
     n, p, half = form.bodies, form.places, half_size(form)
     s, c, alpha, M, by_torque = (
@@ -180,10 +179,10 @@ def on_ground_jacobian(system: OnGround, t: float, y: Any, J: Any) -> None:
             J[i, j], J[half + i, j] = 1.0 if j == i + half else 0.0, 0.0
     sines_cosines(form, y, s, c)
     all_forces(system, t, s, c, y, M, alpha)
-    links = Counted(form.E, form.arm_x[:n])
+    links = CountedModel(form.E, form.arm_x[:n])
     factor_linked(links, 0, M)
     solve_linked(links, 0, M, alpha)
-    for k in range(n):  # row k: the angular accelerations by a torque on body k
+    for k in range(n):  # row k: angular accelerations due to a torque on body k
         for l in range(n):
             by_torque[k, l] = 1.0 if k == l else 0.0
         solve_linked(links, 0, M, by_torque[k])

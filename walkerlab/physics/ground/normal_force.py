@@ -16,7 +16,7 @@ class NormalLaw(NamedTuple):
 
 
 class NormalForce(NamedTuple):
-    """The force and its derivatives."""
+    """Normal force and its derivatives."""
 
     force: float  # N
     spring: float  # N, the elastic part k d^e
@@ -26,7 +26,7 @@ class NormalForce(NamedTuple):
 
 @kernel_part
 def impact_normal_force(penetration: float, penetration_rate: float, law: NormalLaw) -> NormalForce:
-    """Normal force of ADAMS's IMPACT law, never adhesive.
+    """Compute the normal force of ADAMS's IMPACT law, never adhesive.
 
     F = max(0, k d^e + c(d) d'), where c rises from 0 at first touch to `law.damping` at `full_damping_penetration`.
 
@@ -45,9 +45,10 @@ def impact_normal_force(penetration: float, penetration_rate: float, law: Normal
 
 @kernel_part
 def grip(penetration: float, penetration_rate: float, law: NormalLaw) -> float:
-    """A measure of the force before it is kept from pulling: where it falls through zero the ground lets go.
+    """Scale the force before it is cut off at zero: where it falls through zero, the ground releases the foot.
 
-    The force divided by min(d, d_max)^min(e, 2): of finite slope at the surface, and nowhere steeper than the force.
+    The result is the force divided by min(d, d_max)^min(e, 2), with a finite slope at the surface, and nowhere steeper
+    than the force.
     """
     full = law.full_damping_penetration
     power = min(law.exponent, 2.0)
@@ -61,7 +62,7 @@ def grip(penetration: float, penetration_rate: float, law: NormalLaw) -> float:
 
 @kernel_part
 def elastic_energy(penetration: float, law: NormalLaw) -> float:
-    """Energy stored in the contact's spring (J): k d^(e+1) / (e+1)."""
+    """Compute the energy stored in the contact's spring (J): k d^(e+1) / (e+1)."""
     if penetration <= 0.0:
         return 0.0
     return law.stiffness * penetration ** (law.exponent + 1.0) / (law.exponent + 1.0)

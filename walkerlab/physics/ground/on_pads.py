@@ -1,7 +1,7 @@
-"""The walker on its pads as an ordinary differential equation: where a foot is decides whether ground carries it.
+"""The walker on its pads as an ordinary differential equation: ground carries a foot wherever it is over a pad.
 
-What somebody writes who integrates the contact model with a general solver: one right-hand side, no events. It knows
-neither that a foot must come from above nor that a walk can end. The walks of this project do not use it.
+This is the contact model as written for a general solver: one right-hand side, no events. It does not require that a
+foot comes from above, and no walk ends. The walks of this project do not use it.
 """
 
 from typing import Any, NamedTuple
@@ -13,7 +13,7 @@ from walkerlab.physics.solvers.system import block, derivative, jacobian
 
 
 class OnPads(NamedTuple):
-    """A walker and the pads under it."""
+    """A walker and its pads."""
 
     walker: OnGround
     terrain: Any
@@ -21,7 +21,7 @@ class OnPads(NamedTuple):
 
 @kernel_part
 def find_pads(system: OnPads, y: Any) -> None:
-    """Tell the walker of ground under the feet that are over a pad, at whatever height."""
+    """Mark ground under the feet that are over a pad, at any height."""
     feet = feet_motion(system.walker.form, y)
     for foot in range(2):
         system.walker.has_ground[foot] = has_ground_in_cell(cell_at(system.terrain, foot, feet[foot].along))
@@ -29,19 +29,17 @@ def find_pads(system: OnPads, y: Any) -> None:
 
 @block.case(OnPads)
 def on_pads_block(system: OnPads) -> Any:
-    """As on the ground."""
     return block(system.walker)
 
 
 @derivative.case(OnPads)
 def on_pads_derivative(system: OnPads, t: float, y: Any, f: Any) -> None:
-    """The equations of motion on the ground that there is."""
     find_pads(system, y)
     derivative(system.walker, t, y, f)
 
 
 @jacobian.case(OnPads)
 def on_pads_jacobian(system: OnPads, t: float, y: Any, J: Any) -> None:
-    """Their derivatives; the edges of the pads are not among them."""
+    """Compute the derivatives of the equations of motion, without the edges of the pads."""
     find_pads(system, y)
     jacobian(system.walker, t, y, J)

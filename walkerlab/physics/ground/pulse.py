@@ -1,7 +1,7 @@
-"""The push-off on compliant ground: a pulse of force at the trailing foot, along the line from there to the hip.
+"""Push-off on compliant ground: a pulse of force at the trailing foot, along the line from there to the hip.
 
-It begins at the touch of the other foot, has the push-off's impulse P, and with u the part of its duration D that has
-passed its force is 30 u^2 (1 - u)^2 P / D, smooth where it begins and ends.
+It begins at the touch of the other foot and has the push-off's impulse P. With the elapsed fraction u of its duration D
+its force is 30 u^2 (1 - u)^2 P / D, smooth at both ends.
 """
 
 import math
@@ -13,7 +13,7 @@ from walkerlab.physics.kernels import kernel_part
 
 @kernel_part
 def pulse_force(system: OnGround, t: float) -> float:
-    """Force (N) of the pulse at a time; 0 where none lasts."""
+    """Compute the force (N) of the pulse at a time; 0 outside a pulse."""
     if system.form.push_off == 0.0 or system.progress.steps == 0:
         return 0.0
     u = (t - system.progress.last_touch) / system.form.push_off_duration
@@ -24,24 +24,24 @@ def pulse_force(system: OnGround, t: float) -> float:
 
 @kernel_part
 def pulse_left(system: OnGround, t: float) -> float:
-    """How much longer (s) a pulse lasts; nothing where none does."""
+    """Return the remaining duration (s) of a pulse; 0 outside a pulse."""
     if system.form.push_off == 0.0 or system.progress.steps == 0:
         return 0.0
     return max(0.0, system.progress.last_touch + system.form.push_off_duration - t)
 
 
 class Push(NamedTuple):
-    """A pulse as it acts now on a foot."""
+    """Instantaneous push on a foot."""
 
     along: float  # N
     upward: float  # N
-    ahead: float  # m, from where the foot touches to the hip
+    ahead: float  # m, from the foot's contact point to the hip
     above: float  # m
 
 
 @kernel_part
 def push_on(system: OnGround, t: float, foot: int, s: Any, c: Any) -> Push:
-    """What pushes a foot at a time; no force where no pulse lasts."""
+    """Compute the push on a foot at a time; zero force outside a pulse."""
     form, force = system.form, pulse_force(system, t) if foot != system.progress.stance else 0.0
     if force == 0.0:
         return Push(0.0, 0.0, 0.0, 0.0)
@@ -56,14 +56,14 @@ def push_on(system: OnGround, t: float, foot: int, s: Any, c: Any) -> Push:
 
 @kernel_part
 def lever_to_hip(form: GroundModel, foot: int, s: Any, c: Any, k: int) -> tuple[float, float]:
-    """A body's part (m) of the way from a foot's centre to the hip, along the slope and over it."""
+    """Return a body's part (m) of the vector from a foot's centre to the hip, along the slope and over it."""
     x, y = form.hip_x[k] - form.foot_x[foot, k], form.hip_y[k] - form.foot_y[foot, k]
     return c[k] * x - s[k] * y, s[k] * x + c[k] * y
 
 
 @kernel_part
 def push_gradient(form: GroundModel, push: Push, foot: int, s: Any, c: Any, k: int) -> tuple[float, float]:
-    """Derivatives (N/rad) of a push along and upward by a body's angle: its line turns, its force is the same."""
+    """Compute derivatives (N/rad) of a push with respect to a body's angle, which turns the push at constant force."""
     forward, upward = lever_to_hip(form, foot, s, c, k)
     turned = (push.along * forward + push.upward * upward) / (push.ahead * push.ahead + push.above * push.above)
     return -turned * push.above, turned * push.ahead

@@ -1,18 +1,18 @@
-"""How a walker stands on one foot on compliant ground."""
+"""Equilibrium of a walker on one foot on compliant ground."""
 
 import math
 from typing import NamedTuple
 
 
 class RestingFoot(NamedTuple):
-    """A foot that carries a walker's whole weight."""
+    """Foot that carries a walker's whole weight."""
 
     depth: float  # m, the static penetration
     damping_ratio: float  # c / (2 sqrt(dF/dd m)) there, with damping fully developed and the total mass m
 
 
 def resting_foot(weight: float, mass: float, stiffness: float, exponent: float, damping: float) -> RestingFoot:
-    """A foot at rest on ground with the normal force F = k d^e + c d'.
+    """Compute the state of a foot at rest on ground with the normal force F = k d^e + c d'.
 
     weight     normal to the ground, N
     mass       kg

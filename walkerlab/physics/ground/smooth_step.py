@@ -1,11 +1,11 @@
-"""The cubic STEP function that ADAMS blends with."""
+"""ADAMS's cubic STEP function."""
 
 from walkerlab.physics.kernels import kernel_part
 
 
 @kernel_part
 def smooth_step(x: float, x0: float, h0: float, x1: float, h1: float) -> tuple[float, float]:
-    """STEP(x, x0, h0, x1, h1) and its derivative: h0 before x0, h1 behind x1, the cubic in between.
+    """Evaluate STEP(x, x0, h0, x1, h1) and its derivative: h0 before x0, h1 after x1, a cubic in between.
 
     Source: Adams function reference, STEP.
     """

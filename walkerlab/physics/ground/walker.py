@@ -1,11 +1,11 @@
-"""A walker on compliant ground: an assembled tree with ball feet, in the forms that it takes while it walks.
+"""Walker on compliant ground: an assembled tree with ball feet, in the forms that it takes while walking.
 
 Coordinates in the slope's frame: along the slope (positive downhill) and height over it, m; the bodies' absolute
 angles from the vertical, rad. State: (along, height, theta_1 .. theta_n, and the velocities of all these), of the
-centre of mass. While a knee is locked by an ideal lock thigh and shank are one body, theta = S z with a column of S for
-the bodies that turn together: the constants of the tree become S'AS, S'BS and S'c, every lever and radius S'd, and what
-walks is an ordinary walker of fewer bodies. While the first stance foot is hinged the root is the hinge, and the state
-is that of the angles alone.
+centre of mass. While an ideal lock holds a knee, thigh and shank are one body, theta = S z with a column of S for
+the bodies that turn together: the constants of the tree become S'AS, S'BS and S'c, every lever and radius S'd, and the
+form is an ordinary walker of fewer bodies. While the first stance foot is hinged, the root is the hinge and the state
+consists of the angles alone.
 """
 
 import math
@@ -22,28 +22,30 @@ from walkerlab.physics.mechanics.tree import lever_motion
 from walkerlab.physics.solvers.system import Floats, Integers, State
 
 MAX_BODIES = 8
-OF_BODIES = (0.0,) * MAX_BODIES  # scratch is made like these
+OF_BODIES = (0.0,) * MAX_BODIES  # templates of scratch arrays
 OF_STATES = (0.0,) * (4 + 2 * MAX_BODIES)
 NO_FOOT = -1
 FIRST_KNEE = HIP_ROW + 1  # row of its hinge
-# what a knee is doing
+# states of a knee
 RELEASED, BENT, STOPPING, LOCKED = 0, 1, 2, 3
 
 
-@tree.read_at_once
+@tree.fast_fields
 class GroundModel(tree.Mechanism):  # type: ignore[misc]  # as its base
-    """The walker as it moves while its knees are as they are, hinged or free, SI: a structured scalar.
+    """Form of the walker, SI: its bodies with the present knees locked, hinged or free; a structured scalar.
 
-    Its arrays have room for MAX_BODIES, so that one compiled walk serves all walkers; n of the places are used. Its
+    Its arrays have room for MAX_BODIES, so that one compiled walk serves all walkers; only n entries are used. Its
     hinges are the hip, with the uppermost body of the first leg ahead of the second's, and each knee, with the shank
     ahead of the thigh: thigh and shank are the same body while they move as one. E has one reduction.
     """
 
     bodies: int  # [n]
-    places: int  # how many coordinates of the root come before the angles: 2, or none of a hinge
-    hinged: int  # the foot that is; NO_FOOT
+    places: int  # number of root coordinates before the angles: 2, or 0 with a hinge
+    hinged: int  # hinged foot; NO_FOOT
     kneed: bool
-    release_at_touch: bool  # of the trailing knee: at the other foot's touch, not when that foot stops sinking in
+    release_at_touch: (
+        bool  # whether the trailing knee is released at the touch, not when the leading foot stops sinking in
+    )
     foot_x: Floats  # (2, n) m, levers from the root to the centres of the ball feet, in the bodies' frames
     foot_y: Floats
     rolling: Floats  # (2, n) m, the ball's radius for its own body, else zero
@@ -51,9 +53,9 @@ class GroundModel(tree.Mechanism):  # type: ignore[misc]  # as its base
     hip_x: Floats  # (n,) m, levers from the root to the hip
     hip_y: Floats
     push_off_duration: float  # s
-    onto: Integers  # (all bodies,) which of these bodies each is
-    first: Integers  # (n,) the first of the bodies that each of these is
-    root_along: float  # m, where the hinge is
+    onto: Integers  # (all bodies,) the form's body for each
+    first: Integers  # (n,) the first body merged into each
+    root_along: float  # m, position of the hinge
     root_height: float
 
     @property
@@ -63,17 +65,17 @@ class GroundModel(tree.Mechanism):  # type: ignore[misc]  # as its base
         return bodies
 
 
-SHAPES: dict[str, tuple[int, ...]] = {
+FORM_SHAPES: dict[str, tuple[int, ...]] = {
     **tree.mechanism_shapes(MAX_BODIES, 1, 3),
     **dict.fromkeys(("hip_x", "hip_y", "onto", "first"), (MAX_BODIES,)),
     **dict.fromkeys(("foot_x", "foot_y", "rolling"), (2, MAX_BODIES)),
     "radius": (2,),
 }
-FORM = tree.record_type(GroundModel, SHAPES)
+FORM = tree.record_type(GroundModel, FORM_SHAPES)
 
 
 class ContactWalker(NamedTuple):
-    """Everything that stays the same while it walks."""
+    """Constants of a walker on compliant ground."""
 
     forms: Any  # (2, 4) of Form: free or hinged; which knees are locked, as `locked_knees` numbers them
     normal: NormalLaw
@@ -83,90 +85,89 @@ class ContactWalker(NamedTuple):
 
     @property
     def whole(self) -> GroundModel:
-        """With all its bodies, free, no knee locked."""
+        """Free form with all bodies and no knee locked."""
         form: GroundModel = self.forms[0, 0]
         return form
 
     @property
     def size(self) -> int:
-        """How many numbers the state of the whole walker has."""
+        """Length of the whole walker's state."""
         return int(4 + 2 * self.whole.bodies)
 
     @property
     def mass(self) -> float:
-        """kg."""
+        """Total mass, kg."""
         return float(self.whole.mass)
 
     @property
     def slope(self) -> float:
-        """rad."""
+        """Angle of the slope, rad."""
         return float(self.whole.slope)
 
     @property
     def gravity_along(self) -> float:
-        """m/s^2, along the slope."""
+        """Component along the slope, m/s^2."""
         return float(self.whole.gravity_along)
 
     @property
     def gravity_down(self) -> float:
-        """m/s^2, towards the slope."""
+        """Component towards the slope, m/s^2."""
         return float(self.whole.gravity_down)
 
     @property
     def driven(self) -> bool:
-        """Whether anything but gravity gives it energy."""
+        """Whether anything besides gravity supplies energy."""
         return self.whole.driven
 
     @property
     def gravity(self) -> float:
-        """m/s^2."""
+        """Gravitational acceleration, m/s^2."""
         return math.hypot(self.gravity_along, self.gravity_down)
 
     @property
     def kneed(self) -> bool:
-        """Whether it has knees."""
         return bool(self.whole.kneed)
 
 
 def changed_forms(walker: ContactWalker, **fields: Any) -> ContactWalker:
-    """The walker with other values of some fields of all its forms."""
+    """Return the walker with some fields changed in all its forms."""
     forms = walker.forms.copy()
     tree.write_fields(forms, fields)
     return walker._replace(forms=forms)
 
 
-@tree.read_at_once
+@tree.fast_fields
 class WalkProgress(np.record):  # type: ignore[misc]  # NumPy's stubs call one of its bases final
-    """How far a walk has come: a structured scalar that the rules of a walk write to."""
+    """Progress of a walk: a structured scalar that the rules of a walk write to."""
 
-    stance: int  # the foot that carries the step at hand
-    steps: int  # how many have been taken
-    last_touch: float  # s, when the last of them was
-    airborne_since: float  # s, when a foot was on the ground last
-    stopped_at: float  # s, up to where it has been integrated
-    release: int  # when the trailing knee is to be released: see hybrid/contact_state.py
-    passes_switching: bool  # whether the integration step at hand may go past switching points
+    stance: int  # foot that carries the present step
+    steps: int  # number of completed steps
+    last_touch: float  # s, time of the last touch
+    airborne_since: float  # s, last time with a foot on the ground
+    stopped_at: float  # s, end of the integration so far
+    release: int  # when the trailing knee is due for release: see hybrid/contact_state.py
+    passes_switching: bool  # whether the present integration step may pass switching points
 
 
 PROGRESS = tree.record_type(WalkProgress, {})
 
 
 def new_progress(stance: int = 1, steps: int = 0, last_touch: float = 0.0) -> WalkProgress:
-    """The progress of a walk that one foot carries, after some steps, the last of them at a time (s)."""
+    """Create the progress of a walk, carried by one foot, after some steps, the last of them at a time (s)."""
     progress: WalkProgress = tree.new_record(PROGRESS, stance=stance, steps=steps, last_touch=last_touch)
     return progress
 
 
 @by_reference
 class OnGround(NamedTuple):
-    """The walker in one of its forms, with what may change while it moves so: in memory of the walk's own."""
+    """The walker in one of its forms, with variables, owned by the walk, that may change while it keeps the form."""
 
     form: GroundModel
     normal: NormalLaw
     friction: Any
     stop: Any
     has_ground: Any  # (2,) whether there is ground under a foot
-    knee: Any  # (2,) what each knee is doing
+    knee: Any  # (2,) state of each knee
     level: Any  # (2,) m, height over the slope of the ground for each foot
     progress: WalkProgress
 
@@ -179,12 +180,12 @@ def on_ground(
     level: Any = (0.0, 0.0),
     progress: WalkProgress | None = None,
 ) -> OnGround:
-    """The walker in the form that its knees give it.
+    """Return the walker in the form that its knees determine.
 
     has_ground  (2,) whether there is ground under a foot
-    knee        (2,) what each knee is doing
+    knee        (2,) state of each knee
     level       (2,) m, height of the ground for each foot
-    progress    of the walk; without it foot 1 carries the first step
+    progress    of the walk; by default foot 1 carries the first step
     """
     memory = np.asarray(has_ground, np.int8), np.asarray(knee, np.int8), np.asarray(level, float)
     form = walker.forms[int(hinged), locked_knees(knee)]
@@ -194,12 +195,12 @@ def on_ground(
 
 @kernel_part
 def locked_knees(knee: Any) -> int:
-    """The number of the form whose knees are locked as these, (2,) by what each is doing: 0 none, 1, 2, 3 both."""
+    """Return the index of the form with these knees (2,) locked: 0 none, 1 or 2 one knee, 3 both."""
     return (1 if knee[0] == LOCKED else 0) + (2 if knee[1] == LOCKED else 0)
 
 
 class FootMotion(NamedTuple):
-    """Where a foot's lowest point is and how it moves."""
+    """Position and velocity of a foot's lowest point."""
 
     along: float  # m
     height: float  # m over the slope, negative inside the ground
@@ -209,19 +210,19 @@ class FootMotion(NamedTuple):
 
 @kernel_part
 def half_size(form: GroundModel) -> int:
-    """How many coordinates there are: where the velocities begin in the state."""
+    """Return the number of coordinates, which is the index of the first velocity."""
     return form.places + form.bodies
 
 
 @kernel_part
 def sines_cosines(form: GroundModel, y: Any, s: Any, c: Any) -> None:
-    """Sines and cosines (n,) of the bodies' angles from the slope's normal, into s and c."""
+    """Write sines and cosines (n,) of the bodies' angles from the slope's normal into s and c."""
     tree.sines_cosines(form, form.bodies, y[form.places : half_size(form)], s, c)
 
 
 @kernel_part
 def foot_motion(form: GroundModel, foot: int, s: Any, c: Any, y: Any) -> FootMotion:
-    """Position and velocity of the lowest point of a ball foot; the slip is that of the ball's own material there."""
+    """Compute the motion of the lowest point of a ball foot; the slip is that of the ball's material."""
     n, half = form.bodies, half_size(form)
     along, height, slip, vertical_velocity = form.root_along, form.root_height, 0.0, 0.0
     if form.places > 0:
@@ -236,7 +237,6 @@ def foot_motion(form: GroundModel, foot: int, s: Any, c: Any, y: Any) -> FootMot
 
 @kernel_part
 def one_foot_motion(form: GroundModel, foot: int, y: Any) -> FootMotion:
-    """A foot in a state of a form."""
     s, c = vector(OF_BODIES), vector(OF_BODIES)
     sines_cosines(form, y, s, c)
     return foot_motion(form, foot, s, c, y)
@@ -244,7 +244,6 @@ def one_foot_motion(form: GroundModel, foot: int, y: Any) -> FootMotion:
 
 @kernel_part
 def feet_motion(form: GroundModel, y: Any) -> tuple[FootMotion, FootMotion]:
-    """Both feet in a state of a form."""
     s, c = vector(OF_BODIES), vector(OF_BODIES)
     sines_cosines(form, y, s, c)
     return foot_motion(form, 0, s, c, y), foot_motion(form, 1, s, c, y)
@@ -252,12 +251,12 @@ def feet_motion(form: GroundModel, y: Any) -> tuple[FootMotion, FootMotion]:
 
 @kernel_part
 def over_ground(system: OnGround, foot: int, motion: FootMotion) -> FootMotion:
-    """A foot's motion with its height over the ground that is there for it."""
+    """Return a foot's motion with its height over the ground below it."""
     return FootMotion(motion.along, motion.height - system.level[foot], motion.slip, motion.vertical_velocity)
 
 
 class FootForce(NamedTuple):
-    """What the ground does to a foot."""
+    """Force of the ground on a foot."""
 
     along: float  # N, friction
     normal: NormalForce
@@ -267,36 +266,36 @@ class FootForce(NamedTuple):
 
 @kernel_part
 def foot_force(laws: Any, motion: FootMotion) -> FootForce:
-    """Force of the ground on a foot that is inside it; by the laws of a walker or of its system."""
+    """Compute the force of the ground on a foot inside it, by the laws of a walker or of its system."""
     normal = impact_normal_force(-motion.height, -motion.vertical_velocity, laws.normal)
     mu, mu_slope = friction_coefficient(laws.friction, motion.slip)
     return FootForce(mu * normal.force, normal, mu_slope * normal.force, mu)
 
 
-def folded(form: GroundModel, x: Any) -> Floats:
-    """The form's state, or a column of its tangent, from that of all bodies about the same root.
+def to_form(form: GroundModel, x: Any) -> Floats:
+    """Convert a state of all bodies, or a tangent column, to that of a form about the same root.
 
-    Bodies that are one turn alike up to rounding; of each group the first tells.
+    Merged bodies turn alike up to rounding; the first one's values are taken.
     """
     return np.asarray(x)[places_in_whole(form, len(x))]
 
 
-def unfolded(form: GroundModel, y: Any, size: int) -> Floats:
-    """State of all bodies (size,) about the same root: bodies that are one turn alike."""
+def to_full(form: GroundModel, y: Any, size: int) -> Floats:
+    """Convert a form's state to that of all bodies (size,) about the same root."""
     p, n, every = int(form.places), int(form.bodies), size // 2 - int(form.places)
     onto = form.onto[:every]
     return np.asarray(y)[[*range(p), *(p + onto), *range(p + n, 2 * p + n), *(2 * p + n + onto)]]
 
 
 def places_in_whole(form: GroundModel, size: int) -> list[int]:
-    """Where the numbers of a form's state stand in that of all bodies about the same root."""
+    """Return the indices of a form's state within that of all bodies about the same root."""
     p, half, first = int(form.places), size // 2, form.first[: form.bodies]
     return [*range(p), *(p + first), *range(half, half + p), *(half + p + first)]
 
 
 @kernel_part
 def store_whole(form: GroundModel, y: Any, whole: Any) -> None:
-    """Write the state y of a form into `whole`, as that of the whole walker, free: the hinge tells the rest."""
+    """Write the state y of a form into `whole` as that of the free walker with all bodies."""
     n, p, half = form.bodies, form.places, half_size(form)
     middle = whole.size // 2
     for i in range(2, middle):
@@ -313,7 +312,7 @@ def store_whole(form: GroundModel, y: Any, whole: Any) -> None:
 
 
 def floating_state(form: GroundModel, y: Any, size: int) -> State:
-    """The state (size,) of the whole walker, free, of a form's state y."""
+    """Convert a form's state y to the state (size,) of the free walker with all bodies."""
     whole = np.zeros(size)
     store_whole(form, y, whole)
     return tuple(whole.tolist())

@@ -1,11 +1,11 @@
-"""Walks as hybrid systems: smooth motion between events, jumps at them, and how a walk ends.
+"""Walks as hybrid systems: smooth motion between events, jumps at them, and the ends of a walk.
 
 Rigid model (`rigid_walk`; many walks side by side in `rigid_lanes`)
     modes         one foot on the slope, the swing knee BENT or STRAIGHT (`mechanics/rigid_model`)
     KNEE          the bent knee straightens: plastic strike, the knee locks; BENT -> STRAIGHT
     HEEL_STRIKE   the swing foot comes down with AHEAD positive: plastic strike, a push-off before it, the legs change
                   roles; a step; STRAIGHT -> BENT, or STRAIGHT without knees
-    FALL          the hip is too low: fell
+    HIP_FALL      the hip is too low: fell
     other ends    a heel strike with a bent knee, or none in time
 
 Contact model (`contact_loop`)
@@ -24,14 +24,14 @@ Contact model (`contact_loop`)
 
 | file | what is in it |
 |---|---|
-| `endings` | how kernels say that a walk ended, for both models |
+| `endings` | codes with which kernels report the end of a walk, for both models |
 | `contact_events`, `contact_crossings` | the events; their functions along a step, and the first zero |
-| `contact_state` | the memory of a walk: what stands, what has touched, the side each event function is on |
+| `contact_state` | the state of a walk besides its coordinates: stance, contacts, sides of the event functions |
 | `contact_loop` | steps of the integration, and the search for the time of an event |
-| `contact_transitions`, `contact_jumps` | what an event changes in the memory; in velocities, energy and tangent |
-| `contact_record`, `contact_tangent` | samples and energy balance; the derivative by the start |
+| `contact_transitions`, `contact_jumps` | effects of an event on the walk state; on velocities, energy and tangent |
+| `contact_record`, `contact_tangent` | samples and energy balance; the derivative with respect to the start |
 | `contact_result` | a whole walk in all its forms, and its result |
 | `rigid_walk`, `rigid_record`, `recorded_walk` | loop and events; samples and extremes; a whole walk and its result |
-| `walk_record`, `hip_torque` | for both: what every result has; work of the hip's torque |
-| `rigid_measures`, `comparison` | energies and forces along a rigid walk; how far two walks differ |
+| `walk_record`, `hip_torque` | for both: fields of every result; work of the hip's torque |
+| `rigid_measures`, `comparison` | energies and forces along a rigid walk; differences between two walks |
 """

@@ -1,8 +1,8 @@
-"""How far two walks differ: at the same time, at the same phase of each step, and as orbits in the phase plane.
+"""Differences between two walks: at equal times, at equal phases of each step, and as orbits in the phase plane.
 
-A clock that runs one percent fast makes the difference at the same time grow without bound, however alike the gaits
-are. At the same phase, every step's own time scaled to [0, 1], only the difference of the motions is left. The distance
-of the orbits does not know of time at all.
+A frequency error of one percent makes the difference at equal times grow without bound, however similar the gaits.
+Equal phases, with each step's time scaled to [0, 1], leave the difference of the motions. The distance between orbits
+does not depend on time.
 """
 
 from __future__ import annotations
@@ -18,23 +18,23 @@ from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 Array = NDArray[np.float64]
 Quantity = Literal["angle", "velocity"]
 
-LEGS = 2
-JUMP = 1e-9  # of a walk's duration: samples closer than that are the two sides of a strike
-PHASES = 401  # samples of a step
-IMPACT_PHASE = 0.02  # of a step: by then a compliant impact is over
-FINENESS = 5e-3  # of an orbit's range: how finely orbits are drawn to measure between them
-AT_ONCE = 256  # points of an orbit that are measured at once
+LEG_COUNT = 2
+JUMP = 1e-9  # relative to the duration of a walk: closer samples are the two sides of a strike
+PHASES = 401  # samples per step
+IMPACT_PHASE = 0.02  # phase at which a compliant impact is over
+POINT_SPACING = 5e-3  # spacing of the points of an orbit, relative to its range
+BLOCK_POINTS = 256  # points per block, which bounds the memory
 
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """The legs of a walk in time, SI units.
+    """Motion of the legs in time, SI units.
 
     time          (samples,) strictly rising
     angle         (samples, leg)
     velocity      (samples, leg)
     step_ends     (steps,) times of the heel strikes or touches that end the steps; the first step begins at time[0]
-    knee_strikes  (strikes,) times at which a knee locks and velocities jump; of straight legs, none
+    knee_strikes  (strikes,) times at which a knee locks and velocities jump; empty without knees
     """
 
     time: Array
@@ -45,18 +45,20 @@ class Motion:
 
     @property
     def steps(self) -> int:
-        """Completed steps."""
         return int(self.step_ends.size)
 
     @cached_property
     def _first_samples(self) -> NDArray[np.int64]:
-        """Where the smooth pieces begin: at the start, and behind every jump of the velocities."""
+        """First sample of each smooth piece: the start, and the sample after each jump of the velocities."""
         close = np.diff(self.time) < JUMP * (self.time[-1] - self.time[0])
         return np.concatenate(([0], np.flatnonzero(close) + 1))
 
     @cached_property
     def _pieces(self) -> list[tuple[CubicHermiteSpline, PchipInterpolator]]:
-        """Angles through both angles and velocities; velocities without the overshoot that an impact would cause."""
+        """Interpolants of each smooth piece.
+
+        Hermite splines for the angles; monotone splines for the velocities, which do not overshoot at an impact.
+        """
         ends = (*self._first_samples[1:], self.time.size)
         pieces = []
         for first, end in zip(self._first_samples, ends, strict=True):
@@ -66,39 +68,42 @@ class Motion:
         return pieces
 
     def at(self, times: Array) -> tuple[Array, Array]:
-        """Angles and velocities (times, leg); at a heel strike, those after it."""
-        angle, velocity = np.empty((times.size, LEGS)), np.empty((times.size, LEGS))
+        """Compute angles and velocities (times, leg); at a heel strike, those after it."""
+        angle, velocity = np.empty((times.size, LEG_COUNT)), np.empty((times.size, LEG_COUNT))
         piece_of = np.searchsorted(self.time[self._first_samples], times, side="right") - 1
         for index in np.unique(piece_of):
-            here = piece_of == index
-            of_angle, of_velocity = self._pieces[index]
-            angle[here], velocity[here] = of_angle(times[here]), of_velocity(times[here])
+            inside = piece_of == index
+            angle_piece, velocity_piece = self._pieces[index]
+            angle[inside], velocity[inside] = angle_piece(times[inside]), velocity_piece(times[inside])
         return angle, velocity
 
     def last_before(self, end: float) -> float:
-        """The last instant before a jump at `end`; `end` itself where nothing jumps."""
+        """Return the last instant before a jump at `end`, or `end` where nothing jumps."""
         index = int(np.searchsorted(self.time, end))
         if index < self.time.size and self.time[index] == end and index in self._first_samples[1:]:
             return float(self.time[index - 1])
         return end
 
     def during(self, step: int, phases: Array) -> tuple[Array, Array]:
-        """Angles and velocities at phases of a step: 0 just after the impact that began it, 1 just before the next."""
+        """Compute angles and velocities at phases of a step.
+
+        Phase 0 is just after the impact that began it, phase 1 just before the next.
+        """
         start, end = self.span(step)
         return self.at(np.minimum(start + phases * (end - start), self.last_before(end)))
 
     def span(self, step: int) -> tuple[float, float]:
-        """When a step begins and ends (s)."""
+        """Return the start and end of a step (s)."""
         return float(self.time[0] if step == 0 else self.step_ends[step - 1]), float(self.step_ends[step])
 
     def knee_phases(self, step: int) -> Array:
-        """(strikes,) phases of a step at which a knee locks."""
+        """Return the phases (strikes,) of a step at which a knee locks."""
         start, end = self.span(step)
         inside = self.knee_strikes[(self.knee_strikes > start) & (self.knee_strikes < end)]
         return (inside - start) / (end - start)
 
     def last_stride(self) -> Motion:
-        """The last two completed steps, with both impacts; ValueError if there are not two."""
+        """Cut out the last two completed steps, with both impacts; raises ValueError if there are fewer."""
         if self.steps < 2:
             raise ValueError("no stride was completed")
         start = self.time[0] if self.steps == 2 else self.last_before(self.step_ends[-3])
@@ -109,12 +114,12 @@ class Motion:
         return replace(self, time=time, angle=angle, velocity=velocity, step_ends=self.step_ends[-2:])
 
 
-def sampled_at_strikes(motion: Motion) -> Motion:
-    """The motion with a sample at the end of every step, and on either side of every knee strike.
+def add_strike_samples(motion: Motion) -> Motion:
+    """Add samples at the end of every step and on both sides of every knee strike.
 
-    Where there is none, it is continued from the three samples before, and behind a knee strike from the three after,
-    unless another strike lies among them.
-    A compliant impact or an ideal lock takes less than the time between samples: interpolating across would smear it.
+    Where one is missing, it is extrapolated from the three samples before it, or after it behind a knee strike, unless
+    another strike lies among them. A compliant impact or an ideal lock takes less than the time between samples, so
+    interpolating across it would smear the jump.
     """
     side = 0.5 * JUMP * (motion.time[-1] - motion.time[0])
     added = [
@@ -127,45 +132,45 @@ def sampled_at_strikes(motion: Motion) -> Motion:
         if 3 <= place <= motion.time.size - 3 and strike not in motion.time:
             added += [(strike - side, slice(place - 3, place)), (strike, slice(place, place + 3))]
     strikes = np.concatenate((motion.step_ends, motion.knee_strikes))
-    added = [(at, known) for at, known in added if not jumps_among(motion.time[known], at, strikes, 2.0 * side)]
+    added = [(t, near) for t, near in added if not jumps_among(motion.time[near], t, strikes, 2.0 * side)]
     if not added:
         return motion
-    rows = [continued(motion, known, at) for at, known in added]
-    time = np.concatenate((motion.time, [at for at, _ in added]))
+    rows = [extrapolate(motion, near, t) for t, near in added]
+    time = np.concatenate((motion.time, [t for t, _ in added]))
     order = np.argsort(time)
     angle = np.concatenate((motion.angle, [row[0] for row in rows]))
     velocity = np.concatenate((motion.velocity, [row[1] for row in rows]))
     return replace(motion, time=time[order], angle=angle[order], velocity=velocity[order])
 
 
-def jumps_among(times: Array, at: float, strikes: Array, close: float) -> bool:
-    """Whether a strike other than the one at `at` (s), or closer to it than `close`, lies between it and the times."""
-    between = (strikes > min(times[0], at)) & (strikes < max(times[-1], at)) & (np.abs(strikes - at) > close)
+def jumps_among(times: Array, time: float, strikes: Array, close: float) -> bool:
+    """Whether a strike, other than those closer than `close` (s) to `time`, lies between it and the times."""
+    between = (strikes > min(times[0], time)) & (strikes < max(times[-1], time)) & (np.abs(strikes - time) > close)
     return bool(between.any())
 
 
-def continued(motion: Motion, known: slice, at: float) -> tuple[Array, Array]:
-    """Angles and velocities (leg,) at a time, by the parabola through three known samples beside it."""
-    times = motion.time[known]
-    weights = [np.prod([(at - other) / (one - other) for other in times if other != one]) for one in times]
-    return np.asarray(weights @ motion.angle[known]), np.asarray(weights @ motion.velocity[known])
+def extrapolate(motion: Motion, samples: slice, time: float) -> tuple[Array, Array]:
+    """Extrapolate angles and velocities (leg,) to a time by the parabola through three samples."""
+    times = motion.time[samples]
+    weights = [np.prod([(time - node) / (own - node) for node in times if node != own]) for own in times]
+    return np.asarray(weights @ motion.angle[samples]), np.asarray(weights @ motion.velocity[samples])
 
 
 @dataclass(frozen=True, eq=False)
 class WalkDifference:
-    """One walk less another, along time, or along steps and phases; the last axis is the leg."""
+    """One walk minus another, along time, or along steps and phases; the last axis is the leg."""
 
     angle: Array
     velocity: Array
 
     def largest(self, of: Quantity) -> list[float]:
-        """(leg,) largest difference of each leg's angle (rad) or velocity (rad/s)."""
-        found: list[float] = np.abs(getattr(self, of)).reshape(-1, LEGS).max(axis=0).tolist()
-        return found
+        """Return the largest difference (leg,) of each leg's angle (rad) or velocity (rad/s)."""
+        largest: list[float] = np.abs(getattr(self, of)).reshape(-1, LEG_COUNT).max(axis=0).tolist()
+        return largest
 
 
 def difference_in_time(walk: Motion, reference: Motion) -> tuple[Array, WalkDifference]:
-    """`walk` less `reference` at the same times: at every sample of either while both walk.
+    """Compute `walk` minus `reference` at every sample time of either while both walk.
 
     Returns the times (s) and the difference.
     """
@@ -177,7 +182,7 @@ def difference_in_time(walk: Motion, reference: Motion) -> tuple[Array, WalkDiff
 
 
 def difference_in_phase(walk: Motion, reference: Motion, phases: Array) -> WalkDifference:
-    """`walk` less `reference` at the same phases (phases,) of the steps that both completed: (step, phase, leg).
+    """Compute `walk` minus `reference` at phases (phases,) of the steps that both completed: (step, phase, leg).
 
     Raises ValueError if one of them completed none.
     """
@@ -191,9 +196,10 @@ def difference_in_phase(walk: Motion, reference: Motion, phases: Array) -> WalkD
 
 
 def between_impacts(walk: Motion, reference: Motion, phases: Array) -> NDArray[np.bool_]:
-    """(step, phase) where both walks move smoothly: past the impact at a step's start, and off their knees' strikes.
+    """Mark where both walks move smoothly (step, phase): after the impact at a step's start and outside knee strikes.
 
-    Knees that lock at slightly other phases differ by the whole jump between them, however alike the motions are.
+    Between the phases at which the two walks' knees lock, the velocities differ by the whole jump, however similar the
+    motions are.
     """
     clear = np.tile(phases >= IMPACT_PHASE, (min(walk.steps, reference.steps), 1))
     for step, row in enumerate(clear):
@@ -205,46 +211,46 @@ def between_impacts(walk: Motion, reference: Motion, phases: Array) -> NDArray[n
 
 
 def orbit_distances(walk: Motion, reference: Motion) -> Array:
-    """(leg,) how far the orbits of the last stride lie apart in the plane of angle and angular velocity.
+    """Compute the distances (leg,) between the orbits of the last strides in the plane of angle and angular velocity.
 
-    Symmetric Hausdorff distance: the largest distance of a point of either orbit from the other. Each axis is measured
-    in the reference orbit's range along it, so that 0.01 is one percent of the orbit's size.
+    Symmetric Hausdorff distance: the largest distance of a point of either orbit from the other. Each axis is scaled by
+    the reference orbit's range, so that 0.01 is one percent of the orbit's size.
 
     Raises ValueError if one of them completed no stride.
     """
     stride, reference_stride = walk.last_stride(), reference.last_stride()
-    distances = np.empty(LEGS)
-    for leg in range(LEGS):
-        orbit, other = phase_plane(stride, leg), phase_plane(reference_stride, leg)
-        scale = np.ptp(other, axis=0)
-        distances[leg] = hausdorff(orbit / scale, other / scale)
+    distances = np.empty(LEG_COUNT)
+    for leg in range(LEG_COUNT):
+        orbit, reference_orbit = phase_plane(stride, leg), phase_plane(reference_stride, leg)
+        scale = np.ptp(reference_orbit, axis=0)
+        distances[leg] = hausdorff(orbit / scale, reference_orbit / scale)
     return distances
 
 
 def phase_plane(motion: Motion, leg: int) -> Array:
-    """(samples, 2) angle and velocity of a leg."""
+    """Return angle and velocity (samples, 2) of a leg."""
     return np.column_stack((motion.angle[:, leg], motion.velocity[:, leg]))
 
 
-def hausdorff(curve: Array, other: Array) -> float:
-    """Largest distance of a point of either polyline (points, 2) from the other."""
-    return max(farthest(refined(curve), other), farthest(refined(other), curve))
+def hausdorff(curve: Array, reference: Array) -> float:
+    """Compute the largest distance of a point of either polyline (points, 2) from the other."""
+    return max(farthest_distance(refine(curve), reference), farthest_distance(refine(reference), curve))
 
 
-def refined(curve: Array) -> Array:
-    """The polyline with points put in, so that none is further than FINENESS from the next."""
+def refine(curve: Array) -> Array:
+    """Insert points into a polyline, no further apart than FINENESS."""
     along = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(curve, axis=0).T))))
-    points = np.union1d(along, np.linspace(0.0, along[-1], int(along[-1] / FINENESS) + 2))
+    points = np.union1d(along, np.linspace(0.0, along[-1], int(along[-1] / POINT_SPACING) + 2))
     return np.column_stack([np.interp(points, along, axis) for axis in curve.T])
 
 
-def farthest(points: Array, polyline: Array) -> float:
-    """Largest distance of one of the points (n, 2) from the polyline (m, 2)."""
+def farthest_distance(points: Array, polyline: Array) -> float:
+    """Compute the largest distance of one of the points (n, 2) from the polyline (m, 2)."""
     start, edge = polyline[:-1], np.diff(polyline, axis=0)
     length_squared = np.maximum((edge**2).sum(axis=1), np.finfo(float).tiny)
     largest = 0.0
-    for first in range(0, len(points), AT_ONCE):
-        away = points[first : first + AT_ONCE, None, :] - start
+    for first in range(0, len(points), BLOCK_POINTS):
+        away = points[first : first + BLOCK_POINTS, None, :] - start
         fraction = np.clip((away * edge).sum(axis=2) / length_squared, 0.0, 1.0)
         squared = ((away - fraction[:, :, None] * edge) ** 2).sum(axis=2)
         largest = max(largest, float(np.sqrt(squared.min(axis=1).max())))

@@ -1,9 +1,8 @@
-"""The event functions whose zeros are the events of a walk on compliant ground, sampled along a step.
+"""Event functions of a walk on compliant ground, sampled along a step, and their first crossing.
 
-Some change what the ground does (touch, lift, a pad's edge, feet passing each other, the fall). Of these the walk knows
-on which side of zero they are, and the event is that they leave it: of events at one time none can hide another. The
-others are switching points of the force law, where its derivatives jump: a step that ends there keeps the method's
-order.
+Some events change the ground (touch, lift, a pad's edge, feet passing, the fall). The walk stores the side of zero that
+their functions are on, and the event is leaving that side, so simultaneous events cannot hide one another. The others
+are switching points of the force law, where its derivatives jump: ending a step there preserves the method's order.
 """
 
 from typing import Any
@@ -46,14 +45,14 @@ from walkerlab.physics.hybrid.endings import FALLEN_HIP
 from walkerlab.physics.kernels import kernel_part, vector
 from walkerlab.physics.solvers.events import NO_CROSSING, CrossingFinder, first_crossing, way_from_zero
 
-NO_SIDE = 0  # of an event function that may cross zero either way
-ROUNDING = 1e-14  # m, rad or their rates: what event functions are zero to
-CLEARLY_MOVED = 1e-12  # the same, over a step: what they move away from zero by, if not by rounding alone
+NO_SIDE = 0  # for an event function that may cross zero either way
+ZERO_ROUNDING = 1e-14  # m, rad or their rates: smaller values of event functions are zero
+CLEARLY_MOVED = 1e-12  # same units: larger changes over a step are not rounding
 
 
 @kernel_part
 def hip_height(form: GroundModel, s: Any, c: Any, y: Any) -> float:
-    """Height of the hip over the slope (m)."""
+    """Compute the height of the hip over the slope (m)."""
     height = y[1] if form.places > 0 else form.root_height
     for k in range(form.bodies):
         height += s[k] * form.hip_x[k] + c[k] * form.hip_y[k]
@@ -64,7 +63,7 @@ def hip_height(form: GroundModel, s: Any, c: Any, y: Any) -> float:
 def sample_event_functions(
     system: OnGround, ground: JudgedGround, walk_state: WalkState, y: Any, node: int, finder: CrossingFinder
 ) -> None:
-    """Values of all event functions at one node of a step, where the state is y."""
+    """Evaluate all event functions at one node of a step, where the state is y."""
     form, terrain, values = system.form, ground.terrain, finder.values
     s, c = vector(OF_BODIES), vector(OF_BODIES)
     sines_cosines(form, y, s, c)
@@ -87,7 +86,7 @@ def sample_event_functions(
 def sample_foot(
     system: OnGround, motion: FootMotion, edges: tuple[float, float], first: int, j: int, finder: CrossingFinder
 ) -> None:
-    """One foot's event functions at node j."""
+    """Evaluate one foot's event functions at node j."""
     values = finder.values
     values[first + HEIGHT, j] = motion.height
     values[first + VERTICAL_VELOCITY, j] = motion.vertical_velocity
@@ -100,25 +99,27 @@ def sample_foot(
 
 @kernel_part
 def knee_crossing(walk_state: WalkState, finder: CrossingFinder) -> tuple[float, int]:
-    """Fraction of the step at which a knee locks, latches or is to be released, and which event function's that is.
+    """Find the first event of the knees.
 
-    A bent knee gets straight; one in its stop turns back; the stance foot stops sinking in.
+    A bent knee straightens, a knee in its stop turns back, or the stance foot stops sinking in, which releases a knee.
+
+    Returns the fraction of the step and the event.
     """
     best, event = NO_CROSSING, -1
     for knee in range(2):
-        at, index = NO_CROSSING, EXTENSION + knee
+        fraction, index = NO_CROSSING, EXTENSION + knee
         if walk_state.knee[knee] == BENT:
-            at = leaves_side(finder, index, -1, walk_state.at_zero[index] != 0)
+            fraction = leaves_side(finder, index, -1, walk_state.at_zero[index] != 0)
         elif walk_state.knee[knee] == STOPPING:
             index = EXTENSION_RATE + knee
-            at = leaves_side(finder, index, 1, walk_state.at_zero[index] != 0)
-        if at < best:
-            best, event = at, index
+            fraction = leaves_side(finder, index, 1, walk_state.at_zero[index] != 0)
+        if fraction < best:
+            best, event = fraction, index
     if walk_state.progress.release == AT_COMPRESSION:
         index = walk_state.progress.stance * PER_FOOT + VERTICAL_VELOCITY
-        at = leaves_side(finder, index, -1, walk_state.at_zero[index] != 0)
-        if at < best:
-            best, event = at, index
+        fraction = leaves_side(finder, index, -1, walk_state.at_zero[index] != 0)
+        if fraction < best:
+            best, event = fraction, index
     return best, event
 
 
@@ -126,9 +127,11 @@ def knee_crossing(walk_state: WalkState, finder: CrossingFinder) -> tuple[float,
 def earliest_crossing(
     system: OnGround, ground: JudgedGround, walk_state: WalkState, watch_order: bool, finder: CrossingFinder
 ) -> tuple[float, int]:
-    """Fraction of the sampled step at which the first event lies, and which event function's; NO_CROSSING if none.
+    """Find the first event in the sampled step.
 
     watch_order  whether it matters that the feet pass each other
+
+    Returns the fraction of the step, NO_CROSSING without an event, and the event.
     """
     sides, at_zero, has_ground = walk_state.sides, walk_state.at_zero, walk_state.has_ground
     best, event = NO_CROSSING, -1
@@ -136,7 +139,7 @@ def earliest_crossing(
         if foot == system.form.hinged:
             continue
         first = foot * PER_FOOT
-        # above the ground there is no force to switch: what a foot's law does after its touch is the next step's
+        # above the ground there is no force to switch; switching after a touch belongs to the next step
         inside = has_ground[foot] != 0 and sides[first + HEIGHT] < 0
         last = RELEASE
         if inside and ground.frame.locate_switching and not walk_state.progress.passes_switching:
@@ -144,37 +147,37 @@ def earliest_crossing(
         for index in range(first, first + last):
             if not ground.terrain.has_pads and (index == first + LEFT_EDGE or index == first + RIGHT_EDGE):
                 continue
-            at = leaves_side(finder, index, sides[index], at_zero[index] != 0)
-            if at < best:
-                best, event = at, index
+            fraction = leaves_side(finder, index, sides[index], at_zero[index] != 0)
+            if fraction < best:
+                best, event = fraction, index
         if foot == walk_state.progress.stance and sides[first + HEIGHT] < 0 and has_ground[foot] != 0:
-            at = leaves_side(finder, SLIDE, sides[SLIDE], at_zero[SLIDE] != 0)
-            if at < best:
-                best, event = at, SLIDE
+            fraction = leaves_side(finder, SLIDE, sides[SLIDE], at_zero[SLIDE] != 0)
+            if fraction < best:
+                best, event = fraction, SLIDE
     if watch_order:
-        at = leaves_side(finder, PASSING, sides[PASSING], at_zero[PASSING] != 0)
-        if at < best:
-            best, event = at, PASSING
-    at, index = knee_crossing(walk_state, finder)
-    if at < best:
-        best, event = at, index
-    at = leaves_side(finder, FALL, sides[FALL], at_zero[FALL] != 0)
-    if at < best:
-        best, event = at, FALL
+        fraction = leaves_side(finder, PASSING, sides[PASSING], at_zero[PASSING] != 0)
+        if fraction < best:
+            best, event = fraction, PASSING
+    fraction, index = knee_crossing(walk_state, finder)
+    if fraction < best:
+        best, event = fraction, index
+    fraction = leaves_side(finder, FALL, sides[FALL], at_zero[FALL] != 0)
+    if fraction < best:
+        best, event = fraction, FALL
     return best, event
 
 
 @kernel_part
 def leaves_side(finder: CrossingFinder, event: int, side: int, zero_at_start: bool) -> float:
-    """Fraction at which an event function crosses to the other side of zero than it is known to be on.
+    """Find the fraction of the step at which an event function leaves its stored side of zero.
 
-    At once if it is there already: the step before, which ended for another event, went past its zero, or on it. Of one
-    that is zero at the start the way it goes tells, and rounding alone, which has not moved it from zero, does not: a
-    foot whose hinge is released, say, may still sink in. One that its own event left at zero has gone its way already,
-    and is back only where it is on the other side all along.
+    It is 0 if the function is already on the other side, because the previous step, ended by another event, went past
+    this zero or ended on it. For a function that is zero at the start, the direction of its change decides, unless it
+    has moved by rounding alone: a foot just released from its hinge may still sink in. A function that its own event
+    left at zero has already changed sides, so it returns only if it is on the other side throughout.
     """
     value = finder.values[event, 0]
-    at_zero = zero_at_start or abs(value) < ROUNDING
+    at_zero = zero_at_start or abs(value) < ZERO_ROUNDING
     if side != NO_SIDE:
         if at_zero:
             value = way_from_zero(finder, event, CLEARLY_MOVED)

@@ -1,9 +1,8 @@
-"""Events of a walk on compliant ground: which there are, and what they are judged by.
+"""Events of a walk on compliant ground, and the quantities they are judged by.
 
-Events are numbered, and so are the rows of the finder that hold their event functions: PER_FOOT rows for foot 0, as
+Events are numbered like the rows of the finder that hold their event functions: PER_FOOT rows for foot 0, as
 many for foot 1, then those of the walker and of its knees. Event `foot * PER_FOOT + HEIGHT` is a touch or a lift.
-
-They are module constants: kernels take members of an IntEnum for objects, and compile a third longer.
+They are module constants: kernels treat members of an IntEnum as objects, and compile a third longer.
 """
 
 from typing import NamedTuple
@@ -14,22 +13,22 @@ from walkerlab.physics.kernels import by_reference, kernel_part
 # event functions of each foot
 HEIGHT, LEFT_EDGE, RIGHT_EDGE, RELEASE, FULL_DAMPING = range(5)
 FRICTION_SWITCHES = 5  # up to four, of the friction law
-MATERIAL, VERTICAL_VELOCITY = 9, 10  # no events: where the foot's material is, and how fast its height grows
+MATERIAL, VERTICAL_VELOCITY = 9, 10  # no events: position of the foot's material, and rate of its height
 PER_FOOT = 11
 # event functions of the walker
 PASSING, FALL, SLIDE = range(2 * PER_FOOT, 2 * PER_FOOT + 3)
-# event functions of both knees: how far beyond straight, and how fast it gets there
+# event functions of both knees: angle beyond straight, and its rate
 EXTENSION, EXTENSION_RATE = SLIDE + 1, SLIDE + 3
 EVENT_FUNCTIONS = SLIDE + 5
-PULSE_END = EVENT_FUNCTIONS  # has no event function: the clock tells
+PULSE_END = EVENT_FUNCTIONS  # has no event function: it is due at a fixed time
 NO_EVENT = -1
 LEGS_TURN = EVENT_FUNCTIONS  # row of the rate between the legs, which is no event
-ROWS = EVENT_FUNCTIONS + 1
+EVENT_ROWS = EVENT_FUNCTIONS + 1
 FARTHEST_SLIDE = 0.25  # of the stride measure, of a stance foot's material from where it touched
 
 
 class Frame(NamedTuple):
-    """Measures of the walker that events are judged by."""
+    """Dimensions of the walker that events are judged by."""
 
     leg_length: float  # m
     pendulum_time: float  # s, sqrt(L/g)
@@ -38,7 +37,7 @@ class Frame(NamedTuple):
 
 @by_reference
 class JudgedGround(NamedTuple):
-    """What a walk happens on and is judged by."""
+    """Ground of a walk, with the criteria for its events."""
 
     terrain: Terrain
     frame: Frame
@@ -46,11 +45,11 @@ class JudgedGround(NamedTuple):
 
 @kernel_part
 def farthest_slide(terrain: Terrain) -> float:
-    """How far a loaded stance foot may slip (m)."""
+    """Return the distance that a loaded stance foot may slip (m)."""
     return FARTHEST_SLIDE * terrain.stride_measure
 
 
 @kernel_part
 def is_switching(event: int) -> bool:
-    """Whether an event is a mere switching point of the force law."""
+    """Whether an event is only a switching point of the force law."""
     return event < 2 * PER_FOOT and RELEASE <= event % PER_FOOT < MATERIAL

@@ -1,4 +1,4 @@
-"""What a knee that locks, latches or is released does to the walk: velocities, energy, the tangent."""
+"""Jumps of velocities, energy and tangent where a knee locks, latches or is released."""
 
 from typing import Any
 
@@ -14,10 +14,10 @@ from walkerlab.physics.ground.walker import (
     ContactWalker,
     GroundModel,
     OnGround,
-    folded,
     new_progress,
     sines_cosines,
-    unfolded,
+    to_form,
+    to_full,
 )
 from walkerlab.physics.hybrid.contact_events import EXTENSION, EXTENSION_RATE, HEIGHT, PER_FOOT, PULSE_END
 from walkerlab.physics.hybrid.contact_record import ContactObserver
@@ -32,20 +32,20 @@ from walkerlab.physics.solvers.system import Floats
 def change_form(
     walker: ContactWalker, before: OnGround, after: OnGround, event: int, observer: ContactObserver, method: Any
 ) -> Floats:
-    """The state in the form after an event that locked or released a knee; what it cost is noted, the tangent jumps.
+    """Return the state in the form after an event that locked or released a knee, and record its energy loss.
 
-    So it does where a step's touch has the torque between the legs change them. Of a walker that pushes off, whose
-    pulse is as old as the touch, the tangent is that of walks that touch together from then on.
+    A lock is a plastic impact; a latch loses the energy held in its spring; a release changes no velocity.
 
-    A lock is a plastic impact; what a latch holds in its spring is lost; a release changes no velocity.
+    The tangent jumps. So it does at a step's touch if the hip torque changes legs. For a walker with a push-off, whose
+    pulse starts at the touch, the tangent is afterwards that of walks that touch at the same time.
 
-    method  stands where the walk came back, with the state in the form before
+    method  holds the event's time and the state in the form before; its state is replaced
     """
     y, t = method.y, float(method.clock[T])
     whole = walker.forms[int(before.form.places == 0), 0]
     size = int(2 * (whole.places + whole.bodies))
-    x = unfolded(before.form, y, size)
-    if event < EXTENSION and event % PER_FOOT == HEIGHT:  # a step's touch: the other leg stood before
+    x = to_full(before.form, y, size)
+    if event < EXTENSION and event % PER_FOOT == HEIGHT:  # a step's touch: the other leg was the stance leg
         before = before._replace(progress=new_progress(stance=1 - after.progress.stance))
     locks = EXTENSION <= event < PULSE_END
     new = x
@@ -57,11 +57,11 @@ def change_form(
             stopping[(event - EXTENSION) % 2] = STOPPING
             before = before._replace(knee=stopping)
             observer.account[KNEE_STOP] += stop_energy(before, y)
-    z = folded(after.form, new)
+    z = to_form(after.form, new)
     Phi = observer.tangent.Phi
     if Phi.shape[1] > 0:
-        rate, rate_after = rate_of(before, y, size, t), rate_of(after, z, size, t)
-        columns = unfolded(before.form, Phi[: y.size], size)
+        rate, rate_after = state_rate(before, y, size, t), state_rate(after, z, size, t)
+        columns = to_full(before.form, Phi[: y.size], size)
         waits = np.zeros(Phi.shape[1])
         if event != PULSE_END:
             gradient = event_gradient(whole, event, x)
@@ -74,19 +74,19 @@ def change_form(
             columns = lock_knee(whole, after.form, x, columns).columns
         for column, wait in zip(columns.T, waits, strict=True):
             shift_column(column, 0, rate_after, -wait)
-        Phi[: z.size] = folded(after.form, columns)
+        Phi[: z.size] = to_form(after.form, columns)
     return z
 
 
-def rate_of(system: OnGround, y: Floats, size: int, t: float) -> Floats:
-    """dy/dt of all bodies (size,) at a time (s)."""
+def state_rate(system: OnGround, y: Floats, size: int, t: float) -> Floats:
+    """Compute dy/dt of all bodies (size,) at a time (s)."""
     rate = np.zeros(y.size)
     right_hand_side(system, t, y, rate)
-    return unfolded(system.form, rate, size)
+    return to_full(system.form, rate, size)
 
 
 def event_gradient(whole: GroundModel, event: int, x: Floats) -> Floats:
-    """Derivative by the state of all bodies of a knee's extension or a foot's height, or of the rate of either."""
+    """Compute the gradient of an event function (knee extension, foot height, or their rates) in the full state."""
     gradient, p, half = np.zeros(x.size), int(whole.places), x.size // 2
     if event >= EXTENSION:
         first = half + p if event >= EXTENSION_RATE else p

@@ -1,4 +1,4 @@
-"""Walking on compliant ground: integrate to the next event, let it change what the ground does, go on.
+"""Walking on compliant ground: integrate to the next event, apply it, continue.
 
 Compiled as a whole for the project's own methods; the same source runs in Python with a library's integrator.
 """
@@ -38,23 +38,24 @@ from walkerlab.physics.solvers.stepping import (
     sample,
 )
 
-NEVER = -1
+NO_LIMIT = -1
 AT_LIFT = -2  # stop once the foot that carried the last step has lifted
 LONGEST_STEP = 10.0  # pendulum times within which a step must end
 LONGEST_FLIGHT = 0.25  # pendulum times without any foot on the ground
-EVENT_TIME = 1e-12  # s, how exactly an event is located
-REFINEMENTS = 4
-REWINDS = 24  # of one step; where rounding moves an event with each try, the step's end is the event
-DOUBTS = 12  # rewinds of one step after which an event that its end does not bear out does not count
+EVENT_TIME = 1e-12  # s, accuracy of event times
+EVENT_REFINEMENTS = 4
+REWINDS = 24  # of one step, until its end is accepted as the event, which rounding moves with each attempt
+DOUBTS = 12  # rewinds of one step after which an event that its end does not confirm is dropped
 
 
 @callable_kernel
 def scan(
     system: OnGround, ground: JudgedGround, walk_state: WalkState, watch_order: bool, finder: CrossingFinder
 ) -> tuple[float, int]:
-    """Fraction of a step, sampled at the nodes, at which the first event lies, and which it is.
+    """Sample a step at the nodes and find its first event.
 
-    The event functions stay in `finder.values`. The fraction is NO_CROSSING if there is no event.
+    Returns its fraction of the step, NO_CROSSING without an event, and the event. `finder.values` keeps the event
+    functions.
     """
     for node in range(finder.nodes.size):
         sample_event_functions(system, ground, walk_state, finder.states[node], node, finder)
@@ -62,16 +63,16 @@ def scan(
 
 
 class EventSearch(NamedTuple):
-    """The search for the time of an event, by steps that end where it is expected."""
+    """State of the search for the time of an event, by steps that end at its expected time."""
 
-    target: float  # s, how far the next step may lead
-    event: int  # the event that is sought, or was met last
-    latest: float  # s, end of the step in which it showed first: it is not sought beyond
-    arriving: bool  # whether the target is its expected time
-    refinements: int  # of that time
-    rewinds: int  # of the step at hand
-    stands: bool  # whether the last step stands; if not it is taken again, up to the new target
-    happens: bool  # whether the event is at its end
+    target: float  # s, end of the next step at the latest
+    event: int  # the event sought, or the last one
+    latest: float  # s, end of the step in which it appeared, which bounds the search
+    arriving: bool  # whether the target is the event's expected time
+    refinements: int  # corrections of that time
+    rewinds: int  # of the present step
+    stands: bool  # whether the last step is valid; if not it is repeated up to the new target
+    happens: bool  # whether the event is at the end of the step
 
 
 @kernel
@@ -84,15 +85,16 @@ def walk_in_form(
     walk_state: WalkState,
     until: int,
 ) -> tuple[int, int]:
-    """Walk from where the method stands until the walk state is full, the hinge is released, or the walk ends.
+    """Walk until the walk state is full, the walk changes its form, the hinge is released, or the walk ends.
 
-    Each turn takes a step, looks for an event in it, and takes it again if it is to end elsewhere. A step that stands
-    is observed and judged; then the event at its end changes what the walk remembers.
+    Each iteration takes a step, searches it for an event, and repeats it if it must end elsewhere. A valid step is
+    observed and judged; then the event at its end changes the walk state.
 
-    until  how many steps after which it also stops when the feet pass each other, or NEVER; or AT_LIFT: a walk whose
-           walk state is full goes on until the foot that carried its last step has lifted
+    method  holds the start, and the end on return
+    until   number of steps after which it also stops when the feet pass each other, or NEVER; or AT_LIFT: a walk whose
+            walk state is full continues until the foot that carried its last step has lifted
 
-    Returns the outcome's number, or CHANGES_FORM, and the last event that it met.
+    Returns the outcome's number, or CHANGES_FORM, and the last event.
     """
     begin(method, system, method.clock[T], method.y, method.clock[H_NEXT])
     search = seek(deadline(system, ground.frame, walk_state, method.clock[T]), NO_EVENT)
@@ -127,13 +129,13 @@ def walk_in_form(
 
 @kernel_part
 def steps_are_left(walk_state: WalkState, until: int) -> bool:
-    """Whether the walk state has room for a step, or waits for the lift that ends the last one."""
+    """Whether the walk state has room for a step, or the last step still waits for its lift."""
     return walk_state.progress.steps < walk_state.touch_time.size or (until == AT_LIFT and is_to_lift(walk_state))
 
 
 @kernel_part
 def seek(target: float, event: int) -> EventSearch:
-    """Look for the next event, from a step that stands up to a time (s); `event` was the last one."""
+    """Start the search for the next event, with steps up to a time (s); `event` was the last one."""
     return EventSearch(target, event, target, False, 0, 0, False, False)
 
 
@@ -141,9 +143,9 @@ def seek(target: float, event: int) -> EventSearch:
 def aim(
     search: EventSearch, walk_state: WalkState, method: Any, finder: CrossingFinder, fraction: float, event: int
 ) -> EventSearch:
-    """Decide whether the last step stands, and whether its event happens, or how far it is to lead instead.
+    """Decide whether the last step is valid and its event happens, or else where it is to end.
 
-    fraction  of the step, at which the event lies; above 1 if there is none in it
+    fraction  of the step, at which the event lies; above 1 without an event
     """
     start, end = method.clock[T_OLD], method.clock[T]
     if fraction <= 1.0:
@@ -157,21 +159,21 @@ def aim(
 def approach(
     search: EventSearch, walk_state: WalkState, start: float, end: float, fraction: float, event: int
 ) -> EventSearch:
-    """Let the step from start to end (s) lead only up to the event in it; it stands if the event is at its end.
+    """Shorten the step from start to end (s) to the event in it, or accept it if the event is at its end.
 
-    So it does where rounding moves the event with each try.
+    It is also accepted where rounding moves the event with each attempt.
     """
     latest = search.latest if search.arriving else end
     refinements = search.refinements if search.arriving and event == search.event else 0
     wait = max(fraction * (end - start), EVENT_TIME)
     early = start + wait < end - EVENT_TIME
-    if early and refinements <= REFINEMENTS and search.rewinds < REWINDS:
+    if early and refinements <= EVENT_REFINEMENTS and search.rewinds < REWINDS:
         return EventSearch(start + wait, event, latest, True, refinements + 1, search.rewinds + 1, False, False)
     if early and is_switching(event):
-        # its event function is no polynomial on this step: on half of it, it is nearer to one
+        # the event function is not polynomial on this step; on half of it, it is closer to one
         if search.rewinds < REWINDS:
             return EventSearch(0.5 * (start + end), event, latest, False, 0, search.rewinds + 1, False, False)
-        # nor on a short one: the step may pass it over, but nothing else that is in it
+        # nor on a short step: ignore this event, but no other event of the step
         walk_state.progress.passes_switching = True
         return EventSearch(end, event, latest, False, 0, 0, False, False)
     return EventSearch(end, event, latest, True, refinements, search.rewinds, True, True)
@@ -179,9 +181,9 @@ def approach(
 
 @kernel_part
 def confirm(search: EventSearch, start: float, wait: float) -> EventSearch:
-    """Let the event happen at the end of a step that just did not reach it, or lead the step on by `wait` (s)."""
+    """Let the event happen at the end of a step that just failed to reach it, or extend the step by `wait` (s)."""
     happens = abs(wait) <= EVENT_TIME
-    doubtful = search.refinements <= REFINEMENTS and search.rewinds < DOUBTS
+    doubtful = search.refinements <= EVENT_REFINEMENTS and search.rewinds < DOUBTS
     target, refinements, rewinds = search.target + wait, search.refinements + 1, search.rewinds + 1
     if not happens and doubtful and start < target <= search.latest:
         return EventSearch(target, search.event, search.latest, True, refinements, rewinds, False, False)
@@ -190,7 +192,7 @@ def confirm(search: EventSearch, start: float, wait: float) -> EventSearch:
 
 @kernel_part
 def forget_zeros(walk_state: WalkState, h: float) -> None:
-    """After a step of h (s) no event function counts as zero any more; of events at one time each is found once."""
+    """Clear the marks of event functions at zero after a step of h (s), so that each event is found once."""
     if h > 2.0 * EVENT_TIME:
         for i in range(walk_state.at_zero.size):
             walk_state.at_zero[i] = 0
@@ -206,7 +208,7 @@ def react(
     event: int,
     until: int,
 ) -> int:
-    """Let the event at the end of the last step change the walk; returns how the walk goes on, or ends."""
+    """Apply the event at the end of the last step; returns the outcome, GOES_ON or CHANGES_FORM."""
     steps, locked = walk_state.progress.steps, locked_knees(walk_state.knee)
     outcome = apply_event(system, terrain, observer, walk_state, event, method.clock[T], method.y)
     if outcome != GOES_ON:
@@ -216,7 +218,7 @@ def react(
         note_work(observer, system, method.y)
     if (stepped and is_hinged(system)) or (event == PASSING and 0 <= until <= walk_state.progress.steps):
         return WALKED
-    # where the motion jumps the tangent does, too: in another form, and where a hip's legs change
+    # the tangent jumps with the motion: in a change of form, and where the hip's legs change roles
     if locked_knees(walk_state.knee) != locked or (stepped and jumps_at_touch(system)):
         return CHANGES_FORM
     if not is_switching(event):
@@ -232,13 +234,13 @@ def is_hinged(system: OnGround) -> bool:
 
 @kernel_part
 def jumps_at_touch(system: OnGround) -> bool:
-    """Whether a step's touch may change what acts on the walker at once: the hip's legs change, a push-off begins."""
+    """Whether a step's touch may change forces abruptly: the hip's legs change roles, or a push-off begins."""
     return is_sprung(system.form, HIP_ROW) or system.form.push_off != 0.0
 
 
 @kernel_part
 def deadline(system: OnGround, frame: Frame, walk_state: WalkState, t: float) -> float:
-    """When the walk ends if nothing happens before: too long a step, or too long a flight (s); or when a pulse does."""
+    """Compute the time (s) when the walk ends without an event (step or flight too long), or a pulse ends."""
     by_step = walk_state.progress.last_touch + LONGEST_STEP * frame.pendulum_time
     by_flight = walk_state.progress.airborne_since + LONGEST_FLIGHT * frame.pendulum_time
     left = pulse_left(system, t)
@@ -247,7 +249,7 @@ def deadline(system: OnGround, frame: Frame, walk_state: WalkState, t: float) ->
 
 @kernel_part
 def time_to_zero(method: Any, finder: CrossingFinder, event: int) -> float:
-    """How much later than the end of the last step an event function is zero (s), by its slope there."""
+    """Estimate the time (s) from the end of the last step to the zero of an event function, by its slope there."""
     last = finder.nodes.size - 1
     h = method.clock[T] - method.clock[T_OLD]
     change = finder.values[event, last] - finder.values[event, last - 1]
@@ -260,7 +262,7 @@ def time_to_zero(method: Any, finder: CrossingFinder, event: int) -> float:
 
 @kernel_part
 def judge(system: OnGround, frame: Frame, t: float, walk_state: WalkState) -> int:
-    """End the walk if it has flown or taken too long at time t (s); note until when a foot was on the ground.
+    """End the walk if its flight or step is too long at time t (s); record the last time a foot was on the ground.
 
     The event at the step's end has not changed the walk state yet: a foot that leaves there was on the ground before.
     """

@@ -1,20 +1,20 @@
-"""What is recorded of a walk on compliant ground besides its steps: samples, energy balance, the tangent."""
+"""Records of a walk on compliant ground besides its steps: samples, energy balance, tangent."""
 
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from walkerlab.physics.energy_channels import (
-    DAMPING,
+    DAMPING_LOSS,
     EDGES,
     ENTRIES,
     FORWARD,
-    FRICTION,
-    GIVEN,
-    HIP,
+    FRICTION_LOSS,
+    HIP_WORK,
     KNEE_STOP,
-    LOST,
+    LOSS_ENTRIES,
     PUSH_OFF,
+    SUPPLY_ENTRIES,
     TORQUE,
 )
 from walkerlab.physics.ground.energy import dissipated_power, foot_elastic_energy, push_power, total_energy
@@ -26,7 +26,7 @@ from walkerlab.physics.hybrid.contact_tangent import Tangent, carry_tangent
 from walkerlab.physics.hybrid.hip_torque import torque_work
 from walkerlab.physics.kernels import by_reference, by_type_or_default, callable_kernel, kernel_part, matrix, vector
 from walkerlab.physics.mechanics.hinges import HIP_ROW, hinge_law
-from walkerlab.physics.mechanics.tree import read_at_once, record_type
+from walkerlab.physics.mechanics.tree import fast_fields, record_type
 from walkerlab.physics.solvers.events import RISING, CrossingFinder, first_crossing
 from walkerlab.physics.solvers.radau5 import Radau5
 from walkerlab.physics.solvers.stepping import T_OLD, T, interpolate, sample
@@ -45,37 +45,37 @@ OF_ORDER_9: Quadrature = (
 
 @by_reference
 class ContactSamples(NamedTuple):
-    """A walk at rising times."""
+    """Samples of a walk at rising times."""
 
     time_s: Any  # (samples,)
     states: Any  # (samples, 4 + 2 n) of the whole walker
     has_ground: Any  # (samples, 2)
     stance: Any  # (samples,)
-    knees: Any  # (samples, 2) what each knee is doing
+    knees: Any  # (samples, 2) state of each knee
     level: Any  # (samples, 2) m, height over the slope of the ground for each foot
     account: Any  # (samples, entries) J
 
     @property
     def dissipated_J(self) -> Any:
-        """(samples, 5) in the order of account.LOSSES."""
-        return self.account[:, LOST]
+        """Energy dissipated, (samples, 5), in the order of account.LOSSES."""
+        return self.account[:, LOSS_ENTRIES]
 
     @property
     def driven_J(self) -> Any:
-        """(samples, 2) given by push-off and hip."""
-        return self.account[:, GIVEN]
+        """Energy supplied by push-off and hip, (samples, 2)."""
+        return self.account[:, SUPPLY_ENTRIES]
 
 
-@read_at_once
+@fast_fields
 class ContactTally(np.record):  # type: ignore[misc]  # NumPy's stubs call one of its bases final
-    """Counts and extremes of a walk, and the energy that it began with: a structured scalar that kernels write to."""
+    """Counts, extremes and initial energy of a walk: a structured scalar that kernels write to."""
 
     recorded: int  # samples
     max_penetration: float  # m
     residual: float  # J, the largest of the energy balance
-    start_energy: float  # J, its potential from a fixed origin
-    energy_below: float  # J, the same with its potential from the slope below the walker
-    start_spring: float  # J, the part of the hip's spring
+    start_energy: float  # J, with the potential energy from a fixed origin
+    energy_below: float  # J, with the potential energy from the slope below the walker
+    start_spring: float  # J, elastic energy of the hip's spring
 
 
 CONTACT_TALLY = record_type(ContactTally, {})
@@ -83,21 +83,21 @@ CONTACT_TALLY = record_type(ContactTally, {})
 
 @by_reference
 class ContactObserver(NamedTuple):
-    """Samples, energy balance and tangent of a walk; what is not wanted has no room and costs a look."""
+    """Samples, energy balance and tangent of a walk; each is skipped if not requested."""
 
     track_energy: bool  # whether to keep the energy balance
     samples: ContactSamples
     account: Any  # (entries,) J, so far
     account_at_touch: Any  # (entries,) J, until the last step's touch
     tally: ContactTally
-    tangent: Tangent  # derivative of the state with respect to where it started, if wanted
+    tangent: Tangent  # derivative of the state with respect to the start; empty unless requested
 
 
 @kernel_part
 def observe(
     observer: ContactObserver, method: Any, system: OnGround, finder: CrossingFinder, walk_state: WalkState
 ) -> None:
-    """Take note of the last step, which stands and whose event functions are sampled."""
+    """Record the last step, which is valid and whose event functions are sampled."""
     record_samples(observer, method, system, walk_state)
     if observer.track_energy:
         balance(observer, method, system)
@@ -111,7 +111,7 @@ def observe(
 
 @kernel_part
 def record_samples(observer: ContactObserver, method: Any, system: OnGround, walk_state: WalkState) -> None:
-    """The samples that fall into the last step."""
+    """Record the samples within the last step."""
     t, h = method.clock[T_OLD], method.clock[T] - method.clock[T_OLD]
     samples, index = observer.samples, observer.tally.recorded
     y = vector(OF_STATES)[: method.y.size]
@@ -133,10 +133,10 @@ def record_samples(observer: ContactObserver, method: Any, system: OnGround, wal
 
 @kernel_part
 def balance(observer: ContactObserver, method: Any, system: OnGround) -> None:
-    """What the last step took and gave, and how well the energy balances at its end."""
+    """Record works and losses of the last step and the energy residual at its end."""
     account = observer.account
     add_work_until(method, system, 1.0, account)
-    lost = -account[PUSH_OFF] - account[HIP]
+    lost = -account[PUSH_OFF] - account[HIP_WORK]
     for entry in range(PUSH_OFF):
         lost += account[entry]
     residual = end_energy(system, method.y) + lost - observer.tally.start_energy
@@ -145,7 +145,7 @@ def balance(observer: ContactObserver, method: Any, system: OnGround) -> None:
 
 @kernel_part
 def note_torque(observer: ContactObserver, method: Any, system: OnGround, finder: CrossingFinder) -> None:
-    """Work of the hip's constant torque in the last step."""
+    """Record the work of the hip's constant torque in the last step."""
     torque = hinge_law(system.form, HIP_ROW).torque
     if torque != 0.0:
         given = torque_work(torque, method, system, finder, LEGS_TURN, 1.0)
@@ -155,15 +155,15 @@ def note_torque(observer: ContactObserver, method: Any, system: OnGround, finder
 
 @kernel_part
 def note_work(observer: ContactObserver, system: OnGround, y: Any) -> None:
-    """A step has ended: what was given until now belongs to steps that were taken, and what the hip's spring gave."""
+    """Record the work until the end of a step, which belongs to completed steps, including the hip's spring."""
     for entry in range(ENTRIES):
         observer.account_at_touch[entry] = observer.account[entry]
-    observer.account_at_touch[HIP] += observer.tally.start_spring - spring_energy(system, y)
+    observer.account_at_touch[HIP_WORK] += observer.tally.start_spring - spring_energy(system, y)
 
 
 @kernel_part
 def note_depth(observer: ContactObserver, method: Any, system: OnGround, finder: CrossingFinder, foot: int) -> None:
-    """How deep a foot got in the last step: at its end, or where it stopped sinking in."""
+    """Record the penetration of a foot in the last step: at its end, or where the foot stopped sinking in."""
     end, first = finder.nodes.size - 1, foot * PER_FOOT
     deepest = -finder.values[first + HEIGHT, end]
     if finder.values[first + VERTICAL_VELOCITY, 0] < 0.0 < finder.values[first + VERTICAL_VELOCITY, end]:
@@ -176,32 +176,31 @@ def note_depth(observer: ContactObserver, method: Any, system: OnGround, finder:
 
 @kernel_part
 def observe_edge(observer: ContactObserver, system: OnGround, foot: int, y: Any) -> None:
-    """A foot left its pad: the spring under it is gone, and what it held with it."""
+    """Record the energy lost as a foot leaves its pad: that of the spring under it."""
     if system.has_ground[foot] != 0 and observer.track_energy:
         observer.account[EDGES] += foot_elastic_energy(system, foot, y)
 
 
 @callable_kernel
 def end_energy(system: OnGround, y: Any) -> float:
-    """Mechanical energy (J) at the end of the last step."""
+    """Compute the mechanical energy (J) at the end of the last step."""
     return total_energy(system, y)
 
 
 @by_type_or_default
 def quadrature(method: Any) -> Quadrature:
-    """The rule that sums up what a step of a method took and gave: as exact as the best dense output."""
+    """Return the rule that integrates powers over a step of a method, as exact as the best dense output."""
     return OF_ORDER_9
 
 
 @quadrature.case(Radau5)
-def of_collocation(method: Radau5) -> Quadrature:
-    """That of the method's own order."""
+def collocation_rule(method: Radau5) -> Quadrature:
     return OF_ORDER_5
 
 
 @kernel_part
 def add_work_until(method: Any, system: OnGround, fraction: float, account: Any) -> None:
-    """Add to an account (entries,) what the first part of the last step took and gave (J)."""
+    """Add the works and losses (J) of the first `fraction` of the last step to an account (entries,)."""
     nodes, weights = quadrature(method)
     fractions, states = vector(nodes), matrix(OF_STATES)
     for i in range(len(nodes)):
@@ -221,27 +220,27 @@ def add_work(
     span: float,
     account: Any,
 ) -> None:
-    """The same of a time `span` (s) from `begin` on, with the states at its nodes."""
+    """Add works and losses (J) from `begin` on for a time `span` (s) to an account, with the states at the nodes."""
     for foot in range(2):
         if system.has_ground[foot] != 0:
             damping, friction = foot_work(system, states, weights, foot, span)
-            account[DAMPING] += damping
-            account[FRICTION] += friction
+            account[DAMPING_LOSS] += damping
+            account[FRICTION_LOSS] += friction
     stopping = system.knee[0] == STOPPING or system.knee[1] == STOPPING
     for i in range(1, len(nodes)):
         weight = span * weights[i]
         if stopping:
             account[KNEE_STOP] += weight * stop_power(system, states[i])
-        account[HIP] += weight * spring_power(system, states[i])
+        account[HIP_WORK] += weight * spring_power(system, states[i])
         account[PUSH_OFF] += weight * push_power(system, begin + nodes[i] * span, states[i])
 
 
 @kernel_part
 def foot_work(system: OnGround, states: Any, weights: tuple[float, ...], foot: int, span: float) -> tuple[float, float]:
-    """Work (J) lost under a foot that there is ground for.
+    """Compute the work (J) lost under a foot with ground.
 
-    Where the force law has let go, what is lost is what the spring gives up, whose powers of the penetration no
-    quadrature likes; steps end where it lets go.
+    Where the force law has released the foot, the loss is the spring's energy: its powers of the penetration are badly
+    integrated by quadrature, and steps end at the release.
     """
     damping, friction, let_go, last = 0.0, 0.0, True, len(weights) - 1
     for i in range(1, len(weights)):

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walkerlab.outcome import Outcome
-from walkerlab.physics.energy_channels import ENTRIES, KNEE_STRIKES, LOSSES, LOST, PUSH_OFF, TORQUE
+from walkerlab.physics.energy_channels import ENTRIES, KNEE_STRIKES, LOSS_ENTRIES, LOSSES, PUSH_OFF, TORQUE
 from walkerlab.physics.ground.energy import kinetic_energy, potential_energy, total_energy
 from walkerlab.physics.ground.hinges import spring_energy
 from walkerlab.physics.ground.terrain import Terrain, is_uneven
@@ -18,16 +18,16 @@ from walkerlab.physics.ground.walker import (
     OnGround,
     feet_motion,
     floating_state,
-    folded,
     foot_force,
     on_ground,
     sines_cosines,
-    unfolded,
+    to_form,
+    to_full,
 )
 from walkerlab.physics.hybrid.contact_crossings import hip_height
-from walkerlab.physics.hybrid.contact_events import HEIGHT, PER_FOOT, ROWS, JudgedGround
+from walkerlab.physics.hybrid.contact_events import EVENT_ROWS, HEIGHT, PER_FOOT, JudgedGround
 from walkerlab.physics.hybrid.contact_jumps import change_form
-from walkerlab.physics.hybrid.contact_loop import AT_LIFT, NEVER, walk_in_form
+from walkerlab.physics.hybrid.contact_loop import AT_LIFT, NO_LIMIT, walk_in_form
 from walkerlab.physics.hybrid.contact_record import CONTACT_TALLY, ContactObserver, ContactSamples
 from walkerlab.physics.hybrid.contact_state import WalkState, material_along, new_walk_state, steps_with_lift
 from walkerlab.physics.hybrid.contact_tangent import new_tangent
@@ -39,35 +39,37 @@ from walkerlab.physics.solvers.registry import Tolerances, finder_for, method_na
 from walkerlab.physics.solvers.stepping import ACCEPTED, JACOBIANS, REJECTED, RHS, T
 from walkerlab.physics.solvers.system import Floats, State
 
-ROUNDING = 1e-14  # of a start's coordinates and velocities
-USUAL_STEP = 3.0  # pendulum times that most steps are shorter than
+USUAL_STEP = 3.0  # pendulum times; most steps are shorter
 # Residuals over rtol times energy and work exchanged: random walks leave at most 0.5 by radau5 at any rtol from 1e-2 to
 # 1e-9 (scripts/contact_campaign.py prints those of its walks), and 9 by the libraries' multistep methods; cases of the
 # stability catalogue, of which ground of 1e14 N/m is the worst, leave at most 9.
 UNEXPLAINED = 100.0
 SET_STIFF = "set solver.contact.method to radau5."
-FINEST = 1e-10  # rtol below which a walk's rounding, and no longer its tolerance, makes the residual
+FINEST_RTOL = 1e-10  # rtol below which rounding, not the tolerance, determines the residual
 
 
 @dataclass(frozen=True)
 class Stopped:
-    """How, where and at what cost a walk stopped."""
+    """Outcome, time, state and cost at the end of a walk."""
 
     outcome: Outcome
     time_s: float
-    state: State  # of the whole walker, free
+    state: State  # of the free walker with all bodies
     work: NDArray[np.int64]
 
 
-def sampled_energies(walker: ContactWalker, samples: ContactSamples) -> Floats:
-    """Kinetic, potential and total energy (J) of every sample, (samples, 3)."""
+def sample_energies(walker: ContactWalker, samples: ContactSamples) -> Floats:
+    """Compute kinetic, potential and total energy (J) of every sample, (samples, 3)."""
     energies = np.zeros((samples.time_s.size, 3))
     fill_energies(on_ground(walker, (False, False)), samples, energies)
     return energies
 
 
-def sampled_feet(walker: ContactWalker, samples: ContactSamples) -> Floats:
-    """Position along and height over the ground (m), normal force and friction (N), slip (m/s), (samples, foot, 5)."""
+def sample_feet(walker: ContactWalker, samples: ContactSamples) -> Floats:
+    """Compute position along the slope and height over the ground (m), normal force and friction (N), slip (m/s).
+
+    Returns (samples, foot, 5).
+    """
     feet = np.zeros((samples.time_s.size, 2, 5))
     fill_feet(walker, samples, feet)
     return feet
@@ -75,7 +77,10 @@ def sampled_feet(walker: ContactWalker, samples: ContactSamples) -> Floats:
 
 @kernel
 def fill_energies(system: OnGround, samples: ContactSamples, energies: Any) -> None:
-    """`sampled_energies` of a walker with all bodies, free, whose ground and knees are set to those of each sample."""
+    """Write `sample_energies` into `energies`.
+
+    system  free, with all bodies; its ground and knees are set to those of each sample
+    """
     for i in range(samples.states.shape[0]):
         for k in range(2):
             system.has_ground[k], system.knee[k] = samples.has_ground[i, k], samples.knees[i, k]
@@ -87,7 +92,7 @@ def fill_energies(system: OnGround, samples: ContactSamples, energies: Any) -> N
 
 @kernel
 def fill_feet(walker: ContactWalker, samples: ContactSamples, feet: Any) -> None:
-    """`sampled_feet` into an array of zeros."""
+    """Write `sample_feet` into an array of zeros."""
     for i in range(samples.states.shape[0]):
         motions = feet_motion(walker.forms[0, 0], samples.states[i])
         for foot in range(2):
@@ -104,18 +109,18 @@ class ContactWalkResult(WalkRecord):
     """A walk on compliant ground."""
 
     slip_m: Floats  # (steps,) of the stance foot's material; without the last step if its foot did not lift
-    rolling_m: Floats  # likewise, how far the stance foot rolled
+    rolling_m: Floats  # likewise, rolling of the stance foot
     end_state: State
     max_penetration_m: float
     energy_balance_residual_J: float
-    explained_residual_J: float  # what the tolerance explains of it at most
+    explained_residual_J: float  # largest residual that the tolerance explains
     dissipated_J: Floats  # (5,)
     samples: ContactSamples | None
-    method: str  # by which it was integrated
+    method: str  # integration method
 
     @property
     def advice(self) -> str:
-        """What the outcome means and what to try next."""
+        """Meaning of the outcome and what to try next."""
         stiff = method_named(self.method).stiff
         if self.outcome is Outcome.BUDGET_EXHAUSTED and not stiff:
             return (
@@ -140,18 +145,18 @@ def new_observer(
     track_energy: bool = True,
     directions: int = 0,
 ) -> ContactObserver:
-    """An observer of a walk from state y.
+    """Create an observer of a walk from state y.
 
     times         (samples,) rising, in s; no samples without them
-    track_energy  whether to keep the energy balance
-    directions    how many directions of the start to carry along as the tangent
+    track_energy  whether to compute the energy balance
+    directions    number of directions of the start to carry along as the tangent
     """
     times = np.zeros(0) if times is None else times
     samples = times.size
     tally = new_record(CONTACT_TALLY)
     if track_energy or walker.whole.sprung:
-        here = on_ground(walker, walk_state.has_ground, level=walk_state.level, progress=walk_state.progress)
-        tally.start_energy, tally.start_spring = total_energy(here, y), spring_energy(here, y)
+        system = on_ground(walker, walk_state.has_ground, level=walk_state.level, progress=walk_state.progress)
+        tally.start_energy, tally.start_spring = total_energy(system, y), spring_energy(system, y)
         tally.energy_below = tally.start_energy + walker.mass * walker.gravity_along * y[0]
     room = ContactSamples(
         times,
@@ -167,9 +172,9 @@ def new_observer(
 
 
 def in_walk(walker: ContactWalker, walk_state: WalkState, hinged: bool = False) -> OnGround:
-    """The walker in the form that a walk has it in, which changes what it remembers."""
-    at = walk_state
-    return on_ground(walker, at.has_ground, at.knee, hinged, at.level, at.progress)
+    """Return the walker in its present form; it shares the memory of the walk state."""
+    memory = walk_state
+    return on_ground(walker, memory.has_ground, memory.knee, hinged, memory.level, memory.progress)
 
 
 def walk_on(
@@ -179,27 +184,27 @@ def walk_on(
     walk_state: WalkState,
     observer: ContactObserver,
     start: State,
-    until: int = NEVER,
+    until: int = NO_LIMIT,
     hinged: bool = False,
 ) -> Stopped:
-    """Walk on from a walk state that is at hand, in one form after another as knees lock and are released.
+    """Continue a walk from a walk state, changing the form as knees lock and are released.
 
-    start   state of the whole walker, free
-    until   that of `walk_in_form`
-    hinged  whether the stance foot is, until the first step is taken: then the walk ends
+    start   state of the free walker
+    until   as in `walk_in_form`
+    hinged  whether the stance foot is hinged until the first step is taken, which then ends the walk
 
-    Returns where it stopped, and how: `SOLVER_FAILED`, too, where the energy balance does not close.
+    Returns the end of the walk, with `SOLVER_FAILED` also where the energy balance does not close.
     """
     walk = walk_in_form if tolerances.compiled else uncompiled(walk_in_form)
     system = in_walk(walker, walk_state, hinged)
     tangent = observer.tangent.Phi
     half, root = len(start) // 2, 2 if hinged else 0
-    y = folded(system.form, (*start[root:half], *start[half + root :]))
+    y = to_form(system.form, (*start[root:half], *start[half + root :]))
     if tangent.shape[1] > 0:
-        tangent[: y.size] = folded(system.form, tangent)
+        tangent[: y.size] = to_form(system.form, tangent)
     lead = tolerances.new(y.size)
     lead.clock[T] = walk_state.progress.stopped_at
-    by_size, finder = {y.size: lead}, finder_for(lead, ROWS, walker.size)
+    by_size, finder = {y.size: lead}, finder_for(lead, EVENT_ROWS, walker.size)
     while True:
         if y.size not in by_size:
             by_size[y.size] = sharing(tolerances.new(y.size), lead.clock, lead.counts)
@@ -211,10 +216,10 @@ def walk_on(
         before, system = system, in_walk(walker, walk_state, hinged)
         y = change_form(walker, before, system, event, observer, method)
     if tangent.shape[1] > 0:
-        tangent[:] = unfolded(system.form, tangent[: method.y.size], walker.size)
+        tangent[:] = to_full(system.form, tangent[: method.y.size], walker.size)
     end = floating_state(system.form, method.y, walker.size)
     walk_state.progress.stopped_at = lead.clock[T]
-    return Stopped(balanced(ended, observer, tolerances), float(lead.clock[T]), end, lead.counts[:4].copy())
+    return Stopped(check_balance(ended, observer, tolerances), float(lead.clock[T]), end, lead.counts[:4].copy())
 
 
 def walk_contact(
@@ -229,20 +234,20 @@ def walk_contact(
 ) -> ContactWalkResult:
     """Walk up to `steps` steps.
 
-    hinged      whether the stance foot of the first step is
+    hinged      whether the stance foot of the first step is hinged
     stance      the foot that carries the first step
     start       state of the free walker (4 + 2 n); its angles and angular velocities start a hinged one
-    tolerances  how to integrate
-    sampling    time between samples, their times (samples,), rising, in s, or None for none
+    tolerances  settings of the integration
+    sampling    time between samples, their times (samples,), rising, in s, or None for no samples
 
-    The room for samples doubles until the whole walk fits. A start that lies on the ground already is rejected.
+    The room for samples doubles until the whole walk fits. A start with the hip already too low is rejected.
     """
     frame, s, c = ground.frame, vector(OF_BODIES), vector(OF_BODIES)
     sines_cosines(walker.whole, start, s, c)
     if hip_height(walker.whole, s, c, start) < FALLEN_HIP * frame.leg_length:
         walk_state = new_walk_state(walker, ground.terrain, stance, steps, start)
-        here = Stopped(Outcome.REJECTED, 0.0, start, np.zeros(4, np.int64))
-        return gather(here, walk_state, new_observer(walker, walk_state, start), walker, ground.terrain, tolerances)
+        stopped = Stopped(Outcome.REJECTED, 0.0, start, np.zeros(4, np.int64))
+        return gather(stopped, walk_state, new_observer(walker, walk_state, start), walker, ground.terrain, tolerances)
     room = int(USUAL_STEP * steps * frame.pendulum_time / sampling) + 2 if isinstance(sampling, float) else 0
     while True:
         walk_state = new_walk_state(walker, ground.terrain, stance, steps, start)
@@ -263,9 +268,9 @@ def run_parts(
     observer: ContactObserver,
     walk_state: WalkState,
 ) -> Stopped:
-    """The hinged step, if there is one, then the free walk.
+    """Take the hinged step, if there is one, then the free walk.
 
-    A walk that took all its steps goes on, unobserved, until the foot that carried the last one has lifted.
+    A walk that completed all its steps continues, unobserved, until the foot that carried the last one has lifted.
     """
     y, spent = start, np.zeros(4, np.int64)
     if hinged:
@@ -284,13 +289,13 @@ def run_parts(
 
 
 def by_channel(walker: ContactWalker, dissipated: Floats) -> dict[str, float]:
-    """What was dissipated (J), by name; the knees' channels only where there are knees."""
+    """Return dissipated energies (J) by name; the knees' channels only for a walker with knees."""
     pairs = zip(LOSSES, dissipated.tolist(), strict=True)
     return {loss.key: joules for place, (loss, joules) in enumerate(pairs) if walker.kneed or place < KNEE_STRIKES}
 
 
 def release_hinge(walker: ContactWalker, walk_state: WalkState, y: State) -> None:
-    """A hinged foot has neither slipped nor rolled until now; it is on the ground, about to leave."""
+    """Release a hinged foot, which has neither slipped nor rolled, on the ground and about to lift."""
     foot, steps = int(walker.forms[1, 0]["hinged"]), walk_state.progress.steps
     walk_state.slip[:steps], walk_state.rolling[:steps] = 0.0, 0.0
     walk_state.touched[foot] = material_along(walker.whole, foot, feet_motion(walker.whole, y)[foot].along, y)
@@ -299,17 +304,17 @@ def release_hinge(walker: ContactWalker, walk_state: WalkState, y: State) -> Non
 
 
 def explained_residual(observer: ContactObserver, tolerances: Tolerances) -> float:
-    """How large a residual of the energy balance (J) the tolerance explains; a larger one is a fault.
+    """Compute the largest residual of the energy balance (J) that the tolerance explains; a larger one is a fault.
 
     It is UNEXPLAINED times rtol times energy and work exchanged: the energy at the start, kinetic, elastic, and
-    potential over the slope below, and all that has been dissipated since.
+    potential over the slope below, plus all energy dissipated since.
     """
     exchanged = observer.tally.energy_below + np.abs(observer.account[:TORQUE]).sum()
-    return float(UNEXPLAINED * max(tolerances.rtol, FINEST) * exchanged)
+    return float(UNEXPLAINED * max(tolerances.rtol, FINEST_RTOL) * exchanged)
 
 
-def balanced(ended: int, observer: ContactObserver, tolerances: Tolerances) -> Outcome:
-    """How a walk ended: `SOLVER_FAILED`, however it did, if its energy balance does not close.
+def check_balance(ended: int, observer: ContactObserver, tolerances: Tolerances) -> Outcome:
+    """Return the outcome of a walk, or `SOLVER_FAILED` if its energy balance does not close.
 
     This detects faults and estimates no error: a walk may be off by far more than its balance.
     """
@@ -318,7 +323,7 @@ def balanced(ended: int, observer: ContactObserver, tolerances: Tolerances) -> O
 
 
 def driven_work(walker: ContactWalker, along: float, up: float, account: Floats) -> DrivenWork:
-    """What was given on a way that led so far along the slope and up (m); account (entries,) J."""
+    """Gather the works over distances (m) along the slope and up; account (entries,) in J."""
     gravity = walker.mass * (walker.gravity_along * along - walker.gravity_down * up)
     return DrivenWork(walker.mass * walker.gravity, gravity, *account[PUSH_OFF:].tolist())
 
@@ -331,20 +336,20 @@ def gather(
     terrain: Terrain,
     tolerances: Tolerances,
 ) -> ContactWalkResult:
-    """The result of a walk from what was written on the way."""
+    """Build the result of a walk from its records."""
     done, lifted, seen = int(walk_state.progress.steps), steps_with_lift(walk_state), int(observer.tally.recorded)
     samples = ContactSamples(*(each[:seen] for each in observer.samples)) if observer.samples.time_s.size else None
     strikes = walk_state.knee_strike[:done]
     along, up = (
         (float(walk_state.touch_along[done - 1]), float(walk_state.touch_height[done - 1])) if done else (0.0, 0.0)
     )
-    known = np.where(strikes < 0.0, np.nan, strikes)
+    strike_times = np.where(strikes < 0.0, np.nan, strikes)
     return ContactWalkResult(
         foothold_height_m=walk_state.touch_height[:done] if is_uneven(terrain) else None,
         outcome=stopped.outcome,
         touch_time_s=walk_state.touch_time[:done],
         touch_along_m=walk_state.touch_along[:done],
-        knee_strike_time_s=known if walker.kneed else None,
+        knee_strike_time_s=strike_times if walker.kneed else None,
         end_time_s=stopped.time_s,
         work=WalkWork(*(int(stopped.work[count]) for count in (RHS, ACCEPTED, REJECTED, JACOBIANS))),
         slip_m=walk_state.slip[:lifted],
@@ -353,7 +358,7 @@ def gather(
         max_penetration_m=float(observer.tally.max_penetration),
         energy_balance_residual_J=float(observer.tally.residual),
         explained_residual_J=explained_residual(observer, tolerances),
-        dissipated_J=observer.account[LOST].copy(),
+        dissipated_J=observer.account[LOSS_ENTRIES].copy(),
         driven=driven_work(walker, along, up, observer.account_at_touch),
         samples=samples,
         method=tolerances.method,

@@ -1,4 +1,4 @@
-"""The memory of a walk on compliant ground: which foot stands, what has touched, where each event function is known."""
+"""State of a walk on compliant ground besides its coordinates: stance, contacts, sides of the event functions."""
 
 from typing import Any, NamedTuple
 
@@ -31,45 +31,45 @@ from walkerlab.physics.hybrid.contact_events import (
 from walkerlab.physics.kernels import by_reference, kernel_part
 from walkerlab.physics.solvers.system import State
 
-# when the trailing knee is to be released: no more, as the leading foot stops sinking in, or as the push-off ends
+# release of the trailing knee: not due, as the leading foot stops sinking in, or as the push-off ends
 NOT_DUE, AT_COMPRESSION, AT_PULSE_END = range(3)
-ROUNDING = 1e-14  # of a start's coordinates and velocities
+START_ROUNDING = 1e-14  # relative rounding of a start's coordinates and velocities
 
 
 @by_reference
 class WalkState(NamedTuple):
-    """The memory of a walk: its rules read and write it, and its result is gathered from it."""
+    """State of a walk besides its coordinates, changed by events; the result is gathered from it."""
 
     touch_time: Any  # (steps,) s
     touch_along: Any  # (steps,) m
     touch_height: Any  # (steps,) m, of the foothold over the slope
-    slip: Any  # (steps,) m, net slip of the stance foot of each step; of the last one until now, while `is_to_lift`
-    rolling: Any  # (steps,) m, how far it rolled
+    slip: Any  # (steps,) m, net slip of each step's stance foot; of the last one up to now, while `is_to_lift`
+    rolling: Any  # (steps,) m, its rolling distance
     has_ground: Any  # (2,) whether there is ground under a foot
     level: Any  # (2,) m, height over the slope of the ground for each foot
-    cells: Any  # (2,) which cell of its lane a foot is over
-    left_cells: Any  # (2,) the cell where it last stood
-    foothold: Any  # (2,) m, where it touched
-    touched: Any  # (2,) m, where its material was then, as `material_along` has it
-    slipped: Any  # (2,) m, how far it slipped from its touch to its latest lift
-    rolled: Any  # (2,) m, how far it rolled
-    leaving: Any  # (2,) whether a foot is still to lift from the step that it carried
-    knee: Any  # (2,) what each knee is doing
-    knee_strike: Any  # (steps + 1,) s, when the knee of the step's swing leg locked; -1 if it has not
-    sides: Any  # (event functions,) on which side of zero each event function is known to be
-    at_zero: Any  # (event functions,) which event functions the last event left at zero
+    cells: Any  # (2,) cell of its lane below a foot
+    left_cells: Any  # (2,) cell of its last stance
+    foothold: Any  # (2,) m, position of its touch
+    touched: Any  # (2,) m, `material_along` of its touch
+    slipped: Any  # (2,) m, slip from its touch to its latest lift
+    rolled: Any  # (2,) m, its rolling distance
+    leaving: Any  # (2,) whether a foot has yet to lift from the step that it carried
+    knee: Any  # (2,) state of each knee
+    knee_strike: Any  # (steps + 1,) s, time at which the knee of the step's swing leg locked; -1 if it has not
+    sides: Any  # (event functions,) side of zero of each event function
+    at_zero: Any  # (event functions,) whether the last event left it at zero
     progress: WalkProgress
 
 
 def new_walk_state(walker: ContactWalker, terrain: Terrain, stance: int, steps: int, y: State) -> WalkState:
-    """The walk state of a walk of `steps` steps that starts from y with both feet on the ground."""
+    """Create the walk state for `steps` steps from y with both feet on the ground."""
     feet = feet_motion(walker.whole, y)
     cells = np.array([cell_at(terrain, foot, feet[foot].along) for foot in range(2)], np.int64)
     has_ground = np.zeros(2, np.int8)
     for foot in range(2):
         on_pad = has_ground_in_cell(int(cells[foot]))
         has_ground[foot] = on_pad and starts_with_ground(terrain, foot == stance)
-    sides, at_zero = known_sides(walker, feet, stance, y)
+    sides, at_zero = initial_sides(walker, feet, stance, y)
     return WalkState(
         touch_time=np.zeros(steps),
         touch_along=np.zeros(steps),
@@ -94,7 +94,7 @@ def new_walk_state(walker: ContactWalker, terrain: Terrain, stance: int, steps: 
 
 
 def knees_at_start(walker: ContactWalker, stance: int, y: State) -> NDArray[np.int8]:
-    """What each knee is doing (2,): that of the stance leg is locked, the other is not."""
+    """Return the state of each knee (2,): the stance leg's is locked, the other is not."""
     knee = np.full(2, RELEASED, np.int8)
     if walker.kneed:
         knee[stance] = LOCKED
@@ -103,13 +103,13 @@ def knees_at_start(walker: ContactWalker, stance: int, y: State) -> NDArray[np.i
     return knee
 
 
-def known_sides(
+def initial_sides(
     walker: ContactWalker, feet: tuple[FootMotion, FootMotion], stance: int, y: State
 ) -> tuple[NDArray[np.int8], NDArray[np.int8]]:
-    """On which side of zero every event function is at the start, and which are at zero, by rounding at most.
+    """Return the side of zero of every event function at the start, and which are zero to rounding.
 
-    Of these the velocity tells the side. A foot on the ground at rest is in it; of feet side by side at rest the stance
-    foot is the one ahead.
+    A function that is zero takes the side towards which its velocity points. If that is zero, too, a foot on the ground
+    counts as below it, and of feet side by side the stance foot as the one ahead.
     """
     sides, at_zero = np.zeros(EVENT_FUNCTIONS, np.int8), np.zeros(EVENT_FUNCTIONS, np.int8)
     sides[[FALL, SLIDE]] = 1
@@ -120,27 +120,27 @@ def known_sides(
         first = foot * PER_FOOT
         sides[[first + LEFT_EDGE, first + RIGHT_EDGE]] = 1
         signs = (feet[foot].height, feet[foot].vertical_velocity)
-        sides[first + HEIGHT], at_zero[first + HEIGHT] = side_of(signs, (size, speed), -1)
+        sides[first + HEIGHT], at_zero[first + HEIGHT] = zero_side(signs, (size, speed), -1)
     rates = [feet[k].slip - float(whole.rolling[k, :n] @ np.array(y[4 + n :])) for k in range(2)]
     order = (feet[1].along - feet[0].along, rates[1] - rates[0])
-    sides[PASSING], at_zero[PASSING] = side_of(order, (size, speed), 1 if stance == 1 else -1)
+    sides[PASSING], at_zero[PASSING] = zero_side(order, (size, speed), 1 if stance == 1 else -1)
     return sides, at_zero
 
 
-def side_of(value_and_rate: tuple[float, float], scales: tuple[float, float], otherwise: int) -> tuple[int, bool]:
-    """On which side of zero something is, or goes to if it is zero to rounding; whether it is zero."""
-    for number, scale in zip(value_and_rate, scales, strict=True):
-        if abs(number) > ROUNDING * scale:
-            return (1 if number > 0.0 else -1), number is not value_and_rate[0]
+def zero_side(value_and_rate: tuple[float, float], scales: tuple[float, float], otherwise: int) -> tuple[int, bool]:
+    """Return the side of zero of a value, or of its rate if it is zero to rounding; and whether it is zero."""
+    for value, scale in zip(value_and_rate, scales, strict=True):
+        if abs(value) > START_ROUNDING * scale:
+            return (1 if value > 0.0 else -1), value is not value_and_rate[0]
     return otherwise, True
 
 
 @kernel_part
 def material_along(form: GroundModel, foot: int, along: float, y: Any) -> float:
-    """Where a foot at `along` (m) would be had it not rolled: what this changes by is slip.
+    """Compute where a foot at `along` (m) would be without rolling; its change is slip.
 
     The velocity of the material point at the bottom of the ball is that of the contact point plus radius times angular
-    velocity; so is its way the contact point's plus radius times the change of the angle.
+    velocity, so its displacement is the contact point's plus radius times the change of the angle.
     """
     for k in range(form.bodies):
         along += form.rolling[foot, k] * y[form.places + k]
@@ -149,22 +149,21 @@ def material_along(form: GroundModel, foot: int, along: float, y: Any) -> float:
 
 @kernel_part
 def is_above(walk_state: WalkState, foot: int) -> bool:
-    """Whether a foot is above the ground."""
     return walk_state.sides[foot * PER_FOOT + HEIGHT] > 0
 
 
 @kernel_part
 def is_ahead(walk_state: WalkState, foot: int) -> bool:
-    """Whether a foot is further along than the other; known where the order of the feet is watched."""
+    """Whether a foot is further along than the other; valid where the order of the feet is watched."""
     return (walk_state.sides[PASSING] > 0) == (foot == 1)
 
 
 @kernel_part
 def is_to_lift(walk_state: WalkState) -> bool:
-    """Whether the foot that carried the last step is still to lift from it."""
+    """Whether the foot that carried the last step has yet to lift."""
     return walk_state.leaving[1 - walk_state.progress.stance] != 0
 
 
 def steps_with_lift(walk_state: WalkState) -> int:
-    """How many steps have a slip and a rolling, which end where their foot lifts: all, or all but the last."""
+    """Count the steps whose slip and rolling are complete, because their foot has lifted: all, or all but the last."""
     return int(walk_state.progress.steps) - int(is_to_lift(walk_state))

@@ -1,9 +1,9 @@
-"""How a walk on compliant ground changes with its start: the variational equations along the steps taken.
+"""Tangent of a walk on compliant ground: the variational equations along the steps taken.
 
 On each step the derivative Phi of the state obeys dPhi/dt = J(t) Phi. It is solved by the three-stage Radau collocation
 method on the same step, with J at the stages: for radau5 that is the exact derivative of the step itself. The force law
-is continuous at its switching points and at touch and lift, so no jump enters there; where a knee locks or is released
-one does. A foot that leaves its pad under load would need one, and a gait has none.
+is continuous at its switching points and at touch and lift, so Phi does not jump there; it does where a knee locks or
+is released. A foot that leaves its pad under load would need a jump; no gait has one.
 """
 
 from typing import Any, NamedTuple
@@ -13,14 +13,14 @@ import numpy as np
 from walkerlab.physics.ground.walker import OF_STATES
 from walkerlab.physics.kernels import by_reference, kernel_part, vector
 from walkerlab.physics.solvers.linear import factor, solve
-from walkerlab.physics.solvers.radau5 import C
+from walkerlab.physics.solvers.radau5 import RADAU_NODES
 from walkerlab.physics.solvers.stepping import T_OLD, T, interpolate
 from walkerlab.physics.solvers.system import jacobian
 
 THIS_SIDE = 4e-12  # s, a few event-time uncertainties
 ROOT6 = 6.0**0.5
 # Radau IIA, Hairer and Wanner II (5.6)
-A = np.array(
+RADAU_WEIGHTS = np.array(
     [
         [(88.0 - 7.0 * ROOT6) / 360.0, (296.0 - 169.0 * ROOT6) / 1800.0, (-2.0 + 3.0 * ROOT6) / 225.0],
         [(296.0 + 169.0 * ROOT6) / 1800.0, (88.0 + 7.0 * ROOT6) / 360.0, (-2.0 - 3.0 * ROOT6) / 225.0],
@@ -31,12 +31,12 @@ A = np.array(
 
 @by_reference
 class Tangent(NamedTuple):
-    """The derivative Phi and the memory to carry it along, with room for the whole walker's state of n numbers.
+    """The derivative Phi, and workspace sized for the n values of the whole walker's state.
 
-    While the walker moves as one of fewer bodies the first rows are in use.
+    While the walker moves as one of fewer bodies, only the first rows are used.
     """
 
-    Phi: Any  # (n, directions); no directions if the tangent is not wanted
+    Phi: Any  # (n, directions); no directions unless the tangent is requested
     stages: Any  # (4, n, n) Jacobians at the three stages, and one more to extrapolate with
     system: Any  # (3 n, 3 n)
     pivots: Any  # (3 n,)
@@ -44,7 +44,7 @@ class Tangent(NamedTuple):
 
 
 def new_tangent(n: int, directions: int) -> Tangent:
-    """Memory for `directions` directions of a system of n equations; none for zero directions."""
+    """Create the tangent for `directions` directions of a system of n equations; empty for zero directions."""
     m = n if directions else 0
     return Tangent(
         np.zeros((n, directions)),
@@ -57,7 +57,7 @@ def new_tangent(n: int, directions: int) -> Tangent:
 
 @kernel_part
 def jacobian_at(method: Any, system: Any, fraction: float, J: Any) -> None:
-    """The Jacobian at a fraction of the last step into J."""
+    """Write the Jacobian at a fraction of the last step into J."""
     y = vector(OF_STATES)[: method.y.size]
     interpolate(method, system, fraction, y)
     jacobian(system, method.clock[T_OLD] + fraction * (method.clock[T] - method.clock[T_OLD]), y, J)
@@ -65,17 +65,19 @@ def jacobian_at(method: Any, system: Any, fraction: float, J: Any) -> None:
 
 @kernel_part
 def carry_tangent(tangent: Tangent, method: Any, system: Any) -> None:
-    """Carry Phi over the last step of `method`."""
+    """Advance Phi over the last step of `method`."""
     n, h = method.y.size, method.clock[T] - method.clock[T_OLD]
     for i in range(2):
-        jacobian_at(method, system, C[i], tangent.stages[i])
+        jacobian_at(method, system, RADAU_NODES[i], tangent.stages[i])
     jacobian_at_end(tangent, method, system)
     for i in range(3):
         for j in range(3):
             for row in range(n):
                 for column in range(n):
                     same = 1.0 if i == j and row == column else 0.0
-                    tangent.system[i * n + row, j * n + column] = same - h * A[i, j] * tangent.stages[i, row, column]
+                    tangent.system[i * n + row, j * n + column] = (
+                        same - h * RADAU_WEIGHTS[i, j] * tangent.stages[i, row, column]
+                    )
     factor(tangent.system, tangent.pivots, 3 * n)
     for direction in range(tangent.Phi.shape[1]):
         carry_direction(tangent, n, direction, h)
@@ -83,9 +85,9 @@ def carry_tangent(tangent: Tangent, method: Any, system: Any) -> None:
 
 @kernel_part
 def jacobian_at_end(tangent: Tangent, method: Any, system: Any) -> None:
-    """The Jacobian at the step's end, seen from within the step: extrapolated from two states shortly before.
+    """Compute the Jacobian at the step's end from inside, extrapolated from two states shortly before.
 
-    A step that ends at a switching point of the force law ends on either side of it, and the Jacobian jumps there.
+    A step that ends at a switching point of the force law may end on either side of it, and the Jacobian jumps there.
     """
     near = min(0.25, THIS_SIDE / (method.clock[T] - method.clock[T_OLD]))
     for i in range(2):
@@ -98,7 +100,7 @@ def jacobian_at_end(tangent: Tangent, method: Any, system: Any) -> None:
 
 @kernel_part
 def carry_direction(tangent: Tangent, n: int, direction: int, h: float) -> None:
-    """One column of Phi (n,): stage derivatives K = J (Phi + h A K), then the step's sum."""
+    """Advance one column of Phi (n,): stage derivatives K = J (Phi + h A K), then the step's sum."""
     for i in range(3):
         for row in range(n):
             total = 0.0
@@ -107,5 +109,9 @@ def carry_direction(tangent: Tangent, n: int, direction: int, h: float) -> None:
             tangent.rates[i * n + row] = total
     solve(tangent.system, tangent.pivots, tangent.rates, 0, 3 * n)
     for row in range(n):
-        change = A[2, 0] * tangent.rates[row] + A[2, 1] * tangent.rates[n + row] + A[2, 2] * tangent.rates[2 * n + row]
+        change = (
+            RADAU_WEIGHTS[2, 0] * tangent.rates[row]
+            + RADAU_WEIGHTS[2, 1] * tangent.rates[n + row]
+            + RADAU_WEIGHTS[2, 2] * tangent.rates[2 * n + row]
+        )
         tangent.Phi[row, direction] += h * change

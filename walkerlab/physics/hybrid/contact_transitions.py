@@ -1,4 +1,4 @@
-"""What a walk on compliant ground remembers, and what an event changes in it: the rules of steps, pads and falls."""
+"""Effects of events on the walk state on compliant ground: the rules of steps, pads and falls."""
 
 from typing import Any
 
@@ -49,16 +49,16 @@ from walkerlab.physics.hybrid.contact_state import (
 from walkerlab.physics.hybrid.endings import BENT_KNEE, FELL, GOES_ON, OFF_PAD, SLID, STUBBED
 from walkerlab.physics.kernels import by_type_or_default, kernel_part
 
-AHEAD = 0.25  # of the stride measure: how far ahead a step must land
-AT_SURFACE = 1e-11  # m: how far off the surface a foot may be, by the error of an event's time, that is at it
-TRIP = 0.25  # of the stride measure: how far from where it stood a foot must come down to have tripped
+STEP_AHEAD = 0.25  # of the stride measure: least distance ahead at which a step lands
+AT_SURFACE = 1e-11  # m: distance from the surface within the error of an event's time
+TRIP = 0.25  # of the stride measure: distance from its stance beyond which a touch is a trip
 
 
 @kernel_part
 def apply_event(
     system: OnGround, terrain: Terrain, observer: ContactObserver, walk_state: WalkState, event: int, t: float, y: Any
 ) -> int:
-    """Let an event change the walk state; returns an outcome if it ends the walk."""
+    """Apply an event to the walk state; returns an outcome if it ends the walk, else GOES_ON."""
     if event == FALL:
         return FELL
     if event == SLIDE:
@@ -73,7 +73,7 @@ def apply_event(
         walk_state.sides[PASSING] = -walk_state.sides[PASSING]
         outcome = GOES_ON
         for foot in range(2):
-            # equal legs of a hinged step pass each other on the surface: rounding neither lifts a foot nor holds one
+            # equal legs of a hinged step pass on the surface: rounding must neither lift a foot nor hold it
             at_surface = abs(feet[foot].height) < AT_SURFACE
             above = feet[foot].vertical_velocity > 0.0 if at_surface else is_above(walk_state, foot)
             find_ground(terrain, walk_state, foot, above)
@@ -123,7 +123,10 @@ def set_level(
     level: float,
     y: Any,
 ) -> None:
-    """The ground for a foot, in whose ground it moves so, gets another height (m); what its spring held is lost."""
+    """Set the ground height (m) for a foot; the energy in its ground spring is lost.
+
+    motion  of the foot relative to its present ground
+    """
     if level == walk_state.level[foot]:
         return
     height = motion.height + walk_state.level[foot] - level
@@ -136,7 +139,7 @@ def set_level(
 
 @kernel_part
 def next_foothold_counts(terrain: Terrain, walk_state: WalkState, foot: int) -> bool:
-    """Whether the ground for a foot that nothing carries is to take the height of its next foothold, if it has not."""
+    """Whether an unloaded foot has yet to take the ground height of its next foothold."""
     if terrain.has_pads or not is_uneven(terrain) or foot == walk_state.progress.stance:
         return False
     level = foothold_height(terrain, walk_state.progress.steps + 1)
@@ -153,7 +156,7 @@ def set_foothold(
     foot: int,
     y: Any,
 ) -> int:
-    """The ground for a swing foot takes the height of its next foothold, and carries it once it has been above it."""
+    """Set the ground of a swing foot to the height of its next foothold; it carries once the foot has been above it."""
     set_level(system, observer, walk_state, motion, foot, foothold_height(terrain, walk_state.progress.steps + 1), y)
     walk_state.has_ground[foot] = 1 if is_above(walk_state, foot) else 0
     return GOES_ON if is_above(walk_state, foot) or terrain.order_matters else STUBBED
@@ -161,7 +164,7 @@ def set_foothold(
 
 @kernel_part
 def find_ground(terrain: Terrain, walk_state: WalkState, foot: int, above: bool) -> None:
-    """A foot above the surface may find ground, or lose it, as the feet change places or roles."""
+    """Update whether there is ground under a foot above the surface, as the feet change places or roles."""
     if above:
         stands = foot == walk_state.progress.stance
         has_ground = has_ground_in_air(terrain, walk_state.has_ground[foot] != 0, stands, is_ahead(walk_state, foot))
@@ -177,7 +180,7 @@ def lift(
     foot: int,
     y: Any,
 ) -> None:
-    """A foot rose above the ground: from its stance, or out of a scuff."""
+    """Handle a foot that rises above the ground, from its stance or out of a scuff."""
     stands = foot == walk_state.progress.stance
     if stands or walk_state.leaving[foot] != 0:
         note_slip(form, walk_state, feet, foot, y)
@@ -190,7 +193,7 @@ def lift(
 
 @kernel_part
 def note_slip(form: GroundModel, walk_state: WalkState, feet: tuple[FootMotion, FootMotion], foot: int, y: Any) -> None:
-    """How far a foot has slipped and rolled since it touched."""
+    """Record slip and rolling of a foot since its touch."""
     slip = material_along(form, foot, feet[foot].along, y) - walk_state.touched[foot]
     walk_state.slipped[foot] = slip
     walk_state.rolled[foot] = feet[foot].along - walk_state.foothold[foot] - slip
@@ -206,9 +209,9 @@ def touch(
     t: float,
     y: Any,
 ) -> int:
-    """A foot came down on ground.
+    """Handle a foot that comes down on ground; returns an outcome if the walk ends.
 
-    It ends the step if it is the swing foot, on another pad than it left and far enough ahead. A swing foot that comes
+    The step ends if it is the swing foot, on another pad than it left and far enough ahead. A swing foot that comes
     down on the pad it left, away from where it stood, has tripped over it: it scuffs.
     """
     stance = walk_state.progress.stance
@@ -221,7 +224,7 @@ def touch(
     if terrain.has_pads and walk_state.cells[foot] == walk_state.left_cells[foot]:
         away = abs(feet[foot].along - walk_state.foothold[foot] - walk_state.rolled[foot])
         return OFF_PAD if away > TRIP * measure else GOES_ON
-    if feet[foot].along - feet[stance].along < AHEAD * measure:
+    if feet[foot].along - feet[stance].along < STEP_AHEAD * measure:
         return GOES_ON
     if not is_straight(form, walk_state, foot):
         return BENT_KNEE
@@ -247,19 +250,19 @@ def touch(
 
 @by_type_or_default
 def catches(stop: Any) -> bool:
-    """Whether a knee that gets straight locks at once; a compliant stop turns it back first."""
+    """Whether a knee locks as soon as it is straight; a compliant stop turns it back first."""
     return False
 
 
 @catches.case(IdealLock)
 def lock_catches(stop: IdealLock) -> bool:
-    """It does."""
+    """IdealLock always catches."""
     return True
 
 
 @kernel_part
 def knee_stops(stop: Any, walk_state: WalkState, event: int, t: float) -> None:
-    """A knee got straight: it locks, or meets its stop, where it latches when it turns back."""
+    """Handle a knee that gets straight: it locks, or enters its stop, where it latches as it turns back."""
     if event < EXTENSION_RATE and not catches(stop):
         walk_state.knee[(event - EXTENSION) % 2] = STOPPING
         return
@@ -270,20 +273,20 @@ def knee_stops(stop: Any, walk_state: WalkState, event: int, t: float) -> None:
 
 @kernel_part
 def release(walk_state: WalkState, knee: int) -> None:
-    """A knee is free again: its shank turns on its own."""
+    """Free a knee, so that its shank turns independently."""
     walk_state.progress.release = NOT_DUE
     walk_state.knee[knee] = RELEASED
 
 
 @kernel_part
 def is_straight(form: GroundModel, walk_state: WalkState, foot: int) -> bool:
-    """Whether a foot may come down: its knee is locked, if it has one."""
+    """Whether a foot may come down: its leg has no knee, or the knee is locked."""
     return not form.kneed or walk_state.knee[foot] == LOCKED
 
 
 @kernel_part
 def follow_strike(form: GroundModel, walk_state: WalkState, trailing: int) -> None:
-    """The other foot has touched: the trailing knee is released, at once or when the leading foot stops sinking in."""
+    """Release the trailing knee after the touch, at once or when the leading foot stops sinking in."""
     if form.kneed:
         if form.release_at_touch and form.push_off != 0.0:
             walk_state.progress.release = AT_PULSE_END
@@ -295,7 +298,7 @@ def follow_strike(form: GroundModel, walk_state: WalkState, trailing: int) -> No
 
 @kernel_part
 def note_flexion(form: GroundModel, walk_state: WalkState, y: Any) -> None:
-    """A released knee that has bent is caught when it straightens."""
+    """Mark a released knee as bent once it has flexed, so that it locks when it straightens."""
     for knee in range(2):
         if walk_state.knee[knee] == RELEASED and extension(form, knee, y) < -FLEXED:
             walk_state.knee[knee] = BENT

@@ -1,4 +1,4 @@
-"""How a walk of either model ends, as kernels return it: an outcome's number, or one of those below that are none."""
+"""Codes with which kernels of both models report the end of a walk: outcomes, and the codes below for continuing."""
 
 from walkerlab.outcome import Outcome
 
@@ -7,6 +7,6 @@ LIFTED_OFF, SLID, NO_HEEL_STRIKE = int(Outcome.LIFTED_OFF), int(Outcome.SLID), i
 BUDGET_EXHAUSTED, SOLVER_FAILED = int(Outcome.BUDGET_EXHAUSTED), int(Outcome.SOLVER_FAILED)
 REJECTED, BENT_KNEE, STUBBED = int(Outcome.REJECTED), int(Outcome.BENT_KNEE), int(Outcome.STUBBED)
 GOES_ON = -1  # it has not ended
-CHANGES_FORM = -2  # a contact walk goes on in another form: a knee locked or is free, or the legs change places
-KNEE_STRUCK = -3  # a rigid swing goes on with a straight knee
-FALLEN_HIP = 0.5  # leg lengths: a walker whose hip is not this high over the slope has fallen
+CHANGES_FORM = -2  # a contact walk continues in another form: a knee locks or is freed, or the legs change roles
+KNEE_STRUCK = -3  # a rigid swing continues with a straight knee
+FALLEN_HIP = 0.5  # leg lengths: with the hip lower than this over the slope, the walker has fallen

@@ -1,7 +1,7 @@
 """Work of the constant torque at the hip, for both models.
 
-Between two turns of the legs it is the torque times the angle by which they turned, so no power is integrated: only
-the turns within a step are located, as events are.
+Between two reversals of the angle between the legs, the work is the torque times the change of that angle, so no power
+is integrated: only the reversals within a step are located, like events.
 """
 
 from typing import Any, NamedTuple
@@ -11,7 +11,7 @@ from walkerlab.physics.mechanics.hinges import legs_apart
 from walkerlab.physics.solvers.events import CrossingFinder, first_crossing
 from walkerlab.physics.solvers.stepping import interpolate
 
-BEYOND = 1e-12  # of a step: the next turn is sought so far behind the last one
+BEYOND = 1e-12  # fraction of a step by which the search for the next reversal starts after the last
 
 
 class TorqueWork(NamedTuple):
@@ -23,18 +23,18 @@ class TorqueWork(NamedTuple):
 
 @kernel_part
 def torque_work(torque: float, method: Any, system: Any, finder: CrossingFinder, row: int, until: float) -> TorqueWork:
-    """Work of the torque (N m) in the last step up to a fraction of it.
+    """Compute the work of the torque (N m) in the last step up to a fraction of it.
 
-    finder  its states are those of the step; overwritten
-    row     of its values that is free for the rate between the legs
+    finder  holds the states of the step; overwritten
+    row     unused row of the finder's values, for the rate between the legs
     """
     sample_rates(system, finder, row)
     y = finder.states[0, : method.y.size]
     first, _ = legs_apart(system, y)
-    angle, positive, at = first, 0.0, 0.0
-    while at < until:
-        at = min(until, first_crossing(finder, row, 0, at + BEYOND if at > 0.0 else 0.0, False))
-        interpolate(method, system, at, y)
+    angle, positive, fraction = first, 0.0, 0.0
+    while fraction < until:
+        fraction = min(until, first_crossing(finder, row, 0, fraction + BEYOND if fraction > 0.0 else 0.0, False))
+        interpolate(method, system, fraction, y)
         before = angle
         angle, _ = legs_apart(system, y)
         positive += max(0.0, torque * (angle - before))
@@ -43,6 +43,6 @@ def torque_work(torque: float, method: Any, system: Any, finder: CrossingFinder,
 
 @callable_kernel
 def sample_rates(system: Any, finder: CrossingFinder, row: int) -> None:
-    """The rate between the legs at the nodes of a step."""
+    """Evaluate the rate between the legs at the nodes of a step."""
     for node in range(finder.nodes.size):
         _, finder.values[row, node] = legs_apart(system, finder.states[node])

@@ -1,6 +1,6 @@
-"""A walk of the rigid model with all that is asked of it: heel strikes, samples, and how far its assumptions held.
+"""Walks of the rigid model with their records: heel strikes, samples, and violations of the model's assumptions.
 
-Long walks are taken a few dozen steps at a time, so that memory is needed for results only.
+Long walks are taken in blocks of a few dozen steps, so that memory is needed for results only.
 """
 
 import math
@@ -31,9 +31,9 @@ from walkerlab.physics.mechanics.rigid_model import (
     STANCE,
     Mode,
     RigidModel,
+    apply_couplings,
     energies,
     energy_at_touch,
-    linked,
     step_lengths,
     swing_foot,
 )
@@ -42,14 +42,14 @@ from walkerlab.physics.solvers.stepping import ACCEPTED, BUDGET, JACOBIANS, REJE
 from walkerlab.physics.solvers.system import State
 
 STEPS_AT_ONCE = 64
-BUDGET_OF_A_STEP = 50_000  # right-hand sides; the tightest tolerance there is needs about 700
-MOST_FRICTION = 1.0  # coefficient; rubber on dry concrete has about as much
+BUDGET_OF_A_STEP = 50_000  # right-hand sides; the tightest tolerance needs about 700
+MAX_FRICTION = 1.0  # coefficient; about that of rubber on dry concrete
 SAMPLES_PER_UNIT_TIME = 64  # in sqrt(L/g)
 CLOSEST_SAMPLES = 1e-2  # of the time between samples; one nearer to a heel strike is dropped
 
 
 class Samples(NamedTuple):
-    """A walk in time: a regular grid, and both sides of every heel strike."""
+    """Samples of a walk: a regular grid, and both sides of every heel strike."""
 
     time_s: Array  # (samples,) strictly rising; the state before a heel strike is one rounding earlier than after
     state: Array  # (samples, 2 n) rad, rad/s, swing leg first
@@ -69,26 +69,26 @@ class RigidWalkResult(WalkRecord):
     max_scuff_depth: float  # m, of the swing foot below the slope
     min_normal_impulse: float | None  # N s, of the ground in a strike of knee or heel; None without a step
     max_impulse_ratio: float  # tangential over normal impulse, where the ground pushes; 0 if nowhere
-    energy_balance_residual: float  # J, of all energies, works and losses of the steps taken
+    energy_balance_residual: float  # J, over all completed steps
     lost_in_strikes: float  # J
-    energy_drift: float  # J, between least and most of it within a swing; the largest of all swings
+    energy_drift: float  # J, range of the energy within a swing; the largest of all swings
     mean_energy: float  # J, time mean; potential from the contact point at each step's touch
     samples: Samples | None
 
     @property
     def objections(self) -> tuple[str, ...]:
-        """What the model assumes of the ground along this walk and hardly any ground can give."""
-        found = []
+        """Ways in which this walk demands more of the ground than real ground provides."""
+        reasons = []
         if self.min_normal_force < 0.0:
-            found.append(f"the ground would have to pull with {-self.min_normal_force:.3g} N")
+            reasons.append(f"the ground would have to pull with {-self.min_normal_force:.3g} N")
         if self.min_normal_impulse is not None and self.min_normal_impulse < 0.0:
-            found.append(f"the ground would have to pull with {-self.min_normal_impulse:.3g} N s in a strike")
-        if self.max_friction_ratio > MOST_FRICTION:
-            found.append(
+            reasons.append(f"the ground would have to pull with {-self.min_normal_impulse:.3g} N s in a strike")
+        if self.max_friction_ratio > MAX_FRICTION:
+            reasons.append(
                 f"the stance foot would slip: it takes a friction coefficient of {self.max_friction_ratio:.3g}, and "
-                f"hardly any ground gives more than {MOST_FRICTION:g}"
+                f"hardly any ground gives more than {MAX_FRICTION:g}"
             )
-        return tuple(found)
+        return tuple(reasons)
 
     @property
     def final_state(self) -> State:
@@ -97,7 +97,7 @@ class RigidWalkResult(WalkRecord):
 
 
 def as_state(values: Any) -> State:
-    """Numbers as compiled code takes a state."""
+    """Convert values to the tuple of floats that compiled code takes as a state."""
     return tuple(float(value) for value in values)
 
 
@@ -113,14 +113,14 @@ def take_walk(
 ) -> RigidWalkResult:
     """Walk `steps` steps from `start`, or until the walk ends.
 
-    tolerances   how to integrate; no step is given more right-hand sides than any step needs
-    sampled      whether states in time are wanted
-    advance      told how many more steps were taken
-    heights      (steps + 1,) m, of the footholds over the slope, the start's first; even ground without
-    step_length  m, of the gait; the start's foot distance without. On uneven ground a foot that lands less than a
+    tolerances   settings of the integration; the evaluation budget per step is limited as well
+    sampled      whether to record states in time
+    advance      called with the number of further steps taken
+    heights      (steps + 1,) m, of the footholds over the slope, the start's first; None for even ground
+    step_length  m, of the gait; by default the start's foot distance. On uneven ground a foot that lands less than a
                  quarter of it ahead of the other ends the walk as a fall
 
-    A negative normal force does not stop the walk, since the model assumes it away, but the outcome says so.
+    A negative normal force does not stop the walk, since the model excludes lifting off, but sets the outcome.
     """
     recorder = Recorder(walker, tolerances, start, sampled)
     recorder.heights = heights
@@ -132,18 +132,17 @@ def take_walk(
         return recorder.finished(Outcome.REJECTED)
     status = Outcome.WALKED
     while recorder.steps < steps and status == Outcome.WALKED:
-        taken = recorder.steps
-        status = recorder.walk_on(rises[taken : taken + STEPS_AT_ONCE + 1])
+        before = recorder.steps
+        status = recorder.walk_on(rises[before : before + STEPS_AT_ONCE + 1])
         if advance is not None:
-            advance(recorder.steps - taken)
+            advance(recorder.steps - before)
     return recorder.finished(status)
 
 
 class Recorder:
-    """Walks on from where it is, and keeps what was seen."""
+    """Takes blocks of steps, and accumulates their records."""
 
     def __init__(self, walker: RigidModel, tolerances: Tolerances, start: State, sampled: bool) -> None:
-        """Stand at `start`, at time 0."""
         self.walker, self.sampled, self.budget = walker, sampled, tolerances.budget
         self.method = method = tolerances.new(len(walker.zero_state))
         self.start = self.state = start
@@ -152,7 +151,7 @@ class Recorder:
         self.time, self.steps, self.grid_index = 0.0, 0, 0
         self.interval = math.sqrt(walker.leg_length / walker.gravity) / SAMPLES_PER_UNIT_TIME
         self.finder = finder_for(method, EVENTS, len(walker.zero_state))
-        # a library's method is integrated with in Python
+        # a library's method runs in Python
         self.walk: Callable[..., tuple[int, int]] = walk if tolerances.compiled else uncompiled(walk)
         self.numbers, self.kneed = len(walker.zero_state), walker.kneed
         self.seen = new_observer(np.zeros(0), self.numbers)
@@ -163,10 +162,10 @@ class Recorder:
         self.pieces: list[Samples] = []
 
     def walk_on(self, rises: Array) -> Outcome:
-        """Take up to so many more steps as footholds rise (m) over the present one, whose own rise is the first."""
+        """Take up to `rises.size - 1` more steps; `rises` are the rises (m) of the footholds, the present one first."""
         steps = rises.size - 1
         seen, times = new_heel_strikes(steps, self.numbers, self.kneed, rises, self.nearest), np.zeros(0)
-        if self.sampled:  # as many as the steps may reach, from the start of the first of them
+        if self.sampled:  # enough for the longest steps
             most = math.ceil(steps * LONGEST_SWING * SAMPLES_PER_UNIT_TIME) + 1
             times = self.interval * np.arange(self.grid_index, self.grid_index + most, dtype=np.float64) - self.time
         observer = new_observer(times, self.numbers)
@@ -187,8 +186,8 @@ class Recorder:
         knees = seen.knee_time + self.time
         if self.sampled:
             self.pieces.append(self._samples(observer, strikes, before, after, knees))
-        for kept, new in ((self.strikes, strikes), (self.before, before), (self.after, after)):
-            kept.append(new)
+        for blocks, new in ((self.strikes, strikes), (self.before, before), (self.after, after)):
+            blocks.append(new)
         if self.kneed:
             self.knees.append(knees[:taken])
         self.steps += taken
@@ -197,7 +196,7 @@ class Recorder:
         return Outcome(status)
 
     def _mean_energy(self, strikes: Array, after: Array) -> float:
-        """Time mean of the energy (J), in each step from the contact point at its touch."""
+        """Compute the time mean of the energy (J), in each step measured from its contact point."""
         zeros = energy_at_touch(self.walker, np.append(self.start[STANCE], after[:, STANCE]))
         if self.tally.duration == 0.0:
             return float(sum(energies(self.walker, self.start)) - zeros[0])
@@ -205,10 +204,10 @@ class Recorder:
         return float((self.tally.energy_integral - zeros @ durations) / float(self.tally.duration))
 
     def _driven_work(self, before: Array, after: Array, gravity: float) -> tuple[DrivenWork, float]:
-        """What was given over the steps taken, by gravity that much (J); and what does not balance (J).
+        """Compute the works over the completed steps, given that of gravity, and the energy residual (J).
 
-        A push-off works before its strike, which loses what that leaves. The balance gives the damper's work, which
-        the states before and after strikes do not tell.
+        A push-off does its work before the strike, which loses part of it. With damping, the balance determines the
+        damper's work, which the states before and after strikes do not give, so the residual is zero.
         """
         walker, rows = self.walker, range(len(self.walker.hinges))
         laws = [hinge_law(walker, row) for row in rows]
@@ -217,26 +216,26 @@ class Recorder:
         torque = float(laws[HIP_ROW].torque * (apart[1][HIP_ROW] - apart[0][HIP_ROW]).sum())
         stored = [hinge_energy(laws[row], apart[1][row]) - hinge_energy(laws[row], apart[0][row]) for row in rows]
         hip = torque - float(np.sum(stored))
-        # what the springs give is among the works
+        # the springs' energy is counted among the works
         unsprung = walker.changed(laws=0.0) if walker.sprung else walker
         ends = [sum(energies(unsprung, y)) - energy_at_touch(unsprung, y[STANCE]) for y in (self.start, self.state)]
-        left = float(ends[1] - ends[0] - gravity - hip + self.tally.strike_loss)
-        hip, left = (hip + left, 0.0) if any(law.damping for law in laws) else (hip, left)
+        residual = float(ends[1] - ends[0] - gravity - hip + self.tally.strike_loss)
+        hip, residual = (hip + residual, 0.0) if any(law.damping for law in laws) else (hip, residual)
         push = float(push_off_work(walker, before).sum()) if walker.push_off else 0.0
         weight, forward = float(walker.mass * walker.gravity), float(self.tally.forward_work)
-        return DrivenWork(weight, gravity, push, hip, torque, forward), abs(left)
+        return DrivenWork(weight, gravity, push, hip, torque, forward), abs(residual)
 
     def _samples(self, observer: Observer, strikes: Array, before: Array, after: Array, knees: Array) -> Samples:
-        """The grid's samples with both sides of the heel strikes put between them."""
-        found = int(observer.tally[()].recorded)
-        grid = self.interval * np.arange(self.grid_index, self.grid_index + found, dtype=np.float64)
-        self.grid_index += found
+        """Merge the samples on the grid with both sides of the heel strikes."""
+        count = int(observer.tally[()].recorded)
+        grid = self.interval * np.arange(self.grid_index, self.grid_index + count, dtype=np.float64)
+        self.grid_index += count
         events = np.append(strikes, self.time) if self.steps else strikes
         kept = far_from(grid, np.sort(events), CLOSEST_SAMPLES * self.interval)
         swing = self.steps + np.arange(strikes.size)
         time = np.concatenate((grid[kept], np.nextafter(strikes, -np.inf), strikes))
-        state = np.concatenate((observer.states[:found][kept], before, after))
-        step = np.concatenate((self.steps + observer.steps[:found][kept], swing, swing + 1))
+        state = np.concatenate((observer.states[:count][kept], before, after))
+        step = np.concatenate((self.steps + observer.steps[:count][kept], swing, swing + 1))
         # a knee that has not struck yet is free
         until = np.append(np.where(knees > self.time, knees, np.inf), np.inf)
         bent = time < until[step - self.steps] if self.kneed else np.zeros(time.size, np.bool_)
@@ -244,13 +243,13 @@ class Recorder:
         return Samples(time[order], state[order], step[order], bent[order])
 
     def finished(self, outcome: Outcome) -> RigidWalkResult:
-        """All that was seen."""
+        """Build the result."""
         if self.tally.duration == 0.0:  # a swing that begins observes its own start
             observe_start(self.seen, Mode(self.walker, BENT), self.start)
         end_time = self.time if outcome == Outcome.WALKED else float(self.tally.duration)
         if outcome == Outcome.WALKED and self.tally.min_normal_force < 0.0:
             outcome = Outcome.LIFTED_OFF
-        strikes, before, after = (np.concatenate(kept) for kept in (self.strikes, self.before, self.after))
+        strikes, before, after = (np.concatenate(blocks) for blocks in (self.strikes, self.before, self.after))
         lengths = step_lengths(self.walker, np.vstack((self.start, after))[:-1], before)
         climbed = 0.0 if self.heights is None else float(self.heights[self.steps])
         gravity = float(self.walker.mass) * float(
@@ -278,19 +277,19 @@ class Recorder:
             max_impulse_ratio=float(self.tally.max_impulse_ratio),
             energy_drift=float(self.tally.energy_drift),
             mean_energy=self._mean_energy(strikes, after),
-            samples=joined(self.pieces) if self.pieces else None,
+            samples=join(self.pieces) if self.pieces else None,
         )
 
 
 def with_scaled_rates(walker: RigidModel, state: State, swing: float, stance: float) -> State:
-    """A state just after heel strike with the velocities of swing and stance leg scaled."""
+    """Return a state just after heel strike with the velocities of swing and stance leg scaled."""
     n = len(state) // 2
     rates = [(stance if place == STANCE else swing) * rate for place, rate in enumerate(state[n:])]
-    return (*state[:n], *linked(walker, AT_STRIKE, rates).tolist())
+    return (*state[:n], *apply_couplings(walker, AT_STRIKE, rates).tolist())
 
 
 def far_from(times: Array, events: Array, distance: float) -> NDArray[np.bool_]:
-    """Which of `times` are further than `distance` from each of the rising `events`."""
+    """Whether each of `times` is further than `distance` from all of the rising `events`."""
     if events.size == 0:
         return np.ones(times.size, np.bool_)
     behind = np.searchsorted(events, times).clip(max=events.size - 1)
@@ -298,6 +297,6 @@ def far_from(times: Array, events: Array, distance: float) -> NDArray[np.bool_]:
     return np.asarray(np.minimum(np.abs(times - events[behind]), np.abs(times - events[before])) > distance)
 
 
-def joined(pieces: list[Samples]) -> Samples:
-    """One record of several that follow each other."""
+def join(pieces: list[Samples]) -> Samples:
+    """Concatenate consecutive records."""
     return Samples(*map(np.concatenate, zip(*pieces, strict=True)))

@@ -1,8 +1,8 @@
-"""Many walks of the rigid model, side by side in lanes: each with its own step size, a new start as soon as one ends.
+"""Walks of the rigid model side by side in lanes, each with its own step size; a lane takes a new start as a walk ends.
 
-All lanes take a Runge-Kutta step together. A lane that may have met a heel strike or a fall in it is looked at alone:
-the event is located on Hermite's quintic of its event function, the step is taken again up to there, and Newton's last
-correction does the rest. What becomes of a walk does not depend on which walks are beside it.
+All lanes take a Runge-Kutta step together. A lane whose step may hold a heel strike or a fall is then treated alone:
+the event is located on the quintic Hermite interpolant of its event function, the step is repeated up to there, and a
+last Newton correction completes it. The result of a walk does not depend on the walks in the other lanes.
 """
 
 import math
@@ -27,8 +27,8 @@ from walkerlab.physics.mechanics.rigid_model import RigidModel, feet_on_slope
 from walkerlab.physics.mechanics.trigonometry import sine_cosine
 from walkerlab.physics.solvers.dop853 import GROW_MOST, SAFETY, SHRINK_MOST
 from walkerlab.physics.solvers.events import NO_CROSSING, CrossingFinder, new_crossing_finder
-from walkerlab.physics.solvers.hermite import Jet, Quintic, first_fall, hermite, value_of
-from walkerlab.physics.solvers.lane_steps import ERROR_3, ERROR_5, combine, derivative, error_sums, stages_of
+from walkerlab.physics.solvers.hermite import Jet, Quintic, evaluate_quintic, first_fall, hermite
+from walkerlab.physics.solvers.lane_steps import LANE_ERROR_3, LANE_ERROR_5, combine, derivative, error_sums, run_stages
 from walkerlab.physics.solvers.lanes import (
     WIDTH,
     Lanes,
@@ -40,24 +40,29 @@ from walkerlab.physics.solvers.lanes import (
 )
 from walkerlab.physics.solvers.system import State
 
-# rows of a batch's memory, each with one number a lane
-START, START_RATE, END, END_RATE = 0, 4, 8, 12  # state and derivative at the ends of the step tried last
-STEP, TRIED, TIME, LEFT = 16, 17, 18, 19  # next step, step tried last, time, time until a heel strike must have come, s
-ARRIVING, FIRST, TRIES, EVENT, USUAL = 20, 21, 22, 23, 24
-ROWS = 25
+# rows of a batch's memory, with one value per lane
+START_STATE, START_RATE, END_STATE, END_RATE = 0, 4, 8, 12  # state and derivative at the ends of the step tried last
+NEXT_STEP, TRIED_STEP, LANE_TIME, TIME_LEFT = (
+    16,
+    17,
+    18,
+    19,
+)  # s: next step, step tried last, time, time left for a heel strike
+ARRIVALS, FIRST_TRY, TRIES, HAS_EVENT, STEP_BEFORE = 20, 21, 22, 23, 24
+LANE_ROWS = 25
 SLOT_OF_START, STEPS_TAKEN = 0, 1  # rows of whole numbers
 
 NOBODY = -1
-FIRST_STEP = 0.1  # pendulum times
-ARRIVED = 1e-5  # pendulum times between the end of a step and the heel strike that a Taylor expansion bridges
-REFINEMENTS = 6
-MAX_TRIES = 20_000  # of steps in one swing
-SMALLEST_STEP = 1e-13  # pendulum times
-NO_ERROR = 1e-300
+FIRST_LANE_STEP = 0.1  # pendulum times
+ARRIVAL_TIME = 1e-5  # pendulum times from the end of a step to the heel strike that a Taylor expansion bridges
+STRIKE_REFINEMENTS = 6
+MAX_TRIES = 20_000  # steps in one swing
+MIN_LANE_STEP = 1e-13  # pendulum times
+TINY_ERROR = 1e-300
 
 
 class TwoLegs(NamedTuple):
-    """The rigid model of two straight legs, with what lanes need of it."""
+    """Rigid model of two straight legs, with the values that lanes need."""
 
     model: RigidModel
     A: tuple[float, ...]  # (4,) constants of rigid_model.py, row by row
@@ -65,7 +70,7 @@ class TwoLegs(NamedTuple):
     arm_x: tuple[float, ...]  # (2,)
     arm_y: tuple[float, ...]
     hip: SpringDamper
-    unpaired: float  # kg m^2; values of the model, which loops need not load again
+    unpaired: float  # kg m^2; these values repeat the model's, so that loops need not load them
     mass: float  # kg
     radius: float  # m
     gravity_along: float  # m/s^2
@@ -78,18 +83,18 @@ class TwoLegs(NamedTuple):
 
 
 def two_legs(model: RigidModel) -> TwoLegs | None:
-    """The model as that of two straight legs; None if it has more bodies."""
+    """Return the model as one of two straight legs; None if it has more bodies."""
     if len(model.arm_x) != 2 or model.kneed:
         return None
     x, y = model.hip_x, model.hip_y
     lowest = (FALLEN_HIP * model.leg_length - model.radius) / math.hypot(x, y)
 
-    held: dict[str, Any] = {name: tuple(model[name].ravel().tolist()) for name in ("A", "B", "arm_x", "arm_y")}
+    values: dict[str, Any] = {name: tuple(model[name].ravel().tolist()) for name in ("A", "B", "arm_x", "arm_y")}
     for name in ("unpaired", "mass", "radius", "gravity_along", "gravity_down", "slope", "lean"):
-        held[name] = float(model[name])
+        values[name] = float(model[name])
     return TwoLegs(
         model,
-        **held,
+        **values,
         hip=hinge_law(model, HIP_ROW),
         upright=math.atan2(x, y),
         fallen=math.acos(max(-1.0, lowest)),
@@ -99,7 +104,7 @@ def two_legs(model: RigidModel) -> TwoLegs | None:
 
 @derivative.case(TwoLegs, forced_inline=True)
 def swing_derivative(system: TwoLegs, t: float, y: Any) -> Any:
-    """The equations of motion of rigid_model.py for two bodies, written out: of floats or of lanes."""
+    """Evaluate the equations of motion of rigid_model.py, written out for two bodies, with floats or lanes."""
     R, along, down = system.radius, system.gravity_along, system.gravity_down
     s_1, c_1 = sine_cosine(y[0] + system.slope)
     s_2, c_2 = sine_cosine(y[1] + system.slope)
@@ -125,40 +130,39 @@ def swing_derivative(system: TwoLegs, t: float, y: Any) -> Any:
 
 
 class LaneMemory(NamedTuple):
-    """What a batch needs besides its starts and results, however many walks it has."""
+    """Workspace of a batch besides its starts and results, for any number of walks."""
 
     rtol: float
     atol: float
     rows: Any  # (ROWS, WIDTH)
-    slots: Any  # (2, WIDTH) number of the start, and steps taken
+    slots: Any  # (2, WIDTH) index of the start, and steps taken
     finder: CrossingFinder
 
 
 def new_lane_memory(rtol: float, atol: float) -> LaneMemory:
-    """Memory for batches at these tolerances."""
+    """Create the workspace for batches at these tolerances."""
     teach_arithmetic()
     return LaneMemory(
-        rtol, atol, np.zeros((ROWS, WIDTH)), np.full((2, WIDTH), NOBODY, np.int64), new_crossing_finder(5)
+        rtol, atol, np.zeros((LANE_ROWS, WIDTH)), np.full((2, WIDTH), NOBODY, np.int64), new_crossing_finder(5)
     )
 
 
 class Fates(NamedTuple):
-    """How the walks of a batch ended; written."""
+    """Outcomes of the walks of a batch; written."""
 
     outcome: Any  # (n,)
     steps: Any  # (n,) taken
 
 
 def new_fates(n: int) -> Fates:
-    """Room for n walks."""
     return Fates(np.zeros(n, np.int64), np.zeros(n, np.int64))
 
 
 @by_type
-def struck(observer: Any, walk: int, step: int, t: float, y: Any) -> int:
-    """Take note of a heel strike at time t (s) with state y after it; returns GOES_ON or the outcome's number.
+def record_strike(observer: Any, walk: int, step: int, t: float, y: Any) -> int:
+    """Record a heel strike at time t (s) with state y after it; returns GOES_ON or the outcome's number.
 
-    walk  number of the start
+    walk  index of the start
     step  from 0
     """
 
@@ -180,8 +184,8 @@ def walk_lanes(walker: TwoLegs, memory: LaneMemory, observer: Any, starts: Any, 
             for lane in range(WIDTH):
                 if slots[SLOT_OF_START, lane] == NOBODY:
                     continue
-                if memory.rows[EVENT, lane] > 0.0:
-                    outcome = look_at(walker, memory, observer, lane)
+                if memory.rows[HAS_EVENT, lane] > 0.0:
+                    outcome = handle_step(walker, memory, observer, lane)
                     if outcome != GOES_ON:
                         fates.outcome[slots[SLOT_OF_START, lane]] = outcome
                         fates.steps[slots[SLOT_OF_START, lane]] = slots[STEPS_TAKEN, lane]
@@ -191,13 +195,13 @@ def walk_lanes(walker: TwoLegs, memory: LaneMemory, observer: Any, starts: Any, 
 
 @kernel_part
 def refill(walker: TwoLegs, memory: LaneMemory, starts: Any, fates: Fates, lane: int, waiting: int) -> int:
-    """Give a lane the next start that is one; returns how many starts have been given out."""
+    """Give a lane the next valid start; returns the number of starts used."""
     while waiting < starts.shape[0]:
         y = (starts[waiting, 0], starts[waiting, 1], starts[waiting, 2], starts[waiting, 3])
         waiting += 1
         if hip_above_fall(walker.model, y) >= 0.0:
             memory.slots[SLOT_OF_START, lane], memory.slots[STEPS_TAKEN, lane] = waiting - 1, 0
-            begin_swing(walker, memory, lane, 0.0, y, FIRST_STEP * walker.pendulum_time)
+            begin_swing(walker, memory, lane, 0.0, y, FIRST_LANE_STEP * walker.pendulum_time)
             return waiting
         fates.outcome[waiting - 1], fates.steps[waiting - 1] = REJECTED, 0
     memory.slots[SLOT_OF_START, lane] = NOBODY
@@ -207,19 +211,19 @@ def refill(walker: TwoLegs, memory: LaneMemory, starts: Any, fates: Fates, lane:
 
 @kernel_part
 def begin_swing(walker: TwoLegs, memory: LaneMemory, lane: int, t: float, y: State, h: float) -> None:
-    """Have a lane start a swing from state y at time t (s), with a step h."""
+    """Start a swing of a lane from state y at time t (s), with a step h."""
     rows = memory.rows
     rate = derivative(walker, t, y)
     for i in range(4):
-        rows[START + i, lane], rows[START_RATE + i, lane] = y[i], rate[i]
-    rows[STEP, lane], rows[TIME, lane] = h, t
-    rows[LEFT, lane] = LONGEST_SWING * walker.pendulum_time
-    rows[ARRIVING, lane], rows[FIRST, lane], rows[TRIES, lane] = 0.0, 1.0, 0.0
+        rows[START_STATE + i, lane], rows[START_RATE + i, lane] = y[i], rate[i]
+    rows[NEXT_STEP, lane], rows[LANE_TIME, lane] = h, t
+    rows[TIME_LEFT, lane] = LONGEST_SWING * walker.pendulum_time
+    rows[ARRIVALS, lane], rows[FIRST_TRY, lane], rows[TRIES, lane] = 0.0, 1.0, 0.0
 
 
 @kernel_part
-def four(rows: Any, row: int) -> tuple[Lanes, Lanes, Lanes, Lanes]:
-    """Four rows as a state in lanes."""
+def load_state(rows: Any, row: int) -> tuple[Lanes, Lanes, Lanes, Lanes]:
+    """Load four rows as a state in lanes."""
     return (
         load_lanes(rows, row),
         load_lanes(rows, row + 1),
@@ -230,46 +234,46 @@ def four(rows: Any, row: int) -> tuple[Lanes, Lanes, Lanes, Lanes]:
 
 @kernel_part
 def try_steps(walker: TwoLegs, memory: LaneMemory) -> bool:
-    """Try a step in every lane; where nothing can have happened the lane moves on. Returns whether others need a look.
+    """Try a step in every lane; returns whether some lane needs attention. Where no event is possible, accept the step.
 
-    A lane needs one if an event may lie in its step, if it arrives at one, if its time is over or its steps are too
+    A lane needs attention if its step may hold an event or arrives at one, if its time is over, or if its steps are too
     many or too small.
     """
     rows = memory.rows
-    y, k1 = four(rows, START), four(rows, START_RATE)
-    left, tries = load_lanes(rows, LEFT), load_lanes(rows, TRIES) + 1.0
-    h = min(load_lanes(rows, STEP), left)
-    used, end, end_rate = stages_of(walker, 0.0, y, k1, h)
-    error_5, error_3 = error_sums(memory, y, end, combine(ERROR_5, used), combine(ERROR_3, used))
-    error = abs(h) * error_5 / math.sqrt(4.0 * (error_5 + 0.01 * error_3) + NO_ERROR)
-    change = SAFETY / math.sqrt(math.sqrt(math.sqrt(error + NO_ERROR)))
+    y, k1 = load_state(rows, START_STATE), load_state(rows, START_RATE)
+    left, tries = load_lanes(rows, TIME_LEFT), load_lanes(rows, TRIES) + 1.0
+    h = min(load_lanes(rows, NEXT_STEP), left)
+    stages, end, end_rate = run_stages(walker, 0.0, y, k1, h)
+    error_5, error_3 = error_sums(memory, y, end, combine(LANE_ERROR_5, stages), combine(LANE_ERROR_3, stages))
+    error = abs(h) * error_5 / math.sqrt(4.0 * (error_5 + 0.01 * error_3) + TINY_ERROR)
+    change = SAFETY / math.sqrt(math.sqrt(math.sqrt(error + TINY_ERROR)))
     change = min(GROW_MOST, max(SHRINK_MOST, change))
     accepted = 1.0 - error
-    over = NO_ERROR - (left - h)
+    over = TINY_ERROR - (left - h)
     pendulum_time = walker.pendulum_time
-    stuck = max(tries - MAX_TRIES, SMALLEST_STEP * pendulum_time - abs(h))
-    attention = max(may_end(walker, y, end, h), over, load_lanes(rows, ARRIVING))
+    stuck = max(tries - MAX_TRIES, MIN_LANE_STEP * pendulum_time - abs(h))
+    attention = max(may_end(walker, y, end, h), over, load_lanes(rows, ARRIVALS))
     event = choose(stuck, 1.0, choose(accepted, choose(attention, 1.0, 0.0), 0.0))
     quiet = choose(event, 0.0, accepted)
     for i in range(4):
-        store_lanes(choose(quiet, end[i], y[i]), rows, START + i)
+        store_lanes(choose(quiet, end[i], y[i]), rows, START_STATE + i)
         store_lanes(choose(quiet, end_rate[i], k1[i]), rows, START_RATE + i)
-        store_lanes(end[i], rows, END + i)
+        store_lanes(end[i], rows, END_STATE + i)
         store_lanes(end_rate[i], rows, END_RATE + i)
-    gone = choose(quiet, h, 0.0)
-    store_lanes(h * change, rows, STEP)
-    store_lanes(h, rows, TRIED)
-    store_lanes(load_lanes(rows, TIME) + gone, rows, TIME)
-    store_lanes(left - gone, rows, LEFT)
-    store_lanes(choose(quiet, 0.0, load_lanes(rows, FIRST)), rows, FIRST)
+    advanced = choose(quiet, h, 0.0)
+    store_lanes(h * change, rows, NEXT_STEP)
+    store_lanes(h, rows, TRIED_STEP)
+    store_lanes(load_lanes(rows, LANE_TIME) + advanced, rows, LANE_TIME)
+    store_lanes(left - advanced, rows, TIME_LEFT)
+    store_lanes(choose(quiet, 0.0, load_lanes(rows, FIRST_TRY)), rows, FIRST_TRY)
     store_lanes(tries, rows, TRIES)
-    store_lanes(event, rows, EVENT)
+    store_lanes(event, rows, HAS_EVENT)
     return any_positive(event)
 
 
 @kernel_part
 def may_end(walker: TwoLegs, y: Any, end: Any, h: Lanes) -> Lanes:
-    """Positive where a step from y to `end` may hold a heel strike or a fall; see `rigid_walk.may_end`."""
+    """Compute a value that is positive where a step from y to `end` may hold a heel strike or a fall."""
     ahead = hull(y[0] - y[1], h * (y[2] - y[3]), end[0] - end[1], h * (end[2] - end[3]))
     start, stop = feet_on_slope(walker, y[0], y[1]), feet_on_slope(walker, end[0], end[1])
     guard = hull(start, h * (y[2] + y[3]), stop, h * (end[2] + end[3]))
@@ -277,23 +281,23 @@ def may_end(walker: TwoLegs, y: Any, end: Any, h: Lanes) -> Lanes:
 
 
 @kernel_part
-def look_at(walker: TwoLegs, memory: LaneMemory, observer: Any, lane: int) -> int:
-    """Do what the step of a lane asks for; returns GOES_ON, or the outcome's number if its walk is over."""
+def handle_step(walker: TwoLegs, memory: LaneMemory, observer: Any, lane: int) -> int:
+    """Handle the step of a lane that needs attention; returns GOES_ON, or the outcome's number if its walk is over."""
     rows = memory.rows
     if rows[TRIES, lane] >= MAX_TRIES:
         return BUDGET_EXHAUSTED
-    if abs(rows[TRIED, lane]) < SMALLEST_STEP * walker.pendulum_time:
+    if abs(rows[TRIED_STEP, lane]) < MIN_LANE_STEP * walker.pendulum_time:
         return SOLVER_FAILED
-    if rows[ARRIVING, lane] > 0.0:
+    if rows[ARRIVALS, lane] > 0.0:
         return arrive(walker, memory, observer, lane)
     strike, fall = strike_in_step(walker, memory, lane), fall_in_step(walker, memory, lane)
     if fall < strike:
         return FELL
     if strike <= 1.0:
-        rows[ARRIVING, lane], rows[USUAL, lane] = 1.0, rows[STEP, lane]
-        rows[STEP, lane] = max(strike * rows[TRIED, lane], 2.0 * SMALLEST_STEP)
+        rows[ARRIVALS, lane], rows[STEP_BEFORE, lane] = 1.0, rows[NEXT_STEP, lane]
+        rows[NEXT_STEP, lane] = max(strike * rows[TRIED_STEP, lane], 2.0 * MIN_LANE_STEP)
         return GOES_ON
-    if rows[LEFT, lane] <= rows[TRIED, lane]:
+    if rows[TIME_LEFT, lane] <= rows[TRIED_STEP, lane]:
         return NO_HEEL_STRIKE
     move_on(memory, lane)
     return GOES_ON
@@ -301,87 +305,87 @@ def look_at(walker: TwoLegs, memory: LaneMemory, observer: Any, lane: int) -> in
 
 @kernel_part
 def move_on(memory: LaneMemory, lane: int) -> None:
-    """Accept the step of one lane."""
+    """Accept the step of a lane."""
     rows = memory.rows
     for i in range(4):
-        rows[START + i, lane], rows[START_RATE + i, lane] = rows[END + i, lane], rows[END_RATE + i, lane]
-    rows[TIME, lane] += rows[TRIED, lane]
-    rows[LEFT, lane] -= rows[TRIED, lane]
-    rows[FIRST, lane] = 0.0
+        rows[START_STATE + i, lane], rows[START_RATE + i, lane] = rows[END_STATE + i, lane], rows[END_RATE + i, lane]
+    rows[LANE_TIME, lane] += rows[TRIED_STEP, lane]
+    rows[TIME_LEFT, lane] -= rows[TRIED_STEP, lane]
+    rows[FIRST_TRY, lane] = 0.0
 
 
 @kernel_part
 def arrive(walker: TwoLegs, memory: LaneMemory, observer: Any, lane: int) -> int:
-    """Strike if the step has led to the slope, else take the rest of the way."""
+    """Apply the heel strike if the step has reached it, else set the step to the rest of the way."""
     rows, slots = memory.rows, memory.slots
     move_on(memory, lane)
     pendulum_time = walker.pendulum_time
-    rate = rows[START + 2, lane] + rows[START + 3, lane]
-    guard = feet_on_slope(walker, rows[START, lane], rows[START + 1, lane])
+    rate = rows[START_STATE + 2, lane] + rows[START_STATE + 3, lane]
+    guard = feet_on_slope(walker, rows[START_STATE, lane], rows[START_STATE + 1, lane])
     wait = -guard / rate if rate != 0.0 else 0.0
-    if abs(wait) > ARRIVED * pendulum_time and rows[ARRIVING, lane] <= REFINEMENTS:
-        rows[ARRIVING, lane] += 1.0
-        usual = abs(rows[USUAL, lane])
-        rows[STEP, lane] = max(-usual, min(usual, wait))
+    if abs(wait) > ARRIVAL_TIME * pendulum_time and rows[ARRIVALS, lane] <= STRIKE_REFINEMENTS:
+        rows[ARRIVALS, lane] += 1.0
+        step_before = abs(rows[STEP_BEFORE, lane])
+        rows[NEXT_STEP, lane] = max(-step_before, min(step_before, wait))
         return GOES_ON
     y, new = vector(walker.model.zero_state), vector(walker.model.zero_state)
     bridge(rows, lane, wait, y)
     heel_strike(walker.model, y, new)
-    step, t = slots[STEPS_TAKEN, lane], rows[TIME, lane] + wait
+    step, t = slots[STEPS_TAKEN, lane], rows[LANE_TIME, lane] + wait
     slots[STEPS_TAKEN, lane] += 1
-    outcome = struck(observer, slots[SLOT_OF_START, lane], step, t, new)
+    outcome = record_strike(observer, slots[SLOT_OF_START, lane], step, t, new)
     if outcome == GOES_ON:
-        begin_swing(walker, memory, lane, t, (new[0], new[1], new[2], new[3]), rows[USUAL, lane])
+        begin_swing(walker, memory, lane, t, (new[0], new[1], new[2], new[3]), rows[STEP_BEFORE, lane])
     return outcome
 
 
 @kernel_part
 def bridge(rows: Any, lane: int, wait: float, y: Any) -> None:
-    """The state a moment later into y: a Taylor expansion, of second order in the angles that the guard is made of."""
+    """Write the state a short time later into y by a Taylor expansion, of second order in the angles of the guard."""
     for i in range(2):
-        omega, alpha = rows[START + 2 + i, lane], rows[START_RATE + 2 + i, lane]
-        y[i] = rows[START + i, lane] + wait * (omega + 0.5 * wait * alpha)
+        omega, alpha = rows[START_STATE + 2 + i, lane], rows[START_RATE + 2 + i, lane]
+        y[i] = rows[START_STATE + i, lane] + wait * (omega + 0.5 * wait * alpha)
         y[2 + i] = omega + wait * alpha
 
 
 @kernel_part
-def event_function(rows: Any, at: int, lane: int, swing: float, stance: float) -> Jet:
-    """swing theta_1 + stance theta_2 and its first two derivatives in time, at the start or end of a lane's step."""
+def event_function(rows: Any, row: int, lane: int, swing: float, stance: float) -> Jet:
+    """Compute swing theta_1 + stance theta_2 and its first two derivatives in time, at the start or end of a step."""
     return (
-        swing * rows[at, lane] + stance * rows[at + 1, lane],
-        swing * rows[at + 2, lane] + stance * rows[at + 3, lane],
-        swing * rows[at + 6, lane] + stance * rows[at + 7, lane],
+        swing * rows[row, lane] + stance * rows[row + 1, lane],
+        swing * rows[row + 2, lane] + stance * rows[row + 3, lane],
+        swing * rows[row + 6, lane] + stance * rows[row + 7, lane],
     )
 
 
 @kernel_part
 def in_step(memory: LaneMemory, lane: int, swing: float, stance: float, constant: float) -> Quintic:
-    """swing theta_1 + stance theta_2 + constant over a lane's step."""
+    """Interpolate swing theta_1 + stance theta_2 + constant over a lane's step."""
     rows = memory.rows
-    a = event_function(rows, START, lane, swing, stance)
-    b = event_function(rows, END, lane, swing, stance)
-    return hermite(rows[TRIED, lane], (a[0] + constant, a[1], a[2]), (b[0] + constant, b[1], b[2]))
+    a = event_function(rows, START_STATE, lane, swing, stance)
+    b = event_function(rows, END_STATE, lane, swing, stance)
+    return hermite(rows[TRIED_STEP, lane], (a[0] + constant, a[1], a[2]), (b[0] + constant, b[1], b[2]))
 
 
 @kernel_part
 def strike_in_step(walker: TwoLegs, memory: LaneMemory, lane: int) -> float:
-    """Fraction of a lane's step at which the swing foot strikes with its leg ahead; NO_CROSSING if it does not."""
+    """Find the fraction of a lane's step of the heel strike with the leg ahead, or NO_CROSSING."""
     guard = in_step(memory, lane, 1.0, 1.0, feet_on_slope(walker, 0.0, 0.0))
-    at_start = memory.rows[FIRST, lane] > 0.0
+    at_start = memory.rows[FIRST_TRY, lane] > 0.0
     strike = first_fall(memory.finder, guard, at_start, 0.0)
     if strike > 1.0:
         return NO_CROSSING
     ahead = in_step(memory, lane, 1.0, -1.0, 0.0)
-    while strike <= 1.0 and value_of(ahead, strike) <= 0.0:
+    while strike <= 1.0 and evaluate_quintic(ahead, strike) <= 0.0:
         strike = first_fall(memory.finder, guard, at_start, strike + 1e-12)
     return strike
 
 
 @kernel_part
 def fall_in_step(walker: TwoLegs, memory: LaneMemory, lane: int) -> float:
-    """Fraction of a lane's step at which the hip comes below half a leg; NO_CROSSING if it is above at the end."""
+    """Find the fraction of a lane's step at which the hip falls below half a leg, or NO_CROSSING if it ends above."""
     from_upright = walker.slope - walker.upright
-    angle = memory.rows[END + 1, lane] + from_upright
+    angle = memory.rows[END_STATE + 1, lane] + from_upright
     if abs(angle) <= walker.fallen:
         return NO_CROSSING
     side = 1.0 if angle > 0.0 else -1.0

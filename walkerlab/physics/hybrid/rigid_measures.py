@@ -14,14 +14,14 @@ from walkerlab.physics.mechanics.rigid_model import BENT, STANCE, STRAIGHT, SWIN
 
 
 def energies(walker: RigidModel, states: Array) -> Array:
-    """Kinetic and potential energy (samples, 2) of states (samples, 2 n) in J, from the current stance foot."""
+    """Compute kinetic and potential energy (samples, 2) of states (samples, 2 n) in J, from the current stance foot."""
     out = np.zeros((len(states), 2))
     fill_energies(walker, np.ascontiguousarray(states), out)
     return out
 
 
 def reactions(walker: RigidModel, states: Array, bent: NDArray[np.bool_] | None = None) -> Array:
-    """Force of the ground on the stance foot (samples, 2) in N: along the slope, and normal to it.
+    """Compute the ground force on the stance foot (samples, 2) in N: along the slope, and normal to it.
 
     bent  (samples,) whether the swing leg's knee is free; None if it never is
     """
@@ -47,16 +47,16 @@ def fill_reactions(walker: RigidModel, states: Any, bent: Any, out: Any) -> None
 
 @dataclass(frozen=True)
 class Places:
-    """Points of the walker at samples, in m along the slope from the first foothold and over it."""
+    """Points of the walker at each sample, in m along the slope from the first foothold and over it."""
 
-    contact: Array  # (samples, 2) where the stance foot touches
+    contact: Array  # (samples, 2) contact point of the stance foot
     hip: Array  # (samples, 2)
     swing_foot: Array  # (samples, 2) its lowest point
     knees: Array | None  # (samples, 2, 2) of swing and stance leg; None without knees
 
 
 def places(walker: RigidModel, knee_m: tuple[float, float] | None, walk: RigidWalkResult, samples: Samples) -> Places:
-    """Where the walker's points are.
+    """Compute the points of the walker.
 
     knee_m  the knee in its thigh's frame; None without knees
     """
@@ -67,16 +67,18 @@ def places(walker: RigidModel, knee_m: tuple[float, float] | None, walk: RigidWa
     rolled = -walker.radius * (samples.state[:, STANCE] - set_down)
     contact = np.column_stack((touches + rolled, walk.ground_m[samples.step]))
     centre = contact + np.array([0.0, walker.radius])
-    hip = centre + turned(psi[:, [STANCE]], [walker.hip_x], [walker.hip_y])
-    foot = centre + turned(psi, walker.foot_x, walker.foot_y) - [0.0, walker.radius]
+    hip = centre + rotate_levers(psi[:, [STANCE]], [walker.hip_x], [walker.hip_y])
+    foot = centre + rotate_levers(psi, walker.foot_x, walker.foot_y) - [0.0, walker.radius]
     knees = None
     if knee_m is not None:
-        knees = np.stack([hip + turned(psi[:, [leg]], knee_m[:1], knee_m[1:]) for leg in (SWING, STANCE)], axis=1)
+        knees = np.stack(
+            [hip + rotate_levers(psi[:, [leg]], knee_m[:1], knee_m[1:]) for leg in (SWING, STANCE)], axis=1
+        )
     return Places(contact, hip, foot, knees)
 
 
-def turned(psi: Array, lever_x: Any, lever_y: Any) -> Array:
-    """Sum (samples, 2) of the bodies' levers at their angles psi (samples, n) from the slope's normal."""
+def rotate_levers(psi: Array, lever_x: Any, lever_y: Any) -> Array:
+    """Sum the bodies' levers, rotated by their angles psi (samples, n) from the slope's normal: (samples, 2)."""
     s, c = np.sin(psi), np.cos(psi)
     x, y = np.array(lever_x), np.array(lever_y)
     return np.column_stack((c @ x - s @ y, s @ x + c @ y))

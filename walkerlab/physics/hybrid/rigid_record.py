@@ -9,17 +9,17 @@ from walkerlab.physics.kernels import by_reference, kernel_part, vector
 from walkerlab.physics.mechanics.hinges import HIP_ROW, hinge_law
 from walkerlab.physics.mechanics.impact import push_off
 from walkerlab.physics.mechanics.rigid_model import Mode, energies, ground_reaction, momentum, swing_foot
-from walkerlab.physics.mechanics.tree import new_record, read_at_once, record_type
+from walkerlab.physics.mechanics.tree import fast_fields, new_record, record_type
 from walkerlab.physics.solvers.events import CrossingFinder
 from walkerlab.physics.solvers.stepping import T_OLD, T, interpolate, sample
 
 NO_FORCE = 1e300  # above any normal force
-REFINEMENTS = 3  # parabolas fitted around a maximum, each eight times narrower than the last
+PEAK_REFINEMENTS = 3  # parabolas fitted around a maximum, each eight times narrower than the last
 # composite Simpson rule on eighths
 SIMPSON = (1.0 / 24.0, 4.0 / 24.0, 2.0 / 24.0, 4.0 / 24.0, 2.0 / 24.0, 4.0 / 24.0, 2.0 / 24.0, 4.0 / 24.0, 1.0 / 24.0)
 
 
-@read_at_once
+@fast_fields
 class RigidTally(np.record):  # type: ignore[misc]  # NumPy's stubs call one of its bases final
     """Counts, extremes and energies of a walk, written by kernels.
 
@@ -162,7 +162,7 @@ def ascend_to_worst(
 
     last  the fractions stay below it
     """
-    for _ in range(REFINEMENTS):
+    for _ in range(PEAK_REFINEMENTS):
         before = assumptions_at(method, mode, middle - spacing)
         centre = assumptions_at(method, mode, middle)
         after = assumptions_at(method, mode, middle + spacing)

@@ -1,8 +1,8 @@
-"""Walking with the rigid model: swing phases that end in heel strikes, observed or not.
+"""Walking with the rigid model: swing phases that end in heel strikes, with or without an observer.
 
-A leg with a knee swings bent until the knee strikes, then straight. Columns behind the state change with it: flow, then
-saltation at the events. Compiled as a whole for the project's own methods;
-the same source runs in Python with a library's integrator.
+A leg with a knee swings bent until the knee strikes, then straight. Tangent columns may follow the state: they obey the
+variational equations and jump at the events (saltation). Compiled as a whole for the project's own methods; the same
+source runs in Python with a library's integrator.
 """
 
 import math
@@ -63,28 +63,28 @@ from walkerlab.physics.solvers.system import derivative
 LONGEST_SWING = 10.0  # pendulum times sqrt(L/g) within which a heel strike must come
 HULL_ROOM = 0.125
 SHORTEST_LANDING = 0.25  # of the gait's step length, ahead of the stance foot, on uneven ground
-RELEASED = 1e-6  # of the first step; a knee in line and at its thigh's rate crosses by rounding within 1e-9 of it
+SEARCH_START = 1e-6  # fraction of the first step; a straight knee at rest crosses by rounding within 1e-9 of it
 # event functions, rows of the finder
-HEEL_STRIKE, FALL, AHEAD, KNEE = range(4)
-LEGS_TURN = 4  # no event: the rate between the legs
+HEEL_STRIKE, HIP_FALL, AHEAD, KNEE = range(4)
+LEG_RATE = 4  # no event: the rate between the legs
 EVENTS = 5
 
 
 @kernel_part
 def is_bent(system: Mode) -> bool:
-    """Whether a knee is free, whose strike ends the phase."""
+    """Whether a knee is free, so that its strike ends the phase."""
     return system.phase == BENT and system.model.shank != NO_SHANK
 
 
 @kernel_part
 def knee_angle(model: RigidModel, y: Any, first: int) -> float:
-    """Angle of the swing shank beyond its thigh from y[first] on, negative while flexed (rad); or its rate."""
+    """Return the swing shank's angle beyond its thigh from y[first] on, negative while flexed (rad); or its rate."""
     return y[first + model.shank] - y[first + model.thigh]
 
 
 @kernel_part
 def hip_above_fall(model: RigidModel, y: Any) -> float:
-    """Height of the hip over the slope less what counts as fallen (m)."""
+    """Compute the height of the hip over the slope above the limit of a fall (m)."""
     return hip_height(model, y) - FALLEN_HIP * model.leg_length
 
 
@@ -93,7 +93,7 @@ def may_end(system: Mode, method: Any, at_start: bool) -> bool:
     """Whether the last step may hold an event: false through most of a swing.
 
     A heel strike needs the swing leg ahead of the stance leg and its foot to come down onto the slope; a knee strike
-    needs the knee to stretch. The event functions' values and rates at the step's ends are known.
+    needs the knee to stretch. The test uses the event functions' values and rates at the step's ends.
     """
     model, old, y, h = system.model, method.y_old, method.y, method.clock[T] - method.clock[T_OLD]
     if hip_above_fall(model, y) < 0.0:
@@ -111,12 +111,12 @@ def may_end(system: Mode, method: Any, at_start: bool) -> bool:
 
 @kernel_part
 def foot_function(system: Mode, y: Any, turn: Any) -> tuple[float, float, float, float]:
-    """What falls through zero as the swing foot comes down, what is positive with it ahead, and how both change.
+    """Compute the heel strike's event function, a function that is positive with the swing foot ahead, and both rates.
 
-    Of a straight leg over even ground both are linear in the angles, and scuffing near mid-swing is no zero; otherwise
-    they are the foot's height over its next foothold, and its place.
+    For a straight leg over even ground both are linear in the angles, so that scuffing near mid-swing is no zero.
+    Otherwise they are the foot's height over its next foothold, and its distance ahead.
 
-    turn  (n,) and more: angular velocities, or a column
+    turn  (n,) or longer: angular velocities, or a column
     """
     model, swing, stance = system.model, turn[SWING], turn[STANCE]
     if is_bent(system) or system.rise != 0.0:
@@ -127,10 +127,10 @@ def foot_function(system: Mode, y: Any, turn: Any) -> tuple[float, float, float,
 
 @kernel_part
 def hull(start: float, start_rate: float, end: float, end_rate: float, zero_at_start: bool = False) -> Any:
-    """Bounds of an event function within a step, from its values and rates per step at the ends.
+    """Compute bounds of an event function within a step, from its values and rates per step at the ends.
 
-    Those of the Bernstein coefficients of Hermite's cubic, an eighth of their spread further apart: what the cubic
-    leaves out is far less. Without the first one they tell of what a zero at the start leaves when divided out.
+    They are the bounds of the Bernstein coefficients of Hermite's cubic, widened by an eighth of their spread, far more
+    than the cubic's error. With `zero_at_start` the first coefficient is left out, which divides out that zero.
     """
     second, third = start + start_rate / 3.0, end - end_rate / 3.0
     first = second if zero_at_start else start
@@ -141,40 +141,41 @@ def hull(start: float, start_rate: float, end: float, end_rate: float, zero_at_s
 
 @kernel_part
 def sample_events(system: Mode, y: Any, node: int, finder: CrossingFinder) -> None:
-    """Values of the event functions at one node of a step, where the state is y."""
+    """Evaluate the event functions at one node of a step, where the state is y."""
     foot = foot_function(system, y, y[len(system.model.arm_x) :])
     finder.values[HEEL_STRIKE, node], finder.values[AHEAD, node] = foot[0], foot[1]
-    finder.values[FALL, node] = hip_above_fall(system.model, y)
+    finder.values[HIP_FALL, node] = hip_above_fall(system.model, y)
     if is_bent(system):
         finder.values[KNEE, node] = knee_angle(system.model, y, 0)
 
 
 @callable_kernel
 def events_in_step(system: Mode, finder: CrossingFinder, at_start: bool) -> tuple[float, float, float]:
-    """Fractions of a sampled step at which the swing foot comes down ahead, the walker falls, and the knee strikes."""
+    """Find the fractions of a sampled step of the heel strike ahead, the fall, and the knee strike."""
     for node in range(finder.nodes.size):
         sample_events(system, finder.states[node], node, finder)
     on_ground = at_start and system.behind == system.rise
     strike = first_crossing(finder, HEEL_STRIKE, FALLING, 0.0, on_ground)
     while strike <= 1.0 and value_at(finder, AHEAD, strike) <= 0.0:
         strike = first_crossing(finder, HEEL_STRIKE, FALLING, strike + 1e-12, on_ground)
-    fall, struck = first_crossing(finder, FALL, FALLING, 0.0, False), NO_CROSSING
+    fall, knee_strike = first_crossing(finder, HIP_FALL, FALLING, 0.0, False), NO_CROSSING
     if is_bent(system):
-        struck = first_crossing(finder, KNEE, RISING, RELEASED if at_start else 0.0, at_start)
-    return strike, fall, struck
+        knee_strike = first_crossing(finder, KNEE, RISING, SEARCH_START if at_start else 0.0, at_start)
+    return strike, fall, knee_strike
 
 
 @kernel_part
 def take_step(
     model: RigidModel, method: Any, finder: CrossingFinder, observer: Any, t: float, y: Any, step: int, strikes: Any
 ) -> tuple[int, float]:
-    """One step: a swing from time t (s) on, and the heel strike.
+    """Take one step from time t (s): a swing and its heel strike.
 
-    y        the walker's state at the start, with columns behind it if the method has room for them; overwritten with
-             where it led
-    strikes  the walk's HeelStrikes, whose footholds are told; the time of this step's knee strike is written
+    y        state at the start, with tangent columns if the method has room for them; overwritten with that after the
+             strike
+    strikes  HeelStrikes of the walk, with the footholds; the time of this step's knee strike is written
 
-    Returns WALKED and the time of the heel strike, whose state before it is the method's; or what happened, and when.
+    Returns WALKED and the time of the heel strike, with the state before it in the method; or another outcome and its
+    time.
     """
     latest = t + LONGEST_SWING * math.sqrt(model.leg_length / model.gravity)
     phase = BENT if model.shank != NO_SHANK else STRAIGHT
@@ -198,10 +199,9 @@ def take_step(
 def swing_phase(
     method: Any, system: Mode, finder: CrossingFinder, observer: Any, t: float, y: Any, latest: float, step: int
 ) -> int:
-    """Integrate up to the strike that ends a phase: of the knee that is free in it, or else of the heel.
+    """Integrate up to the strike that ends a phase, of a bent knee or else of the heel, or to the time `latest` (s).
 
-    It is over at the time `latest` (s) if not before. A phase that follows a heel strike begins with the foot on the
-    slope, and the knee in line: that is the strike before, none of this phase.
+    A phase starts on the strike that ended the previous one; that zero is ignored.
     """
     limit, coming = latest, False
     at_start = is_bent(system) or system.model.shank == NO_SHANK
@@ -216,19 +216,19 @@ def swing_phase(
         near = may_end(system, method, at_start)
         if near or observer.watching:
             prepare_dense(method, system)
-        strike, fall, struck = NO_CROSSING, NO_CROSSING, NO_CROSSING
+        strike, fall, knee_strike = NO_CROSSING, NO_CROSSING, NO_CROSSING
         if near:
             sample(method, system, finder.nodes, finder.states)
-            strike, fall, struck = events_in_step(system, finder, at_start)
+            strike, fall, knee_strike = events_in_step(system, finder, at_start)
         if observer.watching:
-            observe(observer, method, system, finder, LEGS_TURN, min(1.0, strike, fall, struck), step)
-        if fall < min(strike, struck):
+            observe(observer, method, system, finder, LEG_RATE, min(1.0, strike, fall, knee_strike), step)
+        if fall < min(strike, knee_strike):
             return FELL
-        if is_bent(system) and strike < struck:
+        if is_bent(system) and strike < knee_strike:
             return BENT_KNEE
-        if min(strike, struck) <= 1.0:
+        if min(strike, knee_strike) <= 1.0:
             coming = True
-            limit = method.clock[T_OLD] + min(strike, struck) * (method.clock[T] - method.clock[T_OLD])
+            limit = method.clock[T_OLD] + min(strike, knee_strike) * (method.clock[T] - method.clock[T_OLD])
             rewind(method, system)
         at_start = False
     if not coming:
@@ -238,7 +238,7 @@ def swing_phase(
 
 @kernel_part
 def event_value(system: Mode, y: Any, turn: Any) -> tuple[float, float]:
-    """The event function of the strike that ends a phase, and how it changes; `turn` as in `foot_function`."""
+    """Compute the event function of the strike that ends a phase, and its rate; `turn` as in `foot_function`."""
     if is_bent(system):
         return knee_angle(system.model, y, 0), knee_angle(system.model, turn, 0)
     value, _, change, _ = foot_function(system, y, turn)
@@ -247,11 +247,11 @@ def event_value(system: Mode, y: Any, turn: Any) -> tuple[float, float]:
 
 @kernel_part
 def pass_event(method: Any, system: Mode, new: Any) -> float:
-    """From the end of a phase, where the method stands, across the strike that ends it; returns its time (s).
+    """Apply the strike at the end of a phase; returns its time (s).
 
-    Newton's last correction of the time comes first; the method's own state is that just before the strike then. A
-    column Phi changes by the shift in time of the strike itself, too (saltation): J (Phi + f wait), less f+ wait after
-    a knee strike; after a heel strike it stays on the section.
+    A last Newton correction of the time comes first; the method then holds the state just before the strike. A column
+    Phi also changes by the strike's shift in time (saltation): J (Phi + f wait), minus f+ wait after a knee strike;
+    after a heel strike it stays on the section.
 
     new  state after the strike, and columns; written
     """
@@ -286,20 +286,20 @@ def pass_event(method: Any, system: Mode, new: Any) -> float:
 
 
 class HeelStrikes(NamedTuple):
-    """The heel strikes of a walk, step by step; states have as many columns behind them as the walk."""
+    """Heel strikes of a walk, step by step; states include the tangent columns of the walk."""
 
     time: Any  # (steps,) s
     before: Any  # (steps, m) states just before them
     after: Any  # (steps, m) just after, roles changed
     knee_time: Any  # (steps,) s, of the knee strikes before them, if there are knees
-    rise: Any  # (steps + 1,) m, of each foothold over the one before, of the present one first: given
+    rise: Any  # (steps + 1,) m, input: each foothold over the one before, the present one first
     nearest: float  # m, ahead of the stance foot: a foot that lands nearer ends the walk; 0 on even ground
 
 
 def new_heel_strikes(steps: int, m: int, kneed: bool = True, rise: Any = None, nearest: float = 0.0) -> HeelStrikes:
-    """Room for some heel strikes, with states of m numbers, and for the knee strikes before them if there are knees.
+    """Create room for heel strikes with states of m values, and for knee strikes of a walker with knees.
 
-    rise, nearest  as `HeelStrikes` has them; even ground without
+    rise, nearest  as in `HeelStrikes`; even ground by default
     """
     before, after = np.zeros((2, steps, m))
     even = np.zeros(steps + 1) if rise is None else rise
@@ -312,11 +312,11 @@ def walk(
 ) -> tuple[int, int]:
     """Walk until `strikes` is full or the walk ends.
 
-    walker  (), a RigidModel in an array: compiled code takes it in a tenth of the time of a tuple
-    y       (m,) the state (2 n) at time 0, with columns behind it if the method has room for them; overwritten with
-            where the last heel strike led
+    walker  (), a RigidModel in an array, which compiled code receives ten times faster than a tuple
+    y       (m,) state (2 n) at time 0, with tangent columns if the method has room for them; overwritten with that
+            after the last heel strike
 
-    Returns the outcome's number and how many steps were taken.
+    Returns the outcome's number and the number of steps taken.
     """
     model = walker[()]
     t = 0.0

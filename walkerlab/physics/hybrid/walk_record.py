@@ -1,4 +1,4 @@
-"""What is known of a walk, whichever model took it."""
+"""Result fields of a walk that both models share."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -12,7 +12,7 @@ Array = NDArray[np.float64]
 
 
 class WalkWork(NamedTuple):
-    """What a walk cost, in the order in which methods count it."""
+    """Cost of a walk, in the order of the methods' counters."""
 
     rhs_evaluations: int
     accepted: int
@@ -21,10 +21,10 @@ class WalkWork(NamedTuple):
 
 
 class DrivenWork(NamedTuple):
-    """Work of the steps taken, and the weight that it carries along."""
+    """Work during the completed steps, and the weight carried."""
 
     weight: float  # N
-    gravity: float  # J, of the weight from the first foothold to the last: along the slope and over uneven ground
+    gravity: float  # J, from the first foothold to the last, along the slope and over uneven ground
     push_off: float  # J
     hip: float  # J, of spring, damper and torque
     hip_torque: float  # J, the constant torque's part of that
@@ -32,37 +32,37 @@ class DrivenWork(NamedTuple):
 
     @property
     def given(self) -> float:
-        """Net work of all of them (J)."""
+        """Net work of gravity, push-off and hip (J)."""
         return self.gravity + self.push_off + self.hip
 
     def per_step(self, steps: int) -> dict[str, float]:
-        """Mean over the steps (J), by what gives it; the hip torque's are parts of the hip's."""
+        """Compute the mean work per step (J) by source; the hip torque's are parts of the hip's."""
         return {name: getattr(self, name) / steps for name in self._fields if name != "weight"}
 
     def cost_of_transport(self, distance: float) -> float:
-        """Work spent over weight times distance (m) along the slope.
+        """Compute the work spent divided by weight times distance (m) along the slope.
 
-        A spring gives back what it takes, and what gravity takes uphill is paid for by what drives the walker.
+        A spring returns the energy it stores, and work against gravity is already counted in that of the drives.
         """
         return (max(0.0, self.gravity) + self.push_off + self.hip_torque_positive) / (self.weight * distance)
 
 
 def rough_heights(roughness_m: float, seed: int | tuple[int, ...], steps: int) -> Array:
-    """Heights (steps + 1,) in m of the footholds of rough ground, independent and normal, the start's first and zero.
+    """Draw heights (steps + 1,) in m of the footholds of rough ground, independent and normal; the start's is zero.
 
-    How many are drawn does not change the first.
+    The first heights do not depend on the number drawn.
     """
     return np.append(0.0, np.random.default_rng(seed).normal(0.0, roughness_m, steps))
 
 
 @dataclass(frozen=True, eq=False)
 class WalkRecord:
-    """How a walk went: its steps, its fate and its cost, SI units. A step ends as the swing foot touches the ground."""
+    """Steps, outcome and cost of a walk, SI units. A step ends as the swing foot touches the ground."""
 
     outcome: Outcome
     touch_time_s: Array  # (steps,)
     touch_along_m: Array  # (steps,) along the slope from the first foothold
-    knee_strike_time_s: Array | None  # (steps,) when the swing leg's knee locked, nan if it did not; None without knees
+    knee_strike_time_s: Array | None  # (steps,) of the swing leg's knee, nan if it did not lock; None without knees
     end_time_s: float  # of the walk, which may end after the last touch
     work: WalkWork
     foothold_height_m: Array | None  # (steps,) over the slope, where each touch is; None on even ground
@@ -70,18 +70,17 @@ class WalkRecord:
 
     @property
     def advice(self) -> str:
-        """What the outcome means and what to try next."""
+        """Meaning of the outcome and what to try next."""
         even = self.foothold_height_m is None
         return self.outcome.advice if even else self.outcome.advice_on_uneven_ground
 
     @property
     def steps(self) -> int:
-        """Steps taken."""
         return int(self.touch_time_s.size)
 
     @property
     def periods_s(self) -> Array:
-        """Time of each step from touch to touch, (steps,)."""
+        """Duration of each step from touch to touch, (steps,)."""
         return np.diff(self.touch_time_s, prepend=0.0)
 
     @property
@@ -91,12 +90,12 @@ class WalkRecord:
 
     @property
     def ground_m(self) -> Array:
-        """(steps + 1,) heights over the slope of the footholds, that of the start first."""
+        """Heights over the slope of the footholds, that of the start first, (steps + 1,)."""
         heights = np.zeros(self.steps) if self.foothold_height_m is None else self.foothold_height_m
         return np.append(0.0, heights)
 
     @property
     def knee_strikes_s(self) -> Array:
-        """When knees locked, (strikes,)."""
+        """Times at which knees locked, (strikes,)."""
         times = self.knee_strike_time_s
         return np.zeros(0) if times is None else times[~np.isnan(times)]

@@ -1,1 +1,1 @@
-"""Planar trees of rigid bodies: described by their parts, turned into equations of motion."""
+"""Planar trees of rigid bodies: their parts, equations of motion and impacts."""

@@ -32,16 +32,16 @@ class Tree(NamedTuple):
     arm_y: Floats
 
     def merged(self, members: Floats) -> dict[str, Any]:
-        """Fields of a mechanism whose bodies (n) each stand for those of the tree that turn as one.
+        """Return fields of a mechanism whose bodies (n) are groups of those of the tree that turn as one.
 
-        members  (bodies, n) 1 where a body belongs to one of them
+        members  (bodies, n) 1 where a body belongs to a group
         """
         A, B = (members.T @ pairs @ members for pairs in (self.A, self.B))
         return {"A": A, "B": B, "arm_x": self.arm_x @ members, "arm_y": self.arm_y @ members, "mass": self.mass}
 
 
 def reduction(rows: Mapping[int, Floats], n: int) -> Floats:
-    """E (n, n) by the followers' weights."""
+    """Build E (n, n) from the followers' weights."""
     E = np.eye(n)
     for follower, row in rows.items():
         E[follower] = row
@@ -50,14 +50,14 @@ def reduction(rows: Mapping[int, Floats], n: int) -> Floats:
 
 @dataclass(frozen=True)
 class Anchor:
-    """A point of the tree: a body's name and a position in its frame."""
+    """Point of the tree: a body's name and a position in its frame."""
 
     body: str
     at_m: Position
 
 
 def levers(assembly: Assembly, root: Anchor, point: Anchor) -> Floats:
-    """Levers d (bodies, 2) in m: `point` lies at root + sum over k of R(theta_k) d[k].
+    """Compute levers d (bodies, 2) in m: `point` lies at root + sum over k of R(theta_k) d[k].
 
     Raises KeyError for an unknown body, ValueError if hinges do not lead from the root's body to the point's.
     """
@@ -73,22 +73,22 @@ def levers(assembly: Assembly, root: Anchor, point: Anchor) -> Floats:
 
 
 def path(assembly: Assembly, start: str, goal: str) -> list[tuple[str, Position, Position]]:
-    """Hinges from body `start` to body `goal`: (body left, point left from, point entered in the next body)."""
+    """List the hinges from body `start` to `goal`: (body left, point left from, point entered in the next body)."""
     reached: dict[str, list[tuple[str, Position, Position]]] = {start: []}
     frontier = [start]
     while frontier:
         body = frontier.pop()
-        for other, leaving, entering in neighbours(assembly, body):
-            if other not in reached:
-                reached[other] = [*reached[body], (body, leaving, entering)]
-                frontier.append(other)
+        for neighbour, leaving, entering in neighbours(assembly, body):
+            if neighbour not in reached:
+                reached[neighbour] = [*reached[body], (body, leaving, entering)]
+                frontier.append(neighbour)
     if goal not in reached:
         raise ValueError(f"no hinges lead from body {start!r} to body {goal!r}; add a Revolute between them")
     return reached[goal]
 
 
 def neighbours(assembly: Assembly, body: str) -> Iterator[tuple[str, Position, Position]]:
-    """Bodies hinged to `body`, with the hinge's point in each."""
+    """Yield bodies hinged to `body`, with the hinge's point in each."""
     for joint in assembly.joints:
         if joint.parent == body:
             yield joint.child, joint.parent_point_m, joint.child_point_m
@@ -97,7 +97,7 @@ def neighbours(assembly: Assembly, body: str) -> Iterator[tuple[str, Position, P
 
 
 def masses(assembly: Assembly) -> Iterator[tuple[float, Anchor]]:
-    """Every mass (kg) of the assembly and where it sits."""
+    """Yield every mass (kg) of the assembly with its position."""
     for body in assembly.bodies:
         yield body.mass_kg, Anchor(body.name, body.centre_m)
     for particle in assembly.particles:
@@ -105,26 +105,25 @@ def masses(assembly: Assembly) -> Iterator[tuple[float, Anchor]]:
 
 
 def total_mass(assembly: Assembly) -> float:
-    """Mass of the whole assembly (kg)."""
     return sum(mass for mass, _ in masses(assembly))
 
 
 def tree_about(assembly: Assembly, root: Anchor) -> Tree:
-    """Constants of the equations of motion with a material point as root."""
+    """Compute the constants of the equations of motion with a material point as root."""
     mass_levers = [(mass, levers(assembly, root, at)) for mass, at in masses(assembly)]
-    return tree_of(assembly, mass_levers)
+    return sum_masses(assembly, mass_levers)
 
 
 def tree_about_centre(assembly: Assembly) -> tuple[Tree, tuple[Floats, ...]]:
-    """Constants with the centre of mass as root, and the levers (bodies, 2) from there to each foot's centre."""
+    """Compute the constants with the centre of mass as root, and the levers (bodies, 2) to each foot's centre."""
     root = Anchor(assembly.bodies[0].name, assembly.bodies[0].centre_m)
     mass_levers = [(mass, levers(assembly, root, at)) for mass, at in masses(assembly)]
     centre = sum(mass * d for mass, d in mass_levers) / total_mass(assembly)
     feet = tuple(levers(assembly, root, Anchor(foot.body, foot.centre_m)) - centre for foot in assembly.feet)
-    return tree_of(assembly, [(mass, d - centre) for mass, d in mass_levers]), feet
+    return sum_masses(assembly, [(mass, d - centre) for mass, d in mass_levers]), feet
 
 
-def tree_of(assembly: Assembly, mass_levers: list[tuple[float, Floats]]) -> Tree:
+def sum_masses(assembly: Assembly, mass_levers: list[tuple[float, Floats]]) -> Tree:
     """Sum the levers of all masses into the constants."""
     A = np.diag([body.inertia_kg_m2 for body in assembly.bodies])
     B = np.zeros_like(A)
@@ -138,11 +137,11 @@ def tree_of(assembly: Assembly, mass_levers: list[tuple[float, Floats]]) -> Tree
 
 
 def followers(assembly: Assembly) -> dict[int, Floats]:
-    """Weights (bodies,) by which the bodies of couplings follow others."""
+    """Return the weights (bodies,) by which coupled bodies follow others."""
     rows = {}
     for coupling in assembly.couplings:
         row = np.zeros(len(assembly.bodies))
-        for other, weight in zip(coupling.of, coupling.weights, strict=True):
-            row[assembly.index(other)] += weight
+        for neighbour, weight in zip(coupling.of, coupling.weights, strict=True):
+            row[assembly.index(neighbour)] += weight
         rows[assembly.index(coupling.body)] = row
     return rows

@@ -1,11 +1,11 @@
-"""Torques at hinges, for both models: what acts between two bodies by the angle between them and its rate.
+"""Torques at hinges, for both models, from the angle between two bodies and its rate.
 
 A law is a type with a body in `hinge_torque` and in `hinge_energy`. Its torque turns the first body back and the second
-one forward; what it loses is (torque - elastic part) times the rate.
+one forward; its power loss is (torque - elastic part) times the rate.
 
-Hinges are rows of two arrays in both models' record: `hinges` has the two bodies, `laws` the numbers of a SpringDamper.
-The first row is the hip, the others are the knees that can bend: the swing leg's in the rigid model, both on compliant
-ground, where each has a stop besides.
+Hinges are rows of two arrays in both models: `hinges` has the two bodies, `laws` the parameters of a SpringDamper. The
+first row is the hip, the others are the knees that can bend: the swing leg's in the rigid model, both on compliant
+ground, where each also has a stop.
 """
 
 from typing import Any, NamedTuple
@@ -15,7 +15,7 @@ from walkerlab.physics.kernels import by_type_or_default, forced_inline, kernel_
 
 @by_type_or_default
 def legs_apart(system: Any, y: Any) -> tuple[float, float]:
-    """By how much the swing leg is ahead of the stance leg (rad), and how fast it gets further ahead (rad/s)."""
+    """Return the angle of the swing leg ahead of the stance leg (rad), and its rate (rad/s)."""
     return 0.0, 0.0
 
 
@@ -30,18 +30,18 @@ class HingeTorque(NamedTuple):
 
 @by_type_or_default
 def hinge_torque(law: Any, angle: float, rate: float) -> HingeTorque:
-    """Torque of a law at an angle (rad) and its rate: none of a law that acts in no time, such as an ideal lock."""
+    """Compute the torque of a law at an angle (rad) and its rate; zero for an instantaneous law such as IdealLock."""
     return HingeTorque(0.0, 0.0, 0.0, 0.0)
 
 
 @by_type_or_default
 def hinge_energy(law: Any, angle: float) -> float:
-    """Elastic energy (J) of a law at an angle (rad)."""
+    """Compute the elastic energy (J) of a law at an angle (rad)."""
     return 0.0
 
 
 class SpringDamper(NamedTuple):
-    """A spring that is relaxed at an angle of zero, a damper, and a constant torque that turns the first body on."""
+    """Spring relaxed at zero angle, damper, and constant torque that turns the first body forward."""
 
     stiffness: float  # N m/rad
     damping: float  # N m s/rad
@@ -50,14 +50,13 @@ class SpringDamper(NamedTuple):
 
 @hinge_torque.case(SpringDamper, forced_inline=True)
 def spring_damper_torque(law: SpringDamper, angle: float, rate: float) -> HingeTorque:
-    """Linear in both."""
+    """Evaluate linear spring and damper, minus the constant torque."""
     elastic = law.stiffness * angle
     return HingeTorque(elastic + law.damping * rate - law.torque, elastic, law.stiffness, law.damping)
 
 
 @hinge_energy.case(SpringDamper, forced_inline=True)
 def spring_energy(law: SpringDamper, angle: float) -> float:
-    """That of the spring."""
     return 0.5 * law.stiffness * angle * angle
 
 
@@ -68,13 +67,13 @@ HINGE_ROWS = {"hip": slice(HIP_ROW, HIP_ROW + 1), "knees": slice(HIP_ROW + 1, No
 
 @forced_inline
 def hinge_law(model: Any, row: int) -> SpringDamper:
-    """The spring, damper and torque at a hinge, in the order in which the config has their numbers."""
+    """Return the spring, damper and torque at a hinge, with fields in the config's order."""
     return SpringDamper(model.laws[row, 0], model.laws[row, 1], model.laws[row, 2])
 
 
 @forced_inline
 def is_sprung(model: Any, row: int) -> bool:
-    """Whether any of them acts at a hinge."""
+    """Whether spring, damper or torque acts at a hinge."""
     return model.laws[row, 0] != 0.0 or model.laws[row, 1] != 0.0 or model.laws[row, 2] != 0.0
 
 
@@ -87,7 +86,7 @@ def add_hinge_torque(now: HingeTorque, body: int, other: int, r: Any) -> None:
 
 @kernel_part
 def add_hinge_gradients(now: HingeTorque, body: int, other: int, by_angle: Any, by_rate: Any) -> None:
-    """Add the derivatives of those torques by the angles and by their velocities to by_angle and by_rate (n, n)."""
+    """Add the derivatives of those torques with respect to angles and rates to by_angle and by_rate (n, n)."""
     for row, sign in ((other, 1.0), (body, -1.0)):
         by_angle[row, body] += sign * now.by_angle
         by_angle[row, other] -= sign * now.by_angle

@@ -1,4 +1,4 @@
-"""Plastic impacts: velocities before, projected in the metric of the masses on what the new constraints allow.
+"""Plastic impacts: the velocities before, projected in the metric of the masses on those the new constraints allow.
 
 With velocities u of all masses before and u+ = Z z+ after, Z of the new constraints, Z' M (u+ - u) = 0. Coordinates
 are those of the tree about the foot that stands afterwards: velocity (v_x, v_y) of its centre, along the slope and
@@ -33,24 +33,24 @@ from walkerlab.physics.solvers.system import Floats
 
 @kernel_part
 def heel_strike(model: RigidModel, y: Any, new: Any) -> None:
-    """Write the state after the heel strike that y leads to, roles changed, into `new`.
+    """Write the state after the heel strike that ends in y, with the legs' roles exchanged, into `new`.
 
-    y  the state, and as many columns behind it as there are: directions, whose images `new` gets
+    y  the state, followed by any number of columns: directions, whose images are written into `new`
     """
     strike(model, AT_STRIKE, True, y, new)
 
 
 @kernel_part
 def knee_strike(model: RigidModel, y: Any, new: Any) -> None:
-    """As `heel_strike`, after the swing leg's knee has come into line and locked."""
+    """Write the state after the swing leg's knee has locked straight into `new`; y as in `heel_strike`."""
     strike(model, STRAIGHT, False, y, new)
 
 
 @kernel_part
 def strike(model: RigidModel, phase: int, other_foot: bool, y: Any, new: Any) -> None:
-    """A plastic impact on the constraints of E[phase].
+    """Apply a plastic impact on the constraints of E[phase].
 
-    other_foot  the swing foot stands afterwards; else the foot that stood goes on standing
+    other_foot  whether the swing foot stands afterwards; otherwise the stance foot does
     """
     like = model.arm_x
     n, R = len(like), model.radius
@@ -76,7 +76,8 @@ def strike(model: RigidModel, phase: int, other_foot: bool, y: Any, new: Any) ->
     factor_linked(model, phase, factors)
     pushed = other_foot and model.push_off != 0.0
     twist = push_off(model, new).angular if pushed else 0.0
-    project(model, phase, M, factors, F, U, new[n : 2 * n], along, upward, twist, p)
+    constraints = Constraints(phase, M, factors, F, U)
+    project(model, constraints, new[n : 2 * n], along, upward, twist, p)
     jump, turned = vector(like), vector(like)
     for k in range(n):
         jump[k] = p[k] - new[n + k]
@@ -97,13 +98,13 @@ def strike(model: RigidModel, phase: int, other_foot: bool, y: Any, new: Any) ->
             twist = push.by_trailing * new[at + SWING] + push.by_leading * new[at + STANCE]
         turn, rate = new[at : at + n], new[at + n : at + 2 * n]
         mass_change(model, s, c, turn, jump, jump_along, jump_upward, turned)
-        project_change(model, phase, M, factors, F, U, rate, along, upward, twist, turned, p)
+        project_change(model, constraints, rate, along, upward, twist, turned, p)
         for k in range(n):
             new[at + n + k] = p[k]
 
 
 class RootedTree(NamedTuple):
-    """A tree of n bodies about its root, in the terms of `project`: what a mechanism of either model gives it."""
+    """Tree of n bodies about its root: the fields of a mechanism of either model that `project` needs."""
 
     E: Floats  # (phases, n, n)
     A: Floats  # (n, n) kg m^2
@@ -116,7 +117,7 @@ class RootedTree(NamedTuple):
 
 
 class Lock(NamedTuple):
-    """A joint's lock: a plastic impact that leaves the root's motion as it is."""
+    """Result of a joint's lock: a plastic impact that leaves the root's motion unchanged."""
 
     velocities: Floats  # (n,) rad/s, after it
     lost: float  # J
@@ -124,7 +125,7 @@ class Lock(NamedTuple):
 
 
 def lock(tree: RootedTree, angles: Floats, omega: Floats, turns: Floats, rates: Floats) -> Lock:
-    """Project angular velocities (n,) on what E[0] allows, by the impact of `strike`; the root takes no part.
+    """Project angular velocities (n,) on those E[0] allows, by the impact of `strike` without the root.
 
     angles        (n,) rad, from the vertical
     turns, rates  (n, columns) directions of the state before: changes of the angles and of their velocities
@@ -136,30 +137,31 @@ def lock(tree: RootedTree, angles: Floats, omega: Floats, turns: Floats, rates: 
     add_inertia(tree, n, s, c, omega, M, p)
     factors = M.copy()
     factor_linked(tree, 0, factors)
-    project(tree, 0, M, factors, F, U, omega, 0.0, 0.0, 0.0, p)
+    constraints = Constraints(0, M, factors, F, U)
+    project(tree, constraints, omega, 0.0, 0.0, 0.0, p)
     if rates.shape[1] > 0:
         mass_change(tree, s, c, turns, p - omega, 0.0, 0.0, turned)
-        project_change(tree, 0, M, factors, F, U, rates, 0.0, 0.0, 0.0, turned, changes)
+        project_change(tree, constraints, rates, 0.0, 0.0, 0.0, turned, changes)
     return Lock(p, float(0.5 * (M @ omega) @ (omega - p)), changes)
 
 
 class PushOffImpulse(NamedTuple):
-    """An impulse at the trailing foot, along the line from there to the hip."""
+    """Impulse at the trailing foot, along the line from there to the hip."""
 
     along: float  # N s, along the slope
     upward: float  # N s, normal to it
-    angular: float  # N m s, on the leading leg about its foot: an impulse through the hip turns nothing else
-    by_trailing: float  # N m s, its derivatives by the angles of both legs
+    angular: float  # N m s, on the leading leg about its foot; an impulse through the hip turns no other body
+    by_trailing: float  # N m s, its derivatives with respect to the angles of both legs
     by_leading: float
 
 
 @kernel_part
 def push_off(model: RigidModel, new: Any) -> PushOffImpulse:
-    """The push-off of a heel strike, by the state after it."""
+    """Compute the push-off of a heel strike from the state after it."""
     s_t, c_t = sine_cosine(new[SWING] + model.slope)
     s_l, c_l = sine_cosine(new[STANCE] + model.slope)
     R = model.radius
-    # from where each foot touches to the hip, along the slope and normal to it
+    # from each foot's contact point to the hip, along the slope and normal to it
     x_t, y_t = c_t * model.hip_x - s_t * model.hip_y, s_t * model.hip_x + c_t * model.hip_y + R
     x_l, y_l = c_l * model.hip_x - s_l * model.hip_y, s_l * model.hip_x + c_l * model.hip_y + R
     length = math.hypot(x_t, y_t)
@@ -171,20 +173,21 @@ def push_off(model: RigidModel, new: Any) -> PushOffImpulse:
 
 
 def push_off_work(model: RigidModel, before: Floats) -> Floats:
-    """Work (strikes,) in J of the push-offs at heel strikes, each done just before its strike.
+    """Compute the work (strikes,) in J of the push-offs at heel strikes, each done just before its strike.
 
-    The walker is free of the ground then, its knees locked and its torso coupled: an impulse P along e gives
+    The walker is free of the ground then, its knees locked and its torso coupled: an impulse P along e does the work
     P^2 / 2 J M^-1 J', with J the velocity along e of the trailing contact point, or of the hip on the same line.
-    Angular velocities leave of M the apparent mass at the hip, m - C' I^-1 C, with moments C and inertia I about it.
+    Eliminating angular velocities from M leaves the apparent mass at the hip, m - C' I^-1 C, with moments C and inertia
+    I about it.
 
     before  (strikes, 2 n) states just before the strikes
 
-    Source: Kuo (2002), whose legs without mass leave P^2 / (2 m).
+    Source: Kuo (2002); with massless legs it is P^2 / (2 m).
     """
     n, E = len(model.arm_x), model.E[STRAIGHT]
     Z = E[:, np.diag(E) != 0.0]
     A, B, arm_x, arm_y = (each.copy() for each in (model.A, model.B, model.arm_x, model.arm_y))
-    # the trailing leg hangs from the hip as the leading one does, and seen from there nothing hangs from it
+    # about the hip, the trailing leg is a leg like the leading one, and carries no other body
     leg = [SWING] if model.shank == NO_SHANK else [SWING, int(model.shank)]
     own = A[np.ix_(leg, leg)].sum()
     for pairs in (A, B):
@@ -202,9 +205,9 @@ def push_off_work(model: RigidModel, before: Floats) -> Floats:
 
 
 def pushed_at_hip(model: RigidModel, y: Any, impulse: float) -> NDArray[np.float64]:
-    """The state (2 n) just after a heel strike y, changed by an impulse (N s) at the hip along the slope.
+    """Return the state (2 n) just after a heel strike y, changed by an impulse (N s) at the hip along the slope.
 
-    The new stance foot stays where it is. It comes after the release of the trailing knee, which is free.
+    The new stance foot stays at rest. The impulse follows the release of the trailing knee, which is free.
     """
     n, new, phase = len(model.arm_x), np.array(y, float), BENT if model.kneed else STRAIGHT
     s, c, F, U, p = np.zeros((5, n))
@@ -218,42 +221,48 @@ def pushed_at_hip(model: RigidModel, y: Any, impulse: float) -> NDArray[np.float
     return new
 
 
+class Constraints(NamedTuple):
+    """Constraints E[phase] of an impact, with the masses of a tree about the root that they leave."""
+
+    phase: int
+    M: Any  # (n, n) kg m^2
+    factors: Any  # (n, n) of `factor_linked`
+    F: Any  # (n,) kg m, projections of the first moments
+    U: Any
+
+
 @forced_inline
 def project(
-    model: Any, phase: int, M: Any, factors: Any, F: Any, U: Any, omega: Any, along: float, upward: float, twist: float,
-    p: Any,
-) -> None:  # fmt: skip
-    """Write the velocities after a plastic impact on the constraints of E[phase] into p (n,).
+    model: Any, constraints: Constraints, omega: Any, along: float, upward: float, twist: float, p: Any
+) -> None:
+    """Write the velocities after a plastic impact on constraints into p (n,).
 
-    model                 a tree of either model about the root that the constraints leave
-    M, factors            (n, n) kg m^2, and what `factor_linked` makes of it
-    F, U                  (n,) kg m, projections of the first moments
+    model                 a tree of either model
     omega, along, upward  (n,) rad/s and m/s, velocities before of the bodies and of the root
     twist                 N m s, an impulse on the stance leg
     """
-    momenta(model, M, F, U, omega, along, upward, p)
+    momenta(model, constraints.M, constraints.F, constraints.U, omega, along, upward, p)
     p[STANCE] += twist
-    solve_linked(model, phase, factors, p)
+    solve_linked(model, constraints.phase, constraints.factors, p)
 
 
 @forced_inline
 def project_change(
-    model: Any, phase: int, M: Any, factors: Any, F: Any, U: Any, rate: Any, along: float, upward: float, twist: float,
-    turned: Any, p: Any,
-) -> None:  # fmt: skip
-    """As `project`, of a change of the velocities, with the change of the momenta (n,) by the angles in `turned`."""
-    momenta(model, M, F, U, rate, along, upward, p)
+    model: Any, constraints: Constraints, rate: Any, along: float, upward: float, twist: float, turned: Any, p: Any
+) -> None:
+    """Project a change of the velocities like `project`; `turned` (n,) is the change of momenta due to the angles."""
+    momenta(model, constraints.M, constraints.F, constraints.U, rate, along, upward, p)
     for k in range(len(model.arm_x)):
         p[k] -= turned[k]
     p[STANCE] += twist
-    solve_linked(model, phase, factors, p)
+    solve_linked(model, constraints.phase, constraints.factors, p)
 
 
 @forced_inline
 def momenta(model: Any, M: Any, F: Any, U: Any, omega: Any, along: float, upward: float, p: Any) -> None:
-    """Z' M u into p (n,), with the angular velocities omega (n,).
+    """Write Z' M u into p (n,), with the angular velocities omega (n,).
 
-    M is M' of rigid_model.py, whose part in the rolling of angular velocities is taken out again.
+    M is M' of rigid_model.py, so the rolling part of the angular velocities is subtracted again.
     """
     n, R = len(model.arm_x), model.radius
     sliding = along + R * omega[STANCE]
@@ -267,9 +276,9 @@ def momenta(model: Any, M: Any, F: Any, U: Any, omega: Any, along: float, upward
 
 @forced_inline
 def mass_change(model: Any, s: Any, c: Any, turn: Any, jump: Any, along: float, upward: float, p: Any) -> None:
-    """Z' dM w into p (n,): the change of the masses' matrix as the bodies turn, times a jump w of the velocities.
+    """Write Z' dM w into p (n,): the change of the mass matrix with the angles, times a jump w of the velocities.
 
-    turn  (n,) how the angles change
+    turn  (n,) changes of the angles
     """
     n = len(model.arm_x)
     F, U = vector(model.arm_x), vector(model.arm_x)

@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 from walkerlab.physics.kernels import forced_inline
 
 
-class Counted(NamedTuple):
-    """What is asked of a model here, of one whose bodies are counted while it walks and not while compiling.
+class CountedModel(NamedTuple):
+    """Interface of models here, for one whose number of bodies is known only at run time.
 
     A model with tuples takes little more than half the time: the compiler unrolls its loops.
     """
@@ -22,8 +22,8 @@ class Counted(NamedTuple):
 
 
 @forced_inline
-def spread(model: Any, phase: int, z: Any) -> None:
-    """E z in place of z (n,): a follower moves with those it follows."""
+def expand(model: Any, phase: int, z: Any) -> None:
+    """Replace z (n,) by E z: a follower moves with the bodies it follows."""
     n = len(model.arm_x)
     for c in range(n):
         if model.E[phase, c, c] == 0.0:
@@ -35,7 +35,7 @@ def spread(model: Any, phase: int, z: Any) -> None:
 
 @forced_inline
 def factor_linked(model: Any, phase: int, M: Any) -> None:
-    """L D L' = E' M E in place of M (n, n): 1/D on the diagonal, L' above it."""
+    """Replace M (n, n) by the factors L D L' = E' M E: 1/D on the diagonal, L' above it."""
     n = len(model.arm_x)
     for c in range(n):
         if model.E[phase, c, c] == 0.0:
@@ -58,9 +58,9 @@ def factor_linked(model: Any, phase: int, M: Any) -> None:
 
 @forced_inline
 def solve_linked(model: Any, phase: int, factors: Any, b: Any) -> None:
-    """E dz in place of b (n,) = r, of a matrix that `factor_linked` has taken apart.
+    """Replace the right-hand side b (n,) = r by E dz, with factors from `factor_linked`.
 
-    What acts on a follower acts on those it follows.
+    A torque on a follower acts on the bodies it follows.
     """
     n = len(model.arm_x)
     for c in range(n):
@@ -75,4 +75,4 @@ def solve_linked(model: Any, phase: int, factors: Any, b: Any) -> None:
         b[k] *= factors[k, k]
         for j in range(k + 1, n):
             b[k] -= factors[k, j] * b[j]
-    spread(model, phase, b)
+    expand(model, phase, b)

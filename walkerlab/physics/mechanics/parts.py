@@ -1,4 +1,4 @@
-"""The parts that a planar walker is assembled from, as in a multibody program.
+"""Parts of which a planar walker is assembled, as in a multibody program.
 
 Every body has a frame of its own; at angle zero its axes are those of the world. Positions are given in that frame.
 """
@@ -10,7 +10,7 @@ Position = tuple[float, float]
 
 @dataclass(frozen=True)
 class Body:
-    """A rigid body: mass, centre of mass in its own frame, and inertia about that centre."""
+    """Rigid body: mass, centre of mass in its own frame, and inertia about that centre."""
 
     name: str
     mass_kg: float
@@ -20,7 +20,7 @@ class Body:
 
 @dataclass(frozen=True)
 class Particle:
-    """A point mass fixed to a body, such as a hip that is one with a joint's axle."""
+    """Point mass fixed to a body, such as a hip mass on a joint's axle."""
 
     name: str
     mass_kg: float
@@ -30,7 +30,7 @@ class Particle:
 
 @dataclass(frozen=True)
 class Revolute:
-    """A frictionless hinge between a point of one body and a point of another."""
+    """Frictionless hinge between a point of one body and a point of another."""
 
     name: str
     parent: str
@@ -41,7 +41,7 @@ class Revolute:
 
 @dataclass(frozen=True)
 class BallFoot:
-    """A ball fixed to a body: the ground touches it below its centre; radius zero is a point."""
+    """Ball fixed to a body: the ground touches it below its centre; radius zero is a point."""
 
     name: str
     body: str
@@ -51,7 +51,7 @@ class BallFoot:
 
 @dataclass(frozen=True)
 class Knee:
-    """A hinge that locks when the shank comes into line with its thigh from behind: both at one angle."""
+    """Hinge that locks when the shank comes into line with its thigh from behind: both at one angle."""
 
     name: str
     thigh: str
@@ -60,7 +60,7 @@ class Knee:
 
 @dataclass(frozen=True)
 class Coupling:
-    """A body whose angle is a weighted sum of other bodies' angles, such as a torso on the legs' bisector."""
+    """Body whose angle is a weighted sum of other bodies' angles, such as a torso on the legs' bisector."""
 
     body: str
     of: tuple[str, ...]
@@ -69,12 +69,12 @@ class Coupling:
 
 @dataclass(frozen=True)
 class Assembly:
-    """Bodies held together by hinges, without closed loops.
+    """Bodies connected by hinges, without closed loops.
 
-    legs  the bodies of either leg from the hip down, in the same order; they change roles at heel strike. The first
+    legs  the bodies of each leg from the hip down, in the same order; they change roles at heel strike. The first
           foot is the first leg's. Bodies of neither leg belong to both.
 
-    Raises KeyError for a part on a body that is not there, ValueError for two bodies of one name and for closed loops.
+    Raises KeyError for a part on an unknown body, ValueError for two bodies of one name and for closed loops.
     """
 
     bodies: tuple[Body, ...]
@@ -86,7 +86,7 @@ class Assembly:
     legs: tuple[tuple[str, ...], tuple[str, ...]] = ((), ())
 
     def __post_init__(self) -> None:
-        """Refuse what is not a tree of known bodies."""
+        """Check that the parts form a tree of known bodies."""
         names = [body.name for body in self.bodies]
         if len(set(names)) < len(names):
             raise ValueError(f"two bodies of one name among {', '.join(names)}")
@@ -103,14 +103,14 @@ class Assembly:
             group = [one if of == other else of for of in group]
 
     def index(self, body: str) -> int:
-        """Place of a body in `bodies`; KeyError names the bodies there are."""
+        """Return the index of a body in `bodies`; KeyError lists the known bodies."""
         names = [b.name for b in self.bodies]
         if body not in names:
             raise KeyError(f"no body named {body!r}; bodies: {', '.join(names)}")
         return names.index(body)
 
     def hinge(self, body: str, other: str) -> Revolute | None:
-        """The hinge between two bodies, the first one as its parent; None if they are not hinged directly."""
+        """Return the hinge between two bodies, the first one as its parent; None if they are not hinged directly."""
         for joint in self.joints:
             if (joint.parent, joint.child) == (body, other):
                 return joint

@@ -1,4 +1,4 @@
-"""From parts to the rigid model: which bodies stand, swing and follow, and what changes at heel strike."""
+"""Construction of the rigid model from parts: stance and swing bodies, followers, and roles at heel strike."""
 
 import math
 from dataclasses import dataclass
@@ -11,34 +11,34 @@ from walkerlab.physics.mechanics.parts import Assembly, Revolute
 from walkerlab.physics.mechanics.rigid_model import NO_SHANK, STANCE, SWING, RigidModel, new_rigid_model, on_slope
 from walkerlab.physics.solvers.system import Floats
 
-ALIKE = 1e-12  # relative difference up to which two legs are alike
+ALIKE = 1e-12  # relative difference up to which two legs count as equal
 
 
 @dataclass(frozen=True)
 class BodyPlaces:
-    """Which bodies of an assembly make up each body of the rigid model, whose stance leg stays straight."""
+    """Assignment of an assembly's bodies to those of the rigid model, whose stance leg stays straight."""
 
-    names: tuple[str, ...]  # of the angles, without their 'theta_'
+    names: tuple[str, ...]  # of the angles, without the prefix 'theta_'
     members: Floats  # (bodies, n) 1 where a body belongs to a place
-    roles: tuple[int, ...]  # which place each is taken from at heel strike
+    roles: tuple[int, ...]  # previous place of each after a heel strike
     knees: tuple[tuple[int, int], ...]  # (shank, thigh) of the swing leg
 
 
 def standing(assembly: Assembly, gravity: float, slope: float, knee_locked_at_strike: bool = True) -> RigidModel:
-    """The rigid model of an assembly on a slope (rad), as `on_level_ground` makes it."""
+    """Build the rigid model of an assembly on a slope (rad); other arguments as in `on_level_ground`."""
     return on_slope(on_level_ground(assembly, gravity, knee_locked_at_strike), slope)
 
 
 def on_level_ground(assembly: Assembly, gravity: float, knee_locked_at_strike: bool) -> RigidModel:
-    """The rigid model of an assembly; gravity in m/s^2.
+    """Build the rigid model of an assembly; gravity in m/s^2.
 
     knee_locked_at_strike  whether the trailing knee is rigid during the heel strike and released just after it
 
-    Raises ValueError, in words for the user, for parts that make no walker with two like legs.
+    Raises ValueError, with a message for the user, for parts that are not a walker with two equal legs.
     """
-    refuse_unlike_legs(assembly)
-    hip = hip_of(assembly)
-    places = places_of(assembly)
+    check_equal_legs(assembly)
+    hip = find_hip(assembly)
+    places = group_bodies(assembly)
     foot = assembly.feet[STANCE]
     root = Anchor(foot.body, foot.centre_m)
     to_foot = places.members.T @ levers(
@@ -76,8 +76,8 @@ def on_level_ground(assembly: Assembly, gravity: float, knee_locked_at_strike: b
     )
 
 
-def places_of(assembly: Assembly) -> BodyPlaces:
-    """Swing leg (thigh), straight stance leg, what else swings, and what belongs to both legs."""
+def group_bodies(assembly: Assembly) -> BodyPlaces:
+    """Group the bodies: swing leg (thigh), straight stance leg, other swinging bodies, and bodies of both legs."""
     swinging, stance = assembly.legs
     shared = tuple(body.name for body in assembly.bodies if body.name not in (*swinging, *stance))
     groups = [(swinging[0],), stance, *((name,) for name in swinging[1:]), *((name,) for name in shared)]
@@ -86,33 +86,33 @@ def places_of(assembly: Assembly) -> BodyPlaces:
         for name in group:
             members[assembly.index(name), place] = 1.0
     more = len(swinging) - 1
-    knee_of = {knee.shank: knee.thigh for knee in assembly.knees}
+    knee_position = {knee.shank: knee.thigh for knee in assembly.knees}
     return BodyPlaces(
         names=("1", "2", *(f"1_{name.split()[0]}" for name in swinging[1:]), *(name.split()[0] for name in shared)),
         members=members,
         roles=(STANCE, SWING, *((STANCE,) * more), *range(2 + more, len(groups))),
-        knees=tuple((2 + k, place_of(groups, knee_of[name])) for k, name in enumerate(swinging[1:])),
+        knees=tuple((2 + k, group_index(groups, knee_position[name])) for k, name in enumerate(swinging[1:])),
     )
 
 
-def place_of(groups: list[tuple[str, ...]], name: str) -> int:
-    """Which group a body is in."""
+def group_index(groups: list[tuple[str, ...]], name: str) -> int:
+    """Return the index of the group that holds a body."""
     return next(place for place, group in enumerate(groups) if name in group)
 
 
 def torso_rows(assembly: Assembly, places: BodyPlaces) -> dict[int, Floats]:
-    """Weights by which coupled places follow others."""
+    """Return the weights by which coupled places follow others."""
     members = places.members
     return {int(np.argmax(members[body])): row @ members for body, row in followers(assembly).items()}
 
 
 def knee_rows(places: BodyPlaces) -> dict[int, Floats]:
-    """Weights by which the parts of a straight swing leg follow its thigh."""
+    """Return the weights by which the parts of a straight swing leg follow its thigh."""
     return {shank: np.eye(len(places.names))[thigh] for shank, thigh in places.knees}
 
 
-def hip_of(assembly: Assembly) -> Revolute:
-    """The hinge between the legs, with the stance leg as its parent."""
+def find_hip(assembly: Assembly) -> Revolute:
+    """Return the hinge between the legs, with the stance leg as its parent."""
     first, second = (leg[0] for leg in assembly.legs)
     hinge = assembly.hinge(second, first)
     if hinge is None:
@@ -120,13 +120,13 @@ def hip_of(assembly: Assembly) -> Revolute:
     return hinge
 
 
-def knee_of(assembly: Assembly) -> tuple[float, float] | None:
-    """Where a thigh's frame has its knee (m); None without knees."""
+def knee_position(assembly: Assembly) -> tuple[float, float] | None:
+    """Return the position of the knee in a thigh's frame (m); None without knees."""
     hinges = (assembly.hinge(knee.thigh, knee.shank) for knee in assembly.knees)
     return next((hinge.parent_point_m for hinge in hinges if hinge is not None), None)
 
 
-def refuse_unlike_legs(assembly: Assembly) -> None:
+def check_equal_legs(assembly: Assembly) -> None:
     """Raise ValueError unless both legs have the same parts in the same order, joined by knees, and a foot each."""
     first, second = assembly.legs
     if not first or len(first) != len(second):
@@ -153,9 +153,9 @@ def refuse_unlike_legs(assembly: Assembly) -> None:
 
 
 def leg_measures(assembly: Assembly, k: int) -> Floats:
-    """Mass, inertia, centre of mass and foot of a leg, as seen from its hip."""
+    """Compute mass, inertia, centre of mass and foot of a leg, relative to its hip."""
     leg, foot = assembly.legs[k], assembly.feet[k]
-    hip = hip_of(assembly)
+    hip = find_hip(assembly)
     at_hip = Anchor(hip.parent, hip.parent_point_m) if k == 1 else Anchor(hip.child, hip.child_point_m)
     own = [assembly.index(name) for name in leg]
     measures = [foot.radius_m, *levers(assembly, at_hip, Anchor(foot.body, foot.centre_m))[own].ravel()]

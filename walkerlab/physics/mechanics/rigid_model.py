@@ -1,4 +1,4 @@
-"""A walker standing on one foot that is pinned to the ground or rolls on it without slip.
+"""Walker on one foot that is pinned to the ground or rolls on it without slip.
 
 The centre of the foot's arc is the tree's root; it moves along the slope by -R times the stance leg's angle, and R = 0
 is a hinge. With M, r, F and U of tree.py and s the stance leg:
@@ -9,8 +9,8 @@ is a hinge. With M, r, F and U of tree.py and s the stance leg:
 Bodies that follow others (a locked shank its thigh, a torso the bisector of the legs) are a reduction theta = E z with
 a constant E, which turns M' alpha = r' into E' M' E dz' = E' r'.
 
-Body 0 is the swing leg (its thigh), body 1 the stance leg, which stays straight; then the swing leg's shank, then what
-belongs to both legs.
+Body 0 is the swing leg (its thigh), body 1 the stance leg, which stays straight; then the swing leg's shank, then
+bodies of both legs.
 """
 
 import math
@@ -30,7 +30,7 @@ from walkerlab.physics.mechanics.hinges import (
     is_sprung,
     legs_apart,
 )
-from walkerlab.physics.mechanics.links import factor_linked, solve_linked, spread
+from walkerlab.physics.mechanics.links import expand, factor_linked, solve_linked
 from walkerlab.physics.mechanics.tree import (
     add_gravity,
     add_gravity_gradient,
@@ -49,21 +49,21 @@ BENT, STRAIGHT, AT_STRIKE = 0, 1, 2
 NO_SHANK = -1
 
 
-@tree.read_at_once
+@tree.fast_fields
 class RigidModel(tree.Mechanism):  # type: ignore[misc]  # as its base
-    """Everything that stays the same while the rigid model walks, SI: a structured scalar, of n bodies by its type.
+    """Constants of the rigid model, SI: a structured scalar, for n bodies by its type.
 
     E has three reductions: BENT, STRAIGHT, AT_STRIKE.
     """
 
     foot_x: Floats  # (n,) m, levers from the stance foot's centre to the swing foot's, body by body
     foot_y: Floats
-    roles: Integers  # (n,) which body takes each place after the heel strike
+    roles: Integers  # (n,) body that takes each place after the heel strike
     section: Integers  # (n + 1,) places in the state of the section's coordinates, the stance leg's angle first
     coordinates: int  # [d] of the section
     thigh: int  # places of the swing knee's bodies among them; NO_SHANK for legs without knees
     shank: int
-    unpaired: float  # kg m^2, of a torque on the stance leg that no hinge gives: see `add_unpaired_torque`
+    unpaired: float  # kg m^2, coefficient of a torque on the stance leg without counterpart: see `add_unpaired_torque`
     radius: float  # [R] m, of either foot; 0 is a point
     hip_x: float  # m, to the hip, which belongs to the stance leg
     hip_y: float
@@ -74,33 +74,30 @@ class RigidModel(tree.Mechanism):  # type: ignore[misc]  # as its base
 
     @property
     def section_indices(self) -> tuple[int, ...]:
-        """Places (d) in the state of the section's coordinates."""
+        """Indices (d) in the state of the section's coordinates."""
         return tuple(self.section[: self.coordinates].tolist())
 
     @property
     def kneed(self) -> bool:
-        """Whether the swing leg has a knee."""
         return bool(self.shank != NO_SHANK)
 
     @property
     def passive(self) -> bool:
-        """Whether nothing but gravity acts on it, not even a spring or a damper."""
+        """Whether only gravity acts on it, without even a spring or a damper."""
         return not self.sprung and not self.driven
 
     def __eq__(self, other: object) -> bool:
-        """Whether all numbers are the same."""
         return isinstance(other, RigidModel) and self.dtype == other.dtype and self.tobytes() == other.tobytes()
 
     def __hash__(self) -> int:
-        """Of all numbers."""
         return hash(self.tobytes())
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Its copy in another process, read-only too: kernels are compiled anew for what can be written to."""
+        """Pickle as read-only, since kernels are compiled anew for writable arrays."""
         return RigidModel.changed, (np.asarray(self),)
 
     def changed(self, **fields: Any) -> "RigidModel":
-        """A copy with other values of some fields, that nobody can write to."""
+        """Return a read-only copy with some fields changed."""
         memory: Any = np.empty((), self.dtype)
         memory[()] = self
         tree.write_fields(memory, fields)
@@ -110,7 +107,7 @@ class RigidModel(tree.Mechanism):  # type: ignore[misc]  # as its base
 
 
 def new_rigid_model(n: int, **fields: Any) -> RigidModel:
-    """The rigid model of n bodies with these fields; the others are zero."""
+    """Create the rigid model of n bodies with these fields; the others are zero."""
     shapes = {
         **tree.mechanism_shapes(n, 3, len(fields["hinges"])),
         **dict.fromkeys(("foot_x", "foot_y", "roles"), (n,)),
@@ -123,34 +120,34 @@ def new_rigid_model(n: int, **fields: Any) -> RigidModel:
 
 
 def on_slope(model: RigidModel, slope: float) -> RigidModel:
-    """The same walker on another slope (rad)."""
+    """Return the same walker on another slope (rad)."""
     along, down = model.gravity * math.sin(slope), model.gravity * math.cos(slope)
     return model.changed(slope=slope, gravity_along=along, gravity_down=down)
 
 
 class Mode(NamedTuple):
-    """The walker between events, alone or with how its motion changes along directions of its start.
+    """The walker between events, alone or with variational columns.
 
-    Its state (2 n,) are the bodies' angles and their velocities; behind it come as many columns (2 n,) as there is room
-    for in what a method integrates: the variational equations.
+    Its state (2 n,) consists of the bodies' angles and angular velocities. Columns (2 n,) of the variational equations
+    follow it, as many as the method's state has room for.
     """
 
     model: RigidModel
     phase: int  # BENT or STRAIGHT
-    # m, heights over the present foothold: of that which the swing foot leaves, and of that on which it is to land
+    # m, heights over the present foothold: of the foothold that the swing foot leaves, and of the next one
     behind: float = 0.0
     rise: float = 0.0
 
 
 @block.case(Mode)
 def state_or_column(system: Mode) -> Any:
-    """A state, or a column."""
+    """Use blocks of 2 n: a state or a column."""
     return zeros(system.model.zero_state)
 
 
 @forced_inline
 def equations(model: RigidModel, y: Any, s: Any, c: Any, F: Any, U: Any, M: Any, r: Any) -> None:
-    """M' (n, n) in kg m^2 and r' (n,) in N m at the state y, with all that they are made of."""
+    """Compute M' (n, n) in kg m^2 and r' (n,) in N m at the state y, and the terms they consist of."""
     n, R = len(model.arm_x), model.radius
     omega = y[n : 2 * n]
     sines_cosines(model, n, y, s, c)
@@ -175,24 +172,24 @@ def equations(model: RigidModel, y: Any, s: Any, c: Any, F: Any, U: Any, M: Any,
 
 @forced_inline
 def torque_at(model: RigidModel, row: int, y: Any) -> HingeTorque:
-    """The torque of the spring, damper and drive at a hinge."""
+    """Compute the torque of the spring, damper and drive at a hinge."""
     n, body, other = len(model.arm_x), model.hinges[row, 0], model.hinges[row, 1]
     return hinge_torque(hinge_law(model, row), y[body] - y[other], y[n + body] - y[n + other])
 
 
 @legs_apart.case(Mode)
 def legs_apart_standing(system: Mode, y: Any) -> tuple[float, float]:
-    """The uppermost bodies of both legs."""
+    """Use the uppermost bodies of both legs."""
     n = len(system.model.arm_x)
     return y[SWING] - y[STANCE], y[n + SWING] - y[n + STANCE]
 
 
 @forced_inline
 def add_unpaired_torque(model: RigidModel, s: Any, c: Any, omega: Any, r: Any) -> None:
-    """Add a torque (N m) on the stance leg, by the swing leg's angular velocity squared, that nothing answers.
+    """Add a torque (N m) on the stance leg, proportional to the swing leg's squared rate, without a counterpart.
 
-    It is centrifugal, unpaired sin(theta_1 - theta_2) omega_1^2, without a counterpart on the swing leg, so it does not
-    keep the energy. Walkers of Lagrange's equations have none of it.
+    The centrifugal torque unpaired sin(theta_1 - theta_2) omega_1^2 does not act on the swing leg, so it does not
+    conserve energy. Walkers with Lagrange's equations do not have it.
     """
     if model.unpaired != 0.0:
         r[STANCE] += model.unpaired * omega[SWING] * omega[SWING] * (s[SWING] * c[STANCE] - c[SWING] * s[STANCE])
@@ -200,7 +197,7 @@ def add_unpaired_torque(model: RigidModel, s: Any, c: Any, omega: Any, r: Any) -
 
 @forced_inline
 def add_unpaired_gradients(model: RigidModel, s: Any, c: Any, omega: Any, by_angle: Any, by_rate: Any) -> None:
-    """Add its derivatives by the angles and by their velocities."""
+    """Add the derivatives of that torque with respect to angles and rates."""
     if model.unpaired != 0.0:
         cos_d, sin_d = c[SWING] * c[STANCE] + s[SWING] * s[STANCE], s[SWING] * c[STANCE] - c[SWING] * s[STANCE]
         turning = model.unpaired * omega[SWING] * omega[SWING] * cos_d
@@ -211,7 +208,7 @@ def add_unpaired_gradients(model: RigidModel, s: Any, c: Any, omega: Any, by_ang
 
 @derivative.case(Mode)
 def mode_derivative(system: Mode, t: float, y: Any, f: Any) -> None:
-    """The equations of motion as a first-order system, and the variational equations of the columns behind."""
+    """Evaluate the equations of motion as a first-order system, and the variational equations of the columns."""
     model = system.model
     like, phase = model.arm_x, system.phase
     n = len(like)
@@ -238,7 +235,7 @@ def mode_derivative(system: Mode, t: float, y: Any, f: Any) -> None:
 
 @forced_inline
 def torque_gradients(model: RigidModel, y: Any, s: Any, c: Any, alpha: Any, by_angle: Any, by_rate: Any) -> None:
-    """Derivatives (n, n) of r' - M' alpha at fixed alpha with respect to the angles and to their velocities."""
+    """Compute derivatives (n, n) of r' - M' alpha at fixed alpha with respect to angles and rates."""
     n, R = len(model.arm_x), model.radius
     omega, F, U = y[n : 2 * n], vector(model.arm_x), vector(model.arm_x)
     projections(model.arm_x, model.arm_y, n, s, c, F, U)
@@ -261,7 +258,7 @@ def torque_gradients(model: RigidModel, y: Any, s: Any, c: Any, alpha: Any, by_a
 
 @jacobian.case(Mode)
 def mode_jacobian(system: Mode, t: float, y: Any, J: Any) -> None:
-    """Derivatives of the equations of motion: the rates of unit columns, one direction a column."""
+    """Compute the derivatives of the equations of motion, as rates of unit columns."""
     model = system.model
     like, phase = model.arm_x, system.phase
     n = len(like)
@@ -282,7 +279,7 @@ def mode_jacobian(system: Mode, t: float, y: Any, J: Any) -> None:
 
 @kernel_part
 def ground_reaction(system: Mode, y: Any) -> tuple[float, float]:
-    """Force of the ground on the stance foot (N): along the slope (positive in walking direction) and normal to it."""
+    """Compute the ground force on the stance foot (N): along the slope (in walking direction) and normal to it."""
     model = system.model
     n = len(model.arm_x)
     s, c, F, U, f = (
@@ -306,7 +303,7 @@ def ground_reaction(system: Mode, y: Any) -> tuple[float, float]:
 
 @kernel_part
 def momentum(model: RigidModel, y: Any) -> tuple[float, float]:
-    """Linear momentum (kg m/s): along the slope and normal to it."""
+    """Compute the linear momentum (kg m/s): along the slope and normal to it."""
     n = len(model.arm_x)
     s, c = vector(model.arm_x), vector(model.arm_x)
     sines_cosines(model, n, y, s, c)
@@ -316,9 +313,9 @@ def momentum(model: RigidModel, y: Any) -> tuple[float, float]:
 
 @kernel_part
 def energies(model: RigidModel, y: Any) -> tuple[float, float]:
-    """Kinetic and potential energy (J), the latter from where the foot touches with its leg normal to the slope.
+    """Compute kinetic and potential energy (J), the latter from the contact point with the leg normal to the slope.
 
-    The potential energy is gravity's and that of the springs at the hinges.
+    The potential energy includes gravity and the springs at the hinges.
     """
     n = len(model.arm_x)
     s, c, F, U, r, M = (
@@ -334,7 +331,7 @@ def energies(model: RigidModel, y: Any) -> tuple[float, float]:
 
 
 def energy_at_touch(model: RigidModel, touched: Any) -> Any:
-    """Potential energy (J), as `energies` counts it, of the walker's mass at the contact point of a step's touch.
+    """Compute the potential energy (J), with the zero of `energies`, of the mass at the contact point of a touch.
 
     touched  rad, angle of the stance leg at the touch; or (...,) of several
     """
@@ -343,14 +340,14 @@ def energy_at_touch(model: RigidModel, touched: Any) -> Any:
 
 @kernel_part
 def swing_foot(model: RigidModel, y: Any) -> tuple[float, float]:
-    """How high the swing foot's lowest point is over the slope, and how far it is ahead of the stance foot's (m)."""
+    """Compute the height of the swing foot's lowest point, and its distance ahead of the stance foot (m)."""
     height, ahead, _, _ = swing_foot_motion(model, y, y)
     return height, ahead
 
 
 @kernel_part
 def swing_foot_motion(model: RigidModel, y: Any, turn: Any) -> tuple[float, float, float, float]:
-    """`swing_foot`, and how both change as the bodies turn: rates (m/s) where `turn` are angular velocities."""
+    """Compute `swing_foot` and the changes of both as the bodies turn: rates (m/s) if `turn` are angular velocities."""
     n = len(model.arm_x)
     s, c = vector(model.arm_x), vector(model.arm_x)
     sines_cosines(model, n, y, s, c)
@@ -360,36 +357,36 @@ def swing_foot_motion(model: RigidModel, y: Any, turn: Any) -> tuple[float, floa
 
 @kernel_part
 def hip_height(model: RigidModel, y: Any) -> float:
-    """Height of the hip over the slope (m)."""
+    """Compute the height of the hip over the slope (m)."""
     s, c = sine_cosine(y[STANCE] + model.slope)
     return model.radius + s * model.hip_x + c * model.hip_y
 
 
 @kernel_part
 def feet_on_slope(model: Any, swing: Any, stance: Any) -> Any:
-    """Sum (rad) of the straight legs' angles from the slope's normal: zero with both feet on even ground.
+    """Compute the sum (rad) of the straight legs' angles from the slope's normal: zero with both feet on even ground.
 
     It falls through zero at heel strike. (9-2) prints theta_1 = -theta_2, which holds only for angles from the normal.
 
-    swing, stance  rad, angles from the vertical: numbers, arrays or lanes
+    swing, stance  rad, angles from the vertical: scalars, arrays or lanes
     """
     return swing + stance + 2.0 * (model.slope + model.lean)
 
 
 def step_lengths(model: RigidModel, starts: Any, ends: Any) -> Floats:
-    """Distances (steps,) in m along the slope from touch to touch, by first and last states (steps, 2 n) of steps."""
+    """Compute distances (steps,) in m along the slope from touch to touch, from first and last states (steps, 2 n)."""
     psi = ends[:, : len(model.arm_x)] + model.slope
     ahead = np.cos(psi) @ model.foot_x - np.sin(psi) @ model.foot_y
     return np.asarray(ahead - model.radius * (ends[:, STANCE] - starts[:, STANCE]))
 
 
 def kinetic_energy(model: RigidModel, y: Any) -> float:
-    """Kinetic energy (J)."""
+    """Compute the kinetic energy (J)."""
     return energies(model, y)[0]
 
 
-def linked(model: RigidModel, phase: int, values: Any) -> Floats:
-    """Values (n,) of all bodies, those of the followers from those that they follow."""
+def apply_couplings(model: RigidModel, phase: int, values: Any) -> Floats:
+    """Return values (n,) of all bodies, with the followers' computed from those of the bodies they follow."""
     every = np.array(values, float)
-    spread(model, phase, every)
+    expand(model, phase, every)
     return every

@@ -1,4 +1,4 @@
-"""The equations of motion of a tree of bodies about its root, for both models: matrices, torques, energies, gradients.
+"""Equations of motion of a tree of bodies about its root, for both models: matrices, torques, energies, gradients.
 
 With the projections of the first moments c_k on the slope and its normal, F_k = (R(psi_k) c_k)_x and
 U_k = (R(psi_k) c_k)_y, psi the angles from the slope's normal, and Delta = theta_l - theta_k,
@@ -6,11 +6,11 @@ U_k = (R(psi_k) c_k)_y, psi the angles from the slope's normal, and Delta = thet
     M_kl = A_kl cos Delta + B_kl sin Delta
     r_k = sum over l of omega_l^2 (A_kl sin Delta - B_kl cos Delta) - g_along U_k - g_down F_k
 
-the latter two terms about a root at rest. What the root's own motion adds is each model's: a rolling foot's in
+the latter two terms about a root at rest. The terms of the root's own motion belong to each model: a rolling foot's in
 rigid_model.py, Newton's law for the centre of mass in ground/motion.py.
 
 `tree` is a Mechanism: the `RigidModel` or a `GroundModel` on compliant ground. n is the number of bodies, known
-while compiling where the tree's type tells.
+at compile time if the tree's type fixes it.
 """
 
 from collections.abc import Mapping
@@ -28,10 +28,10 @@ from walkerlab.physics.solvers.system import Floats, Integers
 R = TypeVar("R", bound=type)
 
 
-def read_at_once(kind: R) -> R:
-    """Have the annotated fields of a class of records be read as they lie in memory.
+def fast_fields(kind: R) -> R:
+    """Give a class of records fast access to its annotated fields.
 
-    NumPy's own look-up of a field takes several times as long, and walks are prepared and measured in Python.
+    NumPy's field look-up takes several times as long, and walks are prepared and evaluated in Python.
     """
     fields: dict[str, Any] = {name: property(itemgetter(name)) for name in kind.__annotations__}
     fields |= {"__getattribute__": object.__getattribute__, "__getitem__": np.void.__getitem__}
@@ -41,7 +41,7 @@ def read_at_once(kind: R) -> R:
 
 
 def record_type(kind: type, shapes: Mapping[str, tuple[int, ...]]) -> Any:
-    """NumPy's type of a structured scalar with the fields of a class, whose numbers have eight bytes each."""
+    """Create the NumPy type of a structured scalar with the fields of a class; numbers have eight bytes each."""
     fields = [
         (name, np.int64 if of in (Integers, int, bool) else np.float64, shapes.get(name, ()))
         for each in (*kind.__bases__, kind)
@@ -51,24 +51,24 @@ def record_type(kind: type, shapes: Mapping[str, tuple[int, ...]]) -> Any:
 
 
 def new_record(kind: Any, **fields: Any) -> Any:
-    """A structured scalar of a type from `record_type` that kernels write to; fields not named are zero."""
+    """Create a structured scalar of a type from `record_type`, writable by kernels; fields not named are zero."""
     record = np.zeros((), kind)[()]
     for name, value in fields.items():
         record[name] = value
     return record
 
 
-@read_at_once
+@fast_fields
 class Mechanism(np.record):  # type: ignore[misc]  # NumPy's stubs call one of its bases final
-    """Constants of a tree of n bodies about its root, its hinges and what acts on it, for both models, SI."""
+    """Constants of a tree of n bodies about its root, its hinges and the forces on it, for both models, SI."""
 
     A: Floats  # (n, n) kg m^2, of mechanics/assembly.py
     B: Floats
     arm_x: Floats  # (n,) c, kg m: first moments about the root, zero if that is the centre of mass
     arm_y: Floats
     E: Floats  # (phases, n, n) the reductions of links.py; a body that follows others has zero on the diagonal
-    hinges: Integers  # (rows, 2) the body that a hinge's torque turns back, and the other one
-    laws: Floats  # (rows, 3) numbers of the SpringDamper at each hinge
+    hinges: Integers  # (rows, 2) the body that a hinge's torque turns back, and the second body
+    laws: Floats  # (rows, 3) parameters of the SpringDamper at each hinge
     push_off: float  # N s, along the trailing leg: at once or from a step's touch on
     mass: float  # kg
     gravity_along: float  # m/s^2
@@ -77,7 +77,7 @@ class Mechanism(np.record):  # type: ignore[misc]  # NumPy's stubs call one of i
 
     @property
     def hip(self) -> Floats:
-        """Numbers of the SpringDamper between the legs."""
+        """Parameters of the SpringDamper between the legs."""
         numbers: Floats = self.laws[HIP_ROW]
         return numbers
 
@@ -88,12 +88,12 @@ class Mechanism(np.record):  # type: ignore[misc]  # NumPy's stubs call one of i
 
     @property
     def driven(self) -> bool:
-        """Whether anything but gravity gives it energy."""
+        """Whether anything besides gravity supplies energy."""
         return bool(self.push_off != 0.0 or self.laws[:, -1].any())
 
 
 def mechanism_shapes(n: int, phases: int, rows: int) -> dict[str, tuple[int, ...]]:
-    """Shapes of a Mechanism's arrays for n bodies, some phases and rows of hinges."""
+    """Return the shapes of a Mechanism's arrays for n bodies and some phases and rows of hinges."""
     pairs, arms = dict.fromkeys(("A", "B"), (n, n)), dict.fromkeys(("arm_x", "arm_y"), (n,))
     return {**pairs, **arms, "E": (phases, n, n), "hinges": (rows, 2), "laws": (rows, LAW_NUMBERS)}
 
@@ -109,14 +109,14 @@ def write_fields(mechanisms: Any, fields: Mapping[str, Any]) -> None:
 
 @forced_inline
 def sines_cosines(tree: Any, n: int, theta: Any, s: Any, c: Any) -> None:
-    """Sines and cosines (n,) of the bodies' angles from the slope's normal, into s and c; theta from the vertical."""
+    """Write sines and cosines (n,) of angles from the slope's normal into s and c; theta from the vertical."""
     for k in range(n):
         s[k], c[k] = sine_cosine(theta[k] + tree.slope)
 
 
 @forced_inline
 def projections(lever_x: Any, lever_y: Any, n: int, s: Any, c: Any, F: Any, U: Any) -> None:
-    """Levers or moments (n,) seen along the slope and normal to it, into F and U."""
+    """Write the components of levers or moments (n,) along the slope and normal to it into F and U."""
     for k in range(n):
         F[k] = c[k] * lever_x[k] - s[k] * lever_y[k]
         U[k] = s[k] * lever_x[k] + c[k] * lever_y[k]
@@ -124,7 +124,7 @@ def projections(lever_x: Any, lever_y: Any, n: int, s: Any, c: Any, F: Any, U: A
 
 @forced_inline
 def lever_motion(lever_x: Any, lever_y: Any, n: int, s: Any, c: Any, omega: Any) -> tuple[float, float, float, float]:
-    """Where a point is from the root along the slope and over it (m), by its levers, and its rates (m/s)."""
+    """Compute position (m) and velocity (m/s) of a point from the root along the slope and over it, by its levers."""
     along, height, along_rate, height_rate = 0.0, 0.0, 0.0, 0.0
     for k in range(n):
         forward, upward = c[k] * lever_x[k] - s[k] * lever_y[k], s[k] * lever_x[k] + c[k] * lever_y[k]
@@ -144,7 +144,7 @@ def add_gravity(tree: Any, n: int, F: Any, U: Any, r: Any) -> None:
 
 @forced_inline
 def add_inertia(tree: Any, n: int, s: Any, c: Any, omega: Any, M: Any, r: Any) -> None:
-    """M (n, n) in kg m^2 into M, and the centrifugal terms (N m) added to r (n,)."""
+    """Write M (n, n) in kg m^2 into M, and add the centrifugal terms (N m) to r (n,)."""
     for k in range(n):
         M[k, k] = tree.A[k, k]
         for l in range(k):
@@ -168,7 +168,7 @@ def add_gravity_gradient(tree: Any, n: int, F: Any, U: Any, by_angle: Any) -> No
 def add_inertia_gradients(
     tree: Any, n: int, s: Any, c: Any, omega: Any, alpha: Any, by_angle: Any, by_rate: Any
 ) -> None:
-    """Add the derivatives of (centrifugal terms - M alpha) at fixed alpha by the angles and their velocities (n, n)."""
+    """Add derivatives (n, n) of (centrifugal terms - M alpha) at fixed alpha with respect to angles and rates."""
     for k in range(n):
         own = 0.0
         for l in range(n):
@@ -184,7 +184,7 @@ def add_inertia_gradients(
 
 @forced_inline
 def kinetic_energy(n: int, M: Any, omega: Any) -> float:
-    """Kinetic energy (J) of the bodies' turning, with a mass matrix M (n, n)."""
+    """Compute the kinetic energy (J) of the bodies' rotation with a mass matrix M (n, n)."""
     total = 0.0
     for k in range(n):
         for l in range(n):
@@ -194,7 +194,7 @@ def kinetic_energy(n: int, M: Any, omega: Any) -> float:
 
 @forced_inline
 def potential_energy(tree: Any, n: int, along: float, height: float, F: Any, U: Any) -> float:
-    """Potential energy of gravity (J) with the root at a place along the slope and a height over it (m)."""
+    """Compute the potential energy of gravity (J) with the root at (along, height) in the slope's frame (m)."""
     total = tree.mass * (tree.gravity_down * height - tree.gravity_along * along)
     for k in range(n):
         total += tree.gravity_down * U[k] - tree.gravity_along * F[k]

@@ -14,11 +14,10 @@ PI_1, PI_2 = 3.1415926534682512, 1.2154201012607932e-10
 
 
 def sine_cosine(x: float) -> tuple[float, float]:
-    """(sin x, cos x) within one unit in the last place.
+    """Compute (sin x, cos x) within one unit in the last place.
 
-    Up to pi/4, where a walking leg stays, both are the minimax polynomials of fdlibm (k_sin.c, k_cos.c; Sun
-    Microsystems 1993), evaluated side by side, each in pairs of terms that do not wait for each other; beyond, the
-    library's.
+    Up to pi/4, the range of a walking leg, both are the minimax polynomials of fdlibm (k_sin.c, k_cos.c; Sun
+    Microsystems 1993), evaluated in parallel, each in independent pairs of terms; beyond, the library's functions.
     """
     if abs(x) > QUARTER_PI:
         return math.sin(x), math.cos(x)
@@ -37,10 +36,10 @@ def sine_cosine(x: float) -> tuple[float, float]:
 
 
 def lanes_sine_cosine(x: Lanes) -> tuple[Lanes, Lanes]:
-    """The same for lanes, within 3e-16 for angles of a few thousand turns.
+    """Compute the same for lanes, within 3e-16 for angles of a few thousand turns.
 
-    Where a lane is further than a quarter turn from 0, the nearest multiple k of pi is taken off in all of them: that
-    leaves those that are nearer as they are, and the others change sign with k.
+    If any lane is further than a quarter turn from 0, the nearest multiple k of pi is subtracted in all of them: k = 0
+    leaves the nearer ones unchanged, and the others change sign with k.
     """
     if any_positive(abs(x) - HALF_PI):
         k = nearest(PER_PI * x)
@@ -53,7 +52,7 @@ def lanes_sine_cosine(x: Lanes) -> tuple[Lanes, Lanes]:
 
 @kernel_part
 def half_turn(x: Lanes) -> tuple[Lanes, Lanes]:
-    """(sin x, cos x) up to pi/2: polynomials from Chebyshev interpolation in x^2, truncated below 1e-16."""
+    """Compute (sin x, cos x) up to pi/2: polynomials from Chebyshev interpolation in x^2, truncated below 1e-16."""
     z = x * x
     w = z * z
     v = w * w

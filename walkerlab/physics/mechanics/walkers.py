@@ -1,24 +1,24 @@
-"""The catalogue of walkers: from the measures of a type to the parts it is assembled from.
+"""Catalogue of walkers: assemblies of parts from the dimensions of each type.
 
-Every body's frame has its origin where the body hangs (hip or knee) and points up it; `ahead` is the walking direction
-with the leg upright. Leg 1 swings first, leg 2 stands first. A positive angle puts a leg's foot forward, so that a
-flexed knee has its shank at a smaller angle than its thigh.
+Every body's frame has its origin at its upper joint (hip or knee) and points up the body; `ahead` is the walking
+direction with the leg upright. Leg 1 swings first, leg 2 stands first. A positive angle puts a leg's foot forward, so
+that a flexed knee has its shank at a smaller angle than its thigh.
 """
 
 from dataclasses import dataclass, replace
 
 from walkerlab.physics.mechanics.parts import Assembly, BallFoot, Body, Coupling, Knee, Particle, Revolute
 
-LEGS = ("leg 1", "leg 2")
+LEG_NAMES = ("leg 1", "leg 2")
 THIGHS = ("thigh 1", "thigh 2")
 SHANKS = ("shank 1", "shank 2")
 TORSO = "torso"
-HIP = (0.0, 0.0)
+UPPER_END = (0.0, 0.0)
 
 
 @dataclass(frozen=True)
 class Limb:
-    """A rigid limb that hangs from its upper end, SI."""
+    """Rigid limb that hangs from its upper end, SI."""
 
     length_m: float
     mass_kg: float
@@ -27,41 +27,40 @@ class Limb:
     inertia_kg_m2: float = 0.0  # about its own centre of mass
 
     def body(self, name: str) -> Body:
-        """The limb as a body."""
         return Body(name, self.mass_kg, (self.mass_ahead_m, -self.mass_below_m), self.inertia_kg_m2)
 
 
 @dataclass(frozen=True)
 class Arc:
-    """The sole: an arc of `radius_m` that reaches the leg's length; radius zero is a point."""
+    """Sole: an arc of `radius_m` that reaches the leg's length; radius zero is a point."""
 
     radius_m: float = 0.0
     centre_ahead_m: float = 0.0
 
     def foot(self, body: str, length_m: float) -> BallFoot:
-        """The sole of a limb that is `length_m` long, sole included."""
+        """Return the sole of a limb that is `length_m` long, sole included."""
         return BallFoot(f"foot of {body}", body, (self.centre_ahead_m, self.radius_m - length_m), self.radius_m)
 
 
 def straight_legs(leg: Limb, hip_mass_kg: float, foot: Arc) -> Assembly:
-    """Two straight legs hinged at a hip that is a point mass."""
+    """Assemble two straight legs hinged at a point-mass hip."""
     return Assembly(
-        bodies=tuple(leg.body(name) for name in LEGS),
-        joints=(Revolute("hip", LEGS[1], HIP, LEGS[0], HIP),),
-        particles=(Particle("hip", hip_mass_kg, LEGS[1], HIP),),
-        feet=tuple(foot.foot(name, leg.length_m) for name in LEGS),
-        legs=((LEGS[0],), (LEGS[1],)),
+        bodies=tuple(leg.body(name) for name in LEG_NAMES),
+        joints=(Revolute("hip", LEG_NAMES[1], UPPER_END, LEG_NAMES[0], UPPER_END),),
+        particles=(Particle("hip", hip_mass_kg, LEG_NAMES[1], UPPER_END),),
+        feet=tuple(foot.foot(name, leg.length_m) for name in LEG_NAMES),
+        legs=((LEG_NAMES[0],), (LEG_NAMES[1],)),
     )
 
 
 def kneed_legs(thigh: Limb, shank: Limb, hip_mass_kg: float, foot: Arc) -> Assembly:
-    """Two legs of thigh and shank, with knees that lock straight."""
+    """Assemble two legs of thigh and shank, with knees that lock straight."""
     at_knee = (0.0, -thigh.length_m)
-    knees = tuple(Revolute(f"knee {k + 1}", THIGHS[k], at_knee, SHANKS[k], HIP) for k in range(2))
+    knees = tuple(Revolute(f"knee {k + 1}", THIGHS[k], at_knee, SHANKS[k], UPPER_END) for k in range(2))
     return Assembly(
         bodies=(*(thigh.body(name) for name in THIGHS), *(shank.body(name) for name in SHANKS)),
-        joints=(Revolute("hip", THIGHS[1], HIP, THIGHS[0], HIP), *knees),
-        particles=(Particle("hip", hip_mass_kg, THIGHS[1], HIP),),
+        joints=(Revolute("hip", THIGHS[1], UPPER_END, THIGHS[0], UPPER_END), *knees),
+        particles=(Particle("hip", hip_mass_kg, THIGHS[1], UPPER_END),),
         feet=tuple(foot.foot(name, shank.length_m) for name in SHANKS),
         knees=tuple(Knee(f"knee {k + 1}", THIGHS[k], SHANKS[k]) for k in range(2)),
         legs=((THIGHS[0], SHANKS[0]), (THIGHS[1], SHANKS[1])),
@@ -69,7 +68,7 @@ def kneed_legs(thigh: Limb, shank: Limb, hip_mass_kg: float, foot: Arc) -> Assem
 
 
 def with_torso(walker: Assembly, mass_kg: float, above_hip_m: float, inertia_kg_m2: float) -> Assembly:
-    """The walker with a torso at its hip, kept on the bisector of the legs.
+    """Add a torso at the walker's hip, kept on the bisector of the legs.
 
     Source: Wisse, Schwab, van der Helm, Passive dynamic walking model with upper body, Robotica 22 (2004).
     """
@@ -77,6 +76,6 @@ def with_torso(walker: Assembly, mass_kg: float, above_hip_m: float, inertia_kg_
     return replace(
         walker,
         bodies=(*walker.bodies, Body(TORSO, mass_kg, (0.0, above_hip_m), inertia_kg_m2)),
-        joints=(*walker.joints, Revolute("torso", upper[1], HIP, TORSO, HIP)),
+        joints=(*walker.joints, Revolute("torso", upper[1], UPPER_END, TORSO, UPPER_END)),
         couplings=(*walker.couplings, Coupling(TORSO, upper, (0.5, 0.5))),
     )

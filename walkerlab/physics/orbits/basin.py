@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from walkerlab.outcome import Outcome
 from walkerlab.physics.hybrid.endings import GOES_ON, REJECTED, WALKED
-from walkerlab.physics.hybrid.rigid_lanes import Fates, TwoLegs, new_fates, new_lane_memory, struck, walk_lanes
+from walkerlab.physics.hybrid.rigid_lanes import Fates, TwoLegs, new_fates, new_lane_memory, record_strike, walk_lanes
 from walkerlab.physics.hybrid.rigid_walk import hip_above_fall
 from walkerlab.physics.mechanics.rigid_model import RigidModel
 from walkerlab.physics.orbits.rigid_map import RigidStepper, state_on_section, states_on_section, strike_section
@@ -53,7 +53,7 @@ class Capture(NamedTuple):
     last: Any  # (n, 3) output: last point of each walk
 
 
-@struck.case(Capture)
+@record_strike.case(Capture)
 def check_capture(observer: Capture, walk: int, step: int, t: float, y: Any) -> int:
     for i in range(3):
         observer.last[walk, i] = y[i + 1]

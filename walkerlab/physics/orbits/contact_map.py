@@ -22,25 +22,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walkerlab.outcome import Outcome
-from walkerlab.physics.energy_channels import LOST
+from walkerlab.physics.energy_channels import LOSS_ENTRIES
 from walkerlab.physics.ground.knees import IdealLock
 from walkerlab.physics.ground.terrain import STANCE_FOOT, Terrain, after_mid_swing, checkerboard, has_ground_in_air
 from walkerlab.physics.ground.walker import (
     ContactWalker,
     OnGround,
     feet_motion,
-    folded,
     on_ground,
     sines_cosines,
-    unfolded,
+    to_form,
+    to_full,
 )
 from walkerlab.physics.hybrid.contact_events import PASSING, JudgedGround
-from walkerlab.physics.hybrid.contact_jumps import rate_of
-from walkerlab.physics.hybrid.contact_loop import NEVER
+from walkerlab.physics.hybrid.contact_jumps import state_rate
+from walkerlab.physics.hybrid.contact_loop import NO_LIMIT
 from walkerlab.physics.hybrid.contact_result import Stopped, driven_work, in_walk, new_observer, walk_on
 from walkerlab.physics.hybrid.contact_state import WalkState, material_along, new_walk_state
 from walkerlab.physics.hybrid.walk_record import DrivenWork
-from walkerlab.physics.mechanics.links import Counted, factor_linked, solve_linked
+from walkerlab.physics.mechanics.links import CountedModel, factor_linked, solve_linked
 from walkerlab.physics.mechanics.tree import add_inertia
 from walkerlab.physics.orbits.step_map import (
     CACHE_SIZE,
@@ -177,7 +177,7 @@ def step_from_section(
     DP = np.zeros((z.size, 0))
     if derived:  # project the flow's derivative onto the section, along the flow
         system = in_walk(walker, walk_state)
-        rate = rate_of(system, folded(system.form, end), end.size, stopped.time_s)
+        rate = state_rate(system, to_form(system.form, end), end.size, stopped.time_s)
         gradient, n = np.zeros(end.size), int(walker.whole.bodies)
         gradient[ANGLES : ANGLES + n] = feet_apart(walker, end[ANGLES : ANGLES + n])[1]
         Phi = observer.tangent.Phi
@@ -198,7 +198,7 @@ def step_from_section(
         float(walk_state.touch_time[0]),
         float(walk_state.slip[0] + slipped),
         float(walk_state.rolling[0] + rolled),
-        observer.account[LOST].copy(),
+        observer.account[LOSS_ENTRIES].copy(),
         driven_work(walker, advance, rose, observer.account),
         stopped.work,
     )
@@ -217,7 +217,7 @@ def walk_from_section(
     laid = ground._replace(terrain=ground.terrain._replace(heights=over)) if over.any() else ground
     walk_state = walk_state_on_section(walker, laid, start, steps + 1)
 
-    def go_on(walk_state: WalkState, state: State, until: int = NEVER) -> Stopped:
+    def go_on(walk_state: WalkState, state: State, until: int = NO_LIMIT) -> Stopped:
         return walk_on(walker, laid, tolerances, walk_state, new_observer(walker, walk_state, state), state, until)
 
     stopped = Stopped(Outcome.WALKED, 0.0, start, np.zeros(4, np.int64))
@@ -245,19 +245,19 @@ def shorten(walk_state: WalkState, steps: int) -> WalkState:
 def pushed_at_hip(system: OnGround, walker: ContactWalker, state: State, impulse: float) -> State:
     """Apply an impulse (N s) at the hip along the slope to a state of the free walker."""
     form, new = system.form, np.array(state)
-    y = folded(form, new)
+    y = to_form(form, new)
     n, half = int(form.bodies), int(form.places + form.bodies)
     s, c, r = np.zeros((3, n))
     M = np.zeros((n, n))
     sines_cosines(form, y, s, c)
     add_inertia(form, n, s, c, y[half + 2 :], M, r)
     r[:] = -impulse * (s * form.hip_x[:n] + c * form.hip_y[:n])
-    links = Counted(form.E, form.arm_x[:n])
+    links = CountedModel(form.E, form.arm_x[:n])
     factor_linked(links, 0, M)
     solve_linked(links, 0, M, r)
     y[half] += impulse / form.mass
     y[half + 2 :] += r
-    return tuple(unfolded(form, y, walker.size).tolist())
+    return tuple(to_full(form, y, walker.size).tolist())
 
 
 def walk_state_on_section(walker: ContactWalker, ground: JudgedGround, start: State, steps: int) -> WalkState:

@@ -17,10 +17,10 @@ from walkerlab.physics.ground.walker import ContactWalker, changed_forms
 from walkerlab.physics.hybrid.comparison import (
     PHASES,
     Motion,
+    add_strike_samples,
     between_impacts,
     difference_in_phase,
     difference_in_time,
-    sampled_at_strikes,
 )
 from walkerlab.physics.hybrid.contact_events import JudgedGround
 from walkerlab.physics.hybrid.contact_result import ContactWalkResult, walk_contact
@@ -169,7 +169,7 @@ class Limit:
         if sampled.samples is None or steps == 0 or steps != check.touch_time_s.size:
             return distance
         legs = leg_motion(sampled.samples.states, walker)
-        motion = sampled_at_strikes(Motion(sampled.samples.time_s, *legs, sampled.touch_time_s, sampled.knee_strikes_s))
+        motion = add_strike_samples(Motion(sampled.samples.time_s, *legs, sampled.touch_time_s, sampled.knee_strikes_s))
         phases = np.linspace(0.0, 1.0, PHASES)
         aligned = difference_in_phase(motion, self.motion, phases)
         smooth = between_impacts(motion, self.motion, phases)

@@ -24,9 +24,9 @@ from walkerlab.physics.mechanics.impact import heel_strike
 from walkerlab.physics.mechanics.rigid_model import (
     STRAIGHT,
     RigidModel,
+    apply_couplings,
     equations,
     kinetic_energy,
-    linked,
     on_slope,
     swing_foot,
 )
@@ -81,7 +81,7 @@ def linear_modes(walker: RigidModel) -> Modes | None:
 
 def leg_columns(walker: RigidModel) -> Floats:
     """Return the angles (n, 2) of all bodies for a unit angle of the swing leg, and of the stance leg."""
-    return np.array([linked(walker, STRAIGHT, unit) for unit in np.eye(len(walker.arm_x))[:2]]).T
+    return np.array([apply_couplings(walker, STRAIGHT, unit) for unit in np.eye(len(walker.arm_x))[:2]]).T
 
 
 def seeds(walker: RigidModel) -> tuple[SmallSlopeSeed, ...]:

@@ -11,14 +11,14 @@ from typing import Any
 
 import numpy as np
 
-PACKAGE = "sksundae"
+SUNDIALS_PACKAGE = "sksundae"
 # CVODE needs an end time to choose its first step; an event ends the walk long before
 FAR_AHEAD = 1e3
 
 
 def is_installed() -> bool:
     """Whether CVODE can be imported."""
-    return importlib.util.find_spec(PACKAGE) is not None
+    return importlib.util.find_spec(SUNDIALS_PACKAGE) is not None
 
 
 class CvodeSolver:

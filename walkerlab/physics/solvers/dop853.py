@@ -37,8 +37,9 @@ from walkerlab.physics.solvers.system import Floats, block, derivative
 # error.
 SAFETY, SHRINK_MOST, GROW_MOST = 0.8, 0.333, 6.0
 EXPONENT = 1.0 / 8.0
-STAGES, EXTRA_STAGES = 12, 3
-LAST, ALL = STAGES, STAGES + 1 + EXTRA_STAGES  # row of the derivative at the step's end; rows with dense output
+STAGE_COUNT, EXTRA_STAGES = 12, 3
+# row of the derivative at the step's end; rows with dense output
+LAST_STAGE, ALL_STAGES = STAGE_COUNT, STAGE_COUNT + 1 + EXTRA_STAGES
 
 
 def rows(weights: Sequence[Sequence[float]], length: int) -> Floats:
@@ -46,11 +47,11 @@ def rows(weights: Sequence[Sequence[float]], length: int) -> Floats:
     return np.array([[*row, *[0.0] * (length - len(row))] for row in weights])
 
 
-C = np.array(tableau.C)
-# row s: weights of the state of stage s; row LAST: weights of the solution
-A = rows([(), *(getattr(tableau, f"A_{stage}") for stage in range(2, ALL + 1))], ALL)
-D = rows([tableau.D_4, tableau.D_5, tableau.D_6, tableau.D_7], ALL)
-ERROR_5, ERROR_3 = np.array(tableau.ERROR_5), np.array(tableau.ERROR_3)
+STAGE_NODES = np.array(tableau.NODES)
+# row s: weights of the state of stage s; row LAST_STAGE: weights of the solution
+A = rows([(), *(getattr(tableau, f"A_{stage}") for stage in range(2, ALL_STAGES + 1))], ALL_STAGES)
+D = rows([tableau.D_4, tableau.D_5, tableau.D_6, tableau.D_7], ALL_STAGES)
+ERROR_WEIGHTS_5, ERROR_WEIGHTS_3 = np.array(tableau.ERROR_5), np.array(tableau.ERROR_3)
 
 
 @by_reference
@@ -64,7 +65,7 @@ class Dop853(NamedTuple):
     y: Any
     counts: Any
     at: Any  # (n,) state of the last evaluated stage
-    stages: Any  # (ALL, n) derivatives at the stages
+    stages: Any  # (ALL_STAGES, n) derivatives at the stages
     dense: Any  # (7, n) nested coefficients of the dense output
 
 
@@ -73,7 +74,7 @@ def new_dop853(n: int, rtol: float, atol: float, budget: int) -> Dop853:
     counts = np.zeros(COUNTS, np.int64)
     counts[BUDGET] = budget
     y_old, y, at = np.zeros((3, n))
-    return Dop853(rtol, atol, np.zeros(3), y_old, y, counts, at, np.zeros((ALL, n)), np.zeros((7, n)))
+    return Dop853(rtol, atol, np.zeros(3), y_old, y, counts, at, np.zeros((ALL_STAGES, n)), np.zeros((7, n)))
 
 
 @kernel_part
@@ -93,7 +94,7 @@ def evaluate_stages(method: Dop853, system: Any, t: float, h: float, first: int,
                         total[i] = fused(weight, K[j, start + i], total[i])
             for i in range(width):
                 at[start + i] = fused(h, total[i], y[start + i])
-        derivative(system, t + C[s] * h, at, K[s])
+        derivative(system, t + STAGE_NODES[s] * h, at, K[s])
     method.counts[RHS] += end - first
 
 
@@ -101,18 +102,18 @@ def evaluate_stages(method: Dop853, system: Any, t: float, h: float, first: int,
 def try_step(method: Dop853, system: Any, t: float, h: float) -> float:
     """Compute the step from `y_old` over h into `y`; returns its error relative to the tolerance, (10.17)."""
     y_old, y, at, K = method.y_old, method.y, method.at, method.stages
-    evaluate_stages(method, system, t, h, 1, LAST + 1)
+    evaluate_stages(method, system, t, h, 1, LAST_STAGE + 1)
     by_order_5, by_order_3 = vector(block(system)), vector(block(system))
     width = len(by_order_5)
     error_5, error_3 = 0.0, 0.0
     for start in range(0, y.size, width):
         for i in range(width):
             by_order_5[i], by_order_3[i] = 0.0, 0.0
-        for j in range(STAGES):
-            if ERROR_5[j] != 0.0:
+        for j in range(STAGE_COUNT):
+            if ERROR_WEIGHTS_5[j] != 0.0:
                 for i in range(width):
-                    by_order_5[i] = fused(ERROR_5[j], K[j, start + i], by_order_5[i])
-                    by_order_3[i] = fused(ERROR_3[j], K[j, start + i], by_order_3[i])
+                    by_order_5[i] = fused(ERROR_WEIGHTS_5[j], K[j, start + i], by_order_5[i])
+                    by_order_3[i] = fused(ERROR_WEIGHTS_3[j], K[j, start + i], by_order_3[i])
         for i in range(width):
             y[start + i] = at[start + i]
             scale = 1.0 / (method.atol + method.rtol * max(abs(y_old[start + i]), abs(y[start + i])))
@@ -144,7 +145,7 @@ def change_of_step(error: float) -> float:
 @begin.case(Dop853)
 def begin_dop853(method: Dop853, system: Any, t: float, y: Any, h: float) -> None:
     """Evaluate the derivative and, for h = 0, choose the first step as Hairer's hinit does."""
-    clock, at, slope, ahead = method.clock, method.at, method.stages[LAST], method.stages[0]
+    clock, at, slope, ahead = method.clock, method.at, method.stages[LAST_STAGE], method.stages[0]
     clock[T_OLD], clock[T], clock[H_NEXT] = t, t, h
     for i in range(method.y.size):
         method.y[i] = y[i]
@@ -172,7 +173,7 @@ def advance_dop853(method: Dop853, system: Any, t_end: float) -> int:
     clock, counts, y_old, y, K = method.clock, method.counts, method.y_old, method.y, method.stages
     t, h = clock[T], clock[H_NEXT]
     for i in range(y.size):
-        y_old[i], K[0, i] = y[i], K[LAST, i]
+        y_old[i], K[0, i] = y[i], K[LAST_STAGE, i]
     limit = GROW_MOST
     outcome = OUT_OF_BUDGET
     while counts[RHS] < counts[BUDGET]:
@@ -196,7 +197,7 @@ def advance_dop853(method: Dop853, system: Any, t_end: float) -> int:
             outcome = STEP_TOO_SMALL
             break
     for i in range(y.size):
-        y[i], K[LAST, i] = y_old[i], K[0, i]
+        y[i], K[LAST_STAGE, i] = y_old[i], K[0, i]
     return outcome
 
 
@@ -204,7 +205,7 @@ def advance_dop853(method: Dop853, system: Any, t_end: float) -> int:
 def rewind_dop853(method: Dop853, system: Any) -> None:
     """Restore state and derivative of the step's start."""
     for i in range(method.y.size):
-        method.y[i], method.stages[LAST, i] = method.y_old[i], method.stages[0, i]
+        method.y[i], method.stages[LAST_STAGE, i] = method.y_old[i], method.stages[0, i]
     method.clock[T] = method.clock[T_OLD]
 
 
@@ -212,15 +213,15 @@ def rewind_dop853(method: Dop853, system: Any) -> None:
 def prepare_dense_dop853(method: Dop853, system: Any) -> None:
     """Evaluate three more stages and the coefficients of degree 7."""
     t, h = method.clock[T_OLD], method.clock[T] - method.clock[T_OLD]
-    evaluate_stages(method, system, t, h, LAST + 1, ALL)
+    evaluate_stages(method, system, t, h, LAST_STAGE + 1, ALL_STAGES)
     y_old, y, K, dense = method.y_old, method.y, method.stages, method.dense
     for i in range(y.size):
         dense[0, i] = y[i] - y_old[i]
         dense[1, i] = h * K[0, i] - y[i] + y_old[i]
-        dense[2, i] = fused(-h, K[0, i], fused(-h, K[LAST, i], 2.0 * y[i] - 2.0 * y_old[i]))
+        dense[2, i] = fused(-h, K[0, i], fused(-h, K[LAST_STAGE, i], 2.0 * y[i] - 2.0 * y_old[i]))
         for row in range(4):
             total = 0.0
-            for j in range(ALL):
+            for j in range(ALL_STAGES):
                 total = fused(D[row, j], K[j, i], total)
             dense[3 + row, i] = h * total
 

@@ -22,7 +22,7 @@ from walkerlab.physics.kernels import by_reference, kernel_part
 NO_CROSSING = 2.0
 FALLING, RISING = -1, 1
 MIN_PIECE = 2.0**-48
-RESOLUTION = 2.0**-52  # of a crossing within its piece
+ROOT_RESOLUTION = 2.0**-52  # of a crossing within its piece
 DEPTH = 64  # pieces on the stack
 
 
@@ -52,10 +52,10 @@ def sampling(degree: int) -> tuple[Any, Any]:
     size = degree + 1
     nodes = 0.5 * (1.0 - np.cos(np.pi * np.arange(size) / degree))
     basis = np.zeros((size, size))
-    one = np.array([1.0])
+    constant = np.array([1.0])
     for i in range(size):
         binomial = np.prod([(degree - j) / (j + 1.0) for j in range(i)])
-        term = polynomial.polymul(one, polynomial.polypow([0.0, 1.0], i))
+        term = polynomial.polymul(constant, polynomial.polypow([0.0, 1.0], i))
         term = polynomial.polymul(term, polynomial.polypow([1.0, -1.0], degree - i))
         basis[:, i] = binomial * polynomial.polyval(nodes, term)
     nodes[-1] = 1.0
@@ -186,10 +186,10 @@ def regula_falsi(stack: Any, piece: int, size: int, low: float, high: float) -> 
     value_a, value_b = stack[piece, 0], stack[piece, size - 1]
     side = 0
     for _ in range(100):
-        if b - a <= 2.0 * RESOLUTION or value_a == value_b:
+        if b - a <= 2.0 * ROOT_RESOLUTION or value_a == value_b:
             break
         # rounding may put the secant's zero on an end; keep it inside so that the bracket shrinks
-        c = min(max((a * value_b - b * value_a) / (value_b - value_a), a + RESOLUTION), b - RESOLUTION)
+        c = min(max((a * value_b - b * value_a) / (value_b - value_a), a + ROOT_RESOLUTION), b - ROOT_RESOLUTION)
         value_c = evaluate(stack, piece, size, c)
         if value_c == 0.0:
             a, b = c, c

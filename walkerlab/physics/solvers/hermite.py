@@ -36,7 +36,7 @@ def hermite(h: float, start: Jet, end: Jet) -> Quintic:
 
 
 @kernel_part
-def value_of(quintic: Quintic, x: float) -> float:
+def evaluate_quintic(quintic: Quintic, x: float) -> float:
     """Evaluate a quintic at fraction x of the step."""
     return value_and_slope(in_powers(quintic), x)[0]
 

@@ -11,12 +11,12 @@ from walkerlab.physics.solvers.dop853_tableau import nonzero
 from walkerlab.physics.solvers.lanes import VECTOR, multiply_add, spread_over
 from walkerlab.physics.solvers.system import State
 
-C = tableau.C
+LANE_NODES = tableau.NODES
 A_2, A_3, A_4 = nonzero(tableau.A_2), nonzero(tableau.A_3), nonzero(tableau.A_4)
 A_5, A_6, A_7 = nonzero(tableau.A_5), nonzero(tableau.A_6), nonzero(tableau.A_7)
 A_8, A_9, A_10 = nonzero(tableau.A_8), nonzero(tableau.A_9), nonzero(tableau.A_10)
 A_11, A_12, A_13 = nonzero(tableau.A_11), nonzero(tableau.A_12), nonzero(tableau.A_13)
-ERROR_5, ERROR_3 = nonzero(tableau.ERROR_5), nonzero(tableau.ERROR_3)
+LANE_ERROR_5, LANE_ERROR_3 = nonzero(tableau.ERROR_5), nonzero(tableau.ERROR_3)
 
 
 @by_type
@@ -69,22 +69,22 @@ def stage_state(context: Any, y: Any, h: Any, weights: Any, vectors: Any) -> Any
 
 
 @kernel_part
-def stages_of(system: Any, t: float, y: State, k1: State, h: float) -> tuple[tuple[State, ...], State, State]:
+def run_stages(system: Any, t: float, y: State, k1: State, h: float) -> tuple[tuple[State, ...], State, State]:
     """Compute the stages that solution and error use (k1, k6 .. k12), the solution and its derivative."""
-    k2 = derivative(system, t + C[1] * h, stage_state(y, h, A_2, (k1,)))
-    k3 = derivative(system, t + C[2] * h, stage_state(y, h, A_3, (k1, k2)))
-    k4 = derivative(system, t + C[3] * h, stage_state(y, h, A_4, (k1, k3)))
-    k5 = derivative(system, t + C[4] * h, stage_state(y, h, A_5, (k1, k3, k4)))
-    k6 = derivative(system, t + C[5] * h, stage_state(y, h, A_6, (k1, k4, k5)))
-    k7 = derivative(system, t + C[6] * h, stage_state(y, h, A_7, (k1, k4, k5, k6)))
-    k8 = derivative(system, t + C[7] * h, stage_state(y, h, A_8, (k1, k4, k5, k6, k7)))
-    k9 = derivative(system, t + C[8] * h, stage_state(y, h, A_9, (k1, k4, k5, k6, k7, k8)))
-    k10 = derivative(system, t + C[9] * h, stage_state(y, h, A_10, (k1, k4, k5, k6, k7, k8, k9)))
-    k11 = derivative(system, t + C[10] * h, stage_state(y, h, A_11, (k1, k4, k5, k6, k7, k8, k9, k10)))
+    k2 = derivative(system, t + LANE_NODES[1] * h, stage_state(y, h, A_2, (k1,)))
+    k3 = derivative(system, t + LANE_NODES[2] * h, stage_state(y, h, A_3, (k1, k2)))
+    k4 = derivative(system, t + LANE_NODES[3] * h, stage_state(y, h, A_4, (k1, k3)))
+    k5 = derivative(system, t + LANE_NODES[4] * h, stage_state(y, h, A_5, (k1, k3, k4)))
+    k6 = derivative(system, t + LANE_NODES[5] * h, stage_state(y, h, A_6, (k1, k4, k5)))
+    k7 = derivative(system, t + LANE_NODES[6] * h, stage_state(y, h, A_7, (k1, k4, k5, k6)))
+    k8 = derivative(system, t + LANE_NODES[7] * h, stage_state(y, h, A_8, (k1, k4, k5, k6, k7)))
+    k9 = derivative(system, t + LANE_NODES[8] * h, stage_state(y, h, A_9, (k1, k4, k5, k6, k7, k8)))
+    k10 = derivative(system, t + LANE_NODES[9] * h, stage_state(y, h, A_10, (k1, k4, k5, k6, k7, k8, k9)))
+    k11 = derivative(system, t + LANE_NODES[10] * h, stage_state(y, h, A_11, (k1, k4, k5, k6, k7, k8, k9, k10)))
     k12 = derivative(system, t + h, stage_state(y, h, A_12, (k1, k4, k5, k6, k7, k8, k9, k10, k11)))
-    used = (k1, k6, k7, k8, k9, k10, k11, k12)
-    y_new = stage_state(y, h, A_13, used)
-    return used, y_new, derivative(system, t + h, y_new)
+    needed = (k1, k6, k7, k8, k9, k10, k11, k12)
+    y_new = stage_state(y, h, A_13, needed)
+    return needed, y_new, derivative(system, t + h, y_new)
 
 
 @kernel_part

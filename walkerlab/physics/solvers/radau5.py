@@ -34,7 +34,7 @@ from walkerlab.physics.solvers.stepping import (
 from walkerlab.physics.solvers.system import derivative, jacobian
 
 ROOT6 = math.sqrt(6.0)
-C = ((4.0 - ROOT6) / 10.0, (4.0 + ROOT6) / 10.0, 1.0)
+RADAU_NODES = ((4.0 - ROOT6) / 10.0, (4.0 + ROOT6) / 10.0, 1.0)
 # eigenvalues of A^-1: one real, one complex pair; A^-1 = T Lambda T^-1, (8.5) and (8.12)
 GAMMA = 3.0 + 3.0 ** (2.0 / 3.0) - 3.0 ** (1.0 / 3.0)
 ALPHA = 3.0 + 0.5 * (3.0 ** (1.0 / 3.0) - 3.0 ** (2.0 / 3.0))
@@ -51,10 +51,10 @@ P_1 = (13.0 / 3.0 + 7.0 * ROOT6 / 3.0, 13.0 / 3.0 - 7.0 * ROOT6 / 3.0, 1.0 / 3.0
 P_2 = (-23.0 / 3.0 - 22.0 * ROOT6 / 3.0, -23.0 / 3.0 + 22.0 * ROOT6 / 3.0, -8.0 / 3.0)
 P_3 = (10.0 / 3.0 + 5.0 * ROOT6, 10.0 / 3.0 - 5.0 * ROOT6, 10.0 / 3.0)
 
-SAFETY, SHRINK_MOST, GROW_MOST = 0.9, 0.125, 8.0
+RADAU_SAFETY, RADAU_SHRINK, RADAU_GROWTH = 0.9, 0.125, 8.0
 KEEP_LOW, KEEP_HIGH = 1.0, 1.2  # step ratios for which the factored matrices are kept
 FRESH_RATE = 1e-3  # the Jacobian is kept if Newton converges faster
-FIRST_STEP = 1e-6
+FIRST_RADAU_STEP = 1e-6
 MAX_NEWTON = 7
 
 # indices into `control`
@@ -131,7 +131,7 @@ def first_guess(method: Radau5, h: float) -> None:
     for i in range(method.y.size):
         start = dense[0, i] + dense[1, i] + dense[2, i]
         for stage in range(3):
-            s = 1.0 + C[stage] * ratio
+            s = 1.0 + RADAU_NODES[stage] * ratio
             z[stage, i] = s * (dense[0, i] + s * (dense[1, i] + s * dense[2, i])) - start if ratio > 0.0 else 0.0
         w[0, i] = INV_1[0] * z[0, i] + INV_1[1] * z[1, i] + INV_1[2] * z[2, i]
         w[1, i] = INV_2[0] * z[0, i] + INV_2[1] * z[1, i] + INV_2[2] * z[2, i]
@@ -146,7 +146,7 @@ def newton_move(method: Radau5, system: Any, t: float, h: float) -> float:
     for stage in range(3):
         for i in range(n):
             method.at[i] = y[i] + z[stage, i]
-        derivative(system, t + C[stage] * h, method.at, f[stage])
+        derivative(system, t + RADAU_NODES[stage] * h, method.at, f[stage])
     method.counts[RHS] += 3
     real = method.move
     for i in range(n):
@@ -198,7 +198,7 @@ def solve_stages(method: Radau5, system: Any, t: float, h: float) -> int:
 def begin_radau5(method: Radau5, system: Any, t: float, y: Any, h: float) -> None:
     """Evaluate derivative and Jacobian at the start, and discard step control's history."""
     clock, control = method.clock, method.control
-    clock[T_OLD], clock[T], clock[H_NEXT] = t, t, h if h > 0.0 else FIRST_STEP
+    clock[T_OLD], clock[T], clock[H_NEXT] = t, t, h if h > 0.0 else FIRST_RADAU_STEP
     for i in range(method.y.size):
         method.y[i] = y[i]
     derivative(system, t, method.y, method.slope[0])
@@ -263,8 +263,8 @@ def advance_radau5(method: Radau5, system: Any, t_end: float) -> int:
             rejected = True
             continue
         error = step_error(method, system, t, h, rejected or control[SMOOTH] == 0.0)
-        safety = min(SAFETY, SAFETY * (1 + 2 * MAX_NEWTON) / (iterations + 2 * MAX_NEWTON))
-        shrink = max(1.0 / GROW_MOST, min(1.0 / SHRINK_MOST, error**0.25 / safety))
+        safety = min(RADAU_SAFETY, RADAU_SAFETY * (1 + 2 * MAX_NEWTON) / (iterations + 2 * MAX_NEWTON))
+        shrink = max(1.0 / RADAU_GROWTH, min(1.0 / RADAU_SHRINK, error**0.25 / safety))
         if error < 1.0:
             accept(method, system, t, t_end if last else t + h)
             h_new = next_step(method, h, error, shrink, safety)
@@ -292,7 +292,7 @@ def next_step(method: Radau5, h: float, error: float, shrink: float, safety: flo
     control = method.control
     if control[ERROR_OLD] > 0.0 and control[H_OLD] > 0.0:
         predicted = control[H_OLD] / h * (error * error / control[ERROR_OLD]) ** 0.25 / safety
-        shrink = max(shrink, max(1.0 / GROW_MOST, min(1.0 / SHRINK_MOST, predicted)))
+        shrink = max(shrink, max(1.0 / RADAU_GROWTH, min(1.0 / RADAU_SHRINK, predicted)))
     control[ERROR_OLD], control[H_OLD] = max(1e-2, error), h
     h_new = h / shrink
     if control[FRESH] == 0.0 and KEEP_LOW * h <= h_new <= KEEP_HIGH * h:

@@ -49,29 +49,31 @@ def cvode_factory(family: str) -> Callable[[int, float, float, int], ScipyMethod
     return partial(ScipyMethod, partial(cvode.CvodeSolver, family), True)
 
 
-OWN = (
+OWN_METHODS = (
     Method("dop853", new_dop853, stiff=False, orders=(8, 8), compiled=True),
     Method("radau5", new_radau5, stiff=True, orders=(5, 5), compiled=True),
 )
-SCIPY = (
+SCIPY_METHODS = (
     Method("scipy-rk45", scipy_factory("RK45", takes_jacobian=False), stiff=False, orders=(5, 5)),
     Method("scipy-dop853", scipy_factory("DOP853", takes_jacobian=False), stiff=False, orders=(8, 8)),
     Method("scipy-lsoda", scipy_factory("LSODA"), stiff=True, orders=(1, 12)),
     Method("scipy-radau", scipy_factory("Radau"), stiff=True, orders=(5, 5)),
     Method("scipy-bdf", scipy_factory("BDF"), stiff=True, orders=(1, 5)),
 )
-CVODE = (
+CVODE_METHODS = (
     Method("cvode-bdf", cvode_factory("BDF"), stiff=True, orders=(1, 5)),
     Method("cvode-adams", cvode_factory("Adams"), stiff=False, orders=(1, 12)),
 )
-METHODS = {method.name: method for method in (*OWN, *SCIPY, *(CVODE if cvode.is_installed() else ()))}
+METHODS = {
+    method.name: method for method in (*OWN_METHODS, *SCIPY_METHODS, *(CVODE_METHODS if cvode.is_installed() else ()))
+}
 
 
 def method_named(name: str) -> Method:
     """Return a method by name; raise KeyError with all names if there is none."""
     if name in METHODS:
         return METHODS[name]
-    if any(method.name == name for method in CVODE):
+    if any(method.name == name for method in CVODE_METHODS):
         raise KeyError(f"{name} needs CVODE, which is not installed: pip install scikit-sundae")
     raise KeyError(f"no method named {name!r}; methods: {', '.join(METHODS)}")
 

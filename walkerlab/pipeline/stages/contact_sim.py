@@ -9,11 +9,11 @@ import numpy as np
 
 from walkerlab.config.reads import ContactSimConfig
 from walkerlab.physics.energy_channels import SAMPLED
-from walkerlab.physics.ground.compliant import hinge_of
+from walkerlab.physics.ground.compliant import hinge_point
 from walkerlab.physics.ground.terrain import STANCE_FOOT
 from walkerlab.physics.hybrid.contact_record import ContactSamples
-from walkerlab.physics.hybrid.contact_result import ContactWalkResult, by_channel, sampled_energies, sampled_feet
-from walkerlab.physics.mechanics.rigid import places_of
+from walkerlab.physics.hybrid.contact_result import ContactWalkResult, by_channel, sample_energies, sample_feet
+from walkerlab.physics.mechanics.rigid import group_bodies
 from walkerlab.physics.mechanics.walkers import TORSO
 from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.physics.solvers.system import Floats
@@ -77,7 +77,7 @@ def run(config: ContactSimConfig, inputs: Mapping[str, Content], progress: Progr
 def compile_kernels(config: ContactSimConfig) -> None:
     """Compile all kernels of `run` by a walk with a minimal evaluation budget."""
     scene = contact_scene(config, config.walker.leg_length_m * 2.0 * float(np.sin(HALF_ANGLE)))
-    places = places_of(scene.assembly).names
+    places = group_bodies(scene.assembly).names
     angles = [HALF_ANGLE if name == "2" else -HALF_ANGLE if name.startswith("1") else 0.0 for name in places]
     standing = start_state(scene, (*angles, *(0.0 for _ in places)))
     interval = scene.ground.frame.pendulum_time if config.outputs else None
@@ -155,7 +155,7 @@ def trajectory_group(
 ) -> Group:
     """Build the group of samples that `outputs` selects."""
     variables = {**over_time(time=samples.time_s, stance_leg=samples.stance + 1), **legs()}
-    feet = sampled_feet(scene.walker, samples)
+    feet = sample_feet(scene.walker, samples)
     if "states" in config.outputs:
         variables |= state_variables(scene, samples.states)
         variables |= over_time(foot_along_m=feet[:, :, 0], foot_height_m=feet[:, :, 1] + samples.level)
@@ -191,8 +191,8 @@ def state_variables(scene: ContactScene, y: Floats) -> dict[str, Variable]:
         found |= turning("shank", angle[:, shanks], velocity[:, shanks])
         knees = np.zeros((2, len(y), 2))
         for leg, (thigh, shank) in enumerate(zip(thighs, shanks, strict=True)):
-            hip = hinge_of(scene.assembly, names[thigh], names[thighs[1 - leg]])
-            knee = hinge_of(scene.assembly, names[thigh], names[shank])
+            hip = hinge_point(scene.assembly, names[thigh], names[thighs[1 - leg]])
+            knee = hinge_point(scene.assembly, names[thigh], names[shank])
             ahead, up = knee[0] - hip[0], knee[1] - hip[1]
             knees[0, :, leg] = along + c[:, thigh] * ahead - s[:, thigh] * up
             knees[1, :, leg] = height + s[:, thigh] * ahead + c[:, thigh] * up
@@ -207,7 +207,7 @@ def energy_variables(scene: ContactScene, samples: ContactSamples, foothold: Flo
 
     foothold, up  (samples,) m, where along the slope the stance foot touched, and over it
     """
-    kinetic, potential, total = sampled_energies(scene.walker, samples).T
+    kinetic, potential, total = sample_energies(scene.walker, samples).T
     given = samples.driven_J.T
     lost, walker = samples.dissipated_J, scene.walker
     at_foothold = walker.mass * (walker.gravity_down * up - walker.gravity_along * foothold)

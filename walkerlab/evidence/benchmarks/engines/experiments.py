@@ -20,7 +20,7 @@ from walkerlab.physics.ground.energy import kinetic_energy, potential_energy
 from walkerlab.physics.ground.friction import friction_coefficient
 from walkerlab.physics.ground.resting import resting_foot
 from walkerlab.physics.ground.terrain import STANCE_FOOT
-from walkerlab.physics.ground.walker import changed_forms, folded, on_ground, unfolded
+from walkerlab.physics.ground.walker import changed_forms, on_ground, to_form, to_full
 from walkerlab.physics.hybrid.contact_result import ContactWalkResult, walk_contact
 from walkerlab.physics.hybrid.contact_state import knees_at_start
 from walkerlab.physics.solvers.registry import Tolerances
@@ -318,9 +318,9 @@ def swing_truth(scene: EngineScene, start: Floats, until_s: float = SWING_S) -> 
     def energy(y: Floats) -> float:
         return float(kinetic_energy(free_form, y) + potential_energy(free_form, y))
 
-    y = folded(system.form, start)
+    y = to_form(system.form, start)
     solution = solve_ivp(rate, (0.0, until_s), y, method="DOP853", rtol=1e-13, atol=1e-14)
-    return unfolded(system.form, solution.y[:, -1], start.size), energy
+    return to_full(system.form, solution.y[:, -1], start.size), energy
 
 
 def least_wall(rows: Sequence[EngineRow], error: float) -> float | None:

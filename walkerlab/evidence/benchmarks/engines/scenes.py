@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from walkerlab.config.reads import ContactConfig
 from walkerlab.errors import ConfigError
 from walkerlab.evidence.benchmarks.engines.planar import FLOATING, PlanarModel, planar_model
-from walkerlab.physics.ground.compliant import hinge_of
+from walkerlab.physics.ground.compliant import hinge_point
 from walkerlab.physics.ground.knees import IdealLock
 from walkerlab.physics.ground.terrain import STANCE_FOOT
 from walkerlab.physics.ground.walker import LOCKED, MAX_BODIES, ContactWalker, changed_forms
@@ -122,7 +122,7 @@ def scenes(config: ContactConfig, rigid_step_length_m: float, rigid_state: State
     scene = replace(contact_scene(config, rigid_step_length_m, rigid_step_length_m), pinned=False)
     assembly, start = scene.assembly, start_state(scene, rigid_state)
     upper = assembly.legs[STANCE_FOOT][0]
-    base = Anchor(upper, hinge_of(assembly, upper, assembly.legs[1 - STANCE_FOOT][0]))
+    base = Anchor(upper, hinge_point(assembly, upper, assembly.legs[1 - STANCE_FOOT][0]))
     d = np.zeros((2, MAX_BODIES, 2))
     for foot, part in enumerate(assembly.feet):
         d[foot, : len(assembly.bodies)] = levers(assembly, base, Anchor(part.body, part.centre_m))
