@@ -33,7 +33,7 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    """Load what the package offers when it is first asked for."""
+    """Load an exported name on first access."""
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     # Not by an import statement: what stages are made of is read off those, and none of them needs this.
@@ -45,5 +45,5 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    """What the package offers."""
+    """Names that the package exports."""
     return sorted([*globals(), *__all__])

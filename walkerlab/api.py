@@ -75,11 +75,11 @@ class Result:
     artifact: Path | None = None
 
     def __repr__(self) -> str:
-        found = headline_values(self.stage, self.summary)
-        said = [f"no answer: {self.no_answer}"] if self.no_answer is not None else []
-        said += [f"  {name:<{max(map(len, found))}}  {in_words(value)}" for name, value in found.items()]
-        said += [f"groups: {', '.join(self.groups)}"] if self.groups else []
-        return "\n".join([f"{type(self).__name__} of {self.stage}", *said])
+        values = headline_values(self.stage, self.summary)
+        lines = [f"no answer: {self.no_answer}"] if self.no_answer is not None else []
+        lines += [f"  {name:<{max(map(len, values))}}  {in_words(value)}" for name, value in values.items()]
+        lines += [f"groups: {', '.join(self.groups)}"] if self.groups else []
+        return "\n".join([f"{type(self).__name__} of {self.stage}", *lines])
 
     @property
     def groups(self) -> tuple[str, ...]:
@@ -122,8 +122,8 @@ class Run:
     folder: RunFolder
 
     def __repr__(self) -> str:
-        there = [*self.stages, *self.sweeps]
-        return f"Run in {self.folder.path}: {', '.join(there) or 'no results'}"
+        names = [*self.stages, *self.sweeps]
+        return f"Run in {self.folder.path}: {', '.join(names) or 'no results'}"
 
     @property
     def config(self) -> Config:
@@ -146,10 +146,10 @@ class Run:
     def result(self, stage: str) -> Result:
         """Return the stored result of a stage, up to date or not; StaleError if it cannot be read."""
         _check_stage(stage)
-        found = result_in(self.folder, stage)
-        said = found.summary.get("no_answer")
-        no_answer = None if said is None else NoAnswer(said["message"], said["advice"])
-        return _result_of(stage, found.summary, found, no_answer, self.folder.artifact(stage))
+        stored = result_in(self.folder, stage)
+        message = stored.summary.get("no_answer")
+        no_answer = None if message is None else NoAnswer(message["message"], message["advice"])
+        return _result_of(stage, stored.summary, stored, no_answer, self.folder.artifact(stage))
 
     def sweep(self, name: str = "") -> Any:
         """Return a sweep as an xarray Dataset; by default the only one. StaleError if it cannot be read."""
@@ -243,17 +243,17 @@ def sweep(
     from walkerlab.pipeline.sweeps.sweep import SweepRun, SweepWork, modules_of
 
     xarray_here()  # the answer is a Dataset
-    found = resolve(str(config), set_options(set), runs=_folder_of(runs), name=name)
-    warn(found.loaded.warnings)
+    resolved = resolve(str(config), set_options(set), runs=_folder_of(runs), name=name)
+    warn(resolved.loaded.warnings)
     if not isinstance(over, Mapping):
         raise ConfigError(f"over: {over!r} is not a mapping of keys to values.", 'For example {"slope_deg": [1, 2]}.')
     listed = [(key, sweep_values(key, value), f"over {key}") for key, value in over.items()]
-    block = found.loaded.config.sweep or SweepBlock()
-    said: dict[str, Any] = {key: value for key, value in combined.items() if value is not None}
-    question = build_sweep(stage, listed, **{"seed": block.seed, **said})
+    block = resolved.loaded.config.sweep or SweepBlock()
+    options: dict[str, Any] = {key: value for key, value in combined.items() if value is not None}
+    question = build_sweep(stage, listed, **{"seed": block.seed, **options})
     chosen, address = engine_named(engine)
-    order = Order(jobs, address, modules_of(stage, found.loaded.config, PIPELINE), found.folder.path)
-    swept = SweepRun(question, found.loaded, found.folder).run(SweepWork(chosen, order))
+    order = Order(jobs, address, modules_of(stage, resolved.loaded.config, PIPELINE), resolved.folder.path)
+    swept = SweepRun(question, resolved.loaded, resolved.folder).run(SweepWork(chosen, order))
     if swept.failed:
         raise swept.error()
     return dataset(swept.content[""])
@@ -291,9 +291,9 @@ def contact(**keys: Any) -> Contact:
     >>> contact(static_friction=0.6, dynamic_friction=0.5).stiffness
     100000.0
     """
-    made = validate_tree(tree_of({"contact": keys}, NOWHERE)).contact
-    assert made is not None, "a block that is given is there"
-    return made
+    block = validate_tree(tree_of({"contact": keys}, NOWHERE)).contact
+    assert block is not None, "a block that is given is there"
+    return block
 
 
 def find_gait(walker: Any = None, slope_deg: float | None = None, **keys: Any) -> Gait:
@@ -334,8 +334,8 @@ def simulate(
     >>> walk.dataset("trajectory").angle.dims
     ('time', 'leg')
     """
-    given = {"slope_deg": slope_deg, "contact": contact, "strides": strides}
-    config = config_of_scene(walker, given, keys)
+    values = {"slope_deg": slope_deg, "contact": contact, "strides": strides}
+    config = config_of_scene(walker, values, keys)
     return in_memory("simulate" if contact is None else "contact-sim", config)
 
 
@@ -354,8 +354,8 @@ def continue_gait(
     keys       others of the block `continuation`, such as model; other keys of a config, such as contact, seed
     """
     ends = {} if span is None else dict(zip(("from", "to"), _two_numbers("span", _plain(span)), strict=True))
-    given = {"slope_deg": slope_deg, **_stage_block("continuation", keys, over=over, **ends)}
-    return in_memory("continuation", config_of_scene(walker, given, keys))
+    values = {"slope_deg": slope_deg, **_stage_block("continuation", keys, over=over, **ends)}
+    return in_memory("continuation", config_of_scene(walker, values, keys))
 
 
 def basin(
@@ -368,8 +368,8 @@ def basin(
     cells      along either axis of the window
     keys       others of the block `basin`, such as model; other keys of a config, such as seed
     """
-    given = {"slope_deg": slope_deg, **_stage_block("basin", keys, cells=cells)}
-    return in_memory("basin", config_of_scene(walker, given, keys))
+    values = {"slope_deg": slope_deg, **_stage_block("basin", keys, cells=cells)}
+    return in_memory("basin", config_of_scene(walker, values, keys))
 
 
 def robustness(
@@ -383,8 +383,8 @@ def robustness(
     walks      on each rough ground
     keys       model, steps, roughness_m and max_steps of the block `robustness`; other keys of a config
     """
-    given = {"slope_deg": slope_deg, **_stage_block("robustness", keys, to=to or None, walks=walks)}
-    return in_memory("robustness", config_of_scene(walker, given, keys))
+    values = {"slope_deg": slope_deg, **_stage_block("robustness", keys, to=to or None, walks=walks)}
+    return in_memory("robustness", config_of_scene(walker, values, keys))
 
 
 def explore(
@@ -421,12 +421,12 @@ def design(walker: Any = None, over: Mapping[str, Any] | None = None, **keys: An
     return in_memory("design", config_of_scene(walker, _stage_block("design", keys, over=over or {}), keys))
 
 
-def _stage_block(stage: str, keys: dict[str, Any], **given: Any) -> dict[str, Any]:
+def _stage_block(stage: str, keys: dict[str, Any], **values: Any) -> dict[str, Any]:
     block = block_of(Config.model_fields[stage])
     assert block is not None, "a stage that is asked something has a block"
     own = {name: keys.pop(name) for name in block.model_fields if name in keys}
-    asked = {name: value for name, value in {**own, **given}.items() if value is not None}
-    return {stage: asked or None}
+    entries = {name: value for name, value in {**own, **values}.items() if value is not None}
+    return {stage: entries or None}
 
 
 def dataset(group: Group) -> Any:
@@ -435,8 +435,8 @@ def dataset(group: Group) -> Any:
         name: (variable.dims, variable.values, {"units": variable.units, "long_name": variable.long_name})
         for name, variable in group.variables.items()
     }
-    made = xarray_here().Dataset(data, attrs=dict(group.attrs))
-    return made.set_coords(str(group.attrs.get("coordinates", "")).split())
+    result = xarray_here().Dataset(data, attrs=dict(group.attrs))
+    return result.set_coords(str(group.attrs.get("coordinates", "")).split())
 
 
 def xarray_here() -> Any:
@@ -456,7 +456,7 @@ def in_memory(stage: str, config: Config) -> Result:
     return _result_of(stage, answer.findings, answer, answer.no_answer)
 
 
-def config_of_scene(walker: Any, given: Mapping[str, Any], keys: Mapping[str, Any]) -> Config:
+def config_of_scene(walker: Any, values: Mapping[str, Any], keys: Mapping[str, Any]) -> Config:
     """Build the paper config with another scene; contact only if `given` has it.
 
     walker  its block, or None
@@ -465,12 +465,12 @@ def config_of_scene(walker: Any, given: Mapping[str, Any], keys: Mapping[str, An
 
     Raises ConfigError for unknown keys and invalid values.
     """
-    named = {key: value for key, value in {"walker": walker, **given}.items() if value is not None}
-    for name in named.keys() & MADE_HERE.keys():
+    scene = {key: value for key, value in {"walker": walker, **values}.items() if value is not None}
+    for name in scene.keys() & MADE_HERE.keys():
         kinds, makers = MADE_HERE[name]
-        if not isinstance(named[name], kinds):
-            raise ConfigError(f"{name}: {named[name]!r} is not a {name} block.", makers)
-    lines = {key: _plain(value) for key, value in {"name": "memory", **keys, **named}.items()}
+        if not isinstance(scene[name], kinds):
+            raise ConfigError(f"{name}: {scene[name]!r} is not a {name} block.", makers)
+    lines = {key: _plain(value) for key, value in {"name": "memory", **keys, **scene}.items()}
     replaced = {"source", "contact", *({"walker"} & lines.keys())}
     upper = tree_of(lines, NOWHERE)
     tree = merge_layers([*(layer.without(*replaced) for layer in read_layers(builtin_config(DEFAULT))), upper])
@@ -479,9 +479,9 @@ def config_of_scene(walker: Any, given: Mapping[str, Any], keys: Mapping[str, An
     return config
 
 
-def warn(said: Iterable[str], inside: int = 0) -> None:
+def warn(messages: Iterable[str], inside: int = 0) -> None:
     """Warn at the line of the caller of this module's function, `inside` functions further out."""
-    for text in said:
+    for text in messages:
         warnings.warn(text, stacklevel=3 + inside)
 
 
@@ -510,23 +510,23 @@ def _folder_of(runs: Any) -> Path:
     return Path(runs)
 
 
-def sweep_values(key: str, given: Any) -> str | list[Any]:
+def sweep_values(key: str, values: Any) -> str | list[Any]:
     """Return the values of a sweep's parameter, or the text of a range; ConfigError for anything else."""
     # Imported here: few callers sweep.
     from walkerlab.pipeline.sweeps.question import MAX_POINTS
 
-    if isinstance(given, str) and not given.lstrip().startswith("["):
-        return given
-    if isinstance(given, str) or not isinstance(given, Iterable):
+    if isinstance(values, str) and not values.lstrip().startswith("["):
+        return values
+    if isinstance(values, str) or not isinstance(values, Iterable):
         raise ConfigError(
-            f"over {key}: {given!r} is not a list of values, nor a range FROM:TO:N.",
+            f"over {key}: {values!r} is not a list of values, nor a range FROM:TO:N.",
             f'For example {{"{key}": [1, 2]}} or {{"{key}": "1:3:5"}}.',
         )
-    return list(itertools.islice(given, MAX_POINTS + 1))  # more are refused, and need not be held for that
+    return list(itertools.islice(values, MAX_POINTS + 1))  # more are refused, and need not be held for that
 
 
 def _check_stage(stage: str) -> None:
-    names = [one.name for one in PIPELINE.stages]
+    names = [known_stage.name for known_stage in PIPELINE.stages]
     if stage not in names:
         raise ConfigError(f"{stage}: no such stage.", f"There are {', '.join(names)}.")
 
@@ -534,5 +534,5 @@ def _check_stage(stage: str) -> None:
 def _result_of(
     stage: str, summary: Mapping[str, Any], content: Content, no_answer: NoAnswer | None, path: Path | None = None
 ) -> Result:
-    said = None if no_answer is None else no_answer.message
-    return RESULTS.get(stage, Result)(stage, summary, content, said, path)
+    message = None if no_answer is None else no_answer.message
+    return RESULTS.get(stage, Result)(stage, summary, content, message, path)

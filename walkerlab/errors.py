@@ -12,7 +12,7 @@ def add_run_options(text: str, typed: str) -> str:
 
     typed  options that select the run, with a blank in front
     """
-    return COMMAND_PATTERN.sub(lambda found: f"`{found[1]}{typed}`", text) if typed else text
+    return COMMAND_PATTERN.sub(lambda match: f"`{match[1]}{typed}`", text) if typed else text
 
 
 class WalkerlabError(Exception):
@@ -25,7 +25,7 @@ class WalkerlabError(Exception):
     exit_code: ClassVar[int] = 1
 
     def __init__(self, message: str, advice: str = "") -> None:
-        """Say what happened and, where there is something to do, what to do next."""
+        """Store message and advice."""
         super().__init__(message)
         self.message = message
         self.advice = advice
@@ -44,7 +44,7 @@ class ConfigError(WalkerlabError):
     exit_code = 3
 
     def __init__(self, message: str, advice: str = "", key: tuple[int | str, ...] = ()) -> None:
-        """Say what is wrong, what to do next, and about which key."""
+        """Store message, advice and key."""
         super().__init__(message, advice)
         self.key = key
 
@@ -58,7 +58,7 @@ class NoAnswer(WalkerlabError):  # noqa: N818 (no answer is a result, not an err
     exit_code = 4
 
     def __init__(self, message: str, advice: str = "", partial: object | None = None) -> None:
-        """Say what happened and hand over what there is."""
+        """Store message, advice and partial results."""
         super().__init__(message, advice)
         self.partial = partial
 

@@ -10,7 +10,7 @@ UNITS: Final = {
     "rad_s": "rad/s", "N_s_m": "N s/m", "N_s": "N s", "Hz": "Hz", "W": "W", "mm": "mm", "kg_m2": "kg m^2",
     "N_m": "N m", "N_m_per_rad": "N m/rad", "N_m_s_per_rad": "N m s/rad",
 }  # fmt: skip
-"""By what names of numbers end in."""
+"""Units by name suffix."""
 ERROR_OF_EACH_STEP: Final = {
     "step_periods_s": "step_period_s",
     "step_lengths_m": "step_length_m",
@@ -18,7 +18,7 @@ ERROR_OF_EACH_STEP: Final = {
     "rolling_m": "rolling_m",
     "knee_strike_times_s": "knee_strike_time_s",
 }
-"""Numbers of each step in a walk's summary, and under which name in its `numerical_error` their largest change is."""
+"""Quantities of each step in a walk's summary, with their names in its `numerical_error`."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class Label:
 @cache
 def labels_of(row: type) -> Mapping[str, Label]:
     """Return the labels of a row class by field and property."""
-    properties = [(name, one.fget) for name, one in vars(row).items() if isinstance(one, property)]
+    properties = [(name, member.fget) for name, member in vars(row).items() if isinstance(member, property)]
     returned = {name: get_type_hints(getter, include_extras=True)["return"] for name, getter in properties}
     hints = get_type_hints(row, include_extras=True) | returned
     return {name: label for name, hint in hints.items() for label in get_args(hint)[1:] if isinstance(label, Label)}
@@ -56,7 +56,7 @@ def unit_ending(name: str) -> str:
 
 
 def unit_by_name(name: str) -> str:
-    """Return the unit in a name's suffix; '1' if there is none."""
+    """Return the unit in a name's suffix; '1' without one."""
     return UNITS.get(unit_ending(name), "1")
 
 

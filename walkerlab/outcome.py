@@ -47,17 +47,17 @@ class Outcome(IntEnum):
 
 def outcome_of(label: str) -> Outcome | None:
     """Return the outcome with a label; None if it is unknown."""
-    return next((one for one in Outcome if one.label == label), None)
+    return next((outcome for outcome in Outcome if outcome.label == label), None)
 
 
 class OutcomeWords(NamedTuple):
     """Texts and colour of an outcome."""
 
-    does: str  # what a walker does in the end
-    did: str  # what walks did, behind how many
+    does: str  # present tense, of one walker
+    did: str  # past tense, after a number of walks
     why: str  # why a family of gaits ends there
-    colour: str  # on maps: full for what walks, pale for what fails
-    advice: str  # what it means and what to try next
+    colour: str  # on maps: saturated for walking, pale for failure
+    advice: str  # meaning, and what to try next
 
 
 OUTCOME_TEXTS = {
@@ -155,4 +155,4 @@ ADVICE_ON_UNEVEN_GROUND = {
     f"{TRY_EVEN_GROUND}",
     Outcome.BENT_KNEE: f"On this uneven ground a foot came down on a knee that had not locked; {TRY_EVEN_GROUND}",
 }
-"""What the outcome of a walk over footholds of different heights means and what to try next, where that differs."""
+"""Advice for walks over footholds of different heights, where it differs."""

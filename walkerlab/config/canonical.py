@@ -19,8 +19,8 @@ def slice_of(config: Config, takes: type | None) -> dict[str, Any]:
     def part(data: Any, takes: type | None) -> Any:
         return data if takes is None else {name: part(data[name], inner) for name, inner in keys_of(takes).items()}
 
-    found: dict[str, Any] = part(config.model_dump(mode="json"), takes)
-    return found
+    selected: dict[str, Any] = part(config.model_dump(mode="json"), takes)
+    return selected
 
 
 def flatten(block: Mapping[str, Any], lists: bool = False, prefix: str = "") -> Iterator[tuple[str, Any]]:

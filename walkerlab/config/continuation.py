@@ -53,8 +53,8 @@ class Span(_Span):
     @property
     def most(self) -> float:
         """End of the range, in the unit of the key."""
-        found: Any = getattr(self, "to")  # noqa: B009 - declared above, out of the type checker's sight
-        return float(found)
+        value: Any = getattr(self, "to")  # noqa: B009 - declared above, out of the type checker's sight
+        return float(value)
 
 
 class Continuation(Span):

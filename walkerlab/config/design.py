@@ -36,7 +36,7 @@ class Design(Block):
         5, "1", "starting points of the search: the config's own values, the rest at random", ge=1, le=1000
     )
 
-    _one = check_against(
+    _single_goal = check_against(
         "maximise", "minimise", lambda value, _: "cannot be combined with minimise: remove one of them" if value else ""
     )
 

@@ -59,8 +59,8 @@ def check_against(name: str, other: str, why: Callable[[Any, Any], str]) -> Any:
     """Validate key `name` by the value of key `other` above it; `why` returns the reason or an empty text."""
 
     def check(value: Any, info: ValidationInfo) -> Any:
-        beside = info.data.get(other)  # None where that is wrong itself, which is told
-        reason = "" if beside is None else why(value, beside)
+        other_value = info.data.get(other)  # None if that key has an error of its own
+        reason = "" if other_value is None else why(value, other_value)
         if reason:
             raise meaning_error(reason)
         return value
@@ -78,12 +78,12 @@ def block_of(field: FieldInfo) -> type[Block] | None:
 
 def kinds_of(field: FieldInfo) -> dict[str, type[Block]]:
     """Return the blocks that a key may hold, by their `type`; empty if there is at most one."""
-    found = {}
+    kinds = {}
     for candidate in get_args(field.annotation):
         for tag in get_args(candidate)[1:]:
             if isinstance(tag, Tag) and isinstance(get_args(candidate)[0], type):
-                found[tag.tag] = get_args(candidate)[0]
-    return {tag: block for tag, block in found.items() if issubclass(block, Block)}
+                kinds[tag.tag] = get_args(candidate)[0]
+    return {tag: block for tag, block in kinds.items() if issubclass(block, Block)}
 
 
 def leaves(
@@ -115,8 +115,8 @@ def value_at(config: Any, path: Iterable[str]) -> Any:
 
 def annotation_of(field: FieldInfo, name: str) -> str:
     """Return a key's `unit`, `source`, `bounds` or `default_in_words`; empty if it has none."""
-    held = field.json_schema_extra
-    return str(held.get(name, "")) if isinstance(held, dict) else ""
+    extra = field.json_schema_extra
+    return str(extra.get(name, "")) if isinstance(extra, dict) else ""
 
 
 _KINDS: Final[dict[Any, str]] = {float: "number", int: "integer", str: "text", bool: "true or false"}
@@ -151,9 +151,9 @@ def words_of(annotation: Any) -> tuple[str, ...]:
 
 def bounds_of(field: FieldInfo) -> str:
     """Describe a key's bounds without unit, e.g. `from 0.001 to 1000`; empty if it has none."""
-    spoken, what = annotation_of(field, "bounds"), type_words(field.annotation)
-    if spoken:
-        return spoken
+    description, what = annotation_of(field, "bounds"), type_words(field.annotation)
+    if description:
+        return description
     if what in ("word", _KINDS[bool]):
         return ", ".join(words_of(field.annotation)) or what
     limits = {sign: getattr(item, sign) for item in field.metadata for sign, _ in _SIGNS if hasattr(item, sign)}

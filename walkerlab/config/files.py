@@ -14,13 +14,13 @@ from walkerlab.config.tree import Mapping, Position, Scalar, Sequence
 
 _INSTALLED: Final = Path(__file__).parent / "builtin"
 BUILTIN_FOLDER: Final = _INSTALLED if _INSTALLED.is_dir() else Path(__file__).parents[2] / "configs"
-"""The built-in configs: beside this file where a wheel was installed, at the top of a checkout."""
+"""Folder of the built-in configs: next to this file in an installed wheel, at the top of a checkout."""
 DEFAULT: Final = "paper"
 SUFFIXES: Final = (".yaml", ".yml")
 MAX_EXTENDS: Final = 16
 SHOWN_PATH: Final = 240
 STORED_IS_COMPLETE: Final = "every key with its value; a stored config extends nothing"
-read_cached = lru_cache(maxsize=32)(read)  # trees of texts that were read already: they are changed in copies alone
+read_cached = lru_cache(maxsize=32)(read)  # callers change only copies of the trees
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,8 +45,10 @@ def builtin_names() -> tuple[str, ...]:
 
 def config_to_extend(typed: str | None) -> str:
     """Return the config that a new one may extend: that of the command line, or the paper's for a run."""
-    named = typed is not None and (typed in builtin_names() or (Path(typed).is_file() and Path(typed).suffix != ".h5"))
-    return str(typed) if named else DEFAULT
+    is_config = typed is not None and (
+        typed in builtin_names() or (Path(typed).is_file() and Path(typed).suffix != ".h5")
+    )
+    return str(typed) if is_config else DEFAULT
 
 
 def builtin_config(name: str) -> ConfigFile:
@@ -70,50 +72,52 @@ def read_layers(file: ConfigFile) -> list[Mapping]:
     Raises ConfigError if a file cannot be read, is not a block of keys, or extends itself, and if a stored config
     refers to another file.
     """
-    layers = [with_cases(root.without("extends"), one.path.parent) for one, root in files_and_blocks(file)]
+    layers = [
+        with_cases(root.without("extends"), layer_file.path.parent) for layer_file, root in files_and_blocks(file)
+    ]
     return layers[::-1]
 
 
 def files_read(file: ConfigFile) -> list[Path]:
     """List the files a config is read from: its own, those it extends, and lists of cases."""
-    found = []
-    for one, root in files_and_blocks(file):
-        cases = cases_file(root, one.path.parent)
-        found += [one.path] + ([] if cases is None else [cases[0].path])
-    return found
+    paths = []
+    for layer_file, root in files_and_blocks(file):
+        cases = cases_file(root, layer_file.path.parent)
+        paths += [layer_file.path] + ([] if cases is None else [cases[0].path])
+    return paths
 
 
 def files_and_blocks(file: ConfigFile) -> Iterator[tuple[ConfigFile, Mapping]]:
     """Yield a config's file with its block of keys, then the file it extends, and so on; raises as `read_layers`."""
     seen: list[str] = []
-    asked: Position | None = None  # where the file's name stands
+    reference: Position | None = None  # where the file's name stands
     while True:
-        root = read_cached(_text_of(file, asked), file.label)
+        root = read_cached(_text_of(file, reference), file.label)
         if str(file.path.resolve()) in seen:
-            raise problem_error(asked, f"extends: {file.label} extends itself")
+            raise problem_error(reference, f"extends: {file.label} extends itself")
         if len(seen) == MAX_EXTENDS:
-            raise problem_error(asked, f"extends: more than {MAX_EXTENDS} files deep")
+            raise problem_error(reference, f"extends: more than {MAX_EXTENDS} files deep")
         seen.append(str(file.path.resolve()))
         if not isinstance(root, Mapping):
             empty = root is None or (isinstance(root, Scalar) and root.value is None)
-            held = "is empty" if empty else f"holds a {'single value' if isinstance(root, Scalar) else 'list'}"
+            fault = "is empty" if empty else f"holds a {'single value' if isinstance(root, Scalar) else 'list'}"
             start = root.position if root else Position(file.label, 1, 1)
-            raise problem_error(start, f"the file {held}", "a block of keys, e.g. `extends: paper`")
+            raise problem_error(start, f"the file {fault}", "a block of keys, e.g. `extends: paper`")
         if file.text is not None:
             _refuse_named_files(root)
         yield file, root
         extends = root.entries.get("extends")
         if extends is None:
             return
-        asked = extends.position
+        reference = extends.position
         if not isinstance(extends, Scalar) or not isinstance(extends.value, str) or not extends.value:
-            raise problem_error(asked, "extends: is not the name of a config", _what_there_is())
-        named = extends.value in builtin_names()  # else a path from the file's folder
-        file = builtin_config(extends.value) if named else file_at(file.path.parent / extends.value)
+            raise problem_error(reference, "extends: is not the name of a config", _what_there_is())
+        is_builtin = extends.value in builtin_names()  # else a path from the file's folder
+        file = builtin_config(extends.value) if is_builtin else file_at(file.path.parent / extends.value)
 
 
 def _refuse_named_files(root: Mapping) -> None:
-    """Raise ConfigError if a stored config names a file to be read: it may be from a stranger, and has all its keys."""
+    """Raise ConfigError if a stored config refers to a file: it may be untrusted, and is complete anyway."""
     cases = cases_file(root, Path())
     places = [root.entries["extends"].position] if "extends" in root.entries else []
     places += [] if cases is None else [cases[1]]
@@ -122,15 +126,15 @@ def _refuse_named_files(root: Mapping) -> None:
 
 
 def cases_file(layer: Mapping, folder: Path) -> tuple[ConfigFile, Position] | None:
-    """The file that a config names under stability.cases, and where; None if it lists the cases itself.
+    """Return the file that a config names under stability.cases, and its position; None if it lists the cases itself.
 
-    folder  which relative names start from
+    folder  base of relative names
     """
     block = layer.entries.get("stability")
-    named = block.entries.get("cases") if isinstance(block, Mapping) else None
-    if not isinstance(named, Scalar) or not isinstance(named.value, str):
+    file_name = block.entries.get("cases") if isinstance(block, Mapping) else None
+    if not isinstance(file_name, Scalar) or not isinstance(file_name.value, str):
         return None
-    return file_at(folder / named.value), named.position
+    return file_at(folder / file_name.value), file_name.position
 
 
 def with_cases(layer: Mapping, folder: Path) -> Mapping:
@@ -140,48 +144,48 @@ def with_cases(layer: Mapping, folder: Path) -> Mapping:
 
     Raises ConfigError if the file cannot be read or holds no list.
     """
-    named, block = cases_file(layer, folder), layer.entries.get("stability")
-    if named is None or not isinstance(block, Mapping):
+    located, block = cases_file(layer, folder), layer.entries.get("stability")
+    if located is None or not isinstance(block, Mapping):
         return layer
-    file, position = named
+    file, position = located
     cases = read(_text_of(file, position, "a file that holds a list of cases"), file.label)
     if not isinstance(cases, Sequence):
         raise problem_error(Position(file.label, 1, 1), "the file does not hold a list", "a list of stability cases")
-    whole, inner = layer.without(), block.without()
+    result, inner = layer.without(), block.without()
     inner.put("cases", cases, block.keys["cases"])
-    whole.put("stability", inner, layer.keys["stability"])
-    return whole
+    result.put("stability", inner, layer.keys["stability"])
+    return result
 
 
 def _what_there_is() -> str:
     return f"a file, or one of {', '.join(builtin_names())}"
 
 
-def _text_of(file: ConfigFile, asked: Position | None, wanted: str = "") -> str:
-    """Text of a file.
+def _text_of(file: ConfigFile, reference: Position | None, purpose: str = "") -> str:
+    """Return the text of a file.
 
-    asked   where its name stands, for the message if it cannot be read
-    wanted  what it should be, if not a config
+    reference  position of its name, for the message if it cannot be read
+    purpose    expected content, if not a config
     """
     if file.text is not None:
         return file.text
-    kind = "file" if wanted else "config"
+    kind = "file" if purpose else "config"
     try:
         mode = file.path.stat().st_mode
         if not stat.S_ISREG(mode):
             what = "a folder" if stat.S_ISDIR(mode) else "not a regular file"
-            raise problem_error(asked, f"{kind} {file.label} is {what}", "a YAML file")
+            raise problem_error(reference, f"{kind} {file.label} is {what}", "a YAML file")
         with file.path.open("rb") as stream:
             data = stream.read(4 * MAX_CHARACTERS + 1)
     except FileNotFoundError:
-        there_is = wanted or _what_there_is() if asked else f"a run, {_what_there_is()}"
-        advice = KEYS_ARE_LISTED if wanted else "`walkerlab init` writes a config to begin with"
-        beyond = "" if wanted or file.path.suffix else beyond_scope(file.path.name)
+        there_is = purpose or _what_there_is() if reference else f"a run, {_what_there_is()}"
+        advice = KEYS_ARE_LISTED if purpose else "`walkerlab init` writes a config to begin with"
+        beyond = "" if purpose or file.path.suffix else beyond_scope(file.path.name)
         text = f"there is no {kind} {file.label}{f'; {beyond}' if beyond else ''}"
-        raise problem_error(asked, text, there_is, "" if beyond else _near(file), advice) from None
+        raise problem_error(reference, text, there_is, "" if beyond else _near(file), advice) from None
     except (OSError, ValueError, RuntimeError) as error:  # ValueError: a null byte in the name; RuntimeError: a loop
         reason = (error.strerror if isinstance(error, OSError) else None) or str(error)
-        raise problem_error(asked, f"{kind} {file.label} cannot be read: {reason.lower()}") from None
+        raise problem_error(reference, f"{kind} {file.label} cannot be read: {reason.lower()}") from None
     if len(data) > 4 * MAX_CHARACTERS:
         raise problem_error(Position(file.label, 1, 1), f"longer than {MAX_CHARACTERS} characters: not a config")
     try:
@@ -194,8 +198,8 @@ def _text_of(file: ConfigFile, asked: Position | None, wanted: str = "") -> str:
 
 def _near(file: ConfigFile) -> str:
     """Suggest an existing file or built-in config for a missing one."""
-    beside: list[str] = []
+    neighbours: list[str] = []
     with contextlib.suppress(OSError, ValueError):
-        beside = [path.name for path in file.path.parent.iterdir() if path.suffix in SUFFIXES]
-    found = nearest(file.path.name, beside)
-    return printable(str(file.path.with_name(found)), SHOWN_PATH) if found else nearest(file.path.stem, builtin_names())
+        neighbours = [path.name for path in file.path.parent.iterdir() if path.suffix in SUFFIXES]
+    match = nearest(file.path.name, neighbours)
+    return printable(str(file.path.with_name(match)), SHOWN_PATH) if match else nearest(file.path.stem, builtin_names())

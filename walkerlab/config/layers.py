@@ -51,12 +51,12 @@ def _merged(lower: Mapping, upper: Mapping) -> Mapping:
     return result
 
 
-def _refuse_two_slopes(given: dict[str, Position]) -> None:
-    slopes = [(name, place) for name, place in given.items() if name in SLOPE_KEYS]
+def _refuse_two_slopes(keys: dict[str, Position]) -> None:
+    slopes = [(name, place) for name, place in keys.items() if name in SLOPE_KEYS]
     if len(slopes) == len(SLOPE_KEYS):
-        (first, there), (second, here) = slopes
-        where = f" at {there}" if there else ""
-        raise problem_error(here, f"{second}: the slope is given already, as {first}{where}", "one of both")
+        (first, first_place), (second, second_place) = slopes
+        where = f" at {first_place}" if first_place else ""
+        raise problem_error(second_place, f"{second}: the slope is given already, as {first}{where}", "one of both")
 
 
 def parse_setting(text: str) -> ConfigSetting:
@@ -106,7 +106,9 @@ def _placed(block: Mapping, setting: ConfigSetting, depth: int) -> Mapping:
     if inner is None or (isinstance(inner, Scalar) and inner.value is None):
         inner = Mapping(setting.position)
     if not isinstance(inner, Mapping):
-        above, whole = ".".join(setting.path[: depth + 1]), ".".join(setting.path)
-        raise problem_error(setting.position, f"{printable(whole)}: {printable(above)} is a value, not a block of keys")
+        above, full_key = ".".join(setting.path[: depth + 1]), ".".join(setting.path)
+        raise problem_error(
+            setting.position, f"{printable(full_key)}: {printable(above)} is a value, not a block of keys"
+        )
     result.put(name, _placed(inner, setting, depth + 1), block.keys.get(name, setting.position))
     return result

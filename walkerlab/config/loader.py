@@ -179,8 +179,8 @@ def changes_of(base: Config, changed: Config, slope_deg: float | None = None) ->
         if block is not None and before[name] is None and after[name] is not None:
             before[name] = block().model_dump(mode="json")
             added.append(f"{name}=added")
-    known = dict(flatten(before))
-    differing = {key: value for key, value in flatten(after) if key not in known or known[key] != value}
+    values_before = dict(flatten(before))
+    differing = {key: value for key, value in flatten(after) if key not in values_before or values_before[key] != value}
     if slope_deg is not None and "slope_rad" in differing:
         differing = {"slope_deg" if key == "slope_rad" else key: value for key, value in differing.items()}
         differing["slope_deg"] = slope_deg
@@ -193,10 +193,10 @@ def run_name(name: str, changes: Sequence[str]) -> str:
     The label is the first changed block of a stage, otherwise the first key.
     """
     change = ",".join(changes)
-    whole = f"{name}@{change}" if change else name
-    if not change or (len(whole) <= MAX_NAME and not UNSAFE.search(change)):
-        return whole
-    keys = [key_of(one) for one in changes]
+    full_name = f"{name}@{change}" if change else name
+    if not change or (len(full_name) <= MAX_NAME and not UNSAFE.search(change)):
+        return full_name
+    keys = [key_of(change_text) for change_text in changes]
     label = next((key.partition(".")[0] for key in keys if key.partition(".")[0] in QUESTIONS), keys[0])
     return f"{name}@{UNSAFE.sub('-', label)}-{hashlib.sha256(change.encode()).hexdigest()[:8]}"
 

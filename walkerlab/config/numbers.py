@@ -5,7 +5,7 @@ from decimal import Decimal
 from typing import Any, Final
 
 SAME: Final = 1e-9
-"""Relative difference up to which two numbers are one, written in different units."""
+"""Maximum relative difference between equal numbers converted between units."""
 
 
 def short_number(number: float) -> str:
@@ -19,8 +19,8 @@ def short_number(number: float) -> str:
     return min(plain, f"{digits}e{int(exponent)}", key=len)
 
 
-def same(one: Any, other: Any) -> bool:
+def same(first: Any, second: Any) -> bool:
     """Whether two values are equal, numbers up to rounding."""
-    if isinstance(one, float | int) and isinstance(other, float | int):
-        return math.isclose(one, other, rel_tol=SAME)
-    return bool(one == other)
+    if isinstance(first, float | int) and isinstance(second, float | int):
+        return math.isclose(first, second, rel_tol=SAME)
+    return bool(first == second)

@@ -68,8 +68,8 @@ def beyond_scope(word: str) -> str:
 def nearest(word: str, candidates: Iterable[str]) -> str:
     """Return the candidate most similar to `word`; empty if none is similar."""
     spelled = {candidate.lower(): candidate for candidate in candidates}
-    found = difflib.get_close_matches(word[:SHOWN_LENGTH].lower(), spelled, n=1, cutoff=0.5)
-    return spelled[found[0]] if found else ""
+    matches = difflib.get_close_matches(word[:SHOWN_LENGTH].lower(), spelled, n=1, cutoff=0.5)
+    return spelled[matches[0]] if matches else ""
 
 
 def suggestion(word: str, candidates: Iterable[str]) -> str:

@@ -104,7 +104,7 @@ class _Composer:
         return root
 
     def _node(self, event: Any, depth: int) -> Node:
-        name, at = type(event).__name__, _position(event.start_mark, self._source, self._column)
+        name, position = type(event).__name__, _position(event.start_mark, self._source, self._column)
         if name == "AliasEvent":
             self._refuse(
                 event, f"alias *{printable(event.anchor)}: a config has none; write the value out, or use extends"
@@ -114,12 +114,12 @@ class _Composer:
         if event.tag is not None:
             self._refuse(event, f"tag {printable(event.tag)}: a config has none; types are known from the keys")
         if name == "ScalarEvent":
-            return Scalar(at, value_of(event.value) if event.implicit[0] else event.value, event.value)
+            return Scalar(position, value_of(event.value) if event.implicit[0] else event.value, event.value)
         if depth == MAX_DEPTH:
             self._refuse(event, f"nested deeper than {MAX_DEPTH} levels")
         if name == "SequenceStartEvent":
-            return Sequence(at, [self._node(item, depth + 1) for item in self._until("SequenceEndEvent")])
-        block = Mapping(at)
+            return Sequence(position, [self._node(item, depth + 1) for item in self._until("SequenceEndEvent")])
+        block = Mapping(position)
         for word in self._until("MappingEndEvent"):
             if type(word).__name__ in ("MappingStartEvent", "SequenceStartEvent"):
                 self._refuse(word, "a key is a word, not a list or a block")

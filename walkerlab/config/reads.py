@@ -1,7 +1,7 @@
-"""What stages and their helpers take of a config: each type names the keys that may be read, and mypy holds them to it.
+"""Types of the parts of a config that stages and their helpers read, which mypy enforces.
 
-A config is of every type here. A stage is given an object that has the keys of its type and no others, and the key of
-its result is made of them. What a key means, its unit and its bounds stand in config/schema.py.
+Each type lists its keys; a config satisfies all types. A stage gets an object with the keys of its type alone; these
+determine the key of its result. Meaning, unit and bounds of the keys are in config/schema.py.
 """
 
 from __future__ import annotations
@@ -27,26 +27,26 @@ if TYPE_CHECKING:
 
 @cache
 def keys_of(takes: type) -> dict[str, type | None]:
-    """The keys that a type names, those of its bases first; for a block of which it takes a part, the type of that."""
+    """Return the keys of a type, those of its bases first; for a block that is read in part, the type of that part."""
     members = (item for base in reversed(takes.__mro__) for item in vars(base).items())
     return {name: _part(member) for name, member in members if isinstance(member, property)}
 
 
 def _part(member: property) -> type | None:
     getter: Any = member.fget
-    named = getter.__globals__.get(getter.__annotations__.get("return"))
-    # a block of the config is taken whole, whether or not it is imported here
-    return named if Protocol in getattr(named, "__mro__", ()) else None
+    result_type = getter.__globals__.get(getter.__annotations__.get("return"))
+    # blocks of the config are read whole
+    return result_type if Protocol in getattr(result_type, "__mro__", ()) else None
 
 
 def dotted_keys(takes: type) -> Iterator[str]:
-    """The same keys, those of parts of blocks dotted: `solver.rigid`."""
+    """Yield the keys of a type, dotted in blocks that are read in part: `solver.rigid`."""
     for name, part in keys_of(takes).items():
         yield from (name,) if part is None else (f"{name}.{key}" for key in dotted_keys(part))
 
 
 def only(config: Any, takes: type | None) -> Any:
-    """An object with the keys that a type names, and no others; the config itself for None."""
+    """Return an object with only the keys of a type; the config itself for None."""
     if takes is None:
         return config
     return SimpleNamespace(**{name: only(getattr(config, name), part) for name, part in keys_of(takes).items()})
@@ -60,7 +60,7 @@ class PushOffAtOnce(Protocol):
 
 
 class RigidConfig(Protocol):
-    """What the rigid model is made of."""
+    """Scene of the rigid model."""
 
     @property
     def walker(self) -> Walker: ...
@@ -75,7 +75,7 @@ class RigidConfig(Protocol):
 
 
 class ContactConfig(RigidConfig, Protocol):
-    """What both models are made of."""
+    """Scene of both models."""
 
     @property
     def push_off(self) -> PushOff: ...
@@ -84,14 +84,14 @@ class ContactConfig(RigidConfig, Protocol):
 
 
 class StartConfig(Protocol):
-    """Where a walk starts."""
+    """Start of a walk."""
 
     @property
     def start(self) -> schema.Start: ...
 
 
 class WalkConfig(StartConfig, Protocol):
-    """Where a walk starts, how far it goes, and what is stored of it."""
+    """Start and length of a walk, its ground, and the arrays to store."""
 
     @property
     def strides(self) -> int: ...
@@ -136,32 +136,32 @@ class GroundConfig(SceneConfig, Protocol):
 
 
 class FixedPointConfig(RigidConfig, Protocol):
-    """What `fixedpoint` takes."""
+    """Keys that `fixedpoint` reads."""
 
     @property
     def seed(self) -> int: ...
 
 
 class SimulateConfig(WalkConfig, RigidConfig, Protocol):
-    """What `simulate` takes."""
+    """Keys that `simulate` reads."""
 
     @property
     def solver(self) -> RigidSolvers: ...
 
 
 class ContactSimConfig(WalkConfig, GroundConfig, Protocol):
-    """What `contact-sim` takes."""
+    """Keys that `contact-sim` reads."""
 
 
 class CompareConfig(ContactConfig, Protocol):
-    """What `compare` takes."""
+    """Keys that `compare` reads."""
 
     @property
     def ground(self) -> Footholds: ...
 
 
 class TuneConfig(GroundConfig, Protocol):
-    """What `tune` takes."""
+    """Keys that `tune` reads."""
 
     @property
     def strides(self) -> int: ...
@@ -177,7 +177,7 @@ class OwnCases(Protocol):
 
 
 class CompassCasesConfig(Protocol):
-    """What `stability` takes where the walker is the paper's compass: cases stand on the paper's config."""
+    """Keys that `stability` reads for the paper's compass, whose cases change the paper's config."""
 
     @property
     def walker(self) -> Walker: ...
@@ -188,7 +188,7 @@ class CompassCasesConfig(Protocol):
 
 
 class SceneCasesConfig(WalksConfig, Protocol):
-    """What `stability` takes where the walker is another one: cases stand on its own scene."""
+    """Keys that `stability` reads for other walkers, whose cases change their own scene."""
 
     @property
     def stability(self) -> OwnCases: ...
@@ -202,42 +202,42 @@ class MapCells(Protocol):
 
 
 class MapsConfig(Protocol):
-    """What `stability-maps` takes: the maps are of the paper's config."""
+    """Keys that `stability-maps` reads; it maps the paper's config."""
 
     @property
     def stability(self) -> MapCells: ...
 
 
 class ContinuationConfig(FixedPointConfig, ContactConfig, Protocol):
-    """What `continuation` takes."""
+    """Keys that `continuation` reads."""
 
     @property
     def continuation(self) -> Continuation: ...
 
 
 class BasinConfig(FixedPointConfig, GroundConfig, Protocol):
-    """What `basin` takes."""
+    """Keys that `basin` reads."""
 
     @property
     def basin(self) -> Basin: ...
 
 
 class RobustnessConfig(FixedPointConfig, ContactConfig, Protocol):
-    """What `robustness` takes."""
+    """Keys that `robustness` reads."""
 
     @property
     def robustness(self) -> Robustness: ...
 
 
 class DesignConfig(FixedPointConfig, ContactConfig, Protocol):
-    """What `design` takes."""
+    """Keys that `design` reads."""
 
     @property
     def design(self) -> Design | None: ...
 
 
 class NamedConfig(Protocol):
-    """What `plot` takes."""
+    """Keys that `plot` reads."""
 
     @property
     def name(self) -> str: ...
@@ -250,5 +250,5 @@ if TYPE_CHECKING:
     ]  # fmt: skip
 
     def of_each_type(config: schema.Config) -> OfEachType:
-        """Let mypy see that a config is."""
+        """Let mypy check that a config satisfies every type."""
         return config, config, config, config, config, config, config, config, config, config, config

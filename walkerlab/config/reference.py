@@ -19,7 +19,7 @@ from walkerlab.errors import ConfigError
 
 COLUMNS: Final = 79
 OF_A_KIND: Final = re.compile(r"\([a-z-]+\)")
-"""What tells a block's kinds apart in the name of a key; no config has it."""
+"""Kind of a block in the name of a key; configs do not contain it."""
 REFERENCE: Final = re.compile(r'"#/\$defs/([^"]+)"')
 EXTENDS_MEANING: Final = "config this one inherits from: a file, from this file's folder, or the name of a built-in one"
 
@@ -72,13 +72,13 @@ def _spelled(value: Any) -> str:
     return short_number(value) if isinstance(value, int | float) else str(value)
 
 
-def as_paragraphs(asked: str = "") -> str:
+def as_paragraphs(selection: str = "") -> str:
     """Describe the keys for a terminal, one paragraph each; by default all, otherwise those of a block or key.
 
     Raises ConfigError with the nearest key if there is no such block or key.
     """
     paragraphs = []
-    for key in select_keys(asked):
+    for key in select_keys(selection):
         what = [key.type, f"in {key.unit}" if key.unit not in ("", "1") else "", key.bounds]
         facts = [", ".join(filter(None, what)), f"default: {key.default}", key.meaning, f"source: {key.source}"]
         wrapped = [textwrap.fill(fact, COLUMNS, initial_indent="    ", subsequent_indent="      ") for fact in facts]
@@ -86,24 +86,26 @@ def as_paragraphs(asked: str = "") -> str:
     return "\n\n".join(paragraphs)
 
 
-def select_keys(asked: str) -> list[KeyReference]:
+def select_keys(selection: str) -> list[KeyReference]:
     """Select the keys of a block, or the key of that name, or all keys; ConfigError with the nearest key if none match.
 
     Keys that are equal in every kind of a block are listed once.
     """
     plain = {key: OF_A_KIND.sub("", key.key) for key in keys()}
-    found = [
-        key for key in plain if not asked or any(f"{name}.".startswith(f"{asked}.") for name in (key.key, plain[key]))
+    matches = [
+        key
+        for key in plain
+        if not selection or any(f"{name}.".startswith(f"{selection}.") for name in (key.key, plain[key]))
     ]
-    if not found:
+    if not matches:
         names = {".".join(name.split(".")[:depth]) for name in plain.values() for depth in (1, 2, 3)}
-        near = suggestion(asked, names) or suggestion(asked, {name.split(".")[-1] for name in names})
-        raise ConfigError(f"the config has no key {asked}.{near}", "`walkerlab schema` lists every key")
-    everywhere = {key for key in found if key.key == plain[key]}
-    return [key for key in found if key in everywhere or replace(key, key=plain[key]) not in everywhere]
+        near = suggestion(selection, names) or suggestion(selection, {name.split(".")[-1] for name in names})
+        raise ConfigError(f"the config has no key {selection}.{near}", "`walkerlab schema` lists every key")
+    everywhere = {key for key in matches if key.key == plain[key]}
+    return [key for key in matches if key in everywhere or replace(key, key=plain[key]) not in everywhere]
 
 
-def as_json_schema(asked: str = "") -> dict[str, Any]:
+def as_json_schema(selection: str = "") -> dict[str, Any]:
     """Return the JSON schema of a config file, or of one block or key.
 
     Raises ConfigError with the nearest key if there is no such block or key.
@@ -113,16 +115,16 @@ def as_json_schema(asked: str = "") -> dict[str, Any]:
     extends = {"type": "string", "description": EXTENDS_MEANING, "examples": list(builtin_names())}
     schema["properties"] = {"extends": extends, **schema["properties"], "slope_deg": degrees}
     schema["not"] = {"required": ["slope_rad", "slope_deg"]}
-    part = schema if not asked else part_of(schema, asked)
+    part = schema if not selection else part_of(schema, selection)
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **part}
 
 
-def part_of(schema: dict[str, Any], asked: str) -> dict[str, Any]:
+def part_of(schema: dict[str, Any], selection: str) -> dict[str, Any]:
     """Return the part of a JSON schema that describes a block or key, with the definitions it refers to."""
-    select_keys(asked)
+    select_keys(selection)
     definitions = schema["$defs"]
     parts = [schema]
-    for name in asked.split("."):
+    for name in selection.split("."):
         plain, _, kind = name.rstrip(")").partition("(")
         blocks = [block for part in parts for block in blocks_of(part, definitions)]
         parts = [block["properties"][plain] for block in blocks if plain in block["properties"]]
@@ -130,11 +132,11 @@ def part_of(schema: dict[str, Any], asked: str) -> dict[str, Any]:
             of_kinds = [block for part in parts for block in blocks_of(part, definitions)]
             parts = [block for block in of_kinds if block["properties"]["type"].get("const") == kind]
     unlike = list({json.dumps(part): part for part in parts}.values())
-    found = unlike[0] if len(unlike) == 1 else {"anyOf": unlike}
+    result = unlike[0] if len(unlike) == 1 else {"anyOf": unlike}
     needed: set[str] = set()
-    while more := set(REFERENCE.findall(json.dumps([found, *(definitions[name] for name in needed)]))) - needed:
+    while more := set(REFERENCE.findall(json.dumps([result, *(definitions[name] for name in needed)]))) - needed:
         needed |= more
-    return {**found, "$defs": {name: definitions[name] for name in sorted(needed)}} if needed else found
+    return {**result, "$defs": {name: definitions[name] for name in sorted(needed)}} if needed else result
 
 
 def blocks_of(part: dict[str, Any], definitions: dict[str, Any]) -> Iterator[dict[str, Any]]:

@@ -248,10 +248,10 @@ class Config(Block):
     @classmethod
     def _appendix_a_is_a_compass(cls, value: Equations, info: ValidationInfo) -> Equations:
         if value == "as-printed" and {"walker", "push_off"} <= info.data.keys():
-            given = SimpleNamespace(**info.data)
-            if acting := acting_on(given):
+            values = SimpleNamespace(**info.data)
+            if acting := acting_on(values):
                 raise meaning_error(f"is for a passive compass, and this walker has {', '.join(acting)}")
-            if not is_passive_compass(given):
+            if not is_passive_compass(values):
                 raise meaning_error("is for a compass, and this walker is not one")
         return value
 

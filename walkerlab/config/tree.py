@@ -15,17 +15,17 @@ class Position:
     column: int
 
     def __bool__(self) -> bool:
-        """Whether there is a place: arguments of functions have none."""
+        """False for arguments of functions, which have no position."""
         return bool(self.source)
 
     def __str__(self) -> str:
         """Format as source:line:column, which editors understand; options without line and column."""
-        whole = not self.line or self.source.startswith("--")
-        return self.source if whole else f"{self.source}:{self.line}:{self.column}"
+        without_line = not self.line or self.source.startswith("--")
+        return self.source if without_line else f"{self.source}:{self.line}:{self.column}"
 
 
 NOWHERE = Position("", 0, 0)
-"""The place of what is in no text: an argument of a function."""
+"""Position of arguments of functions, which are in no text."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,8 +57,8 @@ class Mapping:
 
     def without(self, *names: str) -> Mapping:
         """Copy the block without some keys."""
-        kept = {name: node for name, node in self.entries.items() if name not in names}
-        return Mapping(self.position, kept, {name: self.keys[name] for name in kept})
+        entries = {name: node for name, node in self.entries.items() if name not in names}
+        return Mapping(self.position, entries, {name: self.keys[name] for name in entries})
 
 
 Node: TypeAlias = Scalar | Sequence | Mapping

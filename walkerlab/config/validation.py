@@ -82,7 +82,7 @@ def validate_tree(tree: Mapping) -> Config:
 
 
 def align_start(config: Config, tree: Mapping) -> tuple[Config, tuple[str, ...]]:
-    """Move the start onto its constraints, and describe what was moved.
+    """Move the start onto its constraints, and describe the changes.
 
     Both feet stand on the slope (theta_1 + theta_2 = -2 phi), knees are straight, and coupled bodies, such as a torso
     on the legs' bisector, have the angles and rates of their coupling. For walkers of parts only couplings are applied.
@@ -99,7 +99,7 @@ def align_start(config: Config, tree: Mapping) -> tuple[Config, tuple[str, ...]]
         why[2] = "theta_1_shank", "so that the leg is straight"
     for place, (name, of) in followers(walker).items():
         for first, theta in ((0, "theta"), (bodies, "dtheta")):
-            start[first + place] = sum(weight * start[first + other] for other, weight in of.items())
+            start[first + place] = sum(weight * start[first + body] for body, weight in of.items())
             why[first + place] = f"{theta}_{name.split()[0]}", f"as the {name} follows other bodies"
     moved = [
         f"start: {name} moved from {short_number(config.start[place])} to {short_number(start[place])} "
@@ -189,9 +189,9 @@ def _problem(detail: ErrorDetails, tree: Mapping, model: type[Block]) -> Problem
     return Problem(position, f"{key}: {value} {reason}", right, meant if meant != word else "")
 
 
-def _is_later(one: Position, other: Position) -> bool:
+def _is_later(place: Position, earlier: Position) -> bool:
     """Whether `one` belongs to a user's change of the config at `other`."""
-    return one.source.startswith("--") or (bool(one) and other.source.startswith("built-in"))
+    return place.source.startswith("--") or (bool(place) and earlier.source.startswith("built-in"))
 
 
 def _along(
@@ -219,8 +219,8 @@ def _along(
 
 
 def _unknown_key(location: Location, tree: Mapping) -> Problem:
-    above, field, held = _along(Config, location[:-1], tree)
-    name, block = str(location[-1]), held or Config
+    above, field, inner = _along(Config, location[:-1], tree)
+    name, block = str(location[-1]), inner or Config
     kinds = {} if field is None else kinds_of(field)
     parent, _ = node_at(tree, location[:-1])
     assert isinstance(parent, Mapping), "it holds the key"
@@ -234,24 +234,24 @@ def _unknown_key(location: Location, tree: Mapping) -> Problem:
     beyond = beyond_scope(name) or (beyond_scope(value.text) if name == "type" and isinstance(value, Scalar) else "")
     if beyond:
         return Problem(parent.keys[name], f"{text}; {beyond}", ", ".join(siblings))
-    beside = nearest(name, siblings) if "." not in name else ""
-    if beside == "slope_rad" and "rad" not in name:
-        beside = "slope_deg"
-    meant = ".".join((*above, beside)) if beside else _elsewhere(name, exactly=bool(above))
-    return Problem(parent.keys[name], text, ", ".join(siblings), meant)
+    similar = nearest(name, siblings) if "." not in name else ""
+    if similar == "slope_rad" and "rad" not in name:
+        similar = "slope_deg"
+    intended = ".".join((*above, similar)) if similar else _elsewhere(name, exactly=bool(above))
+    return Problem(parent.keys[name], text, ", ".join(siblings), intended)
 
 
 def _keys_of_another_kind(
-    above: str, given: Mapping, source: str, block: type[Block], kinds: dict[str, type[Block]]
+    above: str, entries: Mapping, source: str, block: type[Block], kinds: dict[str, type[Block]]
 ) -> Problem:
     """Describe all keys from one source that belong to another type of the block."""
-    others = {key for one in kinds.values() for key in one.model_fields} - {*block.model_fields}
-    strange = {key: place for key, place in given.keys.items() if key in others and place.source == source}
+    foreign_keys = {key for kind_block in kinds.values() for key in kind_block.model_fields} - {*block.model_fields}
+    strange = {key: place for key, place in entries.keys.items() if key in foreign_keys and place.source == source}
     where = next(iter(strange.values()))
-    chosen = next(kind for kind, one in kinds.items() if one is block)
-    other = next(kind for kind, one in kinds.items() if next(iter(strange)) in one.model_fields)
-    type_at = given.keys.get("type", where)
-    has_no = f"has no {', '.join(strange)} (of type {other})"
+    chosen = next(kind for kind, kind_block in kinds.items() if kind_block is block)
+    other_kind = next(kind for kind, kind_block in kinds.items() if next(iter(strange)) in kind_block.model_fields)
+    type_at = entries.keys.get("type", where)
+    has_no = f"has no {', '.join(strange)} (of type {other_kind})"
     if source.startswith("--") or type_at.source in (source, builtin_config(DEFAULT).label):
         return Problem(where, f"{above}.type is {chosen}, which {has_no}", ", ".join(block.model_fields))
     layers = {name: merge_layers(read_layers(builtin_config(name))) for name in (DEFAULT, *builtin_names())}
@@ -267,8 +267,8 @@ def _elsewhere(name: str, exactly: bool) -> str:
     if "." in name:
         *blocks, last = nearest(name, paths.values()).split(".")
         return f"{': {'.join(blocks)}: {{{last}: …{'}' * len(blocks)}" if blocks else last
-    found = name if exactly else nearest(name, paths)
-    return paths.get(found, "")
+    match = name if exactly else nearest(name, paths)
+    return paths.get(match, "")
 
 
 def node_at(tree: Mapping, location: Location) -> tuple[Node | None, Position]:

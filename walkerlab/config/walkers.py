@@ -21,7 +21,7 @@ HSU_CHEN: Final = "Hsu Chen, Passive dynamic walking with knees, MIT (2007)"
 MAX_LENGTH_M: Final = 1e3  # m
 LEG_LENGTH_DIGITS: Final = 1e-6  # relative, to which a leg's length agrees with its parts
 MAX_MASS_KG: Final = 1e6  # kg
-LIGHTEST_CONTACT: Final = 1e-9  # of the walker's mass: what a foot on compliant ground must carry along
+LIGHTEST_CONTACT: Final = 1e-9  # minimum share of the walker's mass that moves with a foot on compliant ground
 
 Metres = Annotated[float, Field(ge=-MAX_LENGTH_M, le=MAX_LENGTH_M)]
 Point = tuple[Metres, Metres]
@@ -67,12 +67,12 @@ def check_arc(name: str, of: str, limit: Callable[[Any], float] = float) -> Any:
 def check_inertia(inertia: str, why: str, *places: str) -> Any:
     """Validate that a part whose mass lies on its upper hinge (keys `places` are 0) has an inertia."""
 
-    def some(value: float, info: ValidationInfo) -> float:
+    def has_inertia(value: float, info: ValidationInfo) -> float:
         if value == 0.0 and all(info.data.get(place) == 0.0 for place in places):
             raise meaning_error(f"is 0 with {why} would be massless")
         return value
 
-    return field_validator(inertia)(some)
+    return field_validator(inertia)(has_inertia)
 
 
 class Torso(Block):
@@ -103,7 +103,7 @@ class _Legged(Block):
     @field_validator("hip", check_fields=False)
     @classmethod
     def _legs_can_follow(cls, value: Hip, info: ValidationInfo) -> Hip:
-        with suppress(AttributeError):  # what is wrong with the keys above is told
+        with suppress(AttributeError):  # errors of the keys above are reported already
             inertia = leg_inertia(SimpleNamespace(**info.data))
             if value.too_quick_for(inertia):
                 most = f"at most {QUICKEST**2 * inertia:.3g} (torque, spring) and {QUICKEST * inertia:.3g} (damper)"
@@ -314,11 +314,11 @@ class PartsWalker(_Legged):
     @classmethod
     def _agrees_with_the_soles(cls, value: float, info: ValidationInfo) -> float:
         if {"hinges", "feet", "legs"} - info.data.keys():
-            return value  # what is wrong with those is told
-        found = hip_to_sole(info.data["hinges"], info.data["feet"], info.data["legs"])
-        if found is None or math.isclose(value, found, rel_tol=LEG_LENGTH_DIGITS):
+            return value  # errors of those keys are reported already
+        length = hip_to_sole(info.data["hinges"], info.data["feet"], info.data["legs"])
+        if length is None or math.isclose(value, length, rel_tol=LEG_LENGTH_DIGITS):
             return value
-        upright = f"upright, from the hip's hinge to the first leg's sole, it is {found:.9g} m"
+        upright = f"upright, from the hip's hinge to the first leg's sole, it is {length:.9g} m"
         raise meaning_error(f"disagrees with the parts: {upright}")
 
     @property
@@ -374,17 +374,20 @@ def rigid_bodies(walker: Any) -> int:
 
 def followers(walker: Any) -> dict[int, tuple[str, dict[int, float]]]:
     """Return the coupled angles of the rigid model's state: index to body name and weights by index."""
-    found = {}
+    coupled = {}
     if isinstance(walker, PartsWalker):
         swinging, stance = walker.legs
         shared = [body.name for body in walker.bodies if body.name not in (*swinging, *stance)]
         place = {name: k for k, name in enumerate((swinging[0], stance[0], *swinging[1:], *shared))}
         place |= dict.fromkeys(stance, 1)
-        for one in walker.couplings:
-            found[place[one.body]] = one.body, {place[of]: w for of, w in zip(one.of, one.weights, strict=True)}
+        for coupling in walker.couplings:
+            coupled[place[coupling.body]] = (
+                coupling.body,
+                {place[of]: w for of, w in zip(coupling.of, coupling.weights, strict=True)},
+            )
     if walker.torso is not None:
-        found[rigid_bodies(walker) - 1] = "torso", {0: 0.5, 1: 0.5}
-    return found
+        coupled[rigid_bodies(walker) - 1] = "torso", {0: 0.5, 1: 0.5}
+    return coupled
 
 
 def is_passive_compass(config: Any) -> bool:
@@ -406,7 +409,7 @@ def leg_inertia(walker: Any) -> float:
         thigh = upper.mass_kg * (upper.mass_below_hip_m**2 + upper.mass_ahead_m**2) + upper.inertia_kg_m2
         return float(thigh + lower.mass_kg * squared + lower.inertia_kg_m2)
     own = [body for body in walker.bodies if body.name in walker.legs[0]]
-    on_them = [one.mass_kg for one in walker.particles if one.body in walker.legs[0]]
+    on_them = [particle.mass_kg for particle in walker.particles if particle.body in walker.legs[0]]
     mass = sum(on_them) + sum(body.mass_kg for body in own)
     return float(mass * walker.leg_length_m**2 + sum(body.inertia_kg_m2 for body in own))
 
@@ -455,29 +458,31 @@ def why_no_state(start: Any, walker: Any) -> str:
 def contact_to_add(walker: Any) -> str:
     """Suggest a contact block in YAML: the paper's values scaled by mass, on terrain that suits the legs."""
     share, paper = walker.total_mass_kg / CompassWalker().total_mass_kg, Contact()
-    stiffness, damping = (short_number(float(f"{share * one:.3g}")) for one in (paper.stiffness, paper.damping))
+    stiffness, damping = (short_number(float(f"{share * value:.3g}")) for value in (paper.stiffness, paper.damping))
     numbers = f"stiffness: {stiffness}, damping: {damping}"
     return f"contact: {{{numbers}, terrain: {'plane' if has_knees(walker) else 'after-mid-swing'}}}"
 
 
 def has_knees(walker: Any) -> TypeGuard["Kneed | PartsWalker"]:
     """Whether the swing leg shortens and so clears plain ground."""
-    return isinstance(walker, Kneed) or (isinstance(walker, PartsWalker) and any(one.locks for one in walker.hinges))
+    return isinstance(walker, Kneed) or (
+        isinstance(walker, PartsWalker) and any(hinge.locks for hinge in walker.hinges)
+    )
 
 
 def why_rigid_alone(walker: Any) -> str:
     return f"The contact model was not used: {too_light_for_contact(walker) or 'the config has no contact block'}."
 
 
-def contact_required_error(asked: str, walker: Any, instead: str) -> ConfigError:
+def contact_required_error(request: str, walker: Any, instead: str) -> ConfigError:
     """Build the error for a request that needs contact, which the config lacks.
 
     instead  advice if only the block is missing
     """
     why = too_light_for_contact(walker)
     if why:
-        return ConfigError(f"{asked} needs contact, but {why}.", "Stay with the rigid model, or give the legs mass.")
-    return ConfigError(f"{asked} needs a contact block, and the config has none.", instead)
+        return ConfigError(f"{request} needs contact, but {why}.", "Stay with the rigid model, or give the legs mass.")
+    return ConfigError(f"{request} needs a contact block, and the config has none.", instead)
 
 
 Walker = Annotated[

@@ -14,7 +14,7 @@ from walkerlab.config.reader import value_of
 from walkerlab.config.schema import Config, Source
 
 PUNCTUATION = re.compile(r"""^[^\w./]|[:#,\[\]{}"'\n]|^$""")
-"""What YAML may read as more than text in an unquoted value."""
+"""Characters that need quotes in a YAML value."""
 WIDTH: Final = 110
 ELSEWHERE: Final = "left out; `walkerlab schema {}` has its keys"
 
@@ -42,15 +42,15 @@ def slope_in_degrees(slope_rad: float) -> float | None:
 
 
 def _different(base: dict[str, Any], changed: dict[str, Any]) -> dict[str, Any]:
-    found: dict[str, Any] = {}
+    different: dict[str, Any] = {}
     for name, value in changed.items():
         below = base.get(name)
         if isinstance(value, dict) and isinstance(below, dict):
             if inner := _different(below, value):
-                found[name] = inner
+                different[name] = inner
         elif name not in base or value != below:
-            found[name] = value
-    return found
+            different[name] = value
+    return different
 
 
 def to_commented_yaml(config: Config, left_alone: Collection[str] = ()) -> str:
@@ -65,21 +65,21 @@ def to_commented_yaml(config: Config, left_alone: Collection[str] = ()) -> str:
 
 def _commented(block: Block, values: dict[str, Any], indent: str, path: str = "") -> Iterator[str]:
     for name, value in values.items():
-        field, held = type(block).model_fields[name], getattr(block, name)
-        if isinstance(held, Block):
+        field, content = type(block).model_fields[name], getattr(block, name)
+        if isinstance(content, Block):
             yield from [""] * (not indent)
             yield from _comment(field.description or "", indent)
             yield f"{indent}{name}:"
-            yield from _commented(held, value, f"{indent}  ", f"{path}{name}.")
+            yield from _commented(content, value, f"{indent}  ", f"{path}{name}.")
         elif value is None and block_of(field) is Source:
             continue  # the study that a built-in config redoes is not a user's own
         elif value is None and block_of(field) is not None:
             yield f"{indent}# {name}: {ELSEWHERE.format(path + name)}"
-        elif isinstance(held, tuple) and (listed := block_of(field)) is not None:
+        elif isinstance(content, tuple) and (listed := block_of(field)) is not None:
             yield from _comment(field.description or "", indent)
-            for inner, one in listed.model_fields.items():
-                yield from _comment(f"{inner}: {_meaning(one)}", f"{indent}  ")
-            yield f"{indent}{name}:" if held else f"{indent}{name}: []"
+            for inner, inner_field in listed.model_fields.items():
+                yield from _comment(f"{inner}: {_meaning(inner_field)}", f"{indent}  ")
+            yield f"{indent}{name}:" if content else f"{indent}{name}: []"
             for item in value:
                 yield f"{indent}  - {{{', '.join(f'{key}: {_value(inner)}' for key, inner in item.items())}}}"
         else:

@@ -93,19 +93,19 @@ class Executor:
     def carry_out(self, likely: Sequence[Stage] = ()) -> None:
         """Decide on each stage and carry that out; `likely` are the stages that the plan would run."""
         self._waiting, self._left, self._total = list(self.stages), [stage.name for stage in likely], len(likely)
-        beside = self.jobs > 1 and any_side_by_side(likely, self.config)
+        side_by_side = self.jobs > 1 and any_side_by_side(likely, self.config)
         try:
             with WorkerPool(self.jobs) as pool:
                 precompiler = Precompiler(pool, self.config)
                 while self._waiting or self._running:
-                    self._start_ready_stages(pool if beside else None, precompiler)
+                    self._start_ready_stages(pool if side_by_side else None, precompiler)
                     while self._working and not self._events.get()():
                         pass
                     self._draw_early()
                 precompiler.raise_bugs({done.stage for done in self.done if done.action == "run"})
         finally:
-            for begun in self._running.values():
-                begun.reporter.end("")
+            for running_stage in self._running.values():
+                running_stage.reporter.end("")
 
     def skip(self, step: Step) -> None:
         """Record a stage that does not run."""
@@ -115,13 +115,13 @@ class Executor:
 
     def inputs(self, stage: Stage) -> dict[str, Content]:
         """Return the results that a stage gets: those it needs, and optional ones that are current."""
-        there = self.answers.keys() - self.left_out.keys()
-        return {name: self.answers[name] for name in stage.results(self.config) if name in there}
+        available = self.answers.keys() - self.left_out.keys()
+        return {name: self.answers[name] for name in stage.results(self.config) if name in available}
 
     def missing_inputs(self, stage: Stage) -> tuple[LeftOut, ...]:
         """Return the results that a stage has to do without, with the reasons."""
         missing = (name for name in stage.results(self.config) if name not in self._keys)
-        return tuple(left_out(name, self._why_absent(name)) for name in missing)
+        return tuple(omission_of(name, self._why_absent(name)) for name in missing)
 
     def _decide(self, stage: Stage) -> Step:
         """Decide on a stage after its inputs.
@@ -182,7 +182,7 @@ class Executor:
     def _start_ready_stages(self, pool: WorkerPool | None, precompiler: Precompiler) -> None:
         """Start all ready stages in `pool`, or run the next one in this process if `pool` is None."""
         for stage in list(self._waiting):
-            timing = any(begun.step.stage.work == "times" for begun in self._running.values())
+            timing = any(running_stage.step.stage.work == "times" for running_stage in self._running.values())
             if timing or len(self._working) == self.jobs:
                 return
             if not self._is_ready(stage):
@@ -201,9 +201,11 @@ class Executor:
                 return
             elif not (stage.work == "times" and self._running):
                 self._waiting.remove(stage)
-                begun = self._begin(step)
-                future = pool.start(partial(run_in_worker, begun.task), partial(self._hear, begun.reporter))
-                self._running[future] = begun
+                running_stage = self._begin(step)
+                future = pool.start(
+                    partial(run_in_worker, running_stage.task), partial(self._hear, running_stage.reporter)
+                )
+                self._running[future] = running_stage
                 self._watch(future)
 
     def _run_here(self, step: Step, precompiler: Precompiler) -> None:
@@ -213,9 +215,9 @@ class Executor:
         if slow and nothing_compiled_yet():
             precompiler.begin(slow[0], only_first=False)
         precompiler.wait_for(step.stage)
-        begun = self._running[None] = self._begin(step)
-        with watch_compilation(begun.reporter.compiling):
-            answer = begun.task.run(begun.reporter)
+        running_stage = self._running[None] = self._begin(step)
+        with watch_compilation(running_stage.reporter.compiling):
+            answer = running_stage.task.run(running_stage.reporter)
         self._finish(None, answer)
 
     def _watch(self, future: Future[Any]) -> None:
@@ -239,7 +241,9 @@ class Executor:
         return self._unsettled().isdisjoint(stage.results(self.config))
 
     def _unsettled(self) -> set[str]:
-        return {stage.name for stage in self._waiting} | {begun.task.name for begun in self._running.values()}
+        return {stage.name for stage in self._waiting} | {
+            running_stage.task.name for running_stage in self._running.values()
+        }
 
     def _begin(self, step: Step) -> Begun:
         if step.damaged is not None:
@@ -258,19 +262,19 @@ class Executor:
 
     def _finish(self, future: Future[Any] | None, answer: Content) -> None:
         """Keep a stage's result, which is partial if there is no answer."""
-        begun = self._running[future]
-        step, name = begun.step, begun.task.name
+        running_stage = self._running[future]
+        step, name = running_stage.step, running_stage.task.name
         awaited = any(name in stage.results(self.config) for stage in self._waiting)
-        kept = self.results.keep(step, answer, awaited)
+        stored = self.results.keep(step, answer, awaited)
         del self._running[future]
-        self._settle(step, kept)
-        reason = step.reason if kept.no_answer is None else f"no answer: {kept.no_answer.message}"
-        done = StageDone(name, "run", reason, time.perf_counter() - begun.started)
+        self._settle(step, stored)
+        reason = step.reason if stored.no_answer is None else f"no answer: {stored.no_answer.message}"
+        done = StageDone(name, "run", reason, time.perf_counter() - running_stage.started)
         self.done.append(done)
-        self._left = [other for other in self._left if other != name]
-        answered = [] if kept.complete else ["no answer"]
-        left = [f"left: {', '.join(self._left)}"] if self._left else []
-        begun.reporter.end("; ".join([outcome_line(done), *answered, *left]))
+        self._left = [stage_left for stage_left in self._left if stage_left != name]
+        answered = [] if stored.complete else ["no answer"]
+        rest = [f"left: {', '.join(self._left)}"] if self._left else []
+        running_stage.reporter.end("; ".join([outcome_line(done), *answered, *rest]))
 
     def _draw_early(self) -> None:
         """Draw a partial page once its main results exist, while others are being computed."""
@@ -280,15 +284,19 @@ class Executor:
             return
         for stage in self._waiting:
             inputs = self.inputs(stage)
-            wanted = unsettled.intersection(stage.inputs(self.config))
-            pending = {name for name in wanted if self.graph[name].why_unsuited(self.config) is None}
-            others = [name for name in pending if not self.graph[name].draws]
-            if not stage.early_with or not others or not inputs or unsettled & set(stage.early_with):
+            missing = unsettled.intersection(stage.inputs(self.config))
+            pending = {name for name in missing if self.graph[name].why_unsuited(self.config) is None}
+            computing = [name for name in pending if not self.graph[name].draws]
+            if not stage.early_with or not computing or not inputs or unsettled & set(stage.early_with):
                 continue
             absent = [entry for entry in self.missing_inputs(stage) if entry.what not in pending]
-            absent += [LeftOut(one.name, STILL_COMPUTED) for one in self.stages if one.name in pending]
+            absent += [
+                LeftOut(stage_pending.name, STILL_COMPUTED)
+                for stage_pending in self.stages
+                if stage_pending.name in pending
+            ]
             task = task_of(stage, self.config, inputs, folder=folder, left_out=tuple(absent))
-            self.reporter.drawn(task.run(Silent()).summary, folder)
+            self.reporter.announce_page(task.run(Silent()).summary, folder)
 
 
 def survey(config: Config, folder: RunFolder, graph: Graph = PIPELINE) -> tuple[Step, ...]:
@@ -319,7 +327,7 @@ def answer_in_memory(
     return Content({}, {"no_answer": {"message": run.left_out[target], "advice": advice}}, complete=False)
 
 
-def left_out(stage: str, why: str) -> LeftOut:
+def omission_of(stage: str, why: str) -> LeftOut:
     """Describe a stage that does not run."""
     return LeftOut(stage, why, "loading and compiling contact code" if why == without_block("contact") else "")
 

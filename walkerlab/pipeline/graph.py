@@ -50,7 +50,7 @@ def gait_for_start_or_pads(config: SceneConfig) -> tuple[str, ...]:
     return ("fixedpoint",) if pitch_of_gait else gait_unless_start_is_given(config)
 
 
-def known_and_start(config: SceneConfig) -> tuple[str, ...]:
+def known_problems_and_start(config: SceneConfig) -> tuple[str, ...]:
     """Need the known problems; for walkers of no study also the start of their own scene."""
     return ("known-problems", *(() if is_studied(config) else gait_for_start_or_pads(config)))
 
@@ -255,7 +255,7 @@ PIPELINE = Graph(
     Stage(
         "stability", "walkerlab.evidence.verification.stability",
         "Verify extreme cases and problems with known answers.",
-        reads.CompassCasesConfig, known_and_start, takes_of_scene=reads.SceneCasesConfig,
+        reads.CompassCasesConfig, known_problems_and_start, takes_of_scene=reads.SceneCasesConfig,
         takes_of_paper=reads.WalksConfig,
         does_without=later("walkerlab.evidence.verification.omissions", "verification_omissions"),
     ),

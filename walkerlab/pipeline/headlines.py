@@ -65,21 +65,21 @@ def headlines(stage: str, names: Iterable[str]) -> list[str]:
 
     names  of all quantities, dotted
     """
-    there = list(dict.fromkeys(names))
+    unique = list(dict.fromkeys(names))
     if stage not in HEADLINES:
-        return [name for name in there if "." not in name][:MOST]
-    meant = ([name for name in there if stands_for(wanted, name)] for wanted in HEADLINES[stage])
-    return list(chain(*meant))[:MOST]
+        return [name for name in unique if "." not in name][:MOST]
+    matches = ([name for name in unique if stands_for(entry, name)] for entry in HEADLINES[stage])
+    return list(chain(*matches))[:MOST]
 
 
-def stands_for(wanted: str, name: str) -> bool:
+def stands_for(entry: str, name: str) -> bool:
     """Whether an entry of `HEADLINES` or `QUANTITIES` covers a quantity."""
-    return name == wanted or (wanted.endswith(".") and name.startswith(wanted))
+    return name == entry or (entry.endswith(".") and name.startswith(entry))
 
 
 def has_quantity(stage: str, name: str) -> bool:
     """Whether a stage may have a quantity of that name; always true for an unlisted stage."""
-    return stage not in QUANTITIES or any(stands_for(known, name) for known in QUANTITIES[stage])
+    return stage not in QUANTITIES or any(stands_for(entry, name) for entry in QUANTITIES[stage])
 
 
 def claims(compared: Mapping[str, Any]) -> Sequence[Mapping[str, Any]]:

@@ -32,8 +32,8 @@ class Keys:
         """Return the keys of a stage and of all it needs, by name; raises as `Graph.needed_in_memory`."""
         keys: dict[str, str] = {}
         for stage in self.graph.needed_in_memory(target, config):
-            given = {name: keys[name] for name in stage.inputs(config)}
-            keys[stage.name] = self.identity(stage, config, given).key
+            input_keys = {name: keys[name] for name in stage.inputs(config)}
+            keys[stage.name] = self.identity(stage, config, input_keys).key
         return keys
 
     def identity(self, stage: Stage, config: Config, input_keys: Mapping[str, str], again: bool = True) -> Identity:

@@ -25,8 +25,8 @@ class Progress(Protocol):
 def track(progress: Progress, label: str, total: int, done: Iterable[R], n: int = 1) -> Iterator[R]:
     """Iterate over `done`, advancing `progress` by `n` after each item."""
     progress.start(label, total)
-    for one in done:
-        yield one
+    for item in done:
+        yield item
         progress.advance(n)
 
 
@@ -50,7 +50,7 @@ class Reporter(Protocol):
         expected_s  its last run time, if known
         """
 
-    def drawn(self, summary: Mapping[str, Any], folder: Path) -> None:
+    def announce_page(self, summary: Mapping[str, Any], folder: Path) -> None:
         """Announce a partial page in a run's folder while the rest is being computed."""
 
     def note(self, text: str) -> None:
@@ -67,7 +67,7 @@ class Silent:
         """Return itself."""
         return self
 
-    def note(self, *_told: Any, **_named: Any) -> None:
+    def note(self, *_arguments: Any, **_keywords: Any) -> None:
         """Discard the message."""
 
-    start = advance = warn = compiling = end = drawn = note
+    start = advance = warn = compiling = end = announce_page = note

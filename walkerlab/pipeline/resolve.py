@@ -82,13 +82,13 @@ def artifact_at(path: Path) -> tuple[RunFolder, ConfigFile] | None:
     except Damaged as error:
         raise ConfigError(
             f"{path} is damaged, and no config can be taken from it: {error}.",
-            f"`-c {folder.typed}` takes the one of its folder.",
+            f"`-c {folder.quoted_path}` takes the one of its folder.",
         ) from None
     return folder, ConfigFile(Path(folder.name), str(path), stored.provenance.config, folder.changes)
 
 
 def run_at(text: str, runs: Path) -> tuple[RunFolder, ConfigFile] | None:
-    """Return the run of a name or folder and its config; None if there is none."""
+    """Return the run of a name or folder and its config; None without one."""
     folder = find_run(text, runs)
     if folder is None:
         return None

@@ -68,11 +68,11 @@ class FolderResults:
         if not why and stored is not None:
             reason = UP_TO_DATE if stored.no_answer is None else f"no answer: {stored.no_answer.message}"
             return Step(stage, "reuse", reason, identity, stored)
-        # drawings are files beside their artifact and are always drawn in their own folder
+        # drawings are files next to their artifact, so each folder has its own
         looks = self.elsewhere and not force and not stage.draws
-        found = find_elsewhere(self.run, stage.name, identity.key) if looks else None
-        if found is not None and not recomputed_input(stage, found[1], inputs):
-            origin, result = found
+        match = find_elsewhere(self.run, stage.name, identity.key) if looks else None
+        if match is not None and not recomputed_input(stage, match[1], inputs):
+            origin, result = match
             return Step(stage, "reuse", f"the same as in {origin.parent}", identity, result, damaged, origin)
         return Step(stage, "run", why, identity, stored, damaged)
 
@@ -97,26 +97,26 @@ class FolderResults:
 
     def keep(self, step: Step, answer: Content, awaited: bool) -> Stored:  # noqa: ARG002
         """Store a result and remove its checkpoint; raises StorageError if the system refuses."""
-        begun, checkpoint = self._begun.pop(step.stage.name)
+        origin, checkpoint = self._begun.pop(step.stage.name)
         assert step.identity is not None, "a stage that is left out does not run"
         path = self.run.artifact(step.stage.name)
-        stored = artifact.write(path, answer, step.identity, begun.until_now())
+        stored = artifact.write(path, answer, step.identity, origin.until_now())
         checkpoint.forget()
         return stored
 
     def _why_outdated(self, stage: Stage, identity: Identity, verdict: Verdict, inputs: Mapping[str, Content]) -> str:
         """Return why a stage has to run; empty if its result is current."""
-        found = verdict.artifact
-        if not verdict.accepted or found is None:
-            changes = changed_parts(found.identity, identity) if found is not None else []
+        stored = verdict.artifact
+        if not verdict.accepted or stored is None:
+            changes = changed_parts(stored.identity, identity) if stored is not None else []
             return ", ".join(changes) or verdict.reason
-        return broken_file(self.folder, found) or recomputed_input(stage, found, inputs)
+        return broken_file(self.folder, stored) or recomputed_input(stage, stored, inputs)
 
 
-def recomputed_input(stage: Stage, found: Stored, inputs: Mapping[str, Content]) -> str:
-    """Name an input whose content differs from the one that a result was made with; empty if there is none."""
+def recomputed_input(stage: Stage, stored: Stored, inputs: Mapping[str, Content]) -> str:
+    """Name an input whose content differs from that used for a result; empty if all agree."""
     for name, result in inputs.items():
-        if found.provenance.input_digests.get(name) != input_digest(stage, result):
+        if stored.provenance.input_digests.get(name) != input_digest(stage, result):
             return f"input {name} was recomputed"
     return ""
 

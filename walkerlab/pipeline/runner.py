@@ -8,7 +8,7 @@ from typing import Any
 
 from walkerlab.config.schema import Config
 from walkerlab.errors import NoAnswer
-from walkerlab.pipeline.executor import Executor, StageDone, left_out
+from walkerlab.pipeline.executor import Executor, StageDone, omission_of
 from walkerlab.pipeline.graph import PIPELINE, Graph, Stage
 from walkerlab.pipeline.progress import Reporter
 from walkerlab.pipeline.results import FolderResults, Step
@@ -26,7 +26,7 @@ class StageReport:
     reused     whether the result existed already
     wall_s     total time, inputs included
     left_out   results that were not computed, with the reasons
-    summary    of the result; empty if there is none
+    summary    of the result; empty without one
     steps      outcome of each stage
     no_answer  message and advice if the computation, or an input of the drawing, has no answer
     results    summaries of all stages involved that have a result
@@ -111,7 +111,7 @@ def execute(
     if changes and not options.dry:
         refuse_incomplete_law(config, steps)
         reused = "" if options.force else ", and its results will be reused"
-        with folder.locked(options.wait, lambda held: run.reporter.note(held + reused)):
+        with folder.locked(options.wait, lambda message: run.reporter.note(message + reused)):
             claim(folder, config)
             # decide again: another process may have worked here until now
             run = executor()
@@ -159,7 +159,7 @@ def all_left_out(run: Executor, target: Stage, by_stage: Sequence[dict[str, str]
     """
     missing = run.missing_inputs(target) if target.draws else ()
     absent = [entry for entry in missing if not run.graph[entry.what].only_by]
-    absent += [left_out(done.stage, done.reason) for done in run.done if done.action == "leave out"]
+    absent += [omission_of(done.stage, done.reason) for done in run.done if done.action == "leave out"]
     entries = [*by_stage]
     for done in run.done:
         if done.action != "leave out":

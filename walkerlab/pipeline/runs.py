@@ -74,8 +74,12 @@ def config_text(folder: RunFolder) -> str | None:
     record = folder.record()
     if record is not None:
         return record.config
-    found = read_all(folder, stored_in(folder))[0].values()
-    return max(found, key=lambda stored: stored.provenance.ended_utc).provenance.config if found else None
+    stored_results = read_all(folder, stored_in(folder))[0].values()
+    return (
+        max(stored_results, key=lambda stored: stored.provenance.ended_utc).provenance.config
+        if stored_results
+        else None
+    )
 
 
 def stored_in(folder: RunFolder) -> list[str]:
@@ -98,11 +102,11 @@ def read_all(folder: RunFolder, stages: Iterable[str]) -> tuple[dict[str, Stored
     bad: dict[str, str] = {}
     for stage in stages:
         path = folder.artifact(stage)
-        found = artifact.check(path, stage=None if stage.startswith(SWEEP) else stage)
-        if found.artifact is not None:
-            intact[stage] = found.artifact
-        elif found.reason != artifact.NOT_THERE:
-            bad[stage] = f"{path} {'is' if found.damaged else 'cannot be read:'} {found.reason}"
+        verdict = artifact.check(path, stage=None if stage.startswith(SWEEP) else stage)
+        if verdict.artifact is not None:
+            intact[stage] = verdict.artifact
+        elif verdict.reason != artifact.NOT_THERE:
+            bad[stage] = f"{path} {'is' if verdict.damaged else 'cannot be read:'} {verdict.reason}"
     return intact, bad
 
 
@@ -171,11 +175,11 @@ def refusing_older(folder: RunFolder, outdated: Collection[str], graph: Graph = 
 
 def command(folder: RunFolder, stage: Stage) -> str:
     """Return the command that computes a stage's result in a run's folder."""
-    return f"`walkerlab {stage.command} -c {folder.typed}`"
+    return f"`walkerlab {stage.command} -c {folder.quoted_path}`"
 
 
 def find_run(text: str, runs_dir: Path) -> RunFolder | None:
-    """Find a run by its name in the folder of all runs, or by its path; None if there is none."""
+    """Find a run by its name in the folder of all runs, or by its path; None if it does not exist."""
     path = Path(text)
     is_name = path.name == text and text != ".."
     places = (runs_dir / path, path) if is_name else (path,)
@@ -183,12 +187,12 @@ def find_run(text: str, runs_dir: Path) -> RunFolder | None:
 
 
 def run_named(text: str, runs_dir: Path) -> RunFolder:
-    """Find a run by its name in the folder of all runs, or by its path; raises ConfigError if there is none."""
-    found = find_run(text, runs_dir)
-    if found is not None:
-        return found
-    there = sorted(path.name for path in runs_dir.glob("*/"))
-    near = suggestion(Path(text).name, there) or (f" There are {', '.join(there)}." if there else "")
+    """Find a run by its name in the folder of all runs, or by its path; raises ConfigError if it does not exist."""
+    run = find_run(text, runs_dir)
+    if run is not None:
+        return run
+    names = sorted(path.name for path in runs_dir.glob("*/"))
+    near = suggestion(Path(text).name, names) or (f" There are {', '.join(names)}." if names else "")
     raise ConfigError(f"there is no run {text}.{near}", "`walkerlab report` creates the run of the paper config.")
 
 
@@ -199,9 +203,9 @@ def claim(folder: RunFolder, config: Config) -> None:
     """
     refuse_another_config(folder, config)
     record = folder.record()
-    asked = Record(folder.name, folder.source, to_yaml(config), folder.changes)
-    if record is None or (comes_from(record, folder) and record != asked):
-        folder.write_record(asked)
+    new_record = Record(folder.name, folder.source, to_yaml(config), folder.changes)
+    if record is None or (comes_from(record, folder) and record != new_record):
+        folder.write_record(new_record)
 
 
 def refuse_another_config(folder: RunFolder, config: Config) -> None:
@@ -212,13 +216,19 @@ def refuse_another_config(folder: RunFolder, config: Config) -> None:
     record = folder.record()
     if (record is not None and comes_from(record, folder)) or not any(folder.path.glob("*.h5")):
         return
-    held = config_of(folder)
-    if held is None and record is None:  # nothing there can be read
+    recorded = config_of(folder)
+    if recorded is None and record is None:  # nothing there can be read
         return
     changes = ["it is no longer a config"]
-    if held is not None:
+    if recorded is not None:
         changes = list(
-            differences("", *(one.model_dump(mode="json", exclude={"name", "sweep"}) for one in (held, config)))
+            differences(
+                "",
+                *(
+                    config_of_folder.model_dump(mode="json", exclude={"name", "sweep"})
+                    for config_of_folder in (recorded, config)
+                ),
+            )
         )
     if changes:
         origin = f", made from {record.source}" if record is not None and record.source else ""
@@ -227,7 +237,7 @@ def refuse_another_config(folder: RunFolder, config: Config) -> None:
             f"{folder.path} has results of another config{origin}; they are not overwritten "
             f"({', '.join(changes[:SHOWN_CHANGES])}{more}).",
             "`--name NAME` gives this one a folder of its own; "
-            f"`walkerlab clean -c {folder.typed}` removes what is there.",
+            f"`walkerlab clean -c {folder.quoted_path}` removes those results.",
         )
 
 
@@ -268,9 +278,15 @@ def difference(
 ) -> RunDifference:
     """Compare the results and configs of two runs; an unknown config counts as empty."""
     both = [name for name in first if name in second]
-    one, other = ({} if config is None else dict(flatten(config.model_dump(mode="json"))) for config in configs)
+    first_keys, second_keys = (
+        {} if config is None else dict(flatten(config.model_dump(mode="json"))) for config in configs
+    )
     return RunDifference(
-        tuple((key, one.get(key), other.get(key)) for key in {**one, **other} if one.get(key) != other.get(key)),
+        tuple(
+            (key, first_keys.get(key), second_keys.get(key))
+            for key in {**first_keys, **second_keys}
+            if first_keys.get(key) != second_keys.get(key)
+        ),
         {name: pairs(*(dict(flatten(run[name].summary, lists=True)) for run in (first, second))) for name in both},
         {name: pairs(*(headline_values(name, run[name].summary) for run in (first, second))) for name in both},
         tuple(name for name in first if name not in second),
@@ -286,7 +302,7 @@ def pairs(first: Mapping[str, Any], second: Mapping[str, Any]) -> tuple[Pair, ..
 
 def headline_values(stage: str, summary: Mapping[str, Any]) -> dict[str, Any]:
     """Return the headline quantities of a stage's summary, by name."""
-    last = {name: summary[whole][-1] for name, whole in LAST_OF.items() if summary.get(whole)}
+    last = {name: summary[list_name][-1] for name, list_name in LAST_OF.items() if summary.get(list_name)}
     every = dict(flatten(summary, lists=True)) | last
     return {name: every[name] for name in headlines(stage, every)}
 

@@ -45,11 +45,11 @@ class StageTask:
         """Call the stage's `run` with the arguments that it declares."""
         # imported only now: a stage loads its libraries and compiled code
         run = importlib.import_module(self.module).run
-        given = {name: self.offered[name] for name in self.offered.keys() & signature(run).parameters.keys()}
-        folder = given.get("folder")
+        arguments = {name: self.offered[name] for name in self.offered.keys() & signature(run).parameters.keys()}
+        folder = arguments.get("folder")
         try:
             with contextlib.nullcontext() if folder is None else drawing_into(folder):
-                content = run(self.config, self.inputs, progress, **given)
+                content = run(self.config, self.inputs, progress, **arguments)
         except NoAnswer as error:
             partial = error.partial if isinstance(error.partial, Content) else Content()
             why = {"no_answer": {"message": error.message, "advice": error.advice}}

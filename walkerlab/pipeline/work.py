@@ -135,7 +135,7 @@ class Spread:
         if self._deaths > MAX_DEATHS and not self._alive:
             raise NoAnswer(
                 f"no worker lives: {type(error).__name__}: {error}",
-                "What was computed is kept, and the same command goes on. Look at memory and limits of this machine.",
+                "Results so far are kept, and the same command resumes. Look at memory and limits of this machine.",
             )
         middle = len(batch) // 2
         if failures and middle:

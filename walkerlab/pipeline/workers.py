@@ -242,21 +242,21 @@ def in_order(
         return
     ready = {place: calls[place]() for place in first}
     with WorkerPool(min(jobs, len(calls))) as pool:
-        others = {place: pool.start(calls[place]) for place in sorted({*range(len(calls))} - {*first}, key=rank)}
+        futures = {place: pool.start(calls[place]) for place in sorted({*range(len(calls))} - {*first}, key=rank)}
         for place in range(len(calls)):
-            yield ready[place] if place in ready else others[place].result()
+            yield ready[place] if place in ready else futures[place].result()
 
 
 # The rest runs in the worker.
 
 
 class LeaveError(BaseException):
-    """This process is asked to end and to drop its call."""
+    """Signal to end this process and drop its call."""
 
 
 def tell(value: Any) -> None:
     """Send a message to the parent process."""
-    assert _lines, "only calls in a worker can tell"
+    assert _lines, "only calls in a worker send messages"
     _lines[0].send(Told(value))
 
 
@@ -265,7 +265,7 @@ _lines: list[Connection] = []
 
 
 def serve(number: int, modules: Sequence[str]) -> None:
-    """Run calls until this process is told to end.
+    """Run calls until a signal ends this process.
 
     number  descriptor of the connection to the parent
     """
@@ -298,11 +298,11 @@ def answer(work: bytes) -> bytes:
     try:
         return pickle.dumps(Answer(pickle.loads(work)()))
     except Exception as error:
-        said = f"In a worker process:\n{traceback.format_exc()}"
-        error.add_note(said)
+        description = f"In a worker process:\n{traceback.format_exc()}"
+        error.add_note(description)
         try:
             failed = pickle.dumps(Answer(error=error))
             pickle.loads(failed)
         except Exception:  # an exception may be made of anything
-            return pickle.dumps(Answer(error=RuntimeError(said)))
+            return pickle.dumps(Answer(error=RuntimeError(description)))
         return failed

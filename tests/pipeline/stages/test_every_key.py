@@ -43,7 +43,7 @@ REFUSED = (
     ("second", WALKERS, "push_off.duration_s", "does not affect the rigid model"),
     ("second", WALKERS, "walker.foot_radius_m", "does not affect the rigid model"),
     ("second", WALKERS, "walker.knee.stop_*", "does not affect the rigid model"),
-    ("second", WALKERS, "gravity_m_s2", "is already the number that gaits are followed over"),
+    ("second", WALKERS, "gravity_m_s2", "is already the parameter that gaits are followed over"),
     ("*", ("paper-as-printed",), "walker.hip.*", "cannot be 1e-15"),
     ("*", ("paper-as-printed",), "push_off.impulse_N_s", "cannot be 1e-15"),
     ("*", ("parts",), "walker.leg_length_m", "cannot be 0.999 m"),

@@ -88,7 +88,7 @@ def test_a_sweep_over_nothing_is_shown_an_example():
     [
         ("slope_dge=1:2:3", "did you mean slope_deg"),
         ("slope_deg", "not of the form KEY=VALUES"),
-        ("slope_deg=1:2", "how many values"),
+        ("slope_deg=1:2", "number of values is missing"),
         ("slope_deg=a:b:c", "not a range of values"),
         ("slope_deg=1:2:0", "not a range of values"),
         ("slope_deg=1:2:3:lin", "not a range of values"),

@@ -262,7 +262,7 @@ def test_lists_of_points_have_their_parameters_as_coordinates(toy):
 
 def test_a_dry_run_says_what_is_there_and_what_the_rest_will_take(toy):
     toy.run("drop", GRAVITIES)
-    foreseen = toy.sweep("drop", "gravity_m_s2=1:9:9").foresee(workers=2, shown=3)
+    foreseen = toy.sweep("drop", "gravity_m_s2=1:9:9").foresee(workers=2, max_points=3)
     assert (foreseen.count, foreseen.there) == (9, 5)
     assert foreseen.points == ("gravity_m_s2=1.0", "gravity_m_s2=2.0", "gravity_m_s2=3.0")
     assert 0.0 < foreseen.estimate_s < 1.0

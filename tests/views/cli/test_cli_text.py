@@ -9,7 +9,7 @@ from walkerlab.pipeline.runner import StageReport
 from walkerlab.views.cli import console
 from walkerlab.views.cli.console import Console, StageLine
 from walkerlab.views.cli.request import Request
-from walkerlab.views.cli.stage import printed
+from walkerlab.views.cli.stage import report_lines
 from walkerlab.views.report.tables import LONGEST_CELL
 from walkerlab.views.report.text import described_summary, table
 
@@ -83,4 +83,4 @@ def test_that_there_is_no_answer_at_all_is_not_called_stored(summary, stored):
     report = StageReport(
         "drop", artifact.parent, artifact, False, 0.0, (), summary, (), NoAnswer(said["message"], said["advice"])
     )
-    assert (f"stored in {artifact}" in printed(Request("drop"), report)) == stored
+    assert (f"stored in {artifact}" in report_lines(Request("drop"), report)) == stored

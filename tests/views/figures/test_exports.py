@@ -164,7 +164,7 @@ def test_what_a_figure_needs_is_made_by_the_stage_that_is_named(run):
     for name, command in (("figure-13", "continuation"), ("stability-step", "stability --full")):
         with pytest.raises(StaleError) as refused:
             export_from(run, name, Target("pdf", None), 516.0, "", QUIET)
-        assert refused.value.advice == f"`walkerlab {command} -c {run.typed}` makes what it needs."
+        assert refused.value.advice == f"`walkerlab {command} -c {run.quoted_path}` makes what it needs."
 
 
 def test_a_walk_of_its_own_is_meant_where_there_is_no_contact_walk(run):

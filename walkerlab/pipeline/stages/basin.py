@@ -83,42 +83,42 @@ def run(
     window = window_of(config, [float(gait["state"][place]) for place in rigid.section_indices])
     progress.start("basin: attractors")
     question = question_of(config, inputs, window, rigid)
-    begun, shared_from = time.perf_counter(), question.shared_from
+    started_at, shared_from = time.perf_counter(), question.shared_from
     every = range(window.size)
     units = units_of("cells", every, question.cells_at_once, 1, partial(ends_of, question, window))
-    ends, walks = complete(units, checkpoint, "basin", progress, jobs, shared_from)
-    found = WalkEnds(*np.concatenate([np.reshape(part, (3, -1)) for part in ends], axis=1).astype(np.int64))
-    walked = found.outcome == Outcome.WALKED
-    edges = edge_cells(np.where(walked, found.attractor, FAILED).reshape(window.cells))
-    walking = walked.astype(float)
+    parts, walks = complete(units, checkpoint, "basin", progress, jobs, shared_from)
+    ends = WalkEnds(*np.concatenate([np.reshape(part, (3, -1)) for part in parts], axis=1).astype(np.int64))
+    is_walking = ends.outcome == Outcome.WALKED
+    edges = edge_cells(np.where(is_walking, ends.attractor, FAILED).reshape(window.cells))
+    walking = is_walking.astype(float)
     if config.basin.refine > 1 and edges.size:
         refine = config.basin.refine
         walks_of_cell, shares = refine ** len(window.axes), partial(shares_of, question, window, refine)
         units = units_of("edge", edges.tolist(), question.edges_at_once, walks_of_cell, shares)
-        of_edges, more = complete(units, checkpoint, "basin: edges", progress, jobs, shared_from)
-        walking[edges], walks = np.concatenate(of_edges), walks + more
-    rate = {"trajectories_per_s": walks / (time.perf_counter() - begun)} if walks else {}
+        edge_shares, more = complete(units, checkpoint, "basin: edges", progress, jobs, shared_from)
+        walking[edges], walks = np.concatenate(edge_shares), walks + more
+    rate = {"trajectories_per_s": walks / (time.perf_counter() - started_at)} if walks else {}
     aperiodic = isinstance(question, RigidQuestion) and question.attractors.aperiodic
     reached = attractors_of(question, rigid)
-    said = summary(config.basin, window, found, walking.reshape(window.cells), reached, aperiodic)
+    answer = summary(config.basin, window, ends, walking.reshape(window.cells), reached, aperiodic)
     pads = None
     if isinstance(question, ContactQuestion):
         pads = Pads((question.scene.pitch_m, question.scene.pitch_m), laid=str(require_contact(config).pad_pitch))
-    said |= {
-        "numerical_error": sample_again(question, window, found),
-        "endings": describe_endings(said["outcomes"], config, config.basin.model == "contact", pads),
+    answer |= {
+        "numerical_error": sample_again(question, window, ends),
+        "endings": describe_endings(answer["outcomes"], config, config.basin.model == "contact", pads),
         "edge_cells": int(edges.size),
-        **margin_of(config, window, found, gait),
+        **margin_of(config, window, ends, gait),
         **rate,
     }
-    return Content({"basin": group_of(config.basin, window, found, walking)}, said, timed=("trajectories_per_s",))
+    return Content({"basin": group_of(config.basin, window, ends, walking)}, answer, timed=("trajectories_per_s",))
 
 
-def sample_again(question: Question, window: Window, found: WalkEnds) -> dict[str, int]:
+def sample_again(question: Question, window: Window, ends: WalkEnds) -> dict[str, int]:
     """Count cells of an even sample whose walk ends differently at tighter tolerances."""
     cells = np.array(evenly_spread(window.size, SAMPLE))
-    again = question.tightened().walked(window.starts(cells))
-    otherwise = (again.outcome != found.outcome[cells]) | (again.attractor != found.attractor[cells])
+    again = question.tightened().walk_to_ends(window.starts(cells))
+    otherwise = (again.outcome != ends.outcome[cells]) | (again.attractor != ends.attractor[cells])
     return {"walked_again": int(cells.size), "of": window.size, "ended_otherwise": int(np.count_nonzero(otherwise))}
 
 
@@ -144,8 +144,8 @@ def question_of(config: BasinConfig, inputs: Mapping[str, Content], window: Wind
     walker = unit if legs is None else legs
     scale = (1.0, units.time, units.time)
     generator = np.random.default_rng(config.seed)
-    drawn = np.concatenate([np.array([window.rest]), window.draw(DRAWN, generator)])
-    attractors = find_attractors(walker, drawn * np.array(scale), config.seed)
+    starts = np.concatenate([np.array([window.rest]), window.draw(DRAWN, generator)])
+    attractors = find_attractors(walker, starts * np.array(scale), config.seed)
     question = RigidQuestion(walker, scale, attractors, config.basin.steps)
     one_by_one = replace(question, cells_at_once=500, edges_at_once=50, shared_from=10_000)
     return question if legs is not None else one_by_one
@@ -166,7 +166,7 @@ def contact_question(config: BasinConfig, inputs: Mapping[str, Content], rigid: 
     return ContactQuestion(scene, rigid, for_a_map(starts, starts.walk(1.0, 1.0).evaluations))
 
 
-def group_of(settings: Basin, window: Window, found: WalkEnds, walking: Floats) -> Group:
+def group_of(settings: Basin, window: Window, ends: WalkEnds, walking: Floats) -> Group:
     """Build the group of the grid."""
     dims: tuple[str, ...] = tuple(settings.plane)
     variables: dict[str, Variable] = {
@@ -177,16 +177,16 @@ def group_of(settings: Basin, window: Window, found: WalkEnds, walking: Floats) 
     def over(values: Any, text: str) -> Variable:
         return Variable(np.ascontiguousarray(values).reshape(window.cells), dims, "1", text)
 
-    settled = np.where(found.attractor == UNREACHED, 0, found.steps)
+    settled = np.where(ends.attractor == UNREACHED, 0, ends.steps)
     variables |= {
-        "outcome": over(found.outcome, "how the walk ended, see attribute outcomes"),
-        "attractor": over(found.attractor, "number of the attractor that was reached; -1 for none"),
-        "steps": over(found.steps, "steps taken"),
+        "outcome": over(ends.outcome, "how the walk ended, see attribute outcomes"),
+        "attractor": over(ends.attractor, "number of the attractor that was reached; -1 for none"),
+        "steps": over(ends.steps, "steps taken"),
         "steps_to_settle": over(settled, "steps until the attractor was reached; 0 where none was"),
         "walking": over(walking, "share of the cell that walks; of cells at edges from their parts"),
     }
-    rest = {f"at_{name}": value for name, value in zip(COORDINATES, window.rest, strict=True)}
-    return Group(variables, {"outcomes": OUTCOMES, "model": settings.model, **rest})
+    held_values = {f"at_{name}": value for name, value in zip(COORDINATES, window.rest, strict=True)}
+    return Group(variables, {"outcomes": OUTCOMES, "model": settings.model, **held_values})
 
 
 def attractors_of(question: Question, rigid: RigidModel) -> list[dict[str, Any]]:
@@ -202,29 +202,29 @@ def attractors_of(question: Question, rigid: RigidModel) -> list[dict[str, Any]]
 
 
 def summary(
-    settings: Basin, window: Window, found: WalkEnds, walking: Floats, attractors: list[dict[str, Any]], aperiodic: bool
+    settings: Basin, window: Window, ends: WalkEnds, walking: Floats, attractors: list[dict[str, Any]], aperiodic: bool
 ) -> dict[str, Any]:
     """Summarise the grid and the attractors that are reached."""
-    walked = found.outcome == Outcome.WALKED
+    walks = ends.outcome == Outcome.WALKED
     for number, row in enumerate(attractors):
-        there = walked & (found.attractor == number)
-        row["cells"] = int(np.count_nonzero(there))
+        reaches = walks & (ends.attractor == number)
+        row["cells"] = int(np.count_nonzero(reaches))
         if row["cells"]:
-            row["median_steps_to_settle"] = float(np.median(found.steps[there]))
+            row["median_steps_to_settle"] = float(np.median(ends.steps[reaches]))
     sides = zip(settings.plane, window.lower, window.upper, strict=True)
-    rest = zip(COORDINATES, window.rest, strict=True)
+    values = zip(COORDINATES, window.rest, strict=True)
     return {
         "model": settings.model,
         "plane": list(settings.plane),
         "cells": list(settings.cells),
         "window": {name: [low, high] for name, low, high in sides},
-        "held": {name: value for name, value in rest if name not in settings.plane},
+        "held": {name: value for name, value in values if name not in settings.plane},
         "share_walking": float(walking.mean()),
         "share_walking_gaussian": float(np.sum(walking * gaussian(window))),
-        "outcomes": count_outcomes(found.outcome),
+        "outcomes": count_outcomes(ends.outcome),
         "attractors": attractors,
         "aperiodic": aperiodic,
-        "unsettled_cells": int(np.count_nonzero(walked & (found.attractor == UNREACHED))),
+        "unsettled_cells": int(np.count_nonzero(walks & (ends.attractor == UNREACHED))),
         "steps_wanted": settings.steps if settings.model == "rigid" else settings.contact_steps,
     }
 
@@ -236,12 +236,12 @@ def gaussian(window: Window) -> Floats:
     return np.asarray(weights / weights.sum())
 
 
-def margin_of(config: RigidConfig, window: Window, found: WalkEnds, gait: Mapping[str, Any]) -> dict[str, Any]:
+def margin_of(config: RigidConfig, window: Window, ends: WalkEnds, gait: Mapping[str, Any]) -> dict[str, Any]:
     """Return the distance from a stable gait to the nearest cell that does not walk, in rad and sqrt(g/L).
 
     Accurate to the size of a cell; empty if the gait is unstable or the window holds no such cell.
     """
-    failing = np.flatnonzero(found.outcome != Outcome.WALKED)
+    failing = np.flatnonzero(ends.outcome != Outcome.WALKED)
     if not gait["stable"] or not failing.size:
         return {}
     time_unit = math.sqrt(config.walker.leg_length_m / config.gravity_m_s2)
@@ -266,7 +266,7 @@ class RigidQuestion:
     shared_from: int = 200_000  # number of walks above which starting processes pays
     tolerances: tuple[float, float] = (RTOL, ATOL)
 
-    def walked(self, z: Floats) -> WalkEnds:
+    def walk_to_ends(self, z: Floats) -> WalkEnds:
         """Walk from section coordinates z (n, 3), SI."""
         scaled = z * np.array(self.scale)
         return walk_to_attractor(self.walker, self.attractors, scaled, self.steps, tolerances=self.tolerances)
@@ -288,7 +288,7 @@ class ContactQuestion:
     edges_at_once: int = 10
     shared_from: int = 500
 
-    def walked(self, z: Floats) -> WalkEnds:
+    def walk_to_ends(self, z: Floats) -> WalkEnds:
         """Walk from section coordinates z (n, 3), SI."""
         rows = [self.walk((float(a), float(b), float(c))) for a, b, c in z]
         return WalkEnds(*np.array(rows, np.int64).reshape(-1, 3).T)
@@ -318,13 +318,13 @@ def units_of(
 
 def ends_of(question: Question, window: Window, cells: Sequence[int]) -> list[float]:
     """Return outcomes, attractors and steps of cells, walked from their middles, as one flat list."""
-    found = question.walked(window.starts(np.array(cells)))
-    return [float(number) for number in (*found.outcome, *found.attractor, *found.steps)]
+    ends = question.walk_to_ends(window.starts(np.array(cells)))
+    return [float(number) for number in (*ends.outcome, *ends.attractor, *ends.steps)]
 
 
 def shares_of(question: Question, window: Window, refine: int, cells: Sequence[int]) -> list[float]:
     """Return the walking share of each cell, from the middles of its subcells."""
     inside = subcell_centres(refine, len(window.axes))
-    found = question.walked(window.starts(np.repeat(cells, len(inside)), np.tile(inside, (len(cells), 1))))
-    walking = (found.outcome == Outcome.WALKED).reshape(len(cells), -1)
+    ends = question.walk_to_ends(window.starts(np.repeat(cells, len(inside)), np.tile(inside, (len(cells), 1))))
+    walking = (ends.outcome == Outcome.WALKED).reshape(len(cells), -1)
     return [float(share) for share in walking.mean(axis=1)]

@@ -66,12 +66,12 @@ def run(config: ContactSimConfig, inputs: Mapping[str, Content], progress: Progr
 
     def walk(tolerances: Tolerances, sampled: bool) -> ContactWalkResult:
         progress.start("contact-sim" if sampled else "contact-sim: numerical error", 1)
-        taken = scene.walk(start, steps, tolerances, interval if sampled else None, heights)
+        result = scene.walk(start, steps, tolerances, interval if sampled else None, heights)
         progress.advance()
-        return taken
+        return result
 
-    stored, said = partial(groups, config, scene), partial(summary, config, scene)
-    return content_of_walk("contact-sim", walk, tolerances, stored, said, progress, again)
+    stored, summarise = partial(groups, config, scene), partial(summary, config, scene)
+    return content_of_walk("contact-sim", walk, tolerances, stored, summarise, progress, again)
 
 
 def compile_kernels(config: ContactSimConfig) -> None:
@@ -89,8 +89,8 @@ def tell_unresolved_slip(atol: float, scene: ContactScene, progress: Progress) -
     rising = scene.walker.friction.rising_until
     if atol > RESOLVED * rising:
         progress.note(
-            f"contact-sim: lower solver.contact.atol ({atol:g} m/s): it is large beside contact.stiction_velocity, up "
-            f"to which friction rises ({rising:g} m/s), so friction and how the walk ends may be chance"
+            f"contact-sim: lower solver.contact.atol ({atol:g} m/s): it is large relative to contact.stiction_velocity "
+            f"({rising:g} m/s), up to which friction rises, so friction and how the walk ends may be chance"
         )
 
 
@@ -176,19 +176,19 @@ def trajectory_group(
 
 def state_variables(scene: ContactScene, y: Floats) -> dict[str, Variable]:
     """Return motion of legs, shanks and torso, and positions of hip and knees."""
-    walker, whole = scene.walker, scene.walker.whole
+    walker, layout = scene.walker, scene.walker.whole
     names = [body.name for body in scene.assembly.bodies]
     n = len(names)
     angle, velocity, tilted = y[:, 2 : 2 + n], y[:, 4 + n :], y[:, 2 : 2 + n] + walker.slope
     s, c = np.sin(tilted), np.cos(tilted)
     upper = [leg[0] for leg in walker.legs]
-    along = y[:, 0] + c @ whole.hip_x[:n] - s @ whole.hip_y[:n]
-    height = y[:, 1] + s @ whole.hip_x[:n] + c @ whole.hip_y[:n]
+    along = y[:, 0] + c @ layout.hip_x[:n] - s @ layout.hip_y[:n]
+    height = y[:, 1] + s @ layout.hip_x[:n] + c @ layout.hip_y[:n]
     of_legs = {"angle": angle[:, upper], "velocity": velocity[:, upper]}
-    found = over_time(**of_legs, hip_along_m=along, hip_height_m=height)
+    variables = over_time(**of_legs, hip_along_m=along, hip_height_m=height)
     if walker.kneed:
-        shanks, thighs = whole.knees.T.tolist()
-        found |= turning("shank", angle[:, shanks], velocity[:, shanks])
+        shanks, thighs = layout.knees.T.tolist()
+        variables |= turning("shank", angle[:, shanks], velocity[:, shanks])
         knees = np.zeros((2, len(y), 2))
         for leg, (thigh, shank) in enumerate(zip(thighs, shanks, strict=True)):
             hip = hinge_point(scene.assembly, names[thigh], names[thighs[1 - leg]])
@@ -196,10 +196,10 @@ def state_variables(scene: ContactScene, y: Floats) -> dict[str, Variable]:
             ahead, up = knee[0] - hip[0], knee[1] - hip[1]
             knees[0, :, leg] = along + c[:, thigh] * ahead - s[:, thigh] * up
             knees[1, :, leg] = height + s[:, thigh] * ahead + c[:, thigh] * up
-        found |= over_time(knee_along_m=knees[0], knee_height_m=knees[1])
+        variables |= over_time(knee_along_m=knees[0], knee_height_m=knees[1])
     if TORSO in names:
-        found |= turning(TORSO, angle[:, names.index(TORSO)], velocity[:, names.index(TORSO)])
-    return found
+        variables |= turning(TORSO, angle[:, names.index(TORSO)], velocity[:, names.index(TORSO)])
+    return variables
 
 
 def energy_variables(scene: ContactScene, samples: ContactSamples, foothold: Floats, up: Floats) -> dict[str, Variable]:
@@ -208,7 +208,7 @@ def energy_variables(scene: ContactScene, samples: ContactSamples, foothold: Flo
     foothold, up  (samples,) m, where along the slope the stance foot touched, and over it
     """
     kinetic, potential, total = sample_energies(scene.walker, samples).T
-    given = samples.driven_J.T
+    driven = samples.driven_J.T
     lost, walker = samples.dissipated_J, scene.walker
     at_foothold = walker.mass * (walker.gravity_down * up - walker.gravity_along * foothold)
     return over_time(
@@ -217,6 +217,6 @@ def energy_variables(scene: ContactScene, samples: ContactSamples, foothold: Flo
         mechanical_J=total - at_foothold,
         total_energy_J=total,
         **{loss.variable: lost[:, place] for place, loss in SAMPLED.items()},
-        **({"push_off_J": given[0], "hip_J": given[1]} if given.any() else {}),
-        residual_J=total + lost.sum(axis=1) - given.sum(axis=0) - total[:1],
+        **({"push_off_J": driven[0], "hip_J": driven[1]} if driven.any() else {}),
+        residual_J=total + lost.sum(axis=1) - driven.sum(axis=0) - total[:1],
     )

@@ -47,11 +47,11 @@ class FamilyQuestion:
     parameter: Parameter
     span: ValueSpan
 
-    def looked_at(self) -> list[float]:
-        """Values where the search looks for gaits: the config's own first."""
+    def start_values(self) -> list[float]:
+        """Return the values where the search looks for gaits: the config's own first."""
         own = self.parameter.value_in(self.config)
         spread = np.linspace(self.span.least, self.span.most, LOOKED_AT)
-        return [*([own] if own in self.span else []), *(float(one) for one in spread)]
+        return [*([own] if own in self.span else []), *(float(value) for value in spread)]
 
     @property
     def models(self) -> tuple[str, ...]:
@@ -76,7 +76,7 @@ class FamilyQuestion:
         return model_differs(model, self.config, self.parameter, (self.span.least, self.span.most))
 
     def touched(self, key: str) -> tuple[str, ...]:
-        """Return the requested models that the parameter affects; raises ConfigError if there is none."""
+        """Return the requested models that the parameter affects; raises ConfigError if it affects neither."""
         touched = tuple(model for model in self.models if self.touches(model))
         if not touched:
             raise unused_key_error(f"continuation.{key}", self.parameter.key, self.models)
@@ -94,23 +94,23 @@ def run(config: ContinuationConfig, _inputs: Mapping[str, Content], progress: Pr
 
     again  whether some gaits are solved for a second time, for the numerical error
 
-    Raises ConfigError for a key that is no number of the model, NoAnswer for a span without a gait.
+    Raises ConfigError for a key that is not a parameter of the model, NoAnswer for a span without a gait.
     """
-    block, found, alone = config.continuation, [], []
-    asked = question_over(block, config, "continuation")
-    parameter = asked.parameter
-    for model in models_of(asked):
-        search = search_of(model, asked, progress)
+    block, families, isolated = config.continuation, [], []
+    question = question_over(block, config, "continuation")
+    parameter = question.parameter
+    for model in models_of(question):
+        search = search_of(model, question, progress)
         family = Family(model, None) if search is None else search.family(np.random.default_rng(config.seed))
-        alone += [alone_at(branch, model, parameter) for branch in family.branches if len(branch.points) == 1]
-        found.append(replace(family, branches=tuple(one for one in family.branches if len(one.points) > 1)))
-    said, second = summary(found, asked, again), asked.second
-    said["left_out"] += alone
-    content = Content(groups(found, said, config, parameter, None if second is None else second.parameter), said)
-    if not any(family.branches for family in found):
+        isolated += [alone_at(branch, model, parameter) for branch in family.branches if len(branch.points) == 1]
+        families.append(replace(family, branches=tuple(branch for branch in family.branches if len(branch.points) > 1)))
+    answer, second = summary(families, question, again), question.second
+    answer["left_out"] += isolated
+    content = Content(groups(families, answer, config, parameter, None if second is None else second.parameter), answer)
+    if not any(family.branches for family in families):
         raise NoAnswer(
             f"no gait was found with {parameter.key} from {block.least:g} to {block.most:g} {parameter.unit}: "
-            f"none at any of {len(asked.looked_at())} values looked at",
+            f"none at any of {len(question.start_values())} values looked at",
             "Choose another span (--from, --to), or change what else the config fixes.",
             content,
         )
@@ -122,22 +122,23 @@ def refuse(config: ContinuationConfig) -> None:
     models_of(question_over(config.continuation, config, "continuation"))
 
 
-def models_of(asked: FamilyQuestion) -> tuple[str, ...]:
+def models_of(question: FamilyQuestion) -> tuple[str, ...]:
     """Return the models to follow.
 
-    Raises ConfigError for one that the config has not, for keys that touch none or cannot have the ends of their spans,
-    and for a second key that is the first, or whose range leaves out the config's own value.
+    Raises ConfigError if the config lacks a requested model, for keys that affect no model or whose spans have invalid
+    ends, and for a second key that equals the first or whose range excludes the config's own value.
     """
-    config, second = asked.config, asked.second
-    if asked.models != (RIGID,) and config.contact is None:
+    config, second = question.config, question.second
+    if question.models != (RIGID,) and config.contact is None:
         raise contact_required_error("the contact model", config.walker, "Use --model rigid.")
-    asked.refuse_ends("continuation")
+    question.refuse_ends("continuation")
     if second is not None:
         second.refuse_ends("continuation", "second")
         own, span, name = second.parameter.value_in(config), second.span, second.parameter.key
-        if second.parameter.path == asked.parameter.path:
+        if second.parameter.path == question.parameter.path:
             raise ConfigError(
-                f"continuation.second: {name} is already the number that gaits are followed over", "Choose another key."
+                f"continuation.second: {name} is already the parameter that gaits are followed over",
+                "Choose another key.",
             )
         if own not in span:
             raise ConfigError(
@@ -145,54 +146,54 @@ def models_of(asked: FamilyQuestion) -> tuple[str, ...]:
                 "Curves begin at the config's own value; choose a range around it.",
             )
         second.touched("second")
-    return asked.touched("over")
+    return question.touched("over")
 
 
-def search_of(model: str, asked: FamilyQuestion, progress: Progress) -> FamilySearch | None:
+def search_of(model: str, question: FamilyQuestion, progress: Progress) -> FamilySearch | None:
     """Search a model's families, over a plane if there is a second key; None without a first gait."""
-    begun, second, block = SEEDS[model](asked, progress), asked.second, asked.config.continuation
-    if begun is None:
+    seeding, second, block = SEEDS[model](question, progress), question.second, question.config.continuation
+    if seeding is None:
         return None
-    seeds, map_of = begun
+    seeds, map_of = seeding
     plane = None
     if second is not None and second.touches(model):
-        parameter, config = second.parameter, asked.config
+        parameter, config = second.parameter, question.config
         plane = Plane(parameter.over(config, map_of), second.span, parameter.value_in(config))
     periods = min(block.periods, THOROUGHNESS[model].periods)
-    return FamilySearch(model, map_of(asked.config), asked.span, seeds, periods, block.points, progress, plane)
+    return FamilySearch(model, map_of(question.config), question.span, seeds, periods, block.points, progress, plane)
 
 
-def rigid_seeds(asked: FamilyQuestion, progress: Progress) -> Begun:
+def rigid_seeds(question: FamilyQuestion, progress: Progress) -> Begun:
     """Find all one-step gaits of the rigid model at some values."""
-    walker_at, seeds = rigid_walkers(asked.config, asked.parameter), list[Seed]()
+    walker_at, seeds = rigid_walkers(question.config, question.parameter), list[Seed]()
     progress.start("continuation: gaits of the rigid model")
-    for value in asked.looked_at():
+    for value in question.start_values():
         walker = walker_at(value)
         if walker is not None:
-            seeds += [Seed(np.array(gait.z), value) for gait in find_gaits(walker, asked.config.seed).gaits]
-    return seeds, partial(rigid_map, parameter=asked.parameter, scale=asked.span.size)
+            seeds += [Seed(np.array(gait.z), value) for gait in find_gaits(walker, question.config.seed).gaits]
+    return seeds, partial(rigid_map, parameter=question.parameter, scale=question.span.size)
 
 
-def contact_seeds(asked: FamilyQuestion, progress: Progress) -> Begun | None:
-    """Find the first gait of the contact model at some values; None if there is none."""
+def contact_seeds(question: FamilyQuestion, progress: Progress) -> Begun | None:
+    """Find the first gait of the contact model at some values; None without one."""
     from walkerlab.scene.contact import gait_off_pads
 
     progress.start("continuation: a gait of the contact model")
-    for value in asked.looked_at():
-        changed = asked.parameter.config_at(asked.config, value)
+    for value in question.start_values():
+        changed = question.parameter.config_at(question.config, value)
         if changed is None or changed.contact is None:
             continue
         rigid = find_gaits(rigid_walker(changed), changed.seed).gait
         if rigid is None:
             continue
-        found = gait_off_pads(changed, rigid.step_length, rigid.state)
-        if found.gait is None:
-            progress.note(f"contact model at {value:g} {asked.parameter.unit}: {found.reason}")
+        answer = gait_off_pads(changed, rigid.step_length, rigid.state)
+        if answer.gait is None:
+            progress.note(f"contact model at {value:g} {question.parameter.unit}: {answer.reason}")
             continue
         map_of = partial(
-            contact_map, parameter=asked.parameter, scale=asked.span.size, step_length_m=found.gait.step.length_m
+            contact_map, parameter=question.parameter, scale=question.span.size, step_length_m=answer.gait.step.length_m
         )
-        return [Seed(map_of(asked.config).scale_section(found.gait.z), value)], map_of
+        return [Seed(map_of(question.config).scale_section(answer.gait.z), value)], map_of
     return None
 
 
@@ -202,12 +203,12 @@ SEEDS: Final[Mapping[str, Callable[[FamilyQuestion, Progress], Begun | None]]] =
 }
 
 
-def summary(found: Sequence[Family], asked: FamilyQuestion, again: bool) -> dict[str, Any]:
+def summary(families: Sequence[Family], question: FamilyQuestion, again: bool) -> dict[str, Any]:
     """Summarise the families, with values in the unit of the requested key; `again` as in `run`."""
-    config, parameter = asked.config, asked.parameter
+    config, parameter = question.config, question.parameter
 
     def rows(of_model: Callable[[Family], Iterable[Mapping[str, Any]]]) -> list[dict[str, Any]]:
-        return [{"model": one.model, **row} for one in found for row in of_model(one)]
+        return [{"model": family.model, **row} for family in families for row in of_model(family)]
 
     return {
         "over": parameter.key,
@@ -216,16 +217,20 @@ def summary(found: Sequence[Family], asked: FamilyQuestion, again: bool) -> dict
         "to": config.continuation.most,
         "branches": rows(branch_rows),
         "bifurcations": rows(bifurcation_rows),
-        "first_doubling": {one.model: flip for one in found if (flip := first_doubling(one.branches)) is not None},
-        "lyapunov": rows(lambda one: map(asdict, one.exponents)),
+        "first_doubling": {
+            family.model: flip for family in families if (flip := first_doubling(family.branches)) is not None
+        },
+        "lyapunov": rows(lambda family: map(asdict, family.exponents)),
         "cascades": rows(cascade_rows),
         "limits": rows(limit_rows),
-        "numerical_error": {one.model: error for one in found if again and (error := sample_again(one)) is not None},
+        "numerical_error": {
+            family.model: error for family in families if again and (error := sample_again(family)) is not None
+        },
         "endings": rows(partial(ending_rows, parameter=parameter, config=config)),
-        "attractors": rows(lambda one: [attractor_summary(one)] if one.attractors.found else []),
+        "attractors": rows(lambda family: [attractor_summary(family)] if family.attractors.found else []),
         "curves": rows(curve_rows),
         "regions": rows(region_rows),
-        "left_out": left_out(found, asked),
+        "left_out": omitted_families(families, question),
     }
 
 
@@ -248,27 +253,27 @@ def branch_rows(family: Family) -> Iterator[dict[str, Any]]:
 def bifurcation_rows(family: Family) -> Iterator[dict[str, Any]]:
     """Return rows of a model's bifurcations, branch by branch."""
     for number, branch in enumerate(family.branches):
-        for one in branch.bifurcations:
+        for bifurcation in branch.bifurcations:
             yield {
-                "kind": one.kind,
+                "kind": bifurcation.kind,
                 "period": branch.period,
-                "value": one.value,
-                "multiplier": [one.multiplier.real, one.multiplier.imag],
+                "value": bifurcation.value,
+                "multiplier": [bifurcation.multiplier.real, bifurcation.multiplier.imag],
                 "branch": number,
             }
 
 
 def first_doubling(branches: Sequence[GaitBranch]) -> float | None:
-    """Return the first flip where a one-step gait loses stability; None if there is none.
+    """Return the first flip where a one-step gait loses stability; None without one.
 
     branches  of one model; one that is unstable on both sides of a flip does not count
     """
     flips = [
-        one.value
+        flip.value
         for branch in branches
         if branch.period == 1
-        for one in branch.bifurcations
-        if one.kind == "flip" and any(math.isclose(one.value, end) for pair in branch.stable_ranges for end in pair)
+        for flip in branch.bifurcations
+        if flip.kind == "flip" and any(math.isclose(flip.value, end) for pair in branch.stable_ranges for end in pair)
     ]
     return min(flips, default=None)
 
@@ -285,7 +290,7 @@ def limit_rows(family: Family) -> Iterator[dict[str, Any]]:
 def sample_again(family: Family) -> dict[str, Any] | None:
     """Return the change of some gaits at tighter tolerances, spread evenly over all branches; None without gaits.
 
-    They are solved for again, so that what Newton's method left over counts, too.
+    They are solved for again, so that the residual of Newton's method counts as well.
     """
     step_map, every = family.step_map, [(branch, point) for branch in family.branches for point in branch.points]
     if step_map is None or not every:
@@ -314,16 +319,16 @@ def ending_rows(family: Family, parameter: Parameter, config: ContactConfig) -> 
             outcome = end.reason.partition(":")[0]
             if outcome_of(outcome) is not None:
                 why = ground_causes(outcome, config, family.model == CONTACT)
-                said = " ".join([f"At {end.value:.5g} {parameter.unit} {gait} ends ({end.reason}).", *why])
-                yield {"period": branch.period, "value": end.value, "outcome": outcome, "said": said}
+                text = " ".join([f"At {end.value:.5g} {parameter.unit} {gait} ends ({end.reason}).", *why])
+                yield {"period": branch.period, "value": end.value, "outcome": outcome, "said": text}
         for crossing in branch.crossings:
             if crossing.monitor.name == "tripped":
                 side = side_beyond(branch, crossing, family.step_map)
-                said = (
+                text = (
                     f"{side} about {crossing.value:.2g} {parameter.unit} {gait} trips over pads of its own step "
                     f"length: the pads end walks there, not the gait. Try {without_pads(config)}."
                 )
-                yield {"period": branch.period, "value": crossing.value, "outcome": "off-pad", "said": said}
+                yield {"period": branch.period, "value": crossing.value, "outcome": "off-pad", "said": text}
 
 
 def side_beyond(branch: GaitBranch, crossing: Crossing, step_map: StepMap | None) -> str:
@@ -338,7 +343,7 @@ def side_beyond(branch: GaitBranch, crossing: Crossing, step_map: StepMap | None
 def cascade_rows(family: Family) -> Iterator[dict[str, Any]]:
     """Return rows of period-doubling cascades with the ratios of distances between flips."""
     for first in family.branches:
-        if any(is_born_in(first, flip, other) for other in family.branches for flip in other.bifurcations):
+        if any(is_born_in(first, flip, parent) for parent in family.branches for flip in parent.bifurcations):
             continue
         flips = chain(first, family.branches)
         if len(flips) > 1:
@@ -348,8 +353,8 @@ def cascade_rows(family: Family) -> Iterator[dict[str, Any]]:
 
 
 def chain(branch: GaitBranch, branches: Sequence[GaitBranch]) -> list[float]:
-    """Iterate over chains of flips: of a branch, of the branch born there, and so on."""
-    flips = [one for one in branch.bifurcations if one.kind == "flip"]
+    """Return the values of successive flips: on a branch, on the branch born there, and so on."""
+    flips = [bifurcation for bifurcation in branch.bifurcations if bifurcation.kind == "flip"]
     for flip in flips:
         for child in branches:
             if is_born_in(child, flip, branch):
@@ -367,18 +372,18 @@ def is_born_in(child: GaitBranch, flip: Bifurcation, parent: GaitBranch) -> bool
 def attractor_summary(family: Family) -> dict[str, Any]:
     """Describe the range of the attractor and its fate.
 
-    Just beyond a flip walks leave the gait slowly: what has not repeated itself by then counts as aperiodic only where
-    neighbours may part, and neither a gait that was followed is stable nor a cascade still doubles.
+    Just beyond a flip walks leave the gait slowly. A walk that has not repeated itself counts as aperiodic only if
+    neighbouring walks may diverge, no followed gait is stable and no cascade is still doubling.
     """
     attractors, exponents = family.attractors, family.exponents
     periodic = [pair for branch in family.branches for pair in branch.stable_ranges]
     periodic += [(row["flips"][0], row["accumulates_at"]) for row in cascade_rows(family) if "accumulates_at" in row]
     aperiodic = [
-        one.value
-        for one in attractors.found
-        if one.period == 0
-        and may_diverge(exponents, one.value)
-        and not any(min(pair) <= one.value <= max(pair) for pair in periodic)
+        attractor.value
+        for attractor in attractors.found
+        if attractor.period == 0
+        and may_diverge(exponents, attractor.value)
+        and not any(min(pair) <= attractor.value <= max(pair) for pair in periodic)
     ]
     return {
         "from": attractors.found[0].value,
@@ -386,7 +391,7 @@ def attractor_summary(family: Family) -> dict[str, Any]:
         "aperiodic_from": min(aperiodic, default=None),
         "lost_at": attractors.lost_at,
         "ended": attractors.reason,
-        "periods": sorted({one.period for one in attractors.found}),
+        "periods": sorted({attractor.period for attractor in attractors.found}),
     }
 
 
@@ -419,20 +424,20 @@ def alone_at(branch: GaitBranch, model: str, parameter: Parameter) -> dict[str, 
     return {"what": what, "why": f"it goes on neither way: {branch.ends[1].reason}", "saves": ""}
 
 
-def left_out(found: Sequence[Family], asked: FamilyQuestion) -> list[dict[str, str]]:
+def omitted_families(families: Sequence[Family], question: FamilyQuestion) -> list[dict[str, str]]:
     """Report a family that was not followed, and why."""
-    followed, entries, second = {one.model: one for one in found}, [], asked.second
-    for model in asked.models:
+    followed, entries, second = {family.model: family for family in families}, [], question.second
+    for model in question.models:
         if model not in followed:
-            entries.append((f"the {model} model's gaits", f"{asked.parameter.key} does not touch that model"))
+            entries.append((f"the {model} model's gaits", f"{question.parameter.key} does not touch that model"))
         elif not followed[model].branches:
             entries.append((f"the {model} model's gaits", "no gait was found in the span to begin from"))
-        elif model == CONTACT and asked.config.continuation.periods > THOROUGHNESS[CONTACT].periods:
+        elif model == CONTACT and question.config.continuation.periods > THOROUGHNESS[CONTACT].periods:
             what = f"the contact model's gaits of more than {THOROUGHNESS[CONTACT].periods} steps"
             entries.append((what, "its flips are located too coarsely, to about 1e-7, to follow them further"))
     entries += [
-        (f"the {one.model} model's plane of both keys", "the second key does not touch that model")
-        for one in found
-        if second is not None and one.branches and not second.touches(one.model)
+        (f"the {family.model} model's plane of both keys", "the second key does not touch that model")
+        for family in families
+        if second is not None and family.branches and not second.touches(family.model)
     ]
     return [{"what": what, "why": why, "saves": ""} for what, why in entries]

@@ -41,61 +41,63 @@ from walkerlab.scene.subject import ModelUnderTest, find_model_gait, section_coo
 SOLVED: Final = Effort(1e-10)
 MEETING: Final = 1e-3  # relative difference of multipliers that count as meeting
 LABELS: Final = {
-    "to": Label("", "number of the config"),
-    "start": Label("SI", "where the search began"),
-    "best": Label("SI", "where the optimum is, in the unit of the key"),
+    "to": Label("", "parameter of the config"),
+    "start": Label("SI", "start of the search"),
+    "best": Label("SI", "optimum, in the unit of the key"),
 }
-ADVICE: Final = "Widen the bounds (--over), or let other numbers go further (--keep)."
+ADVICE: Final = "Widen the bounds (--over), or the constraints (--keep)."
 
 
 def run(config: DesignConfig, inputs: Mapping[str, Content], progress: Progress, *, checkpoint: Checkpoint) -> Content:
     """Search for the optimum; raises ConfigError for an invalid question, NoAnswer if no walker keeps the bounds.
 
-    checkpoint  ends of searches that an earlier run has left, and where new ones are kept
+    checkpoint  ends of the searches of an earlier run; new ones are added
     """
     refuse(config)
-    asked = config.design or Design()
-    quantity = asked.minimise or asked.maximise
-    assert quantity is not None, "a design without a question is refused"
-    parameters = [parameter_of(key, config) for key in asked.over]
-    gaits = Gaits(config, asked, parameters, inputs["fixedpoint"].summary, progress)
-    lower, upper = np.array(list(asked.over.values()), float).T
-    keep = {name: (bounds[0], bounds[1]) for name, bounds in asked.keep.items()}
-    question = DesignProblem(quantity, -1.0 if asked.maximise else 1.0, lower, upper, keep, gaits.at)
+    design = config.design or Design()
+    quantity = design.minimise or design.maximise
+    assert quantity is not None, "refuse rejects a design without a quantity"
+    parameters = [parameter_of(key, config) for key in design.over]
+    gaits = Gaits(config, design, parameters, inputs["fixedpoint"].summary, progress)
+    lower, upper = np.array(list(design.over.values()), float).T
+    keep = {name: (bounds[0], bounds[1]) for name, bounds in design.keep.items()}
+    question = DesignProblem(quantity, -1.0 if design.maximise else 1.0, lower, upper, keep, gaits.gait_at)
     own = np.array([parameter.value_in(config) for parameter in parameters])
     progress.start("design")
-    begun, own_z = gaits.at(own), gaits.z
+    own_gait, own_z = gaits.gait_at(own), gaits.z
 
     def search(number: int, start: Floats) -> DesignSearch:
-        progress.start(f"design: search {number + 1} of {asked.starts}")
+        progress.start(f"design: search {number + 1} of {design.starts}")
         name, before, gaits.z = f"search {number}", gaits.counts.copy(), own_z
         if name in checkpoint.kept:
-            kept = np.array(checkpoint.kept[name])
-            counts, gradient_norm, x, gaits.z = np.split(kept, (2, 3, 3 + own.size))
-            point = gaits.at(x)
+            entry = np.array(checkpoint.kept[name])
+            counts, gradient_norm, x, gaits.z = np.split(entry, (2, 3, 3 + own.size))
+            point = gaits.gait_at(x)
             gaits.counts = before + counts.astype(int)
             return DesignSearch(x, point, float(gradient_norm[0]))
-        one = minimise(question, start)
-        if one.point is not None:
-            z = gaits.found[one.x.tobytes()]
-            checkpoint.keep(name, [*(gaits.counts - before).tolist(), one.gradient_norm, *one.x.tolist(), *z.tolist()])
-        return one
+        result = minimise(question, start)
+        if result.point is not None:
+            z = gaits.sections[result.x.tobytes()]
+            checkpoint.keep(
+                name, [*(gaits.counts - before).tolist(), result.gradient_norm, *result.x.tolist(), *z.tolist()]
+            )
+        return result
 
-    searches = search_from_starts(question, own, asked.starts, config.seed, search)
+    searches = search_from_starts(question, own, design.starts, config.seed, search)
     if not searches or searches[0].point is None:
-        raise NoAnswer(f"no gait of the {asked.model} model within the bounds", ADVICE)
+        raise NoAnswer(f"no gait of the {design.model} model within the bounds", ADVICE)
     best = searches[0]
     assert best.point is not None
     ends = count_optima(question, searches)
-    start = {} if begun is None else {"start_value": begun.numbers[quantity], "start": dict(begun.numbers)}
-    found = {
-        key: float(f"{value:.12g}") for key, value in zip(asked.over, best.x, strict=True)
-    }  # a bound as it was given
-    said = {
+    start = {} if own_gait is None else {"start_value": own_gait.numbers[quantity], "start": dict(own_gait.numbers)}
+    optimum = {
+        key: float(f"{value:.12g}") for key, value in zip(design.over, best.x, strict=True)
+    }  # 12 digits: bounds as typed
+    answer = {
         "quantity": quantity,
-        "sense": "least" if asked.minimise else "largest",
-        "model": asked.model,
-        "best": found,
+        "sense": "least" if design.minimise else "largest",
+        "model": design.model,
+        "best": optimum,
         "value": best.point.numbers[quantity],
         **start,
         "numbers": dict(best.point.numbers),
@@ -103,44 +105,44 @@ def run(config: DesignConfig, inputs: Mapping[str, Content], progress: Progress,
             {"quantity": name, "from": low, "to": high, "value": best.point.numbers[name]}
             for name, (low, high) in keep.items()
         ],
-        "on_bound": on_bound(asked, best.x),
+        "on_bound": on_bound(design, best.x),
         "gradient_norm": best.gradient_norm,
         "evaluations": int(gaits.counts[0]),
         "without_gait": int(gaits.counts[1]),
         "optima": ends,
-        "starts": asked.starts,
+        "starts": design.starts,
         "multipliers_meet": best.point.apart < MEETING,
     }
     rows = [
         {"to": key, "start": float(begins), "best": value}
-        for (key, value), begins in zip(found.items(), own, strict=True)
+        for (key, value), begins in zip(optimum.items(), own, strict=True)
     ]
-    content = Content({"optimum": rows_group(rows, LABELS, "row", "row")}, said)
+    content = Content({"optimum": rows_group(rows, LABELS, "row", "row")}, answer)
     if not ends:
-        raise NoAnswer("no walker within the bounds keeps the other numbers of its gait within theirs", ADVICE, content)
+        raise NoAnswer("no walker within the bounds satisfies the constraints on its gait", ADVICE, content)
     return content
 
 
 def refuse(config: DesignConfig) -> None:
     """Raise ConfigError for an invalid question."""
-    asked = config.design or Design()
-    if (asked.minimise or asked.maximise) is None or not asked.over:
+    design = config.design or Design()
+    if (design.minimise or design.maximise) is None or not design.over:
         raise ConfigError(
-            "design has no question: it needs a number of the gait and the numbers of the config that may change.",
+            "design needs a quantity to optimise and a parameter to vary.",
             "For example --minimise gait_sensitivity_norm --over walker.hip_mass_kg=5:15.",
         )
-    if asked.model == "contact" and config.contact is None:
+    if design.model == "contact" and config.contact is None:
         raise contact_required_error("design.model: contact", config.walker, "Add one.")
-    parameters = [parameter_of(key, config, ("design", "over")) for key in asked.over]
-    for key in asked.over:
-        if not model_reads(asked.model, config, key):
-            raise unused_key_error("design.over", key, (asked.model,))
-    own, bounds = [parameter.value_in(config) for parameter in parameters], list(asked.over.values())
+    parameters = [parameter_of(key, config, ("design", "over")) for key in design.over]
+    for key in design.over:
+        if not model_reads(design.model, config, key):
+            raise unused_key_error("design.over", key, (design.model,))
+    own, bounds = [parameter.value_in(config) for parameter in parameters], list(design.over.values())
     corners = np.column_stack((own, bounds)).T
     for place, parameter in enumerate(parameters):
         for bound in bounds[place]:
-            beside = (np.where(np.arange(len(parameters)) == place, bound, others) for others in corners)
-            if all(config_with(config, parameters, x) is None for x in beside):
+            neighbours = (np.where(np.arange(len(parameters)) == place, bound, corner) for corner in corners)
+            if all(config_with(config, parameters, x) is None for x in neighbours):
                 raise parameter.refusal(config, bound, ("design", "over"))
 
 
@@ -154,9 +156,9 @@ def config_with(config: DesignConfig, parameters: Sequence[Parameter], x: Floats
     return changed
 
 
-def on_bound(asked: Design, x: Floats) -> list[str]:
+def on_bound(design: Design, x: Floats) -> list[str]:
     """Return the keys whose optimum lies on a bound."""
-    pairs = zip(asked.over.items(), x.tolist(), strict=True)
+    pairs = zip(design.over.items(), x.tolist(), strict=True)
     return [
         key for (key, (low, high)), value in pairs if min(value - low, high - value) < BOUND_TOLERANCE * (high - low)
     ]
@@ -168,58 +170,60 @@ class Gaits:
     def __init__(
         self,
         config: DesignConfig,
-        asked: Design,
+        design: Design,
         parameters: list[Parameter],
         gait: Mapping[str, Any],
         progress: Progress,
     ) -> None:
         """Start at the config's gait."""
-        self.config, self.model, self.parameters, self.progress = config, asked.model, parameters, progress
-        self.wanted = {*filter(None, (asked.minimise, asked.maximise)), *asked.keep}
+        self.config, self.model, self.parameters, self.progress = config, design.model, parameters, progress
+        self.wanted = {*filter(None, (design.minimise, design.maximise)), *design.keep}
         self.counts = np.zeros(2, int)  # evaluations, and those without a gait
-        self.found: dict[bytes, Floats] = {}  # section coordinates of gaits, by parameter values
+        self.sections: dict[bytes, Floats] = {}  # section coordinates of gaits, by parameter values
         self.length = float(gait["step_length_m"])
-        self.z = find_model_gait(asked.model, config, gait, progress.note).z
+        self.z = find_model_gait(design.model, config, gait, progress.note).z
 
-    def at(self, x: Floats) -> Point | None:
-        """Return the gait; None if there is none or the config rejects the values."""
+    def gait_at(self, x: Floats) -> Point | None:
+        """Return the gait; None without one, or if the config rejects the values."""
         self.counts[0] += 1
         self.progress.advance()
         changed = config_with(self.config, self.parameters, x)
-        found = None if changed is None else self.gait_of(changed)
-        if found is None:
+        gait = None if changed is None else self.gait_of(changed)
+        if gait is None:
             self.counts[1] += 1
         else:
-            self.found[x.tobytes()] = self.z
-        return found
+            self.sections[x.tobytes()] = self.z
+        return gait
 
     def gait_of(self, config: Config) -> Point | None:
         """Find the gait of a config near the last one, or by a search."""
         subject = ModelUnderTest(self.model, config, self.z, self.length)
-        here = subject.at()
-        found = self.near(here, self.z)
-        if self.model == "rigid" and (found is None or found[1]["spectral_radius"] >= 1.0):  # a long way, perhaps
+        standpoint = subject.at()
+        match = self.near(standpoint, self.z)
+        if self.model == "rigid" and (match is None or match[1]["spectral_radius"] >= 1.0):  # a long way, perhaps
             walker = rigid_walker(config)
             gait = find_gaits(walker, config.seed).gait
-            found = found if gait is None else self.near(here, section_coordinates(walker, gait.state)) or found
-        if found is None:
+            match = match if gait is None else self.near(standpoint, section_coordinates(walker, gait.state)) or match
+        if match is None:
             return None
-        here, numbers = found
-        self.z, subject, by_key = here.z, replace(subject, z=here.z), []
+        standpoint, numbers = match
+        self.z, subject, by_key = standpoint.z, replace(subject, z=standpoint.z), []
         for parameter in self.parameters:
             of_key = subject.gradients(parameter, self.wanted)
             if any(name not in of_key for name in self.wanted):
                 return None
             by_key.append({name: of_key[name].value or 0.0 for name in self.wanted})
-        others = np.sort(np.abs([value for value in multipliers_of(here.A) if value.imag >= 0.0]))
-        apart = float(others[-1] - others[-2]) if others.size > 1 else 1.0
-        return Point(numbers, {name: np.array([one[name] for one in by_key]) for name in self.wanted}, apart)
+        moduli = np.sort(np.abs([value for value in multipliers_of(standpoint.A) if value.imag >= 0.0]))
+        apart = float(moduli[-1] - moduli[-2]) if moduli.size > 1 else 1.0
+        return Point(
+            numbers, {name: np.array([gradients[name] for gradients in by_key]) for name in self.wanted}, apart
+        )
 
-    def near(self, at: GaitOnMap, z: Floats) -> tuple[GaitOnMap, dict[str, float]] | None:
+    def near(self, standpoint_before: GaitOnMap, z: Floats) -> tuple[GaitOnMap, dict[str, float]] | None:
         """Find the gait near z (d,) with its quantities; None if one is undefined."""
-        cycle = gait_near(at.step_map, z, at.p, SOLVED)
+        cycle = gait_near(standpoint_before.step_map, z, standpoint_before.p, SOLVED)
         if isinstance(cycle, NotConverged):
             return None
-        here = at._replace(z=cycle.z, A=cycle.DP)
-        numbers = gait_quantities(here, self.wanted)
-        return None if numbers is None or any(name not in numbers for name in self.wanted) else (here, numbers)
+        standpoint = standpoint_before._replace(z=cycle.z, A=cycle.DP)
+        numbers = gait_quantities(standpoint, self.wanted)
+        return None if numbers is None or any(name not in numbers for name in self.wanted) else (standpoint, numbers)

@@ -63,7 +63,7 @@ MARKS = {
 
 
 def groups(
-    found: Sequence[Family], said: Mapping[str, Any], config: ContactConfig, parameter: Parameter,
+    families: Sequence[Family], answer: Mapping[str, Any], config: ContactConfig, parameter: Parameter,
     second: Parameter | None,
 ) -> dict[str, Group]:  # fmt: skip
     """Build a group for each branch and curve, and for each model's bifurcations, exponents and attractor.
@@ -77,38 +77,40 @@ def groups(
     def over(plane: BifurcationCurve | Regions, *dims: str) -> dict[str, Variable]:
         """Return coordinates of both parameters."""
         axes = zip(("value", "second"), (plane.first, plane.second), (parameter, second), dims, strict=True)
-        return {name: labelled(values, Label(one.unit, one.key), dim) for name, values, one, dim in axes if one}
+        return {
+            name: labelled(values, Label(family.unit, family.key), dim) for name, values, family, dim in axes if family
+        }
 
-    if said["branches"]:
+    if answer["branches"]:
         ends = {"from": Label(parameter.unit, "where it begins"), "to": Label(parameter.unit, "where it ends")}
-        overview = columns(said["branches"], {"model": MODEL, "period": PERIOD, **ends}, "branch")
+        overview = columns(answer["branches"], {"model": MODEL, "period": PERIOD, **ends}, "branch")
         stored["branches"] = Group(overview, {"over": parameter.key})
-    if said["curves"]:
-        stored["curves"] = Group(columns(said["curves"], CURVES, "curve"))
-    for one in found:
-        if one.step_map is None:
+    if answer["curves"]:
+        stored["curves"] = Group(columns(answer["curves"], CURVES, "curve"))
+    for family in families:
+        if family.step_map is None:
             continue
         own: dict[str, Group] = {}
-        for number, curve in enumerate(one.curves):
+        for number, curve in enumerate(family.curves):
             own[f"curve_{number}"] = Group(over(curve, "point", "point"), {"kind": curve.kind, "period": curve.period})
-        if one.regions is not None:
-            periods = Variable(one.regions.period, ("first", "second"), "1", SETTLED)
-            own["regions"] = Group({**over(one.regions, "first", "second"), "period": periods})
-        for number, branch in enumerate(one.branches):
-            marks = [*birth_of(branch, one.branches), *marks_on(branch)]
-            own[f"branch_{number}"] = branch_group(branch, marks, one.step_map.monitors, value)
-        rows = [row for row in said["bifurcations"] if row["model"] == one.model]
+        if family.regions is not None:
+            periods = Variable(family.regions.period, ("first", "second"), "1", SETTLED)
+            own["regions"] = Group({**over(family.regions, "first", "second"), "period": periods})
+        for number, branch in enumerate(family.branches):
+            marks = [*birth_of(branch, family.branches), *marks_on(branch)]
+            own[f"branch_{number}"] = branch_group(branch, marks, family.step_map.monitors, value)
+        rows = [row for row in answer["bifurcations"] if row["model"] == family.model]
         if rows:
             multipliers = [complex(*row["multiplier"]) for row in rows]
             both = real_and_imaginary("multiplier", multipliers, ("bifurcation",), "critical multiplier")
             own["bifurcations"] = Group({**columns(rows, value | BIFURCATIONS, "bifurcation"), **both})
-        if one.exponents:
-            own["lyapunov"] = Group(columns(one.exponents, value | EXPONENTS, "sample"))
-        if one.attractors.found:
-            own["attractor"] = Group(columns(one.attractors.found, value | ATTRACTORS, "sample"))
-        if one.model == RIGID:
-            own |= motions(one.branches, config, parameter)
-        stored |= {f"{one.model}/{name}": group for name, group in own.items()}
+        if family.exponents:
+            own["lyapunov"] = Group(columns(family.exponents, value | EXPONENTS, "sample"))
+        if family.attractors.found:
+            own["attractor"] = Group(columns(family.attractors.found, value | ATTRACTORS, "sample"))
+        if family.model == RIGID:
+            own |= motions(family.branches, config, parameter)
+        stored |= {f"{family.model}/{name}": group for name, group in own.items()}
     return stored
 
 
@@ -125,18 +127,18 @@ class Mark(NamedTuple):
 def marks_on(branch: GaitBranch) -> list[Mark]:
     """Return the bifurcations of a branch in their order along it."""
     return [
-        Mark(index, one.kind, one.value, one.gait.periods_s, one.gait.angles)
+        Mark(index, bifurcation.kind, bifurcation.value, bifurcation.gait.periods_s, bifurcation.gait.angles)
         for index, (before, after) in enumerate(pairwise(branch.points))
-        for one in branch.bifurcations if one.lies_between(before, after)
+        for bifurcation in branch.bifurcations if bifurcation.lies_between(before, after)
     ]  # fmt: skip
 
 
 def birth_of(branch: GaitBranch, branches: Sequence[GaitBranch]) -> list[Mark]:
     """Return the flip where a branch begins, with its parent's gait repeated twice."""
     for parent in branches:
-        for one in parent.bifurcations:
-            if one.kind == "flip" and 2 * parent.period == branch.period and one.value == branch.ends[0].value:
-                return [Mark(-1, one.kind, one.value, np.tile(one.gait.periods_s, 2), np.tile(one.gait.angles, 2))]
+        for flip in parent.bifurcations:
+            if flip.kind == "flip" and 2 * parent.period == branch.period and flip.value == branch.ends[0].value:
+                return [Mark(-1, flip.kind, flip.value, np.tile(flip.gait.periods_s, 2), np.tile(flip.gait.angles, 2))]
     return []
 
 
@@ -192,6 +194,6 @@ def motion(point: Cycle, period: int, config: ContactConfig, parameter: Paramete
     if walk.steps < steps or walk.samples is None:
         return
     changes = np.flatnonzero(np.diff(walk.samples.step))
-    kept = np.unique(np.concatenate((np.arange(0, walk.samples.time_s.size, EVERY), changes, changes + 1)))
-    seen = trajectory_group(scene, walk, only_at(walk.samples, kept))
-    yield replace(seen, attrs={"value": point.value, "slope_rad": changed.slope_rad, "steps": period})
+    selected = np.unique(np.concatenate((np.arange(0, walk.samples.time_s.size, EVERY), changes, changes + 1)))
+    samples_group = trajectory_group(scene, walk, only_at(walk.samples, selected))
+    yield replace(samples_group, attrs={"value": point.value, "slope_rad": changed.slope_rad, "steps": period})

@@ -22,7 +22,7 @@ NUMBERS = {
     "step_length": Label("m", "length of a step along the slope", name="step_length_m"),
     "spectral_radius": Label("1", "largest magnitude of a multiplier"),
     "stable": Label("1", "whether small disturbances die out"),
-    "residual": Label("rad", "what is left of P(x) - x, velocities times sqrt(L/g)"),
+    "residual": Label("rad", "residual P(x) - x, velocities times sqrt(L/g)"),
     "energy": Label("J", "time mean of the energy from the stance foot", name="energy_J"),
     "energy_drift": Label("J", "spread of the energy within the swing", name="energy_drift_J"),
     "speed": Label("m/s", "step length over period", name="speed_m_s"),

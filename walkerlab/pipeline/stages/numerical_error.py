@@ -19,19 +19,19 @@ ROUNDING: Final = 1e-6  # relative, of a divided tolerance
 Summary = Mapping[str, Any]
 
 
-def numerical_error(walked: Summary, tolerances: Tolerances, walk: Callable[[Tolerances], Summary]) -> dict[str, Any]:
-    """How much a walk's numbers change when it is walked again, at a hundred times tighter tolerances if there are any.
+def numerical_error(first: Summary, tolerances: Tolerances, walk: Callable[[Tolerances], Summary]) -> dict[str, Any]:
+    """Repeat a walk at tighter tolerances and return how much its quantities change.
 
-    walked      summary of the walk: its `outcome`, `steps`, `end_time_s`, and lists with a number for each step
-    tolerances  that it was walked with
-    walk        the same walk with others, as its summary
+    first       summary of the walk: its `outcome`, `steps`, `end_time_s`, and lists with one value per step
+    tolerances  of the first walk
+    walk        repeats the walk with other tolerances and returns its summary
 
-    Returns the largest changes of what its steps have, named as in `ERROR_OF_EACH_STEP`, `end_time_s` (s), and of a
-    driven walk its `cost_of_transport`; `by` tells what was changed if it is not the usual. Only `reason` if the second
-    walk ends otherwise.
+    Returns the largest changes of the quantities of its steps, named as in `ERROR_OF_EACH_STEP`, of `end_time_s` (s),
+    and of `cost_of_transport` for a driven walk; `by` describes the change unless it is the usual one. Returns only
+    `reason` if the second walk ends otherwise.
     """
     tighter, by = tightened(tolerances)
-    return change(walked, walk(tighter), by)
+    return change(first, walk(tighter), by)
 
 
 def tightened(tolerances: Tolerances) -> tuple[Tolerances, str]:
@@ -44,25 +44,25 @@ def tightened(tolerances: Tolerances) -> tuple[Tolerances, str]:
         rtol = tolerances.rtol / factor
         if rtol >= (1.0 - ROUNDING) * LEAST_RTOL:
             return replace(tolerances, rtol=rtol, atol=tolerances.atol / factor), by
-    other = "dop853" if tolerances.method == "radau5" else "radau5"
-    return replace(tolerances, method=other), f"another method, {other}"
+    method = "dop853" if tolerances.method == "radau5" else "radau5"
+    return replace(tolerances, method=method), f"another method, {method}"
 
 
-def change(walked: Summary, again: Summary, by: str = USUAL) -> dict[str, Any]:
+def change(first: Summary, again: Summary, by: str = USUAL) -> dict[str, Any]:
     """Return the largest changes between two summaries of a walk, as `numerical_error` does."""
-    if (walked["outcome"], walked["steps"]) != (again["outcome"], again["steps"]):
+    if (first["outcome"], first["steps"]) != (again["outcome"], again["steps"]):
         steps = f"{again['steps']} step{'' if again['steps'] == 1 else 's'}"
         return {"reason": f"with {by} the walk ends otherwise: {again['outcome']} after {steps}"}
     changes = {}
     for key, name in ERROR_OF_EACH_STEP.items():
-        both = zip(walked.get(key) or (), again.get(key) or (), strict=False)  # the last foot may still stand
-        apart = [abs(one - other) for one, other in both if one is not None and other is not None]
-        if apart and any(walked[key]):  # point feet do not roll
+        both = zip(first.get(key) or (), again.get(key) or (), strict=False)  # the last foot may still stand
+        apart = [abs(before - after) for before, after in both if before is not None and after is not None]
+        if apart and any(first[key]):  # point feet do not roll
             changes[name] = max(apart)
-    changes["end_time_s"] = abs(walked["end_time_s"] - again["end_time_s"])
+    changes["end_time_s"] = abs(first["end_time_s"] - again["end_time_s"])
     # a passive walk's cost is the slope's sine, however large the walk's error
-    if any(work for giver, work in walked.get("work_per_step_J", {}).items() if giver != "gravity"):
-        changes["cost_of_transport"] = abs(walked["cost_of_transport"] - again["cost_of_transport"])
+    if any(work for giver, work in first.get("work_per_step_J", {}).items() if giver != "gravity"):
+        changes["cost_of_transport"] = abs(first["cost_of_transport"] - again["cost_of_transport"])
     return changes if by == USUAL else {**changes, "by": by}
 
 

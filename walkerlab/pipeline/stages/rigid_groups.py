@@ -68,22 +68,24 @@ def reorder_by_leg(by_role: Any, stance: Any) -> Any:
 def body_variables(scene: RigidScene, samples: Samples, stance: Any) -> dict[str, Variable]:
     """Return angles and velocities of shanks and torso."""
     n = samples.state.shape[1] // 2
-    found: dict[str, Variable] = {}
+    variables: dict[str, Variable] = {}
     for k, name in enumerate(scene.names[2:n], 2):
         angle, rate = samples.state[:, k], samples.state[:, n + k]
         if name.startswith("theta_1_"):  # the stance leg's shank is in line with its thigh
             angle = reorder_by_leg(np.column_stack((angle, samples.state[:, 1])), stance)
             rate = reorder_by_leg(np.column_stack((rate, samples.state[:, n + 1])), stance)
-        found |= turning(name.split("_")[-1], angle, rate)
-    return found
+        variables |= turning(name.split("_")[-1], angle, rate)
+    return variables
 
 
 def place_variables(scene: RigidScene, walk: RigidWalkResult, samples: Samples, stance: Any) -> dict[str, Variable]:
     """Return positions of hip, knees and feet along the slope from the first foothold, and above it."""
-    at = places(scene.walker, scene.knee_m, walk, samples)
-    points = {"foot": np.stack((at.swing_foot, at.contact), axis=1)} | ({} if at.knees is None else {"knee": at.knees})
-    found = over_time(hip_along_m=at.hip[:, 0], hip_height_m=at.hip[:, 1])
+    positions = places(scene.walker, scene.knee_m, walk, samples)
+    points = {"foot": np.stack((positions.swing_foot, positions.contact), axis=1)} | (
+        {} if positions.knees is None else {"knee": positions.knees}
+    )
+    variables = over_time(hip_along_m=positions.hip[:, 0], hip_height_m=positions.hip[:, 1])
     for name, point in points.items():
         along, height = (reorder_by_leg(point[:, :, axis], stance) for axis in range(2))
-        found |= over_time(**{f"{name}_along_m": along, f"{name}_height_m": height})
-    return found
+        variables |= over_time(**{f"{name}_along_m": along, f"{name}_height_m": height})
+    return variables

@@ -56,11 +56,11 @@ GIVEN: Final = ("normal_impulse_N_s", "min_normal_force_N")
 UNITS: Final = {"floor-drop": "m", "hip-push": "N s"}
 OF: Final = dict(zip(INDICATORS, ("s", "m", "m/s"), strict=True))
 MODEL: Final = {"model": Label("", "which model walks")}
-NONE_BESIDE: Final = Gradient(None, None, "walks beside the gait end, or the config refuses them")
+NONE_BESIDE: Final = Gradient(None, None, "neighbouring walks end early, or the config rejects their parameters")
 LABELS: Final[dict[str, dict[str, Label]]] = {
     "gait_sensitivity_norm": {
-        "disturbance": Label("", "what the first step is disturbed by"),
-        "indicator": Label("", "what of the steps is measured"),
+        "disturbance": Label("", "disturbance of the first step"),
+        "indicator": Label("", "measured quantity of the steps"),
         "value": Label("SI", "gait sensitivity norm, in the units of indicator and disturbance"),
         "direct": Label("SI", "change of the disturbed step itself"),
         "error": Label("SI", "of the norm, from quotients over two step sizes"),
@@ -86,11 +86,11 @@ LABELS: Final[dict[str, dict[str, Label]]] = {
         "mean_steps": Label("1", "mean number of steps to failure, or a bound from below"),
         "walks": Label("1", "walks"),
         "capped": Label("1", "walks that were cut off"),
-        "method": Label("", "how the mean was found"),
+        "method": Label("", "method of the mean"),
     },
     "sensitivity": {
-        "of": Label("", "what changes"),
-        "to": Label("", "number of the config"),
+        "of": Label("", "quantity of the gait"),
+        "to": Label("", "parameter of the config"),
         "value": Label("SI", "derivative, in the units of both"),
     },
 }
@@ -110,41 +110,41 @@ def run(
     checkpoint  walks of an earlier run
     jobs        processes
 
-    Raises ConfigError for a question that cannot be meant.
+    Raises ConfigError for an invalid question.
     """
     refuse(config)
-    found: dict[str, Any] = {"gaits": [], **{name: [] for name in LABELS}}
+    answer: dict[str, Any] = {"gaits": [], **{name: [] for name in LABELS}}
     unstable, steps = [], {}
     for subject in subjects(config, inputs, progress):
-        here = subject.at()
+        gait = subject.at()
         # the rigid model's gradients and largest disturbances are faster than starting a process
         jobs_but_for_walks = jobs if subject.model == CONTACT else 1
-        numbers = gait_quantities(here)
+        numbers = gait_quantities(gait)
         assert numbers is not None, "a gait that was found walks"
-        found["gaits"].append({"model": subject.model, **numbers})
-        found["sensitivity"] += sensitivities(subject, config.robustness.to, numbers, progress, jobs_but_for_walks)
+        answer["gaits"].append({"model": subject.model, **numbers})
+        answer["sensitivity"] += sensitivities(subject, config.robustness.to, numbers, progress, jobs_but_for_walks)
         if numbers["spectral_radius"] >= 1.0:
             unstable.append(subject.model)
             continue
-        found["gait_sensitivity_norm"] += norms(subject.model, here)
+        answer["gait_sensitivity_norm"] += norms(subject.model, gait)
         rough_walks, label = [*rough(subject, config)], f"robustness: {subject.model} model"
         units, processes = [*single(subject, config), *rough_walks], jobs if rough_walks else jobs_but_for_walks
         # the gait's own quantities have compiled all kernels
         done, _ = complete(units, checkpoint, label, progress, processes, compiled=True)
         (down,), (up,), (forward, *ahead), (backward, *behind), *walks = done
-        of, wanted = {"model": subject.model}, {"steps": config.robustness.steps}
-        found["largest_step"].append({**of, "down_m": down, "up_m": up, **wanted})
-        found["largest_push"].append({**of, "forward_N_s": forward, "backward_N_s": backward, **wanted})
-        pushes = found["largest_push"][-1]
-        for way, given in (("forward", ahead), ("backward", behind)):
-            pushes |= zip((f"{way}_{name}" for name in GIVEN), given or (None, None), strict=True)
-        every = np.array([taken for some in walks for taken in some])
+        model, target = {"model": subject.model}, {"steps": config.robustness.steps}
+        answer["largest_step"].append({**model, "down_m": down, "up_m": up, **target})
+        answer["largest_push"].append({**model, "forward_N_s": forward, "backward_N_s": backward, **target})
+        pushes = answer["largest_push"][-1]
+        for way, reactions in (("forward", ahead), ("backward", behind)):
+            pushes |= zip((f"{way}_{name}" for name in GIVEN), reactions or (None, None), strict=True)
+        every = np.array([count for batch in walks for count in batch])
         steps[subject.model] = every.reshape(-1, config.robustness.walks)
-        found["rough_ground"] += rough_rows(subject.model, config, steps[subject.model])
-    groups = {name: rows_group(found[name], MODEL | labels) for name, labels in LABELS.items() if found[name]}
+        answer["rough_ground"] += rough_rows(subject.model, config, steps[subject.model])
+    groups = {name: rows_group(answer[name], MODEL | labels) for name, labels in LABELS.items() if answer[name]}
     if steps and config.robustness.roughness_m:
         groups |= {"rough_steps": rough_steps(config, steps), **rough_walk(config, inputs)}
-    content = Content(groups, {**found, "steps": config.robustness.steps})
+    content = Content(groups, {**answer, "steps": config.robustness.steps})
     if unstable:
         why = f"the gait of the {' and the '.join(unstable)} model is unstable: it has no sensitivity norm"
         raise NoAnswer(
@@ -155,15 +155,15 @@ def run(
 
 def refuse(config: RobustnessConfig) -> None:
     """Raise ConfigError for an invalid question."""
-    asked = config.robustness
-    if asked.model in (CONTACT, "both") and config.contact is None:
-        raise contact_required_error(f"robustness.model: {asked.model}", config.walker, "Add one, or ask for rigid.")
-    for place, key in enumerate(asked.to):
+    block = config.robustness
+    if block.model in (CONTACT, "both") and config.contact is None:
+        raise contact_required_error(f"robustness.model: {block.model}", config.walker, "Add one, or ask for rigid.")
+    for place, key in enumerate(block.to):
         parameter_of(key, config, ("robustness", "to", place))
         if not any(model_reads(model, config, key) for model in models_of(config)):
             raise unused_key_error("robustness.to", key, models_of(config))
     half = 0.5 * config.walker.leg_length_m
-    for roughness in asked.roughness_m:
+    for roughness in block.roughness_m:
         if roughness > half:
             raise ConfigError(
                 f"robustness.roughness_m: {roughness:g} m is more than half a leg, {half:g} m: no step survives it.",
@@ -181,17 +181,17 @@ def subjects(config: RobustnessConfig, inputs: Mapping[str, Content], progress: 
 
 def models_of(config: RobustnessConfig) -> tuple[str, ...]:
     """Return the requested models."""
-    asked = config.robustness.model or (RIGID if config.contact is None else "both")
-    return (RIGID, CONTACT) if asked == "both" else (asked,)
+    model = config.robustness.model or (RIGID if config.contact is None else "both")
+    return (RIGID, CONTACT) if model == "both" else (model,)
 
 
-def norms(model: str, here: GaitOnMap) -> Iterator[dict[str, Any]]:
+def norms(model: str, gait: GaitOnMap) -> Iterator[dict[str, Any]]:
     """Return rows of sensitivity norms, one for each disturbance and indicator."""
     for disturbance in DISTURBANCES:
-        answer, units, of = sensitivity(here, disturbance), here.units, UNITS[disturbance]
+        answer, units, disturbance_unit = sensitivity(gait, disturbance), gait.units, UNITS[disturbance]
         if answer is None:
             continue
-        to_pure = here.unit_of(disturbance) / np.array((units.time, units.length, units.length / units.time))
+        to_pure = gait.unit_of(disturbance) / np.array((units.time, units.length, units.length / units.time))
         for k, (indicator, unit) in enumerate(OF.items()):
             yield {
                 "model": model,
@@ -199,7 +199,7 @@ def norms(model: str, here: GaitOnMap) -> Iterator[dict[str, Any]]:
                 "indicator": indicator,
                 "value": float(answer.norm[k]),
                 "direct": float(answer.direct[k]),
-                "unit": f"{unit}/({of})" if " " in of else f"{unit}/{of}",
+                "unit": f"{unit}/({disturbance_unit})" if " " in disturbance_unit else f"{unit}/{disturbance_unit}",
                 "scaled": float(answer.norm[k] * to_pure[k]),
                 "error": float(answer.error[k]),
             }
@@ -223,10 +223,10 @@ def single_of(subject: ModelUnderTest, disturbance: Any, sign: float, steps: int
 
 def rough(subject: ModelUnderTest, config: RobustnessConfig) -> Iterator[WorkUnit]:
     """Iterate over batches of walks on rough ground."""
-    asked, most = config.robustness, cap(subject.model, config)
-    for roughness in asked.roughness_m:
-        for first in range(0, asked.walks, WALKS_AT_ONCE):
-            walks = range(first, min(first + WALKS_AT_ONCE, asked.walks))
+    block, most = config.robustness, cap(subject.model, config)
+    for roughness in block.roughness_m:
+        for first in range(0, block.walks, WALKS_AT_ONCE):
+            walks = range(first, min(first + WALKS_AT_ONCE, block.walks))
             run = partial(rough_of, subject, roughness, config.seed, walks, most)
             yield WorkUnit(f"{subject.model} rough {roughness:g} {first}", len(walks), run)
 
@@ -238,8 +238,8 @@ def cap(model: str, config: RobustnessConfig) -> int:
 
 def rough_of(subject: ModelUnderTest, roughness: float, seed: int, walks: range, most: int) -> list[float]:
     """Count steps of some walks; each has its own ground, independent of the process."""
-    here = subject.at(exact=False)
-    return [float(steps_on_rough_ground(here, roughness, (seed, walk), most)) for walk in walks]
+    gait = subject.at(exact=False)
+    return [float(steps_on_rough_ground(gait, roughness, (seed, walk), most)) for walk in walks]
 
 
 def rough_steps(config: RobustnessConfig, steps: Mapping[str, Floats]) -> Group:
@@ -268,35 +268,35 @@ def rough_walk(config: RobustnessConfig, inputs: Mapping[str, Content]) -> dict[
 
 
 def rough_rows(model: str, config: RobustnessConfig, steps: Floats) -> Rows:
-    """Summarise the numbers of steps (roughness, walk) on each rough ground."""
+    """Summarise the step counts (roughness, walk) on each rough ground."""
     most, rows = cap(model, config), []
-    for roughness, taken in zip(config.robustness.roughness_m, steps, strict=True):
-        seen = asdict(rough_walks(taken, most))
-        told = {name: value for name, value in seen.items() if value is not None}
-        rows.append({"model": model, "roughness_m": roughness, **told, "cut_off_at": most})
+    for roughness, counts in zip(config.robustness.roughness_m, steps, strict=True):
+        seen = asdict(rough_walks(counts, most))
+        measures = {name: value for name, value in seen.items() if value is not None}
+        rows.append({"model": model, "roughness_m": roughness, **measures, "cut_off_at": most})
     return rows
 
 
 def sensitivities(
-    subject: ModelUnderTest, wanted: tuple[str, ...], numbers: Mapping[str, float], progress: Progress, jobs: int
+    subject: ModelUnderTest, requested: tuple[str, ...], numbers: Mapping[str, float], progress: Progress, jobs: int
 ) -> Rows:
     """Return rows of derivatives by decreasing relative effect; parameters that are 0 come last."""
-    keys = numbers_read(subject, wanted)
+    keys = numbers_read(subject, requested)
     label, rows = f"robustness: gradients of the {subject.model} model", list[dict[str, Any]]()
-    found = in_order([partial(gradients_of, subject, key) for key in keys], jobs)
-    for key, of_key in track(progress, label, len(keys), zip(keys, found, strict=True)):
+    results = in_order([partial(gradients_of, subject, key) for key in keys], jobs)
+    for key, gradients in track(progress, label, len(keys), zip(keys, results, strict=True)):
         parameter = parameter_of(key, subject.config)
         value = parameter.value_in(subject.config)
-        for name, gradient in (of_key or dict.fromkeys(numbers, NONE_BESIDE)).items():
+        for name, gradient in (gradients or dict.fromkeys(numbers, NONE_BESIDE)).items():
             if name in numbers:
                 share = None if gradient.value is None else relative_gradient(gradient.value, value, numbers[name])
-                told = {} if gradient.value is None else {"error": float(gradient.error or 0.0)}
-                told |= {} if share is None else {"relative": share}
+                details = {} if gradient.value is None else {"error": float(gradient.error or 0.0)}
+                details |= {} if share is None else {"relative": share}
                 unit = (
                     GAIT_QUANTITIES[name] if parameter.unit == "1" else f"{GAIT_QUANTITIES[name]} per {parameter.unit}"
                 )
                 rows.append(
-                    {"model": subject.model, "of": name, "to": key, "value": gradient.value, "unit": unit, **told}
+                    {"model": subject.model, "of": name, "to": key, "value": gradient.value, "unit": unit, **details}
                     | ({"why": gradient.why} if gradient.why else {})
                 )
     return sorted(rows, key=lambda row: (row["value"] is None, "relative" not in row, -abs(row.get("relative", 0.0))))
@@ -304,15 +304,15 @@ def sensitivities(
 
 def gradients_of(subject: ModelUnderTest, key: str) -> dict[str, Gradient]:
     """Return derivatives by one key; a passive walker's cost of transport is the sine of the slope."""
-    known = () if drives_of(subject.config) else ("cost_of_transport",)
-    wanted = [name for name in GAIT_QUANTITIES if name not in known]
-    return subject.gradients(parameter_of(key, subject.config), wanted)
+    omitted = () if drives_of(subject.config) else ("cost_of_transport",)
+    names = [name for name in GAIT_QUANTITIES if name not in omitted]
+    return subject.gradients(parameter_of(key, subject.config), names)
 
 
-def numbers_read(subject: ModelUnderTest, wanted: tuple[str, ...] = ()) -> tuple[str, ...]:
+def numbers_read(subject: ModelUnderTest, requested: tuple[str, ...] = ()) -> tuple[str, ...]:
     """Return the requested parameters, or all, that the model reads, by dotted key."""
     own = {".".join(path): field for path, field in leaves(Config, held=subject.config)}
     in_degrees = slope_in_degrees(subject.config.slope_rad) is not None
     written = {SLOPE_RAD: SLOPE_DEG} if in_degrees else {}
     every = (written.get(key, key) for key in own if not why_no_parameter(key, subject.config, own))
-    return tuple(key for key in wanted or every if model_reads(subject.model, subject.config, key))
+    return tuple(key for key in requested or every if model_reads(subject.model, subject.config, key))

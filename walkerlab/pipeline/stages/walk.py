@@ -1,7 +1,7 @@
 """Common parts of stages that walk: the start, stored groups, the summary and the numerical error.
 
-Both models store a walk under the same names, in the same shapes, with the same meanings; what a model has not is
-absent. Of a long walk's samples all of its beginning and end are stored, and between them what shows each step.
+Both models store a walk under the same names, in the same shapes, with the same meanings; quantities
+that a model lacks are absent. Long walks are thinned: all samples of the beginning and end, fewer of the steps between.
 """
 
 import math
@@ -68,7 +68,7 @@ OVER_TIME: Final = {
     **{loss.variable: Label("J", loss.meaning) for loss in SAMPLED.values()},
     "push_off_J": Label("J", "given by the push-off so far"),
     "hip_J": Label("J", "given by torque and damper of the hip so far"),
-    "residual_J": Label("J", "total energy plus what was lost less what was given, less the start's"),
+    "residual_J": Label("J", "change of total energy plus energy lost minus energy given"),
 }
 OUTCOMES: Final = ", ".join(f"{outcome.value} {outcome.label}" for outcome in Outcome)
 """Meanings of the outcome codes on a map."""
@@ -103,23 +103,23 @@ def content_of_walk(
 ) -> Content:
     """Walk, store samples (thinned for long walks), and repeat the walk for the numerical error.
 
-    walk     takes it with tolerances, sampled if that is asked for, and returns a `WalkRecord` with `samples`
-    groups   the datasets of a walk
-    summary  what is printed of it
-    again    whether the second walk is wanted, which takes about as long as two or three
+    walk     simulates with tolerances, optionally sampled, and returns a `WalkRecord` with `samples`
+    groups   returns the datasets of a walk
+    summary  returns its summary
+    again    whether to repeat the walk, which takes two to three times as long
 
-    Raises NoAnswer, with what there is, if the integrator gives none.
+    Raises NoAnswer with partial results if the integrator fails.
     """
-    taken = walk(tolerances, True)
-    if taken.samples is not None:
-        taken = replace(taken, samples=thinned(taken.samples, taken.touch_time_s, progress))
-    stored, said = groups(taken), summary(taken)
-    if not taken.outcome.answered:
-        why = f"{stage}: {taken.outcome.label} after {taken.steps} steps, {taken.end_time_s:.4g} s"
-        raise NoAnswer(why, said["advice"], Content(stored, said))
+    result = walk(tolerances, True)
+    if result.samples is not None:
+        result = replace(result, samples=thinned(result.samples, result.touch_time_s, progress))
+    stored, answer = groups(result), summary(result)
+    if not result.outcome.answered:
+        why = f"{stage}: {result.outcome.label} after {result.steps} steps, {result.end_time_s:.4g} s"
+        raise NoAnswer(why, answer["advice"], Content(stored, answer))
     if again:
-        said["numerical_error"] = numerical_error(said, tolerances, lambda tighter: summary(walk(tighter, False)))
-    return Content(stored, said)
+        answer["numerical_error"] = numerical_error(answer, tolerances, lambda tighter: summary(walk(tighter, False)))
+    return Content(stored, answer)
 
 
 def thinned(samples: Any, ends: NDArray[np.float64], progress: Progress) -> Any:
@@ -144,14 +144,14 @@ def thinned(samples: Any, ends: NDArray[np.float64], progress: Progress) -> Any:
     return only_at(samples, stored)
 
 
-def only_at(samples: Any, kept: NDArray[Any]) -> Any:
+def only_at(samples: Any, mask: NDArray[Any]) -> Any:
     """Select samples of a walk."""
-    return type(samples)(*(each[kept] for each in samples))
+    return type(samples)(*(each[mask] for each in samples))
 
 
 def over_time(**values: ArrayLike) -> dict[str, Variable]:
     """Build variables over time, named as in `OVER_TIME`, from values (samples,) or (samples, 2) by leg."""
-    return {name: labelled(found, OVER_TIME[name], *(TIME, LEG)[: np.ndim(found)]) for name, found in values.items()}
+    return {name: labelled(column, OVER_TIME[name], *(TIME, LEG)[: np.ndim(column)]) for name, column in values.items()}
 
 
 def turning(name: str, angle: ArrayLike, velocity: ArrayLike) -> dict[str, Variable]:
@@ -172,36 +172,36 @@ def legs() -> dict[str, Variable]:
 def of_steps(touch_time_s: ArrayLike, **values: ArrayLike | None) -> dict[str, Variable]:
     """Build variables over steps, named as in `OF_STEPS`; empty for a walk without a step.
 
-    None is left out; nan, and what the last steps do not have, is a gap.
+    Values that are None are left out; NaN and missing values of the last steps are gaps.
     """
     count = np.size(touch_time_s)
     if count == 0:
         return {}
     columns = numbered(count, STEP, "step number")
-    for name, found in {"touch_time_s": touch_time_s, **values}.items():
-        if found is not None:
+    for name, column in {"touch_time_s": touch_time_s, **values}.items():
+        if column is not None:
             gaps = name in WITH_GAPS
-            rows = np.append(found, np.full(count - np.size(found), np.nan)) if gaps else found
+            rows = np.append(column, np.full(count - np.size(column), np.nan)) if gaps else column
             columns[name] = labelled(rows, OF_STEPS[name], STEP, gaps=gaps)
     return columns
 
 
 def steps_of(walk: WalkRecord, **values: ArrayLike | None) -> dict[str, Variable]:
     """Build columns of a walk's steps: those common to both models, and additional ones."""
-    known = {
+    common = {
         "period_s": walk.periods_s,
         "length_m": walk.lengths_m,
         "touch_along_m": walk.touch_along_m,
         UNEVEN: walk.foothold_height_m,
         "knee_strike_time_s": walk.knee_strike_time_s,
     }
-    return of_steps(walk.touch_time_s, **known, **values)
+    return of_steps(walk.touch_time_s, **common, **values)
 
 
 def pace_of(config: SceneConfig | SimulateConfig, walk: WalkRecord) -> dict[str, float]:
     """Return mean speed (m/s) from the first foothold to the last touch, and its Froude number; empty without a step.
 
-    config  of which leg length L and gravity g are
+    config  gives leg length L and gravity g
     """
     if not walk.steps:
         return {}
@@ -221,7 +221,9 @@ def driven_by(walk: WalkRecord) -> dict[str, Any]:
 def numbers_of(walk: WalkRecord) -> dict[str, Any]:
     """Summarise a walk of either model; knee quantities only for walkers with knees."""
     strikes = walk.knee_strike_time_s
-    known = {} if strikes is None else {"knee_strike_times_s": [None if np.isnan(t) else t for t in strikes.tolist()]}
+    knee_strikes = (
+        {} if strikes is None else {"knee_strike_times_s": [None if np.isnan(t) else t for t in strikes.tolist()]}
+    )
     return {
         "outcome": walk.outcome.label,
         "advice": walk.advice,
@@ -229,7 +231,7 @@ def numbers_of(walk: WalkRecord) -> dict[str, Any]:
         "step_periods_s": walk.periods_s.tolist(),
         "step_lengths_m": walk.lengths_m.tolist(),
         "touch_times_s": walk.touch_time_s.tolist(),
-        **known,
+        **knee_strikes,
         **driven_by(walk),
         "end_time_s": walk.end_time_s,
         "rhs_evaluations": walk.work.rhs_evaluations,
@@ -247,5 +249,5 @@ def last_step(walk: Mapping[str, Any]) -> dict[str, Any]:
     step = {"period_s": periods[-1] if periods else None, "length_m": lengths[-1] if lengths else None}
     if not strikes:
         return step
-    begun = walk["touch_times_s"][-2] if len(strikes) > 1 else 0.0
-    return {**step, "knee_strike_s": None if strikes[-1] is None else strikes[-1] - begun}
+    start_s = walk["touch_times_s"][-2] if len(strikes) > 1 else 0.0
+    return {**step, "knee_strike_s": None if strikes[-1] is None else strikes[-1] - start_s}

@@ -113,7 +113,7 @@ def write_in_turn(
     digest = Digest(labelled.summary, labelled.timed)
     digest.enter("", content.attrs)
 
-    def told() -> Iterator[tuple[str, Variable]]:
+    def remaining() -> Iterator[tuple[str, Variable]]:
         yield from content.coordinates.items()
         for name, variable in content.variables:
             digest.add(name, variable)
@@ -125,7 +125,7 @@ def write_in_turn(
         refuse_full_disk(temporary, content.size)
         hdf5.write_in_turn(
             temporary,
-            told(),
+            remaining(),
             lambda: {**root_attributes(labelled, identity, provenance, complete, digest.hex()), **content.attrs},
         )
         seal = file_digest(temporary)
@@ -136,7 +136,7 @@ def write_in_turn(
 def read(path: Path) -> Stored:
     """Read and verify the artifact at `path`.
 
-    Raises FileNotFoundError if there is none, and Damaged if it is truncated, altered or hostile.
+    Raises FileNotFoundError if it does not exist, and Damaged if it is truncated, altered or hostile.
     """
     try:
         data = read_bounded(path, LIMIT_BYTES)

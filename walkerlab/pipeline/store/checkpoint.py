@@ -1,6 +1,6 @@
 """Checkpoint of a long computation, from which an interrupted run resumes.
 
-A journal beside the artifact: first the key of the result, then a line for each unit of work, each with a checksum.
+A journal next to the artifact: first the key of the result, then a line for each unit of work, each with a checksum.
 Lines are only appended; an incomplete last line is dropped.
 """
 
@@ -29,11 +29,11 @@ class Checkpoint:
         with contextlib.suppress(OSError, ValueError, TypeError):  # an incomplete last line
             lines = [] if path is None else path.read_bytes().splitlines(keepends=True)
             for text in lines if lines[:1] == [line([key])] else []:
-                held = json.loads(text.partition(b" ")[2])
-                if text != line(held):
+                entry = json.loads(text.partition(b" ")[2])
+                if text != line(entry):
                     break
                 if self._intact:
-                    name, numbers = held
+                    name, numbers = entry
                     self.kept[str(name)] = [float(number) for number in numbers]
                 self._intact += len(text)
 

@@ -19,25 +19,25 @@ COMPARED = ("figures/diff-*.svg", "figures/diff-*.png")
 
 def files_of(folder: RunFolder, stages: Iterable[str]) -> list[Path]:
     """Return existing files: artifacts of these stages, files that they list, and leftovers of killed writers."""
-    found = {path for pattern in (*DRAWN, *SWEPT, *COMPARED, f"**/{TEMPORARY}") for path in folder.path.glob(pattern)}
+    files = {path for pattern in (*DRAWN, *SWEPT, *COMPARED, f"**/{TEMPORARY}") for path in folder.path.glob(pattern)}
     inside = folder.path.resolve()
     for stage in stages:
-        found |= {folder.artifact(stage), folder.checkpoint(stage)}
+        files |= {folder.artifact(stage), folder.checkpoint(stage)}
         with contextlib.suppress(OSError, Damaged):
             listed = indexed_files(read(folder.artifact(stage)))
-            found |= {folder.path / name for name in listed if (inside / name).resolve().is_relative_to(inside)}
-    return sorted(path for path in found if path.is_file() or path.is_symlink())
+            files |= {folder.path / name for name in listed if (inside / name).resolve().is_relative_to(inside)}
+    return sorted(path for path in files if path.is_file() or path.is_symlink())
 
 
 def owner_of(path: Path, stages: Iterable[str]) -> RunFolder | None:
     """Return the run whose result, listed file or record a file is; None for the user's own files."""
-    whole = path.resolve()
-    for place in (whole.parent, whole.parent.parent):
+    resolved = path.resolve()
+    for place in (resolved.parent, resolved.parent.parent):
         folder = RunFolder.at(place)
         if folder.record() is None and not any(place.glob("*.h5")):
             continue
-        is_state = whole.parent == place and (whole.suffix in STATE_ENDINGS or whole.name in (RECORD, LOCK))
-        if is_state or whole in {one.resolve() for one in files_of(folder, stages)}:
+        is_state = resolved.parent == place and (resolved.suffix in STATE_ENDINGS or resolved.name in (RECORD, LOCK))
+        if is_state or resolved in {file.resolve() for file in files_of(folder, stages)}:
             return folder
     return None
 

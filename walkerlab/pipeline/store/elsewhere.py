@@ -12,7 +12,7 @@ from walkerlab.pipeline.store.runfolder import RunFolder
 
 
 def find_elsewhere(folder: RunFolder, stage: str, key: str) -> tuple[Path, Stored] | None:
-    """Find the file and result for a key in another run folder; None if there is none. Damaged files are ignored."""
+    """Find the file and result for a key in another run folder; None without one. Damaged files are ignored."""
     try:
         names = sorted(entry.name for entry in os.scandir(folder.runs_dir) if entry.is_dir())
     except OSError:
@@ -34,13 +34,13 @@ def mentions(path: Path, key: str) -> bool:
         return False
 
 
-def take_over(found: Path, target: Path) -> None:
+def take_over(origin: Path, target: Path) -> None:
     """Link or copy a result's file to `target`.
 
     Sharing is safe, since artifacts are replaced but never modified. Raises StorageError if the system refuses.
     """
     with replacing(target) as temporary:
         try:
-            os.link(found, temporary)
+            os.link(origin, temporary)
         except OSError:
-            shutil.copyfile(found, temporary)
+            shutil.copyfile(origin, temporary)

@@ -69,7 +69,9 @@ class VariablesOnDisk(Mapping[str, Variable]):
             members = dict(opened)
             self._by_address = names_of(members)
             self._names = [
-                name for name, one in members.items() if isinstance(one, h5py.Dataset) and not is_bare_dimension(one)
+                name
+                for name, member in members.items()
+                if isinstance(member, h5py.Dataset) and not is_bare_dimension(member)
             ]
         self._read = lru_cache(maxsize=8)(self._read_anew)
 
@@ -223,15 +225,15 @@ def read_strings(dataset: Any, budget: Budget) -> NDArray[Any]:
 
 def read_attributes(holder: Any) -> dict[str, Attribute]:
     """Read the attributes of a group as Python types; raises ValueError for other types."""
-    found: dict[str, Attribute] = {}
+    attributes: dict[str, Attribute] = {}
     for name in holder.attrs:
         declared = holder.attrs.get_id(name)
-        known = declared.dtype in (np.dtype("<f8"), np.dtype("<i8"), np.dtype("?")) or is_text(declared.dtype)
-        if declared.shape != () or not known:
+        is_known = declared.dtype in (np.dtype("<f8"), np.dtype("<i8"), np.dtype("?")) or is_text(declared.dtype)
+        if declared.shape != () or not is_known:
             raise ValueError(f"its attribute {name!r} is of a type that is not written here")
         value = holder.attrs[name]
-        found[name] = value if isinstance(value, str) else value.item()
-    return found
+        attributes[name] = value if isinstance(value, str) else value.item()
+    return attributes
 
 
 def read_text(holder: Any, name: str, default: str | None = None) -> str:

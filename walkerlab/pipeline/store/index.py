@@ -38,9 +38,9 @@ def indexed_files(content: Content) -> dict[str, str]:
 def broken_file(folder: Path, content: Content) -> str | None:
     """Describe the first listed file that is missing or altered; None if all are intact."""
     for name, digest in indexed_files(content).items():
-        found = file_digest(folder / PurePosixPath(name))
-        if found is None:
+        current = file_digest(folder / PurePosixPath(name))
+        if current is None:
             return f"{name} is missing"
-        if found != digest:
+        if current != digest:
             return f"{name} was altered"
     return None

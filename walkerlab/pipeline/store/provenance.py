@@ -49,8 +49,8 @@ class Provenance:
     @property
     def took_s(self) -> float:
         """Run time, s."""
-        begun, ended = map(datetime.datetime.fromisoformat, (self.started_utc, self.ended_utc))
-        return (ended - begun).total_seconds()
+        start, ended = map(datetime.datetime.fromisoformat, (self.started_utc, self.ended_utc))
+        return (ended - start).total_seconds()
 
     def until_now(self) -> Provenance:
         """Return the same, ended now."""

@@ -52,11 +52,11 @@ class RunFolder:
     @classmethod
     def at(cls, path: Path) -> RunFolder:
         """Return the run in a folder, with recorded source and changes."""
-        whole = path if path.name not in ("", "..") else path.resolve()
-        record = cls(whole.parent, whole.name).record()
+        folder = path if path.name not in ("", "..") else path.resolve()
+        record = cls(folder.parent, folder.name).record()
         if record is None:
-            return cls(whole.parent, whole.name, "", changes_in(whole.name))
-        return cls(whole.parent, whole.name, record.source, record.changes)
+            return cls(folder.parent, folder.name, "", changes_in(folder.name))
+        return cls(folder.parent, folder.name, record.source, record.changes)
 
     @property
     def path(self) -> Path:
@@ -64,15 +64,15 @@ class RunFolder:
         return self.runs_dir / self.name
 
     @property
-    def given(self) -> str:
+    def explicit_path(self) -> str:
         """The folder as a path that cannot be mistaken for a name."""
         text = str(self.path)
         return text if os.sep in text else f".{os.sep}{text}"
 
     @property
-    def typed(self) -> str:
+    def quoted_path(self) -> str:
         """The folder, quoted for a shell."""
-        return shlex.quote(self.given)
+        return shlex.quote(self.explicit_path)
 
     @property
     def figures(self) -> Path:
@@ -90,10 +90,10 @@ class RunFolder:
     def record(self) -> Record | None:
         """Read the run record; None if it is missing or unreadable."""
         try:
-            said = json.loads(read_bounded(self.path / RECORD, RECORD_BYTES))
-            run, changes = str(said["run"]), said.get("changes")
+            entry = json.loads(read_bounded(self.path / RECORD, RECORD_BYTES))
+            run, changes = str(entry["run"]), entry.get("changes")
             listed = changes_in(run) if changes is None else tuple(map(str, changes))
-            return Record(run, str(said["source"]), str(said["config"]), listed)
+            return Record(run, str(entry["source"]), str(entry["config"]), listed)
         except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError):
             return None
 
@@ -121,11 +121,11 @@ class RunFolder:
             try:
                 lock.acquire(timeout=0)
             except Timeout:
-                held = f"another walkerlab process is working in {self.path}"
+                message = f"another walkerlab process is working in {self.path}"
                 if not wait:
-                    raise LockedError(f"{held}.", "Leave out --no-wait to wait for it.") from None
+                    raise LockedError(f"{message}.", "Leave out --no-wait to wait for it.") from None
                 if say is not None:
-                    say(f"waiting: {held}")
+                    say(f"waiting: {message}")
                 lock.acquire()
         try:
             remove_leftovers(self.path)

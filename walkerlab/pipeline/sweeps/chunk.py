@@ -107,26 +107,26 @@ def by_name(summary: Mapping[str, Any]) -> dict[str, Any]:
 
     Nested values get dotted names: `dissipated_J.friction`, `gaits.0.period_s`.
     """
-    found: dict[str, Any] = {}
+    flat: dict[str, Any] = {}
 
     def take(name: str, value: Any) -> None:
         if isinstance(value, bool | int | float | str):
-            found[name] = value
+            flat[name] = value
         elif isinstance(value, Mapping):
             for key, inner in value.items():
                 take(f"{name}.{UNFIT.sub('_', key)}", inner)
         elif isinstance(value, list) and value:
             if all(isinstance(item, str) for item in value):
-                found[name] = "; ".join(value)
+                flat[name] = "; ".join(value)
             elif is_regular(value):
-                found[name] = value
+                flat[name] = value
             else:
                 take(name, {str(number): item for number, item in enumerate(value)})
 
     for key, value in summary.items():
         if key not in NOT_OF_THE_POINT:
             take(UNFIT.sub("_", key), value)
-    return found
+    return flat
 
 
 def is_regular(value: list[Any]) -> bool:
@@ -148,14 +148,14 @@ def without_outputs(config: Config, target: str, graph: Graph) -> Config:
 
 def labels_in(content: Content) -> dict[str, tuple[str, str]]:
     """Return unit and meaning of the summary's quantities that are also a variable in a group."""
-    found = {}
+    labels = {}
     for group in content.groups.values():
         for name in content.summary.keys() & group.variables.keys():
-            found[name] = (group.variables[name].units, group.variables[name].long_name)
-    return found
+            labels[name] = (group.variables[name].units, group.variables[name].long_name)
+    return labels
 
 
-def store(folder: RunFolder, stage: str, code_digest: str, chunk: Chunk, begun: Provenance) -> None:
+def store(folder: RunFolder, stage: str, code_digest: str, chunk: Chunk, provenance: Provenance) -> None:
     """Store a chunk without its failed points; raises StorageError if the system refuses."""
     rows = [row for row in chunk.rows if row.status != "failed"]
     if not rows:
@@ -167,11 +167,11 @@ def store(folder: RunFolder, stage: str, code_digest: str, chunk: Chunk, begun: 
     identity = Identity("sweep-chunk", {"of": stage, "name": name}, {}, code_digest)
     path = folder.path / FOLDER / name
     path.parent.mkdir(exist_ok=True)
-    artifact.write(path, content, identity, begun.until_now())
+    artifact.write(path, content, identity, provenance.until_now())
 
 
 def stored_chunks(
-    runs_dir: Path, stage: str, code_digest: str, wanted: Mapping[str, Any], warn: Callable[[str], None]
+    runs_dir: Path, stage: str, code_digest: str, keys: Mapping[str, Any], warn: Callable[[str], None]
 ) -> Iterator[Chunk]:
     """Iterate over the stored results of a stage under its present code, in all run folders.
 
@@ -194,5 +194,5 @@ def stored_chunks(
             stored = artifact.read(path)
         except (OSError, Damaged):
             continue
-        if stored.identity.key in wanted:
+        if stored.identity.key in keys:
             yield chunk_of(stored.identity.key, stored)

@@ -62,7 +62,7 @@ class SweepEngine:
     chunk_s: float
 
     @contextlib.contextmanager
-    def begun(self, order: Order) -> Iterator[SweepEngine]:
+    def start_early(self, order: Order) -> Iterator[SweepEngine]:
         """Return the engine for one sweep; local workers already import their modules while points are prepared."""
         if self.opened is not local:
             yield self
@@ -133,13 +133,13 @@ def slurm(order: Order) -> Iterator[Pool]:
     cluster = str(options.pop("cluster", "slurm"))
     python = options.pop("python", None)
     try:
-        made = submitit.AutoExecutor(
+        job_runner = submitit.AutoExecutor(
             order.folder / "jobs", cluster=cluster, **({"slurm_python": python} if python else {})
         )
-        made.update_parameters(**{"name": "walkerlab", "timeout_min": 60, "cpus_per_task": 1} | options)
+        job_runner.update_parameters(**{"name": "walkerlab", "timeout_min": 60, "cpus_per_task": 1} | options)
     except (RuntimeError, TypeError, ValueError, NotImplementedError) as error:
         raise ConfigError(f"--engine slurm: {error}", "--engine-option cluster=local tries it out here.") from error
-    executor = JobExecutor(made.submit)
+    executor = JobExecutor(job_runner.submit)
     try:
         yield Pool(executor, order.workers or 16)
     finally:

@@ -98,21 +98,29 @@ class SweptStage:
         """Return one point as `--set` options."""
         return [axis.setting(place) for axis, place in zip(self.axes, self.places(index), strict=True)]
 
-    def said(self, index: int) -> str:
+    def describe_point(self, index: int) -> str:
         """Describe one point."""
         settings = self.settings(index)
-        return ", ".join(f"{axis.key}={plain(one.value)}" for axis, one in zip(self.axes, settings, strict=True))
+        return ", ".join(
+            f"{axis.key}={plain(setting.value)}" for axis, setting in zip(self.axes, settings, strict=True)
+        )
 
 
 def distinct_ends(keys: Sequence[str]) -> tuple[str, ...]:
     """Return the shortest endings of dotted keys that distinguish them."""
-    found = []
+    shortest = []
     for key in keys:
         parts = key.split(".")
         ends = (".".join(parts[start:]) for start in range(len(parts) - 1, -1, -1))
-        others = [other for other in keys if other != key]
-        found.append(next(end for end in ends if not any(f".{other}".endswith(f".{end}") for other in others)))
-    return tuple(found)
+        rest_of_keys = [key_of_another for key_of_another in keys if key_of_another != key]
+        shortest.append(
+            next(
+                end
+                for end in ends
+                if not any(f".{key_of_another}".endswith(f".{end}") for key_of_another in rest_of_keys)
+            )
+        )
+    return tuple(shortest)
 
 
 def build_sweep(
@@ -133,18 +141,22 @@ def build_sweep(
     for key, values, source in over:
         axes = (*axes, axis(key, values, source))
         if not (zip or sample):  # before the values of the next parameter are written out
-            refuse_too_many("sweep", math.prod(max(1, len(one.values)) for one in axes))
-    repeated = {one.key for one in axes if sum(other.key == one.key for other in axes) > 1}
+            refuse_too_many("sweep", math.prod(max(1, len(parameter.values)) for parameter in axes))
+    repeated = {
+        parameter.key
+        for parameter in axes
+        if sum(second_parameter.key == parameter.key for second_parameter in axes) > 1
+    }
     if not axes or repeated:
         text = f"{min(repeated)}: given twice" if repeated else "no parameter is given"
         raise problem_error(None, f"sweep: {text}", "--over KEY=VALUES, each key once", advice=EXAMPLE)
     if sample:
         return SweptStage(stage, sampled(axes, sample, seed), "list")
-    for one in axes:
-        if not one.values:
-            raise bad(one.source, f"{one.key}: it is not said how many values", FORMS)
-    if zip and len({len(one.values) for one in axes}) > 1:
-        lengths = ", ".join(f"{one.key} {len(one.values)}" for one in axes)
+    for parameter in axes:
+        if not parameter.values:
+            raise bad(parameter.source, f"{parameter.key}: the number of values is missing", FORMS)
+    if zip and len({len(parameter.values) for parameter in axes}) > 1:
+        lengths = ", ".join(f"{parameter.key} {len(parameter.values)}" for parameter in axes)
         raise problem_error(None, f"--zip: the parameters have different numbers of values: {lengths}")
     return SweptStage(stage, axes, "list" if zip else "grid")
 
@@ -175,19 +187,19 @@ def bad(source: str, text: str, allowed: str = "", near: str = "") -> ConfigErro
 
 
 @cache
-def known_keys() -> dict[str, FieldInfo]:
+def key_fields() -> dict[str, FieldInfo]:
     """Return the fields of all keys of a config that hold a value, by dotted key."""
     return {".".join(path): field for path, field in leaves(Config)} | dict(SlopeInDegrees.model_fields)
 
 
 def axis(key: str, values: Any, source: str) -> Axis:
     """Build one parameter; raises ConfigError for an unknown key or invalid values."""
-    known = known_keys()
-    if key not in known and not any(key.startswith(f"{one}.") for one in known):
-        if any(one.startswith(f"{key}.") for one in known):
+    fields = key_fields()
+    if key not in fields and not any(key.startswith(f"{known_key}.") for known_key in fields):
+        if any(known_key.startswith(f"{key}.") for known_key in fields):
             raise bad(source, f"{key}: is a block of keys, not a value")
         if not key.startswith("walker."):  # one of another type has keys of its own, which are checked point by point
-            raise bad(source, f"{key}: unknown key", near=nearest(key, known))
+            raise bad(source, f"{key}: unknown key", near=nearest(key, fields))
     if isinstance(values, list | tuple):
         odd = next((value for value in values if not isinstance(value, Value)), None)
         if odd is not None or not values:
@@ -211,7 +223,7 @@ def axis(key: str, values: Any, source: str) -> Axis:
 
 def as_the_key_has_it(key: str, values: Sequence[float]) -> tuple[Value, ...]:
     """Convert whole numbers to integers for an integer key; the schema rejects other numbers."""
-    field = known_keys().get(key)
+    field = key_fields().get(key)
     if field is None or field.annotation is not int:
         return tuple(values)
     return tuple(int(value) if value.is_integer() else value for value in values)
@@ -232,8 +244,8 @@ def sampled(axes: Sequence[Axis], sample: str, seed: int) -> tuple[Axis, ...]:
     """
     name, _, number = sample.partition(":")
     if name not in SAMPLERS or not re.fullmatch("[0-9]{1,18}", number) or int(number) < 1:
-        allowed = ", ".join(f"{known}:N" for known in SAMPLERS)
-        raise problem_error(Position(f"--sample {sample}", 1, 1), "is not a sampler with a number", allowed)
+        allowed = ", ".join(f"{sampler}:N" for sampler in SAMPLERS)
+        raise problem_error(Position(f"--sample {sample}", 1, 1), "is not a sampler with a number of points", allowed)
     refuse_too_many(f"--sample {sample}", int(number))
     import numpy as np
 
@@ -252,13 +264,13 @@ def sampled(axes: Sequence[Axis], sample: str, seed: int) -> tuple[Axis, ...]:
     return tuple(Axis(axis.key, tuple(values_at(axis, column)), axis.source) for axis, column in pairs)
 
 
-def values_at(one: Axis, column: Any) -> Iterator[Value]:
+def values_at(axis: Axis, column: Any) -> Iterator[Value]:
     """Map numbers from 0 to 1 to values of one parameter."""
     for share in column.tolist():
-        if one.ends is not None:
-            yield from as_the_key_has_it(one.key, [one.ends[0] + share * (one.ends[1] - one.ends[0])])
+        if axis.ends is not None:
+            yield from as_the_key_has_it(axis.key, [axis.ends[0] + share * (axis.ends[1] - axis.ends[0])])
         else:
-            yield one.values[min(int(share * len(one.values)), len(one.values) - 1)]
+            yield axis.values[min(int(share * len(axis.values)), len(axis.values) - 1)]
 
 
 def described(config: Config, key: str) -> tuple[str, str]:
@@ -266,7 +278,7 @@ def described(config: Config, key: str) -> tuple[str, str]:
     *above, last = key.split(".")
     block = value_at(config, above)
     # the config's own blocks, which may be of a type that the schema only allows
-    field = known_keys().get(key) or getattr(type(block), "model_fields", {}).get(last)
+    field = key_fields().get(key) or getattr(type(block), "model_fields", {}).get(last)
     if field is None:
         return "1", key
     unit = annotation_of(field, "unit")
@@ -280,8 +292,12 @@ def refuse_unrecorded(question: SweptStage, names: Mapping[str, str]) -> None:
     """
     for option, name in names.items():
         if name not in question.names and not has_quantity(question.stage, name):
-            known = QUANTITIES[question.stage]
-            near = nearest(name, (*known, *question.names))
-            listed = ", ".join(one + "…" if one.endswith(".") else one for one in known if one != "outcome")
-            meant = f" Did you mean {near}?" if near else ""
-            raise ConfigError(f"{option}: {question.stage} has no such quantity.{meant}", f"There are {listed}.")
+            quantities = QUANTITIES[question.stage]
+            near = nearest(name, (*quantities, *question.names))
+            listed = ", ".join(
+                quantity + "…" if quantity.endswith(".") else quantity
+                for quantity in quantities
+                if quantity != "outcome"
+            )
+            hint = f" Did you mean {near}?" if near else ""
+            raise ConfigError(f"{option}: {question.stage} has no such quantity.{hint}", f"There are {listed}.")

@@ -24,7 +24,7 @@ CONTACT, PAD_PITCH = "contact-sim", "contact.pad_pitch"
 
 
 OWN: Final = {
-    "outcome": "how it ended: the stage's own outcome, else whether it has an answer",
+    "outcome": "how it ended: the stage's own outcome, otherwise whether it has an answer",
     "status": "answered, no-answer, or failed: not computed",
     "reason": "why there is no answer",
 }
@@ -92,31 +92,31 @@ class Merge:
     def __init__(self, question: SweptStage, config: Config, inverse: Integers) -> None:
         """Start without rows."""
         self.question, self.config, self.inverse = question, config, inverse
-        self.there = np.zeros(int(inverse.max()) + 1, bool)
+        self.has_row = np.zeros(int(inverse.max()) + 1, bool)
         self.labels: dict[str, tuple[str, str]] = {}
         self.columns: dict[str, SweepVariable] = {}
 
     def put(self, chunk: Chunk, places: Mapping[str, int]) -> None:
         """Store the rows of a chunk that belong to this sweep."""
         self.labels.update(chunk.labels)
-        wanted = [row for row in chunk.rows if row.key in places]
-        at = [places[row.key] for row in wanted]
+        rows_of_sweep = [row for row in chunk.rows if row.key in places]
+        indices = [places[row.key] for row in rows_of_sweep]
         rows = []
-        for row in wanted:
+        for row in rows_of_sweep:
             numbers = json.loads(row.numbers)
             own = {"outcome": numbers.get("outcome") or row.status, "status": row.status, "reason": row.reason}
-            last = {name: numbers[whole][-1] for name, whole in LAST_OF.items() if whole in numbers}
+            last = {name: numbers[list_name][-1] for name, list_name in LAST_OF.items() if list_name in numbers}
             rows.append({**numbers, **last, **own})
-        self.there[at] = True
+        self.has_row[indices] = True
         for name in dict.fromkeys(chain.from_iterable(rows)):
             have = [k for k, row in enumerate(rows) if name in row]
             first = rows[have[0]][name]
             text = isinstance(first, str)
             if name not in self.columns:
-                self.columns[name] = SweepVariable(self.there.size, () if text else np.shape(first), text)
+                self.columns[name] = SweepVariable(self.has_row.size, () if text else np.shape(first), text)
             column = self.columns[name]
             have = [k for k in have if isinstance(rows[k][name], str) == column.text]
-            column.put(np.array([at[k] for k in have], int), [rows[k][name] for k in have])
+            column.put(np.array([indices[k] for k in have], int), [rows[k][name] for k in have])
 
     @property
     def numbers(self) -> Collection[str]:
@@ -145,8 +145,8 @@ class Merge:
         ended = self.endings()
         summary |= {"endings": ended} if ended else {}
         attrs = {"coordinates": " ".join(question.names)} if question.layout == "list" else {}
-        scales = {name: one for name, one in parameters.items() if one.dims == (name,)}
-        size = sum(one.values.nbytes * (TEXT_BYTES if one.text else 1) for one in self.columns.values())
+        scales = {name: column for name, column in parameters.items() if column.dims == (name,)}
+        size = sum(column.values.nbytes * (TEXT_BYTES if column.text else 1) for column in self.columns.values())
         # a quantity that is also a parameter is stored as its coordinate
         names = sorted({*parameters, *self.columns})
         variables = ((name, parameters[name] if name in parameters else self.variable(name)) for name in names)
@@ -167,20 +167,24 @@ class Merge:
         return describe_endings(count_texts(outcomes), config, question.stage == CONTACT, pads)
 
     def numerical_error(self) -> dict[str, Any]:
-        """The largest numerical errors of the walks that were taken again, how many those are, and of how many.
+        """Return the largest errors of the repeated walks, and counts; empty for a stage that does not walk.
 
-        `ended_otherwise` counts those that came to another end, whose error is unknown.
-        Nothing for a stage that does not walk.
+        `ended_otherwise` counts walks that ended differently, whose error is unknown.
         """
-        found = {key: self.of(f"numerical_error.{key}") for key in ("end_time_s", *ERROR_OF_EACH_STEP.values())}
-        reasons, ends = self.of("numerical_error.reason"), found["end_time_s"]
+        errors = {key: self.of(f"numerical_error.{key}") for key in ("end_time_s", *ERROR_OF_EACH_STEP.values())}
+        reasons, ends = self.of("numerical_error.reason"), errors["end_time_s"]
         otherwise = 0 if reasons is None else int(np.sum(reasons != ""))
-        known = 0 if ends is None else int(np.sum(np.isfinite(ends)))
-        if otherwise + known == 0:
+        measured = 0 if ends is None else int(np.sum(np.isfinite(ends)))
+        if otherwise + measured == 0:
             return {}
-        largest = {key: float(np.nanmax(values)) for key, values in found.items() if values is not None}
-        told = {"walked_again": known + otherwise, "of": len(self.inverse), "ended_otherwise": otherwise, **largest}
-        return {"numerical_error": told}
+        largest = {key: float(np.nanmax(values)) for key, values in errors.items() if values is not None}
+        summary = {
+            "walked_again": measured + otherwise,
+            "of": len(self.inverse),
+            "ended_otherwise": otherwise,
+            **largest,
+        }
+        return {"numerical_error": summary}
 
     def variable(self, name: str) -> Variable:
         """Remove and return a variable over the points, so that no two copies exist."""
@@ -203,9 +207,9 @@ class Merge:
 
 def last_of_each(rows: NDArray[Any]) -> NDArray[Any]:
     """Return the last number of each row (..., numbers), ignoring trailing gaps; NaN for an empty row."""
-    known = np.isfinite(rows).sum(axis=-1, keepdims=True)
-    last = np.take_along_axis(rows, np.maximum(known - 1, 0), axis=-1)
-    return np.asarray(np.where(known > 0, last, np.nan)[..., 0])
+    counts = np.isfinite(rows).sum(axis=-1, keepdims=True)
+    last = np.take_along_axis(rows, np.maximum(counts - 1, 0), axis=-1)
+    return np.asarray(np.where(counts > 0, last, np.nan)[..., 0])
 
 
 def ends_of(values: NDArray[Any]) -> tuple[float, float]:
@@ -241,8 +245,10 @@ def as_csv(content: Content, question: SweptStage, every: bool = False) -> str:
         columns[name] = [axis.values[question.places(index)[place]] for index in range(len(question))]
     variables = dict(group.variables)
     if not every:
-        found = headlines(question.stage, (name for name, one in variables.items() if len(one.dims) == dimensions))
-        variables = {name: variables[name] for name in dict.fromkeys(("outcome", *found, "reason"))}
+        shown_names = headlines(
+            question.stage, (name for name, variable in variables.items() if len(variable.dims) == dimensions)
+        )
+        variables = {name: variables[name] for name in dict.fromkeys(("outcome", *shown_names, "reason"))}
     for name, variable in variables.items():
         if name not in columns:
             columns.update(flat_columns(name, variable, dimensions))

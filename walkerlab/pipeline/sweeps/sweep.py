@@ -99,12 +99,12 @@ class Swept:
 
     def error(self) -> WalkerlabError:
         """Return the error for points that were not computed; the others are stored."""
-        said = f"{self.failed} of {len(self.question)} points were not computed"
+        message = f"{self.failed} of {len(self.question)} points were not computed"
         why = f"`reason` in {self.path} says why."
         if not self.bugs:
-            return NoAnswer(f"{said}; {why}", "The same command tries them again and keeps the rest.")
+            return NoAnswer(f"{message}; {why}", "The same command tries them again and keeps the rest.")
         error = WalkerlabError(
-            f"{said}, and a bug is among the reasons; {why}", "Please report the traceback; the rest is stored."
+            f"{message}, and a bug is among the reasons; {why}", "Please report the traceback; the rest is stored."
         )
         for bug in self.bugs:
             error.add_note(bug)
@@ -160,20 +160,20 @@ class SweepRun:
 
         Raises ConfigError that names the invalid points with their values, each reason once.
         """
-        found: list[bytes] = []
+        keys: list[bytes] = []
         problems: dict[str, str] = {}
         for index in range(len(self.question)):
             try:
-                found.append(bytes.fromhex(self.keys.of(self.config(index), self.question.stage)[self.question.stage]))
+                keys.append(bytes.fromhex(self.keys.of(self.config(index), self.question.stage)[self.question.stage]))
             except ConfigError as error:
-                at = f"at {self.question.said(index)}: " if len(self.question.axes) > 1 else ""
-                problems.setdefault(error.message, f"{at}{error.message}")
+                prefix = f"at {self.question.describe_point(index)}: " if len(self.question.axes) > 1 else ""
+                problems.setdefault(error.message, f"{prefix}{error.message}")
                 if len(problems) == SHOWN_PROBLEMS:
                     problems["more"] = "and perhaps more"
                     break
         if problems:
             raise ConfigError("\n".join(problems.values()), "Nothing was run; leave these values out.")
-        return found
+        return keys
 
     def unread(self) -> Iterator[str]:
         """Iterate over parameters that neither the stage nor its inputs read."""
@@ -186,22 +186,22 @@ class SweepRun:
                     if self.keys.of(self.loaded.variant(settings), self.question.stage) == base:
                         yield axis.key
 
-    def foresee(self, workers: int, shown: int) -> Foreseen:
+    def foresee(self, workers: int, max_points: int) -> Foreseen:
         """Return the plan without changing a file; raises ConfigError as `run` does."""
         refuse_another_config(self.folder, self.loaded.config)
-        there = np.zeros(len(self.places), bool)
+        stored = np.zeros(len(self.places), bool)
         rows: list[PointResult] = []
         for chunk in self._stored(Silent().warn):
             rows += chunk.rows
-            there[[self.places[row.key] for row in chunk.rows if row.key in self.places]] = True
+            stored[[self.places[row.key] for row in chunk.rows if row.key in self.places]] = True
         count = len(self.question)
-        missing = int(np.sum(~there))
+        missing = int(np.sum(~stored))
         walls = [row.wall_s for row in rows if row.wall_s > 0.0]
         estimate: float | None = 0.0
         if missing:
             estimate = float(np.median(walls)) * missing / max(1, workers) if walls else None
-        said = tuple(self.question.said(index) for index in range(min(shown, count)))
-        return Foreseen(self.path, said, count, int(there[self.inverse].sum()), estimate)
+        descriptions = tuple(self.question.describe_point(index) for index in range(min(max_points, count)))
+        return Foreseen(self.path, descriptions, count, int(stored[self.inverse].sum()), estimate)
 
     def run(self, work: SweepWork, reporter: Reporter | None = None) -> Swept:
         """Compute the points without a stored result and write the sweep's file.
@@ -219,25 +219,25 @@ class SweepRun:
             merge = Merge(self.question, self.loaded.config, self.inverse)
             for chunk in () if work.force else self._stored(reporter.warn):
                 merge.put(chunk, self.places)
-            reused = int(merge.there[self.inverse].sum())
+            reused = int(merge.has_row[self.inverse].sum())
             if reused:
                 reporter.note(f"sweep: {reused} of {len(self.question)} points exist already")
-            begun = provenance.begin(self.loaded.config, {})
+            origin = provenance.begin(self.loaded.config, {})
             progress = reporter.begin(
                 "sweep", f"{len(self.question) - reused} of {len(self.question)} points to compute"
             )
             try:
-                bugs = self._compute(merge, work, reporter, progress, begun)
+                bugs = self._compute(merge, work, reporter, progress, origin)
             except KeyboardInterrupt:
-                kept = int(merge.there[self.inverse].sum())
-                reporter.note(f"sweep: interrupted; {kept} of {len(self.question)} points are kept")
+                stored = int(merge.has_row[self.inverse].sum())
+                reporter.note(f"sweep: interrupted; {stored} of {len(self.question)} points are kept")
                 raise
             finally:
                 progress.end("")
             content = merge.content()
             identity = Identity("sweep", self.slice, {}, self.code_digest)
             complete = content.summary["failed"] == 0
-            artifact.write_in_turn(self.path, content, identity, begun.until_now(), complete)
+            artifact.write_in_turn(self.path, content, identity, origin.until_now(), complete)
         return Swept(self.question, self.path, content.summary, reused, time.perf_counter() - started, bugs)
 
     @property
@@ -249,10 +249,10 @@ class SweepRun:
         return stored_chunks(self.folder.runs_dir, self.question.stage, self.code_digest, self.places, warn)
 
     def _compute(
-        self, merge: Merge, work: SweepWork, reporter: Reporter, progress: Progress, begun: provenance.Provenance
+        self, merge: Merge, work: SweepWork, reporter: Reporter, progress: Progress, origin: provenance.Provenance
     ) -> tuple[str, ...]:
         """Compute the missing points; return tracebacks of bugs, one for each place in the code."""
-        missing = np.sort(self.first[~merge.there])
+        missing = np.sort(self.first[~merge.has_row])
         if not missing.size:
             return ()
         bugs: dict[str, str] = {}
@@ -260,7 +260,7 @@ class SweepRun:
         stage, digest = self.question.stage, self.code_digest
 
         def keep(chunk: Chunk) -> None:
-            store(self.folder, stage, digest, chunk, begun)
+            store(self.folder, stage, digest, chunk, origin)
             merge.put(chunk, self.places)
             if any(row.status == "answered" for row in chunk.rows):
                 work.check(merge.numbers)
@@ -301,4 +301,4 @@ def refuse_unknown_stage(name: str, graph: Graph) -> None:
 def modules_of(stage: str, config: Any, graph: Graph) -> tuple[str, ...]:
     """Return the modules needed to compute a stage; raises ConfigError for a stage that cannot be swept."""
     refuse_unknown_stage(stage, graph)
-    return tuple(one.module for one in graph.needed_for(stage, config))
+    return tuple(needed.module for needed in graph.needed_for(stage, config))

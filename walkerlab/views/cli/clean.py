@@ -20,27 +20,27 @@ def clean_folders(request: Request, every: bool, stages: Sequence[str], yes: boo
     Raises typer.BadParameter without a terminal to confirm on, LockedError (with `--no-wait`) and StorageError.
     """
     if every:
-        there = sorted(path.name for path in request.runs.iterdir() if path.is_dir()) if request.runs.is_dir() else []
-        folders = [RunFolder(request.runs, name) for name in there]
+        names = sorted(path.name for path in request.runs.iterdir() if path.is_dir()) if request.runs.is_dir() else []
+        folders = [RunFolder(request.runs, name) for name in names]
     else:
         folders = [request.folder]
-    found = {folder: files_of(folder, stages) for folder in folders}
-    files = [path for paths in found.values() for path in paths]
+    files_by_folder = {folder: files_of(folder, stages) for folder in folders}
+    files = [path for paths in files_by_folder.values() for path in paths]
     sizes = {path: path.lstat().st_size for path in files}
     where = folders[0].path if len(folders) == 1 else request.runs
     if files and not (yes or request.dry_run):
         if not sys.stdin.isatty():
             raise typer.BadParameter("cannot ask for confirmation without a terminal; give --yes", param_hint="--yes")
         if not typer.confirm(f"Remove {len(files)} files from {where}?", err=True):
-            found, files = {}, []
+            files_by_folder, files = {}, []
     if not request.dry_run:
-        for folder, paths in found.items():
+        for folder, paths in files_by_folder.items():
             if paths:
                 with folder.locked(not request.no_wait, request.console.note):
                     remove(folder, paths)
                 remove_if_empty(folder)
-    said = "would be removed" if request.dry_run else "removed"
-    lines = [f"{said}: {one}" for one in file_lines(files, sizes)] or [f"{where}: nothing {said}"]
+    verb = "would be removed" if request.dry_run else "removed"
+    lines = [f"{verb}: {line}" for line in file_lines(files, sizes)] or [f"{where}: nothing {verb}"]
     print_result(request, {"run_dir": str(where), "removed": [*map(str, files)], "dry_run": request.dry_run}, lines)
 
 

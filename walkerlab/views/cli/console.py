@@ -51,7 +51,7 @@ class Console:
                     threading.Thread(target=self._talk, args=(self._pulse,), daemon=True).start()
         return line
 
-    def ended(self, line: StageLine, said: str) -> None:
+    def ended(self, line: StageLine, message: str) -> None:
         with self._lock:
             if line in self.running:
                 self.running.remove(line)
@@ -61,10 +61,10 @@ class Console:
                 if self._pulse is not None:
                     self._pulse.set()
                 self._live = self._pulse = None
-        if said:
-            self.note(said)
+        if message:
+            self.note(message)
 
-    def drawn(self, summary: Mapping[str, Any], folder: Path) -> None:
+    def announce_page(self, summary: Mapping[str, Any], folder: Path) -> None:
         """Announce a partial page once, and open it if requested."""
         page = summary.get("html")
         if page is None or self._drawn:
@@ -113,7 +113,7 @@ class Console:
         """Report the running stages whenever nothing was printed for a while."""
         while not end.wait(0.5):
             if time.monotonic() - self._said_at >= SILENCE_S:
-                self._say("; ".join(line.said() for line in self._lines()))
+                self._say("; ".join(line.describe() for line in self._lines()))
 
     def _lines(self) -> Iterator[StageLine]:
         with self._lock:
@@ -177,8 +177,8 @@ class StageLine:
         self.kernel, self.compiling_since = kernel, now
         self.console.refresh()
 
-    def end(self, said: str) -> None:
-        self.console.ended(self, said)
+    def end(self, message: str) -> None:
+        self.console.ended(self, message)
 
     def work(self) -> str:
         label = self.label if self.label.startswith(self.stage) else f"{self.stage}: {self.label}"
@@ -187,9 +187,9 @@ class StageLine:
     def pace(self) -> str:
         elapsed = time.monotonic() - self.began
         parts = [f"{self.done} of {self.total}"] if self.total is not None and self.total > 1 else []
-        left = self.seconds_left()
+        remaining = self.seconds_left()
         parts.append(f"{elapsed:.0f} s")
-        parts += [] if left is None else [f"about {left:.0f} s left"]
+        parts += [] if remaining is None else [f"about {remaining:.0f} s left"]
         return ", ".join(parts)
 
     def computed_s(self) -> float:
@@ -206,12 +206,12 @@ class StageLine:
         computed = self.computed_s()
         if self.total and self.done >= ENOUGH_DONE * self.total and computed >= ENOUGH_S:
             half = bisect.bisect_left(self.progress, (self.done // 2,))
-            done, at = self.progress[half - 1] if half else (0, 0.0)
+            done, start = self.progress[half - 1] if half else (0, 0.0)
             latest = self.progress[-1][1]
-            left = (latest - at) / (self.done - done) * (self.total - self.done) - (computed - latest)
+            remaining = (latest - start) / (self.done - done) * (self.total - self.done) - (computed - latest)
         else:
-            left = 0.0 if self.expected_s is None else self.expected_s - (time.monotonic() - self.began)
-        return left if left > 0.0 else None
+            remaining = 0.0 if self.expected_s is None else self.expected_s - (time.monotonic() - self.began)
+        return remaining if remaining > 0.0 else None
 
-    def said(self) -> str:
+    def describe(self) -> str:
         return f"{self.work()} ({self.pace()})"

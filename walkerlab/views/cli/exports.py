@@ -78,11 +78,11 @@ class Target:
         """
         a_file = self.to is not None and self.output is None and "." in self.to
         output = Path(str(self.to)) if a_file else self.output
-        named = "" if output is None else output.suffix.removeprefix(".")
-        kind = (None if a_file else self.to) or named or kinds[0]
+        ending = "" if output is None else output.suffix.removeprefix(".")
+        kind = (None if a_file else self.to) or ending or kinds[0]
         if kind not in kinds:
             raise ConfigError(f"{what} cannot be written as {kind}.", f"--to {', '.join(kinds)}")
-        if named in kinds and named != kind:
+        if ending in kinds and ending != kind:
             raise ConfigError(
                 f"--to {kind} and {output} name two formats.", "Leave out --to, or give the file that ending."
             )
@@ -96,7 +96,7 @@ class Target:
         another = "Nothing was written; name another file with -o."
         if path.is_dir():
             raise ConfigError(f"{path} is a folder.", f"Name a file in it: -o {shlex.quote(f'{path}/NAME.{kind}')}")
-        if path.exists() and any(one.exists() and path.samefile(one) for one in self.inputs):
+        if path.exists() and any(file.exists() and path.samefile(file) for file in self.inputs):
             raise ConfigError(f"{path} is an input of this command.", another)
         owner = owner_of(path, (stage.name for stage in PIPELINE.stages))
         if owner is not None:
@@ -133,10 +133,10 @@ def export_from(
         stem, kinds, make = f"{model}-{what}", TRAJECTORY_KINDS, lambda kind: trajectory(folder, model, kind, console)
     elif what in TABLES:
         stem, kinds, make = what, tuple(WRITERS), lambda kind: WRITERS[kind](table(folder, what, kind, console))
-    elif isinstance(found := find_item(folder, what), Table):
-        stem, kinds, make = hyphenate(what), tuple(WRITERS), lambda kind: WRITERS[kind](found)
+    elif isinstance(item := find_item(folder, what), Table):
+        stem, kinds, make = hyphenate(what), tuple(WRITERS), lambda kind: WRITERS[kind](item)
     else:
-        stem, kinds, make = what, FIGURE_KINDS, lambda kind: figure(folder, found, kind, (width, dpi), console)
+        stem, kinds, make = what, FIGURE_KINDS, lambda kind: figure(folder, item, kind, (width, dpi), console)
     path, kind = target.of(what, f"{folder.name}-{stem}", kinds)
     return write_file(path, make(kind), console)
 
@@ -176,10 +176,11 @@ def page_tables(folder: RunFolder) -> dict[str, Table]:
     results = Results(planner.config, planner.inputs(report), (), planner.missing_inputs(report))
     sections = [section for page in pages_of(results, folder.name) for section in page.sections]
     tables = [block for section in sections for block in section.blocks if isinstance(block, Table)]
-    short = [caption_name(one.caption) for one in tables]
+    short = [caption_name(block.caption) for block in tables]
     unique = [name not in TABLES and short.count(name) == 1 for name in short]
     return {
-        name if alone else hyphenate(one.caption): one for name, alone, one in zip(short, unique, tables, strict=True)
+        name if alone else hyphenate(block.caption): block
+        for name, alone, block in zip(short, unique, tables, strict=True)
     }
 
 
@@ -188,22 +189,22 @@ def find_item(folder: RunFolder, name: str) -> Illustration | Table:
     # Imported here: a table needs no drawing.
     from walkerlab.views.figures.registry import FIGURES
 
-    named = {one.name: one for one in FIGURES}
-    if name in named:
-        return named[name]
+    figures = {illustration.name: illustration for illustration in FIGURES}
+    if name in figures:
+        return figures[name]
     tables = page_tables(folder)
     for called in (hyphenate(name), caption_name(name)):
         if called in tables:
             return tables[called]
     stored, _ = read_all(folder, (stage.name for stage in PIPELINE.stages))
     compared = stored["compare"].summary if "compare" in stored else {}
-    there = [one.name for one in FIGURES if one.why_left_out(stored, {}) is None]
-    there += [table for table, key in TABLES.items() if key in compared]
-    there += tables
-    there += [TRAJECTORY] * any(TRAJECTORY in result.groups for result in stored.values())
+    names = [illustration.name for illustration in FIGURES if illustration.why_left_out(stored, {}) is None]
+    names += [table for table, key in TABLES.items() if key in compared]
+    names += tables
+    names += [TRAJECTORY] * any(TRAJECTORY in result.groups for result in stored.values())
     nothing = f"{folder.path} has no results yet: {command(folder, PIPELINE['report'])} computes them all."
-    advice = "\n  ".join([f"{folder.path} has", *there]) if there else nothing
-    near = suggestion(name, (*named, *TABLES, TRAJECTORY, *tables))
+    advice = "\n  ".join([f"{folder.path} has", *names]) if names else nothing
+    near = suggestion(name, (*figures, *TABLES, TRAJECTORY, *tables))
     raise ConfigError(f"nothing is called {name}.{near}", advice)
 
 
@@ -227,25 +228,27 @@ def figure(
     """
     stored = results_in(folder, illustration.stages)
     run, plot = plan_run(folder), PIPELINE["plot"]
-    taken = {name: result for name, result in run.inputs(plot).items() if isinstance(result, Stored)}
-    known = taken.keys() | run.left_out.keys()
-    outdated, _ = read_all(folder, (name for name in plot.results(run.config) if name not in known))
+    inputs = {name: result for name, result in run.inputs(plot).items() if isinstance(result, Stored)}
+    available = inputs.keys() | run.left_out.keys()
+    outdated, _ = read_all(folder, (name for name in plot.results(run.config) if name not in available))
     with refusing_older(folder, outdated):
         why = illustration.why_left_out(stored, {})
     if why is not None:
-        made = [command(folder, PIPELINE[stage]) for stage in illustration.stages if stage not in stored]
-        advice = f"{join_words(made)} {'makes' if len(made) == 1 else 'make'} what it needs." if made else ""
+        commands = [command(folder, PIPELINE[stage]) for stage in illustration.stages if stage not in stored]
+        advice = (
+            f"{join_words(commands)} {'makes' if len(commands) == 1 else 'make'} what it needs." if commands else ""
+        )
         raise StaleError(f"{illustration.name} cannot be drawn: {why}.", advice)
-    left_out = stored.keys() <= taken.keys()
+    left_out = stored.keys() <= inputs.keys()
     if not left_out:
-        taken |= stored | {name: result for name, result in outdated.items() if result.complete}
+        inputs |= stored | {name: result for name, result in outdated.items() if result.complete}
     if outdated:
         console.warn(
             f"{folder.path} has outdated results, which are {'left out' if left_out else 'drawn all the same'}: "
             f"{join_words(sorted(outdated))}; {command(folder, PIPELINE['report'])} makes them anew."
         )
     with refusing_older(folder, outdated):
-        return illustration.as_file(taken, kind, *size)
+        return illustration.as_file(inputs, kind, *size)
 
 
 def table(folder: RunFolder, name: str, kind: str, console: Console) -> Table:
@@ -342,12 +345,12 @@ def write_film(folder: RunFolder, target: Target, film: Film, console: Console) 
         if why is not None:
             raise StaleError(f"the walk cannot be drawn: {why}.", STORED_WITH)
         sticks = sticks_of(walk)
-        at = film_times(sticks, film.steps, film.rate, film.slower)
-        line = console.begin("animate", f"{at.size} pictures")
-        line.start("drawing", int(at.size))
+        times = film_times(sticks, film.steps, film.rate, film.slower)
+        line = console.begin("animate", f"{times.size} pictures")
+        line.start("drawing", int(times.size))
 
         def count_pictures() -> Iterator[Any]:
-            for picture in pictures(sticks, at, walk.groups.get("terrain")):
+            for picture in pictures(sticks, times, walk.groups.get("terrain")):
                 yield picture
                 line.advance()
 

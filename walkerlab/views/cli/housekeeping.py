@@ -42,12 +42,16 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
             raise typer.BadParameter(f"there is no stage {stage!r}; choose from {', '.join(names)}", param_hint="STAGE")
         if len(runs) > 1 or (runs and request.config is not None):
             raise typer.BadParameter("one run at a time", param_hint="RUN")
-        asked = replace(request, command=stage, config=runs[0] if runs else request.config)
-        with exit_on_failure(asked):
+        request_for_stage = replace(request, command=stage, config=runs[0] if runs else request.config)
+        with exit_on_failure(request_for_stage):
             from walkerlab.pipeline.runs import run_named
             from walkerlab.views.cli.stored import print_stored
 
-            located = replace(asked, config=run_named(runs[0], asked.runs).given) if runs else asked
+            located = (
+                replace(request_for_stage, config=run_named(runs[0], request_for_stage.runs).explicit_path)
+                if runs
+                else request_for_stage
+            )
             print_stored(located, graph, stage)
 
     @command(app, "as_json")

@@ -26,8 +26,8 @@ def write_config(file: Path, walker: str) -> str:
         raise StorageError(f"{file} already exists.", "Choose another name; nothing was overwritten.")
     default = Config()
     untouched = [name for name in QUESTIONS if getattr(config, name) == getattr(default, name)]
-    named = config.model_copy(update={"name": safe_name(file.stem), "source": None})
-    text = f"# yaml-language-server: $schema={SCHEMA}\n{to_commented_yaml(named, untouched)}"
+    renamed = config.model_copy(update={"name": safe_name(file.stem), "source": None})
+    text = f"# yaml-language-server: $schema={SCHEMA}\n{to_commented_yaml(renamed, untouched)}"
     try:
         make_folder(file.parent)
         write_atomically(file.parent / SCHEMA, json.dumps(as_json_schema(), indent=1).encode() + b"\n")
@@ -45,9 +45,9 @@ def template(walker: str) -> str:
     types: dict[str, str] = {}
     for name in (DEFAULT, *builtin_names()):
         types.setdefault(load(Path(name)).config.walker.type, name)
-    named = types | {name: name for name in builtin_names()}
-    if walker not in named:
+    choices = types | {name: name for name in builtin_names()}
+    if walker not in choices:
         beyond = beyond_scope(walker)
-        said = f"; {beyond}." if beyond else f".{suggestion(walker, named)}"
-        raise ConfigError(f"there is no type of walker {walker!r}{said}", f"There are {', '.join(named)}.")
-    return named[walker]
+        hint = f"; {beyond}." if beyond else f".{suggestion(walker, choices)}"
+        raise ConfigError(f"there is no type of walker {walker!r}{hint}", f"There are {', '.join(choices)}.")
+    return choices[walker]

@@ -55,7 +55,7 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
         folder = run_named(run, request.runs)
         page = (folder.path / "report.html").resolve()
         if not page.is_file():
-            advice = f"`walkerlab report -c {folder.typed}` writes it."
+            advice = f"`walkerlab report -c {folder.quoted_path}` writes it."
             raise StaleError(f"{folder.path} has no page yet.", advice)
         request.console.show(page)
         print(page)

@@ -79,9 +79,9 @@ def program(graph: Graph = PIPELINE) -> typer.Typer:
     return app
 
 
-def print_version(asked: bool) -> None:
+def print_version(requested: bool) -> None:
     """Print the version with the commit that the code is from, if that is known, and exit, if asked."""
-    if asked:
+    if requested:
         # Imported here: nothing else that is answered on sight asks git.
         from walkerlab.pipeline.store.commit import commit_of_package
 

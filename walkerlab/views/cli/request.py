@@ -71,10 +71,10 @@ def option(*flags: str, default: Any = None, **about: Any) -> Any:
     return field(default=default, metadata={"option": typer.Option(*flags, **about)})
 
 
-def as_parameter(one: Field[Any]) -> inspect.Parameter:
+def as_parameter(entry: Field[Any]) -> inspect.Parameter:
     """Such a field as a parameter of a function whose signature typer reads."""
-    kind, told = inspect.Parameter.KEYWORD_ONLY, one.metadata["option"]
-    return inspect.Parameter(one.name, kind, default=one.default, annotation=Annotated[one.type, told])
+    kind, declared = inspect.Parameter.KEYWORD_ONLY, entry.metadata["option"]
+    return inspect.Parameter(entry.name, kind, default=entry.default, annotation=Annotated[entry.type, declared])
 
 
 def settings_from(options: Sequence["Option"], values: Mapping[str, Any]) -> tuple[SetByOption, ...]:
@@ -184,30 +184,30 @@ class Request:
         return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
     @cached_property
-    def asked(self) -> "ResolvedRun":
+    def resolved_run(self) -> "ResolvedRun":
         """The config and its run folder, its warnings said; ConfigError if it is not usable."""
         from walkerlab.pipeline.resolve import resolve
 
-        found = resolve(self.config, self.settings, self.strides, self.runs, self.name)
-        loaded = found.loaded
+        run = resolve(self.config, self.settings, self.strides, self.runs, self.name)
+        loaded = run.loaded
         if loaded.config.stability.cases:
             from walkerlab.pipeline.graph import check_cases
 
             check_cases(loaded.config.stability.cases)
         for warning in loaded.warnings:
             self.console.warn(warning)
-        self.console.detail(f"config: {loaded.source}; run folder: {found.folder.path}")
-        return found
+        self.console.detail(f"config: {loaded.source}; run folder: {run.folder.path}")
+        return run
 
     @property
     def run_dir(self) -> Path | None:
         """The run's folder; None as long as nothing has asked for it."""
-        return self.folder.path if "asked" in vars(self) else None
+        return self.folder.path if "resolved_run" in vars(self) else None
 
     @property
     def loaded(self) -> "LoadedConfig":
         """The config, ready to be varied."""
-        return self.asked.loaded
+        return self.resolved_run.loaded
 
     @property
     def resolved(self) -> "Config":
@@ -217,7 +217,7 @@ class Request:
     @property
     def folder(self) -> "RunFolder":
         """The run's folder."""
-        return self.asked.folder
+        return self.resolved_run.folder
 
 
 OF_A_RUN = ("config", "sets", "strides", "name", "runs")
@@ -240,8 +240,8 @@ class KeysAreNoOptions(TyperCommand):
             keys.sort(key=lambda key: not key.startswith(f"{self.name}."))  # its own block is meant first
             key = next((key for key in keys if name in (key, key.rpartition(".")[2])), None)
             if key is not None:
-                said = f"There is no option {typed}, but a key of the config: --set {key}=VALUE"
-                error.message = said  # type: ignore[attr-defined]
+                message = f"There is no option {typed}, but a key of the config: --set {key}=VALUE"
+                error.message = message  # type: ignore[attr-defined]
             raise
 
 
@@ -268,16 +268,20 @@ def command(
         typed = name or function.__name__
         names = {f"set_{option.flag[2:]}": option for option in sets}  # `from` alone is no name of a parameter
 
-        def run(**given: Any) -> None:
-            values = {option.flag: given.pop(parameter) for parameter, option in names.items()}
+        def run(**arguments: Any) -> None:
+            values = {option.flag: arguments.pop(parameter) for parameter, option in names.items()}
             settings = settings_from(sets, values)
-            request = asks(typed, settings, **{field: given.pop(field) for field in shared})
+            request = asks(typed, settings, **{field: arguments.pop(field) for field in shared})
             with exit_on_failure(request):
-                function(request, **given)
+                function(request, **arguments)
 
         _, *own = inspect.signature(function, eval_str=True).parameters.values()
-        options = sorted((one for one in fields(asks) if one.name in shared), key=fields(Request).__contains__)
-        by_name = [one.replace(kind=inspect.Parameter.KEYWORD_ONLY) for one in (*own, *map(as_parameter, options))]
+        options = sorted(
+            (parameter for parameter in fields(asks) if parameter.name in shared), key=fields(Request).__contains__
+        )
+        by_name = [
+            parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY) for parameter in (*own, *map(as_parameter, options))
+        ]
         run.__signature__ = inspect.Signature([*starmap(own_parameter, names.items()), *by_name])  # type: ignore[attr-defined]
         app.command(typed, cls=KeysAreNoOptions, help=purpose or inspect.getdoc(function))(run)
         return function

@@ -44,13 +44,13 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
             results = [
                 stack.enter_context(results_to_show(folder, names, request.console.warn, graph)) for folder in folders
             ]
-            for folder, found in zip(folders, results, strict=True):
-                if not found:
+            for folder, stored in zip(folders, results, strict=True):
+                if not stored:
                     raise StaleError(f"{folder.path} has no results.", "Run a stage first.")
-            found_difference = difference(results[0], results[1], [config_of(folder) for folder in folders])
+            comparison = difference(results[0], results[1], [config_of(folder) for folder in folders])
             figures = draw(folders, results)
-        shown = lines(folders, found_difference, figures, request.every)
-        print_result(request, as_object(folders, found_difference, figures), shown)
+        output = lines(folders, comparison, figures, request.every)
+        print_result(request, as_object(folders, comparison, figures), output)
 
 
 def run_labels(folders: tuple[RunFolder, RunFolder]) -> tuple[str, str]:
@@ -64,12 +64,12 @@ def draw(folders: tuple[RunFolder, RunFolder], results: list[dict[str, Any]]) ->
     from walkerlab.pipeline.store.files import make_folder, write_atomically
     from walkerlab.views.figures.walks import overlaid
 
-    drawn = overlaid(results[0], results[1], run_labels(folders))
-    if drawn is None:
+    images = overlaid(results[0], results[1], run_labels(folders))
+    if images is None:
         return []
     make_folder(folders[0].figures)
     paths = [folders[0].figures / f"diff-{folders[1].name}.{kind}" for kind in ("svg", "png")]
-    for path, data in zip(paths, drawn, strict=True):
+    for path, data in zip(paths, images, strict=True):
         write_atomically(path, data)
     return paths
 
@@ -86,7 +86,9 @@ def as_object(folders: tuple[RunFolder, RunFolder], found: RunDifference, figure
     }
 
 
-def lines(folders: tuple[RunFolder, RunFolder], found: RunDifference, figures: list[Path], every: bool) -> list[str]:
+def lines(
+    folders: tuple[RunFolder, RunFolder], comparison: RunDifference, figures: list[Path], every: bool
+) -> list[str]:
     """Describe a difference: keys of the config, and headline values of each stage.
 
     every  show all differing values instead
@@ -99,21 +101,21 @@ def lines(folders: tuple[RunFolder, RunFolder], found: RunDifference, figures: l
         return number(value, DIGITS) if isinstance(value, float) and not every else in_words(value)
 
     names = run_labels(folders)
-    result = ["config", *aligned([["", *names], *([key, in_words(a), in_words(b)] for key, a, b in found.config)])]
-    if not found.config:
+    result = ["config", *aligned([["", *names], *([key, in_words(a), in_words(b)] for key, a, b in comparison.config)])]
+    if not comparison.config:
         result[1:] = ["  the same"]
-    left = 0
-    for stage, pairs in found.numbers.items():
+    unlisted = 0
+    for stage, pairs in comparison.numbers.items():
         differing = [pair for pair in pairs if differs(pair)]
-        shown = differing if every else list(found.headlines[stage]) if differing else []
-        left += 0 if every else len(differing) - sum(pair in differing for pair in shown)
-        rows = [[pair.name, as_text(pair.first), as_text(pair.second), percent(pair)] for pair in shown]
+        listed = differing if every else list(comparison.headlines[stage]) if differing else []
+        unlisted += 0 if every else len(differing) - sum(pair in differing for pair in listed)
+        rows = [[pair.name, as_text(pair.first), as_text(pair.second), percent(pair)] for pair in listed]
         if rows or not differing:
             result += [stage, *(aligned([["", *names, "change"], *rows]) if rows else ["  the same"])]
-    for name, only in zip(names, (found.only_first, found.only_second), strict=True):
+    for name, only in zip(names, (comparison.only_first, comparison.only_second), strict=True):
         if only:
             result.append(f"only in {name}: {', '.join(only)}")
-    more = [f"{left} other values differ; list them with --all"] if left else []
+    more = [f"{unlisted} other values differ; list them with --all"] if unlisted else []
     return [*result, *more, *(f"figure: {path}" for path in figures[1:])]
 
 

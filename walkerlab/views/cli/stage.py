@@ -40,12 +40,12 @@ def report_on(request: Request, stage: Stage, graph: Graph) -> None:
     config, folder = request.resolved, request.folder
     if options.dry:
         report = execute(config, stage.name, folder, options, graph=graph)
-        print_result(request, report.as_json() | {"dry_run": True}, planned(report))
+        print_result(request, report.as_json() | {"dry_run": True}, plan_lines(report))
         return
     report = with_nearby_gaits(execute(config, stage.name, folder, options, request.console, graph), request)
     if stage.name == "design" and report.no_answer is None:
         report.summary["config"] = str(write_optimum(request, report))
-    lines = printed(request, report)
+    lines = report_lines(request, report)
     if request.open_page and "html" in report.summary and not request.console.shown:
         request.console.show(report.run_dir / str(report.summary["html"]))
     print_result(request, report.as_json(), lines, report.no_answer)
@@ -53,14 +53,14 @@ def report_on(request: Request, stage: Stage, graph: Graph) -> None:
 
 def with_nearby_gaits(report: StageReport, request: Request) -> StageReport:
     """The report of a slope without a gait, its advice led by where gaits are met."""
-    said = report.no_answer
-    if said is None or report.stage not in SEARCHING or "no gait" not in said.message:
+    error = report.no_answer
+    if error is None or report.stage not in SEARCHING or "no gait" not in error.message:
         return report
     # Imported here: most commands find their gait.
     from walkerlab.scene.gait_suggestions import suggest_gaits
 
-    met = suggest_gaits(request.resolved, request.typed)
-    return replace(report, no_answer=NoAnswer(said.message, f"{met} {said.advice}".strip()))
+    suggestions = suggest_gaits(request.resolved, request.typed)
+    return replace(report, no_answer=NoAnswer(error.message, f"{suggestions} {error.advice}".strip()))
 
 
 def write_optimum(request: Request, report: StageReport) -> Path:
@@ -84,45 +84,45 @@ def write_optimum(request: Request, report: StageReport) -> Path:
     raise AssertionError("there is always another name")
 
 
-def printed(request: Request, report: StageReport) -> list[str]:
+def report_lines(request: Request, report: StageReport) -> list[str]:
     """The result for people: what was found, where it is, and what to do next."""
     if report.artifact is None:
-        return [f"{report.stage}: no result", *left_out_lines(request, report)]
+        return [f"{report.stage}: no result", *omission_lines(request, report)]
     # why there is no answer, and what to try, is told once: as the error
     told_apart = ("no_answer",) if report.no_answer is None else ("no_answer", "advice")
     own = {key: value for key, value in report.summary.items() if key not in told_apart}
     if "html" in own:
         page = (report.run_dir / str(own["html"])).resolve()
         shows = f"`walkerlab open {shlex.quote(str(report.run_dir))}` shows it"
-        others = f"`walkerlab show STAGE{request.typed}` has every number"
-        where = ["", f"page: {page}", f"next: {shows}; {others}."]
+        details = f"`walkerlab show STAGE{request.typed}` has every number"
+        where = ["", f"page: {page}", f"next: {shows}; {details}."]
         rigid_alone = ["", why_rigid_alone(request.resolved.walker)] if request.resolved.contact is None else []
         lines = [*verdict(report.results), *answer(report.stage, own), *rigid_alone, *where]
     else:
-        found = answer(report.stage, own)
+        answers = answer(report.stage, own)
         # that there is no answer is kept, too, but nobody would look there for a result
-        lines = [*found, *([""] if found else []), *([f"stored in {report.artifact}"] if own else [])]
+        lines = [*answers, *([""] if answers else []), *([f"stored in {report.artifact}"] if own else [])]
     if report.stage in DRAWN_AT_ONCE:
         # Imported here: most stages draw nothing.
         from walkerlab.views.figures.stage import draw_at_once
 
-        drawn = draw_at_once(report.stage, report.run_dir, anew=not report.reused)
-        lines += [f"figure: {path}" for path in drawn]
-    return [*lines, *left_out_lines(request, report)]
+        figures = draw_at_once(report.stage, report.run_dir, anew=not report.reused)
+        lines += [f"figure: {path}" for path in figures]
+    return [*lines, *omission_lines(request, report)]
 
 
-def planned(report: StageReport) -> list[str]:
+def plan_lines(report: StageReport) -> list[str]:
     """What would happen, for people."""
     rows = [[done.stage, done.action, done.reason] for done in report.steps]
-    return [f"in {report.run_dir}:", *aligned(rows), *each_left_out(report)]
+    return [f"in {report.run_dir}:", *aligned(rows), *describe_omissions(report)]
 
 
-def left_out_lines(request: Request, report: StageReport) -> list[str]:
+def omission_lines(request: Request, report: StageReport) -> list[str]:
     """What was left out, if that is asked for or nothing else is there to be told."""
-    return each_left_out(report) if request.verbose or report.artifact is None else []
+    return describe_omissions(report) if request.verbose or report.artifact is None else []
 
 
-def each_left_out(report: StageReport) -> list[str]:
+def describe_omissions(report: StageReport) -> list[str]:
     """What was left out, why, and what that saves."""
     return [
         f"left out: {entry.what} ({short_reason(entry.why)})" + (f"; saves {entry.saves}" if entry.saves else "")

@@ -34,8 +34,8 @@ def print_status(request: Request, graph: Graph, check: bool, run: str | None) -
     config = request.resolved if run is None else config_of(folder)
     if config is None:
         raise StaleError(f"{folder.path} has no result with a readable config.", "`walkerlab status` lists all runs.")
-    asked = run is not None or request.config is not None or request.settings or request.strides is not None
-    listed = None if asked else list(runs_in(request.runs, graph))
+    is_selected = run is not None or request.config is not None or request.settings or request.strides is not None
+    listed = None if is_selected else list(runs_in(request.runs, graph))
     steps = survey(config, folder, graph)
     error = failing(steps, graph.stages[-1].name)
     rows = [
@@ -58,7 +58,7 @@ def print_status(request: Request, graph: Graph, check: bool, run: str | None) -
     changed = [f"changed: {', '.join(folder.changes)}"] if folder.changes else []
     lines = [f"{folder.path}:", *changed, *table]
     if listed is not None:
-        status["runs"] = [vars(one) | {"run_dir": str(one.run_dir)} for one in listed]
+        status["runs"] = [vars(run_summary) | {"run_dir": str(run_summary.run_dir)} for run_summary in listed]
     if listed:
         head = ["run", "results", "up to date", "sweeps", "size", "last written", "changed"]
         lines += ["", f"all runs in {request.runs}:", *aligned([head, *map(row_of, listed)])]
@@ -104,8 +104,8 @@ def failing(steps: tuple[Step, ...], last: str) -> StaleError | None:
     counts = Counter(state for step in steps if (state := state_of(step)) in NOT_CURRENT)
     if not counts:
         return None
-    spoken = ", ".join(f"{number} {state}" for state, number in counts.items())
-    return StaleError(f"not every result is up to date: {spoken}.", f"`walkerlab {last}` computes them all.")
+    counted_states = ", ".join(f"{number} {state}" for state, number in counts.items())
+    return StaleError(f"not every result is up to date: {counted_states}.", f"`walkerlab {last}` computes them all.")
 
 
 def print_stored(request: Request, graph: Graph, stage: str) -> None:

@@ -78,18 +78,18 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
             raise typer.BadParameter(f"{bad[0]!r} is not NAME=VALUE", param_hint="--engine-option")
         chosen, address = engine_named(request.engine)
         loaded, over = request.loaded, request.over or ()
-        given = loaded.config.sweep or Sweep()  # what the options leave open
-        own = [(key, values, f"sweep.over.{key}") for key, values in given.over.items()]
+        block = loaded.config.sweep or Sweep()  # what the options leave open
+        own = [(key, values, f"sweep.over.{key}") for key, values in block.over.items()]
         question = build_sweep(
-            request.stage or given.stage,
+            request.stage or block.stage,
             [axis_of_text(text) for text in over] or own,
-            request.zipped or (given.zip and not over),
-            request.sample if request.sample is not None else "" if over else given.sample,
-            given.seed if request.seed is None else request.seed,
+            request.zipped or (block.zip and not over),
+            request.sample if request.sample is not None else "" if over else block.sample,
+            block.seed if request.seed is None else request.seed,
         )
-        shown = {f"--show {name}": name for name in request.show or ()}
-        shown |= {f"--against {request.against}": request.against} if request.against is not None else {}
-        refuse_unrecorded(question, shown)
+        quantities = {f"--show {name}": name for name in request.show or ()}
+        quantities |= {f"--against {request.against}": request.against} if request.against is not None else {}
+        refuse_unrecorded(question, quantities)
         order = Order(
             workers=request.at_once,
             address=address,
@@ -101,19 +101,19 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
             foreseen = SweepRun(question, loaded, request.folder, graph)
             show_plan(request, foreseen.foresee(request.at_once or os.cpu_count() or 1, LISTED_POINTS))
             return
-        with chosen.begun(order) as begun:
+        with chosen.start_early(order) as engine:
             run = SweepRun(question, loaded, request.folder, graph)
             # What is needed at the end is loaded while others compute.
             threading.Thread(target=importlib.import_module, args=("walkerlab.views.report.sweep_page",)).start()
 
-            def check(there: Collection[str]) -> None:
+            def check(available: Collection[str]) -> None:
                 from walkerlab.views.report.sweep_page import refuse_unheard
 
-                named = {flag: name for flag, name in shown.items() if name not in question.names}
-                refuse_unheard(question.stage, named, there)
+                flags = {flag: name for flag, name in quantities.items() if name not in question.names}
+                refuse_unheard(question.stage, flags, available)
 
             seconds, waits = request.chunk_seconds, not request.no_wait
-            work = SweepWork(begun, order, seconds, waits, request.force, where(graph), check)
+            work = SweepWork(engine, order, seconds, waits, request.force, where(graph), check)
             swept = run.run(work, request.console)
         show_result(request, swept)
 
@@ -142,8 +142,8 @@ def show_plan(request: Request, foreseen: "Foreseen") -> None:
     }
     more = foreseen.count - len(foreseen.points)
     lines = [f"  {point}" for point in foreseen.points] + ([f"  and {more} more"] if more else [])
-    known = foreseen.estimate_s
-    time = "no point of this kind has been timed yet" if known is None else f"about {format_duration(known)}"
+    estimate = foreseen.estimate_s
+    time = "no point of this kind has been timed yet" if estimate is None else f"about {format_duration(estimate)}"
     counts = f"{foreseen.count} points, {foreseen.there} already computed, {missing} to compute: {time}"
     print_result(request, value, [f"in {foreseen.path}:", *lines, counts])
 
@@ -172,21 +172,21 @@ def show_result(request: SweepRequest, swept: "Swept") -> None:
     from walkerlab.pipeline.sweeps.result import as_csv as table_of
     from walkerlab.views.report.sweep_page import draw
 
-    drawn = draw(swept, request.folder, tuple(request.show or ()), request.against or "")
+    drawing = draw(swept, request.folder, tuple(request.show or ()), request.against or "")
     summary = swept.summary
     value = {
         **common(request, swept.path, swept.wall_s),
         "reused": swept.reused,
         **{name: summary[name] for name in SUMMARY_KEYS if name in summary},
-        "figures": [str(path) for path in drawn.figures],
-        "html": str(drawn.page),
+        "figures": [str(path) for path in drawing.figures],
+        "html": str(drawing.page),
     }
-    lines = result_lines(swept, drawn.page)
+    lines = result_lines(swept, drawing.page)
     if request.as_csv:
         table = table_of(swept.content, swept.question, request.every)
-        beside = swept.path.with_suffix(".csv")
-        write_atomically(beside, table.encode())
-        value["csv"], lines = str(beside), [table.removesuffix("\n")]
+        csv_path = swept.path.with_suffix(".csv")
+        write_atomically(csv_path, table.encode())
+        value["csv"], lines = str(csv_path), [table.removesuffix("\n")]
     print_result(request, value, lines, swept.error() if swept.failed else None)
 
 
@@ -199,7 +199,7 @@ def result_lines(swept: "Swept", page: Path) -> list[str]:
     return [
         f"sweep of {summary['of']} over {over}: {summary['points']} points, {outcomes}",
         *([f"  {swept.reused} of them already existed"] if swept.reused else []),
-        *(line for said in summary_lines(summary) for line in paragraph(said)),
+        *(line for text in summary_lines(summary) for line in paragraph(text)),
         f"  numbers  {swept.path}",
         f"  page     {page}",
     ]
