@@ -123,7 +123,7 @@ def test_what_is_to_be_typed_is_set_as_code_and_powers_are_raised():
 
 
 def test_a_command_on_the_page_of_another_run_has_the_options_that_name_it():
-    section = Section("left-out", "Left out", (Paragraph("`walkerlab engines` makes it"),))
+    section = Section("left-out", "Omitted results", (Paragraph("`walkerlab engines` makes it"),))
     commands = [Page(render(Sheet("t", (section,), run=run))).said("code") for run in ("", "round feet")]
     assert commands == [["walkerlab engines"], ["walkerlab engines -c 'round feet'"]]
 

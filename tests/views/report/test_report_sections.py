@@ -197,7 +197,7 @@ def test_a_reason_of_several_is_given_once_and_what_follows_from_it_below():
 
 
 def test_nothing_missing_is_said_too():
-    assert "Nothing" in texts(sections()["left-out"])
+    assert "Every result of the pipeline is available" in texts(sections()["left-out"])
 
 
 def test_a_walker_that_fell_says_so_before_one_that_walked():
@@ -325,10 +325,10 @@ def test_a_set_of_equations_without_a_gait_is_left_away():
 
 def test_assumptions_are_judged():
     good = rows(sections()["assumptions"])
-    assert [row[-1] for row in good.values()] == ["holds", "holds", "ignored", "holds"]
+    assert [row[-1] for row in good.values()] == ["holds", "holds", "does not hold (ignored)", "holds"]
     walk = simulate(min_normal_force_N=-1.0, energy_drift_J=0.13, max_friction_ratio=2.0)
     bad = rows(sections([], simulate=walk)["assumptions"])
-    assert [row[-1] for row in bad.values()] == ["does not hold", "does not hold", "ignored", "does not hold"]
+    assert [row[-1] for row in bad.values()] == ["does not hold", "does not hold", "does not hold (ignored)", "does not hold"]
 
 
 def test_steps_of_both_models_stand_side_by_side_with_dashes_behind_the_shorter():
@@ -357,7 +357,7 @@ def test_the_contact_walk_has_its_numbers():
     found = rows(sections()["contact"])
     assert found["static penetration"][0] == "58.8 µm"
     assert found["damping ratio"][0] == "3.71"
-    assert found["energy balance residual"][0] == "7 × 10⁻⁹ J"
+    assert found["energy balance error"][0] == "7 × 10⁻⁹ J"
 
 
 def test_the_config_can_be_run_again_from_the_page(tmp_path):
@@ -490,7 +490,7 @@ def test_where_no_ground_is_described_the_friction_it_takes_is_told_once():
     walk = simulate()
     walk = stored("simulate", walk.groups, walk.summary | {"max_friction_ratio": 0.203})
     made = assumptions(Results(config("contact=null"), {"simulate": walk}))
-    assert "The stance foot does not slip: needs friction (0.203)" in made.finding
+    assert "The stance foot does not slip: needs friction, 0.203" in made.finding
 
 
 def test_the_page_names_the_law_of_friction_that_walked():

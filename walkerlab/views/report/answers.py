@@ -95,9 +95,9 @@ OF_THE_WALK = (
     told("cost of transport", "cost_of_transport"),
     told("mean energy", "mean_energy_J", 7),
     told("energy drift", "energy_drift_J", 2),
-    told("energy balance off by", "energy_balance_residual_J", 2),
+    told("energy balance error", "energy_balance_residual_J", 2),
     Column("energy lost", lambda walk: energy_lost(walk.get("dissipated_J") or {}) or None),
-    told("least normal force", "min_normal_force_N"),
+    told("minimum normal force", "min_normal_force_N"),
     told("largest friction ratio", "max_friction_ratio"),
     Column("largest penetration", "max_penetration_m", length),
     Column("scuffing depth", "max_scuff_depth_m", length),
@@ -118,7 +118,7 @@ def walk(model: str, summary: Summary) -> list[str | Table]:
         side_by_side("", columns, taken, head="step"),
         side_by_side("", OF_THE_WALK, {"": summary}, head=""),
         f"numerical error: {off_by(error)}." if error else "",
-        f"Not a walk on real ground: {'; '.join(objections)}." if (objections := summary.get("objections")) else "",
+        f"Not possible on real ground: {'; '.join(objections)}." if (objections := summary.get("objections")) else "",
         f"advice: {summary['advice']}" if advised else "",
     ]
 
@@ -186,7 +186,7 @@ def accuracy(summary: Summary) -> list[str | Table]:
     levels = dict.fromkeys(level for scene in summary["best"].values() for level in scene)
     columns = [Column(f"at {level}", level, lambda method: method or "no method") for level in levels]
     scenes = [{"scene": scene, **best} for scene, best in summary["best"].items()]
-    head = f"{len(summary['rows'])} runs measured; the fastest method by the error that is asked for:"
+    head = f"{len(summary['rows'])} runs measured; the fastest method at each error level:"
     return [head, table("", [Column("scene", "scene"), *columns], scenes), *summary["conclusions"].values()]
 
 

@@ -35,13 +35,13 @@ def tone(outcome: str) -> Tone:
 USUAL = "a hundred times tighter tolerances"
 """Default settings of the second walk that measures the error."""
 ERRORS = {
-    "step_period_s": ("in a period", "s"),
-    "step_length_m": ("in a length", "m"),
-    "slip_m": ("in a slip", "m"),
-    "rolling_m": ("in a rolling", "m"),
-    "knee_strike_time_s": ("in the time of a knee strike", "s"),
-    "end_time_s": ("at the end", "s"),
-    "cost_of_transport": ("in the cost of transport", "1"),
+    "step_period_s": ("in period", "s"),
+    "step_length_m": ("in step length", "m"),
+    "slip_m": ("in slip", "m"),
+    "rolling_m": ("in rolling distance", "m"),
+    "knee_strike_time_s": ("in knee-strike time", "s"),
+    "end_time_s": ("in end time", "s"),
+    "cost_of_transport": ("in cost of transport", "1"),
 }
 """Quantities with a numerical error: text and unit."""
 

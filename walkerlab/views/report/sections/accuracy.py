@@ -48,8 +48,8 @@ def costs(summary: Row) -> Table:
         Column("method", "method"),
         *(Column(f"ms for {power_of_ten(at, 1)}", f"{at}", with_spread, numeric=True) for at in levels),
         Column("smallest error", "smallest_error", numeric=True),
-        Column("right-hand sides there", "rhs_evaluations", whole, numeric=True),
-        Column("end not reached", "failures", wide=True),
+        Column("right-hand sides", "rhs_evaluations", whole, numeric=True),
+        Column("failed runs", "failures", wide=True),
     )
     methods = {scene: list(methods_of(summary, scene, levels)) for scene in summary["reference"]}
     note = words("accuracy.costs", summary)
@@ -91,7 +91,7 @@ def with_spread(run: Row | None) -> Cell:
 
 
 def ended_as(run: Row) -> str:
-    return "budget used up" if run["outcome"] == Outcome.BUDGET_EXHAUSTED.label else str(run["outcome"])
+    return "budget exhausted" if run["outcome"] == Outcome.BUDGET_EXHAUSTED.label else str(run["outcome"])
 
 
 def nearest_library(summary: Row, scene: str) -> Row | None:
@@ -112,7 +112,7 @@ def whose(reference: Row) -> str:
 REFERENCE_COLUMNS = (
     Column("scene", "scene"),
     Column("reference", "method"),
-    Column("by", whose),
+    Column("computed by", whose),
     Column("second method", "second_method"),
     Column("difference", "agreement", partial(number, digits=2), numeric=True),
 )
@@ -122,7 +122,7 @@ NOT_RUN_COLUMNS = (
     Column("scene", "scene"),
     Column("method", "method"),
     Column("tolerances", "tolerances", lambda values: join_words(power_of_ten(value, 1) for value in values)),
-    Column("why", "why", wide=True),
+    Column("reason", "why", wide=True),
 )
 
 

@@ -31,7 +31,7 @@ def section(results: Results, summary: Summary) -> Section | None:
     return Section.of("adjustment", "The parameter adjustment", blocks, words("adjustment.needed", summary))
 
 
-ORDER_COLUMNS = (Column("knob"), Column("observed orders, towards the limit", wide=True))
+ORDER_COLUMNS = (Column("parameter"), Column("observed orders, towards the limit", wide=True))
 
 
 def limit(results: Results) -> Section | None:
@@ -46,7 +46,7 @@ def limit(results: Results) -> Section | None:
     rows = [[name, ", ".join(fixed(order, 2) for order in values) or NONE] for name, values in orders.items()]
     blocks = (
         *(table(caption, columns, found, note=note) for caption, found in settings.items()),
-        table("How fast the period converges when one knob is turned", ORDER_COLUMNS, rows),
+        table("Convergence of the period when one parameter changes", ORDER_COLUMNS, rows),
     )
     return Section.of("limit", "Towards the rigid limit", blocks, words("adjustment.reached", reaches, pushes), COSTS)
 
@@ -57,7 +57,7 @@ def starts_table(results: Results, summary: Summary) -> Table:
     caption, note, head = "The start before and after the adjustment", "", "coordinate"
     if results.claims:
         caption, head = "Table 2 again: the start before and after the adjustment", "row"
-        note = "The paper's percentages are those of the ADAMS value, without saying so."
+        note = "The paper's percentages are relative to the ADAMS value, which it does not state."
     named = in_signs if results.claims else symbol
     first = Column(head, lambda row: f"{named(row['name'])} ({row['unit']})")
     beside = (
@@ -68,7 +68,7 @@ def starts_table(results: Results, summary: Summary) -> Table:
 
 
 LOST = {
-    "damping": ("to damping", "in the impact, all"),
+    "damping": ("to damping", "all in the impact"),
     "friction": ("to friction", "none"),
     "knee_strikes": ("in the knee's strike", "in the strike"),
     "knee_stop": ("in the knees' stops", "none"),
@@ -115,10 +115,10 @@ def gait_table(summary: Summary, rigid: Summary) -> Table:
 
 
 MARGIN_COLUMNS = (
-    Column("scaled", "name", in_signs),
+    Column("scaled velocity", "name", in_signs),
     Column("last factor that walks", "factor", number, numeric=True),
-    Column("beyond", "beyond", lambda outcome: outcome or "nothing, as far as searched"),
-    Column("steps there", "steps_beyond", lambda steps: "" if steps is None else str(steps), numeric=True),
+    Column("outcome beyond", "beyond", lambda outcome: outcome or "no failure in the search range"),
+    Column("steps beyond", "steps_beyond", lambda steps: "" if steps is None else str(steps), numeric=True),
 )
 
 

@@ -12,9 +12,9 @@ from walkerlab.views.report.tables import Column, table
 from walkerlab.views.report.words import words
 
 TITLES = {
-    PAPER: "Number by number: the paper and what is found here",
+    PAPER: "The paper's values compared with computed ones",
     CASES: "Extreme cases and known problems",
-    COSTS: "Accuracy: what an error costs, and the rigid limit",
+    COSTS: "Accuracy: run time against error, and the rigid limit",
 }
 """Titles of the further pages, in order."""
 
@@ -32,18 +32,18 @@ def further(results: Results, pages: Mapping[str, Sequence[Section]]) -> Section
 
 def glossary(results: Results) -> Section:
     told = words.terms("closing.glossary", results.config.contact is not None, drives_of(results.config))
-    return Section("glossary", "Glossary", (Terms(told),), "The words of this report, in a line each.")
+    return Section("glossary", "Glossary", (Terms(told),), "Terms used in this report.")
 
 
 def left_out(results: Results) -> Section | None:
     """Tabulate results, and parts of results, that were not computed."""
     parts = [LeftOut(**one) for stored in results.stored.values() for one in stored.summary.get("left_out", [])]
     rows = list(rows_of(list(dict.fromkeys((*results.absent, *parts)))))
-    columns = [Column("what"), Column("why", wide=True), Column("saves", wide=True)]
-    missing = table("What was left out of this scene, why, and what that saves", columns, rows, wordy=True)
-    nothing = Paragraph("" if rows else "Nothing is left out: every result of the pipeline is there.")
-    finding = f"{count(len(rows), 'thing')}, each with its reason." if rows else "Nothing."
-    return Section.of("left-out", "Left out", (missing, nothing), finding)
+    columns = [Column("result"), Column("reason", wide=True), Column("saves", wide=True)]
+    missing = table("Omitted results, with reasons and savings", columns, rows, wordy=True)
+    nothing = Paragraph("" if rows else "Every result of the pipeline is available.")
+    finding = f"{count(len(rows), 'item')}, each with its reason." if rows else "None."
+    return Section.of("left-out", "Omitted results", (missing, nothing), finding)
 
 
 def rows_of(missing: Sequence[LeftOut]) -> Iterator[tuple[str, str, str]]:

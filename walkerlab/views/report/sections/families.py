@@ -41,7 +41,7 @@ def bifurcations(summary: Mapping[str, Any]) -> Table:
     columns = (
         Column("kind", "kind"),
         Column("model", "model"),
-        Column("steps of the gait", "period", numeric=True),
+        Column("period (steps)", "period", numeric=True),
         Column(with_unit(parameter(summary), summary["unit"]), "value", lambda value: number(value, 9), numeric=True),
         Column("critical multiplier", "multiplier", lambda parts: complex_number(*parts), numeric=True),
     )

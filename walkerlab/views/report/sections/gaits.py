@@ -46,4 +46,4 @@ def every_gait(sets: Mapping[str, Sequence[Mapping[str, Any]]], names: Sequence[
         ]
         for name, found in sets.items()
     }
-    return table("Every gait of one step that was found", columns, gaits)
+    return table("All one-step gaits found", columns, gaits)

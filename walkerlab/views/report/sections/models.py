@@ -9,7 +9,7 @@ from walkerlab.views.report.tables import Column, measured, table
 from walkerlab.views.report.words import words
 
 DIFFERENCE_COLUMNS = (
-    Column("contact model less rigid model"),
+    Column("contact minus rigid model"),
     Column("angle (rad)", written=partial(number, digits=3), numeric=True),
     Column("velocity (rad/s)", written=partial(number, digits=3), numeric=True),
 )
@@ -42,7 +42,7 @@ def section(results: Results) -> Section | None:
         walks.insert(0, {**summary["steps"]["gait"], "released": "rigid gait"})
     blocks = (
         table("Largest differences of the legs’ motions", DIFFERENCE_COLUMNS, rows, note=note),
-        table("What the instant of release decides", RELEASE_COLUMNS, walks, note=words("models.releases")),
+        table("Effect of the release instant", RELEASE_COLUMNS, walks, note=words("models.releases")),
     )
     return Section.of("models", "The models compared", blocks, words("models.finding", angle))
 

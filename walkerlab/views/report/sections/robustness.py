@@ -19,7 +19,7 @@ MODEL = Column("model", "model")
 NORMS = (
     MODEL,
     Column("disturbance", "disturbance"),
-    Column("of the", lambda row: row["indicator"].replace("_", " ")),
+    Column("indicator", lambda row: row["indicator"].replace("_", " ")),
     Column("norm", "value", lambda value: number(value, 6), numeric=True),
     Column("unit", "unit"),
     Column("direct", "direct", lambda value: number(value, 5), numeric=True),
@@ -38,8 +38,8 @@ ROUGH = (
 )
 MOVES = (
     MODEL,
-    Column("number of the config", "to"),
-    Column("of the gait", "of"),
+    Column("parameter", "to"),
+    Column("gait quantity", "of"),
     Column("derivative", "value", number, numeric=True),
     Column("unit", "unit"),
     Column("% per %", "relative", lambda value: number(value, 3), numeric=True),
@@ -47,21 +47,21 @@ MOVES = (
 
 
 BEST = (
-    Column("number of the config", "to"),
+    Column("parameter", "to"),
     Column("best", "best", lambda value: number(value, 7), numeric=True),
 )
 KEPT = (
-    Column("kept", "quantity"),
-    Column("from", "from", number, numeric=True),
-    Column("to", "to", number, numeric=True),
-    Column("there", "value", lambda value: number(value, 6), numeric=True),
+    Column("quantity", "quantity"),
+    Column("minimum", "from", number, numeric=True),
+    Column("maximum", "to", number, numeric=True),
+    Column("at the optimum", "value", lambda value: number(value, 6), numeric=True),
 )
 
 
 def designed(summary: Mapping[str, Any]) -> list[str | Table]:
     """Describe the optimum of a design, with its parameters and constraints."""
     rows = [{"to": key, "best": value} for key, value in summary["best"].items()]
-    kept = table("Kept within bounds", KEPT, summary["constraints"])
+    kept = table("Constraints", KEPT, summary["constraints"])
     return [*words.parts("design.findings", summary), table("Optimum", BEST, rows), kept]
 
 
@@ -69,7 +69,7 @@ def designed(summary: Mapping[str, Any]) -> list[str | Table]:
 def section(_results: Results, summary: Mapping[str, Any]) -> Section | None:
     first, *others = findings(summary) or [""]
     blocks: tuple[PageBlock, ...] = (Paragraph(" ".join(others)), *tables(summary))
-    return Section.of("robustness", "What the gait withstands", blocks, first)
+    return Section.of("robustness", "Robustness of the gait", blocks, first)
 
 
 def findings(summary: Mapping[str, Any]) -> list[str]:
@@ -98,8 +98,8 @@ def tables(summary: Mapping[str, Any]) -> list[Table]:
     return [
         table("Gait sensitivity norms", NORMS, summary["gait_sensitivity_norm"], note=words("robustness.norms")),
         table("Steps on rough ground", ROUGH, summary["rough_ground"], note=words("robustness.rough")),
-        table("What to change first", MOVES, first, note=words("robustness.first")),
-        table("What moves the gait", MOVES, shown, note=words("robustness.moves", left)),
+        table("Most effective changes", MOVES, first, note=words("robustness.first")),
+        table("Effect of the parameters on the gait", MOVES, shown, note=words("robustness.moves", left)),
         table("Gravity, slope and ground", MOVES, around[:SHOWN]),
         table("Parameters that are zero", MOVES, zeros, note=words("robustness.zeros")),
     ]

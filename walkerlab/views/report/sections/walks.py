@@ -53,9 +53,9 @@ def contact_rows(summary: Mapping[str, Any]) -> list[tuple[str, str | Cell, str]
         "speed": quantity(get("speed_m_s"), "m/s", 4),
         "Froude number": number(get("froude"), 4),
         "cost of transport": number(get("cost_of_transport"), 4),
-        "energy balance residual": joules(summary["energy_balance_residual_J"]),
+        "energy balance error": joules(summary["energy_balance_residual_J"]),
         **{f"energy lost {CHANNELS.get(key, key)}": joules(value) for key, value in lost.items()},
-        "work": whole(get("rhs_evaluations")),
+        "solver work": whole(get("rhs_evaluations")),
     }
     meanings = words.terms("walks.meanings", summary)
     return [
@@ -68,7 +68,7 @@ def joules(value: float, digits: int = 4) -> str:
     return f"{number(value, digits) if abs(value) >= 1e-3 or value == 0 else power_of_ten(value, 2)} J"
 
 
-HOLDS, FAILS, NOTED = Cell("holds", "good"), Cell("does not hold", "bad"), Cell("ignored", "fair")
+HOLDS, FAILS, NOTED = Cell("holds", "good"), Cell("does not hold", "bad"), Cell("does not hold (ignored)", "fair")
 ROUNDING = 1e-6
 """Relative energy drift, and scuffing depth in leg lengths, that count as zero."""
 ASSUMPTION_COLUMNS = (
@@ -89,7 +89,7 @@ def assumptions(results: Results) -> Section | None:
             (assumption, _, measured), (value, verdict) = said.partition(": "), judgement(key, summary, results)
             judged.append({"assumption": assumption, "measured": measured, "value": value, "verdict": verdict})
     where = " (sections 3.1 and 3.2)" if results.claims else ""
-    caption = f"What the rigid model assumes{where}, and what its walk says"
+    caption = f"Assumptions of the rigid model{where}, checked on its walk"
     shown = table(caption, ASSUMPTION_COLUMNS, judged, wordy=True)
     return Section.of("assumptions", "Assumptions, checked", (shown,), words("walks.assumptions", judged))
 
