@@ -6,7 +6,7 @@ import pytest
 from synthetic_results import paper_row
 
 from walkerlab.outcome import Outcome
-from walkerlab.views.report.answers import ANSWERS, answer, elided, verdict
+from walkerlab.views.report.answers import ANSWERS, answer, elide, verdict
 from walkerlab.views.report.gaits import gait_table
 from walkerlab.views.report.numbers import number
 from walkerlab.views.report.tables import (
@@ -21,7 +21,7 @@ from walkerlab.views.report.tables import (
     width,
 )
 from walkerlab.views.report.tex import as_tex
-from walkerlab.views.report.text import COLUMNS, described_summary
+from walkerlab.views.report.text import PARAGRAPH_WIDTH, describe_summary
 
 GAIT = {
     "state": [-0.2042, 0.1694, -0.6058, -0.861],
@@ -226,9 +226,9 @@ def test_how_far_a_start_may_change_is_told_in_signs():
 
 
 def test_long_rows_keep_their_ends():
-    assert elided(list(range(12))) == list(range(12))
-    assert elided(list(range(100))) == [0, 1, 2, 3, 4, 5, "…", 98, 99]
-    (line,) = described_summary({"values": list(range(1000))}, short=True)
+    assert elide(list(range(12))) == list(range(12))
+    assert elide(list(range(100))) == [0, 1, 2, 3, 4, 5, "…", 98, 99]
+    (line,) = describe_summary({"values": list(range(1000))}, short=True)
     assert line.split()[:5] == ["values", "0", "1", "2", "3"]
     assert "(1000 of them" in line
 
@@ -277,7 +277,7 @@ SAYS_MUCH = {
 def test_whatever_stage_speaks_its_paragraphs_have_lines_of_one_length(stage):
     lines = answer(stage, SAYS_MUCH[stage])
     assert sum(line.count("word") for line in lines) == 60
-    assert max(map(len, lines)) <= COLUMNS
+    assert max(map(len, lines)) <= PARAGRAPH_WIDTH
 
 
 def test_a_gait_is_one_table_on_page_and_terminal():

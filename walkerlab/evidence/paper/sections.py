@@ -9,7 +9,7 @@ from walkerlab.labels import with_unit
 from walkerlab.views.report.answers import last_steps
 from walkerlab.views.report.blocks import PAPER, PageBlock, Paragraph, Section, Shares, Statement, Statements
 from walkerlab.views.report.numbers import count, number
-from walkerlab.views.report.outcomes import off_by
+from walkerlab.views.report.outcomes import describe_error
 from walkerlab.views.report.results import Results
 from walkerlab.views.report.symbols import in_signs
 from walkerlab.views.report.tables import Cell, Column, Table, Tone, grouped, table
@@ -182,7 +182,7 @@ def fates(results: Results, rows: Sequence[Row]) -> Iterator[PageBlock]:
 def answer(summary: Row) -> list[str | Table]:
     """Report the verdicts on the paper's values or, for another walker, how the models differ."""
     errors = summary.get("numerical_error", {})
-    error_lines = [f"numerical error of the {model} walk: {off_by(error)}." for model, error in errors.items()]
+    error_lines = [f"numerical error of the {model} walk: {describe_error(error)}." for model, error in errors.items()]
     if "verdicts" in summary:
         head = words("paper.finding", by_verdict(row["verdict"] for row in summary["paper_numbers"]))
         return [head, numbers_table(summary["paper_numbers"]), *error_lines]

@@ -36,7 +36,7 @@ from walkerlab.pipeline.store.runfolder import RunFolder
 from walkerlab.views.cli.console import Console
 from walkerlab.views.report.answers import paper_table
 from walkerlab.views.report.outcomes import MODELS
-from walkerlab.views.report.tables import Table, as_csv, of_records
+from walkerlab.views.report.tables import Table, as_csv, record_table
 from walkerlab.views.report.tex import as_tex
 
 if TYPE_CHECKING:
@@ -266,7 +266,7 @@ def table(folder: RunFolder, name: str, kind: str, console: Console) -> Table:
         return tex_table
     if isinstance(rows, Mapping):
         rows = [{"quantity": quantity, **row} for quantity, row in rows.items()]
-    return of_records(rows)
+    return record_table(rows)
 
 
 def trajectory(folder: RunFolder, model: str, kind: str, console: Console) -> bytes:

@@ -107,10 +107,10 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
             threading.Thread(target=importlib.import_module, args=("walkerlab.views.report.sweep_page",)).start()
 
             def check(there: Collection[str]) -> None:
-                from walkerlab.views.report.sweep_page import refuse_unheard
+                from walkerlab.views.report.sweep_page import check_options
 
                 named = {flag: name for flag, name in shown.items() if name not in question.names}
-                refuse_unheard(question.stage, named, there)
+                check_options(question.stage, named, there)
 
             seconds, waits = request.chunk_seconds, not request.no_wait
             work = SweepWork(begun, order, seconds, waits, request.force, where(graph), check)

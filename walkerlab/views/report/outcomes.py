@@ -32,7 +32,7 @@ def tone(outcome: str) -> Tone:
     return "good" if outcome == WALKED else "bad"
 
 
-USUAL = "a hundred times tighter tolerances"
+DEFAULT_CHECK = "a hundred times tighter tolerances"
 """Default settings of the second walk that measures the error."""
 ERRORS = {
     "step_period_s": ("in period", "s"),
@@ -46,9 +46,9 @@ ERRORS = {
 """Quantities with a numerical error: text and unit."""
 
 
-def off_by(error: Mapping[str, Any]) -> str:
+def describe_error(error: Mapping[str, Any]) -> str:
     """Describe the numerical errors of a walk and how they were measured."""
     if "reason" in error:
         return f"unknown: {error['reason']}"
-    off = join_words(f"{quantity(error[key], unit, 1)} {what}" for key, (what, unit) in ERRORS.items() if key in error)
-    return f"{off}, by a second walk with {error.get('by', USUAL)}"
+    text = join_words(f"{quantity(error[key], unit, 1)} {what}" for key, (what, unit) in ERRORS.items() if key in error)
+    return f"{text}, by a second walk with {error.get('by', DEFAULT_CHECK)}"

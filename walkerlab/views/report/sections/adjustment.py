@@ -9,7 +9,7 @@ from walkerlab.views.report.blocks import COSTS, Paragraph, Section
 from walkerlab.views.report.gaits import symbol, works
 from walkerlab.views.report.numbers import NONE, fixed, length, number, quantity
 from walkerlab.views.report.outcomes import tone
-from walkerlab.views.report.results import Results, of_stage
+from walkerlab.views.report.results import Results, stage_section
 from walkerlab.views.report.symbols import in_signs
 from walkerlab.views.report.tables import Cell, Column, Table, measured, side_by_side, table
 from walkerlab.views.report.words import words
@@ -17,9 +17,8 @@ from walkerlab.views.report.words import words
 Summary = Mapping[str, Any]
 
 
-@of_stage("tune", "adjustment")
+@stage_section("tune", "adjustment")
 def section(results: Results, summary: Summary) -> Section | None:
-    """Report the verdict on the adjustment, with its tables."""
     changed = results.claims or summary["adjustment"]["needed"]
     blocks = (
         Paragraph(words("adjustment.explained", summary, results.claims)),
@@ -42,10 +41,10 @@ def limit(results: Results) -> Section | None:
     note = words("adjustment.factors", pushes)
     titles = words.terms("adjustment.distances").items()
     columns = [measured(title, key, partial(number, digits=3)) for key, title in titles]
-    settings = {f"Towards the rigid limit: {name}": found["settings"] for name, found in reaches.items()}
+    settings = {f"Towards the rigid limit: {name}": reach["settings"] for name, reach in reaches.items()}
     rows = [[name, ", ".join(fixed(order, 2) for order in values) or NONE] for name, values in orders.items()]
     blocks = (
-        *(table(caption, columns, found, note=note) for caption, found in settings.items()),
+        *(table(caption, columns, rungs, note=note) for caption, rungs in settings.items()),
         table("Convergence of the period when one parameter changes", ORDER_COLUMNS, rows),
     )
     return Section.of("limit", "Towards the rigid limit", blocks, words("adjustment.reached", reaches, pushes), COSTS)
@@ -60,14 +59,14 @@ def starts_table(results: Results, summary: Summary) -> Table:
         note = "The paper's percentages are relative to the ADAMS value, which it does not state."
     named = in_signs if results.claims else symbol
     first = Column(head, lambda row: f"{named(row['name'])} ({row['unit']})")
-    beside = (
+    value_columns = (
         Column(title, key, partial(number, digits=3 if "percent" in key else 6), numeric=True)
         for key, title in words.terms("adjustment.starts", results.claims).items()
     )
-    return table(caption, (first, *beside), rows, note=note)
+    return table(caption, (first, *value_columns), rows, note=note)
 
 
-LOST = {
+LOSSES = {
     "damping": ("to damping", "all in the impact"),
     "friction": ("to friction", "none"),
     "knee_strikes": ("in the knee's strike", "in the strike"),
@@ -76,10 +75,10 @@ LOST = {
 """Energy losses per step: stored name, label, and the rigid model's counterpart."""
 
 
-def lost(channel: str, gait: Summary) -> float | Cell | None:
+def lost_energy(channel: str, gait: Summary) -> float | Cell | None:
     """Return the energy (J) that a gait loses in a channel; None for knees that lose nothing."""
-    into = gait["lost_J"].get(channel)
-    return into if into or channel in ("damping", "friction") else None
+    energy = gait["lost_J"].get(channel)
+    return energy if energy or channel in ("damping", "friction") else None
 
 
 def factors(multipliers: Sequence[tuple[float, float]]) -> str:
@@ -97,20 +96,19 @@ GAIT_LINES = (
     Column("stable", "stable"),
     Column("slip a step", "slip_m", length),
     *(
-        Column(f"energy lost {said}", partial(lost, channel), partial(quantity, unit="J"))
-        for channel, (said, _) in LOST.items()
+        Column(f"energy lost {label}", partial(lost_energy, channel), partial(quantity, unit="J"))
+        for channel, (label, _) in LOSSES.items()
     ),
     *works(number),
 )
 
 
 def gait_table(summary: Summary, rigid: Summary) -> Table:
-    """Tabulate the contact gait next to the rigid one."""
     gait = summary["gait"]
     note = f"Section of the contact gait: {gait['section']}."
-    losses = {channel: Cell(said) for channel, (_, said) in LOST.items() if lost(channel, gait) is not None}
-    beside = {**rigid, "slip_m": Cell("none"), "lost_J": losses}
-    gaits = {"contact model": gait, "rigid model": beside}
+    losses = {channel: Cell(label) for channel, (_, label) in LOSSES.items() if lost_energy(channel, gait) is not None}
+    rigid_column = {**rigid, "slip_m": Cell("none"), "lost_J": losses}
+    gaits = {"contact model": gait, "rigid model": rigid_column}
     return side_by_side("The contact model's own gait", GAIT_LINES, gaits, note=note)
 
 
@@ -123,7 +121,6 @@ MARGIN_COLUMNS = (
 
 
 def margins_table(summary: Summary) -> Table:
-    """Tabulate how far the start may be scaled."""
     rows = [{"name": name, **margin} for name, margin in (summary["adjustment"].get("margins") or {}).items()]
     return table("How far the start's velocities may change", MARGIN_COLUMNS, rows)
 
@@ -137,7 +134,6 @@ WALK_COLUMNS = (
 
 
 def walks_table(results: Results, summary: Summary) -> Table:
-    """Tabulate the walks of the procedure."""
     names = words.terms("adjustment.walks", "hinged" in summary["procedure"])
     walks = [{"walk": names[name], **walk} for name, walk in summary["procedure"].items() if walk is not None]
     if results.claims:

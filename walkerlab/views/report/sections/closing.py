@@ -22,23 +22,23 @@ TITLES = {
 def further(results: Results, pages: Mapping[str, Sequence[Section]]) -> Section | None:
     """Link to the further pages, each with its sections' findings, and announce pending results."""
     items = []
-    for file, found in pages.items():
+    for file, sections in pages.items():
         silent = file == PAPER and not results.claims
-        items.append((file, TITLES[file], "" if silent else " ".join(filter(None, (one.finding for one in found)))))
+        findings = () if silent else (section.finding for section in sections)
+        items.append((file, TITLES[file], " ".join(filter(None, findings))))
     waiting = (Paragraph(words("closing.pending", name), "waiting") for name in results.pending)
     title = "Further pages" if items else "Still to come"
     return Section.of("further", title, (Cards(tuple(items)) if items else None, *waiting))
 
 
 def glossary(results: Results) -> Section:
-    told = words.terms("closing.glossary", results.config.contact is not None, drives_of(results.config))
-    return Section("glossary", "Glossary", (Terms(told),), "Terms used in this report.")
+    meanings = words.terms("closing.glossary", results.config.contact is not None, drives_of(results.config))
+    return Section("glossary", "Glossary", (Terms(meanings),), "Terms used in this report.")
 
 
 def left_out(results: Results) -> Section | None:
-    """Tabulate results, and parts of results, that were not computed."""
-    parts = [LeftOut(**one) for stored in results.stored.values() for one in stored.summary.get("left_out", [])]
-    rows = list(rows_of(list(dict.fromkeys((*results.absent, *parts)))))
+    parts = [LeftOut(**entry) for stored in results.stored.values() for entry in stored.summary.get("left_out", [])]
+    rows = list(rows_by_reason(list(dict.fromkeys((*results.absent, *parts)))))
     columns = [Column("result"), Column("reason", wide=True), Column("saves", wide=True)]
     missing = table("Omitted results, with reasons and savings", columns, rows, wordy=True)
     nothing = Paragraph("" if rows else "Every result of the pipeline is available.")
@@ -46,7 +46,7 @@ def left_out(results: Results) -> Section | None:
     return Section.of("left-out", "Omitted results", (missing, nothing), finding)
 
 
-def rows_of(missing: Sequence[LeftOut]) -> Iterator[tuple[str, str, str]]:
+def rows_by_reason(missing: Sequence[LeftOut]) -> Iterator[tuple[str, str, str]]:
     """Yield one row per reason: what is missing, then what depends on it."""
     reasons = {absent.why for absent in missing}
     # the reason at the bottom of one such as 'it needs simulate: it needs fixedpoint: no gait'

@@ -12,9 +12,9 @@ from walkerlab.views.report.results import Results
 from walkerlab.views.report.tracks import Array, Track, sampling_gap, track_in
 from walkerlab.views.report.words import words
 
-MAX_STEPS = 10
+MAX_SHOWN_STEPS = 10
 STYLES = {RIGID: "rigid", CONTACT: "contact"}
-DEEPEST_IN_VIEW = 5.0
+CLOSEUP_DEPTHS = 5.0
 """Height of the close-up relative to the largest penetration outside impacts."""
 STILL_VIEW_OF_RIGID = 4e-3
 """Height of the close-up for a foot that does not sink in, leg lengths."""
@@ -24,13 +24,13 @@ def section(results: Results) -> Section | None:
     return Section.of("motion", "The walk", (player(results),))
 
 
-def player(results: Results, most: int = MAX_STEPS) -> Player | None:
+def player(results: Results, most: int = MAX_SHOWN_STEPS) -> Player | None:
     """Show the first steps of both models' walks; None if no motion was stored."""
     touches = [results.summary(stage).get("touch_times_s", []) for stage in MODELS]
-    # of the model that takes longest over them
+    # of the slower model
     end = max((times[most - 1] for times in touches if len(times) >= most), default=math.inf)
-    found = {stage: track_in(results.group(stage, "trajectory")) for stage in MODELS}
-    tracks = {stage: track.until(end) for stage, track in found.items() if track is not None}
+    by_stage = {stage: track_in(results.group(stage, "trajectory")) for stage in MODELS}
+    tracks = {stage: track.until(end) for stage, track in by_stage.items() if track is not None}
     if not tracks:
         return None
     config, torso = results.config, results.config.walker.torso
@@ -93,7 +93,7 @@ def closeup(track: Track | None, length: float) -> float:
         return STILL_VIEW_OF_RIGID * length
     depths = np.concatenate((track["p0"], track["p1"]))
     loaded = depths[depths > 0.0]
-    return DEEPEST_IN_VIEW * float(np.quantile(loaded, 0.98)) if loaded.size else STILL_VIEW_OF_RIGID * length
+    return CLOSEUP_DEPTHS * float(np.quantile(loaded, 0.98)) if loaded.size else STILL_VIEW_OF_RIGID * length
 
 
 def pads(results: Results) -> tuple[Pad, ...]:
@@ -102,7 +102,7 @@ def pads(results: Results) -> tuple[Pad, ...]:
     if terrain is None or "left_m" not in terrain.variables:
         return ()
     left, right, leg = (terrain[name].tolist() for name in ("left_m", "right_m", "leg"))
-    return tuple((round(one[0], 4), round(one[1], 4), int(one[2]) - 1) for one in zip(left, right, leg, strict=True))
+    return tuple((round(pad[0], 4), round(pad[1], 4), int(pad[2]) - 1) for pad in zip(left, right, leg, strict=True))
 
 
 def ground(results: Results) -> tuple[tuple[float, float], ...]:
@@ -129,6 +129,6 @@ def view(tracks: tuple[Track, ...], slope: float, margin: float) -> tuple[int, i
 
 
 def figures(results: Results) -> Section | None:
-    shown = tuple(picture for picture in results.pictures if picture.page == MAIN)
+    main_pictures = tuple(picture for picture in results.pictures if picture.page == MAIN)
     numbered = (Paragraph(words("figures.numbered")),) if results.claims else ()
-    return Section("figures", "Figures", (*numbered, Gallery(shown))) if shown else None
+    return Section("figures", "Figures", (*numbered, Gallery(main_pictures))) if main_pictures else None

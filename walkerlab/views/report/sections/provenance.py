@@ -11,16 +11,16 @@ from walkerlab.views.report.words import words
 
 
 def section(results: Results) -> Section | None:
-    made = [result for result in results.stored.values() if isinstance(result, Stored)]  # read from files
+    stored = [result for result in results.stored.values() if isinstance(result, Stored)]  # read from files
     note = "A key covers config, inputs and code; equal keys give equal digests. Neither includes timings."
     blocks = (
         Code("The config of this run, defaults included", to_yaml(results.config).strip()),
-        table("Computation of each result", RESULT_COLUMNS, made),
-        software_table(made),
-        table("Keys and digests of the results", DIGEST_COLUMNS, made, note=note),
-        Code("Command lines", "\n".join(dict.fromkeys(result.provenance.command_line for result in made))),
+        table("Computation of each result", RESULT_COLUMNS, stored),
+        software_table(stored),
+        table("Keys and digests of the results", DIGEST_COLUMNS, stored, note=note),
+        Code("Command lines", "\n".join(dict.fromkeys(result.provenance.command_line for result in stored))),
     )
-    finding = words("closing.provenance", [result.provenance for result in made])
+    finding = words("closing.provenance", [result.provenance for result in stored])
     return Section.of("provenance", "Provenance", blocks, finding)
 
 
@@ -40,10 +40,10 @@ DIGEST_COLUMNS = (
 )
 
 
-def software_table(made: Sequence[Stored]) -> Table:
+def software_table(stored: Sequence[Stored]) -> Table:
     """Tabulate software versions and platform; one column unless results differ."""
     used: dict[tuple[tuple[str, str], ...], list[str]] = {}
-    for result in made:
+    for result in stored:
         origin = result.provenance
         versions = {"walkerlab": origin.package_version, "commit": origin.git_commit or "unknown"}
         versions |= {**dict(sorted(origin.library_versions.items())), "platform": origin.platform}
