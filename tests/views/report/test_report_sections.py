@@ -26,7 +26,7 @@ from synthetic_results import (
 
 from walkerlab.config.loader import load
 from walkerlab.scene.omissions import LeftOut
-from walkerlab.views.report.blocks import PAPER, Code, Paragraph, Picture, Player, Section, Shares, Statements
+from walkerlab.views.report.blocks import PAPER_PAGE, Code, Paragraph, Picture, Player, Section, Shares, Statements
 from walkerlab.views.report.gaits import SETS, coordinate, works
 from walkerlab.views.report.registry import SECTIONS, lead, sections_of
 from walkerlab.views.report.results import Results
@@ -258,7 +258,7 @@ def test_a_scene_that_is_not_the_papers_has_its_own_results_first_and_the_paper_
     found = sections(compare=other)
     assert "printed" not in found
     assert "paper" not in texts(found["verdict"]).lower()
-    assert found["paper-numbers"].page == PAPER
+    assert found["paper-numbers"].page == PAPER_PAGE
     (said,) = blocks(found["paper-numbers"], Paragraph)
     assert "slope_rad 0.05" in said.text
 

@@ -35,7 +35,7 @@ from walkerlab.pipeline.store.files import as_text, storing, write_through
 from walkerlab.pipeline.store.runfolder import RunFolder
 from walkerlab.views.cli.console import Console
 from walkerlab.views.report.answers import paper_table
-from walkerlab.views.report.outcomes import MODELS
+from walkerlab.views.report.outcomes import MODEL_NAMES
 from walkerlab.views.report.tables import Table, as_csv, record_table
 from walkerlab.views.report.tex import as_tex
 
@@ -317,9 +317,9 @@ def walk_in(folder: RunFolder, model: str | None = None) -> str:
 
     Raises ConfigError if `model` is not a walk.
     """
-    if model is not None and model not in MODELS:
-        raise ConfigError(f"--model {model}: not a walk.", f"There are {', '.join(MODELS)}.")
-    rigid, contact = MODELS
+    if model is not None and model not in MODEL_NAMES:
+        raise ConfigError(f"--model {model}: not a walk.", f"There are {', '.join(MODEL_NAMES)}.")
+    rigid, contact = MODEL_NAMES
     alone = folder.artifact(rigid).is_file() and not folder.artifact(contact).is_file()
     return model or (rigid if alone else contact)
 

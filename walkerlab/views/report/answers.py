@@ -14,7 +14,7 @@ from walkerlab.physics.energy_channels import CHANNELS
 from walkerlab.registration import later
 from walkerlab.views.report import gaits
 from walkerlab.views.report.numbers import count, decimals_left, fixed, length, number, quantity
-from walkerlab.views.report.outcomes import MODELS, WALKED, describe_error
+from walkerlab.views.report.outcomes import MODEL_NAMES, WALKED_LABEL, describe_error
 from walkerlab.views.report.outcomes import walks as walk_text
 from walkerlab.views.report.tables import Cell, Column, Table, in_lines, measured, side_by_side, table
 from walkerlab.views.report.text import describe_summary, paragraph
@@ -67,10 +67,9 @@ def fixedpoint(summary: Summary) -> list[str | Table]:
         for name, gait in summary.get("equation_sets", {}).items()
         if "state" in gait and [fixed(value, 6) for value in gait["state"]] != state
     }
-    sets, names = {summary["equations"]: summary, **different}, summary.get("state_names", gaits.STATE)
-    text, search = f"{count(summary['gaits_found'], 'gait')} of one step found.", summary.get("sought")
-    text += f" Searched: {search}; very unstable gaits may be missed." if search else ""
-    return [head, gaits.gait_table(sets, names), text]
+    sets, names = {summary["equations"]: summary, **different}, summary.get("state_names", gaits.COMPASS_STATE)
+    search = f" Searched: {summary['sought']}; very unstable gaits may be missed." if summary.get("sought") else ""
+    return [head, gaits.gait_table(sets, names), f"{count(summary['gaits_found'], 'gait')} of one step found.{search}"]
 
 
 def walk_row(title: str, key: str, digits: int = 4) -> Column:
@@ -108,7 +107,7 @@ def walk(model: str, summary: Summary) -> list[str | Table]:
     if summary["step_periods_s"]:
         last = list(step_rows.values())[-1]
         head += f"; the last takes {last['step_periods_s']} s and is {last['step_lengths_m']} m long"
-    error, advised = summary.get("numerical_error"), summary.get("advice") and summary["outcome"] != WALKED
+    error, advised = summary.get("numerical_error"), summary.get("advice") and summary["outcome"] != WALKED_LABEL
     return [
         f"{head}.",
         side_by_side("", columns, step_rows, head="step"),
@@ -241,7 +240,7 @@ paper_table = later("walkerlab.evidence.paper.sections", "table_of")
 
 ANSWERS: dict[str, Answer] = {
     "fixedpoint": fixedpoint,
-    **{stage: partial(walk, model.lower()) for stage, model in MODELS.items()},
+    **{stage: partial(walk, model.lower()) for stage, model in MODEL_NAMES.items()},
     "tune": tune,
     "compare": later("walkerlab.evidence.paper.sections", "answer"),
     "accuracy": accuracy,
@@ -258,7 +257,7 @@ ANSWERS: dict[str, Answer] = {
 
 def verdict(results: Mapping[str, Summary]) -> list[str]:
     """Summarise a whole run in three paragraphs at most: gait, walks, and verdicts on the paper."""
-    walks = [(model.lower(), results[stage]) for stage, model in MODELS.items() if stage in results]
+    walks = [(model.lower(), results[stage]) for stage, model in MODEL_NAMES.items() if stage in results]
     outcomes = "; the ".join(f"{model} {walk_text(summary['steps'], summary['outcome'])}" for model, summary in walks)
     judged = ("compare",) if "verdicts" in results.get("compare", {}) else ()
     stages = [stage for stage in ("fixedpoint", *judged, "stability") if stage in results]

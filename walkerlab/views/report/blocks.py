@@ -12,7 +12,7 @@ from markupsafe import Markup
 from walkerlab.views.report.tables import Tone
 from walkerlab.views.report.tracks import Track
 
-MAIN, PAPER, CASES, COSTS = "report.html", "report-paper.html", "report-stability.html", "report-accuracy.html"
+MAIN, PAPER_PAGE, CASES, COSTS = "report.html", "report-paper.html", "report-stability.html", "report-accuracy.html"
 """The report and the pages linked from it."""
 
 

@@ -10,7 +10,7 @@ from walkerlab.views.report.symbols import DOT, SUBSCRIPTS, in_signs
 from walkerlab.views.report.tables import Column, Table, measured, side_by_side
 
 COORDINATE_NAME = re.compile(r"(?P<rate>d)?theta(?:_(?P<index>\d+))?(?:_(?P<body>[a-z]\w*))?")
-STATE = ("theta_1", "theta_2", "dtheta_1", "dtheta_2")
+COMPASS_STATE = ("theta_1", "theta_2", "dtheta_1", "dtheta_2")
 """Coordinates of a compass; results of other walkers name theirs."""
 SETS = {"as-printed": "as printed", "corrected": "corrected"}
 """Sets of equations: stored name and display name."""

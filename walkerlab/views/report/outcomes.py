@@ -8,28 +8,28 @@ from walkerlab.outcome import OUTCOME_TEXTS, Outcome, outcome_of
 from walkerlab.views.report.numbers import count, quantity
 from walkerlab.views.report.tables import Tone
 
-RIGID, CONTACT = "simulate", "contact-sim"
-MODELS = {RIGID: "Rigid model", CONTACT: "Contact model"}
+RIGID_STAGE, CONTACT_STAGE = "simulate", "contact-sim"
+MODEL_NAMES = {RIGID_STAGE: "Rigid model", CONTACT_STAGE: "Contact model"}
 """Stages that simulate a walk, and the model each simulates."""
 
-WALKED = Outcome.WALKED.label
+WALKED_LABEL = Outcome.WALKED.label
 
 
 def ends(outcome: str) -> str:
     """Describe how a walk ends; an outcome unknown to this version keeps its name."""
-    known = outcome_of(outcome)
-    return f"ends as {outcome}" if known is None else OUTCOME_TEXTS[known].does
+    ending = outcome_of(outcome)
+    return f"ends as {outcome}" if ending is None else OUTCOME_TEXTS[ending].does
 
 
 def walks(steps: int, outcome: str) -> str:
     """Describe how far a walker gets, to follow its name in a sentence."""
-    if outcome == WALKED:
+    if outcome == WALKED_LABEL:
         return f"walks all {count(steps, 'step')}"
     return f"walks {count(steps, 'step')} and then {ends(outcome)}" if steps else f"{ends(outcome)} in its first step"
 
 
 def tone(outcome: str) -> Tone:
-    return "good" if outcome == WALKED else "bad"
+    return "good" if outcome == WALKED_LABEL else "bad"
 
 
 DEFAULT_CHECK = "a hundred times tighter tolerances"

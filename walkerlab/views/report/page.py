@@ -15,7 +15,7 @@ from walkerlab.errors import add_run_options
 from walkerlab.views.report.blocks import MAIN, Section
 from walkerlab.views.report.symbols import CARET, POWER, power, to_superscript
 
-TEMPLATES = Path(__file__).parent / "templates"
+TEMPLATE_FOLDER = Path(__file__).parent / "templates"
 COMMENT_LINE = re.compile(r"^ *//.*\n", re.MULTILINE)
 CODE_SPAN = re.compile(r"`([^`]*)`")
 """Code in a text, between backticks."""
@@ -64,7 +64,7 @@ def digest_of(script: str) -> str:
 def environment(run: str = "") -> Environment:
     """Create the template environment: every text is escaped, and commands name the run."""
     template_environment = Environment(
-        loader=FileSystemLoader(TEMPLATES),
+        loader=FileSystemLoader(TEMPLATE_FOLDER),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
@@ -87,4 +87,4 @@ def to_markup(text: str) -> Markup:
 
 def source(name: str) -> str:
     """Read a file to embed in the page, without comment lines."""
-    return COMMENT_LINE.sub("", (TEMPLATES / name).read_text(encoding="utf-8")).strip()
+    return COMMENT_LINE.sub("", (TEMPLATE_FOLDER / name).read_text(encoding="utf-8")).strip()

@@ -73,10 +73,7 @@ def pages_of(results: Results, run: str) -> tuple[Page, ...]:
     title, source = f"{'Driven' if drives_of(results.config) else 'Passive'} walking: {run}", results.config.source
     return (
         Page(title, tuple(main), (lead(results.config, run),), MAIN, source, relation, results.pending, option),
-        *(
-            Page(f"{closing.TITLES[file]} · {run}", sections, file=file, run=option)
-            for file, sections in further.items()
-        ),
+        *(Page(f"{closing.TITLES[file]} · {run}", parts, file=file, run=option) for file, parts in further.items()),
     )
 
 

@@ -46,10 +46,10 @@ def draw(swept: Swept, folder: RunFolder, names: Sequence[str] = (), against: st
     check_quantities(group, question.dims, names)
     if against and against not in question.names:
         check_quantities(group, question.dims, [against], "--against")
-    shown = [*names] or [name for name in choose(group, question.dims, question.names) if name != against]
+    quantities = [*names] or [name for name in choose(group, question.dims, question.names) if name != against]
     own = None if names or against else robustness.of_sweep(group, question.names)
-    if own is None and shown:
-        own = illustration(group, question.stage, question.names, question.dims, shown, against)
+    if own is None and quantities:
+        own = illustration(group, question.stage, question.names, question.dims, quantities, against)
     paths: list[Path] = []
     pictures: list[Picture] = []
     if own is not None:
@@ -62,7 +62,7 @@ def draw(swept: Swept, folder: RunFolder, names: Sequence[str] = (), against: st
         files = {path.suffix.removeprefix("."): path.relative_to(folder.path) for path in paths}
         pictures.append(picture({**about, **files}, folder.path))
     page = folder.path / PAGE
-    write_atomically(page, render(page_of(swept, pictures, shown)).encode())
+    write_atomically(page, render(page_of(swept, pictures, quantities)).encode())
     return Files(page, tuple(paths))
 
 
@@ -79,17 +79,17 @@ def check_options(stage: str, names: Mapping[str, str], variables: Collection[st
 
     names  by option, as typed
     """
-    known = sorted({*variables, *HEADLINES.get(stage, ())} - {"outcome"})
+    available = sorted({*variables, *HEADLINES.get(stage, ())} - {"outcome"})
     for option, name in names.items():
-        if name not in known and "." not in name:
-            listed = ", ".join(quantity for quantity in known if "." not in quantity)
+        if name not in available and "." not in name:
+            listed = ", ".join(quantity for quantity in available if "." not in quantity)
             raise ConfigError(f"{option}: no such quantity in the first results.", f"There are {listed}.")
 
 
 PARAMETER_COLUMNS = (Column("name"), Column("key"), Column("unit"), Column("values"), Column("meaning", wide=True))
 
 
-def page_of(swept: Swept, pictures: Sequence[Picture], shown: Sequence[str]) -> Page:
+def page_of(swept: Swept, pictures: Sequence[Picture], quantities: Sequence[str]) -> Page:
     """Build the page: the figure, the parameters and the first points."""
     summary, question, group = swept.summary, swept.question, swept.group
     outcomes = ", ".join(f"{count} {name}" for name, count in summary["outcomes"].items())
@@ -99,14 +99,14 @@ def page_of(swept: Swept, pictures: Sequence[Picture], shown: Sequence[str]) -> 
         for variable in [group.variables[name]]
     ]
     columns = [
-        *(Column(name, written=format_value, numeric=True) for name in (*question.names, *shown)),
+        *(Column(name, written=format_value, numeric=True) for name in (*question.names, *quantities)),
         *(Column("outcome"), Column("reason", wide=True)),
     ]
     listed = f"Of the {len(question)} points the first {MAX_ROWS} are listed. " if len(question) > MAX_ROWS else ""
     where = f"All numbers of every point are in `{swept.path.name}`, which xarray opens as one Dataset."
     tables = (
         table("Parameters", PARAMETER_COLUMNS, parameters),
-        table("Points", columns, rows(group, question, shown), note=f"{listed}{where}"),
+        table("Points", columns, rows(group, question, quantities), note=f"{listed}{where}"),
     )
     section = Section("points", "Numbers", (*([Gallery(tuple(pictures))] if pictures else []), *tables))
     lead = (f"{summary['points']} points: {outcomes}.", *summary_lines(summary))
@@ -125,12 +125,12 @@ def values_summary(values: Sequence[object]) -> str:
     return ", ".join(listed) if len(listed) <= 8 else f"{len(listed)} values, {listed[0]} to {listed[-1]}"
 
 
-def rows(group: Group, question: SweptStage, shown: Sequence[str]) -> list[tuple[Any, ...]]:
+def rows(group: Group, question: SweptStage, quantities: Sequence[str]) -> list[tuple[Any, ...]]:
     """Return table rows of the first points: parameters, quantities, outcome and reason."""
     count = min(len(question), MAX_ROWS)
     places = [question.places(index) for index in range(count)]
     columns: list[list[Any]] = [[axis.values[point[k]] for point in places] for k, axis in enumerate(question.axes)]
-    columns += [group[name].ravel()[:count].tolist() for name in (*shown, "outcome", "reason")]
+    columns += [group[name].ravel()[:count].tolist() for name in (*quantities, "outcome", "reason")]
     return list(zip(*columns, strict=True))
 
 

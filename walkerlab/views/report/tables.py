@@ -176,7 +176,7 @@ def record_table(rows: Sequence[Mapping[str, Any]], written: Callable[[Any], str
     names = list(dict.fromkeys(name for row in rows for name in row))
     present = [[row.get(name) is not None for name in names] for row in rows]
     cells = [
-        [Cell(written(row[name]) if known else "", value=row.get(name)) for name, known in zip(names, has, strict=True)]
+        [Cell(written(row[key]) if exists else "", value=row.get(key)) for key, exists in zip(names, has, strict=True)]
         for row, has in zip(rows, present, strict=True)
     ]
     lengths = [max(len(row[place].text) for row in cells) for place in range(len(names))]

@@ -59,7 +59,7 @@ def method_rows(summary: Row, scene: str, levels: Sequence[float]) -> Iterator[R
 
     Errors below the uncertainty of the reference are shown as upper bounds.
     """
-    best, known = summary["best"].get(scene, {}).values(), float(summary["reference"][scene]["agreement"])
+    best, bound = summary["best"].get(scene, {}).values(), float(summary["reference"][scene]["agreement"])
     for method, runs in grouped((row for row in summary["rows"] if row["scene"] == scene), "method").items():
         ended = [run for run in runs if run["error"] is not None]
         exact: Row = min(ended, key=lambda run: float(run["error"]), default={})
@@ -67,7 +67,7 @@ def method_rows(summary: Row, scene: str, levels: Sequence[float]) -> Iterator[R
         failed = [f"{failure_text(run)} at {power_of_ten(run['tolerance'], 1)}" for run in runs if run["error"] is None]
         yield {
             "method": Cell(method, "good" if method in best else None),
-            "smallest_error": number(error, 2) if error is None or error > known else f"≤ {number(known, 2)}",
+            "smallest_error": number(error, 2) if error is None or error > bound else f"≤ {number(bound, 2)}",
             "rhs_evaluations": exact.get("rhs_evaluations"),
             "failures": join_words(failed),
             **{

@@ -5,14 +5,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from walkerlab.config.drives import drives_of
 from walkerlab.labels import join_words
 from walkerlab.scene.omissions import LeftOut
-from walkerlab.views.report.blocks import CASES, COSTS, PAPER, Cards, Paragraph, Section, Terms
+from walkerlab.views.report.blocks import CASES, COSTS, PAPER_PAGE, Cards, Paragraph, Section, Terms
 from walkerlab.views.report.numbers import count
 from walkerlab.views.report.results import Results
 from walkerlab.views.report.tables import Column, table
 from walkerlab.views.report.words import words
 
 TITLES = {
-    PAPER: "The paper's values compared with computed ones",
+    PAPER_PAGE: "The paper's values compared with computed ones",
     CASES: "Extreme cases and known problems",
     COSTS: "Accuracy: run time against error, and the rigid limit",
 }
@@ -23,8 +23,7 @@ def further(results: Results, pages: Mapping[str, Sequence[Section]]) -> Section
     """Link to the further pages, each with its sections' findings, and announce pending results."""
     items = []
     for file, sections in pages.items():
-        silent = file == PAPER and not results.claims
-        findings = () if silent else (section.finding for section in sections)
+        findings = (section.finding for section in sections if file != PAPER_PAGE or results.claims)
         items.append((file, TITLES[file], " ".join(filter(None, findings))))
     waiting = (Paragraph(words("closing.pending", name), "waiting") for name in results.pending)
     title = "Further pages" if items else "Still to come"

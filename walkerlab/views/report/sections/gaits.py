@@ -5,7 +5,7 @@ from functools import partial
 from typing import Any
 
 from walkerlab.views.report.blocks import Paragraph, Section
-from walkerlab.views.report.gaits import SETS, STATE, gait_table, state_at, symbol
+from walkerlab.views.report.gaits import COMPASS_STATE, SETS, gait_table, state_at, symbol
 from walkerlab.views.report.numbers import fixed
 from walkerlab.views.report.results import Results, stage_section
 from walkerlab.views.report.tables import Column, Table, measured, table
@@ -14,7 +14,7 @@ from walkerlab.views.report.words import words
 
 @stage_section("fixedpoint")
 def section(results: Results, summary: Mapping[str, Any]) -> Section | None:
-    names = summary.get("state_names", STATE)
+    names = summary.get("state_names", COMPASS_STATE)
     set_names = SETS if results.claims else (summary["equations"],)
     sets = summary.get("equation_sets", {summary.get("equations"): summary})
     selected = {name: sets[name] for name in set_names if name in sets}

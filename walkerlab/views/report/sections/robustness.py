@@ -90,13 +90,13 @@ def tables(summary: Mapping[str, Any]) -> list[Table]:
     built = [row for row in ranked if row["to"].startswith(BUILDER_KEYS)]
     environment = [row for row in ranked if not row["to"].startswith(BUILDER_KEYS)]
     zeros = [row for row in rows if row["of"] == NORM and "relative" not in row and row["value"] is not None]
-    first, shown = [row for row in built if row["of"] == NORM][:MAX_DERIVATIVES], built[:MAX_DERIVATIVES]
-    left = len(rows) - len(shown) - len(environment[:MAX_DERIVATIVES])
+    first, top = [row for row in built if row["of"] == NORM][:MAX_DERIVATIVES], built[:MAX_DERIVATIVES]
+    left = len(rows) - len(top) - len(environment[:MAX_DERIVATIVES])
     return [
         table("Gait sensitivity norms", NORM_COLUMNS, summary["gait_sensitivity_norm"], note=words("robustness.norms")),
         table("Steps on rough ground", ROUGH_COLUMNS, summary["rough_ground"], note=words("robustness.rough")),
         table("Most effective changes", DERIVATIVE_COLUMNS, first, note=words("robustness.first")),
-        table("Effect of the parameters on the gait", DERIVATIVE_COLUMNS, shown, note=words("robustness.moves", left)),
+        table("Effect of the parameters on the gait", DERIVATIVE_COLUMNS, top, note=words("robustness.moves", left)),
         table("Gravity, slope and ground", DERIVATIVE_COLUMNS, environment[:MAX_DERIVATIVES]),
         table("Parameters that are zero", DERIVATIVE_COLUMNS, zeros, note=words("robustness.zeros")),
     ]

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from walkerlab.config.drives import drives_of, springs_of
 from walkerlab.views.report.blocks import Paragraph, Section, Statement, Statements
-from walkerlab.views.report.outcomes import MODELS, tone
+from walkerlab.views.report.outcomes import MODEL_NAMES, tone
 from walkerlab.views.report.results import Results
 from walkerlab.views.report.sections.models import departure
 from walkerlab.views.report.tables import Tone
@@ -14,7 +14,7 @@ from walkerlab.views.report.words import words
 
 
 def section(results: Results) -> Section | None:
-    walks = {model.lower(): summary for stage, model in MODELS.items() if (summary := results.summary(stage))}
+    walks = {model.lower(): summary for stage, model in MODEL_NAMES.items() if (summary := results.summary(stage))}
     verdicts = Counter(row["verdict"] for row in results.claims)
     misprint = any(erratum["where"].startswith("A.5") for erratum in results.summary("compare").get("errata", ()))
     arguments, config = (results.summary("fixedpoint"), verdicts, misprint), results.config
@@ -45,7 +45,7 @@ def failures(results: Results) -> list[str]:
 
 def outcome_statements(results: Results) -> Iterator[Statement]:
     """Yield a statement for each walk (outcome, key numbers, advice), for the gait, and for a failed adjustment."""
-    for stage, model in MODELS.items():
+    for stage, model in MODEL_NAMES.items():
         if summary := results.summary(stage):
             config, outcome = results.config, summary["outcome"]
             tau = math.sqrt(config.walker.leg_length_m / config.gravity_m_s2)

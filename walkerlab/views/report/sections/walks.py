@@ -19,7 +19,7 @@ from walkerlab.views.report.numbers import (
     span,
     whole,
 )
-from walkerlab.views.report.outcomes import CONTACT, MODELS, RIGID, tone
+from walkerlab.views.report.outcomes import CONTACT_STAGE, MODEL_NAMES, RIGID_STAGE, tone
 from walkerlab.views.report.results import Results, stage_section
 from walkerlab.views.report.tables import Cell, Column, table
 from walkerlab.views.report.words import words
@@ -27,7 +27,7 @@ from walkerlab.views.report.words import words
 QUANTITY_COLUMNS = (Column("quantity"), Column("value", numeric=True), Column("meaning", wide=True))
 
 
-@stage_section(CONTACT)
+@stage_section(CONTACT_STAGE)
 def contact(results: Results, summary: Mapping[str, Any]) -> Section | None:
     ground = results.config.contact
     text = "" if ground is None else words("walks.ground", ground, ground.in_si(), summary)
@@ -80,7 +80,7 @@ ASSUMPTION_COLUMNS = (
 
 def assumptions(results: Results) -> Section | None:
     """Check the rigid model's assumptions against its own walk."""
-    summary = results.summary(RIGID)
+    summary = results.summary(RIGID_STAGE)
     judged, hip = [], results.config.walker.hip
     works = hip.torque_N_m != 0.0 or hip.damping_N_m_s_per_rad != 0.0
     for key, text in words.terms("walks.assumed").items():
@@ -111,11 +111,11 @@ def judgement(key: str, summary: Mapping[str, Any], results: Results) -> tuple[s
 HEAD_STEPS, TAIL_STEPS = 20, 4
 """Steps listed from the beginning and the end of a longer walk."""
 SERIES = {
-    (RIGID, "step_periods_s"): "rigid T (s)",
-    (CONTACT, "step_periods_s"): "contact T (s)",
-    (RIGID, "step_lengths_m"): "rigid S (m)",
-    (CONTACT, "step_lengths_m"): "contact S (m)",
-    (CONTACT, "slips_m"): "slip of the stance foot (mm)",
+    (RIGID_STAGE, "step_periods_s"): "rigid T (s)",
+    (CONTACT_STAGE, "step_periods_s"): "contact T (s)",
+    (RIGID_STAGE, "step_lengths_m"): "rigid S (m)",
+    (CONTACT_STAGE, "step_lengths_m"): "contact S (m)",
+    (CONTACT_STAGE, "slips_m"): "slip of the stance foot (mm)",
 }
 """Columns of the step table: stage, key and title."""
 
@@ -132,7 +132,7 @@ def steps(results: Results) -> Section | None:
     rows = taken if hidden <= 0 else [*taken[:HEAD_STEPS], *taken[-TAIL_STEPS:]]
     columns = [Column("step", numeric=True), *(Column(SERIES[name], numeric=True) for name in series)]
     note = words("walks.steps", HEAD_STEPS, hidden)
-    models = {stage: model.lower() for stage, model in MODELS.items()}
+    models = {stage: model.lower() for stage, model in MODEL_NAMES.items()}
     errors = {models[stage]: error for stage in models if (error := results.summary(stage).get("numerical_error"))}
     blocks = (
         table("Periods and lengths of the steps", columns, rows, note=note),
