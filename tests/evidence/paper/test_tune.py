@@ -60,9 +60,9 @@ def test_what_drives_a_gaits_step_is_what_the_ground_takes_of_it():
     assert gait["cost_of_transport"] == pytest.approx(given["push_off"] / (20 * 9.81 * gait["step_length_m"]))
     assert abs(gait["balance_J"]) < 1e-7
     said = words("adjustment.explained", {"gait": gait}, False).replace("\xa0", " ")
-    assert "of the 1.694 J that drive a step, 1.556 J go into damping at touch-down" in said
+    assert "Of the 1.694 J of work per step, 1.556 J go into damping at touch-down" in said
     told = words("adjustment.caused", {"total_s": 1e-3, "together_s": 1e-3}, True)
-    assert "what they and the push-off's length do together" in told
+    assert "their interaction, including that with the push-off's duration" in told
 
 
 def test_the_papers_own_start_does_not_walk_and_says_why():
@@ -233,7 +233,7 @@ def test_what_could_not_be_told_apart_is_not_put_down_to_what_causes_do_together
     assert said.startswith(
         "Its period differs from the rigid gait's by 10 ms. With each cause switched off alone, −2 ms"
     )
-    assert "12 ms (120 %) from creep in the friction law and what they do together, which could not" in said
+    assert "12 ms (120 %) from creep in the friction law and the interaction, which could not" in said
     told = causes(replace(limit, without_creep=Extrapolation(0.701, 1e-6)))
     assert told["together_s"] == pytest.approx(0.003)
 

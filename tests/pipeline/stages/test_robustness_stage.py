@@ -122,7 +122,7 @@ def test_a_longer_leg_does_not_win_by_the_dimension_of_the_norm():
     shown = {
         one.caption: [row[1].text for rows in one.groups.values() for row in rows] for one in tables(found.summary)
     }
-    assert all(key.startswith("walker.") for key in shown["What to change first"])
+    assert all(key.startswith("walker.") for key in shown["Most effective changes"])
     assert set(shown["Gravity, slope and ground"]) == {"gravity_m_s2", "slope_deg"}
     assert "push_off.impulse_N_s" in shown["Parameters that are zero"]
 
@@ -189,7 +189,7 @@ def test_an_unstable_gait_has_no_norm_and_says_so_with_what_there_is():
     summary = raised.value.partial.summary
     assert summary["gaits"][0]["spectral_radius"] > 1.0
     assert not summary["gait_sensitivity_norm"]
-    assert "What moves the gait" not in "".join(answer("robustness", {**summary, "sensitivity": []}))
+    assert "Effect of the parameters on the gait" not in "".join(answer("robustness", {**summary, "sensitivity": []}))
     assert any("spectral_radius" in line for line in answer("robustness", summary))
     assert {row["of"] for row in summary["sensitivity"]} >= {"period_s", "spectral_radius"}
 

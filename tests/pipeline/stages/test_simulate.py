@@ -168,7 +168,9 @@ def test_a_walk_says_what_no_ground_can_give():
     assert f"pull with {-fast['min_normal_force_N']:.3g} N" in fast["objections"][0]
     slippery = [one for one in fast["objections"] if f"coefficient of {fast['max_friction_ratio']:.3g}" in one]
     assert bool(slippery) == (fast["max_friction_ratio"] > 1.0)
-    assert any("Not a walk on real ground: the ground would have to pull" in line for line in answer("simulate", fast))
+    assert any(
+        "Not possible on real ground: the ground would have to pull" in line for line in answer("simulate", fast)
+    )
     assert run(contact=None, strides=1).summary["objections"] == []
 
 

@@ -93,7 +93,7 @@ def test_an_evenly_spread_sample_of_walks_is_taken_again_and_told(toy):
     told = {"walked_again": 16, "of": 40, "ended_otherwise": 0, "end_time_s": 1e-9, "step_period_s": 0.04}
     assert swept.summary["numerical_error"] == pytest.approx(told)
     assert plain(summary_lines(swept.summary)) == [
-        "Largest numerical error: 0.04 s in a period and 10⁻⁹ s at the end, by a second walk with a hundred times "
+        "Largest numerical error: 0.04 s in period and 10⁻⁹ s in end time, by a second walk with a hundred times "
         "tighter tolerances; 16 of 40 points were recomputed."
     ]
 

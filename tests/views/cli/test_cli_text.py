@@ -11,14 +11,14 @@ from walkerlab.views.cli.console import Console, StageLine
 from walkerlab.views.cli.request import Request
 from walkerlab.views.cli.stage import report_lines
 from walkerlab.views.report.tables import LONGEST_CELL
-from walkerlab.views.report.text import described_summary, table
+from walkerlab.views.report.text import describe_summary, table
 
 SENTENCES = "One gait cycle of the rigid model, to scale. " * 5
 
 
 def test_a_column_of_sentences_is_named_below_the_table_and_not_in_it():
     rows = [{"number": 2, "svg": "figures/figure-02.svg", "caption": SENTENCES}, {"svg": "own.svg", "caption": "-"}]
-    lines = list(described_summary({"figures": rows}))
+    lines = list(describe_summary({"figures": rows}))
     assert lines[1].split() == ["number", "svg"]
     assert lines[2].split() == ["2", "figures/figure-02.svg"]
     assert lines[-1].strip() == "with --json also: caption"

@@ -62,7 +62,7 @@ def test_without_a_basin_it_says_how_to_make_one():
 
 def test_the_report_has_its_shares_and_attractors():
     made = section(Results(CONFIG, basin([0, 0, 1, UNREACHED]), (), ()))
-    assert "75 % of the window walk" in made.blocks[0].text
+    assert "75 % of the starts in the window lead to walking" in made.blocks[0].text
     assert [row[1].text for row in next(iter(made.blocks[1].groups.values()))] == ["6", "3"]
     assert section(Results(CONFIG, {}, (), ())) is None
 

@@ -8,7 +8,7 @@ from walkerlab.pipeline.store.content import Group, Variable
 from walkerlab.views.figures.canvas import styled
 from walkerlab.views.figures.maps import is_logarithmic
 from walkerlab.views.figures.sweep import choose, illustration, lines, maps, one_over_another
-from walkerlab.views.report.sweep_page import refuse_unheard
+from walkerlab.views.report.sweep_page import check_options
 
 PARAMETERS = ("slope_deg", "hip_mass_kg")
 
@@ -84,9 +84,9 @@ def test_pictures_of_walks_begin_with_the_last_steps_period_and_length():
 
 def test_a_name_that_no_first_result_has_is_refused_and_headlines_and_nested_ones_are_not():
     known = ("steps", "last_step_period_s", "gaits.3.period_s")
-    refuse_unheard("contact-sim", {f"--show {name}": name for name in known}, ["steps"])
+    check_options("contact-sim", {f"--show {name}": name for name in known}, ["steps"])
     with pytest.raises(ConfigError, match="--show nonsense: no such quantity"):
-        refuse_unheard("contact-sim", {"--show nonsense": "nonsense"}, ["steps"])
+        check_options("contact-sim", {"--show nonsense": "nonsense"}, ["steps"])
 
 
 def test_one_quantity_is_drawn_over_another():

@@ -6,7 +6,7 @@ import pytest
 from synthetic_results import paper_row
 
 from walkerlab.outcome import Outcome
-from walkerlab.views.report.answers import ANSWERS, answer, elided, verdict
+from walkerlab.views.report.answers import ANSWERS, answer, elide, verdict
 from walkerlab.views.report.gaits import gait_table
 from walkerlab.views.report.numbers import number
 from walkerlab.views.report.tables import (
@@ -21,7 +21,7 @@ from walkerlab.views.report.tables import (
     width,
 )
 from walkerlab.views.report.tex import as_tex
-from walkerlab.views.report.text import COLUMNS, described_summary
+from walkerlab.views.report.text import PARAGRAPH_WIDTH, describe_summary
 
 GAIT = {
     "state": [-0.2042, 0.1694, -0.6058, -0.861],
@@ -126,7 +126,7 @@ def test_periods_and_lengths_have_the_digits_that_their_numerical_error_leaves()
     lines = answer("contact-sim", WALK | numbers | {"numerical_error": changed})
     assert lines[0].endswith("the last takes 0.80612 s and is 0.37 m long.")
     assert row(lines, "period (s)") == ["0.80612"]
-    assert "numerical error: 4 × 10⁻⁶ s in a period, 0.003 m in a length and 10⁻⁵ s at the end, by" in said(lines)
+    assert "numerical error: 4 × 10⁻⁶ s in period, 0.003 m in step length and 10⁻⁵ s in end time, by" in said(lines)
     exact = dict.fromkeys(changed, 0.0)
     assert "takes 0.806123 s" in answer("simulate", WALK | numbers | {"numerical_error": exact})[0]
     other = {**changed, "by": "another method, radau5"}
@@ -153,7 +153,7 @@ def test_compared_walks_have_their_digits_and_errors():
     lines = answer("compare", summary)
     assert row(lines, "rigid") == ["0.80612", "0.37123", "walked"]
     assert row(lines, "contact") == ["0.81", "0.37123", "walked"]
-    assert "numerical error of the contact walk: 0.004 s in a period" in said(lines)
+    assert "numerical error of the contact walk: 0.004 s in period" in said(lines)
 
 
 def test_a_fall_is_told_with_its_advice():
@@ -221,14 +221,14 @@ def test_how_far_a_start_may_change_is_told_in_signs():
     change = {"needed": False, "found": True, "margins": margins}
     cells = {"walks_share": 0.296, "cells": 3721}
     lines = answer("tune", {"adjustment": change, "gait": {"found": False, "reason": "none was sought"}, "map": cells})
-    assert " ".join(row(lines, "θ̇₁ down")) == "0 nothing, as far as searched"
+    assert " ".join(row(lines, "θ̇₁ down")) == "0 no failure in the search range"
     assert " ".join(row(lines, "both up")) == "1.1066 off-pad"
 
 
 def test_long_rows_keep_their_ends():
-    assert elided(list(range(12))) == list(range(12))
-    assert elided(list(range(100))) == [0, 1, 2, 3, 4, 5, "…", 98, 99]
-    (line,) = described_summary({"values": list(range(1000))}, short=True)
+    assert elide(list(range(12))) == list(range(12))
+    assert elide(list(range(100))) == [0, 1, 2, 3, 4, 5, "…", 98, 99]
+    (line,) = describe_summary({"values": list(range(1000))}, short=True)
     assert line.split()[:5] == ["values", "0", "1", "2", "3"]
     assert "(1000 of them" in line
 
@@ -277,7 +277,7 @@ SAYS_MUCH = {
 def test_whatever_stage_speaks_its_paragraphs_have_lines_of_one_length(stage):
     lines = answer(stage, SAYS_MUCH[stage])
     assert sum(line.count("word") for line in lines) == 60
-    assert max(map(len, lines)) <= COLUMNS
+    assert max(map(len, lines)) <= PARAGRAPH_WIDTH
 
 
 def test_a_gait_is_one_table_on_page_and_terminal():

@@ -93,7 +93,7 @@ def test_figures_and_pages_are_made_of_a_kneed_walk(run, tmp_path):
     pages, _ = write_pages(results.config, results.stored, folder.path)
     page = Page((folder.path / pages[0].file).read_text(encoding="utf-8"))
     assert not {"None", "nan", "inf"} & set(page.text.split())
-    assert "What the instant of release decides" in page.text
+    assert "Effect of the release instant" in page.text
 
 
 def test_without_a_release_to_compare_the_paragraph_is_silent_about_knees(run):

@@ -144,7 +144,7 @@ def test_a_budget_that_is_used_up_is_explained_as_such():
     used_up = {**SUMMARY, "rows": [*ROWS, row("dop853", 1e-8, None, 0.1, "budget-exhausted", scene="contact")]}
     made = section(Results(config(), {"accuracy": stored("accuracy", {}, used_up)}))
     costs = next(block for block in made.blocks if isinstance(block, Table))
-    assert costs.groups["contact"][-1][-1].text == "budget used up at 10⁻⁸"
+    assert costs.groups["contact"][-1][-1].text == "budget exhausted at 10⁻⁸"
     assert "Each run is limited to 200,000 right-hand sides" in costs.note
     assert "dop853 exhausts this budget at tight tolerances" in costs.note
 

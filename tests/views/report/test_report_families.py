@@ -7,7 +7,7 @@ from synthetic_results import config, families, families_that_move, simulate
 from walkerlab.config.loader import load
 from walkerlab.views.report.results import Results
 from walkerlab.views.report.sections import families as section
-from walkerlab.views.report.sections.families import CLEAR, apart, gait_diagram
+from walkerlab.views.report.sections.families import MIN_MARK_DISTANCE, apart, gait_diagram
 from walkerlab.views.report.words import words
 
 
@@ -53,6 +53,6 @@ def test_the_diagram_marks_gaits_whose_motion_is_stored():
 def test_no_mark_covers_another_and_stable_gaits_keep_theirs():
     walk = simulate()
     (mark, _) = gait_diagram(Results(config(), {"continuation": families_that_move(walk)})).gaits
-    near, far = replace(mark, x=mark.x + 0.9 * CLEAR), replace(mark, x=mark.x + CLEAR)
+    near, far = replace(mark, x=mark.x + 0.9 * MIN_MARK_DISTANCE), replace(mark, x=mark.x + MIN_MARK_DISTANCE)
     assert apart([mark, near, far]) == (mark, far)
     assert apart([replace(mark, stable=False), near, far]) == (near,)

@@ -15,7 +15,7 @@ from walkerlab.scene.omissions import LeftOut
 from walkerlab.views.prose import parts
 from walkerlab.views.report.blocks import MAIN, Paragraph, Picture, Section, Shares, Statement, Statements
 from walkerlab.views.report.page import Page as Sheet
-from walkerlab.views.report.page import render, said, source
+from walkerlab.views.report.page import render, source, to_markup
 from walkerlab.views.report.registry import pages_of
 from walkerlab.views.report.results import Results
 from walkerlab.views.report.tables import Cell, Column, table
@@ -116,14 +116,14 @@ def test_no_text_has_a_backtick_or_a_number_as_programs_print_it(page):
 
 
 def test_what_is_to_be_typed_is_set_as_code_and_powers_are_raised():
-    assert said("`walkerlab x --at 1e-3` errs by 2.5e-07, 1e-03 and 10^-4") == (
+    assert to_markup("`walkerlab x --at 1e-3` errs by 2.5e-07, 1e-03 and 10^-4") == (
         "<code>walkerlab x --at 1e-3</code> errs by 2.5 × 10⁻⁷, 10⁻³ and 10⁻⁴"
     )
-    assert said("`<b>` & <i>") == "<code>&lt;b&gt;</code> &amp; &lt;i&gt;"
+    assert to_markup("`<b>` & <i>") == "<code>&lt;b&gt;</code> &amp; &lt;i&gt;"
 
 
 def test_a_command_on_the_page_of_another_run_has_the_options_that_name_it():
-    section = Section("left-out", "Left out", (Paragraph("`walkerlab engines` makes it"),))
+    section = Section("left-out", "Omitted results", (Paragraph("`walkerlab engines` makes it"),))
     commands = [Page(render(Sheet("t", (section,), run=run))).said("code") for run in ("", "round feet")]
     assert commands == [["walkerlab engines"], ["walkerlab engines -c 'round feet'"]]
 

@@ -1,7 +1,7 @@
 """Tables for LaTeX: aligned decimals, one number of digits a column, heads and captions in words."""
 
 from walkerlab.evidence.paper.sections import table_of
-from walkerlab.views.report.tables import Column, as_csv, of_records, table
+from walkerlab.views.report.tables import Column, as_csv, record_table, table
 from walkerlab.views.report.tex import as_tex
 
 END = r" \\"
@@ -51,4 +51,4 @@ def test_the_papers_tables_have_its_digits_its_words_and_a_caption():
 
 
 def test_what_a_record_has_no_value_for_is_empty_in_a_file():
-    assert as_csv(of_records([{"a": None, "b": 1.5}, {"a": "x", "b": 2.5}])) == b"a,b\n,1.5\nx,2.5\n"
+    assert as_csv(record_table([{"a": None, "b": 1.5}, {"a": "x", "b": 2.5}])) == b"a,b\n,1.5\nx,2.5\n"

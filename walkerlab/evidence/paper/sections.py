@@ -7,9 +7,9 @@ from typing import Any
 
 from walkerlab.labels import with_unit
 from walkerlab.views.report.answers import last_steps
-from walkerlab.views.report.blocks import PAPER, PageBlock, Paragraph, Section, Shares, Statement, Statements
+from walkerlab.views.report.blocks import PAPER_PAGE, PageBlock, Paragraph, Section, Shares, Statement, Statements
 from walkerlab.views.report.numbers import count, number
-from walkerlab.views.report.outcomes import off_by
+from walkerlab.views.report.outcomes import describe_error
 from walkerlab.views.report.results import Results
 from walkerlab.views.report.symbols import in_signs
 from walkerlab.views.report.tables import Cell, Column, Table, Tone, grouped, table
@@ -43,7 +43,7 @@ def numbers(results: Results) -> Section | None:
     departs = words("paper.departs", results.departures) if results.departures else ""
     blocks = (Paragraph(departs, "fair"), Statements(statements, "lines"), numbers_table(rows))
     finding = words("paper.finding", by_verdict(row["verdict"] for row in rows))
-    return Section.of("paper-numbers", "The paper’s numbers", blocks, finding, PAPER)
+    return Section.of("paper-numbers", "The paper’s numbers", blocks, finding, PAPER_PAGE)
 
 
 def numbers_table(rows: Sequence[Row]) -> Table:
@@ -82,7 +82,7 @@ def paper_numbers(results: Results) -> Sequence[Row]:
 def tables(results: Results) -> Section | None:
     summary = results.summary("compare")
     tables_shown = (table_of(key, summary.get(key) or {}) for key in words.terms("paper.tables"))
-    return Section.of("tables", "The paper’s tables", tables_shown, page=PAPER)
+    return Section.of("tables", "The paper’s tables", tables_shown, page=PAPER_PAGE)
 
 
 def table_of(key: str, rows: Any) -> Table:
@@ -132,7 +132,7 @@ def errors(results: Results) -> Section | None:
     rows = errata(results)
     block = table("What is printed, and what is right", ERRATUM_COLUMNS, rows, wordy=True)
     finding = f"{count(len(rows), 'error')} and gaps of the paper, with evidence."
-    return Section.of("errata", "Errata of the paper", (block,), finding, PAPER)
+    return Section.of("errata", "Errata of the paper", (block,), finding, PAPER_PAGE)
 
 
 def errata(results: Results) -> Sequence[Row]:
@@ -182,7 +182,7 @@ def fates(results: Results, rows: Sequence[Row]) -> Iterator[PageBlock]:
 def answer(summary: Row) -> list[str | Table]:
     """Report the verdicts on the paper's values or, for another walker, how the models differ."""
     errors = summary.get("numerical_error", {})
-    error_lines = [f"numerical error of the {model} walk: {off_by(error)}." for model, error in errors.items()]
+    error_lines = [f"numerical error of the {model} walk: {describe_error(error)}." for model, error in errors.items()]
     if "verdicts" in summary:
         head = words("paper.finding", by_verdict(row["verdict"] for row in summary["paper_numbers"]))
         return [head, numbers_table(summary["paper_numbers"]), *error_lines]

@@ -9,7 +9,7 @@ from walkerlab.evidence.verification.verdict import BUDGET_USED
 from walkerlab.outcome import outcome_of
 from walkerlab.views.report.blocks import CASES, Gallery, PageBlock, Paragraph, Section, Statement, Statements
 from walkerlab.views.report.numbers import number, whole
-from walkerlab.views.report.results import Results, of_stage
+from walkerlab.views.report.results import Results, stage_section
 from walkerlab.views.report.tables import Cell, Column, Table, Tone, grouped, measured, table
 from walkerlab.views.report.words import words
 
@@ -19,7 +19,7 @@ Row = Mapping[str, Any]
 Rows = Sequence[Row]
 
 
-@of_stage("stability")
+@stage_section("stability")
 def section(results: Results, summary: Row) -> Section | None:
     """Build the section; None if the stage did not run."""
     cases, problems = summary["cases"], summary["known"]

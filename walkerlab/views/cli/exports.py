@@ -35,8 +35,8 @@ from walkerlab.pipeline.store.files import as_text, storing, write_through
 from walkerlab.pipeline.store.runfolder import RunFolder
 from walkerlab.views.cli.console import Console
 from walkerlab.views.report.answers import paper_table
-from walkerlab.views.report.outcomes import MODELS
-from walkerlab.views.report.tables import Table, as_csv, of_records
+from walkerlab.views.report.outcomes import MODEL_NAMES
+from walkerlab.views.report.tables import Table, as_csv, record_table
 from walkerlab.views.report.tex import as_tex
 
 if TYPE_CHECKING:
@@ -269,7 +269,7 @@ def table(folder: RunFolder, name: str, kind: str, console: Console) -> Table:
         return tex_table
     if isinstance(rows, Mapping):
         rows = [{"quantity": quantity, **row} for quantity, row in rows.items()]
-    return of_records(rows)
+    return record_table(rows)
 
 
 def trajectory(folder: RunFolder, model: str, kind: str, console: Console) -> bytes:
@@ -320,9 +320,9 @@ def walk_in(folder: RunFolder, model: str | None = None) -> str:
 
     Raises ConfigError if `model` is not a walk.
     """
-    if model is not None and model not in MODELS:
-        raise ConfigError(f"--model {model}: not a walk.", f"There are {', '.join(MODELS)}.")
-    rigid, contact = MODELS
+    if model is not None and model not in MODEL_NAMES:
+        raise ConfigError(f"--model {model}: not a walk.", f"There are {', '.join(MODEL_NAMES)}.")
+    rigid, contact = MODEL_NAMES
     alone = folder.artifact(rigid).is_file() and not folder.artifact(contact).is_file()
     return model or (rigid if alone else contact)
 

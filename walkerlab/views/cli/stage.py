@@ -89,8 +89,8 @@ def report_lines(request: Request, report: StageReport) -> list[str]:
     if report.artifact is None:
         return [f"{report.stage}: no result", *omission_lines(request, report)]
     # why there is no answer, and what to try, is told once: as the error
-    told_apart = ("no_answer",) if report.no_answer is None else ("no_answer", "advice")
-    own = {key: value for key, value in report.summary.items() if key not in told_apart}
+    separate = ("no_answer",) if report.no_answer is None else ("no_answer", "advice")
+    own = {key: value for key, value in report.summary.items() if key not in separate}
     if "html" in own:
         page = (report.run_dir / str(own["html"])).resolve()
         shows = f"`walkerlab open {shlex.quote(str(report.run_dir))}` shows it"

@@ -15,7 +15,7 @@ from walkerlab.pipeline.store.content import Variable
 from walkerlab.views.cli.failures import print_result
 from walkerlab.views.cli.request import Request
 from walkerlab.views.report.tables import aligned
-from walkerlab.views.report.text import described_summary
+from walkerlab.views.report.text import describe_summary
 
 SHORT = 12
 """Characters of a digest that are shown to people."""
@@ -149,10 +149,10 @@ def as_json(stored: Stored) -> dict[str, Any]:
 
 def lines(stored: Stored) -> list[str]:
     """Format summary, arrays and provenance."""
-    result = ["summary", *described_summary(stored.summary)]
+    result = ["summary", *describe_summary(stored.summary)]
     for path, group in stored.groups.items():
         result.append(path)
-        result += [f"  {line}" for line in described_summary(group.attrs)]
+        result += [f"  {line}" for line in describe_summary(group.attrs)]
         result += [f"  {line}" for line in aligned([row(name, variable) for name, variable in group.variables.items()])]
     where = stored.provenance
     versions = {"walkerlab": where.package_version, **where.library_versions}
@@ -165,7 +165,7 @@ def lines(stored: Stored) -> list[str]:
         "platform": where.platform,
         "versions": ", ".join(f"{name} {version}" for name, version in versions.items()),
     }
-    return [*result, "provenance", *described_summary(facts)]
+    return [*result, "provenance", *describe_summary(facts)]
 
 
 def row(name: str, variable: Variable) -> list[str]:

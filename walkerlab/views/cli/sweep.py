@@ -107,10 +107,10 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
             threading.Thread(target=importlib.import_module, args=("walkerlab.views.report.sweep_page",)).start()
 
             def check(available: Collection[str]) -> None:
-                from walkerlab.views.report.sweep_page import refuse_unheard
+                from walkerlab.views.report.sweep_page import check_options
 
                 flags = {flag: name for flag, name in quantities.items() if name not in question.names}
-                refuse_unheard(question.stage, flags, available)
+                check_options(question.stage, flags, available)
 
             seconds, waits = request.chunk_seconds, not request.no_wait
             work = SweepWork(engine, order, seconds, waits, request.force, where(graph), check)

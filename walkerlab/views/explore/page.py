@@ -38,7 +38,7 @@ def rendered(base: ExploredConfig) -> tuple[str, str]:
     own = (TEMPLATES / "explore.js").read_text(encoding="utf-8").strip()
     script = f'\n"use strict";\n{report.source("player.js")}\n{own}\n'
     environment = report.environment()
-    environment.loader = FileSystemLoader([report.TEMPLATES, TEMPLATES])
+    environment.loader = FileSystemLoader([report.TEMPLATE_FOLDER, TEMPLATES])
     html = environment.get_template("explore.html.j2").render(
         started=started(base),
         configs=choices(base),

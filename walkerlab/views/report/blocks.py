@@ -12,7 +12,7 @@ from markupsafe import Markup
 from walkerlab.views.report.tables import Tone
 from walkerlab.views.report.tracks import Track
 
-MAIN, PAPER, CASES, COSTS = "report.html", "report-paper.html", "report-stability.html", "report-accuracy.html"
+MAIN, PAPER_PAGE, CASES, COSTS = "report.html", "report-paper.html", "report-stability.html", "report-accuracy.html"
 """The report and the pages linked from it."""
 
 
@@ -47,9 +47,8 @@ class Statements:
 class Statement:
     """One statement.
 
-    about  a few words, set bold
-    text   whole sentences
-    badge  how it came out, in a word; empty for none
+    about  subject, set bold
+    badge  verdict in a word; empty for none
     """
 
     about: str
@@ -71,14 +70,12 @@ class Shares:
 class Picture:
     """An embedded figure in a gallery.
 
-    title    what it shows, in a line
-    caption  how to read it
-    alt      what one sees, for those who do not see it
-    svg      the drawing, made safe; empty where it is too large
-    uri      data: with the image, for a drawing that is too large
-    name     of its files, without suffix
-    links    files beside the page that hold the drawing and its data, by what they are called
-    page     the file that it is on
+    alt      description for readers who cannot see it
+    svg      sanitised drawing; None if too large
+    uri      data URI of the image, for a drawing that is too large
+    name     file name without suffix
+    links    label and file of the drawing and its data
+    page     file of the page that shows it
     """
 
     title: str
@@ -137,10 +134,10 @@ Pad = tuple[float, float, int]
 class Walker:
     """Motion and style of one walker in a player.
 
-    track     its motion, thinned
-    strikes   times of its heel strikes, s
-    stills    postures, each a line through its joints in mm along and below the slope
-    pushes    whether the trailing foot pushes off as the other one lands
+    track     thinned motion
+    strikes   times of the heel strikes (s)
+    stills    postures, each a line through the joints (mm along and below the slope)
+    pushes    whether the trailing foot pushes off as the other foot lands
     """
 
     name: str
@@ -165,10 +162,9 @@ class Walker:
 class Player:
     """The animated walk; shown as stills in print and without scripts.
 
-    alt               what is seen
-    ordinary_force   a force whose arrow is of ordinary length
-    closeup_m  height of the ground seen in the close-up of a foot
-    view       what the stills show, mm: left, top, width, height, y downwards, after the slope is tilted
+    ordinary_force  force (N) whose arrow has the usual length
+    closeup_m       height of the close-up of a foot
+    view            left, top, width and height of the stills (mm, y down), after the slope is tilted
     """
 
     template: ClassVar[str] = "player"
@@ -183,7 +179,7 @@ class Player:
     ordinary_force: float
     closeup_m: float
     pads: tuple[Pad, ...]
-    ground: tuple[tuple[float, float], ...]  # m along the slope where each level of uneven ground begins, and over it
+    ground: tuple[tuple[float, float], ...]  # start along the slope and height of each ground level (m)
     view: tuple[int, int, int, int]
 
     @property
@@ -201,8 +197,8 @@ class Player:
 class GaitMark:
     """A point of a diagram whose gait the player can show.
 
-    x, y    where its mark is, in the diagram's own units
-    walker  how it moves; its name says what it is
+    x, y    position in diagram units
+    walker  motion; its name describes the gait
     """
 
     x: float
@@ -216,8 +212,8 @@ class GaitMark:
 class Diagram:
     """Branches of gaits over a parameter; a mark is a gait that is loaded into the page's player.
 
-    curves  points of a line, and whether the gaits on it are stable
-    ticks   of both axes: place and text
+    curves  points of each line, and whether its gaits are stable
+    ticks   position and text of the ticks of both axes
     """
 
     template: ClassVar[str] = "diagram"
@@ -239,9 +235,9 @@ class Diagram:
 class Section:
     """A part of a page under a heading.
 
-    anchor   its id, unique on the page
-    finding  what it comes to, in one sentence; a section that has one is folded to it
-    page     the file that it is on
+    anchor   id, unique on the page
+    finding  one-sentence result; a section with one is folded to it
+    page     file of the page
     """
 
     anchor: str
@@ -255,5 +251,5 @@ class Section:
         cls, anchor: str, title: str, blocks: Iterable[PageBlock | None], finding: str = "", page: str = MAIN
     ) -> Section | None:
         """Create a section of the non-empty blocks; None if there are none."""
-        said = tuple(block for block in blocks if block)
-        return cls(anchor, title, said, finding, page) if said else None
+        filled = tuple(block for block in blocks if block)
+        return cls(anchor, title, filled, finding, page) if filled else None

@@ -5,12 +5,12 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any
 
-from walkerlab.views.report.numbers import MINUS, NONE, fixed, number, power_of_ten, told_apart
+from walkerlab.views.report.numbers import MINUS, NONE, drop_rounding, fixed, number, power_of_ten
 from walkerlab.views.report.symbols import DOT, SUBSCRIPTS, in_signs
 from walkerlab.views.report.tables import Column, Table, measured, side_by_side
 
-COORDINATE = re.compile(r"(?P<rate>d)?theta(?:_(?P<index>\d+))?(?:_(?P<body>[a-z]\w*))?")
-STATE = ("theta_1", "theta_2", "dtheta_1", "dtheta_2")
+COORDINATE_NAME = re.compile(r"(?P<rate>d)?theta(?:_(?P<index>\d+))?(?:_(?P<body>[a-z]\w*))?")
+COMPASS_STATE = ("theta_1", "theta_2", "dtheta_1", "dtheta_2")
 """Coordinates of a compass; results of other walkers name theirs."""
 SETS = {"as-printed": "as printed", "corrected": "corrected"}
 """Sets of equations: stored name and display name."""
@@ -19,7 +19,7 @@ SETS = {"as-printed": "as printed", "corrected": "corrected"}
 def gait_table(sets: Mapping[str, Mapping[str, Any]], names: Sequence[str], note: str = "") -> Table:
     """Tabulate fixed points and multipliers, the sets of equations side by side.
 
-    names  of the coordinates of a state
+    names  names of the state's coordinates
     """
     six = partial(fixed, decimals=6)
     multipliers = range(max(len(gait["multipliers"]) for gait in sets.values()))
@@ -39,11 +39,11 @@ def gait_table(sets: Mapping[str, Mapping[str, Any]], names: Sequence[str], note
         measured("cost of transport", "cost_of_transport", partial(fixed, decimals=5)),
         measured("energy from the stance foot", "energy_J", partial(fixed, decimals=3)),
         measured("energy drift", "energy_drift_J", partial(number, digits=2)),
-        measured("least normal force", "min_normal_force_N", partial(number, digits=4)),
+        measured("minimum normal force", "min_normal_force_N", partial(number, digits=4)),
         Column("largest friction ratio", "max_friction_ratio", partial(fixed, decimals=4)),
-        measured("least normal impulse", "min_normal_impulse_N_s", partial(number, digits=4)),
+        measured("minimum normal impulse", "min_normal_impulse_N_s", partial(number, digits=4)),
         Column("largest impulse ratio", "max_impulse_ratio", partial(fixed, decimals=4)),
-        measured("scuffing depth", "max_scuff_depth_m", lambda depth: number(told_apart(depth), 4)),
+        measured("scuffing depth", "max_scuff_depth_m", lambda depth: number(drop_rounding(depth), 4)),
         Column("residual of the step map", "residual", partial(power_of_ten, digits=2)),
     ]
     both = len(sets) > 1
@@ -53,23 +53,23 @@ def gait_table(sets: Mapping[str, Mapping[str, Any]], names: Sequence[str], note
     return side_by_side(caption, lines, gaits, note=note)
 
 
-GIVEN_BY = {"gravity": "gravity", "push_off": "the push-off", "hip": "the hip"}
+WORK_SOURCES = {"gravity": "gravity", "push_off": "the push-off", "hip": "the hip"}
 """Sources of a step's work: stored name and display name."""
 
 
-ROUNDING = 1e-12
+WORK_ROUNDING = 1e-12
 """Works below this fraction of the largest are rounding errors."""
 
 
 def works(written: Callable[[Any], str]) -> Iterator[Column]:
     """Yield a column for each source of work, skipping rounding errors."""
-    for name, giver in GIVEN_BY.items():
+    for name, source in WORK_SOURCES.items():
 
-        def given(record: Mapping[str, Any], name: str = name) -> float | None:
+        def source_work(record: Mapping[str, Any], name: str = name) -> float | None:
             work = record.get("work_per_step_J") or {}
-            return work[name] if work and abs(work[name]) > ROUNDING * max(map(abs, work.values())) else None
+            return work[name] if work and abs(work[name]) > WORK_ROUNDING * max(map(abs, work.values())) else None
 
-        yield Column(f"work of {giver} a step (J)", given, written)
+        yield Column(f"work of {source} a step (J)", source_work, written)
 
 
 def state_at(place: int, gait: Mapping[str, Any]) -> float:
@@ -77,24 +77,23 @@ def state_at(place: int, gait: Mapping[str, Any]) -> float:
 
 
 def coordinate(name: str) -> str:
-    """Return a coordinate's symbol and unit."""
     return f"{symbol(name)} ({'rad/s' if name.startswith('d') else 'rad'})"
 
 
 def symbol(name: str) -> str:
     """Return a coordinate's symbol and its body: 'dtheta_1_shank' becomes 'θ̇₁, shank'."""
-    found = COORDINATE.fullmatch(name)
-    if found is None:
+    match = COORDINATE_NAME.fullmatch(name)
+    if match is None:
         return name
-    dot = DOT if found["rate"] else ""
-    body = f", {found['body'].replace('_', ' ')}" if found["body"] else ""
-    return f"θ{dot}{(found['index'] or '').translate(SUBSCRIPTS)}{body}"
+    dot = DOT if match["rate"] else ""
+    body = f", {match['body'].replace('_', ' ')}" if match["body"] else ""
+    return f"θ{dot}{(match['index'] or '').translate(SUBSCRIPTS)}{body}"
 
 
 def multiplier(place: int, gait: Mapping[str, Any]) -> str:
     """Format one multiplier of a gait; a dash if it has fewer."""
-    found = gait["multipliers"]
-    return complex_number(*found[place]) if place < len(found) else NONE
+    multipliers = gait["multipliers"]
+    return complex_number(*multipliers[place]) if place < len(multipliers) else NONE
 
 
 def complex_number(real: float, imaginary: float) -> str:

@@ -9,11 +9,11 @@ MINUS = "−"
 NONE = "–"
 SPACE = "\u00a0"
 """No-break space between a number and its unit."""
-LEAST_LENGTH_M = 1e-9
+MIN_LENGTH_M = 1e-9
 """Lengths below this are zero: walkers are centimetres to metres tall, and walks are accurate to 1e-10 of that."""
 PLAIN_FROM, PLAIN_BELOW = 1e-4, 1e6
 """Range of magnitudes written without a power of ten."""
-MAX_DECIMALS, USUAL_DECIMALS = 6, 4
+MAX_DECIMALS, DEFAULT_DECIMALS = 6, 4
 """Decimals of step periods (s) and lengths (m): maximum, and default if the error is unknown."""
 
 
@@ -38,7 +38,7 @@ def fixed(value: float | None, decimals: int) -> str:
 def decimals_left(error: float | None) -> int:
     """Return how many decimals an error leaves: at most half a unit of the last one."""
     if error is None:
-        return USUAL_DECIMALS
+        return DEFAULT_DECIMALS
     return max(0, min(MAX_DECIMALS, math.floor(-math.log10(2.0 * error)))) if error else MAX_DECIMALS
 
 
@@ -56,16 +56,16 @@ def quantity(value: float | None, unit: str, digits: int = 5) -> str:
     return text if text == NONE or unit in ("", "1") else f"{text}{SPACE}{unit}"
 
 
-def told_apart(value_m: float) -> float:
+def drop_rounding(value_m: float) -> float:
     """Return a length (m), or zero if it is below rounding and solver tolerance."""
-    return value_m if abs(value_m) >= LEAST_LENGTH_M else 0.0
+    return value_m if abs(value_m) >= MIN_LENGTH_M else 0.0
 
 
 def length(value_m: float | None, digits: int = 4) -> str:
-    """Format a length in m, mm or µm, whichever reads best; 0 m below `LEAST_LENGTH_M`."""
+    """Format a length in m, mm or µm, whichever reads best; 0 m below `MIN_LENGTH_M`."""
     if value_m is None or not math.isfinite(value_m):
         return NONE
-    value_m = told_apart(value_m)
+    value_m = drop_rounding(value_m)
     magnitude = abs(value_m)
     if magnitude >= 0.1 or magnitude == 0:
         return quantity(value_m, "m", digits)
@@ -85,8 +85,8 @@ def span(values: Iterable[float], unit: str, digits: int = 5) -> str:
     if not ordered:
         return NONE
     least, largest = number(ordered[0], digits), number(ordered[-1], digits)
-    spoken = least if least == largest else f"{least} to {largest}"
-    return f"{spoken}{SPACE}{unit}" if unit else spoken
+    text = least if least == largest else f"{least} to {largest}"
+    return f"{text}{SPACE}{unit}" if unit else text
 
 
 def count(how_many: int, what: str, several: str = "") -> str:

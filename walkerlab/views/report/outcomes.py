@@ -8,47 +8,47 @@ from walkerlab.outcome import OUTCOME_TEXTS, Outcome, outcome_of
 from walkerlab.views.report.numbers import count, quantity
 from walkerlab.views.report.tables import Tone
 
-RIGID, CONTACT = "simulate", "contact-sim"
-MODELS = {RIGID: "Rigid model", CONTACT: "Contact model"}
+RIGID_STAGE, CONTACT_STAGE = "simulate", "contact-sim"
+MODEL_NAMES = {RIGID_STAGE: "Rigid model", CONTACT_STAGE: "Contact model"}
 """Stages that simulate a walk, and the model each simulates."""
 
-WALKED = Outcome.WALKED.label
+WALKED_LABEL = Outcome.WALKED.label
 
 
 def ends(outcome: str) -> str:
     """Describe how a walk ends; an outcome unknown to this version keeps its name."""
-    known = outcome_of(outcome)
-    return f"ends as {outcome}" if known is None else OUTCOME_TEXTS[known].does
+    ending = outcome_of(outcome)
+    return f"ends as {outcome}" if ending is None else OUTCOME_TEXTS[ending].does
 
 
 def walks(steps: int, outcome: str) -> str:
     """Describe how far a walker gets, to follow its name in a sentence."""
-    if outcome == WALKED:
+    if outcome == WALKED_LABEL:
         return f"walks all {count(steps, 'step')}"
     return f"walks {count(steps, 'step')} and then {ends(outcome)}" if steps else f"{ends(outcome)} in its first step"
 
 
 def tone(outcome: str) -> Tone:
-    return "good" if outcome == WALKED else "bad"
+    return "good" if outcome == WALKED_LABEL else "bad"
 
 
-USUAL = "a hundred times tighter tolerances"
+DEFAULT_CHECK = "a hundred times tighter tolerances"
 """Default settings of the second walk that measures the error."""
 ERRORS = {
-    "step_period_s": ("in a period", "s"),
-    "step_length_m": ("in a length", "m"),
-    "slip_m": ("in a slip", "m"),
-    "rolling_m": ("in a rolling", "m"),
-    "knee_strike_time_s": ("in the time of a knee strike", "s"),
-    "end_time_s": ("at the end", "s"),
-    "cost_of_transport": ("in the cost of transport", "1"),
+    "step_period_s": ("in period", "s"),
+    "step_length_m": ("in step length", "m"),
+    "slip_m": ("in slip", "m"),
+    "rolling_m": ("in rolling distance", "m"),
+    "knee_strike_time_s": ("in knee-strike time", "s"),
+    "end_time_s": ("in end time", "s"),
+    "cost_of_transport": ("in cost of transport", "1"),
 }
 """Quantities with a numerical error: text and unit."""
 
 
-def off_by(error: Mapping[str, Any]) -> str:
+def describe_error(error: Mapping[str, Any]) -> str:
     """Describe the numerical errors of a walk and how they were measured."""
     if "reason" in error:
         return f"unknown: {error['reason']}"
-    off = join_words(f"{quantity(error[key], unit, 1)} {what}" for key, (what, unit) in ERRORS.items() if key in error)
-    return f"{off}, by a second walk with {error.get('by', USUAL)}"
+    text = join_words(f"{quantity(error[key], unit, 1)} {what}" for key, (what, unit) in ERRORS.items() if key in error)
+    return f"{text}, by a second walk with {error.get('by', DEFAULT_CHECK)}"

@@ -13,11 +13,11 @@ from markupsafe import Markup, escape
 from walkerlab.config.schema import Source
 from walkerlab.errors import add_run_options
 from walkerlab.views.report.blocks import MAIN, Section
-from walkerlab.views.report.symbols import CARET, POWER, power, raised
+from walkerlab.views.report.symbols import CARET, POWER, power, to_superscript
 
-TEMPLATES = Path(__file__).parent / "templates"
-COMMENT = re.compile(r"^ *//.*\n", re.MULTILINE)
-TYPED = re.compile(r"`([^`]*)`")
+TEMPLATE_FOLDER = Path(__file__).parent / "templates"
+COMMENT_LINE = re.compile(r"^ *//.*\n", re.MULTILINE)
+CODE_SPAN = re.compile(r"`([^`]*)`")
 """Code in a text, between backticks."""
 
 
@@ -25,12 +25,11 @@ TYPED = re.compile(r"`([^`]*)`")
 class Page:
     """One file of the report; texts are plain.
 
-    title     its heading
-    lead      paragraphs under it
-    study     what is redone; None if that is not said
-    redone    how the scene stands to that study, in a word or two
-    pending   the results that are still being computed
-    run       name of the run, for commands that the page advises; empty for the run that these have without options
+    lead      paragraphs under the title
+    study     the study reproduced, or None
+    relation  how closely the scene matches it, in a word or two
+    pending   results still being computed
+    run       name of the run for advised commands; empty for the default run
     """
 
     title: str
@@ -38,7 +37,7 @@ class Page:
     lead: tuple[str, ...] = ()
     file: str = MAIN
     study: Source | None = None
-    redone: str = "Redoes"
+    relation: str = "Redoes"
     pending: tuple[str, ...] = ()
     run: str = ""
 
@@ -64,28 +63,28 @@ def digest_of(script: str) -> str:
 
 def environment(run: str = "") -> Environment:
     """Create the template environment: every text is escaped, and commands name the run."""
-    made = Environment(
-        loader=FileSystemLoader(TEMPLATES),
+    template_environment = Environment(
+        loader=FileSystemLoader(TEMPLATE_FOLDER),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
     )
     options = f" -c {shlex.quote(run)}" if run else ""
-    made.filters["said"] = lambda text: said(add_run_options(text, options))
-    return made
+    template_environment.filters["to_markup"] = lambda text: to_markup(add_run_options(text, options))
+    return template_environment
 
 
-def said(text: str) -> Markup:
+def to_markup(text: str) -> Markup:
     """Convert a text to markup: code between backticks, and powers of ten in one notation."""
-    parts = TYPED.split(text)
-    set_apart = [
-        Markup("<code>%s</code>") % part if index % 2 else escape(CARET.sub(raised, POWER.sub(power, part)))
+    parts = CODE_SPAN.split(text)
+    markup_parts = [
+        Markup("<code>%s</code>") % part if index % 2 else escape(CARET.sub(to_superscript, POWER.sub(power, part)))
         for index, part in enumerate(parts)
     ]
-    return Markup("").join(set_apart)
+    return Markup("").join(markup_parts)
 
 
 def source(name: str) -> str:
     """Read a file to embed in the page, without comment lines."""
-    return COMMENT.sub("", (TEMPLATES / name).read_text(encoding="utf-8")).strip()
+    return COMMENT_LINE.sub("", (TEMPLATE_FOLDER / name).read_text(encoding="utf-8")).strip()

@@ -21,29 +21,29 @@ VIEW_BOX = re.compile(rb'\bviewBox="0 0 ([\d.]+) ([\d.]+)"')
 def pictures(stored: Mapping[str, Content], folder: Path, *, numbered: bool = True) -> tuple[Picture, ...]:
     """Embed every figure listed by `plot`, in its order.
 
-    folder    of the run, which the figures' paths are relative to
-    numbered  whether the paper's numbers mean something to the reader
+    folder    run folder, to which the figures' paths are relative
+    numbered  whether to show the paper's figure numbers
 
     Raises FileNotFoundError if a listed file is not there.
     """
     figures = stored["plot"].summary.get("figures", []) if "plot" in stored else []
     files = fitting([(folder / figure["svg"], folder / figure["png"]) for figure in figures])
-    return tuple(picture(one, folder, file.suffix, numbered) for one, file in zip(figures, files, strict=True))
+    return tuple(picture(figure, folder, file.suffix, numbered) for figure, file in zip(figures, files, strict=True))
 
 
 def picture(figure: Mapping[str, Any], folder: Path, kind: str = ".svg", numbered: bool = False) -> Picture:
     """Embed one figure.
 
-    figure    its words and its files, which are relative to the folder
-    kind      the file that is embedded: a drawing becomes a part of the page, pixels an image
-    numbered  whether the reader has the paper before them
+    figure    texts and file paths relative to the folder
+    kind      suffix of the embedded file; SVG is inlined, PNG is embedded as an image
+    numbered  whether to show the paper's figure number
 
     Raises FileNotFoundError if a file is not there.
     """
     svg = folder / figure["svg"]
     with svg.open("rb") as file:
         box = VIEW_BOX.search(file.read(2000))
-    # in CSS pixels, to keep its place while it loads; 0 if it does not say
+    # in CSS pixels, to reserve space while loading; 0 if unknown
     width, height = (round(float(box[1])), round(float(box[2]))) if box else (0, 0)
     number = f"Figure {figure['number']}. " if numbered and "number" in figure else ""
     title = f"{number}{figure['title']}."
@@ -87,7 +87,7 @@ def fitting(drawings: Sequence[tuple[Path, Path]], most: int = MAX_BYTES) -> lis
 
 
 SVG, XLINK = "{http://www.w3.org/2000/svg}", "{http://www.w3.org/1999/xlink}"
-SHAPES = frozenset(
+SVG_ELEMENTS = frozenset(
     {"svg", "g", "path", "rect", "circle", "line", "polyline", "polygon", "text", "tspan", "use", "defs", "clipPath"}
     | {"pattern", "image"}
 )
@@ -109,9 +109,9 @@ ROLES = {
 }
 """Colours in drawings that the page may replace (dark mode), with their CSS variables."""
 COLOUR = re.compile(r"#[0-9a-fA-F]{6}\b")
-DIGITS = re.compile(r"(-?\d+\.\d{2})\d+")
-BLANKS = re.compile(r"\s+")
-FETCHES = re.compile(r"url\((?!#)|@import|expression|javascript:", re.IGNORECASE)
+LONG_DECIMALS = re.compile(r"(-?\d+\.\d{2})\d+")
+WHITESPACE = re.compile(r"\s+")
+EXTERNAL_REFERENCE = re.compile(r"url\((?!#)|@import|expression|javascript:", re.IGNORECASE)
 
 
 def inline(file: Path, alt: str) -> Markup:
@@ -121,8 +121,8 @@ def inline(file: Path, alt: str) -> Markup:
     """
     root = ET.fromstring(file.read_bytes())
     values = [value for element in root.iter() for value in element.attrib.values()]
-    refers = [found for value in values for found in re.findall(r"url\(#[^)]*\)|^#.*$", value)]
-    used = {value.removeprefix("url(").strip("#)") for value in refers}
+    references = [reference for value in values for reference in re.findall(r"url\(#[^)]*\)|^#.*$", value)]
+    used = {value.removeprefix("url(").strip("#)") for value in references}
     inside = Markup("").join(markup(child, used) for child in root)
     box = root.get("viewBox", "0 0 1 1")
     return Markup('<svg viewBox="{}" role="img" aria-label="{}">{}</svg>').format(box, alt, inside)
@@ -131,27 +131,27 @@ def inline(file: Path, alt: str) -> Markup:
 def markup(element: ET.Element, used: set[str]) -> Markup:
     """Copy an element and its children; nothing for elements that the page does not allow.
 
-    used  the ids that something refers to: others are left out
+    used  ids that are referred to; others are omitted
     """
     name = element.tag.removeprefix(SVG)
-    if name not in SHAPES:
+    if name not in SVG_ELEMENTS:
         return Markup("")
-    inside = spoken(element.text, name)
+    inside = text_content(element.text, name)
     for child in element:
-        inside += markup(child, used) + spoken(child.tail, name)
+        inside += markup(child, used) + text_content(child.tail, name)
     if name in ("g", "defs") and not inside:
         return Markup("")
     attributes = Markup("")
     for key, value in element.attrib.items():
         local = "href" if key in (f"{XLINK}href", "href") else key
         wanted = value.startswith(("#", "data:image/png;base64,")) if local == "href" else local in ATTRIBUTES
-        if wanted and (local != "id" or value in used) and not FETCHES.search(value):
+        if wanted and (local != "id" or value in used) and not EXTERNAL_REFERENCE.search(value):
             attributes += Markup(' {}="{}"').format(Markup(local), short(local, value))
     return Markup("<{0}{1}>{2}</{0}>").format(Markup(name), attributes, inside)
 
 
-def spoken(text: str | None, name: str) -> Markup:
-    """Return the text of an element that may hold text."""
+def text_content(text: str | None, name: str) -> Markup:
+    """Escape the text of a text element; empty for other elements."""
     return escape(text.strip()) if text and name in ("text", "tspan") else Markup("")
 
 
@@ -160,11 +160,11 @@ def short(name: str, value: str) -> str:
     if name in ("id", "href", "clip-path"):
         return value.strip()
     if name == "style":
-        return BLANKS.sub(" ", COLOUR.sub(role, value)).replace("; ", ";").replace(": ", ":")
-    return BLANKS.sub(" ", DIGITS.sub(r"\1", value)).strip()
+        return WHITESPACE.sub(" ", COLOUR.sub(role, value)).replace("; ", ";").replace(": ", ":")
+    return WHITESPACE.sub(" ", LONG_DECIMALS.sub(r"\1", value)).strip()
 
 
-def role(found: re.Match[str]) -> str:
+def role(match: re.Match[str]) -> str:
     """Return the CSS variable of a colour, or the colour itself."""
-    name = ROLES.get(found[0].lower())
-    return found[0] if name is None else f"var({name})"
+    name = ROLES.get(match[0].lower())
+    return match[0] if name is None else f"var({name})"

@@ -63,17 +63,17 @@ def pages_of(results: Results, run: str) -> tuple[Page, ...]:
     """
     sections = sections_of(results)
     main = [section for section in sections if section.page == MAIN]
-    beside = {file: tuple(one for one in sections if one.page == file) for file in closing.TITLES}
-    beside = {file: found for file, found in beside.items() if found}
-    links = closing.further(results, beside)
+    further = {file: tuple(section for section in sections if section.page == file) for file in closing.TITLES}
+    further = {file: sections for file, sections in further.items() if sections}
+    links = closing.further(results, further)
     if links is not None:
         main.insert([section.anchor for section in main].index("glossary"), links)
-    redone = "After" if results.departures else "Redoes"
-    of_run = "" if run == DEFAULT else run
+    relation = "After" if results.departures else "Redoes"
+    option = "" if run == DEFAULT else run
     title, source = f"{'Driven' if drives_of(results.config) else 'Passive'} walking: {run}", results.config.source
     return (
-        Page(title, tuple(main), (lead(results.config, run),), MAIN, source, redone, results.pending, of_run),
-        *(Page(f"{closing.TITLES[file]} · {run}", found, file=file, run=of_run) for file, found in beside.items()),
+        Page(title, tuple(main), (lead(results.config, run),), MAIN, source, relation, results.pending, option),
+        *(Page(f"{closing.TITLES[file]} · {run}", parts, file=file, run=option) for file, parts in further.items()),
     )
 
 

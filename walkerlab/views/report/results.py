@@ -16,12 +16,11 @@ from walkerlab.views.report.blocks import Picture, Section
 class Results:
     """A run as the report sees it.
 
-    config    what was asked for
-    stored    results by stage: those that are there and current
-    pictures  the figures that `plot` drew, embedded
-    absent    what has no result
-    failed    those of them that were tried and have no answer
-    pending   the stages whose results are still being computed
+    stored    up-to-date results by stage
+    pictures  embedded figures of `plot`
+    absent    missing results, with reasons
+    failed    stages that were run and failed
+    pending   stages that are still running
     """
 
     config: Config
@@ -34,8 +33,8 @@ class Results:
     @property
     def departures(self) -> Sequence[str] | None:
         """Differences between this scene and the paper's; empty if there are none, None if not compared."""
-        found: Sequence[str] | None = self.summary("compare").get("departures")
-        return found
+        departures: Sequence[str] | None = self.summary("compare").get("departures")
+        return departures
 
     @property
     def claims(self) -> Sequence[Mapping[str, Any]]:
@@ -55,10 +54,10 @@ class Results:
 SectionMaker = Callable[[Results], Section | None]
 
 
-def of_stage(stage: str, needed: str = "") -> Callable[[Callable[..., Section | None]], SectionMaker]:
+def stage_section(stage: str, needed: str = "") -> Callable[[Callable[..., Section | None]], SectionMaker]:
     """Make a section from a stage's summary, passed as a second argument; None without a result.
 
-    needed  a key of the summary without which there is nothing to say
+    needed  summary key without which there is no section
     """
 
     def section_of(make: Callable[..., Section | None]) -> SectionMaker:

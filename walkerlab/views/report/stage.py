@@ -30,8 +30,8 @@ def run(
 ) -> Content:
     """Write the report's pages into the run's folder.
 
-    inputs    results by stage: those that there are
-    left_out  the stages without a result, and why
+    inputs    available results by stage
+    left_out  stages without a result, with reasons
 
     Raises StorageError if a page cannot be stored.
     """
@@ -60,11 +60,11 @@ def write_pages(
 ) -> tuple[tuple[Page, ...], Results]:
     """Write pages of the available results; also called while other results are being computed.
 
-    inputs    results by stage: those that there are
-    left_out  the stages without a result, and why
-    pending   the stages whose results are still being computed; the report says so in their place
+    inputs    available results by stage
+    left_out  stages without a result, with reasons
+    pending   stages that are still running, shown as such
 
-    Pages of an earlier run that there is nothing for any more are removed. Raises StorageError if one cannot be stored.
+    Removes pages of an earlier run that have no content now. Raises StorageError if one cannot be stored.
     """
     waited = [entry for entry in left_out if entry.what not in pending]
     names = {entry.what for entry in waited}

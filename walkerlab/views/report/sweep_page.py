@@ -43,13 +43,13 @@ def draw(swept: Swept, folder: RunFolder, names: Sequence[str] = (), against: st
     Raises ConfigError for an unknown quantity, StorageError if the system refuses.
     """
     group, question = swept.group, swept.question
-    refuse_unknown(group, question.dims, names)
+    check_quantities(group, question.dims, names)
     if against and against not in question.names:
-        refuse_unknown(group, question.dims, [against], "--against")
-    shown = [*names] or [name for name in choose(group, question.dims, question.names) if name != against]
+        check_quantities(group, question.dims, [against], "--against")
+    quantities = [*names] or [name for name in choose(group, question.dims, question.names) if name != against]
     own = None if names or against else robustness.of_sweep(group, question.names)
-    if own is None and shown:
-        own = illustration(group, question.stage, question.names, question.dims, shown, against)
+    if own is None and quantities:
+        own = illustration(group, question.stage, question.names, question.dims, quantities, against)
     paths: list[Path] = []
     pictures: list[Picture] = []
     if own is not None:
@@ -62,34 +62,34 @@ def draw(swept: Swept, folder: RunFolder, names: Sequence[str] = (), against: st
         files = {path.suffix.removeprefix("."): path.relative_to(folder.path) for path in paths}
         pictures.append(picture({**about, **files}, folder.path))
     page = folder.path / PAGE
-    write_atomically(page, render(page_of(swept, pictures, shown)).encode())
+    write_atomically(page, render(page_of(swept, pictures, quantities)).encode())
     return Files(page, tuple(paths))
 
 
-def refuse_unknown(group: Group, dims: tuple[str, ...], names: Sequence[str], option: str = "--show") -> None:
+def check_quantities(group: Group, dims: tuple[str, ...], names: Sequence[str], option: str = "--show") -> None:
     """Raise ConfigError for an unknown quantity of the result."""
     for name in names:
         if not is_number(group, name, dims):
-            there = ", ".join(one for one in group.variables if is_number(group, one, dims) and "." not in one)
-            raise ConfigError(f"{option} {name}: no such quantity in the result.", f"There are {there}.")
+            listed = ", ".join(key for key in group.variables if is_number(group, key, dims) and "." not in key)
+            raise ConfigError(f"{option} {name}: no such quantity in the result.", f"There are {listed}.")
 
 
-def refuse_unheard(stage: str, names: Mapping[str, str], there: Collection[str]) -> None:
+def check_options(stage: str, names: Mapping[str, str], variables: Collection[str]) -> None:
     """Raise ConfigError for a quantity missing in the first results; later results may add nested ones only.
 
     names  by option, as typed
     """
-    known = sorted({*there, *HEADLINES.get(stage, ())} - {"outcome"})
-    for asked, name in names.items():
-        if name not in known and "." not in name:
-            listed = ", ".join(one for one in known if "." not in one)
-            raise ConfigError(f"{asked}: no such quantity in the first results.", f"There are {listed}.")
+    available = sorted({*variables, *HEADLINES.get(stage, ())} - {"outcome"})
+    for option, name in names.items():
+        if name not in available and "." not in name:
+            listed = ", ".join(quantity for quantity in available if "." not in quantity)
+            raise ConfigError(f"{option}: no such quantity in the first results.", f"There are {listed}.")
 
 
 PARAMETER_COLUMNS = (Column("name"), Column("key"), Column("unit"), Column("values"), Column("meaning", wide=True))
 
 
-def page_of(swept: Swept, pictures: Sequence[Picture], shown: Sequence[str]) -> Page:
+def page_of(swept: Swept, pictures: Sequence[Picture], quantities: Sequence[str]) -> Page:
     """Build the page: the figure, the parameters and the first points."""
     summary, question, group = swept.summary, swept.question, swept.group
     outcomes = ", ".join(f"{count} {name}" for name, count in summary["outcomes"].items())
@@ -99,14 +99,14 @@ def page_of(swept: Swept, pictures: Sequence[Picture], shown: Sequence[str]) -> 
         for variable in [group.variables[name]]
     ]
     columns = [
-        *(Column(name, written=format_value, numeric=True) for name in (*question.names, *shown)),
+        *(Column(name, written=format_value, numeric=True) for name in (*question.names, *quantities)),
         *(Column("outcome"), Column("reason", wide=True)),
     ]
     listed = f"Of the {len(question)} points the first {MAX_ROWS} are listed. " if len(question) > MAX_ROWS else ""
     where = f"All numbers of every point are in `{swept.path.name}`, which xarray opens as one Dataset."
     tables = (
         table("Parameters", PARAMETER_COLUMNS, parameters),
-        table("Points", columns, rows(group, question, shown), note=f"{listed}{where}"),
+        table("Points", columns, rows(group, question, quantities), note=f"{listed}{where}"),
     )
     section = Section("points", "Numbers", (*([Gallery(tuple(pictures))] if pictures else []), *tables))
     lead = (f"{summary['points']} points: {outcomes}.", *summary_lines(summary))
@@ -115,26 +115,24 @@ def page_of(swept: Swept, pictures: Sequence[Picture], shown: Sequence[str]) -> 
 
 def summary_lines(summary: Mapping[str, Any]) -> list[str]:
     """Describe how a sweep's walks ended and their numerical error."""
-    ended = [str(one["said"]) for one in summary.get("endings", ())]
+    ended = [str(ending["said"]) for ending in summary.get("endings", ())]
     error = summary.get("numerical_error")
     return ended if error is None else [*ended, words("error.of_sample", error, "points")]
 
 
 def values_summary(values: Sequence[object]) -> str:
-    """Summarise values in one phrase."""
     listed = [f"{value:.6g}" if isinstance(value, float) else str(value) for value in values]
     return ", ".join(listed) if len(listed) <= 8 else f"{len(listed)} values, {listed[0]} to {listed[-1]}"
 
 
-def rows(group: Group, question: SweptStage, shown: Sequence[str]) -> list[tuple[Any, ...]]:
+def rows(group: Group, question: SweptStage, quantities: Sequence[str]) -> list[tuple[Any, ...]]:
     """Return table rows of the first points: parameters, quantities, outcome and reason."""
     count = min(len(question), MAX_ROWS)
     places = [question.places(index) for index in range(count)]
-    columns: list[list[Any]] = [[axis.values[at[k]] for at in places] for k, axis in enumerate(question.axes)]
-    columns += [group[name].ravel()[:count].tolist() for name in (*shown, "outcome", "reason")]
+    columns: list[list[Any]] = [[axis.values[point[k]] for point in places] for k, axis in enumerate(question.axes)]
+    columns += [group[name].ravel()[:count].tolist() for name in (*quantities, "outcome", "reason")]
     return list(zip(*columns, strict=True))
 
 
 def format_value(value: Any) -> str:
-    """Format a value for a table."""
     return number(value, 6) if isinstance(value, float) else str(value)

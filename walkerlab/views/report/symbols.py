@@ -15,27 +15,27 @@ CARET = re.compile(r"(?<=\d)\^(-?\d+)\b")
 """A typed power, such as 10^-4."""
 
 
-def raised(found: re.Match[str]) -> str:
-    return found[1].translate(SUPERSCRIPTS)
+def to_superscript(match: re.Match[str]) -> str:
+    return match[1].translate(SUPERSCRIPTS)
 
 
-def power(found: re.Match[str]) -> str:
+def power(match: re.Match[str]) -> str:
     """Format a power of ten as 10⁻⁴, or 1.1 × 10⁻⁹."""
-    ten = f"10{f'{found[2]}{found[3]}'.strip('+').translate(SUPERSCRIPTS)}"
-    return ten if found[1] == "1" else f"{found[1]} × {ten}"
+    ten = f"10{f'{match[2]}{match[3]}'.strip('+').translate(SUPERSCRIPTS)}"
+    return ten if match[1] == "1" else f"{match[1]} × {ten}"
 
 
 RULES = (
     (
         re.compile(r"\bd(theta|omega|phi)_(\d)\b"),
-        lambda found: f"{LETTERS[found[1]]}{DOT}{found[2].translate(SUBSCRIPTS)}",
+        lambda match: f"{LETTERS[match[1]]}{DOT}{match[2].translate(SUBSCRIPTS)}",
     ),
     (
         re.compile(r"\b(theta|omega|phi|mu|lambda)(?:_(\d))?\b"),
-        lambda found: LETTERS[found[1]] + (found[2] or "").translate(SUBSCRIPTS),
+        lambda match: LETTERS[match[1]] + (match[2] or "").translate(SUBSCRIPTS),
     ),
-    (re.compile(r"\b([A-Za-z])_(\d+|[ape])\b"), lambda found: found[1] + found[2].translate(SUBSCRIPTS)),
-    (re.compile(r"\^(-?\d+|[en])\b"), lambda found: found[1].translate(SUPERSCRIPTS)),
+    (re.compile(r"\b([A-Za-z])_(\d+|[ape])\b"), lambda match: match[1] + match[2].translate(SUBSCRIPTS)),
+    (re.compile(r"\^(-?\d+|[en])\b"), lambda match: match[1].translate(SUPERSCRIPTS)),
     (POWER, power),
     (re.compile(r"\+-"), lambda _: "±"),
     (re.compile(r"(?<![\w)\]-])-(?=[\w.(])|(?<= )-(?= )"), lambda _: "−"),

@@ -27,7 +27,7 @@ class Cell:
     """A cell of a table.
 
     tone   sets the text as a badge
-    value  what the text was written from; None for none
+    value  value behind the text, or None
     """
 
     text: str
@@ -43,7 +43,7 @@ class Cell:
         return None if plain in ("", NONE) else plain
 
 
-def plainly(value: Any) -> str:
+def format_plain(value: Any) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
     return NONE if value is None else str(value)
@@ -53,22 +53,21 @@ def plainly(value: Any) -> str:
 class Column:
     """Describes how to show one value of each record: a column or, in `side_by_side`, a row.
 
-    title    its head, with the unit
-    of       key of a record's value, `a/b` of one in a record within; or a function of the record; without one a record
-             is a row of cells
-    written  a value as text, or as a cell with a tone; a cell in the place of a value stays as it is
-    numeric  numbers, which stand under one another
-    wide     sentences, for which a terminal has no room
+    title    head, with the unit
+    of       key of a record's value (`a/b` for nested records), or a function of the record; None if records are rows
+             of cells
+    written  formats a value as text or as a cell with a tone; values that are cells already are kept
+    numeric  whether to align as numbers
+    wide     whether cells hold sentences, which a terminal omits
     """
 
     title: str
     of: str | Callable[[Any], Any] | None = None
-    written: Callable[[Any], str | Cell] = plainly
+    written: Callable[[Any], str | Cell] = format_plain
     numeric: bool = False
     wide: bool = False
 
     def value(self, record: Any, place: int = 0) -> Any:
-        """Return a record's value for this column, or None."""
         if self.of is None:
             return record[place]
         if not isinstance(self.of, str):
@@ -102,10 +101,10 @@ def measured(
 class Table:
     """A table; the first cell of a row is its head.
 
-    groups rows by the head that they have in common, which may be empty
-    wordy  it has cells with sentences in them: on a narrow screen each row becomes a card of its own
-    note   what to know when reading it, below it
-    by     what the titles of its groups of rows are, where that is a column
+    groups rows by group title, which may be empty
+    wordy  whether cells hold sentences; on a narrow screen each row then becomes a card
+    note   text below the table
+    by     head of the column of group titles
     """
 
     template: ClassVar[str] = "table"
@@ -131,27 +130,27 @@ def table(
 ) -> Table:
     """Build a table with a row for each record.
 
-    records  all under one head, or by the title of the group in which they stand
+    records  records, or records by group title
 
-    Raises ValueError for a record that is a row of cells and has not one for each column.
+    Raises ValueError for a row of cells whose length differs from the number of columns.
     """
     groups = records if isinstance(records, Mapping) else {"": records}
     for record in chain.from_iterable(groups.values()):
         if isinstance(record, list | tuple) and len(record) != len(columns):
             raise ValueError(f"{record!r} has not {len(columns)} cells")
     rows = {
-        title: [[column.cell(record, place) for place, column in enumerate(columns)] for record in found]
-        for title, found in groups.items()
+        title: [[column.cell(record, place) for place, column in enumerate(columns)] for record in members]
+        for title, members in groups.items()
     }
     return Table(caption, tuple(columns), rows, wordy, note, by)
 
 
 def grouped(records: Iterable[Mapping[str, Any]], *keys: str) -> dict[str, list[Mapping[str, Any]]]:
     """Group records by their values of some keys, in order of first appearance."""
-    found: dict[str, list[Mapping[str, Any]]] = {}
+    groups: dict[str, list[Mapping[str, Any]]] = {}
     for record in records:
-        found.setdefault(" ".join(str(record[key]) for key in keys), []).append(record)
-    return found
+        groups.setdefault(" ".join(str(record[key]) for key in keys), []).append(record)
+    return groups
 
 
 def side_by_side(
@@ -166,19 +165,19 @@ def side_by_side(
     """Build a table with a column for each record, and a row for each line that any record has a value for."""
     rows = []
     for line in lines:
-        there = {title: line.cell(record) for title, record in records.items() if line.value(record) is not None}
-        if there:
-            rows.append([line.title, *(there.get(title, Cell("")) for title in records)])
+        cells = {title: line.cell(record) for title, record in records.items() if line.value(record) is not None}
+        if cells:
+            rows.append([line.title, *(cells.get(title, Cell("")) for title in records)])
     return table(caption, [Column(head), *(Column(title, numeric=numeric) for title in records)], rows, note=note)
 
 
-def of_records(rows: Sequence[Mapping[str, Any]], written: Callable[[Any], str] = str) -> Table:
+def record_table(rows: Sequence[Mapping[str, Any]], written: Callable[[Any], str] = str) -> Table:
     """Build a table of all keys of the records; cells of missing keys stay empty."""
     names = list(dict.fromkeys(name for row in rows for name in row))
-    there = [[row.get(name) is not None for name in names] for row in rows]
+    present = [[row.get(name) is not None for name in names] for row in rows]
     cells = [
-        [Cell(written(row[name]) if known else "", value=row.get(name)) for name, known in zip(names, has, strict=True)]
-        for row, has in zip(rows, there, strict=True)
+        [Cell(written(row[key]) if exists else "", value=row.get(key)) for key, exists in zip(names, has, strict=True)]
+        for row, has in zip(rows, present, strict=True)
     ]
     lengths = [max(len(row[place].text) for row in cells) for place in range(len(names))]
     room = any(length <= LONGEST_CELL for length in lengths)
@@ -186,31 +185,29 @@ def of_records(rows: Sequence[Mapping[str, Any]], written: Callable[[Any], str] 
     return table("", columns, cells)
 
 
-def flat(shown: Table, wide: bool = False) -> tuple[list[str], list[list[Cell]]]:
+def flat(content: Table, wide: bool = False) -> tuple[list[str], list[list[Cell]]]:
     """Return heads and rows of a table, with group titles as a column of their own.
 
-    wide  whether columns of sentences are among them
+    wide  include columns of sentences
     """
-    kept = [place for place, column in enumerate(shown.columns) if wide or not column.wide]
-    titled = any(shown.groups)
-    heads = [*([shown.by] if titled else []), *(shown.columns[place].title for place in kept)]
+    places = [place for place, column in enumerate(content.columns) if wide or not column.wide]
+    titled = any(content.groups)
+    heads = [*([content.by] if titled else []), *(content.columns[place].title for place in places)]
     rows = [
-        [*([Cell(title, value=title)] if titled else []), *(row[place] for place in kept)]
-        for title, found in shown.groups.items()
-        for row in found
+        [*([Cell(title, value=title)] if titled else []), *(row[place] for place in places)]
+        for title, members in content.groups.items()
+        for row in members
     ]
     return heads, rows
 
 
-def in_lines(shown: Table) -> list[str]:
-    """Format a table for a terminal, without columns of sentences."""
-    heads, rows = flat(shown)
+def in_lines(content: Table) -> list[str]:
+    heads, rows = flat(content)
     texts = [[cell.text for cell in row] for row in rows]
     return aligned([heads, *texts] if texts and any(heads) else texts)
 
 
 def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
-    """Align cells in columns."""
     widths = [max(width(row[column]) for row in rows) for column in range(len(rows[0]))] if rows else []
     return [
         "  ".join(cell + " " * (wide - width(cell)) for cell, wide in zip(row, widths, strict=True)).rstrip()
@@ -223,6 +220,6 @@ def width(text: str) -> int:
     return sum(not unicodedata.combining(letter) for letter in text)
 
 
-def as_csv(shown: Table) -> bytes:
-    heads, rows = flat(shown, wide=True)
+def as_csv(content: Table) -> bytes:
+    heads, rows = flat(content, wide=True)
     return csv_text(heads, ([cell.datum for cell in row] for row in rows))

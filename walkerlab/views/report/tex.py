@@ -8,15 +8,15 @@ from typing import Any, Final
 from walkerlab.views.report.symbols import DOT, LETTERS, SUBSCRIPTS, SUPERSCRIPTS
 from walkerlab.views.report.tables import Table, flat
 
-DIGITS: Final = 5
+COLUMN_DIGITS: Final = 5
 """Significant digits of a column's largest number or, if its numbers differ too much, of each one."""
-CLEAREST: Final = 1e6
+MAX_PLAIN: Final = 1e6
 """Numbers from here on are written with a power of ten."""
-MISSING: Final = "--"
+EMPTY_CELL: Final = "--"
 PACKAGES: Final = r"% \usepackage{booktabs, siunitx}"
 DECIMAL = re.compile(r"(-?)(\d+)(?:\.(\d+))?(?:e(-?)(\d+))?")
 """A number in a siunitx column: sign, digits before and after the point, sign and digits of the exponent."""
-RAISED = re.compile(r"\\\^\{\}(-?\d+)")
+ESCAPED_POWER = re.compile(r"\\\^\{\}(-?\d+)")
 """A power in a text that is already escaped."""
 SYMBOL = re.compile(rf"\b(d?)({'|'.join(LETTERS)}|[A-Za-z])\\_([A-Za-z0-9]+)\b(?!\\_)")
 """A symbol in plain letters, already escaped."""
@@ -33,14 +33,14 @@ SIGNS = re.compile("|".join(map(re.escape, IN_MATHS)))
 TEX = str.maketrans({letter: f"\\{letter}" for letter in "&%$#_{}"} | {"~": r"\textasciitilde{}", "^": r"\^{}"})
 
 
-def as_tex(shown: Table) -> bytes:
+def as_tex(content: Table) -> bytes:
     """Format a table for booktabs and siunitx, as a float if it has a caption; without columns of sentences."""
-    heads, rows = flat(shown)
+    heads, rows = flat(content)
     columns = [in_column(head, [row[place].datum for row in rows]) for place, head in enumerate(heads)]
     head, *lines = [" & ".join(line) + r" \\" for line in zip(*(cells for _, cells in columns), strict=True)]
     layout = "".join(layout for layout, _ in columns)
     body = [rf"\begin{{tabular}}{{{layout}}}", r"\toprule", head, r"\midrule", *lines, r"\bottomrule", r"\end{tabular}"]
-    sentences = (text if text.endswith((".", "?")) else f"{text}." for text in (shown.caption, shown.note) if text)
+    sentences = (text if text.endswith((".", "?")) else f"{text}." for text in (content.caption, content.note) if text)
     if caption := " ".join(sentences):
         body = [r"\begin{table}", r"\centering", rf"\caption{{{in_tex(caption)}}}", *body, r"\end{table}"]
     return "\n".join([PACKAGES, *body, ""]).encode()
@@ -49,11 +49,11 @@ def as_tex(shown: Table) -> bytes:
 def in_column(head: str, data: Sequence[Any]) -> tuple[str, list[str]]:
     """Return layout and cells of a column; a numeric column is a siunitx column with aligned points."""
     numbers = [value for value in data if is_number(value)]
-    written = written_alike(numbers)
+    written = column_format(numbers)
     cells = [written(value) if is_number(value) else in_tex(value) for value in data]
     decimals = [cell for cell in cells if DECIMAL.fullmatch(cell)]
     # texts that read as numbers, such as printed ones, count where they are most of a column
-    if not numbers and 2 * len(decimals) <= len(cells) - cells.count(MISSING):
+    if not numbers and 2 * len(decimals) <= len(cells) - cells.count(EMPTY_CELL):
         return "l", [in_tex(head), *cells]
     aligned = [cell if DECIMAL.fullmatch(cell) else f"{{{cell}}}" for cell in cells]
     return f"S[table-format={room_for(decimals)}]", [f"{{{in_tex(head)}}}", *aligned]
@@ -64,41 +64,41 @@ def is_number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
-def written_alike(numbers: Sequence[float]) -> Callable[[float], str]:
+def column_format(numbers: Sequence[float]) -> Callable[[float], str]:
     """Choose the format of a column's numbers: integers, equal decimals, or equal significant digits."""
     if all(isinstance(value, int) for value in numbers):
         return str
     sizes = [abs(value) for value in numbers if value != 0.0 and math.isfinite(value)] or [1.0]
-    decimals = max(0, DIGITS - 1 - math.floor(math.log10(max(sizes))))
+    decimals = max(0, COLUMN_DIGITS - 1 - math.floor(math.log10(max(sizes))))
     # the smallest one loses a digit at most
-    if min(sizes) >= 10.0 ** (DIGITS - 2 - decimals) and max(sizes) < CLEAREST:
+    if min(sizes) >= 10.0 ** (COLUMN_DIGITS - 2 - decimals) and max(sizes) < MAX_PLAIN:
         return lambda value: f"{value:z.{decimals}f}"
     return lambda value: "0" if value == 0.0 else with_digits(value)
 
 
 def with_digits(value: float) -> str:
-    mantissa, _, exponent = f"{value:#.{DIGITS}g}".partition("e")
+    mantissa, _, exponent = f"{value:#.{COLUMN_DIGITS}g}".partition("e")
     return mantissa.removesuffix(".") + (f"e{int(exponent)}" if exponent else "")
 
 
 def room_for(cells: Sequence[str]) -> str:
     """Return siunitx's table-format: digits before and after the point, and of the exponent."""
-    found = [part.groups(default="") for cell in cells if (part := DECIMAL.fullmatch(cell))]
-    sign, before, behind, below, power = (max(len(one[place]) for one in found) for place in range(5))
+    parts = [part.groups(default="") for cell in cells if (part := DECIMAL.fullmatch(cell))]
+    sign, before, behind, below, power = (max(len(groups[place]) for groups in parts) for place in range(5))
     return f"{'-' * sign}{before}.{behind}" + (f"e{'-' * below}{power}" if power else "")
 
 
 def in_tex(value: Any) -> str:
     """Convert a text to LaTeX: symbols and powers in maths, special characters escaped; a dash for None."""
     if value is None:
-        return MISSING
-    text = SIGNS.sub(lambda found: IN_MATHS[found[0]], RAISED.sub(r"$^{\1}$", str(value).translate(TEX)))
+        return EMPTY_CELL
+    text = SIGNS.sub(lambda match: IN_MATHS[match[0]], ESCAPED_POWER.sub(r"$^{\1}$", str(value).translate(TEX)))
     return SYMBOL.sub(symbol_in_tex, text).replace("$$", "")
 
 
-def symbol_in_tex(found: re.Match[str]) -> str:
+def symbol_in_tex(match: re.Match[str]) -> str:
     """Set a symbol with its subscript, such as t_left or dtheta_1, in maths."""
-    rate, letter, below = found.groups()
+    rate, letter, below = match.groups()
     letter = rf"\{letter}" if letter in LETTERS else letter
     below = below if len(below) == 1 else rf"\mathrm{{{below}}}"
     letter = rf"\dot{{{letter}}}" if rate else letter

@@ -4,25 +4,25 @@ import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from walkerlab.views.report.tables import in_lines, of_records
+from walkerlab.views.report.tables import in_lines, record_table
 
 INDENT = "  "
-COLUMNS = 100
+PARAGRAPH_WIDTH = 100
 """Line width of a paragraph, characters."""
 LONGEST_ROW, ENDS = 12, 4
 """Longest row shown in full, and values shown at each end of longer ones."""
 
 
-def described_summary(summary: Mapping[str, Any], indent: str = INDENT, short: bool = False) -> Iterator[str]:
+def describe_summary(summary: Mapping[str, Any], indent: str = INDENT, short: bool = False) -> Iterator[str]:
     """Yield one line per key, nested values below it, and rows of objects as a table.
 
-    short  leave out the middle of long rows of numbers and of long tables
+    short  omit the middle of long rows and tables
     """
     widest = max((len(key) for key in summary), default=0)
     for key, value in summary.items():
         if isinstance(value, Mapping) and value:
             yield f"{indent}{key}"
-            yield from described_summary(value, indent + INDENT, short)
+            yield from describe_summary(value, indent + INDENT, short)
         elif isinstance(value, list) and value and all(isinstance(row, Mapping) for row in value):
             yield f"{indent}{key}"
             yield from (f"{indent}{INDENT}{line}" for line in table(value))
@@ -40,14 +40,14 @@ def cut(value: Any) -> Any:
 
 def table(rows: Sequence[Mapping[str, Any]]) -> list[str]:
     """Tabulate objects with their keys as heads, and name the keys that are too wide."""
-    cells = of_records(rows, in_words)
+    cells = record_table(rows, in_words)
     long = [column.title for column in cells.columns if column.wide]
     return [*in_lines(cells), f"with --json also: {', '.join(long)}"] if long else in_lines(cells)
 
 
 def paragraph(text: str) -> list[str]:
     """Wrap prose without breaking words."""
-    return textwrap.wrap(text, COLUMNS, break_long_words=False, break_on_hyphens=False)
+    return textwrap.wrap(text, PARAGRAPH_WIDTH, break_long_words=False, break_on_hyphens=False)
 
 
 def in_words(value: Any) -> str:

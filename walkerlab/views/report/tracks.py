@@ -13,12 +13,12 @@ from walkerlab.config.reads import RigidConfig
 from walkerlab.pipeline.store.content import Group
 
 SAMPLES_A_SECOND = 150
-LEGS = (0, 1)
-OF_THE_WALKER = {
+LEG_INDICES = (0, 1)
+WALKER_CHANNELS = {
     "time": "t", "hip_along_m": "hx", "hip_height_m": "hy", "torso_angle": "u", "stance_leg": "s",
     "kinetic_J": "ke", "potential_J": "pe", "mechanical_J": "me",
 }  # fmt: skip
-OF_A_LEG = {
+LEG_CHANNELS = {
     "foot_along_m": "fx", "foot_height_m": "fy", "knee_along_m": "kx", "knee_height_m": "ky",
     "angle": "a", "velocity": "v", "shank_angle": "b",
     "normal_force_N": "n", "friction_force_N": "d", "penetration_m": "p",
@@ -59,12 +59,12 @@ class Track:
         bins = np.floor(time / gap).astype(np.int64)
         first = np.flatnonzero(np.diff(bins, prepend=-1))
         jumps = np.flatnonzero(np.diff(time) <= 0.0)
-        kept = {*first.tolist(), *jumps.tolist(), *(jumps + 1).tolist(), time.size - 1}
+        samples = {*first.tolist(), *jumps.tolist(), *(jumps + 1).tolist(), time.size - 1}
         if "n0" in self.channels:
             load = self["n0"] + self["n1"]
             ends = [*first[1:].tolist(), time.size]
-            kept |= {begin + int(load[begin:end].argmax()) for begin, end in zip(first.tolist(), ends, strict=True)}
-        chosen = sorted(kept)
+            samples |= {begin + int(load[begin:end].argmax()) for begin, end in zip(first.tolist(), ends, strict=True)}
+        chosen = sorted(samples)
         return Track({name: values[chosen] for name, values in self.channels.items()})
 
     def packed(self) -> str:
@@ -76,14 +76,14 @@ def track_in(trajectory: Group | None) -> Track | None:
     """Read the motion from a stored trajectory; None if it lacks joint positions."""
     if trajectory is None or "hip_along_m" not in trajectory.variables or trajectory["time"].size < 2:
         return None
-    there = trajectory.variables.keys()
-    channels = {channel: trajectory[name] for name, channel in OF_THE_WALKER.items() if name in there}
-    if "stance_leg" in there:
-        channels[OF_THE_WALKER["stance_leg"]] = trajectory["stance_leg"] - 1
-    of_legs = {name: channel for name, channel in OF_A_LEG.items() if name in there}
-    channels |= {f"{channel}{leg}": trajectory[name][:, leg] for name, channel in of_legs.items() for leg in LEGS}
-    if {"penetration_m", "slip_velocity_m_s"} <= there:
-        for leg in LEGS:
+    names = trajectory.variables.keys()
+    channels = {channel: trajectory[name] for name, channel in WALKER_CHANNELS.items() if name in names}
+    if "stance_leg" in names:
+        channels[WALKER_CHANNELS["stance_leg"]] = trajectory["stance_leg"] - 1
+    by_leg = {name: channel for name, channel in LEG_CHANNELS.items() if name in names}
+    channels |= {f"{channel}{leg}": trajectory[name][:, leg] for name, channel in by_leg.items() for leg in LEG_INDICES}
+    if {"penetration_m", "slip_velocity_m_s"} <= names:
+        for leg in LEG_INDICES:
             touching = trajectory["penetration_m"][:, leg] > 0.0
             velocity = trajectory["slip_velocity_m_s"][:, leg]
             channels[f"q{leg}"] = slip_since_touch(trajectory["time"], velocity, touching)

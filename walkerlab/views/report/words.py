@@ -6,7 +6,7 @@ from walkerlab.labels import join_words
 from walkerlab.physics.energy_channels import CHANNELS
 from walkerlab.views.prose import Prose, parts
 from walkerlab.views.report import numbers
-from walkerlab.views.report.outcomes import ERRORS, USUAL, ends, off_by, walks
+from walkerlab.views.report.outcomes import DEFAULT_CHECK, ERRORS, describe_error, ends, walks
 from walkerlab.views.report.symbols import in_signs
 
 
@@ -15,10 +15,10 @@ def in_row(text: str) -> str:
     return join_words(parts(text))
 
 
-WRITTEN = (
+TEMPLATE_FUNCTIONS = (
     *(numbers.number, numbers.fixed, numbers.quantity, numbers.length, numbers.whole, numbers.span),
-    *(numbers.count, join_words, numbers.power_of_ten, in_row, in_signs, ends, walks, off_by, len),
+    *(numbers.count, join_words, numbers.power_of_ten, in_row, in_signs, ends, walks, describe_error, len),
 )
 """Functions available to the templates."""
-KNOWN = {"CHANNELS": CHANNELS, "ERRORS": ERRORS, "USUAL": USUAL}
-words = Prose(Path(__file__).parent / "templates" / "words", WRITTEN, KNOWN)
+TEMPLATE_CONSTANTS = {"CHANNELS": CHANNELS, "ERRORS": ERRORS, "DEFAULT_CHECK": DEFAULT_CHECK}
+words = Prose(Path(__file__).parent / "templates" / "words", TEMPLATE_FUNCTIONS, TEMPLATE_CONSTANTS)

@@ -8,7 +8,7 @@ from walkerlab.evidence.benchmarks.engines import rows as engines
 from walkerlab.evidence.benchmarks.engines.rows import OWN_LAW, SAME_LAW
 from walkerlab.views.report.blocks import Paragraph, Section, Statement, Statements
 from walkerlab.views.report.numbers import NONE, fixed, number, power_of_ten
-from walkerlab.views.report.results import Results, of_stage
+from walkerlab.views.report.results import Results, stage_section
 from walkerlab.views.report.tables import Column, Table, grouped, measured, table
 from walkerlab.views.report.words import words
 
@@ -16,7 +16,7 @@ EXPERIMENT_TITLES = {SAME_LAW: "same law", OWN_LAW: "own contact"}
 Row = Mapping[str, Any]
 
 
-@of_stage("engines", "rows")
+@stage_section("engines", "rows")
 def section(_results: Results, summary: Row) -> Section | None:
     """Build the conclusions and a table for each experiment; None if the stage did not run."""
     concluded = [

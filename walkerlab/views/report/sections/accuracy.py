@@ -8,18 +8,17 @@ from walkerlab.labels import join_words
 from walkerlab.outcome import Outcome
 from walkerlab.views.report.blocks import COSTS, Gallery, PageBlock, Paragraph, Section, Statement, Statements
 from walkerlab.views.report.numbers import NONE, number, power_of_ten, whole
-from walkerlab.views.report.results import Results, of_stage
+from walkerlab.views.report.results import Results, stage_section
 from walkerlab.views.report.tables import Cell, Column, Table, grouped, table
 from walkerlab.views.report.words import words
 
 Row = Mapping[str, Any]
 
 
-@of_stage("accuracy", "reference")
+@stage_section("accuracy", "reference")
 def section(results: Results, summary: Row) -> Section | None:
-    """Tabulate the methods for each scene, with conclusions, references and omitted runs."""
-    told = {scene: summary["conclusions"][scene].removeprefix(f"{scene}: ") for scene in summary["reference"]}
-    concluded = tuple(Statement(scene, text[:1].upper() + text[1:]) for scene, text in told.items())
+    conclusions = {scene: summary["conclusions"][scene].removeprefix(f"{scene}: ") for scene in summary["reference"]}
+    concluded = tuple(Statement(scene, text[:1].upper() + text[1:]) for scene, text in conclusions.items())
     references = [{"scene": scene, **entry} for scene, entry in summary["reference"].items()]
     nearest = {scene: run for scene in summary["reference"] if (run := nearest_library(summary, scene))}
     blocks: tuple[PageBlock, ...] = (
@@ -42,34 +41,33 @@ def section(results: Results, summary: Row) -> Section | None:
 
 
 def costs(summary: Row) -> Table:
-    """Tabulate the run time of each method at each error level, by scene."""
     levels = sorted({float(level) for best in summary["best"].values() for level in best}, reverse=True)
     columns = (
         Column("method", "method"),
-        *(Column(f"ms for {power_of_ten(at, 1)}", f"{at}", with_spread, numeric=True) for at in levels),
+        *(Column(f"ms for {power_of_ten(level, 1)}", f"{level}", format_time, numeric=True) for level in levels),
         Column("smallest error", "smallest_error", numeric=True),
-        Column("right-hand sides there", "rhs_evaluations", whole, numeric=True),
-        Column("end not reached", "failures", wide=True),
+        Column("right-hand sides", "rhs_evaluations", whole, numeric=True),
+        Column("failed runs", "failures", wide=True),
     )
-    methods = {scene: list(methods_of(summary, scene, levels)) for scene in summary["reference"]}
+    methods = {scene: list(method_rows(summary, scene, levels)) for scene in summary["reference"]}
     note = words("accuracy.costs", summary)
     return table("Shortest run time for each error, by method", columns, methods, note=note)
 
 
-def methods_of(summary: Row, scene: str, levels: Sequence[float]) -> Iterator[Row]:
-    """Yield the methods of a scene, each with its shortest run (ms) per error level and its smallest error.
+def method_rows(summary: Row, scene: str, levels: Sequence[float]) -> Iterator[Row]:
+    """Yield the methods of a scene, each with its shortest run per error level and its smallest error.
 
-    What the reference is known to bounds what can be told of an error.
+    Errors below the uncertainty of the reference are shown as upper bounds.
     """
-    best, known = summary["best"].get(scene, {}).values(), float(summary["reference"][scene]["agreement"])
+    best, bound = summary["best"].get(scene, {}).values(), float(summary["reference"][scene]["agreement"])
     for method, runs in grouped((row for row in summary["rows"] if row["scene"] == scene), "method").items():
         ended = [run for run in runs if run["error"] is not None]
         exact: Row = min(ended, key=lambda run: float(run["error"]), default={})
         error = exact.get("error")
-        failed = [f"{ended_as(run)} at {power_of_ten(run['tolerance'], 1)}" for run in runs if run["error"] is None]
+        failed = [f"{failure_text(run)} at {power_of_ten(run['tolerance'], 1)}" for run in runs if run["error"] is None]
         yield {
             "method": Cell(method, "good" if method in best else None),
-            "smallest_error": number(error, 2) if error is None or error > known else f"≤ {number(known, 2)}",
+            "smallest_error": number(error, 2) if error is None or error > bound else f"≤ {number(bound, 2)}",
             "rhs_evaluations": exact.get("rhs_evaluations"),
             "failures": join_words(failed),
             **{
@@ -81,7 +79,7 @@ def methods_of(summary: Row, scene: str, levels: Sequence[float]) -> Iterator[Ro
         }
 
 
-def with_spread(run: Row | None) -> Cell:
+def format_time(run: Row | None) -> Cell:
     """Format a run's median time (ms), with the range if it was repeated."""
     if run is None:
         return Cell(NONE)
@@ -90,19 +88,18 @@ def with_spread(run: Row | None) -> Cell:
     return Cell(median if alone else f"{median} ({least} to {largest})", value=1e3 * run["wall_s"])
 
 
-def ended_as(run: Row) -> str:
-    return "budget used up" if run["outcome"] == Outcome.BUDGET_EXHAUSTED.label else str(run["outcome"])
+def failure_text(run: Row) -> str:
+    return "budget exhausted" if run["outcome"] == Outcome.BUDGET_EXHAUSTED.label else str(run["outcome"])
 
 
 def nearest_library(summary: Row, scene: str) -> Row | None:
     """Return the library run that ends closest to the reference, or None."""
     runs = [row for row in summary["rows"] if row["scene"] == scene and row["error"] is not None]
-    of_libraries = [row for row in runs if row["method"].startswith(("scipy", "cvode"))]
-    return min(of_libraries, key=lambda row: float(row["error"]), default=None)
+    library_runs = [row for row in runs if row["method"].startswith(("scipy", "cvode"))]
+    return min(library_runs, key=lambda row: float(row["error"]), default=None)
 
 
-def whose(reference: Row) -> str:
-    """Name the origin and tolerance of a reference."""
+def reference_origin(reference: Row) -> str:
     if reference["from_outside"]:
         return "heyoka, at machine precision"
     spent = f", {whole(reference['rhs_evaluations'])} right-hand sides"
@@ -112,7 +109,7 @@ def whose(reference: Row) -> str:
 REFERENCE_COLUMNS = (
     Column("scene", "scene"),
     Column("reference", "method"),
-    Column("by", whose),
+    Column("computed by", reference_origin),
     Column("second method", "second_method"),
     Column("difference", "agreement", partial(number, digits=2), numeric=True),
 )
@@ -122,12 +119,12 @@ NOT_RUN_COLUMNS = (
     Column("scene", "scene"),
     Column("method", "method"),
     Column("tolerances", "tolerances", lambda values: join_words(power_of_ten(value, 1) for value in values)),
-    Column("why", "why", wide=True),
+    Column("reason", "why", wide=True),
 )
 
 
 def not_run(summary: Row) -> Table:
     """Tabulate the omitted tolerances, a row per reason."""
-    found = grouped(summary.get("not_run", []), "scene", "method", "why").values()
-    rows = [{**entries[0], "tolerances": [float(one["tolerance"]) for one in entries]} for entries in found]
+    groups = grouped(summary.get("not_run", []), "scene", "method", "why").values()
+    rows = [{**entries[0], "tolerances": [float(entry["tolerance"]) for entry in entries]} for entries in groups]
     return table("Not run", NOT_RUN_COLUMNS, rows, wordy=True)

@@ -9,7 +9,7 @@ from walkerlab.views.report.blocks import COSTS, Paragraph, Section
 from walkerlab.views.report.gaits import symbol, works
 from walkerlab.views.report.numbers import NONE, fixed, length, number, quantity
 from walkerlab.views.report.outcomes import tone
-from walkerlab.views.report.results import Results, of_stage
+from walkerlab.views.report.results import Results, stage_section
 from walkerlab.views.report.symbols import in_signs
 from walkerlab.views.report.tables import Cell, Column, Table, measured, side_by_side, table
 from walkerlab.views.report.words import words
@@ -17,9 +17,8 @@ from walkerlab.views.report.words import words
 Summary = Mapping[str, Any]
 
 
-@of_stage("tune", "adjustment")
+@stage_section("tune", "adjustment")
 def section(results: Results, summary: Summary) -> Section | None:
-    """Report the verdict on the adjustment, with its tables."""
     changed = results.claims or summary["adjustment"]["needed"]
     blocks = (
         Paragraph(words("adjustment.explained", summary, results.claims)),
@@ -31,7 +30,7 @@ def section(results: Results, summary: Summary) -> Section | None:
     return Section.of("adjustment", "The parameter adjustment", blocks, words("adjustment.needed", summary))
 
 
-ORDER_COLUMNS = (Column("knob"), Column("observed orders, towards the limit", wide=True))
+ORDER_COLUMNS = (Column("parameter"), Column("observed orders, towards the limit", wide=True))
 
 
 def limit(results: Results) -> Section | None:
@@ -42,11 +41,11 @@ def limit(results: Results) -> Section | None:
     note = words("adjustment.factors", pushes)
     titles = words.terms("adjustment.distances").items()
     columns = [measured(title, key, partial(number, digits=3)) for key, title in titles]
-    settings = {f"Towards the rigid limit: {name}": found["settings"] for name, found in reaches.items()}
+    settings = {f"Towards the rigid limit: {name}": reach["settings"] for name, reach in reaches.items()}
     rows = [[name, ", ".join(fixed(order, 2) for order in values) or NONE] for name, values in orders.items()]
     blocks = (
-        *(table(caption, columns, found, note=note) for caption, found in settings.items()),
-        table("How fast the period converges when one knob is turned", ORDER_COLUMNS, rows),
+        *(table(caption, columns, rungs, note=note) for caption, rungs in settings.items()),
+        table("Convergence of the period when one parameter changes", ORDER_COLUMNS, rows),
     )
     return Section.of("limit", "Towards the rigid limit", blocks, words("adjustment.reached", reaches, pushes), COSTS)
 
@@ -57,18 +56,18 @@ def starts_table(results: Results, summary: Summary) -> Table:
     caption, note, head = "The start before and after the adjustment", "", "coordinate"
     if results.claims:
         caption, head = "Table 2 again: the start before and after the adjustment", "row"
-        note = "The paper's percentages are those of the ADAMS value, without saying so."
+        note = "The paper's percentages are relative to the ADAMS value, which it does not state."
     named = in_signs if results.claims else symbol
     first = Column(head, lambda row: f"{named(row['name'])} ({row['unit']})")
-    beside = (
+    value_columns = (
         Column(title, key, partial(number, digits=3 if "percent" in key else 6), numeric=True)
         for key, title in words.terms("adjustment.starts", results.claims).items()
     )
-    return table(caption, (first, *beside), rows, note=note)
+    return table(caption, (first, *value_columns), rows, note=note)
 
 
-LOST = {
-    "damping": ("to damping", "in the impact, all"),
+LOSSES = {
+    "damping": ("to damping", "all in the impact"),
     "friction": ("to friction", "none"),
     "knee_strikes": ("in the knee's strike", "in the strike"),
     "knee_stop": ("in the knees' stops", "none"),
@@ -76,10 +75,10 @@ LOST = {
 """Energy losses per step: stored name, label, and the rigid model's counterpart."""
 
 
-def lost(channel: str, gait: Summary) -> float | Cell | None:
+def lost_energy(channel: str, gait: Summary) -> float | Cell | None:
     """Return the energy (J) that a gait loses in a channel; None for knees that lose nothing."""
-    into = gait["lost_J"].get(channel)
-    return into if into or channel in ("damping", "friction") else None
+    energy = gait["lost_J"].get(channel)
+    return energy if energy or channel in ("damping", "friction") else None
 
 
 def factors(multipliers: Sequence[tuple[float, float]]) -> str:
@@ -97,33 +96,31 @@ GAIT_LINES = (
     Column("stable", "stable"),
     Column("slip a step", "slip_m", length),
     *(
-        Column(f"energy lost {said}", partial(lost, channel), partial(quantity, unit="J"))
-        for channel, (said, _) in LOST.items()
+        Column(f"energy lost {label}", partial(lost_energy, channel), partial(quantity, unit="J"))
+        for channel, (label, _) in LOSSES.items()
     ),
     *works(number),
 )
 
 
 def gait_table(summary: Summary, rigid: Summary) -> Table:
-    """Tabulate the contact gait next to the rigid one."""
     gait = summary["gait"]
     note = f"Section of the contact gait: {gait['section']}."
-    losses = {channel: Cell(said) for channel, (_, said) in LOST.items() if lost(channel, gait) is not None}
-    beside = {**rigid, "slip_m": Cell("none"), "lost_J": losses}
-    gaits = {"contact model": gait, "rigid model": beside}
+    losses = {channel: Cell(label) for channel, (_, label) in LOSSES.items() if lost_energy(channel, gait) is not None}
+    rigid_column = {**rigid, "slip_m": Cell("none"), "lost_J": losses}
+    gaits = {"contact model": gait, "rigid model": rigid_column}
     return side_by_side("The contact model's own gait", GAIT_LINES, gaits, note=note)
 
 
 MARGIN_COLUMNS = (
-    Column("scaled", "name", in_signs),
+    Column("scaled velocity", "name", in_signs),
     Column("last factor that walks", "factor", number, numeric=True),
-    Column("beyond", "beyond", lambda outcome: outcome or "nothing, as far as searched"),
-    Column("steps there", "steps_beyond", lambda steps: "" if steps is None else str(steps), numeric=True),
+    Column("outcome beyond", "beyond", lambda outcome: outcome or "no failure in the search range"),
+    Column("steps beyond", "steps_beyond", lambda steps: "" if steps is None else str(steps), numeric=True),
 )
 
 
 def margins_table(summary: Summary) -> Table:
-    """Tabulate how far the start may be scaled."""
     rows = [{"name": name, **margin} for name, margin in (summary["adjustment"].get("margins") or {}).items()]
     return table("How far the start's velocities may change", MARGIN_COLUMNS, rows)
 
@@ -137,7 +134,6 @@ WALK_COLUMNS = (
 
 
 def walks_table(results: Results, summary: Summary) -> Table:
-    """Tabulate the walks of the procedure."""
     names = words.terms("adjustment.walks", "hinged" in summary["procedure"])
     walks = [{"walk": names[name], **walk} for name, walk in summary["procedure"].items() if walk is not None]
     if results.claims:

@@ -5,16 +5,16 @@ from collections.abc import Iterator, Mapping, Sequence
 from walkerlab.config.drives import drives_of
 from walkerlab.labels import join_words
 from walkerlab.scene.omissions import LeftOut
-from walkerlab.views.report.blocks import CASES, COSTS, PAPER, Cards, Paragraph, Section, Terms
+from walkerlab.views.report.blocks import CASES, COSTS, PAPER_PAGE, Cards, Paragraph, Section, Terms
 from walkerlab.views.report.numbers import count
 from walkerlab.views.report.results import Results
 from walkerlab.views.report.tables import Column, table
 from walkerlab.views.report.words import words
 
 TITLES = {
-    PAPER: "Number by number: the paper and what is found here",
+    PAPER_PAGE: "The paper's values compared with computed ones",
     CASES: "Extreme cases and known problems",
-    COSTS: "Accuracy: what an error costs, and the rigid limit",
+    COSTS: "Accuracy: run time against error, and the rigid limit",
 }
 """Titles of the further pages, in order."""
 
@@ -22,31 +22,30 @@ TITLES = {
 def further(results: Results, pages: Mapping[str, Sequence[Section]]) -> Section | None:
     """Link to the further pages, each with its sections' findings, and announce pending results."""
     items = []
-    for file, found in pages.items():
-        silent = file == PAPER and not results.claims
-        items.append((file, TITLES[file], "" if silent else " ".join(filter(None, (one.finding for one in found)))))
+    for file, sections in pages.items():
+        findings = (section.finding for section in sections if file != PAPER_PAGE or results.claims)
+        items.append((file, TITLES[file], " ".join(filter(None, findings))))
     waiting = (Paragraph(words("closing.pending", name), "waiting") for name in results.pending)
     title = "Further pages" if items else "Still to come"
     return Section.of("further", title, (Cards(tuple(items)) if items else None, *waiting))
 
 
 def glossary(results: Results) -> Section:
-    told = words.terms("closing.glossary", results.config.contact is not None, drives_of(results.config))
-    return Section("glossary", "Glossary", (Terms(told),), "The words of this report, in a line each.")
+    meanings = words.terms("closing.glossary", results.config.contact is not None, drives_of(results.config))
+    return Section("glossary", "Glossary", (Terms(meanings),), "Terms used in this report.")
 
 
 def left_out(results: Results) -> Section | None:
-    """Tabulate results, and parts of results, that were not computed."""
-    parts = [LeftOut(**one) for stored in results.stored.values() for one in stored.summary.get("left_out", [])]
-    rows = list(rows_of(list(dict.fromkeys((*results.absent, *parts)))))
-    columns = [Column("what"), Column("why", wide=True), Column("saves", wide=True)]
-    missing = table("What was left out of this scene, why, and what that saves", columns, rows, wordy=True)
-    nothing = Paragraph("" if rows else "Nothing is left out: every result of the pipeline is there.")
-    finding = f"{count(len(rows), 'thing')}, each with its reason." if rows else "Nothing."
-    return Section.of("left-out", "Left out", (missing, nothing), finding)
+    parts = [LeftOut(**entry) for stored in results.stored.values() for entry in stored.summary.get("left_out", [])]
+    rows = list(rows_by_reason(list(dict.fromkeys((*results.absent, *parts)))))
+    columns = [Column("result"), Column("reason", wide=True), Column("saves", wide=True)]
+    missing = table("Omitted results, with reasons and savings", columns, rows, wordy=True)
+    nothing = Paragraph("" if rows else "Every result of the pipeline is available.")
+    finding = f"{count(len(rows), 'item')}, each with its reason." if rows else "None."
+    return Section.of("left-out", "Omitted results", (missing, nothing), finding)
 
 
-def rows_of(missing: Sequence[LeftOut]) -> Iterator[tuple[str, str, str]]:
+def rows_by_reason(missing: Sequence[LeftOut]) -> Iterator[tuple[str, str, str]]:
     """Yield one row per reason: what is missing, then what depends on it."""
     reasons = {absent.why for absent in missing}
     # the reason at the bottom of one such as 'it needs simulate: it needs fixedpoint: no gait'

@@ -13,26 +13,24 @@ from walkerlab.pipeline.store.content import Group
 from walkerlab.views.report.blocks import Diagram, GaitMark, Paragraph, Section, Walker
 from walkerlab.views.report.gaits import complex_number
 from walkerlab.views.report.numbers import number, whole
-from walkerlab.views.report.results import Results, of_stage
+from walkerlab.views.report.results import Results, stage_section
 from walkerlab.views.report.tables import Column, Table, table
 from walkerlab.views.report.tracks import sampling_gap, track_in
 from walkerlab.views.report.words import words
 
 
-@of_stage("continuation", "branches")
+@stage_section("continuation", "branches")
 def section(results: Results, summary: Mapping[str, Any]) -> Section | None:
-    """Show branches, bifurcations and chaos; None without branches."""
-    first, *others = findings(summary) or [words("families.followed", summary["branches"])]
-    blocks = (Paragraph(" ".join(others)), gait_diagram(results), bifurcations(summary))
+    first, *rest = findings(summary) or [words("families.followed", summary["branches"])]
+    blocks = (Paragraph(" ".join(rest)), gait_diagram(results), bifurcations(summary))
     return Section.of("families", f"Families of gaits over {parameter(summary)}", blocks, first)
 
 
 def findings(summary: Mapping[str, Any]) -> list[str]:
-    """Summarise the families, one sentence per item."""
     stable = {}
     for model in ("rigid", "contact"):
-        alone = [one for one in summary["branches"] if (one["model"], one["period"]) == (model, 1)]
-        if ranges := [pair for one in alone for pair in one["stable_ranges"]]:
+        alone = [branch for branch in summary["branches"] if (branch["model"], branch["period"]) == (model, 1)]
+        if ranges := [pair for branch in alone for pair in branch["stable_ranges"]]:
             stable[model] = max(ranges, key=lambda pair: pair[1] - pair[0])
     return words.parts("families.findings", summary, stable)
 
@@ -41,7 +39,7 @@ def bifurcations(summary: Mapping[str, Any]) -> Table:
     columns = (
         Column("kind", "kind"),
         Column("model", "model"),
-        Column("steps of the gait", "period", numeric=True),
+        Column("period (steps)", "period", numeric=True),
         Column(with_unit(parameter(summary), summary["unit"]), "value", lambda value: number(value, 9), numeric=True),
         Column("critical multiplier", "multiplier", lambda parts: complex_number(*parts), numeric=True),
     )
@@ -52,10 +50,10 @@ def parameter(summary: Mapping[str, Any]) -> str:
     return axis_label(str(summary["over"]))
 
 
-MODEL = "rigid"
-CLEAR = 16.0
+DIAGRAM_MODEL = "rigid"
+MIN_MARK_DISTANCE = 16.0
 """Minimum distance between two marks in diagram units: 1.5 times their width, for touch screens."""
-GAP = 3.0
+SAMPLING_FACTOR = 3.0
 """Sampling interval relative to that of the walk: these gaits are only looked at."""
 
 
@@ -83,13 +81,13 @@ def gait_diagram(results: Results) -> Diagram | None:
     """Plot step periods over the parameter, with marks for gaits whose motion is stored; None without any."""
     summary = results.summary("continuation")
     branches: list[Group] = []
-    while (branch := results.group("continuation", f"{MODEL}/branch_{len(branches)}")) is not None:
+    while (branch := results.group("continuation", f"{DIAGRAM_MODEL}/branch_{len(branches)}")) is not None:
         branches.append(branch)
     moving = [
         (branch, place, motion)
         for number, branch in enumerate(branches)
         for place in range(branch["value"].size)
-        if (motion := results.group("continuation", f"{MODEL}/branch_{number}/motion_{place}")) is not None
+        if (motion := results.group("continuation", f"{DIAGRAM_MODEL}/branch_{number}/motion_{place}")) is not None
     ]
     if not moving:
         return None
@@ -98,7 +96,7 @@ def gait_diagram(results: Results) -> Diagram | None:
     across = DiagramAxis(value, Diagram.LEFT, Diagram.WIDTH - Diagram.RIGHT)
     up = DiagramAxis(period, Diagram.HEIGHT - Diagram.BOTTOM, Diagram.TOP)
     pushes = results.config.push_off.impulse_N_s != 0.0
-    gap, unit = GAP * sampling_gap(results.config), summary["unit"]
+    gap, unit = SAMPLING_FACTOR * sampling_gap(results.config), summary["unit"]
     marks = []
     for branch, place, motion in moving:
         x, y = float(branch["value"][place]), float(branch["step_period"][place][0])
@@ -107,7 +105,7 @@ def gait_diagram(results: Results) -> Diagram | None:
         if track is not None:
             name = words("families.mark", int(motion.attrs["steps"]), x, unit, stable)
             strikes = motion["time"][1:][np.diff(motion["step"]) > 0].round(6)
-            walker = Walker(name, MODEL, track.thinned(gap), tuple(strikes.tolist()), (), pushes=pushes)
+            walker = Walker(name, DIAGRAM_MODEL, track.thinned(gap), tuple(strikes.tolist()), (), pushes=pushes)
             marks.append(GaitMark(across.place(x), up.place(y), stable, walker, float(motion.attrs["slope_rad"])))
     over = parameter(summary)
     return Diagram(
@@ -122,12 +120,12 @@ def gait_diagram(results: Results) -> Diagram | None:
 
 def apart(marks: Sequence[GaitMark]) -> tuple[GaitMark, ...]:
     """Select marks that do not cover one another, stable gaits first."""
-    kept: list[int] = []
+    chosen: list[int] = []
     for place in sorted(range(len(marks)), key=lambda place: not marks[place].stable):
         x, y = marks[place].x, marks[place].y
-        if all(math.hypot(marks[other].x - x, marks[other].y - y) >= CLEAR for other in kept):
-            kept.append(place)
-    return tuple(marks[place] for place in sorted(kept))
+        if all(math.hypot(marks[index].x - x, marks[index].y - y) >= MIN_MARK_DISTANCE for index in chosen):
+            chosen.append(place)
+    return tuple(marks[place] for place in sorted(chosen))
 
 
 def curves(
@@ -137,9 +135,9 @@ def curves(
     stable = branch["stable"].astype(bool)
     bounds = [0, *(int(place) + 1 for place in np.flatnonzero(np.diff(stable))), stable.size]
     for begin, end in pairwise(bounds):
-        here = slice(max(0, begin - 1), end)
-        for period in branch["step_period"][here].T:
-            points = zip(branch["value"][here], period, strict=True)
+        stretch = slice(max(0, begin - 1), end)
+        for period in branch["step_period"][stretch].T:
+            points = zip(branch["value"][stretch], period, strict=True)
             yield tuple((across.place(float(x)), up.place(float(y))) for x, y in points), bool(stable[begin])
 
 
@@ -150,11 +148,10 @@ ATTRACTOR_COLUMNS = (
 )
 
 
-@of_stage("basin")
+@stage_section("basin")
 def basin(_results: Results, summary: Mapping[str, Any]) -> Section | None:
-    """Report the basins of attraction."""
-    told = (words("basin.shares", summary), *words.parts("basin.grounds", summary))
-    return Section.of("basin", "Basins of attraction", (*map(Paragraph, told), attractors(summary)))
+    sentences = (words("basin.shares", summary), *words.parts("basin.grounds", summary))
+    return Section.of("basin", "Basins of attraction", (*map(Paragraph, sentences), attractors(summary)))
 
 
 def attractors(summary: Mapping[str, Any]) -> Table:

@@ -5,25 +5,25 @@ from functools import partial
 from typing import Any
 
 from walkerlab.views.report.blocks import Paragraph, Section
-from walkerlab.views.report.gaits import SETS, STATE, gait_table, state_at, symbol
+from walkerlab.views.report.gaits import COMPASS_STATE, SETS, gait_table, state_at, symbol
 from walkerlab.views.report.numbers import fixed
-from walkerlab.views.report.results import Results, of_stage
+from walkerlab.views.report.results import Results, stage_section
 from walkerlab.views.report.tables import Column, Table, measured, table
 from walkerlab.views.report.words import words
 
 
-@of_stage("fixedpoint")
+@stage_section("fixedpoint")
 def section(results: Results, summary: Mapping[str, Any]) -> Section | None:
-    names = summary.get("state_names", STATE)
-    shown = SETS if results.claims else (summary["equations"],)
+    names = summary.get("state_names", COMPASS_STATE)
+    set_names = SETS if results.claims else (summary["equations"],)
     sets = summary.get("equation_sets", {summary.get("equations"): summary})
-    found = {name: sets[name] for name in shown if name in sets}
-    gaits = {name: one for name, one in found.items() if one.get("state")}
-    every = {name: one["gaits"] for name, one in found.items() if one.get("gaits")}
+    selected = {name: sets[name] for name in set_names if name in sets}
+    gaits = {name: gait for name, gait in selected.items() if gait.get("state")}
+    every = {name: gait["gaits"] for name, gait in selected.items() if gait.get("gaits")}
     blocks = (
         Paragraph(words("gait.disturbances", summary)),
         gait_table(gaits, names, note=words("gait.equations") if len(gaits) > 1 else "") if gaits else None,
-        every_gait(every, names) if any(len(one) > 1 for one in every.values()) else None,
+        every_gait(every, names) if any(len(gait) > 1 for gait in every.values()) else None,
     )
     return Section.of("gait", "The gait", blocks, words("gait.finding", summary))
 
@@ -42,8 +42,8 @@ def every_gait(sets: Mapping[str, Sequence[Mapping[str, Any]]], names: Sequence[
     )
     gaits = {
         "" if list(sets) == ["corrected"] else SETS[name]: [
-            {**one, "gait": place} for place, one in enumerate(found, 1)
+            {**gait, "gait": place} for place, gait in enumerate(selected, 1)
         ]
-        for name, found in sets.items()
+        for name, selected in sets.items()
     }
-    return table("Every gait of one step that was found", columns, gaits)
+    return table("All one-step gaits found", columns, gaits)

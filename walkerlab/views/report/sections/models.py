@@ -9,11 +9,11 @@ from walkerlab.views.report.tables import Column, measured, table
 from walkerlab.views.report.words import words
 
 DIFFERENCE_COLUMNS = (
-    Column("contact model less rigid model"),
+    Column("contact minus rigid model"),
     Column("angle (rad)", written=partial(number, digits=3), numeric=True),
     Column("velocity (rad/s)", written=partial(number, digits=3), numeric=True),
 )
-RELEASED = {
+RELEASE_TEXTS = {
     "compression": "when the leading foot stops sinking in, both knees rigid in the impact",
     "touch": "at the leading foot's first touch, free in the impact",
 }
@@ -35,14 +35,14 @@ def section(results: Results) -> Section | None:
     angle, velocity = summary.get("max_angle_error_rad"), summary.get("max_velocity_error_rad_s")
     if not angle or not velocity:
         return None
-    rows = [(said, angle[key], velocity.get(key)) for key, said in words.terms("models.ways").items() if key in angle]
+    rows = [(label, angle[key], velocity.get(key)) for key, label in words.terms("models.ways").items() if key in angle]
     note = words("models.differences", summary.get("orbit_distance"))
-    walks = [{**walk, "released": RELEASED[name]} for name, walk in summary.get("releases", {}).items()]
+    walks = [{**walk, "released": RELEASE_TEXTS[name]} for name, walk in summary.get("releases", {}).items()]
     if walks:
         walks.insert(0, {**summary["steps"]["gait"], "released": "rigid gait"})
     blocks = (
         table("Largest differences of the legs’ motions", DIFFERENCE_COLUMNS, rows, note=note),
-        table("What the instant of release decides", RELEASE_COLUMNS, walks, note=words("models.releases")),
+        table("Effect of the release instant", RELEASE_COLUMNS, walks, note=words("models.releases")),
     )
     return Section.of("models", "The models compared", blocks, words("models.finding", angle))
 
@@ -55,4 +55,4 @@ def departure(results: Results) -> str:
     summary = results.summary("compare")
     if "steps" not in summary or summary["steps"]["contact"]["period_s"] is None:
         return ""
-    return words("models.departure", summary, RELEASED)
+    return words("models.departure", summary, RELEASE_TEXTS)

@@ -7,14 +7,14 @@ import numpy as np
 
 from walkerlab.pipeline.store.footholds import ground_levels
 from walkerlab.views.report.blocks import MAIN, Gallery, Pad, Paragraph, Player, Section, Walker
-from walkerlab.views.report.outcomes import CONTACT, MODELS, RIGID, WALKED, ends
+from walkerlab.views.report.outcomes import CONTACT_STAGE, MODEL_NAMES, RIGID_STAGE, WALKED_LABEL, ends
 from walkerlab.views.report.results import Results
 from walkerlab.views.report.tracks import Array, Track, sampling_gap, track_in
 from walkerlab.views.report.words import words
 
-MAX_STEPS = 10
-STYLES = {RIGID: "rigid", CONTACT: "contact"}
-DEEPEST_IN_VIEW = 5.0
+MAX_SHOWN_STEPS = 10
+WALKER_STYLES = {RIGID_STAGE: "rigid", CONTACT_STAGE: "contact"}
+CLOSEUP_DEPTHS = 5.0
 """Height of the close-up relative to the largest penetration outside impacts."""
 STILL_VIEW_OF_RIGID = 4e-3
 """Height of the close-up for a foot that does not sink in, leg lengths."""
@@ -24,18 +24,18 @@ def section(results: Results) -> Section | None:
     return Section.of("motion", "The walk", (player(results),))
 
 
-def player(results: Results, most: int = MAX_STEPS) -> Player | None:
+def player(results: Results, most: int = MAX_SHOWN_STEPS) -> Player | None:
     """Show the first steps of both models' walks; None if no motion was stored."""
-    touches = [results.summary(stage).get("touch_times_s", []) for stage in MODELS]
-    # of the model that takes longest over them
+    touches = [results.summary(stage).get("touch_times_s", []) for stage in MODEL_NAMES]
+    # of the slower model
     end = max((times[most - 1] for times in touches if len(times) >= most), default=math.inf)
-    found = {stage: track_in(results.group(stage, "trajectory")) for stage in MODELS}
-    tracks = {stage: track.until(end) for stage, track in found.items() if track is not None}
+    by_stage = {stage: track_in(results.group(stage, "trajectory")) for stage in MODEL_NAMES}
+    tracks = {stage: track.until(end) for stage, track in by_stage.items() if track is not None}
     if not tracks:
         return None
     config, torso = results.config, results.config.walker.torso
     length = config.walker.leg_length_m
-    steps = {MODELS[stage].lower(): len(results.summary(stage)["step_periods_s"]) for stage in tracks}
+    steps = {MODEL_NAMES[stage].lower(): len(results.summary(stage)["step_periods_s"]) for stage in tracks}
     return Player(
         title="The walk.",
         caption=words("motion.caption", max(steps.values()), most, config.push_off.impulse_N_s != 0.0),
@@ -46,7 +46,7 @@ def player(results: Results, most: int = MAX_STEPS) -> Player | None:
         foot_radius_m=config.walker.foot_radius_m,
         torso_m=0.0 if torso is None else torso.above_hip_m,
         ordinary_force=weight(tracks),
-        closeup_m=closeup(tracks.get(CONTACT), length),
+        closeup_m=closeup(tracks.get(CONTACT_STAGE), length),
         pads=pads(results),
         ground=ground(results),
         view=view(tuple(tracks.values()), config.slope_rad, margin=0.1 * length),
@@ -57,12 +57,12 @@ def walker(results: Results, stage: str, track: Track) -> Walker:
     summary = results.summary(stage)
     strikes = [time for time in summary["touch_times_s"] if time <= track.end + 1e-9]
     return Walker(
-        name=MODELS[stage],
-        style=STYLES[stage],
+        name=MODEL_NAMES[stage],
+        style=WALKER_STYLES[stage],
         track=track.thinned(sampling_gap(results.config)),
         strikes=tuple(round(time, 6) for time in strikes),
         stills=stills(track, strikes),
-        ends="" if summary["outcome"] == WALKED else ends(summary["outcome"]),
+        ends="" if summary["outcome"] == WALKED_LABEL else ends(summary["outcome"]),
         pushes=results.config.push_off.impulse_N_s != 0.0,
     )
 
@@ -93,21 +93,21 @@ def closeup(track: Track | None, length: float) -> float:
         return STILL_VIEW_OF_RIGID * length
     depths = np.concatenate((track["p0"], track["p1"]))
     loaded = depths[depths > 0.0]
-    return DEEPEST_IN_VIEW * float(np.quantile(loaded, 0.98)) if loaded.size else STILL_VIEW_OF_RIGID * length
+    return CLOSEUP_DEPTHS * float(np.quantile(loaded, 0.98)) if loaded.size else STILL_VIEW_OF_RIGID * length
 
 
 def pads(results: Results) -> tuple[Pad, ...]:
     """Return the pads that the contact model walks on; empty on a plane."""
-    terrain = results.group(CONTACT, "terrain")
+    terrain = results.group(CONTACT_STAGE, "terrain")
     if terrain is None or "left_m" not in terrain.variables:
         return ()
     left, right, leg = (terrain[name].tolist() for name in ("left_m", "right_m", "leg"))
-    return tuple((round(one[0], 4), round(one[1], 4), int(one[2]) - 1) for one in zip(left, right, leg, strict=True))
+    return tuple((round(pad[0], 4), round(pad[1], 4), int(pad[2]) - 1) for pad in zip(left, right, leg, strict=True))
 
 
 def ground(results: Results) -> tuple[tuple[float, float], ...]:
     """Return the start along the slope and the height of each ground level (m); empty on even ground."""
-    for stage in reversed(MODELS):
+    for stage in reversed(MODEL_NAMES):
         steps = results.group(stage, "steps")
         levels = None if steps is None else ground_levels(steps)
         if levels is not None:
@@ -129,6 +129,6 @@ def view(tracks: tuple[Track, ...], slope: float, margin: float) -> tuple[int, i
 
 
 def figures(results: Results) -> Section | None:
-    shown = tuple(picture for picture in results.pictures if picture.page == MAIN)
+    main_pictures = tuple(picture for picture in results.pictures if picture.page == MAIN)
     numbered = (Paragraph(words("figures.numbered")),) if results.claims else ()
-    return Section("figures", "Figures", (*numbered, Gallery(shown))) if shown else None
+    return Section("figures", "Figures", (*numbered, Gallery(main_pictures))) if main_pictures else None

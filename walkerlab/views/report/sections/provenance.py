@@ -11,39 +11,39 @@ from walkerlab.views.report.words import words
 
 
 def section(results: Results) -> Section | None:
-    made = [result for result in results.stored.values() if isinstance(result, Stored)]  # read from files
-    note = "A key is made of config, inputs and code; equal keys give equal digests. Timings are in neither."
+    stored = [result for result in results.stored.values() if isinstance(result, Stored)]  # read from files
+    note = "A key covers config, inputs and code; equal keys give equal digests. Neither includes timings."
     blocks = (
         Code("The config of this run, defaults included", to_yaml(results.config).strip()),
-        table("When each result was made", RESULT_COLUMNS, made),
-        software_table(made),
-        table("What determines each result, and what it holds", DIGEST_COLUMNS, made, note=note),
-        Code("Command lines", "\n".join(dict.fromkeys(result.provenance.command_line for result in made))),
+        table("Computation of each result", RESULT_COLUMNS, stored),
+        software_table(stored),
+        table("Keys and digests of the results", DIGEST_COLUMNS, stored, note=note),
+        Code("Command lines", "\n".join(dict.fromkeys(result.provenance.command_line for result in stored))),
     )
-    finding = words("closing.provenance", [result.provenance for result in made])
-    return Section.of("provenance", "Where this comes from", blocks, finding)
+    finding = words("closing.provenance", [result.provenance for result in stored])
+    return Section.of("provenance", "Provenance", blocks, finding)
 
 
 RESULT_COLUMNS = (
     Column("result", lambda result: result.identity.stage),
     Column(
-        "begun (UTC)", lambda result: result.provenance.started_utc.partition(".")[0].replace("T", " "), numeric=True
+        "started (UTC)", lambda result: result.provenance.started_utc.partition(".")[0].replace("T", " "), numeric=True
     ),
-    Column("took (s)", lambda result: f"{result.provenance.took_s:.2f}", numeric=True),
+    Column("run time (s)", lambda result: f"{result.provenance.took_s:.2f}", numeric=True),
     Column("seed", lambda result: result.provenance.seed, numeric=True),
     Column("complete", lambda result: result.complete),
 )
 DIGEST_COLUMNS = (
     Column("result", lambda result: f"{result.identity.stage}.h5"),
     Column("stage key (sha256)", lambda result: result.identity.key, wide=True),
-    Column("digest of its content", lambda result: result.digest(), wide=True),
+    Column("content digest", lambda result: result.digest(), wide=True),
 )
 
 
-def software_table(made: Sequence[Stored]) -> Table:
+def software_table(stored: Sequence[Stored]) -> Table:
     """Tabulate software versions and platform; one column unless results differ."""
     used: dict[tuple[tuple[str, str], ...], list[str]] = {}
-    for result in made:
+    for result in stored:
         origin = result.provenance
         versions = {"walkerlab": origin.package_version, "commit": origin.git_commit or "unknown"}
         versions |= {**dict(sorted(origin.library_versions.items())), "platform": origin.platform}

@@ -5,78 +5,76 @@ from typing import Any
 
 from walkerlab.views.report.blocks import PageBlock, Paragraph, Section
 from walkerlab.views.report.numbers import length, number, whole
-from walkerlab.views.report.results import Results, of_stage
+from walkerlab.views.report.results import Results, stage_section
 from walkerlab.views.report.tables import Column, Table, table
 from walkerlab.views.report.words import words
 
-SHOWN = 12
+MAX_DERIVATIVES = 12
 """Derivatives per table."""
-BUILT = ("walker.", "push_off.")
+BUILDER_KEYS = ("walker.", "push_off.")
 """Prefixes of the keys that a builder can change."""
 NORM = "gait_sensitivity_norm_scaled"
 """Quantity used to rank parameters; scaled, since a norm in s/m falls with leg length by its dimension alone."""
-MODEL = Column("model", "model")
-NORMS = (
-    MODEL,
+MODEL_COLUMN = Column("model", "model")
+NORM_COLUMNS = (
+    MODEL_COLUMN,
     Column("disturbance", "disturbance"),
-    Column("of the", lambda row: row["indicator"].replace("_", " ")),
+    Column("indicator", lambda row: row["indicator"].replace("_", " ")),
     Column("norm", "value", lambda value: number(value, 6), numeric=True),
     Column("unit", "unit"),
     Column("direct", "direct", lambda value: number(value, 5), numeric=True),
     Column("scaled", "scaled", lambda value: number(value, 6), numeric=True),
 )
-BOUND = {"lower-bound": "> "}
-ROUGH = (
-    MODEL,
+BOUND_SIGNS = {"lower-bound": "> "}
+ROUGH_COLUMNS = (
+    MODEL_COLUMN,
     Column("roughness", "roughness_m", length, numeric=True),
-    Column("mean steps", lambda row: BOUND.get(row["method"], "") + number(row["mean_steps"], 4), numeric=True),
+    Column("mean steps", lambda row: BOUND_SIGNS.get(row["method"], "") + number(row["mean_steps"], 4), numeric=True),
     Column("standard error", "standard_error", lambda value: number(value, 2), numeric=True),
     Column("walks", "walks", whole, numeric=True),
     Column("cut off", "capped", whole, numeric=True),
     Column("at step", "cut_off_at", whole, numeric=True),
     Column("method", "method"),
 )
-MOVES = (
-    MODEL,
-    Column("number of the config", "to"),
-    Column("of the gait", "of"),
+DERIVATIVE_COLUMNS = (
+    MODEL_COLUMN,
+    Column("parameter", "to"),
+    Column("gait quantity", "of"),
     Column("derivative", "value", number, numeric=True),
     Column("unit", "unit"),
     Column("% per %", "relative", lambda value: number(value, 3), numeric=True),
 )
 
 
-BEST = (
-    Column("number of the config", "to"),
+OPTIMUM_COLUMNS = (
+    Column("parameter", "to"),
     Column("best", "best", lambda value: number(value, 7), numeric=True),
 )
-KEPT = (
-    Column("kept", "quantity"),
-    Column("from", "from", number, numeric=True),
-    Column("to", "to", number, numeric=True),
-    Column("there", "value", lambda value: number(value, 6), numeric=True),
+CONSTRAINT_COLUMNS = (
+    Column("quantity", "quantity"),
+    Column("minimum", "from", number, numeric=True),
+    Column("maximum", "to", number, numeric=True),
+    Column("at the optimum", "value", lambda value: number(value, 6), numeric=True),
 )
 
 
-def designed(summary: Mapping[str, Any]) -> list[str | Table]:
-    """Describe the optimum of a design, with its parameters and constraints."""
+def design_blocks(summary: Mapping[str, Any]) -> list[str | Table]:
     rows = [{"to": key, "best": value} for key, value in summary["best"].items()]
-    kept = table("Kept within bounds", KEPT, summary["constraints"])
-    return [*words.parts("design.findings", summary), table("Optimum", BEST, rows), kept]
+    constraints = table("Constraints", CONSTRAINT_COLUMNS, summary["constraints"])
+    return [*words.parts("design.findings", summary), table("Optimum", OPTIMUM_COLUMNS, rows), constraints]
 
 
-@of_stage("robustness", "gaits")
+@stage_section("robustness", "gaits")
 def section(_results: Results, summary: Mapping[str, Any]) -> Section | None:
-    first, *others = findings(summary) or [""]
-    blocks: tuple[PageBlock, ...] = (Paragraph(" ".join(others)), *tables(summary))
-    return Section.of("robustness", "What the gait withstands", blocks, first)
+    first, *rest = findings(summary) or [""]
+    blocks: tuple[PageBlock, ...] = (Paragraph(" ".join(rest)), *tables(summary))
+    return Section.of("robustness", "Robustness of the gait", blocks, first)
 
 
 def findings(summary: Mapping[str, Any]) -> list[str]:
-    """Summarise the findings, one sentence per item."""
     first: dict[str, Mapping[str, Any]] = {}
     for row in summary["sensitivity"]:
-        if row["of"] == NORM and row["to"].startswith(BUILT) and ranks(row):
+        if row["of"] == NORM and row["to"].startswith(BUILDER_KEYS) and ranks(row):
             first.setdefault(row["model"], row)
     return words.parts("robustness.findings", summary, [*first.values()])
 
@@ -87,19 +85,18 @@ def ranks(row: Mapping[str, Any]) -> bool:
 
 
 def tables(summary: Mapping[str, Any]) -> list[Table]:
-    """Tabulate sensitivity norms, rough ground and derivatives."""
     rows = summary["sensitivity"]
     ranked = sorted((row for row in rows if ranks(row)), key=lambda row: -abs(row["relative"]))  # of both models
-    built = [row for row in ranked if row["to"].startswith(BUILT)]
-    around = [row for row in ranked if not row["to"].startswith(BUILT)]
+    built = [row for row in ranked if row["to"].startswith(BUILDER_KEYS)]
+    environment = [row for row in ranked if not row["to"].startswith(BUILDER_KEYS)]
     zeros = [row for row in rows if row["of"] == NORM and "relative" not in row and row["value"] is not None]
-    first, shown = [row for row in built if row["of"] == NORM][:SHOWN], built[:SHOWN]
-    left = len(rows) - len(shown) - len(around[:SHOWN])
+    first, top = [row for row in built if row["of"] == NORM][:MAX_DERIVATIVES], built[:MAX_DERIVATIVES]
+    left = len(rows) - len(top) - len(environment[:MAX_DERIVATIVES])
     return [
-        table("Gait sensitivity norms", NORMS, summary["gait_sensitivity_norm"], note=words("robustness.norms")),
-        table("Steps on rough ground", ROUGH, summary["rough_ground"], note=words("robustness.rough")),
-        table("What to change first", MOVES, first, note=words("robustness.first")),
-        table("What moves the gait", MOVES, shown, note=words("robustness.moves", left)),
-        table("Gravity, slope and ground", MOVES, around[:SHOWN]),
-        table("Parameters that are zero", MOVES, zeros, note=words("robustness.zeros")),
+        table("Gait sensitivity norms", NORM_COLUMNS, summary["gait_sensitivity_norm"], note=words("robustness.norms")),
+        table("Steps on rough ground", ROUGH_COLUMNS, summary["rough_ground"], note=words("robustness.rough")),
+        table("Most effective changes", DERIVATIVE_COLUMNS, first, note=words("robustness.first")),
+        table("Effect of the parameters on the gait", DERIVATIVE_COLUMNS, top, note=words("robustness.moves", left)),
+        table("Gravity, slope and ground", DERIVATIVE_COLUMNS, environment[:MAX_DERIVATIVES]),
+        table("Parameters that are zero", DERIVATIVE_COLUMNS, zeros, note=words("robustness.zeros")),
     ]
