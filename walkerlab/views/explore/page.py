@@ -12,8 +12,8 @@ from walkerlab.views.report.blocks import Player
 
 TEMPLATES = Path(__file__).parent / "templates"
 SEEN = (
-    "The broad walker is the rigid model, the narrow one the contact model. Each leg is a line from hip to foot;"
-    " leg 2 is hollow. The ground's forces are arrows; a red one is a push-off."
+    "Wide outline: rigid model; narrow: contact model. Each leg is a line from hip to foot;"
+    " leg 2 is hollow. Arrows are ground forces; a red arrow is a push-off."
 )
 
 
@@ -43,7 +43,7 @@ def rendered(base: ExploredConfig) -> tuple[str, str]:
         started=started(base),
         configs=choices(base),
         anchor="walk",
-        # Whatever is asked for later is drawn in this one.
+        # An empty player, filled by the script.
         block=Player("The walk.", SEEN, "The walker", (), 0.0, 1.0, 0.0, 0.0, 1.0, 1.0, (), (), (0, 0, 1, 1)),
         # The only texts that are markup already: files of this package.
         style=Markup(report.source("style.css") + (TEMPLATES / "explore.css").read_text(encoding="utf-8")),

@@ -70,7 +70,7 @@ class Desk:
                     if deaths > 1:
                         return failed(500, error.message, error.advice)
                 except Exception as error:
-                    return failed(500, f"this is a bug of walkerlab: {type(error).__name__}: {error}")
+                    return failed(500, f"this is a bug in walkerlab: {type(error).__name__}: {error}")
                 else:
                     if answer != SUPERSEDED:
                         return answer
@@ -163,7 +163,7 @@ class Server(ThreadingHTTPServer):
 def saved(question: ExploredConfig, name: Any) -> Answered:
     """Save the config in the working folder; never overwrite a file."""
     if not isinstance(name, str) or not name or Path(name).name != name:
-        return failed(400, "a config is saved under a name without folders, such as mine.yaml")
+        return failed(400, "give a file name without folders, such as mine.yaml")
     path = Path(name).with_suffix(".yaml")
     try:
         text = walks.as_file(question, path.stem)
@@ -172,7 +172,7 @@ def saved(question: ExploredConfig, name: Any) -> Answered:
     except ConfigError as error:
         return question.refused(error)
     except FileExistsError:
-        return failed(409, f"{path} exists already.", "Choose another name: no file is written over.")
+        return failed(409, f"{path} exists already.", "Choose another name; files are never overwritten.")
     except OSError as error:
         return failed(500, f"{path} cannot be written: {error.strerror}.")
     return 200, {"file": str(path.resolve()), "text": text}
@@ -213,18 +213,20 @@ class Handler(BaseHTTPRequestHandler):
         try:
             length = int(self.headers.get("Content-Length", 0))
             if not 0 <= length <= LONGEST_BODY:
-                return self.answer(*failed(413, f"at most {LONGEST_BODY} bytes"))
+                return self.answer(*failed(413, f"a request has at most {LONGEST_BODY} bytes"))
             self.answer(*self.server.answer(urlsplit(self.path).path, json.loads(self.rfile.read(length))))
         except (ValueError, AttributeError, TypeError, RecursionError):
             form = '{"set": {KEY: VALUE}, "models": ["rigid", "contact"]}'
-            self.answer(*failed(400, f"a question is JSON: {form}; its `config`, if any, is one that the page offers"))
+            self.answer(
+                *failed(400, f"a request is JSON: {form}; `config`, if given, must be one of the page's")
+            )
 
     def local(self) -> bool:
         """Whether the request comes from this server's own page; otherwise answer 403."""
         own = f"http://{self.server.host}"
         if self.headers.get("Host") == self.server.host and self.headers.get("Origin", own) == own:
             return True
-        self.answer(*failed(403, "only pages of this server may ask"))
+        self.answer(*failed(403, "only this server's own page may send requests"))
         return False
 
     def cookie(self) -> str:
@@ -239,7 +241,7 @@ class Handler(BaseHTTPRequestHandler):
         """Whether the token is right; otherwise answer 401."""
         if secrets.compare_digest(token.encode(), self.server.token.encode()):
             return True
-        self.answer(*failed(401, "the token of the printed address is missing", "Open the address as it was printed."))
+        self.answer(*failed(401, "the token is missing", "Open the address as it was printed."))
         return False
 
     def answer(self, status: int, value: Mapping[str, Any]) -> None:

@@ -28,7 +28,7 @@ from walkerlab.views.report.sections import motion
 STAGES = {"rigid": "simulate", "contact": "contact-sim"}
 Answered = tuple[int, dict[str, Any]]
 """HTTP status and JSON object."""
-SUPERSEDED: Final[Answered] = 409, {"error": {"message": "a newer question was asked meanwhile", "advice": ""}}
+SUPERSEDED: Final[Answered] = 409, {"error": {"message": "superseded by a newer request", "advice": ""}}
 MAX_STEPS = 100
 """Maximum number of steps shown, enough to see one gait change into another."""
 GIVE_WAY = signal.SIGUSR1

@@ -162,7 +162,7 @@ def draw_branches(results: Results) -> Drawn:
     """
     summary = results[STAGE].summary
     branches, settled, close = list(branches_of(results)), list(clouds(results)), close_of(results)
-    parts = {"(a) all of it": None} | ({"(b) where gaits change": close} if close else {})
+    parts = {"(a) full range": None} | ({"(b) bifurcations": close} if close else {})
     if is_narrow():
         figure, stack = panels(5.6 * len(parts), 2 * len(parts))
         both = stack.reshape(len(parts), 2).T
@@ -225,7 +225,7 @@ def label_births(axes: Axes, births: Sequence[tuple[float, int]]) -> None:
     if births:
         above = axes.secondary_xaxis("top")
         above.set_xticks([value for value, _ in births], [str(period) for _, period in births])
-        above.set_xlabel("steps of gaits that are born in folds")
+        above.set_xlabel("steps per gait born in a fold")
 
 
 def close_of(results: Results) -> tuple[float, float] | None:
@@ -320,7 +320,7 @@ def draw_multipliers(results: Results) -> Drawn:
     right.set(
         xlabel=parameter_of(results), ylabel="magnitude", ylim=(0.0, 2.0 * FARTHEST), title="(b) over the parameter"
     )
-    end = entry("largest value of the span", color=BLACK, linestyle="none", marker=">", markersize=4)
+    end = entry("largest parameter value", color=BLACK, linestyle="none", marker=">", markersize=4)
     add_legend(figure, [*key, end])
     found: dict[tuple[str, str], list[float]] = {}
     for one in results[STAGE].summary["bifurcations"]:
@@ -373,9 +373,9 @@ def region_kinds(regions: Group) -> list[Kind]:
     other = (period > 0) & ~np.isin(period, list(DOUBLED))
     kinds = [(colour, f"{n} step{'s' if n > 1 else ''}", period == n) for n, colour in DOUBLED.items()]
     kinds += [
-        (OTHER_PERIOD, "another number of steps", other),
-        (APERIODIC, "never repeats itself", period == 0),
-        (NOTHING, "no walk goes on", period < 0),
+        (OTHER_PERIOD, "other number of steps", other),
+        (APERIODIC, "aperiodic", period == 0),
+        (NOTHING, "no walking", period < 0),
     ]
     return [kind for kind in kinds if kind[2].any()]
 

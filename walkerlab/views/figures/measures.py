@@ -120,7 +120,7 @@ def upright(walker: CompassWalker | StraightLegs | Kneed) -> UprightLeg:
 
 def drawn(walker: AnyWalker, name: str, kind: str = "svg") -> bytes:
     """Draw the walker's dimensions as SVG, PDF or PNG bytes; equal walkers and names give equal bytes."""
-    title = f"The measures of a walker of type {walker.type}"
+    title = f"Dimensions of a walker of type {walker.type}"
     with styled():
         figure = of_parts(walker) if isinstance(walker, PartsWalker) else of_type(walker)
         return files_of(figure, name, title, [kind])[0]

@@ -162,9 +162,9 @@ def draw_shares(axes: Axes, steps: Group) -> None:
 FIGURE_18 = paper_figure(
     18,
     (
-        Need(STAGE, "rough_walk/trajectory", ("hip_along_m", "foot_along_m"), "no walk on rough ground was asked for"),
+        Need(STAGE, "rough_walk/trajectory", ("hip_along_m", "foot_along_m"), "no walk on rough ground was requested"),
         Need(STAGE, "rough_walk/steps", ("touch_along_m",), "the walk on rough ground takes no step"),
-        Need(STAGE, "rough_steps", ("steps",), "no walks on rough ground were asked for"),
+        Need(STAGE, "rough_steps", ("steps",), "no walks on rough ground were requested"),
     ),
     on_rough_ground,
 )

@@ -159,7 +159,7 @@ def legend(figure: Figure, walks: list[Walk], *more: Artist) -> None:
     add_legend(figure, [*models, *(strike_entry(look) for look in looks), *more])
 
 
-ADJUSTED = Need(TUNE_STAGE, "adjusted", ("time", "velocity"), "no start of those searched walks")
+ADJUSTED = Need(TUNE_STAGE, "adjusted", ("time", "velocity"), "no start in the search leads to walking")
 FROM_RIGID = Need(TUNE_STAGE, "rigid_start", ("time", "velocity"), "the rigid model took no step")
 
 
@@ -181,7 +181,7 @@ def draw_adjusted(results: Results) -> Drawn:
         times = touch_times(result[group])
         whole.append(Walk(look, end, times.size, times, result[group]))
     walks, extent = shown(whole)
-    links = ("link 1", "link 2") if named else ("the leg that swings first", "the leg that stands first")
+    links = ("link 1", "link 2") if named else ("the first swing leg", "the first stance leg")
     titles = [f"({'ab'[leg]}) angular velocity of {link}" for leg, link in enumerate(links)]
     figure, _ = in_time(walks, 1.9, [("velocity", "velocity", leg, title) for leg, title in enumerate(titles)])
     legend(figure, walks)
