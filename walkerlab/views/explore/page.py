@@ -20,7 +20,7 @@ SEEN = (
 LONGEST_NAME = 60
 
 
-def started(base: ExploredConfig) -> str:
+def start_name(base: ExploredConfig) -> str:
     """Name the config from which the page was started."""
     name = base.called or base.config or DEFAULT
     changed = f"{name} with {', '.join(base.sets)}"
@@ -30,17 +30,17 @@ def started(base: ExploredConfig) -> str:
 def choices(base: ExploredConfig) -> list[str]:
     """List the other configs offered: built-in ones, and the YAML files in the working folder."""
     own = sorted(path.name for path in Path().glob("*.yaml"))
-    return [name for name in (*builtin_names(), *own) if name != started(base)]
+    return [name for name in (*builtin_names(), *own) if name != start_name(base)]
 
 
-def rendered(base: ExploredConfig) -> tuple[str, str]:
+def render_page(base: ExploredConfig) -> tuple[str, str]:
     """Return the page's HTML and its content security policy."""
     own = (TEMPLATES / "explore.js").read_text(encoding="utf-8").strip()
     script = f'\n"use strict";\n{report.source("player.js")}\n{own}\n'
     environment = report.environment()
     environment.loader = FileSystemLoader([report.TEMPLATES, TEMPLATES])
     html = environment.get_template("explore.html.j2").render(
-        started=started(base),
+        start_name=start_name(base),
         configs=choices(base),
         anchor="walk",
         # An empty player, filled by the script.

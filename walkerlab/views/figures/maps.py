@@ -50,7 +50,7 @@ def patches(kinds: Iterable[tuple[str, str]]) -> list[Artist]:
 
 def ends_among(outcomes: Any) -> list[tuple[str, str]]:
     """Return colours and labels of the outcomes that occur."""
-    return [(OUTCOME_TEXTS[one].colour, one.label) for one in map(Outcome, np.unique(outcomes).tolist())]
+    return [(OUTCOME_TEXTS[item].colour, item.label) for item in map(Outcome, np.unique(outcomes).tolist())]
 
 
 def edges(centres: NDArray[Any]) -> NDArray[Any]:
@@ -82,7 +82,7 @@ MAP = Need(
     TUNE_STAGE, "map", (SWING, STANCE, "outcome", "steps", "rigid_outcome", "rigid_steps"), "no walk was computed"
 )
 
-OUTCOMES: Final = discrete([OUTCOME_TEXTS[one].colour for one in Outcome])
+OUTCOMES: Final = discrete([OUTCOME_TEXTS[item].colour for item in Outcome])
 MODELS: Final = (("", "(a) contact model"), ("rigid_", "(b) rigid model"))
 STEP_LEVELS: Final = (0.5, 1.5, 2.5, 4.5)
 
@@ -187,8 +187,8 @@ def fates(outcome: NDArray[Any], attractor: NDArray[Any], summary: Mapping[str, 
     kinds.append(
         (OUTCOME_TEXTS[Outcome.WALKED].colour, said, (outcome == Outcome.WALKED) & (attractor == NO_ATTRACTOR))
     )
-    failures = [one for one in Outcome if one is not Outcome.WALKED]
-    kinds += [(OUTCOME_TEXTS[one].colour, one.label, outcome == one) for one in failures]
+    failures = [item for item in Outcome if item is not Outcome.WALKED]
+    kinds += [(OUTCOME_TEXTS[item].colour, item.label, outcome == item) for item in failures]
     return [kind for kind in kinds if kind[2].any()]
 
 
@@ -264,7 +264,7 @@ def draw_stiction(results: Results) -> Drawn:
 def draw_step(results: Results) -> Drawn:
     """Plot verdict (left) and error (right); the caption names the walk and counts the verdicts."""
     cells = results[MAPS]["step"]
-    names = [one.partition(" ")[2] for one in str(cells.attrs["verdicts"]).split(", ")]
+    names = [item.partition(" ")[2] for item in str(cells.attrs["verdicts"]).split(", ")]
     made = OverStiffness(cells, STEP, ("(a) outcome", "(b) error of the final state"))
     verdict = np.array(names, dtype=object)[cells["verdict"]]
     made.draw(made.left, cells["verdict"], **discrete([VERDICT_COLOURS[name] for name in names]))
@@ -280,9 +280,11 @@ def draw_step(results: Results) -> Drawn:
     return made.figure, (results[MAPS].summary, cells.attrs)
 
 
-NEVER = "this map was not computed"
-STICTION_NEED = Need(MAPS, "stiction", (STIFFNESS, VELOCITY, "outcome", "sharper_outcome", "compared", "error"), NEVER)
-STEP_NEED = Need(MAPS, "step", (STIFFNESS, STEP, "verdict", "error"), NEVER)
+NOT_COMPUTED = "this map was not computed"
+STICTION_NEED = Need(
+    MAPS, "stiction", (STIFFNESS, VELOCITY, "outcome", "sharper_outcome", "compared", "error"), NOT_COMPUTED
+)
+STEP_NEED = Need(MAPS, "step", (STIFFNESS, STEP, "verdict", "error"), NOT_COMPUTED)
 STABILITY = (
     Illustration("stability-stiction", (STICTION_NEED,), draw_stiction),
     Illustration("stability-step", (STEP_NEED,), draw_step),
