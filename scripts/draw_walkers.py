@@ -8,7 +8,7 @@ from pathlib import Path
 
 from walkerlab.config.loader import load
 from walkerlab.config.schema import Config
-from walkerlab.views.figures.measures import drawn
+from walkerlab.views.figures.measures import draw_measures
 
 ROOT = Path(__file__).parent.parent
 IMAGES = ROOT / "docs" / "images"
@@ -26,10 +26,10 @@ PICTURES: dict[str, tuple[str, tuple[str, ...]]] = {
 def pictures() -> dict[str, bytes]:
     """The pictures of docs/walkers.md, by the name of their file."""
     found = {
-        f"walker-{name}.svg": drawn(load(Path(file), sets).config.walker, name)
+        f"walker-{name}.svg": draw_measures(load(Path(file), sets).config.walker, name)
         for name, (file, sets) in PICTURES.items()
     }
-    return {**found, "walker-parts.svg": drawn(own_parts().walker, "parts")}
+    return {**found, "walker-parts.svg": draw_measures(own_parts().walker, "parts")}
 
 
 def own_parts() -> Config:

@@ -90,7 +90,7 @@ def test_the_figure_of_the_docs_is_drawn(tmp_path, monkeypatch):
     steps = Group({"slip_m": Variable(np.array([5e-4, 6e-4]), ("step",), "m", "slip")})
     walk = SimpleNamespace(groups={"steps": steps})
     assert figure.why_left_out({"contact-sim": walk}, {}) is None
-    drawing = figure.drawn({"contact-sim": walk})
+    drawing = figure.render({"contact-sim": walk})
     assert b"slip (mm)" in drawing.svg
     assert drawing.caption.endswith("contact model, at most 0.6 mm.")
 

@@ -74,13 +74,13 @@ def test_a_panel_without_a_finished_walk_says_so():
     with styled():
         for figure, place in ((ERRORS, 1), (PERIODS, 0)):
             drawn = figure.draw(unfinished)[0]
-            assert [text.get_text() for text in drawn.axes[place].texts] == ["no walk came to its end"]
+            assert [text.get_text() for text in drawn.axes[place].texts] == ["no run reached the end"]
             assert as_file(drawn, "svg", figure.name, "")
 
 
 def test_captions_say_what_was_concluded_and_what_did_not_walk(results):
     assert "as a multiple of walkerlab's time" in ERRORS.caption(results)
-    assert "Not walked to the end: mujoco soft at 0.0005 s" in PERIODS.caption(results)
+    assert "Incomplete walks: mujoco soft at 0.0005 s" in PERIODS.caption(results)
 
 
 def test_a_run_without_the_stage_has_neither_figure_nor_section():

@@ -102,7 +102,7 @@ def test_a_picture_is_never_taken_for_that_of_other_numbers(page):
     typed(page, "slope_deg", "30")
     page.until(f"{SAID}.startsWith('No gait at a slope')")
     assert page.evaluate("document.querySelector('.scenes').hidden")
-    assert page.evaluate(f"{SHOWN} + {PERIOD}") == "Nothing walks: paper with slope_deg 30–"
+    assert page.evaluate(f"{SHOWN} + {PERIOD}") == "No walk: paper with slope_deg 30–"
 
 
 def test_any_other_key_is_found_and_turned(page):

@@ -60,13 +60,13 @@ def test_the_caption_tells_the_conclusion_the_reference_and_the_failures():
 
 def test_the_caption_says_what_a_method_is_measured_by_that_is_the_reference_too():
     results = measured_methods()
-    assert "itself is measured by" not in RIGID.caption(results)
+    assert "itself is measured against" not in RIGID.caption(results)
     results["accuracy"].summary["reference"]["rigid"] = {
         "method": "radau5",
         "second_method": "dop853",
         "agreement": 1e-12,
     }
-    assert "radau5 itself is measured by dop853." in RIGID.caption(results)
+    assert "radau5 itself is measured against dop853." in RIGID.caption(results)
 
 
 def test_every_method_of_the_registry_has_a_look_of_its_own():

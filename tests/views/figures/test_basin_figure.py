@@ -16,30 +16,30 @@ from walkerlab.views.report.sections.families import basin as section
 
 
 def test_walks_that_have_settled_from_their_first_step_on_are_drawn():
-    assert FIGURE.drawn(basin([0, UNREACHED], steps=0)).png.startswith(b"\x89PNG")
+    assert FIGURE.render(basin([0, UNREACHED], steps=0)).png.startswith(b"\x89PNG")
 
 
 def test_it_says_how_much_of_the_window_walks_and_where_to():
     results = basin([0, 0, 1, UNREACHED])
-    drawing = FIGURE.drawn(results)
+    drawing = FIGURE.render(results)
     assert drawing.png.startswith(b"\x89PNG")
-    assert "75 % of the window walk" in drawing.caption
-    assert "The gait of 1 step is reached from 6 cells, after 7 steps in the median." in drawing.caption
+    assert "75 % of the starts in the window lead to walking" in drawing.caption
+    assert "The gait of 1 step is reached from 6 cells, after a median of 7 steps." in drawing.caption
     for label in ("gait of 1 step", "gait of 2 steps", "fell", "rigid gait of one step"):
         assert label in drawing.svg.decode()
-    assert drawing.svg == FIGURE.drawn(results).svg
+    assert drawing.svg == FIGURE.render(results).svg
 
 
 def test_walks_that_settle_nowhere_are_told_apart():
-    drawing = FIGURE.drawn(basin([-2, UNREACHED], aperiodic=True))
-    assert "never repeats itself" in drawing.svg.decode()
+    drawing = FIGURE.render(basin([-2, UNREACHED], aperiodic=True))
+    assert "aperiodic" in drawing.svg.decode()
     assert "no walk settles on a gait" in drawing.svg.decode()
-    assert "6 cells still walk after 300 steps" in drawing.caption
+    assert "6 walks are still going after 300 steps" in drawing.caption
 
 
 def test_of_three_coordinates_the_middle_plane_is_drawn():
     config = load(None, ["basin.plane=[theta_2,dtheta_1,dtheta_2]", "basin.cells=[3,3,3]"]).config
-    assert "of which the middle plane is shown" in FIGURE.drawn(basin([0, UNREACHED], config=config)).caption
+    assert "of which the middle plane is shown" in FIGURE.render(basin([0, UNREACHED], config=config)).caption
 
 
 def test_attractors_of_one_period_have_letters():
@@ -79,7 +79,7 @@ def test_its_own_command_draws_it_at_once(tmp_path):
     artifact.write(tmp_path / "basin.h5", Content(made.groups, made.summary), made.identity, made.provenance)
     (path,) = plot.draw_at_once("basin", tmp_path, anew=True)
     assert path == tmp_path / "figures" / "figure-15.svg"
-    assert path.read_bytes() == FIGURE.drawn({"basin": made}).svg
+    assert path.read_bytes() == FIGURE.render({"basin": made}).svg
     path.write_text("as it was")
     assert plot.draw_at_once("basin", tmp_path, anew=False) == [path]
     assert path.read_text() == "as it was"

@@ -39,7 +39,7 @@ def plotted(figure):
 
 @pytest.mark.parametrize("figure", FIGURES, ids=[figure.name for figure in FIGURES])
 def test_the_same_families_give_the_same_bytes(figure):
-    assert figure.drawn(families()) == figure.drawn(families())
+    assert figure.render(families()) == figure.render(families())
 
 
 def test_curves_over_two_parameters_are_left_out_where_none_were_asked_for():
@@ -105,7 +105,7 @@ def test_the_captions_say_where_gaits_change():
 def test_the_plane_is_shaded_by_what_walks_settle_on():
     regions = families()["continuation"]["rigid/regions"]
     kinds = {name: where.sum() for _, name, where in region_kinds(regions)}
-    assert kinds == {"1 step": 3, "2 steps": 1, "never repeats itself": 1, "no walk goes on": 1}
+    assert kinds == {"1 step": 3, "2 steps": 1, "aperiodic": 1, "no walking": 1}
     assert "1 step in 50 %" in FIGURE_16.caption(families())
     assert len(plotted(FIGURE_16).axes[0].collections) == 1
 
@@ -113,10 +113,10 @@ def test_the_plane_is_shaded_by_what_walks_settle_on():
 def test_multipliers_beyond_the_axes_are_told():
     results = families()
     branch = next(group for path, group in results["continuation"].groups.items() if path.endswith("branch_0"))
-    assert "beyond the axes" not in FIGURE_14.caption(results)
+    assert "outside the axes" not in FIGURE_14.caption(results)
     branch["multiplier_real"].flags.writeable = True
     branch["multiplier_real"][-1] = -7.25
-    assert "Some lie beyond the axes, up to a magnitude of 7.25." in FIGURE_14.caption(results)
+    assert "Some multipliers lie outside the axes; the largest magnitude is 7.25." in FIGURE_14.caption(results)
 
 
 def test_gaits_part_from_a_flip_as_the_root_of_the_distance():

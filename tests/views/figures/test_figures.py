@@ -89,7 +89,7 @@ def test_a_walk_without_a_step_has_no_gait_cycle_but_can_be_drawn_in_time():
 def test_a_walk_that_ended_where_it_began_can_be_drawn():
     results = rigid_alone(simulate=first_sample_of(rigid(1, outcome="rejected", completed=0)))
     for figure in (NUMBERED[7], NUMBERED[9], NUMBERED[10]):
-        assert "0 steps (rejected)" in figure.drawn(results).caption
+        assert "0 steps (rejected)" in figure.render(results).caption
 
 
 def first_sample_of(result):
@@ -124,7 +124,7 @@ def test_every_figure_has_its_words_and_every_word_a_figure():
 
 @functools.cache
 def drawn_once():
-    return {figure.name: figure.drawn(everything()) for figure in FIGURES}
+    return {figure.name: figure.render(everything()) for figure in FIGURES}
 
 
 OWN_SETTINGS = "font.size: 20\nlines.linewidth: 9\nsvg.fonttype: path\naxes.grid: True\nfigure.dpi: 300\n"
@@ -135,7 +135,7 @@ from walkerlab.views.figures.registry import FIGURES
 for figure in FIGURES:
     if any(need.stage in ("tune", "continuation", "basin", "engines", "robustness") for need in figure.needs):
         continue
-    drawing = figure.drawn(everything())
+    drawing = figure.render(everything())
     print(figure.name, hashlib.sha256(drawing.svg + drawing.png).hexdigest())
 assert "matplotlib.pyplot" not in sys.modules, "pyplot has state, and opens windows"
 """

@@ -36,7 +36,7 @@ def test_a_step_loses_what_its_beginning_took_whatever_lies_between_two_samples(
     np.testing.assert_allclose(damping, [0.0, *[1.0] * 9], atol=1e-12)
     np.testing.assert_allclose(friction, 0.1 * damping, atol=1e-12)
     said = LOST.caption(both_models())
-    assert "1.1 J in the mean: 90.9 % to damping of the ground, 9.09 % to friction" in said
+    assert "1.1 J on average: 90.9 % to damping of the ground, 9.09 % to friction" in said
 
 
 def test_what_drives_a_walker_is_no_loss_and_hides_none():

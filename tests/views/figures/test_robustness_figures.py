@@ -45,7 +45,7 @@ def test_the_footholds_heights_stand_under_the_walker(rough):
     heights = rough["robustness"]["rough_walk/steps"]["foothold_height_m"]
     bars = [bar.get_height() for bar in figure.axes[1].patches]
     assert bars == pytest.approx([0.0, *(1e3 * heights)])
-    assert "rough by 2 mm" in robustness.FIGURE_18.drawn(rough).caption
+    assert "2 mm (s.d.) roughness" in robustness.FIGURE_18.render(rough).caption
 
 
 def test_without_walks_on_rough_ground_it_is_said_that_none_were_asked_for():
@@ -72,9 +72,9 @@ def swept(count=5):
 
 
 def test_over_one_number_both_models_are_drawn_and_the_least_disturbed_gait_is_named():
-    drawing = robustness.of_sweep(swept(), ("slope_deg",)).drawn({})
-    assert "the rigid model's gaits the one at 2 deg is disturbed least, with a norm of 20 s/m" in drawing.caption
-    assert "the contact model's gaits the one at 2 deg is disturbed least, with a norm of 21 s/m" in drawing.caption
+    drawing = robustness.sweep_illustration(swept(), ("slope_deg",)).render({})
+    assert "The rigid model's least sensitive gait is at 2 deg, with a norm of 20 s/m" in drawing.caption
+    assert "The contact model's least sensitive gait is at 2 deg, with a norm of 21 s/m" in drawing.caption
     assert "speed (m/s)" in drawing.svg.decode()
 
 
@@ -99,8 +99,8 @@ def test_ways_to_drive_a_walker_are_told_apart_by_what_is_not_zero():
         "slope_deg": [True, True, False, False],
         "impulse_N_s": [False, False, True, True],
     }
-    drawing = robustness.of_sweep(group, names).drawn({})
-    assert "With slope the least disturbed gait walks at 0.4 m/s, with a norm of 20 s/m" in drawing.caption
-    assert "With push-off the least disturbed gait walks at 0.6 m/s" in drawing.caption
+    drawing = robustness.sweep_illustration(group, names).render({})
+    assert "With slope the least sensitive gait walks at 0.4 m/s, with a norm of 20 s/m" in drawing.caption
+    assert "With push-off the least sensitive gait walks at 0.6 m/s" in drawing.caption
     assert robustness.actuations(driven([1.0, 2.0, 1.0, 0.0], [0.0, 0.0, 2.0, 4.0]), names) is None
     assert robustness.actuations(group, ("slope_deg",)) is None

@@ -114,7 +114,7 @@ def of(patch, look):
 def test_without_pads_the_ground_is_a_plane_and_the_caption_says_when_it_carries():
     results = both_models(**{"contact-sim": contact(pads=False)})
     assert not [patch for patch in drawn(FIGURE_6, results).patches if patch.get_hatch()]
-    assert "once it has passed the stance foot" in FIGURE_6.caption(results)
+    assert "after it has passed the stance foot" in FIGURE_6.caption(results)
     assert "lane of pads" in FIGURE_6.caption(both_models())
 
 

@@ -61,11 +61,11 @@ def test_a_map_ends_where_values_were_sampled_and_its_white_line_has_a_legend():
 
 def test_the_caption_tells_how_gaps_look():
     for masses, said in (
-        (3, "Marks at the bottom: no answer there."),
-        (8, "Where there is no answer the map is grey."),
+        (3, "Marks at the bottom: no answer."),
+        (8, "Grey: no answer."),
     ):
         group = swept(9, masses, answered=False)
-        made = illustration(group, "fixedpoint", PARAMETERS, PARAMETERS, ["spectral_radius"]).drawn({})
+        made = illustration(group, "fixedpoint", PARAMETERS, PARAMETERS, ["spectral_radius"]).render({})
         assert said in made.caption
         assert made.svg.startswith(b"<?xml")
 
@@ -102,5 +102,5 @@ def test_one_quantity_is_drawn_over_another():
     (curve,) = axes.lines
     np.testing.assert_array_equal((curve.get_xdata(), curve.get_ydata()), (speed, cost))
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("speed (m/s)", "cost of transport")
-    made = illustration(group, "fixedpoint", ["x"], ("x",), ["cost_of_transport"], "speed_m_s").drawn({})
+    made = illustration(group, "fixedpoint", ["x"], ("x",), ["cost_of_transport"], "speed_m_s").render({})
     assert made.caption.startswith("Cost over speed, for values of x: 3 answered.")

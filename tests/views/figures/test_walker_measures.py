@@ -14,7 +14,7 @@ from walkerlab.config.walkers import Kneed, PartsWalker, StraightLegs
 from walkerlab.views.cli.console import Console
 from walkerlab.views.cli.exports import Target, draw_walker
 from walkerlab.views.figures.canvas import settle, styled
-from walkerlab.views.figures.measures import drawn, of_parts, of_type, upright
+from walkerlab.views.figures.measures import draw_measures, draw_parts, draw_upright, upright
 
 ROOT = Path(__file__).parents[3]
 SCRIPT = runpy.run_path(str(ROOT / "scripts" / "draw_walkers.py"))
@@ -50,7 +50,7 @@ def test_every_picture_stands_in_the_docs(pictures):
 
 
 def test_every_length_of_the_walker_is_named_with_its_value():
-    shown = drawn(KNEED, "kneed").decode()
+    shown = draw_measures(KNEED, "kneed").decode()
     for limb, keys in (("thigh", ("mass_below_hip_m",)), ("shank", ("mass_below_knee_m",))):
         for key in ("length_m", "mass_kg", "mass_ahead_m", *keys):
             assert f"{limb}.{key}: {getattr(getattr(KNEED, limb), key):g}" in shown
@@ -115,8 +115,12 @@ def parts(radius=0.0, at=(0.0, 0.0)):
 
 def figures():
     for name, changed in OF_TYPES:
-        yield of_type(load(Path(name), changed).config.walker)
-    yield from (of_parts(load(Path("parts")).config.walker), of_parts(parts()), of_parts(parts(0.2, (0.0, -0.48))))
+        yield draw_upright(load(Path(name), changed).config.walker)
+    yield from (
+        draw_parts(load(Path("parts")).config.walker),
+        draw_parts(parts()),
+        draw_parts(parts(0.2, (0.0, -0.48))),
+    )
 
 
 @pytest.mark.parametrize("place", range(len(OF_TYPES) + 3))
@@ -135,7 +139,7 @@ def test_no_words_meet_or_leave_the_picture(place):
 
 
 def test_a_leg_of_parts_ends_on_its_arc():
-    (axes,) = of_parts(parts(0.2)).axes
+    (axes,) = draw_parts(parts(0.2)).axes
     sole, leg = (line for line in axes.lines if line.get_linewidth() == 2.0)
     low = int(np.argmin(sole.get_ydata()))
     assert (leg.get_xdata()[-1], leg.get_ydata()[-1]) == pytest.approx((sole.get_xdata()[low], sole.get_ydata()[low]))

@@ -158,11 +158,11 @@ def plotted(folder):
         [],
     )
     for figure in (one for one in FIGURES if one.why_left_out(known, {}) is None):
-        drawing = figure.drawn(known)
+        drawing = figure.render(known)
         files = {kind: f"{figure.name}.{kind}" for kind in ("svg", "png")}
         (folder / files["svg"]).write_bytes(drawing.svg)
         (folder / files["png"]).write_bytes(drawing.png)
-        figures.append({"title": drawing.title, "caption": drawing.caption, "alt": figure.seen, **files})
+        figures.append({"title": drawing.title, "caption": drawing.caption, "alt": figure.alt_text, **files})
     return stored("plot", {}, {"figures": figures})
 
 

@@ -17,8 +17,8 @@ from walkerlab.views.figures.walks import (
     STEPS_TAKEN_RIGID,
     TUNE_STAGE,
     claims_in,
+    first_strides,
     line,
-    shown,
     strike_entry,
     time_axes,
     walk_of,
@@ -50,7 +50,7 @@ def draw_differences(results: Results) -> Drawn:
 
     The caption gets the largest errors in time and in phase, and the paper's.
     """
-    (rigid,), _ = shown([walk_of(results[RIGID_STAGE], RIGID)])
+    (rigid,), _ = first_strides([walk_of(results[RIGID_STAGE], RIGID)])
     raw, aligned = (results[COMPARE_STAGE][need.group] for need in (RAW_ERRORS, ALIGNED_ERRORS))
     claimed, early = bool(claims_in(results)), raw["time"] <= rigid.time[-1]
     figure, axes = time_axes(4, 1.55, [rigid])

@@ -146,14 +146,14 @@ def draw_walker(config: Path, target: Target, console: Console) -> Path:
     # Imported here: other exports draw no walker.
     from walkerlab.config.files import files_read, find_config
     from walkerlab.config.loader import load
-    from walkerlab.views.figures.measures import drawn
+    from walkerlab.views.figures.measures import draw_measures
 
     loaded = load(config, ())
     for warning in loaded.warnings:
         console.warn(warning)
     target = replace(target, inputs=tuple(files_read(find_config(config))))
     path, kind = target.of("a walker", f"{loaded.run_name}-walker", DRAWING_KINDS)
-    return write_file(path, drawn(loaded.config.walker, as_text(path.stem), kind), console)
+    return write_file(path, draw_measures(loaded.config.walker, as_text(path.stem), kind), console)
 
 
 def hyphenate(words: str) -> str:

@@ -62,9 +62,9 @@ def run_labels(folders: tuple[RunFolder, RunFolder]) -> tuple[str, str]:
 def draw(folders: tuple[RunFolder, RunFolder], results: list[dict[str, Any]]) -> list[Path]:
     """Draw both walks into the first run's folder of figures."""
     from walkerlab.pipeline.store.files import make_folder, write_atomically
-    from walkerlab.views.figures.walks import overlaid
+    from walkerlab.views.figures.walks import draw_runs
 
-    images = overlaid(results[0], results[1], run_labels(folders))
+    images = draw_runs(results[0], results[1], run_labels(folders))
     if images is None:
         return []
     make_folder(folders[0].figures)

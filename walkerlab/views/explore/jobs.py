@@ -41,7 +41,7 @@ class Job:
             raise TypeError
         with self._lock:
             if self._told["running"]:
-                return 409, {"error": {"message": "one is being made already", "advice": "Wait until it is there."}}
+                return 409, {"error": {"message": "another export is running", "advice": "Wait until it has finished."}}
             self._told = {"running": True, "kind": kind, "said": ""}
         threading.Thread(target=self._make, args=(str(kind), question), daemon=True).start()
         return 200, dict(self._told)

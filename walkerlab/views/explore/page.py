@@ -12,15 +12,15 @@ from walkerlab.views.report.blocks import Player
 
 TEMPLATES = Path(__file__).parent / "templates"
 SEEN = (
-    "The broad walker is the rigid model, the narrow one the contact model. Each leg is a line from hip to foot;"
-    " leg 2 is hollow. The ground's forces are arrows; a red one is a push-off."
+    "Wide outline: rigid model; narrow: contact model. Each leg is a line from hip to foot;"
+    " leg 2 is hollow. Arrows are ground forces; a red arrow is a push-off."
 )
 
 
 LONGEST_NAME = 60
 
 
-def started(base: ExploredConfig) -> str:
+def start_name(base: ExploredConfig) -> str:
     """Name the config from which the page was started."""
     name = base.called or base.config or DEFAULT
     changed = f"{name} with {', '.join(base.sets)}"
@@ -30,20 +30,20 @@ def started(base: ExploredConfig) -> str:
 def choices(base: ExploredConfig) -> list[str]:
     """List the other configs offered: built-in ones, and the YAML files in the working folder."""
     own = sorted(path.name for path in Path().glob("*.yaml"))
-    return [name for name in (*builtin_names(), *own) if name != started(base)]
+    return [name for name in (*builtin_names(), *own) if name != start_name(base)]
 
 
-def rendered(base: ExploredConfig) -> tuple[str, str]:
+def render_page(base: ExploredConfig) -> tuple[str, str]:
     """Return the page's HTML and its content security policy."""
     own = (TEMPLATES / "explore.js").read_text(encoding="utf-8").strip()
     script = f'\n"use strict";\n{report.source("player.js")}\n{own}\n'
     environment = report.environment()
     environment.loader = FileSystemLoader([report.TEMPLATE_FOLDER, TEMPLATES])
     html = environment.get_template("explore.html.j2").render(
-        started=started(base),
+        start_name=start_name(base),
         configs=choices(base),
         anchor="walk",
-        # Whatever is asked for later is drawn in this one.
+        # An empty player, filled by the script.
         block=Player("The walk.", SEEN, "The walker", (), 0.0, 1.0, 0.0, 0.0, 1.0, 1.0, (), (), (0, 0, 1, 1)),
         # The only texts that are markup already: files of this package.
         style=Markup(report.source("style.css") + (TEMPLATES / "explore.css").read_text(encoding="utf-8")),

@@ -19,14 +19,14 @@ from walkerlab.errors import ConfigError
 from walkerlab.pipeline.workers import Worker, WorkerDiedError
 from walkerlab.views.explore import walks
 from walkerlab.views.explore.jobs import Job
-from walkerlab.views.explore.page import choices, rendered, started
+from walkerlab.views.explore.page import choices, render_page, start_name
 from walkerlab.views.explore.walks import GIVE_WAY, SUPERSEDED, Answered, ExploredConfig
 
 LONGEST_BODY = 100_000
 NICE = 15
 
 
-def failed(status: int, message: str, advice: str = "") -> Answered:
+def failure(status: int, message: str, advice: str = "") -> Answered:
     return status, {"error": {"message": message, "advice": advice}}
 
 
@@ -39,10 +39,10 @@ class Desk:
         drops  whether a newer question ends the work on an older one
         """
         self.drops, self.compiling, self.compiled = drops, "", 0
-        self.worker = self._hired()
+        self.worker = self._hire()
         self._turn, self._count, self._newest = threading.Lock(), threading.Lock(), 0
 
-    def _hired(self) -> Worker:
+    def _hire(self) -> Worker:
         worker = Worker(("walkerlab.views.explore.walks",))
         if self.drops:  # nobody waits for it
             os.setpriority(os.PRIO_PROCESS, worker.process.pid, NICE)
@@ -63,20 +63,20 @@ class Desk:
             # again, if what was to end the question before has come late, or if the worker died while nobody asked
             while number == self._newest:
                 try:
-                    answer = self.worker.do(call, self._heard)
+                    answer = self.worker.do(call, self._note_compilation)
                 except WorkerDiedError as error:
-                    self.worker = self._hired()
+                    self.worker = self._hire()
                     deaths += error.exit_code_of_worker != -GIVE_WAY  # not even begun
                     if deaths > 1:
-                        return failed(500, error.message, error.advice)
+                        return failure(500, error.message, error.advice)
                 except Exception as error:
-                    return failed(500, f"this is a bug of walkerlab: {type(error).__name__}: {error}")
+                    return failure(500, f"this is a bug in walkerlab: {type(error).__name__}: {error}")
                 else:
                     if answer != SUPERSEDED:
                         return answer
             return SUPERSEDED
 
-    def _heard(self, kernel: str) -> None:
+    def _note_compilation(self, kernel: str) -> None:
         self.compiling = kernel
         self.compiled += bool(kernel)
 
@@ -98,7 +98,7 @@ class Server(ThreadingHTTPServer):
         self.cookie = f"walkerlab-explore-{self.server_port}"
         # what is drawn in the background keeps nobody waiting who turns a number
         self.desk, self.background = Desk(), Desk(drops=True)
-        self._beside: threading.Thread | None = None
+        self._thread: threading.Thread | None = None
 
     @property
     def host(self) -> str:
@@ -112,8 +112,8 @@ class Server(ThreadingHTTPServer):
 
     def begin(self) -> None:
         """Serve from a background thread."""
-        self._beside = threading.Thread(target=self.serve_forever, daemon=True)
-        self._beside.start()
+        self._thread = threading.Thread(target=self.serve_forever, daemon=True)
+        self._thread.start()
 
     def handle_error(self, request: Any, client_address: Any) -> None:
         """Report errors, except closed connections."""
@@ -125,10 +125,10 @@ class Server(ThreadingHTTPServer):
 
     def close(self) -> None:
         """End all computations and stop listening."""
-        if self._beside is not None:
+        if self._thread is not None:
             self.shutdown()
-        for one in (self.desk, self.background, self.job):
-            one.close()
+        for part in (self.desk, self.background, self.job):
+            part.close()
         self.server_close()
 
     def question(self, body: Mapping[str, Any]) -> ExploredConfig:
@@ -137,44 +137,44 @@ class Server(ThreadingHTTPServer):
         if not isinstance(changes, Mapping) or not isinstance(models, list) or not {*models} <= walks.STAGES.keys():
             raise TypeError
         question = replace(self.base, changes=changes, models=models)
-        named = body.get("config")
-        if named is None or named == started(self.base):
+        config_name = body.get("config")
+        if config_name is None or config_name == start_name(self.base):
             return question
-        if named not in choices(self.base):
+        if config_name not in choices(self.base):
             raise TypeError
-        return replace(question, config=named, sets=())
+        return replace(question, config=config_name, sets=())
 
     def answer(self, path: str, body: Mapping[str, Any]) -> Answered:
         """Answer a POST request; TypeError if it is malformed."""
         question = self.question(body)
         if path == "/api/walk":
-            return self.desk.ask(partial(walks.walked, question))
+            return self.desk.ask(partial(walks.walk, question))
         if path == "/api/numbers":
             return walks.numbers(question)
         if path == "/api/along":
             return self.background.ask(partial(walks.along, question))
         if path == "/api/save":
-            return saved(question, body.get("name"))
+            return save(question, body.get("name"))
         if path == "/api/job":
             return self.job.begin(body.get("kind"), question)
-        return failed(404, f"there is no {path}")
+        return failure(404, f"there is no {path}")
 
 
-def saved(question: ExploredConfig, name: Any) -> Answered:
+def save(question: ExploredConfig, name: Any) -> Answered:
     """Save the config in the working folder; never overwrite a file."""
     if not isinstance(name, str) or not name or Path(name).name != name:
-        return failed(400, "a config is saved under a name without folders, such as mine.yaml")
+        return failure(400, "give a file name without folders, such as mine.yaml")
     path = Path(name).with_suffix(".yaml")
     try:
-        text = walks.as_file(question, path.stem)
+        text = walks.config_text(question, path.stem)
         with path.open("x", encoding="utf-8") as file:
             file.write(text)
     except ConfigError as error:
-        return question.refused(error)
+        return question.refusal(error)
     except FileExistsError:
-        return failed(409, f"{path} exists already.", "Choose another name: no file is written over.")
+        return failure(409, f"{path} exists already.", "Choose another name; files are never overwritten.")
     except OSError as error:
-        return failed(500, f"{path} cannot be written: {error.strerror}.")
+        return failure(500, f"{path} cannot be written: {error.strerror}.")
     return 200, {"file": str(path.resolve()), "text": text}
 
 
@@ -188,11 +188,11 @@ class Handler(BaseHTTPRequestHandler):
         """Send the page, the progress of a job, or a file that a job made."""
         try:
             address = urlsplit(self.path)
-            given = parse_qs(address.query).get("token", [""])[0]
-            if not self.local() or not self.allowed(given or self.cookie() or self.bearer()):
+            url_token = parse_qs(address.query).get("token", [""])[0]
+            if not self.local() or not self.allowed(url_token or self.cookie() or self.bearer()):
                 return None
             if address.path == "/":
-                html, policy = rendered(self.server.base)
+                html, policy = render_page(self.server.base)
                 return self.send(200, html.encode(), "text/html; charset=utf-8", policy)
             if address.path == "/api/job":
                 desk = self.server.desk
@@ -205,7 +205,7 @@ class Handler(BaseHTTPRequestHandler):
                 return self.send(200, file.read_bytes(), guess_type(file.name)[0] or "application/octet-stream")
         except (ValueError, OSError):  # no address, or none that can be read
             pass
-        return self.answer(*failed(404, f"there is no {self.path}"))
+        return self.answer(*failure(404, f"there is no {self.path}"))
 
     def do_POST(self) -> None:
         if not self.local() or not self.allowed(self.bearer()):
@@ -213,18 +213,18 @@ class Handler(BaseHTTPRequestHandler):
         try:
             length = int(self.headers.get("Content-Length", 0))
             if not 0 <= length <= LONGEST_BODY:
-                return self.answer(*failed(413, f"at most {LONGEST_BODY} bytes"))
+                return self.answer(*failure(413, f"a request has at most {LONGEST_BODY} bytes"))
             self.answer(*self.server.answer(urlsplit(self.path).path, json.loads(self.rfile.read(length))))
         except (ValueError, AttributeError, TypeError, RecursionError):
             form = '{"set": {KEY: VALUE}, "models": ["rigid", "contact"]}'
-            self.answer(*failed(400, f"a question is JSON: {form}; its `config`, if any, is one that the page offers"))
+            self.answer(*failure(400, f"a request is JSON: {form}; `config`, if given, must be one of the page's"))
 
     def local(self) -> bool:
         """Whether the request comes from this server's own page; otherwise answer 403."""
         own = f"http://{self.server.host}"
         if self.headers.get("Host") == self.server.host and self.headers.get("Origin", own) == own:
             return True
-        self.answer(*failed(403, "only pages of this server may ask"))
+        self.answer(*failure(403, "only this server's own page may send requests"))
         return False
 
     def cookie(self) -> str:
@@ -239,7 +239,7 @@ class Handler(BaseHTTPRequestHandler):
         """Whether the token is right; otherwise answer 401."""
         if secrets.compare_digest(token.encode(), self.server.token.encode()):
             return True
-        self.answer(*failed(401, "the token of the printed address is missing", "Open the address as it was printed."))
+        self.answer(*failure(401, "the token is missing", "Open the address as it was printed."))
         return False
 
     def answer(self, status: int, value: Mapping[str, Any]) -> None:

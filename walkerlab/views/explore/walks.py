@@ -28,7 +28,7 @@ from walkerlab.views.report.sections import motion
 STAGES = {"rigid": "simulate", "contact": "contact-sim"}
 Answered = tuple[int, dict[str, Any]]
 """HTTP status and JSON object."""
-SUPERSEDED: Final[Answered] = 409, {"error": {"message": "a newer question was asked meanwhile", "advice": ""}}
+SUPERSEDED: Final[Answered] = 409, {"error": {"message": "superseded by a newer request", "advice": ""}}
 MAX_STEPS = 100
 """Maximum number of steps shown, enough to see one gait change into another."""
 GIVE_WAY = signal.SIGUSR1
@@ -95,7 +95,7 @@ class ExploredConfig:
         """The resolved config, with its warnings; ConfigError if it is invalid."""
         return resolve(self.config, self.all_sets, None, self.runs).loaded
 
-    def refused(self, error: WalkerlabError) -> Answered:
+    def refusal(self, error: WalkerlabError) -> Answered:
         """Describe why the config is invalid, naming the change responsible if it can be identified."""
         key = next((key for key in self.changes if key in error.message), next(iter(self.changes), None))
         value = None if key is None else self.changes[key]
@@ -115,7 +115,7 @@ def memory() -> MemoryResults:
     return MemoryResults()
 
 
-def walked(question: ExploredConfig) -> Answered:
+def walk(question: ExploredConfig) -> Answered:
     """Compute the gait and the walks, with the data that the player needs."""
     try:
         loaded = question.loaded
@@ -127,7 +127,7 @@ def walked(question: ExploredConfig) -> Answered:
                 stage: answer_in_memory(config, stage, memory(), again=False) for stage in (*wanted, "fixedpoint")
             }
     except ConfigError as error:
-        return question.refused(error)
+        return question.refusal(error)
     commands = [shlex.join(["walkerlab", stage, *question.options]) for stage in ("fixedpoint", *wanted)]
     found: dict[str, Any] = {"command": "\n".join(commands), "warnings": list(loaded.warnings)}
     walks: dict[str, Content] = {}
@@ -152,7 +152,7 @@ def numbers(question: ExploredConfig) -> Answered:
     try:
         return 200, {"numbers": list(adjustable(replace(question, changes={}).loaded.config, question.loaded.config))}
     except ConfigError as error:
-        return question.refused(error)
+        return question.refusal(error)
 
 
 def along(question: ExploredConfig) -> Answered:
@@ -164,7 +164,7 @@ def along(question: ExploredConfig) -> Answered:
         config = question.loaded.config
         answer = answer_in_memory(config, "continuation", memory(), again=False, reporter=GivingWay())
     except ConfigError as error:
-        return question.refused(error)
+        return question.refusal(error)
     except SupersededError:
         return SUPERSEDED
     # the steps of an attractor have periods, but they are no branch
@@ -190,7 +190,7 @@ def curve(branch: Group) -> dict[str, list[Any]]:
     return {name: values.tolist() for name, values in found.items()}
 
 
-def as_file(question: ExploredConfig, name: str) -> str:
+def config_text(question: ExploredConfig, name: str) -> str:
     """Write the config as YAML that extends its starting point and lists only differences; ConfigError.
 
     It says all where nothing can be extended: for a walker of another type than the paper's that no file holds.

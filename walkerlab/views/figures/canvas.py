@@ -94,7 +94,7 @@ def cost_axis(axes: Axes) -> None:
         axes.set_xscale("log")
         label_ticks(axes.xaxis)
     else:
-        axes.text(0.5, 0.5, "no walk came to its end", transform=axes.transAxes, ha="center")
+        axes.text(0.5, 0.5, "no run reached the end", transform=axes.transAxes, ha="center")
 
 
 def power_of_ten(value: float, _place: float | None = None) -> str:

@@ -30,7 +30,7 @@ MODELS: Final = {"rigid": BLUE, "contact": ORANGE}
 MARKS: Final = {"flip": ("o", VERMILLION), "fold": ("s", BLACK), "torus": ("D", PURPLE)}
 STYLES: Final[dict[bool, LineStyleType]] = {True: "-", False: (0.0, (2.2, 1.6))}
 FROM_FLIP: Final = 16  # points drawn from a flip to the first gait that is born there
-OTHER: Final = GREEN
+OTHER_GAITS: Final = GREEN
 """Colours of gaits outside the cascade of the one-step gait."""
 
 
@@ -50,7 +50,7 @@ class DrawnBranch:
     def colour(self) -> str:
         """Colour of the model; gaits outside the one-step gait and its cascade have their own colours."""
         period = self.period
-        return MODELS[self.model] if period & (period - 1) == 0 else OTHER
+        return MODELS[self.model] if period & (period - 1) == 0 else OTHER_GAITS
 
 
 def branches_of(results: Results, name: str = "branch") -> Iterator[DrawnBranch]:
@@ -162,7 +162,7 @@ def draw_branches(results: Results) -> Drawn:
     """
     summary = results[STAGE].summary
     branches, settled, close = list(branches_of(results)), list(clouds(results)), close_of(results)
-    parts = {"(a) all of it": None} | ({"(b) where gaits change": close} if close else {})
+    parts = {"(a) full range": None} | ({"(b) bifurcations": close} if close else {})
     if is_narrow():
         figure, stack = panels(5.6 * len(parts), 2 * len(parts))
         both = stack.reshape(len(parts), 2).T
@@ -186,8 +186,8 @@ def draw_branches(results: Results) -> Drawn:
         axes.set_title(title if close else "")
     models = {branch.model: MODELS[branch.model] for branch in branches}
     key: list[Artist] = [entry(f"{model} model", color=colour, linewidth=1.5) for model, colour in models.items()]
-    if any(branch.colour == OTHER for branch in branches):
-        key.append(entry("other gaits", color=OTHER, linewidth=1.0))
+    if any(branch.colour == OTHER_GAITS for branch in branches):
+        key.append(entry("other gaits", color=OTHER_GAITS, linewidth=1.0))
     key.append(entry("unstable", color=BLACK, linewidth=0.9, linestyle=STYLES[False]))
     if settled:
         key.append(entry("attractor", color=BLACK, linestyle="none", marker=".", markersize=3))
@@ -195,7 +195,7 @@ def draw_branches(results: Results) -> Drawn:
     for kind, (marker, colour) in marks.items():
         key.append(entry(kind, color=colour, linestyle="none", marker=marker, markersize=4))
     add_legend(figure, key)
-    cascades = [one for one in summary["cascades"] if one["period"] == 1 and "accumulates_at" in one]
+    cascades = [item for item in summary["cascades"] if item["period"] == 1 and "accumulates_at" in item]
     return figure, (summary["first_doubling"], cascades, births, "" if summary["unit"] == "1" else summary["unit"])
 
 
@@ -207,7 +207,7 @@ def births_in(branches: Sequence[DrawnBranch], shown: tuple[float, float]) -> li
     folds = [
         (branch.period, float(curve.value[place]))
         for branch in branches
-        if branch.colour == OTHER
+        if branch.colour == OTHER_GAITS
         for curve in (curve_of(branch.group, "step_period"),)
         for place, kind in curve.marks
         if kind == "fold"
@@ -225,16 +225,16 @@ def label_births(axes: Axes, births: Sequence[tuple[float, int]]) -> None:
     if births:
         above = axes.secondary_xaxis("top")
         above.set_xticks([value for value, _ in births], [str(period) for _, period in births])
-        above.set_xlabel("steps of gaits that are born in folds")
+        above.set_xlabel("steps per gait born in a fold")
 
 
 def close_of(results: Results) -> tuple[float, float] | None:
     """Return the range with bifurcations, from just before the first to the end of the attractor."""
     summary = results[STAGE].summary
-    found = [one["value"] for one in summary["bifurcations"]]
+    found = [item["value"] for item in summary["bifurcations"]]
     if not found:
         return None
-    ends = [one["to"] for one in summary["attractors"]] or [summary["to"]]
+    ends = [item["to"] for item in summary["attractors"]] or [summary["to"]]
     least, most = min(found), max(*ends, max(found))
     room = max(ROOM * (most - least), 0.5 * (LEAST * (summary["to"] - summary["from"]) - (most - least)))
     return max(least - room, summary["from"]), min(most + room, summary["to"])
@@ -320,12 +320,12 @@ def draw_multipliers(results: Results) -> Drawn:
     right.set(
         xlabel=parameter_of(results), ylabel="magnitude", ylim=(0.0, 2.0 * FARTHEST), title="(b) over the parameter"
     )
-    end = entry("largest value of the span", color=BLACK, linestyle="none", marker=">", markersize=4)
+    end = entry("largest parameter value", color=BLACK, linestyle="none", marker=">", markersize=4)
     add_legend(figure, [*key, end])
     found: dict[tuple[str, str], list[float]] = {}
-    for one in results[STAGE].summary["bifurcations"]:
-        if one["period"] == 1:
-            found.setdefault((one["model"], one["kind"]), []).append(one["value"])
+    for item in results[STAGE].summary["bifurcations"]:
+        if item["period"] == 1:
+            found.setdefault((item["model"], item["kind"]), []).append(item["value"])
     bifurcations = {which: sorted(values) for which, values in found.items()}
     return figure, (bifurcations, largest if largest > FARTHEST else None)
 
@@ -361,10 +361,10 @@ def draw_plane(results: Results) -> Drawn:
         second = curve.group.variables["second"]
         axes.set_ylabel(label_of(axis_label(second.long_name), second.units))
     axes.set_xlabel(parameter_of(results))
-    order = sorted(looks, key=lambda one: (list(CURVE_COLOURS).index(one[0]), one[1]))
+    order = sorted(looks, key=lambda look: (list(CURVE_COLOURS).index(look[0]), look[1]))
     add_legend(figure, [*key, *(entry(f"{kind}s, {model} model", **looks[model, kind]) for model, kind in order)])
     kinds = sorted({kind for _, kind in looks}, key=list(MARKS).index)
-    return figure, (kinds, [model for model in CURVE_COLOURS if any(model == one for one, _ in looks)], shares)
+    return figure, (kinds, [model for model in CURVE_COLOURS if any(model == name for name, _ in looks)], shares)
 
 
 def region_kinds(regions: Group) -> list[Kind]:
@@ -373,9 +373,9 @@ def region_kinds(regions: Group) -> list[Kind]:
     other = (period > 0) & ~np.isin(period, list(DOUBLED))
     kinds = [(colour, f"{n} step{'s' if n > 1 else ''}", period == n) for n, colour in DOUBLED.items()]
     kinds += [
-        (OTHER_PERIOD, "another number of steps", other),
-        (APERIODIC, "never repeats itself", period == 0),
-        (NOTHING, "no walk goes on", period < 0),
+        (OTHER_PERIOD, "other number of steps", other),
+        (APERIODIC, "aperiodic", period == 0),
+        (NOTHING, "no walking", period < 0),
     ]
     return [kind for kind in kinds if kind[2].any()]
 

@@ -76,7 +76,7 @@ class Illustration:
         return self.say("title")
 
     @property
-    def seen(self) -> str:
+    def alt_text(self) -> str:
         """Text alternative in one or two sentences; may be empty."""
         return self.say("seen")
 
@@ -108,7 +108,7 @@ class Illustration:
         """Title with the paper's figure number."""
         return self.title if self.number is None else f"Figure {self.number}. {self.title}"
 
-    def drawn(self, results: Results) -> Drawing:
+    def render(self, results: Results) -> Drawing:
         """Draw the files and texts; equal results give equal bytes."""
         with styled():
             figure, caption_values = self.draw(results)

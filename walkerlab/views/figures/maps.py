@@ -50,7 +50,7 @@ def patches(kinds: Iterable[tuple[str, str]]) -> list[Artist]:
 
 def ends_among(outcomes: Any) -> list[tuple[str, str]]:
     """Return colours and labels of the outcomes that occur."""
-    return [(OUTCOME_TEXTS[one].colour, one.label) for one in map(Outcome, np.unique(outcomes).tolist())]
+    return [(OUTCOME_TEXTS[item].colour, item.label) for item in map(Outcome, np.unique(outcomes).tolist())]
 
 
 def edges(centres: NDArray[Any]) -> NDArray[Any]:
@@ -79,10 +79,10 @@ def axis_of(cells: Group, name: str) -> str:
 
 SWING, STANCE = "swing_factor", "stance_factor"
 MAP = Need(
-    TUNE_STAGE, "map", (SWING, STANCE, "outcome", "steps", "rigid_outcome", "rigid_steps"), "no start was walked"
+    TUNE_STAGE, "map", (SWING, STANCE, "outcome", "steps", "rigid_outcome", "rigid_steps"), "no walk was computed"
 )
 
-OUTCOMES: Final = discrete([OUTCOME_TEXTS[one].colour for one in Outcome])
+OUTCOMES: Final = discrete([OUTCOME_TEXTS[item].colour for item in Outcome])
 MODELS: Final = (("", "(a) contact model"), ("rigid_", "(b) rigid model"))
 STEP_LEVELS: Final = (0.5, 1.5, 2.5, 4.5)
 
@@ -123,7 +123,7 @@ def draw_starts(results: Results) -> Drawn:
 
 
 BASIN: Final = "basin"
-CELLS = Need(BASIN, "basin", ("outcome", "attractor", "steps_to_settle", "walking"), "no start was walked")
+CELLS = Need(BASIN, "basin", ("outcome", "attractor", "steps_to_settle", "walking"), "no walk was computed")
 ATTRACTORS: Final = (BLUE, ORANGE, GREEN, PURPLE, VERMILLION)
 NO_ATTRACTOR: Final = -1
 
@@ -146,7 +146,7 @@ def draw_basins(results: Results) -> Drawn:
 
     figure, (left, right) = panels(3.9, 1, 2, sharex=True, sharey=True)
     key = draw_kinds(partial(draw, left), fates(shown["outcome"], shown["attractor"], summary))
-    left.set_title("(a) where walks end")
+    left.set_title("(a) outcome")
     # on a scale of powers what has settled from its first step on has the colour of one step
     settled = np.ma.masked_where(shown["attractor"] == NO_ATTRACTOR, shown["steps_to_settle"].clip(min=1))
     right.set_title("(b) steps to the attractor")
@@ -183,12 +183,12 @@ def fates(outcome: NDArray[Any], attractor: NDArray[Any], summary: Mapping[str, 
         (ATTRACTORS[number % len(ATTRACTORS)], attractor_name(number, attractors), attractor == number)
         for number in range(len(attractors))
     ]
-    said = "never repeats itself" if summary["aperiodic"] else "walks, not settled"
+    said = "aperiodic" if summary["aperiodic"] else "walks, not settled"
     kinds.append(
         (OUTCOME_TEXTS[Outcome.WALKED].colour, said, (outcome == Outcome.WALKED) & (attractor == NO_ATTRACTOR))
     )
-    failures = [one for one in Outcome if one is not Outcome.WALKED]
-    kinds += [(OUTCOME_TEXTS[one].colour, one.label, outcome == one) for one in failures]
+    failures = [item for item in Outcome if item is not Outcome.WALKED]
+    kinds += [(OUTCOME_TEXTS[item].colour, item.label, outcome == item) for item in failures]
     return [kind for kind in kinds if kind[2].any()]
 
 
@@ -247,11 +247,11 @@ class OverStiffness:
 def draw_stiction(results: Results) -> Drawn:
     """Plot outcome (left) and error (right); the caption names the walk and counts the outcomes."""
     cells = results[MAPS]["stiction"]
-    made = OverStiffness(cells, VELOCITY, ("(a) how the walk ends", "(b) against a tolerance ten times tighter"))
+    made = OverStiffness(cells, VELOCITY, ("(a) outcome", "(b) difference at a ten times tighter tolerance"))
     outcomes, compared = cells["outcome"], cells["compared"] == 1
     made.draw(made.left, outcomes, **OUTCOMES)
     unanswered = np.isin(outcomes, [int(Outcome.BUDGET_EXHAUSTED), int(Outcome.SOLVER_FAILED)])
-    otherwise = (VERMILLION, "(b) ends otherwise", ~compared & ~unanswered)
+    otherwise = (VERMILLION, "(b) other outcome", ~compared & ~unanswered)
     made.draw_errors(compared, SHARP, [(BLACK, "", unanswered), otherwise])
     seen = [*ends_among(outcomes), *([otherwise[:2]] if otherwise[2].any() else [])]
     mark: dict[str, Any] = {"marker": "o", "color": BLACK, "markerfacecolor": WHITE}
@@ -264,8 +264,8 @@ def draw_stiction(results: Results) -> Drawn:
 def draw_step(results: Results) -> Drawn:
     """Plot verdict (left) and error (right); the caption names the walk and counts the verdicts."""
     cells = results[MAPS]["step"]
-    names = [one.partition(" ")[2] for one in str(cells.attrs["verdicts"]).split(", ")]
-    made = OverStiffness(cells, STEP, ("(a) what becomes of the walk", "(b) error of the state at the end"))
+    names = [item.partition(" ")[2] for item in str(cells.attrs["verdicts"]).split(", ")]
+    made = OverStiffness(cells, STEP, ("(a) outcome", "(b) error of the final state"))
     verdict = np.array(names, dtype=object)[cells["verdict"]]
     made.draw(made.left, cells["verdict"], **discrete([VERDICT_COLOURS[name] for name in names]))
     errors = ("fine", "wrong silently")
@@ -280,9 +280,11 @@ def draw_step(results: Results) -> Drawn:
     return made.figure, (results[MAPS].summary, cells.attrs)
 
 
-NEVER = "it has no such map"
-STICTION_NEED = Need(MAPS, "stiction", (STIFFNESS, VELOCITY, "outcome", "sharper_outcome", "compared", "error"), NEVER)
-STEP_NEED = Need(MAPS, "step", (STIFFNESS, STEP, "verdict", "error"), NEVER)
+NOT_COMPUTED = "this map was not computed"
+STICTION_NEED = Need(
+    MAPS, "stiction", (STIFFNESS, VELOCITY, "outcome", "sharper_outcome", "compared", "error"), NOT_COMPUTED
+)
+STEP_NEED = Need(MAPS, "step", (STIFFNESS, STEP, "verdict", "error"), NOT_COMPUTED)
 STABILITY = (
     Illustration("stability-stiction", (STICTION_NEED,), draw_stiction),
     Illustration("stability-step", (STEP_NEED,), draw_step),

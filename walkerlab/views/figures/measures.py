@@ -64,16 +64,16 @@ class UprightLeg:
     top: float
 
 
-def said(key: str, value: float) -> str:
+def entry(key: str, value: float) -> str:
     """Return `key: value` as a config writes it."""
     return f"{key}: {value:g}"
 
 
-def weighing(walker: Any, prefix: str) -> tuple[str, ...]:
+def mass_labels(walker: Any, prefix: str) -> tuple[str, ...]:
     """Label a body's mass, and its inertia if it has one; `prefix` begins its config keys."""
     inertia = value_of(walker, f"{prefix}inertia_kg_m2", 0.0)
-    mass = said(f"{prefix}mass_kg", value_of(walker, f"{prefix}mass_kg"))
-    return (mass, said(f"{prefix}inertia_kg_m2", inertia)) if inertia else (mass,)
+    mass = entry(f"{prefix}mass_kg", value_of(walker, f"{prefix}mass_kg"))
+    return (mass, entry(f"{prefix}inertia_kg_m2", inertia)) if inertia else (mass,)
 
 
 def value_of(walker: Any, key: str, *otherwise: float) -> float:
@@ -87,7 +87,7 @@ def upright(walker: CompassWalker | StraightLegs | Kneed) -> UprightLeg:
     radius, top, sole = walker.foot_radius_m, walker.leg_length_m, (0.0, 0.0)
     hip, centre, joints = (0.0, top), (0.0, radius), [(0.0, top)]
     lengths: list[Length] = []
-    masses = [(weighing(walker, "hip_"), hip)]
+    masses = [(mass_labels(walker, "hip_"), hip)]
 
     def measured(key: str, start: Point, end: Point) -> None:
         lengths.append(Length(key, value_of(walker, key), start, end))
@@ -95,7 +95,7 @@ def upright(walker: CompassWalker | StraightLegs | Kneed) -> UprightLeg:
     if walker.torso is not None:
         top += walker.torso.above_hip_m
         measured("torso.above_hip_m", (0.0, top), hip)
-        masses.append((weighing(walker, "torso."), (0.0, top)))
+        masses.append((mass_labels(walker, "torso."), (0.0, top)))
     limbs = [("leg_", "hip", hip, sole)]
     if isinstance(walker, Kneed):
         joints.append((0.0, walker.shank.length_m))
@@ -110,7 +110,7 @@ def upright(walker: CompassWalker | StraightLegs | Kneed) -> UprightLeg:
             measured(below, above, mass)
             measured(ahead, (0.0, mass[1]), mass)
         measured(f"{limb}length_m", above, end)
-        masses.append((weighing(walker, limb), mass))
+        masses.append((mass_labels(walker, limb), mass))
     if isinstance(walker, StraightLegs | Kneed):
         centre = (walker.foot_centre_ahead_m, radius)
         measured("foot_centre_ahead_m", (0.0, radius), centre)
@@ -118,28 +118,30 @@ def upright(walker: CompassWalker | StraightLegs | Kneed) -> UprightLeg:
     return UprightLeg(tuple(joints), centre, radius, tuple(lengths), tuple(masses), top)
 
 
-def drawn(walker: AnyWalker, name: str, kind: str = "svg") -> bytes:
+def draw_measures(walker: AnyWalker, name: str, kind: str = "svg") -> bytes:
     """Draw the walker's dimensions as SVG, PDF or PNG bytes; equal walkers and names give equal bytes."""
-    title = f"The measures of a walker of type {walker.type}"
+    title = f"Dimensions of a walker of type {walker.type}"
     with styled():
-        figure = of_parts(walker) if isinstance(walker, PartsWalker) else of_type(walker)
+        figure = draw_parts(walker) if isinstance(walker, PartsWalker) else draw_upright(walker)
         return files_of(figure, name, title, [kind])[0]
 
 
-def of_type(walker: CompassWalker | StraightLegs | Kneed) -> Figure:
+def draw_upright(walker: CompassWalker | StraightLegs | Kneed) -> Figure:
     """Draw one leg upright on the slope with its dimensions, and the second leg pale behind it."""
     leg = upright(walker)
     length, centre = leg.joints[0][1], leg.centre
     # the joints, and where the leg's line meets its sole's arc
     line = [*leg.joints, (0.0, centre[1] - math.sqrt(max(0.0, leg.radius**2 - centre[0] ** 2)))]
-    labels, lanes = arranged(leg)
+    labels, lanes = arrange_labels(leg)
     # letters keep their size, so that they take parts of the width, whatever the walker's length
     behind = letters([words for words, *_ in labels])
-    ahead = [letters([said(one.key, one.value) for one in lane]) for lane in lanes]
+    ahead = [letters([entry(dimension.key, dimension.value) for dimension in lane]) for lane in lanes]
     width = (BESIDE + FIRST_LANE) * length / (1.0 - LETTER * (behind + sum(ahead)))
     width = max(width, (leg.top + 0.3 * length) * WIDTH / HEIGHT)
     left = -BESIDE * length - LETTER * behind * width
-    heights = apart([at[1] for *_, at in labels], [LINE * width * len(words.split("\n")) for words, *_ in labels], 0.0)
+    heights = spread(
+        [spot[1] for *_, spot in labels], [LINE * width * len(words.split("\n")) for words, *_ in labels], 0.0
+    )
     bottom, top, ends = -0.16 * length, max(leg.top, *heights) + 0.1 * length, (left, left + width)
     figure = blank(WIDTH * (top - bottom) / width)
     axes = figure.add_subplot()
@@ -151,41 +153,41 @@ def of_type(walker: CompassWalker | StraightLegs | Kneed) -> Figure:
     axes.annotate("", xy=(0.25 * length, y), xytext=(-0.25 * length, y), arrowprops={"arrowstyle": "-|>"})
     axes.text(0.28 * length, y, "walking direction", va="center", fontsize=SMALL)
     # the other leg, off the ground behind, its knee bent if it has one
-    other, angles = [leg.joints[0]], (BEHIND, BENT)[: len(leg.joints)]
+    second, angles = [leg.joints[0]], (BEHIND, BENT)[: len(leg.joints)]
     for angle, above, below in zip(angles, leg.joints, line[1:], strict=True):
-        other.append(turned(angle, above, below, other[-1]))
-    draw_leg(axes, other, turned(angles[-1], leg.joints[-1], centre, other[-2]), leg.radius, FAINT)
+        second.append(rotate(angle, above, below, second[-1]))
+    draw_leg(axes, second, rotate(angles[-1], leg.joints[-1], centre, second[-2]), leg.radius, FAINT)
     draw_leg(axes, line, centre, leg.radius, BLACK)
     axes.plot([0.0, 0.0], [length, leg.top], color=BLACK, linewidth=2.0)
     x = FIRST_LANE * length
     for lane, wide in zip(lanes, ahead, strict=True):
-        for one in lane:
-            draw_length(axes, one, x, LETTER * width)
+        for dimension in lane:
+            draw_length(axes, dimension, x, LETTER * width)
         x += LETTER * wide * width
-    axes.plot(*np.transpose([at for _, at in leg.masses]), "o", markersize=8, color=GREEN, zorder=5)
-    for one in leg.lengths:
-        if one.start[1] == one.end[1]:
-            axes.plot(*np.transpose([one.start, one.end]), color=VERMILLION, linewidth=1.5)
-    for (words, colour, at), height in zip(labels, heights, strict=True):
-        axes.plot([-BESIDE * length, at[0]], [height, at[1]], color=colour, linewidth=0.5, zorder=1)
+    axes.plot(*np.transpose([spot for _, spot in leg.masses]), "o", markersize=8, color=GREEN, zorder=5)
+    for dimension in leg.lengths:
+        if dimension.start[1] == dimension.end[1]:
+            axes.plot(*np.transpose([dimension.start, dimension.end]), color=VERMILLION, linewidth=1.5)
+    for (words, colour, spot), height in zip(labels, heights, strict=True):
+        axes.plot([-BESIDE * length, spot[0]], [height, spot[1]], color=colour, linewidth=0.5, zorder=1)
         axes.text(-BESIDE * length, height, f"{words} ", color=colour, fontsize=SMALL, ha="right", va="center")
     if leg.radius > SMALL_ARC * length:
         axes.plot(*centre, marker="+", markersize=8, color=BLUE, zorder=5)
     return figure
 
 
-def arranged(leg: UprightLeg) -> tuple[list[tuple[str, str, Point]], list[list[Length]]]:
+def arrange_labels(leg: UprightLeg) -> tuple[list[tuple[str, str, Point]], list[list[Length]]]:
     """Return the labels behind the leg (colour, position, text) and the height dimensions, lane by lane."""
     length, lanes = leg.joints[0][1], list[list[Length]]()
-    labels = [("\n".join(words), GREEN, at) for words, at in leg.masses]
-    for one in (one for one in leg.lengths if one.value):
-        level = one.start[1] == one.end[1]
-        if level or one.value <= SMALL_ARC * length:
-            labels.append((said(one.key, one.value), VERMILLION if level else BLUE, one.end))
-        elif free := [lane for lane in lanes if all(clear(one, other, length) for other in lane)]:
-            free[0].append(one)
+    labels = [("\n".join(words), GREEN, spot) for words, spot in leg.masses]
+    for dimension in (dimension for dimension in leg.lengths if dimension.value):
+        level = dimension.start[1] == dimension.end[1]
+        if level or dimension.value <= SMALL_ARC * length:
+            labels.append((entry(dimension.key, dimension.value), VERMILLION if level else BLUE, dimension.end))
+        elif free := [lane for lane in lanes if all(clear(dimension, second, length) for second in lane)]:
+            free[0].append(dimension)
         else:
-            lanes.append([one])
+            lanes.append([dimension])
     return labels, lanes
 
 
@@ -194,13 +196,13 @@ def letters(texts: Sequence[str]) -> int:
     return max((len(line) + 2 for text in texts for line in text.split("\n")), default=0)
 
 
-def clear(one: Length, other: Length, length: float) -> bool:
+def clear(dimension: Length, second: Length, length: float) -> bool:
     """Whether two dimensions in one lane, and their labels, stay apart."""
-    between = 0.5 * abs(one.start[1] + one.end[1] - other.start[1] - other.end[1])
-    return between > max(0.499 * (one.value + other.value), CLEAR * length)
+    between = 0.5 * abs(dimension.start[1] + dimension.end[1] - second.start[1] - second.end[1])
+    return between > max(0.499 * (dimension.value + second.value), CLEAR * length)
 
 
-def apart(heights: Sequence[float], sizes: Sequence[float], lowest: float = -math.inf) -> list[float]:
+def spread(heights: Sequence[float], sizes: Sequence[float], lowest: float = -math.inf) -> list[float]:
     """Place labels as close to the wanted heights as they fit, moving them up where those below need room."""
     found = list(heights)
     for place in sorted(range(len(found)), key=found.__getitem__):
@@ -220,7 +222,7 @@ def draw_leg(axes: Axes, line: Sequence[Point], centre: Point, radius: float, co
         axes.plot(*np.transpose([line[-1], centre]), color=colour, linewidth=2.0, zorder=2)
 
 
-def turned(angle: float, origin: Point, point: Point, moved_to: Point) -> Point:
+def rotate(angle: float, origin: Point, point: Point, moved_to: Point) -> Point:
     """Rotate a point (rad), then shift it to a new origin."""
     (across, up), s, c = np.subtract(point, origin), np.sin(angle), np.cos(angle)
     return float(moved_to[0] + c * across - s * up), float(moved_to[1] + s * across + c * up)
@@ -232,38 +234,38 @@ def draw_length(axes: Axes, measure: Length, x: float, letter: float) -> None:
         axes.plot([point[0], x], [point[1], point[1]], color=GREY, linewidth=0.5, linestyle=":", zorder=1)
     high, low = measure.start[1], measure.end[1]
     axes.annotate("", xy=(x, high), xytext=(x, low), arrowprops={"arrowstyle": "<|-|>", "color": BLUE})
-    words = said(measure.key, measure.value)
+    words = entry(measure.key, measure.value)
     axes.text(x + letter, 0.5 * (high + low), words, color=BLUE, fontsize=SMALL, va="center")
 
 
-def of_parts(walker: PartsWalker) -> Figure:
+def draw_parts(walker: PartsWalker) -> Figure:
     """Draw each body of the second leg, and the bodies of neither leg, in its own frame."""
     shown = [body for body in walker.bodies if body.name not in walker.legs[0]]
     figure = blank(HEIGHT)
     for axes, body in zip(figure.subplots(1, len(shown), squeeze=False)[0], shown, strict=True):
-        axes.set(aspect="equal", title="\n".join([f"name: {body.name}", *weighing(body, "")]), xlabel="ahead (m)")
+        axes.set(aspect="equal", title="\n".join([f"name: {body.name}", *mass_labels(body, "")]), xlabel="ahead (m)")
         axes.axhline(0.0, color=GREY, linewidth=0.6, zorder=0)
         axes.axvline(0.0, color=GREY, linewidth=0.6, zorder=0)
         marks = list(marks_of(walker, body.name, body.centre_m))
-        bones = [at for words, _, marker, at in marks if marker == "o" and not words.startswith("centre_m")]
+        bones = [spot for words, _, marker, spot in marks if marker == "o" and not words.startswith("centre_m")]
         for foot in walker.feet:
             if foot.body == body.name:
                 x, y = foot.centre_m
                 bones.append((x, y - foot.radius_m))
                 axes.plot(x + foot.radius_m * np.sin(ARC), y - foot.radius_m * np.cos(ARC), color=BLACK, linewidth=2.0)
         axes.plot(*np.transpose(bones), color=BLACK, linewidth=2.0, zorder=1)
-        points = np.array([*bones, *(at for *_, at in marks)])
+        points = np.array([*bones, *(spot for *_, spot in marks)])
         (left, low), (_, high) = points.min(axis=0), points.max(axis=0)
         tall = PARTS_ROOM * max(high - low, 0.1 * walker.leg_length_m)
         wide = tall * (WIDTH / len(shown) - 0.7) / (HEIGHT - 1.0)
         low = 0.5 * (low + high - tall)
         axes.set(ylim=(low, low + tall), xlim=(left - 0.25 * wide, left + 0.75 * wide))
         line = tall * 1.35 * SMALL * POINT / (HEIGHT - 1.0)
-        heights = apart([at[1] for *_, at in marks], [line * len(words.split("\n")) for words, *_ in marks])
-        for (words, colour, marker, at), height in zip(marks, heights, strict=True):
-            axes.plot(*at, marker=marker, markersize=8, color=colour, linestyle="none", zorder=3)
+        heights = spread([spot[1] for *_, spot in marks], [line * len(words.split("\n")) for words, *_ in marks])
+        for (words, colour, marker, spot), height in zip(marks, heights, strict=True):
+            axes.plot(*spot, marker=marker, markersize=8, color=colour, linestyle="none", zorder=3)
             aside = points[:, 0].max() + 0.1 * wide
-            axes.plot([at[0], aside], [at[1], height], color=colour, linewidth=0.5, zorder=2)
+            axes.plot([spot[0], aside], [spot[1], height], color=colour, linewidth=0.5, zorder=2)
             axes.text(aside, height, f" {words}".replace("\n", "\n "), color=colour, fontsize=SMALL, va="center")
     figure.axes[0].set_ylabel("up (m)")
     return figure
@@ -272,20 +274,25 @@ def of_parts(walker: PartsWalker) -> Figure:
 def marks_of(walker: PartsWalker, body: str, centre: Point) -> Iterator[tuple[str, str, str, Point]]:
     """List the points that the config defines on a body: label, colour, marker and position (m)."""
 
-    def at(point: Point) -> str:
+    def spot(point: Point) -> str:
         return f"[{point[0]:g}, {point[1]:g}]"
 
     for hinge in walker.hinges:
         called = f"{hinge.name}{', locks' if hinge.locks else ''}\n"
         if hinge.parent == body:
-            yield f"{called}parent_point_m: {at(hinge.parent_point_m)}", BLUE, "o", hinge.parent_point_m
+            yield f"{called}parent_point_m: {spot(hinge.parent_point_m)}", BLUE, "o", hinge.parent_point_m
         if hinge.child == body:
-            yield f"{called}child_point_m: {at(hinge.child_point_m)}", BLUE, "o", hinge.child_point_m
-    yield f"centre_m: {at(centre)}", GREEN, "o", centre
+            yield f"{called}child_point_m: {spot(hinge.child_point_m)}", BLUE, "o", hinge.child_point_m
+    yield f"centre_m: {spot(centre)}", GREEN, "o", centre
     for particle in walker.particles:
         if particle.body == body:
-            words = f"particle {particle.name}\nat_m: {at(particle.at_m)}\n{said('mass_kg', particle.mass_kg)}"
+            words = f"particle {particle.name}\nat_m: {spot(particle.at_m)}\n{entry('mass_kg', particle.mass_kg)}"
             yield words, VERMILLION, "D", particle.at_m
     for foot in walker.feet:
         if foot.body == body:
-            yield f"foot\ncentre_m: {at(foot.centre_m)}\n{said('radius_m', foot.radius_m)}", ORANGE, "s", foot.centre_m
+            yield (
+                f"foot\ncentre_m: {spot(foot.centre_m)}\n{entry('radius_m', foot.radius_m)}",
+                ORANGE,
+                "s",
+                foot.centre_m,
+            )

@@ -29,7 +29,7 @@ PANELS: Final[tuple[tuple[str, str, Callable[[Values], Values]], ...]] = (
 )
 """Axis label, sweep variable (with a slot for the model), and how to plot it."""
 SPEED: Final = "gaits.0.speed_m_s"
-OF_ACTUATIONS: Final = (
+ACTUATION_PANELS: Final = (
     ("cost of transport", "gaits.0.cost_of_transport", True),
     ("sensitivity norm (s/m)", "gaits.0.gait_sensitivity_norm", True),
     ("largest step down (m)", "largest_step.0.down_m", False),
@@ -49,10 +49,10 @@ BELOW, BESIDE = 1.7, 0.4
 """Height of the panels below the walker, and minimum room for axis labels beside it, in."""
 
 
-def of_sweep(group: Group, parameters: Sequence[str]) -> Illustration | None:
+def sweep_illustration(group: Group, parameters: Sequence[str]) -> Illustration | None:
     """Return how to plot a `robustness` sweep: over one parameter, or by drive; None to plot it like any other."""
     if can_be_drawn(group, parameters):
-        return Illustration("figure-17", (), partial(over_one_number, group, parameters[0]))
+        return Illustration("figure-17", (), partial(over_one_parameter, group, parameters[0]))
     driven = actuations(group, parameters)
     return None if driven is None else Illustration("push-off-or-hip", (), partial(push_off_or_hip, group, driven))
 
@@ -63,18 +63,18 @@ def can_be_drawn(group: Group, parameters: Sequence[str]) -> bool:
     return len(parameters) == 1 and all(name in group.variables for name in names)
 
 
-def over_one_number(group: Group, parameter: str, _results: Results) -> Drawn:
+def over_one_parameter(group: Group, parameter: str, _results: Results) -> Drawn:
     """Plot figure 17; the caption names the parameter and each model's least sensitive gait with its norm (s/m)."""
     x, said, unit = group[parameter].astype(float), axis_label(parameter), group.variables[parameter].units
     models = {str(group[f"gaits.{k}.model"][0]): k for k in range(2) if f"gaits.{k}.model" in group.variables}
     figure, axes = panels(0.6 + PANEL_HEIGHT * len(PANELS), len(PANELS), sharex=True)
-    for one, (label, name, shown) in zip(axes, PANELS, strict=True):
+    for panel, (label, name, shown) in zip(axes, PANELS, strict=True):
         for model, k in models.items():
             look: dict[str, Any] = {"color": MODELS[model], "markersize": 2.6, "linewidth": 1.3, **LINES[model]}
             for place in (name, UP) if name.startswith("largest_step") else (name,):
                 values = group[place.format(k)].astype(float)
-                one.plot(x, shown(values) if place == name else 1e3 * values, **look)
-        one.set_ylabel(label)
+                panel.plot(x, shown(values) if place == name else 1e3 * values, **look)
+        panel.set_ylabel(label)
     axes[2].axhline(0.0, color=GREY, linewidth=0.7)
     axes[-1].set_xlabel(label_of(said, unit))
     add_legend(figure, [entry(f"{model} model", color=MODELS[model], **LINES[model]) for model in models])
@@ -85,7 +85,7 @@ def over_one_number(group: Group, parameter: str, _results: Results) -> Drawn:
 
 def actuations(group: Group, parameters: Sequence[str]) -> dict[str, NDArray[np.bool_]] | None:
     """Return the points of a robustness sweep driven by each drive alone; None if points combine drives."""
-    if not set(parameters) <= ACTUATIONS.keys() or len(parameters) < 2 or OF_ACTUATIONS[0][1] not in group.variables:
+    if not set(parameters) <= ACTUATIONS.keys() or len(parameters) < 2 or ACTUATION_PANELS[0][1] not in group.variables:
         return None
     if any(group.variables[name].dims != group.variables["outcome"].dims for name in parameters):
         return None
@@ -99,17 +99,17 @@ def push_off_or_hip(group: Group, driven: Mapping[str, NDArray[np.bool_]], _resu
     Caption: of each way speed (m/s), norm (s/m) and cost of transport of the least disturbed gait.
     """
     speed = group[SPEED].astype(float)
-    figure, axes = panels(0.6 + PANEL_HEIGHT * len(OF_ACTUATIONS), len(OF_ACTUATIONS), sharex=True)
+    figure, axes = panels(0.6 + PANEL_HEIGHT * len(ACTUATION_PANELS), len(ACTUATION_PANELS), sharex=True)
     looks = {name: {"color": colour, "marker": marker} for name, (_, colour, marker) in ACTUATIONS.items()}
-    for one, (said, name, logarithmic) in zip(axes, OF_ACTUATIONS, strict=True):
+    for panel, (said, name, logarithmic) in zip(axes, ACTUATION_PANELS, strict=True):
         for parameter, points in driven.items():
             order = np.argsort(speed[points])
             at, values = speed[points][order], group[name].astype(float)[points][order]
-            one.plot(at, values, **looks[parameter], markersize=3.0, linewidth=1.2)
-        one.set(ylabel=said, yscale="log" if logarithmic else "linear")
+            panel.plot(at, values, **looks[parameter], markersize=3.0, linewidth=1.2)
+        panel.set(ylabel=said, yscale="log" if logarithmic else "linear")
     axes[-1].set_xlabel("speed (m/s)")
     add_legend(figure, [entry(ACTUATIONS[name][0], **looks[name]) for name in driven])
-    cost, norm = (group[name].astype(float) for _, name, _ in OF_ACTUATIONS[:2])
+    cost, norm = (group[name].astype(float) for _, name, _ in ACTUATION_PANELS[:2])
     least = {name: np.flatnonzero(points)[np.nanargmin(norm[points])] for name, points in driven.items()}
     return figure, ({ACTUATIONS[name][0]: (speed[at], norm[at], cost[at]) for name, at in least.items()},)
 
@@ -162,9 +162,9 @@ def draw_shares(axes: Axes, steps: Group) -> None:
 FIGURE_18 = paper_figure(
     18,
     (
-        Need(STAGE, "rough_walk/trajectory", ("hip_along_m", "foot_along_m"), "no walk on rough ground was asked for"),
+        Need(STAGE, "rough_walk/trajectory", ("hip_along_m", "foot_along_m"), "no walk on rough ground was requested"),
         Need(STAGE, "rough_walk/steps", ("touch_along_m",), "the walk on rough ground takes no step"),
-        Need(STAGE, "rough_steps", ("steps",), "no walks on rough ground were asked for"),
+        Need(STAGE, "rough_steps", ("steps",), "no walks on rough ground were requested"),
     ),
     on_rough_ground,
 )

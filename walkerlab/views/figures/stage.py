@@ -56,12 +56,12 @@ def run(
 
 def draw(figure: Illustration, results: Mapping[str, Stored], folder: Path) -> dict[str, str | int | list[str]]:
     """Draw a figure and store its files; return its texts and paths relative to the run's folder."""
-    drawing = figure.drawn(results)
+    drawing = figure.render(results)
     paths = paths_of(figure)
     write_atomically(folder / paths["svg"], drawing.svg)
     write_atomically(folder / paths["png"], drawing.png)
     number = {} if figure.number is None else {"number": figure.number}
-    words = {"title": figure.title, "caption": drawing.caption, "alt": figure.seen}
+    words = {"title": figure.title, "caption": drawing.caption, "alt": figure.alt_text}
     return {**number, **words, **paths, "results": list(figure.stages)}
 
 
@@ -73,7 +73,7 @@ def draw_at_once(stage: str, folder: Path, anew: bool) -> list[Path]:
     Raises StorageError if a figure cannot be stored.
     """
     results = {stage: artifact.read(folder / f"{stage}.h5")}
-    figures = [one for one in FIGURES if one.stages == (stage,) and one.why_left_out(results, {}) is None]
+    figures = [figure for figure in FIGURES if figure.stages == (stage,) and figure.why_left_out(results, {}) is None]
     make_folder(folder / FOLDER)
     for figure in figures:
         if anew or not all((folder / path).is_file() for path in paths_of(figure).values()):

@@ -363,7 +363,7 @@ def draw_relief(axes: Axes, sticks: Sticks) -> None:
     under = times * np.repeat(heights, 2) - RELIEF_UNDER * sticks.leg_length
     axes.plot(*sticks.in_plane(np.column_stack((edges, under))).T, color=VERMILLION, linewidth=0.9)
     axes.text(
-        0.99, 0.97, f"below: the ground, its heights × {times:g}", transform=axes.transAxes, va="top", ha="right",
+        0.99, 0.97, f"below: ground heights × {times:g}", transform=axes.transAxes, va="top", ha="right",
         color=VERMILLION,
     )  # fmt: skip
 

@@ -25,7 +25,7 @@ MAX_PANELS: Final = 4
 MAX_LINES: Final = 5
 """Maximum number of values of a second parameter to draw as lines; more are drawn as a map."""
 DASHES: Final = ("-", "--", "-.")
-ONE: Final = "largest multiplier 1"
+STABILITY_BOUND: Final = "largest multiplier 1"
 MAX_SCATTERED: Final = 20_000
 """Points shown individually in a panel; of more, an even selection is shown."""
 PREFERRED: Final[tuple[str, ...]] = (
@@ -92,7 +92,7 @@ def draw(
     outcomes = zip(*np.unique(group["outcome"].astype(str), return_counts=True), strict=True)
     marked_gaps = "" if against or len(dims) > 2 else "marks"
     gaps = "" if np.all(group["status"] == "answered") else "map" if a_map else marked_gaps
-    what, other = ([spoken(group, name) for name in each] for each in (names, [against] if against else []))
+    what, other = ([name_in_text(group, name) for name in each] for each in (names, [against] if against else []))
     return figure, (what, parameters, list(outcomes), gaps, a_map, RADIUS in names, *other)
 
 
@@ -101,19 +101,19 @@ def one_over_another(group: Group, dims: tuple[str, ...], names: Sequence[str], 
     x = spread(group, against, dims)
     few = np.unique(np.linspace(0, x.size - 1, min(x.size, MAX_SCATTERED)).astype(int))
     figure, axes = panels(0.8 + PANEL_HEIGHT * len(names), len(names), sharex=True, squeeze=False)
-    for one, name in zip(axes[:, 0], names, strict=True):
+    for panel, name in zip(axes[:, 0], names, strict=True):
         line = "-" if len(dims) == 1 else "none"
         y = group[name].astype(float).ravel()
-        one.plot(x[few], y[few], color=BLUE, linestyle=line, linewidth=1.2, marker="o", markersize=2.6)
+        panel.plot(x[few], y[few], color=BLUE, linestyle=line, linewidth=1.2, marker="o", markersize=2.6)
         if name == RADIUS:
-            one.axhline(1.0, color=GREY, linewidth=0.8)
-            add_legend(figure, [entry(ONE, color=GREY, linewidth=0.8)])
-        one.set_ylabel(label(group, name))
+            panel.axhline(1.0, color=GREY, linewidth=0.8)
+            add_legend(figure, [entry(STABILITY_BOUND, color=GREY, linewidth=0.8)])
+        panel.set_ylabel(label(group, name))
     axes[-1, 0].set_xlabel(label(group, against))
     return figure
 
 
-def spoken(group: Group, name: str) -> str:
+def name_in_text(group: Group, name: str) -> str:
     """Name a variable in a sentence."""
     return group.variables[name].long_name.replace("_", " ")
 
@@ -132,17 +132,17 @@ def scattered(group: Group, parameters: Sequence[str], dims: tuple[str, ...], na
         x = spread(group, parameter, dims)
         few = np.unique(np.linspace(0, x.size - 1, min(x.size, MAX_SCATTERED)).astype(int))
         ordered = len(dims) == 1 and column == 0 and bool(np.all(np.diff(x) > 0.0) or np.all(np.diff(x) < 0.0))
-        for one, name in zip(axes[:, column], names, strict=True):
+        for panel, name in zip(axes[:, column], names, strict=True):
             y = group[name].astype(float).ravel()
             if ordered:
-                one.plot(x, y, color=BLUE, linewidth=1.4, marker="o" if x.size <= 60 else "", markersize=2.6)
+                panel.plot(x, y, color=BLUE, linewidth=1.4, marker="o" if x.size <= 60 else "", markersize=2.6)
             else:
                 dots: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 2.2}
-                one.plot(x[few], y[few], color=BLUE, **dots, rasterized=few.size > 2000)
-            finish_panel(one, group, parameter, name, x[np.isnan(y)])
+                panel.plot(x[few], y[few], color=BLUE, **dots, rasterized=few.size > 2000)
+            finish_panel(panel, group, parameter, name, x[np.isnan(y)])
         axes[-1][column].set_xlabel(label(group, parameter))
-    for one, name in zip(axes[:, 0], names, strict=True):
-        one.set_ylabel(label(group, name))
+    for panel, name in zip(axes[:, 0], names, strict=True):
+        panel.set_ylabel(label(group, name))
     if key := marked(group, names):
         add_legend(figure, key)
     return figure
@@ -172,8 +172,8 @@ def finish_panel(axes: Axes, group: Group, parameter: str, name: str, missing: N
 def marked(group: Group, names: Sequence[str]) -> list[Artist]:
     """Legend entries for `finish_panel`."""
     gaps = any(np.isnan(group[name].astype(float)).any() for name in names)
-    one = [entry(ONE, color=GREY, linewidth=0.8)] if RADIUS in names else []
-    return [*one, *([entry("no answer", **MISSING)] if gaps else [])]
+    stability = [entry(STABILITY_BOUND, color=GREY, linewidth=0.8)] if RADIUS in names else []
+    return [*stability, *([entry("no answer", **MISSING)] if gaps else [])]
 
 
 def in_lines(group: Group, dims: tuple[str, ...]) -> bool:
@@ -188,13 +188,13 @@ def lines(group: Group, parameters: Sequence[str], names: Sequence[str]) -> Figu
     looks = [{"color": matplotlib.colormaps["viridis"](0.85 * shade), "linestyle": DASHES[place % len(DASHES)]}
              for place, shade in enumerate(np.linspace(0.0, 1.0, len(values)))]  # fmt: skip
     figure, axes = panels(0.8 + PANEL_HEIGHT * len(names), len(names), sharex=True, squeeze=False)
-    for one, name in zip(axes[:, 0], names, strict=True):
+    for panel, name in zip(axes[:, 0], names, strict=True):
         found = group[name].astype(float)
         rows = found if parameters[0] == few else found.T
         for row, look in zip(rows, looks, strict=True):
-            one.plot(x, row, **look, linewidth=1.3, marker="o", markersize=2.4)
-        finish_panel(one, group, across, name, x[np.isnan(rows).any(axis=0)])
-        one.set_ylabel(label(group, name))
+            panel.plot(x, row, **look, linewidth=1.3, marker="o", markersize=2.4)
+        finish_panel(panel, group, across, name, x[np.isnan(rows).any(axis=0)])
+        panel.set_ylabel(label(group, name))
     axes[-1, 0].set_xlabel(label(group, across))
     unit = group.variables[few].units
     key = []
@@ -219,23 +219,23 @@ def maps(group: Group, parameters: Sequence[str], names: Sequence[str]) -> Figur
     figure, axes = panels(0.4 + MAP_HEIGHT * rows, rows, columns, squeeze=False)
     across, up = (numbers(group, parameter) for parameter in parameters)
     for place, name in enumerate(names):
-        one = axes[place // columns][place % columns]
+        panel = axes[place // columns][place % columns]
         values = np.ma.masked_invalid(group[name].astype(float)).T
-        one.set_facecolor("#D9D9D9")
-        mesh = one.pcolormesh(edges(across), edges(up), values, cmap="viridis", rasterized=True)
-        figure.colorbar(mesh, ax=one, label=label(group, name))
+        panel.set_facecolor("#D9D9D9")
+        mesh = panel.pcolormesh(edges(across), edges(up), values, cmap="viridis", rasterized=True)
+        figure.colorbar(mesh, ax=panel, label=label(group, name))
         if name == RADIUS and values.count() and values.min() < 1.0 < values.max() and min(values.shape) > 1:
-            one.contour(across, up, values, levels=[1.0], colors=WHITE, linewidths=1.4)
+            panel.contour(across, up, values, levels=[1.0], colors=WHITE, linewidths=1.4)
             outlined = [withStroke(linewidth=2.6, foreground=GREY)]
-            add_legend(figure, [entry(ONE, color=WHITE, linewidth=1.4, path_effects=outlined)])
+            add_legend(figure, [entry(STABILITY_BOUND, color=WHITE, linewidth=1.4, path_effects=outlined)])
         for axis, parameter, scale in (("x", parameters[0], across), ("y", parameters[1], up)):
-            getattr(one, f"set_{axis}label")(label(group, parameter))
+            getattr(panel, f"set_{axis}label")(label(group, parameter))
             if is_logarithmic(scale, span=1.0):
-                getattr(one, f"set_{axis}scale")("log")
+                getattr(panel, f"set_{axis}scale")("log")
             if scale.size > 1 and group[parameter].dtype.kind != "O":
-                getattr(one, f"set_{axis}ticks")(scale, minor=True)
-                getattr(one, f"set_{axis}lim")(scale.min(), scale.max())
-            name_ticks(one, group, parameter, axis)
+                getattr(panel, f"set_{axis}ticks")(scale, minor=True)
+                getattr(panel, f"set_{axis}lim")(scale.min(), scale.max())
+            name_ticks(panel, group, parameter, axis)
     for place in range(len(names), rows * columns):
         axes[place // columns][place % columns].set_axis_off()
     return figure

@@ -106,7 +106,7 @@ def touch_times(steps: Group) -> Array:
     return steps[TOUCHES] if TOUCHES in steps.variables else np.zeros(0)
 
 
-def shown(walks: list[Walk], strides: int = PAPER_STRIDES) -> tuple[list[Walk], str]:
+def first_strides(walks: list[Walk], strides: int = PAPER_STRIDES) -> tuple[list[Walk], str]:
     """Return the walks' first strides, and ' (the first 5 strides)' for the caption if that is not the whole walk."""
     cut = [walk.first(strides) for walk in walks]
     return cut, "" if all(map(is_, cut, walks)) else f" (the first {strides} strides)"
@@ -116,10 +116,10 @@ def time_axes(rows: int, row_height: float, walks: list[Walk]) -> tuple[Figure, 
     """Create axes that share the time axis, with the heel strikes of all walks."""
     figure, column = panels(0.85 + rows * row_height, rows, sharex=True, squeeze=False)
     axes = list(column[:, 0])
-    for one in axes:
+    for panel in axes:
         for walk in walks:
-            look, across = walk.look, one.get_xaxis_transform()
-            one.vlines(walk.strikes, 0.0, 1.0, look.colour, look.style, transform=across, lw=STRIKE_WIDTH, zorder=1.5)
+            look, across = walk.look, panel.get_xaxis_transform()
+            panel.vlines(walk.strikes, 0.0, 1.0, look.colour, look.style, transform=across, lw=STRIKE_WIDTH, zorder=1.5)
     end = max(float(walk.time[-1]) for walk in walks)
     if end > 0.0:
         axes[-1].set_xlim(0.0, 1.01 * end)
@@ -136,10 +136,10 @@ def in_time(
     rows  for each the variable, what its axis says, its leg (None: it has none), and the title
     """
     figure, axes = time_axes(len(rows), row_height, walks)
-    for one, (name, words, leg, title) in zip(axes, rows, strict=True):
+    for panel, (name, words, leg, title) in zip(axes, rows, strict=True):
         for walk in walks:
-            line(one, walk.time, walk[name] if leg is None else walk[name][:, leg], walk.look)
-        one.set(ylabel=walks[0].label(words, name), title=title)
+            line(panel, walk.time, walk[name] if leg is None else walk[name][:, leg], walk.look)
+        panel.set(ylabel=walks[0].label(words, name), title=title)
     return figure, axes
 
 
@@ -159,7 +159,7 @@ def legend(figure: Figure, walks: list[Walk], *more: Artist) -> None:
     add_legend(figure, [*models, *(strike_entry(look) for look in looks), *more])
 
 
-ADJUSTED = Need(TUNE_STAGE, "adjusted", ("time", "velocity"), "no start of those searched walks")
+ADJUSTED = Need(TUNE_STAGE, "adjusted", ("time", "velocity"), "no start in the search leads to walking")
 FROM_RIGID = Need(TUNE_STAGE, "rigid_start", ("time", "velocity"), "the rigid model took no step")
 
 
@@ -180,8 +180,8 @@ def draw_adjusted(results: Results) -> Drawn:
     for group, look, end in (("rigid_start", RIGID, "walked"), ("adjusted", CONTACT, outcome)):
         times = touch_times(result[group])
         whole.append(Walk(look, end, times.size, times, result[group]))
-    walks, extent = shown(whole)
-    links = ("link 1", "link 2") if named else ("the leg that swings first", "the leg that stands first")
+    walks, extent = first_strides(whole)
+    links = ("link 1", "link 2") if named else ("the first swing leg", "the first stance leg")
     titles = [f"({'ab'[leg]}) angular velocity of {link}" for leg, link in enumerate(links)]
     figure, _ = in_time(walks, 1.9, [("velocity", "velocity", leg, title) for leg, title in enumerate(titles)])
     legend(figure, walks)
@@ -201,13 +201,13 @@ def draw_states(results: Results) -> Drawn:
 
     Caption: how much is shown, and how the walks went.
     """
-    walks, extent = shown(walks_with(results, STATES))
+    walks, extent = first_strides(walks_with(results, STATES))
     first = walks[0]
     figure, axes = in_time(walks, 1.55, STATES_IN_TIME)
-    for one, (_, _, leg, _) in zip(axes, STATES_IN_TIME, strict=True):
+    for panel, (_, _, leg, _) in zip(axes, STATES_IN_TIME, strict=True):
         edges = np.diff((first["stance_leg"] == leg + 1).astype(int), prepend=0, append=0)
         for begin, end in zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1), strict=True):
-            one.axvspan(first.time[begin], first.time[end - 1], color=PALE, linewidth=0.0, zorder=0.5)
+            panel.axvspan(first.time[begin], first.time[end - 1], color=PALE, linewidth=0.0, zorder=0.5)
     stance = f"stance of the leg, {first.look.label.split()[0]}"
     legend(figure, walks, Patch(facecolor=PALE, edgecolor="none", label=stance))
     return figure, (extent, walks)
@@ -224,13 +224,13 @@ ARROW_LENGTH = 0.06
 
 def draw_cycles(results: Results) -> Drawn:
     """Plot a phase plane for each leg on equal scales; the caption says how much is shown and how the walks ended."""
-    walks, extent = shown(walks_with(results, STATES), CYCLES)
+    walks, extent = first_strides(walks_with(results, STATES), CYCLES)
     figure, axes = panels(4.2, 1, 2, sharex=True, sharey=True)
-    for leg, one in enumerate(axes):
+    for leg, panel in enumerate(axes):
         for walk in walks:
-            draw_cycles_of(one, walk, leg)
-        show_direction(one, walks[0], leg)
-        one.set(title=f"({'ab'[leg]}) leg {leg + 1}", xlabel=walks[0].label("angle", "angle"))
+            draw_cycles_of(panel, walk, leg)
+        show_direction(panel, walks[0], leg)
+        panel.set(title=f"({'ab'[leg]}) leg {leg + 1}", xlabel=walks[0].label("angle", "angle"))
     axes[0].set_ylabel(walks[0].label("angular velocity", "velocity"))
     key = [entry(walk.look.label, **walk.look.line) for walk in walks]
     if any(walk.strikes.size > LAST_STRIDE for walk in walks):
@@ -293,7 +293,7 @@ def draw_energies(results: Results) -> Drawn:
     Caption: how much is shown, the means of the mechanical energy, whether Table 3 has it too, whether there are
     impacts, whether anything drives the walker, and how the walks went.
     """
-    walks, extent = shown(walks_with(results, ENERGIES))
+    walks, extent = first_strides(walks_with(results, ENERGIES))
     figure, axes = in_time(walks, 1.75, ENERGIES_IN_TIME)
     ends = np.array([np.quantile(walk["mechanical_J"], (FEW, 1.0 - FEW)) for walk in walks])
     bottom, top = float(ends[:, 0].min()), float(ends[:, 1].max())
@@ -323,7 +323,9 @@ RUN_LOOKS: Final[tuple[dict[str, Any], ...]] = (
 )
 
 
-def overlaid(first: Mapping[str, Content], second: Mapping[str, Content], names: tuple[str, str]) -> list[bytes] | None:
+def draw_runs(
+    first: Mapping[str, Content], second: Mapping[str, Content], names: tuple[str, str]
+) -> list[bytes] | None:
     """Draw two runs' walks overlaid, as SVG and PNG; None if they share no sampled walk.
 
     names  of the runs
@@ -345,10 +347,10 @@ def draw_overlay(both: list[tuple[str, list[Group]]], names: tuple[str, str]) ->
     figure, axes = panels(0.5 + 1.9 * rows, rows, columns, sharex="col", sharey="row", squeeze=False)
     for row, (variable, leg, label) in zip(axes, OVERLAY_ROWS, strict=True):
         row[0].set_ylabel(label)
-        for one, (_, groups) in zip(row, both, strict=True):
+        for panel, (_, groups) in zip(row, both, strict=True):
             for group, look in zip(groups, RUN_LOOKS, strict=True):
                 if variable in group.variables:
-                    one.plot(group["time"], group[variable][..., leg], **look)
+                    panel.plot(group["time"], group[variable][..., leg], **look)
     for top, bottom, (stage, _) in zip(axes[0], axes[-1], both, strict=True):
         top.set_title(stage)
         bottom.set_xlabel("time (s)")

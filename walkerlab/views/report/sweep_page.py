@@ -47,13 +47,13 @@ def draw(swept: Swept, folder: RunFolder, names: Sequence[str] = (), against: st
     if against and against not in question.names:
         check_quantities(group, question.dims, [against], "--against")
     quantities = [*names] or [name for name in choose(group, question.dims, question.names) if name != against]
-    own = None if names or against else robustness.of_sweep(group, question.names)
+    own = None if names or against else robustness.sweep_illustration(group, question.names)
     if own is None and quantities:
         own = illustration(group, question.stage, question.names, question.dims, quantities, against)
     paths: list[Path] = []
     pictures: list[Picture] = []
     if own is not None:
-        figure = own.drawn({})
+        figure = own.render({})
         make_folder(folder.figures)
         paths = [folder.figures / f"{swept.path.stem}.{kind}" for kind in ("svg", "png")]
         for path, data in zip(paths, (figure.svg, figure.png), strict=True):

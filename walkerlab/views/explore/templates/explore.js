@@ -2,7 +2,7 @@ const token = new URLSearchParams(location.search).get("token");
 const byId = (id) => document.getElementById(id);
 const MODELS = { rigid: "simulate", contact: "contact-sim" };
 
-// What is asked about: the config's name, none for the one that was started from, and what differs from it.
+// Requested config: its name (empty for the initial one) and the changes to it.
 let state = { config: "", set: {} };
 let rows = new Map();
 let touched = "slope_deg";
@@ -44,13 +44,13 @@ function fromFragment() {
   byId("config").value = state.config;
 }
 
-// A number that is let go is a place to come back to; one that is still being turned is not.
+// Add to the history only values at which a slider is released.
 function remember() {
   if (fragment() !== remember.last) history.pushState(null, "", fragment());
   remember.last = fragment();
 }
 
-// Asking: one question at a time; of those that come meanwhile, the last.
+// Requests: one at a time; of those made meanwhile only the last is sent.
 
 let [asking, next] = [false, false];
 
@@ -61,14 +61,14 @@ async function walk() {
   while (next) {
     next = false;
     document.body.dataset.state = "asking";
-    // The rigid model walks while the contact model is still compiled.
+    // Show the rigid model while the contact model is being compiled.
     const first = !shown;
     const asked = structuredClone(question({ models: first ? ["rigid"] : models() }));
     const began = performance.now();
     const late = setInterval(async () => {
       const [, { compiling, compiled } = {}] = await ask("/api/job").catch(() => [0]);
       if (!asking || document.body.dataset.state !== "asking") return;
-      const what = compiling ? `Compiling, which is done once: part ${compiled}, ${compiling}` : `Computing ${changes(asked.set) || called(asked.config)}`;
+      const what = compiling ? `Compiling (only once): part ${compiled}, ${compiling}` : `Computing ${changes(asked.set) || called(asked.config)}`;
       say(`${what} (${Math.round((performance.now() - began) / 1000)} s).`);
     }, 500);
     try {
@@ -78,7 +78,7 @@ async function walk() {
       if (first && status === 200) next = true;
     } catch {
       document.body.dataset.state = "failed";
-      say("The server does not answer. Start `walkerlab explore` again; this page goes on asking.", "bad");
+      say("The server does not answer. Start `walkerlab explore` again; this page keeps trying.", "bad");
       await new Promise((resolve) => setTimeout(resolve, 1000));
       next = true;
     }
@@ -86,13 +86,13 @@ async function walk() {
   asking = false;
 }
 
-// What is to be typed stands between backticks.
+// Text between backticks is shown as code.
 function say(text, tone = "plain") {
   byId("said").replaceChildren(...text.split("`").map((part, place) => (place % 2 ? Object.assign(document.createElement("code"), { textContent: part }) : part)));
   byId("said").className = `statement ${tone}`;
 }
 
-// Where a value stands in a command line is nothing to a page.
+// Positions in a command line mean nothing on a page; they are removed.
 const ended = (text = "") => text && (/^[a-z]+[ :]/.test(text) ? text[0].toUpperCase() : text[0]) + text.slice(1) + (/[.:]$/.test(text) ? "" : ".");
 const placeless = (text) => text.replace(/^(--set .*?|\S.*?:\d+:\d+): /, "");
 const sentence = ({ message, advice }) => [placeless(message), advice].map(ended).join(" ").trim();
@@ -109,7 +109,7 @@ function show(status, answer, asked) {
   shown = { answer, asked };
   document.body.dataset.shown = "";
   const named = [called(asked.config), changes(asked.set)].filter(Boolean).join(" with ");
-  byId("shown").textContent = `${answer.tracks ? "Shown" : "Nothing walks"}: ${named}`;
+  byId("shown").textContent = `${answer.tracks ? "Shown" : "No walk"}: ${named}`;
   byId("command").textContent = answer.command;
   reveal(!!answer.tracks);
   fillTable(answer);
@@ -127,12 +127,12 @@ function show(status, answer, asked) {
 const ENDS = { walked: "walks", fell: "falls", slid: "slides" };
 const outcome = (walk) => (walk.error ? sentence(walk.error) : walk.outcome === "walked" ? `walks ${walk.steps} steps.` : `${ENDS[walk.outcome] ?? walk.outcome} in step ${walk.steps + 1}: ${walk.advice}`);
 
-// The circle and the table stay where nothing walks.
+// The circle and the table stay visible without a walk.
 function reveal(walks) {
   for (const part of byId("place").querySelectorAll(".scenes, .controls, .views, .readout, .key, .player > figcaption")) part.hidden = !walks;
 }
 
-// A steady walk goes on in its last two steps, where it has settled: their end, their beginning and their length.
+// A steady walk repeats its last two steps: [end, start, length].
 function lastLap(track) {
   const strikes = [0, ...track.strikes];
   const last = 2 * Math.floor(track.strikes.length / 2);
@@ -157,7 +157,7 @@ function draw() {
   if (!matchMedia("(prefers-reduced-motion: reduce)").matches) player.start();
 }
 
-// What the walks come to
+// Table of results
 
 const ROWS = [
   ["step period of the gait (s)", (gait, walk, first) => first && gait.period_s],
@@ -200,7 +200,7 @@ function drawCircle(multipliers) {
   svg.setAttribute("aria-label", `Multipliers in the unit circle: ${said.join(", ") || "none"}`);
 }
 
-// The numbers
+// Parameters
 
 class Row {
   constructor(number) {
@@ -240,7 +240,7 @@ class Row {
   typed(id) {
     this.text = Object.assign(document.createElement("input"), { className: "typed", spellcheck: false, autocomplete: "off" });
     if (id) this.text.id = id;
-    else Object.assign(this.text, { inputMode: "decimal", ariaLabel: `${this.number.key}, typed` });
+    else Object.assign(this.text, { inputMode: "decimal", ariaLabel: `${this.number.key}, value` });
     this.text.addEventListener("change", () => {
       const text = this.text.value.trim().replace("−", "-");
       turn(this.number.key, text ? valueOf(text) : this.number.start, true);
@@ -263,7 +263,7 @@ class Row {
     if (document.activeElement !== this.text || Number(this.text.value) !== value) this.text.value = text;
     this.written = this.text.value;
   }
-  // What is typed and not yet entered stays, whatever answer arrives meanwhile.
+  // Typed text that is not yet entered survives answers that arrive meanwhile.
   get edited() {
     return this.text && this.text.value !== this.written;
   }
@@ -280,7 +280,7 @@ function turn(key, value, settled) {
   else along.mark();
 }
 
-// Other values may follow from the one that was turned. An answer about values that have changed meanwhile is late.
+// Other values may depend on the changed one. Ignore answers for values that have changed again.
 async function settle() {
   const asked = fragment();
   const [status, answer] = await ask("/api/numbers", question()).catch(() => [0]);
@@ -326,10 +326,10 @@ function search() {
     });
     return button;
   }));
-  if (words.length && !hits.length) byId("found").textContent = "No key of this walker has these words in its name, unit or meaning.";
+  if (words.length && !hits.length) byId("found").textContent = "No key of this walker matches these words.";
 }
 
-// Gaits over the number that was turned last
+// Gaits over the parameter changed last
 
 class Along extends Plot {
   constructor(place) {
@@ -340,7 +340,7 @@ class Along extends Plot {
       if (this.series) turn(this.key, Number(this.value(clamp(this.at(event), least, most)).toPrecision(4)), true);
     });
   }
-  // What spans decades is drawn over its logarithm.
+  // Values that span decades are plotted on a logarithmic axis.
   scaled(value) {
     return this.log ? Math.log10(value) : value;
   }
@@ -358,7 +358,7 @@ class Along extends Plot {
   look(event) {
     if (this.series) this.tip.textContent = `${digits(this.value(this.at(event)), 4)} ${rows.get(this.key)?.number.unit ?? ""}`;
   }
-  // Coarse at once, then finer, while nothing else is asked.
+  // Coarse first, then finer unless something else is requested.
   async draw() {
     const row = [rows.get(touched), rows.get("slope_deg")].find((one) => one?.number.gaits);
     if (!row) return;
@@ -383,13 +383,13 @@ class Along extends Plot {
       const block = Object.fromEntries(Object.entries(span).map(([name, value]) => [`continuation.${name}`, value]));
       const [status, answer] = await ask("/api/along", question({ set: { ...state.set, ...block } })).catch(() => [0]);
       if (this.asked !== asked) return;
-      if (status === 409) return this.said("Another page has asked for other gaits."), (this.asked = null);
+      if (status === 409) return this.said("Superseded by another page's request."), (this.asked = null);
       if (status === 200) found[model] = answer.curves;
       else if (status === 422) refused = sentence(answer.error);
       this.found = Object.values(found).flat();
       if (this.found.length) this.plot();
-      const more = place + 1 < finer.length ? ` Computing more of the ${finer[place + 1][0]} model.` : "";
-      this.said((this.found.length ? "Stable gaits are full lines; a click goes there." : more ? "" : refused || "No gaits are found along this number.") + more);
+      const more = place + 1 < finer.length ? ` Refining the ${finer[place + 1][0]} model's curve.` : "";
+      this.said((this.found.length ? "Solid lines are stable; click to jump there." : more ? "" : refused || "No gaits found along this parameter.") + more);
     }
   }
   said(text) {
@@ -400,7 +400,7 @@ class Along extends Plot {
     this.place.classList.remove("old");
     const what = byId("what");
     this.titles = [this.unit && this.unit !== "1" ? `${this.key} (${this.unit})` : this.key, ""];
-    // Gaits far from those that can be walked would make these one flat line.
+    // Gaits far from the stable ones would flatten the others into a line.
     const near = [this.height, ...this.found.flatMap((curve) => curve[what.value].filter((_, index) => curve.stable[index]))].filter(Number.isFinite);
     const [least, most] = near.length ? [Math.min(...near) / 1.5, Math.max(...near) * 1.5] : [0, Infinity];
     const series = this.found.flatMap((curve) => {
@@ -422,7 +422,7 @@ class Along extends Plot {
     this.cursor.replaceChildren(this.line, this.dot);
     this.mark();
   }
-  // Of the gait that is shown; there is none beside the contact model's curves alone.
+  // Quantity of the gait shown; undefined if only the contact model's curves are plotted.
   get height() {
     const [gait, what] = [shown?.answer.fixedpoint ?? {}, byId("what").value];
     if (!this.found?.some(({ model }) => model === "rigid")) return undefined;
@@ -439,13 +439,13 @@ class Along extends Plot {
   }
 }
 
-// Out of the page
+// Exports
 
 function leave(name, address) {
   Object.assign(document.createElement("a"), { download: name, href: address }).click();
 }
 
-// The canvas has no ground of its own: the page shows through.
+// The canvas is transparent: fill in the page's background.
 function picture() {
   if (!player) return;
   const { canvas } = player.walk;
@@ -459,7 +459,7 @@ function picture() {
 
 function tell(text, url) {
   byId("made").textContent = `${text} `;
-  if (url) byId("made").append(Object.assign(document.createElement("a"), { href: `${url}?token=${token}`, textContent: "Open it", target: "_blank" }));
+  if (url) byId("made").append(Object.assign(document.createElement("a"), { href: `${url}?token=${token}`, textContent: "Open", target: "_blank" }));
 }
 
 async function save() {
@@ -469,15 +469,17 @@ async function save() {
   if (name && ![...byId("config").options].some((option) => option.value === name)) byId("config").append(new Option(name));
 }
 
+const LABELS = { gif: "GIF", report: "Report" };
+
 async function make(kind) {
   let [status, answer] = await ask("/api/job", question({ kind, models: models() })).catch(() => [0]);
   while (status === 200 && answer.running) {
-    tell(`${kind}: ${answer.said || "begins"}`, answer.url);
+    tell(`${kind}: ${answer.said || "starting"}`, answer.url);
     await new Promise((resolve) => setTimeout(resolve, 500));
     [status, answer] = await ask("/api/job").catch(() => [0]);
   }
   if (status !== 200) return tell(status ? sentence(answer.error) : "The server does not answer.");
-  tell(answer.error ? sentence(answer.error) : `The ${kind} is there.`, answer.url);
+  tell(answer.error ? sentence(answer.error) : `${LABELS[kind]} ready.`, answer.url);
 }
 
 // The whole page
@@ -522,7 +524,7 @@ byId("save").addEventListener("click", save);
 byId("png").addEventListener("click", picture);
 for (const kind of ["gif", "report"]) byId(kind).addEventListener("click", () => make(kind));
 addEventListener("popstate", begin);
-// The fragment is taken: it holds the changes.
+// The link must not replace the fragment, which holds the changes.
 document.querySelector(".skip").addEventListener("click", (event) => {
   event.preventDefault();
   byId("config").focus();
