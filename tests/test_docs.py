@@ -19,7 +19,7 @@ from typer.testing import CliRunner
 import walkerlab
 from walkerlab.config.loader import load
 from walkerlab.config.schema import Contact
-from walkerlab.physics.ground.friction import friction_coefficient, lacking
+from walkerlab.physics.ground.friction import friction_coefficient, missing_members
 from walkerlab.pipeline.graph import PIPELINE, Stage, results_of
 from walkerlab.pipeline.store.content import Content, Group, Variable
 from walkerlab.views.cli.main import program
@@ -111,7 +111,7 @@ def test_the_friction_of_the_docs_is_a_whole_law_with_the_derivative_that_it_say
     monkeypatch.setattr(friction_coefficient, "_bodies", dict(friction_coefficient._bodies))
     names = {"math": math, "NamedTuple": NamedTuple, "Any": Any, "friction_coefficient": friction_coefficient}
     exec(f"from __future__ import annotations\n{code}", names)
-    assert lacking(names["Smooth"]) == []
+    assert missing_members(names["Smooth"]) == []
     law, h = names["Smooth"].of(Contact(units="si")), 1e-6
     assert law == (0.7, 0.1)
     low, high = (friction_coefficient(law, 0.05 + side * h)[0] for side in (-1, 1))
