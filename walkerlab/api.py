@@ -375,7 +375,7 @@ def basin(
 def robustness(
     walker: Any = None, slope_deg: float | None = None, to: Sequence[str] = (), walks: int | None = None, **keys: Any
 ) -> Result:
-    """What a gait withstands and which number moves it, in memory: norms, largest steps, rough ground in `summary`.
+    """Find what a gait survives and which parameter matters most, in memory; `summary` has norms, steps and rough ground.
 
     walker     from `compass`, `kneed` or `walker`
     slope_deg  positive downhill, deg

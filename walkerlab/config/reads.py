@@ -249,6 +249,6 @@ if TYPE_CHECKING:
         ContinuationConfig, BasinConfig, RobustnessConfig, DesignConfig, NamedConfig,
     ]  # fmt: skip
 
-    def of_each_type(config: schema.Config) -> OfEachType:
+    def for_each_type(config: schema.Config) -> OfEachType:
         """Let mypy check that a config satisfies every type."""
         return config, config, config, config, config, config, config, config, config, config, config

@@ -55,7 +55,7 @@ def kernel_part(function: F) -> F:
 
 
 def callable_kernel(function: F) -> F:
-    """As `kernel_part`, and called from Python as a kernel."""
+    """Declare a `kernel_part` that Python also calls as a kernel."""
     whole = kernel(function)
 
     @functools.wraps(function)
@@ -67,7 +67,7 @@ def callable_kernel(function: F) -> F:
 
 
 def forced_inline(function: F) -> F:
-    """As `kernel_part`, with a copy of its code in every caller, however large."""
+    """Declare a `kernel_part` whose code is copied into every caller, however large."""
     compile_as(function, lambda *_: (function, ALWAYS_INLINE_FLAGS))
     return function
 
@@ -167,7 +167,7 @@ def by_type(declaration: Callable[..., Any]) -> ByType:
 
 
 def by_type_or_default(declaration: Callable[..., Any]) -> ByType:
-    """As `by_type`; the declaration's own body serves all types without a registered one."""
+    """Declare as `by_type`; the declaration's own body serves all types without a registered one."""
     chosen = by_type(declaration)
     chosen.default(declaration)
     return chosen

@@ -1,1 +1,1 @@
-"""What people see: figures, reports, the interactive page and the command line; nothing here computes a result."""
+"""Views for people: figures, reports, the interactive page and the command line; they compute no results."""

@@ -13,9 +13,9 @@ if TYPE_CHECKING:
     from jinja2 import Environment
 
 BLANKS = re.compile(r"[ \n]+")
-"""Where a template's lines end; the narrow and the unbreakable blanks of numbers are others."""
+"""Ends of a template's lines; narrow and unbreakable blanks within numbers do not count."""
 BETWEEN_PARTS = re.compile(r"(?:^|[ \n])\|(?=[ \n]|$)")
-"""What sets the parts of a text apart, as in 'one | two'."""
+"""Separator of the parts of a text, as in 'one | two'."""
 
 
 def parts(text: str) -> list[str]:

@@ -76,7 +76,7 @@ TYPES = {"compass": compasses, "straight-legs": straight, "kneed": kneed}
 each_type = pytest.mark.parametrize("kind", TYPES)
 
 
-def of_each_type(test):
+def for_each_type(test):
     """The test for random walkers, slopes and states of one type at a time."""
 
     @each_type
@@ -152,7 +152,7 @@ def walkers_differ_by(one, other):
     return np.abs(np.subtract(one, other)).max() / (1.0 + np.abs(other).max())
 
 
-@of_each_type
+@for_each_type
 def test_energy_is_constant_in_a_swing(assembly, slope, free):
     model = standing(assembly, G, slope)
     y, n = state_of(model, BENT, free), len(model.arm_x)
@@ -164,7 +164,7 @@ def test_energy_is_constant_in_a_swing(assembly, slope, free):
     assert max(energies) - min(energies) < 1e-8 * scale
 
 
-@of_each_type
+@for_each_type
 def test_kinetic_energy_is_the_sum_over_masses(assembly, slope, free):
     model = standing(assembly, G, slope)
     y = state_of(model, BENT, free)
@@ -172,7 +172,7 @@ def test_kinetic_energy_is_the_sum_over_masses(assembly, slope, free):
     assert kinetic_energy(model, y) == pytest.approx(energy_of(points, spins), rel=1e-10, abs=1e-12)
 
 
-@of_each_type
+@for_each_type
 def test_a_heel_strike_keeps_angular_momentum_about_the_new_foothold_and_gains_no_energy(assembly, slope, free):
     model = standing(assembly, G, slope)
     y = both_feet_down(model, free)
@@ -234,7 +234,7 @@ def mapped(assembly: Assembly, place, of_mass=lambda m: m, of_inertia=lambda i: 
     )
 
 
-@of_each_type
+@for_each_type
 def test_the_mirror_image_moves_as_the_mirror_image(assembly, slope, free):
     model = standing(assembly, G, slope)
     mirror = standing(mapped(assembly, lambda _, at: (-at[0], at[1])), G, -slope)
@@ -248,7 +248,7 @@ def test_the_mirror_image_moves_as_the_mirror_image(assembly, slope, free):
     assert swing_foot(mirror, image) == pytest.approx((height, -apart), abs=1e-12)
 
 
-@of_each_type
+@for_each_type
 def test_a_twin_of_another_size_and_mass_moves_alike(assembly, slope, free):
     long, heavy = 3.7, 0.2
     model = standing(assembly, G, slope)
@@ -294,7 +294,7 @@ def by_parts(assembly, radius_m, leg_length_m):
     )
 
 
-@of_each_type
+@for_each_type
 def test_a_walker_by_its_parts_in_frames_of_their_own_is_that_of_its_type(assembly, slope, free):
     model = standing(assembly, G, slope)
     # one and the same shift for like bodies of both legs

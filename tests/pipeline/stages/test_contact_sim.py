@@ -15,7 +15,7 @@ from walkerlab.physics.hybrid.walk_record import DrivenWork, WalkRecord, WalkWor
 from walkerlab.pipeline.graph import PIPELINE
 from walkerlab.pipeline.progress import Silent
 from walkerlab.pipeline.stages import contact_sim, simulate
-from walkerlab.pipeline.stages.walk import numbers_of, of_steps
+from walkerlab.pipeline.stages.walk import numbers_of, step_columns
 from walkerlab.pipeline.store import artifact
 from walkerlab.pipeline.store.content import Content
 from walkerlab.pipeline.store.key import Identity
@@ -184,7 +184,7 @@ def test_the_rigid_walk_says_the_same_of_what_has_the_same_name(paper):
 
 
 def test_a_knee_that_does_not_lock_is_a_gap():
-    kneed = of_steps([0.7, 1.4], knee_strike_time_s=[0.5, np.nan])
+    kneed = step_columns([0.7, 1.4], knee_strike_time_s=[0.5, np.nan])
     np.testing.assert_array_equal(kneed["knee_strike_time_s"].values, [0.5, np.nan])
     times, along, strikes = np.array([[0.7, 1.4], [0.3, 0.6], [0.5, np.nan]])
     nothing = DrivenWork(1.0, 0.0, 0.0, 0.0, 0.0, 0.0)

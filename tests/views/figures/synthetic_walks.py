@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from walkerlab.pipeline.stages.walk import of_steps, over_time
+from walkerlab.pipeline.stages.walk import over_time, step_columns
 from walkerlab.pipeline.store.artifact import Stored
 from walkerlab.pipeline.store.content import Group, Variable
 from walkerlab.pipeline.store.key import Identity
@@ -75,7 +75,7 @@ def trajectory(step, time, angle, velocity, level):
 def walked(period, count, **more):
     """What is stored of the steps, if there are any."""
     number = np.arange(1, count + 1)
-    columns = of_steps(
+    columns = step_columns(
         period * number,
         period_s=np.full(count, period),
         length_m=np.full(count, STEP_LENGTH),

@@ -37,9 +37,9 @@ from walkerlab.pipeline.stages.walk import (
     count_outcomes,
     legs,
     numbers_of,
-    of_steps,
     over_time,
     rigid_start,
+    step_columns,
 )
 from walkerlab.pipeline.store.columns import numbered, real_and_imaginary, rows_group
 from walkerlab.pipeline.store.content import Content, Group, Variable
@@ -334,10 +334,10 @@ def groups(tune: TuneRun) -> dict[str, Group]:
     rigid = tune.rigid_walk.samples
     if rigid is not None and rigid.time_s.size:
         in_time = {**legs(), **over_time(time=rigid.time_s), **leg_variables(rigid)}
-        stored["rigid_start"] = Group({**in_time, **of_steps(tune.rigid_walk.touch_time_s)})
+        stored["rigid_start"] = Group({**in_time, **step_columns(tune.rigid_walk.touch_time_s)})
     for name, walk in tune.walks.items():
         if walk.samples is not None and walk.samples.time_s.size:
-            stored[name] = Group({**legs_in_time(walk, walker), **of_steps(walk.touch_time_s)})
+            stored[name] = Group({**legs_in_time(walk, walker), **step_columns(walk.touch_time_s)})
     if tune.paper is not None:
         energy = {"mechanical_J": Variable(tune.paper.mechanical, (TIME,), "J", "kinetic and potential energy")}
         forces = over_time(normal_force_N=tune.paper.normal)

@@ -1,4 +1,4 @@
-"""From parts to the constants of the equations of motion.
+"""Constants of the equations of motion, from the parts of a walker.
 
 Choose a point of the tree, the root. Every other point lies at root + sum over bodies k of R(theta_k) d_k, where the
 levers d_k are constants of the assembly and theta_k the bodies' absolute angles. The kinetic energy then needs only

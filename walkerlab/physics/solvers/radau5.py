@@ -334,7 +334,7 @@ def rewind_radau5(method: Radau5, system: Any) -> None:
 
 @prepare_dense.case(Radau5)
 def prepare_dense_radau5(method: Radau5, system: Any) -> None:
-    """Nothing to do: `accept` has stored the polynomial."""
+    """Do nothing: `accept` has stored the polynomial."""
 
 
 @interpolate.case(Radau5)

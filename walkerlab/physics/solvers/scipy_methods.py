@@ -166,7 +166,7 @@ def rewind_scipy(method: ScipyMethod, system: Any) -> None:
 
 @prepare_dense.case(ScipyMethod)
 def prepare_dense_scipy(method: ScipyMethod, system: Any) -> None:
-    """Nothing to do: `step_solver` has stored the dense output."""
+    """Do nothing: `step_solver` has stored the dense output."""
 
 
 @interpolate.case(ScipyMethod)

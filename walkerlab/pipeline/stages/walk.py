@@ -169,7 +169,7 @@ def legs() -> dict[str, Variable]:
     return {LEG: Variable(np.array([1, 2]), (LEG,), "1", "leg: 1 swings first, 2 stands first")}
 
 
-def of_steps(touch_time_s: ArrayLike, **values: ArrayLike | None) -> dict[str, Variable]:
+def step_columns(touch_time_s: ArrayLike, **values: ArrayLike | None) -> dict[str, Variable]:
     """Build variables over steps, named as in `OF_STEPS`; empty for a walk without a step.
 
     Values that are None are left out; NaN and missing values of the last steps are gaps.
@@ -195,7 +195,7 @@ def steps_of(walk: WalkRecord, **values: ArrayLike | None) -> dict[str, Variable
         UNEVEN: walk.foothold_height_m,
         "knee_strike_time_s": walk.knee_strike_time_s,
     }
-    return of_steps(walk.touch_time_s, **common, **values)
+    return step_columns(walk.touch_time_s, **common, **values)
 
 
 def pace_of(config: SceneConfig | SimulateConfig, walk: WalkRecord) -> dict[str, float]:

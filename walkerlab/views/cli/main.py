@@ -95,7 +95,7 @@ def options_of_the_program(
         bool, typer.Option("--version", is_eager=True, callback=print_version, help="Print the version and the commit.")
     ] = False,
 ) -> None:
-    """Nothing but `--version`, which is answered on sight."""
+    """Answer `--version` at once."""
 
 
 def add_stage(app: typer.Typer, stage: Stage, graph: Graph) -> None:

@@ -1,4 +1,4 @@
-"""What commands are asked: the options that they share, each declared once, and the run that these mean."""
+"""Options that commands share, each declared once, and the run that they select."""
 
 import glob
 import inspect
@@ -72,7 +72,7 @@ def option(*flags: str, default: Any = None, **about: Any) -> Any:
 
 
 def as_parameter(entry: Field[Any]) -> inspect.Parameter:
-    """Such a field as a parameter of a function whose signature typer reads."""
+    """Turn such a field into a parameter of a function whose signature typer reads."""
     kind, declared = inspect.Parameter.KEYWORD_ONLY, entry.metadata["option"]
     return inspect.Parameter(entry.name, kind, default=entry.default, annotation=Annotated[entry.type, declared])
 
@@ -157,7 +157,7 @@ class Request:
 
     @cached_property
     def console(self) -> Console:
-        """Where messages go."""
+        """Console that messages go to."""
         return Console(self.quiet, self.verbose, self.open_page)
 
     @property

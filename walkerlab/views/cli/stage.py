@@ -112,18 +112,18 @@ def report_lines(request: Request, report: StageReport) -> list[str]:
 
 
 def plan_lines(report: StageReport) -> list[str]:
-    """What would happen, for people."""
+    """Describe what would happen."""
     rows = [[done.stage, done.action, done.reason] for done in report.steps]
     return [f"in {report.run_dir}:", *aligned(rows), *describe_omissions(report)]
 
 
 def omission_lines(request: Request, report: StageReport) -> list[str]:
-    """What was left out, if that is asked for or nothing else is there to be told."""
+    """Lines about what was left out, if they are requested or there is nothing else to report."""
     return describe_omissions(report) if request.verbose or report.artifact is None else []
 
 
 def describe_omissions(report: StageReport) -> list[str]:
-    """What was left out, why, and what that saves."""
+    """Describe what was left out, why, and what that saves."""
     return [
         f"left out: {entry.what} ({short_reason(entry.why)})" + (f"; saves {entry.saves}" if entry.saves else "")
         for entry in report.left_out

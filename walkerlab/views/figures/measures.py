@@ -27,7 +27,7 @@ ARC = np.linspace(-0.6, 0.6, 41)
 BEHIND, BENT = -0.3, -0.75
 """Angles (rad) of the second leg and of its shank."""
 BESIDE, FIRST_LANE = 0.62, 0.24
-"""Where mass labels (behind the leg) and the first height dimensions (ahead of it) stand, in leg lengths."""
+"""Distance of mass labels (behind the leg) and of the first height dimensions (ahead of it), in leg lengths."""
 LETTER, LINE = 0.0088, 0.0195
 """Width and height of a letter as fractions of the picture's width."""
 CLEAR = 0.05
