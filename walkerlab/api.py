@@ -375,7 +375,7 @@ def basin(
 def robustness(
     walker: Any = None, slope_deg: float | None = None, to: Sequence[str] = (), walks: int | None = None, **keys: Any
 ) -> Result:
-    """Find what a gait survives and which parameter matters most, in memory; `summary` has norms, steps and rough ground.
+    """Find what a gait survives and which parameter matters most, in memory; `summary` has the norms.
 
     walker     from `compass`, `kneed` or `walker`
     slope_deg  positive downhill, deg

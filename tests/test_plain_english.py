@@ -1,0 +1,75 @@
+"""What a machine can check of plain English: names, how docstrings begin, and references that lead somewhere.
+
+The rules are in CONTRIBUTING.md.
+"""
+
+import ast
+import re
+from pathlib import Path
+
+import pytest
+
+import walkerlab
+
+PACKAGE = Path(walkerlab.__file__).parent
+SOURCES = sorted(PACKAGE.rglob("*.py"))
+TREES = {path: ast.parse(path.read_text(encoding="utf-8")) for path in SOURCES}
+PARTICIPLES = {
+    "asked", "begun", "counted", "drawn", "found", "held", "kept", "made", "meant", "met", "said", "shown", "sought",
+    "spoken", "taken", "told", "walked", "wanted",
+}  # fmt: skip
+"""Words that say what was done to something, not what it is."""
+FRAGMENT = re.compile(
+    r"(Of|What|That of|Those|Whom|To whom|By what|It (does|is)\b|Its|None|In which|With what|Nothing|So many|Some|As|At"
+    r"|From|Where|Between|Until|Once|If|Such)\b"
+)
+REFERENCE = re.compile(r"`([a-z_]+(?:\.[A-Za-z_]+)+)`|\b((?:[a-z_]+/)*[a-z_]+\.(?:pyi?|md))\b")
+LIBRARIES = {"scipy", "numpy", "matplotlib", "mujoco", "numba"}
+DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
+
+
+def named(path):
+    return str(path.relative_to(PACKAGE))
+
+
+def assigned_names(tree):
+    """Names of functions, classes, arguments and variables, with their lines."""
+    for node in ast.walk(tree):
+        if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)):
+            yield node.name.strip("_"), node.lineno
+        elif isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
+            yield node.id.strip("_"), node.lineno
+        elif isinstance(node, ast.arg):
+            yield node.arg.strip("_"), node.lineno
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=named)
+def test_functions_are_verbs_or_name_what_they_return(path):
+    functions = [node for node in ast.walk(TREES[path]) if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef))]
+    names = [(node.lineno, node.name.strip("_")) for node in functions]
+    assert [(line, name) for line, name in names if name.split("_")[0] in PARTICIPLES] == []
+    assert [(line, name) for line, name in names if name.startswith("of_")] == []
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=named)
+def test_docstrings_begin_with_a_verb_or_the_thing(path):
+    documented = [node for node in ast.walk(TREES[path]) if isinstance(node, DOCUMENTED)]
+    texts = [(getattr(node, "lineno", 1), ast.get_docstring(node) or "") for node in documented]
+    assert [(line, text.split("\n")[0]) for line, text in texts if FRAGMENT.match(text)] == []
+
+
+def test_references_lead_somewhere():
+    """Files named in docstrings and comments exist, and dotted names in backticks are names of the package."""
+    files = {path.name for path in PACKAGE.parent.rglob("*.*") if ".git" not in path.parts}
+    words = {name for tree in TREES.values() for name, _ in assigned_names(tree)} | {path.stem for path in SOURCES}
+    words |= {path.name for path in PACKAGE.rglob("*") if path.is_dir()} | {"walkerlab"}
+    words |= {node.attr for tree in TREES.values() for node in ast.walk(tree) if isinstance(node, ast.Attribute)}
+    lost = []
+    for path, tree in TREES.items():
+        for node in ast.walk(tree):
+            text = ast.get_docstring(node) if isinstance(node, DOCUMENTED) else None
+            for dotted, file in REFERENCE.findall(text or ""):
+                known = dotted.split(".")[0] in LIBRARIES or set(dotted.split(".")) <= words | {""}
+                if (file and Path(file).name not in files) or not known:
+                    lost.append((named(path), dotted or file))
+    assert lost == []
