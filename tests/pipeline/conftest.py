@@ -80,7 +80,7 @@ class Listener:
     def compiling(self, kernel):
         pass
 
-    def drawn(self, summary, folder):
+    def announce_page(self, summary, folder):
         self.pages.append((folder / summary["html"]).read_text())
 
     def start(self, label, total=None):

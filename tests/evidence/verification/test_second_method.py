@@ -59,7 +59,7 @@ def test_a_rigid_walk_too():
 def test_what_has_no_answer_is_not_compared_and_says_so():
     case = CASES["no-budget"]
     result = judge(case, config_of(case))
-    assert (result.second_method, result.second_tried) == ("", "the walk itself ended budget-exhausted")
+    assert (result.second_method, result.second_tried) == ("", "the walk itself ended as budget-exhausted")
 
 
 @pytest.mark.parametrize(("rtol", "limit"), [(1e-10, 1e-7), (1e-3, 1e-4)])

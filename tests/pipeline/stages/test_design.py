@@ -122,14 +122,14 @@ def test_searches_go_round_places_without_a_gait_and_tell_how_many_optima_there_
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ((), "no question"),
-        (("design.minimise=period_s",), "no question"),
+        ((), "needs a quantity to optimise"),
+        (("design.minimise=period_s",), "needs a quantity to optimise"),
         (("design.minimise=period_s", "design.over={walker.thigh.mass_kg: [1, 2]}"), "walker.thigh.mass_kg"),
         (("design.minimise=period_s", "design.over={slope_deg: [3, 1]}"), "first below the second"),
         (("design.minimise=period_s", "design.maximise=speed_m_s"), "remove one of them"),
         (("design.minimise=period_s", "design.over={walker.hip_mass_kg: [-5, 3]}"), "hip_mass_kg cannot be -5 kg"),
         (("design.minimise=height",), "design.minimise"),
-        (("design.minimise=period_s", "design.over={slope_deg: [1, 3]}", "design.keep={w: [0, 1]}"), "not a number of"),
+        (("design.minimise=period_s", "design.over={slope_deg: [1, 3]}", "design.keep={w: [0, 1]}"), "is not a gait quantity"),
     ],
 )  # fmt: skip
 def test_bad_questions_end_in_words(changes, said):

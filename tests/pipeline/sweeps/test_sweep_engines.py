@@ -44,7 +44,7 @@ def test_a_point_that_kills_its_worker_is_marked_and_the_rest_is_there(toy):
 
 
 def test_workers_of_this_machine_may_begin_before_there_are_points():
-    with LOCAL.begun(Order(workers=2)) as begun:
+    with LOCAL.start_early(Order(workers=2)) as begun:
         workers = set(processes_below(os.getpid()))
         with begun.opened(Order(workers=2)) as pool:
             assert pool.executor.submit(os.getpid).result() in workers
@@ -52,7 +52,7 @@ def test_workers_of_this_machine_may_begin_before_there_are_points():
 
 def test_only_a_forced_sweep_computes_again_what_its_workers_remember(toy, marks, tmp_path):
     counts = []
-    with LOCAL.begun(Order(workers=1)) as begun:
+    with LOCAL.start_early(Order(workers=1)) as begun:
         for first, force in ((2, False), (4, False), (4, True), (4, True)):
             toy.run("roll", f"strides={first}:{first + 1}:2", engine=begun, order=Order(1), force=force)
             counts.append(marks())

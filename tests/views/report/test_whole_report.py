@@ -35,7 +35,7 @@ def run(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         cases = tuple(case for case in package_cases() if case.name in JUDGED)
         assert len(cases) == len(JUDGED)
-        patch.setattr(stability, "judged", lambda own: cases)
+        patch.setattr(stability, "all_cases", lambda own: cases)
         patch.setattr(known_problems, "PROBLEMS", known_problems.PROBLEMS[:1])
         for trial in (RigidTrial, ContactTrial):
             patch.setattr(trial, "methods", property(lambda self: ("dop853", "radau5")))
