@@ -69,6 +69,8 @@ def test_references_lead_somewhere():
         for node in ast.walk(tree):
             text = ast.get_docstring(node) if isinstance(node, DOCUMENTED) else None
             for dotted, file in REFERENCE.findall(text or ""):
+                if dotted.endswith((".py", ".pyi", ".md")):
+                    dotted, file = "", dotted
                 known = dotted.split(".")[0] in LIBRARIES or set(dotted.split(".")) <= words | {""}
                 if (file and Path(file).name not in files) or not known:
                     lost.append((named(path), dotted or file))

@@ -129,7 +129,10 @@ def test_searches_go_round_places_without_a_gait_and_tell_how_many_optima_there_
         (("design.minimise=period_s", "design.maximise=speed_m_s"), "remove one of them"),
         (("design.minimise=period_s", "design.over={walker.hip_mass_kg: [-5, 3]}"), "hip_mass_kg cannot be -5 kg"),
         (("design.minimise=height",), "design.minimise"),
-        (("design.minimise=period_s", "design.over={slope_deg: [1, 3]}", "design.keep={w: [0, 1]}"), "is not a gait quantity"),
+        (
+            ("design.minimise=period_s", "design.over={slope_deg: [1, 3]}", "design.keep={w: [0, 1]}"),
+            "is not a gait quantity",
+        ),
     ],
 )  # fmt: skip
 def test_bad_questions_end_in_words(changes, said):
