@@ -99,7 +99,8 @@ def test_the_stage_of_the_docs_runs():
     type_it_takes, module, entry = (code for code in code_to_add() if "peed" in code)
     names = {"Protocol": Protocol, "Mapping": dict, "Content": Content, "Group": Group, "Variable": Variable}
     exec(type_it_takes + module, names | {"Progress": object, "Stage": Stage, "results_of": results_of}, names)
-    stage = eval(entry, {"Stage": Stage, "results_of": results_of}, names)
+    reads = SimpleNamespace(SpeedConfig=names["SpeedConfig"])
+    stage = eval(entry, {"Stage": Stage, "results_of": results_of, "reads": reads}, names)
     assert stage.reads == ("gravity_m_s2",)
     steps = {name: Variable(np.array([0.5]), ("step",), "1", name) for name in ("length_m", "period_s")}
     found = names["run"](SimpleNamespace(gravity_m_s2=10.0), {"simulate": Content({"steps": Group(steps)}, {})}, None)
