@@ -27,7 +27,7 @@ MEMORY = MemoryResults()
 
 @functools.cache
 def real(stage):
-    """The result of a stage on a walk of two strides, computed once a session."""
+    """The result of a stage on a walk of two strides, computed once per run of the tests."""
     config = load(None, ["strides=2", *SMALL[stage]]).config
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(two_parameters, "PLANE_CELLS", (3, 2))
