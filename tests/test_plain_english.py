@@ -11,6 +11,8 @@ import pytest
 
 import walkerlab
 
+PROJECT = Path(__file__).parents[1]
+"""The checkout. The package may be installed elsewhere, without the docs beside it."""
 PACKAGE = Path(walkerlab.__file__).parent
 SOURCES = sorted(PACKAGE.rglob("*.py"))
 TREES = {path: ast.parse(path.read_text(encoding="utf-8")) for path in SOURCES}
@@ -60,7 +62,7 @@ def test_docstrings_begin_with_a_verb_or_the_thing(path):
 
 def test_references_lead_somewhere():
     """Files named in docstrings and comments exist, and dotted names in backticks are names of the package."""
-    files = {path.name for path in PACKAGE.parent.rglob("*.*") if ".git" not in path.parts}
+    files = {path.name for path in PROJECT.rglob("*.*") if ".git" not in path.parts}
     words = {name for tree in TREES.values() for name, _ in assigned_names(tree)} | {path.stem for path in SOURCES}
     words |= {path.name for path in PACKAGE.rglob("*") if path.is_dir()} | {"walkerlab"}
     words |= {node.attr for tree in TREES.values() for node in ast.walk(tree) if isinstance(node, ast.Attribute)}
