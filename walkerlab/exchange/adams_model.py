@@ -126,7 +126,7 @@ def adams_model(export: Exported, law: str) -> AdamsModel:
     """
     planar = export.model
     gravity = MM * planar.gravity_along, -MM * planar.gravity_down
-    model = AdamsModel(export.file_stem, gravity, markers={ORIGIN: Marker(GROUND)})
+    model = AdamsModel(export.model_name, gravity, markers={ORIGIN: Marker(GROUND)})
     add_bodies(model, export)
     add_ground(model, export)
     if law == "contact":

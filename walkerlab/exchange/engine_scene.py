@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from walkerlab.config.reads import ContactConfig
 from walkerlab.exchange.planar import FLOATING, PlanarModel, planar_model
 from walkerlab.physics.ground.compliant import hinge_point
-from walkerlab.physics.ground.friction import friction_coefficient
+from walkerlab.physics.ground.friction import FrictionLaw, friction_coefficient
 from walkerlab.physics.ground.resting import resting_foot
 from walkerlab.physics.ground.terrain import STANCE_FOOT
 from walkerlab.physics.ground.walker import LOCKED, MAX_BODIES, ContactWalker, changed_forms
@@ -146,16 +146,23 @@ class EngineContact:
     creep_velocity: float
 
 
+def creep_velocity(friction: FrictionLaw, load: float) -> float:
+    """Return the slip velocity (m/s) at which friction carries a load, tangential over normal force."""
+    # Bisection down to neighbouring numbers: loading a library's root finder takes longer than an export may.
+    low, high = 0.0, friction.rising_until
+    while low < (middle := 0.5 * (low + high)) < high:
+        low, high = (middle, high) if -friction_coefficient(friction, middle)[0] < load else (low, middle)
+    return high
+
+
 def contact_target(scene: EngineScene) -> EngineContact | None:
     """Linearise the walker's contact under its weight on one foot; None on frictionless ground."""
-    from scipy.optimize import brentq
-
     walker = scene.ours
     law, friction = walker.normal, walker.friction
     if friction.largest == 0.0:
         return None
     mass, g = walker.mass, walker.gravity_down
     foot = resting_foot(mass * g, mass, law.stiffness, law.exponent, law.damping)
-    creep = brentq(lambda v: -friction_coefficient(friction, v)[0] - CREEP_LOAD, 0.0, friction.rising_until, xtol=1e-18)
+    creep = creep_velocity(friction, CREEP_LOAD)
     sliding = -friction_coefficient(friction, friction.sliding_from)[0]
     return EngineContact(mass, g, foot.depth, law.exponent, foot.damping_ratio, sliding, CREEP_LOAD, creep)

@@ -21,6 +21,8 @@ Kind = Literal["adm", "cmd", "mjcf"]
 Law = Literal["contact", "functions"]
 KINDS: Final[tuple[Kind, ...]] = get_args(Kind)
 LAWS: Final[tuple[Law, ...]] = get_args(Law)
+ENDINGS: Final[dict[str, Kind]] = {"adm": "adm", "cmd": "cmd", "xml": "mjcf", "mjcf": "mjcf"}
+"""Formats by the ending of their files."""
 
 
 @dataclass(frozen=True)
@@ -38,6 +40,7 @@ def export_model(
     kind: Kind,
     law: Law = "contact",
     commit: str | None = None,
+    stem: str | None = None,
 ) -> ExportedFiles:
     """Write a walker for another program, started from a rigid state as `contact-sim` starts it.
 
@@ -46,18 +49,15 @@ def export_model(
     kind                 adm: ADAMS/Solver's dataset and commands; cmd: Adams View's commands; mjcf: MuJoCo's model
     law                  of ADAMS: its contact between shapes, or walkerlab's law as functions
     commit               of walkerlab, for the head of the file
+    stem                 of the files' names; by default the config's name
 
     Raises ConfigError for what the format cannot express and would change the walk, NoAnswer if pads are to follow a
     contact gait and there is none.
     """
-    if kind not in KINDS or law not in LAWS:
-        raise ConfigError(
-            f"{kind!r} with the law {law!r} is no kind of export.",
-            f"Kinds are {', '.join(KINDS)}, laws {', '.join(LAWS)}.",
-        )
     export = prepare_export(config, rigid_step_length_m, rigid_state)
-    left_out = tuple(parts_left_out(export, kind, law))
-    head, stem = list(export.describe(left_out, commit)), export.file_stem
+    stem = stem or export.model_name
+    left_out = tuple(parts_left_out(export, kind, law, f"{stem}.py"))
+    head = list(export.describe(left_out, commit))
     if kind == "mjcf":
         script = {f"{stem}.py": mjcf.script_text()} if mjcf.needs_script(export) else {}
         return ExportedFiles({f"{stem}.xml": mjcf.walker_text(export, head)} | script, left_out)
@@ -70,7 +70,15 @@ def export_model(
     return ExportedFiles(files, left_out)
 
 
-def parts_left_out(export: Exported, kind: Kind, law: Law) -> Iterator[str]:
+def law_named(text: str) -> Law:
+    """Return the contact law of ADAMS models with this name; raises ConfigError for another name."""
+    for law in LAWS:
+        if text == law:
+            return law
+    raise ConfigError(f"--law {text}: not a contact law.", f"Laws of ADAMS models: {', '.join(LAWS)}.")
+
+
+def parts_left_out(export: Exported, kind: Kind, law: Law, script: str) -> Iterator[str]:
     """Describe the parts of the walk that an exported model lacks or replaces."""
     config, by_functions = export.config, kind != "mjcf" and law == "functions"
     if export.scene.ground.terrain.has_pads:
@@ -80,7 +88,7 @@ def parts_left_out(export: Exported, kind: Kind, law: Law) -> Iterator[str]:
         yield f"point feet; balls of {millimetres:g} mm stand for them, on ground that much lower"
     if kind == "mjcf":
         if mjcf.needs_script(export):
-            yield f"push-offs and hip torque in the model itself; the script {export.file_stem}.py applies them"
+            yield f"push-offs and hip torque in the model itself; the script {script} applies them"
     else:
         when = "act at the times of walkerlab's own touches, as ADAMS functions have no memory"
         if config.push_off.impulse_N_s:

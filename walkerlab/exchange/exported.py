@@ -149,8 +149,7 @@ class Exported:
         return float(self.walk.end_time_s)
 
     @property
-    def file_stem(self) -> str:
-        """Name of the config, as an identifier."""
+    def model_name(self) -> str:
         return identifier(self.config.name)
 
     def describe(self, left_out: Iterable[str], commit: str | None) -> Iterator[str]:

@@ -151,7 +151,7 @@ def walker_text(export: Exported, head: Iterable[str]) -> str:
     q, v = (" ".join(repr(float(value)) for value in values) for values in export.start)
     distance = -4.0 * export.config.walker.leg_length_m
     elements = [
-        f'<mujoco model="{export.file_stem}">',
+        f'<mujoco model="{export.model_name}">',
         '<compiler angle="radian" autolimits="true" balanceinertia="true"/>',
         option_text(model, contact, f'timestep="{STEP_S!r}" '),
         f"<custom>{''.join(custom_texts(export))}</custom>",
