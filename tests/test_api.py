@@ -272,5 +272,5 @@ def test_a_model_is_written_with_the_start_of_its_gait(tmp_path):
     written = walkerlab.export_model(tmp_path / "round.adm", walker, slope_deg=0.9, strides=2, law="functions")
     assert [path.name for path in written] == ["round.adm", "round.acf"]
     assert "walked, 4 steps" in written[0].read_text()
-    with pytest.raises(ConfigError, match=r"round\.pdf: not a model\. Its ending is one of \.adm"):
+    with pytest.raises(ConfigError, match=r"round\.pdf: not a model\."):
         walkerlab.export_model(tmp_path / "round.pdf")
