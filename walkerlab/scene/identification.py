@@ -19,7 +19,7 @@ from walkerlab.physics.estimation.measurements import MeasuredAngles, MeasuredSt
 from walkerlab.physics.estimation.mixed_model import evaluate, products_of
 from walkerlab.physics.estimation.prediction import Forecast, felt_directions
 from walkerlab.physics.estimation.result import Estimate, Identification, ModelFit, StepTable, Uncertain
-from walkerlab.physics.orbits.family_search import CONTACT, RIGID
+from walkerlab.physics.orbits.family_search import RIGID
 from walkerlab.physics.orbits.newton import Effort
 from walkerlab.physics.orbits.rigid_map import RigidMap
 from walkerlab.physics.orbits.robustness import CENTRAL_4TH
@@ -186,9 +186,7 @@ def starts_of(problem: FitProblem, count: int) -> list[Floats]:
     return starts
 
 
-def describe(
-    subject: ModelUnderTest, problem: FitProblem, question: Question, fitted: Fitted
-) -> Identification:
+def describe(subject: ModelUnderTest, problem: FitProblem, question: Question, fitted: Fitted) -> Identification:
     """Turn a fit into its answer."""
     forecast, keys = problem.forecast, question.keys
     sizes = typical_sizes(forecast)
@@ -220,7 +218,7 @@ def describe(
         forecast.steps.count,
         rms_residuals(forecast, fitted),
         fitted.evaluation.squares / dof,
-        gait_with_errors(subject, problem, fitted, information.covariance),
+        gait_with_errors(problem, fitted, information.covariance),
         (ModelFit(subject.model, fitted.evaluation.likelihood, fit_word, reason),),
         step_tables(forecast, fitted),
         fitted,
@@ -234,7 +232,8 @@ def process_noise(fitted: Fitted, problem: FitProblem) -> dict[str, float | bool
         return {"roughness_m": 0.0, "standard_error": None, "at_bound": True}
     products, h = products_of(fitted.data), 1e-2
     logs = [
-        evaluate(products, fitted.noise._replace(roughness_m=roughness * math.exp(k * h))).restricted for k in (-1, 0, 1)
+        evaluate(products, fitted.noise._replace(roughness_m=roughness * math.exp(k * h))).restricted
+        for k in (-1, 0, 1)
     ]
     curvature = (2.0 * logs[1] - logs[0] - logs[2]) / h**2
     error = roughness / math.sqrt(curvature) if curvature > 0.0 else None
@@ -262,9 +261,7 @@ def step_tables(forecast: Forecast, fitted: Fitted) -> tuple[StepTable, ...]:
     )
 
 
-def gait_with_errors(
-    subject: ModelUnderTest, problem: FitProblem, fitted: Fitted, covariance: Floats
-) -> dict[str, Uncertain]:
+def gait_with_errors(problem: FitProblem, fitted: Fitted, covariance: Floats) -> dict[str, Uncertain]:
     """Return period, length and spectral radius of the identified gait, with errors that follow from the estimates'.
 
     Empty if the identified walker has no gait of one step near the start's.
@@ -276,7 +273,7 @@ def gait_with_errors(
         parameters = tuple(p.tolist())
         if not forecast.admits(parameters):
             return None
-        gait = gait_near(forecast.walks, subject.z, parameters, GAIT_EFFORT)  # type: ignore[arg-type]
+        gait = gait_near(forecast.walks, fitted.z, parameters, GAIT_EFFORT)  # type: ignore[arg-type]
         if not isinstance(gait, Cycle):
             return None
         return np.array((gait.period_s, gait.step.length_m, float(np.abs(gait.multipliers).max())))
@@ -286,7 +283,9 @@ def gait_with_errors(
         return {}
     gradient = []
     for place, scale in enumerate(forecast.scales):
-        ends = [quantities(values + offset * GAIT_STEP * scale * np.eye(values.size)[place]) for offset, _ in CENTRAL_4TH]
+        ends = [
+            quantities(values + offset * GAIT_STEP * scale * np.eye(values.size)[place]) for offset, _ in CENTRAL_4TH
+        ]
         usable = [end for end in ends if end is not None]
         if len(usable) < len(ends):
             gradient.append(np.zeros(3))

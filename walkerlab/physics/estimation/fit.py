@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Final, Literal
 
 import numpy as np
 
-from walkerlab.physics.estimation.measurements import PERIOD
 from walkerlab.physics.estimation.mixed_model import (
     Evaluation,
     Linearised,
@@ -76,6 +75,7 @@ class Fitted:
     evaluation: Evaluation
     data: Linearised
     predicted: Floats  # (values,) over even ground, with the most probable start
+    z: Floats  # (d,) end of that walk, on the section
     rounds: int
     why: str = ""
 
@@ -110,10 +110,12 @@ def fit(problem: FitProblem, start: Floats) -> Fitted | str:
             break
     G = forecast.respond(u, heights, problem.leg_length_m)
     final = None if G is None else linearise(problem, u, heights, G, exact=True)
-    predicted = forecast.predict(u, np.zeros(forecast.heights))
+    even = np.zeros(forecast.heights)
+    predicted = forecast.predict(u, even)
     if final is None or predicted is None:
         return NO_NEIGHBOURS
-    return Fitted(u, heights, noise, evaluate(products_of(final), noise), final, predicted, round_number, why)
+    z = forecast.walks.disturbed(forecast.start(u), forecast.parameters(u), even).z
+    return Fitted(u, heights, noise, evaluate(products_of(final), noise), final, predicted, z, round_number, why)
 
 
 NO_NEIGHBOURS: Final = "the walk from the start, or one beside it, ends before the measured steps are over"

@@ -90,9 +90,7 @@ def evaluate(products: Products, noise: Noise) -> Evaluation:
     return Evaluation(restricted, likelihood, information, move, heights, squares)
 
 
-def estimate_noise(
-    products: Products, floors: Floats, leg_length_m: float, start: Noise, anew: bool = True
-) -> Noise:
+def estimate_noise(products: Products, floors: Floats, leg_length_m: float, start: Noise, anew: bool = True) -> Noise:
     """Maximise the restricted likelihood over the standard deviations; a roughness of 0 is one of the candidates.
 
     floors  (quantities,) smallest standard deviations of the measurement

@@ -17,7 +17,12 @@ from walkerlab.physics.orbits.step_map import CENTRAL_2ND, DisturbedWalk
 from walkerlab.physics.solvers.system import Floats
 
 CLOCK, OFFSET, GAIN, DELAY = "clock_rate", "angle_offset_rad", "angle_gain", "time_offset_s"
-NUISANCES: Final[Mapping[str, tuple[float, float]]] = {CLOCK: (1.0, 0.1), OFFSET: (0.0, 0.1), GAIN: (1.0, 0.1), DELAY: (0.0, 0.05)}
+NUISANCES: Final[Mapping[str, tuple[float, float]]] = {
+    CLOCK: (1.0, 0.1),
+    OFFSET: (0.0, 0.1),
+    GAIN: (1.0, 0.1),
+    DELAY: (0.0, 0.05),
+}
 """Properties of clock and sensors that may be estimated too: value if they are not, and typical change."""
 FELT: Final = 1e-3  # change of the next step by a change of the start, below which a direction of the start is lost
 QUICK_STEP: Final = 1e-5  # of an unknown's scale, in difference quotients while searching
