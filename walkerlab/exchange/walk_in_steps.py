@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Final
 
@@ -29,6 +30,7 @@ START_TOLERANCE: Final = (
 SHORTEST: Final = 0.25  # of the mean step, before which the first heel strike is the start itself
 DEGREE: Final = 5
 INTERVALS: Final = 24  # of the spline through a step
+MOST_SAMPLES: Final = 500  # of a step, that are kept
 SIDE: Final = 1e-10  # share of the walk's duration before a heel strike, of the sample that ends a step
 
 
@@ -36,7 +38,7 @@ SIDE: Final = 1e-10  # share of the walk's duration before a heel strike, of the
 class RecordedSteps:
     """A recorded walk from its first heel strike on, the leg that swings first in column 0.
 
-    time_s         (samples,) from that heel strike, with both sides of every later one
+    time_s         (samples,) from that heel strike, with both sides of every later one; dense recordings are thinned
     step           (samples,) index of the step
     angle_rad      (samples, 2)
     velocity_rad_s (samples, 2)
@@ -68,6 +70,13 @@ def divide_into_steps(walk: Walk, model: RigidModel, source: str) -> RecordedSte
     angle = walk.both_legs("angle")
     assert angle is not None, "a walk has the angles of both legs"
 
+    largest = float(np.abs(angle).max())
+    if largest > math.pi:
+        raise ConfigError(
+            f"{source}: an angle from the vertical reaches {largest:.3g} rad, more than half a turn.",
+            "Say in which unit angles are, such as --units angle=deg, or remove outliers.",
+        )
+
     def height(angles: Array) -> Array:
         """Height (m) of leg 0's foot over leg 1's, perpendicular to the slope, for straight legs of one length."""
         total = feet_on_slope(model, angles[:, 0], angles[:, 1])
@@ -81,7 +90,7 @@ def divide_into_steps(walk: Walk, model: RigidModel, source: str) -> RecordedSte
         ends = [touch for touch in touches if touch.time_s > origin + SHORTEST * touches[-1].time_s / len(touches)]
     if not ends:
         raise ConfigError(
-            f"{source} holds no complete step: {len(touches)} heel strikes were found.",
+            f"{source} holds no complete step; heel strikes found: {len(touches)}.",
             "Angles are from the vertical, positive with the foot ahead (--columns), in the right unit (--units), over "
             "at least one whole step.",
         )
@@ -121,7 +130,8 @@ def samples_within(time: Array, columns: Array, begin: float, end: float) -> tup
     """
     near = (time >= begin) & (time <= end)
     spline = spline_through(time[near], columns[near])
-    inside = (time > begin) & (time < end)
+    inside = np.flatnonzero((time > begin) & (time < end))
+    inside = inside[:: max(1, inside.size // MOST_SAMPLES)]
     grid = np.concatenate(([begin], time[inside], [end]))
     values = spline(grid)
     values[1:-1] = columns[inside]

@@ -148,6 +148,11 @@ class Stage:
 
     def refuse_unsuited(self, target: str, config: Config) -> None:
         """Raise ConfigError if it cannot run under a config, although `target` needs it."""
+        if "recording" in self.requires and config.recording is None:
+            raise ConfigError(
+                f"{target} needs a recorded walk, and {without_block('recording')}.",
+                "Name its file: walkerlab compare --with FILE.",
+            )
         # Imported here: the help of the command line needs neither.
         from walkerlab.config.walkers import contact_required_error, contact_to_add
 
@@ -225,6 +230,11 @@ PIPELINE = Graph(
         "Find the periodic gait of the rigid model and its multipliers.", reads.FixedPointConfig,
     ),
     Stage(
+        "recorded-walk", "walkerlab.pipeline.stages.recorded_walk",
+        "Read a walk recorded elsewhere and find its steps.", reads.RecordedWalkConfig, requires=("recording",),
+        files=later("walkerlab.pipeline.stages.recorded_walk", "digests"),
+    ),
+    Stage(
         "simulate", "walkerlab.pipeline.stages.simulate", "Walk the rigid model.", reads.SimulateConfig,
         gait_unless_start_is_given, options=(STRIDES,), does_without=rigid_walk_omissions,
     ),
@@ -233,11 +243,6 @@ PIPELINE = Graph(
         "Walk the contact model, its contact forces as in ADAMS.",
         reads.ContactSimConfig, gait_for_start_or_pads, options=(STRIDES,), requires=("contact",),
         precompile="compile_kernels", does_without=contact_walk_omissions,
-    ),
-    Stage(
-        "recorded-walk", "walkerlab.pipeline.stages.recorded_walk",
-        "Read a walk recorded elsewhere and find its steps.", reads.RecordedWalkConfig, requires=("recording",),
-        files=later("walkerlab.pipeline.stages.recorded_walk", "digests"),
     ),
     Stage(
         "tune", "walkerlab.evidence.paper.tune",

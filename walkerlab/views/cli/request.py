@@ -116,9 +116,13 @@ def bounds(flag: str, values: Sequence[str]) -> str:
 def pairs(flag: str, values: Sequence[str]) -> str:
     """Return pairs NAME=VALUE,... as a YAML block; a unit alone stands for that of its kind."""
     # Imported here: few commands read files of other programs.
+    from walkerlab.errors import ConfigError
     from walkerlab.exchange.columns import parse_pairs, parse_units
 
-    return json.dumps(parse_units(values) if flag == "--units" else parse_pairs(flag, values))
+    try:
+        return json.dumps(parse_units(values) if flag == "--units" else parse_pairs(flag, values))
+    except ConfigError as error:
+        raise typer.BadParameter(f"{error.message} {error.advice}", param_hint=flag) from None
 
 
 def own_parameter(name: str, option: "Option") -> inspect.Parameter:
