@@ -11,6 +11,7 @@ import pytest
 import walkerlab
 from walkerlab.config.loader import load
 from walkerlab.errors import ConfigError
+from walkerlab.evidence.paper.sections import recorded_tables, recorded_words
 from walkerlab.pipeline.executor import answer_in_memory
 from walkerlab.pipeline.results import MemoryResults
 from walkerlab.pipeline.runner import execute
@@ -116,6 +117,19 @@ def test_a_comparison_has_the_recorded_walk_as_a_third_column(tmp_path):
     assert summary["differences"]["contact"]["max_angle_error_rad"]["aligned"] == pytest.approx(contact, rel=0.05)
     assert compared.findings["table3"]["t_cycle"]["recorded"] == pytest.approx(1.407194, abs=1e-5)
     assert {"recorded/rigid/errors", "recorded/contact/aligned"} <= compared.groups.keys()
+    characteristics, differences = recorded_tables(summary)
+    assert characteristics.columns[-1].title == "mine"
+    assert len(differences.groups[""]) == 4
+    assert "mine: the last step takes 0.7036 s" in recorded_words(summary)
+
+
+def test_figures_draw_the_recorded_walk_under_its_name(tmp_path):
+    path = written(tmp_path, table(simulated("rigid")))
+    config = load(None, ("strides=2", f"recording.file={json.dumps(str(path))}", "recording.name=mine")).config
+    folder = RunFolder(tmp_path / "runs", "drawn")
+    execute(config, "plot", folder)
+    for number in ("07", "08", "09"):
+        assert "mine" in (folder.path / "figures" / f"figure-{number}.svg").read_text(encoding="utf-8")
 
 
 def test_a_changed_file_makes_the_result_stale_and_the_same_content_does_not(tmp_path):
