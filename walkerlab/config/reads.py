@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from walkerlab.config.design import Design
     from walkerlab.config.drives import PushOff
     from walkerlab.config.ground import Footholds
+    from walkerlab.config.recording import Recording
     from walkerlab.config.robustness import Robustness
     from walkerlab.config.stability import Case
     from walkerlab.config.walkers import Walker
@@ -158,6 +159,13 @@ class CompareConfig(ContactConfig, Protocol):
 
     @property
     def ground(self) -> Footholds: ...
+
+
+class RecordedWalkConfig(RigidConfig, Protocol):
+    """Keys that `recorded-walk` reads."""
+
+    @property
+    def recording(self) -> Recording | None: ...
 
 
 class TuneConfig(GroundConfig, Protocol):
