@@ -22,7 +22,7 @@ from walkerlab.physics.estimation.result import Estimate, Identification, ModelF
 from walkerlab.physics.orbits.family_search import RIGID
 from walkerlab.physics.orbits.newton import Effort
 from walkerlab.physics.orbits.rigid_map import RigidMap
-from walkerlab.physics.orbits.robustness import CENTRAL_4TH
+from walkerlab.physics.orbits.robustness import derivative
 from walkerlab.physics.orbits.step_map import Cycle, StepMap, gait_near
 from walkerlab.physics.solvers.system import Floats
 from walkerlab.scene.families import CONTACT_STEP
@@ -39,12 +39,13 @@ CONFIGS_AT_ONCE: Final = 512
 SCALE_OF_ZERO: Final = 0.01  # typical change of a parameter that is 0
 SPREAD_OF_STARTS: Final = 0.1  # of a parameter, between starts of the fit
 GAIT_EFFORT: Final = Effort(1e-9, 40)
+GAIT_NAMES: Final = ("period_s", "step_length_m", "spectral_radius")
 GAIT_STEP: Final = 1e-3  # of a parameter's scale, in derivatives of the gait
 
 
 @dataclass(frozen=True)
 class Question:
-    """What is to be fitted.
+    """Question to a measured walk.
 
     fit        bounds of each fitted key, in its unit; None for the schema's
     prior      value and standard deviation of keys, known beforehand
@@ -213,7 +214,7 @@ def describe(subject: ModelUnderTest, problem: FitProblem, question: Question, f
         estimates,
         combinations,
         information,
-        process_noise(fitted, problem),
+        process_noise(fitted),
         dict(zip(forecast.quantities, fitted.noise.measurement.tolist(), strict=True)),
         forecast.steps.count,
         rms_residuals(forecast, fitted),
@@ -225,7 +226,7 @@ def describe(subject: ModelUnderTest, problem: FitProblem, question: Question, f
     )
 
 
-def process_noise(fitted: Fitted, problem: FitProblem) -> dict[str, float | bool | None]:
+def process_noise(fitted: Fitted) -> dict[str, float | bool | None]:
     """Return the roughness with its standard error, from the curvature of the restricted likelihood."""
     roughness = fitted.noise.roughness_m
     if roughness == 0.0:
@@ -281,17 +282,12 @@ def gait_with_errors(problem: FitProblem, fitted: Fitted, covariance: Floats) ->
     centre = quantities(values)
     if centre is None:
         return {}
-    gradient = []
+    slopes = np.zeros((values.size, len(GAIT_NAMES)))
     for place, scale in enumerate(forecast.scales):
-        ends = [
-            quantities(values + offset * GAIT_STEP * scale * np.eye(values.size)[place]) for offset, _ in CENTRAL_4TH
-        ]
-        usable = [end for end in ends if end is not None]
-        if len(usable) < len(ends):
-            gradient.append(np.zeros(3))
-            continue
-        gradient.append(np.tensordot([weight / (GAIT_STEP * scale) for _, weight in CENTRAL_4TH], usable, 1))
-    slopes = np.array(gradient)
+        along = scale * np.eye(values.size)[place]
+        slope = derivative(lambda share, along=along: quantities(values + share * along), GAIT_STEP)  # type: ignore[misc]
+        if slope is None:
+            return {name: Uncertain(float(v), None) for name, v in zip(GAIT_NAMES, centre, strict=True)}
+        slopes[place] = slope / scale
     errors = np.sqrt(np.maximum(np.einsum("iq,ij,jq->q", slopes, covariance, slopes), 0.0))
-    names = ("period_s", "step_length_m", "spectral_radius")
-    return {name: Uncertain(float(v), float(e)) for name, v, e in zip(names, centre, errors, strict=True)}
+    return {name: Uncertain(float(v), float(e)) for name, v, e in zip(GAIT_NAMES, centre, errors, strict=True)}

@@ -26,6 +26,7 @@ SETTLED: Final = 1e-2  # change of a standard deviation, relative, and of an unk
 FIRST_NOISE: Final = 0.02  # of a quantity's typical size, before any fit
 NOISE_FLOOR: Final = 1e-6  # of a quantity's typical size: noise-free measurements are taken to have this noise
 NO_WALK: Final = 1e3  # whitened residual of unknowns that make no walk
+HEIGHT_SHARES: Final = (1.0, 0.5, 0.0)
 EVALUATIONS: Final = 12  # in a round
 WEAK_PRIOR: Final = 3.0  # standard deviation of every unknown about its start, in its scale: what is open stays there
 
@@ -86,15 +87,16 @@ def fit(problem: FitProblem, start: Floats) -> Fitted | str:
     Rounds alternate between the unknowns, by least squares on whitened residuals, and the standard deviations.
     """
     forecast, u = problem.forecast, start.copy()
-    y, size = forecast.values, typical_sizes(forecast)
+    size = typical_sizes(forecast)
     floors = NOISE_FLOOR * size
     noise = Noise(FIRST_NOISE * size, 0.0)
     heights = np.zeros(forecast.heights)
     why = "standard deviations still change"
     for round_number in range(1, MAX_ROUNDS + 1):
-        G = forecast.respond(u, heights, problem.leg_length_m)
-        if G is None:
-            return NO_NEIGHBOURS if round_number == 1 else "neighbouring walks end early"
+        over = responses(problem, u, heights)
+        if over is None:
+            return NO_NEIGHBOURS
+        heights, G = over
         before, u = u, least_squares_fit(problem, u, start, heights, G, noise)
         data = linearise(problem, u, heights, G, exact=False)
         if data is None:
@@ -108,8 +110,8 @@ def fit(problem: FitProblem, start: Floats) -> Fitted | str:
         if settled(earlier, noise, problem.leg_length_m) and moved < SETTLED * 10.0:
             why = ""
             break
-    G = forecast.respond(u, heights, problem.leg_length_m)
-    final = None if G is None else linearise(problem, u, heights, G, exact=True)
+    over = responses(problem, u, heights)
+    final = None if over is None else linearise(problem, u, *over, exact=True)
     even = np.zeros(forecast.heights)
     predicted = forecast.predict(u, even)
     if final is None or predicted is None:
@@ -119,6 +121,18 @@ def fit(problem: FitProblem, start: Floats) -> Fitted | str:
 
 
 NO_NEIGHBOURS: Final = "the walk from the start, or one beside it, ends before the measured steps are over"
+
+
+def responses(problem: FitProblem, u: Floats, heights: Floats) -> tuple[Floats, Floats] | None:
+    """Return heights to linearise about, with responses to them; None if even the walk over even ground ends early.
+
+    Lower heights serve where the walk over the most probable ones ends early.
+    """
+    for share in HEIGHT_SHARES:
+        G = problem.forecast.respond(u, share * heights, problem.leg_length_m)
+        if G is not None:
+            return share * heights, G
+    return None
 
 
 def settled(before: Noise, after: Noise, leg_length_m: float) -> bool:
@@ -139,7 +153,7 @@ def linearise(problem: FitProblem, u: Floats, heights: Floats, G: Floats, exact:
     if values is None or J is None:
         return None
     residuals = forecast.values - values + G @ heights
-    return Linearised(residuals, J, G, forecast.quantity, problem.prior_rows(u))
+    return Linearised(residuals, J, G, forecast.quantity, problem.prior_rows(u), typical_sizes(forecast))
 
 
 def least_squares_fit(
