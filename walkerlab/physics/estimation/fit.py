@@ -1,0 +1,185 @@
+"""Most likely parameters, start and noise of a measured walk."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Final, Literal
+
+import numpy as np
+
+from walkerlab.physics.estimation.mixed_model import (
+    Evaluation,
+    Linearised,
+    Noise,
+    estimate_noise,
+    evaluate,
+    products_of,
+    whitening,
+)
+from walkerlab.physics.estimation.prediction import Forecast
+from walkerlab.physics.solvers.system import Floats
+
+Loss = Literal["linear", "soft_l1"]
+MAX_ROUNDS: Final = 12
+SETTLED: Final = 1e-2  # relative change of a standard deviation
+SETTLED_MOVE: Final = 0.1  # change of an unknown, in standard errors
+FIRST_NOISE: Final = 0.02  # of a quantity's typical size, before any fit
+NOISE_FLOOR: Final = 1e-6  # of a quantity's typical size: noise-free measurements are taken to have this noise
+NO_WALK: Final = 1e3  # whitened residual of unknowns that make no walk
+NO_NEIGHBOURS: Final = "the walk from the start, or one beside it, ends before the measured steps are over"
+HEIGHT_SHARES: Final = (1.0, 0.5, 0.0)
+EVALUATIONS: Final = 12  # in a round
+WEAK_PRIOR: Final = 3.0  # standard deviation of every unknown about its start, in its scale: what is open stays there
+
+
+@dataclass(frozen=True, eq=False)
+class FitProblem:
+    """A measured walk, unknowns, and what is known of them.
+
+    start   values of the parameters, in their units
+    priors  (value, standard deviation) of parameters by index, in their units
+    bounds  (low, high) of each parameter, infinite where there are none
+    """
+
+    forecast: Forecast
+    leg_length_m: float
+    start: tuple[float, ...]
+    bounds: Sequence[tuple[float, float]]
+    priors: dict[int, tuple[float, float]] = field(default_factory=dict)
+    loss: Loss = "linear"
+
+    def limits(self) -> tuple[Floats, Floats]:
+        """Return bounds (unknowns,) of the scaled unknowns."""
+        low, high = (np.full(self.forecast.unknowns, sign * np.inf) for sign in (-1.0, 1.0))
+        for place, (least, most) in enumerate(self.bounds):
+            low[place], high[place] = np.array((least, most)) / self.forecast.scales[place]
+        return low, high
+
+    def prior_rows(self, u: Floats) -> Floats:
+        """Return whitened residuals and derivatives (priors, 1 + unknowns) of the priors."""
+        rows = np.zeros((len(self.priors), 1 + u.size))
+        for row, (place, (value, sigma)) in zip(rows, self.priors.items(), strict=True):
+            scale = self.forecast.scales[place]
+            row[0], row[1 + place] = (value - u[place] * scale) / sigma, scale / sigma
+        return rows
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """Result of a fit.
+
+    why  reason why it did not converge; empty if it did
+    """
+
+    u: Floats  # (unknowns,) scaled
+    heights_m: Floats  # most probable
+    noise: Noise
+    evaluation: Evaluation
+    data: Linearised
+    predicted: Floats  # (values,) over even ground, with the most probable start
+    z: Floats  # (d,) end of that walk, on the section
+    rounds: int
+    why: str = ""
+
+
+def fit(problem: FitProblem, start: Floats) -> Fitted | str:
+    """Fit from a start (unknowns,); the reason in words if no walk near the start can be predicted.
+
+    Rounds alternate between the unknowns, by least squares on whitened residuals, and the standard deviations.
+    """
+    forecast, u = problem.forecast, start.copy()
+    size, even = typical_sizes(forecast), np.zeros(forecast.heights)
+    noise, heights, why = Noise(FIRST_NOISE * size, 0.0), even, "standard deviations still change"
+    over = responses(problem, u, heights)
+    if over is None:
+        return NO_NEIGHBOURS
+    for round_number in range(1, MAX_ROUNDS + 1):
+        before, u = u, least_squares_fit(problem, u, start, *over, noise)
+        data = linearise(problem, u, *over)
+        if data is None or responses(problem, u, even) is None:
+            # The data pull the walker out of its basin: the last walk that went on is judged.
+            u, why = before, NO_NEIGHBOURS
+            data = linearise(problem, u, *over)
+        if data is None:
+            return NO_NEIGHBOURS
+        products, earlier = products_of(data), noise
+        noise = estimate_noise(products, NOISE_FLOOR * size, problem.leg_length_m, noise, anew=round_number == 1)
+        evaluation = evaluate(products, noise)
+        over = responses(problem, u, evaluation.heights_m)
+        if over is None:
+            return NO_NEIGHBOURS
+        if why == NO_NEIGHBOURS:
+            break
+        errors = np.sqrt(np.maximum(np.diag(np.linalg.pinv(evaluation.information, hermitian=True)), 1e-300))
+        moved = float(np.max(np.abs(u - before) / errors))
+        if settled(earlier, noise, problem.leg_length_m) and moved < SETTLED_MOVE:
+            why = ""
+            break
+    data = linearise(problem, u, *over, exact=True) or linearise(problem, u, *over)
+    predicted = forecast.predict(u, even)
+    if data is None or predicted is None:
+        return NO_NEIGHBOURS
+    z = forecast.walks.disturbed(forecast.start(u), forecast.parameters(u), even).z
+    return Fitted(u, over[0], noise, evaluate(products_of(data), noise), data, predicted, z, round_number, why)
+
+
+def responses(problem: FitProblem, u: Floats, heights: Floats) -> tuple[Floats, Floats] | None:
+    """Return heights to linearise about, with responses to them; None if even the walk over even ground ends early.
+
+    Lower heights serve where the walk over the most probable ones ends early.
+    """
+    for share in HEIGHT_SHARES:
+        G = problem.forecast.respond(u, share * heights, problem.leg_length_m)
+        if G is not None:
+            return share * heights, G
+    return None
+
+
+def settled(before: Noise, after: Noise, leg_length_m: float) -> bool:
+    same = np.all(np.abs(np.log(after.measurement / before.measurement)) < SETTLED)
+    change = abs(after.roughness_m - before.roughness_m)
+    return bool(same) and change < SETTLED * max(after.roughness_m, 1e-7 * leg_length_m)
+
+
+def typical_sizes(forecast: Forecast) -> Floats:
+    """Return a typical size (quantities,) of each quantity."""
+    values, quantity = forecast.values, forecast.quantity
+    return np.array([np.sqrt(np.mean(values[quantity == q] ** 2)) for q in range(len(forecast.quantities))])
+
+
+def linearise(problem: FitProblem, u: Floats, heights: Floats, G: Floats, exact: bool = False) -> Linearised | None:
+    forecast = problem.forecast
+    values, J = forecast.predict(u, heights), forecast.differentiate(u, heights, exact)
+    if values is None or J is None:
+        return None
+    residuals = forecast.values - values + G @ heights
+    return Linearised(residuals, J, G, forecast.quantity, problem.prior_rows(u), typical_sizes(forecast))
+
+
+def least_squares_fit(
+    problem: FitProblem, u: Floats, start: Floats, heights: Floats, G: Floats, noise: Noise
+) -> Floats:
+    """Minimise the whitened residuals over the unknowns, for given standard deviations."""
+    from scipy.optimize import least_squares  # takes a third of a second, only needed here
+
+    forecast = problem.forecast
+    whiten = whitening(G, forecast.quantity, noise)
+    offset = forecast.values + G @ heights
+
+    def residuals(x: Floats) -> Floats:
+        values = forecast.predict(x, heights)
+        own = np.full(offset.size, NO_WALK) if values is None else whiten(offset - values)
+        return np.concatenate((own, problem.prior_rows(x)[:, 0], (start - x) / WEAK_PRIOR))
+
+    def jacobian(x: Floats) -> Floats:
+        J = forecast.differentiate(x, heights, exact=False)
+        own = np.zeros((offset.size, x.size)) if J is None else -whiten(J)
+        return np.vstack((own, -problem.prior_rows(x)[:, 1:], -np.eye(x.size) / WEAK_PRIOR))
+
+    low, high = problem.limits()
+    inside = np.clip(u, low + 1e-9, high - 1e-9)
+    result = least_squares(
+        residuals, inside, jacobian, bounds=(low, high), loss=problem.loss, max_nfev=EVALUATIONS, xtol=1e-10, ftol=1e-10
+    )
+    return np.asarray(result.x)

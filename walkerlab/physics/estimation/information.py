@@ -1,0 +1,139 @@
+"""How well a measured walk determines parameters: errors, correlations, and combinations that it leaves open."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from walkerlab.physics.estimation.fit import Fitted
+from walkerlab.physics.estimation.mixed_model import Noise, Products, evaluate, products_of
+from walkerlab.physics.estimation.result import Information, Unidentifiable
+from walkerlab.physics.solvers.system import Floats
+
+OPEN: Final = 1.0
+"""Singular value below which a combination is open: a change by its whole scale stays within the data's noise."""
+ROUNDING: Final = 1e-7  # share of the largest singular value, below which a combination has no effect at all
+NOISE_DRAWS: Final = 200
+LOG_STEP: Final = 0.05
+FARTHEST: Final = (3.0, 1.5)  # below and above the likeliest, of logarithms of standard deviations
+LOADED: Final = 0.1  # share of a parameter in an open direction, from which the parameter itself is open
+
+
+def information_on(fitted: Fitted, keys: tuple[str, ...], scales: Floats, quantities: tuple[str, ...]) -> Information:
+    """Reduce the information of a fit to its parameters; `scales` (parameters,) are their typical changes."""
+    count = len(keys)
+    reduced = free_the_rest(fitted.evaluation.information, count)
+    values, vectors = np.linalg.eigh(reduced)
+    order = np.argsort(values)[::-1]
+    singular, directions = np.sqrt(np.maximum(values[order], 0.0)), vectors[:, order].T
+    basis = directions[~is_open(singular)]
+    covariance = basis.T @ averaged_covariance(fitted, basis) @ basis
+    errors = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+    values_count = fitted.data.residuals.size + len(fitted.data.prior)
+    return Information(
+        keys,
+        covariance / np.outer(errors, errors),
+        singular,
+        directions,
+        covariance * np.outer(scales, scales),
+        max(1, values_count - fitted.u.size),
+        contributions(fitted, quantities, count, basis),
+    )
+
+
+def averaged_covariance(fitted: Fitted, basis: Floats) -> Floats:
+    """Average the covariance on directions `basis` (directions, parameters) over plausible standard deviations.
+
+    A short walk determines the standard deviations of floor and measurement poorly; errors at the likeliest ones alone
+    would be too small. Weights are the restricted likelihood with a flat prior on each standard deviation.
+    """
+    products, noise = products_of(fitted.data), fitted.noise
+    count = basis.shape[1]
+    centre = np.log(np.append(noise.measurement, noise.roughness_m or 1.0))
+
+    def noise_at(logs: Floats) -> Noise:
+        return Noise(np.exp(logs[:-1]), float(np.exp(logs[-1])) if noise.roughness_m else 0.0)
+
+    draws = np.random.default_rng(0).uniform(-1.0, 1.0, (NOISE_DRAWS, centre.size))
+    logs = centre + np.where(draws < 0.0, *(draws * reach for reach in noise_reach(products, noise_at, centre)))
+    likelihoods, covariances = np.zeros(NOISE_DRAWS), np.zeros((NOISE_DRAWS, len(basis), len(basis)))
+    for place, row in enumerate(logs):
+        at_row = evaluate(products, noise_at(row))
+        inverse = np.linalg.pinv(basis @ free_the_rest(at_row.information, count) @ basis.T, hermitian=True)
+        moved = basis @ at_row.move[:count]
+        likelihoods[place] = at_row.restricted + row.sum()
+        covariances[place] = inverse + np.outer(moved, moved)
+    weights = np.exp(likelihoods - likelihoods.max())
+    return np.asarray(np.tensordot(weights / weights.sum(), covariances, 1))
+
+
+def noise_reach(products: Products, noise_at: Callable[[Floats], Noise], centre: Floats) -> tuple[Floats, Floats]:
+    """Return how far below and above `centre` (deviations,) logarithms of standard deviations are plausible."""
+    best = evaluate(products, noise_at(centre)).restricted
+    curvatures = np.zeros(centre.size)
+    for place, unit in enumerate(np.eye(centre.size)):
+        ends = (evaluate(products, noise_at(centre + sign * LOG_STEP * unit)).restricted for sign in (-1.0, 1.0))
+        curvatures[place] = (2.0 * best - sum(ends)) / LOG_STEP**2
+    spread = 3.0 / np.sqrt(np.maximum(curvatures, 1e-6))
+    return np.minimum(spread, FARTHEST[0]), np.minimum(spread, FARTHEST[1])
+
+
+def free_the_rest(information: Floats, count: int) -> Floats:
+    """Return the information on the first unknowns while the others are free (Schur complement)."""
+    own, cross, rest = information[:count, :count], information[:count, count:], information[count:, count:]
+    return np.asarray(own - cross @ np.linalg.pinv(rest, hermitian=True) @ cross.T)
+
+
+def is_open(singular: Floats) -> NDArray[np.bool_]:
+    return np.asarray((singular < OPEN) | (singular < ROUNDING * singular.max(initial=0.0)))
+
+
+def open_combinations(information: Information) -> tuple[tuple[Unidentifiable, ...], set[str]]:
+    """Name the combinations that the walk leaves open, and the parameters in them."""
+    named, keys = [], set[str]()
+    largest = information.singular_values.max(initial=0.0)
+    for value, direction in zip(information.singular_values, information.directions, strict=True):
+        if not is_open(np.array([value, largest]))[0]:
+            continue
+        order = np.argsort(-np.abs(direction))
+        signed = direction * np.sign(direction[order[0]])
+        parts = [(information.keys[k], float(signed[k])) for k in order if abs(signed[k]) >= LOADED]
+        keys |= {key for key, _ in parts}
+        named.append(Unidentifiable(combination_in_words(parts), reason_in_words(value, largest)))
+    return tuple(named), keys
+
+
+def combination_in_words(parts: list[tuple[str, float]]) -> str:
+    """Write which parameters change together, with their shares of a change by their scale."""
+    if len(parts) == 1:
+        return parts[0][0]
+    up = [f"{key} ({share:.2g})" for key, share in parts if share > 0.0]
+    down = [f"{key} ({-share:.2g})" for key, share in parts if share < 0.0]
+    return " and ".join(up) + (f" up, {' and '.join(down)} down" if down else " together")
+
+
+def reason_in_words(value: float, largest: float) -> str:
+    if value <= ROUNDING * largest:
+        return "the walk does not change with this combination"
+    return f"a change of it by its whole size moves the walk by {value:.2g} standard deviations of the data"
+
+
+def contributions(fitted: Fitted, quantities: tuple[str, ...], count: int, basis: Floats) -> dict[str, float]:
+    """Return the share of each quantity in the information on the determined directions `basis` (directions, count).
+
+    A quantity's share is the information that would be lost without it.
+    """
+    if not len(basis):
+        return dict.fromkeys(quantities, 0.0)
+    whole = np.diag(basis @ free_the_rest(fitted.evaluation.information, count) @ basis.T)
+    products, losses = products_of(fitted.data), []
+    for place in range(len(quantities)):
+        noise = fitted.noise.measurement.copy()
+        noise[place] *= 1e6
+        without = evaluate(products, fitted.noise._replace(measurement=noise)).information
+        left = np.diag(basis @ free_the_rest(without, count) @ basis.T)
+        losses.append(float(np.mean(1.0 - np.clip(left / whole, 0.0, 1.0))))
+    return dict(zip(quantities, losses, strict=True))
