@@ -14,6 +14,7 @@ from walkerlab.config.design import Design
 from walkerlab.config.drives import PushOff, acting_on
 from walkerlab.config.fields import Block, check_against, key, meaning_error
 from walkerlab.config.ground import Footholds
+from walkerlab.config.identify import Identify
 from walkerlab.config.robustness import Robustness
 from walkerlab.config.stability import Stability
 from walkerlab.config.sweep import Sweep
@@ -167,7 +168,7 @@ class Tune(Block):
         return value
 
 
-QUESTIONS: Final = ("stability", "tune", "continuation", "basin", "robustness", "design", "sweep")
+QUESTIONS: Final = ("stability", "tune", "continuation", "basin", "robustness", "design", "identify", "sweep")
 """Blocks that configure a stage or a sweep rather than the scene."""
 
 
@@ -234,6 +235,7 @@ class Config(Block):
     basin: Basin = Basin()
     robustness: Robustness = Robustness()
     design: Design | None = None
+    identify: Identify | None = None
     sweep: Sweep | None = None
     outputs: tuple[Output, ...] = key(OUTPUTS, "", "arrays to store", bounds="a list of states, energies, forces")
     seed: int = key(0, "1", "seed of everything random", ge=0, le=2**32 - 1)

@@ -61,7 +61,9 @@ class Option:
 
     flag      as typed
     key       dotted
-    metavar   "KEY" for the name of a key, "...=A:B" for bounds by name, which may be repeated
+    metavar   "KEY" for the name of a key; with "=", pairs, which may be repeated: "...=A:B" two numbers by name,
+              "[=A:B]" where they may be missing, "...=...,..." names by name
+    type      of its value; list for names, which may be repeated
     needs     flags without which it means nothing
     """
 
@@ -87,6 +89,7 @@ class Stage:
     takes_of_scene the same for a walker of no study, where that is another type
     takes_of_paper keys of the built-in paper config that its own cases are based on
     programs       versions of other programs that its result depends on, by name
+    files          digests of files that its result depends on, by key of the config
     inputs         stages whose results it needs under a config, earlier in the table
     if_current     stages whose results it takes if they are current
     options        of its command, besides those of all stages
@@ -115,6 +118,7 @@ class Stage:
     takes_of_scene: type | None = None
     takes_of_paper: type | None = None
     programs: Callable[[], Mapping[str, str]] | None = None
+    files: Callable[[Config], Mapping[str, str]] | None = None
 
     @property
     def reads(self) -> tuple[str, ...]:
@@ -300,15 +304,32 @@ PIPELINE = Graph(
         ),
     ),
     Stage(
+        "identify", "walkerlab.pipeline.stages.identify",
+        "Estimate parameters of the walker from a measured walk, with error bars.",
+        reads.IdentifyConfig, results_of("fixedpoint"), only_by="identify",
+        files=later("walkerlab.pipeline.stages.measured_walk", "digests"),
+        options=(
+            Option("--data", "identify.data", "FILE", "Measured walk: a table of steps, or angles over time."),
+            Option("--fit", "identify.fit", "KEY[=A:B]", "Key to estimate, or also its bounds."),
+            Option("--prior", "identify.prior", "KEY=VALUE:SIGMA", "Value known beforehand, and its deviation."),
+            Option("--nuisance", "identify.nuisance", "NAME", "Property of clock or sensors to estimate too.", list),
+            Option("--model", "identify.model", "rigid|contact|both", "Model to fit."),
+            Option("--level", "identify.level", "steps|angles", "What was measured."),
+            Option("--loss", "identify.loss", "linear|soft_l1", "soft_l1 for data with outliers."),
+            Option("--columns", "identify.columns", "QUANTITY=COLUMN,...", "Columns of the file."),
+            Option("--units", "identify.units", "KIND=UNIT,...", "Units that it does not state."),
+        ),
+    ),
+    Stage(
         "plot", "walkerlab.views.figures.stage", "Draw the figures from the stored results.", reads.NamedConfig,
         results_of(*WALKED, "compare"), work="draws",
-        if_current=("accuracy", "engines", "tune", "stability-maps", "continuation", "basin", "robustness"),
+        if_current=("accuracy", "engines", "tune", "stability-maps", "continuation", "basin", "robustness", "identify"),
     ),
     Stage(
         "report", "walkerlab.views.report.stage", "Write the report, one HTML file.", None,
         results_of(*WALKED, "tune", "compare", "accuracy", "stability", "plot"), options=(STRIDES,), work="draws",
         early_with=WALKED,
-        if_current=("engines", "stability-maps", "continuation", "basin", "robustness"),
+        if_current=("engines", "stability-maps", "continuation", "basin", "robustness", "identify"),
     ),
 )  # fmt: skip
 STAGES = PIPELINE.stages

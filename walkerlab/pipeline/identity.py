@@ -48,8 +48,9 @@ class Keys:
                 fixed["paper"] = slice_of(paper_config_with({}), stage.takes_of_paper)
             if stage.programs is not None:
                 fixed["programs"] = dict(stage.programs())
+        files = {} if stage.files is None else {"files": dict(stage.files(config))}
         once = {} if again or not takes_again(stage) else {"again": False}
-        own = {**slice_of(config, stage.takes_under(config)), **self._fixed[stage.name], **once}
+        own = {**slice_of(config, stage.takes_under(config)), **self._fixed[stage.name], **files, **once}
         return Identity(stage.name, own, input_keys, self.code_digest(stage.name))
 
     def code_digest(self, target: str) -> str:
