@@ -4,8 +4,8 @@
     python scripts/refresh_docs.py --examples [--slow] [DOCUMENT ...]
 
 A part stands between `<!-- made by scripts/refresh_docs.py: NAME -->` and `<!-- end -->`. With --check nothing is
-written, and the exit code is 1 if a part is out of date. With --picture the README's picture is drawn too; its bytes
-depend on the version of matplotlib, so it is not checked.
+written, and the exit code is 1 if a part is out of date. With --picture the README's picture and the models in
+docs/downloads are written too; their bytes depend on versions and platform, so they are not compared.
 
 An example is a fenced block: `console` has commands after `$` and what they print below them, `pycon` has Python after
 `>>>`, and a `yaml` block that begins with `# NAME.yaml` or `name: NAME` is written to NAME.yaml. `...` stands for
@@ -30,6 +30,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from walkerlab.api import export_model
 from walkerlab.config.fields import block_of
 from walkerlab.config.loader import load
 from walkerlab.config.reference import KeyReference, keys
@@ -210,7 +211,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--check", action="store_true", help="write nothing; exit with 1 if a document is out of date")
     parser.add_argument("--examples", action="store_true", help="try the examples; exit with 1 if one prints otherwise")
     parser.add_argument("--slow", action="store_true", help="those that take minutes too")
-    parser.add_argument("--picture", action="store_true", help="draw the README's picture too")
+    parser.add_argument("--picture", action="store_true", help="write the README's picture and docs/downloads too")
     parser.add_argument("--runs", type=Path, help="folder of runs to reuse; default: a temporary one")
     options = parser.parse_args(arguments)
     if options.examples:
@@ -218,11 +219,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
     with tempfile.TemporaryDirectory() as temporary:
         results = Results(options.runs or Path(temporary))
         if options.picture:
+            write_downloads()
             (ROOT / "docs" / "images" / PICTURE).write_bytes(results.picture())
         stale = [path for name in DOCUMENTS if not refresh(path := ROOT / name, results, write=not options.check)]
     for path in stale:
         print(f"{path.relative_to(ROOT)}: {'out of date' if options.check else 'written'}")
     return 1 if stale and options.check else 0
+
+
+def write_downloads() -> None:
+    """Write the paper's walker for ADAMS and MuJoCo."""
+    for ending in ("adm", "cmd", "xml"):
+        export_model(ROOT / "docs" / "downloads" / f"paper.{ending}", name="paper", slope_rad=0.0174)
 
 
 def refresh(path: Path, results: Results, write: bool) -> bool:

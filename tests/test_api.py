@@ -265,3 +265,12 @@ def test_a_sweep_without_xarray_computes_nothing(tmp_path, monkeypatch):
 def test_a_list_without_an_end_is_refused(tmp_path):
     with pytest.raises(ConfigError, match="10000001 points"):
         walkerlab.sweep("fixedpoint", {"seed": itertools.count()}, runs=tmp_path / "runs")
+
+
+def test_a_model_is_written_with_the_start_of_its_gait(tmp_path):
+    walker = walkerlab.compass(foot_radius_m=0.1)
+    written = walkerlab.export_model(tmp_path / "round.adm", walker, slope_deg=0.9, strides=2, law="functions")
+    assert [path.name for path in written] == ["round.adm", "round.acf"]
+    assert "walked, 4 steps" in written[0].read_text()
+    with pytest.raises(ConfigError, match=r"round\.pdf: not a model\."):
+        walkerlab.export_model(tmp_path / "round.pdf")

@@ -28,6 +28,7 @@ LAYERS = (
     "pipeline.stages",
     "pipeline",
     "pipeline.store",
+    "exchange",
     "scene",
     "physics.orbits",
     "physics.hybrid",
@@ -45,7 +46,7 @@ LAYERS = (
     "outcome",
     "errors",
 )
-WINGS = ("evidence", "views", "pipeline", "scene", "physics", "config")
+WINGS = ("evidence", "views", "pipeline", "exchange", "scene", "physics", "config")
 SOURCES = sorted(PACKAGE.rglob("*.py"))
 DOORS = {"__init__.py", "__main__.py", *(f"{wing}/__init__.py" for wing in WINGS)}
 KERNEL_LAYERS = {f"physics.{home}" for home in KERNEL_HOMES}

@@ -21,6 +21,7 @@ __all__ = [
     "dataset",
     "design",
     "explore",
+    "export_model",
     "find_gait",
     "kneed",
     "open_run",

@@ -421,6 +421,49 @@ def design(walker: Any = None, over: Mapping[str, Any] | None = None, **keys: An
     return in_memory("design", config_of_scene(walker, _stage_block("design", keys, over=over or {}), keys))
 
 
+def export_model(
+    path: str | Path,
+    walker: Any = None,
+    slope_deg: float | None = None,
+    contact: Contact | None = None,
+    law: str = "contact",
+    **keys: Any,
+) -> tuple[Path, ...]:
+    """Write a walker with the start of its gait for ADAMS (.adm, .cmd) or MuJoCo (.xml); return the files written.
+
+    path       the model; commands (.acf) of a dataset, or the script of a driven walker, are written beside it
+    walker     from `compass`, `kneed` or `walker`
+    slope_deg  positive downhill, deg
+    contact    the ground, from `contact`; by default the paper's, on pads
+    law        contact in ADAMS: its own `contact`, or `functions` for walkerlab's law exactly
+    keys       other keys of a config, such as start, strides, push_off
+
+    Raises ConfigError for an unknown format and for a walker that it cannot express, NoAnswer without a gait.
+    """
+    from walkerlab.exchange import export
+    from walkerlab.pipeline.stages.walk import rigid_start
+    from walkerlab.pipeline.store.files import write_through
+    from walkerlab.pipeline.store.provenance import git_commit
+
+    path = Path(path)
+    kind = export.ENDINGS.get(path.suffix.removeprefix("."))
+    if kind is None:
+        raise ConfigError(f"{path}: not a model.", f"Its ending is one of .{', .'.join(export.ENDINGS)}.")
+    ground = contact or Contact(terrain="checkerboard")
+    config = config_of_scene(walker, {"slope_deg": slope_deg, "contact": ground}, keys)
+    inputs = {}
+    if config.start == "fixed-point":
+        gait = in_memory("fixedpoint", config)
+        if gait.no_answer is not None:
+            raise NoAnswer(gait.no_answer)
+        inputs["fixedpoint"] = gait.content
+    start = rigid_start(config, inputs)
+    texts = export.export_model(config, *start, kind, export.law_named(law), git_commit(), path.stem).files
+    for name, text in texts.items():
+        write_through(path.with_name(name), text.encode())
+    return tuple(path.with_name(name) for name in texts)
+
+
 def _stage_block(stage: str, keys: dict[str, Any], **values: Any) -> dict[str, Any]:
     block = block_of(Config.model_fields[stage])
     assert block is not None, "a stage that is asked something has a block"

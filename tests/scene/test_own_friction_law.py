@@ -12,7 +12,7 @@ from walkerlab.config.loader import load
 from walkerlab.config.schema import Contact
 from walkerlab.errors import ConfigError
 from walkerlab.evidence.benchmarks.contact_trials import CREEP_FACTOR, near_rigid_trial
-from walkerlab.evidence.benchmarks.engines.experiments import CREEP_LOAD, contact_target
+from walkerlab.exchange.engine_scene import CREEP_LOAD, contact_target
 from walkerlab.physics.ground import friction
 from walkerlab.physics.ground.friction import FRICTION_LAWS, Frictionless, friction_coefficient, steepest_change
 from walkerlab.physics.orbits.contact_gait import why_no_gait, with_rigidity, with_scaled_laws

@@ -8,9 +8,10 @@ import pytest
 from engine_scenes import compass, kneed
 
 from walkerlab.evidence.benchmarks.engines.adapter import Stepping
-from walkerlab.evidence.benchmarks.engines.experiments import START_FACTORS, contact_target, simulate, swing_truth
+from walkerlab.evidence.benchmarks.engines.experiments import START_FACTORS, simulate, swing_truth
 from walkerlab.evidence.benchmarks.engines.registry import PHYSICS_ENGINES
 from walkerlab.evidence.benchmarks.engines.runs import Bench, SwingTask, TuningTask, WalkTask, pinned_model
+from walkerlab.exchange.engine_scene import contact_target
 
 SWING_S, COARSE_S = 0.24, 4e-3
 

@@ -5,9 +5,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from walkerlab.evidence.benchmarks.engines.adapter import Stepping
-from walkerlab.evidence.benchmarks.engines.planar import HINGED, planar_model
 from walkerlab.evidence.benchmarks.engines.registry import PHYSICS_ENGINES
 from walkerlab.evidence.benchmarks.engines.runs import SwingTask
+from walkerlab.exchange.planar import HINGED, planar_model
 from walkerlab.physics.mechanics.assembly import Anchor
 from walkerlab.physics.mechanics.rigid import standing
 from walkerlab.physics.mechanics.rigid_model import BENT, STANCE, Mode

@@ -5,9 +5,10 @@ import pytest
 from engine_scenes import compass, kneed
 
 from walkerlab.errors import ConfigError
-from walkerlab.evidence.benchmarks.engines.experiments import CREEP_LOAD, contact_target, simulate
+from walkerlab.evidence.benchmarks.engines.experiments import simulate
 from walkerlab.evidence.benchmarks.engines.follow import RuleFollower, crossing
 from walkerlab.evidence.benchmarks.engines.runs import pinned_model
+from walkerlab.exchange.engine_scene import CREEP_LOAD, contact_target
 from walkerlab.outcome import Outcome
 from walkerlab.physics.ground.friction import friction_coefficient
 from walkerlab.physics.ground.terrain import STANCE_FOOT

@@ -187,3 +187,15 @@ def test_errata_say_the_measured_numbers(found):
     assert "1.36 s" in found["Table 3, cycle of MSC ADAMS"].measured
     assert "-0.202216, 0.167416, -0.600581, -0.846575" in found["eq. 11, x_p"].measured
     assert "cut off" in found["eq. 11, x_p"].measured
+
+
+def test_the_contact_parameters_have_three_readings(found):
+    """In a model in metres 10^8 N/m^2.2 carry 20 kg 2.5 mm deep; 1000^1.2 times more carry them 0.06 mm deep."""
+    measured = found["section 4, Fig. 4b"].measured
+    weight = 20 * 9.81
+    depths = [
+        (weight / stiffness) ** (1 / exponent) for stiffness, exponent in ((1e5 * 1000**2.2, 2.2), (1e5, 1), (1e8, 2.2))
+    ]
+    for depth, digits in zip(depths, (3, 2, 3), strict=True):
+        assert f"{1e3 * depth:.{digits}f} mm" in measured
+    assert "3981 times lower" in measured

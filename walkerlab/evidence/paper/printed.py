@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from decimal import ROUND_DOWN, ROUND_HALF_UP, Decimal
 from typing import Final
 
-from walkerlab.config.contact import Contact
+from walkerlab.config.contact import MM_PER_M, Contact
 from walkerlab.evidence.paper.appendix_a import RigidWalker
 from walkerlab.physics.ground.resting import RestingFoot, resting_foot
 
@@ -192,9 +192,22 @@ def speed_difference(matlab_cycle: float, adams_cycle: float) -> float:
     return 100.0 * abs(adams - matlab) / matlab
 
 
-def readings_of_fig_4b() -> tuple[RestingFoot, RestingFoot]:
-    """Rest of the paper's walker on its contact parameters, read in N, mm and s, and in SI."""
+def softening_in_metres() -> float:
+    """Return how much lower a default stiffness of ADAMS is in a model in metres than in one in millimetres."""
+    return float(MM_PER_M ** (Contact().exponent - 1.0))
+
+
+def readings_of_fig_4b() -> tuple[RestingFoot, RestingFoot, RestingFoot]:
+    """Rest of the paper's walker on its contact parameters: in N, mm and s; in SI; as defaults of a model in metres.
+
+    Adams View converts a default stiffness as force over length whatever the exponent, so the same dialog in a model in
+    metres has 1000^(exponent - 1) times less of it than 10^5 N/mm^exponent.
+    """
     _, leg, hip, gravity = (entry.value for entry in TABLE_1)
     mass, adams = hip + 2.0 * leg, Contact(stiffness=STIFFNESS.value, damping=DAMPING.value).in_si()
-    in_adams = resting_foot(mass * gravity, mass, adams.stiffness, adams.exponent, adams.damping)
-    return in_adams, resting_foot(mass * gravity, mass, STIFFNESS.value, 1.0, DAMPING.value)
+    weight = mass * gravity
+    return (
+        resting_foot(weight, mass, adams.stiffness, adams.exponent, adams.damping),
+        resting_foot(weight, mass, STIFFNESS.value, 1.0, DAMPING.value),
+        resting_foot(weight, mass, STIFFNESS.value * MM_PER_M, adams.exponent, adams.damping),
+    )

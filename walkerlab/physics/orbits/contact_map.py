@@ -213,8 +213,7 @@ def walk_from_section(
     push     N s, along the slope
     """
     start, steps = state_on_section(walker, z, STANCE_FOOT), heights.size - 1
-    over = np.append(heights[0], heights) - heights[0]
-    laid = ground._replace(terrain=ground.terrain._replace(heights=over)) if over.any() else ground
+    laid = over_footholds(ground, heights)
     walk_state = walk_state_on_section(walker, laid, start, steps + 1)
 
     def go_on(walk_state: WalkState, state: State, until: int = NO_LIMIT) -> Stopped:
@@ -234,7 +233,35 @@ def walk_from_section(
         stopped = go_on(walk_state, stopped.state)
     touched = int(walk_state.progress.steps)
     times, places = walk_state.touch_time[:touched], walk_state.touch_along[:touched]
-    return DisturbedWalk(stopped.outcome, np.diff(times), np.diff(places), z)
+    angles = touch_angles(walker, ground.frame.leg_length, np.diff(places), np.diff(walk_state.touch_height[:touched]))
+    return DisturbedWalk(stopped.outcome, np.diff(times), np.diff(places), angles, z)
+
+
+def touch_angles(walker: ContactWalker, leg_length: float, along: Floats, up: Floats) -> Floats:
+    """Return the angles (steps,) from the vertical of straight legs that touch this far ahead and up (m)."""
+    apart = 0.5 * np.hypot(along, up) / leg_length
+    return np.asarray(np.arcsin(np.clip(apart, -1.0, 1.0)) + np.arctan2(up, along) - walker.slope)
+
+
+def legs_sampled_from_section(
+    walker: ContactWalker, ground: JudgedGround, tolerances: Tolerances, z: Floats, heights: Floats, times: Floats
+) -> Floats:
+    """Sample the legs' angles (times, 2) of the walk of `walk_from_section`, the leg that swings second first.
+
+    times  (times,) s, from the section
+    """
+    start = state_on_section(walker, z, STANCE_FOOT)
+    laid = over_footholds(ground, heights)
+    walk_state = walk_state_on_section(walker, laid, start, heights.size)
+    observer = new_observer(walker, walk_state, start, times, track_energy=False)
+    walk_on(walker, laid, tolerances, walk_state, observer, start, NO_LIMIT)
+    legs = [ANGLES + walker.legs[foot][0] for foot in (STANCE_FOOT, 1 - STANCE_FOOT)]
+    return np.asarray(observer.samples.states[:, legs])
+
+
+def over_footholds(ground: JudgedGround, heights: Floats) -> JudgedGround:
+    over = np.append(heights[0], heights) - heights[0]
+    return ground._replace(terrain=ground.terrain._replace(heights=over)) if over.any() else ground
 
 
 def shorten(walk_state: WalkState, steps: int) -> WalkState:
@@ -362,6 +389,14 @@ class ContactMap(StepMap):
         endless = replace(self.tolerances, budget=self.tolerances.budget * heights_m.size)
         walk = walk_from_section(site.walker, ground, endless, z * self._units, heights_m, push_N_s)
         return replace(walk, z=walk.z / self._units)
+
+    def sampled(self, z: Floats, p: float, heights_m: Floats, times_s: Floats) -> Floats:
+        site, touch = self._at(p), self.step(z, p, derived=False)
+        assert site is not None, "what is sampled makes a walker"
+        ground = site.ground._replace(terrain=self._terrain(site))
+        endless = replace(self.tolerances, budget=self.tolerances.budget * heights_m.size)
+        times = times_s + touch.strike_s
+        return legs_sampled_from_section(site.walker, ground, endless, z * self._units, heights_m, times)
 
     def cost_of_transport(self, z: Floats, p: float) -> float | None:
         step = self.step(z, p, derived=False)

@@ -18,7 +18,7 @@ import numpy as np
 
 from walkerlab.outcome import Outcome
 from walkerlab.physics.hybrid.recorded_walk import as_state, take_walk
-from walkerlab.physics.hybrid.rigid_record import Observer, unwatched
+from walkerlab.physics.hybrid.rigid_record import Observer, new_observer, unwatched
 from walkerlab.physics.hybrid.rigid_walk import EVENTS, SHORTEST_LANDING, HeelStrikes, new_heel_strikes, take_step, walk
 from walkerlab.physics.kernels import kernel, kernel_part, matrix, vector
 from walkerlab.physics.mechanics.impact import pushed_at_hip
@@ -148,11 +148,13 @@ class RigidStepper(local):
         rises: Floats | None = None,
         nearest: float = 0.0,
         start: Floats | None = None,
+        observer: Observer | None = None,
     ) -> Steps:
         """Walk from z (d,), with the derivative unless `derived` is false, which saves a third of the work.
 
         rises, nearest  see HeelStrikes, in units of the walker; even ground by default
         start           (2 n,) state off the section to walk from instead, without a derivative
+        observer        records samples
         """
         memory = self.memory
         method = memory.varied if derived else self.plain
@@ -162,7 +164,7 @@ class RigidStepper(local):
         method.counts[:BUDGET] = 0
         method.clock[H_NEXT] = 0.0
         strikes: HeelStrikes = new_heel_strikes(steps, y.size, rise=rises, nearest=nearest)
-        status, completed = walk(section.walker, method, memory.finder, memory.observer, y, strikes)
+        status, completed = walk(section.walker, method, memory.finder, observer or memory.observer, y, strikes)
         ahead = strikes.after[:completed].take(section.places if derived else section.places[:d], axis=1)
         DP = ahead[:, d:].reshape(completed, d if derived else 0, d) / TANGENT_SCALE
         return Steps(Outcome(status), strikes.time[:completed], ahead[:, :d], DP, strikes)
@@ -314,24 +316,35 @@ class RigidMap(StepMap):
         return np.array(extremes) * (units.force, 1.0, units.length)
 
     def disturbed(self, z: Floats, p: float, heights_m: Floats, push_N_s: float = 0.0) -> DisturbedWalk:
-        """Walk from a gait z over footholds (m), after a push just after the heel strike at z."""
+        """Walk from z over footholds (m), after a push just after the heel strike at z."""
         unit = self._unit_at(p)
-        assert unit is not None, "what is disturbed has a gait"
-        walker, units, section, start = (
-            unit.walker,
-            unit.units,
-            unit.section,
-            np.array(state_on_section(unit.walker, z)),
-        )
+        assert unit is not None, "what is disturbed makes a walker"
+        walker, units, start = unit.walker, unit.units, np.array(state_on_section(unit.walker, z))
         start = pushed_at_hip(walker, start, push_N_s / units.impulse) if push_N_s != 0.0 else start
-        step_length = unit.step_length(float(z[0]), float(z[0]))
-        rises = np.diff(heights_m, prepend=heights_m[0]) / units.length
-        nearest = SHORTEST_LANDING * step_length if rises.any() else 0.0
-        walk = self._exact.walk(section, z, rises.size - 1, False, rises, nearest, start)
+        walk = self._walk_over(unit, z, heights_m, start)
         before, after = (states[: len(walk.time)] for states in (walk.strikes.before, walk.strikes.after))
         lengths = step_lengths(walker, np.vstack((start, after))[:-1], before)
         durations = np.diff(walk.time, prepend=0.0) * units.time
-        return DisturbedWalk(walk.outcome, durations, lengths * units.length, walk.z[-1] if walk.z.size else z)
+        last = walk.z[-1] if walk.z.size else z
+        return DisturbedWalk(walk.outcome, durations, lengths * units.length, after[:, STANCE], last)
+
+    def _walk_over(
+        self, unit: SimilarWalker, z: Floats, heights_m: Floats, start: Floats, observer: Observer | None = None
+    ) -> Steps:
+        rises = np.diff(heights_m, prepend=heights_m[0]) / unit.units.length
+        nearest = SHORTEST_LANDING * unit.step_length(float(z[0]), float(z[0])) if rises.any() else 0.0
+        return self._exact.walk(unit.section, z, rises.size - 1, False, rises, nearest, start, observer)
+
+    def sampled(self, z: Floats, p: float, heights_m: Floats, times_s: Floats) -> Floats:
+        unit = self._unit_at(p)
+        assert unit is not None, "what is sampled makes a walker"
+        start = np.array(state_on_section(unit.walker, z))
+        observer = new_observer(times_s / unit.units.time, start.size)
+        self._walk_over(unit, z, heights_m, start, observer)
+        # the legs change roles at every heel strike
+        swaps = observer.steps % 2 == 1
+        legs = observer.states[:, [SWING, STANCE]]
+        return np.where(swaps[:, None], legs[:, ::-1], legs)
 
     def cost_of_transport(self, z: Floats, p: float) -> float | None:
         unit = self._unit_at(p)

@@ -70,6 +70,7 @@ class DisturbedWalk:
     outcome: Outcome  # WALKED if every step was completed
     durations_s: Floats  # (steps,) between heel strikes
     lengths_m: Floats  # (steps,) distances
+    angles_rad: Floats  # (steps,) stance leg just after each heel strike, from the vertical
     z: Floats  # (d,) last point on the section
 
 
@@ -94,6 +95,12 @@ class StepMap(Stepper, Protocol):
         """Walk from z (d,) over footholds, after an impulse at the hip along the slope.
 
         heights_m  (steps + 1,) of the footholds, beginning with the current one
+        """
+
+    def sampled(self, z: Floats, p: float, heights_m: Floats, times_s: Floats) -> Floats:
+        """Sample the legs' angles (times, 2) from the vertical on the walk of `disturbed`, the first swing leg's first.
+
+        times_s  rising, from the first heel strike to before the last
         """
 
     def cost_of_transport(self, z: Floats, p: float) -> float | None:

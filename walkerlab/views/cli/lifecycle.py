@@ -14,7 +14,7 @@ from walkerlab.views.cli.request import OF_TALK, Request, command
 RunArgument = Annotated[
     str, typer.Argument(metavar="RUN", help="A run's folder, or its name in the folder of all runs.")
 ]
-FIGURES = "figure-07 or 7, trajectory, or a table by its caption; any other word lists what there is"
+FIGURES = "figure-07 or 7, trajectory, model, or a table by its caption; any other word lists the run's items"
 Output = Annotated[
     Path | None,
     typer.Option(
@@ -76,7 +76,10 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
         run: RunArgument,
         what: Annotated[str, typer.Argument(metavar="WHAT", help=FIGURES)],
         to: Annotated[
-            str | None, typer.Option("--to", metavar="FORMAT", help="pdf, svg, png, eps, tiff, csv, tex or nc.")
+            str | None,
+            typer.Option(
+                "--to", metavar="FORMAT", help="pdf, svg, png, eps, tiff, csv, tex or nc; a model: adm, cmd, mjcf."
+            ),
         ] = None,
         output: Output = None,
         columns: Annotated[int, typer.Option(min=1, max=2, help="Journal columns that a figure spans.")] = 1,
@@ -86,10 +89,23 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
         ] = None,
         dpi: Annotated[int, typer.Option(min=30, max=2400, help="Pixels per inch of PNG and TIFF.")] = 300,
         model: Annotated[str | None, typer.Option(metavar="STAGE", help=f"Whose trajectory; {FIRST_WALK}.")] = None,
+        law: Annotated[
+            str | None,
+            typer.Option(metavar="LAW", help="Contact in ADAMS: contact (its own, default) or functions (exact)."),
+        ] = None,
     ) -> None:
-        """Write a figure, a table or a trajectory of a run for use elsewhere."""
+        """Write a figure, a table or a trajectory of a run, or its walker for ADAMS or MuJoCo."""
+        from walkerlab.views.cli.target import Target
+
+        if what == "model":
+            # Imported here: only this export needs a walker.
+            from walkerlab.views.cli.models import write_model
+
+            for path in write_model(run, request.runs, Target(to, output), law, request.console):
+                print(path)
+            return
         from walkerlab.pipeline.runs import run_named
-        from walkerlab.views.cli.exports import COLUMNS, Target, export_from, walk_in
+        from walkerlab.views.cli.exports import COLUMNS, export_from, walk_in
 
         folder, points = run_named(run, request.runs), width or COLUMNS[columns]
         whose = walk_in(folder, model)
@@ -103,7 +119,8 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
         output: Output = None,
     ) -> None:
         """Draw a config's walker to scale, with dimensions labelled by their config keys."""
-        from walkerlab.views.cli.exports import Target, draw_walker
+        from walkerlab.views.cli.exports import draw_walker
+        from walkerlab.views.cli.target import Target
 
         print(draw_walker(file, Target(to, output), request.console))
 
@@ -153,7 +170,8 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
     ) -> None:
         """Animate a run's walk."""
         from walkerlab.pipeline.runs import run_named
-        from walkerlab.views.cli.exports import Film, Target, walk_in, write_film
+        from walkerlab.views.cli.exports import Film, walk_in, write_film
+        from walkerlab.views.cli.target import Target
 
         folder = run_named(run, request.runs)
         film = Film(walk_in(folder, model), steps, rate, slower)

@@ -5,35 +5,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
-from walkerlab.evidence.benchmarks.engines.planar import PlanarModel
+from walkerlab.exchange.engine_scene import EngineContact
+from walkerlab.exchange.planar import PlanarModel
 from walkerlab.physics.solvers.system import Floats
 
 Forces = Callable[[float, Floats, Floats], Floats]
 """Generalised forces from time, coordinates and velocities; the result is overwritten by the next call."""
-
-
-@dataclass(frozen=True)
-class EngineContact:
-    """Target to which an engine's own contact is tuned in closed form, SI.
-
-    mass             resting on one foot (kg)
-    gravity          towards the ground (m/s^2)
-    penetration      at rest under that weight (m)
-    exponent         of the penetration in the normal force
-    damping_ratio    c / (2 sqrt(k m)) at rest
-    friction         tangential over normal force of a sliding foot
-    creep_load       tangential over normal force of a standing foot
-    creep_velocity   creep under that load (m/s)
-    """
-
-    mass: float
-    gravity: float
-    penetration: float
-    exponent: float
-    damping_ratio: float
-    friction: float
-    creep_load: float
-    creep_velocity: float
 
 
 @dataclass(frozen=True)

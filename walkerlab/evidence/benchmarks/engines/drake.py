@@ -15,7 +15,8 @@ from typing import Any
 import numpy as np
 
 from walkerlab.evidence.benchmarks.engines import adapter
-from walkerlab.evidence.benchmarks.engines.planar import Link, PlanarModel
+from walkerlab.exchange.engine_scene import EngineContact
+from walkerlab.exchange.planar import Link, PlanarModel
 from walkerlab.physics.solvers.system import Floats
 
 INTEGRATORS = {
@@ -36,7 +37,7 @@ CANNOT_EXPRESS = (
 )
 
 
-def tuned(model: str, target: adapter.EngineContact) -> adapter.OwnContact:
+def tuned(model: str, target: EngineContact) -> adapter.OwnContact:
     """Solve the closed forms above for the target."""
     from scipy.optimize import brentq
 

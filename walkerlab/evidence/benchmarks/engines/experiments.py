@@ -10,15 +10,13 @@ from typing import Any
 import numpy as np
 
 from walkerlab.evidence.benchmarks.engines import runs
-from walkerlab.evidence.benchmarks.engines.adapter import EngineContact, Integrator, OwnContact, Stepping
+from walkerlab.evidence.benchmarks.engines.adapter import Integrator, OwnContact, Stepping
 from walkerlab.evidence.benchmarks.engines.process import OwnProcess, TaskLost
 from walkerlab.evidence.benchmarks.engines.registry import Engine
 from walkerlab.evidence.benchmarks.engines.rows import OURS, OWN_LAW, SAME_LAW, EngineRow, SwingRow, TuningRow
-from walkerlab.evidence.benchmarks.engines.scenes import EngineScene
+from walkerlab.exchange.engine_scene import EngineContact, EngineScene
 from walkerlab.outcome import Outcome
 from walkerlab.physics.ground.energy import kinetic_energy, potential_energy
-from walkerlab.physics.ground.friction import friction_coefficient
-from walkerlab.physics.ground.resting import resting_foot
 from walkerlab.physics.ground.terrain import STANCE_FOOT
 from walkerlab.physics.ground.walker import changed_forms, on_ground, to_form, to_full
 from walkerlab.physics.hybrid.contact_result import ContactWalkResult, walk_contact
@@ -38,7 +36,6 @@ TUNING_STEP_S = 2e-5
 COMPARED_TOUCHES, OWN_TOUCHES = 2, 10
 INTO_NEXT_STEP = 0.9  # share of the step after the last touch at which states are compared
 SWING_S = 0.48
-CREEP_LOAD = 0.1  # tangential over normal force, about the mean of a walk
 RUN_TIMEOUT_S = 120.0  # with a run, before its process is ended
 OUR_METHOD = "radau5"
 OUR_LADDER = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
@@ -175,21 +172,6 @@ def steppings(name: str, integrator: Integrator, steps_s: Sequence[float]) -> li
     if integrator.adapts:
         return [Stepping(name, LARGEST_STEP_S, tolerance) for tolerance in ADAPTIVE_TOLERANCES]
     return [Stepping(name, h) for h in steps_s]
-
-
-def contact_target(scene: EngineScene) -> EngineContact | None:
-    """Linearise the walker's contact under its weight on one foot; None on frictionless ground."""
-    from scipy.optimize import brentq
-
-    walker = scene.ours
-    law, friction = walker.normal, walker.friction
-    if friction.largest == 0.0:
-        return None
-    mass, g = walker.mass, walker.gravity_down
-    foot = resting_foot(mass * g, mass, law.stiffness, law.exponent, law.damping)
-    creep = brentq(lambda v: -friction_coefficient(friction, v)[0] - CREEP_LOAD, 0.0, friction.rising_until, xtol=1e-18)
-    sliding = -friction_coefficient(friction, friction.sliding_from)[0]
-    return EngineContact(mass, g, foot.depth, law.exponent, foot.damping_ratio, sliding, CREEP_LOAD, creep)
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 
 from walkerlab.evidence.benchmarks.engines import adapter
-from walkerlab.evidence.benchmarks.engines.planar import PlanarModel
+from walkerlab.exchange.engine_scene import EngineContact
+from walkerlab.exchange.planar import PlanarModel
 from walkerlab.physics.solvers.system import Floats
 
 INTEGRATORS = {
@@ -37,7 +38,7 @@ NO_ITERATION = 1e12
 EXPLICIT_METHODS = ("ExplicitEuler", "RK44")
 
 
-def tuned(model: str, target: adapter.EngineContact) -> adapter.OwnContact:
+def tuned(model: str, target: EngineContact) -> adapter.OwnContact:
     """Use the target's own parameters, and derive the zone over which friction rises."""
     stiffness = target.exponent * target.mass * target.gravity / target.penetration
     settings = {

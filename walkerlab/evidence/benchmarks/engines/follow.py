@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from walkerlab.evidence.benchmarks.engines.scenes import EngineScene
+from walkerlab.exchange.engine_scene import EngineScene
 from walkerlab.outcome import Outcome
 from walkerlab.physics.ground.external import feet_and_forces
 from walkerlab.physics.ground.knees import FLEXED, lock_knee

@@ -7,11 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from walkerlab.evidence.benchmarks.engines import planar
-from walkerlab.evidence.benchmarks.engines.adapter import EngineContact, OwnContact, Simulation, Stepping
+from walkerlab.evidence.benchmarks.engines.adapter import OwnContact, Simulation, Stepping
 from walkerlab.evidence.benchmarks.engines.follow import RuleFollower
 from walkerlab.evidence.benchmarks.engines.registry import PHYSICS_ENGINES
-from walkerlab.evidence.benchmarks.engines.scenes import EngineScene
+from walkerlab.exchange import planar
+from walkerlab.exchange.engine_scene import EngineContact, EngineScene
 from walkerlab.outcome import Outcome
 from walkerlab.physics.ground.terrain import STANCE_FOOT
 from walkerlab.physics.hybrid.contact_state import steps_with_lift

@@ -1,107 +1,14 @@
-"""Walks taken to other engines: the walker's parts, its ground and its start."""
-
-from __future__ import annotations
-
-from dataclasses import dataclass, replace
-from functools import cached_property
-
-import numpy as np
-from numpy.typing import NDArray
+"""Walks taken to other engines, and the walkers that engines do not support."""
 
 from walkerlab.config.reads import ContactConfig
 from walkerlab.errors import ConfigError
-from walkerlab.evidence.benchmarks.engines.planar import FLOATING, PlanarModel, planar_model
-from walkerlab.physics.ground.compliant import hinge_point
+from walkerlab.exchange.engine_scene import EngineScene, engine_scene
 from walkerlab.physics.ground.knees import IdealLock
 from walkerlab.physics.ground.terrain import STANCE_FOOT
-from walkerlab.physics.ground.walker import LOCKED, MAX_BODIES, ContactWalker, changed_forms
-from walkerlab.physics.hybrid.contact_events import JudgedGround
 from walkerlab.physics.hybrid.contact_state import knees_at_start
-from walkerlab.physics.mechanics.assembly import Anchor, levers, masses, total_mass
-from walkerlab.physics.mechanics.parts import Assembly, Knee
-from walkerlab.physics.solvers.system import Floats, State
-from walkerlab.scene.contact import contact_scene, knee_rules, start_state
+from walkerlab.physics.solvers.system import State
+from walkerlab.scene.contact import knee_rules
 from walkerlab.scene.parts import assembly_of
-
-
-@dataclass(frozen=True)
-class EngineScene:
-    """A walker on its ground, for an engine and for the walking rules.
-
-    assembly  the parts
-    base      root of the engine's tree: the hip, on the first stance leg
-    ours      the walker as this project walks it
-    walker    the same with foot and hip levers taken from the base
-    ground    terrain, and the measures that a walk is judged by
-    start     state of the free walker on the gait
-    locked    locked knees, which have no hinge in the engine
-    """
-
-    assembly: Assembly
-    base: Anchor
-    ours: ContactWalker
-    walker: ContactWalker
-    ground: JudgedGround
-    start: State
-    locked: tuple[Knee, ...] = ()
-
-    @cached_property
-    def model(self) -> PlanarModel:
-        return planar_model(self.assembly, self.base, FLOATING, self.gravity, self.locked)
-
-    @property
-    def name(self) -> str:
-        return "kneed" if self.assembly.knees else "compass"
-
-    @property
-    def gravity(self) -> tuple[float, float]:
-        """Along the slope and towards it (m/s^2)."""
-        return self.ours.gravity_along, self.ours.gravity_down
-
-    @cached_property
-    def knee_places(self) -> tuple[int, ...]:
-        """Index of each knee's angle among the engine's coordinates; -1 for a locked knee."""
-        ends = [(self.assembly.index(knee.shank), self.assembly.index(knee.thigh)) for knee in self.assembly.knees]
-        bends = [self.model.chain[shank] - self.model.chain[thigh] for shank, thigh in ends]
-        return tuple(2 + int(np.argmax(bend)) if bend.any() else -1 for bend in bends)
-
-    def with_knees_locked(self, doing: NDArray[np.int8]) -> EngineScene:
-        """Scene whose locked knees are those in state LOCKED."""
-        locked = (knee for knee, state in zip(self.assembly.knees, doing, strict=False) if state == LOCKED)
-        return replace(self, locked=tuple(locked))
-
-    @cached_property
-    def centre_levers(self) -> Floats:
-        """Levers (n, 2) in m from the base to the centre of mass."""
-        weighted = [mass * levers(self.assembly, self.base, anchor) for mass, anchor in masses(self.assembly)]
-        return np.asarray(sum(weighted) / total_mass(self.assembly))
-
-    def from_base(self, y: State) -> tuple[Floats, Floats]:
-        """Engine's coordinates and velocities from the state of the free walker."""
-        n = len(self.model.chain)
-        angles, rates = np.array(y[2 : 2 + n]) + self.ours.slope, np.array(y[4 + n :])
-        shift, drift = self._centre(angles, rates)
-        position, velocity = np.array(y[:2]) - shift, np.array(y[2 + n : 4 + n]) - drift
-        relative, relative_rates = np.linalg.lstsq(self.model.chain, np.column_stack((angles, rates)), rcond=None)[0].T
-        return np.concatenate((position, relative)), np.concatenate((velocity, relative_rates))
-
-    def about_centre(self, q: Floats, v: Floats) -> Floats:
-        """State of the free walker from an engine's coordinates and velocities."""
-        angles, rates = self.model.chain @ q[2:], self.model.chain @ v[2:]
-        shift, drift = self._centre(angles, rates)
-        return np.concatenate((q[:2] + shift, angles - self.ours.slope, v[:2] + drift, rates))
-
-    def _centre(self, angles: Floats, rates: Floats) -> tuple[Floats, Floats]:
-        """Position (m) and velocity (m/s) of the centre of mass relative to the base."""
-        s, c = np.sin(angles), np.cos(angles)
-        d = self.centre_levers
-        forward, upward = c * d[:, 0] - s * d[:, 1], s * d[:, 0] + c * d[:, 1]
-        return np.array((forward.sum(), upward.sum())), np.array((-rates @ upward, rates @ forward))
-
-    def started(self, factor: float) -> EngineScene:
-        """Scene with the start's velocities scaled; the walk's rules still see the stance foot at rest."""
-        n = len(self.model.chain)
-        return replace(self, start=(*self.start[: 2 + n], *(factor * x for x in self.start[2 + n :])))
 
 
 def scenes(config: ContactConfig, rigid_step_length_m: float, rigid_state: State) -> tuple[EngineScene, ...]:
@@ -119,13 +26,5 @@ def scenes(config: ContactConfig, rigid_step_length_m: float, rigid_state: State
         raise ConfigError(
             "engines: the engine models do not support a knee's compliant stop.", "Choose walker.knee.lock: ideal."
         )
-    scene = replace(contact_scene(config, rigid_step_length_m, rigid_step_length_m), pinned=False)
-    assembly, start = scene.assembly, start_state(scene, rigid_state)
-    upper = assembly.legs[STANCE_FOOT][0]
-    base = Anchor(upper, hinge_point(assembly, upper, assembly.legs[1 - STANCE_FOOT][0]))
-    d = np.zeros((2, MAX_BODIES, 2))
-    for foot, part in enumerate(assembly.feet):
-        d[foot, : len(assembly.bodies)] = levers(assembly, base, Anchor(part.body, part.centre_m))
-    walker = changed_forms(scene.walker, foot_x=d[..., 0], foot_y=d[..., 1], hip_x=0.0, hip_y=0.0)
-    free = EngineScene(assembly, base, scene.walker, walker, scene.ground, start)
-    return (free.with_knees_locked(knees_at_start(scene.walker, STANCE_FOOT, start)),)
+    scene = engine_scene(config, rigid_step_length_m, rigid_state)
+    return (scene.with_knees_locked(knees_at_start(scene.ours, STANCE_FOOT, scene.start)),)

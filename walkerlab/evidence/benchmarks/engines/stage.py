@@ -20,6 +20,7 @@ from walkerlab.evidence.benchmarks.engines.registry import EXTRA, PHYSICS_ENGINE
 from walkerlab.evidence.benchmarks.engines.rows import OURS, OWN_LAW, SAME_LAW, EngineRow, SwingRow, TuningRow
 from walkerlab.evidence.benchmarks.engines.scenes import scenes
 from walkerlab.evidence.benchmarks.words import words
+from walkerlab.exchange.engine_scene import contact_target
 from walkerlab.labels import labels_of
 from walkerlab.pipeline.progress import Progress
 from walkerlab.pipeline.stages.walk import rigid_start
@@ -93,7 +94,7 @@ def missing_engines() -> list[dict[str, str]]:
 
 def measure(pair: EngineOnScene) -> EngineFindings:
     findings, name = EngineFindings(), pair.engine.name
-    target = experiments.contact_target(pair.scene)
+    target = contact_target(pair.scene)
     with pair.process:
         findings.swings, lost = pair.swings()
         findings.left_out += [{"what": f"a swing in {name}", "why": failure.why} for failure in lost]

@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 
-from walkerlab.physics.mechanics.assembly import Anchor, masses, neighbours
+from walkerlab.physics.mechanics.assembly import Anchor, followers, masses, neighbours
 from walkerlab.physics.mechanics.parts import Assembly, Knee, Position
 from walkerlab.physics.solvers.system import Floats
 
@@ -144,3 +144,8 @@ def lump_bodies(
     least = SMALLEST_INERTIA * total * max(float(np.hypot(*(np.array(point) - centre))), SMALLEST_BALL_M) ** 2
     x, y = float(centre[0]), float(centre[1])
     return Link(members[0][0], total, (x, y), max(inertia, least), parent, parent_point, point)
+
+
+def coupling_rows(assembly: Assembly, model: PlanarModel) -> list[Floats]:
+    """Return weights (links,) of relative angles, base first, whose sum is zero for each body that follows others."""
+    return [model.chain[body] - row @ model.chain for body, row in followers(assembly).items()]

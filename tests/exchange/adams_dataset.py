@@ -1,0 +1,463 @@
+"""A small reader of ADAMS/Solver datasets (.adm), written from the format's description alone.
+
+It rebuilds parts, markers, joints and force expressions of planar models (motion in the x-y plane of the ground),
+evaluates the expressions as they are written, and integrates with SciPy. Every part has three coordinates (x, y of
+its frame's origin and its angle); joints are constraints on them, which acceleration multipliers enforce.
+"""
+
+from __future__ import annotations
+
+import ast
+import math
+import re
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from scipy.integrate import solve_ivp
+
+NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?D?$")
+EXPRESSIONS = {"FUNCTION", "FX", "FY", "FZ", "TX", "TY", "TZ", *(f"F{n}" for n in range(1, 9))}
+MEASURES = {"DX", "DY", "DZ", "VX", "VY", "VZ", "WX", "WY", "WZ", "AX", "AY", "AZ", "VARVAL"}
+LENGTHS_M = {"METER": 1.0, "MILLIMETER": 1e-3, "CENTIMETER": 1e-2, "INCH": 0.0254}
+
+
+@dataclass(frozen=True)
+class Statement:
+    """One statement of a dataset: its name, id, flags, and arguments by name."""
+
+    name: str
+    id: int
+    flags: tuple[str, ...]
+    arguments: dict[str, str]
+    label: str = ""
+
+    def numbers(self, key: str, default: tuple[float, ...] = ()) -> tuple[float, ...]:
+        return tuple(number(text) for text in self.arguments[key].split(",")) if key in self.arguments else default
+
+    def marker(self, key: str) -> int:
+        return int(self.arguments[key])
+
+
+def number(text: str) -> float:
+    """A number as ADAMS writes it; a D behind it means degrees."""
+    text = text.strip()
+    assert NUMBER.match(text), f"not a number: {text!r}"
+    return math.radians(float(text[:-1])) if text.endswith("D") else float(text)
+
+
+def logical_lines(text: str):
+    """Statements as single lines, each with the name that Adams View gives its object."""
+    title, *lines = text.splitlines()
+    assert "/" not in title, "the first line is a title and must not look like a statement"
+    label, current = "", None
+    for line in lines:
+        assert len(line) <= 2000
+        if line.lstrip().startswith("!"):
+            if named := re.search(r"adams_view_name='(\w+)'", line):
+                label = named[1]
+                assert not label[0].isdigit()
+            continue
+        line = line.split("!")[0].rstrip()
+        if not line:
+            continue
+        if line.startswith(","):
+            assert current is not None
+            current[0] += line
+        else:
+            if current:
+                yield tuple(current)
+            current, label = [line, label], ""
+    if current:
+        yield tuple(current)
+
+
+def split_arguments(text: str) -> list[str]:
+    """Split at commas outside parentheses and quotes; an expression ends at a backslash or the end."""
+    pieces, depth, quoted, start = [], 0, False, 0
+    for i, character in enumerate(text):
+        if character == '"':
+            quoted = not quoted
+        elif quoted:
+            continue
+        elif character == "(":
+            depth += 1
+        elif character == ")":
+            depth -= 1
+            assert depth >= 0
+        elif (character == "," and depth == 0) or (character == "\\" and text[i + 1 : i + 2] not in (",", "")):
+            pieces.append(text[start : i + (character == "\\")])
+            start = i + 1
+    assert depth == 0
+    assert not quoted
+    return [*pieces, text[start:]]
+
+
+def parse_statement(line: str, label: str) -> Statement:
+    head, *pieces = split_arguments(line)
+    name, _, identity = head.partition("/")
+    flags, arguments, key = [], {}, None
+    for piece in pieces:
+        text = piece.strip()
+        if "=" in text:
+            key, _, value = (part.strip() for part in text.partition("="))
+            key = key.upper()
+            if arguments and (last := next(reversed(arguments))) in EXPRESSIONS:
+                assert arguments[last].endswith("\\"), f"{head}: {last} is neither last nor closed by a backslash"
+            assert key not in arguments, f"{head}: {key} twice"
+            arguments[key] = value
+        elif key is not None and key not in EXPRESSIONS and text and (NUMBER.match(text) or text.startswith('"')):
+            arguments[key] += "," + text
+        elif text:
+            flags.append(text.upper())
+            key = None
+    arguments = {key: value.rstrip("\\").strip() if key in EXPRESSIONS else value for key, value in arguments.items()}
+    identity = identity.strip()
+    return Statement(name.strip().upper(), int(identity) if identity else 0, tuple(flags), arguments, label)
+
+
+def read_statements(text: str) -> list[Statement]:
+    statements = [parse_statement(*line) for line in logical_lines(text)]
+    assert statements[-1].name == "END"
+    seen = [(statement.name, statement.id) for statement in statements]
+    assert len(set(seen)) == len(seen), "ids are unique within a type of statement"
+    return statements[:-1]
+
+
+@dataclass(frozen=True)
+class Marker:
+    part: int
+    place: np.ndarray  # (2,) in the part's frame
+    turn: float  # rad, about z
+    floating: bool = False
+
+
+@dataclass
+class Part:
+    mass: float
+    inertia: float
+    centre: np.ndarray  # (2,) in the part's frame
+    start: np.ndarray  # x, y, angle
+    velocity: np.ndarray  # of the centre of mass, and angular
+    label: str = ""
+
+
+def turn_of(reuler: tuple[float, ...]) -> float:
+    """Rotation about z from body-fixed 3-1-3 angles that keep z, or turn it twice by pi."""
+    a, b, c = reuler or (0.0, 0.0, 0.0)
+    assert abs(math.sin(b)) < 1e-12, "planar models turn about z alone"
+    return a + math.cos(b) * c
+
+
+def rotation(angle: float) -> np.ndarray:
+    return np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
+
+
+def step(x: float, x0: float, h0: float, x1: float, h1: float) -> float:
+    if x <= x0:
+        return h0
+    if x >= x1:
+        return h1
+    s = (x - x0) / (x1 - x0)
+    return h0 + (h1 - h0) * s * s * (3.0 - 2.0 * s)
+
+
+def impact(x: float, v: float, x1: float, k: float, e: float, c: float, d: float) -> float:
+    assert x1 > 0.0, "IMPACT wants a free length above zero"
+    assert min(k, e, d) > 0.0
+    if x >= x1:
+        return 0.0
+    return max(0.0, k * (x1 - x) ** e - step(x, x1 - d, c, x1, 0.0) * v)
+
+
+FUNCTIONS = {
+    "STEP": step, "IMPACT": impact, "ABS": abs, "MAX": max, "MIN": min, "SQRT": math.sqrt, "SIN": math.sin,
+    "COS": math.cos, "SIGN": lambda a, b: math.copysign(abs(a), b), "MOD": math.fmod,
+    "ADAMS_IF": lambda e, negative, zero, positive: (negative if e < 0 else zero if e == 0 else positive)(),
+}  # fmt: skip
+
+
+def compile_expression(text: str):
+    """Compile an expression of ADAMS to Python's code; IF(e: a, b, c) evaluates only what is chosen."""
+    text = text.upper()
+    assert "--" not in text.replace(" ", ""), f"two minus signs in a row: {text}"
+
+    def choices(match_text: str) -> str:
+        while (found := re.search(r"\bIF\(", match_text)) is not None:
+            depth, parts, start = 1, [], found.end()
+            position = start
+            while depth:
+                character = match_text[position]
+                depth += {"(": 1, ")": -1}.get(character, 0)
+                if (depth == 1 and character in ":,") or depth == 0:
+                    parts.append(match_text[start:position])
+                    start = position + 1
+                position += 1
+            assert len(parts) == 4, f"IF takes e: a, b, c in {match_text}"
+            e, *rest = parts
+            chosen = f"ADAMS_IF({e}, " + ", ".join(f"lambda: ({part})" for part in rest) + ")"
+            match_text = match_text[: found.start()] + chosen + match_text[position:]
+        return match_text
+
+    source = choices(text)
+    names = {node.id for node in ast.walk(ast.parse(source.strip(), mode="eval")) if isinstance(node, ast.Name)}
+    allowed = {*FUNCTIONS, *MEASURES, "TIME", "PI", "DTOR", "RTOD"}
+    assert names <= allowed, f"unknown names: {sorted(names - allowed)}"
+    return compile(source.strip(), "expression", "eval")
+
+
+@dataclass
+class Dataset:
+    """A planar model of ADAMS in its own units (lengths, kg, s), as its text defines it."""
+
+    text: str
+    statements: list[Statement] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.statements = read_statements(self.text)
+        self.markers = {s.id: self._marker(s) for s in self.of("MARKER")}
+        self.ground = next(s.id for s in self.of("PART") if "GROUND" in s.flags)
+        self.parts = {s.id: self._part(s) for s in self.of("PART") if s.id != self.ground}
+        self.index = {part: 3 * place for place, part in enumerate(self.parts)}
+        self.variables = {s.id: compile_expression(s.arguments["FUNCTION"]) for s in self.of("VARIABLE")}
+        components = ("FX", "FY", "TZ")
+        self.forces = [
+            (s.marker("I"), s.marker("RM"), [compile_expression(s.arguments[key]) for key in components])
+            for s in self.of("GFORCE")
+        ]
+        self.reactions = [s.marker("JFLOAT") for s in self.of("GFORCE")]
+        self.single = [(s, compile_expression(s.arguments["FUNCTION"])) for s in self.of("SFORCE")]
+        for s in self.of("GFORCE"):
+            assert all(float(s.arguments[key]) == 0.0 for key in ("FZ", "TX", "TY"))
+        (units,) = self.of("UNITS")
+        assert (units.arguments["MASS"], units.arguments["TIME"]) == ("KILOGRAM", "SECOND")
+        assert units.arguments["FORCE"] == "NEWTON"
+        self.metre = 1.0 / LENGTHS_M[units.arguments["LENGTH"]]  # lengths of the dataset in a metre
+        (gravity,) = self.of("ACCGRAV")
+        self.gravity = np.array([gravity.numbers(key, (0.0,))[0] for key in ("IGRAV", "JGRAV")])
+        assert gravity.numbers("KGRAV", (0.0,)) == (0.0,)
+
+    def of(self, name: str) -> list[Statement]:
+        return [statement for statement in self.statements if statement.name == name]
+
+    def _marker(self, s: Statement) -> Marker:
+        place = s.numbers("QP", (0.0, 0.0, 0.0))
+        return Marker(s.marker("PART"), np.array(place[:2]), turn_of(s.numbers("REULER")), "FLOATING" in s.flags)
+
+    def _part(self, s: Statement) -> Part:
+        place, turn = s.numbers("QG", (0.0, 0.0, 0.0)), turn_of(s.numbers("REULER"))
+        assert place[2] == 0.0
+        centre = self.markers[s.marker("CM")]
+        assert centre.part == s.id
+        inertia = s.numbers("IP", (0.0, 0.0, 0.0))
+        assert all(abs(product) == 0.0 for product in inertia[3:])
+        assert "IM" not in s.arguments
+        assert "VM" not in s.arguments
+        velocity = [s.numbers(key, (0.0,))[0] for key in ("VX", "VY", "WZ")]
+        assert all(s.numbers(key, (0.0,)) == (0.0,) for key in ("VZ", "WX", "WY"))
+        return Part(
+            s.numbers("MASS")[0], inertia[2], centre.place, np.array([*place[:2], turn]), np.array(velocity), s.label
+        )
+
+    # kinematics -----------------------------------------------------------------------------------------------------
+    def pose(self, q, part):
+        if part == self.ground:
+            return np.zeros(2), 0.0
+        i = self.index[part]
+        return q[i : i + 2], q[i + 2]
+
+    def rates(self, u, part):
+        if part == self.ground:
+            return np.zeros(2), 0.0
+        i = self.index[part]
+        return u[i : i + 2], u[i + 2]
+
+    def place(self, q, marker):
+        m = self.markers[marker]
+        origin, angle = self.pose(q, m.part)
+        return origin + rotation(angle) @ m.place, angle + m.turn
+
+    def velocity(self, q, u, marker):
+        m = self.markers[marker]
+        _, angle = self.pose(q, m.part)
+        rate, spin = self.rates(u, m.part)
+        lever = rotation(angle) @ m.place
+        return rate + spin * np.array([-lever[1], lever[0]]), spin
+
+    def jacobian(self, q, marker):
+        """(2, 3 parts): of a marker's velocity by the rates."""
+        m = self.markers[marker]
+        out = np.zeros((2, 3 * len(self.parts)))
+        if m.part != self.ground:
+            i = self.index[m.part]
+            lever = rotation(q[i + 2]) @ m.place
+            out[:, i : i + 2] = np.eye(2)
+            out[:, i + 2] = -lever[1], lever[0]
+        return out
+
+    # measures -------------------------------------------------------------------------------------------------------
+    def environment(self, t, q, u):
+        def zero(place):
+            return 0.0
+
+        def relative(i, j=0, k=0):
+            vector = self.place(q, i)[0] - (self.place(q, j)[0] if j else 0.0)
+            return rotation(-self.place(q, k)[1]) @ vector if k else vector
+
+        def relative_rate(i, j=0, k=0, frame=0):
+            assert not frame or self.markers[frame].part == self.ground, "differentiated in the ground"
+            vector = self.velocity(q, u, i)[0] - (self.velocity(q, u, j)[0] if j else 0.0)
+            return rotation(-self.place(q, k)[1]) @ vector if k else vector
+
+        def spin(i, j=0, k=0):
+            return self.velocity(q, u, i)[1] - (self.velocity(q, u, j)[1] if j else 0.0)
+
+        def angle(i, j=0):
+            return self.place(q, i)[1] - (self.place(q, j)[1] if j else 0.0)
+
+        names = dict(FUNCTIONS)
+        names |= {"TIME": t, "PI": math.pi, "DTOR": math.pi / 180.0, "RTOD": 180.0 / math.pi}
+        names |= {"DX": lambda *a: relative(*a)[0], "DY": lambda *a: relative(*a)[1], "DZ": zero}
+        names |= {"VX": lambda *a: relative_rate(*a)[0], "VY": lambda *a: relative_rate(*a)[1], "VZ": zero}
+        names |= {"WZ": spin, "AZ": angle, "WX": zero, "WY": zero}
+        values: dict[int, float] = {}
+
+        def variable(identity):
+            if identity not in values:
+                values[identity] = eval(self.variables[identity], names)
+            return values[identity]
+
+        names["VARVAL"] = variable
+        return names
+
+    def value(self, expression, t, q, u) -> float:
+        return float(eval(expression, self.environment(t, q, u)))
+
+    # dynamics -------------------------------------------------------------------------------------------------------
+    @cached_property
+    def start(self) -> tuple[np.ndarray, np.ndarray]:
+        q = np.concatenate([part.start for part in self.parts.values()])
+        u = np.zeros_like(q)
+        for identity, part in self.parts.items():
+            i = self.index[identity]
+            lever = rotation(q[i + 2]) @ part.centre
+            u[i : i + 2] = part.velocity[:2] - part.velocity[2] * np.array([-lever[1], lever[0]])
+            u[i + 2] = part.velocity[2]
+        return q, u
+
+    def mass(self, q):
+        """Mass matrix by the parts' coordinates."""
+        out = np.zeros((len(q), len(q)))
+        for identity, part in self.parts.items():
+            i = self.index[identity]
+            lever = rotation(q[i + 2]) @ part.centre
+            turn = np.array([-lever[1], lever[0]]) * part.mass
+            out[i : i + 2, i : i + 2] = part.mass * np.eye(2)
+            out[i : i + 2, i + 2] = out[i + 2, i : i + 2] = turn
+            out[i + 2, i + 2] = part.inertia + part.mass * lever @ lever
+        return out
+
+    def applied(self, t, q, u):
+        """Generalised forces of gravity, of expressions and of the centripetal terms."""
+        environment, out = self.environment(t, q, u), np.zeros_like(q)
+        for identity, part in self.parts.items():
+            i = self.index[identity]
+            lever = rotation(q[i + 2]) @ part.centre
+            force = part.mass * (self.gravity + u[i + 2] ** 2 * lever)
+            out[i : i + 2] += force
+            out[i + 2] += lever[0] * force[1] - lever[1] * force[0]
+        for (marker, frame, expressions), reaction in zip(self.forces, self.reactions, strict=True):
+            fx, fy, tz = (eval(expression, environment) for expression in expressions)
+            # a newton is a kilogram times `metre` lengths of the dataset per second squared
+            force = self.metre * (rotation(self.place(q, frame)[1]) @ np.array([fx, fy]))
+            self._apply(out, q, marker, force, self.metre * tz)
+            # a floating marker stands where I is, on the part that takes the reaction
+            assert self.markers[reaction].floating
+            assert self.markers[reaction].part == self.ground
+        for statement, expression in self.single:
+            value = self.metre * eval(expression, environment)
+            i, j = statement.marker("I"), statement.marker("J")
+            action_only = "ACTIONONLY" in statement.flags
+            if "ROTATIONAL" in statement.flags:
+                self._apply(out, q, i, np.zeros(2), value)
+                if not action_only:
+                    self._apply(out, q, j, np.zeros(2), -value)
+            else:
+                raise AssertionError("translational forces along z do not occur in planar models")
+        return out
+
+    def _apply(self, out, q, marker, force, torque):
+        part = self.markers[marker].part
+        if part != self.ground:
+            out += force @ self.jacobian(q, marker)
+            out[self.index[part] + 2] += torque
+
+    def constraints(self, q, u):
+        """Rows of the constraints' Jacobian, and minus their derivative times the rates."""
+        rows, biases = [], []
+
+        def lever_bias(marker):
+            m = self.markers[marker]
+            if m.part == self.ground:
+                return np.zeros(2)
+            i = self.index[m.part]
+            return -(u[i + 2] ** 2) * (rotation(q[i + 2]) @ m.place)
+
+        for s in self.of("JOINT"):
+            i, j = s.marker("I"), s.marker("J")
+            if "PLANAR" in s.flags:
+                assert self.ground in (self.markers[i].part, self.markers[j].part)
+                continue
+            assert {"REVOLUTE"} <= set(s.flags) or {"FIXED"} <= set(s.flags), s.flags
+            rows.extend(self.jacobian(q, i) - self.jacobian(q, j))
+            biases.extend(lever_bias(j) - lever_bias(i))
+            if "FIXED" in s.flags:
+                rows.append(self.relative_turn(i, j))
+                biases.append(0.0)
+        joints = {s.id: s for s in self.of("JOINT")}
+        for s in self.of("COUPLER"):
+            ids, scales = (s.numbers(key) for key in ("JOINTS", "SCALES"))
+            turns = (self.relative_turn(joints[int(id)].marker("I"), joints[int(id)].marker("J")) for id in ids)
+            rows.append(sum(scale * turn for scale, turn in zip(scales, turns, strict=True)))
+            biases.append(0.0)
+        return np.array(rows).reshape(len(rows), len(q)), np.array(biases)
+
+    def relative_turn(self, i, j):
+        row = np.zeros(3 * len(self.parts))
+        for marker, sign in ((i, 1.0), (j, -1.0)):
+            if (part := self.markers[marker].part) != self.ground:
+                row[self.index[part] + 2] += sign
+        return row
+
+    def rate(self, t, y):
+        q, u = np.split(y, 2)
+        g, bias = self.constraints(q, u)
+        n, m = len(q), len(g)
+        matrix = np.block([[self.mass(q), g.T], [g, np.zeros((m, m))]])
+        # lengths are not metres: both blocks are brought to like sizes before they are solved
+        scale = np.concatenate([np.ones(n) / np.sqrt(np.diag(matrix)[:n]), np.ones(m)])
+        for row in range(m):
+            scale[n + row] = 1.0 / np.linalg.norm(g[row] * scale[:n])
+        right = np.concatenate([self.applied(t, q, u), bias])
+        solution = scale * np.linalg.solve(scale[:, None] * matrix * scale, scale * right)
+        return np.concatenate([u, solution[:n]])
+
+    def degrees_of_freedom(self) -> int:
+        return 3 * len(self.parts) - len(self.constraints(*self.start)[0])
+
+    def integrate(self, end_s: float, rtol=1e-10, atol=1e-10, events=(), method="Radau", first_step=1e-6):
+        """Integrate from the initial conditions; `events` are functions of (t, q, u)."""
+        wrapped = []
+        for event in events:
+
+            def function(t, y, event=event):
+                return event(t, *np.split(y, 2))
+
+            function.terminal = getattr(event, "terminal", False)
+            function.direction = getattr(event, "direction", 0.0)
+            wrapped.append(function)
+        y = np.concatenate(self.start)
+        return solve_ivp(
+            self.rate, (0.0, end_s), y, method, events=wrapped, rtol=rtol, atol=atol, first_step=first_step,
+            dense_output=True,
+        )  # fmt: skip

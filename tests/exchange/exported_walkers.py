@@ -1,0 +1,104 @@
+"""Walkers to export, each with its rigid gait: built-in ones and random ones of every kind that is exported."""
+
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+from walkerlab.api import in_memory
+from walkerlab.config.loader import load
+from walkerlab.exchange.export import export_model
+from walkerlab.exchange.exported import prepare_export
+
+PADS = "contact.terrain=checkerboard"
+
+
+@cache
+def with_gait(name, *sets):
+    """Config, rigid step length and rigid start state."""
+    config = load(Path(name), sets).config
+    gait = in_memory("fixedpoint", config).summary
+    return config, gait["step_length_m"], gait["state"]
+
+
+@cache
+def export_of(name, *sets):
+    return prepare_export(*with_gait(name, *sets))
+
+
+@cache
+def files_of(kind, law, name, *sets):
+    return export_model(*with_gait(name, *sets), kind, law)
+
+
+PARTS = """
+name: compass-by-parts
+walker:
+  type: parts
+  leg_length_m: 1.0
+  bodies:
+    - {name: left leg, mass_kg: 5.0, centre_m: [0.0, -0.5]}
+    - {name: right leg, mass_kg: 5.0, centre_m: [0.0, -0.5]}
+  hinges:
+    - {name: hip, parent: right leg, parent_point_m: [0.0, 0.0], child: left leg, child_point_m: [0.0, 0.0]}
+  particles:
+    - {name: hip, mass_kg: 10.0, body: right leg, at_m: [0.0, 0.0]}
+  feet:
+    - {body: left leg, centre_m: [0.0, -0.999], radius_m: 0.001}
+    - {body: right leg, centre_m: [0.0, -0.999], radius_m: 0.001}
+  legs: [[left leg], [right leg]]
+slope_rad: 0.0174
+strides: 2
+contact: {terrain: checkerboard}
+"""
+
+
+def random_walker(seed):
+    """Name and settings of a walker drawn at random, one of each kind in turn, on pads of its own step length."""
+    draw = np.random.default_rng(seed)
+
+    def about(key, value):
+        return f"{key}={value * draw.uniform(0.95, 1.05):.6g}"
+
+    pads = (PADS, "strides=2")
+    springs = (about("walker.hip.spring_N_m_per_rad", 1.0), about("walker.hip.damping_N_m_s_per_rad", 0.02))
+    kinds = (
+        ("paper", about("walker.leg_mass_kg", 5.0), about("walker.foot_radius_m", 0.02), *springs, *pads),
+        (
+            "round-feet", about("walker.leg_inertia_kg_m2", 0.01), about("walker.foot_radius_m", 0.1),
+            about("walker.foot_centre_ahead_m", 0.004), *pads,
+        ),
+        ("torso", about("walker.torso.mass_kg", 5.0), about("walker.torso.inertia_kg_m2", 0.1), *springs, *pads),
+        ("level", about("push_off.impulse_N_s", 4.0), about("walker.hip_mass_kg", 10.0), *pads),
+        ("paper", about("walker.hip.torque_N_m", 0.1), about("walker.leg_inertia_kg_m2", 0.1), *pads),
+    )  # fmt: skip
+    return kinds[seed % len(kinds)]
+
+
+def touches_of(dataset, export, count):
+    """When the feet touch ahead of each other, the model integrated from its initial conditions as written."""
+    names = export.names[export.hip_link], export.names[0]
+    parts = [next(k for k, part in dataset.parts.items() if part.label == name) for name in names]
+    marked = {dataset.markers[s.id].part: s.id for s in dataset.of("MARKER") if s.label == "foot"}
+    feet = [marked[part] for part in parts]
+    radii = 1000.0 * export.scene.ours.whole.radius
+
+    def sinking(foot):
+        def height(t, q, u):
+            return dataset.place(q, feet[foot])[0][1] - radii[foot]
+
+        height.direction = -1.0
+        return height
+
+    end = export.touches_s[count - 1] + 1e-3
+    solution = dataset.integrate(end, 1e-9, 1e-9, (sinking(0), sinking(1)), "LSODA")
+    assert solution.success
+    times = []
+    for foot, events in enumerate(zip(solution.t_events, solution.y_events, strict=True)):
+        for time, y in zip(*events, strict=True):
+            ahead = dataset.place(y[: y.size // 2], feet[foot])[0] - dataset.place(y[: y.size // 2], feet[1 - foot])[0]
+            if ahead[0] > 0.25 * 1000.0 * export.scene.ground.terrain.stride_measure and time > 0.1:
+                times.append((time, foot))
+    times.sort()
+    # a leading foot that bounces touches again before the other one's turn
+    return np.array([time for k, (time, foot) in enumerate(times) if k == 0 or times[k - 1][1] != foot])

@@ -1,0 +1,209 @@
+"""Files that other programs and people write, read into columns and quantities."""
+
+import math
+
+import numpy as np
+import pytest
+
+from walkerlab.errors import ConfigError
+from walkerlab.exchange.columns import as_walk, parse_pairs, parse_units
+from walkerlab.exchange.recording import TIME, read_recording
+
+TIMES = np.linspace(0.0, 0.4, 5)
+ANGLES = np.stack([0.1 * np.sin(TIMES), -0.2 * np.cos(TIMES)], axis=1)
+
+OWN = "time (s),angle 1 (rad),angle 2 (rad)\n" + "\n".join(
+    f"{t!r},{a!r},{b!r}" for t, (a, b) in zip(TIMES.tolist(), ANGLES.tolist(), strict=True)
+)
+ADAMS_TABLE = "walker\n\nTime\t.walker.Last_Run.leg_1.angle\t.walker.Last_Run.leg_2.angle\n" + "\n".join(
+    f"{t:+.12E}\t{a:+.12E}\t{b:+.12E}" for t, (a, b) in zip(TIMES, ANGLES, strict=True)
+)
+DEGREES = "t;Angle 1 [deg];angle_2 [deg];note\n" + "\n".join(
+    f"{t:.6f};{math.degrees(a):.12f};{math.degrees(b):.12f};".replace(".", ",")
+    for t, (a, b) in zip(TIMES, ANGLES, strict=True)
+)
+STO = "walk\nversion=1\nnRows=99\nnColumns=3\ninDegrees=no\nendheader\ntime\tangle_1\tangle_2\n" + "\n".join(
+    f"{t}\t{a}\t{b}" for t, (a, b) in zip(TIMES, ANGLES, strict=True)
+)
+MOT = STO.replace("inDegrees=no", "inDegrees=yes")
+# ids not in the order of the document, two blocks of which the second repeats the last sample of the first
+BLOCKS = [(TIMES[:3], ANGLES[:3]), (TIMES[2:], ANGLES[2:])]
+RES = (
+    '<?xml version="1.0"?><Results xmlns="http://www.mscsoftware.com/:xrf10"><Analysis name="A"><Units angle="rad" '
+    'length="millimeter" mass="kilogram" time="sec"/><StepMap name="map_001"><Entity name="leg_2"><Component '
+    'name="angle" unitsValue="rad" id="3"/></Entity><Entity name="time"><Component name="TIME" unitsValue="sec" '
+    'id="1"/></Entity><Entity name="leg_1"><Component name="angle" unitsValue="rad" id="2"/></Entity></StepMap>'
+    '<Data name="modelInput_001" id="1"><Step type="input">0 9\n9</Step></Data>'
+    + "".join(
+        f'<Data name="dynamic_00{n}" id="{n + 1}">'
+        + "".join(f"<Step>{t}\n{a} {b}</Step>" for t, (a, b) in zip(*block, strict=True))
+        + "</Data>"
+        for n, block in enumerate(BLOCKS, 1)
+    )
+    + "</Analysis></Results>"
+)
+FILES = {"own.csv": OWN, "table.txt": ADAMS_TABLE, "degrees.csv": DEGREES, "walk.sto": STO, "walk.res": RES}
+
+
+def marker_file(times, places, unit="mm"):
+    """A .trc file of three markers, without the blank line that is often missing."""
+    head = "PathFileType\t4\t(X/Y/Z)\twalk.trc\nDataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\tOrigDataRate\t"
+    head += f"OrigDataStartFrame\tOrigNumFrames\n100\t100\t{len(times)}\t3\t{unit}\t100\t1\t{len(times)}\n"
+    head += "Frame#\tTime\tHIP\t\t\tFOOT1\t\t\tFOOT2\t\t\t\n\t\tX1\tY1\tZ1\tX2\tY2\tZ2\tX3\tY3\tZ3\n"
+    rows = (
+        f"{n}\t{t}\t" + "\t".join(map(repr, row.ravel().tolist()))
+        for n, (t, row) in enumerate(zip(times, places, strict=True), 1)
+    )
+    return head + "\n".join(rows)
+
+
+def markers():
+    """Places (frames, marker, axis) of a hip that moves along x and of the ends of two legs, y upwards, mm."""
+    hip = np.stack([100.0 * TIMES, np.full_like(TIMES, 900.0), np.zeros_like(TIMES)], axis=1)
+    feet = [hip + 900.0 * np.stack([np.sin(a), -np.cos(a), 0.0 * a], axis=1) for a in ANGLES.T]
+    return np.stack([hip, *feet], axis=1)
+
+
+def written(folder, name, text):
+    path = folder / name
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_the_same_walk_is_read_from_every_format(name, tmp_path):
+    units = {} if name == "own.csv" else {"angle": "rad", "time": "s"} if name == "table.txt" else {"time": "s"}
+    walk = as_walk(read_recording(written(tmp_path, name, FILES[name])), {}, units)
+    assert walk.time_s == pytest.approx(TIMES, abs=1e-12)
+    assert walk.both_legs("angle") == pytest.approx(ANGLES, abs=1e-11)
+
+
+def test_a_table_in_degrees_says_so_in_its_header(tmp_path):
+    walk = as_walk(read_recording(written(tmp_path, "walk.mot", MOT)), {}, {})
+    assert walk.both_legs("angle") == pytest.approx(np.radians(ANGLES), abs=1e-12)
+
+
+def test_markers_give_the_angles_of_lines_between_them(tmp_path):
+    path = written(tmp_path, "walk.trc", marker_file(TIMES, markers()))
+    walk = as_walk(read_recording(path), {"angle 1": "HIP>FOOT1", "angle 2": "HIP > FOOT2", "hip_along_m": "HIP.x"}, {})
+    assert walk.both_legs("angle") == pytest.approx(ANGLES, abs=1e-12)
+    assert walk.quantities["hip_along_m"] == pytest.approx(0.1 * TIMES, abs=1e-12)
+
+
+def test_markers_may_be_recorded_with_z_upwards_and_walking_backwards(tmp_path):
+    turned = markers()[:, :, [2, 0, 1]] * [1.0, -1.0, 1.0]
+    path = written(tmp_path, "walk.trc", marker_file(TIMES, turned))
+    walk = as_walk(read_recording(path), {"angle 1": "HIP>FOOT1", "angle 2": "HIP>FOOT2"}, {})
+    assert walk.both_legs("angle") == pytest.approx(ANGLES, abs=1e-12)
+
+
+def test_a_gap_in_a_column_that_is_used_is_an_error_and_elsewhere_is_not(tmp_path):
+    places = markers()
+    text = marker_file(TIMES, places).replace(repr(float(places[2, 2, 0])), "")
+    recording = read_recording(written(tmp_path, "walk.trc", text))
+    assert np.isnan(recording.columns["FOOT2.x"]).sum() == 1
+    assert as_walk(recording, {"angle 1": "HIP>FOOT1", "angle 2": "HIP>FOOT1"}, {}).time_s.size == TIMES.size
+    with pytest.raises(ConfigError, match=r"FOOT2\.x.*1 gaps.*sample 3"):
+        as_walk(recording, {"angle 1": "HIP>FOOT1", "angle 2": "HIP>FOOT2"}, {})
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "message"),
+    [
+        ("walk.req", "x", "format that cannot be read"),
+        ("walk.xlsx", "x", "format that cannot be read"),
+        ("walk", "x", "no ending"),
+        ("walk.csv", "", "no header"),
+        ("walk.csv", "1,2,3\n4,5,6\n", "no header"),
+        ("walk.csv", OWN.replace("angle 2", "angle 1"), "two columns named"),
+        ("walk.csv", OWN.replace("time (s)", "tempo (s)"), "no column of time"),
+        ("walk.csv", "\n".join(OWN.splitlines()[:2]), "1 samples"),
+        ("walk.csv", OWN.replace(repr(float(ANGLES[1, 0])), "abc"), "line 3: 'abc' is not a number"),
+        ("walk.csv", OWN + ",7", "4 values where the header names 3"),
+        ("walk.csv", "\n".join([*OWN.splitlines(), OWN.splitlines()[2]]), "time does not rise"),
+        ("walk.csv", OWN.replace("\n0.2,", "\n,"), "time is missing"),
+        ("walk.res", RES[:-40], "not complete XML"),
+        ("walk.res", RES.replace('id="3"', 'id="2"'), "not unique"),
+        ("walk.res", RES.replace('id="3"', 'id="x"'), "no id"),
+        ("walk.res", RES.replace("dynamic_", "modelInput_"), "no steps"),
+        ("walk.res", RES.replace(f"{TIMES[1]}\n", f"{TIMES[1]}\n1 "), "step 2 holds 4 numbers for 3"),
+        ("walk.res", RES.replace(f"{TIMES[1]}\n", "one\n"), "no number"),
+        ("walk.sto", STO.replace("endheader", "end"), "endheader"),
+        ("walk.sto", STO.replace("version=1", "DataType=Vec3"), "type vec3"),
+        ("walk.sto", STO + "\t4", "4 values where the header names 3"),
+        ("walk.trc", "x\n" * 7, "PathFileType"),
+        ("walk.trc", "\n".join(marker_file(TIMES, markers()).splitlines()[:5]), "no markers"),
+    ],
+)
+def test_a_damaged_file_says_what_is_wrong(name, text, message, tmp_path):
+    with pytest.raises(ConfigError, match=message) as caught:
+        read_recording(written(tmp_path, name, text))
+    assert caught.value.advice
+
+
+def test_a_file_that_is_not_there_is_named(tmp_path):
+    with pytest.raises(ConfigError, match=r"walk\.csv cannot be read"):
+        read_recording(tmp_path / "walk.csv")
+
+
+def test_bytes_that_are_no_text_are_refused(tmp_path):
+    path = tmp_path / "walk.csv"
+    path.write_bytes(b"PK\3\4\0\0" * 30)
+    with pytest.raises(ConfigError, match="not a text"):
+        read_recording(path)
+
+
+@pytest.mark.parametrize(
+    ("columns", "units", "message", "advice"),
+    [
+        ({"angle 1": "left"}, {}, "no column 'left'", "nearest"),
+        ({"angel 1": "angle 1"}, {}, "no quantity", "angle 1"),
+        ({}, {"angle": "gon"}, "'gon' is no unit", "rad, radian"),
+        ({"hip_along_m": "angle 1"}, {}, "no unit of 'hip_along_m'", "length"),
+    ],
+)
+def test_a_column_or_unit_that_is_not_known_is_named(columns, units, message, advice, tmp_path):
+    recording = read_recording(
+        written(tmp_path, "walk.csv", OWN.replace(",angle 2 (rad)", ",angle 2 (gon)") if "angle" in units else OWN)
+    )
+    with pytest.raises(ConfigError, match=message) as caught:
+        as_walk(recording, columns, units)
+    assert advice in caught.value.advice
+
+
+def test_a_missing_unit_is_asked_for(tmp_path):
+    recording = read_recording(written(tmp_path, "walk.csv", OWN.replace("angle 2 (rad)", "angle 2")))
+    with pytest.raises(ConfigError, match="does not say in which unit 'angle 2'") as caught:
+        as_walk(recording, {}, {})
+    assert "--units angle=rad" in caught.value.advice
+    assert as_walk(recording, {}, parse_units(["rad"])).both_legs("angle") == pytest.approx(ANGLES)
+
+
+def test_two_columns_of_one_name_are_asked_about(tmp_path):
+    text = ADAMS_TABLE.replace("leg_2.angle", "leg_2.angle\t.walker.Second.leg_2.angle").replace("\n", "\t0\n")
+    recording = read_recording(
+        written(
+            tmp_path,
+            "walk.txt",
+            text.replace("walker\t0\n\t0\n", "walker\n\n").replace("Second.leg_2.angle\t0", "Second.leg_2.angle")
+            + "\t0",
+        )
+    )
+    with pytest.raises(ConfigError, match="could each be 'angle 2'"):
+        as_walk(recording, {}, {"angle": "rad", "time": "s"})
+
+
+def test_options_are_pairs():
+    assert parse_pairs("--columns", ["a=b,c = d", "e=f"]) == {"a": "b", "c": "d", "e": "f"}
+    assert parse_units(["deg,mm", "time=ms"]) == {"angle": "deg", "length": "mm", "time": "ms"}
+    for wrong in ("a", "=b", "a="):
+        with pytest.raises(ConfigError, match="not of the form"):
+            parse_pairs("--columns", [wrong])
+    with pytest.raises(ConfigError, match="no unit that is known"):
+        parse_units(["furlong"])
+
+
+def test_a_recording_keeps_columns_that_no_walker_has(tmp_path):
+    recording = read_recording(written(tmp_path, "degrees.csv", DEGREES))
+    assert set(recording.columns) == {TIME, "Angle 1", "angle_2", "note"}
+    assert np.isnan(recording.columns["note"]).all()

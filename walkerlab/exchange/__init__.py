@@ -1,0 +1,1 @@
+"""Exchange with other programs: models out (ADAMS, MuJoCo), recorded walks in."""

@@ -1,0 +1,177 @@
+"""Adams View: the commands (.cmd) that build a walker, with the same objects as the dataset.
+
+Objects come in the order in which View writes them: parts with their markers, joints, contacts, forces, and last the
+functions of all these, since a function may name any of them.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Iterator
+
+from walkerlab.exchange.adams_model import GROUND, AdamsModel
+from walkerlab.exchange.exported import finite
+
+REFERENCE = re.compile(r"\{([\w.]+)\}")
+OUTPUT_S = 1e-3
+Naming = Callable[[str], str]
+
+
+def view_text(model: AdamsModel, head: Iterable[str], end_s: float, pinned_until_s: float | None = None) -> str:
+    """Write the commands that build a model, with comments at their head and a script that runs it until a time.
+
+    pinned_until_s  when the hinge of the first stance foot is to be removed, if there is one
+    """
+    lines = ["! CMD Version:2", *(f"! {line}" for line in head)]
+    lines += [line for each in (*building(model), script(model, end_s, pinned_until_s)) for line in each]
+    return "\n".join([*lines, ""])
+
+
+def command(words: str, **arguments: str) -> list[str]:
+    """Write a command with one argument per line."""
+    lines = [words, *(f"   {key} = {value}" for key, value in arguments.items())]
+    return [*(f"{line}  &" for line in lines[:-1]), lines[-1]]
+
+
+def quoted(text: str) -> str:
+    return f'"{text}"'
+
+
+def listed(*numbers: float) -> str:
+    return ", ".join(finite(number) for number in numbers)
+
+
+def building(model: AdamsModel) -> Iterator[list[str]]:
+    """Yield the commands that build a model."""
+    root = f".{model.name}"
+
+    def full(name: str) -> str:
+        return f"{root}.{name}"
+
+    def function(text: str) -> str:
+        return quoted(REFERENCE.sub(lambda match: full(match[1]), text))
+
+    yield command("defaults units", length="mm", angle="rad", force="newton", mass="kg", time="sec")
+    yield command("defaults units", coordinate_system_type="cartesian", orientation_type="body313")
+    yield command("model create", model_name=model.name)
+    yield from bodies(model, full)
+    for name in model.variables:
+        yield command("data_element create variable", variable_name=full(name), function=quoted(""))
+    for name, joint in model.joints.items():
+        kind = "primitive_joint inline" if joint.kind == "INLINE" else f"joint {joint.kind.lower()}"
+        named = {"jprim_name": full(name), "adams_id": "1"} if joint.kind == "INLINE" else {"joint_name": full(name)}
+        yield command(f"constraint create {kind}", **named, i_marker_name=full(joint.i), j_marker_name=full(joint.j))
+    for name, weights in model.couplers.items():
+        yield command(
+            "constraint create complex_joint coupler", coupler_name=full(name),
+            joint_name=", ".join(full(joint) for joint, _ in weights), type_of_freedom="_".join("rot" for _ in weights),
+            motion_multipliers=listed(*(weight for _, weight in weights)),
+        )  # fmt: skip
+    yield from contacts(model, full)
+    for name, force in model.forces.items():
+        empty = {f"{axis}_{kind}_function": quoted("") for kind in ("force", "torque") for axis in "xyz"}
+        yield command(
+            "force create direct general_force", general_force_name=full(name), i_marker_name=full(force.i),
+            j_floating_marker_name=full(force.reaction), ref_marker_name=full("ground.origin"), **empty,
+        )  # fmt: skip
+    for name, torque in model.torques.items():
+        yield command(
+            "force create direct single_component_force", single_component_force_name=full(name),
+            type_of_freedom="rotational", i_marker_name=full(torque.i), j_marker_name=full(torque.j), action_only="off",
+            function=quoted(""),
+        )  # fmt: skip
+    along, up = (finite(component) for component in model.gravity)
+    gravity = {"x_component_gravity": along, "y_component_gravity": up, "z_component_gravity": "0"}
+    yield command("force create body gravitational", gravity_field_name=full("gravity"), **gravity)
+    for name, components in model.requests.items():
+        functions = {f"f{k}": function(text) for k, text in enumerate(components.values(), start=1)}
+        yield command(
+            "output_control create request", request_name=full(f"request_{name}"), results_name=quoted(name),
+            component_names=", ".join(quoted(component) for component in components), **functions,
+        )  # fmt: skip
+    for name, text in model.variables.items():
+        yield command("data_element modify variable", variable_name=full(name), function=function(text))
+    for name, force in model.forces.items():
+        yield command(
+            "force modify direct general_force", general_force_name=full(name), x_force_function=function(force.x),
+            y_force_function=function(force.y), z_force_function=quoted("0"), x_torque_function=quoted("0"),
+            y_torque_function=quoted("0"), z_torque_function=function(force.torque),
+        )  # fmt: skip
+    for name, torque in model.torques.items():
+        yield command(
+            "force modify direct single_component_force", single_component_force_name=full(name),
+            function=function(torque.function),
+        )  # fmt: skip
+
+
+def bodies(model: AdamsModel, full: Naming) -> Iterator[list[str]]:
+    """Yield parts with markers, mass, velocity and geometry; angular velocities carry their unit."""
+    for number, (name, part) in enumerate([(GROUND, None), *model.parts.items()], start=1):
+        if part is not None:
+            yield command(
+                "part create rigid_body name_and_position", part_name=full(name), adams_id=str(number),
+                location=listed(*part.place, 0.0), orientation=turned(part.angle),
+            )  # fmt: skip
+        yield command("defaults coordinate_system", default_coordinate_system=full(name))
+        for marker_name, marker in model.markers.items():
+            if marker.part == name and marker.floating:
+                yield command("floating_marker create", floating_marker_name=full(marker_name))
+            elif marker.part == name:
+                place = {"location": listed(*marker.place), "orientation": turned(0.0)}
+                yield command("marker create", marker_name=full(marker_name), **place)
+        if part is not None:
+            moments = dict.fromkeys(("ixx", "iyy", "izz"), finite(part.inertia))
+            products = dict.fromkeys(("ixy", "izx", "iyz"), "0")
+            yield command(
+                "part create rigid_body mass_properties", part_name=full(name), mass=finite(part.mass),
+                center_of_mass_marker=full(part.centre), **moments, **products,
+            )  # fmt: skip
+            vx, vy = (finite(component) for component in part.velocity)
+            motion = {"vx": vx, "vy": vy, "vz": "0", "wx": "0", "wy": "0", "wz": f"({finite(part.spin)}(rad/sec))"}
+            yield command("part create rigid_body initial_velocity", part_name=full(name), **motion)
+    for name, shape in model.shapes.items():
+        own, sizes = full(model.shape_name(name)), [finite(edge) for edge in shape.size]
+        if shape.kind == "BOX":
+            corner = {"corner_marker": full(shape.marker), "diag_corner_coords": ", ".join(sizes)}
+            yield command("geometry create shape block", block_name=own, **corner)
+        else:
+            scales = {f"{axis}_scale_factor": size for axis, size in zip("xyz", sizes, strict=True)}
+            centre = {"center_marker": full(shape.marker)}
+            yield command("geometry create shape ellipsoid", ellipsoid_name=own, **centre, **scales)
+    for name, ends in model.outlines.items():
+        own, points = full(f"{model.markers[ends[0]].part}.{name}"), ", ".join(full(end) for end in ends)
+        yield command("geometry create curve outline", outline_name=own, marker_name=points)
+
+
+def turned(angle: float) -> str:
+    """Write an orientation about the normal of the plane, with its unit."""
+    return f"({finite(angle)}(rad)), (0(rad)), (0(rad))"
+
+
+def contacts(model: AdamsModel, full: Naming) -> Iterator[list[str]]:
+    """Yield the contacts of feet and pads."""
+    for name, contact in model.contacts.items():
+        shapes = [full(model.shape_name(shape)) for shape in (contact.foot, *contact.pads)]
+        normal, friction = contact.normal, contact.friction
+        slides = {"coulomb_friction": "off"}
+        if friction is not None:
+            slides = {
+                "coulomb_friction": "on",
+                "mu_static": finite(friction.static),
+                "mu_dynamic": finite(friction.dynamic),
+                "stiction_transition_velocity": finite(friction.stiction_velocity),
+                "friction_transition_velocity": finite(friction.friction_velocity),
+            }
+        yield command(
+            "contact create", contact_name=full(name), type="solid_to_solid", i_geometry_name=shapes[0],
+            j_geometry_name=", ".join(shapes[1:]), stiffness=finite(normal.stiffness), damping=finite(normal.damping),
+            dmax=finite(normal.full_damping_penetration), exponent=finite(normal.exponent), **slides,
+        )  # fmt: skip
+
+
+def script(model: AdamsModel, end_s: float, pinned_until_s: float | None) -> list[str]:
+    """Write a simulation script; a pinned stance foot stays hinged until the first touch."""
+    run = f"simulate/dynamic, end = {{}}, dtout = {finite(OUTPUT_S)}"
+    stages = [] if pinned_until_s is None else [run.format(finite(pinned_until_s)), "deactivate/jprim, id = 1"]
+    commands = ", ".join(quoted(text) for text in (*stages, run.format(finite(end_s))))
+    return command("simulation script create", sim_script_name=f".{model.name}.walk", solver_commands=commands)

@@ -1,0 +1,240 @@
+"""Quantities of a walk in SI units, from the columns of a recording: found by name and suffix, or named by hand."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from walkerlab.errors import ConfigError
+from walkerlab.exchange.recording import TIME, Recording
+
+Array = NDArray[np.float64]
+
+DEGREE: Final = math.pi / 180.0
+UNITS: Final[Mapping[str, Mapping[str, float]]] = {
+    "time": {"s": 1.0, "sec": 1.0, "second": 1.0, "seconds": 1.0, "ms": 1e-3, "msec": 1e-3, "min": 60.0},
+    "angle": {"rad": 1.0, "radian": 1.0, "radians": 1.0, "deg": DEGREE, "degree": DEGREE, "°": DEGREE},
+    "rate": {"rad/s": 1.0, "rad/sec": 1.0, "deg/s": DEGREE, "deg/sec": DEGREE, "°/s": DEGREE},
+    "length": {"m": 1.0, "meter": 1.0, "metre": 1.0, "mm": 1e-3, "millimeter": 1e-3, "cm": 1e-2, "centimeter": 1e-2}
+    | {"km": 1e3, "in": 0.0254, "inch": 0.0254, "ft": 0.3048, "foot": 0.3048},
+    "speed": {"m/s": 1.0, "mm/s": 1e-3, "cm/s": 1e-2},
+    "force": {"n": 1.0, "newton": 1.0, "kn": 1e3},
+    "energy": {"j": 1.0, "joule": 1.0, "mj": 1e-3, "n mm": 1e-3},
+}  # fmt: skip
+"""SI values of the units of each kind, in lower case."""
+SI: Final = {kind: next(iter(units)) for kind, units in UNITS.items()}
+OF_LEG: Final = {
+    "angle": "angle", "velocity": "rate", "shank_angle": "angle", "shank_velocity": "rate", "foot_along_m": "length",
+    "foot_height_m": "length", "knee_along_m": "length", "knee_height_m": "length", "normal_force_N": "force",
+    "friction_force_N": "force", "penetration_m": "length", "slip_velocity_m_s": "speed",
+}  # fmt: skip
+OF_WALKER: Final = {
+    TIME: "time", "torso_angle": "angle", "torso_velocity": "rate", "hip_along_m": "length", "hip_height_m": "length",
+    "kinetic_J": "energy", "potential_J": "energy", "mechanical_J": "energy", "total_energy_J": "energy",
+}  # fmt: skip
+KINDS: Final = OF_WALKER | {f"{name} {leg}": kind for name, kind in OF_LEG.items() for leg in (1, 2)}
+"""Kind of unit of each quantity; those of a leg end in its number, 1 for the leg that swings first."""
+NEEDED: Final = (TIME, "angle 1", "angle 2")
+UNIT_AT_END: Final = re.compile(r"_(?:m_s|m|n)$")
+LINE: Final = re.compile(r"(.+?)\s*>\s*(.+)")
+"""The angle of the line from a marker to another, as in `angle 1=HIP>HEEL`."""
+
+
+@dataclass(frozen=True, eq=False)
+class Walk:
+    """A recorded walk in SI units: time and quantities (samples,) by name, and the columns they come from."""
+
+    time_s: Array
+    quantities: dict[str, Array]
+    sources: dict[str, str] = field(default_factory=dict)
+
+    def both_legs(self, name: str) -> Array | None:
+        """(samples, 2) of both legs; None unless both are there."""
+        both = [self.quantities.get(f"{name} {leg}") for leg in (1, 2)]
+        return None if both[0] is None or both[1] is None else np.stack([both[0], both[1]], axis=1)
+
+
+def as_walk(recording: Recording, columns: Mapping[str, str], units: Mapping[str, str]) -> Walk:
+    """The quantities of a walk in a recording, in SI units.
+
+    columns  columns by quantity, where their names do not say it; `HIP>FOOT` is the angle of a line of markers
+    units    units by kind ('angle', 'length', ...), by quantity or by column, where the file does not state them
+
+    Raises ConfigError for a column or unit that is unknown or missing, and for gaps.
+    """
+    sources = {**matches(recording, set(columns)), **named_columns(recording, columns)}
+    for name in NEEDED:
+        if name not in sources:
+            raise missing(recording, name)
+    values = {name: in_si(recording, name, source, units) for name, source in sources.items()}
+    time = values.pop(TIME)
+    return Walk(time, values, sources)
+
+
+def plain(name: str) -> str:
+    """A name without case, units' brackets, and differences of separators."""
+    return re.sub(r"[\s_\-]+", "_", name.strip().lower())
+
+
+def matches(recording: Recording, given: set[str]) -> dict[str, str]:
+    """Columns by quantity: those of the same name, otherwise the only one whose name ends in it."""
+    found = {}
+    for name in KINDS.keys() - given:
+        wanted = {plain(name), plain(name).removesuffix("_m"), *leg_names(name)}
+        exact = [column for column in recording.columns if plain(column) in wanted]
+        ending = [column for column in recording.columns if any(ends_in(plain(column), each) for each in wanted)]
+        if len(candidates := exact or ending) == 1:
+            found[name] = candidates[0]
+        elif len(candidates) > 1:
+            raise ConfigError(
+                f"{recording.path}: {' and '.join(candidates[:3])} could each be {name!r}.",
+                f'Say which: --columns "{name}=..."',
+            )
+    return found
+
+
+def leg_names(name: str) -> list[str]:
+    """How exported models name a leg's quantity in their results: leg_1.angle for 'angle 1'."""
+    quantity, blank, leg = name.rpartition(" ")
+    return [f"leg_{leg}.{UNIT_AT_END.sub('', plain(quantity))}"] if blank else []
+
+
+def ends_in(name: str, ending: str) -> bool:
+    """Whether a longer name ends in a name, behind a dot or a slash."""
+    return name.endswith((f".{ending}", f"/{ending}"))
+
+
+def named_columns(recording: Recording, columns: Mapping[str, str]) -> dict[str, str]:
+    """The columns that the user names, once both names are known."""
+    known = {plain(name): name for name in KINDS}
+    found = {}
+    for quantity, column in columns.items():
+        name = known.get(plain(quantity))
+        if name is None:
+            near = get_close_matches(plain(quantity), known, 1)
+            advice = f"Did you mean {known[near[0]]!r}?" if near else f"Quantities are: {', '.join(KINDS)}."
+            raise ConfigError(f"--columns: {quantity!r} is no quantity of a walk.", advice)
+        ends = LINE.fullmatch(column)
+        markers = [f"{marker}.{axis}" for marker in (ends[1], ends[2]) for axis in "xyz"] if ends else [column]
+        for each in markers:
+            if each not in recording.columns:
+                near = get_close_matches(each, recording.columns, 1, 0.3)
+                advice = (
+                    f"The nearest is {near[0]!r}." if near else f"There are: {', '.join(list(recording.columns)[:12])}."
+                )
+                raise ConfigError(f"{recording.path} has no column {each!r}.", advice)
+        found[name] = column
+    return found
+
+
+def missing(recording: Recording, name: str) -> ConfigError:
+    """The error for a quantity that no column could be found for, with the nearest column."""
+    near = get_close_matches(plain(name), [plain(column) for column in recording.columns], 1, 0.2)
+    nearest = next((column for column in recording.columns if near and plain(column) == near[0]), "NAME")
+    there = ", ".join(column for column in list(recording.columns)[:12])
+    return ConfigError(
+        f"{recording.path} has no column for {name!r}; it has: {there}.", f'Name it: --columns "{name}={nearest}"'
+    )
+
+
+def in_si(recording: Recording, name: str, source: str, units: Mapping[str, str]) -> Array:
+    """A quantity in SI units; raises ConfigError for gaps, and for a unit that is missing or not of its kind."""
+    kind = KINDS[name]
+    if ends := LINE.fullmatch(source):
+        return line_angle(*(marker_place(recording, marker, units) for marker in (ends[1], ends[2])))
+    values = recording.columns[source] * unit_value(recording, name, source, kind, units)
+    return complete(recording, name, source, values)
+
+
+def complete(recording: Recording, name: str, source: str, values: Array) -> Array:
+    """Values of a column without gaps."""
+    gaps = np.flatnonzero(~np.isfinite(values))
+    if gaps.size:
+        time = recording.columns[TIME][gaps[0]]
+        raise ConfigError(
+            f"{recording.path}: {source!r} ({name}) has {gaps.size} gaps, the first at time {time:.6g} "
+            f"(sample {gaps[0] + 1}).",
+            "Fill the gaps, or cut the recording to a part without them.",
+        )
+    return values
+
+
+def unit_value(recording: Recording, name: str, source: str, kind: str, units: Mapping[str, str]) -> float:
+    """SI value of the unit of a column: the user's, the file's, or that of the quantity's own name."""
+    stated = (
+        units.get(source) or units.get(name) or recording.units.get(source) or units.get(kind)
+        or recording.kind_units.get(kind) or unit_in_name(source, kind) or rate_unit(recording, kind, units)
+    )  # fmt: skip
+    if not stated:
+        raise ConfigError(
+            f"{recording.path} does not say in which unit {source!r} ({name}) is.",
+            f"Say it: --units {kind}={SI[kind]}, or one of {', '.join(UNITS[kind])}.",
+        )
+    value = UNITS[kind].get(stated.strip().lower())
+    if value is None:
+        raise ConfigError(
+            f"{recording.path}: {stated!r} is no unit of {name!r} that is known ({kind}).",
+            f"Known are {', '.join(UNITS[kind])}: --units {kind}={SI[kind]}",
+        )
+    return value
+
+
+def unit_in_name(column: str, kind: str) -> str:
+    """Unit that a column's name ends in, as mm of hip_mm; empty if there is none."""
+    endings = [unit for unit in UNITS[kind] if plain(column).endswith(f"_{unit.replace('/', '_')}")]
+    return max(endings, key=len, default="")
+
+
+def rate_unit(recording: Recording, kind: str, units: Mapping[str, str]) -> str:
+    """Unit of velocities in a file that states only that of its angles or lengths."""
+    moved = {"rate": "angle", "speed": "length"}.get(kind, "")
+    unit = units.get(moved) or recording.kind_units.get(moved)
+    return f"{unit}/s" if unit else ""
+
+
+def marker_place(recording: Recording, marker: str, units: Mapping[str, str]) -> Array:
+    """(samples, 3) place of a marker (m)."""
+    axes = [f"{marker}.{axis}" for axis in "xyz"]
+    scale = unit_value(recording, marker, axes[0], "length", units)
+    return np.stack([complete(recording, marker, axis, recording.columns[axis] * scale) for axis in axes], axis=1)
+
+
+def line_angle(top: Array, bottom: Array) -> Array:
+    """Angle of lines from the vertical (rad), positive with the lower end ahead; the axis that moves most is ahead."""
+    vertical = int(np.argmax(np.abs(np.mean(top - bottom, axis=0))))
+    spans = np.ptp(top, axis=0)
+    spans[vertical] = -1.0
+    ahead = int(np.argmax(spans))
+    forward = np.sign(top[-1, ahead] - top[0, ahead]) or 1.0
+    return np.asarray(np.arctan2(forward * (bottom - top)[:, ahead], np.abs((top - bottom)[:, vertical])))
+
+
+def parse_pairs(option: str, texts: Sequence[str]) -> dict[str, str]:
+    """Pairs of an option such as `a=b,c=d`."""
+    pairs = [pair for text in texts for pair in text.split(",") if pair.strip()]
+    for pair in pairs:
+        if "=" not in pair or not all(side.strip() for side in pair.split("=", 1)):
+            raise ConfigError(f"{option}: {pair!r} is not of the form name=name.", f'Write {option} "a=b,c=d".')
+    return {key.strip(): value.strip() for key, value in (pair.split("=", 1) for pair in pairs)}
+
+
+def parse_units(texts: Sequence[str]) -> dict[str, str]:
+    """Units by kind, quantity or column; a unit alone is that of its kind, as `deg` of angles."""
+    pairs, alone = [], {}
+    for part in (part.strip() for text in texts for part in text.split(",") if part.strip()):
+        kinds = [kind for kind, units in UNITS.items() if part.lower() in units]
+        if "=" in part:
+            pairs.append(part)
+        elif kinds:
+            alone[kinds[0]] = part
+        else:
+            known = ", ".join(unit for units in UNITS.values() for unit in units)
+            raise ConfigError(f"--units: {part!r} is no unit that is known.", f"Known are {known}.")
+    return alone | parse_pairs("--units", pairs)

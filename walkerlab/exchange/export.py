@@ -1,0 +1,98 @@
+"""Export of a walker with the start of its gait to ADAMS and MuJoCo."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final, Literal, get_args
+
+from walkerlab.errors import ConfigError
+from walkerlab.exchange import mjcf
+from walkerlab.exchange.adams import command_text, dataset_text
+from walkerlab.exchange.adams_model import adams_model
+from walkerlab.exchange.adams_view import view_text
+from walkerlab.exchange.exported import Exported, prepare_export
+from walkerlab.physics.solvers.system import State
+
+if TYPE_CHECKING:
+    from walkerlab.config.schema import Config
+
+Kind = Literal["adm", "cmd", "mjcf"]
+Law = Literal["contact", "functions"]
+KINDS: Final[tuple[Kind, ...]] = get_args(Kind)
+LAWS: Final[tuple[Law, ...]] = get_args(Law)
+ENDINGS: Final[dict[str, Kind]] = {"adm": "adm", "cmd": "cmd", "xml": "mjcf", "mjcf": "mjcf"}
+"""Formats by the ending of their files."""
+
+
+@dataclass(frozen=True)
+class ExportedFiles:
+    """Texts by file name, the model first, and the parts of the walk that they leave out."""
+
+    files: dict[str, str]
+    left_out: tuple[str, ...]
+
+
+def export_model(
+    config: Config,
+    rigid_step_length_m: float,
+    rigid_state: State,
+    kind: Kind,
+    law: Law = "contact",
+    commit: str | None = None,
+    stem: str | None = None,
+) -> ExportedFiles:
+    """Write a walker for another program, started from a rigid state as `contact-sim` starts it.
+
+    rigid_step_length_m  step length of the rigid gait, for which pads are laid
+    rigid_state          start: the gait's, or another one with both feet on the slope
+    kind                 adm: ADAMS/Solver's dataset and commands; cmd: Adams View's commands; mjcf: MuJoCo's model
+    law                  of ADAMS: its contact between shapes, or walkerlab's law as functions
+    commit               of walkerlab, for the head of the file
+    stem                 of the files' names; by default the config's name
+
+    Raises ConfigError for what the format cannot express and would change the walk, NoAnswer if pads are to follow a
+    contact gait and there is none.
+    """
+    export = prepare_export(config, rigid_step_length_m, rigid_state)
+    stem = stem or export.model_name
+    left_out = tuple(parts_left_out(export, kind, law, f"{stem}.py"))
+    head = list(export.describe(left_out, commit))
+    if kind == "mjcf":
+        script = {f"{stem}.py": mjcf.script_text()} if mjcf.needs_script(export) else {}
+        return ExportedFiles({f"{stem}.xml": mjcf.walker_text(export, head)} | script, left_out)
+    model = adams_model(export, law)
+    if kind == "cmd":
+        pinned_until_s = export.touches_s[0] if export.pinned and export.touches_s else None
+        return ExportedFiles({f"{stem}.cmd": view_text(model, head, export.end_s, pinned_until_s)}, left_out)
+    dataset = f"{stem}.adm"
+    files = {dataset: dataset_text(model, head), f"{stem}.acf": command_text(export, dataset)}
+    return ExportedFiles(files, left_out)
+
+
+def law_named(text: str) -> Law:
+    """Return the contact law of ADAMS models with this name; raises ConfigError for another name."""
+    for law in LAWS:
+        if text == law:
+            return law
+    raise ConfigError(f"--law {text}: not a contact law.", f"Laws of ADAMS models: {', '.join(LAWS)}.")
+
+
+def parts_left_out(export: Exported, kind: Kind, law: Law, script: str) -> Iterator[str]:
+    """Describe the parts of the walk that an exported model lacks or replaces."""
+    config, by_functions = export.config, kind != "mjcf" and law == "functions"
+    if export.scene.ground.terrain.has_pads:
+        yield "the rule that a foot which meets a pad below its top ends the walk; here the pad pushes it away"
+    if not by_functions and any(radius == 0.0 for radius in export.scene.ours.whole.radius):
+        millimetres = 1e3 * export.model.balls[0].radius_m
+        yield f"point feet; balls of {millimetres:g} mm stand for them, on ground that much lower"
+    if kind == "mjcf":
+        if mjcf.needs_script(export):
+            yield f"push-offs and hip torque in the model itself; the script {script} applies them"
+    else:
+        when = "act at the times of walkerlab's own touches, as ADAMS functions have no memory"
+        if config.push_off.impulse_N_s:
+            yield f"the trigger of push-offs; open-loop pulses {when}"
+        if export.hip.torque_N_m:
+            yield f"the trigger by which the hip torque changes legs; changes {when}"
+    yield "the judgement of falls, slides and steps, and the energy balance"

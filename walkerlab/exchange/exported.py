@@ -1,0 +1,212 @@
+"""A walker to export: on its pads, at the start of a walk, with the walk that walkerlab takes from there."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+import walkerlab
+from walkerlab.config.drives import Hip
+from walkerlab.config.walkers import contact_required_error
+from walkerlab.errors import ConfigError
+from walkerlab.exchange.engine_scene import EngineScene, scene_for_engines
+from walkerlab.exchange.planar import PlanarModel, coupling_rows
+from walkerlab.physics.ground.terrain import STANCE_FOOT, Terrain, foothold_height
+from walkerlab.physics.hybrid.contact_result import ContactWalkResult
+from walkerlab.physics.solvers.system import Floats, State
+from walkerlab.scene.contact import require_contact, scene_on_pads, tolerances_of
+from walkerlab.scene.footholds import foothold_heights
+
+if TYPE_CHECKING:
+    from walkerlab.config.schema import Config
+
+PADS_BEHIND, PADS_AHEAD = 2, 4
+RESERVED = ("ground", "world", "walker")
+COUPLED = 1e-12  # smallest weight of a coupling
+
+
+@dataclass(frozen=True)
+class Pad:
+    """Ground for one foot: the whole floor, or a pad of its lane."""
+
+    foot: int
+    centre_m: float
+    length_m: float
+    height_m: float
+
+
+@dataclass(frozen=True)
+class Coupling:
+    """Links whose hinge angles, times these weights, add up to zero."""
+
+    links: tuple[int, ...]
+    weights: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Exported:
+    """A walker on its ground at the start of a walk.
+
+    scene    as other programs see it
+    steps    of the walk
+    walk     the contact model's own walk from that start
+    heights  (footholds,) of uneven ground (m), None on even ground
+    pinned   whether the stance foot is hinged until the first touch
+    """
+
+    config: Config
+    scene: EngineScene
+    steps: int
+    walk: ContactWalkResult
+    heights: Floats | None
+    pinned: bool
+
+    @property
+    def model(self) -> PlanarModel:
+        return self.scene.model
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Unique names of the links that other programs accept."""
+        names: list[str] = []
+        for link in self.model.links:
+            name = identifier(link.name)
+            choices = (name, *(f"{name}_{number}" for number in range(2, len(self.model.links) + 3)))
+            names.append(next(choice for choice in choices if choice not in (*names, *RESERVED)))
+        return tuple(names)
+
+    @cached_property
+    def start(self) -> tuple[Floats, Floats]:
+        """Coordinates (m, rad) and velocities of the model at the start."""
+        return self.scene.from_base(self.scene.start)
+
+    @property
+    def hip(self) -> Hip:
+        return self.config.walker.hip
+
+    @property
+    def hip_link(self) -> int:
+        """Index of the link that hangs from the base's hip: the leg that swings first."""
+        upper = self.scene.assembly.legs[1 - STANCE_FOOT][0]
+        return [link.name for link in self.model.links].index(upper)
+
+    @cached_property
+    def couplings(self) -> tuple[Coupling, ...]:
+        """Couplings of bodies whose angles follow others."""
+        found = []
+        for row in coupling_rows(self.scene.assembly, self.model):
+            if abs(row[0]) > COUPLED:
+                raise ConfigError(
+                    "A body whose angle follows others' by weights that do not add up to 1 cannot be exported.",
+                    "Choose weights that add up to 1 in walker.couplings.",
+                )
+            links = [int(place) for place in np.flatnonzero(np.abs(row) > COUPLED)]
+            found.append(Coupling(tuple(links), tuple(float(row[place]) for place in links)))
+        return tuple(found)
+
+    @cached_property
+    def pads(self) -> tuple[Pad, ...]:
+        """Ground: one floor for each foot, or pads from behind the start to beyond the end."""
+        terrain = self.scene.ground.terrain
+        pitch, last = terrain.stride_measure, self.steps + PADS_AHEAD
+        if not terrain.has_pads:
+            span = (PADS_BEHIND + last) * pitch
+            return tuple(Pad(foot, 0.5 * span - PADS_BEHIND * pitch, span, 0.0) for foot in range(2))
+        pads = []
+        for number in range(-PADS_BEHIND, last + 1):
+            height = 0.0 if self.heights is None else float(foothold_height(self._uneven, number))
+            foot = STANCE_FOOT if number % 2 == 0 else 1 - STANCE_FOOT
+            pads.append(Pad(foot, number * pitch, pitch, height))
+        return tuple(pads)
+
+    @property
+    def _uneven(self) -> Terrain:
+        return self.scene.ground.terrain._replace(heights=self.heights)
+
+    def lane_across_m(self, foot: int) -> float:
+        """Distance of a foot's lane from the plane of the walk, so that no ball reaches the other's pads (m)."""
+        distance = self.half_lane_m + 0.01 * self.config.walker.leg_length_m
+        return -distance if foot == STANCE_FOOT else distance
+
+    @property
+    def half_lane_m(self) -> float:
+        """Half the width of a lane (m)."""
+        return max(ball.radius_m for ball in self.model.balls) + 0.02 * self.config.walker.leg_length_m
+
+    @property
+    def touches_s(self) -> list[float]:
+        """Times at which the legs change roles in walkerlab's walk."""
+        return [float(time) for time in self.walk.touch_time_s]
+
+    @property
+    def end_s(self) -> float:
+        return float(self.walk.end_time_s)
+
+    @property
+    def model_name(self) -> str:
+        return identifier(self.config.name)
+
+    def describe(self, left_out: Iterable[str], commit: str | None) -> Iterator[str]:
+        """Yield the head of an exported file: its origin, the walk in walkerlab, and omissions."""
+        yield f"Written by walkerlab {walkerlab.__version__}" + (f", commit {commit}" if commit else "") + "."
+        yield f"Config: {self.config.name}. Slope: {self.scene.ours.slope:.10g} rad, as tilted gravity."
+        yield f"walkerlab's contact model from this start: {self.walk.outcome.label}, {self.walk.steps} steps."
+        if self.walk.steps:
+            yield f"Its last step: {self.walk.periods_s[-1]:.7g} s, {self.walk.lengths_m[-1]:.7g} m."
+            touches = [f"{time:.7g}" for time in self.touches_s]
+            yield from (f"Touches (s): {', '.join(touches[k : k + 8])}" for k in range(0, len(touches), 8))
+        yield from (f"Left out: {text}" for text in left_out)
+
+
+def identifier(name: str) -> str:
+    """Reduce a name to letters, digits and underscores, beginning with a letter."""
+    plain = re.sub(r"\W+", "_", name, flags=re.ASCII).strip("_")
+    return plain if plain[:1].isalpha() else f"m_{plain}"
+
+
+def prepare_export(config: Config, rigid_step_length_m: float, rigid_state: State) -> Exported:
+    """Place the walker of a config on its ground, started from a rigid state as `contact-sim` starts it.
+
+    Raises ConfigError for a walker or a ground that no exported model has.
+    """
+    refuse(config)
+    contact_scene = scene_on_pads(config, rigid_step_length_m, rigid_state)
+    steps = 2 * config.strides
+    scene = scene_for_engines(contact_scene, rigid_state)
+    if contact_scene.assembly.knees:
+        raise ConfigError(
+            "Knees that lock cannot be exported: no statement of ADAMS or MJCF locks and releases a hinge by itself.",
+            "Choose a walker with straight legs, such as paper, round-feet or torso.",
+        )
+    heights = foothold_heights(config.ground, steps + 1)
+    walk = contact_scene.walk(scene.start, steps, tolerances_of(config, steps), None, heights)
+    return Exported(config, scene, steps, walk, heights, contact_scene.pinned)
+
+
+def refuse(config: Config) -> None:
+    """Raise ConfigError for a ground or a walker that no format can express."""
+    if config.contact is None:
+        raise contact_required_error("Export", config.walker, "Add a contact block, as in the config paper.")
+    contact = require_contact(config)
+    if contact.terrain == "after-mid-swing":
+        raise ConfigError(
+            "Ground that carries a foot only after mid-swing cannot be exported: other programs have no such ground.",
+            "Set contact.terrain=checkerboard.",
+        )
+    if contact.terrain == "plane" and not config.ground.even:
+        raise ConfigError(
+            "Uneven ground can be exported only as pads of different heights.",
+            "Set contact.terrain=checkerboard, or leave out the block ground.",
+        )
+
+
+def finite(value: float) -> str:
+    """Write a number with all its digits."""
+    text = repr(float(value))
+    return "0" if float(value) == 0.0 else text.removesuffix(".0") if math.isfinite(value) else text

@@ -1,0 +1,231 @@
+"""MJCF: a planar walker in MuJoCo's language, with MuJoCo's soft contact tuned to the ADAMS contact law.
+
+Contact is normalised by mass. With constant impedance d and a reference of stiffness K and damping B (solref -K, -B),
+a loaded contact accelerates by a = (1 - d) a_0 - B v - K r, where a_0 is the acceleration without contact; so any ball
+rests at (1 - d) g / K, and a foot creeps at (1 - d) a_0 / (impratio B).
+
+Source: MuJoCo documentation, Computation: constraint model, and Modeling: solver parameters.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from xml.etree import ElementTree
+
+from walkerlab.errors import ConfigError
+from walkerlab.exchange.engine_scene import EngineContact, contact_target
+from walkerlab.exchange.exported import Exported, Pad
+from walkerlab.exchange.planar import Ball, PlanarModel
+from walkerlab.physics.mechanics.parts import Position
+
+MIN_INERTIA = 2e-15  # kg m^2, twice what MuJoCo asks for
+IMPEDANCE = 0.1  # small: close to a spring and damper that the load acts on in full
+JOINT_AXES = {"along": ("slide", "1 0 0"), "height": ("slide", "0 0 1"), "turn": ("hinge", "0 -1 0")}
+STEP_S, PAD_M = 1e-4, 0.05
+HIP = "hip"
+STIFF = 'solref="0.0005 1" solimp="0.9999 0.9999 0.001 0.5 2"'
+"""Settings of couplings: as hard as MuJoCo's constraints become at such steps."""
+CLOSE = 'iterations="100" tolerance="1e-12"'
+
+
+@dataclass(frozen=True)
+class Foot:
+    """A foot's ball: name, collision group, and position across the walk (m)."""
+
+    name: str
+    group: int = 1
+    across_m: float = 0.0
+
+
+FEET = (Foot("foot 0"), Foot("foot 1"))
+
+
+@dataclass(frozen=True)
+class HipJoint:
+    """The hinge of a link that is the hip, with its spring and damper."""
+
+    link: int
+    stiffness: float  # N m/rad
+    damping: float  # N m s/rad
+
+
+def contact_settings(target: EngineContact) -> dict[str, float]:
+    """Tune MuJoCo's contact to the target by the closed forms above."""
+    stiffness = (1.0 - IMPEDANCE) * target.gravity / target.penetration
+    damping = 2.0 * target.damping_ratio * math.sqrt(stiffness)
+    creep = (1.0 - IMPEDANCE) * target.creep_load * target.gravity / damping
+    return {
+        "solref_stiffness": stiffness,
+        "solref_damping": damping,
+        "solimp_d": IMPEDANCE,
+        "impratio": creep / target.creep_velocity,
+        "friction": target.friction,
+    }
+
+
+def option_text(model: PlanarModel, contact: Mapping[str, float] | None, more: str = "") -> str:
+    """Write the element `option`: tilted gravity, and the friction cone where there is contact."""
+    cone = "" if contact is None else f'cone="elliptic" impratio="{contact["impratio"]!r}" '
+    return f'<option {more}gravity="{model.gravity_along!r} 0 {-model.gravity_down!r}" {cone}{CLOSE}/>'
+
+
+def body_text(
+    model: PlanarModel,
+    link_number: int,
+    contact: Mapping[str, float] | None,
+    feet: tuple[Foot, ...] = FEET,
+    hip: HipJoint | None = None,
+    drawing: Callable[[int], str] = lambda _: "",
+) -> str:
+    """Write a link with its hinge, its feet and its child links.
+
+    contact  settings of the feet's contact; None for a walker without feet
+    feet     how each ball collides
+    drawing  geometry of a link that touches nothing
+    """
+    link = model.links[link_number]
+    (px, pz), (x, z), (cx, cz) = link.parent_point_m, link.point_m, link.centre_m
+    inside = "".join(joint_texts(model, link_number, hip))
+    i = max(link.inertia_kg_m2, MIN_INERTIA)
+    inside += f'<inertial pos="{cx!r} 0 {cz!r}" mass="{link.mass_kg!r}" diaginertia="{i!r} {i!r} {i!r}"/>'
+    if contact is not None:
+        for number, ball in enumerate(model.balls):
+            if ball.link == link_number:
+                inside += foot_text(ball, feet[number], contact)
+    inside += drawing(link_number)
+    for child, hung in enumerate(model.links):
+        if hung.parent == link_number:
+            inside += body_text(model, child, contact, feet, hip, drawing)
+    return f'<body name="{link.name}" pos="{px - x!r} 0 {pz - z!r}">{inside}</body>'
+
+
+def joint_texts(model: PlanarModel, link_number: int, hip: HipJoint | None) -> Iterator[str]:
+    """Yield the joints of a link, named after their coordinates: the root's freedoms, or its hinge."""
+    link = model.links[link_number]
+    x, z = link.point_m
+    for freedom in model.freedoms if link.parent < 0 else ("turn",):
+        kind, axis = JOINT_AXES[freedom]
+        name, acts = freedom if link.parent < 0 else f"hinge of {link.name}", ""
+        if hip is not None and hip.link == link_number:
+            name, acts = HIP, f' stiffness="{hip.stiffness!r}" damping="{hip.damping!r}"'
+        yield f'<joint name="{name}" type="{kind}" axis="{axis}" pos="{x!r} 0 {z!r}"{acts}/>'
+
+
+def foot_text(ball: Ball, foot: Foot, contact: Mapping[str, float]) -> str:
+    (x, z), d = ball.centre_m, contact["solimp_d"]
+    return (
+        f'<geom name="{foot.name}" type="sphere" size="{ball.radius_m!r}" pos="{x!r} {foot.across_m!r} {z!r}" '
+        f'contype="{foot.group}" conaffinity="0" condim="3" friction="{contact["friction"]!r} 0 0" priority="1" '
+        f'solref="{-contact["solref_stiffness"]!r} {-contact["solref_damping"]!r}" solimp="{d!r} {d!r} 1 0.5 1"/>'
+    )
+
+
+def walker_text(export: Exported, head: Iterable[str]) -> str:
+    """Write a model with pads and the keyframe `gait`; without drives, plain `mj_step` walks from it.
+
+    head  lines of the comment at its beginning
+
+    Raises ConfigError for what MJCF cannot express.
+    """
+    target = contact_target(export.scene)
+    if target is None:
+        raise ConfigError(
+            "MuJoCo's contact cannot be tuned to ground without friction.", "Set contact.friction=coulomb."
+        )
+    if export.pinned:
+        raise ConfigError("MJCF has no hinge that opens at the first touch.", "Set contact.stance=free.")
+    contact = contact_settings(target)
+    links = tuple(replace(link, name=name) for link, name in zip(export.model.links, export.names, strict=True))
+    model = replace(export.model, links=links)
+    feet = tuple(Foot(f"foot_{foot + 1}", 1 << foot, export.lane_across_m(foot)) for foot in range(2))
+    hip = HipJoint(export.hip_link, export.hip.spring_N_m_per_rad, export.hip.damping_N_m_s_per_rad)
+
+    def drawing(link_number: int) -> str:
+        balls = zip(model.balls, feet, strict=True)
+        own = [(ball, foot) for ball, foot in balls if ball.link == link_number]
+        return "".join(leg_text(links[link_number].point_m, ball, foot) for ball, foot in own)
+
+    q, v = (" ".join(repr(float(value)) for value in values) for values in export.start)
+    distance = -4.0 * export.config.walker.leg_length_m
+    elements = [
+        f'<mujoco model="{export.model_name}">',
+        '<compiler angle="radian" autolimits="true" balanceinertia="true"/>',
+        option_text(model, contact, f'timestep="{STEP_S!r}" '),
+        f"<custom>{''.join(custom_texts(export))}</custom>",
+        f'<worldbody><camera name="side" mode="trackcom" pos="0 {distance!r} 0" xyaxes="1 0 0 0 0 1"/>',
+        *(pad_text(export, number, pad) for number, pad in enumerate(export.pads)),
+        body_text(model, 0, contact, feet, hip, drawing),
+        "</worldbody>",
+        f"<equality>{''.join(coupling_texts(export))}</equality>" if export.couplings else "",
+        f'<keyframe><key name="gait" qpos="{q}" qvel="{v}"/></keyframe>',
+        "</mujoco>",
+    ]
+    tree = ElementTree.fromstring("".join(elements))
+    ElementTree.indent(tree)
+    comment = "\n".join(line.replace("--", "- -") for line in (*head, *tuning_lines(export, target)))
+    return f"<!--\n{comment}\n-->\n{ElementTree.tostring(tree, encoding='unicode')}\n"
+
+
+def leg_text(hinge: Position, ball: Ball, foot: Foot) -> str:
+    """Draw a capsule from a hinge to a foot; it collides with nothing."""
+    (x, z), (a, c), y = hinge, ball.centre_m, foot.across_m
+    ends, width = f"{x!r} {y!r} {z!r} {a!r} {y!r} {c!r}", 0.015 * math.hypot(x - a, z - c)
+    return f'<geom type="capsule" fromto="{ends}" size="{width!r}" contype="0" conaffinity="0" rgba=".4 .5 .7 1"/>'
+
+
+def pad_text(export: Exported, number: int, pad: Pad) -> str:
+    """Write a pad as a box that collides only with the ball of its lane."""
+    size = f"{0.5 * pad.length_m!r} {export.half_lane_m!r} {0.5 * PAD_M!r}"
+    z = pad.height_m + export.model.balls[pad.foot].ground_m - 0.5 * PAD_M
+    place = f"{pad.centre_m!r} {export.lane_across_m(pad.foot)!r} {z!r}"
+    group = f'contype="0" conaffinity="{1 << pad.foot}"'
+    return f'<geom name="pad_{number + 1}" type="box" size="{size}" pos="{place}" {group} rgba=".6 .6 .55 1"/>'
+
+
+def custom_texts(export: Exported) -> Iterator[str]:
+    """Yield the values that the script reads for push-offs and hip torque."""
+    push_off, hip = export.config.push_off, export.hip
+    yield f'<numeric name="push_off" data="{push_off.impulse_N_s!r} {push_off.duration_s!r}"/>'
+    yield f'<numeric name="hip_torque" data="{hip.torque_N_m!r}"/>'
+
+
+def coupling_texts(export: Exported) -> Iterator[str]:
+    """Yield constraints that hold bodies at weighted sums of others' angles."""
+    for coupling in export.couplings:
+        if len(coupling.links) > 2:
+            raise ConfigError(
+                "MJCF can couple no more than two hinges.",
+                "Export to ADAMS, or couple fewer bodies in walker.couplings.",
+            )
+        *before, last = (
+            HIP if link == export.hip_link else f"hinge of {export.names[link]}" for link in coupling.links
+        )
+        follows = f'joint2="{before[0]}" ' if before else ""
+        weight = -coupling.weights[0] / coupling.weights[-1] if before else 0.0
+        yield f'<joint joint1="{last}" {follows}polycoef="0 {weight!r} 0 0 0" {STIFF}/>'
+
+
+def tuning_lines(export: Exported, target: EngineContact) -> Iterator[str]:
+    """Describe which properties of the law MuJoCo's contact has, and which it lacks."""
+    static = float(export.scene.ours.friction.largest)
+    yield (
+        f"Contact tuned to ADAMS's law under {target.mass:.6g} kg: penetration at rest {target.penetration:.4g} m, "
+        f"damping ratio {target.damping_ratio:.4g}, friction {target.friction:.4g} of a foot that slides, creep of "
+        f"{target.creep_velocity:.4g} m/s under a tangential load of {target.creep_load:.4g} of the normal force."
+    )
+    yield (
+        f"Not expressed: the exponent {target.exponent:.4g} (the force is linear), damping that grows with the "
+        f"penetration, and static friction of {static:.4g}."
+    )
+
+
+def needs_script(export: Exported) -> bool:
+    """Return whether the walker has drives, which only the script applies."""
+    return export.config.push_off.impulse_N_s != 0.0 or export.hip.torque_N_m != 0.0
+
+
+def script_text() -> str:
+    return (Path(__file__).parent / "mujoco_script.py").read_text(encoding="utf-8")

@@ -1,0 +1,404 @@
+"""Recordings: columns over time from files that other programs and people write.
+
+`read_recording` knows a file by its ending: delimited text (CSV, tables of ADAMS), results of ADAMS (.res), tables of
+OpenSim (.sto, .mot), markers (.trc, .c3d). What the columns mean for a walker is the matter of `columns`.
+"""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from io import StringIO
+from pathlib import Path
+from typing import Final
+from xml.etree import ElementTree
+
+import numpy as np
+from numpy.typing import NDArray
+
+from walkerlab.errors import ConfigError
+
+Array = NDArray[np.float64]
+
+TIME: Final = "time"
+UNIT_IN_NAME: Final = re.compile(r"\s*[\[(]\s*([^\[\]()]*?)\s*[\])]\s*$")
+DELIMITERS: Final = "\t;,"
+EMPTY: Final = frozenset({"", "nan", "na", "n/a", "null", "none", "-", "#n/a"})
+"""Cells that hold no value."""
+HEADER_LINES: Final = 60
+"""Lines of a text in which its header is looked for."""
+WANTED: Final = "CSV (.csv, .txt, .tab, .tsv), ADAMS results (.res), OpenSim (.sto, .mot), markers (.trc, .c3d)"
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """Columns over time as a file has them, before any conversion; a missing value is nan.
+
+    columns     (samples,) each, by name; time is `time`
+    units       of columns whose unit the file states, as it writes them
+    kind_units  units for all angles, lengths or times of the file, by 'angle', 'length', 'time', where it states them
+    """
+
+    path: Path
+    columns: dict[str, Array]
+    units: dict[str, str] = field(default_factory=dict)
+    kind_units: dict[str, str] = field(default_factory=dict)
+
+
+def read_recording(path: Path) -> Recording:
+    """Read the columns of a file, by the format that its ending names.
+
+    Raises ConfigError for a file that cannot be read, whose format is not known, or that is damaged.
+    """
+    reader = READERS.get(path.suffix.lower())
+    if reader is None:
+        raise ConfigError(f"{path} is in a format that cannot be read ({path.suffix or 'no ending'}).", ADVICE.get(
+            path.suffix.lower(), f"Export it as one of: {WANTED}."
+        ))  # fmt: skip
+    try:
+        recording = reader(path)
+    except OSError as error:
+        raise ConfigError(
+            f"{path} cannot be read: {error.strerror or error}.", "Check the path given to --with."
+        ) from error
+    return checked_time(recording)
+
+
+def checked_time(recording: Recording) -> Recording:
+    """The recording, once its time is complete and strictly rising."""
+    time, path = recording.columns.get(TIME), recording.path
+    if time is None:
+        names = ", ".join(list(recording.columns)[:8])
+        raise ConfigError(
+            f"{path} has no column of time; its columns begin with: {names}.", "Name it: --columns time=NAME"
+        )
+    if time.size < 2:
+        raise ConfigError(f"{path} holds {time.size} samples; a walk needs at least two.", "Record a longer walk.")
+    gaps = np.flatnonzero(~np.isfinite(time))
+    if gaps.size:
+        raise ConfigError(
+            f"{path}: time is missing at sample {gaps[0] + 1}.", "Fill the column of time, or leave out such rows."
+        )
+    steps_back = np.flatnonzero(np.diff(time) <= 0.0)
+    if steps_back.size:
+        row = int(steps_back[0])
+        raise ConfigError(
+            f"{path}: time does not rise from sample {row + 1} ({time[row]:.9g}) to {row + 2} ({time[row + 1]:.9g}).",
+            "Sort the rows by time, and give each time once.",
+        )
+    return recording
+
+
+# Delimited text -------------------------------------------------------------------------------------------------------
+
+
+def read_delimited(path: Path) -> Recording:
+    """CSV and tables of ADAMS: titles, a header, rows of numbers."""
+    lines = text_of(path).splitlines()
+    header, delimiter = header_of(path, lines)
+    names, units = names_and_units(split_row(lines[header], delimiter))
+    names = unique(path, names)
+    values = numbers_in(path, lines, header + 1, delimiter, len(names))
+    columns = {name: values[:, place] for place, name in enumerate(names)}
+    return as_time_column(
+        Recording(path, columns, {name: unit for name, unit in zip(names, units, strict=True) if unit})
+    )
+
+
+def text_of(path: Path) -> str:
+    """Text of a file in UTF-8, UTF-16 or Latin-1."""
+    data = path.read_bytes()
+    for encoding in ("utf-16",) if data[:2] in (b"\xff\xfe", b"\xfe\xff") else ("utf-8-sig", "latin-1"):
+        try:
+            text = data.decode(encoding)
+        except UnicodeDecodeError:
+            continue
+        if "\0" in text:
+            break
+        return text
+    raise ConfigError(f"{path} is not a text, although its ending says so.", f"Export it as one of: {WANTED}.")
+
+
+def header_of(path: Path, lines: Sequence[str]) -> tuple[int, str]:
+    """Line of the header and the delimiter: the first row of names that a row of as many numbers follows."""
+    for number, line in enumerate(lines[:HEADER_LINES]):
+        following = next((each for each in lines[number + 1 :] if each.strip()), "")
+        for delimiter in DELIMITERS:
+            names, cells = split_row(line, delimiter), split_row(following, delimiter)
+            alike = len(names) == len(cells) > 1 and all(names)
+            if alike and not all(map(is_number, names)) and any(map(is_number, cells)):
+                return number, delimiter
+    raise ConfigError(
+        f"{path} has no header with the names of its columns.",
+        "Its first row must name them, separated by commas, semicolons or tabs: time (s), angle 1 (rad), ...",
+    )
+
+
+def split_row(line: str, delimiter: str) -> list[str]:
+    """Cells of a row, without blanks around them."""
+    return [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter), [])]
+
+
+def is_number(cell: str) -> bool:
+    """Whether a cell holds a number, with a point or a comma."""
+    try:
+        float(cell.replace(",", "."))
+    except ValueError:
+        return False
+    return True
+
+
+def names_and_units(header: Iterable[str]) -> tuple[list[str], list[str]]:
+    """Names of columns, and their units where they stand in brackets behind them."""
+    units = [match[1] if (match := UNIT_IN_NAME.search(name)) else "" for name in header]
+    return [UNIT_IN_NAME.sub("", name).strip() for name in header], units
+
+
+def unique(path: Path, names: Sequence[str]) -> list[str]:
+    """The names, if no two are the same."""
+    for name in names:
+        if names.count(name) > 1:
+            raise ConfigError(f"{path} has two columns named {name!r}.", "Give each column a name of its own.")
+    return list(names)
+
+
+def numbers_in(path: Path, lines: Sequence[str], first: int, delimiter: str, count: int) -> Array:
+    """(rows, count) numbers of the lines from `first`; empty cells are nan."""
+    rows = [line for line in lines[first:] if line.strip()]
+    text = "\n".join(rows)
+    if delimiter == ";":
+        text = text.replace(",", ".")
+    try:
+        values = np.loadtxt(StringIO(text), delimiter=delimiter, ndmin=2, comments=None)
+        if values.shape[1] == count:
+            return values
+    except ValueError:
+        pass  # a cell is empty or no number: look at each
+    return np.array(
+        [cells_as_numbers(path, number, line, delimiter, count) for number, line in numbered_rows(lines, first)]
+    )
+
+
+def numbered_rows(lines: Sequence[str], first: int) -> Iterator[tuple[int, str]]:
+    """Lines that are not blank, with their numbers as an editor shows them."""
+    return ((number + 1, line) for number, line in enumerate(lines) if number >= first and line.strip())
+
+
+def cells_as_numbers(path: Path, number: int, line: str, delimiter: str, count: int) -> list[float]:
+    """Numbers of a row, nan for empty cells."""
+    cells = split_row(line.replace(",", ".") if delimiter == ";" else line, delimiter)
+    if len(cells) != count:
+        raise ConfigError(
+            f"{path}, line {number}: {len(cells)} values where the header names {count} columns.",
+            "Complete or remove the line.",
+        )
+    try:
+        return [np.nan if cell.lower() in EMPTY else float(cell) for cell in cells]
+    except ValueError:
+        wrong = next(cell for cell in cells if cell.lower() not in EMPTY and not is_number(cell))
+        raise ConfigError(
+            f"{path}, line {number}: {wrong!r} is not a number.", "Correct it, or leave the cell empty."
+        ) from None
+
+
+def as_time_column(recording: Recording) -> Recording:
+    """Call the column of time so; it is the one named time or t, or .TIME at the end of a longer name."""
+    columns = recording.columns
+    name = next((name for name in columns if name.lower() in ("time", "t")), None)
+    name = name or next((name for name in columns if re.search(r"(^|[.\s_])time$", name, re.IGNORECASE)), None)
+    if name is None or name == TIME:
+        return recording
+    renamed = {TIME if key == name else key: values for key, values in columns.items()}
+    return replace(
+        recording, columns=renamed, units={TIME if key == name else key: unit for key, unit in recording.units.items()}
+    )
+
+
+# ADAMS results --------------------------------------------------------------------------------------------------------
+
+
+def read_adams_results(path: Path) -> Recording:
+    """XML results of ADAMS (.res): a map of components by id, and blocks of steps with a number for each."""
+    try:
+        root = ElementTree.parse(path).getroot()
+    except ElementTree.ParseError as error:
+        raise ConfigError(
+            f"{path} is not complete XML: {error}.", "Export the results again with RESULTS/XRF."
+        ) from None
+    blocks = [
+        block for block in every(root, "Data") if not str(block.get("name", "")).startswith(("modelInput", "initial"))
+    ]
+    names = component_names(path, root)
+    steps = [step for block in blocks for step in every(block, "Step")]
+    if not steps:
+        raise ConfigError(
+            f"{path} holds no steps of a simulation.", "Run a dynamic simulation before exporting its results."
+        )
+    table = [numbers_of_step(path, place, step, len(names)) for place, step in enumerate(steps)]
+    values = np.array(table)
+    order = sorted(range(len(names)), key=lambda place: names[place][0])
+    columns = {names[place][1]: values[:, column] for column, place in enumerate(order)}
+    units = {name: unit for _, name, unit in names if unit not in ("", "no_units")}
+    time = next((name for name in columns if name.lower() in ("time", "time.time")), "")
+    recording = Recording(
+        path, {TIME if name == time else name: column for name, column in columns.items()}, units, xml_units(root)
+    )
+    return without_repeated_times(recording)
+
+
+def every(node: ElementTree.Element, tag: str) -> Iterator[ElementTree.Element]:
+    """Elements of a tag below a node, whatever namespace they are in."""
+    return (each for each in node.iter() if each.tag.rpartition("}")[2] == tag)
+
+
+def component_names(path: Path, root: ElementTree.Element) -> list[tuple[int, str, str]]:
+    """Id, name and unit of each component, in the order of the file."""
+    try:
+        names = [
+            (
+                int(component.get("id", "")),
+                f"{entity.get('name')}.{component.get('name')}",
+                component.get("unitsValue", ""),
+            )
+            for entity in every(root, "Entity")
+            for component in every(entity, "Component")
+        ]
+    except ValueError:
+        raise ConfigError(f"{path}: a component has no id.", "Export the results again with RESULTS/XRF.") from None
+    if len({name[0] for name in names}) < len(names) or not names:
+        raise ConfigError(
+            f"{path}: ids of components are missing or not unique.", "Export the results again with RESULTS/XRF."
+        )
+    return names
+
+
+def numbers_of_step(path: Path, place: int, step: ElementTree.Element, count: int) -> list[float]:
+    """Numbers of a step, in the order of the components' ids."""
+    try:
+        values = [float(cell) for cell in (step.text or "").split()]
+    except ValueError:
+        raise ConfigError(
+            f"{path}: step {place + 1} holds something that is no number.", "Export the results again."
+        ) from None
+    if len(values) != count:
+        raise ConfigError(
+            f"{path}: step {place + 1} holds {len(values)} numbers for {count} components.", "Export the results again."
+        )
+    return values
+
+
+def xml_units(root: ElementTree.Element) -> dict[str, str]:
+    """Units of the model that was solved."""
+    units: Mapping[str, str] = next((node.attrib for node in every(root, "Units")), {})
+    return {kind: units[kind] for kind in ("angle", "length", "time", "force") if units.get(kind)}
+
+
+def without_repeated_times(recording: Recording) -> Recording:
+    """Each time once: a block begins with the sample that ended the one before it."""
+    time = recording.columns.get(TIME, np.zeros(0))
+    rising = np.concatenate(([True], np.diff(time) != 0.0)) if time.size else np.zeros(0, bool)
+    return replace(recording, columns={name: column[rising] for name, column in recording.columns.items()})
+
+
+# OpenSim --------------------------------------------------------------------------------------------------------------
+
+
+def read_opensim(path: Path) -> Recording:
+    """Tables of OpenSim (.sto, .mot), also in SIMM's form: lines up to `endheader`, names, rows."""
+    lines = text_of(path).splitlines()
+    end = next((number for number, line in enumerate(lines) if line.strip().lower() == "endheader"), None)
+    if end is None or end + 1 >= len(lines):
+        raise ConfigError(f"{path} has no line 'endheader', or nothing behind it.", "Export it again from OpenSim.")
+    stated = dict(line.lower().replace(" ", "").split("=", 1) for line in lines[:end] if "=" in line)
+    if stated.get("datatype", "double") != "double":
+        raise ConfigError(
+            f"{path} holds values of type {stated['datatype']}, not numbers.", "Export a table of type double."
+        )
+    start = next((number for number in range(end + 1, len(lines)) if lines[number].strip()), len(lines) - 1)
+    names = unique(path, lines[start].split())
+    values = blank_separated(path, lines, start + 1, len(names))
+    units = {"angle": "deg" if stated.get("indegrees", "no") == "yes" else "rad", "length": "m", "time": "s"}
+    return as_time_column(Recording(path, {name: values[:, place] for place, name in enumerate(names)}, {}, units))
+
+
+def blank_separated(path: Path, lines: Sequence[str], first: int, count: int) -> Array:
+    """(rows, count) numbers separated by blanks or tabs; the header's count of rows is not relied on."""
+    rows = []
+    for number, line in numbered_rows(lines, first):
+        rows.append(cells_as_numbers(path, number, "\t".join(line.split()), "\t", count))
+    return np.array(rows).reshape(len(rows), count)
+
+
+# Markers --------------------------------------------------------------------------------------------------------------
+
+
+def read_markers(path: Path) -> Recording:
+    """Markers of a .trc file, as columns 'name.x', 'name.y', 'name.z'; cells between two tabs may be empty."""
+    lines = text_of(path).splitlines()
+    if len(lines) < 5 or not lines[0].startswith("PathFileType"):
+        raise ConfigError(
+            f"{path} is no file of markers: its first line must begin with PathFileType.", "Export it again as .trc."
+        )
+    stated = dict(zip(lines[1].split(), lines[2].split(), strict=False))
+    labels = [label.strip() for label in lines[3].split("\t")]
+    names = [label for label in labels[2:] if label]
+    rows = [(number, line.rstrip("\r\n").split("\t")) for number, line in numbered_rows(lines, 5)]
+    if not rows or not names:
+        raise ConfigError(f"{path} holds no markers.", "Export it again as .trc.")
+    columns = [f"{name}.{axis}" for name in unique(path, names) for axis in "xyz"]
+    width = 2 + len(columns)
+    values = np.array(
+        [
+            cells_as_numbers(path, number, "\t".join((cells + [""] * width)[:width]), "\t", width)
+            for number, cells in rows
+        ]
+    )
+    units = {"time": "s", **({"length": stated["Units"]} if "Units" in stated else {})}
+    markers = {name: values[:, 2 + place] for place, name in enumerate(columns)}
+    return Recording(path, {TIME: values[:, 1], **markers}, {}, units)
+
+
+def read_c3d(path: Path) -> Recording:
+    """Markers of a C3D file, as columns 'name.x', 'name.y', 'name.z'; needs the extra `data`."""
+    try:
+        import ezc3d  # type: ignore[import-not-found]  # an extra without types
+    except ImportError:
+        raise ConfigError(f"{path}: reading C3D needs ezc3d.", 'Install it: pip install "walkerlab[data]"') from None
+    if not path.is_file():
+        raise FileNotFoundError(2, "no such file")
+    try:
+        content = ezc3d.c3d(str(path))
+    except (RuntimeError, OSError, ValueError) as error:
+        raise ConfigError(f"{path} is no C3D file that can be read: {error}.", "Export it again.") from None
+    point = content["parameters"]["POINT"]
+    names = unique(path, [str(label).strip() for label in point["LABELS"]["value"]])
+    places, rate = np.asarray(content["data"]["points"], float), float(np.ravel(point["RATE"]["value"])[0])
+    if not names or rate <= 0.0 or places.shape[1] < len(names):
+        raise ConfigError(f"{path} holds no markers, or no rate of frames.", "Export it again.")
+    columns = {
+        f"{name}.{axis}": places[place, row] for row, name in enumerate(names) for place, axis in enumerate("xyz")
+    }
+    units = [str(unit) for unit in point.get("UNITS", {}).get("value", [])]
+    return Recording(
+        path,
+        {TIME: np.arange(places.shape[2]) / rate, **columns},
+        {},
+        {"time": "s", **({"length": units[0]} if units else {})},
+    )
+
+
+READERS: Final[dict[str, Callable[[Path], Recording]]] = {
+    **dict.fromkeys((".csv", ".txt", ".tab", ".tsv"), read_delimited),
+    ".res": read_adams_results,
+    **dict.fromkeys((".sto", ".mot"), read_opensim),
+    ".trc": read_markers,
+    ".c3d": read_c3d,
+}
+ADVICE: Final = {
+    ".req": "Request files differ between versions of ADAMS; export .res (RESULTS/XRF) or a table instead.",
+    ".xlsx": "Save the sheet as CSV.",
+    ".xls": "Save the sheet as CSV.",
+    ".mat": "Export the columns as CSV.",
+}

@@ -1,0 +1,108 @@
+"""Find the heel strikes in recorded angles.
+
+A foot comes down where its height over the other foot falls to zero while it is ahead; between two heel strikes that
+happens once, however noisy the angles are. The instant is the zero of that height in a smooth fit: polynomials before
+and after, which meet at the heel strike because angles are continuous there while their rates jump.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Height = Callable[[Array], Array]
+
+AHEAD: Final = 0.4
+"""Smallest angle between the legs at a heel strike, over the largest of the walk."""
+WINDOW: Final = 0.1
+"""Time before and after a heel strike in which angles are fitted, over a step's period."""
+DEGREE: Final = 3
+FEWEST: Final = 6
+"""Samples on each side of a heel strike that a fit needs."""
+ITERATIONS: Final = 8
+
+
+@dataclass(frozen=True)
+class Touch:
+    """A heel strike: its time (s), the leg (0 or 1) that comes down, and the scatter of the angles around it (rad)."""
+
+    time_s: float
+    leg: int
+    scatter_rad: float
+
+
+def find_touches(time: Array, angle: Array, height: Height) -> list[Touch]:
+    """Heel strikes in the angles of both legs.
+
+    time    (samples,) s, rising
+    angle   (samples, 2) rad, from the vertical, positive with the foot ahead
+    height  (samples, 2) angles -> (samples,) m, height of leg 0's foot over leg 1's, perpendicular to the slope
+    """
+    crossings = one_each(candidates(time, angle, height))
+    times = [crossing for crossing, _ in crossings]
+    period = float(np.median(np.diff(times))) if len(times) > 1 else float(time[-1] - time[0])
+    return [refined(time, angle, height, crossing, leg, period) for crossing, leg in crossings]
+
+
+def candidates(time: Array, angle: Array, height: Height) -> list[tuple[float, int]]:
+    """Times at which a foot that is ahead comes down to the other's level, and its leg; noise repeats some.
+
+    A recording may end with a heel strike: the last two samples are continued by half an interval.
+    """
+    time = np.append(time, 1.5 * time[-1] - 0.5 * time[-2])
+    angle = np.append(angle, 1.5 * angle[-1:] - 0.5 * angle[-2:-1], axis=0)
+    spread, over = angle[:, 0] - angle[:, 1], height(angle)
+    apart = AHEAD * np.abs(spread).max()
+    crossings = []
+    for i in np.flatnonzero((over[:-1] > 0.0) != (over[1:] > 0.0)):
+        leg, ahead = (0, spread[i]) if over[i] > 0.0 else (1, -spread[i])
+        if ahead > apart:
+            share = over[i] / (over[i] - over[i + 1])
+            crossings.append((float(time[i] + share * (time[i + 1] - time[i])), leg))
+    return crossings
+
+
+def one_each(crossings: list[tuple[float, int]]) -> list[tuple[float, int]]:
+    """One crossing for each heel strike: crossings of one leg without the other leg's between them are the same."""
+    groups: list[list[float]] = []
+    legs: list[int] = []
+    for crossing, leg in crossings:
+        if legs and legs[-1] == leg:
+            groups[-1].append(crossing)
+        else:
+            groups.append([crossing])
+            legs.append(leg)
+    return [(float(np.mean(group)), leg) for group, leg in zip(groups, legs, strict=True)]
+
+
+def refined(time: Array, angle: Array, height: Height, near: float, leg: int, period: float) -> Touch:
+    """The heel strike near a crossing, from angles fitted around it; the crossing itself where samples are too few."""
+    half = WINDOW * period
+    inside = np.abs(time - near) <= half
+    t, y, touch, scatter = (time[inside] - near) / half, angle[inside], 0.0, 0.0
+    if np.count_nonzero(t <= 0.0) < FEWEST:
+        return Touch(near, leg, 0.0)
+    for _ in range(ITERATIONS):
+        at_touch, rate, scatter = fit_around(t, y, touch)
+        over = height(np.array([at_touch, at_touch + 1e-6 * rate, at_touch - 1e-6 * rate]))
+        slope = (over[1] - over[2]) / 2e-6
+        correction = float(np.clip(-over[0] / slope, -0.5, 0.5)) if slope else 0.0
+        touch += correction
+        if abs(correction) < 1e-9:
+            break
+    return Touch(near + touch * half, leg, scatter)
+
+
+def fit_around(t: Array, y: Array, touch: float) -> tuple[Array, Array, float]:
+    """Angles at a heel strike, their rates just before it, and the scatter, from polynomials that meet there."""
+    before, after = np.minimum(t - touch, 0.0), np.maximum(t - touch, 0.0)
+    sides = [side[:, None] ** np.arange(1, DEGREE + 1) for side in (before, after) if np.count_nonzero(side) >= DEGREE]
+    basis = np.concatenate([np.ones((t.size, 1)), *sides], axis=1)
+    coefficients = np.linalg.lstsq(basis, y, rcond=None)[0]
+    freedoms = max(1, y.size - coefficients.size)
+    return coefficients[0], coefficients[1], float(np.sqrt(np.sum((y - basis @ coefficients) ** 2) / freedoms))

@@ -1,0 +1,168 @@
+"""Most likely parameters, start and noise of a measured walk."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Final, Literal
+
+import numpy as np
+
+from walkerlab.physics.estimation.measurements import PERIOD
+from walkerlab.physics.estimation.mixed_model import (
+    Evaluation,
+    Linearised,
+    Noise,
+    estimate_noise,
+    evaluate,
+    products_of,
+    whitening,
+)
+from walkerlab.physics.estimation.prediction import Forecast
+from walkerlab.physics.solvers.system import Floats
+
+Loss = Literal["linear", "soft_l1"]
+MAX_ROUNDS: Final = 12
+SETTLED: Final = 1e-2  # change of a standard deviation, relative, and of an unknown, in standard errors
+FIRST_NOISE: Final = 0.02  # of a quantity's typical size, before any fit
+NOISE_FLOOR: Final = 1e-6  # of a quantity's typical size: noise-free measurements are taken to have this noise
+NO_WALK: Final = 1e3  # whitened residual of unknowns that make no walk
+EVALUATIONS: Final = 12  # in a round
+WEAK_PRIOR: Final = 3.0  # standard deviation of every unknown about its start, in its scale: what is open stays there
+
+
+@dataclass(frozen=True, eq=False)
+class FitProblem:
+    """A measured walk, unknowns, and what is known of them.
+
+    start   values of the parameters, in their units
+    priors  (value, standard deviation) of parameters by index, in their units
+    bounds  (low, high) of each parameter, infinite where there are none
+    """
+
+    forecast: Forecast
+    leg_length_m: float
+    start: tuple[float, ...]
+    bounds: Sequence[tuple[float, float]]
+    priors: dict[int, tuple[float, float]] = field(default_factory=dict)
+    loss: Loss = "linear"
+
+    def limits(self) -> tuple[Floats, Floats]:
+        """Return bounds (unknowns,) of the scaled unknowns."""
+        low, high = (np.full(self.forecast.unknowns, sign * np.inf) for sign in (-1.0, 1.0))
+        for place, (least, most) in enumerate(self.bounds):
+            low[place], high[place] = np.array((least, most)) / self.forecast.scales[place]
+        return low, high
+
+    def prior_rows(self, u: Floats) -> Floats:
+        """Return whitened residuals and derivatives (priors, 1 + unknowns) of the priors."""
+        rows = np.zeros((len(self.priors), 1 + u.size))
+        for row, (place, (value, sigma)) in zip(rows, self.priors.items(), strict=True):
+            scale = self.forecast.scales[place]
+            row[0], row[1 + place] = (value - u[place] * scale) / sigma, scale / sigma
+        return rows
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """Result of a fit.
+
+    why  reason why it did not converge; empty if it did
+    """
+
+    u: Floats  # (unknowns,) scaled
+    heights_m: Floats  # most probable
+    noise: Noise
+    evaluation: Evaluation
+    data: Linearised
+    predicted: Floats  # (values,) over even ground, with the most probable start
+    rounds: int
+    why: str = ""
+
+
+def fit(problem: FitProblem, start: Floats) -> Fitted | str:
+    """Fit from a start (unknowns,); the reason in words if no walk near the start can be predicted.
+
+    Rounds alternate between the unknowns, by least squares on whitened residuals, and the standard deviations.
+    """
+    forecast, u = problem.forecast, start.copy()
+    y, size = forecast.values, typical_sizes(forecast)
+    floors = NOISE_FLOOR * size
+    noise = Noise(FIRST_NOISE * size, 0.0)
+    heights = np.zeros(forecast.heights)
+    why = "standard deviations still change"
+    for round_number in range(1, MAX_ROUNDS + 1):
+        G = forecast.respond(u, heights, problem.leg_length_m)
+        if G is None:
+            return NO_NEIGHBOURS if round_number == 1 else "neighbouring walks end early"
+        before, u = u, least_squares_fit(problem, u, start, heights, G, noise)
+        data = linearise(problem, u, heights, G, exact=False)
+        if data is None:
+            return NO_NEIGHBOURS
+        products, earlier = products_of(data), noise
+        noise = estimate_noise(products, floors, problem.leg_length_m, noise, anew=round_number == 1)
+        evaluation = evaluate(products, noise)
+        heights = evaluation.heights_m
+        errors = np.sqrt(np.maximum(np.diag(np.linalg.pinv(evaluation.information, hermitian=True)), 1e-300))
+        moved = float(np.max(np.abs(u - before) / errors))
+        if settled(earlier, noise, problem.leg_length_m) and moved < SETTLED * 10.0:
+            why = ""
+            break
+    G = forecast.respond(u, heights, problem.leg_length_m)
+    final = None if G is None else linearise(problem, u, heights, G, exact=True)
+    predicted = forecast.predict(u, np.zeros(forecast.heights))
+    if final is None or predicted is None:
+        return NO_NEIGHBOURS
+    return Fitted(u, heights, noise, evaluate(products_of(final), noise), final, predicted, round_number, why)
+
+
+NO_NEIGHBOURS: Final = "the walk from the start, or one beside it, ends before the measured steps are over"
+
+
+def settled(before: Noise, after: Noise, leg_length_m: float) -> bool:
+    same = np.all(np.abs(np.log(after.measurement / before.measurement)) < SETTLED)
+    change = abs(after.roughness_m - before.roughness_m)
+    return bool(same) and change < SETTLED * max(after.roughness_m, 1e-7 * leg_length_m)
+
+
+def typical_sizes(forecast: Forecast) -> Floats:
+    """Return a typical size (quantities,) of each quantity."""
+    values, quantity = forecast.values, forecast.quantity
+    return np.array([np.sqrt(np.mean(values[quantity == q] ** 2)) for q in range(len(forecast.quantities))])
+
+
+def linearise(problem: FitProblem, u: Floats, heights: Floats, G: Floats, exact: bool) -> Linearised | None:
+    forecast = problem.forecast
+    values, J = forecast.predict(u, heights), forecast.differentiate(u, heights, exact)
+    if values is None or J is None:
+        return None
+    residuals = forecast.values - values + G @ heights
+    return Linearised(residuals, J, G, forecast.quantity, problem.prior_rows(u))
+
+
+def least_squares_fit(
+    problem: FitProblem, u: Floats, start: Floats, heights: Floats, G: Floats, noise: Noise
+) -> Floats:
+    """Minimise the whitened residuals over the unknowns, for given standard deviations."""
+    from scipy.optimize import least_squares  # takes a third of a second, only needed here
+
+    forecast = problem.forecast
+    whiten = whitening(G, forecast.quantity, noise)
+    offset = forecast.values + G @ heights
+
+    def residuals(x: Floats) -> Floats:
+        values = forecast.predict(x, heights)
+        own = np.full(offset.size, NO_WALK) if values is None else whiten(offset - values)
+        return np.concatenate((own, problem.prior_rows(x)[:, 0], (start - x) / WEAK_PRIOR))
+
+    def jacobian(x: Floats) -> Floats:
+        J = forecast.differentiate(x, heights, exact=False)
+        own = np.zeros((offset.size, x.size)) if J is None else -whiten(J)
+        return np.vstack((own, -problem.prior_rows(x)[:, 1:], -np.eye(x.size) / WEAK_PRIOR))
+
+    low, high = problem.limits()
+    inside = np.clip(u, low + 1e-9, high - 1e-9)
+    result = least_squares(
+        residuals, inside, jacobian, bounds=(low, high), loss=problem.loss, max_nfev=EVALUATIONS, xtol=1e-10, ftol=1e-10
+    )
+    return np.asarray(result.x)

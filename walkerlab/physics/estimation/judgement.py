@@ -1,0 +1,87 @@
+"""Whether a fitted model explains a measured walk."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+
+from walkerlab.physics.estimation.fit import Fitted
+from walkerlab.physics.estimation.measurements import ANGLE, MeasuredAngles
+from walkerlab.physics.estimation.mixed_model import whitening
+from walkerlab.physics.estimation.prediction import Forecast
+from walkerlab.physics.estimation.result import Fit
+from walkerlab.physics.solvers.system import Floats
+
+LARGEST_SHARE: Final = 0.05  # of a quantity's size, as noise or as systematic difference
+ROUGHEST: Final = 0.02  # of the leg length
+OUTLIER: Final = 6.0  # standard deviations
+ALTERNATION: Final = 5.0  # standard errors of the difference between odd and even steps
+PHASES: Final = 20
+
+
+def judge(forecast: Forecast, fitted: Fitted, sizes: Floats, leg_length_m: float) -> tuple[Fit, str]:
+    """Return whether a model fits, and the reason in words if it does not.
+
+    sizes  (quantities,) typical size of each quantity
+    """
+    if fitted.why:
+        return "not-converged", fitted.why
+    for quantity, noise, size in zip(forecast.quantities, fitted.noise.measurement, sizes, strict=True):
+        if noise > LARGEST_SHARE * size:
+            share = 100.0 * noise / size
+            return "misfit", f"{quantity} differs from the model by {noise:.3g} on average, {share:.2g} % of its size"
+    if fitted.noise.roughness_m > ROUGHEST * leg_length_m:
+        return "misfit", f"only a floor {1e3 * fitted.noise.roughness_m:.3g} mm rough would explain the steps"
+    white = whitened_residuals(forecast, fitted)
+    steps = forecast.steps.count
+    for place, quantity in enumerate(forecast.steps.channels()):
+        own = white[place * steps : (place + 1) * steps]
+        worst = int(np.argmax(np.abs(own)))
+        spread = float(np.median(np.abs(own))) * 1.4826 or 1.0
+        if abs(own[worst]) > OUTLIER * max(spread, 0.3) and steps > 4:
+            times = abs(own[worst]) / spread
+            return "misfit", f"{quantity} of step {worst + 1} is off by {times:.2g} times the others' scatter"
+        alternation = alternation_of(own)
+        if alternation > ALTERNATION:
+            return "misfit", f"{quantity} alternates from step to step by {alternation:.2g} standard errors: a limp"
+    if isinstance(forecast.measured, MeasuredAngles):
+        return judge_phases(forecast, fitted, sizes[forecast.quantities.index(ANGLE)])
+    return "fits", ""
+
+
+def whitened_residuals(forecast: Forecast, fitted: Fitted) -> Floats:
+    whiten = whitening(fitted.data.G, forecast.quantity, fitted.noise)
+    return whiten(fitted.data.residuals)
+
+
+def alternation_of(residuals: Floats) -> float:
+    """Return the difference between the means of odd and even steps, in its standard errors."""
+    odd, even = residuals[::2], residuals[1::2]
+    if min(odd.size, even.size) < 2:
+        return 0.0
+    scatter = math.sqrt(odd.var(ddof=1) / odd.size + even.var(ddof=1) / even.size)
+    return abs(float(odd.mean() - even.mean())) / (scatter or math.inf)
+
+
+def judge_phases(forecast: Forecast, fitted: Fitted, size: float) -> tuple[Fit, str]:
+    """Compare the mean difference of the angles at each phase of the step with the angles' size."""
+    assert isinstance(forecast.measured, MeasuredAngles)
+    mean = phase_means(forecast, fitted)
+    systematic = float(np.sqrt(np.nanmean(mean**2)))
+    if systematic > LARGEST_SHARE * size:
+        return "misfit", f"the angles differ by {systematic:.3g} rad at the same phase of every step"
+    return "fits", ""
+
+
+def phase_means(forecast: Forecast, fitted: Fitted) -> Floats:
+    """Return the mean residual (phases, legs) of the angles at each phase; the stance leg's and swing leg's."""
+    assert isinstance(forecast.measured, MeasuredAngles)
+    residuals = fitted.data.residuals[-forecast.measured.angles_rad.size :].reshape(-1, 2)
+    swaps = forecast.measured.step % 2 == 1
+    residuals = np.where(swaps[:, None], residuals[:, ::-1], residuals)
+    bins = np.minimum((PHASES * forecast.measured.phase).astype(int), PHASES - 1)
+    counts = np.bincount(bins, minlength=PHASES)
+    sums = np.array([np.bincount(bins, residuals[:, leg], PHASES) for leg in range(2)]).T
+    return np.asarray(sums[counts > 0] / counts[counts > 0, None])

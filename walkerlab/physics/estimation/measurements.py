@@ -1,0 +1,61 @@
+"""Measured walks: periods and lengths of steps, or angles of both legs over time."""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from walkerlab.physics.solvers.system import Floats
+
+PERIOD: Final = "step_period_s"
+LENGTH: Final = "step_length_m"
+ANGLE: Final = "angle_rad"
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredSteps:
+    """Quantities of consecutive steps, from heel strike to heel strike."""
+
+    periods_s: Floats  # (steps,)
+    lengths_m: Floats | None = None  # (steps,)
+    touch_angles_rad: Floats | None = None  # (steps,) of the leg that touches, from the vertical
+
+    @property
+    def count(self) -> int:
+        return int(self.periods_s.size)
+
+    def channels(self) -> dict[str, Floats]:
+        """Return the measured values (steps,) by quantity."""
+        values = {PERIOD: self.periods_s, LENGTH: self.lengths_m, ANGLE: self.touch_angles_rad}
+        return {name: value for name, value in values.items() if value is not None}
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredAngles:
+    """Angles of both legs within consecutive steps, each at its share of the step's period."""
+
+    touches_s: Floats  # (steps + 1,) heel strikes, the first one starts the walk
+    step: NDArray[np.int64]  # (samples,) index of each sample's step
+    phase: Floats  # (samples,) share of the step's period that has passed, 0 to 1
+    angles_rad: Floats  # (samples, 2) from the vertical; the leg that swings first comes first
+    lengths_m: Floats | None = None  # (steps,)
+
+    @property
+    def count(self) -> int:
+        return int(self.touches_s.size) - 1
+
+    @property
+    def steps(self) -> MeasuredSteps:
+        return MeasuredSteps(np.diff(self.touches_s), self.lengths_m)
+
+
+def split_into_steps(
+    time_s: Floats, angles_rad: Floats, touches_s: Floats, lengths_m: Floats | None = None
+) -> MeasuredAngles:
+    """Assign samples of angles (samples, 2) to steps between heel strikes (steps + 1,); others are dropped."""
+    inside = (time_s >= touches_s[0]) & (time_s < touches_s[-1])
+    time, angles = time_s[inside], angles_rad[inside]
+    step = np.searchsorted(touches_s, time, "right") - 1
+    phase = (time - touches_s[step]) / np.diff(touches_s)[step]
+    return MeasuredAngles(touches_s, step, phase, angles, lengths_m)

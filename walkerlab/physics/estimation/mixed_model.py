@@ -1,0 +1,145 @@
+"""Linear model with random heights: whitening, restricted likelihood of its standard deviations, and information.
+
+Everything follows from the sums of squares and products of residuals, derivatives and responses of each quantity, so
+that the cost of a likelihood does not depend on the number of samples.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from walkerlab.physics.solvers.system import Floats
+
+ROUGHNESS_STARTS: Final = (1e-5, 1e-3, 1e-2)
+"""Shares of the leg length from which the search for the roughness starts."""
+ROUGHNESS_BOUNDS: Final = (1e-8, 0.2)  # shares of the leg length
+LARGEST_NOISE: Final = 1e3  # of the quantity's typical size
+LOST_INFORMATION: Final = 1e-13  # share of the largest eigenvalue of scaled information, below which it is rounding
+
+
+class Noise(NamedTuple):
+    """Standard deviations of the measurement by quantity, and of the floor's heights (m)."""
+
+    measurement: Floats  # (quantities,)
+    roughness_m: float
+
+
+@dataclass(frozen=True, eq=False)
+class Linearised:
+    """Measured minus predicted values, and how predictions change, about one walk."""
+
+    residuals: Floats  # (values,) about the walk over even ground
+    J: Floats  # (values, unknowns) by the unknowns, scaled
+    G: Floats  # (values, heights) by the heights, 1/m
+    quantity: NDArray[np.int64]  # (values,) index of the quantity of each value
+    prior: Floats  # (priors, 1 + unknowns) whitened residuals and derivatives of what is known beforehand
+
+
+class Evaluation(NamedTuple):
+    restricted: float  # log-likelihood of the standard deviations
+    likelihood: float  # log-likelihood of the data
+    information: Floats  # (unknowns, unknowns)
+    move: Floats  # (unknowns,) that remains to the most likely unknowns
+    heights_m: Floats  # (heights,) most probable
+    squares: float  # whitened sum of squares
+
+
+class Products(NamedTuple):
+    """Sums of squares and products of [residual, J, G], by quantity."""
+
+    sums: Floats  # (quantities, k, k)
+    counts: NDArray[np.int64]  # (quantities,)
+    prior: Floats  # (1 + unknowns, 1 + unknowns)
+    priors: int
+    unknowns: int
+
+
+def products_of(data: Linearised) -> Products:
+    columns = np.column_stack((data.residuals, data.J, data.G))
+    quantities = range(int(data.quantity.max()) + 1)
+    parts = [columns[data.quantity == q] for q in quantities]
+    sums = np.array([part.T @ part for part in parts])
+    counts = np.array([len(part) for part in parts])
+    return Products(sums, counts, data.prior.T @ data.prior, len(data.prior), data.J.shape[1])
+
+
+def evaluate(products: Products, noise: Noise) -> Evaluation:
+    """Evaluate the likelihoods at given standard deviations."""
+    total = np.einsum("qij,q->ij", products.sums, noise.measurement**-2.0)
+    fixed = 1 + products.unknowns
+    rho2 = noise.roughness_m**2
+    cross, random = total[:fixed, fixed:], total[fixed:, fixed:]
+    K = np.eye(len(random)) + rho2 * random
+    solved = rho2 * np.linalg.solve(K, cross.T)
+    reduced = total[:fixed, :fixed] - cross @ solved + products.prior
+    information, score = reduced[1:, 1:], reduced[1:, 0]
+    values, vectors = np.linalg.eigh(information)
+    kept = values > LOST_INFORMATION * values.max(initial=0.0)
+    move = vectors[:, kept] @ ((vectors[:, kept].T @ score) / values[kept])
+    squares = float(reduced[0, 0] - score @ move)
+    log_determinant = float(2.0 * products.counts @ np.log(noise.measurement) + np.linalg.slogdet(K)[1])
+    restricted = -0.5 * (log_determinant + squares + float(np.log(values[kept]).sum()))
+    count = int(products.counts.sum()) + products.priors
+    likelihood = -0.5 * (log_determinant + squares + count * math.log(2.0 * math.pi))
+    heights = solved[:, 0] - solved[:, 1:] @ move
+    return Evaluation(restricted, likelihood, information, move, heights, squares)
+
+
+def estimate_noise(
+    products: Products, floors: Floats, leg_length_m: float, start: Noise, anew: bool = True
+) -> Noise:
+    """Maximise the restricted likelihood over the standard deviations; a roughness of 0 is one of the candidates.
+
+    floors  (quantities,) smallest standard deviations of the measurement
+    anew    whether to search from several roughnesses rather than from the start's
+    """
+    from scipy.optimize import minimize
+
+    def noise_at(logs: Floats, rough: bool) -> Noise:
+        return Noise(np.exp(logs[: floors.size]), math.exp(logs[-1]) if rough else 0.0)
+
+    best, most = start, -math.inf
+    low, high = (math.log(share * leg_length_m) for share in ROUGHNESS_BOUNDS)
+    bounds = [(math.log(floor), math.log(floor) + 40.0) for floor in floors]
+    middle = np.maximum(start.measurement, 2.0 * floors)
+    near = start.roughness_m / leg_length_m
+    for share in (*(ROUGHNESS_STARTS if anew or near == 0.0 else (near,)), 0.0):
+        rough = share > 0.0
+        logs = np.log(np.append(middle, share * leg_length_m)) if rough else np.log(middle)
+        result = minimize(
+            lambda x, rough=rough: -evaluate(products, noise_at(x, rough)).restricted,
+            logs,
+            method="L-BFGS-B",
+            bounds=[*bounds, (low, high)] if rough else bounds,
+        )
+        # A roughness above 0 must be worth its number; even ground is the simpler explanation.
+        if -result.fun > most or (not rough and -result.fun > most - 1e-6):
+            best, most = noise_at(result.x, rough), float(-result.fun)
+    return best
+
+
+class Whitening(NamedTuple):
+    """Turn values into independent ones of unit variance, with the covariance G G' roughness^2 + noise^2."""
+
+    scale: Floats  # (values,)
+    U: Floats  # (values, heights)
+    shrink: Floats  # (heights,)
+
+    def __call__(self, values: Floats) -> Floats:
+        """Whiten values (values,) or columns (values, n)."""
+        scaled = values * (self.scale if values.ndim == 1 else self.scale[:, None])
+        along = self.U.T @ scaled
+        return np.asarray(scaled - self.U @ (along * (self.shrink if values.ndim == 1 else self.shrink[:, None])))
+
+
+def whitening(G: Floats, quantity: NDArray[np.int64], noise: Noise) -> Whitening:
+    scale = 1.0 / noise.measurement[quantity]
+    if noise.roughness_m == 0.0:
+        return Whitening(scale, np.zeros((scale.size, 0)), np.zeros(0))
+    U, s, _ = np.linalg.svd(noise.roughness_m * G * scale[:, None], full_matrices=False)
+    return Whitening(scale, U, 1.0 - 1.0 / np.sqrt(1.0 + s**2))

@@ -1,0 +1,98 @@
+"""Result of an identification: estimates with errors, and how well the walk determines them."""
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+from walkerlab.physics.estimation.fit import Fitted
+from walkerlab.physics.solvers.system import Floats
+
+Fit = Literal["fits", "misfit", "not-converged"]
+
+
+@dataclass(frozen=True)
+class Uncertain:
+    """A value with its standard error; None where the walk does not determine it."""
+
+    value: float
+    standard_error: float | None
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A fitted parameter, in the unit of its key."""
+
+    key: str
+    value: float
+    standard_error: float | None
+    unit: str
+    start: float
+    at_bound: bool
+
+
+@dataclass(frozen=True)
+class Unidentifiable:
+    """A combination of parameters that the walk does not determine, and why."""
+
+    combination: str
+    reason: str
+
+
+@dataclass(frozen=True, eq=False)
+class Information:
+    """How well a walk determines the fitted parameters.
+
+    correlations     (parameters, parameters) of the estimates
+    singular_values  (parameters,) of the sensitivity to parameters over their scale, in standard deviations of the
+                     data; the start and the nuisances are free
+    directions       (parameters, parameters) one row per singular value: shares of the parameters
+    covariance       (parameters, parameters) in the parameters' units, on determined directions
+    freedom          degrees of freedom left, for Student's t
+    contributions    share of each measured quantity in the information, averaged over determined directions
+    """
+
+    keys: tuple[str, ...]
+    correlations: Floats
+    singular_values: Floats
+    directions: Floats
+    covariance: Floats
+    freedom: int
+    contributions: dict[str, float]
+
+
+@dataclass(frozen=True)
+class ModelFit:
+    """Verdict on a model: how likely it makes the data, and whether it fits."""
+
+    model: str
+    log_likelihood: float | None
+    fit: Fit
+    reason: str
+
+
+@dataclass(frozen=True, eq=False)
+class StepTable:
+    """Measured and predicted values (steps,) of a quantity, and the standard deviation of their difference."""
+
+    quantity: str
+    measured: Floats
+    predicted: Floats
+    deviation: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Identification:
+    """A walker identified from a walk."""
+
+    model: str
+    estimates: tuple[Estimate, ...]
+    not_identifiable: tuple[Unidentifiable, ...]
+    information: Information
+    process: dict[str, float | bool | None]  # roughness_m, standard_error, at_bound
+    measurement: dict[str, float]  # standard deviation by quantity
+    steps: int
+    rms_residual: dict[str, float]
+    chi_square_per_dof: float
+    gait: dict[str, Uncertain]
+    models: tuple[ModelFit, ...]
+    tables: tuple[StepTable, ...]
+    fitted: Fitted = field(repr=False)

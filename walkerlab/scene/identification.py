@@ -1,0 +1,298 @@
+"""Identify the parameters of a config from a measured walk, with both models."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from walkerlab.config.reads import ContactConfig
+from walkerlab.errors import ConfigError, NoAnswer
+from walkerlab.physics.estimation.fit import FitProblem, Fitted, Loss, fit, typical_sizes
+from walkerlab.physics.estimation.information import information_on, open_combinations
+from walkerlab.physics.estimation.judgement import judge
+from walkerlab.physics.estimation.measurements import MeasuredAngles, MeasuredSteps
+from walkerlab.physics.estimation.mixed_model import evaluate, products_of
+from walkerlab.physics.estimation.prediction import Forecast, felt_directions
+from walkerlab.physics.estimation.result import Estimate, Identification, ModelFit, StepTable, Uncertain
+from walkerlab.physics.orbits.family_search import CONTACT, RIGID
+from walkerlab.physics.orbits.newton import Effort
+from walkerlab.physics.orbits.rigid_map import RigidMap
+from walkerlab.physics.orbits.robustness import CENTRAL_4TH
+from walkerlab.physics.orbits.step_map import Cycle, StepMap, gait_near
+from walkerlab.physics.solvers.system import Floats
+from walkerlab.scene.families import CONTACT_STEP
+from walkerlab.scene.parameter import parameter_of
+from walkerlab.scene.rigid import rigid_walker
+from walkerlab.scene.subject import ModelUnderTest, find_model_gait
+
+if TYPE_CHECKING:
+    from walkerlab.config.schema import Config
+
+Measured = MeasuredSteps | MeasuredAngles
+Values = tuple[float, ...]
+CONFIGS_AT_ONCE: Final = 512
+SCALE_OF_ZERO: Final = 0.01  # typical change of a parameter that is 0
+SPREAD_OF_STARTS: Final = 0.1  # of a parameter, between starts of the fit
+GAIT_EFFORT: Final = Effort(1e-9, 40)
+GAIT_STEP: Final = 1e-3  # of a parameter's scale, in derivatives of the gait
+
+
+@dataclass(frozen=True)
+class Question:
+    """What is to be fitted.
+
+    fit        bounds of each fitted key, in its unit; None for the schema's
+    prior      value and standard deviation of keys, known beforehand
+    nuisance   properties of sensors that are estimated too
+    starts     number of starts of the fit
+    """
+
+    fit: Mapping[str, tuple[float, float] | None]
+    prior: Mapping[str, tuple[float, float]]
+    nuisance: tuple[str, ...] = ()
+    loss: Loss = "linear"
+    starts: int = 1
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        return tuple(dict.fromkeys((*self.fit, *self.prior)))
+
+
+class Family:
+    """Configs at values of several parameters."""
+
+    def __init__(self, config: ContactConfig, keys: Sequence[str]) -> None:
+        self.config = config
+        self.parameters = [parameter_of(key, config) for key in keys]
+        self.start: Values = tuple(parameter.value_in(config) for parameter in self.parameters)
+        self.at = lru_cache(CONFIGS_AT_ONCE)(self._at)
+
+    def _at(self, values: Values) -> ContactConfig | None:
+        config: ContactConfig = self.config
+        for parameter, value in zip(self.parameters, values, strict=True):
+            changed = parameter.config_at(config, value)
+            if changed is None:
+                return None
+            config = changed
+        return config
+
+    def admits(self, values: Values) -> bool:
+        try:
+            return self.at(values) is not None and rigid_walker(self.at(values)) is not None  # type: ignore[arg-type]
+        except ConfigError:
+            return False
+
+    def over(self, make: Callable[[ContactConfig], Any]) -> Callable[[Any], Any]:
+        def at_values(values: Values) -> Any:
+            config = self.at(values)
+            return None if config is None else make(config)
+
+        return at_values
+
+    def scales(self) -> Floats:
+        return np.array([abs(value) or SCALE_OF_ZERO for value in self.start])
+
+
+def step_map_of(model: str, family: Family, length_m: float) -> StepMap:
+    """Return a model's step map over the family's values."""
+    config = family.config
+    if model == RIGID:
+        return RigidMap(family.over(rigid_walker), 1.0, rigid_walker(config))
+    from walkerlab.physics.orbits.contact_map import ContactMap
+    from walkerlab.scene.contact import contact_scene
+
+    def on_ground(changed: ContactConfig) -> Any:
+        return contact_scene(changed, length_m, length_m)
+
+    return ContactMap(family.over(on_ground), 1.0, CONTACT_STEP, length_m, on_ground(config))
+
+
+def identify_walk(
+    config: Config,
+    measured: Measured,
+    gait: Mapping[str, Any],
+    question: Question,
+    models: Sequence[str] = (RIGID,),
+    note: Callable[[str], None] = lambda _: None,
+) -> Identification:
+    """Fit the question's keys to a measured walk with each model, and return the likeliest model's result.
+
+    gait  summary of `fixedpoint` for the config
+    note  receives messages
+
+    Raises ConfigError for keys that are no parameters, NoAnswer if no model can be fitted.
+    """
+    results = [identify_with(model, config, measured, gait, question, note) for model in models]
+    answers = [result for result in results if isinstance(result, Identification)]
+    verdicts = tuple(
+        result.models[0] if isinstance(result, Identification) else ModelFit(model, None, "not-converged", result)
+        for model, result in zip(models, results, strict=True)
+    )
+    if not answers:
+        raise NoAnswer(
+            f"no walk of the model can be fitted: {verdicts[0].reason}.",
+            "Start from a config whose walk takes as many steps, or fit fewer parameters.",
+        )
+    best = max(answers, key=lambda answer: (answer.models[0].fit == "fits", answer.models[0].log_likelihood))
+    return replace(best, models=verdicts)
+
+
+def identify_with(
+    model: str,
+    config: Config,
+    measured: Measured,
+    gait: Mapping[str, Any],
+    question: Question,
+    note: Callable[[str], None],
+) -> Identification | str:
+    """Fit one model; the reason in words if none of its walks can be fitted."""
+    subject = find_model_gait(model, config, gait, note)
+    problem = problem_of(subject, measured, question)
+    fits = [fit(problem, start) for start in starts_of(problem, question.starts)]
+    walked = [result for result in fits if isinstance(result, Fitted)]
+    if not walked:
+        return str(fits[0])
+    best = max(walked, key=lambda result: (not result.why, result.evaluation.likelihood))
+    return describe(subject, problem, question, best)
+
+
+def problem_of(subject: ModelUnderTest, measured: Measured, question: Question) -> FitProblem:
+    family = Family(subject.config, question.keys)
+    walks = step_map_of(subject.model, family, subject.length_m)
+    start = walks.step(subject.z, family.start)  # type: ignore[arg-type]  # values of several parameters
+    forecast = Forecast(
+        walks, family.admits, family.scales(), subject.z, felt_directions(start.DP), measured, question.nuisance
+    )
+    free = (-math.inf, math.inf)
+    bounds = [question.fit.get(key) or free for key in question.keys]
+    priors = {place: question.prior[key] for place, key in enumerate(question.keys) if key in question.prior}
+    return FitProblem(forecast, subject.config.walker.leg_length_m, family.start, bounds, priors, question.loss)
+
+
+def starts_of(problem: FitProblem, count: int) -> list[Floats]:
+    """Return starts (unknowns,): the config's values, then values beside them."""
+    parameters = np.array(problem.start) / problem.forecast.scales
+    rng, starts = np.random.default_rng(0), []
+    for place in range(count):
+        spread = SPREAD_OF_STARTS * rng.uniform(-1.0, 1.0, parameters.size) if place else 0.0
+        start = np.zeros(problem.forecast.unknowns)
+        start[: parameters.size] = parameters * (1.0 + spread)
+        starts.append(start)
+    return starts
+
+
+def describe(
+    subject: ModelUnderTest, problem: FitProblem, question: Question, fitted: Fitted
+) -> Identification:
+    """Turn a fit into its answer."""
+    forecast, keys = problem.forecast, question.keys
+    sizes = typical_sizes(forecast)
+    information = information_on(fitted, keys, forecast.scales, forecast.quantities)
+    combinations, left_open = open_combinations(information)
+    values = forecast.parameters(fitted.u)
+    errors = dict(zip(keys, np.sqrt(np.diag(information.covariance)).tolist(), strict=True))
+    known = {key: None if key in left_open else error for key, error in errors.items()}
+    estimates = tuple(
+        Estimate(
+            key,
+            value,
+            known[key],
+            parameter_of(key, subject.config).unit,
+            start,
+            any(math.isclose(value, bound, rel_tol=1e-6, abs_tol=1e-12) for bound in bounds),
+        )
+        for key, value, start, bounds in zip(keys, values, problem.start, problem.bounds, strict=True)
+    )
+    fit_word, reason = judge(forecast, fitted, sizes, problem.leg_length_m)
+    dof = max(1, fitted.data.residuals.size - fitted.u.size)
+    return Identification(
+        subject.model,
+        estimates,
+        combinations,
+        information,
+        process_noise(fitted, problem),
+        dict(zip(forecast.quantities, fitted.noise.measurement.tolist(), strict=True)),
+        forecast.steps.count,
+        rms_residuals(forecast, fitted),
+        fitted.evaluation.squares / dof,
+        gait_with_errors(subject, problem, fitted, information.covariance),
+        (ModelFit(subject.model, fitted.evaluation.likelihood, fit_word, reason),),
+        step_tables(forecast, fitted),
+        fitted,
+    )
+
+
+def process_noise(fitted: Fitted, problem: FitProblem) -> dict[str, float | bool | None]:
+    """Return the roughness with its standard error, from the curvature of the restricted likelihood."""
+    roughness = fitted.noise.roughness_m
+    if roughness == 0.0:
+        return {"roughness_m": 0.0, "standard_error": None, "at_bound": True}
+    products, h = products_of(fitted.data), 1e-2
+    logs = [
+        evaluate(products, fitted.noise._replace(roughness_m=roughness * math.exp(k * h))).restricted for k in (-1, 0, 1)
+    ]
+    curvature = (2.0 * logs[1] - logs[0] - logs[2]) / h**2
+    error = roughness / math.sqrt(curvature) if curvature > 0.0 else None
+    return {"roughness_m": roughness, "standard_error": error, "at_bound": False}
+
+
+def rms_residuals(forecast: Forecast, fitted: Fitted) -> dict[str, float]:
+    """Return the root mean square of measured minus predicted values, over the most probable floor, by quantity."""
+    about = fitted.data.residuals - fitted.data.G @ fitted.heights_m
+    return {
+        name: float(np.sqrt(np.mean(about[forecast.quantity == place] ** 2)))
+        for place, name in enumerate(forecast.quantities)
+    }
+
+
+def step_tables(forecast: Forecast, fitted: Fitted) -> tuple[StepTable, ...]:
+    """Return measured and predicted steps over even ground, with the standard deviation of their difference."""
+    steps, variance = forecast.steps.count, fitted.noise.measurement[forecast.quantity] ** 2
+    total = np.sqrt(variance + (fitted.noise.roughness_m**2) * (fitted.data.G**2).sum(axis=1))
+    return tuple(
+        StepTable(name, values, fitted.predicted[first : first + steps], total[first : first + steps])
+        for first, (name, values) in zip(
+            range(0, steps * len(forecast.steps.channels()), steps), forecast.steps.channels().items(), strict=True
+        )
+    )
+
+
+def gait_with_errors(
+    subject: ModelUnderTest, problem: FitProblem, fitted: Fitted, covariance: Floats
+) -> dict[str, Uncertain]:
+    """Return period, length and spectral radius of the identified gait, with errors that follow from the estimates'.
+
+    Empty if the identified walker has no gait of one step near the start's.
+    """
+    forecast = problem.forecast
+    values = np.array(forecast.parameters(fitted.u))
+
+    def quantities(p: Floats) -> Floats | None:
+        parameters = tuple(p.tolist())
+        if not forecast.admits(parameters):
+            return None
+        gait = gait_near(forecast.walks, subject.z, parameters, GAIT_EFFORT)  # type: ignore[arg-type]
+        if not isinstance(gait, Cycle):
+            return None
+        return np.array((gait.period_s, gait.step.length_m, float(np.abs(gait.multipliers).max())))
+
+    centre = quantities(values)
+    if centre is None:
+        return {}
+    gradient = []
+    for place, scale in enumerate(forecast.scales):
+        ends = [quantities(values + offset * GAIT_STEP * scale * np.eye(values.size)[place]) for offset, _ in CENTRAL_4TH]
+        usable = [end for end in ends if end is not None]
+        if len(usable) < len(ends):
+            gradient.append(np.zeros(3))
+            continue
+        gradient.append(np.tensordot([weight / (GAIT_STEP * scale) for _, weight in CENTRAL_4TH], usable, 1))
+    slopes = np.array(gradient)
+    errors = np.sqrt(np.maximum(np.einsum("iq,ij,jq->q", slopes, covariance, slopes), 0.0))
+    names = ("period_s", "step_length_m", "spectral_radius")
+    return {name: Uncertain(float(v), float(e)) for name, v, e in zip(names, centre, errors, strict=True)}

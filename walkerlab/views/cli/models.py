@@ -1,0 +1,46 @@
+"""`walkerlab export RUN model`: a run's walker with the start of its gait, for ADAMS and MuJoCo."""
+
+from dataclasses import replace
+from pathlib import Path
+
+from walkerlab.errors import ConfigError
+from walkerlab.exchange.export import ENDINGS, export_model, law_named
+from walkerlab.pipeline.resolve import resolve
+from walkerlab.pipeline.runner import Options, execute
+from walkerlab.pipeline.stages.walk import rigid_start
+from walkerlab.pipeline.store import artifact
+from walkerlab.pipeline.store.provenance import git_commit
+from walkerlab.views.cli.console import Console
+from walkerlab.views.cli.target import Target, write_file
+
+
+def write_model(run: str, runs: Path, target: Target, law: str | None, console: Console) -> list[Path]:
+    """Write the walker of a run or config, after computing its gait if there is none yet.
+
+    Raises ConfigError for an unknown run or format and for a walker that the format cannot express, NoAnswer if the
+    walker has no gait to start from.
+    """
+    resolved = resolve(run, runs=runs)
+    config, folder = resolved.loaded.config, resolved.folder
+    # MuJoCo's viewer opens files that end in .xml.
+    named_mjcf = target.output is not None and target.output.suffix == ".mjcf"
+    to = "xml" if target.to == "mjcf" and not named_mjcf else target.to
+    path, ending = replace(target, to=to).of("a model", folder.name, list(ENDINGS))
+    kind, adams_law = ENDINGS[ending], law_named(law or "contact")
+    if law is not None and kind == "mjcf":
+        raise ConfigError("--law chooses between contact laws of ADAMS.", "Leave it out for MuJoCo.")
+    inputs = {}
+    if config.start == "fixed-point":
+        report = execute(config, "fixedpoint", folder, Options(), console)
+        if report.no_answer is not None:
+            raise report.no_answer
+        assert report.artifact is not None, "a stage with an answer stores it"
+        inputs["fixedpoint"] = artifact.read(report.artifact)
+    start = rigid_start(config, inputs)
+    exported = export_model(config, *start, kind, adams_law, git_commit(), path.stem)
+    for omission in exported.left_out:
+        console.note(f"left out: {omission}")
+    paths = [path, *(path.with_name(name) for name in list(exported.files)[1:])]
+    for extra in paths[1:]:
+        target.refuse(extra, extra.suffix.removeprefix("."))
+    return [write_file(file, text.encode(), console) for file, text in zip(paths, exported.files.values(), strict=True)]
