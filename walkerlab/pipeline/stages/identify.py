@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
+from itertools import combinations
 from typing import TYPE_CHECKING, Final, cast
 
 import numpy as np
@@ -16,6 +17,7 @@ from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.labels import Label, unit_by_name
 from walkerlab.physics.estimation.measurements import MeasuredAngles, MeasuredSteps
 from walkerlab.physics.estimation.result import Identification
+from walkerlab.physics.solvers.system import Floats
 from walkerlab.pipeline.progress import Progress
 from walkerlab.pipeline.stages.measured_walk import read_measured
 from walkerlab.pipeline.store.columns import numbered, rows_group
@@ -138,9 +140,20 @@ def content_of(config: IdentifyConfig, result: Identification, measured: Measure
     groups["covariance"] = Group(
         {"covariance": Variable(known.covariance, ("row", "column"), "1", "covariance, in the keys' units")}
     )
+    determined = [place for place, row in enumerate(estimates) if row["standard_error"] is not None]
+    if len(determined) > 1:
+        pair = worst_pair(known.correlations, determined)
+        groups["trade_off"] = Group(
+            {"pair": Variable(np.array(pair), ("parameter",), "1", "indices of two parameters")}
+        )
     if isinstance(measured, MeasuredAngles):
         groups["samples"] = sample_group(result, measured)
     return Content(groups, summary)
+
+
+def worst_pair(correlations: Floats, determined: Sequence[int]) -> tuple[int, int]:
+    """Return the indices of the two determined parameters that the walk separates worst, by their correlation."""
+    return max(combinations(determined, 2), key=lambda pair: abs(float(correlations[pair])))
 
 
 def step_group(result: Identification) -> Group:
