@@ -134,7 +134,7 @@ def content_of(config: IdentifyConfig, result: Identification, measured: Measure
         "chi_square_per_dof": result.chi_square_per_dof,
         "gait": {name: asdict(value) for name, value in result.gait.items()},
         "models": [asdict(model) for model in result.models],
-        "kept_masses_kg": kept_masses(config, [estimate.key for estimate in result.estimates], result.model),
+        "reference_masses_kg": reference_masses(config, [estimate.key for estimate in result.estimates], result.model),
     }
     groups = {"estimates": rows_group(estimates, LABELS, "row", "row"), "steps": step_group(result)}
     groups["covariance"] = Group(
@@ -181,7 +181,7 @@ def sample_group(result: Identification, measured: MeasuredAngles) -> Group:
     )
 
 
-def kept_masses(config: IdentifyConfig, keys: Sequence[str], model: str) -> dict[str, float]:
+def reference_masses(config: IdentifyConfig, keys: Sequence[str], model: str) -> dict[str, float]:
     """Return the masses that estimated masses refer to: those of the config that were not fitted.
 
     Empty if no mass was estimated, or for the contact model, whose stiffness sets the scale of mass.

@@ -12,7 +12,7 @@ import numpy as np
 
 from walkerlab.errors import ConfigError
 from walkerlab.exchange.columns import as_walk, plain, unit_value
-from walkerlab.exchange.recording import Recording, read_delimited, read_recording
+from walkerlab.exchange.recording import TIME, Recording, read_delimited, read_recording
 from walkerlab.exchange.touches import find_touches
 from walkerlab.physics.estimation.measurements import MeasuredAngles, MeasuredSteps, split_into_steps
 from walkerlab.physics.mechanics.rigid_model import feet_on_slope
@@ -103,6 +103,8 @@ def read_column(table: Recording, name: str, block: Identify) -> Floats | None:
     source = block.columns.get(name) or by_name.get(name) or by_name.get(stem)
     if source is None:
         return None
+    if source.lower() == "t" and TIME in table.columns:  # the reader of files calls a column t so
+        source = TIME
     if source not in table.columns:
         near = get_close_matches(source, table.columns, 1, 0.3)
         advice = f"The nearest is {near[0]!r}." if near else f"It has: {', '.join(list(table.columns)[:8])}."

@@ -24,7 +24,8 @@ MAX_POINTS: Final = 4000  # residuals drawn of each leg
 
 
 def quantities(steps: Group) -> list[str]:
-    return [name.removeprefix(MEASURED) for name in steps.variables if name.startswith(MEASURED)]
+    """Return the measured quantities: period, length, angle."""
+    return sorted((name.removeprefix(MEASURED) for name in steps.variables if name.startswith(MEASURED)), reverse=True)
 
 
 def named(quantity: str) -> str:

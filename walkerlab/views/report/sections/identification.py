@@ -48,7 +48,7 @@ def findings(summary: Mapping[str, Any]) -> list[str]:
     verdict = next(row for row in summary["models"] if row["model"] == summary["model"])
     other = next((row for row in summary["models"] if row["model"] != summary["model"]), None)
     known = [row for row in summary["estimates"] if row["standard_error"] is not None]
-    masses = [mass_in_words(key, number(value)) for key, value in summary["kept_masses_kg"].items()]
+    masses = [mass_in_words(key, number(value)) for key, value in summary["reference_masses_kg"].items()]
     determined = capitalised("; ".join(estimate_in_words(row) for row in known))
     weighed = any(row["key"].endswith("mass_kg") for row in known)
     separable = any(" and " in row["combination"] for row in summary["not_identifiable"])
