@@ -30,6 +30,7 @@ LAYERS = (
     "pipeline.store",
     "exchange",
     "scene",
+    "physics.estimation",
     "physics.orbits",
     "physics.hybrid",
     "physics.ground",

@@ -25,6 +25,7 @@ __all__ = [
     "find_gait",
     "kneed",
     "open_run",
+    "read_walk",
     "robustness",
     "run",
     "simulate",

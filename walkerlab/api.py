@@ -421,6 +421,30 @@ def design(walker: Any = None, over: Mapping[str, Any] | None = None, **keys: An
     return in_memory("design", config_of_scene(walker, _stage_block("design", keys, over=over or {}), keys))
 
 
+def read_walk(
+    path: str | Path,
+    columns: Mapping[str, str] | None = None,
+    units: Mapping[str, str] | None = None,
+    walker: Any = None,
+    slope_deg: float | None = None,
+    **keys: Any,
+) -> Result:
+    """Read a walk recorded elsewhere, in memory: its steps in `summary`, steps and samples in `dataset`.
+
+    path       CSV, table or results (.res) of ADAMS, OpenSim (.mot, .sto), markers (.trc, .c3d), or a stored walk (.h5)
+    columns    columns by quantity where their names do not say it, such as {"angle 1": "hip_r"}
+    units      units by kind, quantity or column where the file does not state them, such as {"angle": "deg"}
+    walker     whose walk it is, from `compass`, `kneed` or `walker`
+    slope_deg  positive downhill, deg
+    keys       other keys of a config
+
+    Raises ConfigError for a file without a walk.
+    """
+    recording = {"file": str(path), "columns": dict(columns or {}), "units": dict(units or {})}
+    values = {"slope_deg": slope_deg, "recording": recording}
+    return in_memory("recorded-walk", config_of_scene(walker, values, keys))
+
+
 def export_model(
     path: str | Path,
     walker: Any = None,

@@ -39,7 +39,7 @@ def test_the_walker_walks_in_plain_mujoco_and_as_an_environment(folder, monkeypa
     pytest.importorskip("mujoco")
     pytest.importorskip("gymnasium")
     monkeypatch.chdir(folder)
-    stepping, environment, writing = python_blocks()
+    stepping, _, environment, writing = python_blocks()
     names = {}
     exec(stepping, names)
     assert names["data"].qpos[0] > 3.0

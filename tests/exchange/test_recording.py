@@ -199,7 +199,7 @@ def test_options_are_pairs():
     for wrong in ("a", "=b", "a="):
         with pytest.raises(ConfigError, match="not of the form"):
             parse_pairs("--columns", [wrong])
-    with pytest.raises(ConfigError, match="no unit that is known"):
+    with pytest.raises(ConfigError, match="not a known unit"):
         parse_units(["furlong"])
 
 

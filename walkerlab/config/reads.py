@@ -161,6 +161,13 @@ class CompareConfig(ContactConfig, Protocol):
     def ground(self) -> Footholds: ...
 
 
+class RecordedWalkConfig(RigidConfig, Protocol):
+    """Keys that `recorded-walk` reads."""
+
+    @property
+    def recording(self) -> Recording | None: ...
+
+
 class TuneConfig(GroundConfig, Protocol):
     """Keys that `tune` reads."""
 

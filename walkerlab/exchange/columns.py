@@ -221,7 +221,7 @@ def parse_pairs(option: str, texts: Sequence[str]) -> dict[str, str]:
     pairs = [pair for text in texts for pair in text.split(",") if pair.strip()]
     for pair in pairs:
         if "=" not in pair or not all(side.strip() for side in pair.split("=", 1)):
-            raise ConfigError(f"{option}: {pair!r} is not of the form name=name.", f'Write {option} "a=b,c=d".')
+            raise ConfigError(f"{pair!r} is not of the form NAME=NAME.", f'Write {option} "a=b,c=d".')
     return {key.strip(): value.strip() for key, value in (pair.split("=", 1) for pair in pairs)}
 
 
@@ -236,5 +236,5 @@ def parse_units(texts: Sequence[str]) -> dict[str, str]:
             alone[kinds[0]] = part
         else:
             known = ", ".join(unit for units in UNITS.values() for unit in units)
-            raise ConfigError(f"--units: {part!r} is no unit that is known.", f"Known are {known}.")
+            raise ConfigError(f"{part!r} is not a known unit.", f"Units are {known}.")
     return alone | parse_pairs("--units", pairs)

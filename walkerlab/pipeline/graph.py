@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from walkerlab.config.schema import Config
 
 Inputs = Callable[["Config"], tuple[str, ...]]
+WALKED = ("fixedpoint", "simulate", "contact-sim")
 Lacks = Callable[["Config"], tuple[dict[str, str], ...]]
 
 
@@ -48,6 +49,11 @@ def gait_for_start_or_pads(config: SceneConfig) -> tuple[str, ...]:
     """Need the fixed point if it gives the start state or the pads' pitch."""
     pitch_of_gait = config.contact is not None and config.contact.pad_pitch == "rigid"
     return ("fixedpoint",) if pitch_of_gait else gait_unless_start_is_given(config)
+
+
+def walks_and(*names: str) -> Inputs:
+    """Return a function that gives the walks, a recorded one if the config names it, and these names."""
+    return lambda config: (*WALKED, *(() if config.recording is None else ("recorded-walk",)), *names)
 
 
 def known_problems_and_start(config: SceneConfig) -> tuple[str, ...]:
@@ -144,6 +150,11 @@ class Stage:
 
     def refuse_unsuited(self, target: str, config: Config) -> None:
         """Raise ConfigError if it cannot run under a config, although `target` needs it."""
+        if "recording" in self.requires and config.recording is None:
+            raise ConfigError(
+                f"{target} needs a recorded walk, and {without_block('recording')}.",
+                "Name its file: walkerlab compare --with FILE.",
+            )
         # Imported here: the help of the command line needs neither.
         from walkerlab.config.walkers import contact_required_error, contact_to_add
 
@@ -215,11 +226,15 @@ class Graph:
 
 
 MODEL_HELP = "Model whose gaits to study."
-WALKED = ("fixedpoint", "simulate", "contact-sim")
 PIPELINE = Graph(
     Stage(
         "fixedpoint", "walkerlab.pipeline.stages.fixedpoint",
         "Find the periodic gait of the rigid model and its multipliers.", reads.FixedPointConfig,
+    ),
+    Stage(
+        "recorded-walk", "walkerlab.pipeline.stages.recorded_walk",
+        "Read a walk recorded elsewhere and find its steps.", reads.RecordedWalkConfig, requires=("recording",),
+        files=later("walkerlab.pipeline.stages.recorded_walk", "digests"),
     ),
     Stage(
         "simulate", "walkerlab.pipeline.stages.simulate", "Walk the rigid model.", reads.SimulateConfig,
@@ -240,7 +255,12 @@ PIPELINE = Graph(
     Stage(
         "compare", "walkerlab.evidence.paper.compare",
         "Compare both models with each other and with every number of the paper.", reads.CompareConfig,
-        results_of(*WALKED), requires=("contact",),
+        walks_and(), requires=("contact",),
+        options=(
+            Option("--with", "recording.file", "FILE", "Also compare a walk from a file, such as CSV."),
+            Option("--columns", "recording.columns", "QUANTITY=COLUMN,...", "Its columns.", needs=("--with",)),
+            Option("--units", "recording.units", "KIND=UNIT,...", "Units that it does not state.", needs=("--with",)),
+        ),
     ),
     Stage(
         "accuracy", "walkerlab.evidence.benchmarks.accuracy", "Measure error against run time, method by method.",
@@ -327,7 +347,7 @@ PIPELINE = Graph(
     ),
     Stage(
         "report", "walkerlab.views.report.stage", "Write the report, one HTML file.", None,
-        results_of(*WALKED, "tune", "compare", "accuracy", "stability", "plot"), options=(STRIDES,), work="draws",
+        walks_and("tune", "compare", "accuracy", "stability", "plot"), options=(STRIDES,), work="draws",
         early_with=WALKED,
         if_current=("engines", "stability-maps", "continuation", "basin", "robustness", "identify"),
     ),

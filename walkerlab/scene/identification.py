@@ -19,10 +19,10 @@ from walkerlab.physics.estimation.measurements import MeasuredAngles, MeasuredSt
 from walkerlab.physics.estimation.mixed_model import evaluate, products_of
 from walkerlab.physics.estimation.prediction import Forecast, felt_directions
 from walkerlab.physics.estimation.result import Estimate, Identification, ModelFit, StepTable, Uncertain
-from walkerlab.physics.orbits.family_search import CONTACT, RIGID
+from walkerlab.physics.orbits.family_search import RIGID
 from walkerlab.physics.orbits.newton import Effort
 from walkerlab.physics.orbits.rigid_map import RigidMap
-from walkerlab.physics.orbits.robustness import CENTRAL_4TH
+from walkerlab.physics.orbits.robustness import derivative
 from walkerlab.physics.orbits.step_map import Cycle, StepMap, gait_near
 from walkerlab.physics.solvers.system import Floats
 from walkerlab.scene.families import CONTACT_STEP
@@ -39,12 +39,13 @@ CONFIGS_AT_ONCE: Final = 512
 SCALE_OF_ZERO: Final = 0.01  # typical change of a parameter that is 0
 SPREAD_OF_STARTS: Final = 0.1  # of a parameter, between starts of the fit
 GAIT_EFFORT: Final = Effort(1e-9, 40)
+GAIT_NAMES: Final = ("period_s", "step_length_m", "spectral_radius")
 GAIT_STEP: Final = 1e-3  # of a parameter's scale, in derivatives of the gait
 
 
 @dataclass(frozen=True)
 class Question:
-    """What is to be fitted.
+    """Question to a measured walk.
 
     fit        bounds of each fitted key, in its unit; None for the schema's
     prior      value and standard deviation of keys, known beforehand
@@ -186,9 +187,7 @@ def starts_of(problem: FitProblem, count: int) -> list[Floats]:
     return starts
 
 
-def describe(
-    subject: ModelUnderTest, problem: FitProblem, question: Question, fitted: Fitted
-) -> Identification:
+def describe(subject: ModelUnderTest, problem: FitProblem, question: Question, fitted: Fitted) -> Identification:
     """Turn a fit into its answer."""
     forecast, keys = problem.forecast, question.keys
     sizes = typical_sizes(forecast)
@@ -215,26 +214,27 @@ def describe(
         estimates,
         combinations,
         information,
-        process_noise(fitted, problem),
+        process_noise(fitted),
         dict(zip(forecast.quantities, fitted.noise.measurement.tolist(), strict=True)),
         forecast.steps.count,
         rms_residuals(forecast, fitted),
         fitted.evaluation.squares / dof,
-        gait_with_errors(subject, problem, fitted, information.covariance),
+        gait_with_errors(problem, fitted, information.covariance),
         (ModelFit(subject.model, fitted.evaluation.likelihood, fit_word, reason),),
         step_tables(forecast, fitted),
         fitted,
     )
 
 
-def process_noise(fitted: Fitted, problem: FitProblem) -> dict[str, float | bool | None]:
+def process_noise(fitted: Fitted) -> dict[str, float | bool | None]:
     """Return the roughness with its standard error, from the curvature of the restricted likelihood."""
     roughness = fitted.noise.roughness_m
     if roughness == 0.0:
         return {"roughness_m": 0.0, "standard_error": None, "at_bound": True}
     products, h = products_of(fitted.data), 1e-2
     logs = [
-        evaluate(products, fitted.noise._replace(roughness_m=roughness * math.exp(k * h))).restricted for k in (-1, 0, 1)
+        evaluate(products, fitted.noise._replace(roughness_m=roughness * math.exp(k * h))).restricted
+        for k in (-1, 0, 1)
     ]
     curvature = (2.0 * logs[1] - logs[0] - logs[2]) / h**2
     error = roughness / math.sqrt(curvature) if curvature > 0.0 else None
@@ -262,9 +262,7 @@ def step_tables(forecast: Forecast, fitted: Fitted) -> tuple[StepTable, ...]:
     )
 
 
-def gait_with_errors(
-    subject: ModelUnderTest, problem: FitProblem, fitted: Fitted, covariance: Floats
-) -> dict[str, Uncertain]:
+def gait_with_errors(problem: FitProblem, fitted: Fitted, covariance: Floats) -> dict[str, Uncertain]:
     """Return period, length and spectral radius of the identified gait, with errors that follow from the estimates'.
 
     Empty if the identified walker has no gait of one step near the start's.
@@ -276,7 +274,7 @@ def gait_with_errors(
         parameters = tuple(p.tolist())
         if not forecast.admits(parameters):
             return None
-        gait = gait_near(forecast.walks, subject.z, parameters, GAIT_EFFORT)  # type: ignore[arg-type]
+        gait = gait_near(forecast.walks, fitted.z, parameters, GAIT_EFFORT)  # type: ignore[arg-type]
         if not isinstance(gait, Cycle):
             return None
         return np.array((gait.period_s, gait.step.length_m, float(np.abs(gait.multipliers).max())))
@@ -284,15 +282,12 @@ def gait_with_errors(
     centre = quantities(values)
     if centre is None:
         return {}
-    gradient = []
+    slopes = np.zeros((values.size, len(GAIT_NAMES)))
     for place, scale in enumerate(forecast.scales):
-        ends = [quantities(values + offset * GAIT_STEP * scale * np.eye(values.size)[place]) for offset, _ in CENTRAL_4TH]
-        usable = [end for end in ends if end is not None]
-        if len(usable) < len(ends):
-            gradient.append(np.zeros(3))
-            continue
-        gradient.append(np.tensordot([weight / (GAIT_STEP * scale) for _, weight in CENTRAL_4TH], usable, 1))
-    slopes = np.array(gradient)
+        along = scale * np.eye(values.size)[place]
+        slope = derivative(lambda share, along=along: quantities(values + share * along), GAIT_STEP)  # type: ignore[misc]
+        if slope is None:
+            return {name: Uncertain(float(v), None) for name, v in zip(GAIT_NAMES, centre, strict=True)}
+        slopes[place] = slope / scale
     errors = np.sqrt(np.maximum(np.einsum("iq,ij,jq->q", slopes, covariance, slopes), 0.0))
-    names = ("period_s", "step_length_m", "spectral_radius")
-    return {name: Uncertain(float(v), float(e)) for name, v, e in zip(names, centre, errors, strict=True)}
+    return {name: Uncertain(float(v), float(e)) for name, v, e in zip(GAIT_NAMES, centre, errors, strict=True)}

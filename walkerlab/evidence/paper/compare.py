@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -12,12 +11,19 @@ from walkerlab.config.reads import CompareConfig
 from walkerlab.config.schema import Equations
 from walkerlab.evidence.paper.compared_releases import LOCK_OMISSION, compare_releases
 from walkerlab.evidence.paper.departures import departures
+from walkerlab.evidence.paper.differences import (
+    STEPS_PER_STRIDE,
+    Comparison,
+    compare_motion,
+    motion_of,
+    stored_variable,
+    times_of_steps,
+)
 from walkerlab.evidence.paper.errata import Erratum, errata
 from walkerlab.evidence.paper.law import is_own_walker
 from walkerlab.evidence.paper.measured import (
     PAPER_CYCLES,
     ContactMeasurements,
-    Errors,
     Measured,
     RigidMeasurements,
     characteristics,
@@ -25,28 +31,25 @@ from walkerlab.evidence.paper.measured import (
     over_last_steps,
 )
 from walkerlab.evidence.paper.printed import fixed_point_as_printed
+from walkerlab.evidence.paper.recorded import compare_recorded
 from walkerlab.evidence.paper.rows import NumberVerdict, count_verdicts, paper_rows, table_1, table_2, table_3
 from walkerlab.evidence.paper.study import study_the_paper
 from walkerlab.evidence.paper.walker import compass
 from walkerlab.labels import labels_of
-from walkerlab.physics.hybrid import comparison
 from walkerlab.physics.hybrid.recorded_walk import as_state
 from walkerlab.pipeline.progress import Progress
-from walkerlab.pipeline.stages.walk import LEG, STEP, TIME, last_step, legs, over_time
+from walkerlab.pipeline.stages.walk import last_step
 from walkerlab.pipeline.store.columns import numbered, rows_group
 from walkerlab.pipeline.store.content import Content, Group, Variable
 from walkerlab.scene.contact import GAIT_TOLERANCES, contact_scene, require_contact, start_state
 
-STEPS_PER_STRIDE = 2  # steps
 START_TOLERANCE = 1e-6  # rad and rad/s: a start this far from the fixed point is another one
 EQUATION_SETS: tuple[Equations, ...] = ("as-printed", "corrected")
 PAPER_OMISSION = {
     "what": "the paper's numbers, tables and errata",
     "why": "they apply only to the paper's walker on even ground",
 }
-ALIGNMENTS = ("raw", "aligned", "between_impacts", "settled")
-QUANTITY_KEYS: dict[str, comparison.Quantity] = {"max_angle_error_rad": "angle", "max_velocity_error_rad_s": "velocity"}
-PHASE, ROW = "phase", "row"
+ROW = "row"
 MODEL_NAMES = {
     "as_printed": "rigid model, equations as printed",
     "corrected": "rigid model, corrected equations",
@@ -88,8 +91,13 @@ def run(config: CompareConfig, inputs: Mapping[str, Content], progress: Progress
     else:
         groups, summary = {}, models_compared(config, inputs)
     progress.advance()
+    recorded_groups, recorded = compare_recorded(inputs)
+    for symbol, row in summary.get("table3", {}).items() if recorded else ():
+        row["recorded"] = recorded["recorded"]["table3"]["recorded"][symbol]
     left_out = [*summary.pop("left_out"), *motion.left_out]
-    return Content({**groups, **motion.groups}, {**summary, **shared, "left_out": left_out})
+    return Content(
+        {**groups, **motion.groups, **recorded_groups}, {**summary, **shared, **recorded, "left_out": left_out}
+    )
 
 
 def against_the_paper(
@@ -133,103 +141,6 @@ def models_compared(config: CompareConfig, inputs: Mapping[str, Content]) -> dic
         "departures": list(departures(config, start_moved=False).contact),
         **({} if releases is None else {"releases": releases}),
         "left_out": [PAPER_OMISSION, *(() if releases is None else LOCK_OMISSION)],
-    }
-
-
-def stored_variable(walk: Content, group: str, name: str) -> comparison.Array | None:
-    variables = walk.groups.get(group, Group({}))
-    return variables[name] if name in variables.variables else None
-
-
-def times_of_steps(walk: Content, name: str) -> comparison.Array:
-    """Return the times (s) of a walk's steps, empty unless stored."""
-    times = stored_variable(walk, "steps", name)
-    return np.zeros(0) if times is None else times
-
-
-def motion_of(walk: Content) -> comparison.Motion | None:
-    """Motion of the legs in a stored walk; None if states were not stored or the walk ended at once."""
-    angle = stored_variable(walk, "trajectory", "angle")
-    if angle is None or len(angle) < 2:
-        return None
-    trajectory, strikes = walk["trajectory"], times_of_steps(walk, "knee_strike_time_s")
-    touches = times_of_steps(walk, "touch_time_s")
-    motion = comparison.Motion(trajectory["time"], angle, trajectory["velocity"], touches, strikes[strikes > 0.0])
-    return comparison.add_strike_samples(motion)
-
-
-@dataclass(frozen=True)
-class Comparison:
-    """Difference between the walks of both models.
-
-    errors    by alignment, where there is something to compare
-    orbit     distance between each leg's orbits, or None
-    left_out  comparisons left out, and why
-    """
-
-    errors: Errors
-    orbit: list[float] | None = None
-    groups: Mapping[str, Group] = field(default_factory=dict)
-    left_out: tuple[dict[str, str], ...] = ()
-
-    @property
-    def summary(self) -> dict[str, Any]:
-        """Largest errors of both legs by alignment; None where there is nothing to compare."""
-        errors: dict[str, Any] = {}
-        for name, quantity in QUANTITY_KEYS.items():
-            per_leg = {way: self.errors[way].largest(quantity) if way in self.errors else None for way in ALIGNMENTS}
-            errors[name] = {way: max(both) if both else None for way, both in per_leg.items()} | {"per_leg": per_leg}
-        orbit = None if self.orbit is None else max(self.orbit)
-        return {**errors, "orbit_distance": orbit, "orbit_distance_per_leg": self.orbit}
-
-
-def compare_motion(rigid: comparison.Motion | None, contact: comparison.Motion | None) -> Comparison:
-    """Subtract the rigid walk from the contact walk: in time, in phase, and as orbits."""
-    if rigid is None or contact is None:
-        why = "there are no states of both walks: outputs omits them, or a walk ended at once"
-        return Comparison({}, left_out=({"what": "differences of the walks", "why": why},))
-    steps, orbit = min(rigid.steps, contact.steps), None
-    time, raw = comparison.difference_in_time(contact, rigid)
-    errors = {"raw": raw}
-    groups = {"errors": Group({**over_time(time=time), **legs(), **differences("raw", raw, (TIME, LEG), "time")})}
-    missing = ("differences in phase and between the orbits", "step")
-    if steps:
-        missing = ("differences of the last stride and between the orbits", "stride")
-        phases = np.linspace(0.0, 1.0, comparison.PHASES)
-        aligned = comparison.difference_in_phase(contact, rigid, phases)
-        smooth = comparison.between_impacts(contact, rigid, phases)
-        errors |= {"aligned": aligned, "between_impacts": select(aligned, smooth)}
-        coordinates = {
-            **numbered(len(aligned.angle), STEP, "step number"),
-            PHASE: Variable(phases, (PHASE,), "1", "time within the step over the step's period"),
-            **legs(),
-        }
-        in_phase = differences("aligned", aligned, (STEP, PHASE, LEG), "phase")
-        groups["aligned"] = Group({**coordinates, **in_phase}, {"impact_phase": comparison.IMPACT_PHASE})
-        if steps >= STEPS_PER_STRIDE:
-            last = slice(-STEPS_PER_STRIDE, None)
-            errors["settled"] = select(select(aligned, last), smooth[last])
-            distances = comparison.orbit_distances(contact, rigid)
-            text = "Hausdorff distance of the last stride's orbits, angle and velocity in units of the rigid orbit's "
-            groups["orbit"] = Group({**legs(), "orbit_distance": Variable(distances, (LEG,), "1", f"{text}ranges")})
-            orbit = distances.tolist()
-    what, needed = missing
-    lacking = {"what": what, "why": f"no {needed} was completed by both models"}
-    return Comparison(errors, orbit, groups, () if steps >= STEPS_PER_STRIDE else (lacking,))
-
-
-def select(difference: comparison.WalkDifference, where: Any) -> comparison.WalkDifference:
-    return comparison.WalkDifference(difference.angle[where], difference.velocity[where])
-
-
-def differences(
-    way: str, difference: comparison.WalkDifference, dims: tuple[str, ...], alignment: str
-) -> dict[str, Variable]:
-    """Differences at the same time or phase, as variables."""
-    meaning = f"contact less rigid model, at the same {alignment}"
-    return {
-        f"{way}_angle_error_rad": Variable(difference.angle, dims, "rad", f"angle, {meaning}"),
-        f"{way}_velocity_error_rad_s": Variable(difference.velocity, dims, "rad/s", f"velocity, {meaning}"),
     }
 
 

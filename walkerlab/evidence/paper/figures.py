@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from walkerlab.evidence.paper.printed import LARGEST_ERROR
 from walkerlab.views.figures.canvas import add_legend, blank, cost_axis, entry, error_axis, label_of, power_of_ten
 from walkerlab.views.figures.illustration import Drawn, Need, Results, paper_figure
-from walkerlab.views.figures.style import BLACK, BLUE, GREY, ORANGE, RIGID, VERMILLION, Look
+from walkerlab.views.figures.style import BLACK, BLUE, GREY, ORANGE, RECORDED, RIGID, VERMILLION, Look
 from walkerlab.views.figures.walks import (
     COMPARE_STAGE,
     NO_STATES,
@@ -53,6 +54,11 @@ def draw_differences(results: Results) -> Drawn:
     (rigid,), _ = first_strides([walk_of(results[RIGID_STAGE], RIGID)])
     raw, aligned = (results[COMPARE_STAGE][need.group] for need in (RAW_ERRORS, ALIGNED_ERRORS))
     claimed, early = bool(claims_in(results)), raw["time"] <= rigid.time[-1]
+    recorded = results[COMPARE_STAGE].groups.get("recorded/rigid/aligned")
+    recorded_look = RECORDED
+    if recorded is not None:
+        name_of_walk = results[COMPARE_STAGE].summary["recorded"]["name"]
+        recorded_look = replace(RECORDED, label=f"{name_of_walk}, at the same phase")
     figure, axes = time_axes(4, 1.55, [rigid])
     rows = [(*quantity, leg) for quantity in LEG_QUANTITIES for leg in (0, 1)]
     for panel, (letter, words, name, leg) in zip(axes, rows, strict=True):
@@ -70,7 +76,11 @@ def draw_differences(results: Results) -> Drawn:
         panel.yaxis.set_major_formatter(power_of_ten)
         panel.set(ylim=(bottom, top), ylabel=label_of("error", raw.variables[f"raw_{name}"].units))
         panel.set_title(f"({letter}{leg + 1}) {words} of leg {leg + 1}")
-    looks = [TIME_LOOK, PHASE_LOOK, *([PAPER_ERROR] if claimed else [])]
+        if recorded is not None:
+            error = np.abs(recorded[f"aligned_{name}"][: rigid.strikes.size, :, leg])
+            for begin, end, values in zip((0.0, *rigid.strikes), rigid.strikes, error, strict=False):
+                line(panel, begin + (end - begin) * recorded["phase"], values, recorded_look)
+    looks = [TIME_LOOK, PHASE_LOOK, *([PAPER_ERROR] if claimed else []), *([] if recorded is None else [recorded_look])]
     add_legend(figure, [*(entry(look.label, **look.line) for look in looks), strike_entry(rigid.look)])
     caption_values = []
     for _, words, name in LEG_QUANTITIES:

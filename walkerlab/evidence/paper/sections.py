@@ -179,10 +179,64 @@ def fates(results: Results, rows: Sequence[Row]) -> Iterator[PageBlock]:
         yield Statements(tuple(statements), "columns")
 
 
+QUANTITIES_OF_TABLE_3 = {"t_left": "s", "t_right": "s", "t_cycle": "s", "v_com": "m/s", "E_avg": "J"}
+DIFFERENCE_COLUMNS = (
+    Column("largest difference", "quantity"),
+    Column("from the rigid model", "rigid", number, numeric=True),
+    Column("from the contact model", "contact", number, numeric=True),
+)
+
+
+def recorded(results: Results) -> Section | None:
+    """Compare the recorded walk with both models; None without one."""
+    stored = results.summary("compare").get("recorded")
+    if stored is None:
+        return None
+    return Section(
+        "recorded", f"The recorded walk {stored['name']}", tuple(recorded_tables(stored)), recorded_words(stored)
+    )
+
+
+def recorded_words(stored: Row) -> str:
+    period, length = (stored["steps"]["recorded"][key] for key in ("period_s", "length_m"))
+    return f"{stored['name']}: the last step takes {number(period, 5)} s and is {number(length, 5)} m long."
+
+
+def recorded_tables(stored: Row) -> Iterator[Table]:
+    """Yield the quantities of Table 3 with the recorded walk as a column, and its differences from both models."""
+    models = {"rigid": "rigid model", "contact": "contact model", "recorded": str(stored["name"])}
+    columns = [Column("quantity", "row"), *(Column(head, key, number, numeric=True) for key, head in models.items())]
+    names = words.terms("paper.quantities")
+    rows = [
+        {"row": name_with_unit(names.get(key, key), unit), **{model: stored["table3"][model][key] for model in models}}
+        for key, unit in QUANTITIES_OF_TABLE_3.items()
+        if stored["table3"]["recorded"][key] is not None
+    ]
+    yield table(f"Quantities of Table 3 with {stored['name']}", columns, rows)
+    keys = {"max_angle_error_rad": ("angle", "rad"), "max_velocity_error_rad_s": ("angular velocity", "rad/s")}
+    ways = {"raw": "at the same time", "aligned": "at the same phase"}
+    yield table(
+        f"Differences of {stored['name']} from both models",
+        DIFFERENCE_COLUMNS,
+        [
+            {
+                "quantity": name_with_unit(f"{name} {words_of_way}", unit),
+                **{model: each[key][way] for model, each in stored["differences"].items()},
+            }
+            for key, (name, unit) in keys.items()
+            for way, words_of_way in ways.items()
+        ],
+    )
+
+
 def answer(summary: Row) -> list[str | Table]:
     """Report the verdicts on the paper's values or, for another walker, how the models differ."""
     errors = summary.get("numerical_error", {})
-    error_lines = [f"numerical error of the {model} walk: {describe_error(error)}." for model, error in errors.items()]
+    error_lines: list[str | Table] = [
+        f"numerical error of the {model} walk: {describe_error(error)}." for model, error in errors.items()
+    ]
+    if "recorded" in summary:
+        error_lines += ["", recorded_words(summary["recorded"]), *recorded_tables(summary["recorded"])]
     if "verdicts" in summary:
         head = words("paper.finding", by_verdict(row["verdict"] for row in summary["paper_numbers"]))
         return [head, numbers_table(summary["paper_numbers"]), *error_lines]

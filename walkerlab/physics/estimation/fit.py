@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Final, Literal
 
 import numpy as np
 
-from walkerlab.physics.estimation.measurements import PERIOD
 from walkerlab.physics.estimation.mixed_model import (
     Evaluation,
     Linearised,
@@ -23,10 +22,13 @@ from walkerlab.physics.solvers.system import Floats
 
 Loss = Literal["linear", "soft_l1"]
 MAX_ROUNDS: Final = 12
-SETTLED: Final = 1e-2  # change of a standard deviation, relative, and of an unknown, in standard errors
+SETTLED: Final = 1e-2  # relative change of a standard deviation
+SETTLED_MOVE: Final = 0.1  # change of an unknown, in standard errors
 FIRST_NOISE: Final = 0.02  # of a quantity's typical size, before any fit
 NOISE_FLOOR: Final = 1e-6  # of a quantity's typical size: noise-free measurements are taken to have this noise
 NO_WALK: Final = 1e3  # whitened residual of unknowns that make no walk
+NO_NEIGHBOURS: Final = "the walk from the start, or one beside it, ends before the measured steps are over"
+HEIGHT_SHARES: Final = (1.0, 0.5, 0.0)
 EVALUATIONS: Final = 12  # in a round
 WEAK_PRIOR: Final = 3.0  # standard deviation of every unknown about its start, in its scale: what is open stays there
 
@@ -76,6 +78,7 @@ class Fitted:
     evaluation: Evaluation
     data: Linearised
     predicted: Floats  # (values,) over even ground, with the most probable start
+    z: Floats  # (d,) end of that walk, on the section
     rounds: int
     why: str = ""
 
@@ -86,37 +89,51 @@ def fit(problem: FitProblem, start: Floats) -> Fitted | str:
     Rounds alternate between the unknowns, by least squares on whitened residuals, and the standard deviations.
     """
     forecast, u = problem.forecast, start.copy()
-    y, size = forecast.values, typical_sizes(forecast)
-    floors = NOISE_FLOOR * size
-    noise = Noise(FIRST_NOISE * size, 0.0)
-    heights = np.zeros(forecast.heights)
-    why = "standard deviations still change"
+    size, even = typical_sizes(forecast), np.zeros(forecast.heights)
+    noise, heights, why = Noise(FIRST_NOISE * size, 0.0), even, "standard deviations still change"
+    over = responses(problem, u, heights)
+    if over is None:
+        return NO_NEIGHBOURS
     for round_number in range(1, MAX_ROUNDS + 1):
-        G = forecast.respond(u, heights, problem.leg_length_m)
-        if G is None:
-            return NO_NEIGHBOURS if round_number == 1 else "neighbouring walks end early"
-        before, u = u, least_squares_fit(problem, u, start, heights, G, noise)
-        data = linearise(problem, u, heights, G, exact=False)
+        before, u = u, least_squares_fit(problem, u, start, *over, noise)
+        data = linearise(problem, u, *over)
+        if data is None or responses(problem, u, even) is None:
+            # The data pull the walker out of its basin: the last walk that went on is judged.
+            u, why = before, NO_NEIGHBOURS
+            data = linearise(problem, u, *over)
         if data is None:
             return NO_NEIGHBOURS
         products, earlier = products_of(data), noise
-        noise = estimate_noise(products, floors, problem.leg_length_m, noise, anew=round_number == 1)
+        noise = estimate_noise(products, NOISE_FLOOR * size, problem.leg_length_m, noise, anew=round_number == 1)
         evaluation = evaluate(products, noise)
-        heights = evaluation.heights_m
+        over = responses(problem, u, evaluation.heights_m)
+        if over is None:
+            return NO_NEIGHBOURS
+        if why == NO_NEIGHBOURS:
+            break
         errors = np.sqrt(np.maximum(np.diag(np.linalg.pinv(evaluation.information, hermitian=True)), 1e-300))
         moved = float(np.max(np.abs(u - before) / errors))
-        if settled(earlier, noise, problem.leg_length_m) and moved < SETTLED * 10.0:
+        if settled(earlier, noise, problem.leg_length_m) and moved < SETTLED_MOVE:
             why = ""
             break
-    G = forecast.respond(u, heights, problem.leg_length_m)
-    final = None if G is None else linearise(problem, u, heights, G, exact=True)
-    predicted = forecast.predict(u, np.zeros(forecast.heights))
-    if final is None or predicted is None:
+    data = linearise(problem, u, *over, exact=True) or linearise(problem, u, *over)
+    predicted = forecast.predict(u, even)
+    if data is None or predicted is None:
         return NO_NEIGHBOURS
-    return Fitted(u, heights, noise, evaluate(products_of(final), noise), final, predicted, round_number, why)
+    z = forecast.walks.disturbed(forecast.start(u), forecast.parameters(u), even).z
+    return Fitted(u, over[0], noise, evaluate(products_of(data), noise), data, predicted, z, round_number, why)
 
 
-NO_NEIGHBOURS: Final = "the walk from the start, or one beside it, ends before the measured steps are over"
+def responses(problem: FitProblem, u: Floats, heights: Floats) -> tuple[Floats, Floats] | None:
+    """Return heights to linearise about, with responses to them; None if even the walk over even ground ends early.
+
+    Lower heights serve where the walk over the most probable ones ends early.
+    """
+    for share in HEIGHT_SHARES:
+        G = problem.forecast.respond(u, share * heights, problem.leg_length_m)
+        if G is not None:
+            return share * heights, G
+    return None
 
 
 def settled(before: Noise, after: Noise, leg_length_m: float) -> bool:
@@ -131,13 +148,13 @@ def typical_sizes(forecast: Forecast) -> Floats:
     return np.array([np.sqrt(np.mean(values[quantity == q] ** 2)) for q in range(len(forecast.quantities))])
 
 
-def linearise(problem: FitProblem, u: Floats, heights: Floats, G: Floats, exact: bool) -> Linearised | None:
+def linearise(problem: FitProblem, u: Floats, heights: Floats, G: Floats, exact: bool = False) -> Linearised | None:
     forecast = problem.forecast
     values, J = forecast.predict(u, heights), forecast.differentiate(u, heights, exact)
     if values is None or J is None:
         return None
     residuals = forecast.values - values + G @ heights
-    return Linearised(residuals, J, G, forecast.quantity, problem.prior_rows(u))
+    return Linearised(residuals, J, G, forecast.quantity, problem.prior_rows(u), typical_sizes(forecast))
 
 
 def least_squares_fit(

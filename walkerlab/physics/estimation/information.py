@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from walkerlab.physics.estimation.fit import Fitted
-from walkerlab.physics.estimation.mixed_model import evaluate, products_of
+from walkerlab.physics.estimation.mixed_model import Noise, Products, evaluate, products_of
 from walkerlab.physics.estimation.result import Information, Unidentifiable
 from walkerlab.physics.solvers.system import Floats
 
 OPEN: Final = 1.0
 """Singular value below which a combination is open: a change by its whole scale stays within the data's noise."""
 ROUNDING: Final = 1e-7  # share of the largest singular value, below which a combination has no effect at all
+NOISE_DRAWS: Final = 200
+LOG_STEP: Final = 0.05
+FARTHEST: Final = (3.0, 1.5)  # below and above the likeliest, of logarithms of standard deviations
 LOADED: Final = 0.1  # share of a parameter in an open direction, from which the parameter itself is open
 
 
@@ -24,9 +29,8 @@ def information_on(fitted: Fitted, keys: tuple[str, ...], scales: Floats, quanti
     values, vectors = np.linalg.eigh(reduced)
     order = np.argsort(values)[::-1]
     singular, directions = np.sqrt(np.maximum(values[order], 0.0)), vectors[:, order].T
-    kept = ~is_open(singular)
-    basis = directions[kept]
-    covariance = basis.T @ (basis / singular[kept, None] ** 2) if kept.any() else np.zeros((count, count))
+    basis = directions[~is_open(singular)]
+    covariance = basis.T @ averaged_covariance(fitted, basis) @ basis
     errors = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
     values_count = fitted.data.residuals.size + len(fitted.data.prior)
     return Information(
@@ -40,13 +44,50 @@ def information_on(fitted: Fitted, keys: tuple[str, ...], scales: Floats, quanti
     )
 
 
+def averaged_covariance(fitted: Fitted, basis: Floats) -> Floats:
+    """Average the covariance on directions `basis` (directions, parameters) over plausible standard deviations.
+
+    A short walk determines the standard deviations of floor and measurement poorly; errors at the likeliest ones alone
+    would be too small. Weights are the restricted likelihood with a flat prior on each standard deviation.
+    """
+    products, noise = products_of(fitted.data), fitted.noise
+    count = basis.shape[1]
+    centre = np.log(np.append(noise.measurement, noise.roughness_m or 1.0))
+
+    def noise_at(logs: Floats) -> Noise:
+        return Noise(np.exp(logs[:-1]), float(np.exp(logs[-1])) if noise.roughness_m else 0.0)
+
+    draws = np.random.default_rng(0).uniform(-1.0, 1.0, (NOISE_DRAWS, centre.size))
+    logs = centre + np.where(draws < 0.0, *(draws * reach for reach in noise_reach(products, noise_at, centre)))
+    likelihoods, covariances = np.zeros(NOISE_DRAWS), np.zeros((NOISE_DRAWS, len(basis), len(basis)))
+    for place, row in enumerate(logs):
+        at_row = evaluate(products, noise_at(row))
+        inverse = np.linalg.pinv(basis @ free_the_rest(at_row.information, count) @ basis.T, hermitian=True)
+        moved = basis @ at_row.move[:count]
+        likelihoods[place] = at_row.restricted + row.sum()
+        covariances[place] = inverse + np.outer(moved, moved)
+    weights = np.exp(likelihoods - likelihoods.max())
+    return np.asarray(np.tensordot(weights / weights.sum(), covariances, 1))
+
+
+def noise_reach(products: Products, noise_at: Callable[[Floats], Noise], centre: Floats) -> tuple[Floats, Floats]:
+    """Return how far below and above `centre` (deviations,) logarithms of standard deviations are plausible."""
+    best = evaluate(products, noise_at(centre)).restricted
+    curvatures = np.zeros(centre.size)
+    for place, unit in enumerate(np.eye(centre.size)):
+        ends = (evaluate(products, noise_at(centre + sign * LOG_STEP * unit)).restricted for sign in (-1.0, 1.0))
+        curvatures[place] = (2.0 * best - sum(ends)) / LOG_STEP**2
+    spread = 3.0 / np.sqrt(np.maximum(curvatures, 1e-6))
+    return np.minimum(spread, FARTHEST[0]), np.minimum(spread, FARTHEST[1])
+
+
 def free_the_rest(information: Floats, count: int) -> Floats:
     """Return the information on the first unknowns while the others are free (Schur complement)."""
     own, cross, rest = information[:count, :count], information[:count, count:], information[count:, count:]
     return np.asarray(own - cross @ np.linalg.pinv(rest, hermitian=True) @ cross.T)
 
 
-def is_open(singular: Floats) -> Floats:
+def is_open(singular: Floats) -> NDArray[np.bool_]:
     return np.asarray((singular < OPEN) | (singular < ROUNDING * singular.max(initial=0.0)))
 
 

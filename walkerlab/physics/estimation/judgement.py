@@ -26,12 +26,12 @@ def judge(forecast: Forecast, fitted: Fitted, sizes: Floats, leg_length_m: float
 
     sizes  (quantities,) typical size of each quantity
     """
-    if fitted.why:
-        return "not-converged", fitted.why
     for quantity, noise, size in zip(forecast.quantities, fitted.noise.measurement, sizes, strict=True):
         if noise > LARGEST_SHARE * size:
             share = 100.0 * noise / size
             return "misfit", f"{quantity} differs from the model by {noise:.3g} on average, {share:.2g} % of its size"
+    if fitted.why:
+        return "not-converged", fitted.why
     if fitted.noise.roughness_m > ROUGHEST * leg_length_m:
         return "misfit", f"only a floor {1e3 * fitted.noise.roughness_m:.3g} mm rough would explain the steps"
     white = whitened_residuals(forecast, fitted)

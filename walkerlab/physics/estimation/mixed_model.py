@@ -18,7 +18,11 @@ from walkerlab.physics.solvers.system import Floats
 ROUGHNESS_STARTS: Final = (1e-5, 1e-3, 1e-2)
 """Shares of the leg length from which the search for the roughness starts."""
 ROUGHNESS_BOUNDS: Final = (1e-8, 0.2)  # shares of the leg length
-LARGEST_NOISE: Final = 1e3  # of the quantity's typical size
+NOISE_RATIO: Final = 1.0
+"""Standard deviation of the logarithm by which relative noises of quantities differ.
+
+Without it a floor can explain one quantity of a short walk exactly, and its noise goes to zero.
+"""
 LOST_INFORMATION: Final = 1e-13  # share of the largest eigenvalue of scaled information, below which it is rounding
 
 
@@ -38,10 +42,11 @@ class Linearised:
     G: Floats  # (values, heights) by the heights, 1/m
     quantity: NDArray[np.int64]  # (values,) index of the quantity of each value
     prior: Floats  # (priors, 1 + unknowns) whitened residuals and derivatives of what is known beforehand
+    sizes: Floats  # (quantities,) typical size of each quantity
 
 
 class Evaluation(NamedTuple):
-    restricted: float  # log-likelihood of the standard deviations
+    restricted: float  # log-likelihood of the standard deviations, with their prior
     likelihood: float  # log-likelihood of the data
     information: Floats  # (unknowns, unknowns)
     move: Floats  # (unknowns,) that remains to the most likely unknowns
@@ -57,6 +62,7 @@ class Products(NamedTuple):
     prior: Floats  # (1 + unknowns, 1 + unknowns)
     priors: int
     unknowns: int
+    sizes: Floats  # (quantities,) typical size of each quantity
 
 
 def products_of(data: Linearised) -> Products:
@@ -65,7 +71,7 @@ def products_of(data: Linearised) -> Products:
     parts = [columns[data.quantity == q] for q in quantities]
     sums = np.array([part.T @ part for part in parts])
     counts = np.array([len(part) for part in parts])
-    return Products(sums, counts, data.prior.T @ data.prior, len(data.prior), data.J.shape[1])
+    return Products(sums, counts, data.prior.T @ data.prior, len(data.prior), data.J.shape[1], data.sizes)
 
 
 def evaluate(products: Products, noise: Noise) -> Evaluation:
@@ -84,15 +90,14 @@ def evaluate(products: Products, noise: Noise) -> Evaluation:
     squares = float(reduced[0, 0] - score @ move)
     log_determinant = float(2.0 * products.counts @ np.log(noise.measurement) + np.linalg.slogdet(K)[1])
     restricted = -0.5 * (log_determinant + squares + float(np.log(values[kept]).sum()))
+    restricted -= 0.5 * float(np.var(np.log(noise.measurement / products.sizes))) / NOISE_RATIO**2
     count = int(products.counts.sum()) + products.priors
     likelihood = -0.5 * (log_determinant + squares + count * math.log(2.0 * math.pi))
     heights = solved[:, 0] - solved[:, 1:] @ move
     return Evaluation(restricted, likelihood, information, move, heights, squares)
 
 
-def estimate_noise(
-    products: Products, floors: Floats, leg_length_m: float, start: Noise, anew: bool = True
-) -> Noise:
+def estimate_noise(products: Products, floors: Floats, leg_length_m: float, start: Noise, anew: bool = True) -> Noise:
     """Maximise the restricted likelihood over the standard deviations; a roughness of 0 is one of the candidates.
 
     floors  (quantities,) smallest standard deviations of the measurement

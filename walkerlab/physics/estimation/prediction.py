@@ -17,9 +17,15 @@ from walkerlab.physics.orbits.step_map import CENTRAL_2ND, DisturbedWalk
 from walkerlab.physics.solvers.system import Floats
 
 CLOCK, OFFSET, GAIN, DELAY = "clock_rate", "angle_offset_rad", "angle_gain", "time_offset_s"
-NUISANCES: Final[Mapping[str, tuple[float, float]]] = {CLOCK: (1.0, 0.1), OFFSET: (0.0, 0.1), GAIN: (1.0, 0.1), DELAY: (0.0, 0.05)}
+NUISANCES: Final[Mapping[str, tuple[float, float]]] = {
+    CLOCK: (1.0, 0.1),
+    OFFSET: (0.0, 0.1),
+    GAIN: (1.0, 0.1),
+    DELAY: (0.0, 0.05),
+}
 """Properties of clock and sensors that may be estimated too: value if they are not, and typical change."""
 FELT: Final = 1e-3  # change of the next step by a change of the start, below which a direction of the start is lost
+START_SCALE: Final = 0.02  # typical change of the start, in coordinates of the section
 QUICK_STEP: Final = 1e-5  # of an unknown's scale, in difference quotients while searching
 EXACT_STEP: Final = 1e-4  # in those of the result
 
@@ -55,7 +61,7 @@ class Forecast:
 
     @property
     def unknowns(self) -> int:
-        return self.scales.size + self.directions.shape[1] + len(self.nuisances)
+        return int(self.scales.size + self.directions.shape[1] + len(self.nuisances))
 
     @property
     def heights(self) -> int:
@@ -88,7 +94,7 @@ class Forecast:
 
     def start(self, u: Floats) -> Floats:
         first = self.scales.size
-        return np.asarray(self.z + self.directions @ u[first : first + self.directions.shape[1]])
+        return np.asarray(self.z + START_SCALE * self.directions @ u[first : first + self.directions.shape[1]])
 
     def predict(self, u: Floats, heights_m: Floats) -> Floats | None:
         """Return the predicted values (values,); None where the walk ends early or the parameters make no walker."""

@@ -93,6 +93,7 @@ class Look:
 
 RIGID: Final = Look("rigid model", BLUE, "-", 1.7, "o", order=3)
 CONTACT: Final = Look("contact model", ORANGE, (0.0, (3.2, 1.4)), 1.5, "^", order=4)
+RECORDED: Final = Look("recorded walk", GREEN, (0.0, (1.0, 1.0)), 1.5, "s", order=5)
 
 LEGS: Final = (
     Look("leg 1 (swings first)", GREEN, "-", 1.0, "o", order=4),

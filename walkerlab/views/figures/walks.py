@@ -18,11 +18,12 @@ from walkerlab.pipeline.headlines import claims
 from walkerlab.pipeline.store.content import Content, Group
 from walkerlab.views.figures.canvas import add_legend, entry, files_of, label_of, panels, styled
 from walkerlab.views.figures.illustration import Drawn, Need, Results, paper_figure
-from walkerlab.views.figures.style import BLUE, CONTACT, GREY, ORANGE, PALE, RIGID, Look
+from walkerlab.views.figures.style import BLUE, CONTACT, GREY, ORANGE, PALE, RECORDED, RIGID, Look
 
 Array = NDArray[np.float64]
 
 RIGID_STAGE, CONTACT_STAGE, COMPARE_STAGE, TUNE_STAGE = "simulate", "contact-sim", "compare", "tune"
+RECORDED_STAGE = "recorded-walk"
 TRAJECTORY, STEPS = "trajectory", "steps"
 STATES = ("time", "angle", "velocity", "stance_leg")
 JOINTS = ("hip_along_m", "hip_height_m", "foot_along_m", "foot_height_m")
@@ -91,13 +92,19 @@ class Walk:
 
 def walks_with(results: Results, names: tuple[str, ...]) -> list[Walk]:
     """Return the walks whose trajectories have the given variables, the rigid model's first."""
-    both = ((RIGID_STAGE, RIGID), (CONTACT_STAGE, CONTACT))
-    there = [(stage, look) for stage, look in both if not Need(stage, TRAJECTORY, names, "").missing_in(results, {})]
+    every = ((RIGID_STAGE, RIGID), (CONTACT_STAGE, CONTACT), (RECORDED_STAGE, RECORDED))
+    there = [(stage, look) for stage, look in every if not Need(stage, TRAJECTORY, names, "").missing_in(results, {})]
     return [walk_of(results[stage], look) for stage, look in there]
+
+
+def recorded_look(result: Content) -> Look:
+    """Return the style of a recorded walk, under its name."""
+    return replace(RECORDED, label=str(result.summary["name"]))
 
 
 def walk_of(result: Content, look: Look) -> Walk:
     times = touch_times(result.groups.get(STEPS, Group({})))
+    look = recorded_look(result) if look is RECORDED else look
     return Walk(look, str(result.summary["outcome"]), times.size, times, result[TRAJECTORY])
 
 

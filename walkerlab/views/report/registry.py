@@ -35,6 +35,7 @@ SECTIONS: tuple[SectionMaker, ...] = (
     motion.section,
     registered("walkerlab.evidence.paper.sections", "paper_section"),
     motion.figures,
+    registered("walkerlab.evidence.paper.sections", "recorded"),
     gaits.section,
     families.section,
     walks.assumptions,

@@ -1,0 +1,108 @@
+"""Identify walkers from synthetic walks and compare errors with the spread of the estimates.
+
+Usage: python scripts/identification_coverage.py [WALKS, 1000 by default] [steps | angles] [CONFIG ...]
+
+Walks go over a rough floor from a disturbed start, and are measured with noise. Printed for each walker: the share of
+walks whose 95 % region holds the truth, with the binomial error of that share, and for each parameter the mean standard
+error over the spread of the estimates.
+"""
+
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+from scipy.stats import f as fisher
+
+from walkerlab.api import in_memory
+from walkerlab.config.loader import load
+from walkerlab.physics.estimation.measurements import MeasuredSteps, split_into_steps
+from walkerlab.physics.orbits.family_search import RIGID
+from walkerlab.scene.identification import Family, Question, identify_walk, step_map_of
+from walkerlab.scene.subject import find_model_gait
+
+WALKERS = {
+    "paper": ("slope_deg", "walker.leg_length_m", "walker.hip_mass_kg"),
+    "slope-3deg": ("slope_deg", "walker.leg_length_m"),
+    "simplest": ("slope_deg", "walker.leg_length_m"),
+    "round-feet": ("slope_deg", "walker.leg_length_m", "walker.foot_radius_m"),
+    "kneed": ("slope_deg", "walker.shank.length_m"),
+}
+STEPS, ROUGHNESS, NOISE, ANGLE_NOISE, PRIOR = 20, 1e-4, (1e-3, 1e-3), 2e-3, 0.01
+"""Steps of a walk; leg lengths; s and leg lengths; rad; shares of the last parameter's value."""
+
+
+class Truth:
+    """A walker of a config, and synthetic walks of it."""
+
+    def __init__(self, name, keys, level="steps"):
+        self.config, self.keys, self.level = load(Path(name)).config, keys, level
+        self.gait = in_memory("fixedpoint", self.config).summary
+        subject = find_model_gait(RIGID, self.config, self.gait, lambda _: None)
+        self.family = Family(self.config, keys)
+        self.walks = step_map_of(RIGID, self.family, subject.length_m)
+        self.z, self.leg = subject.z, self.config.walker.leg_length_m
+        self.values = np.array(self.family.start)
+
+    def walk(self, seed):
+        """Measure a walk; None if it ends early. Returns also a weighing of the last parameter."""
+        draw = np.random.default_rng(seed)
+        heights = draw.normal(0.0, ROUGHNESS * self.leg, STEPS + 1)
+        z = self.z * (1.0 + draw.normal(0.0, 0.01, self.z.size))
+        walk = self.walks.disturbed(z, tuple(self.values), heights)
+        weighed = self.values[-1] * (1.0 + PRIOR * draw.normal())
+        if walk.durations_s.size < STEPS:
+            return None
+        periods = walk.durations_s + draw.normal(0.0, NOISE[0], STEPS)
+        lengths = walk.lengths_m + draw.normal(0.0, NOISE[1] * self.leg, STEPS)
+        if self.level == "steps":
+            return MeasuredSteps(periods, lengths), weighed
+        touches = np.append(0.0, np.cumsum(walk.durations_s))
+        times = np.arange(0.0, touches[-1] * (1.0 - 1e-9), 2e-3)
+        angles = self.walks.sampled(z, tuple(self.values), heights, times)
+        return split_into_steps(times, angles + draw.normal(0.0, ANGLE_NOISE, angles.shape), touches), weighed
+
+    def identify(self, measured, weighed):
+        question = Question(dict.fromkeys(self.keys), {self.keys[-1]: (weighed, PRIOR * self.values[-1])})
+        return identify_walk(self.config, measured, self.gait, question)
+
+
+def region_holds(result, truth):
+    """Whether the 95 % region of the estimates holds the truth."""
+    known = result.information
+    error = np.array([estimate.value for estimate in result.estimates]) - truth
+    distance = error @ np.linalg.pinv(known.covariance, hermitian=True) @ error
+    return distance / error.size < fisher.ppf(0.95, error.size, known.freedom)
+
+
+def coverage(truth, seeds):
+    """Return shares covered, estimates and standard errors over the walks of these seeds."""
+    inside, estimates, errors = [], [], []
+    for seed in seeds:
+        walk = truth.walk(seed)
+        if walk is None:
+            continue
+        result = truth.identify(*walk)
+        inside.append(region_holds(result, truth.values))
+        estimates.append([estimate.value for estimate in result.estimates])
+        errors.append(np.sqrt(np.diag(result.information.covariance)))
+    return np.array(inside), np.array(estimates), np.array(errors)
+
+
+def main(walks, level, names):
+    for name in names:
+        begun = time.perf_counter()
+        inside, estimates, errors = coverage(Truth(name, WALKERS[name], level), range(walks))
+        share, spread = inside.mean(), estimates.std(axis=0, ddof=1)
+        ratios = np.sqrt((errors**2).mean(axis=0)) / spread
+        print(
+            f"{name}: {inside.size} walks, {100 * share:.1f} % inside "
+            f"(+- {196 * np.sqrt(0.95 * 0.05 / inside.size):.1f} %), standard error over spread "
+            f"{' '.join(f'{ratio:.2f}' for ratio in ratios)}, {time.perf_counter() - begun:.0f} s",
+            flush=True,
+        )
+
+
+if __name__ == "__main__":
+    count, level, *names = [*sys.argv[1:], *("1000", "steps")[len(sys.argv) - 1 :]]
+    main(int(count), level, names or WALKERS)

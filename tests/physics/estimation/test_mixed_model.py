@@ -1,0 +1,90 @@
+"""The likelihood of a linear model with random heights, against dense linear algebra."""
+
+import numpy as np
+import pytest
+from scipy.stats import multivariate_normal
+
+from walkerlab.physics.estimation.mixed_model import (
+    NOISE_RATIO,
+    Linearised,
+    Noise,
+    estimate_noise,
+    evaluate,
+    products_of,
+    whitening,
+)
+
+NOISE = Noise(np.array([0.3, 0.5]), 0.2)
+
+
+@pytest.fixture
+def data():
+    draw = np.random.default_rng(3)
+    quantity = np.repeat([0, 1], [9, 7])
+    J, G = draw.normal(size=(16, 3)), draw.normal(size=(16, 5))
+    return Linearised(draw.normal(size=16), J, G, quantity, draw.normal(size=(1, 4)), np.ones(2))
+
+
+def covariance(data, noise):
+    return np.diag(noise.measurement[data.quantity] ** 2) + noise.roughness_m**2 * data.G @ data.G.T
+
+
+def test_the_likelihood_is_that_of_a_normal_distribution(data):
+    no_prior = data.__class__(data.residuals, data.J, data.G, data.quantity, np.zeros((0, 4)), data.sizes)
+    S = covariance(data, NOISE)
+    inverse = np.linalg.inv(S)
+    information = data.J.T @ inverse @ data.J
+    move = np.linalg.solve(information, data.J.T @ inverse @ data.residuals)
+    left = data.residuals - data.J @ move
+    answer = evaluate(products_of(no_prior), NOISE)
+    assert answer.information == pytest.approx(information, rel=1e-12)
+    assert answer.move == pytest.approx(move, rel=1e-9)
+    assert answer.likelihood == pytest.approx(multivariate_normal(np.zeros(16), S).logpdf(left), rel=1e-12)
+    restricted = -0.5 * (np.linalg.slogdet(S)[1] + left @ inverse @ left + np.linalg.slogdet(information)[1])
+    ratio = 0.5 * np.var(np.log(NOISE.measurement)) / NOISE_RATIO**2
+    assert answer.restricted == pytest.approx(restricted - ratio, rel=1e-12)
+    heights = NOISE.roughness_m**2 * data.G.T @ inverse @ left
+    assert answer.heights_m == pytest.approx(heights, rel=1e-9)
+
+
+def test_a_prior_is_one_more_measurement(data):
+    weighed = np.vstack((data.J, data.prior[:, 1:]))
+    residuals = np.append(data.residuals, data.prior[:, 0])
+    S = np.eye(17)
+    S[:16, :16] = covariance(data, NOISE)
+    information = weighed.T @ np.linalg.solve(S, weighed)
+    answer = evaluate(products_of(data), NOISE)
+    assert answer.information == pytest.approx(information, rel=1e-12)
+    assert answer.move == pytest.approx(
+        np.linalg.solve(information, weighed.T @ np.linalg.solve(S, residuals)), rel=1e-9
+    )
+
+
+@pytest.mark.parametrize("roughness", [0.0, 0.2])
+def test_whitening_makes_values_independent(data, roughness):
+    noise = NOISE._replace(roughness_m=roughness)
+    whiten = whitening(data.G, data.quantity, noise)
+    root = whiten(np.eye(16))
+    assert root @ covariance(data, noise) @ root.T == pytest.approx(np.eye(16), abs=1e-12)
+
+
+def test_standard_deviations_of_many_values_are_found():
+    draw = np.random.default_rng(5)
+    quantity = np.repeat([0, 1], 4000)
+    J, G = draw.normal(size=(8000, 2)), draw.normal(size=(8000, 60))
+    noise = np.array([0.3, 0.6])[quantity] * draw.normal(size=8000)
+    residuals = J @ [1.0, -2.0] + 0.1 * G @ draw.normal(size=60) + noise
+    products = products_of(Linearised(residuals, J, G, quantity, np.zeros((0, 3)), np.ones(2)))
+    found = estimate_noise(products, np.full(2, 1e-6), 1.0, Noise(np.ones(2), 0.0))
+    assert found.measurement == pytest.approx([0.3, 0.6], rel=0.04)
+    assert found.roughness_m == pytest.approx(0.1, rel=0.3)
+
+
+def test_an_even_floor_is_found_even():
+    draw = np.random.default_rng(6)
+    G = draw.normal(size=(400, 20))
+    products = products_of(
+        Linearised(draw.normal(size=400), np.ones((400, 1)), G, np.zeros(400, int), np.zeros((0, 2)), np.ones(1))
+    )
+    found = estimate_noise(products, np.array([1e-6]), 1.0, Noise(np.ones(1), 0.0))
+    assert found.roughness_m < 0.03

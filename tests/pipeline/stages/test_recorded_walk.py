@@ -1,0 +1,213 @@
+"""Walks recorded elsewhere, read as files and compared: round trips, and 300 damaged files."""
+
+import functools
+import json
+import math
+import random
+
+import numpy as np
+import pytest
+
+import walkerlab
+from walkerlab.config.loader import load
+from walkerlab.errors import ConfigError
+from walkerlab.evidence.paper.sections import recorded_tables, recorded_words
+from walkerlab.pipeline.executor import answer_in_memory
+from walkerlab.pipeline.results import MemoryResults
+from walkerlab.pipeline.runner import execute
+from walkerlab.pipeline.store.runfolder import RunFolder
+
+MEMORY = MemoryResults()
+
+
+@functools.cache
+def simulated(model):
+    contact = walkerlab.contact(terrain="checkerboard") if model == "contact" else None
+    return walkerlab.simulate(contact=contact, strides=3)
+
+
+def table(walk, scale=1.0, unit="rad", noise=0.0, every=1, delay=0.0, legs=(0, 1)):
+    """A walk's angles as CSV, perhaps in other units, with noise, fewer samples and another origin of time."""
+    trajectory, draw = walk.content["trajectory"], np.random.default_rng(1)
+    time, angle = trajectory["time"], trajectory["angle"][:, legs]
+    keep = np.flatnonzero(np.diff(time, prepend=-1.0) > 1e-7)[::every]
+    values = scale * (angle[keep] + draw.normal(0.0, noise, angle[keep].shape))
+    rows = np.column_stack((time[keep] + delay, values))
+    head = f"time (s),angle 1 ({unit}),angle 2 ({unit})\n"
+    return head + "\n".join(",".join(f"{value:.12g}" for value in row) for row in rows)
+
+
+def written(folder, text, name="walk.csv"):
+    path = folder / name
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize(("model", "period", "length"), [("rigid", 1e-6, 1e-6), ("contact", 2e-4, 1e-3)])
+def test_a_walk_read_back_has_its_own_steps(tmp_path, model, period, length):
+    """On compliant ground feet sink in and slip, so that touches by angles are a little later and shorter."""
+    walk = simulated(model)
+    read = walkerlab.read_walk(written(tmp_path, table(walk)))
+    count = read.summary["steps"]  # the last touch may be too late to be recorded
+    assert count >= 5
+    assert read.summary["step_periods_s"] == pytest.approx(walk.summary["step_periods_s"][:count], abs=period)
+    assert read.summary["step_lengths_m"] == pytest.approx(walk.summary["step_lengths_m"][:count], abs=length)
+    inside = np.abs(read.content["trajectory"]["velocity"]).max() / np.abs(walk.content["trajectory"]["velocity"]).max()
+    assert inside == pytest.approx(1.0, abs=0.02)
+
+
+def test_degrees_noise_drops_an_offset_and_swapped_legs_change_little(tmp_path):
+    walk = simulated("rigid")
+    text = table(walk, math.degrees(1.0), "deg", noise=5e-4, every=2, delay=12.5, legs=(1, 0))
+    read = walkerlab.read_walk(written(tmp_path, text))
+    assert read.summary["legs_swapped"]
+    assert read.summary["first_heel_strike_s"] == pytest.approx(12.5, abs=0.01)
+    assert read.summary["step_periods_s"][1:] == pytest.approx(walk.summary["step_periods_s"][1:6], abs=2e-3)
+    assert read.summary["scatter_rad"] == pytest.approx(5e-4, rel=0.5)
+
+
+def test_a_recording_that_begins_within_a_step_starts_at_its_first_heel_strike(tmp_path):
+    walk = simulated("rigid")
+    lines = table(walk).splitlines()
+    late = [line for line in lines[1:] if float(line.split(",")[0]) > 0.3]
+    read = walkerlab.read_walk(written(tmp_path, "\n".join([lines[0], *late])))
+    assert read.summary["steps"] == 5
+    assert read.summary["legs_swapped"]
+    assert read.summary["step_periods_s"] == pytest.approx(walk.summary["step_periods_s"][1:], abs=1e-6)
+
+
+def test_a_stored_walk_of_another_run_is_read_with_its_energies(tmp_path):
+    folder = RunFolder(tmp_path, "paper")
+    config = load(None, ("strides=2",)).config
+    execute(config, "simulate", folder)
+    read = walkerlab.read_walk(folder.artifact("simulate"))
+    assert read.summary["steps"] == 4
+    assert "mechanical_J" in read.content["trajectory"].variables
+    with pytest.raises(ConfigError, match=r"holds no walk over time"):
+        walkerlab.read_walk(folder.artifact("fixedpoint"))
+
+
+def test_mujocos_walk_of_an_exported_model_is_read_back(tmp_path):
+    mujoco = pytest.importorskip("mujoco")
+    path, *_ = walkerlab.export_model(tmp_path / "paper.xml", name="paper", slope_rad=0.0174, strides=3)
+    model = mujoco.MjModel.from_xml_path(str(path))
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    stance, hip = data.qpos[2:4].copy(), model.joint("hip").qposadr[0]
+    assert hip == 3, stance
+    rows = ["time (s),angle 1 (rad),angle 2 (rad)"]
+    slope = 0.0174
+    while data.time < 3.0:
+        rows.append(f"{data.time:.9g},{data.qpos[2] + data.qpos[3] - slope:.12g},{data.qpos[2] - slope:.12g}")
+        mujoco.mj_step(model, data, 20)
+    read = walkerlab.read_walk(written(tmp_path, "\n".join(rows)), slope_deg=math.degrees(slope))
+    assert read.summary["steps"] >= 3
+    assert read.summary["step_periods_s"][-1] == pytest.approx(0.712, abs=0.01)
+    assert read.summary["step_lengths_m"][-1] == pytest.approx(0.36, abs=0.02)
+
+
+def test_a_comparison_has_the_recorded_walk_as_a_third_column(tmp_path):
+    path = written(tmp_path, table(simulated("rigid")))
+    config = load(None, ("strides=2", f"recording.file={json.dumps(str(path))}", "recording.name=mine")).config
+    compared = answer_in_memory(config, "compare", MEMORY)
+    summary = compared.findings["recorded"]
+    assert summary["name"] == "mine"
+    assert summary["differences"]["rigid"]["max_angle_error_rad"]["aligned"] < 1e-5
+    contact = compared.findings["max_angle_error_rad"]["aligned"]
+    assert summary["differences"]["contact"]["max_angle_error_rad"]["aligned"] == pytest.approx(contact, rel=0.05)
+    assert compared.findings["table3"]["t_cycle"]["recorded"] == pytest.approx(1.407194, abs=1e-5)
+    assert {"recorded/rigid/errors", "recorded/contact/aligned"} <= compared.groups.keys()
+    characteristics, differences = recorded_tables(summary)
+    assert characteristics.columns[-1].title == "mine"
+    assert len(differences.groups[""]) == 4
+    assert "mine: the last step takes 0.7036 s" in recorded_words(summary)
+
+
+def test_figures_draw_the_recorded_walk_under_its_name(tmp_path):
+    path = written(tmp_path, table(simulated("rigid")))
+    config = load(None, ("strides=2", f"recording.file={json.dumps(str(path))}", "recording.name=mine")).config
+    folder = RunFolder(tmp_path / "runs", "drawn")
+    execute(config, "plot", folder)
+    for number in ("07", "08", "09"):
+        assert "mine" in (folder.path / "figures" / f"figure-{number}.svg").read_text(encoding="utf-8")
+
+
+def test_a_changed_file_makes_the_result_stale_and_the_same_content_does_not(tmp_path):
+    path = written(tmp_path, table(simulated("rigid")))
+    config = load(None, (f"recording.file={json.dumps(str(path))}",)).config
+    folder = RunFolder(tmp_path / "runs", "recorded")
+    assert not execute(config, "recorded-walk", folder).reused
+    path.write_text(path.read_text(), encoding="utf-8")
+    assert execute(config, "recorded-walk", folder).reused
+    written(tmp_path, table(simulated("rigid"), delay=1.0))
+    assert not execute(config, "recorded-walk", folder).reused
+
+
+def damaged(draw, lines):
+    """A recording with one thing wrong or odd, and what that is."""
+    head, *rows = lines
+    row, cell = draw.randrange(len(rows)), draw.randrange(3)
+    cells = rows[row].split(",")
+    kind = draw.randrange(18)
+    if kind == 0:
+        cells[cell] = draw.choice(["abc", "1..2", "--", "1e", "0x1", "\N{GREEK SMALL LETTER PI}"])
+    elif kind == 1:
+        cells[cell] = ""
+    elif kind == 2:
+        cells = cells[: cell or 1]
+    elif kind == 3:
+        cells.append("1.0")
+    elif kind == 4:
+        rows[row], rows[row - 1] = rows[row - 1], rows[row]
+        return "\n".join([head, *rows])
+    elif kind == 5:
+        head = head.replace("rad", draw.choice(["furlong", "", "m", "Rad/s"]))
+    elif kind == 6:
+        head = head.replace("angle 1", draw.choice(["angle 2", "phi", "", "time"]))
+    elif kind == 7:
+        return "\n".join([head, *rows[: draw.randrange(12)]])
+    elif kind == 8:
+        return "\n".join([head, *rows])[: draw.randrange(400)]
+    elif kind == 9:
+        return "\n".join(rows)
+    elif kind == 10:
+        head = head.replace(",", draw.choice([";", "|", " "]))
+    elif kind == 11:
+        factor = draw.choice([0.0, -1.0, 1e6, 1e-6])
+        rows = [",".join([row.split(",")[0], *(repr(factor * float(x)) for x in row.split(",")[1:])]) for row in rows]
+        return "\n".join([head, *rows])
+    elif kind == 12:
+        cells[cell] = draw.choice(["inf", "-inf", "nan", "1e308", "1e400"])
+    elif kind == 13:
+        return "\n".join([head, *rows]) + "\0"
+    elif kind == 14:
+        return "\r\n".join([head, *rows, ""])
+    elif kind == 15:
+        return "\n".join([f"{line},{'note' if place == 0 else ''}" for place, line in enumerate([head, *rows])])
+    elif kind == 16:
+        return "\ufeff" + "\n".join([head.upper().replace("(S)", "(s)"), *rows])
+    else:
+        time = float(cells[0])
+        cells[0] = repr(time + draw.choice([-10.0, 10.0, 1e9]))
+    rows[row] = ",".join(cells)
+    return "\n".join([head, *rows])
+
+
+def test_300_damaged_files_end_in_a_message_or_in_a_walk(tmp_path):
+    draw, lines = random.Random(44), table(simulated("rigid"), every=5).splitlines()
+    refusals = []
+    for number in range(300):
+        ending = draw.choice([".csv", ".csv", ".txt", ".sto", ".trc", ".res"])
+        path = written(tmp_path, damaged(draw, lines), f"{number}{ending}")
+        try:
+            read = walkerlab.read_walk(path)
+        except ConfigError as error:
+            refusals.append((str(path) in error.message, bool(error.advice)))
+            continue
+        periods = np.array(read.summary["step_periods_s"])
+        assert periods.size
+        assert np.isfinite(periods).all()
+        assert (periods > 0.0).all()
+        assert np.isfinite(read.summary["step_lengths_m"]).all()
+    assert 200 < len(refusals) < 295
+    assert set(refusals) == {(True, True)}

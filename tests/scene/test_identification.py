@@ -1,0 +1,127 @@
+"""Parameters identified from synthetic walks, and walks that no walker explains."""
+
+import runpy
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from walkerlab.config.loader import load
+from walkerlab.errors import NoAnswer
+from walkerlab.physics.estimation.measurements import MeasuredSteps
+from walkerlab.scene.identification import Question, identify_walk, problem_of
+from walkerlab.scene.subject import find_model_gait
+
+CAMPAIGN = runpy.run_path(str(Path(__file__).parents[2] / "scripts" / "identification_coverage.py"))
+KEYS = ("slope_deg", "walker.leg_length_m")
+
+
+@cache
+def truth(level="steps", name="slope-3deg", keys=KEYS):
+    return CAMPAIGN["Truth"](name, keys, level)
+
+
+def identify(measured, *sets, keys=KEYS, prior=None, **options):
+    config = load(Path("slope-3deg"), sets).config
+    question = Question(dict.fromkeys(keys), prior or {}, **options)
+    return identify_walk(config, measured, truth().gait, question)
+
+
+def verdict(result):
+    return result.models[0].fit
+
+
+def test_regions_hold_the_truth_and_errors_are_as_large_as_the_spread():
+    """Of twelve walks more than two lie outside with a probability of 2 %; the script does a thousand."""
+    inside, estimates, errors = CAMPAIGN["coverage"](truth(), range(12))
+    assert inside.sum() >= 10
+    ratio = np.sqrt((errors**2).mean(axis=0)) / np.abs(estimates - truth().values).std(axis=0, ddof=1)
+    assert np.all((ratio > 0.4) & (ratio < 3.0))
+
+
+def test_angles_determine_the_hip_mass():
+    keys = ("walker.hip_mass_kg", *KEYS)
+    own = truth("angles", "slope-3deg", keys)
+    measured, _ = own.walk(1)
+    result = identify(measured, "walker.hip_mass_kg=10.3", "slope_deg=3.05", keys=keys)
+    assert verdict(result) == "fits"
+    assert result.not_identifiable == ()
+    for estimate, value in zip(result.estimates, own.values, strict=True):
+        assert abs(estimate.value - value) < 4.0 * estimate.standard_error
+        assert estimate.standard_error < 0.01 * value
+    assert result.measurement["angle_rad"] == pytest.approx(2e-3, rel=0.05)
+    assert result.gait["period_s"].value == pytest.approx(truth().gait["period_s"], abs=2e-3)
+
+
+def test_a_rigid_walk_holds_no_scale_of_mass():
+    keys = ("walker.hip_mass_kg", "walker.leg_mass_kg", "walker.leg_inertia_kg_m2")
+    measured, _ = truth("angles").walk(2)
+    result = identify(measured, "walker.leg_inertia_kg_m2=0.01", keys=keys[:2])
+    (open_combination,) = result.not_identifiable
+    assert sorted(open_combination.combination.removesuffix(" together").split(" and ")) == [
+        "walker.hip_mass_kg (0.71)", "walker.leg_mass_kg (0.71)",
+    ]  # fmt: skip
+    assert [estimate.standard_error for estimate in result.estimates] == [None, None]
+    weighed = identify(measured, keys=keys[:2], prior={"walker.leg_mass_kg": (5.0, 0.05)})
+    assert weighed.not_identifiable == ()
+    hip, _ = weighed.estimates
+    assert abs(hip.value - 10.0) < 4.0 * hip.standard_error
+
+
+def test_derivatives_equal_differences_of_other_sizes():
+    own = truth()
+    measured, _ = own.walk(3)
+    subject = find_model_gait("rigid", own.config, own.gait, lambda _: None)
+    forecast = problem_of(subject, measured, Question(dict.fromkeys(KEYS), {})).forecast
+    u, heights = np.zeros(forecast.unknowns), np.zeros(forecast.heights)
+    u[:2] = own.values / forecast.scales
+    J = forecast.differentiate(u, heights, exact=True)
+    for place, unit in enumerate(np.eye(u.size)):
+        for size in (3e-5, 3e-4):
+            ends = [forecast.predict(u + sign * size * unit, heights) for sign in (-2, -1, 1, 2)]
+            column = (ends[0] - 8.0 * ends[1] + 8.0 * ends[2] - ends[3]) / (12.0 * size)
+            assert J[:, place] == pytest.approx(column, abs=1e-6 * np.abs(J[:, place]).max())
+
+
+def test_noise_free_steps_give_the_parameters_to_many_digits():
+    own = truth()
+    walk = own.walks.disturbed(own.z * 1.005, tuple(own.values), np.zeros(21))
+    measured = MeasuredSteps(walk.durations_s, walk.lengths_m)
+    result = identify(measured, "slope_deg=3.03", "walker.leg_length_m=1.01")
+    assert result.process["at_bound"]
+    assert [estimate.value for estimate in result.estimates] == pytest.approx(own.values, rel=1e-5)
+
+
+def wrong_walks():
+    measured, _ = truth().walk(4)
+    periods, lengths = measured.periods_s, measured.lengths_m
+    limp = 1.0 + 0.04 * (-1.0) ** np.arange(periods.size)
+    missed = np.concatenate((periods[:7], [periods[7] + periods[8]], periods[9:]))
+    missed_lengths = np.concatenate((lengths[:7], [lengths[7] + lengths[8]], lengths[9:]))
+    return {
+        "limp": MeasuredSteps(periods * limp, lengths / limp),
+        "missed step": MeasuredSteps(missed, missed_lengths),
+        "mm for m": MeasuredSteps(periods, 1e3 * lengths),
+        "ms for s": MeasuredSteps(1e3 * periods, lengths),
+    }
+
+
+@pytest.mark.parametrize("name", ["limp", "missed step", "mm for m", "ms for s"])
+def test_wrong_data_do_not_fit(name):
+    try:
+        result = identify(wrong_walks()[name])
+    except NoAnswer as error:
+        assert error.message.startswith("no walk of the model can be fitted")  # noqa: PT017
+        return
+    assert verdict(result) in ("misfit", "not-converged")
+    assert result.models[0].reason
+
+
+@pytest.mark.parametrize("change", ["swapped", "mirrored"])
+def test_swapped_or_mirrored_angles_do_not_fit(change):
+    measured, _ = truth("angles").walk(5)
+    angles = measured.angles_rad[:, ::-1] if change == "swapped" else -measured.angles_rad
+    result = identify(replace(measured, angles_rad=angles))
+    assert verdict(result) in ("misfit", "not-converged")

@@ -1,0 +1,24 @@
+"""The recording block: a walk measured or computed elsewhere, to compare with."""
+
+from walkerlab.config.fields import Block, key
+
+
+class Recording(Block):
+    """A file with a walk for `walkerlab compare --with`, and the meanings of its columns."""
+
+    file: str = key(
+        "",
+        "",
+        "file with the walk: CSV, ADAMS, OpenSim, markers, or a stored walk of a run",
+        bounds="a path, from the current folder",
+        default_in_words="none",
+    )
+    name: str = key(
+        "", "", "name of the walk in figures and tables", bounds="a text", default_in_words="the file's, without ending"
+    )
+    columns: dict[str, str] = key(
+        dict, "", "columns by quantity, where their names do not say it", bounds="a column for each quantity"
+    )
+    units: dict[str, str] = key(
+        dict, "", "units by kind (angle, length, ...), quantity or column", bounds="a unit for each"
+    )

@@ -1,0 +1,46 @@
+"""A recorded walk compared with the walks of both models."""
+
+from collections.abc import Mapping
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from walkerlab.evidence.paper.differences import Comparison, compare_motion, motion_of, stored_variable, times_of_steps
+from walkerlab.evidence.paper.measured import Characteristics, characteristics, over_last_steps
+from walkerlab.pipeline.stages.walk import last_step
+from walkerlab.pipeline.store.content import Content, Group
+
+MODELS = {"rigid": "simulate", "contact": "contact-sim"}
+
+
+def compare_recorded(inputs: Mapping[str, Content]) -> tuple[dict[str, Group], dict[str, Any]]:
+    """Return groups and summary of the recorded walk's differences from each model; empty if there is none."""
+    recorded = inputs.get("recorded-walk")
+    if recorded is None:
+        return {}, {}
+    motion = motion_of(recorded)
+    compared: dict[str, Comparison] = {
+        model: compare_motion(motion_of(inputs[stage]), motion, f"recorded walk less {model} model")
+        for model, stage in MODELS.items()
+    }
+    groups = {
+        f"recorded/{model}/{name}": group for model, each in compared.items() for name, group in each.groups.items()
+    }
+    walks = {**{model: inputs[stage] for model, stage in MODELS.items()}, "recorded": recorded}
+    return groups, {
+        "recorded": {
+            "name": recorded.summary["name"],
+            "steps": {model: last_step(walk.summary) for model, walk in walks.items()},
+            "table3": {model: asdict(characteristics_of(walk)) for model, walk in walks.items()},
+            "differences": {model: each.summary for model, each in compared.items()},
+        }
+    }
+
+
+def characteristics_of(walk: Content) -> Characteristics:
+    """Return the quantities of Table 3 of a stored walk; its energy only where it was stored."""
+    periods, lengths = (np.array(walk.summary[key]) for key in ("step_periods_s", "step_lengths_m"))
+    joules, touches = stored_variable(walk, "trajectory", "mechanical_J"), times_of_steps(walk, "touch_time_s")
+    energy = None if joules is None else over_last_steps(walk["trajectory"]["time"], joules, touches)
+    return characteristics(periods, lengths, None if energy is None else energy.mean)

@@ -1,0 +1,162 @@
+"""Divide a recorded walk into steps: heel strikes, lengths, and each leg's angle and velocity."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import BSpline, make_lsq_spline
+
+from walkerlab.errors import ConfigError
+from walkerlab.exchange.columns import Walk
+from walkerlab.exchange.touches import AHEAD, Touch, find_touches
+from walkerlab.physics.mechanics.rigid_model import (
+    STANCE,
+    STRAIGHT,
+    SWING,
+    RigidModel,
+    apply_couplings,
+    feet_on_slope,
+    step_lengths,
+)
+
+Array = NDArray[np.float64]
+START_TOLERANCE: Final = (
+    0.03  # rad, sum of the legs' angles from the normal, up to which a recording starts on two feet
+)
+SHORTEST: Final = 0.25  # of the mean step, before which the first heel strike is the start itself
+DEGREE: Final = 5
+INTERVALS: Final = 24  # of the spline through a step
+MOST_SAMPLES: Final = 500  # of a step, that are kept
+SIDE: Final = 1e-10  # share of the walk's duration before a heel strike, of the sample that ends a step
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedSteps:
+    """A recorded walk from its first heel strike on, the leg that swings first in column 0.
+
+    time_s         (samples,) from that heel strike, with both sides of every later one; dense recordings are thinned
+    step           (samples,) index of the step
+    angle_rad      (samples, 2)
+    velocity_rad_s (samples, 2)
+    touch_time_s   (steps,) ends of the steps
+    length_m       (steps,)
+    scatter_rad    of the angles around heel strikes
+    swapped        whether the recording's second leg swings first
+    origin_s       the recording's time at the first heel strike
+    """
+
+    time_s: Array
+    step: NDArray[np.int64]
+    angle_rad: Array
+    velocity_rad_s: Array
+    touch_time_s: Array
+    length_m: Array
+    scatter_rad: float
+    swapped: bool
+    origin_s: float
+
+
+def divide_into_steps(walk: Walk, model: RigidModel, source: str) -> RecordedSteps:
+    """Find the steps of a recorded walk of a walker.
+
+    source  name of the recording, for messages
+
+    Raises ConfigError if the recording has no complete step.
+    """
+    angle = walk.both_legs("angle")
+    assert angle is not None, "a walk has the angles of both legs"
+
+    largest = float(np.abs(angle).max())
+    if largest > math.pi:
+        raise ConfigError(
+            f"{source}: an angle from the vertical reaches {largest:.3g} rad, more than half a turn.",
+            "Say in which unit angles are, such as --units angle=deg, or remove outliers.",
+        )
+
+    def height(angles: Array) -> Array:
+        """Height (m) of leg 0's foot over leg 1's, perpendicular to the slope, for straight legs of one length."""
+        total = feet_on_slope(model, angles[:, 0], angles[:, 1])
+        return np.asarray(2.0 * model.leg_length * np.sin(0.5 * total) * np.sin(0.5 * (angles[:, 0] - angles[:, 1])))
+
+    touches = find_touches(walk.time_s, angle, height)
+    if touches and not starts_on_two_feet(angle, model):
+        origin, ends = touches[0].time_s, touches[1:]
+    else:
+        origin = float(walk.time_s[0])
+        ends = [touch for touch in touches if touch.time_s > origin + SHORTEST * touches[-1].time_s / len(touches)]
+    if not ends:
+        raise ConfigError(
+            f"{source} holds no complete step; heel strikes found: {len(touches)}.",
+            "Angles are from the vertical, positive with the foot ahead (--columns), in the right unit (--units), over "
+            "at least one whole step.",
+        )
+    return divided(walk, angle, model, origin, ends, swapped=ends[0].leg == 1)
+
+
+def starts_on_two_feet(angle: Array, model: RigidModel) -> bool:
+    spread = np.abs(angle[:, 0] - angle[:, 1])
+    total = float(feet_on_slope(model, angle[0, 0], angle[0, 1]))
+    return bool(abs(total) < START_TOLERANCE and spread[0] > AHEAD * spread.max())
+
+
+def divided(
+    walk: Walk, angle: Array, model: RigidModel, origin: float, ends: list[Touch], swapped: bool
+) -> RecordedSteps:
+    times = np.array([touch.time_s for touch in ends]) - origin
+    order = [1, 0] if swapped else [0, 1]
+    velocity = walk.both_legs("velocity")
+    columns = angle[:, order] if velocity is None else np.column_stack((angle[:, order], velocity[:, order]))
+    time, side = walk.time_s - origin, SIDE * float(times[-1])
+    last = float(time[-1])
+    spans = list(zip((0.0, *times), (*(times - side), last), strict=True))
+    if np.count_nonzero(time >= times[-1]) <= DEGREE:
+        spans.pop()  # too little is recorded of the step after the last heel strike
+    pieces = [samples_within(time, columns, *span) for span in spans]
+    step = np.repeat(np.arange(len(pieces)), [piece[0].size for piece in pieces])
+    times_s, angles, velocities = (np.concatenate(parts) for parts in zip(*pieces, strict=True))
+    lengths = lengths_of(model, angles, step, len(times))
+    scatter = float(np.median([touch.scatter_rad for touch in ends]))
+    return RecordedSteps(times_s, step, angles, velocities, times, lengths, scatter, swapped, origin)
+
+
+def samples_within(time: Array, columns: Array, begin: float, end: float) -> tuple[Array, Array, Array]:
+    """Return times, angles and velocities of a step, with samples at its ends.
+
+    columns  (samples, 2) angles, or (samples, 4) with velocities; otherwise those are a spline's
+    """
+    near = (time >= begin) & (time <= end)
+    spline = spline_through(time[near], columns[near])
+    inside = np.flatnonzero((time > begin) & (time < end))
+    inside = inside[:: max(1, inside.size // MOST_SAMPLES)]
+    grid = np.concatenate(([begin], time[inside], [end]))
+    values = spline(grid)
+    values[1:-1] = columns[inside]
+    velocities = spline.derivative()(grid)[:, :2] if columns.shape[1] == 2 else values[:, 2:]
+    return grid, values[:, :2], velocities
+
+
+def spline_through(time: Array, columns: Array) -> BSpline:
+    """Fit a spline with evenly spaced knots, fewer where samples are few."""
+    degree = min(DEGREE, time.size - 1)
+    intervals = max(1, min(INTERVALS, time.size // (2 * DEGREE)))
+    inner = np.linspace(time[0], time[-1], intervals + 1)[1:-1]
+    knots = np.concatenate(([time[0]] * (degree + 1), inner, [time[-1]] * (degree + 1)))
+    return make_lsq_spline(time, columns, knots, degree)
+
+
+def lengths_of(model: RigidModel, angle: Array, step: NDArray[np.int64], count: int) -> Array:
+    """Return the lengths (m) of the steps, from the legs' angles as they begin and end."""
+    n = len(model.arm_x)
+    states = np.zeros((2, count, 2 * n))
+    for number in range(count):
+        rows = np.flatnonzero(step == number)
+        swing, stance = (0, 1) if number % 2 == 0 else (1, 0)
+        for place, row in enumerate((rows[0], rows[-1])):
+            bodies = np.zeros(n)
+            bodies[SWING], bodies[STANCE] = angle[row, swing], angle[row, stance]
+            states[place, number, :n] = apply_couplings(model, STRAIGHT, bodies)
+    return step_lengths(model, *states)

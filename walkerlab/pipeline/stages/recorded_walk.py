@@ -1,0 +1,130 @@
+"""Stage `recorded-walk`: a walk recorded elsewhere, stored like a computed one."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from walkerlab.config.reads import RecordedWalkConfig
+from walkerlab.errors import ConfigError
+from walkerlab.exchange.columns import OF_LEG, OF_WALKER, Walk, as_walk
+from walkerlab.exchange.recording import TIME, Recording, read_recording
+from walkerlab.exchange.walk_in_steps import RecordedSteps, divide_into_steps
+from walkerlab.outcome import Outcome
+from walkerlab.pipeline.progress import Progress
+from walkerlab.pipeline.stages.walk import OVER_TIME, legs, over_time, step_columns
+from walkerlab.pipeline.store import artifact
+from walkerlab.pipeline.store.artifact import Damaged
+from walkerlab.pipeline.store.content import Content, Group
+from walkerlab.scene.rigid import rigid_walker
+
+if TYPE_CHECKING:
+    from walkerlab.config.recording import Recording as RecordingBlock
+    from walkerlab.config.schema import Config
+
+NOT_THERE = "there is no such file"
+
+
+def digests(config: Config) -> Mapping[str, str]:
+    """Return the digest of the recording's content, so that a changed file makes results stale."""
+    assert config.recording is not None, "the stage requires the block"
+    try:
+        return {"recording.file": hashlib.sha256(Path(config.recording.file).read_bytes()).hexdigest()}
+    except OSError:
+        return {"recording.file": NOT_THERE}
+
+
+def run(config: RecordedWalkConfig, _inputs: Mapping[str, Content], progress: Progress) -> Content:
+    """Read the recording and find its steps; raises ConfigError for a file that holds no walk."""
+    block = config.recording
+    assert block is not None, "the stage requires the block"
+    progress.start("recorded-walk", 1)
+    walk = read_walk(block)
+    steps = divide_into_steps(walk, rigid_walker(config), block.file)
+    progress.advance()
+    return content_of(block, config, walk, steps)
+
+
+def read_walk(block: RecordingBlock) -> Walk:
+    """Read the quantities of a recorded walk in SI units; raises ConfigError."""
+    if not block.file:
+        raise ConfigError("recording.file: the recording has no file.", "Name one: --with FILE.", ("recording", "file"))
+    path = Path(block.file)
+    recording = read_artifact(path) if path.suffix.lower() == ".h5" else read_recording(path)
+    return as_walk(recording, block.columns, block.units)
+
+
+def read_artifact(path: Path) -> Recording:
+    """Read the trajectory of a walk that a run has stored."""
+    try:
+        groups = artifact.read(path).groups
+    except FileNotFoundError:
+        raise ConfigError(f"{path} cannot be read: {NOT_THERE}.", "Check the path given to --with.") from None
+    except (Damaged, NotADirectoryError, IsADirectoryError) as error:
+        raise ConfigError(
+            f"{path} is not a stored walk: {error}.", "Name simulate.h5 or contact-sim.h5 of a run."
+        ) from None
+    group = groups.get("trajectory")
+    if group is None or "angle" not in group.variables:
+        raise ConfigError(f"{path} holds no walk over time.", "Run it with outputs: [states, energies, forces].")
+    columns, units = {TIME: np.asarray(group["time"], float)}, {TIME: "s"}
+    for name, variable in group.variables.items():
+        if variable.dims[:1] != ("time",) or name not in (*OF_LEG, *OF_WALKER) or name == TIME:
+            continue
+        for place, values in enumerate(np.atleast_2d(np.asarray(variable.values, float).T)):
+            column = f"{name} {place + 1}" if variable.values.ndim > 1 else name
+            columns[column], units[column] = values, variable.units
+    return Recording(path, columns, units)
+
+
+def content_of(block: RecordingBlock, config: RecordedWalkConfig, walk: Walk, steps: RecordedSteps) -> Content:
+    """Store steps and samples under the names of computed walks; energies and forces where they were recorded."""
+    periods = np.diff(steps.touch_time_s, prepend=0.0)
+    along = np.cumsum(steps.length_m)
+    columns = step_columns(steps.touch_time_s, period_s=periods, length_m=steps.length_m, touch_along_m=along)
+    swing = steps.step % 2
+    samples: dict[str, Any] = {
+        "time": steps.time_s,
+        "step": steps.step,
+        "stance_leg": 2 - swing,
+        "angle": steps.angle_rad,
+        "velocity": steps.velocity_rad_s,
+        **recorded_besides(walk, steps),
+    }
+    speed = float(along[-1] / steps.touch_time_s[-1])
+    summary = {
+        "name": block.name or Path(block.file).stem,
+        "outcome": Outcome.WALKED.label,
+        "steps": len(periods),
+        "step_periods_s": periods.tolist(),
+        "step_lengths_m": steps.length_m.tolist(),
+        "touch_times_s": steps.touch_time_s.tolist(),
+        "end_time_s": float(steps.time_s[-1]),
+        "speed_m_s": speed,
+        "froude": speed / math.sqrt(config.gravity_m_s2 * config.walker.leg_length_m),
+        "scatter_rad": steps.scatter_rad,
+        "first_heel_strike_s": steps.origin_s,
+        "legs_swapped": steps.swapped,
+        "columns": walk.sources,
+    }
+    return Content({"steps": Group(columns), "trajectory": Group({**over_time(**samples), **legs()})}, summary)
+
+
+def recorded_besides(walk: Walk, steps: RecordedSteps) -> dict[str, Any]:
+    """Interpolate the other recorded quantities (samples,) or (samples, 2) at the samples' times."""
+    time, besides = walk.time_s - steps.origin_s, {}
+    for name in OVER_TIME:
+        if name in ("time", "angle", "velocity"):
+            continue
+        both = walk.both_legs(name)
+        if both is not None:
+            both = both[:, ::-1] if steps.swapped else both
+            besides[name] = np.column_stack([np.interp(steps.time_s, time, column) for column in both.T])
+        elif name in walk.quantities:
+            besides[name] = np.interp(steps.time_s, time, walk.quantities[name])
+    return besides
