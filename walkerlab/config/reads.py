@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from walkerlab.config.drives import PushOff
     from walkerlab.config.ground import Footholds
     from walkerlab.config.identify import Identify
+    from walkerlab.config.recording import Recording
     from walkerlab.config.robustness import Robustness
     from walkerlab.config.stability import Case
     from walkerlab.config.walkers import Walker

@@ -342,7 +342,7 @@ PIPELINE = Graph(
     ),
     Stage(
         "plot", "walkerlab.views.figures.stage", "Draw the figures from the stored results.", reads.NamedConfig,
-        results_of(*WALKED, "compare"), work="draws",
+        walks_and("compare"), work="draws",
         if_current=("accuracy", "engines", "tune", "stability-maps", "continuation", "basin", "robustness", "identify"),
     ),
     Stage(

@@ -244,12 +244,14 @@ def test_a_missing_file_is_refused(path, tmp_path, monkeypatch):
     refused(tmp_path, monkeypatch, "--data", path, *FIT)
 
 
-def test_steps_that_no_search_follows_have_no_answer(tmp_path, monkeypatch):
+def test_a_misfit_is_an_answer_that_proposes_no_next_step(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("steps.csv").write_text(GOOD)
     done = CliRunner().invoke(program(), ["identify", "--data", "steps.csv", *FIT])
-    assert done.exit_code == 4, done.output
-    assert "advice: " in done.output
+    assert done.exit_code == 0, done.output
+    assert "Do not use the estimates below." in " ".join(done.output.split())
+    assert "identified.yaml" in done.output
+    assert "next: " not in done.output
 
 
 def test_a_misspelt_key_is_answered_with_the_nearest(tmp_path):

@@ -130,18 +130,6 @@ def pairs(flag: str, values: Sequence[str]) -> str:
         raise typer.BadParameter(f"{error.message} {error.advice}", param_hint=flag) from None
 
 
-def pairs(flag: str, values: Sequence[str]) -> str:
-    """Return pairs NAME=VALUE,... as a YAML block; a unit alone stands for that of its kind."""
-    # Imported here: few commands read files of other programs.
-    from walkerlab.errors import ConfigError
-    from walkerlab.exchange.columns import parse_pairs, parse_units
-
-    try:
-        return json.dumps(parse_units(values) if flag == "--units" else parse_pairs(flag, values))
-    except ConfigError as error:
-        raise typer.BadParameter(f"{error.message} {error.advice}", param_hint=flag) from None
-
-
 def own_parameter(name: str, option: "Option") -> inspect.Parameter:
     """Return a stage's own option as a parameter of a function whose signature typer reads."""
     complete = keys_to_vary if option.metavar == "KEY" else None
