@@ -18,6 +18,9 @@ from walkerlab.pipeline.stages.measured_walk import MISSING, digests, read_measu
 from walkerlab.views.cli.main import program
 from walkerlab.views.figures.registry import FIGURES
 from walkerlab.views.report.answers import answer
+from walkerlab.views.report.results import Results
+from walkerlab.views.report.sections.identification import section
+from walkerlab.views.report.tables import Table
 
 # fixed by the interface of `--json`; `config` is the command line's
 FIXED_KEYS = {
@@ -241,8 +244,26 @@ def test_a_missing_file_is_refused(path, tmp_path, monkeypatch):
     refused(tmp_path, monkeypatch, "--data", path, *FIT)
 
 
+def test_a_misfit_is_an_answer_that_proposes_no_next_step(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("steps.csv").write_text(GOOD)
+    done = CliRunner().invoke(program(), ["identify", "--data", "steps.csv", *FIT])
+    assert done.exit_code == 0, done.output
+    assert "Do not use the estimates below." in " ".join(done.output.split())
+    assert "identified.yaml" in done.output
+    assert "next: " not in done.output
+
+
 def test_a_misspelt_key_is_answered_with_the_nearest(tmp_path):
     path = tmp_path / "steps.csv"
     path.write_text(GOOD)
     with pytest.raises(ConfigError, match=r"identify\.fit: walker\.hip_mas_kg .*did you mean walker\.hip_mass_kg"):
         identify.refuse(taken(*ask(path, "identify.fit={walker.hip_mas_kg: null}")))
+
+
+def test_the_page_has_a_section_that_begins_with_the_estimates(identified):
+    part = section(Results(load(Path("paper"), ()).config, {"identify": identified}))
+    assert part is not None
+    assert part.finding.startswith("The slope is ")
+    captions = [block.caption for block in part.blocks if isinstance(block, Table)]
+    assert captions == ["Estimates", "Fit to the measurements"]

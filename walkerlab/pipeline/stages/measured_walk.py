@@ -13,9 +13,8 @@ import numpy as np
 from walkerlab.errors import ConfigError
 from walkerlab.exchange.columns import as_walk, plain, unit_value
 from walkerlab.exchange.recording import TIME, Recording, read_delimited, read_recording
-from walkerlab.exchange.touches import find_touches
+from walkerlab.exchange.walk_in_steps import divide_into_steps
 from walkerlab.physics.estimation.measurements import MeasuredAngles, MeasuredSteps, split_into_steps
-from walkerlab.physics.mechanics.rigid_model import feet_on_slope
 from walkerlab.physics.solvers.system import Floats
 from walkerlab.scene.rigid import rigid_walker
 
@@ -57,25 +56,11 @@ def read_measured(block: Identify, config: RigidConfig) -> MeasuredSteps | Measu
 
 def read_angles(path: Path, block: Identify, config: RigidConfig) -> MeasuredAngles:
     """Read angles over time and divide them at the heel strikes of the config's walker."""
-    walk, walker = as_walk(read_recording(path), block.columns, block.units), rigid_walker(config)
-    angles = walk.both_legs("angle")
-    assert angles is not None, "a walk has the angles of both legs"
-
-    def height(angles: Floats) -> Floats:
-        """Height (m) of leg 0's foot over leg 1's, perpendicular to the slope, for straight legs of one length."""
-        total = feet_on_slope(walker, angles[:, 0], angles[:, 1])
-        return np.asarray(2.0 * walker.leg_length * np.sin(0.5 * total) * np.sin(0.5 * (angles[:, 0] - angles[:, 1])))
-
-    touches = find_touches(walk.time_s, angles, height)
-    if len(touches) <= MIN_STEPS:
-        raise ConfigError(
-            f"{path} has {len(touches)} heel strikes; {MIN_STEPS} steps between them are needed.",
-            "Angles are from the vertical, positive with the foot ahead (--columns), in the right unit (--units).",
-        )
-    swings_first = touches[1].leg
-    return split_into_steps(
-        walk.time_s, angles[:, [swings_first, 1 - swings_first]], np.array([touch.time_s for touch in touches])
-    )
+    walk = as_walk(read_recording(path), block.columns, block.units)
+    steps = divide_into_steps(walk, rigid_walker(config), str(path))
+    if steps.touch_time_s.size < MIN_STEPS:
+        raise ConfigError(f"{path} has 1 complete step; at least {MIN_STEPS} are needed.", "Record a longer walk.")
+    return split_into_steps(steps.time_s, steps.angle_rad, np.append(0.0, steps.touch_time_s))
 
 
 def read_steps(path: Path, block: Identify) -> MeasuredSteps:

@@ -221,7 +221,9 @@ def config_lines(summary: Summary) -> list[str]:
 def identified_walker(summary: Summary) -> list[str | Table]:
     from walkerlab.views.report.sections import identification
 
-    return [*identification.findings(summary), *identification.tables(summary), *config_lines(summary)]
+    usable = any(row["fit"] == "fits" for row in summary["models"] if row["model"] == summary["model"])
+    lines = config_lines(summary) if usable else config_lines(summary)[:1]
+    return [*identification.findings(summary), *identification.tables(summary), *lines]
 
 
 def engines(summary: Summary) -> list[str | Table]:
