@@ -274,3 +274,13 @@ def test_a_model_is_written_with_the_start_of_its_gait(tmp_path):
     assert "walked, 4 steps" in written[0].read_text()
     with pytest.raises(ConfigError, match=r"round\.pdf: not a model\."):
         walkerlab.export_model(tmp_path / "round.pdf")
+
+
+def test_a_walker_is_identified_in_memory():
+    walk = walkerlab.simulate(slope_deg=3, strides=5, start=[-2.0 * np.radians(3.0) - 0.2253, 0.2253, -0.37, -1.1])
+    summary = walk.summary
+    columns = {"period_s": summary["step_periods_s"], "length_m": summary["step_lengths_m"]}
+    answer = walkerlab.identify(columns, "slope-3deg", ["slope_deg"], level="steps")
+    (slope,) = answer.summary["estimates"]
+    assert slope["key"] == "slope_deg"
+    assert slope["value"] == pytest.approx(3.0, abs=0.01)

@@ -23,6 +23,7 @@ __all__ = [
     "explore",
     "export_model",
     "find_gait",
+    "identify",
     "kneed",
     "open_run",
     "read_walk",

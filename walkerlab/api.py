@@ -3,6 +3,7 @@
 import itertools
 import json
 import os
+import tempfile
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -30,6 +31,7 @@ from walkerlab.pipeline.runs import config_of, headline_values, result_in, run_n
 from walkerlab.pipeline.store import artifact
 from walkerlab.pipeline.store.artifact import Damaged
 from walkerlab.pipeline.store.content import Content, Group
+from walkerlab.pipeline.store.csv_text import csv_text
 from walkerlab.pipeline.store.runfolder import RunFolder
 from walkerlab.views.report.text import in_words
 
@@ -443,6 +445,35 @@ def read_walk(
     recording = {"file": str(path), "columns": dict(columns or {}), "units": dict(units or {})}
     values = {"slope_deg": slope_deg, "recording": recording}
     return in_memory("recorded-walk", config_of_scene(walker, values, keys))
+
+
+def identify(
+    walk: str | Path | Mapping[str, Sequence[float]],
+    config: str | Path | Config = DEFAULT,
+    fit: Sequence[str] | Mapping[str, Sequence[float] | None] = (),
+    prior: Mapping[str, Sequence[float]] | None = None,
+    **keys: Any,
+) -> Result:
+    """Estimate parameters of a walker from a measured walk, in memory: `estimates`, … in `summary`.
+
+    walk    a file, or columns by name: period_s and perhaps length_m of steps, or time, angle 1 and angle 2
+    config  everything that is known of the walker: a config, its file or name, or a run
+    fit     keys to estimate, or their bounds by key, in the key's unit
+    prior   value and standard deviation of keys known beforehand
+    keys    others of the block `identify`, such as level, model, nuisance
+
+    Raises ConfigError for an invalid question or file. A fit that does not converge is told in `Result.no_answer`.
+    """
+    start = config if isinstance(config, Config) else resolve(str(config)).loaded.config
+    if isinstance(walk, Mapping):
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "walk.csv"
+            path.write_bytes(csv_text(list(walk), zip(*walk.values(), strict=True)))
+            return identify(path, start, fit, prior, **keys)
+    bounds = dict(fit) if isinstance(fit, Mapping) else dict.fromkeys(fit)
+    block = {**keys, "data": str(walk), "fit": bounds, "prior": dict(prior or {})}
+    tree = tree_of({**start.model_dump(mode="json", exclude_none=True, by_alias=True), "identify": block}, NOWHERE)
+    return in_memory("identify", validate_tree(tree))
 
 
 def export_model(

@@ -16,6 +16,7 @@ from walkerlab.config.continuation import Continuation
 from walkerlab.config.design import Design
 from walkerlab.config.drives import PushOff
 from walkerlab.config.ground import Footholds
+from walkerlab.config.identify import Identify
 from walkerlab.config.reads import ContactConfig, SceneConfig, SimulateConfig, StartConfig, dotted_keys, only
 from walkerlab.config.robustness import Robustness
 from walkerlab.config.schema import Config, Contact
@@ -58,7 +59,7 @@ class MisspeltConfig(Protocol):
 @pytest.fixture
 def blocks_imported(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """As if `reads` imported the blocks of the config when it runs, and not for mypy alone."""
-    blocks = (Basin, Case, Contact, Continuation, Design, Footholds, PushOff, Robustness)
+    blocks = (Basin, Case, Contact, Continuation, Design, Footholds, Identify, PushOff, Robustness)
     for block in blocks:
         monkeypatch.setattr(reads, block.__name__, block, raising=False)
     monkeypatch.setattr(reads, "schema", schema, raising=False)

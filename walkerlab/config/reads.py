@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from walkerlab.config.design import Design
     from walkerlab.config.drives import PushOff
     from walkerlab.config.ground import Footholds
+    from walkerlab.config.identify import Identify
     from walkerlab.config.recording import Recording
     from walkerlab.config.robustness import Robustness
     from walkerlab.config.stability import Case
@@ -244,6 +245,13 @@ class DesignConfig(FixedPointConfig, ContactConfig, Protocol):
     def design(self) -> Design | None: ...
 
 
+class IdentifyConfig(FixedPointConfig, ContactConfig, Protocol):
+    """Keys that `identify` reads."""
+
+    @property
+    def identify(self) -> Identify | None: ...
+
+
 class NamedConfig(Protocol):
     """Keys that `plot` reads."""
 
@@ -254,9 +262,9 @@ class NamedConfig(Protocol):
 if TYPE_CHECKING:
     OfEachType = tuple[
         SimulateConfig, ContactSimConfig, TuneConfig, CompassCasesConfig, SceneCasesConfig, MapsConfig,
-        ContinuationConfig, BasinConfig, RobustnessConfig, DesignConfig, NamedConfig,
+        ContinuationConfig, BasinConfig, RobustnessConfig, DesignConfig, IdentifyConfig, NamedConfig,
     ]  # fmt: skip
 
     def for_each_type(config: schema.Config) -> OfEachType:
         """Let mypy check that a config satisfies every type."""
-        return config, config, config, config, config, config, config, config, config, config, config
+        return config, config, config, config, config, config, config, config, config, config, config, config

@@ -14,6 +14,7 @@ from walkerlab.config.design import Design
 from walkerlab.config.drives import PushOff, acting_on
 from walkerlab.config.fields import Block, check_against, key, meaning_error
 from walkerlab.config.ground import Footholds
+from walkerlab.config.identify import Identify
 from walkerlab.config.recording import Recording
 from walkerlab.config.robustness import Robustness
 from walkerlab.config.stability import Stability
@@ -168,7 +169,9 @@ class Tune(Block):
         return value
 
 
-QUESTIONS: Final = ("recording", "stability", "tune", "continuation", "basin", "robustness", "design", "sweep")
+QUESTIONS: Final = (
+    "recording", "stability", "tune", "continuation", "basin", "robustness", "design", "identify", "sweep",
+)  # fmt: skip
 """Blocks that configure a stage or a sweep rather than the scene."""
 
 
@@ -236,6 +239,7 @@ class Config(Block):
     robustness: Robustness = Robustness()
     design: Design | None = None
     recording: Recording | None = None
+    identify: Identify | None = None
     sweep: Sweep | None = None
     outputs: tuple[Output, ...] = key(OUTPUTS, "", "arrays to store", bounds="a list of states, energies, forces")
     seed: int = key(0, "1", "seed of everything random", ge=0, le=2**32 - 1)

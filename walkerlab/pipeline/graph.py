@@ -67,7 +67,9 @@ class Option:
 
     flag      as typed
     key       dotted
-    metavar   "KEY" for the name of a key, "...=A:B" for bounds by name, which may be repeated
+    metavar   "KEY" for the name of a key; with "=", pairs, which may be repeated: "...=A:B" two numbers by name,
+              "[=A:B]" where they may be missing, "...=...,..." names by name
+    type      of its value; list for names, which may be repeated
     needs     flags without which it means nothing
     """
 
@@ -322,15 +324,32 @@ PIPELINE = Graph(
         ),
     ),
     Stage(
+        "identify", "walkerlab.pipeline.stages.identify",
+        "Estimate parameters of the walker from a measured walk, with error bars.",
+        reads.IdentifyConfig, results_of("fixedpoint"), only_by="identify",
+        files=later("walkerlab.pipeline.stages.measured_walk", "digests"),
+        options=(
+            Option("--data", "identify.data", "FILE", "Measured walk: a table of steps, or angles over time."),
+            Option("--fit", "identify.fit", "KEY[=A:B]", "Key to estimate, or also its bounds."),
+            Option("--prior", "identify.prior", "KEY=VALUE:SIGMA", "Value known beforehand, and its deviation."),
+            Option("--nuisance", "identify.nuisance", "NAME", "Property of clock or sensors to estimate too.", list),
+            Option("--model", "identify.model", "rigid|contact|both", "Model to fit."),
+            Option("--level", "identify.level", "steps|angles", "What was measured."),
+            Option("--loss", "identify.loss", "linear|soft_l1", "soft_l1 for data with outliers."),
+            Option("--columns", "identify.columns", "QUANTITY=COLUMN,...", "Columns of the file."),
+            Option("--units", "identify.units", "KIND=UNIT,...", "Units that it does not state."),
+        ),
+    ),
+    Stage(
         "plot", "walkerlab.views.figures.stage", "Draw the figures from the stored results.", reads.NamedConfig,
         walks_and("compare"), work="draws",
-        if_current=("accuracy", "engines", "tune", "stability-maps", "continuation", "basin", "robustness"),
+        if_current=("accuracy", "engines", "tune", "stability-maps", "continuation", "basin", "robustness", "identify"),
     ),
     Stage(
         "report", "walkerlab.views.report.stage", "Write the report, one HTML file.", None,
         walks_and("tune", "compare", "accuracy", "stability", "plot"), options=(STRIDES,), work="draws",
         early_with=WALKED,
-        if_current=("engines", "stability-maps", "continuation", "basin", "robustness"),
+        if_current=("engines", "stability-maps", "continuation", "basin", "robustness", "identify"),
     ),
 )  # fmt: skip
 STAGES = PIPELINE.stages

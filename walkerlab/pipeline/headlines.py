@@ -36,6 +36,10 @@ HEADLINES: Final[Mapping[str, tuple[str, ...]]] = {
         "rough_ground.1.mean_steps", "rough_ground.2.mean_steps",
     ),
     "design": ("quantity", "value", "start_value", "best.", "evaluations", "optima"),
+    "identify": (
+        "estimates.", "chi_square_per_dof", "noise.process.roughness_m", "gait.period_s.value",
+        "gait.spectral_radius.value",
+    ),
     "plot": (),
     "report": (),
 }  # fmt: skip

@@ -12,12 +12,12 @@ import numpy as np
 
 from walkerlab.config.reads import ContactConfig
 from walkerlab.errors import ConfigError, NoAnswer
-from walkerlab.physics.estimation.fit import FitProblem, Fitted, Loss, fit, typical_sizes
+from walkerlab.physics.estimation.fit import FitProblem, Fitted, Loss, evaluate_at, fit, typical_sizes
 from walkerlab.physics.estimation.information import information_on, open_combinations
 from walkerlab.physics.estimation.judgement import judge
 from walkerlab.physics.estimation.measurements import MeasuredAngles, MeasuredSteps
 from walkerlab.physics.estimation.mixed_model import evaluate, products_of
-from walkerlab.physics.estimation.prediction import Forecast, felt_directions
+from walkerlab.physics.estimation.prediction import DELAY, Forecast, felt_directions
 from walkerlab.physics.estimation.result import Estimate, Identification, ModelFit, StepTable, Uncertain
 from walkerlab.physics.orbits.family_search import RIGID
 from walkerlab.physics.orbits.newton import Effort
@@ -159,7 +159,30 @@ def identify_with(
     if not walked:
         return str(fits[0])
     best = max(walked, key=lambda result: (not result.why, result.evaluation.likelihood))
-    return describe(subject, problem, question, best)
+    in_phase = Fit(problem, best)
+    timed = in_time(in_phase)
+    if timed is None:
+        return describe(subject, question, in_phase, in_phase)
+    again = evaluate_at(problem, timed.fitted.u[: best.u.size], best)
+    return describe(subject, question, in_phase if again is None else Fit(problem, again), timed)
+
+
+@dataclass(frozen=True)
+class Fit:
+    problem: FitProblem
+    fitted: Fitted
+
+
+def in_time(first: Fit) -> Fit | None:
+    """Refine a fit of angles in phase to one of angles at their times; None for steps, or if that does not converge."""
+    forecast, u = first.problem.forecast, first.fitted.u
+    if not isinstance(forecast.measured, MeasuredAngles):
+        return None
+    nuisances = forecast.nuisances if DELAY in forecast.nuisances else (*forecast.nuisances, DELAY)
+    start = u if nuisances == forecast.nuisances else np.append(u, 0.0)
+    problem = replace(first.problem, forecast=replace(forecast, in_phase=False, nuisances=nuisances))
+    fitted = fit(problem, start)
+    return Fit(problem, fitted) if isinstance(fitted, Fitted) and not fitted.why else None
 
 
 def problem_of(subject: ModelUnderTest, measured: Measured, question: Question) -> FitProblem:
@@ -187,27 +210,33 @@ def starts_of(problem: FitProblem, count: int) -> list[Floats]:
     return starts
 
 
-def describe(subject: ModelUnderTest, problem: FitProblem, question: Question, fitted: Fitted) -> Identification:
-    """Turn a fit into its answer."""
-    forecast, keys = problem.forecast, question.keys
-    sizes = typical_sizes(forecast)
+def describe(subject: ModelUnderTest, question: Question, steps: Fit, best: Fit) -> Identification:
+    """Turn a fit into its answer.
+
+    steps  the fit whose values include the steps' periods; the same as `best` but for angles at their times
+    """
+    problem, fitted, forecast, keys = best.problem, best.fitted, best.problem.forecast, question.keys
     information = information_on(fitted, keys, forecast.scales, forecast.quantities)
     combinations, left_open = open_combinations(information)
-    values = forecast.parameters(fitted.u)
-    errors = dict(zip(keys, np.sqrt(np.diag(information.covariance)).tolist(), strict=True))
-    known = {key: None if key in left_open else error for key, error in errors.items()}
+    errors = np.sqrt(np.diag(information.covariance)).tolist()
     estimates = tuple(
         Estimate(
             key,
             value,
-            known[key],
+            None if key in left_open else error,
             parameter_of(key, subject.config).unit,
             start,
             any(math.isclose(value, bound, rel_tol=1e-6, abs_tol=1e-12) for bound in bounds),
         )
-        for key, value, start, bounds in zip(keys, values, problem.start, problem.bounds, strict=True)
+        for key, value, error, start, bounds in zip(
+            keys, forecast.parameters(fitted.u), errors, problem.start, problem.bounds, strict=True
+        )
     )
-    fit_word, reason = judge(forecast, fitted, sizes, problem.leg_length_m)
+    verdicts = [
+        judge(each.problem.forecast, each.fitted, typical_sizes(each.problem.forecast), problem.leg_length_m)
+        for each in (steps, best)
+    ]
+    fit_word, reason = next((verdict for verdict in verdicts if verdict[0] != "fits"), verdicts[-1])
     dof = max(1, fitted.data.residuals.size - fitted.u.size)
     return Identification(
         subject.model,
@@ -215,15 +244,19 @@ def describe(subject: ModelUnderTest, problem: FitProblem, question: Question, f
         combinations,
         information,
         process_noise(fitted),
-        dict(zip(forecast.quantities, fitted.noise.measurement.tolist(), strict=True)),
+        measurement_noise(steps) | measurement_noise(best),
         forecast.steps.count,
-        rms_residuals(forecast, fitted),
+        rms_residuals(steps) | rms_residuals(best),
         fitted.evaluation.squares / dof,
         gait_with_errors(problem, fitted, information.covariance),
         (ModelFit(subject.model, fitted.evaluation.likelihood, fit_word, reason),),
-        step_tables(forecast, fitted),
+        step_tables(steps),
         fitted,
     )
+
+
+def measurement_noise(fit: Fit) -> dict[str, float]:
+    return dict(zip(fit.problem.forecast.quantities, fit.fitted.noise.measurement.tolist(), strict=True))
 
 
 def process_noise(fitted: Fitted) -> dict[str, float | bool | None]:
@@ -241,8 +274,9 @@ def process_noise(fitted: Fitted) -> dict[str, float | bool | None]:
     return {"roughness_m": roughness, "standard_error": error, "at_bound": False}
 
 
-def rms_residuals(forecast: Forecast, fitted: Fitted) -> dict[str, float]:
+def rms_residuals(fit: Fit) -> dict[str, float]:
     """Return the root mean square of measured minus predicted values, over the most probable floor, by quantity."""
+    forecast, fitted = fit.problem.forecast, fit.fitted
     about = fitted.data.residuals - fitted.data.G @ fitted.heights_m
     return {
         name: float(np.sqrt(np.mean(about[forecast.quantity == place] ** 2)))
@@ -250,14 +284,15 @@ def rms_residuals(forecast: Forecast, fitted: Fitted) -> dict[str, float]:
     }
 
 
-def step_tables(forecast: Forecast, fitted: Fitted) -> tuple[StepTable, ...]:
+def step_tables(fit: Fit) -> tuple[StepTable, ...]:
     """Return measured and predicted steps over even ground, with the standard deviation of their difference."""
+    forecast, fitted = fit.problem.forecast, fit.fitted
     steps, variance = forecast.steps.count, fitted.noise.measurement[forecast.quantity] ** 2
     total = np.sqrt(variance + (fitted.noise.roughness_m**2) * (fitted.data.G**2).sum(axis=1))
     return tuple(
         StepTable(name, values, fitted.predicted[first : first + steps], total[first : first + steps])
         for first, (name, values) in zip(
-            range(0, steps * len(forecast.steps.channels()), steps), forecast.steps.channels().items(), strict=True
+            range(0, steps * len(forecast.channels), steps), forecast.channels.items(), strict=True
         )
     )
 

@@ -156,7 +156,7 @@ def test_what_a_run_has_is_listed_for_a_name_that_there_is_not(run):
     with pytest.raises(ConfigError) as refused:
         export_from(run, "figur", Target("pdf", None), 516.0, "", QUIET)
     assert "figure-07" in refused.value.advice
-    assert refused.value.advice.endswith("\n  table-3\n  omitted-results\n  trajectory")
+    assert refused.value.advice.endswith("\n  table-3\n  omitted-results\n  steps\n  trajectory")
     assert "figure-13" not in refused.value.advice
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Final, Literal
 
 import numpy as np
@@ -30,7 +30,7 @@ NO_WALK: Final = 1e3  # whitened residual of unknowns that make no walk
 NO_NEIGHBOURS: Final = "the walk from the start, or one beside it, ends before the measured steps are over"
 HEIGHT_SHARES: Final = (1.0, 0.5, 0.0)
 EVALUATIONS: Final = 12  # in a round
-WEAK_PRIOR: Final = 3.0  # standard deviation of every unknown about its start, in its scale: what is open stays there
+WEAK_PRIOR: Final = 1.0  # standard deviation of every unknown about its start, in its scale: what is open stays there
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,6 +122,22 @@ def fit(problem: FitProblem, start: Floats) -> Fitted | str:
         return NO_NEIGHBOURS
     z = forecast.walks.disturbed(forecast.start(u), forecast.parameters(u), even).z
     return Fitted(u, over[0], noise, evaluate(products_of(data), noise), data, predicted, z, round_number, why)
+
+
+def evaluate_at(problem: FitProblem, u: Floats, like: Fitted) -> Fitted | None:
+    """Estimate the standard deviations at unknowns (unknowns,) of another fit; None if the walk there ends early."""
+    even = np.zeros(problem.forecast.heights)
+    over = responses(problem, u, even)
+    data = None if over is None else linearise(problem, u, *over)
+    predicted = problem.forecast.predict(u, even)
+    if over is None or data is None or predicted is None:
+        return None
+    products = products_of(data)
+    noise = estimate_noise(products, NOISE_FLOOR * data.sizes, problem.leg_length_m, like.noise)
+    evaluation = evaluate(products, noise)
+    return replace(
+        like, u=u, heights_m=evaluation.heights_m, noise=noise, evaluation=evaluation, data=data, predicted=predicted
+    )
 
 
 def responses(problem: FitProblem, u: Floats, heights: Floats) -> tuple[Floats, Floats] | None:

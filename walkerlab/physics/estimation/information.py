@@ -19,7 +19,7 @@ ROUNDING: Final = 1e-7  # share of the largest singular value, below which a com
 NOISE_DRAWS: Final = 200
 LOG_STEP: Final = 0.05
 FARTHEST: Final = (3.0, 1.5)  # below and above the likeliest, of logarithms of standard deviations
-LOADED: Final = 0.1  # share of a parameter in an open direction, from which the parameter itself is open
+LOADED: Final = 0.1  # share of a parameter in an open direction, from which it is named
 
 
 def information_on(fitted: Fitted, keys: tuple[str, ...], scales: Floats, quantities: tuple[str, ...]) -> Information:
@@ -39,6 +39,7 @@ def information_on(fitted: Fitted, keys: tuple[str, ...], scales: Floats, quanti
         singular,
         directions,
         covariance * np.outer(scales, scales),
+        scales,
         max(1, values_count - fitted.u.size),
         contributions(fitted, quantities, count, basis),
     )
@@ -101,6 +102,9 @@ def open_combinations(information: Information) -> tuple[tuple[Unidentifiable, .
         order = np.argsort(-np.abs(direction))
         signed = direction * np.sign(direction[order[0]])
         parts = [(information.keys[k], float(signed[k])) for k in order if abs(signed[k]) >= LOADED]
+        moved = np.abs(direction) * information.scales
+        errors = np.sqrt(np.diag(information.covariance))
+        keys |= {key for key, move, error in zip(information.keys, moved, errors, strict=True) if move > error}
         keys |= {key for key, _ in parts}
         named.append(Unidentifiable(combination_in_words(parts), reason_in_words(value, largest)))
     return tuple(named), keys

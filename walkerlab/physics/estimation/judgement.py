@@ -36,7 +36,7 @@ def judge(forecast: Forecast, fitted: Fitted, sizes: Floats, leg_length_m: float
         return "misfit", f"only a floor {1e3 * fitted.noise.roughness_m:.3g} mm rough would explain the steps"
     white = whitened_residuals(forecast, fitted)
     steps = forecast.steps.count
-    for place, quantity in enumerate(forecast.steps.channels()):
+    for place, quantity in enumerate(forecast.channels):
         own = white[place * steps : (place + 1) * steps]
         worst = int(np.argmax(np.abs(own)))
         spread = float(np.median(np.abs(own))) * 1.4826 or 1.0

@@ -25,6 +25,7 @@ NUISANCES: Final[Mapping[str, tuple[float, float]]] = {
 }
 """Properties of clock and sensors that may be estimated too: value if they are not, and typical change."""
 FELT: Final = 1e-3  # change of the next step by a change of the start, below which a direction of the start is lost
+LAST_INSTANT: Final = 1e-9  # share of a walk before its last heel strike that counts as after it
 START_SCALE: Final = 0.02  # typical change of the start, in coordinates of the section
 QUICK_STEP: Final = 1e-5  # of an unknown's scale, in difference quotients while searching
 EXACT_STEP: Final = 1e-4  # in those of the result
@@ -44,7 +45,9 @@ class WalkMap(Protocol):
 class Forecast:
     """Function from unknowns to predicted values.
 
-    The unknowns are parameters, coordinates of the start along `directions`, and nuisances, each over its scale.
+    The unknowns are parameters, coordinates of the start along `directions`, and nuisances, each over its scale. Angles
+    at shares of each step are easy to fit from afar. Angles at their times have no errors of measured heel strikes in
+    them: periods are then not measured values of their own.
     """
 
     walks: WalkMap
@@ -54,6 +57,7 @@ class Forecast:
     directions: Floats  # (d, starts) of the start, those that the next step feels
     measured: MeasuredSteps | MeasuredAngles
     nuisances: tuple[str, ...] = ()
+    in_phase: bool = True  # angles at shares of each measured step rather than at their times
 
     @cached_property
     def steps(self) -> MeasuredSteps:
@@ -65,22 +69,28 @@ class Forecast:
 
     @property
     def heights(self) -> int:
-        return self.steps.count + 1
+        """Number of footholds: in time, a step more than measured, in case predicted steps are shorter."""
+        return self.steps.count + (1 if self.in_phase else 2)
+
+    @cached_property
+    def channels(self) -> dict[str, Floats]:
+        """Measured values (steps,) by quantity of the steps."""
+        return {name: values for name, values in self.steps.channels().items() if self.in_phase or name != PERIOD}
 
     @cached_property
     def values(self) -> Floats:
         """Measured values (values,): channels of the steps, then angles."""
         angles = [self.measured.angles_rad.ravel()] if isinstance(self.measured, MeasuredAngles) else []
-        return np.concatenate([*self.steps.channels().values(), *angles])
+        return np.concatenate([*self.channels.values(), *angles])
 
     @cached_property
     def quantities(self) -> tuple[str, ...]:
-        return (*self.steps.channels(), *([ANGLE] if isinstance(self.measured, MeasuredAngles) else []))
+        return (*self.channels, *([ANGLE] if isinstance(self.measured, MeasuredAngles) else []))
 
     @cached_property
     def quantity(self) -> NDArray[np.int64]:
         """Index (values,) of each value's quantity."""
-        sizes = [self.steps.count] * len(self.steps.channels())
+        sizes = [self.steps.count] * len(self.channels)
         sizes += [self.values.size - sum(sizes)] if isinstance(self.measured, MeasuredAngles) else []
         return np.repeat(np.arange(len(sizes)), sizes)
 
@@ -102,19 +112,29 @@ class Forecast:
         if not self.admits(p):
             return None
         walk = self.walks.disturbed(z, p, heights_m)
-        if walk.outcome is not Outcome.WALKED or walk.durations_s.size < self.steps.count:
+        count = self.steps.count
+        if walk.outcome is not Outcome.WALKED or walk.durations_s.size < self.heights - 1:
             return None
         predicted = {PERIOD: walk.durations_s * sensors[CLOCK], LENGTH: walk.lengths_m, ANGLE: walk.angles_rad}
-        parts = [predicted[name] for name in self.steps.channels()]
+        parts = [predicted[name][:count] for name in self.channels]
         if isinstance(self.measured, MeasuredAngles):
             touches = np.append(0.0, np.cumsum(walk.durations_s))
-            step = self.measured.step
-            times = touches[step] + self.measured.phase * walk.durations_s[step] + sensors[DELAY]
+            times = self._times(touches, walk.durations_s) / (1.0 if self.in_phase else sensors[CLOCK]) + sensors[DELAY]
             order = np.argsort(times)
             angles = np.empty((times.size, 2))
-            angles[order] = self.walks.sampled(z, p, heights_m, np.clip(times[order], 0.0, touches[-1]))
+            last = touches[-1] * (1.0 - LAST_INSTANT)
+            angles[order] = self.walks.sampled(z, p, heights_m, np.clip(times[order], 0.0, last))
             parts.append((sensors[OFFSET] + sensors[GAIN] * angles).ravel())
         return np.concatenate(parts)
+
+    def _times(self, touches: Floats, durations: Floats) -> Floats:
+        """Return the times (samples,) of the samples in the predicted walk, from its first heel strike."""
+        assert isinstance(self.measured, MeasuredAngles), "only angles are sampled"
+        step, phase = self.measured.step, self.measured.phase
+        if self.in_phase:
+            return np.asarray(touches[step] + phase * durations[step])
+        measured = self.measured.touches_s
+        return np.asarray(measured[step] + phase * np.diff(measured)[step] - measured[0])
 
     def differentiate(self, u: Floats, heights_m: Floats, exact: bool) -> Floats | None:
         """Return the derivatives (values, unknowns) by the unknowns, as difference quotients of exact walks."""

@@ -46,6 +46,7 @@ class Information:
                      data; the start and the nuisances are free
     directions       (parameters, parameters) one row per singular value: shares of the parameters
     covariance       (parameters, parameters) in the parameters' units, on determined directions
+    scales           (parameters,) typical changes, in the parameters' units
     freedom          degrees of freedom left, for Student's t
     contributions    share of each measured quantity in the information, averaged over determined directions
     """
@@ -55,6 +56,7 @@ class Information:
     singular_values: Floats
     directions: Floats
     covariance: Floats
+    scales: Floats
     freedom: int
     contributions: dict[str, float]
 

@@ -47,7 +47,7 @@ DRAWING_KINDS = ("svg", "pdf", "png")
 FILM_KINDS = ("gif", "mp4")
 TABLES = {"table": "paper_numbers", "table-1": "table1", "table-2": "table2", "table-3": "table3"}
 NOT_IN_NAMES = re.compile(r"[^a-z0-9]+")
-TRAJECTORY = "trajectory"
+TRAJECTORY, STEPS = "trajectory", "steps"
 COLUMNS = {1: 252.0, 2: 516.0}
 """Width of one or two columns of a journal, pt."""
 DPI = 300
@@ -73,6 +73,8 @@ def export_from(
     kinds: Sequence[str]
     if what == TRAJECTORY:
         stem, kinds, make = f"{model}-{what}", TRAJECTORY_KINDS, lambda kind: trajectory(folder, model, kind, console)
+    elif what == STEPS:
+        stem, kinds, make = f"{model}-{what}", ("csv",), lambda _: steps_of_walk(folder, model, console)
     elif what in TABLES:
         stem, kinds, make = what, tuple(WRITERS), lambda kind: WRITERS[kind](table(folder, what, kind, console))
     elif isinstance(item := find_item(folder, what), Table):
@@ -143,10 +145,10 @@ def find_item(folder: RunFolder, name: str) -> Illustration | Table:
     names = [illustration.name for illustration in FIGURES if illustration.why_left_out(stored, {}) is None]
     names += [table for table, key in TABLES.items() if key in compared]
     names += tables
-    names += [TRAJECTORY] * any(TRAJECTORY in result.groups for result in stored.values())
+    names += [name for name in (STEPS, TRAJECTORY) if any(name in result.groups for result in stored.values())]
     nothing = f"{folder.path} has no results yet: {command(folder, PIPELINE['report'])} computes them all."
     advice = "\n  ".join([f"{folder.path} has", *names]) if names else nothing
-    near = suggestion(name, (*figures, *TABLES, TRAJECTORY, *tables))
+    near = suggestion(name, (*figures, *TABLES, STEPS, TRAJECTORY, *tables))
     raise ConfigError(f"nothing is called {name}.{near}", advice)
 
 
@@ -212,6 +214,16 @@ def table(folder: RunFolder, name: str, kind: str, console: Console) -> Table:
     if isinstance(rows, Mapping):
         rows = [{"quantity": quantity, **row} for quantity, row in rows.items()]
     return record_table(rows)
+
+
+def steps_of_walk(folder: RunFolder, model: str, console: Console) -> bytes:
+    """Write the steps of a walk, as `identify --level steps` reads them; StaleError if it takes none."""
+    with results_to_show(folder, [model], console.warn) as results:
+        steps = the_result(results, folder, model).groups.get(STEPS)
+    names = ("period_s", "length_m")
+    if steps is None or not all(name in steps.variables for name in names):
+        raise StaleError("the walk takes no step.", f"Run {model} from another start.")
+    return csv_text(names, zip(*(steps[name].tolist() for name in names), strict=True))
 
 
 def trajectory(folder: RunFolder, model: str, kind: str, console: Console) -> bytes:

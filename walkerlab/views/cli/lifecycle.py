@@ -14,7 +14,7 @@ from walkerlab.views.cli.request import OF_TALK, Request, command
 RunArgument = Annotated[
     str, typer.Argument(metavar="RUN", help="A run's folder, or its name in the folder of all runs.")
 ]
-FIGURES = "figure-07 or 7, trajectory, model, or a table by its caption; any other word lists the run's items"
+FIGURES = "figure-07 or 7, steps, trajectory, model, or a table by its caption; any other word lists the run's items"
 Output = Annotated[
     Path | None,
     typer.Option(

@@ -93,11 +93,11 @@ def settings_from(options: Sequence["Option"], values: Mapping[str, Any]) -> tup
         if any(values[flag] is None for flag in option.needs):
             raise typer.BadParameter(f"also give {' and '.join(option.needs)}", param_hint=option.flag)
         typed = " ".join(f"{option.flag} {item}" for item in (value if isinstance(value, list) else [value]))
-        if "=A:B" in option.metavar:
-            text = bounds(option.flag, value)
+        if ":" in option.metavar:
+            text = bounds(option.flag, value, option.metavar)
         elif "=" in option.metavar:
             text = pairs(option.flag, value)
-        elif option.metavar == "FILE":
+        elif option.metavar == "FILE" or option.type is list:
             text = json.dumps(value)
         else:
             text, typed = str(value), f"{option.flag} {str(value).removesuffix('.0')}"
@@ -105,12 +105,17 @@ def settings_from(options: Sequence["Option"], values: Mapping[str, Any]) -> tup
     return tuple(settings)
 
 
-def bounds(flag: str, values: Sequence[str]) -> str:
-    """Return bounds NAME=A:B as a YAML block; typer.BadParameter for another form."""
-    parts = [re.fullmatch(r"([^=]+)=([^:]+):([^:]+)", value) for value in values]
+def bounds(flag: str, values: Sequence[str], form: str) -> str:
+    """Return pairs of numbers by name as a YAML block; typer.BadParameter for another form than NAME=A:B.
+
+    form  as documented; with brackets, a name alone stands for null
+    """
+    either = r"([^=]+)(?:=([^:]+):([^:]+))" + ("?" if "[" in form else "")
+    parts = [re.fullmatch(either, value) for value in values]
     if None in parts:
-        raise typer.BadParameter("give a name and its bounds, NAME=A:B", param_hint=flag)
-    return "{" + ", ".join(f"{part[1]}: [{part[2]}, {part[3]}]" for part in parts if part) + "}"
+        raise typer.BadParameter(f"give a name and two numbers, {form}", param_hint=flag)
+    named = (f"{part[1]}: [{part[2]}, {part[3]}]" if part[2] else f"{part[1]}: null" for part in parts if part)
+    return "{" + ", ".join(named) + "}"
 
 
 def pairs(flag: str, values: Sequence[str]) -> str:
@@ -129,7 +134,7 @@ def own_parameter(name: str, option: "Option") -> inspect.Parameter:
     """Return a stage's own option as a parameter of a function whose signature typer reads."""
     complete = keys_to_vary if option.metavar == "KEY" else None
     declared = typer.Option(option.flag, metavar=option.metavar, help=option.help, autocompletion=complete)
-    kind: Any = list[str] if "=" in option.metavar else option.type
+    kind: Any = list[str] if "=" in option.metavar or option.type is list else option.type
     annotation = Annotated[kind | None, declared]
     return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=annotation)
 

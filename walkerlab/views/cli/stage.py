@@ -3,8 +3,10 @@
 import itertools
 import os
 import shlex
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from walkerlab.config.files import builtin_names, config_to_extend
 from walkerlab.config.layers import parse_setting
@@ -23,6 +25,8 @@ from walkerlab.views.report.tables import aligned
 
 SEARCHING = ("fixedpoint", "report")
 """Stages that look for gaits nearby where there is none."""
+WRITES_CONFIG = {"design": "optimum", "identify": "identified"}
+"""Stages that end in a config, with its name."""
 DRAWN_AT_ONCE = {stage.name for stage in PIPELINE.stages if stage.on_demand}
 
 
@@ -43,8 +47,8 @@ def report_on(request: Request, stage: Stage, graph: Graph) -> None:
         print_result(request, report.as_json() | {"dry_run": True}, plan_lines(report))
         return
     report = with_nearby_gaits(execute(config, stage.name, folder, options, request.console, graph), request)
-    if stage.name == "design" and report.no_answer is None:
-        report.summary["config"] = str(write_optimum(request, report))
+    if stage.name in WRITES_CONFIG and report.no_answer is None:
+        report.summary["config"] = str(write_config(request, report, WRITES_CONFIG[stage.name]))
     lines = report_lines(request, report)
     if request.open_page and "html" in report.summary and not request.console.shown:
         request.console.show(report.run_dir / str(report.summary["html"]))
@@ -63,19 +67,26 @@ def with_nearby_gaits(report: StageReport, request: Request) -> StageReport:
     return replace(report, no_answer=NoAnswer(error.message, f"{suggestions} {error.advice}".strip()))
 
 
-def write_optimum(request: Request, report: StageReport) -> Path:
-    """Write the optimum as a config that extends the one that was asked about, into its run folder, over no file.
+def values_of(summary: Mapping[str, Any]) -> dict[str, float]:
+    """Return the values of parameters that a stage ends in."""
+    if "best" in summary:
+        return dict(summary["best"])
+    return {estimate["key"]: estimate["value"] for estimate in summary["estimates"]}
+
+
+def write_config(request: Request, report: StageReport, name: str) -> Path:
+    """Write a stage's parameters as a config that extends that of the request, into its run folder, over no file.
 
     Raises StorageError if the system refuses.
     """
     start = config_to_extend(request.config)
     base = load(Path(start)).config
     typed = start if start in builtin_names() else os.path.relpath(start, report.run_dir)
-    settings = [parse_setting(f"{key}={value!r}") for key, value in report.summary["best"].items()]
-    best = request.loaded.variant(settings).model_copy(update={"design": base.design})
-    text = to_extending_yaml(typed, base, best, f"{base.name}-optimum")
+    settings = [parse_setting(f"{key}={value!r}") for key, value in values_of(report.summary).items()]
+    changed = request.loaded.variant(settings).model_copy(update={report.stage: getattr(base, report.stage)})
+    text = to_extending_yaml(typed, base, changed, f"{base.name}-{name}")
     for number in itertools.count(1):
-        path = report.run_dir / ("optimum.yaml" if number == 1 else f"optimum-{number}.yaml")
+        path = report.run_dir / (f"{name}.yaml" if number == 1 else f"{name}-{number}.yaml")
         with storing(path):
             if not path.exists():
                 path.write_text(text, encoding="utf-8")

@@ -20,7 +20,8 @@ FIRST: Final = (
 DRIVES: Final = ("walker.hip.", "push_off.")
 """Shown initially only if active; knee-lock keys appear in searches only."""
 OF_OTHERS: Final = (
-    "name", "source", "outputs", "seed", "sweep", "design", "stability", "tune", "continuation", "basin", "robustness",
+    "name", "source", "outputs", "seed", "sweep", "design", "identify", "stability", "tune", "continuation", "basin",
+    "robustness",
 )  # fmt: skip
 """Keys that do not affect a walk."""
 AROUND: Final = 5.0

@@ -209,9 +209,21 @@ def robustness_answer(summary: Summary) -> list[str | Table]:
 def best_walker(summary: Summary) -> list[str | Table]:
     from walkerlab.views.report.sections.robustness import design_blocks
 
+    return [*design_blocks(summary), *config_lines(summary)]
+
+
+def config_lines(summary: Summary) -> list[str]:
+    """Name the config that a stage wrote, and what to do with it."""
     file = summary.get("config")
-    lines = [] if file is None else [f"config: {file}", f"next: `walkerlab report -c {shlex.quote(file)}`."]
-    return [*design_blocks(summary), *lines]
+    return [] if file is None else [f"config: {file}", f"next: `walkerlab report -c {shlex.quote(file)}`."]
+
+
+def identified_walker(summary: Summary) -> list[str | Table]:
+    from walkerlab.views.report.sections import identification
+
+    usable = any(row["fit"] == "fits" for row in summary["models"] if row["model"] == summary["model"])
+    lines = config_lines(summary) if usable else config_lines(summary)[:1]
+    return [*identification.findings(summary), *identification.tables(summary), *lines]
 
 
 def engines(summary: Summary) -> list[str | Table]:
@@ -249,6 +261,7 @@ ANSWERS: dict[str, Answer] = {
     "basin": starts,
     "robustness": robustness_answer,
     "design": best_walker,
+    "identify": identified_walker,
     "engines": engines,
     "plot": plot,
     "report": report,

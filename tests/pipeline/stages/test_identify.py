@@ -1,0 +1,269 @@
+"""The identify stage: parameters recovered from measured walks, misfits recognised, damaged questions refused."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from walkerlab.config.loader import load
+from walkerlab.config.reads import only
+from walkerlab.errors import ConfigError
+from walkerlab.pipeline.graph import PIPELINE
+from walkerlab.pipeline.identity import Keys
+from walkerlab.pipeline.progress import Silent
+from walkerlab.pipeline.stages import fixedpoint, identify, simulate
+from walkerlab.pipeline.stages.measured_walk import MISSING, digests, read_measured
+from walkerlab.views.cli.main import program
+from walkerlab.views.figures.registry import FIGURES
+from walkerlab.views.report.answers import answer
+from walkerlab.views.report.results import Results
+from walkerlab.views.report.sections.identification import section
+from walkerlab.views.report.tables import Table
+
+# fixed by the interface of `--json`; `config` is the command line's
+FIXED_KEYS = {
+    "estimates", "not_identifiable", "correlations", "singular_values", "steps", "rms_residual", "chi_square_per_dof",
+    "noise", "gait", "models",
+}  # fmt: skip
+NOISE = 1e-3
+START = "start=[-0.20477, 0.17, -0.35, -0.9]"
+GOOD = "period_s,length_m\n" + "".join(f"0.7{k},0.37{k}\n" for k in range(8))
+
+
+def taken(*changes):
+    return only(load(Path("paper"), changes).config, PIPELINE["identify"].takes)
+
+
+@pytest.fixture(scope="module")
+def gait():
+    config = load(Path("paper"), ()).config
+    return {"fixedpoint": fixedpoint.run(only(config, PIPELINE["fixedpoint"].takes), {}, Silent())}
+
+
+@pytest.fixture(scope="module")
+def transient(gait):
+    config = load(Path("paper"), (START, "strides=10")).config
+    return simulate.run(only(config, PIPELINE["simulate"].takes), gait, Silent())
+
+
+@pytest.fixture(scope="module")
+def table(transient, tmp_path_factory):
+    """The steps of a transient with noise of 1 ms and 1 mm."""
+    rng, steps = np.random.default_rng(4), transient.groups["steps"]
+    values = np.column_stack((steps["period_s"], steps["length_m"]))
+    path = tmp_path_factory.mktemp("walk") / "steps.csv"
+    rows = (f"{period:.9f},{length:.9f}" for period, length in values + NOISE * rng.standard_normal(values.shape))
+    path.write_text("\n".join(("period_s,length_m", *rows)))
+    return path
+
+
+def ask(data, *changes):
+    return (f"identify.data={json.dumps(str(data))}", *changes)
+
+
+@pytest.fixture(scope="module")
+def identified(table, gait):
+    fit = "identify.fit={slope_deg: null, walker.hip_mass_kg: [5, 20]}"
+    return identify.run(taken(*ask(table, fit, "walker.hip_mass_kg=9")), gait, Silent())
+
+
+def test_parameters_of_a_noisy_transient_are_recovered_within_their_bars(identified):
+    truth = load(Path("paper"), ()).config
+    values = {row["key"]: row for row in identified.summary["estimates"]}
+    for key, value in (("slope_deg", np.degrees(truth.slope_rad)), ("walker.hip_mass_kg", truth.walker.hip_mass_kg)):
+        assert abs(values[key]["value"] - value) < 4.0 * values[key]["standard_error"], key
+    assert values["walker.hip_mass_kg"]["start"] == 9.0
+    assert not values["walker.hip_mass_kg"]["at_bound"]
+
+
+def test_the_summary_has_the_fixed_keys_and_is_json(identified):
+    summary = identified.summary
+    assert set(summary) >= FIXED_KEYS
+    json.dumps(summary, allow_nan=False)
+    assert set(summary["estimates"][0]) == {"key", "value", "standard_error", "unit", "start", "at_bound"}
+    assert set(summary["gait"]) == {"period_s", "step_length_m", "spectral_radius"}
+    assert all(set(value) == {"value", "standard_error"} for value in summary["gait"].values())
+    assert set(summary["noise"]["process"]) == {"roughness_m", "standard_error", "at_bound"}
+    assert summary["models"][0]["fit"] == "fits"
+    assert summary["steps"] == 20
+    assert np.allclose(np.diag(summary["correlations"]["matrix"]), 1.0)
+
+
+def test_the_answer_says_masses_as_a_builder_does(identified):
+    text = " ".join(" ".join(answer("identify", identified.summary)).split())
+    assert "the hip weighs " in text
+    assert " kg, if the leg weighs 5 kg" in text
+    assert "The slope is " in text
+    assert " degrees" in text
+
+
+def test_stored_steps_are_those_of_the_file(identified, table):
+    columns = np.loadtxt(table, delimiter=",", skiprows=1).T
+    steps = identified.groups["steps"]
+    assert np.allclose(steps["measured_step_period_s"], columns[0], rtol=1e-12)
+    residual = steps["measured_step_length_m"] - steps["predicted_step_length_m"]
+    assert 0.3 * NOISE < residual.std() < 3.0 * NOISE
+
+
+def test_every_figure_of_an_identification_is_drawn(identified):
+    figures = [figure for figure in FIGURES if figure.stages == ("identify",)]
+    results = {"identify": identified}
+    assert [figure.why_left_out(results, {}) for figure in figures] == [None] * 4
+    for figure in figures:
+        drawing = figure.render(results)
+        assert drawing.caption
+        assert drawing.png.startswith(b"\x89PNG")
+
+
+def test_two_masses_of_a_rigid_walk_are_reported_as_one_combination(table, gait):
+    changes = ask(table, "identify.fit={walker.leg_mass_kg: null, walker.hip_mass_kg: null}")
+    summary = identify.run(taken(*changes), gait, Silent()).summary
+    assert [row["standard_error"] for row in summary["estimates"]] == [None, None]
+    assert len(summary["not_identifiable"]) == 1
+    text = " ".join(" ".join(answer("identify", summary)).split())
+    combination = text.partition("Not determined by this walk: ")[2].partition(";")[0]
+    assert all(row["key"] in combination for row in summary["estimates"])
+    assert "No walk would separate them; a value known beforehand (--prior) does." in text
+
+
+def test_a_weighed_leg_determines_the_hip(table, gait):
+    fit = "identify.fit={walker.leg_mass_kg: null, walker.hip_mass_kg: null}"
+    changes = ask(table, fit, "identify.prior={walker.leg_mass_kg: [5, 0.05]}")
+    rows = {row["key"]: row for row in identify.run(taken(*changes), gait, Silent()).summary["estimates"]}
+    assert rows["walker.leg_mass_kg"]["standard_error"] == pytest.approx(0.05, rel=0.02)
+    # hip over leg is known far better than the leg: the hip inherits its relative error
+    assert rows["walker.hip_mass_kg"]["standard_error"] == pytest.approx(0.1, rel=0.1)
+
+
+def test_lengths_in_millimetres_taken_for_metres_are_a_misfit(table, gait, tmp_path):
+    rows = np.loadtxt(table, delimiter=",", skiprows=1) * (1.0, 1e3)
+    path = tmp_path / "mm.csv"
+    path.write_text("period_s,length_m\n" + "\n".join(f"{p},{q}" for p, q in rows))
+    summary = identify.run(taken(*ask(path, "identify.fit={slope_deg: null}")), gait, Silent()).summary
+    assert summary["models"][0]["fit"] == "misfit"
+    assert "explains this walk" in " ".join(" ".join(answer("identify", summary)).split())
+
+
+def test_columns_and_units_are_mapped(table, tmp_path):
+    rows = np.loadtxt(table, delimiter=",", skiprows=1) * 1e3
+    path = tmp_path / "mapped.csv"
+    path.write_text("T,stride [mm]\n" + "\n".join(f"{p},{q}" for p, q in rows))
+    columns = 'identify.columns={period_s: T, length_m: "stride"}'
+    changes = ask(path, "identify.fit={slope_deg: null}", columns, "identify.units={period_s: ms}")
+    config = taken(*changes)
+    steps = read_measured(config.identify, config)
+    assert np.allclose(np.column_stack((steps.periods_s, steps.lengths_m)), 1e-3 * rows)
+
+
+def test_a_changed_file_changes_the_key_of_the_result(tmp_path):
+    path = tmp_path / "steps.csv"
+    config = load(Path("paper"), ask(path, "identify.fit={slope_deg: null}")).config
+    assert digests(config) == {"identify.data": MISSING}
+    keys = []
+    for text in (GOOD, GOOD.replace("0.373", "0.372"), GOOD):
+        path.write_text(text)
+        keys.append(Keys().of(config, "identify")["identify"])
+    assert keys[0] == keys[2] != keys[1]
+
+
+def test_sampled_angles_are_divided_at_their_heel_strikes(transient, tmp_path):
+    samples = transient.groups["trajectory"]
+    time, angle, path = samples["time"], samples["angle"], tmp_path / "angles.csv"
+    rising = np.append(True, np.diff(time) > 0.0)
+    lines = (f"{t!r},{a!r},{b!r}" for t, (a, b) in zip(time[rising].tolist(), angle[rising].tolist(), strict=True))
+    path.write_text("time (s),angle 1 (rad),angle 2 (rad)\n" + "\n".join(lines))
+    config = taken(*ask(path, "identify.level=angles", "identify.fit={slope_deg: null}"))
+    measured = read_measured(config.identify, config)
+    expected = transient.groups["steps"]["period_s"][-measured.count :]
+    assert measured.count >= 18
+    assert np.allclose(measured.steps.periods_s, expected, atol=2e-4)
+    assert 0.0 <= measured.phase.min() <= measured.phase.max() < 1.0
+
+
+FIT = ("--fit", "slope_deg")
+DAMAGED_OPTIONS = [
+    (), ("--fit", "slope"), ("--fit", "walker"), ("--fit", "walker.hip_mas_kg"), ("--fit", "name"), ("--fit", "seed"),
+    ("--fit", "walker.thigh.mass_kg"), ("--fit", "contact.damping"), ("--fit", "walker.hip_mass_kg=5"),
+    ("--fit", "walker.hip_mass_kg=5:"), ("--fit", "walker.hip_mass_kg=:5"), ("--fit", "walker.hip_mass_kg=20:5"),
+    ("--fit", "walker.hip_mass_kg=5:5"), ("--fit", "walker.hip_mass_kg=a:b"), ("--fit", "walker.hip_mass_kg=-1:20"),
+    ("--fit", "walker.hip_mass_kg=nan:20"), ("--fit", "walker.hip_mass_kg=5:inf"), ("--fit", "=5:20"), ("--fit", ""),
+    ("--fit", "walker.hip_mass_kg=11:20"), ("--fit", "slope_deg=-95:5"), ("--fit", "slope_deg: [1"), ("--fit", "[=1:2"),
+    (*FIT, "--prior", "walker.hip_mass_kg"), (*FIT, "--prior", "walker.hip_mass_kg=10"), (*FIT, "--prior", "10:1"),
+    (*FIT, "--prior", "walker.hip_mass_kg=10:0"), (*FIT, "--prior", "walker.hip_mass_kg=10:-1"),
+    (*FIT, "--prior", "walker.hip_mass_kg=-10:1"), (*FIT, "--prior", "hip=10:1"),
+    (*FIT, "--prior", "walker.hip_mass_kg=x:1"), (*FIT, "--prior", "walker.hip_mass_kg=10:nan"),
+    (*FIT, "--nuisance", "clock"), (*FIT, "--nuisance", "clock_rate"), (*FIT, "--nuisance", ""),
+    (*FIT, "--model", "elastic"), (*FIT, "--model", "contact", "--set", "contact=null"),
+    (*FIT, "--level", "strides"), (*FIT, "--level", "angles"), (*FIT, "--loss", "huber"),
+    (*FIT, "--columns", "period_s"), (*FIT, "--columns", "period=T"), (*FIT, "--columns", "period_s=T"),
+    (*FIT, "--columns", "length_m=step"), (*FIT, "--units", "furlong"), (*FIT, "--units", "length=furlong"),
+    ("--set", "identify.fit=3"), (*FIT, "--set", "identify.date=steps.csv"), (*FIT, "--set", "identify=3"),
+]  # fmt: skip
+HEAD = "period_s,length_m\n"
+DAMAGED_FILES = [
+    b"", b"\n\n", b"\0\1\2\3", HEAD.encode(), f"{HEAD}0.7,0.37\n".encode(), b"0.7,0.37\n0.7,0.37\n",
+    f"{HEAD}0.7,0.37\n0.7\n".encode(), f"{HEAD}0.7,0.37\n0.7,0.37,1\n".encode(), f"{HEAD}0.7,0.37\n,0.37\n".encode(),
+    f"{HEAD}0.7,0.37\n0.7,nan\n".encode(), f"{HEAD}0.7,0.37\nabc,0.37\n".encode(),
+    f"{HEAD}0.7,0.37\n-0.7,0.4\n".encode(),
+    f"{HEAD}0.7,0.37\n0,0.37\n".encode(), f"{HEAD}0.7,0.37\n0.7,0\n".encode(), f"{HEAD}0.7,0.37\n0.7,inf\n".encode(),
+    b"period_s,period_s\n0.7,0.7\n0.7,0.7\n", b"length_m,angle\n0.3,0.2\n0.3,0.2\n",
+    b"period,length_m\n0.7,0.3\n0.7,0.3\n",
+    b"period_s [furlong],length_m\n0.7,0.3\n0.7,0.3\n", b"time,angle 1,angle 2\n0,0,0\n1,0,0\n", b"\xff\xfe\x00\xd8",
+]  # fmt: skip
+
+
+def refused(folder, monkeypatch, *options):
+    """Run the command in the folder, and return its messages; it must refuse and leave nothing behind."""
+    monkeypatch.chdir(folder)
+    done = CliRunner().invoke(program(), ["identify", *options])
+    assert done.exit_code in (2, 3), (done.output, done.exception)
+    assert not list(folder.rglob("identif*"))
+    text = " ".join(done.output.split())
+    assert "Traceback" not in text
+    assert "Error" in text or "error: " in text
+    return text
+
+
+@pytest.mark.parametrize("options", DAMAGED_OPTIONS, ids=" ".join)
+def test_a_damaged_option_is_refused(options, tmp_path, monkeypatch):
+    (tmp_path / "steps.csv").write_text(GOOD)
+    refused(tmp_path, monkeypatch, "--data", "steps.csv", *options)
+
+
+@pytest.mark.parametrize("data", DAMAGED_FILES, ids=repr)
+def test_a_damaged_file_is_refused_by_its_name(data, tmp_path, monkeypatch):
+    (tmp_path / "steps.csv").write_bytes(data)
+    assert "steps.csv" in refused(tmp_path, monkeypatch, "--data", "steps.csv", *FIT)
+
+
+@pytest.mark.parametrize("path", ["nowhere.csv", ".", "", "steps.csv/x"])
+def test_a_missing_file_is_refused(path, tmp_path, monkeypatch):
+    (tmp_path / "steps.csv").write_text(GOOD)
+    refused(tmp_path, monkeypatch, "--data", path, *FIT)
+
+
+def test_a_misfit_is_an_answer_that_proposes_no_next_step(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("steps.csv").write_text(GOOD)
+    done = CliRunner().invoke(program(), ["identify", "--data", "steps.csv", *FIT])
+    assert done.exit_code == 0, done.output
+    assert "Do not use the estimates below." in " ".join(done.output.split())
+    assert "identified.yaml" in done.output
+    assert "next: " not in done.output
+
+
+def test_a_misspelt_key_is_answered_with_the_nearest(tmp_path):
+    path = tmp_path / "steps.csv"
+    path.write_text(GOOD)
+    with pytest.raises(ConfigError, match=r"identify\.fit: walker\.hip_mas_kg .*did you mean walker\.hip_mass_kg"):
+        identify.refuse(taken(*ask(path, "identify.fit={walker.hip_mas_kg: null}")))
+
+
+def test_the_page_has_a_section_that_begins_with_the_estimates(identified):
+    part = section(Results(load(Path("paper"), ()).config, {"identify": identified}))
+    assert part is not None
+    assert part.finding.startswith("The slope is ")
+    captions = [block.caption for block in part.blocks if isinstance(block, Table)]
+    assert captions == ["Estimates", "Fit to the measurements"]

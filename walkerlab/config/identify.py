@@ -1,0 +1,73 @@
+"""The identify block: a measured walk, and the parameters to estimate from it."""
+
+from typing import Literal, get_args
+
+from pydantic import field_validator
+
+from walkerlab.config.fields import Block, key, meaning_error
+
+Nuisance = Literal["time_offset_s", "clock_rate", "angle_offset_rad", "angle_gain"]
+Pair = list[float]
+
+
+class Identify(Block):
+    """Estimation problem of `walkerlab identify`."""
+
+    data: str = key(
+        "", "", "file with the measured walk", bounds="a path, from the current folder", default_in_words="none"
+    )
+    level: Literal["steps", "angles"] = key(
+        "steps", "", "steps: a period for each step, or also a length and the leg's angle at touch; angles: over time"
+    )
+    fit: dict[str, Pair | None] = key(
+        dict,
+        "",
+        "parameters to estimate, with their bounds in the key's unit",
+        bounds="[A, B] for each key, A below B, or null for the schema's bounds",
+    )
+    prior: dict[str, Pair] = key(
+        dict,
+        "",
+        "parameters that were measured otherwise, in the key's unit",
+        bounds="[value, standard deviation] for each key, the second above 0",
+    )
+    nuisance: tuple[Nuisance, ...] = key(
+        (), "", "properties of clock and sensors to estimate too", bounds=f"a list of {', '.join(get_args(Nuisance))}"
+    )
+    model: Literal["rigid", "contact", "both"] = key("rigid", "", "model to fit")
+    loss: Literal["linear", "soft_l1"] = key(
+        "linear", "", "linear: least squares; soft_l1: outliers count by their size, not its square"
+    )
+    columns: dict[str, str] = key(
+        dict, "", "columns by quantity, where their names do not say it", bounds="a column for each quantity"
+    )
+    units: dict[str, str] = key(
+        dict, "", "units by kind (time, length, angle), quantity or column", bounds="a unit for each"
+    )
+
+    @field_validator("fit")
+    @classmethod
+    def _upwards(cls, value: dict[str, Pair | None]) -> dict[str, Pair | None]:
+        for name, bounds in value.items():
+            if bounds is not None and (len(bounds) != 2 or bounds[0] >= bounds[1]):
+                raise meaning_error(
+                    f"has bounds for {name}, [{listed(bounds)}], that are not two numbers, the first below the second"
+                )
+        return value
+
+    @field_validator("prior")
+    @classmethod
+    def _with_deviation(cls, value: dict[str, Pair]) -> dict[str, Pair]:
+        for name, pair in value.items():
+            if len(pair) != 2 or pair[1] <= 0.0:
+                raise meaning_error(f"has [{listed(pair)}] for {name}, not a value and a standard deviation above 0")
+        return value
+
+    @field_validator("nuisance")
+    @classmethod
+    def _once(cls, value: tuple[Nuisance, ...]) -> tuple[Nuisance, ...]:
+        return tuple(dict.fromkeys(value))
+
+
+def listed(numbers: Pair) -> str:
+    return ", ".join(f"{number:g}" for number in numbers)

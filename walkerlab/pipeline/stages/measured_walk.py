@@ -1,0 +1,107 @@
+"""Measured walks as `identify` reads them: a table of steps, or angles over time divided into steps."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from difflib import get_close_matches
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from walkerlab.errors import ConfigError
+from walkerlab.exchange.columns import as_walk, plain, unit_value
+from walkerlab.exchange.recording import TIME, Recording, read_delimited, read_recording
+from walkerlab.exchange.walk_in_steps import divide_into_steps
+from walkerlab.physics.estimation.measurements import MeasuredAngles, MeasuredSteps, split_into_steps
+from walkerlab.physics.solvers.system import Floats
+from walkerlab.scene.rigid import rigid_walker
+
+if TYPE_CHECKING:
+    from walkerlab.config.identify import Identify
+    from walkerlab.config.reads import RigidConfig
+    from walkerlab.config.schema import Config
+
+KINDS: Final = {"period_s": "time", "length_m": "length", "touch_angle_rad": "angle"}
+"""Kind of unit of each quantity of a table of steps."""
+MIN_STEPS: Final = 2
+MISSING: Final = "there is no such file"
+
+
+def digests(config: Config) -> Mapping[str, str]:
+    """Return the digest of the data's content, so that a changed file makes results stale."""
+    if config.identify is None:
+        return {}
+    try:
+        return {"identify.data": hashlib.sha256(Path(config.identify.data).read_bytes()).hexdigest()}
+    except OSError:
+        return {"identify.data": MISSING}
+
+
+def read_measured(block: Identify, config: RigidConfig) -> MeasuredSteps | MeasuredAngles:
+    """Read the block's file at its level; raises ConfigError for a file without such a walk."""
+    path = Path(block.data)
+    if not path.is_file():
+        raise ConfigError(
+            f"identify.data: {block.data} cannot be read: {'it is a folder' if path.is_dir() else MISSING}.",
+            "Check the path given to --data.",
+            ("identify", "data"),
+        )
+    try:
+        return read_steps(path, block) if block.level == "steps" else read_angles(path, block, config)
+    except OSError as error:
+        raise ConfigError(f"{path} cannot be read: {error.strerror or error}.", "Check the path.") from error
+
+
+def read_angles(path: Path, block: Identify, config: RigidConfig) -> MeasuredAngles:
+    """Read angles over time and divide them at the heel strikes of the config's walker."""
+    walk = as_walk(read_recording(path), block.columns, block.units)
+    steps = divide_into_steps(walk, rigid_walker(config), str(path))
+    if steps.touch_time_s.size < MIN_STEPS:
+        raise ConfigError(f"{path} has 1 complete step; at least {MIN_STEPS} are needed.", "Record a longer walk.")
+    return split_into_steps(steps.time_s, steps.angle_rad, np.append(0.0, steps.touch_time_s))
+
+
+def read_steps(path: Path, block: Identify) -> MeasuredSteps:
+    """Read a table with a row per step: `period_s`, and `length_m` and `touch_angle_rad` if they were measured."""
+    table = read_delimited(path)
+    for name in block.columns.keys() - KINDS.keys():
+        raise ConfigError(f"--columns: {name!r} is not a quantity of a step.", f"Quantities are {', '.join(KINDS)}.")
+    values = {name: read_column(table, name, block) for name in KINDS}
+    period = values["period_s"]
+    if period is None:
+        near = get_close_matches("period_s", table.columns, 1, 0.3) or list(table.columns)[:1]
+        raise ConfigError(
+            f"{path} has no column period_s; it has: {', '.join(list(table.columns)[:8])}.",
+            f'Name the column of periods: --columns "period_s={near[0]}". Angles over time need --level angles.',
+        )
+    if period.size < MIN_STEPS:
+        raise ConfigError(f"{path} has {period.size} step; at least {MIN_STEPS} are needed.", "Measure more steps.")
+    return MeasuredSteps(period, values["length_m"], values["touch_angle_rad"])
+
+
+def read_column(table: Recording, name: str, block: Identify) -> Floats | None:
+    """Return a quantity (steps,) in SI units, None without a column; raises ConfigError for gaps and bad values."""
+    by_name = {plain(column): column for column in table.columns}
+    stem = name.rpartition("_")[0]
+    source = block.columns.get(name) or by_name.get(name) or by_name.get(stem)
+    if source is None:
+        return None
+    if source.lower() == "t" and TIME in table.columns:  # the reader of files calls a column t so
+        source = TIME
+    if source not in table.columns:
+        near = get_close_matches(source, table.columns, 1, 0.3)
+        advice = f"The nearest is {near[0]!r}." if near else f"It has: {', '.join(list(table.columns)[:8])}."
+        raise ConfigError(f"{table.path} has no column {source!r}.", advice)
+    values = table.columns[source]
+    if (gaps := np.flatnonzero(~np.isfinite(values))).size:
+        raise ConfigError(
+            f"{table.path}: {source!r} is missing in step {gaps[0] + 1}.", "Complete it, or leave out the column."
+        )
+    if name != "touch_angle_rad" and (bad := np.flatnonzero(values <= 0.0)).size:
+        raise ConfigError(
+            f"{table.path}: {source!r} is {values[bad[0]]:g} in step {bad[0] + 1}; it must be above 0.",
+            "Correct it, or leave out the step and those before it.",
+        )
+    return np.asarray(values * unit_value(table, name, source, KINDS[name], block.units))

@@ -1,0 +1,137 @@
+"""The parameters identified from a measured walk."""
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from walkerlab.labels import axis_label, join_words, unit_by_name
+from walkerlab.views.report.blocks import PageBlock, Paragraph, Section
+from walkerlab.views.report.numbers import fixed, number, quantity
+from walkerlab.views.report.results import Results, stage_section
+from walkerlab.views.report.tables import Column, Table, table
+from walkerlab.views.report.words import words
+
+NO_EFFECT = 1e-6
+"""Share of the largest singular value, below which no walk depends on a combination."""
+UNITS_IN_WORDS = {"deg": " degrees", "1": "", "": ""}
+GAIT_WORDS = {
+    "step_length_m": "steps of {}",
+    "period_s": "a period of {}",
+    "spectral_radius": "a largest multiplier of {}",
+}
+ESTIMATE_COLUMNS = (
+    Column("parameter", "key"),
+    Column("estimate", lambda row: rounded(row["value"], row["standard_error"]), numeric=True),
+    Column("standard error", "standard_error", lambda value: number(value, 2), numeric=True),
+    Column("unit", "unit"),
+    Column("start", "start", lambda value: number(value, 6), numeric=True),
+    Column("at a bound", "at_bound"),
+)
+QUALITY_COLUMNS = (
+    Column("quantity", "quantity"),
+    Column("residual (r.m.s.)", "residual", lambda value: number(value, 3), numeric=True),
+    Column("measurement noise", "noise", lambda value: number(value, 3), numeric=True),
+    Column("unit", "unit"),
+    Column("information lost without it", "share", lambda value: f"{100.0 * value:.0f} %", numeric=True),
+)
+
+
+@stage_section("identify", "estimates")
+def section(_results: Results, summary: Mapping[str, Any]) -> Section | None:
+    first, *rest = findings(summary)
+    blocks: tuple[PageBlock, ...] = (Paragraph(" ".join(rest)), *tables(summary))
+    return Section.of("identification", "Identified walker", blocks, first)
+
+
+def findings(summary: Mapping[str, Any]) -> list[str]:
+    """Sentences of the answer: estimates, undetermined combinations, fit, gait and the other model."""
+    verdict = next(row for row in summary["models"] if row["model"] == summary["model"])
+    other = next((row for row in summary["models"] if row["model"] != summary["model"]), None)
+    known = [row for row in summary["estimates"] if row["standard_error"] is not None]
+    masses = [mass_in_words(key, number(value)) for key, value in summary["reference_masses_kg"].items()]
+    determined = capitalised("; ".join(estimate_in_words(row) for row in known))
+    weighed = any(row["key"].endswith("mass_kg") for row in known)
+    separable = any(" and " in row["combination"] for row in summary["not_identifiable"])
+    singular = summary["singular_values"]
+    without_effect = separable and min(singular) < NO_EFFECT * max(singular)
+    parameters = (determined, join_words(masses) if weighed else "", separable, without_effect)
+    quality = (other, gait_in_words(summary["gait"]), noise_in_words(summary))
+    return [
+        *words.parts("identify.findings", summary, verdict, *parameters),
+        *words.parts("identify.quality", summary, verdict, *quality),
+    ]
+
+
+def tables(summary: Mapping[str, Any]) -> list[Table]:
+    quality = [
+        {
+            "quantity": name.rpartition("_")[0].replace("_", " "),
+            "residual": residual,
+            "noise": summary["noise"]["measurement"].get(name),
+            "unit": unit_by_name(name),
+            "share": summary["contributions"].get(name, 0.0),
+        }
+        for name, residual in summary["rms_residual"].items()
+    ]
+    return [
+        table("Estimates", ESTIMATE_COLUMNS, summary["estimates"]),
+        table("Fit to the measurements", QUALITY_COLUMNS, quality),
+    ]
+
+
+def rounded(value: float, error: float | None) -> str:
+    """Format a value with the decimals that its standard error leaves."""
+    return number(value, 6) if not error else fixed(value, decimals_of(error))
+
+
+def decimals_of(error: float) -> int:
+    """Return the decimals that show one digit of an error, two if the first is 1."""
+    mantissa, _, exponent = f"{error:.1e}".partition("e")
+    return max(0, -int(exponent) + (mantissa < "2"))
+
+
+def with_error(value: float, error: float | None, unit: str) -> str:
+    """Format as in 9.8 ± 0.2 kg."""
+    ending = UNITS_IN_WORDS.get(unit, f" {unit}")
+    if not error:
+        return f"{number(value, 6)}{ending}"
+    if error >= 10.0 or not math.isfinite(error):
+        return f"{number(value, 4)} ± {number(error, 2)}{ending}"
+    return f"{fixed(value, decimals_of(error))} ± {fixed(error, decimals_of(error))}{ending}"
+
+
+def mass_in_words(key: str, text: str) -> str:
+    """Say a mass as a builder does, as in 'the hip weighs 9.8 ± 0.2 kg'."""
+    return f"the {axis_label(key).removesuffix(' mass')} weighs {text} kg"
+
+
+def estimate_in_words(row: Mapping[str, Any]) -> str:
+    value = with_error(row["value"], row["standard_error"], row["unit"])
+    bound = " (at its bound)" if row["at_bound"] else ""
+    if row["key"].endswith("mass_kg"):
+        return mass_in_words(row["key"], value.removesuffix(" kg")) + bound
+    return f"the {axis_label(row['key'])} is {value}{bound}"
+
+
+def gait_in_words(gait: Mapping[str, Mapping[str, float]]) -> str:
+    parts = [
+        said.format(with_error(gait[name]["value"], gait[name]["standard_error"], unit_by_name(name)))
+        for name, said in GAIT_WORDS.items()
+        if name in gait
+    ]
+    return f"The identified gait has {join_words(parts)}" if parts else ""
+
+
+def noise_in_words(summary: Mapping[str, Any]) -> str:
+    """Describe the noise: the floor's, then the measurement's."""
+    floor = summary["noise"]["process"]["roughness_m"]
+    parts = [f"floor {number(1e3 * floor, 2)} mm rough" if floor else "an even floor"]
+    parts += [
+        f"{name.rpartition('_')[0].replace('_', ' ')} measured to {quantity(value, unit_by_name(name), 2)}"
+        for name, value in summary["noise"]["measurement"].items()
+    ]
+    return join_words(parts)
+
+
+def capitalised(sentence: str) -> str:
+    return sentence[:1].upper() + sentence[1:]
