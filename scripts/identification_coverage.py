@@ -18,7 +18,7 @@ from walkerlab.api import in_memory
 from walkerlab.config.loader import load
 from walkerlab.physics.estimation.measurements import MeasuredSteps, split_into_steps
 from walkerlab.physics.orbits.family_search import RIGID
-from walkerlab.scene.identification import Family, Question, identify_walk, step_map_of
+from walkerlab.scene.identification import ConfigFamily, Question, identify_walk, step_map_of
 from walkerlab.scene.subject import find_model_gait
 
 WALKERS = {
@@ -39,7 +39,7 @@ class Truth:
         self.config, self.keys, self.level = load(Path(name)).config, keys, level
         self.gait = in_memory("fixedpoint", self.config).summary
         subject = find_model_gait(RIGID, self.config, self.gait, lambda _: None)
-        self.family = Family(self.config, keys)
+        self.family = ConfigFamily(self.config, keys)
         self.walks = step_map_of(RIGID, self.family, subject.length_m)
         self.z, self.leg = subject.z, self.config.walker.leg_length_m
         self.values = np.array(self.family.start)

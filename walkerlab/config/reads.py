@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from walkerlab.config.drives import PushOff
     from walkerlab.config.ground import Footholds
     from walkerlab.config.identify import Identify
-    from walkerlab.config.recording import Recording
+    from walkerlab.config.recording import RecordedFile
     from walkerlab.config.robustness import Robustness
     from walkerlab.config.stability import Case
     from walkerlab.config.walkers import Walker
@@ -166,7 +166,7 @@ class RecordedWalkConfig(RigidConfig, Protocol):
     """Keys that `recorded-walk` reads."""
 
     @property
-    def recording(self) -> Recording | None: ...
+    def recording(self) -> RecordedFile | None: ...
 
 
 class TuneConfig(GroundConfig, Protocol):

@@ -3,7 +3,7 @@
 from walkerlab.config.fields import Block, key
 
 
-class Recording(Block):
+class RecordedFile(Block):
     """A file with a walk for `walkerlab compare --with`, and the meanings of its columns."""
 
     file: str = key(

@@ -15,7 +15,7 @@ from walkerlab.config.drives import PushOff, acting_on
 from walkerlab.config.fields import Block, check_against, key, meaning_error
 from walkerlab.config.ground import Footholds
 from walkerlab.config.identify import Identify
-from walkerlab.config.recording import Recording
+from walkerlab.config.recording import RecordedFile
 from walkerlab.config.robustness import Robustness
 from walkerlab.config.stability import Stability
 from walkerlab.config.sweep import Sweep
@@ -238,7 +238,7 @@ class Config(Block):
     basin: Basin = Basin()
     robustness: Robustness = Robustness()
     design: Design | None = None
-    recording: Recording | None = None
+    recording: RecordedFile | None = None
     identify: Identify | None = None
     sweep: Sweep | None = None
     outputs: tuple[Output, ...] = key(OUTPUTS, "", "arrays to store", bounds="a list of states, energies, forces")

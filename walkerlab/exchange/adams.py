@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Mapping
 
-from walkerlab.exchange.adams_model import GROUND, AdamsModel, Contact
+from walkerlab.exchange.adams_model import GROUND, AdamsContact, AdamsModel
 from walkerlab.exchange.exported import Exported, finite
 
 REFERENCE = re.compile(r"\{([\w.]+)\}")
@@ -124,7 +124,7 @@ def statement(head: str, *arguments: str) -> Iterator[str]:
     yield from (f", {argument}" for argument in arguments)
 
 
-def contact_arguments(contact: Contact, shapes: Mapping[str, int]) -> Iterator[str]:
+def contact_arguments(contact: AdamsContact, shapes: Mapping[str, int]) -> Iterator[str]:
     """Yield the arguments of a CONTACT statement."""
     pads = [str(shapes[pad]) for pad in contact.pads]
     yield "TYPE = SOLID_TO_SOLID"

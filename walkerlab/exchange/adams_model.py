@@ -67,7 +67,7 @@ class Shape:
 
 
 @dataclass(frozen=True)
-class Contact:
+class AdamsContact:
     """ADAMS's contact of a foot with its pads."""
 
     foot: str
@@ -108,7 +108,7 @@ class AdamsModel:
     couplers: dict[str, tuple[tuple[str, float], ...]] = field(default_factory=dict)
     shapes: dict[str, Shape] = field(default_factory=dict)
     outlines: dict[str, tuple[str, ...]] = field(default_factory=dict)
-    contacts: dict[str, Contact] = field(default_factory=dict)
+    contacts: dict[str, AdamsContact] = field(default_factory=dict)
     variables: dict[str, str] = field(default_factory=dict)
     forces: dict[str, Force] = field(default_factory=dict)
     torques: dict[str, Torque] = field(default_factory=dict)
@@ -308,7 +308,7 @@ def add_contacts(model: AdamsModel, export: Exported) -> None:
         )
     for foot in range(2):
         pads = tuple(f"pad_{number + 1}" for number, pad in enumerate(export.pads) if pad.foot == foot)
-        model.contacts[f"contact_{foot + 1}"] = Contact(f"ball_{foot + 1}", pads, normal, friction)
+        model.contacts[f"contact_{foot + 1}"] = AdamsContact(f"ball_{foot + 1}", pads, normal, friction)
 
 
 def add_normal_and_friction(model: AdamsModel, export: Exported) -> None:

@@ -17,11 +17,12 @@ from walkerlab.exchange.recording import TIME, Recording
 
 Array = NDArray[np.float64]
 
-DEGREE: Final = math.pi / 180.0
-UNITS: Final[Mapping[str, Mapping[str, float]]] = {
+DEG_RAD: Final = math.pi / 180.0
+UNIT_VALUES: Final[Mapping[str, Mapping[str, float]]] = {
     "time": {"s": 1.0, "sec": 1.0, "second": 1.0, "seconds": 1.0, "ms": 1e-3, "msec": 1e-3, "min": 60.0},
-    "angle": {"rad": 1.0, "radian": 1.0, "radians": 1.0, "deg": DEGREE, "degree": DEGREE, "°": DEGREE},
-    "rate": {"rad/s": 1.0, "rad/sec": 1.0, "deg/s": DEGREE, "deg/sec": DEGREE, "°/s": DEGREE},
+    "angle": {"rad": 1.0, "radian": 1.0, "radians": 1.0, "deg": DEG_RAD, "degree": DEG_RAD}
+    | {"°": DEG_RAD},
+    "rate": {"rad/s": 1.0, "rad/sec": 1.0, "deg/s": DEG_RAD, "deg/sec": DEG_RAD, "°/s": DEG_RAD},
     "length": {"m": 1.0, "meter": 1.0, "metre": 1.0, "mm": 1e-3, "millimeter": 1e-3, "cm": 1e-2, "centimeter": 1e-2}
     | {"km": 1e3, "in": 0.0254, "inch": 0.0254, "ft": 0.3048, "foot": 0.3048},
     "speed": {"m/s": 1.0, "mm/s": 1e-3, "cm/s": 1e-2},
@@ -29,7 +30,7 @@ UNITS: Final[Mapping[str, Mapping[str, float]]] = {
     "energy": {"j": 1.0, "joule": 1.0, "mj": 1e-3, "n mm": 1e-3},
 }  # fmt: skip
 """SI values of the units of each kind, in lower case."""
-SI: Final = {kind: next(iter(units)) for kind, units in UNITS.items()}
+SI: Final = {kind: next(iter(units)) for kind, units in UNIT_VALUES.items()}
 OF_LEG: Final = {
     "angle": "angle", "velocity": "rate", "shank_angle": "angle", "shank_velocity": "rate", "foot_along_m": "length",
     "foot_height_m": "length", "knee_along_m": "length", "knee_height_m": "length", "normal_force_N": "force",
@@ -39,7 +40,7 @@ OF_WALKER: Final = {
     TIME: "time", "torso_angle": "angle", "torso_velocity": "rate", "hip_along_m": "length", "hip_height_m": "length",
     "kinetic_J": "energy", "potential_J": "energy", "mechanical_J": "energy", "total_energy_J": "energy",
 }  # fmt: skip
-KINDS: Final = OF_WALKER | {f"{name} {leg}": kind for name, kind in OF_LEG.items() for leg in (1, 2)}
+QUANTITY_KINDS: Final = OF_WALKER | {f"{name} {leg}": kind for name, kind in OF_LEG.items() for leg in (1, 2)}
 """Kind of unit of each quantity; those of a leg end in its number, 1 for the leg that swings first."""
 NEEDED: Final = (TIME, "angle 1", "angle 2")
 UNIT_AT_END: Final = re.compile(r"_(?:m_s|m|n)$")
@@ -48,7 +49,7 @@ LINE: Final = re.compile(r"(.+?)\s*>\s*(.+)")
 
 
 @dataclass(frozen=True, eq=False)
-class Walk:
+class RecordedWalk:
     """A recorded walk in SI units: time and quantities (samples,) by name, and the columns they come from."""
 
     time_s: Array
@@ -61,7 +62,7 @@ class Walk:
         return None if both[0] is None or both[1] is None else np.stack([both[0], both[1]], axis=1)
 
 
-def as_walk(recording: Recording, columns: Mapping[str, str], units: Mapping[str, str]) -> Walk:
+def as_walk(recording: Recording, columns: Mapping[str, str], units: Mapping[str, str]) -> RecordedWalk:
     """The quantities of a walk in a recording, in SI units.
 
     columns  columns by quantity, where their names do not say it; `HIP>FOOT` is the angle of a line of markers
@@ -75,7 +76,7 @@ def as_walk(recording: Recording, columns: Mapping[str, str], units: Mapping[str
             raise missing(recording, name)
     values = {name: in_si(recording, name, source, units) for name, source in sources.items()}
     time = values.pop(TIME)
-    return Walk(time, values, sources)
+    return RecordedWalk(time, values, sources)
 
 
 def plain(name: str) -> str:
@@ -86,7 +87,7 @@ def plain(name: str) -> str:
 def matches(recording: Recording, given: set[str]) -> dict[str, str]:
     """Columns by quantity: those of the same name, otherwise the only one whose name ends in it."""
     found = {}
-    for name in KINDS.keys() - given:
+    for name in QUANTITY_KINDS.keys() - given:
         wanted = {plain(name), plain(name).removesuffix("_m"), *leg_names(name)}
         exact = [column for column in recording.columns if plain(column) in wanted]
         ending = [column for column in recording.columns if any(ends_in(plain(column), each) for each in wanted)]
@@ -113,13 +114,13 @@ def ends_in(name: str, ending: str) -> bool:
 
 def named_columns(recording: Recording, columns: Mapping[str, str]) -> dict[str, str]:
     """The columns that the user names, once both names are known."""
-    known = {plain(name): name for name in KINDS}
+    known = {plain(name): name for name in QUANTITY_KINDS}
     found = {}
     for quantity, column in columns.items():
         name = known.get(plain(quantity))
         if name is None:
             near = get_close_matches(plain(quantity), known, 1)
-            advice = f"Did you mean {known[near[0]]!r}?" if near else f"Quantities are: {', '.join(KINDS)}."
+            advice = f"Did you mean {known[near[0]]!r}?" if near else f"Quantities are: {', '.join(QUANTITY_KINDS)}."
             raise ConfigError(f"--columns: {quantity!r} is no quantity of a walk.", advice)
         ends = LINE.fullmatch(column)
         markers = [f"{marker}.{axis}" for marker in (ends[1], ends[2]) for axis in "xyz"] if ends else [column]
@@ -146,7 +147,7 @@ def missing(recording: Recording, name: str) -> ConfigError:
 
 def in_si(recording: Recording, name: str, source: str, units: Mapping[str, str]) -> Array:
     """A quantity in SI units; raises ConfigError for gaps, and for a unit that is missing or not of its kind."""
-    kind = KINDS[name]
+    kind = QUANTITY_KINDS[name]
     if ends := LINE.fullmatch(source):
         return line_angle(*(marker_place(recording, marker, units) for marker in (ends[1], ends[2])))
     values = recording.columns[source] * unit_value(recording, name, source, kind, units)
@@ -175,20 +176,20 @@ def unit_value(recording: Recording, name: str, source: str, kind: str, units: M
     if not stated:
         raise ConfigError(
             f"{recording.path} does not say in which unit {source!r} ({name}) is.",
-            f"Say it: --units {kind}={SI[kind]}, or one of {', '.join(UNITS[kind])}.",
+            f"Say it: --units {kind}={SI[kind]}, or one of {', '.join(UNIT_VALUES[kind])}.",
         )
-    value = UNITS[kind].get(stated.strip().lower())
+    value = UNIT_VALUES[kind].get(stated.strip().lower())
     if value is None:
         raise ConfigError(
             f"{recording.path}: {stated!r} is no unit of {name!r} that is known ({kind}).",
-            f"Known are {', '.join(UNITS[kind])}: --units {kind}={SI[kind]}",
+            f"Known are {', '.join(UNIT_VALUES[kind])}: --units {kind}={SI[kind]}",
         )
     return value
 
 
 def unit_in_name(column: str, kind: str) -> str:
     """Unit that a column's name ends in, as mm of hip_mm; empty if there is none."""
-    endings = [unit for unit in UNITS[kind] if plain(column).endswith(f"_{unit.replace('/', '_')}")]
+    endings = [unit for unit in UNIT_VALUES[kind] if plain(column).endswith(f"_{unit.replace('/', '_')}")]
     return max(endings, key=len, default="")
 
 
@@ -229,12 +230,12 @@ def parse_units(texts: Sequence[str]) -> dict[str, str]:
     """Units by kind, quantity or column; a unit alone is that of its kind, as `deg` of angles."""
     pairs, alone = [], {}
     for part in (part.strip() for text in texts for part in text.split(",") if part.strip()):
-        kinds = [kind for kind, units in UNITS.items() if part.lower() in units]
+        kinds = [kind for kind, units in UNIT_VALUES.items() if part.lower() in units]
         if "=" in part:
             pairs.append(part)
         elif kinds:
             alone[kinds[0]] = part
         else:
-            known = ", ".join(unit for units in UNITS.values() for unit in units)
+            known = ", ".join(unit for units in UNIT_VALUES.values() for unit in units)
             raise ConfigError(f"{part!r} is not a known unit.", f"Units are {known}.")
     return alone | parse_pairs("--units", pairs)

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 
 Kind = Literal["adm", "cmd", "mjcf"]
 Law = Literal["contact", "functions"]
-KINDS: Final[tuple[Kind, ...]] = get_args(Kind)
-LAWS: Final[tuple[Law, ...]] = get_args(Law)
+FORMATS: Final[tuple[Kind, ...]] = get_args(Kind)
+CONTACT_LAWS: Final[tuple[Law, ...]] = get_args(Law)
 ENDINGS: Final[dict[str, Kind]] = {"adm": "adm", "cmd": "cmd", "xml": "mjcf", "mjcf": "mjcf"}
 """Formats by the ending of their files."""
 
@@ -72,10 +72,10 @@ def export_model(
 
 def law_named(text: str) -> Law:
     """Return the contact law of ADAMS models with this name; raises ConfigError for another name."""
-    for law in LAWS:
+    for law in CONTACT_LAWS:
         if text == law:
             return law
-    raise ConfigError(f"--law {text}: not a contact law.", f"Laws of ADAMS models: {', '.join(LAWS)}.")
+    raise ConfigError(f"--law {text}: not a contact law.", f"Laws of ADAMS models: {', '.join(CONTACT_LAWS)}.")
 
 
 def parts_left_out(export: Exported, kind: Kind, law: Law, script: str) -> Iterator[str]:

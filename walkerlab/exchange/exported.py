@@ -42,7 +42,7 @@ class Pad:
 
 
 @dataclass(frozen=True)
-class Coupling:
+class HingeCoupling:
     """Links whose hinge angles, times these weights, add up to zero."""
 
     links: tuple[int, ...]
@@ -97,7 +97,7 @@ class Exported:
         return [link.name for link in self.model.links].index(upper)
 
     @cached_property
-    def couplings(self) -> tuple[Coupling, ...]:
+    def couplings(self) -> tuple[HingeCoupling, ...]:
         """Couplings of bodies whose angles follow others."""
         found = []
         for row in coupling_rows(self.scene.assembly, self.model):
@@ -107,7 +107,7 @@ class Exported:
                     "Choose weights that add up to 1 in walker.couplings.",
                 )
             links = [int(place) for place in np.flatnonzero(np.abs(row) > COUPLED)]
-            found.append(Coupling(tuple(links), tuple(float(row[place]) for place in links)))
+            found.append(HingeCoupling(tuple(links), tuple(float(row[place]) for place in links)))
         return tuple(found)
 
     @cached_property

@@ -26,7 +26,7 @@ IMPEDANCE = 0.1  # small: close to a spring and damper that the load acts on in 
 JOINT_AXES = {"along": ("slide", "1 0 0"), "height": ("slide", "0 0 1"), "turn": ("hinge", "0 -1 0")}
 STEP_S, PAD_M = 1e-4, 0.05
 HIP = "hip"
-STIFF = 'solref="0.0005 1" solimp="0.9999 0.9999 0.001 0.5 2"'
+COUPLING_SETTINGS = 'solref="0.0005 1" solimp="0.9999 0.9999 0.001 0.5 2"'
 """Settings of couplings: as hard as MuJoCo's constraints become at such steps."""
 CLOSE = 'iterations="100" tolerance="1e-12"'
 
@@ -205,7 +205,7 @@ def coupling_texts(export: Exported) -> Iterator[str]:
         )
         follows = f'joint2="{before[0]}" ' if before else ""
         weight = -coupling.weights[0] / coupling.weights[-1] if before else 0.0
-        yield f'<joint joint1="{last}" {follows}polycoef="0 {weight!r} 0 0 0" {STIFF}/>'
+        yield f'<joint joint1="{last}" {follows}polycoef="0 {weight!r} 0 0 0" {COUPLING_SETTINGS}/>'
 
 
 def tuning_lines(export: Exported, target: EngineContact) -> Iterator[str]:

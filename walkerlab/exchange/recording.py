@@ -54,9 +54,10 @@ def read_recording(path: Path) -> Recording:
     """
     reader = READERS.get(path.suffix.lower())
     if reader is None:
-        raise ConfigError(f"{path} is in a format that cannot be read ({path.suffix or 'no ending'}).", ADVICE.get(
-            path.suffix.lower(), f"Export it as one of: {WANTED}."
-        ))  # fmt: skip
+        raise ConfigError(
+            f"{path} is in a format that cannot be read ({path.suffix or 'no ending'}).",
+            FORMAT_ADVICE.get(path.suffix.lower(), f"Export it as one of: {WANTED}."),
+        )
     try:
         recording = reader(path)
     except OSError as error:
@@ -363,7 +364,7 @@ def read_markers(path: Path) -> Recording:
 def read_c3d(path: Path) -> Recording:
     """Markers of a C3D file, as columns 'name.x', 'name.y', 'name.z'; needs the extra `data`."""
     try:
-        import ezc3d  # type: ignore[import-not-found]  # an extra without types
+        import ezc3d
     except ImportError:
         raise ConfigError(f"{path}: reading C3D needs ezc3d.", 'Install it: pip install "walkerlab[data]"') from None
     if not path.is_file():
@@ -396,7 +397,7 @@ READERS: Final[dict[str, Callable[[Path], Recording]]] = {
     ".trc": read_markers,
     ".c3d": read_c3d,
 }
-ADVICE: Final = {
+FORMAT_ADVICE: Final = {
     ".req": "Request files differ between versions of ADAMS; export .res (RESULTS/XRF) or a table instead.",
     ".xlsx": "Save the sheet as CSV.",
     ".xls": "Save the sheet as CSV.",

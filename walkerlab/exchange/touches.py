@@ -21,7 +21,7 @@ AHEAD: Final = 0.4
 """Smallest angle between the legs at a heel strike, over the largest of the walk."""
 WINDOW: Final = 0.1
 """Time before and after a heel strike in which angles are fitted, over a step's period."""
-DEGREE: Final = 3
+TOUCH_DEGREE: Final = 3
 FEWEST: Final = 6
 """Samples on each side of a heel strike that a fit needs."""
 ITERATIONS: Final = 8
@@ -101,7 +101,11 @@ def refined(time: Array, angle: Array, height: Height, near: float, leg: int, pe
 def fit_around(t: Array, y: Array, touch: float) -> tuple[Array, Array, float]:
     """Angles at a heel strike, their rates just before it, and the scatter, from polynomials that meet there."""
     before, after = np.minimum(t - touch, 0.0), np.maximum(t - touch, 0.0)
-    sides = [side[:, None] ** np.arange(1, DEGREE + 1) for side in (before, after) if np.count_nonzero(side) >= DEGREE]
+    sides = [
+        side[:, None] ** np.arange(1, TOUCH_DEGREE + 1)
+        for side in (before, after)
+        if np.count_nonzero(side) >= TOUCH_DEGREE
+    ]
     basis = np.concatenate([np.ones((t.size, 1)), *sides], axis=1)
     coefficients = np.linalg.lstsq(basis, y, rcond=None)[0]
     freedoms = max(1, y.size - coefficients.size)

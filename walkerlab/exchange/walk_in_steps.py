@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import BSpline, make_lsq_spline
 
 from walkerlab.errors import ConfigError
-from walkerlab.exchange.columns import Walk
+from walkerlab.exchange.columns import RecordedWalk
 from walkerlab.exchange.touches import AHEAD, Touch, find_touches
 from walkerlab.physics.mechanics.rigid_model import (
     STANCE,
@@ -24,11 +24,11 @@ from walkerlab.physics.mechanics.rigid_model import (
 )
 
 Array = NDArray[np.float64]
-START_TOLERANCE: Final = (
+TWO_FEET_TOLERANCE: Final = (
     0.03  # rad, sum of the legs' angles from the normal, up to which a recording starts on two feet
 )
 SHORTEST: Final = 0.25  # of the mean step, before which the first heel strike is the start itself
-DEGREE: Final = 5
+SPLINE_DEGREE: Final = 5
 INTERVALS: Final = 24  # of the spline through a step
 MOST_SAMPLES: Final = 500  # of a step, that are kept
 SIDE: Final = 1e-10  # share of the walk's duration before a heel strike, of the sample that ends a step
@@ -60,7 +60,7 @@ class RecordedSteps:
     origin_s: float
 
 
-def divide_into_steps(walk: Walk, model: RigidModel, source: str) -> RecordedSteps:
+def divide_into_steps(walk: RecordedWalk, model: RigidModel, source: str) -> RecordedSteps:
     """Find the steps of a recorded walk of a walker.
 
     source  name of the recording, for messages
@@ -100,11 +100,11 @@ def divide_into_steps(walk: Walk, model: RigidModel, source: str) -> RecordedSte
 def starts_on_two_feet(angle: Array, model: RigidModel) -> bool:
     spread = np.abs(angle[:, 0] - angle[:, 1])
     total = float(feet_on_slope(model, angle[0, 0], angle[0, 1]))
-    return bool(abs(total) < START_TOLERANCE and spread[0] > AHEAD * spread.max())
+    return bool(abs(total) < TWO_FEET_TOLERANCE and spread[0] > AHEAD * spread.max())
 
 
 def divided(
-    walk: Walk, angle: Array, model: RigidModel, origin: float, ends: list[Touch], swapped: bool
+    walk: RecordedWalk, angle: Array, model: RigidModel, origin: float, ends: list[Touch], swapped: bool
 ) -> RecordedSteps:
     times = np.array([touch.time_s for touch in ends]) - origin
     order = [1, 0] if swapped else [0, 1]
@@ -113,7 +113,7 @@ def divided(
     time, side = walk.time_s - origin, SIDE * float(times[-1])
     last = float(time[-1])
     spans = list(zip((0.0, *times), (*(times - side), last), strict=True))
-    if np.count_nonzero(time >= times[-1]) <= DEGREE:
+    if np.count_nonzero(time >= times[-1]) <= SPLINE_DEGREE:
         spans.pop()  # too little is recorded of the step after the last heel strike
     pieces = [samples_within(time, columns, *span) for span in spans]
     step = np.repeat(np.arange(len(pieces)), [piece[0].size for piece in pieces])
@@ -141,8 +141,8 @@ def samples_within(time: Array, columns: Array, begin: float, end: float) -> tup
 
 def spline_through(time: Array, columns: Array) -> BSpline:
     """Fit a spline with evenly spaced knots, fewer where samples are few."""
-    degree = min(DEGREE, time.size - 1)
-    intervals = max(1, min(INTERVALS, time.size // (2 * DEGREE)))
+    degree = min(SPLINE_DEGREE, time.size - 1)
+    intervals = max(1, min(INTERVALS, time.size // (2 * SPLINE_DEGREE)))
     inner = np.linspace(time[0], time[-1], intervals + 1)[1:-1]
     knots = np.concatenate(([time[0]] * (degree + 1), inner, [time[-1]] * (degree + 1)))
     return make_lsq_spline(time, columns, knots, degree)

@@ -64,7 +64,7 @@ class Question:
         return tuple(dict.fromkeys((*self.fit, *self.prior)))
 
 
-class Family:
+class ConfigFamily:
     """Configs at values of several parameters."""
 
     def __init__(self, config: ContactConfig, keys: Sequence[str]) -> None:
@@ -99,7 +99,7 @@ class Family:
         return np.array([abs(value) or SCALE_OF_ZERO for value in self.start])
 
 
-def step_map_of(model: str, family: Family, length_m: float) -> StepMap:
+def step_map_of(model: str, family: ConfigFamily, length_m: float) -> StepMap:
     """Return a model's step map over the family's values."""
     config = family.config
     if model == RIGID:
@@ -186,7 +186,7 @@ def in_time(first: Fit) -> Fit | None:
 
 
 def problem_of(subject: ModelUnderTest, measured: Measured, question: Question) -> FitProblem:
-    family = Family(subject.config, question.keys)
+    family = ConfigFamily(subject.config, question.keys)
     walks = step_map_of(subject.model, family, subject.length_m)
     start = walks.step(subject.z, family.start)  # type: ignore[arg-type]  # values of several parameters
     forecast = Forecast(

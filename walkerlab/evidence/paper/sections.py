@@ -180,7 +180,7 @@ def fates(results: Results, rows: Sequence[Row]) -> Iterator[PageBlock]:
 
 
 QUANTITIES_OF_TABLE_3 = {"t_left": "s", "t_right": "s", "t_cycle": "s", "v_com": "m/s", "E_avg": "J"}
-DIFFERENCE_COLUMNS = (
+RECORDED_COLUMNS = (
     Column("largest difference", "quantity"),
     Column("from the rigid model", "rigid", number, numeric=True),
     Column("from the contact model", "contact", number, numeric=True),
@@ -217,7 +217,7 @@ def recorded_tables(stored: Row) -> Iterator[Table]:
     ways = {"raw": "at the same time", "aligned": "at the same phase"}
     yield table(
         f"Differences of {stored['name']} from both models",
-        DIFFERENCE_COLUMNS,
+        RECORDED_COLUMNS,
         [
             {
                 "quantity": name_with_unit(f"{name} {words_of_way}", unit),

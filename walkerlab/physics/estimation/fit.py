@@ -22,7 +22,7 @@ from walkerlab.physics.solvers.system import Floats
 
 Loss = Literal["linear", "soft_l1"]
 MAX_ROUNDS: Final = 12
-SETTLED: Final = 1e-2  # relative change of a standard deviation
+SETTLED_NOISE: Final = 1e-2  # relative change of a standard deviation
 SETTLED_MOVE: Final = 0.1  # change of an unknown, in standard errors
 FIRST_NOISE: Final = 0.02  # of a quantity's typical size, before any fit
 NOISE_FLOOR: Final = 1e-6  # of a quantity's typical size: noise-free measurements are taken to have this noise
@@ -153,9 +153,9 @@ def responses(problem: FitProblem, u: Floats, heights: Floats) -> tuple[Floats, 
 
 
 def settled(before: Noise, after: Noise, leg_length_m: float) -> bool:
-    same = np.all(np.abs(np.log(after.measurement / before.measurement)) < SETTLED)
+    same = np.all(np.abs(np.log(after.measurement / before.measurement)) < SETTLED_NOISE)
     change = abs(after.roughness_m - before.roughness_m)
-    return bool(same) and change < SETTLED * max(after.roughness_m, 1e-7 * leg_length_m)
+    return bool(same) and change < SETTLED_NOISE * max(after.roughness_m, 1e-7 * leg_length_m)
 
 
 def typical_sizes(forecast: Forecast) -> Floats:

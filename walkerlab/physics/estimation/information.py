@@ -15,10 +15,10 @@ from walkerlab.physics.solvers.system import Floats
 
 OPEN: Final = 1.0
 """Singular value below which a combination is open: a change by its whole scale stays within the data's noise."""
-ROUNDING: Final = 1e-7  # share of the largest singular value, below which a combination has no effect at all
+LOST_SHARE: Final = 1e-7  # share of the largest singular value, below which a combination has no effect at all
 NOISE_DRAWS: Final = 200
 LOG_STEP: Final = 0.05
-FARTHEST: Final = (3.0, 1.5)  # below and above the likeliest, of logarithms of standard deviations
+FARTHEST_NOISE: Final = (3.0, 1.5)  # below and above the likeliest, of logarithms of standard deviations
 LOADED: Final = 0.1  # share of a parameter in an open direction, from which it is named
 
 
@@ -79,7 +79,7 @@ def noise_reach(products: Products, noise_at: Callable[[Floats], Noise], centre:
         ends = (evaluate(products, noise_at(centre + sign * LOG_STEP * unit)).restricted for sign in (-1.0, 1.0))
         curvatures[place] = (2.0 * best - sum(ends)) / LOG_STEP**2
     spread = 3.0 / np.sqrt(np.maximum(curvatures, 1e-6))
-    return np.minimum(spread, FARTHEST[0]), np.minimum(spread, FARTHEST[1])
+    return np.minimum(spread, FARTHEST_NOISE[0]), np.minimum(spread, FARTHEST_NOISE[1])
 
 
 def free_the_rest(information: Floats, count: int) -> Floats:
@@ -89,7 +89,7 @@ def free_the_rest(information: Floats, count: int) -> Floats:
 
 
 def is_open(singular: Floats) -> NDArray[np.bool_]:
-    return np.asarray((singular < OPEN) | (singular < ROUNDING * singular.max(initial=0.0)))
+    return np.asarray((singular < OPEN) | (singular < LOST_SHARE * singular.max(initial=0.0)))
 
 
 def open_combinations(information: Information) -> tuple[tuple[Unidentifiable, ...], set[str]]:
@@ -120,7 +120,7 @@ def combination_in_words(parts: list[tuple[str, float]]) -> str:
 
 
 def reason_in_words(value: float, largest: float) -> str:
-    if value <= ROUNDING * largest:
+    if value <= LOST_SHARE * largest:
         return "the walk does not change with this combination"
     return f"a change of it by its whole size moves the walk by {value:.2g} standard deviations of the data"
 

@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from walkerlab.physics.estimation.fit import Fitted
-from walkerlab.physics.estimation.measurements import ANGLE, MeasuredAngles
+from walkerlab.physics.estimation.measurements import LEG_ANGLE, MeasuredAngles
 from walkerlab.physics.estimation.mixed_model import whitening
 from walkerlab.physics.estimation.prediction import Forecast
 from walkerlab.physics.estimation.result import Fit
@@ -18,7 +18,7 @@ LARGEST_SHARE: Final = 0.05  # of a quantity's size, as noise or as systematic d
 ROUGHEST: Final = 0.02  # of the leg length
 OUTLIER: Final = 6.0  # standard deviations
 ALTERNATION: Final = 5.0  # standard errors of the difference between odd and even steps
-PHASES: Final = 20
+PHASE_BINS: Final = 20
 
 
 def judge(forecast: Forecast, fitted: Fitted, sizes: Floats, leg_length_m: float) -> tuple[Fit, str]:
@@ -47,7 +47,7 @@ def judge(forecast: Forecast, fitted: Fitted, sizes: Floats, leg_length_m: float
         if alternation > ALTERNATION:
             return "misfit", f"{quantity} alternates from step to step by {alternation:.2g} standard errors: a limp"
     if isinstance(forecast.measured, MeasuredAngles):
-        return judge_phases(forecast, fitted, sizes[forecast.quantities.index(ANGLE)])
+        return judge_phases(forecast, fitted, sizes[forecast.quantities.index(LEG_ANGLE)])
     return "fits", ""
 
 
@@ -81,7 +81,7 @@ def phase_means(forecast: Forecast, fitted: Fitted) -> Floats:
     residuals = fitted.data.residuals[-forecast.measured.angles_rad.size :].reshape(-1, 2)
     swaps = forecast.measured.step % 2 == 1
     residuals = np.where(swaps[:, None], residuals[:, ::-1], residuals)
-    bins = np.minimum((PHASES * forecast.measured.phase).astype(int), PHASES - 1)
-    counts = np.bincount(bins, minlength=PHASES)
-    sums = np.array([np.bincount(bins, residuals[:, leg], PHASES) for leg in range(2)]).T
+    bins = np.minimum((PHASE_BINS * forecast.measured.phase).astype(int), PHASE_BINS - 1)
+    counts = np.bincount(bins, minlength=PHASE_BINS)
+    sums = np.array([np.bincount(bins, residuals[:, leg], PHASE_BINS) for leg in range(2)]).T
     return np.asarray(sums[counts > 0] / counts[counts > 0, None])

@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 from walkerlab.physics.solvers.system import Floats
 
-PERIOD: Final = "step_period_s"
-LENGTH: Final = "step_length_m"
-ANGLE: Final = "angle_rad"
+STEP_PERIOD: Final = "step_period_s"
+STEP_LENGTH: Final = "step_length_m"
+LEG_ANGLE: Final = "angle_rad"
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,7 +27,7 @@ class MeasuredSteps:
 
     def channels(self) -> dict[str, Floats]:
         """Return the measured values (steps,) by quantity."""
-        values = {PERIOD: self.periods_s, LENGTH: self.lengths_m, ANGLE: self.touch_angles_rad}
+        values = {STEP_PERIOD: self.periods_s, STEP_LENGTH: self.lengths_m, LEG_ANGLE: self.touch_angles_rad}
         return {name: value for name, value in values.items() if value is not None}
 
 

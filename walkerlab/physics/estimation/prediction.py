@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walkerlab.outcome import Outcome
-from walkerlab.physics.estimation.measurements import ANGLE, LENGTH, PERIOD, MeasuredAngles, MeasuredSteps
+from walkerlab.physics.estimation.measurements import LEG_ANGLE, STEP_LENGTH, STEP_PERIOD, MeasuredAngles, MeasuredSteps
 from walkerlab.physics.orbits.robustness import CENTRAL_4TH
 from walkerlab.physics.orbits.step_map import CENTRAL_2ND, DisturbedWalk
 from walkerlab.physics.solvers.system import Floats
@@ -75,7 +75,7 @@ class Forecast:
     @cached_property
     def channels(self) -> dict[str, Floats]:
         """Measured values (steps,) by quantity of the steps."""
-        return {name: values for name, values in self.steps.channels().items() if self.in_phase or name != PERIOD}
+        return {name: values for name, values in self.steps.channels().items() if self.in_phase or name != STEP_PERIOD}
 
     @cached_property
     def values(self) -> Floats:
@@ -85,7 +85,7 @@ class Forecast:
 
     @cached_property
     def quantities(self) -> tuple[str, ...]:
-        return (*self.channels, *([ANGLE] if isinstance(self.measured, MeasuredAngles) else []))
+        return (*self.channels, *([LEG_ANGLE] if isinstance(self.measured, MeasuredAngles) else []))
 
     @cached_property
     def quantity(self) -> NDArray[np.int64]:
@@ -115,7 +115,11 @@ class Forecast:
         count = self.steps.count
         if walk.outcome is not Outcome.WALKED or walk.durations_s.size < self.heights - 1:
             return None
-        predicted = {PERIOD: walk.durations_s * sensors[CLOCK], LENGTH: walk.lengths_m, ANGLE: walk.angles_rad}
+        predicted = {
+            STEP_PERIOD: walk.durations_s * sensors[CLOCK],
+            STEP_LENGTH: walk.lengths_m,
+            LEG_ANGLE: walk.angles_rad,
+        }
         parts = [predicted[name][:count] for name in self.channels]
         if isinstance(self.measured, MeasuredAngles):
             touches = np.append(0.0, np.cumsum(walk.durations_s))

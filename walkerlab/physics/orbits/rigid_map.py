@@ -145,16 +145,15 @@ class RigidStepper(local):
         z: Floats,
         steps: int = 1,
         derived: bool = True,
-        rises: Floats | None = None,
-        nearest: float = 0.0,
+        floor: tuple[Floats, float] | None = None,
         start: Floats | None = None,
         observer: Observer | None = None,
     ) -> Steps:
         """Walk from z (d,), with the derivative unless `derived` is false, which saves a third of the work.
 
-        rises, nearest  see HeelStrikes, in units of the walker; even ground by default
-        start           (2 n,) state off the section to walk from instead, without a derivative
-        observer        records samples
+        floor     rises and nearest landing, see HeelStrikes, in units of the walker; even ground by default
+        start     (2 n,) state off the section to walk from instead, without a derivative
+        observer  records samples
         """
         memory = self.memory
         method = memory.varied if derived else self.plain
@@ -163,6 +162,7 @@ class RigidStepper(local):
         y[:size] = y[:size] + z @ section.basis if start is None else start
         method.counts[:BUDGET] = 0
         method.clock[H_NEXT] = 0.0
+        rises, nearest = floor or (None, 0.0)
         strikes: HeelStrikes = new_heel_strikes(steps, y.size, rise=rises, nearest=nearest)
         status, completed = walk(section.walker, method, memory.finder, observer or memory.observer, y, strikes)
         ahead = strikes.after[:completed].take(section.places if derived else section.places[:d], axis=1)
@@ -333,7 +333,7 @@ class RigidMap(StepMap):
     ) -> Steps:
         rises = np.diff(heights_m, prepend=heights_m[0]) / unit.units.length
         nearest = SHORTEST_LANDING * unit.step_length(float(z[0]), float(z[0])) if rises.any() else 0.0
-        return self._exact.walk(unit.section, z, rises.size - 1, False, rises, nearest, start, observer)
+        return self._exact.walk(unit.section, z, rises.size - 1, False, (rises, nearest), start, observer)
 
     def sampled(self, z: Floats, p: float, heights_m: Floats, times_s: Floats) -> Floats:
         unit = self._unit_at(p)

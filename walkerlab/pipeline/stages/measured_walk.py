@@ -23,10 +23,10 @@ if TYPE_CHECKING:
     from walkerlab.config.reads import RigidConfig
     from walkerlab.config.schema import Config
 
-KINDS: Final = {"period_s": "time", "length_m": "length", "touch_angle_rad": "angle"}
+STEP_KINDS: Final = {"period_s": "time", "length_m": "length", "touch_angle_rad": "angle"}
 """Kind of unit of each quantity of a table of steps."""
 MIN_STEPS: Final = 2
-MISSING: Final = "there is no such file"
+NO_DATA_FILE: Final = "there is no such file"
 
 
 def digests(config: Config) -> Mapping[str, str]:
@@ -36,7 +36,7 @@ def digests(config: Config) -> Mapping[str, str]:
     try:
         return {"identify.data": hashlib.sha256(Path(config.identify.data).read_bytes()).hexdigest()}
     except OSError:
-        return {"identify.data": MISSING}
+        return {"identify.data": NO_DATA_FILE}
 
 
 def read_measured(block: Identify, config: RigidConfig) -> MeasuredSteps | MeasuredAngles:
@@ -44,7 +44,7 @@ def read_measured(block: Identify, config: RigidConfig) -> MeasuredSteps | Measu
     path = Path(block.data)
     if not path.is_file():
         raise ConfigError(
-            f"identify.data: {block.data} cannot be read: {'it is a folder' if path.is_dir() else MISSING}.",
+            f"identify.data: {block.data} cannot be read: {'it is a folder' if path.is_dir() else NO_DATA_FILE}.",
             "Check the path given to --data.",
             ("identify", "data"),
         )
@@ -66,9 +66,11 @@ def read_angles(path: Path, block: Identify, config: RigidConfig) -> MeasuredAng
 def read_steps(path: Path, block: Identify) -> MeasuredSteps:
     """Read a table with a row per step: `period_s`, and `length_m` and `touch_angle_rad` if they were measured."""
     table = read_delimited(path)
-    for name in block.columns.keys() - KINDS.keys():
-        raise ConfigError(f"--columns: {name!r} is not a quantity of a step.", f"Quantities are {', '.join(KINDS)}.")
-    values = {name: read_column(table, name, block) for name in KINDS}
+    for name in block.columns.keys() - STEP_KINDS.keys():
+        raise ConfigError(
+            f"--columns: {name!r} is not a quantity of a step.", f"Quantities are {', '.join(STEP_KINDS)}."
+        )
+    values = {name: read_column(table, name, block) for name in STEP_KINDS}
     period = values["period_s"]
     if period is None:
         near = get_close_matches("period_s", table.columns, 1, 0.3) or list(table.columns)[:1]
@@ -104,4 +106,4 @@ def read_column(table: Recording, name: str, block: Identify) -> Floats | None:
             f"{table.path}: {source!r} is {values[bad[0]]:g} in step {bad[0] + 1}; it must be above 0.",
             "Correct it, or leave out the step and those before it.",
         )
-    return np.asarray(values * unit_value(table, name, source, KINDS[name], block.units))
+    return np.asarray(values * unit_value(table, name, source, STEP_KINDS[name], block.units))

@@ -12,7 +12,7 @@ import numpy as np
 
 from walkerlab.config.reads import RecordedWalkConfig
 from walkerlab.errors import ConfigError
-from walkerlab.exchange.columns import OF_LEG, OF_WALKER, Walk, as_walk
+from walkerlab.exchange.columns import OF_LEG, OF_WALKER, RecordedWalk, as_walk
 from walkerlab.exchange.recording import TIME, Recording, read_recording
 from walkerlab.exchange.walk_in_steps import RecordedSteps, divide_into_steps
 from walkerlab.outcome import Outcome
@@ -24,10 +24,10 @@ from walkerlab.pipeline.store.content import Content, Group
 from walkerlab.scene.rigid import rigid_walker
 
 if TYPE_CHECKING:
-    from walkerlab.config.recording import Recording as RecordingBlock
+    from walkerlab.config.recording import RecordedFile
     from walkerlab.config.schema import Config
 
-NOT_THERE = "there is no such file"
+NO_FILE = "there is no such file"
 
 
 def digests(config: Config) -> Mapping[str, str]:
@@ -36,7 +36,7 @@ def digests(config: Config) -> Mapping[str, str]:
     try:
         return {"recording.file": hashlib.sha256(Path(config.recording.file).read_bytes()).hexdigest()}
     except OSError:
-        return {"recording.file": NOT_THERE}
+        return {"recording.file": NO_FILE}
 
 
 def run(config: RecordedWalkConfig, _inputs: Mapping[str, Content], progress: Progress) -> Content:
@@ -50,7 +50,7 @@ def run(config: RecordedWalkConfig, _inputs: Mapping[str, Content], progress: Pr
     return content_of(block, config, walk, steps)
 
 
-def read_walk(block: RecordingBlock) -> Walk:
+def read_walk(block: RecordedFile) -> RecordedWalk:
     """Read the quantities of a recorded walk in SI units; raises ConfigError."""
     if not block.file:
         raise ConfigError("recording.file: the recording has no file.", "Name one: --with FILE.", ("recording", "file"))
@@ -64,7 +64,7 @@ def read_artifact(path: Path) -> Recording:
     try:
         groups = artifact.read(path).groups
     except FileNotFoundError:
-        raise ConfigError(f"{path} cannot be read: {NOT_THERE}.", "Check the path given to --with.") from None
+        raise ConfigError(f"{path} cannot be read: {NO_FILE}.", "Check the path given to --with.") from None
     except (Damaged, NotADirectoryError, IsADirectoryError) as error:
         raise ConfigError(
             f"{path} is not a stored walk: {error}.", "Name simulate.h5 or contact-sim.h5 of a run."
@@ -82,7 +82,7 @@ def read_artifact(path: Path) -> Recording:
     return Recording(path, columns, units)
 
 
-def content_of(block: RecordingBlock, config: RecordedWalkConfig, walk: Walk, steps: RecordedSteps) -> Content:
+def content_of(block: RecordedFile, config: RecordedWalkConfig, walk: RecordedWalk, steps: RecordedSteps) -> Content:
     """Store steps and samples under the names of computed walks; energies and forces where they were recorded."""
     periods = np.diff(steps.touch_time_s, prepend=0.0)
     along = np.cumsum(steps.length_m)
@@ -115,7 +115,7 @@ def content_of(block: RecordingBlock, config: RecordedWalkConfig, walk: Walk, st
     return Content({"steps": Group(columns), "trajectory": Group({**over_time(**samples), **legs()})}, summary)
 
 
-def recorded_besides(walk: Walk, steps: RecordedSteps) -> dict[str, Any]:
+def recorded_besides(walk: RecordedWalk, steps: RecordedSteps) -> dict[str, Any]:
     """Interpolate the other recorded quantities (samples,) or (samples, 2) at the samples' times."""
     time, besides = walk.time_s - steps.origin_s, {}
     for name in OVER_TIME:

@@ -17,7 +17,7 @@ from walkerlab.views.figures.walks import (
     STEPS_TAKEN_CONTACT,
     TRAJECTORY,
     Array,
-    Walk,
+    DrawnWalk,
     line,
     walk_of,
 )
@@ -85,7 +85,7 @@ def draw_forces(results: Results) -> Drawn:
     return figure, (0 if walk is whole else STRIDES, ratio, every.max())
 
 
-def losses(walk: Walk) -> dict[tuple[str, str], Array]:
+def losses(walk: DrawnWalk) -> dict[tuple[str, str], Array]:
     """Return the energy (J) lost per step, by cause and colour; the knees account for the rest."""
     # the last samples before touches: an impact falls between two samples, and is not to be divided among two steps
     rows = np.concatenate(([0], np.maximum(np.searchsorted(walk.time, walk.strikes) - 1, 0)))

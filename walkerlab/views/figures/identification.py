@@ -13,14 +13,14 @@ from walkerlab.views.figures.canvas import add_legend, entry, label_of, panels
 from walkerlab.views.figures.illustration import Drawn, Illustration, Need, Results
 from walkerlab.views.figures.style import BLACK, BLUE, GREY, ORANGE, PALE, VERMILLION
 
-STAGE: Final = "identify"
-NO_STEPS: Final = "it has no steps"
+IDENTIFY_STAGE: Final = "identify"
+NO_MEASURED_STEPS: Final = "it has no steps"
 TWO_SIGMA: Final = 2.0
 REGION_95: Final = 2.4477  # sqrt(-2 ln 0.05): semi-axis of the 95 % region of two parameters, in standard errors
-PANEL_HEIGHT: Final = 1.7
+STEP_PANEL_HEIGHT: Final = 1.7
 MEASURED: Final = "measured_"
 LEGS: Final = (("swing leg", BLUE), ("stance leg", VERMILLION))
-MAX_POINTS: Final = 4000  # residuals drawn of each leg
+MAX_RESIDUALS: Final = 4000  # residuals drawn of each leg
 
 
 def quantities(steps: Group) -> list[str]:
@@ -34,9 +34,9 @@ def named(quantity: str) -> str:
 
 def draw_steps(results: Results) -> Drawn:
     """Plot measured steps over predicted ones; caption: number of steps and the share inside the bands."""
-    steps = results[STAGE].groups["steps"]
+    steps = results[IDENTIFY_STAGE].groups["steps"]
     names, number = quantities(steps), 1 + steps["step"]
-    figure, axes = panels(0.6 + PANEL_HEIGHT * len(names), len(names), sharex=True, squeeze=False)
+    figure, axes = panels(0.6 + STEP_PANEL_HEIGHT * len(names), len(names), sharex=True, squeeze=False)
     inside = []
     for panel, name in zip(axes[:, 0], names, strict=True):
         predicted, measured = steps[f"predicted_{name}"], steps[f"{MEASURED}{name}"]
@@ -55,11 +55,11 @@ def draw_steps(results: Results) -> Drawn:
 
 def draw_residuals(results: Results) -> Drawn:
     """Plot residuals per step, and of angles in phase; caption: number of steps, whether angles are among them."""
-    groups = results[STAGE].groups
+    groups = results[IDENTIFY_STAGE].groups
     steps, samples = groups["steps"], groups.get("samples")
     names, number = quantities(steps), 1 + steps["step"]
     rows = len(names) + (samples is not None)
-    figure, axes = panels(0.6 + PANEL_HEIGHT * rows, rows, squeeze=False)
+    figure, axes = panels(0.6 + STEP_PANEL_HEIGHT * rows, rows, squeeze=False)
     for panel, name in zip(axes[:, 0], names, strict=False):
         scaled = (steps[f"{MEASURED}{name}"] - steps[f"predicted_{name}"]) / steps[f"deviation_{name}"]
         panel.axhspan(-TWO_SIGMA, TWO_SIGMA, color=PALE)
@@ -68,7 +68,7 @@ def draw_residuals(results: Results) -> Drawn:
         panel.set(xlabel="step", ylabel=f"{name.rpartition('_')[0].replace('_', ' ')} (σ)")
         panel.xaxis.set_major_locator(MaxNLocator(integer=True))
     if samples is not None:
-        panel, every = axes[-1, 0], max(1, samples["phase"].size // MAX_POINTS)
+        panel, every = axes[-1, 0], max(1, samples["phase"].size // MAX_RESIDUALS)
         for leg, (_, colour) in enumerate(LEGS):
             residual = 1e3 * samples["residual_rad"][::every, leg]
             panel.plot(samples["phase"][::every], residual, linestyle="none", marker=".", markersize=1.5, color=colour)
@@ -80,8 +80,8 @@ def draw_residuals(results: Results) -> Drawn:
 
 def draw_trade_off(results: Results) -> Drawn:
     """Plot the 95 % region of the two parameters that trade off most; caption: their keys and correlation."""
-    summary, covariance = results[STAGE].summary, results[STAGE].groups["covariance"]["covariance"]
-    first, second = results[STAGE].groups["trade_off"]["pair"]
+    summary, covariance = results[IDENTIFY_STAGE].summary, results[IDENTIFY_STAGE].groups["covariance"]["covariance"]
+    first, second = results[IDENTIFY_STAGE].groups["trade_off"]["pair"]
     rows = [summary["estimates"][place] for place in (first, second)]
     block = covariance[np.ix_((first, second), (first, second))]
     values, vectors = np.linalg.eigh(block)
@@ -99,7 +99,7 @@ def draw_trade_off(results: Results) -> Drawn:
 
 def draw_worth(results: Results) -> Drawn:
     """Plot the information that would be lost without each measured quantity; caption: the one worth most."""
-    shares = results[STAGE].summary["contributions"]
+    shares = results[IDENTIFY_STAGE].summary["contributions"]
     names = [name.rpartition("_")[0].replace("_", " ") for name in shares]
     figure, axes = panels(0.9 + 0.35 * len(names))
     axes.barh(names, [100.0 * share for share in shares.values()], 0.6, color=ORANGE)
@@ -109,12 +109,13 @@ def draw_worth(results: Results) -> Drawn:
     return figure, (most.rpartition("_")[0].replace("_", " "), float(shares[most]))
 
 
-STEPS = Need(STAGE, "steps", ("measured_step_period_s",), NO_STEPS)
+STEPS = Need(IDENTIFY_STAGE, "steps", ("measured_step_period_s",), NO_MEASURED_STEPS)
 FIGURES: Final = (
     Illustration("identified-steps", (STEPS,), draw_steps),
     Illustration("identified-residuals", (STEPS,), draw_residuals),
     Illustration(
-        "identified-trade-off", (Need(STAGE, "trade_off", ("pair",), "fewer than two parameters are determined"),),
+        "identified-trade-off",
+        (Need(IDENTIFY_STAGE, "trade_off", ("pair",), "fewer than two parameters are determined"),),
         draw_trade_off,
     ),
     Illustration("identified-worth", (STEPS,), draw_worth),

@@ -51,7 +51,7 @@ def claims_in(results: Results) -> Sequence[Mapping[str, Any]]:
 
 
 @dataclass(frozen=True, eq=False)
-class Walk:
+class DrawnWalk:
     """A walk over time.
 
     look      of its model
@@ -81,7 +81,7 @@ class Walk:
     def label(self, words: str, name: str) -> str:
         return label_of(words, self.samples.variables[name].units)
 
-    def first(self, strides: int) -> Walk:
+    def first(self, strides: int) -> DrawnWalk:
         """Return the first strides, or the whole walk if it is shorter."""
         strikes = self.strikes[: 2 * strides]
         if strikes.size == self.strikes.size:
@@ -90,7 +90,7 @@ class Walk:
         return replace(self, strikes=strikes, end=end)
 
 
-def walks_with(results: Results, names: tuple[str, ...]) -> list[Walk]:
+def walks_with(results: Results, names: tuple[str, ...]) -> list[DrawnWalk]:
     """Return the walks whose trajectories have the given variables, the rigid model's first."""
     every = ((RIGID_STAGE, RIGID), (CONTACT_STAGE, CONTACT), (RECORDED_STAGE, RECORDED))
     there = [(stage, look) for stage, look in every if not Need(stage, TRAJECTORY, names, "").missing_in(results, {})]
@@ -102,10 +102,10 @@ def recorded_look(result: Content) -> Look:
     return replace(RECORDED, label=str(result.summary["name"]))
 
 
-def walk_of(result: Content, look: Look) -> Walk:
+def walk_of(result: Content, look: Look) -> DrawnWalk:
     times = touch_times(result.groups.get(STEPS, Group({})))
     look = recorded_look(result) if look is RECORDED else look
-    return Walk(look, str(result.summary["outcome"]), times.size, times, result[TRAJECTORY])
+    return DrawnWalk(look, str(result.summary["outcome"]), times.size, times, result[TRAJECTORY])
 
 
 def touch_times(steps: Group) -> Array:
@@ -113,13 +113,13 @@ def touch_times(steps: Group) -> Array:
     return steps[TOUCHES] if TOUCHES in steps.variables else np.zeros(0)
 
 
-def first_strides(walks: list[Walk], strides: int = PAPER_STRIDES) -> tuple[list[Walk], str]:
+def first_strides(walks: list[DrawnWalk], strides: int = PAPER_STRIDES) -> tuple[list[DrawnWalk], str]:
     """Return the walks' first strides, and ' (the first 5 strides)' for the caption if that is not the whole walk."""
     cut = [walk.first(strides) for walk in walks]
     return cut, "" if all(map(is_, cut, walks)) else f" (the first {strides} strides)"
 
 
-def time_axes(rows: int, row_height: float, walks: list[Walk]) -> tuple[Figure, list[Axes]]:
+def time_axes(rows: int, row_height: float, walks: list[DrawnWalk]) -> tuple[Figure, list[Axes]]:
     """Create axes that share the time axis, with the heel strikes of all walks."""
     figure, column = panels(0.85 + rows * row_height, rows, sharex=True, squeeze=False)
     axes = list(column[:, 0])
@@ -136,7 +136,7 @@ def time_axes(rows: int, row_height: float, walks: list[Walk]) -> tuple[Figure, 
 
 
 def in_time(
-    walks: list[Walk], row_height: float, rows: Sequence[tuple[str, str, int | None, str]]
+    walks: list[DrawnWalk], row_height: float, rows: Sequence[tuple[str, str, int | None, str]]
 ) -> tuple[Figure, list[Axes]]:
     """Plot variables of walks over time, one row each.
 
@@ -160,7 +160,7 @@ def strike_entry(look: Look) -> Artist:
     return entry(label, color=look.colour, linestyle="none", marker="|", markersize=11.0, markeredgewidth=STRIKE_WIDTH)
 
 
-def legend(figure: Figure, walks: list[Walk], *more: Artist) -> None:
+def legend(figure: Figure, walks: list[DrawnWalk], *more: Artist) -> None:
     looks = [walk.look for walk in walks]
     models = [entry(look.label, **look.line) for look in looks]
     add_legend(figure, [*models, *(strike_entry(look) for look in looks), *more])
@@ -186,7 +186,7 @@ def draw_adjusted(results: Results) -> Drawn:
     whole = []
     for group, look, end in (("rigid_start", RIGID, "walked"), ("adjusted", CONTACT, outcome)):
         times = touch_times(result[group])
-        whole.append(Walk(look, end, times.size, times, result[group]))
+        whole.append(DrawnWalk(look, end, times.size, times, result[group]))
     walks, extent = first_strides(whole)
     links = ("link 1", "link 2") if named else ("the first swing leg", "the first stance leg")
     titles = [f"({'ab'[leg]}) angular velocity of {link}" for leg, link in enumerate(links)]
@@ -250,7 +250,7 @@ def draw_cycles(results: Results) -> Drawn:
     return figure, (extent, walks)
 
 
-def draw_cycles_of(axes: Axes, walk: Walk, leg: int) -> None:
+def draw_cycles_of(axes: Axes, walk: DrawnWalk, leg: int) -> None:
     """Plot the last stride in the model's style, with earlier strides as thin lines below.
 
     Marked is the state just before each heel strike of the last stride: filled if the leg's own, open if not.
@@ -268,7 +268,7 @@ def draw_cycles_of(axes: Axes, walk: Walk, leg: int) -> None:
         )  # fmt: skip
 
 
-def show_direction(axes: Axes, walk: Walk, leg: int) -> None:
+def show_direction(axes: Axes, walk: DrawnWalk, leg: int) -> None:
     """Draw arrowheads in the middle of the leg's first swing and first stance."""
     carries = walk["stance_leg"] == leg + 1
     for phase in (carries, ~carries):
