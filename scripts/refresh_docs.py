@@ -230,7 +230,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def write_downloads() -> None:
     """Write the paper's walker for ADAMS and MuJoCo."""
     for ending in ("adm", "cmd", "xml"):
-        export_model(ROOT / "docs" / "downloads" / f"paper.{ending}", name="paper", slope_rad=0.0174)
+        for path in export_model(ROOT / "docs" / "downloads" / f"paper.{ending}", name="paper", slope_rad=0.0174):
+            # The commit that will hold the file is not known yet.
+            text = re.sub(r", commit \w+(-dirty)?", "", path.read_text(encoding="utf-8"))
+            path.write_text(text, encoding="utf-8")
 
 
 def refresh(path: Path, results: Results, write: bool) -> bool:

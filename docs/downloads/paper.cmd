@@ -1,5 +1,5 @@
 ! CMD Version:2
-! Written by walkerlab 0.3.0.dev0, commit 32e6ff022a7218b46094eb1e4b5a0fb9dfcb14d6-dirty.
+! Written by walkerlab 0.3.0.dev0.
 ! Config: paper. Slope: 0.0174 rad, as tilted gravity.
 ! walkerlab's contact model from this start: walked, 10 steps.
 ! Its last step: 0.7110229 s, 0.3608206 m.
