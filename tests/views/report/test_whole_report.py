@@ -109,6 +109,7 @@ ON_DEMAND = (
     "basin",
     "engines.section",
     "robustness",
+    "identification",
 )  # sections of stages that only their own commands run
 
 
