@@ -133,7 +133,8 @@ import hashlib, sys
 from synthetic_methods import everything
 from walkerlab.views.figures.registry import FIGURES
 for figure in FIGURES:
-    if any(need.stage in ("tune", "continuation", "basin", "engines", "robustness", "identify") for need in figure.needs):
+    elsewhere = ("tune", "continuation", "basin", "engines", "robustness", "identify")
+    if any(need.stage in elsewhere for need in figure.needs):
         continue
     drawing = figure.render(everything())
     print(figure.name, hashlib.sha256(drawing.svg + drawing.png).hexdigest())
