@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, Final
 
@@ -49,16 +50,16 @@ ALIGNED_ERRORS = Need(
 def draw_differences(results: Results) -> Drawn:
     """Plot the errors of each leg's angle and angular velocity over the rigid walk's steps, on logarithmic scales.
 
-    The caption gets the largest errors in time and in phase, and the paper's.
+    The caption gets the largest errors in time and in phase, the paper's, and a recorded walk's.
     """
     (rigid,), _ = first_strides([walk_of(results[RIGID_STAGE], RIGID)])
     raw, aligned = (results[COMPARE_STAGE][need.group] for need in (RAW_ERRORS, ALIGNED_ERRORS))
     claimed, early = bool(claims_in(results)), raw["time"] <= rigid.time[-1]
-    recorded = results[COMPARE_STAGE].groups.get("recorded/rigid/aligned")
+    recorded, summary = results[COMPARE_STAGE].groups.get("recorded/rigid/aligned"), {}
     recorded_look = RECORDED
     if recorded is not None:
-        name_of_walk = results[COMPARE_STAGE].summary["recorded"]["name"]
-        recorded_look = replace(RECORDED, label=f"{name_of_walk}, at the same phase")
+        summary = results[COMPARE_STAGE].summary["recorded"]
+        recorded_look = replace(RECORDED, label=f"{summary['name']}, at the same phase")
     figure, axes = time_axes(4, 1.55, [rigid])
     rows = [(*quantity, leg) for quantity in LEG_QUANTITIES for leg in (0, 1)]
     for panel, (letter, words, name, leg) in zip(axes, rows, strict=True):
@@ -67,7 +68,12 @@ def draw_differences(results: Results) -> Drawn:
         line(panel, raw["time"][early], raw_error, TIME_LOOK)
         for begin, end, error in zip((0.0, *rigid.strikes), rigid.strikes, aligned_error, strict=False):
             line(panel, begin + (end - begin) * aligned["phase"], error, PHASE_LOOK)
-        largest = max(float(raw_error.max()), float(aligned_error.max()))
+        errors = [raw_error, aligned_error]
+        if recorded is not None:
+            errors.append(np.abs(recorded[f"aligned_{name}"][: rigid.strikes.size, :, leg]))
+            for begin, end, error in zip((0.0, *rigid.strikes), rigid.strikes, errors[-1], strict=False):
+                line(panel, begin + (end - begin) * recorded["phase"], error, recorded_look)
+        largest = max(float(error.max()) for error in errors)
         bottom, top = ZERO_CROSSING * largest, AXIS_MARGIN * largest
         if claimed:
             panel.axhline(LARGEST_ERROR.value, **PAPER_ERROR.line)
@@ -76,17 +82,24 @@ def draw_differences(results: Results) -> Drawn:
         panel.yaxis.set_major_formatter(power_of_ten)
         panel.set(ylim=(bottom, top), ylabel=label_of("error", raw.variables[f"raw_{name}"].units))
         panel.set_title(f"({letter}{leg + 1}) {words} of leg {leg + 1}")
-        if recorded is not None:
-            error = np.abs(recorded[f"aligned_{name}"][: rigid.strikes.size, :, leg])
-            for begin, end, values in zip((0.0, *rigid.strikes), rigid.strikes, error, strict=False):
-                line(panel, begin + (end - begin) * recorded["phase"], values, recorded_look)
     looks = [TIME_LOOK, PHASE_LOOK, *([PAPER_ERROR] if claimed else []), *([] if recorded is None else [recorded_look])]
     add_legend(figure, [*(entry(look.label, **look.line) for look in looks), strike_entry(rigid.look)])
     caption_values = []
     for _, words, name in LEG_QUANTITIES:
         at_once, in_phase = np.abs(raw[f"raw_{name}"]).max(), np.abs(aligned[f"aligned_{name}"]).max()
         caption_values.append((words, at_once, in_phase, raw.variables[f"raw_{name}"].units))
-    return figure, (caption_values, LARGEST_ERROR.text if claimed else "")
+    return figure, (caption_values, LARGEST_ERROR.text if claimed else "", largest_of_recorded(summary))
+
+
+def largest_of_recorded(summary: Mapping[str, Any]) -> tuple[str, list[tuple[str, float, str]]] | None:
+    """Return the recorded walk's name and largest differences from the rigid model in phase; None without one."""
+    if not summary:
+        return None
+    differences = summary["differences"]["rigid"]
+    units = {"angle_error_rad": "rad", "velocity_error_rad_s": "rad/s"}
+    return summary["name"], [
+        (words, differences[f"max_{name}"]["aligned"], units[name]) for _, words, name in LEG_QUANTITIES
+    ]
 
 
 ALIGNED_ANGLE, NUMERICAL_ERROR, RUN_TIME = "angle_error_rad", "numerical_time_s", "wall_s"

@@ -61,6 +61,7 @@ class DrawnWalk:
     time      (samples,) s
     samples   what was stored over time
     end       number of the samples that are shown; None for all
+    recorded  whether it was recorded elsewhere, and has a name of its own
     """
 
     look: Look
@@ -69,6 +70,7 @@ class DrawnWalk:
     strikes: Array
     samples: Group
     end: int | None = None
+    recorded: bool = False
 
     def __getitem__(self, name: str) -> NDArray[Any]:
         return self.samples[name][: self.end]
@@ -104,8 +106,9 @@ def recorded_look(result: Content) -> Look:
 
 def walk_of(result: Content, look: Look) -> DrawnWalk:
     times = touch_times(result.groups.get(STEPS, Group({})))
-    look = recorded_look(result) if look is RECORDED else look
-    return DrawnWalk(look, str(result.summary["outcome"]), times.size, times, result[TRAJECTORY])
+    recorded = look is RECORDED
+    look = recorded_look(result) if recorded else look
+    return DrawnWalk(look, str(result.summary["outcome"]), times.size, times, result[TRAJECTORY], recorded=recorded)
 
 
 def touch_times(steps: Group) -> Array:
