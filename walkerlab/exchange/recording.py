@@ -8,12 +8,16 @@ from __future__ import annotations
 
 import csv
 import re
+import subprocess
+import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from io import StringIO
+from importlib.util import find_spec
+from io import BytesIO, StringIO
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 from xml.etree import ElementTree
+from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +34,17 @@ EMPTY: Final = frozenset({"", "nan", "na", "n/a", "null", "none", "-", "#n/a"})
 HEADER_LINES: Final = 60
 """Lines of a text in which its header is looked for."""
 WANTED: Final = "CSV (.csv, .txt, .tab, .tsv), ADAMS results (.res), OpenSim (.sto, .mot), markers (.trc, .c3d)"
+
+
+C3D_PATIENCE_S: Final = 60.0
+C3D_PROGRAM: Final = """
+import sys, ezc3d, numpy
+content = ezc3d.c3d(sys.argv[1])
+point = content["parameters"]["POINT"]
+labels, units = (numpy.array(point.get(name, {}).get("value", []), str) for name in ("LABELS", "UNITS"))
+rate = numpy.ravel(point["RATE"]["value"])
+numpy.savez(sys.stdout.buffer, places=content["data"]["points"], rate=rate, labels=labels, units=units)
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -362,32 +377,35 @@ def read_markers(path: Path) -> Recording:
 
 
 def read_c3d(path: Path) -> Recording:
-    """Markers of a C3D file, as columns 'name.x', 'name.y', 'name.z'; needs the extra `data`."""
-    try:
-        import ezc3d
-    except ImportError:
-        raise ConfigError(f"{path}: reading C3D needs ezc3d.", 'Install it: pip install "walkerlab[data]"') from None
-    if not path.is_file():
-        raise FileNotFoundError(2, "no such file")
-    try:
-        content = ezc3d.c3d(str(path))
-    except (RuntimeError, OSError, ValueError) as error:
-        raise ConfigError(f"{path} is no C3D file that can be read: {error}.", "Export it again.") from None
-    point = content["parameters"]["POINT"]
-    names = unique(path, [str(label).strip() for label in point["LABELS"]["value"]])
-    places, rate = np.asarray(content["data"]["points"], float), float(np.ravel(point["RATE"]["value"])[0])
-    if not names or rate <= 0.0 or places.shape[1] < len(names):
+    """Read the markers of a C3D file, as columns 'name.x', 'name.y', 'name.z'; needs the extra `data`."""
+    if find_spec("ezc3d") is None:
+        raise ConfigError(f"{path}: reading C3D needs ezc3d.", 'Install it: pip install "walkerlab[data]"')
+    arrays = c3d_arrays(path)
+    names, places = unique(path, [str(label).strip() for label in arrays["labels"]]), arrays["places"]
+    rate = float(arrays["rate"][0]) if arrays["rate"].size else 0.0
+    if not names or not rate > 0.0 or places.ndim != 3 or places.shape[1] < len(names):
         raise ConfigError(f"{path} holds no markers, or no rate of frames.", "Export it again.")
     columns = {
         f"{name}.{axis}": places[place, row] for row, name in enumerate(names) for place, axis in enumerate("xyz")
     }
-    units = [str(unit) for unit in point.get("UNITS", {}).get("value", [])]
-    return Recording(
-        path,
-        {TIME: np.arange(places.shape[2]) / rate, **columns},
-        {},
-        {"time": "s", **({"length": units[0]} if units else {})},
-    )
+    kind_units = {"time": "s", **({"length": str(arrays["units"][0])} if arrays["units"].size else {})}
+    return Recording(path, {TIME: np.arange(places.shape[2]) / rate, **columns}, {}, kind_units)
+
+
+def c3d_arrays(path: Path) -> dict[str, NDArray[Any]]:
+    """Read labels, rate, units and places (3 or 4, markers, frames) with ezc3d.
+
+    A child process does, because damaged files end ezc3d in segmentation faults.
+    """
+    with path.open("rb"):  # raises OSError, which ezc3d does not
+        pass
+    try:
+        command = [sys.executable, "-P", "-c", C3D_PROGRAM, str(path)]
+        done = subprocess.run(command, capture_output=True, check=True, timeout=C3D_PATIENCE_S)
+        with np.load(BytesIO(done.stdout), allow_pickle=False) as arrays:
+            return dict(arrays)
+    except (subprocess.SubprocessError, ValueError, EOFError, BadZipFile):
+        raise ConfigError(f"{path} is not a C3D file that ezc3d can read.", "Export it again.") from None
 
 
 READERS: Final[dict[str, Callable[[Path], Recording]]] = {

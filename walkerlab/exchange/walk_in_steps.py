@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Final
+from itertools import pairwise
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import BSpline, make_lsq_spline
 
 from walkerlab.errors import ConfigError
 from walkerlab.exchange.columns import RecordedWalk
@@ -23,6 +23,9 @@ from walkerlab.physics.mechanics.rigid_model import (
     step_lengths,
 )
 
+if TYPE_CHECKING:
+    from scipy.interpolate import BSpline
+
 Array = NDArray[np.float64]
 TWO_FEET_TOLERANCE: Final = (
     0.03  # rad, sum of the legs' angles from the normal, up to which a recording starts on two feet
@@ -30,7 +33,8 @@ TWO_FEET_TOLERANCE: Final = (
 SHORTEST: Final = 0.25  # of the mean step, before which the first heel strike is the start itself
 SPLINE_DEGREE: Final = 5
 INTERVALS: Final = 24  # of the spline through a step
-MOST_SAMPLES: Final = 500  # of a step, that are kept
+MOST_SAMPLES: Final = 250  # of a step, that are kept
+LONGEST_GAP: Final = 1 / 8  # of a step's duration, between two samples
 SIDE: Final = 1e-10  # share of the walk's duration before a heel strike, of the sample that ends a step
 
 
@@ -65,7 +69,7 @@ def divide_into_steps(walk: RecordedWalk, model: RigidModel, source: str) -> Rec
 
     source  name of the recording, for messages
 
-    Raises ConfigError if the recording has no complete step.
+    Raises ConfigError if the recording has no complete step, or a gap within one.
     """
     angle = walk.both_legs("angle")
     assert angle is not None, "a walk has the angles of both legs"
@@ -94,7 +98,28 @@ def divide_into_steps(walk: RecordedWalk, model: RigidModel, source: str) -> Rec
             "Angles are from the vertical, positive with the foot ahead (--columns), in the right unit (--units), over "
             "at least one whole step.",
         )
+    refuse_gaps(walk.time_s, [origin, *(touch.time_s for touch in ends)], source)
     return divided(walk, angle, model, origin, ends, swapped=ends[0].leg == 1)
+
+
+def refuse_gaps(time: Array, touches: list[float], source: str) -> None:
+    """Raise ConfigError for a step in which samples are too far apart: its heel strikes and velocities are unknown."""
+    for number, (begin, end) in enumerate(pairwise(touches), 1):
+        first, last = longest_gap(time, begin, end)
+        if last - first > LONGEST_GAP * (end - begin):
+            raise ConfigError(
+                f"{source}: step {number} has no sample from time {first:.6g} to {last:.6g} s, "
+                f"{(last - first) / (end - begin):.0%} of its duration.",
+                f"Record at least {1 / LONGEST_GAP:.0f} samples a step, or cut the recording to a part without gaps.",
+            )
+
+
+def longest_gap(time: Array, begin: float, end: float) -> tuple[float, float]:
+    """Return the neighbouring samples that lie farthest apart, of those around and between two instants."""
+    first, last = np.searchsorted(time, begin, "right") - 1, np.searchsorted(time, end)
+    instants = time[first : last + 1]
+    place = int(np.argmax(np.diff(instants)))
+    return float(instants[place]), float(instants[place + 1])
 
 
 def starts_on_two_feet(angle: Array, model: RigidModel) -> bool:
@@ -113,14 +138,22 @@ def divided(
     time, side = walk.time_s - origin, SIDE * float(times[-1])
     last = float(time[-1])
     spans = list(zip((0.0, *times), (*(times - side), last), strict=True))
-    if np.count_nonzero(time >= times[-1]) <= SPLINE_DEGREE:
-        spans.pop()  # too little is recorded of the step after the last heel strike
+    if not is_recorded_beyond(time, times):
+        spans.pop()
     pieces = [samples_within(time, columns, *span) for span in spans]
     step = np.repeat(np.arange(len(pieces)), [piece[0].size for piece in pieces])
     times_s, angles, velocities = (np.concatenate(parts) for parts in zip(*pieces, strict=True))
     lengths = lengths_of(model, angles, step, len(times))
     scatter = float(np.median([touch.scatter_rad for touch in ends]))
     return RecordedSteps(times_s, step, angles, velocities, times, lengths, scatter, swapped, origin)
+
+
+def is_recorded_beyond(time: Array, touches: Array) -> bool:
+    """Return whether enough is recorded of the step after the last heel strike."""
+    if np.count_nonzero(time >= touches[-1]) <= SPLINE_DEGREE:
+        return False
+    first, last = longest_gap(time, float(touches[-1]), float(time[-1]))
+    return last - first <= LONGEST_GAP * float(np.diff(touches, prepend=0.0)[-1])
 
 
 def samples_within(time: Array, columns: Array, begin: float, end: float) -> tuple[Array, Array, Array]:
@@ -131,7 +164,7 @@ def samples_within(time: Array, columns: Array, begin: float, end: float) -> tup
     near = (time >= begin) & (time <= end)
     spline = spline_through(time[near], columns[near])
     inside = np.flatnonzero((time > begin) & (time < end))
-    inside = inside[:: max(1, inside.size // MOST_SAMPLES)]
+    inside = inside[:: max(1, math.ceil(inside.size / MOST_SAMPLES))]
     grid = np.concatenate(([begin], time[inside], [end]))
     values = spline(grid)
     values[1:-1] = columns[inside]
@@ -141,6 +174,9 @@ def samples_within(time: Array, columns: Array, begin: float, end: float) -> tup
 
 def spline_through(time: Array, columns: Array) -> BSpline:
     """Fit a spline with evenly spaced knots, fewer where samples are few."""
+    # Imported here: to see whether a result is current, nothing is fitted.
+    from scipy.interpolate import make_lsq_spline
+
     degree = min(SPLINE_DEGREE, time.size - 1)
     intervals = max(1, min(INTERVALS, time.size // (2 * SPLINE_DEGREE)))
     inner = np.linspace(time[0], time[-1], intervals + 1)[1:-1]

@@ -12,6 +12,7 @@ import walkerlab
 from walkerlab.config.loader import load
 from walkerlab.errors import ConfigError
 from walkerlab.evidence.paper.sections import recorded_tables, recorded_words
+from walkerlab.exchange.walk_in_steps import MOST_SAMPLES
 from walkerlab.pipeline.executor import answer_in_memory
 from walkerlab.pipeline.results import MemoryResults
 from walkerlab.pipeline.runner import execute
@@ -127,7 +128,10 @@ def test_figures_draw_the_recorded_walk_under_its_name(tmp_path):
     path = written(tmp_path, table(simulated("rigid")))
     config = load(None, ("strides=2", f"recording.file={json.dumps(str(path))}", "recording.name=mine")).config
     folder = RunFolder(tmp_path / "runs", "drawn")
-    execute(config, "plot", folder)
+    figures = execute(config, "plot", folder).summary["figures"]
+    captions = {figure["number"]: figure["caption"] for figure in figures if "number" in figure}
+    assert captions[7].endswith(", mine walked 6 steps.")
+    assert "Dotted: mine less the rigid model at the same phase; maxima: angle" in captions[8]
     for number in ("07", "08", "09"):
         assert "mine" in (folder.path / "figures" / f"figure-{number}.svg").read_text(encoding="utf-8")
 
@@ -141,6 +145,109 @@ def test_a_changed_file_makes_the_result_stale_and_the_same_content_does_not(tmp
     assert execute(config, "recorded-walk", folder).reused
     written(tmp_path, table(simulated("rigid"), delay=1.0))
     assert not execute(config, "recorded-walk", folder).reused
+
+
+@pytest.mark.parametrize(
+    ("begin", "end", "why"),
+    [
+        (1.0, 1.3, "step 2 has no sample"),
+        (1.36, 1.46, "step 2 has no sample"),  # around a heel strike
+        (0.9, 1.7, "step 1 has no sample"),  # over a whole heel strike, so that two steps would be one
+    ],
+)
+def test_missing_rows_are_an_error_that_says_where(tmp_path, begin, end, why):
+    head, *rows = table(simulated("rigid")).splitlines()
+    kept = [row for row in rows if not begin < float(row.split(",")[0]) < end]
+    with pytest.raises(ConfigError, match=why) as refusal:
+        walkerlab.read_walk(written(tmp_path, "\n".join([head, *kept])))
+    assert "8 samples a step" in refusal.value.advice
+
+
+def test_a_few_missing_rows_and_a_last_time_that_jumps_change_nothing(tmp_path):
+    head, *rows = table(simulated("rigid")).splitlines()
+    kept = [row for row in rows if not 1.0 < float(row.split(",")[0]) < 1.05 and float(row.split(",")[0]) < 4.0]
+    time, angles = kept[-1].split(",", 1)
+    kept[-1] = f"{float(time) + 1e9!r},{angles}"
+    read = walkerlab.read_walk(written(tmp_path, "\n".join([head, *kept])))
+    assert read.summary["step_periods_s"] == pytest.approx([0.703597] * read.summary["steps"], abs=1e-5)
+
+
+def test_a_recording_with_five_samples_a_step_is_refused(tmp_path):
+    """Its steps would come out wrong by several percent, its velocities by half."""
+    trajectory = simulated("rigid").content["trajectory"]
+    time = np.arange(0.0, 4.0, 0.15)
+    angle = [np.interp(time, trajectory["time"], leg) for leg in trajectory["angle"].T]
+    rows = [
+        "time (s),angle 1 (rad),angle 2 (rad)",
+        *(",".join(map(str, row)) for row in zip(time, *angle, strict=True)),
+    ]
+    with pytest.raises(ConfigError, match="has no sample from"):
+        walkerlab.read_walk(written(tmp_path, "\n".join(rows)))
+
+
+def test_a_dense_recording_is_thinned(tmp_path):
+    trajectory = simulated("rigid").content["trajectory"]
+    time = np.linspace(0.0, 4.0, 4001)
+    angle = [np.interp(time, trajectory["time"], leg) for leg in trajectory["angle"].T]
+    rows = [
+        "time (s),angle 1 (rad),angle 2 (rad)",
+        *(",".join(map(str, row)) for row in zip(time, *angle, strict=True)),
+    ]
+    read = walkerlab.read_walk(written(tmp_path, "\n".join(rows)))
+    assert np.bincount(read.content["trajectory"]["step"]).max() <= MOST_SAMPLES + 2
+
+
+def marker_recording(folder):
+    """The rigid walk as C3D: a hip and two feet, mm."""
+    ezc3d = pytest.importorskip("ezc3d")
+    trajectory = simulated("rigid").content["trajectory"]
+    time = np.arange(0.0, 4.0, 0.005)
+    hip = np.stack([500.0 * time, np.zeros_like(time), np.full_like(time, 900.0)])
+    angles = [np.interp(time, trajectory["time"], leg) for leg in trajectory["angle"].T]
+    feet = [hip + 900.0 * np.stack([np.sin(angle), np.zeros_like(time), -np.cos(angle)]) for angle in angles]
+    content = ezc3d.c3d()
+    values = {"RATE": [200.0], "LABELS": ("HIP", "FOOT1", "FOOT2"), "UNITS": ["mm"]}
+    for name, value in values.items():
+        content["parameters"]["POINT"][name]["value"] = value
+    points = np.ones((4, 3, time.size))
+    points[:3] = np.stack([hip, *feet], axis=1)
+    content["data"]["points"] = points
+    path = folder / "walk.c3d"
+    content.write(str(path))
+    return path
+
+
+LEGS = {"angle 1": "HIP>FOOT1", "angle 2": "HIP>FOOT2"}
+
+
+def test_markers_of_a_c3d_file_are_a_walk(tmp_path):
+    read = walkerlab.read_walk(marker_recording(tmp_path), LEGS)
+    assert read.summary["step_periods_s"] == pytest.approx([0.703597] * 5, abs=2e-4)
+
+
+def test_a_c3d_file_that_is_cut_is_refused(tmp_path):
+    path = marker_recording(tmp_path)
+    path.write_bytes(path.read_bytes()[:300])
+    with pytest.raises(ConfigError, match=r"walk\.c3d is not a C3D file"):
+        walkerlab.read_walk(path, LEGS)
+
+
+def test_a_c3d_file_that_ends_its_reader_in_a_segmentation_fault_is_refused(tmp_path):
+    path = marker_recording(tmp_path)
+    content = bytearray(path.read_bytes())
+    content[600] = 255  # among the parameters; ezc3d 1.7.2 reads beyond their end
+    path.write_bytes(content)
+    with pytest.raises(ConfigError, match=r"walk\.c3d is not a C3D file"):
+        walkerlab.read_walk(path, LEGS)
+
+
+def test_a_recording_that_is_refused_stores_nothing(tmp_path):
+    path = written(tmp_path, "time (s),angle 1 (rad),angle 2 (rad)\n0,0.1\n")
+    config = load(None, (f"recording.file={json.dumps(str(path))}",)).config
+    folder = RunFolder(tmp_path / "runs", "refused")
+    with pytest.raises(ConfigError):
+        execute(config, "recorded-walk", folder)
+    assert not list(folder.path.rglob("*.h5*"))
 
 
 def damaged(draw, lines):
