@@ -1,4 +1,4 @@
-"""Quantities of a walk in SI units, from the columns of a recording: found by name and suffix, or named by hand."""
+"""Convert columns of a recording, by name, by suffix or as the user says, to quantities of a walk in SI units."""
 
 from __future__ import annotations
 
@@ -50,20 +50,20 @@ LINE: Final = re.compile(r"(.+?)\s*>\s*(.+)")
 
 @dataclass(frozen=True, eq=False)
 class RecordedWalk:
-    """A recorded walk in SI units: time and quantities (samples,) by name, and the columns they come from."""
+    """Hold a recorded walk in SI units: time and quantities (samples,) by name, and their columns' names."""
 
     time_s: Array
     quantities: dict[str, Array]
     sources: dict[str, str] = field(default_factory=dict)
 
     def both_legs(self, name: str) -> Array | None:
-        """(samples, 2) of both legs; None unless both are there."""
+        """Return a quantity (samples, 2) of both legs; None unless both are recorded."""
         both = [self.quantities.get(f"{name} {leg}") for leg in (1, 2)]
         return None if both[0] is None or both[1] is None else np.stack([both[0], both[1]], axis=1)
 
 
 def as_walk(recording: Recording, columns: Mapping[str, str], units: Mapping[str, str]) -> RecordedWalk:
-    """The quantities of a walk in a recording, in SI units.
+    """Return the quantities of a recorded walk in SI units.
 
     columns  columns by quantity, where their names do not say it; `HIP>FOOT` is the angle of a line of markers
     units    units by kind ('angle', 'length', ...), by quantity or by column, where the file does not state them
@@ -80,42 +80,45 @@ def as_walk(recording: Recording, columns: Mapping[str, str], units: Mapping[str
 
 
 def plain(name: str) -> str:
-    """A name without case, units' brackets, and differences of separators."""
+    """Return a name in lower case, with one kind of separator."""
     return re.sub(r"[\s_\-]+", "_", name.strip().lower())
 
 
-def matches(recording: Recording, given: set[str]) -> dict[str, str]:
-    """Columns by quantity: those of the same name, otherwise the only one whose name ends in it."""
-    found = {}
-    for name in QUANTITY_KINDS.keys() - given:
-        wanted = {plain(name), plain(name).removesuffix("_m"), *leg_names(name)}
-        exact = [column for column in recording.columns if plain(column) in wanted]
-        ending = [column for column in recording.columns if any(ends_in(plain(column), each) for each in wanted)]
-        if len(candidates := exact or ending) == 1:
-            found[name] = candidates[0]
+def matches(recording: Recording, named: set[str]) -> dict[str, str]:
+    """Return columns by quantity: of the same name, otherwise the only one whose name ends in it.
+
+    named  quantities whose columns the user names
+    """
+    sources = {}
+    for name in QUANTITY_KINDS.keys() - named:
+        names = {plain(name), plain(name).removesuffix("_m"), *leg_names(name)}
+        exact = [column for column in recording.columns if plain(column) in names]
+        longer = [column for column in recording.columns if any(ends_in(plain(column), ending) for ending in names)]
+        if len(candidates := exact or longer) == 1:
+            sources[name] = candidates[0]
         elif len(candidates) > 1:
             raise ConfigError(
                 f"{recording.path}: {' and '.join(candidates[:3])} could each be {name!r}.",
                 f'Say which: --columns "{name}=..."',
             )
-    return found
+    return sources
 
 
 def leg_names(name: str) -> list[str]:
-    """How exported models name a leg's quantity in their results: leg_1.angle for 'angle 1'."""
+    """Return the name of a leg's quantity in results of exported models: leg_1.angle for 'angle 1'."""
     quantity, blank, leg = name.rpartition(" ")
     return [f"leg_{leg}.{UNIT_AT_END.sub('', plain(quantity))}"] if blank else []
 
 
 def ends_in(name: str, ending: str) -> bool:
-    """Whether a longer name ends in a name, behind a dot or a slash."""
+    """Return whether a longer name ends in a name, behind a dot or a slash."""
     return name.endswith((f".{ending}", f"/{ending}"))
 
 
 def named_columns(recording: Recording, columns: Mapping[str, str]) -> dict[str, str]:
-    """The columns that the user names, once both names are known."""
+    """Return columns by quantity as the user names them; raises ConfigError for an unknown name."""
     known = {plain(name): name for name in QUANTITY_KINDS}
-    found = {}
+    sources = {}
     for quantity, column in columns.items():
         name = known.get(plain(quantity))
         if name is None:
@@ -124,19 +127,19 @@ def named_columns(recording: Recording, columns: Mapping[str, str]) -> dict[str,
             raise ConfigError(f"--columns: {quantity!r} is no quantity of a walk.", advice)
         ends = LINE.fullmatch(column)
         markers = [f"{marker}.{axis}" for marker in (ends[1], ends[2]) for axis in "xyz"] if ends else [column]
-        for each in markers:
-            if each not in recording.columns:
-                near = get_close_matches(each, recording.columns, 1, 0.3)
+        for needed in markers:
+            if needed not in recording.columns:
+                near = get_close_matches(needed, recording.columns, 1, 0.3)
                 advice = (
                     f"The nearest is {near[0]!r}." if near else f"There are: {', '.join(list(recording.columns)[:12])}."
                 )
-                raise ConfigError(f"{recording.path} has no column {each!r}.", advice)
-        found[name] = column
-    return found
+                raise ConfigError(f"{recording.path} has no column {needed!r}.", advice)
+        sources[name] = column
+    return sources
 
 
 def missing(recording: Recording, name: str) -> ConfigError:
-    """The error for a quantity that no column could be found for, with the nearest column."""
+    """Return the error for a quantity without a column, with the nearest column."""
     near = get_close_matches(plain(name), [plain(column) for column in recording.columns], 1, 0.2)
     nearest = next((column for column in recording.columns if near and plain(column) == near[0]), "NAME")
     there = ", ".join(column for column in list(recording.columns)[:12])
@@ -146,7 +149,7 @@ def missing(recording: Recording, name: str) -> ConfigError:
 
 
 def in_si(recording: Recording, name: str, source: str, units: Mapping[str, str]) -> Array:
-    """A quantity in SI units; raises ConfigError for gaps, and for a unit that is missing or not of its kind."""
+    """Return a quantity in SI units; raises ConfigError for gaps, and for a unit that is missing or not of its kind."""
     kind = QUANTITY_KINDS[name]
     if ends := LINE.fullmatch(source):
         return line_angle(*(marker_place(recording, marker, units) for marker in (ends[1], ends[2])))
@@ -155,7 +158,7 @@ def in_si(recording: Recording, name: str, source: str, units: Mapping[str, str]
 
 
 def complete(recording: Recording, name: str, source: str, values: Array) -> Array:
-    """Values of a column without gaps."""
+    """Return the values of a column; raises ConfigError for gaps."""
     gaps = np.flatnonzero(~np.isfinite(values))
     if gaps.size:
         time = recording.columns[TIME][gaps[0]]
@@ -168,47 +171,50 @@ def complete(recording: Recording, name: str, source: str, values: Array) -> Arr
 
 
 def unit_value(recording: Recording, name: str, source: str, kind: str, units: Mapping[str, str]) -> float:
-    """SI value of the unit of a column: the user's, the file's, or that of the quantity's own name."""
-    stated = (
+    """Return the SI value of a column's unit, by the user, the file or the column's name."""
+    unit = (
         units.get(source) or units.get(name) or recording.units.get(source) or units.get(kind)
         or recording.kind_units.get(kind) or unit_in_name(source, kind) or rate_unit(recording, kind, units)
     )  # fmt: skip
-    if not stated:
+    if not unit:
         raise ConfigError(
             f"{recording.path} does not say in which unit {source!r} ({name}) is.",
             f"Say it: --units {kind}={SI[kind]}, or one of {', '.join(UNIT_VALUES[kind])}.",
         )
-    value = UNIT_VALUES[kind].get(stated.strip().lower())
+    value = UNIT_VALUES[kind].get(unit.strip().lower())
     if value is None:
         raise ConfigError(
-            f"{recording.path}: {stated!r} is no unit of {name!r} that is known ({kind}).",
+            f"{recording.path}: {unit!r} is no unit of {name!r} that is known ({kind}).",
             f"Known are {', '.join(UNIT_VALUES[kind])}: --units {kind}={SI[kind]}",
         )
     return value
 
 
 def unit_in_name(column: str, kind: str) -> str:
-    """Unit that a column's name ends in, as mm of hip_mm; empty if there is none."""
+    """Return the unit that a column's name ends in, as mm of hip_mm; empty without one."""
     endings = [unit for unit in UNIT_VALUES[kind] if plain(column).endswith(f"_{unit.replace('/', '_')}")]
     return max(endings, key=len, default="")
 
 
 def rate_unit(recording: Recording, kind: str, units: Mapping[str, str]) -> str:
-    """Unit of velocities in a file that states only that of its angles or lengths."""
+    """Return the unit of velocities in a file that states only that of its angles or lengths."""
     moved = {"rate": "angle", "speed": "length"}.get(kind, "")
     unit = units.get(moved) or recording.kind_units.get(moved)
     return f"{unit}/s" if unit else ""
 
 
 def marker_place(recording: Recording, marker: str, units: Mapping[str, str]) -> Array:
-    """(samples, 3) place of a marker (m)."""
+    """Return the places (samples, 3) of a marker (m)."""
     axes = [f"{marker}.{axis}" for axis in "xyz"]
     scale = unit_value(recording, marker, axes[0], "length", units)
     return np.stack([complete(recording, marker, axis, recording.columns[axis] * scale) for axis in axes], axis=1)
 
 
 def line_angle(top: Array, bottom: Array) -> Array:
-    """Angle of lines from the vertical (rad), positive with the lower end ahead; the axis that moves most is ahead."""
+    """Return angles of lines from the vertical (rad), positive with the lower end ahead.
+
+    The horizontal axis along which the upper end moves most points ahead.
+    """
     vertical = int(np.argmax(np.abs(np.mean(top - bottom, axis=0))))
     spans = np.ptp(top, axis=0)
     spans[vertical] = -1.0
@@ -218,7 +224,7 @@ def line_angle(top: Array, bottom: Array) -> Array:
 
 
 def parse_pairs(option: str, texts: Sequence[str]) -> dict[str, str]:
-    """Pairs of an option such as `a=b,c=d`."""
+    """Split pairs of an option such as `a=b,c=d`."""
     pairs = [pair for text in texts for pair in text.split(",") if pair.strip()]
     for pair in pairs:
         if "=" not in pair or not all(side.strip() for side in pair.split("=", 1)):
@@ -227,7 +233,7 @@ def parse_pairs(option: str, texts: Sequence[str]) -> dict[str, str]:
 
 
 def parse_units(texts: Sequence[str]) -> dict[str, str]:
-    """Units by kind, quantity or column; a unit alone is that of its kind, as `deg` of angles."""
+    """Return units by kind, quantity or column; a unit alone is that of its kind, as `deg` of angles."""
     pairs, alone = [], {}
     for part in (part.strip() for text in texts for part in text.split(",") if part.strip()):
         kinds = [kind for kind, units in UNIT_VALUES.items() if part.lower() in units]

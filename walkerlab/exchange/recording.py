@@ -1,7 +1,7 @@
-"""Recordings: columns over time from files that other programs and people write.
+"""Read columns over time from files that other programs and people write.
 
-`read_recording` knows a file by its ending: delimited text (CSV, tables of ADAMS), results of ADAMS (.res), tables of
-OpenSim (.sto, .mot), markers (.trc, .c3d). What the columns mean for a walker is the matter of `columns`.
+`read_recording` chooses the format by the ending: delimited text (CSV, tables of ADAMS), results of ADAMS (.res),
+tables of OpenSim (.sto, .mot), markers (.trc, .c3d). `columns` gives them their meanings for a walker.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ TIME: Final = "time"
 UNIT_IN_NAME: Final = re.compile(r"\s*[\[(]\s*([^\[\]()]*?)\s*[\])]\s*$")
 DELIMITERS: Final = "\t;,"
 EMPTY: Final = frozenset({"", "nan", "na", "n/a", "null", "none", "-", "#n/a"})
-"""Cells that hold no value."""
+"""Cells without a value."""
 HEADER_LINES: Final = 60
-"""Lines of a text in which its header is looked for."""
+"""Lines at the top of a text that are searched for its header."""
 WANTED: Final = "CSV (.csv, .txt, .tab, .tsv), ADAMS results (.res), OpenSim (.sto, .mot), markers (.trc, .c3d)"
 
 
@@ -49,11 +49,11 @@ numpy.savez(sys.stdout.buffer, places=content["data"]["points"], rate=rate, labe
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """Columns over time as a file has them, before any conversion; a missing value is nan.
+    """Hold columns over time as a file has them, before any conversion; a missing value is nan.
 
-    columns     (samples,) each, by name; time is `time`
-    units       of columns whose unit the file states, as it writes them
-    kind_units  units for all angles, lengths or times of the file, by 'angle', 'length', 'time', where it states them
+    columns     arrays (samples,) by name; time is `time`
+    units       by column where the file states one, as it is written there
+    kind_units  by 'angle', 'length' and 'time' where the file states one for all columns of that kind
     """
 
     path: Path
@@ -83,7 +83,7 @@ def read_recording(path: Path) -> Recording:
 
 
 def checked_time(recording: Recording) -> Recording:
-    """The recording, once its time is complete and strictly rising."""
+    """Return the recording; raises ConfigError unless its time is complete and strictly rising."""
     time, path = recording.columns.get(TIME), recording.path
     if time is None:
         names = ", ".join(list(recording.columns)[:8])
@@ -111,7 +111,7 @@ def checked_time(recording: Recording) -> Recording:
 
 
 def read_delimited(path: Path) -> Recording:
-    """CSV and tables of ADAMS: titles, a header, rows of numbers."""
+    """Read CSV and tables of ADAMS: titles, a header, rows of numbers."""
     lines = text_of(path).splitlines()
     header, delimiter = header_of(path, lines)
     names, units = names_and_units(split_row(lines[header], delimiter))
@@ -124,7 +124,7 @@ def read_delimited(path: Path) -> Recording:
 
 
 def text_of(path: Path) -> str:
-    """Text of a file in UTF-8, UTF-16 or Latin-1."""
+    """Read a file in UTF-8, UTF-16 or Latin-1."""
     data = path.read_bytes()
     for encoding in ("utf-16",) if data[:2] in (b"\xff\xfe", b"\xfe\xff") else ("utf-8-sig", "latin-1"):
         try:
@@ -138,9 +138,9 @@ def text_of(path: Path) -> str:
 
 
 def header_of(path: Path, lines: Sequence[str]) -> tuple[int, str]:
-    """Line of the header and the delimiter: the first row of names that a row of as many numbers follows."""
+    """Find the header's line and the delimiter: the first row of names with a row of as many numbers behind it."""
     for number, line in enumerate(lines[:HEADER_LINES]):
-        following = next((each for each in lines[number + 1 :] if each.strip()), "")
+        following = next((row for row in lines[number + 1 :] if row.strip()), "")
         for delimiter in DELIMITERS:
             names, cells = split_row(line, delimiter), split_row(following, delimiter)
             alike = len(names) == len(cells) > 1 and all(names)
@@ -153,12 +153,12 @@ def header_of(path: Path, lines: Sequence[str]) -> tuple[int, str]:
 
 
 def split_row(line: str, delimiter: str) -> list[str]:
-    """Cells of a row, without blanks around them."""
+    """Split a row into cells, without blanks around them."""
     return [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter), [])]
 
 
 def is_number(cell: str) -> bool:
-    """Whether a cell holds a number, with a point or a comma."""
+    """Return whether a cell holds a number, with a point or a comma."""
     try:
         float(cell.replace(",", "."))
     except ValueError:
@@ -167,13 +167,13 @@ def is_number(cell: str) -> bool:
 
 
 def names_and_units(header: Iterable[str]) -> tuple[list[str], list[str]]:
-    """Names of columns, and their units where they stand in brackets behind them."""
+    """Split headers into names and the units in brackets behind them, empty without one."""
     units = [match[1] if (match := UNIT_IN_NAME.search(name)) else "" for name in header]
     return [UNIT_IN_NAME.sub("", name).strip() for name in header], units
 
 
 def unique(path: Path, names: Sequence[str]) -> list[str]:
-    """The names, if no two are the same."""
+    """Return the names; raises ConfigError if two are the same."""
     for name in names:
         if names.count(name) > 1:
             raise ConfigError(f"{path} has two columns named {name!r}.", "Give each column a name of its own.")
@@ -181,7 +181,7 @@ def unique(path: Path, names: Sequence[str]) -> list[str]:
 
 
 def numbers_in(path: Path, lines: Sequence[str], first: int, delimiter: str, count: int) -> Array:
-    """(rows, count) numbers of the lines from `first`; empty cells are nan."""
+    """Return the numbers (rows, count) of the lines from `first`; empty cells are nan."""
     rows = [line for line in lines[first:] if line.strip()]
     text = "\n".join(rows)
     if delimiter == ";":
@@ -191,19 +191,19 @@ def numbers_in(path: Path, lines: Sequence[str], first: int, delimiter: str, cou
         if values.shape[1] == count:
             return values
     except ValueError:
-        pass  # a cell is empty or no number: look at each
+        pass  # a cell is empty or no number: read cell by cell
     return np.array(
         [cells_as_numbers(path, number, line, delimiter, count) for number, line in numbered_rows(lines, first)]
     )
 
 
 def numbered_rows(lines: Sequence[str], first: int) -> Iterator[tuple[int, str]]:
-    """Lines that are not blank, with their numbers as an editor shows them."""
+    """Return lines that are not blank, with their numbers as an editor shows them."""
     return ((number + 1, line) for number, line in enumerate(lines) if number >= first and line.strip())
 
 
 def cells_as_numbers(path: Path, number: int, line: str, delimiter: str, count: int) -> list[float]:
-    """Numbers of a row, nan for empty cells."""
+    """Return a row's numbers, nan for empty cells."""
     cells = split_row(line.replace(",", ".") if delimiter == ";" else line, delimiter)
     if len(cells) != count:
         raise ConfigError(
@@ -220,7 +220,7 @@ def cells_as_numbers(path: Path, number: int, line: str, delimiter: str, count: 
 
 
 def as_time_column(recording: Recording) -> Recording:
-    """Call the column of time so; it is the one named time or t, or .TIME at the end of a longer name."""
+    """Rename the column of time, which is named time or t, or a longer name that ends in .TIME."""
     columns = recording.columns
     name = next((name for name in columns if name.lower() in ("time", "t")), None)
     name = name or next((name for name in columns if re.search(r"(^|[.\s_])time$", name, re.IGNORECASE)), None)
@@ -236,7 +236,7 @@ def as_time_column(recording: Recording) -> Recording:
 
 
 def read_adams_results(path: Path) -> Recording:
-    """XML results of ADAMS (.res): a map of components by id, and blocks of steps with a number for each."""
+    """Read XML results of ADAMS (.res): components by id, and blocks of steps with a number for each component."""
     try:
         root = ElementTree.parse(path).getroot()
     except ElementTree.ParseError as error:
@@ -244,10 +244,12 @@ def read_adams_results(path: Path) -> Recording:
             f"{path} is not complete XML: {error}.", "Export the results again with RESULTS/XRF."
         ) from None
     blocks = [
-        block for block in every(root, "Data") if not str(block.get("name", "")).startswith(("modelInput", "initial"))
+        block
+        for block in elements(root, "Data")
+        if not str(block.get("name", "")).startswith(("modelInput", "initial"))
     ]
     names = component_names(path, root)
-    steps = [step for block in blocks for step in every(block, "Step")]
+    steps = [step for block in blocks for step in elements(block, "Step")]
     if not steps:
         raise ConfigError(
             f"{path} holds no steps of a simulation.", "Run a dynamic simulation before exporting its results."
@@ -264,13 +266,13 @@ def read_adams_results(path: Path) -> Recording:
     return without_repeated_times(recording)
 
 
-def every(node: ElementTree.Element, tag: str) -> Iterator[ElementTree.Element]:
-    """Elements of a tag below a node, whatever namespace they are in."""
-    return (each for each in node.iter() if each.tag.rpartition("}")[2] == tag)
+def elements(node: ElementTree.Element, tag: str) -> Iterator[ElementTree.Element]:
+    """Return the elements of a tag below a node, in any namespace."""
+    return (element for element in node.iter() if element.tag.rpartition("}")[2] == tag)
 
 
 def component_names(path: Path, root: ElementTree.Element) -> list[tuple[int, str, str]]:
-    """Id, name and unit of each component, in the order of the file."""
+    """Return id, name and unit of each component, in the order of the file."""
     try:
         names = [
             (
@@ -278,8 +280,8 @@ def component_names(path: Path, root: ElementTree.Element) -> list[tuple[int, st
                 f"{entity.get('name')}.{component.get('name')}",
                 component.get("unitsValue", ""),
             )
-            for entity in every(root, "Entity")
-            for component in every(entity, "Component")
+            for entity in elements(root, "Entity")
+            for component in elements(entity, "Component")
         ]
     except ValueError:
         raise ConfigError(f"{path}: a component has no id.", "Export the results again with RESULTS/XRF.") from None
@@ -291,7 +293,7 @@ def component_names(path: Path, root: ElementTree.Element) -> list[tuple[int, st
 
 
 def numbers_of_step(path: Path, place: int, step: ElementTree.Element, count: int) -> list[float]:
-    """Numbers of a step, in the order of the components' ids."""
+    """Return a step's numbers, in the order of the components' ids."""
     try:
         values = [float(cell) for cell in (step.text or "").split()]
     except ValueError:
@@ -306,13 +308,13 @@ def numbers_of_step(path: Path, place: int, step: ElementTree.Element, count: in
 
 
 def xml_units(root: ElementTree.Element) -> dict[str, str]:
-    """Units of the model that was solved."""
-    units: Mapping[str, str] = next((node.attrib for node in every(root, "Units")), {})
+    """Return the model's units by kind."""
+    units: Mapping[str, str] = next((node.attrib for node in elements(root, "Units")), {})
     return {kind: units[kind] for kind in ("angle", "length", "time", "force") if units.get(kind)}
 
 
 def without_repeated_times(recording: Recording) -> Recording:
-    """Each time once: a block begins with the sample that ended the one before it."""
+    """Remove samples that repeat a time: a block begins with the last sample of the block before it."""
     time = recording.columns.get(TIME, np.zeros(0))
     rising = np.concatenate(([True], np.diff(time) != 0.0)) if time.size else np.zeros(0, bool)
     return replace(recording, columns={name: column[rising] for name, column in recording.columns.items()})
@@ -322,25 +324,25 @@ def without_repeated_times(recording: Recording) -> Recording:
 
 
 def read_opensim(path: Path) -> Recording:
-    """Tables of OpenSim (.sto, .mot), also in SIMM's form: lines up to `endheader`, names, rows."""
+    """Read tables of OpenSim (.sto, .mot), also in SIMM's form: lines up to `endheader`, names, rows."""
     lines = text_of(path).splitlines()
     end = next((number for number, line in enumerate(lines) if line.strip().lower() == "endheader"), None)
     if end is None or end + 1 >= len(lines):
         raise ConfigError(f"{path} has no line 'endheader', or nothing behind it.", "Export it again from OpenSim.")
-    stated = dict(line.lower().replace(" ", "").split("=", 1) for line in lines[:end] if "=" in line)
-    if stated.get("datatype", "double") != "double":
+    settings = dict(line.lower().replace(" ", "").split("=", 1) for line in lines[:end] if "=" in line)
+    if settings.get("datatype", "double") != "double":
         raise ConfigError(
-            f"{path} holds values of type {stated['datatype']}, not numbers.", "Export a table of type double."
+            f"{path} holds values of type {settings['datatype']}, not numbers.", "Export a table of type double."
         )
     start = next((number for number in range(end + 1, len(lines)) if lines[number].strip()), len(lines) - 1)
     names = unique(path, lines[start].split())
     values = blank_separated(path, lines, start + 1, len(names))
-    units = {"angle": "deg" if stated.get("indegrees", "no") == "yes" else "rad", "length": "m", "time": "s"}
+    units = {"angle": "deg" if settings.get("indegrees", "no") == "yes" else "rad", "length": "m", "time": "s"}
     return as_time_column(Recording(path, {name: values[:, place] for place, name in enumerate(names)}, {}, units))
 
 
 def blank_separated(path: Path, lines: Sequence[str], first: int, count: int) -> Array:
-    """(rows, count) numbers separated by blanks or tabs; the header's count of rows is not relied on."""
+    """Return numbers (rows, count) separated by blanks or tabs; the header's count of rows is often wrong."""
     rows = []
     for number, line in numbered_rows(lines, first):
         rows.append(cells_as_numbers(path, number, "\t".join(line.split()), "\t", count))
@@ -351,13 +353,13 @@ def blank_separated(path: Path, lines: Sequence[str], first: int, count: int) ->
 
 
 def read_markers(path: Path) -> Recording:
-    """Markers of a .trc file, as columns 'name.x', 'name.y', 'name.z'; cells between two tabs may be empty."""
+    """Read markers of a .trc file as columns 'name.x', 'name.y', 'name.z'; cells between two tabs may be empty."""
     lines = text_of(path).splitlines()
     if len(lines) < 5 or not lines[0].startswith("PathFileType"):
         raise ConfigError(
             f"{path} is no file of markers: its first line must begin with PathFileType.", "Export it again as .trc."
         )
-    stated = dict(zip(lines[1].split(), lines[2].split(), strict=False))
+    settings = dict(zip(lines[1].split(), lines[2].split(), strict=False))
     labels = [label.strip() for label in lines[3].split("\t")]
     names = [label for label in labels[2:] if label]
     rows = [(number, line.rstrip("\r\n").split("\t")) for number, line in numbered_rows(lines, 5)]
@@ -371,7 +373,7 @@ def read_markers(path: Path) -> Recording:
             for number, cells in rows
         ]
     )
-    units = {"time": "s", **({"length": stated["Units"]} if "Units" in stated else {})}
+    units = {"time": "s", **({"length": settings["Units"]} if "Units" in settings else {})}
     markers = {name: values[:, 2 + place] for place, name in enumerate(columns)}
     return Recording(path, {TIME: values[:, 1], **markers}, {}, units)
 

@@ -29,7 +29,7 @@ ITERATIONS: Final = 8
 
 @dataclass(frozen=True)
 class Touch:
-    """A heel strike: its time (s), the leg (0 or 1) that comes down, and the scatter of the angles around it (rad)."""
+    """Describe a heel strike: time (s), leg (0 or 1) that comes down, and scatter of the angles around it (rad)."""
 
     time_s: float
     leg: int
@@ -37,20 +37,20 @@ class Touch:
 
 
 def find_touches(time: Array, angle: Array, height: Height) -> list[Touch]:
-    """Heel strikes in the angles of both legs.
+    """Find the heel strikes in the angles of both legs.
 
     time    (samples,) s, rising
     angle   (samples, 2) rad, from the vertical, positive with the foot ahead
     height  (samples, 2) angles -> (samples,) m, height of leg 0's foot over leg 1's, perpendicular to the slope
     """
-    crossings = one_each(candidates(time, angle, height))
+    crossings = merge_repeats(candidates(time, angle, height))
     times = [crossing for crossing, _ in crossings]
     period = float(np.median(np.diff(times))) if len(times) > 1 else float(time[-1] - time[0])
-    return [refined(time, angle, height, crossing, leg, period) for crossing, leg in crossings]
+    return [locate_touch(time, angle, height, crossing, leg, period) for crossing, leg in crossings]
 
 
 def candidates(time: Array, angle: Array, height: Height) -> list[tuple[float, int]]:
-    """Times at which a foot that is ahead comes down to the other's level, and its leg; noise repeats some.
+    """Return times at which a foot that is ahead comes down to the other's level, and its leg; noise repeats some.
 
     A recording may end with a heel strike: the last two samples are continued by half an interval.
     """
@@ -67,8 +67,8 @@ def candidates(time: Array, angle: Array, height: Height) -> list[tuple[float, i
     return crossings
 
 
-def one_each(crossings: list[tuple[float, int]]) -> list[tuple[float, int]]:
-    """One crossing for each heel strike: crossings of one leg without the other leg's between them are the same."""
+def merge_repeats(crossings: list[tuple[float, int]]) -> list[tuple[float, int]]:
+    """Merge the crossings of each heel strike: those of one leg without the other leg's between them."""
     groups: list[list[float]] = []
     legs: list[int] = []
     for crossing, leg in crossings:
@@ -80,8 +80,8 @@ def one_each(crossings: list[tuple[float, int]]) -> list[tuple[float, int]]:
     return [(float(np.mean(group)), leg) for group, leg in zip(groups, legs, strict=True)]
 
 
-def refined(time: Array, angle: Array, height: Height, near: float, leg: int, period: float) -> Touch:
-    """The heel strike near a crossing, from angles fitted around it; the crossing itself where samples are too few."""
+def locate_touch(time: Array, angle: Array, height: Height, near: float, leg: int, period: float) -> Touch:
+    """Locate the heel strike near a crossing by a fit of the angles; too few samples leave it at the crossing."""
     half = WINDOW * period
     inside = np.abs(time - near) <= half
     t, y, touch, scatter = (time[inside] - near) / half, angle[inside], 0.0, 0.0
@@ -99,7 +99,7 @@ def refined(time: Array, angle: Array, height: Height, near: float, leg: int, pe
 
 
 def fit_around(t: Array, y: Array, touch: float) -> tuple[Array, Array, float]:
-    """Angles at a heel strike, their rates just before it, and the scatter, from polynomials that meet there."""
+    """Fit polynomials that meet at a heel strike; returns the angles there, their rates just before it, the scatter."""
     before, after = np.minimum(t - touch, 0.0), np.maximum(t - touch, 0.0)
     sides = [
         side[:, None] ** np.arange(1, TOUCH_DEGREE + 1)
