@@ -105,7 +105,7 @@ def test_columns_change_over_steps_up_and_down_as_differences_say(name):
     rises = np.array([0.0, 6e-4, -9e-4, 3e-4]) * walker.leg_length  # the last foothold is level with the first
 
     def end(z, derived=False):
-        return shooting.walk(section, z, 3, derived, rises)
+        return shooting.walk(section, z, 3, derived, (rises, 0.0))
 
     n = len(walker.arm_x)
     columns = end(z, derived=True).strikes.after[-1].reshape(1 + d, 2 * n)[1:].T / TANGENT_SCALE
