@@ -72,6 +72,7 @@ class ConfigFamily:
         self.parameters = [parameter_of(key, config) for key in keys]
         self.start: Values = tuple(parameter.value_in(config) for parameter in self.parameters)
         self.at = lru_cache(CONFIGS_AT_ONCE)(self._at)
+        self.admits = lru_cache(CONFIGS_AT_ONCE)(self._admits)
 
     def _at(self, values: Values) -> ContactConfig | None:
         config: ContactConfig = self.config
@@ -82,7 +83,7 @@ class ConfigFamily:
             config = changed
         return config
 
-    def admits(self, values: Values) -> bool:
+    def _admits(self, values: Values) -> bool:
         try:
             return self.at(values) is not None and rigid_walker(self.at(values)) is not None  # type: ignore[arg-type]
         except ConfigError:

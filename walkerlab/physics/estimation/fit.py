@@ -91,24 +91,22 @@ def fit(problem: FitProblem, start: Floats) -> Fitted | str:
     forecast, u = problem.forecast, start.copy()
     size, even = typical_sizes(forecast), np.zeros(forecast.heights)
     noise, heights, why = Noise(FIRST_NOISE * size, 0.0), even, "standard deviations still change"
-    over = responses(problem, u, heights)
-    if over is None:
+    data = linearise(problem, u, heights)
+    if data is None:
         return NO_NEIGHBOURS
     for round_number in range(1, MAX_ROUNDS + 1):
-        before, u = u, least_squares_fit(problem, u, start, *over, noise)
-        data = linearise(problem, u, *over)
-        if data is None or responses(problem, u, even) is None:
+        before, u = u, least_squares_fit(problem, u, start, heights, data.G, noise)
+        data = None if forecast.predict(u, even) is None else linearise(problem, u, heights)
+        if data is None:
             # The data pull the walker out of its basin: the last walk that went on is judged.
             u, why = before, NO_NEIGHBOURS
-            data = linearise(problem, u, *over)
+            data = linearise(problem, u, heights)
         if data is None:
             return NO_NEIGHBOURS
         products, earlier = products_of(data), noise
         noise = estimate_noise(products, NOISE_FLOOR * size, problem.leg_length_m, noise, anew=round_number == 1)
         evaluation = evaluate(products, noise)
-        over = responses(problem, u, evaluation.heights_m)
-        if over is None:
-            return NO_NEIGHBOURS
+        heights = passable(problem, u, evaluation.heights_m)
         if why == NO_NEIGHBOURS:
             break
         errors = np.sqrt(np.maximum(np.diag(np.linalg.pinv(evaluation.information, hermitian=True)), 1e-300))
@@ -116,21 +114,19 @@ def fit(problem: FitProblem, start: Floats) -> Fitted | str:
         if settled(earlier, noise, problem.leg_length_m) and moved < SETTLED_MOVE:
             why = ""
             break
-    data = linearise(problem, u, *over, exact=True) or linearise(problem, u, *over)
+    data = linearise(problem, u, heights, exact=True) or linearise(problem, u, heights)
     predicted = forecast.predict(u, even)
     if data is None or predicted is None:
         return NO_NEIGHBOURS
     z = forecast.walks.disturbed(forecast.start(u), forecast.parameters(u), even).z
-    return Fitted(u, over[0], noise, evaluate(products_of(data), noise), data, predicted, z, round_number, why)
+    return Fitted(u, heights, noise, evaluate(products_of(data), noise), data, predicted, z, round_number, why)
 
 
 def evaluate_at(problem: FitProblem, u: Floats, like: Fitted) -> Fitted | None:
     """Estimate the standard deviations at unknowns (unknowns,) of another fit; None if the walk there ends early."""
     even = np.zeros(problem.forecast.heights)
-    over = responses(problem, u, even)
-    data = None if over is None else linearise(problem, u, *over)
-    predicted = problem.forecast.predict(u, even)
-    if over is None or data is None or predicted is None:
+    data, predicted = linearise(problem, u, even), problem.forecast.predict(u, even)
+    if data is None or predicted is None:
         return None
     products = products_of(data)
     noise = estimate_noise(products, NOISE_FLOOR * data.sizes, problem.leg_length_m, like.noise)
@@ -140,16 +136,10 @@ def evaluate_at(problem: FitProblem, u: Floats, like: Fitted) -> Fitted | None:
     )
 
 
-def responses(problem: FitProblem, u: Floats, heights: Floats) -> tuple[Floats, Floats] | None:
-    """Return heights to linearise about, with responses to them; None if even the walk over even ground ends early.
-
-    Lower heights serve where the walk over the most probable ones ends early.
-    """
-    for share in HEIGHT_SHARES:
-        G = problem.forecast.respond(u, share * heights, problem.leg_length_m)
-        if G is not None:
-            return share * heights, G
-    return None
+def passable(problem: FitProblem, u: Floats, heights: Floats) -> Floats:
+    """Return lower heights where the walk over the most probable ones ends early."""
+    shares = (share for share in HEIGHT_SHARES if problem.forecast.predict(u, share * heights) is not None)
+    return next(shares, 0.0) * heights
 
 
 def settled(before: Noise, after: Noise, leg_length_m: float) -> bool:
@@ -164,11 +154,12 @@ def typical_sizes(forecast: Forecast) -> Floats:
     return np.array([np.sqrt(np.mean(values[quantity == q] ** 2)) for q in range(len(forecast.quantities))])
 
 
-def linearise(problem: FitProblem, u: Floats, heights: Floats, G: Floats, exact: bool = False) -> Linearised | None:
+def linearise(problem: FitProblem, u: Floats, heights: Floats, exact: bool = False) -> Linearised | None:
     forecast = problem.forecast
-    values, J = forecast.predict(u, heights), forecast.differentiate(u, heights, exact)
-    if values is None or J is None:
+    values, derivatives = forecast.predict(u, heights), forecast.differentiate_all(u, heights, exact)
+    if values is None or derivatives is None:
         return None
+    J, G = derivatives
     residuals = forecast.values - values + G @ heights
     return Linearised(residuals, J, G, forecast.quantity, problem.prior_rows(u), typical_sizes(forecast))
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walkerlab.physics.estimation.fit import Fitted
-from walkerlab.physics.estimation.mixed_model import Noise, Products, evaluate, products_of
+from walkerlab.physics.estimation.mixed_model import Evaluation, evaluate, noise_at, products_of
 from walkerlab.physics.estimation.result import Information, Unidentifiable
 from walkerlab.physics.solvers.system import Floats
 
@@ -55,37 +55,34 @@ def averaged_covariance(fitted: Fitted, basis: Floats) -> Floats:
     count = basis.shape[1]
     centre = np.log(np.append(noise.measurement, noise.roughness_m or 1.0))
 
-    def noise_at(logs: Floats) -> Noise:
-        return Noise(np.exp(logs[:-1]), float(np.exp(logs[-1])) if noise.roughness_m else 0.0)
+    def evaluate_at(logs: Floats) -> Evaluation:
+        drawn = noise_at(logs, True)
+        return evaluate(products, drawn if noise.roughness_m else drawn._replace(roughness_m=0.0 * drawn.roughness_m))
 
     draws = np.random.default_rng(0).uniform(-1.0, 1.0, (NOISE_DRAWS, centre.size))
-    logs = centre + np.where(draws < 0.0, *(draws * reach for reach in noise_reach(products, noise_at, centre)))
-    likelihoods, covariances = np.zeros(NOISE_DRAWS), np.zeros((NOISE_DRAWS, len(basis), len(basis)))
-    for place, row in enumerate(logs):
-        at_row = evaluate(products, noise_at(row))
-        inverse = np.linalg.pinv(basis @ free_the_rest(at_row.information, count) @ basis.T, hermitian=True)
-        moved = basis @ at_row.move[:count]
-        likelihoods[place] = at_row.restricted + row.sum()
-        covariances[place] = inverse + np.outer(moved, moved)
+    logs = centre + np.where(draws < 0.0, *(draws * reach for reach in noise_reach(evaluate_at, centre)))
+    drawn = evaluate_at(logs)
+    inverses = np.linalg.pinv(basis @ free_the_rest(drawn.information, count) @ basis.T, hermitian=True)
+    moved = drawn.move[:, :count] @ basis.T
+    likelihoods, covariances = drawn.restricted + logs.sum(axis=1), inverses + moved[:, :, None] * moved[:, None, :]
     weights = np.exp(likelihoods - likelihoods.max())
     return np.asarray(np.tensordot(weights / weights.sum(), covariances, 1))
 
 
-def noise_reach(products: Products, noise_at: Callable[[Floats], Noise], centre: Floats) -> tuple[Floats, Floats]:
+def noise_reach(evaluate_at: Callable[[Floats], Evaluation], centre: Floats) -> tuple[Floats, Floats]:
     """Return how far below and above `centre` (deviations,) logarithms of standard deviations are plausible."""
-    best = evaluate(products, noise_at(centre)).restricted
-    curvatures = np.zeros(centre.size)
-    for place, unit in enumerate(np.eye(centre.size)):
-        ends = (evaluate(products, noise_at(centre + sign * LOG_STEP * unit)).restricted for sign in (-1.0, 1.0))
-        curvatures[place] = (2.0 * best - sum(ends)) / LOG_STEP**2
+    moves = LOG_STEP * np.vstack((np.zeros(centre.size), np.eye(centre.size), -np.eye(centre.size)))
+    likelihoods = evaluate_at(centre + moves).restricted
+    above, below = likelihoods[1 : 1 + centre.size], likelihoods[1 + centre.size :]
+    curvatures = (2.0 * likelihoods[0] - above - below) / LOG_STEP**2
     spread = 3.0 / np.sqrt(np.maximum(curvatures, 1e-6))
     return np.minimum(spread, FARTHEST_NOISE[0]), np.minimum(spread, FARTHEST_NOISE[1])
 
 
 def free_the_rest(information: Floats, count: int) -> Floats:
-    """Return the information on the first unknowns while the others are free (Schur complement)."""
-    own, cross, rest = information[:count, :count], information[:count, count:], information[count:, count:]
-    return np.asarray(own - cross @ np.linalg.pinv(rest, hermitian=True) @ cross.T)
+    """Return the information (..., count, count) on the first unknowns while the others are free (Schur complement)."""
+    own, cross, rest = information[..., :count, :count], information[..., :count, count:], information[..., count:, count:]
+    return np.asarray(own - cross @ np.linalg.pinv(rest, hermitian=True) @ cross.swapaxes(-1, -2))
 
 
 def is_open(singular: Floats) -> NDArray[np.bool_]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,7 @@ NOISE_RATIO: Final = 1.0
 
 Without it a floor can explain one quantity of a short walk exactly, and its noise goes to zero.
 """
+LOG_STEP: Final = 1e-4  # in derivatives of the restricted likelihood by logarithms
 LOST_INFORMATION: Final = 1e-13  # share of the largest eigenvalue of scaled information, below which it is rounding
 
 
@@ -30,7 +31,7 @@ class Noise(NamedTuple):
     """Standard deviations of the measurement by quantity, and of the floor's heights (m)."""
 
     measurement: Floats  # (quantities,)
-    roughness_m: float
+    roughness_m: Any  # a float; an array where `evaluate` takes several at once
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,12 +47,14 @@ class Linearised:
 
 
 class Evaluation(NamedTuple):
-    restricted: float  # log-likelihood of the standard deviations, with their prior
-    likelihood: float  # log-likelihood of the data
+    """Likelihoods and the most likely unknowns; with leading axes for several standard deviations."""
+
+    restricted: Any  # log-likelihood of the standard deviations, with their prior
+    likelihood: Any  # log-likelihood of the data
     information: Floats  # (unknowns, unknowns)
     move: Floats  # (unknowns,) that remains to the most likely unknowns
     heights_m: Floats  # (heights,) most probable
-    squares: float  # whitened sum of squares
+    squares: Any  # whitened sum of squares
 
 
 class Products(NamedTuple):
@@ -75,26 +78,35 @@ def products_of(data: Linearised) -> Products:
 
 
 def evaluate(products: Products, noise: Noise) -> Evaluation:
-    """Evaluate the likelihoods at given standard deviations."""
-    total = np.einsum("qij,q->ij", products.sums, noise.measurement**-2.0)
+    """Evaluate the likelihoods at given standard deviations, or at several: measurement (..., quantities)."""
+    deviations, rough = np.asarray(noise.measurement), np.asarray(noise.roughness_m)
+    total = np.einsum("qij,...q->...ij", products.sums, deviations**-2.0)
     fixed = 1 + products.unknowns
-    rho2 = noise.roughness_m**2
-    cross, random = total[:fixed, fixed:], total[fixed:, fixed:]
-    K = np.eye(len(random)) + rho2 * random
-    solved = rho2 * np.linalg.solve(K, cross.T)
-    reduced = total[:fixed, :fixed] - cross @ solved + products.prior
-    information, score = reduced[1:, 1:], reduced[1:, 0]
+    rho2 = (rough**2)[..., None, None]
+    cross, random = total[..., :fixed, fixed:], total[..., fixed:, fixed:]
+    K = np.eye(random.shape[-1]) + rho2 * random
+    solved = rho2 * np.linalg.solve(K, cross.swapaxes(-1, -2))
+    reduced = total[..., :fixed, :fixed] - cross @ solved + products.prior
+    information, score = reduced[..., 1:, 1:], reduced[..., 1:, 0]
     values, vectors = np.linalg.eigh(information)
-    kept = values > LOST_INFORMATION * values.max(initial=0.0)
-    move = vectors[:, kept] @ ((vectors[:, kept].T @ score) / values[kept])
-    squares = float(reduced[0, 0] - score @ move)
-    log_determinant = float(2.0 * products.counts @ np.log(noise.measurement) + np.linalg.slogdet(K)[1])
-    restricted = -0.5 * (log_determinant + squares + float(np.log(values[kept]).sum()))
-    restricted -= 0.5 * float(np.var(np.log(noise.measurement / products.sizes))) / NOISE_RATIO**2
+    kept = values > LOST_INFORMATION * values.max(axis=-1, initial=0.0)[..., None]
+    sizes = np.where(kept, values, 1.0)
+    parts = np.einsum("...ij,...i->...j", vectors, score) * kept / sizes
+    move = np.einsum("...ij,...j->...i", vectors, parts)
+    squares = reduced[..., 0, 0] - np.einsum("...i,...i->...", score, move)
+    log_determinant = 2.0 * np.log(deviations) @ products.counts + np.linalg.slogdet(K)[1]
+    restricted = -0.5 * (log_determinant + squares + np.log(sizes).sum(axis=-1))
+    restricted -= 0.5 * np.var(np.log(deviations / products.sizes), axis=-1) / NOISE_RATIO**2
     count = int(products.counts.sum()) + products.priors
     likelihood = -0.5 * (log_determinant + squares + count * math.log(2.0 * math.pi))
-    heights = solved[:, 0] - solved[:, 1:] @ move
+    heights = solved[..., 0] - np.einsum("...ij,...j->...i", solved[..., 1:], move)
     return Evaluation(restricted, likelihood, information, move, heights, squares)
+
+
+def noise_at(logs: Floats, rough: bool) -> Noise:
+    """Return the standard deviations of logarithms (..., quantities), followed by the roughness's if there is one."""
+    own = np.exp(logs)
+    return Noise(own[..., :-1], own[..., -1]) if rough else Noise(own, np.zeros(own.shape[:-1]))
 
 
 def estimate_noise(products: Products, floors: Floats, leg_length_m: float, start: Noise, anew: bool = True) -> Noise:
@@ -105,8 +117,10 @@ def estimate_noise(products: Products, floors: Floats, leg_length_m: float, star
     """
     from scipy.optimize import minimize
 
-    def noise_at(logs: Floats, rough: bool) -> Noise:
-        return Noise(np.exp(logs[: floors.size]), math.exp(logs[-1]) if rough else 0.0)
+    def costs(logs: Floats, rough: bool) -> tuple[float, Floats]:
+        moves = LOG_STEP * np.vstack((np.zeros(logs.size), np.eye(logs.size), -np.eye(logs.size)))
+        own = -evaluate(products, noise_at(logs + moves, rough)).restricted
+        return own[0], (own[1 : 1 + logs.size] - own[1 + logs.size :]) / (2.0 * LOG_STEP)
 
     best, most = start, -math.inf
     low, high = (math.log(share * leg_length_m) for share in ROUGHNESS_BOUNDS)
@@ -117,14 +131,12 @@ def estimate_noise(products: Products, floors: Floats, leg_length_m: float, star
         rough = share > 0.0
         logs = np.log(np.append(middle, share * leg_length_m)) if rough else np.log(middle)
         result = minimize(
-            lambda x, rough=rough: -evaluate(products, noise_at(x, rough)).restricted,
-            logs,
-            method="L-BFGS-B",
-            bounds=[*bounds, (low, high)] if rough else bounds,
+            costs, logs, (rough,), "L-BFGS-B", jac=True, bounds=[*bounds, (low, high)] if rough else bounds
         )
         # A roughness above 0 must be worth its number; even ground is the simpler explanation.
         if -result.fun > most or (not rough and -result.fun > most - 1e-6):
-            best, most = noise_at(result.x, rough), float(-result.fun)
+            likeliest = noise_at(result.x, rough)
+            best, most = Noise(likeliest.measurement, float(likeliest.roughness_m)), float(-result.fun)
     return best
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Final, Protocol
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from walkerlab.outcome import Outcome
 from walkerlab.physics.estimation.measurements import LEG_ANGLE, STEP_LENGTH, STEP_PERIOD, MeasuredAngles, MeasuredSteps
 from walkerlab.physics.orbits.robustness import CENTRAL_4TH
-from walkerlab.physics.orbits.step_map import CENTRAL_2ND, DisturbedWalk
+from walkerlab.physics.orbits.step_map import CENTRAL_2ND, NO_TIMES, DisturbedWalk, VariedWalk
 from walkerlab.physics.solvers.system import Floats
 
 CLOCK, OFFSET, GAIN, DELAY = "clock_rate", "angle_offset_rad", "angle_gain", "time_offset_s"
@@ -39,6 +39,9 @@ class WalkMap(Protocol):
 
     def sampled(self, z: Floats, p: Any, heights_m: Floats, times_s: Floats) -> Floats:
         """Return the legs' angles (times, 2) at times from the first heel strike, the first swing leg's first."""
+
+    def varied(self, z: Floats, p: Any, heights_m: Floats, along: Floats, times_s: Floats = ...) -> VariedWalk | None:
+        """Differentiate both along columns (d + steps + 1, columns) of start and heights."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,13 +111,10 @@ class Forecast:
 
     def predict(self, u: Floats, heights_m: Floats) -> Floats | None:
         """Return the predicted values (values,); None where the walk ends early or the parameters make no walker."""
-        p, z, sensors = self.parameters(u), self.start(u), self.sensors(u)
-        if not self.admits(p):
+        walk = self._walk(u, heights_m)
+        if walk is None:
             return None
-        walk = self.walks.disturbed(z, p, heights_m)
-        count = self.steps.count
-        if walk.outcome is not Outcome.WALKED or walk.durations_s.size < self.heights - 1:
-            return None
+        sensors, count = self.sensors(u), self.steps.count
         predicted = {
             STEP_PERIOD: walk.durations_s * sensors[CLOCK],
             STEP_LENGTH: walk.lengths_m,
@@ -122,60 +122,111 @@ class Forecast:
         }
         parts = [predicted[name][:count] for name in self.channels]
         if isinstance(self.measured, MeasuredAngles):
-            touches = np.append(0.0, np.cumsum(walk.durations_s))
-            times = self._times(touches, walk.durations_s) / (1.0 if self.in_phase else sensors[CLOCK]) + sensors[DELAY]
-            order = np.argsort(times)
-            angles = np.empty((times.size, 2))
-            last = touches[-1] * (1.0 - LAST_INSTANT)
-            angles[order] = self.walks.sampled(z, p, heights_m, np.clip(times[order], 0.0, last))
+            angles = self.walks.sampled(self.start(u), self.parameters(u), heights_m, self._times(walk, sensors)[0])
             parts.append((sensors[OFFSET] + sensors[GAIN] * angles).ravel())
         return np.concatenate(parts)
 
-    def _times(self, touches: Floats, durations: Floats) -> Floats:
-        """Return the times (samples,) of the samples in the predicted walk, from its first heel strike."""
-        assert isinstance(self.measured, MeasuredAngles), "only angles are sampled"
-        step, phase = self.measured.step, self.measured.phase
-        if self.in_phase:
-            return np.asarray(touches[step] + phase * durations[step])
-        measured = self.measured.touches_s
-        return np.asarray(measured[step] + phase * np.diff(measured)[step] - measured[0])
-
     def differentiate(self, u: Floats, heights_m: Floats, exact: bool) -> Floats | None:
-        """Return the derivatives (values, unknowns) by the unknowns, as difference quotients of exact walks."""
+        """Return the derivatives (values, unknowns) by the unknowns; `exact` for those of the result.
 
-        def moved(place: int, change: float) -> Floats | None:
-            shifted = u.copy()
-            shifted[place] += change
-            return self.predict(shifted, heights_m)
+        Those by parameters are difference quotients of exact walks; those by the start and by the heights follow from
+        the walk's tangent columns.
+        """
+        none = np.zeros((heights_m.size, 0))
+        columns = self._columns_along(u, heights_m, none)
+        return None if columns is None else self._with_parameters(u, heights_m, columns, exact)
 
-        step = EXACT_STEP if exact else QUICK_STEP
-        return self._columns(moved, self.unknowns, CENTRAL_4TH if exact else CENTRAL_2ND, step)
+    def differentiate_all(self, u: Floats, heights_m: Floats, exact: bool) -> tuple[Floats, Floats] | None:
+        """Return the derivatives (values, unknowns) by the unknowns, and (values, heights) by the heights (1/m)."""
+        columns = self._columns_along(u, heights_m, np.eye(heights_m.size))
+        J = None if columns is None else self._with_parameters(u, heights_m, columns, exact)
+        if columns is None or J is None:
+            return None
+        starts = self.directions.shape[1]
+        return J, columns[:, starts : starts + heights_m.size]
 
-    def respond(self, u: Floats, heights_m: Floats, leg_length_m: float) -> Floats | None:
-        """Return the derivatives (values, heights) by the footholds' heights (1/m)."""
+    def _walk(self, u: Floats, heights_m: Floats) -> DisturbedWalk | None:
+        p = self.parameters(u)
+        if not self.admits(p):
+            return None
+        walk = self.walks.disturbed(self.start(u), p, heights_m)
+        whole = walk.outcome is Outcome.WALKED and walk.durations_s.size >= self.heights - 1
+        return walk if whole else None
 
-        def raised(place: int, change: float) -> Floats | None:
-            heights = heights_m.copy()
-            heights[place] += change
-            return self.predict(u, heights)
+    def _times(self, walk: DisturbedWalk, sensors: Mapping[str, float]) -> tuple[Floats, NDArray[np.bool_]]:
+        """Return the times (samples,) of the samples from the walk's first heel strike, and which are inside it."""
+        assert isinstance(self.measured, MeasuredAngles), "only angles are sampled"
+        touches, step = np.append(0.0, np.cumsum(walk.durations_s)), self.measured.step
+        times = self._measured_times() / sensors[CLOCK]
+        if self.in_phase:
+            times = touches[step] + self.measured.phase * walk.durations_s[step]
+        times, last = times + sensors[DELAY], touches[-1] * (1.0 - LAST_INSTANT)
+        return np.clip(times, 0.0, last), (times >= 0.0) & (times <= last)
 
-        return self._columns(raised, self.heights, CENTRAL_2ND, QUICK_STEP * leg_length_m)
+    def _measured_times(self) -> Floats:
+        """Return the times (samples,) of the samples by the measurement's clock, from its first heel strike."""
+        assert isinstance(self.measured, MeasuredAngles), "only angles are sampled"
+        touches, step = self.measured.touches_s, self.measured.step
+        return np.asarray(touches[step] + self.measured.phase * np.diff(touches)[step] - touches[0])
 
-    def _columns(
-        self,
-        changed: Callable[[int, float], Floats | None],
-        count: int,
-        formula: Sequence[tuple[int, float]],
-        step: float,
-    ) -> Floats | None:
-        columns = []
-        for place in range(count):
-            values = [changed(place, offset * step) for offset, _ in formula]
-            known = [value for value in values if value is not None]
-            if len(known) < len(values):
-                return None
-            columns.append(np.tensordot([weight / step for _, weight in formula], known, 1))
-        return np.array(columns).reshape(count, self.values.size).T
+    def _columns_along(self, u: Floats, heights_m: Floats, lifts: Floats) -> Floats | None:
+        """Return derivatives (values, columns) by coordinates of the start, heights along `lifts`, and nuisances."""
+        walk, sensors, count = self._walk(u, heights_m), self.sensors(u), self.steps.count
+        if walk is None:
+            return None
+        z, starts = self.start(u), self.directions.shape[1]
+        along = np.zeros((z.size + heights_m.size, starts + lifts.shape[1]))
+        along[: z.size, :starts], along[z.size :, starts:] = START_SCALE * self.directions, lifts
+        sampled = isinstance(self.measured, MeasuredAngles)
+        times, inside = self._times(walk, sensors) if sampled else (NO_TIMES, NO_TIMES)
+        varied = self.walks.varied(z, self.parameters(u), heights_m, along, times)
+        if varied is None:
+            return None
+        changes = {
+            STEP_PERIOD: varied.durations_s * sensors[CLOCK],
+            STEP_LENGTH: varied.lengths_m,
+            LEG_ANGLE: varied.angles_rad,
+        }
+        parts = [changes[name][:count] for name in self.channels]
+        by_sensor = {name: [np.zeros(count) for _ in self.channels] for name in self.nuisances}
+        if CLOCK in by_sensor and STEP_PERIOD in self.channels:
+            by_sensor[CLOCK][list(self.channels).index(STEP_PERIOD)] = walk.durations_s[:count]
+        if sampled:
+            rates = sensors[GAIN] * varied.rates * inside[:, None]
+            moving = varied.samples_rad * sensors[GAIN] + rates[:, None] * self._drift(varied.durations_s)[:, :, None]
+            parts.append(moving.swapaxes(1, 2).reshape(-1, along.shape[1]))
+            angles = self.walks.sampled(z, self.parameters(u), heights_m, times)
+            clock = np.zeros(times.size) if self.in_phase else -self._measured_times() / sensors[CLOCK] ** 2
+            own = {OFFSET: np.ones_like(angles), GAIN: angles, DELAY: rates, CLOCK: rates * clock[:, None]}
+            for name, columns in by_sensor.items():
+                columns.append(own[name].ravel())
+        last = [NUISANCES[name][1] * np.concatenate(columns) for name, columns in by_sensor.items()]
+        return np.column_stack((np.concatenate(parts), *last))
+
+    def _drift(self, durations: Floats) -> Floats:
+        """Return changes (samples, columns) of the samples' times with those of the steps' durations."""
+        assert isinstance(self.measured, MeasuredAngles), "only angles are sampled"
+        if not self.in_phase:
+            return np.zeros((self.measured.step.size, durations.shape[1]))
+        touches = np.concatenate((np.zeros((1, durations.shape[1])), np.cumsum(durations, axis=0)))
+        step = self.measured.step
+        return np.asarray(touches[step] + self.measured.phase[:, None] * durations[step])
+
+    def _with_parameters(self, u: Floats, heights_m: Floats, columns: Floats, exact: bool) -> Floats | None:
+        """Return the derivatives (values, unknowns): by parameters, then those of `columns` that belong to unknowns."""
+        formula, step = (CENTRAL_4TH, EXACT_STEP) if exact else (CENTRAL_2ND, QUICK_STEP)
+        starts, own = self.directions.shape[1], []
+        for place in range(self.scales.size):
+            total = np.zeros(self.values.size)
+            for offset, weight in formula:
+                moved = u.copy()
+                moved[place] += offset * step
+                values = self.predict(moved, heights_m)
+                if values is None:
+                    return None
+                total += weight / step * values
+            own.append(total)
+        return np.column_stack((*own, columns[:, :starts], columns[:, columns.shape[1] - len(self.nuisances) :]))
 
 
 def felt_directions(DP: Floats) -> Floats:

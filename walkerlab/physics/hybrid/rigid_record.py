@@ -54,7 +54,7 @@ class Observer(NamedTuple):
 
     watching: bool
     times: Any  # (samples,) s, rising
-    states: Any  # (samples, 2 n)
+    states: Any  # (samples, 2 n), or longer with tangent columns, at fixed time since the heel strike
     steps: Any  # (samples,) the step of each sample
     tally: Any  # () array of RIGID_TALLY: passing a structured scalar to a kernel takes as long as a step
 
@@ -74,11 +74,12 @@ def unwatched() -> Observer:
 def observe_start(observer: Observer, mode: Mode, y: Any) -> None:
     """Record the start of a swing, whose energy the swing must keep."""
     if observer.watching:
-        kinetic, potential = energies(mode.model, y)
+        start = y[: len(mode.model.zero_state)]  # without tangent columns
+        kinetic, potential = energies(mode.model, start)
         tally = observer.tally[()]
         tally.min_energy = kinetic + potential
         tally.max_energy = kinetic + potential
-        record_extremes(tally, mode, y)
+        record_extremes(tally, mode, start)
 
 
 @kernel_part
@@ -207,9 +208,7 @@ def observe(
     tally.duration += fraction * h
     index = tally.recorded
     while index < observer.times.size and observer.times[index] <= t_end:
-        interpolate(method, mode, (observer.times[index] - t) / h, y)
-        for i in range(len(y)):
-            observer.states[index, i] = y[i]
+        interpolate(method, mode, (observer.times[index] - t) / h, observer.states[index])
         observer.steps[index] = step
         index += 1
     tally.recorded = index

@@ -187,7 +187,7 @@ def take_step(
             return status, method.clock[T]
         if status == WALKED and strikes.nearest > 0.0 and swing_foot(model, method.y)[1] < strikes.nearest:
             return FELL, method.clock[T]
-        t = pass_event(method, system, y)
+        t = pass_event(method, system, y, strikes, step)
         observe_strike(observer, system, status == WALKED, method.y, y)
         if status == WALKED:
             return WALKED, t
@@ -246,18 +246,19 @@ def event_value(system: Mode, y: Any, turn: Any) -> tuple[float, float]:
 
 
 @kernel_part
-def pass_event(method: Any, system: Mode, new: Any) -> float:
+def pass_event(method: Any, system: Mode, new: Any, strikes: Any, step: int) -> float:
     """Apply the strike at the end of a phase; returns its time (s).
 
     A last Newton correction of the time comes first; the method then holds the state just before the strike. A column
     Phi also changes by the strike's shift in time (saltation): J (Phi + f wait), minus f+ wait after a knee strike;
     after a heel strike it stays on the section.
 
-    new  state after the strike, and columns; written
+    new      state after the strike, and columns; written
+    strikes  HeelStrikes; the columns' waits are written
     """
-    model, y = system.model, method.y
+    model, y, waits = system.model, method.y, strikes.waits
     n, knee = len(model.arm_x), is_bent(system)
-    before, f, waits = vector(model.zero_state), vector(model.zero_state), vector(model.zero_state)
+    before, f = vector(model.zero_state), vector(model.zero_state)
     for i in range(2 * n):
         before[i] = y[i]
     derivative(system, method.clock[T], before, f)
@@ -273,15 +274,19 @@ def pass_event(method: Any, system: Mode, new: Any) -> float:
         for column in range(1, len(y) // (2 * n)):
             at = 2 * n * column
             _, change = event_value(system, y, y[at : at + n])
-            waits[column] = -change / rate
-            shift_column(y, at, f, waits[column])
+            wait, lift = -change / rate, strikes.lift[step + 1, column - 1]
+            if lift != 0.0 and not knee:
+                _, _, upward, _ = swing_foot_motion(model, y, y[n : 2 * n])
+                wait += lift / upward
+            waits[step, column - 1] = wait
+            shift_column(y, at, f, wait)
     strike(model, STRAIGHT if knee else AT_STRIKE, not knee, y, new)
     if knee and len(y) > 2 * n:
         for i in range(2 * n):
             before[i] = new[i]
         derivative(Mode(model, STRAIGHT, system.behind, system.rise), t, before, f)
         for column in range(1, len(y) // (2 * n)):
-            shift_column(new, 2 * n * column, f, -waits[column])
+            shift_column(new, 2 * n * column, f, -waits[step, column - 1])
     return t
 
 
@@ -294,16 +299,22 @@ class HeelStrikes(NamedTuple):
     knee_time: Any  # (steps,) s, of the knee strikes before them, if there are knees
     rise: Any  # (steps + 1,) m, input: each foothold over the one before, the present one first
     nearest: float  # m, ahead of the stance foot: a foot that lands nearer ends the walk; 0 on even ground
+    lift: Any  # (steps + 1, columns) m, input: change of each rise along each column
+    waits: Any  # (steps, columns) s, change of each step's duration along each column
 
 
-def new_heel_strikes(steps: int, m: int, kneed: bool = True, rise: Any = None, nearest: float = 0.0) -> HeelStrikes:
+def new_heel_strikes(
+    steps: int, m: int, kneed: bool = True, rise: Any = None, nearest: float = 0.0, columns: int = 0
+) -> HeelStrikes:
     """Create room for heel strikes with states of m values, and for knee strikes of a walker with knees.
 
     rise, nearest  as in `HeelStrikes`; even ground by default
+    columns        number of tangent columns among the m values; they leave the ground as it is
     """
     before, after = np.zeros((2, steps, m))
-    even = np.zeros(steps + 1) if rise is None else rise
-    return HeelStrikes(np.zeros(steps), before, after, np.zeros(steps if kneed else 0), even, nearest)
+    even, knee_time = np.zeros(steps + 1) if rise is None else rise, np.zeros(steps if kneed else 0)
+    lift, waits = np.zeros((steps + 1, columns)), np.zeros((steps, columns))
+    return HeelStrikes(np.zeros(steps), before, after, knee_time, even, nearest, lift, waits)
 
 
 @kernel

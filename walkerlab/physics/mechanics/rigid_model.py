@@ -380,6 +380,15 @@ def step_lengths(model: RigidModel, starts: Any, ends: Any) -> Floats:
     return np.asarray(ahead - model.radius * (ends[:, STANCE] - starts[:, STANCE]))
 
 
+def step_length_changes(model: RigidModel, ends: Any, starts_turn: Any, ends_turn: Any) -> Floats:
+    """Differentiate `step_lengths` (steps, columns) by changes of first and last states (steps, columns, 2 n)."""
+    n = len(model.arm_x)
+    psi = ends[:, :n] + model.slope
+    by_angle = -np.sin(psi) * model.foot_x - np.cos(psi) * model.foot_y
+    ahead = (ends_turn[:, :, :n] * by_angle[:, None]).sum(axis=2)
+    return np.asarray(ahead - model.radius * (ends_turn[:, :, STANCE] - starts_turn[:, :, STANCE]))
+
+
 def kinetic_energy(model: RigidModel, y: Any) -> float:
     """Compute the kinetic energy (J)."""
     return energies(model, y)[0]

@@ -30,6 +30,7 @@ from walkerlab.physics.mechanics.rigid_model import (
     RigidModel,
     feet_on_slope,
     momentum,
+    step_length_changes,
     step_lengths,
 )
 from walkerlab.physics.orbits.similarity import Units, unit_walker
@@ -39,7 +40,9 @@ from walkerlab.physics.orbits.step_map import (
     Iterates,
     MappedStep,
     Monitor,
+    NO_TIMES,
     StepMap,
+    VariedWalk,
     failed_step,
 )
 from walkerlab.physics.solvers.events import CrossingFinder
@@ -59,6 +62,7 @@ EXACT_STEPS = Tolerances("dop853", 1e-13, 1e-13, 20_000)
 LONG_WALKS = Tolerances("dop853", 1e-9, 1e-11, ENDLESS)  # for attractors
 MONITORED_STEPS = Tolerances("dop853", 1e-13, 1e-13, ENDLESS)
 STEPS_PER_BATCH = 8  # with one derivative
+METHODS_AT_ONCE = 4  # kept for numbers of tangent columns
 SHORTEST_STEP = 0.05  # in sqrt(L/g); a shorter 'step' is standing, also a fixed point
 # Newton's method from random starts
 MAX_START_EVALUATIONS, SMALLEST_MOVE = 40, 2.0**-6  # evaluations; share of a move below which it is not halved
@@ -134,9 +138,10 @@ class RigidStepper(local):
     def __init__(self, like: RigidModel, tolerances: Tolerances) -> None:
         size, d = len(like.zero_state), int(like.coordinates)
         self.plain, varied = tolerances.new(size), tolerances.new(size * (1 + d))
+        self.with_columns = lru_cache(METHODS_AT_ONCE)(lambda columns: tolerances.new(size * (1 + columns)))
         finder = finder_for(self.plain, EVENTS, size)
         self.memory = Memory(
-            varied, finder, unwatched(), np.zeros(size * (1 + d)), new_heel_strikes(1, 0), np.zeros(d, np.int64)
+            varied, finder, unwatched(), np.zeros(size * (1 + d)), new_heel_strikes(1, 0, columns=d), np.zeros(d, np.int64)
         )
 
     def walk(
@@ -163,11 +168,27 @@ class RigidStepper(local):
         method.counts[:BUDGET] = 0
         method.clock[H_NEXT] = 0.0
         rises, nearest = floor or (None, 0.0)
-        strikes: HeelStrikes = new_heel_strikes(steps, y.size, rise=rises, nearest=nearest)
+        strikes: HeelStrikes = new_heel_strikes(steps, y.size, True, rises, nearest, columns=d if derived else 0)
         status, completed = walk(section.walker, method, memory.finder, observer or memory.observer, y, strikes)
         ahead = strikes.after[:completed].take(section.places if derived else section.places[:d], axis=1)
         DP = ahead[:, d:].reshape(completed, d if derived else 0, d) / TANGENT_SCALE
         return Steps(Outcome(status), strikes.time[:completed], ahead[:, :d], DP, strikes)
+
+    def walk_along(
+        self, section: StrikeSection, start: Floats, columns: Floats, lift: Floats, floor: tuple[Floats, float], observer: Observer
+    ) -> tuple[Outcome, HeelStrikes, int]:
+        """Walk from a state (2 n,) with tangent columns (columns, 2 n), along which rises change by `lift`.
+
+        Returns the outcome, the heel strikes, and the number of completed steps.
+        """
+        method, (rises, nearest) = self.with_columns(len(columns)), floor
+        y = np.concatenate((start, columns.ravel()))
+        method.counts[:BUDGET] = 0
+        method.clock[H_NEXT] = 0.0
+        strikes: HeelStrikes = new_heel_strikes(rises.size - 1, y.size, True, rises, nearest, len(columns))
+        strikes.lift[:] = lift
+        status, completed = walk(section.walker, method, self.memory.finder, observer, y, strikes)
+        return Outcome(status), strikes, completed
 
     def solve_starts(self, section: StrikeSection, gaits: list[tuple[Floats, Floats]], starts: Floats) -> Integers:
         """Run Newton's method from starts (starts, d), overwritten with the last states tried.
@@ -331,9 +352,8 @@ class RigidMap(StepMap):
     def _walk_over(
         self, unit: SimilarWalker, z: Floats, heights_m: Floats, start: Floats, observer: Observer | None = None
     ) -> Steps:
-        rises = np.diff(heights_m, prepend=heights_m[0]) / unit.units.length
-        nearest = SHORTEST_LANDING * unit.step_length(float(z[0]), float(z[0])) if rises.any() else 0.0
-        return self._exact.walk(unit.section, z, rises.size - 1, False, (rises, nearest), start, observer)
+        floor = unit.floor(z, heights_m)
+        return self._exact.walk(unit.section, z, floor[0].size - 1, False, floor, start, observer)
 
     def sampled(self, z: Floats, p: float, heights_m: Floats, times_s: Floats) -> Floats:
         unit = self._unit_at(p)
@@ -341,10 +361,41 @@ class RigidMap(StepMap):
         start = np.array(state_on_section(unit.walker, z))
         observer = new_observer(times_s / unit.units.time, start.size)
         self._walk_over(unit, z, heights_m, start, observer)
-        # the legs change roles at every heel strike
-        swaps = observer.steps % 2 == 1
-        legs = observer.states[:, [SWING, STANCE]]
-        return np.where(swaps[:, None], legs[:, ::-1], legs)
+        return by_leg(observer.states[:, [SWING, STANCE]], observer.steps)
+
+    def varied(
+        self, z: Floats, p: float, heights_m: Floats, along: Floats, times_s: Floats = NO_TIMES
+    ) -> VariedWalk | None:
+        """Walk with tangent columns: variational equations in swings, saltation at strikes."""
+        unit = self._unit_at(p)
+        if unit is None:
+            return None
+        walker, units, d = unit.walker, unit.units, z.size
+        start, (n, count) = np.array(state_on_section(walker, z)), (len(walker.arm_x), along.shape[1])
+        columns = TANGENT_SCALE * along[:d].T @ unit.section.basis
+        lift = TANGENT_SCALE / units.length * np.diff(along[d:], axis=0, prepend=along[d : d + 1])
+        observer = new_observer(times_s / units.time, 2 * n * (1 + count))._replace(watching=times_s.size > 0)
+        outcome, strikes, steps = self._exact.walk_along(
+            unit.section, start, columns, lift, unit.floor(z, heights_m), observer
+        )
+        if outcome is not Outcome.WALKED:
+            return None
+        before, after = (
+            states.reshape(steps, 1 + count, 2 * n)[:, 1:] / TANGENT_SCALE for states in (strikes.before, strikes.after)
+        )
+        starts = np.concatenate((columns[None] / TANGENT_SCALE, after))[:-1]
+        lengths = step_length_changes(walker, strikes.before[:, : 2 * n], starts, before)
+        samples = observer.states.reshape(times_s.size, 1 + count, 2 * n)[:, :, [SWING, STANCE]]
+        since = np.concatenate((np.zeros((1, count)), np.cumsum(strikes.waits, axis=0)))[observer.steps] / TANGENT_SCALE
+        rates = observer.states[:, [n + SWING, n + STANCE]]
+        by = samples[:, 1:] / TANGENT_SCALE - since[:, :, None] * rates[:, None]
+        return VariedWalk(
+            strikes.waits * (units.time / TANGENT_SCALE),
+            lengths * units.length,
+            after[:, :, STANCE],
+            by_leg(rates, observer.steps) / units.time,
+            by_leg(by, observer.steps),
+        )
 
     def cost_of_transport(self, z: Floats, p: float) -> float | None:
         unit = self._unit_at(p)
@@ -404,6 +455,12 @@ class RigidMap(StepMap):
         )
 
 
+def by_leg(angles: Floats, steps: Integers) -> Floats:
+    """Order angles (samples, ..., 2) of swing and stance leg by leg, the first swing leg's first."""
+    swaps = (steps % 2 == 1).reshape(-1, *[1] * (angles.ndim - 1))
+    return np.where(swaps, angles[..., ::-1], angles)
+
+
 class SimilarWalker(NamedTuple):
     walker: RigidModel
     units: Units
@@ -411,6 +468,11 @@ class SimilarWalker(NamedTuple):
     feet: list[list[float]]  # for each body: angle from the slope's normal at z = 0, its derivative by theta_2, levers
     radius: float
     apart: float  # rad, minus the sum of the legs' angles with both feet on the slope
+
+    def floor(self, z: Floats, heights_m: Floats) -> tuple[Floats, float]:
+        """Return rises and nearest landing of a walk from z over footholds (m), in units of the walker."""
+        rises = np.diff(heights_m, prepend=heights_m[0]) / self.units.length
+        return rises, SHORTEST_LANDING * self.step_length(float(z[0]), float(z[0])) if rises.any() else 0.0
 
     def step_length(self, before: float, after: float) -> float:
         """Return the length of a step from the stance leg's angles just after its first and last heel strike."""

@@ -27,6 +27,9 @@ CENTRAL_2ND: tuple[tuple[int, float], ...] = ((-1, -0.5), (1, 0.5))
 FORWARD_2ND: tuple[tuple[int, float], ...] = ((0, -1.5), (1, 2.0), (2, -0.5))
 identity = lru_cache(np.eye)  # shared: never written to
 no_values = partial(np.zeros, 0)
+NO_TIMES = np.zeros(0)
+VARIATION = 1e-6  # of section coordinates, and m of heights, in differences of walks
+INSTANT_S = 1e-6  # s, in rates of samples
 
 
 @dataclass(frozen=True)
@@ -74,6 +77,17 @@ class DisturbedWalk:
     z: Floats  # (d,) last point on the section
 
 
+@dataclass(frozen=True, eq=False)
+class VariedWalk:
+    """Derivatives of a walk from the section along columns; those of samples are at fixed times."""
+
+    durations_s: Floats  # (steps, columns)
+    lengths_m: Floats  # (steps, columns)
+    angles_rad: Floats  # (steps, columns), as in `DisturbedWalk`
+    rates: Floats  # (times, 2) rad/s of the legs themselves, as in `StepMap.sampled`
+    samples_rad: Floats  # (times, columns, 2) of the legs' angles
+
+
 class Stepper(Protocol):
     def step(self, z: Floats, p: float, derived: bool = True) -> MappedStep:
         """Take a step from z (d,) at parameter p, with its derivative; the outcome is None where p makes no walker."""
@@ -102,6 +116,25 @@ class StepMap(Stepper, Protocol):
 
         times_s  rising, from the first heel strike to before the last
         """
+
+    def varied(
+        self, z: Floats, p: float, heights_m: Floats, along: Floats, times_s: Floats = NO_TIMES
+    ) -> VariedWalk | None:
+        """Differentiate the walk of `disturbed`, and its samples, along directions of start and heights.
+
+        along  (d + steps + 1, columns) changes of z and of the footholds' heights (m) along each column
+
+        None if the walk, or one beside it, ends early. Difference quotients of exact walks, unless the model has better.
+        """
+        columns = [differentiate_along(self, z, p, heights_m, column, times_s) for column in along.T]
+        if not columns or any(column is None for column in columns):
+            return None
+        rates = np.zeros((0, 2))
+        if times_s.size:
+            later, earlier = (self.sampled(z, p, heights_m, times_s + sign * INSTANT_S) for sign in (0.0, -1.0))
+            rates = (later - earlier) / INSTANT_S
+        durations, lengths, angles, samples = (np.stack(parts, axis=1) for parts in zip(*columns, strict=True))  # type: ignore[arg-type]
+        return VariedWalk(durations, lengths, angles, rates, samples)
 
     def cost_of_transport(self, z: Floats, p: float) -> float | None:
         """Return work divided by weight times distance of a step from z (d,); None if it fails."""
@@ -150,6 +183,22 @@ def differentiate_by_parameter(step_map: StepMap, z: Floats, p: float) -> tuple[
         outcome = next((outcome for outcome in outcomes if outcome is not Outcome.WALKED), Outcome.WALKED)
         return outcome, sum((weight / h * step.z for step, (_, weight) in zip(steps, formula, strict=True)), 0.0 * z)
     return None, 0.0 * z
+
+
+def differentiate_along(
+    step_map: StepMap, z: Floats, p: float, heights_m: Floats, along: Floats, times_s: Floats
+) -> tuple[Floats, ...] | None:
+    """Differentiate durations, lengths and angles (steps,) and samples (times, 2) along a column; None if walks end."""
+    ends, h = [], VARIATION / np.abs(along).max()
+    for offset, weight in CENTRAL_2ND:
+        moved, heights = z + offset * h * along[: z.size], heights_m + offset * h * along[z.size :]
+        walk = step_map.disturbed(moved, p, heights)
+        if walk.outcome is not Outcome.WALKED:
+            return None
+        samples = step_map.sampled(moved, p, heights, times_s) if times_s.size else np.zeros((0, 2))
+        parts = (walk.durations_s, walk.lengths_m, walk.angles_rad, samples)
+        ends.append([weight / h * part for part in parts])
+    return tuple(first + second for first, second in zip(*ends, strict=True))
 
 
 def failed_step(outcome: Outcome | None, d: int) -> MappedStep:
