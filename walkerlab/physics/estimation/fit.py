@@ -30,6 +30,9 @@ NO_WALK: Final = 1e3  # whitened residual of unknowns that make no walk
 NO_NEIGHBOURS: Final = "the walk from the start, or one beside it, ends before the measured steps are over"
 HEIGHT_SHARES: Final = (1.0, 0.5, 0.0)
 EVALUATIONS: Final = 12  # in a round
+SETTLED_FIT: Final = 1e-6  # relative change of the cost, or of the unknowns, that ends a round
+SAME_DERIVATIVES: Final = 1e-3  # change of an unknown, in its scale, within which derivatives are kept
+INSIDE: Final = 1e-9  # distance from the bounds at the start, in scales
 WEAK_PRIOR: Final = 1.0  # standard deviation of every unknown about its start, in its scale: what is open stays there
 
 
@@ -95,7 +98,7 @@ def fit(problem: FitProblem, start: Floats) -> Fitted | str:
     if data is None:
         return NO_NEIGHBOURS
     for round_number in range(1, MAX_ROUNDS + 1):
-        before, u = u, least_squares_fit(problem, u, start, heights, data.G, noise)
+        before, u = u, least_squares_fit(problem, u, start, heights, data, noise)
         data = None if forecast.predict(u, even) is None else linearise(problem, u, heights)
         if data is None:
             # The data pull the walker out of its basin: the last walk that went on is judged.
@@ -165,14 +168,18 @@ def linearise(problem: FitProblem, u: Floats, heights: Floats, exact: bool = Fal
 
 
 def least_squares_fit(
-    problem: FitProblem, u: Floats, start: Floats, heights: Floats, G: Floats, noise: Noise
+    problem: FitProblem, u: Floats, start: Floats, heights: Floats, data: Linearised, noise: Noise
 ) -> Floats:
-    """Minimise the whitened residuals over the unknowns, for given standard deviations."""
+    """Minimise the whitened residuals over the unknowns, for given standard deviations.
+
+    data  derivatives at u; they serve for all unknowns near it
+    """
     from scipy.optimize import least_squares  # takes a third of a second, only needed here
 
-    forecast = problem.forecast
-    whiten = whitening(G, forecast.quantity, noise)
-    offset = forecast.values + G @ heights
+    forecast, low_high = problem.forecast, problem.limits()
+    inside = np.clip(u, low_high[0] + INSIDE, low_high[1] - INSIDE)
+    whiten, known = whitening(data.G, forecast.quantity, noise), (inside, data.J)
+    offset = forecast.values + data.G @ heights
 
     def residuals(x: Floats) -> Floats:
         values = forecast.predict(x, heights)
@@ -180,13 +187,13 @@ def least_squares_fit(
         return np.concatenate((own, problem.prior_rows(x)[:, 0], (start - x) / WEAK_PRIOR))
 
     def jacobian(x: Floats) -> Floats:
-        J = forecast.differentiate(x, heights, exact=False)
-        own = np.zeros((offset.size, x.size)) if J is None else -whiten(J)
+        nonlocal known
+        if np.abs(x - known[0]).max() > SAME_DERIVATIVES:
+            J = forecast.differentiate(x, heights, exact=False)
+            known = x.copy(), np.zeros((offset.size, x.size)) if J is None else J
+        own = -whiten(known[1])
         return np.vstack((own, -problem.prior_rows(x)[:, 1:], -np.eye(x.size) / WEAK_PRIOR))
 
-    low, high = problem.limits()
-    inside = np.clip(u, low + 1e-9, high - 1e-9)
-    result = least_squares(
-        residuals, inside, jacobian, bounds=(low, high), loss=problem.loss, max_nfev=EVALUATIONS, xtol=1e-10, ftol=1e-10
-    )
+    settings = {"loss": problem.loss, "max_nfev": EVALUATIONS, "xtol": SETTLED_FIT, "ftol": SETTLED_FIT}
+    result = least_squares(residuals, inside, jacobian, low_high, **settings)
     return np.asarray(result.x)

@@ -81,7 +81,11 @@ def noise_reach(evaluate_at: Callable[[Floats], Evaluation], centre: Floats) -> 
 
 def free_the_rest(information: Floats, count: int) -> Floats:
     """Return the information (..., count, count) on the first unknowns while the others are free (Schur complement)."""
-    own, cross, rest = information[..., :count, :count], information[..., :count, count:], information[..., count:, count:]
+    own, cross, rest = (
+        information[..., :count, :count],
+        information[..., :count, count:],
+        information[..., count:, count:],
+    )
     return np.asarray(own - cross @ np.linalg.pinv(rest, hermitian=True) @ cross.swapaxes(-1, -2))
 
 

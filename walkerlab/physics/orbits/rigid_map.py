@@ -141,7 +141,12 @@ class RigidStepper(local):
         self.with_columns = lru_cache(METHODS_AT_ONCE)(lambda columns: tolerances.new(size * (1 + columns)))
         finder = finder_for(self.plain, EVENTS, size)
         self.memory = Memory(
-            varied, finder, unwatched(), np.zeros(size * (1 + d)), new_heel_strikes(1, 0, columns=d), np.zeros(d, np.int64)
+            varied,
+            finder,
+            unwatched(),
+            np.zeros(size * (1 + d)),
+            new_heel_strikes(1, 0, columns=d),
+            np.zeros(d, np.int64),
         )
 
     def walk(
@@ -175,7 +180,13 @@ class RigidStepper(local):
         return Steps(Outcome(status), strikes.time[:completed], ahead[:, :d], DP, strikes)
 
     def walk_along(
-        self, section: StrikeSection, start: Floats, columns: Floats, lift: Floats, floor: tuple[Floats, float], observer: Observer
+        self,
+        section: StrikeSection,
+        start: Floats,
+        columns: Floats,
+        lift: Floats,
+        floor: tuple[Floats, float],
+        observer: Observer,
     ) -> tuple[Outcome, HeelStrikes, int]:
         """Walk from a state (2 n,) with tangent columns (columns, 2 n), along which rises change by `lift`.
 
