@@ -36,11 +36,11 @@ from walkerlab.physics.mechanics.rigid_model import (
 from walkerlab.physics.orbits.similarity import Units, unit_walker
 from walkerlab.physics.orbits.step_map import (
     CACHE_SIZE,
+    NO_TIMES,
     DisturbedWalk,
     Iterates,
     MappedStep,
     Monitor,
-    NO_TIMES,
     StepMap,
     VariedWalk,
     failed_step,

@@ -124,7 +124,7 @@ class StepMap(Stepper, Protocol):
 
         along  (d + steps + 1, columns) changes of z and of the footholds' heights (m) along each column
 
-        None if the walk, or one beside it, ends early. Difference quotients of exact walks, unless the model has better.
+        None if the walk, or one beside it, ends early. Models without tangent columns take difference quotients.
         """
         columns = [differentiate_along(self, z, p, heights_m, column, times_s) for column in along.T]
         if not columns or any(column is None for column in columns):
@@ -133,7 +133,7 @@ class StepMap(Stepper, Protocol):
         if times_s.size:
             later, earlier = (self.sampled(z, p, heights_m, times_s + sign * INSTANT_S) for sign in (0.0, -1.0))
             rates = (later - earlier) / INSTANT_S
-        durations, lengths, angles, samples = (np.stack(parts, axis=1) for parts in zip(*columns, strict=True))  # type: ignore[arg-type]
+        durations, lengths, angles, samples = (np.stack(parts, axis=1) for parts in zip(*columns, strict=True))
         return VariedWalk(durations, lengths, angles, rates, samples)
 
     def cost_of_transport(self, z: Floats, p: float) -> float | None:
