@@ -284,3 +284,10 @@ def test_a_walker_is_identified_in_memory():
     (slope,) = answer.summary["estimates"]
     assert slope["key"] == "slope_deg"
     assert slope["value"] == pytest.approx(3.0, abs=0.01)
+
+
+def test_measurements_are_planned_in_memory():
+    plan = walkerlab.plan_measurements("slope-3deg", ["slope_deg"], steps=4, max_steps=6, errors={"slope_deg": 0.02})
+    angles = plan.summary["measurements"][3]
+    assert angles["measurement"] == "angles over time"
+    assert 2 <= angles["errors"][0]["steps_needed"] <= 6

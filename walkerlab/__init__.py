@@ -26,6 +26,7 @@ __all__ = [
     "identify",
     "kneed",
     "open_run",
+    "plan_measurements",
     "read_walk",
     "robustness",
     "run",

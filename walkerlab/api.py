@@ -464,16 +464,42 @@ def identify(
 
     Raises ConfigError for an invalid question or file. A fit that does not converge is told in `Result.no_answer`.
     """
-    start = config if isinstance(config, Config) else resolve(str(config)).loaded.config
     if isinstance(walk, Mapping):
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "walk.csv"
             path.write_bytes(csv_text(list(walk), zip(*walk.values(), strict=True)))
-            return identify(path, start, fit, prior, **keys)
+            return identify(path, config, fit, prior, **keys)
     bounds = dict(fit) if isinstance(fit, Mapping) else dict.fromkeys(fit)
     block = {**keys, "data": str(walk), "fit": bounds, "prior": dict(prior or {})}
-    tree = tree_of({**start.model_dump(mode="json", exclude_none=True, by_alias=True), "identify": block}, NOWHERE)
-    return in_memory("identify", validate_tree(tree))
+    return in_memory("identify", with_blocks(config, identify=block))
+
+
+def plan_measurements(
+    config: str | Path | Config = DEFAULT,
+    fit: Sequence[str] = (),
+    prior: Mapping[str, Sequence[float]] | None = None,
+    model: str = "rigid",
+    **keys: Any,
+) -> Result:
+    """Say which measurements would determine parameters of a walker: `measurements`, … in `summary`.
+
+    config  everything that is known of the walker: a config, its file or name, or a run
+    fit     keys to estimate
+    prior   value and standard deviation of keys known beforehand
+    model   rigid or contact
+    keys    others of the block `plan`, such as steps, max_steps, errors, period_noise_s
+
+    Raises ConfigError for an invalid question. A walk that ends too early is told in `Result.no_answer`.
+    """
+    question = {"fit": dict.fromkeys(fit), "prior": dict(prior or {}), "model": model}
+    return in_memory("plan", with_blocks(config, identify=question, plan=keys))
+
+
+def with_blocks(config: str | Path | Config, **blocks: Mapping[str, Any]) -> Config:
+    """Return a config, named by itself, its file, name or run, with these blocks."""
+    start = config if isinstance(config, Config) else resolve(str(config)).loaded.config
+    tree = {**start.model_dump(mode="json", exclude_none=True, by_alias=True), **blocks}
+    return validate_tree(tree_of(tree, NOWHERE))
 
 
 def export_model(

@@ -10,7 +10,9 @@ import pytest
 
 from walkerlab.config.loader import load
 from walkerlab.errors import NoAnswer
+from walkerlab.outcome import Outcome
 from walkerlab.physics.estimation.measurements import MeasuredSteps
+from walkerlab.physics.orbits.step_map import StepMap
 from walkerlab.scene.identification import Question, identify_walk, problem_of
 from walkerlab.scene.subject import find_model_gait
 
@@ -83,6 +85,27 @@ def test_derivatives_equal_differences_of_other_sizes():
             ends = [forecast.predict(u + sign * size * unit, heights) for sign in (-2, -1, 1, 2)]
             column = (ends[0] - 8.0 * ends[1] + 8.0 * ends[2] - ends[3]) / (12.0 * size)
             assert J[:, place] == pytest.approx(column, abs=1e-6 * np.abs(J[:, place]).max())
+
+
+def test_a_walk_of_many_steps_is_predicted_whole():
+    own = truth()
+    walk = own.walks.disturbed(own.z, tuple(own.values), np.zeros(121))
+    assert walk.outcome is Outcome.WALKED
+    assert walk.durations_s.size == 120
+
+
+@pytest.mark.parametrize("name", ["round-feet", "kneed", "paper"])
+def test_tangent_columns_of_a_walk_are_its_difference_quotients(name):
+    own = CAMPAIGN["Truth"](name, CAMPAIGN["WALKERS"][name])
+    heights, p, steps = np.random.default_rng(3).normal(0.0, 1e-3, 6) * own.leg, tuple(own.values), 5
+    along = np.eye(own.z.size + steps + 1)
+    times = np.linspace(0.0, 0.999 * own.walks.disturbed(own.z, p, heights).durations_s.sum(), 40)
+    exact = own.walks.varied(own.z, p, heights, along, times)
+    differences = StepMap.varied(own.walks, own.z, p, heights, along, times)
+    for field in ("durations_s", "lengths_m", "angles_rad", "samples_rad"):
+        values, others = getattr(exact, field), getattr(differences, field)
+        assert values == pytest.approx(others, abs=2e-5 * np.abs(values).max()), field
+    assert exact.rates == pytest.approx(differences.rates, abs=1e-4)
 
 
 def test_noise_free_steps_give_the_parameters_to_many_digits():

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from walkerlab.config.drives import PushOff
     from walkerlab.config.ground import Footholds
     from walkerlab.config.identify import Identify
+    from walkerlab.config.plan import Plan
     from walkerlab.config.recording import RecordedFile
     from walkerlab.config.robustness import Robustness
     from walkerlab.config.stability import Case
@@ -252,6 +253,16 @@ class IdentifyConfig(FixedPointConfig, ContactConfig, Protocol):
     def identify(self) -> Identify | None: ...
 
 
+class PlanConfig(FixedPointConfig, ContactConfig, Protocol):
+    """Keys that `plan` reads."""
+
+    @property
+    def identify(self) -> Identify | None: ...
+
+    @property
+    def plan(self) -> Plan | None: ...
+
+
 class NamedConfig(Protocol):
     """Keys that `plot` reads."""
 
@@ -262,9 +273,9 @@ class NamedConfig(Protocol):
 if TYPE_CHECKING:
     OfEachType = tuple[
         SimulateConfig, ContactSimConfig, TuneConfig, CompassCasesConfig, SceneCasesConfig, MapsConfig,
-        ContinuationConfig, BasinConfig, RobustnessConfig, DesignConfig, IdentifyConfig, NamedConfig,
+        ContinuationConfig, BasinConfig, RobustnessConfig, DesignConfig, IdentifyConfig, PlanConfig, NamedConfig,
     ]  # fmt: skip
 
     def for_each_type(config: schema.Config) -> OfEachType:
         """Let mypy check that a config satisfies every type."""
-        return config, config, config, config, config, config, config, config, config, config, config, config
+        return config, config, config, config, config, config, config, config, config, config, config, config, config

@@ -15,6 +15,7 @@ from walkerlab.config.drives import PushOff, acting_on
 from walkerlab.config.fields import Block, check_against, key, meaning_error
 from walkerlab.config.ground import Footholds
 from walkerlab.config.identify import Identify
+from walkerlab.config.plan import Plan
 from walkerlab.config.recording import RecordedFile
 from walkerlab.config.robustness import Robustness
 from walkerlab.config.stability import Stability
@@ -170,7 +171,7 @@ class Tune(Block):
 
 
 QUESTIONS: Final = (
-    "recording", "stability", "tune", "continuation", "basin", "robustness", "design", "identify", "sweep",
+    "recording", "stability", "tune", "continuation", "basin", "robustness", "design", "identify", "plan", "sweep",
 )  # fmt: skip
 """Blocks that configure a stage or a sweep rather than the scene."""
 
@@ -240,6 +241,7 @@ class Config(Block):
     design: Design | None = None
     recording: RecordedFile | None = None
     identify: Identify | None = None
+    plan: Plan | None = None
     sweep: Sweep | None = None
     outputs: tuple[Output, ...] = key(OUTPUTS, "", "arrays to store", bounds="a list of states, energies, forces")
     seed: int = key(0, "1", "seed of everything random", ge=0, le=2**32 - 1)

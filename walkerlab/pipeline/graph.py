@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal
 
 from walkerlab.config import reads
@@ -71,6 +71,7 @@ class Option:
               "[=A:B]" where they may be missing, "...=...,..." names by name
     type      of its value; list for names, which may be repeated
     needs     flags without which it means nothing
+    runs      the stage that the command runs instead of its own; sets no key
     """
 
     flag: str
@@ -79,6 +80,7 @@ class Option:
     help: str
     type: type = str
     needs: tuple[str, ...] = ()
+    runs: str = ""
 
 
 STRIDES = Option("--strides", "strides", "N", "Strides to walk; one stride is two steps.", int)
@@ -226,6 +228,15 @@ class Graph:
 
 
 MODEL_HELP = "Model whose gaits to study."
+ESTIMATED = (
+    Option("--fit", "identify.fit", "KEY[=A:B]", "Key to estimate, or also its bounds."),
+    Option("--prior", "identify.prior", "KEY=VALUE:SIGMA", "Value known beforehand, and its deviation."),
+    Option("--nuisance", "identify.nuisance", "NAME", "Property of clock or sensors to estimate too.", list),
+    Option("--model", "identify.model", "rigid|contact|both", "Model to fit."),
+)
+ERRORS_TO_REACH = Option(
+    "--error", "plan.errors", "KEY=SIGMA,...", "Standard error to plan for, in the key's unit.", float
+)
 PIPELINE = Graph(
     Stage(
         "fixedpoint", "walkerlab.pipeline.stages.fixedpoint",
@@ -330,26 +341,36 @@ PIPELINE = Graph(
         files=later("walkerlab.pipeline.stages.measured_walk", "digests"),
         options=(
             Option("--data", "identify.data", "FILE", "Measured walk: a table of steps, or angles over time."),
-            Option("--fit", "identify.fit", "KEY[=A:B]", "Key to estimate, or also its bounds."),
-            Option("--prior", "identify.prior", "KEY=VALUE:SIGMA", "Value known beforehand, and its deviation."),
-            Option("--nuisance", "identify.nuisance", "NAME", "Property of clock or sensors to estimate too.", list),
-            Option("--model", "identify.model", "rigid|contact|both", "Model to fit."),
+            *ESTIMATED,
             Option("--level", "identify.level", "steps|angles", "What was measured."),
             Option("--loss", "identify.loss", "linear|soft_l1", "soft_l1 for data with outliers."),
             Option("--columns", "identify.columns", "QUANTITY=COLUMN,...", "Columns of the file."),
             Option("--units", "identify.units", "KIND=UNIT,...", "Units that it does not state."),
+            Option("--plan", "", "", "Without data: errors that each way of measuring would leave.", bool, runs="plan"),
+            replace(ERRORS_TO_REACH, needs=("--plan",)),
+        ),
+    ),
+    Stage(
+        "plan", "walkerlab.pipeline.stages.plan",
+        "Say which measurements would determine parameters of the walker, and with how many steps.",
+        reads.PlanConfig, results_of("fixedpoint"), only_by="plan",
+        options=(
+            *ESTIMATED, ERRORS_TO_REACH,
+            Option("--steps", "plan.steps", "N", "Steps of the walk whose errors are stated.", int),
         ),
     ),
     Stage(
         "plot", "walkerlab.views.figures.stage", "Draw the figures from the stored results.", reads.NamedConfig,
         walks_and("compare"), work="draws",
-        if_current=("accuracy", "engines", "tune", "stability-maps", "continuation", "basin", "robustness", "identify"),
+        if_current=(
+            "accuracy", "engines", "tune", "stability-maps", "continuation", "basin", "robustness", "identify", "plan",
+        ),
     ),
     Stage(
         "report", "walkerlab.views.report.stage", "Write the report, one HTML file.", None,
         walks_and("tune", "compare", "accuracy", "stability", "plot"), options=(STRIDES,), work="draws",
         early_with=WALKED,
-        if_current=("engines", "stability-maps", "continuation", "basin", "robustness", "identify"),
+        if_current=("engines", "stability-maps", "continuation", "basin", "robustness", "identify", "plan"),
     ),
 )  # fmt: skip
 STAGES = PIPELINE.stages

@@ -40,6 +40,7 @@ HEADLINES: Final[Mapping[str, tuple[str, ...]]] = {
         "estimates.", "chi_square_per_dof", "noise.process.roughness_m", "gait.period_s.value",
         "gait.spectral_radius.value",
     ),
+    "plan": ("steps", "simplest."),
     "plot": (),
     "report": (),
 }  # fmt: skip

@@ -68,7 +68,8 @@ def test_every_stage_has_the_common_options_and_strides_if_it_walks(walker, stag
     assert ("--open" in words) == (stage.name == "report")
 
 
-OF_STAGES = [(stage.name, option) for stage in STAGES for option in stage.options]
+OF_STAGES = [(stage.name, option) for stage in STAGES for option in stage.options if not option.runs]
+BLOCKS_OF_OTHERS = {("compare", "recording"), ("identify", "plan"), ("plan", "identify")}
 
 
 @pytest.mark.parametrize(("stage", "option"), OF_STAGES, ids=lambda entry: getattr(entry, "flag", entry))
@@ -76,7 +77,7 @@ def test_an_option_of_a_stage_sets_a_key_and_offers_the_words_that_the_key_allow
     block, _, name = option.key.rpartition(".")
     fields = block_of(Config.model_fields[block]).model_fields if block else Config.model_fields
     names = {field.alias or key: field for key, field in fields.items()}
-    assert block in ("", stage) or (stage, block) == ("compare", "recording")
+    assert block in ("", stage) or (stage, block) in BLOCKS_OF_OTHERS
     assert not set(option.needs) - {other.flag for other in PIPELINE[stage].options}
     if "|" in option.metavar:
         assert set(option.metavar.split("|")) == set(words_of(names[name].annotation))
@@ -166,3 +167,11 @@ def test_an_option_that_is_no_key_is_told_as_any_other():
     done = CliRunner().invoke(program(), ["fixedpoint", "--colour", "3"])
     assert done.exit_code == 2
     assert "--set" not in done.output
+
+
+def test_an_option_that_runs_another_stage_names_one_with_the_options_that_need_it():
+    redirects = [(stage, option) for stage in STAGES for option in stage.options if option.runs]
+    assert [(stage.name, option.flag, option.runs) for stage, option in redirects] == [("identify", "--plan", "plan")]
+    for stage, option in redirects:
+        needing = {other.flag for other in stage.options if option.flag in other.needs}
+        assert needing <= {other.flag for other in PIPELINE[option.runs].options}

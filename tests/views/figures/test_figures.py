@@ -24,7 +24,7 @@ from walkerlab.views.figures.registry import FIGURES as ALL_FIGURES
 from walkerlab.views.figures.style import CONTACT, RIGID
 
 SVG = "{http://www.w3.org/2000/svg}"
-ELSEWHERE = {"tune", "continuation", "basin", "engines", "robustness", "identify"}
+ELSEWHERE = {"tune", "continuation", "basin", "engines", "robustness", "identify", "plan"}
 FIGURES = [figure for figure in ALL_FIGURES if ELSEWHERE.isdisjoint(need.stage for need in figure.needs)]
 PAPER_FIGURES = [figure for figure in FIGURES if figure.number is not None]
 NUMBERED = {figure.number: figure for figure in PAPER_FIGURES}
@@ -133,7 +133,7 @@ import hashlib, sys
 from synthetic_methods import everything
 from walkerlab.views.figures.registry import FIGURES
 for figure in FIGURES:
-    elsewhere = ("tune", "continuation", "basin", "engines", "robustness", "identify")
+    elsewhere = ("tune", "continuation", "basin", "engines", "robustness", "identify", "plan")
     if any(need.stage in elsewhere for need in figure.needs):
         continue
     drawing = figure.render(everything())

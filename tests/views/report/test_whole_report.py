@@ -110,6 +110,7 @@ ON_DEMAND = (
     "engines.section",
     "robustness",
     "identification",
+    "sections.plan",
 )  # sections of stages that only their own commands run
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -24,25 +25,36 @@ LOADED: Final = 0.1  # share of a parameter in an open direction, from which it 
 
 def information_on(fitted: Fitted, keys: tuple[str, ...], scales: Floats, quantities: tuple[str, ...]) -> Information:
     """Reduce the information of a fit to its parameters; `scales` (parameters,) are their typical changes."""
-    count = len(keys)
-    reduced = free_the_rest(fitted.evaluation.information, count)
-    values, vectors = np.linalg.eigh(reduced)
-    order = np.argsort(values)[::-1]
-    singular, directions = np.sqrt(np.maximum(values[order], 0.0)), vectors[:, order].T
-    basis = directions[~is_open(singular)]
-    covariance = basis.T @ averaged_covariance(fitted, basis) @ basis
-    errors = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
     values_count = fitted.data.residuals.size + len(fitted.data.prior)
-    return Information(
-        keys,
-        covariance / np.outer(errors, errors),
-        singular,
-        directions,
-        covariance * np.outer(scales, scales),
-        scales,
-        max(1, values_count - fitted.u.size),
-        contributions(fitted, quantities, count, basis),
+    plain = information_from(fitted.evaluation.information, keys, scales, values_count)
+    basis = plain.directions[~is_open(plain.singular_values)]
+    covariance = basis.T @ averaged_covariance(fitted, basis) @ basis
+    return replace(
+        plain,
+        correlations=correlations(covariance),
+        covariance=covariance * np.outer(scales, scales),
+        contributions=contributions(fitted, quantities, len(keys), basis),
     )
+
+
+def information_from(whole: Floats, keys: tuple[str, ...], scales: Floats, values: int) -> Information:
+    """Reduce the information (unknowns, unknowns) at known standard deviations to the parameters, the first unknowns.
+
+    values  number of measured values
+    """
+    reduced = free_the_rest(whole, len(keys))
+    sizes, vectors = np.linalg.eigh(reduced)
+    order = np.argsort(sizes)[::-1]
+    singular, directions = np.sqrt(np.maximum(sizes[order], 0.0)), vectors[:, order].T
+    basis = directions[~is_open(singular)]
+    covariance = basis.T @ np.linalg.pinv(basis @ reduced @ basis.T, hermitian=True) @ basis
+    freedom, scaled = max(1, values - len(whole)), covariance * np.outer(scales, scales)
+    return Information(keys, correlations(covariance), singular, directions, scaled, scales, freedom, {})
+
+
+def correlations(covariance: Floats) -> Floats:
+    errors = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+    return np.asarray(covariance / np.outer(errors, errors))
 
 
 def averaged_covariance(fitted: Fitted, basis: Floats) -> Floats:

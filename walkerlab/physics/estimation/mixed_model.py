@@ -70,8 +70,7 @@ class Products(NamedTuple):
 
 def products_of(data: Linearised) -> Products:
     columns = np.column_stack((data.residuals, data.J, data.G))
-    quantities = range(int(data.quantity.max()) + 1)
-    parts = [columns[data.quantity == q] for q in quantities]
+    parts = [columns[data.quantity == q] for q in range(data.sizes.size)]
     sums = np.array([part.T @ part for part in parts])
     counts = np.array([len(part) for part in parts])
     return Products(sums, counts, data.prior.T @ data.prior, len(data.prior), data.J.shape[1], data.sizes)

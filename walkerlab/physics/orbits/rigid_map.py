@@ -137,6 +137,7 @@ class RigidStepper(local):
 
     def __init__(self, like: RigidModel, tolerances: Tolerances) -> None:
         size, d = len(like.zero_state), int(like.coordinates)
+        self.budget = tolerances.budget
         self.plain, varied = tolerances.new(size), tolerances.new(size * (1 + d))
         self.with_columns = lru_cache(METHODS_AT_ONCE)(lambda columns: tolerances.new(size * (1 + columns)))
         finder = finder_for(self.plain, EVENTS, size)
@@ -170,14 +171,18 @@ class RigidStepper(local):
         d, size = section.basis.shape
         y = section.start[: method.y.size].copy()
         y[:size] = y[:size] + z @ section.basis if start is None else start
-        method.counts[:BUDGET] = 0
-        method.clock[H_NEXT] = 0.0
+        self._reset(method, steps)
         rises, nearest = floor or (None, 0.0)
         strikes: HeelStrikes = new_heel_strikes(steps, y.size, True, rises, nearest, columns=d if derived else 0)
         status, completed = walk(section.walker, method, memory.finder, observer or memory.observer, y, strikes)
         ahead = strikes.after[:completed].take(section.places if derived else section.places[:d], axis=1)
         DP = ahead[:, d:].reshape(completed, d if derived else 0, d) / TANGENT_SCALE
         return Steps(Outcome(status), strikes.time[:completed], ahead[:, :d], DP, strikes)
+
+    def _reset(self, method: Any, steps: int) -> None:
+        method.counts[:BUDGET] = 0
+        method.counts[BUDGET] = min(steps * self.budget, ENDLESS)
+        method.clock[H_NEXT] = 0.0
 
     def walk_along(
         self,
@@ -194,8 +199,7 @@ class RigidStepper(local):
         """
         method, (rises, nearest) = self.with_columns(len(columns)), floor
         y = np.concatenate((start, columns.ravel()))
-        method.counts[:BUDGET] = 0
-        method.clock[H_NEXT] = 0.0
+        self._reset(method, rises.size - 1)
         strikes: HeelStrikes = new_heel_strikes(rises.size - 1, y.size, True, rises, nearest, len(columns))
         strikes.lift[:] = lift
         status, completed = walk(section.walker, method, self.memory.finder, observer, y, strikes)

@@ -12,19 +12,17 @@ import numpy as np
 from walkerlab.config.fields import leaves, value_at
 from walkerlab.config.identify import Identify
 from walkerlab.config.reads import IdentifyConfig
-from walkerlab.config.walkers import contact_required_error
 from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.labels import Label, unit_by_name
 from walkerlab.physics.estimation.measurements import MeasuredAngles, MeasuredSteps
 from walkerlab.physics.estimation.result import Identification
 from walkerlab.physics.solvers.system import Floats
 from walkerlab.pipeline.progress import Progress
+from walkerlab.pipeline.stages.estimated import models_of, question_of, refuse_keys, refuse_model
 from walkerlab.pipeline.stages.measured_walk import read_measured
 from walkerlab.pipeline.store.columns import numbered, rows_group
 from walkerlab.pipeline.store.content import Content, Group, Variable
-from walkerlab.scene.families import model_reads, unused_key_error
-from walkerlab.scene.identification import Question, identify_walk
-from walkerlab.scene.parameter import parameter_of
+from walkerlab.scene.identification import identify_walk
 
 if TYPE_CHECKING:
     from walkerlab.config.schema import Config
@@ -45,23 +43,13 @@ def run(config: IdentifyConfig, inputs: Mapping[str, Content], progress: Progres
     assert block is not None, "refuse rejects a config without the block"
     measured = read_measured(block, config)
     progress.start("identify")
-    question = Question(
-        {key: None if bounds is None else (bounds[0], bounds[1]) for key, bounds in block.fit.items()},
-        {key: (value, sigma) for key, (value, sigma) in block.prior.items()},
-        block.nuisance,
-        block.loss,
-    )
-    gait = inputs["fixedpoint"].summary
-    result = identify_walk(cast("Config", config), measured, gait, question, models_of(block), progress.note)
+    gait, models = inputs["fixedpoint"].summary, models_of(block)
+    result = identify_walk(cast("Config", config), measured, gait, question_of(block), models, progress.note)
     content = content_of(config, result, measured)
     verdict = next(model for model in result.models if model.model == result.model)
     if verdict.fit == "not-converged":
         raise NoAnswer(f"the fit of the {verdict.model} model did not converge: {verdict.reason}", FEWER, content)
     return content
-
-
-def models_of(block: Identify) -> tuple[str, ...]:
-    return ("rigid", "contact") if block.model == "both" else (block.model,)
 
 
 def refuse(config: IdentifyConfig) -> None:
@@ -72,16 +60,14 @@ def refuse(config: IdentifyConfig) -> None:
             "identify needs a measured walk and a parameter to estimate.",
             "For example --data steps.csv --fit walker.hip_mass_kg --fit slope_deg.",
         )
-    if "contact" in models_of(block) and config.contact is None:
-        raise contact_required_error(f"identify.model: {block.model}", config.walker, "Add one.")
+    refuse_model(config, block)
     if block.nuisance and block.level == "steps":
         raise ConfigError(
             f"identify.nuisance: {', '.join(block.nuisance)}: only sampled angles have these.",
             "Leave out --nuisance, or give angles over time (--level angles).",
             ("identify", "nuisance"),
         )
-    for where, values in (("fit", block.fit), ("prior", {key: pair[:1] for key, pair in block.prior.items()})):
-        refuse_keys(config, where, values, models_of(block))
+    refuse_keys(config, block)
     measured = read_measured(block, config)
     steps = measured.steps if isinstance(measured, MeasuredAngles) else measured
     values_count = steps.count * len(steps.channels()) + (isinstance(measured, MeasuredAngles) and measured.step.size)
@@ -90,27 +76,6 @@ def refuse(config: IdentifyConfig) -> None:
             f"{block.data} holds {values_count} values, too few for {len(block.fit)} parameters.",
             "Measure more steps, or fit fewer parameters.",
         )
-
-
-def refuse_keys(
-    config: IdentifyConfig, where: str, values: Mapping[str, Sequence[float] | None], models: Sequence[str]
-) -> None:
-    """Raise ConfigError for a key that is not a parameter of the models, or a value that the schema refuses."""
-    asker = ("identify", where)
-    for key, own in values.items():
-        parameter = parameter_of(key, config, asker)
-        if not any(model_reads(model, config, key) for model in models):
-            raise unused_key_error(".".join(asker), key, models)
-        for value in own or ():
-            if parameter.config_at(config, value) is None:
-                raise parameter.refusal(config, value, asker)
-        if own is not None and len(own) > 1 and not own[0] <= parameter.value_in(config) <= own[1]:
-            raise ConfigError(
-                f"{'.'.join(asker)}: {key} starts at {parameter.value_in(config):g} {parameter.unit}, outside its "
-                f"bounds {own[0]:g} to {own[1]:g}",
-                "Widen the bounds, or change the start (--set).",
-                asker,
-            )
 
 
 def content_of(config: IdentifyConfig, result: Identification, measured: MeasuredSteps | MeasuredAngles) -> Content:

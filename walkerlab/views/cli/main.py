@@ -112,4 +112,4 @@ def add_stage(app: typer.Typer, stage: Stage, graph: Graph) -> None:
         # Imported here: help loads neither a config nor an array.
         from walkerlab.views.cli.stage import run_stage
 
-        run_stage(request, stage, graph)
+        run_stage(request, graph[request.instead or stage.name], graph)

@@ -88,7 +88,7 @@ def settings_from(options: Sequence["Option"], values: Mapping[str, Any]) -> tup
     settings = []
     for option in options:
         value = values[option.flag]
-        if not value and value != 0:
+        if option.runs or (not value and value != 0):
             continue
         if any(values[flag] is None for flag in option.needs):
             raise typer.BadParameter(f"also give {' and '.join(option.needs)}", param_hint=option.flag)
@@ -96,7 +96,7 @@ def settings_from(options: Sequence["Option"], values: Mapping[str, Any]) -> tup
         if ":" in option.metavar:
             text = bounds(option.flag, value, option.metavar)
         elif "=" in option.metavar:
-            text = pairs(option.flag, value)
+            text = pairs(option.flag, value, option.type)
         elif option.metavar == "FILE" or option.type is list:
             text = json.dumps(value)
         else:
@@ -118,16 +118,20 @@ def bounds(flag: str, values: Sequence[str], form: str) -> str:
     return "{" + ", ".join(named) + "}"
 
 
-def pairs(flag: str, values: Sequence[str]) -> str:
-    """Return pairs NAME=VALUE,... as a YAML block; a unit alone stands for that of its kind."""
+def pairs(flag: str, values: Sequence[str], kind: type) -> str:
+    """Return pairs NAME=VALUE,... as a YAML block; a unit alone stands for that of its kind.
+
+    kind  float for numbers, which stay unquoted
+    """
     # Imported here: few commands read files of other programs.
     from walkerlab.errors import ConfigError
     from walkerlab.exchange.columns import parse_pairs, parse_units
 
     try:
-        return json.dumps(parse_units(values) if flag == "--units" else parse_pairs(flag, values))
+        named = parse_units(values) if flag == "--units" else parse_pairs(flag, values)
     except ConfigError as error:
         raise typer.BadParameter(f"{error.message} {error.advice}", param_hint=flag) from None
+    return json.dumps(named) if kind is str else "{" + ", ".join(f"{k}: {value}" for k, value in named.items()) + "}"
 
 
 def own_parameter(name: str, option: "Option") -> inspect.Parameter:
@@ -135,6 +139,8 @@ def own_parameter(name: str, option: "Option") -> inspect.Parameter:
     complete = keys_to_vary if option.metavar == "KEY" else None
     declared = typer.Option(option.flag, metavar=option.metavar, help=option.help, autocompletion=complete)
     kind: Any = list[str] if "=" in option.metavar or option.type is list else option.type
+    if kind is bool:
+        declared = typer.Option(option.flag, help=option.help)
     annotation = Annotated[kind | None, declared]
     return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=annotation)
 
@@ -145,10 +151,12 @@ class Request:
 
     command  as it is typed
     own      settings of the config from options of its own
+    instead  stage that an option runs instead of the command's own; empty if there is no such option
     """
 
     command: str
     own: tuple[SetByOption, ...] = ()
+    instead: str = ""
     full: bool = option(
         "--full", default=False, help="Run the long campaign too; if interrupted, it resumes the next time."
     )
@@ -294,7 +302,8 @@ def command(
         def run(**arguments: Any) -> None:
             values = {option.flag: arguments.pop(parameter) for parameter, option in names.items()}
             settings = settings_from(sets, values)
-            request = asks(typed, settings, **{field: arguments.pop(field) for field in shared})
+            instead = next((option.runs for option in sets if option.runs and values[option.flag]), "")
+            request = asks(typed, settings, instead, **{field: arguments.pop(field) for field in shared})
             with exit_on_failure(request):
                 function(request, **arguments)
 

@@ -226,6 +226,12 @@ def identified_walker(summary: Summary) -> list[str | Table]:
     return [*identification.findings(summary), *identification.tables(summary), *lines]
 
 
+def measurements_to_make(summary: Summary) -> list[str | Table]:
+    from walkerlab.views.report.sections import plan
+
+    return [*plan.findings(summary), *plan.tables(summary)]
+
+
 def engines(summary: Summary) -> list[str | Table]:
     """Report the conclusions for each scene; `show` has every run."""
     conclusions = [
@@ -262,6 +268,7 @@ ANSWERS: dict[str, Answer] = {
     "robustness": robustness_answer,
     "design": best_walker,
     "identify": identified_walker,
+    "plan": measurements_to_make,
     "engines": engines,
     "plot": plot,
     "report": report,

@@ -1,0 +1,66 @@
+"""Errors that a walk would leave before it is measured, from derivatives of a predicted walk."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from walkerlab.physics.estimation.fit import FitProblem, linearise
+from walkerlab.physics.estimation.information import information_from
+from walkerlab.physics.estimation.measurements import MeasuredAngles
+from walkerlab.physics.estimation.mixed_model import Linearised, Noise, evaluate, products_of
+from walkerlab.physics.estimation.prediction import Forecast
+from walkerlab.physics.estimation.result import Information
+from walkerlab.physics.solvers.system import Floats
+
+
+@dataclass(frozen=True, eq=False)
+class PlannedWalk:
+    """A walk that is predicted and not measured, with its derivatives.
+
+    quantities  those that the walk could be measured by
+    step        (values,) index of the step of each value
+    """
+
+    data: Linearised
+    quantities: tuple[str, ...]
+    step: NDArray[np.int64]
+    keys: tuple[str, ...]
+    scales: Floats
+
+    def expect(
+        self, steps: int, measured: Collection[str], noise: Mapping[str, float], roughness_m: float
+    ) -> Information:
+        """Return the information on the parameters from the first steps, measured by some quantities.
+
+        noise        standard deviation by quantity
+        roughness_m  standard deviation of the floor's heights
+        """
+        deviations = np.array([noise[name] for name in self.quantities])
+        used = np.isin(self.data.quantity, [self.quantities.index(name) for name in measured])
+        rows = used & (self.step < steps)
+        data = replace(
+            self.data, residuals=self.data.residuals[rows], J=self.data.J[rows], G=self.data.G[rows],
+            quantity=self.data.quantity[rows],
+        )  # fmt: skip
+        whole = evaluate(products_of(data), Noise(deviations, roughness_m)).information
+        return information_from(whole, self.keys, self.scales, int(np.count_nonzero(rows)))
+
+
+def planned_walk(problem: FitProblem, keys: tuple[str, ...]) -> PlannedWalk | None:
+    """Predict the walk of the problem's start with its derivatives; None if it, or one beside it, ends early."""
+    forecast = problem.forecast
+    u = np.zeros(forecast.unknowns)
+    u[: forecast.scales.size] = np.array(problem.start) / forecast.scales
+    data = linearise(problem, u, np.zeros(forecast.heights), exact=True)
+    return None if data is None else PlannedWalk(data, forecast.quantities, steps_of(forecast), keys, forecast.scales)
+
+
+def steps_of(forecast: Forecast) -> NDArray[np.int64]:
+    """Return the index (values,) of the step of each value."""
+    steps = np.tile(np.arange(forecast.steps.count), len(forecast.channels))
+    measured = forecast.measured
+    return np.append(steps, np.repeat(measured.step, 2)) if isinstance(measured, MeasuredAngles) else steps

@@ -1,0 +1,58 @@
+"""The question of the block `identify`: parameters to estimate, what is known beforehand, and the models."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from walkerlab.config.identify import Identify
+from walkerlab.config.reads import ContactConfig
+from walkerlab.config.walkers import contact_required_error
+from walkerlab.errors import ConfigError
+from walkerlab.scene.families import model_reads, unused_key_error
+from walkerlab.scene.identification import Question
+from walkerlab.scene.parameter import parameter_of
+
+
+def question_of(block: Identify) -> Question:
+    return Question(
+        {key: None if bounds is None else (bounds[0], bounds[1]) for key, bounds in block.fit.items()},
+        {key: (value, sigma) for key, (value, sigma) in block.prior.items()},
+        block.nuisance,
+        block.loss,
+    )
+
+
+def models_of(block: Identify) -> tuple[str, ...]:
+    return ("rigid", "contact") if block.model == "both" else (block.model,)
+
+
+def refuse_model(config: ContactConfig, block: Identify) -> None:
+    """Raise ConfigError for the contact model of a config without contact."""
+    if "contact" in models_of(block) and config.contact is None:
+        raise contact_required_error(f"identify.model: {block.model}", config.walker, "Add one.")
+
+
+def refuse_keys(config: ContactConfig, block: Identify) -> None:
+    """Raise ConfigError for a key that is not a parameter of the models, or a value that the schema refuses."""
+    refuse_values(config, "fit", block.fit, models_of(block))
+    refuse_values(config, "prior", {key: pair[:1] for key, pair in block.prior.items()}, models_of(block))
+
+
+def refuse_values(
+    config: ContactConfig, where: str, values: Mapping[str, Sequence[float] | None], models: Sequence[str]
+) -> None:
+    asker = ("identify", where)
+    for key, own in values.items():
+        parameter = parameter_of(key, config, asker)
+        if not any(model_reads(model, config, key) for model in models):
+            raise unused_key_error(".".join(asker), key, models)
+        for value in own or ():
+            if parameter.config_at(config, value) is None:
+                raise parameter.refusal(config, value, asker)
+        if own is not None and len(own) > 1 and not own[0] <= parameter.value_in(config) <= own[1]:
+            raise ConfigError(
+                f"{'.'.join(asker)}: {key} starts at {parameter.value_in(config):g} {parameter.unit}, outside its "
+                f"bounds {own[0]:g} to {own[1]:g}",
+                "Widen the bounds, or change the start (--set).",
+                asker,
+            )

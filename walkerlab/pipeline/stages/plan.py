@@ -1,0 +1,102 @@
+"""Say which measurements would determine parameters of the walker, and with how many steps."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any, Final, cast
+
+import numpy as np
+
+from walkerlab.config.identify import Identify
+from walkerlab.config.plan import Plan
+from walkerlab.config.reads import PlanConfig
+from walkerlab.errors import ConfigError
+from walkerlab.pipeline.progress import Progress
+from walkerlab.pipeline.stages.estimated import question_of, refuse_keys, refuse_model
+from walkerlab.pipeline.store.content import Content, Group, Variable
+from walkerlab.scene.measurement_plan import Option, plan_measurements
+from walkerlab.scene.parameter import parameter_of
+
+if TYPE_CHECKING:
+    from walkerlab.config.schema import Config
+
+AXES: Final = ("measurement", "steps", "parameter")
+
+
+def run(config: PlanConfig, inputs: Mapping[str, Content], progress: Progress) -> Content:
+    """Predict the errors of several ways to measure a walk; raises ConfigError for an invalid question."""
+    refuse(config)
+    block, plan = cast("Identify", config.identify), config.plan or Plan()
+    progress.start("plan")
+    gait = inputs["fixedpoint"].summary
+    options = plan_measurements(cast("Config", config), gait, question_of(block), plan, block.model, progress.note)
+    keys = tuple(options[0].errors)
+    units = {key: parameter_of(key, config).unit for key in keys}
+    determining = next((option for option in options if None not in option.errors.values()), None)
+    summary = {
+        "model": block.model,
+        "steps": plan.steps,
+        "max_steps": plan.max_steps,
+        "measurements": [row_of(option, units, plan.errors) for option in options],
+        "simplest": None if determining is None else {
+            "measurement": determining.measurement, "start": determining.start,
+        },
+        "assumptions": plan.model_dump(mode="json", exclude={"steps", "max_steps", "errors"}),
+    }  # fmt: skip
+    return Content({"errors": curves_of(options, keys)}, summary)
+
+
+def refuse(config: PlanConfig) -> None:
+    """Raise ConfigError for an invalid question."""
+    block, plan = config.identify or Identify(), config.plan or Plan()
+    if not block.fit:
+        raise ConfigError("a plan needs a parameter to estimate.", "For example --fit walker.hip_mass_kg.")
+    if block.model == "both":
+        raise ConfigError("identify.model: both: a plan is for one model.", "Choose --model rigid or contact.")
+    refuse_model(config, block)
+    question = question_of(block)
+    refuse_keys(config, block)
+    for key in plan.errors:
+        if key not in question.keys:
+            raise ConfigError(
+                f"plan.errors: {key} is not estimated.", f"Name one of {', '.join(question.keys)}, or add --fit {key}.",
+                ("plan", "errors"),
+            )  # fmt: skip
+    if plan.steps > plan.max_steps:
+        raise ConfigError(
+            f"plan.steps: {plan.steps} exceeds plan.max_steps, {plan.max_steps}.", "Raise plan.max_steps.",
+            ("plan", "steps"),
+        )  # fmt: skip
+
+
+def row_of(option: Option, units: Mapping[str, str], wanted: Mapping[str, float]) -> dict[str, Any]:
+    errors = [
+        {"key": key, "standard_error": error, "unit": units[key]}
+        | ({"wanted": wanted[key], "steps_needed": option.steps_needed[key]} if key in wanted else {})
+        for key, error in option.errors.items()
+    ]
+    return {
+        "measurement": option.measurement,
+        "start": option.start,
+        "errors": errors,
+        "not_identifiable": [asdict(entry) for entry in option.not_identifiable],
+    }
+
+
+def curves_of(options: Sequence[Option], keys: Sequence[str]) -> Group:
+    """Store the errors by number of steps; gaps where the walk leaves a parameter open."""
+    counts = list(options[0].curve)
+    errors = [[[option.curve[count][key] for key in keys] for count in counts] for option in options]
+    return Group(
+        {
+            "steps": Variable(np.array(counts), ("steps",), "1", "number of measured steps"),
+            "standard_error": Variable(
+                np.array(errors, float),
+                AXES,
+                "SI",
+                "standard error in the key's unit; a gap where it is open",
+                missing=True,
+            ),
+        }
+    )

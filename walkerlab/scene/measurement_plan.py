@@ -1,0 +1,147 @@
+"""Plan measurements: which ones would determine parameters of a walker, and with how many steps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from walkerlab.errors import NoAnswer
+from walkerlab.physics.estimation.expectation import PlannedWalk, planned_walk
+from walkerlab.physics.estimation.information import open_combinations
+from walkerlab.physics.estimation.measurements import (
+    LEG_ANGLE,
+    STEP_LENGTH,
+    STEP_PERIOD,
+    MeasuredAngles,
+    MeasuredSteps,
+    split_into_steps,
+)
+from walkerlab.physics.estimation.prediction import DELAY
+from walkerlab.physics.estimation.result import Unidentifiable
+from walkerlab.scene.identification import ConfigFamily, Measured, Question, problem_of, step_map_of
+from walkerlab.scene.subject import ModelUnderTest, find_model_gait
+
+if TYPE_CHECKING:
+    from walkerlab.config.plan import Plan
+    from walkerlab.config.schema import Config
+
+STEP_MEASUREMENTS: Final = {
+    "periods": (STEP_PERIOD,),
+    "periods and lengths": (STEP_PERIOD, STEP_LENGTH),
+    "periods, lengths and touch angles": (STEP_PERIOD, STEP_LENGTH, LEG_ANGLE),
+}
+ANGLES: Final = "angles over time"
+AT_GAIT, OFF_GAIT = "at the gait", "off the gait"
+CURVE: Final = (2, 3, 5, 7, 10, 14, 20, 30, 50, 70, 100, 150, 200, 300, 500)
+"""Numbers of steps at which errors are listed."""
+
+
+@dataclass(frozen=True)
+class Option:
+    """A way to measure a walk, and the errors that it would leave.
+
+    errors        standard error of each key, in its unit; None where the walk leaves it open
+    steps_needed  number of steps for each key with a wanted error; None where the longest walk does not suffice
+    curve         errors by number of steps
+    """
+
+    measurement: str
+    start: str
+    errors: dict[str, float | None]
+    not_identifiable: tuple[Unidentifiable, ...]
+    steps_needed: dict[str, int | None]
+    curve: dict[int, dict[str, float | None]]
+
+
+def plan_measurements(
+    config: Config,
+    gait: Mapping[str, Any],
+    question: Question,
+    plan: Plan,
+    model: str,
+    note: Callable[[str], None] = lambda _: None,
+) -> tuple[Option, ...]:
+    """Return the errors that each way of measuring a walk would leave, simple ones first.
+
+    gait  summary of `fixedpoint` for the config
+    note  receives messages
+
+    Raises NoAnswer if the model does not walk as far, ConfigError for keys that are no parameters.
+    """
+    subject = find_model_gait(model, config, gait, note)
+    noise = {STEP_PERIOD: plan.period_noise_s, STEP_LENGTH: plan.length_noise_m, LEG_ANGLE: plan.angle_noise_rad}
+    options = []
+    for start, change in ((AT_GAIT, 0.0), (OFF_GAIT, plan.start_change)):
+        moved = replace(subject, z=subject.z * (1.0 + change))
+        steps, angles = predict_measured(moved, question, plan)
+        of_steps, of_angles = walk_of(moved, steps, question), walk_of(moved, angles, question)
+        for measurement, quantities in (*STEP_MEASUREMENTS.items(), (ANGLES, (LEG_ANGLE,))):
+            walk = of_angles if measurement == ANGLES else of_steps
+
+            def errors_after(count: int, walk: PlannedWalk = walk, quantities: tuple[str, ...] = quantities) -> Errors:
+                information = walk.expect(count, quantities, noise, plan.roughness_m)
+                combinations, left_open = open_combinations(information)
+                deviations = np.sqrt(np.diag(information.covariance)).tolist()
+                by_key = zip(question.keys, deviations, strict=True)
+                return {key: None if key in left_open else value for key, value in by_key}, combinations
+
+            counts = {*(count for count in CURVE if count <= plan.max_steps), plan.max_steps}
+            needed = {key: steps_for(key, error, errors_after, plan.max_steps) for key, error in plan.errors.items()}
+            curve = {count: errors_after(count)[0] for count in sorted(counts)}
+            options.append(Option(measurement, start, *errors_after(plan.steps), needed, curve))
+    return tuple(options)
+
+
+Errors = tuple[dict[str, float | None], tuple[Unidentifiable, ...]]
+
+
+def predict_measured(subject: ModelUnderTest, question: Question, plan: Plan) -> tuple[MeasuredSteps, MeasuredAngles]:
+    """Predict what would be measured of the walk from the subject's z; raises NoAnswer if it ends early."""
+    family = ConfigFamily(subject.config, question.keys)
+    walks, level = step_map_of(subject.model, family, subject.length_m), np.zeros(plan.max_steps + 2)
+    walk = walks.disturbed(subject.z, family.start, level)  # type: ignore[arg-type]  # values of several parameters
+    if walk.durations_s.size <= plan.max_steps:
+        raise NoAnswer(
+            f"the {subject.model} model takes {walk.durations_s.size} of {plan.max_steps + 1} steps.",
+            "Plan a shorter walk (plan.max_steps), or one that starts nearer to the gait (plan.start_change).",
+        )
+    steps = slice(plan.max_steps)
+    touches = np.append(0.0, np.cumsum(walk.durations_s[steps]))
+    times = np.arange(0.0, touches[-1], 1.0 / plan.rate_hz)
+    angles = walks.sampled(subject.z, family.start, level, times)  # type: ignore[arg-type]
+    of_steps = MeasuredSteps(walk.durations_s[steps], walk.lengths_m[steps], walk.angles_rad[steps])
+    return of_steps, split_into_steps(times, angles, touches)
+
+
+def walk_of(subject: ModelUnderTest, measured: Measured, question: Question) -> PlannedWalk:
+    """Return the predicted walk with its derivatives; raises NoAnswer if a walk beside it ends early."""
+    problem = problem_of(subject, measured, question)
+    if isinstance(measured, MeasuredAngles):
+        nuisances = tuple(dict.fromkeys((*question.nuisance, DELAY)))
+        problem = replace(problem, forecast=replace(problem.forecast, in_phase=False, nuisances=nuisances))
+    walk = planned_walk(problem, question.keys)
+    if walk is None:
+        raise NoAnswer(
+            f"a walk of the {subject.model} model beside the planned one ends early.",
+            "Plan a shorter walk (plan.max_steps), or one that starts nearer to the gait (plan.start_change).",
+        )
+    return walk
+
+
+def steps_for(key: str, wanted: float, errors_after: Callable[[int], Errors], most: int) -> int | None:
+    """Return the smallest number of steps, up to `most`, after which a key's error is at most `wanted`."""
+
+    def suffices(count: int) -> bool:
+        error = errors_after(count)[0].get(key)
+        return error is not None and error <= wanted
+
+    if not suffices(most):
+        return None
+    low, high = 0, most  # more steps never increase an error
+    while high - low > 1:
+        middle = (low + high) // 2
+        low, high = (low, middle) if suffices(middle) else (middle, high)
+    return high
