@@ -7,8 +7,10 @@ walks whose 95 % region holds the truth, with the binomial error of that share, 
 error over the spread of the estimates.
 """
 
+import os
 import sys
 import time
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -89,10 +91,23 @@ def coverage(truth, seeds):
     return np.array(inside), np.array(estimates), np.array(errors)
 
 
+def coverage_on_all_cores(name, level, walks):
+    """Return the same for seeds 0 to walks, with a process for each core."""
+    cores = os.process_cpu_count() if hasattr(os, "process_cpu_count") else os.cpu_count()
+    with ProcessPoolExecutor(cores) as pool:
+        parts = pool.map(coverage_of, [(name, level, range(core, walks, cores)) for core in range(cores)])
+        return (np.concatenate(columns) for columns in zip(*parts, strict=True))
+
+
+def coverage_of(task):
+    name, level, seeds = task
+    return coverage(Truth(name, WALKERS[name], level), seeds)
+
+
 def main(walks, level, names):
     for name in names:
         begun = time.perf_counter()
-        inside, estimates, errors = coverage(Truth(name, WALKERS[name], level), range(walks))
+        inside, estimates, errors = coverage_on_all_cores(name, level, walks)
         share, spread = inside.mean(), estimates.std(axis=0, ddof=1)
         ratios = np.sqrt((errors**2).mean(axis=0)) / spread
         print(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any, Final, Protocol
 
 import numpy as np
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from walkerlab.outcome import Outcome
 from walkerlab.physics.estimation.measurements import LEG_ANGLE, STEP_LENGTH, STEP_PERIOD, MeasuredAngles, MeasuredSteps
 from walkerlab.physics.orbits.robustness import CENTRAL_4TH
-from walkerlab.physics.orbits.step_map import CENTRAL_2ND, NO_TIMES, DisturbedWalk, VariedWalk
+from walkerlab.physics.orbits.step_map import NO_TIMES, DisturbedWalk, VariedWalk
 from walkerlab.physics.solvers.system import Floats
 
 CLOCK, OFFSET, GAIN, DELAY = "clock_rate", "angle_offset_rad", "angle_gain", "time_offset_s"
@@ -27,7 +27,8 @@ NUISANCES: Final[Mapping[str, tuple[float, float]]] = {
 FELT: Final = 1e-3  # change of the next step by a change of the start, below which a direction of the start is lost
 LAST_INSTANT: Final = 1e-9  # share of a walk before its last heel strike that counts as after it
 START_SCALE: Final = 0.02  # typical change of the start, in coordinates of the section
-QUICK_STEP: Final = 1e-5  # of an unknown's scale, in difference quotients while searching
+QUICK_STEP: Final = 1e-6  # of an unknown's scale, in difference quotients while searching
+FORWARD: Final = ((0, -1.0), (1, 1.0))
 EXACT_STEP: Final = 1e-4  # in those of the result
 
 
@@ -214,18 +215,15 @@ class Forecast:
 
     def _with_parameters(self, u: Floats, heights_m: Floats, columns: Floats, exact: bool) -> Floats | None:
         """Return the derivatives (values, unknowns): by parameters, then those of `columns` that belong to unknowns."""
-        formula, step = (CENTRAL_4TH, EXACT_STEP) if exact else (CENTRAL_2ND, QUICK_STEP)
+        formula, step = (CENTRAL_4TH, EXACT_STEP) if exact else (FORWARD, QUICK_STEP)
         starts, own = self.directions.shape[1], []
+        predict = cache(lambda place, offset: self.predict(u + offset * step * np.eye(u.size)[place], heights_m))
         for place in range(self.scales.size):
-            total = np.zeros(self.values.size)
-            for offset, weight in formula:
-                moved = u.copy()
-                moved[place] += offset * step
-                values = self.predict(moved, heights_m)
-                if values is None:
-                    return None
-                total += weight / step * values
-            own.append(total)
+            values = [predict(place if offset else 0, offset) for offset, _ in formula]
+            known = [value for value in values if value is not None]
+            if len(known) < len(values):
+                return None
+            own.append(np.tensordot([weight / step for _, weight in formula], known, 1))
         return np.column_stack((*own, columns[:, :starts], columns[:, columns.shape[1] - len(self.nuisances) :]))
 
 
