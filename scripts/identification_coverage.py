@@ -2,9 +2,9 @@
 
 Usage: python scripts/identification_coverage.py [WALKS, 1000 by default] [steps | angles] [CONFIG ...]
 
-Walks go over a rough floor from a disturbed start, and are measured with noise. Printed for each walker: the share of
-walks whose 95 % region holds the truth, with the binomial error of that share, and for each parameter the mean standard
-error over the spread of the estimates.
+Walks go over a rough floor from a disturbed start, and are measured with noise. Printed for each walker: the number of
+walks that took all steps and whose fit converged; the share of these whose 95 % region holds the truth, with the
+binomial error of that share; and for each parameter the mean standard error over the spread of the estimates.
 """
 
 import os
@@ -78,13 +78,15 @@ def region_holds(result, truth):
 
 
 def coverage(truth, seeds):
-    """Return shares covered, estimates and standard errors over the walks of these seeds."""
+    """Return whether regions cover, estimates and standard errors, over the walks of these seeds whose fit converges."""
     inside, estimates, errors = [], [], []
     for seed in seeds:
         walk = truth.walk(seed)
         if walk is None:
             continue
         result = truth.identify(*walk)
+        if result.models[0].fit == "not-converged":
+            continue
         inside.append(region_holds(result, truth.values))
         estimates.append([estimate.value for estimate in result.estimates])
         errors.append(np.sqrt(np.diag(result.information.covariance)))
@@ -111,7 +113,7 @@ def main(walks, level, names):
         share, spread = inside.mean(), estimates.std(axis=0, ddof=1)
         ratios = np.sqrt((errors**2).mean(axis=0)) / spread
         print(
-            f"{name}: {inside.size} walks, {100 * share:.1f} % inside "
+            f"{name}: {inside.size} of {walks} walks fitted, {100 * share:.1f} % inside "
             f"(+- {196 * np.sqrt(0.95 * 0.05 / inside.size):.1f} %), standard error over spread "
             f"{' '.join(f'{ratio:.2f}' for ratio in ratios)}, {time.perf_counter() - begun:.0f} s",
             flush=True,
