@@ -6,6 +6,7 @@ import math
 from typing import Final
 
 import numpy as np
+from scipy.special import ndtri, stdtr
 
 from walkerlab.physics.estimation.fit import Fitted
 from walkerlab.physics.estimation.measurements import LEG_ANGLE, MeasuredAngles
@@ -17,7 +18,7 @@ from walkerlab.physics.solvers.system import Floats
 LARGEST_SHARE: Final = 0.05  # of a quantity's size, as noise or as systematic difference
 ROUGHEST: Final = 0.02  # of the leg length
 OUTLIER: Final = 6.0  # standard deviations
-ALTERNATION: Final = 5.0  # standard errors of the difference between odd and even steps
+ALTERNATION: Final = 5.0  # standard deviations by which odd and even steps differ
 PHASE_BINS: Final = 20
 
 
@@ -45,7 +46,7 @@ def judge(forecast: Forecast, fitted: Fitted, sizes: Floats, leg_length_m: float
             return "misfit", f"{quantity} of step {worst + 1} is off by {times:.2g} times the others' scatter"
         alternation = alternation_of(own)
         if alternation > ALTERNATION:
-            return "misfit", f"{quantity} alternates from step to step by {alternation:.2g} standard errors: a limp"
+            return "misfit", f"{quantity} alternates from step to step by {alternation:.2g} standard deviations: a limp"
     if isinstance(forecast.measured, MeasuredAngles):
         return judge_phases(forecast, fitted, sizes[forecast.quantities.index(LEG_ANGLE)])
     return "fits", ""
@@ -57,12 +58,13 @@ def whitened_residuals(forecast: Forecast, fitted: Fitted) -> Floats:
 
 
 def alternation_of(residuals: Floats) -> float:
-    """Return the difference between the means of odd and even steps, in its standard errors."""
+    """Return the difference between odd and even steps, as a normal deviate as unlikely as Student's t of few steps."""
     odd, even = residuals[::2], residuals[1::2]
     if min(odd.size, even.size) < 2:
         return 0.0
     scatter = math.sqrt(odd.var(ddof=1) / odd.size + even.var(ddof=1) / even.size)
-    return abs(float(odd.mean() - even.mean())) / (scatter or math.inf)
+    t = abs(float(odd.mean() - even.mean())) / (scatter or math.inf)
+    return -float(ndtri(max(stdtr(residuals.size - 2, -t), 1e-300)))
 
 
 def judge_phases(forecast: Forecast, fitted: Fitted, size: float) -> tuple[Fit, str]:
