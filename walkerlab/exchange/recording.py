@@ -138,12 +138,16 @@ def text_of(path: Path) -> str:
 
 
 def header_of(path: Path, lines: Sequence[str]) -> tuple[int, str]:
-    """Find the header's line and the delimiter: the first row of names with a row of as many numbers behind it."""
-    for number, line in enumerate(lines[:HEADER_LINES]):
-        following = next((row for row in lines[number + 1 :] if row.strip()), "")
-        for delimiter in DELIMITERS:
-            names, cells = split_row(line, delimiter), split_row(following, delimiter)
-            alike = len(names) == len(cells) > 1 and all(names)
+    """Find the header's line and the delimiter: the first row of names with a row of as many numbers behind it.
+
+    A table of one column is recognised only where no row has several.
+    """
+    several = [(number, delimiter) for number in range(len(lines[:HEADER_LINES])) for delimiter in DELIMITERS]
+    for fewest in (2, 1):
+        for number, delimiter in several:
+            following = next((row for row in lines[number + 1 :] if row.strip()), "")
+            names, cells = split_row(lines[number], delimiter), split_row(following, delimiter)
+            alike = len(names) == len(cells) >= fewest and all(names)
             if alike and not all(map(is_number, names)) and any(map(is_number, cells)):
                 return number, delimiter
     raise ConfigError(

@@ -267,3 +267,22 @@ def test_the_page_has_a_section_that_begins_with_the_estimates(identified):
     assert part.finding.startswith("The slope is ")
     captions = [block.caption for block in part.blocks if isinstance(block, Table)]
     assert captions == ["Estimates", "Fit to the measurements"]
+
+
+def test_a_table_of_periods_alone_is_read(tmp_path):
+    path = tmp_path / "stopwatch.csv"
+    path.write_text("period_s\n0.70\n0.71\n0.70\n")
+    measured = read_measured(taken(*ask(path)).identify, taken())
+    assert measured.periods_s.tolist() == [0.70, 0.71, 0.70]
+    assert measured.lengths_m is None
+
+
+def test_the_noise_of_a_quantity_never_exceeds_its_size(tmp_path, gait):
+    """Lengths that repeat to the last digit leave no noise to them, and would leave any to the periods."""
+    path = tmp_path / "table.csv"
+    path.write_text("period_s,length_m\n" + "".join(f"{(0.59, 0.77)[k % 2]},0.0171\n" for k in range(10)))
+    fit = "identify.fit={slope_deg: [0.1, 6], walker.leg_length_m: [0.6, 2]}"
+    summary = identify.run(taken(*ask(path, fit)), gait, Silent()).summary
+    assert summary["models"][0]["fit"] == "misfit"
+    assert "the step period differs from the model by" in summary["models"][0]["reason"]
+    assert summary["noise"]["measurement"]["step_period_s"] < 0.7

@@ -29,8 +29,12 @@ def judge(forecast: Forecast, fitted: Fitted, sizes: Floats, leg_length_m: float
     """
     for quantity, noise, size in zip(forecast.quantities, fitted.noise.measurement, sizes, strict=True):
         if noise > LARGEST_SHARE * size:
+            name, unit = name_and_unit(quantity)
             share = 100.0 * noise / size
-            return "misfit", f"{quantity} differs from the model by {noise:.3g} on average, {share:.2g} % of its size"
+            return (
+                "misfit",
+                f"the {name} differs from the model by {noise:.2g} {unit} (r.m.s.), {share:.2g} % of its size",
+            )
     if fitted.why:
         return "not-converged", fitted.why
     if fitted.noise.roughness_m > ROUGHEST * leg_length_m:
@@ -38,18 +42,23 @@ def judge(forecast: Forecast, fitted: Fitted, sizes: Floats, leg_length_m: float
     white = whitened_residuals(forecast, fitted)
     steps = forecast.steps.count
     for place, quantity in enumerate(forecast.channels):
-        own = white[place * steps : (place + 1) * steps]
+        own, name = white[place * steps : (place + 1) * steps], name_and_unit(quantity)[0]
         worst = int(np.argmax(np.abs(own)))
         spread = float(np.median(np.abs(own))) * 1.4826 or 1.0
         if abs(own[worst]) > OUTLIER * max(spread, 0.3) and steps > 4:
             times = abs(own[worst]) / spread
-            return "misfit", f"{quantity} of step {worst + 1} is off by {times:.2g} times the others' scatter"
-        alternation = alternation_of(own)
-        if alternation > ALTERNATION:
-            return "misfit", f"{quantity} alternates from step to step by {alternation:.2g} standard deviations: a limp"
+            return "misfit", f"the {name} of step {worst + 1} is off by {times:.2g} times the others' scatter"
+        if (alternation := alternation_of(own)) > ALTERNATION:
+            reason = f"the {name} alternates from step to step by {alternation:.2g} standard deviations: a limp"
+            return "misfit", reason
     if isinstance(forecast.measured, MeasuredAngles):
         return judge_phases(forecast, fitted, sizes[forecast.quantities.index(LEG_ANGLE)])
     return "fits", ""
+
+
+def name_and_unit(quantity: str) -> tuple[str, str]:
+    name, _, unit = quantity.rpartition("_")
+    return name.replace("_", " "), unit
 
 
 def whitened_residuals(forecast: Forecast, fitted: Fitted) -> Floats:

@@ -23,6 +23,7 @@ NOISE_RATIO: Final = 1.0
 
 Without it a floor can explain one quantity of a short walk exactly, and its noise goes to zero.
 """
+NOISE_RANGE: Final = 1e6  # ratio of the largest standard deviation of a measurement to the smallest
 LOG_STEP: Final = 1e-4  # in derivatives of the restricted likelihood by logarithms
 LOST_INFORMATION: Final = 1e-13  # share of the largest eigenvalue of scaled information, below which it is rounding
 
@@ -123,7 +124,7 @@ def estimate_noise(products: Products, floors: Floats, leg_length_m: float, star
 
     best, most = start, -math.inf
     low, high = (math.log(share * leg_length_m) for share in ROUGHNESS_BOUNDS)
-    bounds = [(math.log(floor), math.log(floor) + 40.0) for floor in floors]
+    bounds = [(math.log(floor), math.log(floor * NOISE_RANGE)) for floor in floors]
     middle = np.maximum(start.measurement, 2.0 * floors)
     near = start.roughness_m / leg_length_m
     for share in (*(ROUGHNESS_STARTS if anew or near == 0.0 else (near,)), 0.0):
