@@ -2,8 +2,8 @@
 
 Usage: python scripts/film_in_mujoco.py [FILE, docs/downloads/film.csv by default]
 
-MuJoCo steps the exported model with its own contact. The film begins late, its clock is fast by 0.2 %, its angles are in
-degrees, and have an error of 0.15 degrees each.
+MuJoCo steps the exported model with its own contact. The film begins within a step, its clock is fast by 0.2 %, and its
+angles, in degrees, have errors of 0.15 degrees.
 """
 
 import math

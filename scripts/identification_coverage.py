@@ -78,7 +78,7 @@ def region_holds(result, truth):
 
 
 def coverage(truth, seeds):
-    """Return whether regions cover, estimates and standard errors, over the walks of these seeds whose fit converges."""
+    """Return whether regions cover, estimates and standard errors of the walks of these seeds whose fit converges."""
     inside, estimates, errors = [], [], []
     for seed in seeds:
         walk = truth.walk(seed)

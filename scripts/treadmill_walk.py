@@ -2,9 +2,9 @@
 
 Usage: python scripts/treadmill_walk.py RAWDATA [FILE, docs/downloads/treadmill.csv by default]
 
-RAWDATA is gaitanalysis/octave/2d_inverse_dynamics/test/rawdata.txt of its source distribution (Apache-2.0): planar markers
-of the right side of a person at 100 Hz. A leg is the line from the trochanter to the ankle. The left leg was not
-recorded; it is taken to do the same half a stride later.
+RAWDATA is gaitanalysis/octave/2d_inverse_dynamics/test/rawdata.txt of its source distribution (Apache-2.0): planar
+markers of the right side of a person at 100 Hz. A leg is the line from the trochanter to the ankle. The left leg was
+not recorded; it is taken to do the same half a stride later.
 """
 
 import sys
@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 TIME, HIP, ANKLE, FORCE = 0, (3, 4), (7, 8), 14
-ON_GROUND_N = 50.0  # per kg of body mass times 10, as the file has it
+ON_GROUND_N = 50.0  # vertical force under the foot
 
 
 def read(path):
