@@ -37,6 +37,7 @@ Measured = MeasuredSteps | MeasuredAngles
 Values = tuple[float, ...]
 CONFIGS_AT_ONCE: Final = 512
 SCALE_OF_ZERO: Final = 0.01  # typical change of a parameter that is 0
+AT_BOUND: Final = 1e-6  # distance from a bound, in the scale of the parameter, that counts as at it
 SPREAD_OF_STARTS: Final = 0.1  # of a parameter, between starts of the fit
 GAIT_EFFORT: Final = Effort(1e-9, 40)
 GAIT_NAMES: Final = ("period_s", "step_length_m", "spectral_radius")
@@ -227,10 +228,10 @@ def describe(subject: ModelUnderTest, question: Question, steps: Fit, best: Fit)
             None if key in left_open else error,
             parameter_of(key, subject.config).unit,
             start,
-            any(math.isclose(value, bound, rel_tol=1e-6, abs_tol=1e-12) for bound in bounds),
+            any(abs(value - bound) <= AT_BOUND * scale for bound in bounds),
         )
-        for key, value, error, start, bounds in zip(
-            keys, forecast.parameters(fitted.u), errors, problem.start, problem.bounds, strict=True
+        for key, value, error, start, bounds, scale in zip(
+            keys, forecast.parameters(fitted.u), errors, problem.start, problem.bounds, forecast.scales, strict=True
         )
     )
     verdicts = [

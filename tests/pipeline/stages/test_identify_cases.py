@@ -1,0 +1,58 @@
+"""The walks of docs/identify-cases.md: the answers that it states."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+import walkerlab
+
+DOCS = Path(__file__).parents[3] / "docs"
+PAGE = " ".join((DOCS / "identify-cases.md").read_text(encoding="utf-8").replace("> ", "").split())
+
+
+def identify(name, fit, level, **options):
+    return walkerlab.identify(DOCS / "downloads" / name, "paper", fit, level=level, **options).summary
+
+
+def test_the_rigid_model_fits_the_film_with_a_hip_too_light():
+    prior = {"walker.leg_length_m": [1.0, 0.001]}
+    fit = ["slope_deg", "walker.hip_mass_kg"]
+    summary = identify("film.csv", fit, "angles", prior=prior, nuisance=["clock_rate"])
+    slope, hip, _ = summary["estimates"]
+    assert summary["models"][0]["fit"] == "fits"
+    assert f"{slope['value']:.3f} ± {slope['standard_error']:.3f}" in PAGE
+    assert f"{hip['value']:.2f} ± {hip['standard_error']:.2f}" in PAGE
+
+
+@pytest.mark.parametrize(
+    ("name", "level", "fit"),
+    [
+        ("treadmill.csv", "angles", ["slope_deg", "walker.leg_length_m"]),
+        (
+            "table-3.csv",
+            "steps",
+            {
+                "slope_deg": [0.1, 6],
+                "walker.hip_mass_kg": [1, 30],
+                "walker.leg_length_m": [0.6, 2],
+                "walker.foot_to_mass_m": [0.1, 0.59],
+            },
+        ),
+    ],
+)
+def test_no_walker_explains_a_person_or_the_papers_tables(name, level, fit):
+    summary = identify(name, fit, level)
+    verdict = summary["models"][0]
+    assert verdict["fit"] == "misfit"
+    assert verdict["reason"] in PAGE
+
+
+def test_the_person_takes_a_step_of_six_tenths_of_a_second():
+    walk = walkerlab.read_walk(DOCS / "downloads" / "treadmill.csv")
+    assert walk.summary["steps"] == 3
+    assert walk.summary["step_periods_s"] == pytest.approx([0.597] * 3, abs=0.02)
+
+
+def test_the_page_repeats_the_answer_word_for_word():
+    assert len(re.findall(r"No walker that differs from the start by", PAGE)) == 2
