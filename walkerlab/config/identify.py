@@ -35,6 +35,7 @@ class Identify(Block):
         (), "", "properties of clock and sensors to estimate too", bounds=f"a list of {', '.join(get_args(Nuisance))}"
     )
     model: Literal["rigid", "contact", "both"] = key("rigid", "", "model to fit")
+    starts: int = key(1, "1", "starts of the fit: the config's values, the rest up to 10 % beside them", ge=1, le=100)
     loss: Literal["linear", "soft_l1"] = key(
         "linear", "", "linear: least squares; soft_l1: outliers count by their size, not its square"
     )

@@ -19,6 +19,7 @@ def question_of(block: Identify) -> Question:
         {key: (value, sigma) for key, (value, sigma) in block.prior.items()},
         block.nuisance,
         block.loss,
+        block.starts,
     )
 
 
