@@ -60,7 +60,11 @@ def read_angles(path: Path, block: Identify, config: RigidConfig) -> MeasuredAng
     steps = divide_into_steps(walk, rigid_walker(config), str(path))
     if steps.touch_time_s.size < MIN_STEPS:
         raise ConfigError(f"{path} has 1 complete step; at least {MIN_STEPS} are needed.", "Record a longer walk.")
-    return split_into_steps(steps.time_s, steps.angle_rad, np.append(0.0, steps.touch_time_s))
+    angles = walk.both_legs("angle")
+    assert angles is not None, "a walk in steps has angles"
+    # only what was measured: the steps' own samples at heel strikes are interpolated
+    own = angles[:, ::-1] if steps.swapped else angles
+    return split_into_steps(walk.time_s - steps.origin_s, own, np.append(0.0, steps.touch_time_s))
 
 
 def read_steps(path: Path, block: Identify) -> MeasuredSteps:
