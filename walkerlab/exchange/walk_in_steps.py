@@ -35,6 +35,8 @@ SPLINE_DEGREE: Final = 5
 INTERVALS: Final = 24  # of the spline through a step
 MOST_SAMPLES: Final = 250  # of a step, that are kept
 LONGEST_GAP: Final = 1 / 8  # of a step's duration, between two samples
+PLAUSIBLE: Final = (1e-6, 1e6)
+"""Shortest and longest step, in s or m; values beyond are damaged, or in another unit."""
 SIDE: Final = 1e-10  # share of the walk's duration before a heel strike, of the sample that ends a step
 
 
@@ -91,15 +93,31 @@ def divide_into_steps(walk: RecordedWalk, model: RigidModel, source: str) -> Rec
         origin, ends = touches[0].time_s, touches[1:]
     else:
         origin = float(walk.time_s[0])
-        ends = [touch for touch in touches if touch.time_s > origin + SHORTEST * touches[-1].time_s / len(touches)]
+        mean_step = (touches[-1].time_s - origin) / len(touches) if touches else 0.0
+        ends = [touch for touch in touches if touch.time_s > origin + SHORTEST * mean_step]
     if not ends:
         raise ConfigError(
-            f"{source} holds no complete step; heel strikes found: {len(touches)}.",
-            "Angles are from the vertical, positive with the foot ahead (--columns), in the right unit (--units), over "
-            "at least one whole step.",
+            f"{source} holds no complete step; heel strikes found: {len(touches)}; the largest angle is "
+            f"{largest:.3g} rad.",
+            "Angles are from the vertical, positive with the foot ahead (--columns), in the right unit (--units), "
+            "without outliers, over at least one whole step.",
         )
+    refuse_duration((ends[-1].time_s - origin) / len(ends), source)
     refuse_gaps(walk.time_s, [origin, *(touch.time_s for touch in ends)], source)
     return divided(walk, angle, model, origin, ends, swapped=ends[0].leg == 1)
+
+
+def is_plausible(size: float) -> bool:
+    """Return whether a step can take so many seconds, or be so many metres long."""
+    return PLAUSIBLE[0] <= size <= PLAUSIBLE[1]
+
+
+def refuse_duration(step_s: float, source: str) -> None:
+    if not is_plausible(step_s):
+        raise ConfigError(
+            f"{source}: its steps take {step_s:.3g} s, which no walker does.",
+            "Say in which unit time is, such as --units time=ms.",
+        )
 
 
 def refuse_gaps(time: Array, touches: list[float], source: str) -> None:

@@ -67,6 +67,37 @@ def test_degrees_noise_drops_an_offset_and_swapped_legs_change_little(tmp_path):
     assert read.summary["scatter_rad"] == pytest.approx(5e-4, rel=0.5)
 
 
+@pytest.mark.parametrize("delay", [100.0, 1.7e9])
+def test_a_clock_that_starts_anywhere_loses_no_step(tmp_path, delay):
+    """Clocks of cameras count from when they were switched on, or from 1970."""
+    lines = table(simulated("rigid"), every=4).splitlines()
+    rows = [line.split(",", 1) for line in lines[1:]]
+    later = [f"{float(time) + delay:.9f},{angles}" for time, angles in rows]
+    steps = [
+        walkerlab.read_walk(written(tmp_path, "\n".join([lines[0], *body]))).summary for body in (lines[1:], later)
+    ]
+    assert steps[1]["steps"] == steps[0]["steps"]
+    assert steps[1]["step_periods_s"] == pytest.approx(steps[0]["step_periods_s"], abs=1e-5)
+
+
+@pytest.mark.parametrize("factor", [1e-200, 1e9])
+def test_steps_of_an_impossible_duration_are_refused(tmp_path, factor):
+    lines = table(simulated("rigid")).splitlines()
+    rows = [line.split(",", 1) for line in lines[1:]]
+    body = [f"{factor * float(time):.12g},{angles}" for time, angles in rows]
+    with pytest.raises(ConfigError, match=r"its steps take .* s, which no walker does"):
+        walkerlab.read_walk(written(tmp_path, "\n".join([lines[0], *body])))
+
+
+def test_a_single_outlier_is_named_where_it_hides_the_steps(tmp_path):
+    lines = table(simulated("rigid")).splitlines()
+    time, _, other = lines[200].split(",")
+    lines[200] = f"{time},3.0,{other}"
+    with pytest.raises(ConfigError, match="the largest angle is 3 rad") as raised:
+        walkerlab.read_walk(written(tmp_path, "\n".join(lines)))
+    assert "without outliers" in raised.value.advice
+
+
 def test_a_recording_that_begins_within_a_step_starts_at_its_first_heel_strike(tmp_path):
     walk = simulated("rigid")
     lines = table(walk).splitlines()

@@ -33,7 +33,7 @@ def judge(forecast: Forecast, fitted: Fitted, sizes: Floats, leg_length_m: float
             share = 100.0 * noise / size
             return (
                 "misfit",
-                f"the {name} differs from the model by {noise:.2g} {unit} (r.m.s.), {share:.2g} % of its size",
+                f"the {name} differs from the model by {noise:.2g} {unit} (r.m.s.), {share:.0f} % of its size",
             )
     if fitted.why:
         return "not-converged", fitted.why

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Final
 
 from walkerlab.config.identify import Identify
 from walkerlab.config.reads import ContactConfig
 from walkerlab.config.walkers import contact_required_error
 from walkerlab.errors import ConfigError
 from walkerlab.scene.families import model_reads, unused_key_error
-from walkerlab.scene.identification import Question
+from walkerlab.scene.identification import SCALE_OF_ZERO, Question
 from walkerlab.scene.parameter import parameter_of
+
+EXACT: Final = 1e-9  # standard deviation of a prior, in its value's size, below which the value counts as known exactly
 
 
 def question_of(block: Identify) -> Question:
@@ -37,6 +40,13 @@ def refuse_keys(config: ContactConfig, block: Identify) -> None:
     """Raise ConfigError for a key that is not a parameter of the models, or a value that the schema refuses."""
     refuse_values(config, "fit", block.fit, models_of(block))
     refuse_values(config, "prior", {key: pair[:1] for key, pair in block.prior.items()}, models_of(block))
+    for key, (value, sigma) in block.prior.items():
+        if sigma < EXACT * (abs(value) or SCALE_OF_ZERO):
+            raise ConfigError(
+                f"identify.prior: {key} has a standard deviation of {sigma:g}, too small for its value, {value:g}.",
+                f"A value that is known exactly belongs in the config (--set {key}={value:g}), without --prior.",
+                ("identify", "prior"),
+            )
 
 
 def refuse_values(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 from collections.abc import Mapping
 from difflib import get_close_matches
 from pathlib import Path
@@ -13,7 +14,8 @@ import numpy as np
 from walkerlab.errors import ConfigError
 from walkerlab.exchange.columns import as_walk, plain, unit_value
 from walkerlab.exchange.recording import TIME, Recording, read_delimited, read_recording
-from walkerlab.exchange.walk_in_steps import divide_into_steps
+from walkerlab.exchange.walk_in_steps import PLAUSIBLE, divide_into_steps, is_plausible
+from walkerlab.labels import unit_by_name
 from walkerlab.physics.estimation.measurements import MeasuredAngles, MeasuredSteps, split_into_steps
 from walkerlab.physics.solvers.system import Floats
 from walkerlab.scene.rigid import rigid_walker
@@ -26,6 +28,7 @@ if TYPE_CHECKING:
 STEP_KINDS: Final = {"period_s": "time", "length_m": "length", "touch_angle_rad": "angle"}
 """Kind of unit of each quantity of a table of steps."""
 MIN_STEPS: Final = 2
+MOST_STEPS: Final = 500  # each has a floor height of its own: memory grows with their square, time with their cube
 NO_DATA_FILE: Final = "there is no such file"
 
 
@@ -49,9 +52,14 @@ def read_measured(block: Identify, config: RigidConfig) -> MeasuredSteps | Measu
             ("identify", "data"),
         )
     try:
-        return read_steps(path, block) if block.level == "steps" else read_angles(path, block, config)
+        measured = read_steps(path, block) if block.level == "steps" else read_angles(path, block, config)
     except OSError as error:
         raise ConfigError(f"{path} cannot be read: {error.strerror or error}.", "Check the path.") from error
+    if measured.count > MOST_STEPS:
+        raise ConfigError(
+            f"{path} has {measured.count} steps; at most {MOST_STEPS} are fitted at once.", "Cut it into shorter walks."
+        )
+    return measured
 
 
 def read_angles(path: Path, block: Identify, config: RigidConfig) -> MeasuredAngles:
@@ -110,4 +118,20 @@ def read_column(table: Recording, name: str, block: Identify) -> Floats | None:
             f"{table.path}: {source!r} is {values[bad[0]]:g} in step {bad[0] + 1}; it must be above 0.",
             "Correct it, or leave out the step and those before it.",
         )
-    return np.asarray(values * unit_value(table, name, source, STEP_KINDS[name], block.units))
+    in_si = np.asarray(values * unit_value(table, name, source, STEP_KINDS[name], block.units))
+    refuse_sizes(table, name, source, in_si)
+    return in_si
+
+
+def refuse_sizes(table: Recording, name: str, source: str, values: Floats) -> None:
+    """Raise ConfigError for values (steps,) in SI units that no step has."""
+    angle = name == "touch_angle_rad"
+    possible = [abs(value) <= math.pi if angle else is_plausible(value) for value in values.tolist()]
+    if all(possible):
+        return
+    step, unit = possible.index(False), unit_by_name(name)
+    allowed = "up to half a turn" if angle else f"{PLAUSIBLE[0]:g} to {PLAUSIBLE[1]:g} {unit}"
+    raise ConfigError(
+        f"{table.path}: {source!r} is {values[step]:.3g} {unit} in step {step + 1}; possible: {allowed}.",
+        f"Correct it, or say its unit: --units {name}=UNIT.",
+    )

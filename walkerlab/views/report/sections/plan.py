@@ -39,9 +39,9 @@ def goal(rows: list[Mapping[str, Any]], place: int, most: int) -> str:
     if not reached:
         return f"The {wanted}: {whole(most)} steps do not suffice."
     best = min(reached, key=lambda row: row["errors"][place]["steps_needed"])
-    return (
-        f"The {wanted}: {whole(best['errors'][place]['steps_needed'])} steps of {best['measurement']}, {best['start']}."
-    )
+    needed = best["errors"][place]["steps_needed"]
+    steps = "1 step" if needed == 1 else f"{whole(needed)} steps"
+    return f"The {wanted}: {steps} of {best['measurement']}, {best['start']}."
 
 
 def tables(summary: Mapping[str, Any]) -> list[Table]:
