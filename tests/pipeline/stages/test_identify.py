@@ -18,6 +18,7 @@ from walkerlab.pipeline.stages.measured_walk import NO_DATA_FILE, digests, read_
 from walkerlab.views.cli.main import program
 from walkerlab.views.figures.registry import FIGURES
 from walkerlab.views.report.answers import answer
+from walkerlab.views.report.blocks import Player
 from walkerlab.views.report.results import Results
 from walkerlab.views.report.sections.identification import section
 from walkerlab.views.report.tables import Table
@@ -267,3 +268,51 @@ def test_the_page_has_a_section_that_begins_with_the_estimates(identified):
     assert part.finding.startswith("The slope is ")
     captions = [block.caption for block in part.blocks if isinstance(block, Table)]
     assert captions == ["Estimates", "Fit to the measurements"]
+
+
+@pytest.fixture(scope="module")
+def from_angles(transient, gait, tmp_path_factory):
+    """The walker identified from angles of the transient."""
+    samples, path = transient.groups["trajectory"], tmp_path_factory.mktemp("film") / "angles.csv"
+    time, angle = samples["time"], samples["angle"]
+    rising = np.append(True, np.diff(time) > 0.0) & (time < 4.0)
+    lines = (f"{t!r},{a!r},{b!r}" for t, (a, b) in zip(time[rising].tolist(), angle[rising].tolist(), strict=True))
+    path.write_text("time (s),angle 1 (rad),angle 2 (rad)\n" + "\n".join(lines))
+    changes = ask(path, "identify.level=angles", "identify.fit={slope_deg: null}")
+    return identify.run(taken(*changes), gait, Silent())
+
+
+def test_both_motions_are_where_the_walk_was(from_angles, transient):
+    walk = transient.groups["trajectory"]
+    for name in ("identified_motion", "measured_motion"):
+        motion = from_angles.groups[name]
+        assert set(motion["step"].tolist()) == set(range(from_angles.summary["steps"]))
+        inside = slice(5, -5)
+        for along in ("hip_along_m", "hip_height_m"):
+            expected = np.interp(motion["time"], walk["time"], walk[along])
+            assert np.allclose(motion[along][inside], expected[inside], atol=5e-3), (name, along)
+        assert motion["foot_height_m"].min() > -2e-3
+
+
+def test_the_page_overlays_the_measured_walk_on_the_identified_one(from_angles):
+    (player,) = (
+        block
+        for block in section(Results(load(Path("paper"), ()).config, {"identify": from_angles})).blocks
+        if isinstance(block, Player)
+    )
+    assert [(walker.name, walker.style) for walker in player.walkers] == [
+        ("Identified walk", "rigid"),
+        ("Measured walk", "contact"),
+    ]
+    assert not player.shows_forces
+
+
+def test_steps_alone_are_not_overlaid(identified):
+    part = section(Results(load(Path("paper"), ()).config, {"identify": identified}))
+    assert not any(isinstance(block, Player) for block in part.blocks)
+
+
+def test_worst_combinations_spread_as_the_covariance(identified):
+    moves = identified.groups["worst"]["moves"]
+    # of two parameters, both combinations are the whole covariance
+    assert np.allclose(moves.T @ moves, identified.groups["covariance"]["covariance"], rtol=1e-9)

@@ -235,7 +235,7 @@ def steps_of_walk(folder: RunFolder, model: str, console: Console) -> bytes:
 def touch_angles(steps: Group, trajectory: Group) -> NDArray[np.float64]:
     """Read the angle (steps,) of the leg that touches at the end of each step; leg 1 touches first."""
     legs = [np.interp(steps["touch_time_s"], trajectory["time"], leg) for leg in trajectory["angle"].T]
-    return np.where(np.arange(steps["touch_time_s"].size) % 2 == 0, *legs)
+    return np.asarray(np.where(np.arange(steps["touch_time_s"].size) % 2 == 0, *legs))
 
 
 def trajectory(folder: RunFolder, model: str, kind: str, console: Console) -> bytes:

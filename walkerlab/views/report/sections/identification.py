@@ -8,6 +8,7 @@ from walkerlab.labels import axis_label, join_words, unit_by_name
 from walkerlab.views.report.blocks import PageBlock, Paragraph, Section
 from walkerlab.views.report.numbers import fixed, number, quantity
 from walkerlab.views.report.results import Results, stage_section
+from walkerlab.views.report.sections import motion
 from walkerlab.views.report.tables import Column, Table, table
 from walkerlab.views.report.words import words
 
@@ -37,9 +38,9 @@ QUALITY_COLUMNS = (
 
 
 @stage_section("identify", "estimates")
-def section(_results: Results, summary: Mapping[str, Any]) -> Section | None:
+def section(results: Results, summary: Mapping[str, Any]) -> Section | None:
     first, *rest = findings(summary)
-    blocks: tuple[PageBlock, ...] = (Paragraph(" ".join(rest)), *tables(summary))
+    blocks: tuple[PageBlock | None, ...] = (Paragraph(" ".join(rest)), *tables(summary), motion.overlay(results))
     return Section.of("identification", "Identified walker", blocks, first)
 
 
