@@ -94,9 +94,9 @@ def test_the_summary_has_the_fixed_keys_and_is_json(identified):
 
 def test_the_answer_says_masses_as_a_builder_does(identified):
     text = " ".join(" ".join(answer("identify", identified.summary)).split())
-    assert "the hip weighs " in text
-    assert " kg, if the leg weighs 5 kg" in text
-    assert "The slope is " in text
+    assert "The hip weighs " in text
+    assert " kg if the legs weigh 5 kg each" in text
+    assert "each; the slope is " in text
     assert " degrees" in text
 
 
@@ -124,7 +124,8 @@ def test_two_masses_of_a_rigid_walk_are_reported_as_one_combination(table, gait)
     assert [row["standard_error"] for row in summary["estimates"]] == [None, None]
     assert len(summary["not_identifiable"]) == 1
     text = " ".join(" ".join(answer("identify", summary)).split())
-    combination = text.partition("Not determined by this walk: ")[2].partition(";")[0]
+    assert "Leg mass and hip mass cannot be separated by this walk (" in text
+    combination = text.partition("by this walk (")[2].partition(";")[0]
     assert all(row["key"] in combination for row in summary["estimates"])
     assert "No walk would separate them; a value known beforehand (--prior) does." in text
 
@@ -265,7 +266,7 @@ def test_a_misspelt_key_is_answered_with_the_nearest(tmp_path):
 def test_the_page_has_a_section_that_begins_with_the_estimates(identified):
     part = section(Results(load(Path("paper"), ()).config, {"identify": identified}))
     assert part is not None
-    assert part.finding.startswith("The slope is ")
+    assert part.finding.startswith("The hip weighs ")
     captions = [block.caption for block in part.blocks if isinstance(block, Table)]
     assert captions == ["Estimates", "Fit to the measurements"]
 

@@ -113,7 +113,7 @@ def draw_trade_off(results: Results) -> Drawn:
     for move, name, style in zip(reach, (worst, next_worst), ("-", "--"), strict=True):
         axes.plot(*np.array([centre - move, centre + move]).T, color=BLACK, linewidth=1.2, linestyle=style)
         key.append(entry(name, color=BLACK, linewidth=1.2, linestyle=style))
-    axes.plot(*centre, marker="o", color=BLACK)
+    axes.plot(*centre, marker="o", markersize=4.0, color=BLACK)
     labels = (label_of(axis_label(rows[place]["key"]), rows[place]["unit"]) for place in pair)
     axes.set(**dict(zip(("xlabel", "ylabel"), labels, strict=True)))
     add_legend(figure, key)
