@@ -254,6 +254,8 @@ def describe(subject: ModelUnderTest, question: Question, steps: Fit, best: Fit)
         (ModelFit(subject.model, fitted.evaluation.likelihood, fit_word, reason),),
         step_tables(steps),
         fitted,
+        forecast.walks.disturbed(forecast.start(fitted.u), forecast.parameters(fitted.u), fitted.heights_m),
+        forecast.sensors(fitted.u),
     )
 
 

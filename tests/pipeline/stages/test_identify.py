@@ -18,6 +18,7 @@ from walkerlab.pipeline.stages.measured_walk import NO_DATA_FILE, digests, read_
 from walkerlab.views.cli.main import program
 from walkerlab.views.figures.registry import FIGURES
 from walkerlab.views.report.answers import answer
+from walkerlab.views.report.blocks import Player
 from walkerlab.views.report.results import Results
 from walkerlab.views.report.sections.identification import section
 from walkerlab.views.report.tables import Table
@@ -93,9 +94,9 @@ def test_the_summary_has_the_fixed_keys_and_is_json(identified):
 
 def test_the_answer_says_masses_as_a_builder_does(identified):
     text = " ".join(" ".join(answer("identify", identified.summary)).split())
-    assert "the hip weighs " in text
-    assert " kg, if the leg weighs 5 kg" in text
-    assert "The slope is " in text
+    assert "The hip weighs " in text
+    assert " kg if the legs weigh 5 kg each" in text
+    assert "each; the slope is " in text
     assert " degrees" in text
 
 
@@ -123,7 +124,8 @@ def test_two_masses_of_a_rigid_walk_are_reported_as_one_combination(table, gait)
     assert [row["standard_error"] for row in summary["estimates"]] == [None, None]
     assert len(summary["not_identifiable"]) == 1
     text = " ".join(" ".join(answer("identify", summary)).split())
-    combination = text.partition("Not determined by this walk: ")[2].partition(";")[0]
+    assert "Leg mass and hip mass cannot be separated by this walk (" in text
+    combination = text.partition("by this walk (")[2].partition(";")[0]
     assert all(row["key"] in combination for row in summary["estimates"])
     assert "No walk would separate them; a value known beforehand (--prior) does." in text
 
@@ -267,7 +269,7 @@ def test_a_misspelt_key_is_answered_with_the_nearest(tmp_path):
 def test_the_page_has_a_section_that_begins_with_the_estimates(identified):
     part = section(Results(load(Path("paper"), ()).config, {"identify": identified}))
     assert part is not None
-    assert part.finding.startswith("The slope is ")
+    assert part.finding.startswith("The hip weighs ")
     captions = [block.caption for block in part.blocks if isinstance(block, Table)]
     assert captions == ["Estimates", "Fit to the measurements"]
 
@@ -289,3 +291,51 @@ def test_the_noise_of_a_quantity_never_exceeds_its_size(tmp_path, gait):
     assert summary["models"][0]["fit"] == "misfit"
     assert "the step period differs from the model by" in summary["models"][0]["reason"]
     assert summary["noise"]["measurement"]["step_period_s"] < 0.7
+
+
+@pytest.fixture(scope="module")
+def from_angles(transient, gait, tmp_path_factory):
+    """The walker identified from angles of the transient."""
+    samples, path = transient.groups["trajectory"], tmp_path_factory.mktemp("film") / "angles.csv"
+    time, angle = samples["time"], samples["angle"]
+    rising = np.append(True, np.diff(time) > 0.0) & (time < 4.0)
+    lines = (f"{t!r},{a!r},{b!r}" for t, (a, b) in zip(time[rising].tolist(), angle[rising].tolist(), strict=True))
+    path.write_text("time (s),angle 1 (rad),angle 2 (rad)\n" + "\n".join(lines))
+    changes = ask(path, "identify.level=angles", "identify.fit={slope_deg: null}")
+    return identify.run(taken(*changes), gait, Silent())
+
+
+def test_both_motions_are_where_the_walk_was(from_angles, transient):
+    walk = transient.groups["trajectory"]
+    for name in ("identified_motion", "measured_motion"):
+        motion = from_angles.groups[name]
+        assert set(motion["step"].tolist()) == set(range(from_angles.summary["steps"]))
+        inside = slice(5, -5)
+        for along in ("hip_along_m", "hip_height_m"):
+            expected = np.interp(motion["time"], walk["time"], walk[along])
+            assert np.allclose(motion[along][inside], expected[inside], atol=5e-3), (name, along)
+        assert motion["foot_height_m"].min() > -2e-3
+
+
+def test_the_page_overlays_the_measured_walk_on_the_identified_one(from_angles):
+    (player,) = (
+        block
+        for block in section(Results(load(Path("paper"), ()).config, {"identify": from_angles})).blocks
+        if isinstance(block, Player)
+    )
+    assert [(walker.name, walker.style) for walker in player.walkers] == [
+        ("Identified walk", "rigid"),
+        ("Measured walk", "contact"),
+    ]
+    assert not player.shows_forces
+
+
+def test_steps_alone_are_not_overlaid(identified):
+    part = section(Results(load(Path("paper"), ()).config, {"identify": identified}))
+    assert not any(isinstance(block, Player) for block in part.blocks)
+
+
+def test_worst_combinations_spread_as_the_covariance(identified):
+    moves = identified.groups["worst"]["moves"]
+    # of two parameters, both combinations are the whole covariance
+    assert np.allclose(moves.T @ moves, identified.groups["covariance"]["covariance"], rtol=1e-9)

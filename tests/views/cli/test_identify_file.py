@@ -3,7 +3,13 @@
 import json
 from pathlib import Path
 
+import h5py
+import numpy as np
+import pytest
+
+from walkerlab.config.identify import Identify
 from walkerlab.config.loader import load
+from walkerlab.pipeline.stages.measured_walk import read_steps
 
 WALK = ("--set", "start=[-0.20477, 0.17, -0.35, -0.9]")
 FIT = ("--fit", "walker.hip_mass_kg=5:20", "--set", "walker.hip_mass_kg=9")
@@ -13,7 +19,7 @@ def test_exported_steps_are_identified_and_written_as_a_config(walker):
     assert walker("simulate", *WALK, "--name", "walk").returncode == 0
     assert walker("export", "walk", "steps", "--model", "simulate", "-o", "steps.csv").stdout.split() == ["steps.csv"]
     data = walker.folder / "steps.csv"
-    assert data.read_text().startswith("period_s,length_m\n")
+    assert data.read_text().startswith("period_s,length_m,touch_angle_rad\n")
 
     done = walker("identify", "--data", "steps.csv", *FIT, "--json")
     assert done.returncode == 0, done.stderr
@@ -39,6 +45,25 @@ def test_exported_steps_are_identified_and_written_as_a_config(walker):
     assert status.returncode == 5
     assert "identify" in status.stdout
     assert not json.loads(walker("identify", "--data", "steps.csv", *FIT, "--json").stdout)["reused"]
+
+
+@pytest.mark.parametrize(
+    ("config", "model"), [("paper", "simulate"), ("round-feet", "simulate"), ("paper", "contact-sim")]
+)
+def test_exported_steps_are_read_back_as_the_walk_that_was_stored(walker, config, model):
+    assert walker(model, "-c", config, "--set", "strides=4", "--name", "walk").returncode == 0
+    assert walker("export", "walk", "steps", "--model", model, "--to", "csv", "-o", "steps.csv").returncode == 0
+    measured = read_steps(walker.folder / "steps.csv", Identify())
+    with h5py.File(walker.folder / "runs" / "walk" / f"{model}.h5") as file:
+        steps, angle = file["steps"], file["trajectory/angle"][:]
+        assert measured.periods_s.tolist() == steps["period_s"][:].tolist()
+        assert measured.lengths_m.tolist() == steps["length_m"][:].tolist()
+        if "state_after" in steps:
+            assert measured.touch_angles_rad == pytest.approx(steps["state_after"][:, 1], abs=1e-12)
+        # the sample nearest in time, which is up to half an interval away
+        nearest = [int(np.abs(file["trajectory/time"][:] - time).argmin()) for time in steps["touch_time_s"][:]]
+        legs = np.arange(len(nearest)) % 2
+        assert measured.touch_angles_rad == pytest.approx(angle[nearest, legs], abs=0.01)
 
 
 def test_a_missing_file_is_refused_as_it_was_typed(walker):

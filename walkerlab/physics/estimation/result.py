@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from walkerlab.physics.estimation.fit import Fitted
+from walkerlab.physics.orbits.step_map import DisturbedWalk
 from walkerlab.physics.solvers.system import Floats
 
 Fit = Literal["fits", "misfit", "not-converged"]
@@ -98,3 +99,5 @@ class Identification:
     models: tuple[ModelFit, ...]
     tables: tuple[StepTable, ...]
     fitted: Fitted = field(repr=False)
+    walk: DisturbedWalk = field(repr=False)  # over the most probable floor
+    sensors: dict[str, float]  # properties of clock and sensors, as `prediction.NUISANCES`

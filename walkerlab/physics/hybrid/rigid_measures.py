@@ -1,12 +1,12 @@
 """Energies and forces along a recorded walk of the rigid model."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from walkerlab.physics.hybrid.recorded_walk import RigidWalkResult, Samples
+from walkerlab.physics.hybrid.recorded_walk import RigidWalkResult
 from walkerlab.physics.hybrid.walk_record import Array
 from walkerlab.physics.kernels import kernel
 from walkerlab.physics.mechanics import rigid_model
@@ -55,17 +55,31 @@ class Places:
     knees: Array | None  # (samples, 2, 2) of swing and stance leg; None without knees
 
 
-def places(walker: RigidModel, knee_m: tuple[float, float] | None, walk: RigidWalkResult, samples: Samples) -> Places:
+class Footholds(NamedTuple):
+    """Footholds of a walk, that of the start first."""
+
+    along_m: Array  # (steps + 1,) along the slope
+    height_m: Array  # (steps + 1,) over it
+    set_down_rad: Array  # (steps + 1,) angle of the leg from the vertical as its foot is set down
+
+
+def footholds_of(walk: RigidWalkResult) -> Footholds:
+    set_down = np.append(walk.start[STANCE], walk.after[:, STANCE])
+    return Footholds(np.append(0.0, walk.touch_along_m), walk.ground_m, set_down)
+
+
+def places(
+    walker: RigidModel, knee_m: tuple[float, float] | None, footholds: Footholds, angle: Array, step: NDArray[np.int64]
+) -> Places:
     """Compute the points of the walker.
 
     knee_m  the knee in its thigh's frame; None without knees
+    angle   (samples, n) rad from the vertical, swing leg first
+    step    (samples,) index of the step, and of the stance foot's foothold
     """
-    n = len(walker.arm_x)
-    psi = samples.state[:, :n] + walker.slope
-    touches = np.append(0.0, walk.touch_along_m)[samples.step]
-    set_down = np.concatenate(([walk.start[STANCE]], walk.after[:, STANCE]))[samples.step]
-    rolled = -walker.radius * (samples.state[:, STANCE] - set_down)
-    contact = np.column_stack((touches + rolled, walk.ground_m[samples.step]))
+    psi = angle + walker.slope
+    rolled = -walker.radius * (angle[:, STANCE] - footholds.set_down_rad[step])
+    contact = np.column_stack((footholds.along_m[step] + rolled, footholds.height_m[step]))
     centre = contact + np.array([0.0, walker.radius])
     hip = centre + rotate_levers(psi[:, [STANCE]], [walker.hip_x], [walker.hip_y])
     foot = centre + rotate_levers(psi, walker.foot_x, walker.foot_y) - [0.0, walker.radius]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
-from itertools import combinations
 from typing import TYPE_CHECKING, Final, cast
 
 import numpy as np
@@ -14,15 +13,23 @@ from walkerlab.config.identify import Identify
 from walkerlab.config.reads import IdentifyConfig
 from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.labels import Label, unit_by_name
+from walkerlab.physics.estimation.information import is_open
 from walkerlab.physics.estimation.measurements import MeasuredAngles, MeasuredSteps
-from walkerlab.physics.estimation.result import Identification
+from walkerlab.physics.estimation.prediction import GAIN, OFFSET
+from walkerlab.physics.estimation.result import Identification, Information
+from walkerlab.physics.hybrid.rigid_measures import Footholds, places
+from walkerlab.physics.mechanics.rigid_model import STRAIGHT, apply_couplings
 from walkerlab.physics.solvers.system import Floats
 from walkerlab.pipeline.progress import Progress
 from walkerlab.pipeline.stages.estimated import models_of, question_of, refuse_keys, refuse_model
 from walkerlab.pipeline.stages.measured_walk import read_measured
+from walkerlab.pipeline.stages.rigid_groups import place_variables, reorder_by_leg
+from walkerlab.pipeline.stages.walk import legs, over_time
 from walkerlab.pipeline.store.columns import numbered, rows_group
 from walkerlab.pipeline.store.content import Content, Group, Variable
 from walkerlab.scene.identification import identify_walk
+from walkerlab.scene.parameter import parameter_of
+from walkerlab.scene.rigid import rigid_walker
 
 if TYPE_CHECKING:
     from walkerlab.config.schema import Config
@@ -33,6 +40,8 @@ LABELS: Final = {
     "standard_error": Label("SI", "standard error; absent where the walk leaves the parameter open"),
     "start": Label("SI", "value in the config"),
 }
+SHOWN_STEPS, SHOWN_SAMPLES = 10, 800
+"""Number of steps, and about that of samples, whose motion the player shows."""
 FEWER: Final = "Fit fewer parameters, add what was weighed (--prior), or start nearer to the walk (--set)."
 
 
@@ -105,20 +114,27 @@ def content_of(config: IdentifyConfig, result: Identification, measured: Measure
     groups["covariance"] = Group(
         {"covariance": Variable(known.covariance, ("row", "column"), "1", "covariance, in the keys' units")}
     )
-    determined = [place for place, row in enumerate(estimates) if row["standard_error"] is not None]
-    if len(determined) > 1:
-        pair = worst_pair(known.correlations, determined)
-        groups["trade_off"] = Group(
-            {"pair": Variable(np.array(pair), ("parameter",), "1", "indices of two parameters")}
-        )
+    moves = worst_moves(known)
+    if moves is not None:
+        meaning = "standard deviations of the two worst-determined combinations, in the keys' units, the worst first"
+        groups["worst"] = Group({"moves": Variable(moves, ("combination", "parameter"), "1", meaning)})
     if isinstance(measured, MeasuredAngles):
         groups["samples"] = sample_group(result, measured)
+        groups |= motions(identified_config(config, result), result, measured)
     return Content(groups, summary)
 
 
-def worst_pair(correlations: Floats, determined: Sequence[int]) -> tuple[int, int]:
-    """Return the indices of the two determined parameters that the walk separates worst, by their correlation."""
-    return max(combinations(determined, 2), key=lambda pair: abs(float(correlations[pair])))
+def worst_moves(known: Information) -> Floats | None:
+    """Return changes (2, parameters) by a standard deviation along the two combinations that the walk separates worst.
+
+    They are independent, in the keys' units, the worst first; None if fewer than two combinations are determined.
+    """
+    worst = known.directions[~is_open(known.singular_values)][-2:]
+    if len(worst) < 2:
+        return None
+    variances, axes = np.linalg.eigh(worst @ (known.covariance / np.outer(known.scales, known.scales)) @ worst.T)
+    moves = np.sqrt(np.maximum(variances, 0.0))[:, None] * (axes.T @ worst) * known.scales
+    return np.asarray(moves[::-1])
 
 
 def step_group(result: Identification) -> Group:
@@ -132,11 +148,15 @@ def step_group(result: Identification) -> Group:
     return Group(columns)
 
 
+def angle_residuals(result: Identification, measured: MeasuredAngles) -> Floats:
+    """Return measured minus predicted angles (samples, 2) over the most probable floor."""
+    about = result.fitted.data.residuals - result.fitted.data.G @ result.fitted.heights_m
+    return about[-measured.angles_rad.size :].reshape(-1, 2)
+
+
 def sample_group(result: Identification, measured: MeasuredAngles) -> Group:
-    """Residuals of the angles in phase, over the most probable floor; the swing leg's first."""
-    fitted = result.fitted
-    residuals = (fitted.data.residuals - fitted.data.G @ fitted.heights_m)[-measured.angles_rad.size :].reshape(-1, 2)
-    swing_first = np.where((measured.step % 2 == 1)[:, None], residuals[:, ::-1], residuals)
+    """Residuals of the angles in phase; the swing leg's first."""
+    swing_first = reorder_by_leg(angle_residuals(result, measured), 1 - measured.step % 2)
     return Group(
         {
             "phase": Variable(measured.phase, ("sample",), "1", "share of the step's period that has passed"),
@@ -144,6 +164,49 @@ def sample_group(result: Identification, measured: MeasuredAngles) -> Group:
             "residual_rad": Variable(swing_first, ("sample", "leg"), "rad", "measured minus predicted angle"),
         }
     )
+
+
+def identified_config(config: IdentifyConfig, result: Identification) -> IdentifyConfig:
+    """Return the config with the estimates as its values."""
+    for estimate in result.estimates:
+        changed = parameter_of(estimate.key, config).config_at(config, estimate.value)
+        assert changed is not None, "an estimate makes a walker"
+        config = changed
+    return config
+
+
+def motions(config: IdentifyConfig, result: Identification, measured: MeasuredAngles) -> dict[str, Group]:
+    """Build the identified and the measured motion of the first steps; empty for knees, whose shanks have no angles.
+
+    Both stand on the identified footholds at the same phase, and angles are free of the sensors' offset and gain.
+
+    config  the identified walker's
+    """
+    walker, walk, sensors = rigid_walker(config), result.walk, result.sensors
+    if walker.kneed:
+        return {}
+    shown = np.flatnonzero(measured.step < SHOWN_STEPS)
+    sides = np.flatnonzero(np.diff(measured.step[shown])) + np.array([[0], [1]])
+    every = max(1, shown.size // SHOWN_SAMPLES)
+    rows = np.union1d(shown[::every], shown[sides])
+    step, stance = measured.step[rows], 1 - measured.step[rows] % 2
+    residuals = angle_residuals(result, measured)[rows] / sensors[GAIN]
+    seen = (measured.angles_rad[rows] - sensors[OFFSET]) / sensors[GAIN]
+    along, touches = (np.append(0.0, np.cumsum(each)) for each in (walk.lengths_m, walk.durations_s))
+    time = touches[step] + measured.phase[rows] * walk.durations_s[step]
+    set_down = np.append((seen - residuals)[0, 1], walk.angles_rad)
+    footholds = Footholds(along, result.fitted.heights_m[: along.size], set_down)
+    about = {"slope_rad": config.slope_rad, "leg_m": config.walker.leg_length_m}
+    about["foot_radius_m"] = config.walker.foot_radius_m
+    groups = {}
+    for name, angle in (("identified", seen - residuals), ("measured", seen)):
+        bodies = np.zeros((rows.size, len(walker.arm_x)))
+        bodies[:, :2] = reorder_by_leg(angle, stance)
+        straight = np.array([apply_couplings(walker, STRAIGHT, row) for row in bodies])
+        variables = {**over_time(time=time, step=step, stance_leg=stance + 1, angle=angle), **legs()}
+        variables |= place_variables(places(walker, None, footholds, straight, step), stance)
+        groups[f"{name}_motion"] = Group(variables, about)
+    return groups
 
 
 def reference_masses(config: IdentifyConfig, keys: Sequence[str], model: str) -> dict[str, float]:

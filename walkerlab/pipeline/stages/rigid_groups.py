@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from walkerlab.physics.hybrid.recorded_walk import RigidWalkResult, Samples
-from walkerlab.physics.hybrid.rigid_measures import energies, places, reactions
+from walkerlab.physics.hybrid.rigid_measures import Places, energies, footholds_of, places, reactions
 from walkerlab.physics.mechanics.rigid_model import STANCE, energy_at_touch
 from walkerlab.pipeline.stages.walk import COORDINATE, legs, over_time, steps_of, turning
 from walkerlab.pipeline.store.content import Group, Variable
@@ -33,7 +33,9 @@ def trajectory_group(scene: RigidScene, walk: RigidWalkResult, samples: Samples)
     if "states" in scene.outputs:
         variables |= leg_variables(samples)
         variables |= body_variables(scene, samples, stance)
-        variables |= place_variables(scene, walk, samples, stance)
+        n = len(scene.names) // 2
+        positions = places(scene.walker, scene.knee_m, footholds_of(walk), samples.state[:, :n], samples.step)
+        variables |= place_variables(positions, stance)
     if "energies" in scene.outputs:
         kinetic, potential = energies(scene.walker, samples.state).T
         touched = np.append(walk.start[STANCE], walk.after[:, STANCE])
@@ -78,9 +80,8 @@ def body_variables(scene: RigidScene, samples: Samples, stance: Any) -> dict[str
     return variables
 
 
-def place_variables(scene: RigidScene, walk: RigidWalkResult, samples: Samples, stance: Any) -> dict[str, Variable]:
+def place_variables(positions: Places, stance: Any) -> dict[str, Variable]:
     """Return positions of hip, knees and feet along the slope from the first foothold, and above it."""
-    positions = places(scene.walker, scene.knee_m, walk, samples)
     points = {"foot": np.stack((positions.swing_foot, positions.contact), axis=1)} | (
         {} if positions.knees is None else {"knee": positions.knees}
     )

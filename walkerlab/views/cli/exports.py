@@ -11,6 +11,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from walkerlab.config.problems import suggestion
 from walkerlab.config.schema import Config
 from walkerlab.errors import ConfigError, StaleError, StorageError
@@ -28,6 +31,7 @@ from walkerlab.pipeline.runs import (
     the_result,
 )
 from walkerlab.pipeline.store.artifact import Stored
+from walkerlab.pipeline.store.content import Group
 from walkerlab.pipeline.store.csv_text import csv_text
 from walkerlab.pipeline.store.files import as_text
 from walkerlab.pipeline.store.runfolder import RunFolder
@@ -219,11 +223,19 @@ def table(folder: RunFolder, name: str, kind: str, console: Console) -> Table:
 def steps_of_walk(folder: RunFolder, model: str, console: Console) -> bytes:
     """Write the steps of a walk, as `identify --level steps` reads them; StaleError if it takes none."""
     with results_to_show(folder, [model], console.warn) as results:
-        steps = the_result(results, folder, model).groups.get(STEPS)
-    names = ("period_s", "length_m")
-    if steps is None or not all(name in steps.variables for name in names):
+        groups = the_result(results, folder, model).groups
+    if STEPS not in groups:
         raise StaleError("the walk takes no step.", f"Run {model} from another start.")
-    return csv_text(names, zip(*(steps[name].tolist() for name in names), strict=True))
+    columns = {name: groups[STEPS][name] for name in ("period_s", "length_m")}
+    if TRAJECTORY in groups and "angle" in groups[TRAJECTORY].variables:
+        columns["touch_angle_rad"] = touch_angles(groups[STEPS], groups[TRAJECTORY])
+    return csv_text(list(columns), zip(*(values.tolist() for values in columns.values()), strict=True))
+
+
+def touch_angles(steps: Group, trajectory: Group) -> NDArray[np.float64]:
+    """Read the angle (steps,) of the leg that touches at the end of each step; leg 1 touches first."""
+    legs = [np.interp(steps["touch_time_s"], trajectory["time"], leg) for leg in trajectory["angle"].T]
+    return np.asarray(np.where(np.arange(steps["touch_time_s"].size) % 2 == 0, *legs))
 
 
 def trajectory(folder: RunFolder, model: str, kind: str, console: Console) -> bytes:

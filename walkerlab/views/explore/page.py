@@ -44,7 +44,7 @@ def render_page(base: ExploredConfig) -> tuple[str, str]:
         configs=choices(base),
         anchor="walk",
         # An empty player, filled by the script.
-        block=Player("The walk.", SEEN, "The walker", (), 0.0, 1.0, 0.0, 0.0, 1.0, 1.0, (), (), (0, 0, 1, 1)),
+        block=Player("The walk.", SEEN, "The walker", (), 0.0, 1.0, 0.0, 1.0, (0, 0, 1, 1)),
         # The only texts that are markup already: files of this package.
         style=Markup(report.source("style.css") + (TEMPLATES / "explore.css").read_text(encoding="utf-8")),
         script=Markup(script),

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Final
+from collections.abc import Mapping, Sequence
+from itertools import combinations
+from typing import Any, Final
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
-from walkerlab.labels import axis_label, unit_by_name
+from walkerlab.labels import axis_label, unit_by_name, with_unit
+from walkerlab.physics.solvers.system import Floats
 from walkerlab.pipeline.store.content import Group
 from walkerlab.views.figures.canvas import add_legend, entry, label_of, panels
 from walkerlab.views.figures.illustration import Drawn, Illustration, Need, Results
@@ -21,6 +25,8 @@ STEP_PANEL_HEIGHT: Final = 1.7
 MEASURED: Final = "measured_"
 LEGS: Final = (("swing leg", BLUE), ("stance leg", VERMILLION))
 MAX_RESIDUALS: Final = 4000  # residuals drawn of each leg
+PHASES: Final = 25  # intervals of the step's phase, each with the mean residual
+LEADING: Final = 0.1  # share of a combination's largest change, from which a parameter is named
 
 
 def quantities(steps: Group) -> list[str]:
@@ -68,33 +74,62 @@ def draw_residuals(results: Results) -> Drawn:
         panel.set(xlabel="step", ylabel=f"{name.rpartition('_')[0].replace('_', ' ')} (σ)")
         panel.xaxis.set_major_locator(MaxNLocator(integer=True))
     if samples is not None:
-        panel, every = axes[-1, 0], max(1, samples["phase"].size // MAX_RESIDUALS)
-        for leg, (_, colour) in enumerate(LEGS):
-            residual = 1e3 * samples["residual_rad"][::every, leg]
-            panel.plot(samples["phase"][::every], residual, linestyle="none", marker=".", markersize=1.5, color=colour)
-        panel.axhline(0.0, color=GREY, linewidth=0.7)
-        panel.set(xlabel="phase of the step", ylabel="angle (mrad)", xlim=(0.0, 1.0))
-        add_legend(figure, [entry(name, color=colour, marker=".", linestyle="none") for name, colour in LEGS])
+        draw_residuals_in_phase(axes[-1, 0], samples)
     return figure, (int(number.size), samples is not None)
 
 
+def draw_residuals_in_phase(panel: Axes, samples: Group) -> None:
+    """Plot the residuals of the angles over the phase of the step, with the mean of each interval."""
+    phase, residual = samples["phase"], 1e3 * samples["residual_rad"]
+    every, bins = max(1, phase.size // MAX_RESIDUALS), np.minimum((PHASES * phase).astype(int), PHASES - 1)
+    filled = np.unique(bins)
+    for leg, (name, colour) in enumerate(LEGS):
+        look: dict[str, Any] = {"linestyle": "none", "marker": ".", "markersize": 1.5, "alpha": 0.35}
+        panel.plot(phase[::every], residual[::every, leg], color=colour, **look)
+        mean = [residual[bins == place, leg].mean() for place in filled]
+        panel.plot((filled + 0.5) / PHASES, mean, color=colour, linewidth=2.0, label=f"{name}, mean")
+    panel.axhline(0.0, color=GREY, linewidth=0.7)
+    panel.set(xlabel="phase of the step", ylabel="angle (mrad)", xlim=(0.0, 1.0))
+    panel.legend(loc="upper right", ncols=2)
+
+
 def draw_trade_off(results: Results) -> Drawn:
-    """Plot the 95 % region of the two parameters that trade off most; caption: their keys and correlation."""
-    summary, covariance = results[IDENTIFY_STAGE].summary, results[IDENTIFY_STAGE].groups["covariance"]["covariance"]
-    first, second = results[IDENTIFY_STAGE].groups["trade_off"]["pair"]
-    rows = [summary["estimates"][place] for place in (first, second)]
-    block = covariance[np.ix_((first, second), (first, second))]
-    values, vectors = np.linalg.eigh(block)
+    """Plot the 95 % region of the two worst-determined combinations; caption: both, in words.
+
+    The plane is that of the two parameters that show them best.
+    """
+    rows = results[IDENTIFY_STAGE].summary["estimates"]
+    moves, values = results[IDENTIFY_STAGE].groups["worst"]["moves"], np.array([row["value"] for row in rows])
+    relative = moves / np.where(values == 0.0, 1.0, np.abs(values))
+    pair = max(combinations(range(len(rows)), 2), key=lambda pair: abs(float(np.linalg.det(relative[:, pair]))))
+    centre, reach = values[list(pair)], REGION_95 * moves[:, pair]
     angle = np.linspace(0.0, 2.0 * np.pi, 181)
-    circle = REGION_95 * np.sqrt(np.maximum(values, 0.0))[:, None] * np.array([np.cos(angle), np.sin(angle)])
-    outline = np.array([[row["value"]] for row in rows]) + vectors @ circle
-    figure, axes = panels(3.6)
-    axes.fill(*outline, color=BLUE, alpha=0.2, linewidth=0.0)
-    axes.plot(*outline, color=BLUE)
-    axes.plot(rows[0]["value"], rows[1]["value"], marker="o", color=BLACK)
-    axes.set(**{f"{x}label": label_of(axis_label(row["key"]), row["unit"]) for x, row in zip("xy", rows, strict=True)})
-    correlation = summary["correlations"]["matrix"][first][second]
-    return figure, (rows[0]["key"], rows[1]["key"], float(correlation))
+    outline = centre[:, None] + reach.T @ np.array([np.cos(angle), np.sin(angle)])
+    figure, axes = panels(3.9)
+    axes.fill(*outline, color=BLUE, alpha=0.15, linewidth=0.0)
+    axes.plot(*outline, color=BLUE, linewidth=0.8)
+    worst, next_worst = (combination_in_words(rows, REGION_95 * move) for move in moves)
+    key = []
+    for move, name, style in zip(reach, (worst, next_worst), ("-", "--"), strict=True):
+        axes.plot(*np.array([centre - move, centre + move]).T, color=BLACK, linewidth=1.2, linestyle=style)
+        key.append(entry(name, color=BLACK, linewidth=1.2, linestyle=style))
+    axes.plot(*centre, marker="o", markersize=4.0, color=BLACK)
+    labels = (label_of(axis_label(rows[place]["key"]), rows[place]["unit"]) for place in pair)
+    axes.set(**dict(zip(("xlabel", "ylabel"), labels, strict=True)))
+    add_legend(figure, key)
+    return figure, (worst, next_worst)
+
+
+def combination_in_words(rows: Sequence[Mapping[str, Any]], move: Floats) -> str:
+    """Say how far the leading parameters move together, as in 'slope + 25 %, foot radius − 19 %'."""
+    sizes = [move / (abs(row["value"]) or 1.0) for row, move in zip(rows, move.tolist(), strict=True)]
+    largest = max(sizes, key=abs)
+    parts = []
+    for row, size in zip(rows, sizes, strict=True):
+        if abs(size) >= LEADING * abs(largest):
+            amount = f"{100.0 * abs(size):.2g} %" if row["value"] else with_unit(f"{abs(size):.2g}", row["unit"])
+            parts.append(f"{axis_label(row['key'])} {'+' if size * largest > 0.0 else '−'} {amount}")
+    return ", ".join(parts)
 
 
 def draw_worth(results: Results) -> Drawn:
@@ -115,7 +150,7 @@ FIGURES: Final = (
     Illustration("identified-residuals", (STEPS,), draw_residuals),
     Illustration(
         "identified-trade-off",
-        (Need(IDENTIFY_STAGE, "trade_off", ("pair",), "fewer than two parameters are determined"),),
+        (Need(IDENTIFY_STAGE, "worst", ("moves",), "fewer than two combinations of parameters are determined"),),
         draw_trade_off,
     ),
     Illustration("identified-worth", (STEPS,), draw_worth),

@@ -175,16 +175,21 @@ class Player:
     slope_rad: float
     leg_m: float
     foot_radius_m: float
-    torso_m: float
-    ordinary_force: float
     closeup_m: float
-    pads: tuple[Pad, ...]
-    ground: tuple[tuple[float, float], ...]  # start along the slope and height of each ground level (m)
     view: tuple[int, int, int, int]
+    torso_m: float = 0.0
+    ordinary_force: float = 1.0
+    pads: tuple[Pad, ...] = ()
+    ground: tuple[tuple[float, float], ...] = ()  # start along the slope and height of each ground level (m)
 
     @property
     def slope_deg(self) -> float:
         return round(math.degrees(self.slope_rad), 3)
+
+    @property
+    def shows_forces(self) -> bool:
+        """Whether a walker has ground forces; a player that is filled later may."""
+        return not self.walkers or any("n0" in walker.track.channels for walker in self.walkers)
 
     @property
     def scene(self) -> dict[str, object]:

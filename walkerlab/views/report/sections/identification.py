@@ -8,6 +8,7 @@ from walkerlab.labels import axis_label, join_words, unit_by_name
 from walkerlab.views.report.blocks import PageBlock, Paragraph, Section
 from walkerlab.views.report.numbers import fixed, number, quantity
 from walkerlab.views.report.results import Results, stage_section
+from walkerlab.views.report.sections import motion
 from walkerlab.views.report.tables import Column, Table, table
 from walkerlab.views.report.words import words
 
@@ -37,9 +38,9 @@ QUALITY_COLUMNS = (
 
 
 @stage_section("identify", "estimates")
-def section(_results: Results, summary: Mapping[str, Any]) -> Section | None:
+def section(results: Results, summary: Mapping[str, Any]) -> Section | None:
     first, *rest = findings(summary)
-    blocks: tuple[PageBlock, ...] = (Paragraph(" ".join(rest)), *tables(summary))
+    blocks: tuple[PageBlock | None, ...] = (Paragraph(" ".join(rest)), *tables(summary), motion.overlay(results))
     return Section.of("identification", "Identified walker", blocks, first)
 
 
@@ -48,13 +49,24 @@ def findings(summary: Mapping[str, Any]) -> list[str]:
     verdict = next(row for row in summary["models"] if row["model"] == summary["model"])
     other = next((row for row in summary["models"] if row["model"] != summary["model"]), None)
     known = [row for row in summary["estimates"] if row["standard_error"] is not None]
-    masses = [mass_in_words(key, number(value)) for key, value in summary["reference_masses_kg"].items()]
-    determined = capitalised("; ".join(estimate_in_words(row) for row in known))
-    weighed = any(row["key"].endswith("mass_kg") for row in known)
+    references = [mass_in_words(key, number(value)) for key, value in summary["reference_masses_kg"].items()]
+    masses = [estimate_in_words(row) for row in known if row["key"].endswith("mass_kg")]
+    others = [estimate_in_words(row) for row in known if not row["key"].endswith("mass_kg")]
+    condition = f" if {join_words(references)}" if references else ""
+    determined = capitalised("; ".join([*([join_words(masses) + condition] if masses else []), *others]))
+    keys = [row["key"] for row in summary["estimates"]]
+    left_open = [
+        (
+            capitalised(join_words(axis_label(key) for key in keys if key in row["combination"])),
+            row["combination"],
+            row["reason"],
+        )
+        for row in summary["not_identifiable"]
+    ]
     separable = any(" and " in row["combination"] for row in summary["not_identifiable"])
     singular = summary["singular_values"]
     without_effect = separable and min(singular) < NO_EFFECT * max(singular)
-    parameters = (determined, join_words(masses) if weighed else "", separable, without_effect)
+    parameters = (determined, bool(masses and references), left_open, separable, without_effect)
     quality = (other, gait_in_words(summary["gait"]), noise_in_words(summary))
     return [
         *words.parts("identify.findings", summary, verdict, *parameters),
@@ -102,7 +114,8 @@ def with_error(value: float, error: float | None, unit: str) -> str:
 
 def mass_in_words(key: str, text: str) -> str:
     """Say a mass as a builder does, as in 'the hip weighs 9.8 ± 0.2 kg'."""
-    return f"the {axis_label(key).removesuffix(' mass')} weighs {text} kg"
+    body = axis_label(key).removesuffix(" mass")
+    return f"the legs weigh {text} kg each" if body == "leg" else f"the {body} weighs {text} kg"
 
 
 def estimate_in_words(row: Mapping[str, Any]) -> str:

@@ -1,4 +1,4 @@
-"""The animated walk with a close-up of a foot and three synchronised plots; and the figures."""
+"""Animated walks with a close-up of a foot and three synchronised plots; and the figures."""
 
 import math
 from typing import Any
@@ -14,6 +14,7 @@ from walkerlab.views.report.words import words
 
 MAX_SHOWN_STEPS = 10
 WALKER_STYLES = {RIGID_STAGE: "rigid", CONTACT_STAGE: "contact"}
+OVERLAY_STYLES = {"identified": "rigid", "measured": "contact"}
 CLOSEUP_DEPTHS = 5.0
 """Height of the close-up relative to the largest penetration outside impacts."""
 STILL_VIEW_OF_RIGID = 4e-3
@@ -50,6 +51,32 @@ def player(results: Results, most: int = MAX_SHOWN_STEPS) -> Player | None:
         pads=pads(results),
         ground=ground(results),
         view=view(tuple(tracks.values()), config.slope_rad, margin=0.1 * length),
+    )
+
+
+def overlay(results: Results) -> Player | None:
+    """Show the measured walk over the identified one; None if no angles were measured."""
+    motions = {style: results.group("identify", f"{name}_motion") for name, style in OVERLAY_STYLES.items()}
+    tracks = {style: track for style, motion in motions.items() if (track := track_in(motion)) is not None}
+    about = motions["rigid"]
+    if about is None or not tracks:
+        return None
+    slope, leg, radius = (float(about.attrs[name]) for name in ("slope_rad", "leg_m", "foot_radius_m"))
+    strikes = about["time"][1:][np.diff(about["step"]) > 0].round(6).tolist()
+    walkers = [
+        Walker(f"{name.capitalize()} walk", style, tracks[style], tuple(strikes), stills(tracks[style], strikes))
+        for name, style in OVERLAY_STYLES.items()
+    ]
+    return Player(
+        title="The measured walk over the identified one.",
+        caption=words("motion.overlay", len(strikes) + 1),
+        alt=words("motion.overlay_alt", math.degrees(slope)),
+        walkers=tuple(walkers),
+        slope_rad=slope,
+        leg_m=leg,
+        foot_radius_m=radius,
+        closeup_m=STILL_VIEW_OF_RIGID * leg,
+        view=view(tuple(tracks.values()), slope, margin=0.1 * leg),
     )
 
 
