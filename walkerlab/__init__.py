@@ -1,7 +1,7 @@
 """Passive-dynamic walking as a reproducible experiment; see README.md, and docs/python.md for use from Python.
 
-What is listed in `__all__` is loaded when it is first asked for: importing the package takes no time. For type
-checkers `__init__.pyi` lists the same.
+Names in `__all__` are imported on first access, so importing the package takes no time. `__init__.pyi` lists the same
+names for type checkers.
 """
 
 from typing import Any

@@ -8,57 +8,40 @@ COMMAND_PATTERN: Final = re.compile(r"`(walkerlab (?!schema|open|init)[a-z-]+(?:
 
 
 def add_run_options(text: str, typed: str) -> str:
-    """Add options to the commands that a text advises.
-
-    typed  options that select the run, with a blank in front
-    """
+    """Add the options that select the run, `typed` with a blank in front, to the commands that a text advises."""
     return COMMAND_PATTERN.sub(lambda match: f"`{match[1]}{typed}`", text) if typed else text
 
 
 class WalkerlabError(Exception):
-    """A failure that the user can act on.
-
-    message  what happened
-    advice   what to do next; may be empty
-    """
+    """A failure that the user can act on: a message that says what happened, and advice, which may be empty."""
 
     exit_code: ClassVar[int] = 1
 
     def __init__(self, message: str, advice: str = "") -> None:
-        """Store message and advice."""
         super().__init__(message)
         self.message = message
         self.advice = advice
 
     def as_json(self) -> dict[str, Any]:
-        """Return the error as `--json` prints it."""
         return {"message": self.message, "advice": self.advice, "exit_code": self.exit_code}
 
 
 class ConfigError(WalkerlabError):
-    """The config (file, `extends`, `--set`) is invalid; nothing was run.
-
-    key  path of the key at fault; empty if the message locates the problem or no key is at fault
-    """
+    """The config (file, `extends`, `--set`) is invalid; nothing was run. `key` is the path of the key at fault."""
 
     exit_code = 3
 
     def __init__(self, message: str, advice: str = "", key: tuple[int | str, ...] = ()) -> None:
-        """Store message, advice and key."""
         super().__init__(message, advice)
         self.key = key
 
 
 class NoAnswer(WalkerlabError):  # noqa: N818 (no answer is a result, not an error)
-    """The computation has no answer: no gait found, solver failed, budget exhausted.
-
-    partial  results so far (a `store.content.Content`), or None
-    """
+    """The computation has no answer (no gait found, solver failed, ...); `partial` may hold its content so far."""
 
     exit_code = 4
 
     def __init__(self, message: str, advice: str = "", partial: object | None = None) -> None:
-        """Store message, advice and partial results."""
         super().__init__(message, advice)
         self.partial = partial
 

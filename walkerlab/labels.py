@@ -23,22 +23,14 @@ ERROR_OF_EACH_STEP: Final = {
 
 @dataclass(frozen=True)
 class Label:
-    """Unit and meaning of a field or property of a row, used in `Annotated`; unlabelled fields are not stored.
+    """Unit and meaning of a field or property of a row, used in `Annotated`; unlabelled fields are not stored."""
 
-    unit    "1" for a pure number, "" for text
-    text    meaning
-    dims    dimensions of a row's value; () for a scalar
-    timing  whether it is a measured run time or derived from one
-    absent  substitute for a missing value; None leaves a gap
-    name    stored name, if not the field's
-    """
-
-    unit: str
-    text: str
-    dims: tuple[str, ...] = ()
-    timing: bool = False
-    absent: float | None = None
-    name: str = ""
+    unit: str  # "1" for a pure number, "" for text
+    text: str  # meaning
+    dims: tuple[str, ...] = ()  # dimensions of a row's value; () for a scalar
+    timing: bool = False  # whether it is a measured run time or derived from one
+    absent: float | None = None  # substitute for a missing value; None leaves a gap
+    name: str = ""  # stored name, if not the field's
 
 
 @cache
@@ -67,7 +59,6 @@ def axis_label(key: str) -> str:
 
 
 def with_unit(words: str, unit: str) -> str:
-    """Append a unit in parentheses, unless it is '' or '1'."""
     return words if unit in ("", "1") else f"{words} ({unit})"
 
 

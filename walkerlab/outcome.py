@@ -36,7 +36,6 @@ class Outcome(IntEnum):
 
     @property
     def advice(self) -> str:
-        """Meaning of the outcome and what to try next."""
         return OUTCOME_TEXTS[self].advice
 
     @property
@@ -51,8 +50,6 @@ def outcome_of(label: str) -> Outcome | None:
 
 
 class OutcomeWords(NamedTuple):
-    """Texts and colour of an outcome."""
-
     does: str  # present tense, of one walker
     did: str  # past tense, after a number of walks
     why: str  # why a family of gaits ends there

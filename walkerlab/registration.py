@@ -9,7 +9,6 @@ from typing import Any
 
 
 def registered(module: str, name: str) -> Any:
-    """Import a module and return one of its names."""
     return getattr(import_module(module), name)
 
 

@@ -9,9 +9,7 @@ from walkerlab.config.schema import Config
 
 
 def slice_of(config: Config, takes: type | None) -> dict[str, Any]:
-    """Select the part of `config` that a type of `config.reads` names, nested as in the config, of JSON types only.
-
-    takes  None for the whole config
+    """Select the part of a config that a type of `config.reads` names, nested, of JSON types; None selects all.
 
     Raises KeyError if a key is not in the schema.
     """
@@ -34,7 +32,7 @@ def flatten(block: Mapping[str, Any], lists: bool = False, prefix: str = "") -> 
 
 
 def canonical_json(data: Any) -> str:
-    """Serialise to JSON so that equal content gives equal text: sorted keys, no blanks, ASCII, shortest floats.
+    """Serialise so that equal content gives equal text: sorted keys, no blanks, ASCII, shortest floats.
 
     Raises ValueError if a number is not finite.
     """

@@ -21,7 +21,6 @@ _SECTION_4 = "section 4"
 
 
 def from_mm(numbers: Mapping[str, Any], exponent: float) -> dict[str, Any]:
-    """Convert the quantities with mm in their unit to SI."""
     return {
         "units": "si",
         "stiffness": numbers["stiffness"] * MM_PER_M**exponent,
@@ -132,7 +131,6 @@ class Contact(Block):
 
     @property
     def has_friction(self) -> bool:
-        """Whether the ground has friction."""
         return self.friction != "none"
 
     def unit_of(self, either: str) -> str:
@@ -140,5 +138,4 @@ class Contact(Block):
         return either.split(" or ")[-1 if self.units == "si" else 0]
 
     def in_si(self) -> Self:
-        """Convert to SI units."""
         return self if self.units == "si" else self.model_copy(update=from_mm(vars(self), self.exponent))

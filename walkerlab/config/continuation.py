@@ -47,12 +47,10 @@ class Span(_Span):
 
     @property
     def least(self) -> float:
-        """Start of the range, in the unit of the key."""
         return float(getattr(self, "from"))
 
     @property
     def most(self) -> float:
-        """End of the range, in the unit of the key."""
         value: Any = getattr(self, "to")  # noqa: B009 - declared above, out of the type checker's sight
         return float(value)
 

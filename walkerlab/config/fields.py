@@ -33,7 +33,6 @@ def key(
 ) -> Any:
     """Declare a key of a block.
 
-    default           its value or a factory; `...` for a required key
     unit              as printed; "1" for pure numbers, "" for none
     meaning           one sentence
     source            origin of the default
@@ -91,7 +90,7 @@ def leaves(
 ) -> Iterator[tuple[tuple[str, ...], FieldInfo]]:
     """Yield path and field of every value in `block`, in the schema's order.
 
-    held  a config's block of that type, which selects the kind of each inner block; by default the first kind
+    A config's block of that type, `held`, selects the kind of each inner block; by default the first kind.
     """
     for name, field in block.model_fields.items():
         inner, own = block_of(field), getattr(held, name, None)

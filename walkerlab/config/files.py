@@ -25,18 +25,12 @@ read_cached = lru_cache(maxsize=32)(read)  # callers change only copies of the t
 
 @dataclass(frozen=True, slots=True)
 class ConfigFile:
-    """A config file, or the config of a stored run.
+    """A config file, or the config of a stored run."""
 
-    path     of the file; for a run, the name of its folder
-    label    name in messages
-    text     config stored with a run or artifact; None to read the file
-    changes  KEY=VALUE settings that made the run's config from its file
-    """
-
-    path: Path
-    label: str
-    text: str | None = None
-    changes: tuple[str, ...] = ()
+    path: Path  # of the file; for a run, the name of its folder
+    label: str  # name in messages
+    text: str | None = None  # config stored with a run or artifact; None to read the file
+    changes: tuple[str, ...] = ()  # KEY=VALUE settings that made the run's config from its file
 
 
 def builtin_names() -> tuple[str, ...]:
@@ -126,10 +120,7 @@ def _refuse_named_files(root: Mapping) -> None:
 
 
 def cases_file(layer: Mapping, folder: Path) -> tuple[ConfigFile, Position] | None:
-    """Return the file that a config names under stability.cases, and its position; None if it lists the cases itself.
-
-    folder  base of relative names
-    """
+    """Return the file named under stability.cases, relative to a folder, and its position; None for a list of cases."""
     block = layer.entries.get("stability")
     file_name = block.entries.get("cases") if isinstance(block, Mapping) else None
     if not isinstance(file_name, Scalar) or not isinstance(file_name.value, str):
@@ -138,9 +129,7 @@ def cases_file(layer: Mapping, folder: Path) -> tuple[ConfigFile, Position] | No
 
 
 def with_cases(layer: Mapping, folder: Path) -> Mapping:
-    """Replace the name of a file under stability.cases by the list in that file.
-
-    folder  base of relative names
+    """Replace the name of a file under stability.cases, relative to a folder, by the list in that file.
 
     Raises ConfigError if the file cannot be read or holds no list.
     """
@@ -162,11 +151,8 @@ def _what_there_is() -> str:
 
 
 def _text_of(file: ConfigFile, reference: Position | None, purpose: str = "") -> str:
-    """Return the text of a file.
-
-    reference  position of its name, for the message if it cannot be read
-    purpose    expected content, if not a config
-    """
+    """Return the text of a file."""
+    # position of its name and expected content, if not a config, are for the message if it cannot be read
     if file.text is not None:
         return file.text
     kind = "file" if purpose else "config"

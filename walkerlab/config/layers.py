@@ -13,16 +13,11 @@ SLOPE_KEYS: Final = ("slope_rad", "slope_deg")
 
 @dataclass(frozen=True, slots=True)
 class ConfigSetting:
-    """A `--set KEY=VALUE` option.
+    """A `--set KEY=VALUE` option."""
 
-    path      parts of the dotted key
-    value     tree of the value
-    position  of the key
-    """
-
-    path: tuple[str, ...]
-    value: Node
-    position: Position
+    path: tuple[str, ...]  # parts of the dotted key
+    value: Node  # tree of the value
+    position: Position  # of the key
 
 
 def merge_layers(layers: Sequence[Mapping]) -> Mapping:
@@ -60,10 +55,8 @@ def _refuse_two_slopes(keys: dict[str, Position]) -> None:
 
 
 def parse_setting(text: str) -> ConfigSetting:
-    """Parse a `--set` option; ConfigError if it is not KEY=VALUE with a YAML value.
-
-    text  its attribute `source`, if any, names the option in messages
-    """
+    """Parse a `--set` option; ConfigError if it is not KEY=VALUE with a YAML value."""
+    # an attribute `source` of the text, if any, names the option in messages
     key, equals, value = text.partition("=")
     source = printable(getattr(text, "source", "")) or f"--set {printable(text)}"
     start = Position(source, 1, 1)
@@ -78,16 +71,12 @@ def parse_setting(text: str) -> ConfigSetting:
 
 
 def option_setting(key: str, value: int | str) -> ConfigSetting:
-    """Build the setting of an option with the name of a key, such as `--strides`."""
     position = Position(f"--{key} {printable(str(value))}", 1, 1)
     return ConfigSetting((key,), Scalar(position, value, str(value)), position)
 
 
 def apply_settings(tree: Mapping, settings: Sequence[ConfigSetting]) -> Mapping:
-    """Apply settings to `tree` in order; a list or block is replaced whole.
-
-    Raises ConfigError if a setting addresses a key below a value.
-    """
+    """Apply settings in order; a list or block is replaced whole. ConfigError for a key below a value."""
     _refuse_two_slopes({setting.path[0]: setting.position for setting in settings})
     for setting in settings:
         if setting.path[0] in SLOPE_KEYS:

@@ -38,22 +38,15 @@ HEAVY_KG_M3: Final = 1000.0
 
 @dataclass(frozen=True, slots=True)
 class LoadedConfig:
-    """A valid config with its origin.
+    """A valid config with its origin."""
 
-    config    resolved, in the schema's types
-    run_name  name of its folder below the runs folder
-    changes   KEY=VALUE of each key that differs from its file; for a run's config, the run's changes come first
-    warnings  adjustments and suspicious values, as sentences
-    source    its file
-    tree      its untyped tree, with positions
-    """
-
-    config: Config
-    run_name: str
+    config: Config  # resolved, in the schema's types
+    run_name: str  # name of its folder below the runs folder
+    # KEY=VALUE of each key that differs from its file; for a run's config, the run's changes come first
     changes: tuple[str, ...]
-    warnings: tuple[str, ...]
-    source: str
-    tree: Mapping
+    warnings: tuple[str, ...]  # adjustments and suspicious values, as sentences
+    source: str  # its file
+    tree: Mapping  # its untyped tree, with positions
 
     def placed(self, error: ConfigError) -> ConfigError:
         """Add the position of the key at fault to an error, where the config's text has one."""
@@ -72,9 +65,8 @@ def load(
     strides: int | None = None,
     name: str | None = None,
 ) -> LoadedConfig:
-    """Load a config.
+    """Load a config: a file, the name of a built-in config, or a run's; by default the paper's.
 
-    path     YAML file, name of a built-in config, or a `ConfigFile` with the text of a run's config; default: paper
     sets     `--set` options, KEY=VALUE, in order
     strides  `--strides`, which overrides everything else
     name     `--name`; None keeps the config's own
@@ -116,7 +108,6 @@ def load(
 
 
 def safe_name(text: str) -> str:
-    """Turn a text into a valid name of a run folder."""
     plain = unicodedata.normalize("NFKD", text).encode("ascii", "ignore").decode()
     return re.sub(r"[^A-Za-z0-9._-]+", "-", plain).strip("-.")[:64].rstrip(".") or "run"
 
@@ -168,10 +159,7 @@ UNSAFE: Final = re.compile(r"[^A-Za-z0-9._,@=+-]")
 
 
 def changes_of(base: Config, changed: Config, slope_deg: float | None = None) -> tuple[str, ...]:
-    """List KEY=VALUE of each key in which `changed` differs from `base`, in the schema's order.
-
-    slope_deg  the slope as given by the user, if in degrees
-    """
+    """List KEY=VALUE of each key in which `changed` differs from `base`; the slope as typed, if in degrees."""
     before, after = base.model_dump(mode="json", exclude={"name"}), changed.model_dump(mode="json", exclude={"name"})
     added = []
     for name in before:
@@ -188,10 +176,8 @@ def changes_of(base: Config, changed: Config, slope_deg: float | None = None) ->
 
 
 def run_name(name: str, changes: Sequence[str]) -> str:
-    """Name a run folder `name@key=value,...` if that is short, otherwise `name@label-` and 8 hex digits.
-
-    The label is the first changed block of a stage, otherwise the first key.
-    """
+    """Name a run folder `name@key=value,...` if that is short, otherwise `name@label-` and 8 hex digits."""
+    # the label is the first changed block of a stage, otherwise the first key
     change = ",".join(changes)
     full_name = f"{name}@{change}" if change else name
     if not change or (len(full_name) <= MAX_NAME and not UNSAFE.search(change)):

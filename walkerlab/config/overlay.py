@@ -13,10 +13,7 @@ from walkerlab.config.validation import align_start, validate_tree
 
 
 def paper_config_with(lines: Keys[str, Any], source: str = "the paper's") -> Config:
-    """Build the paper config with changes.
-
-    lines   keys of a config, nested, as plain values
-    source  origin named in messages
+    """Build the paper config with changes, plain values by nested key; messages name their `source`.
 
     Raises ConfigError if the result is invalid; theta_1 of a start is moved onto the slope without a warning.
     """
@@ -24,10 +21,8 @@ def paper_config_with(lines: Keys[str, Any], source: str = "the paper's") -> Con
 
 
 def paper_config_with_tree(upper: Mapping) -> Config:
-    """Build the paper config with a block of keys on top; ConfigError with positions if the result is invalid.
-
-    With SI units, keys missing in the contact block keep the paper's physical value rather than its value in N, mm, s.
-    """
+    """Build the paper config with a block of keys on top; ConfigError with positions if the result is invalid."""
+    # With SI units, keys missing in the contact block keep the paper's physical value, not its value in N, mm, s.
     layers = read_layers(builtin_config(DEFAULT))
     contact = upper.entries.get("contact")
     units = contact.entries.get("units") if isinstance(contact, Mapping) else None
@@ -39,10 +34,7 @@ def paper_config_with_tree(upper: Mapping) -> Config:
 
 
 def check_cases(config: Config, tree: Mapping) -> None:
-    """Raise ConfigError with positions if a config's stability cases are invalid or share a name.
-
-    tree  source of the config
-    """
+    """Raise ConfigError with positions if a config's stability cases are invalid or share a name."""
     if not config.stability.cases:
         return
     block = tree.entries["stability"]
@@ -62,7 +54,6 @@ def check_cases(config: Config, tree: Mapping) -> None:
 
 
 def check_ground(case: Case, config: Config, lines: Mapping) -> None:
-    """Raise ConfigError if a contact case has no ground, or pads of zero length."""
     if config.contact is None:
         where = lines.keys.get("contact", lines.position)
         raise problem_error(where, f"contact: case {case.name} walks on the ground and has none", "model: rigid")

@@ -15,18 +15,12 @@ SHOWN_PROBLEMS = 20
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """A problem with a config.
+    """A problem with a config."""
 
-    position  None if it is in no text
-    text      description with key and value
-    allowed   valid values; empty if `text` names them
-    nearest   likely intention; empty if nothing is similar
-    """
-
-    position: Position | None
-    text: str
-    allowed: str = ""
-    nearest: str = ""
+    position: Position | None  # None if it is in no text
+    text: str  # description with key and value
+    allowed: str = ""  # valid values; empty if `text` names them
+    nearest: str = ""  # likely intention; empty if nothing is similar
 
     def __str__(self) -> str:
         where = f"{self.position}: " if self.position else ""

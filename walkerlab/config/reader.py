@@ -44,13 +44,10 @@ def value_of(text: str) -> str | int | float | bool | None:
 
 
 def read(text: str, source: str, column: int = 1) -> Node | None:
-    """Parse a YAML text to a tree; None if it is empty.
+    """Parse the text of a single document to a tree; None if it is empty.
 
-    text    a single document
-    source  its file or option, for positions
-    column  of its first character, for a text inside a longer one
-
-    Raises ConfigError with the position of whatever is not a plain YAML tree.
+    Positions refer to its source, a file or option, and count from `column`, for a text inside a longer one. Raises
+    ConfigError with the position of whatever is not a plain YAML tree.
     """
     if len(text) > MAX_CHARACTERS:
         raise problem_error(Position(source, 1, column), f"longer than {MAX_CHARACTERS} characters: not a config")

@@ -56,15 +56,11 @@ def only(config: Any, takes: type | None) -> Any:
 
 
 class PushOffAtOnce(Protocol):
-    """A push-off that takes no time."""
-
     @property
     def impulse_N_s(self) -> float: ...
 
 
 class RigidConfig(Protocol):
-    """Scene of the rigid model."""
-
     @property
     def walker(self) -> Walker: ...
     @property
@@ -87,8 +83,6 @@ class ContactConfig(RigidConfig, Protocol):
 
 
 class StartConfig(Protocol):
-    """Start of a walk."""
-
     @property
     def start(self) -> schema.Start: ...
 
@@ -118,15 +112,11 @@ class WalksConfig(WalkConfig, SceneConfig, Protocol):
 
 
 class RigidSolvers(Protocol):
-    """How the rigid model is integrated."""
-
     @property
     def rigid(self) -> schema.RigidSolver: ...
 
 
 class ContactSolvers(Protocol):
-    """How the contact model is integrated."""
-
     @property
     def contact(self) -> schema.ContactSolver: ...
 
@@ -139,15 +129,11 @@ class GroundConfig(SceneConfig, Protocol):
 
 
 class FixedPointConfig(RigidConfig, Protocol):
-    """Keys that `fixedpoint` reads."""
-
     @property
     def seed(self) -> int: ...
 
 
 class SimulateConfig(WalkConfig, RigidConfig, Protocol):
-    """Keys that `simulate` reads."""
-
     @property
     def solver(self) -> RigidSolvers: ...
 
@@ -157,22 +143,16 @@ class ContactSimConfig(WalkConfig, GroundConfig, Protocol):
 
 
 class CompareConfig(ContactConfig, Protocol):
-    """Keys that `compare` reads."""
-
     @property
     def ground(self) -> Footholds: ...
 
 
 class RecordedWalkConfig(RigidConfig, Protocol):
-    """Keys that `recorded-walk` reads."""
-
     @property
     def recording(self) -> RecordedFile | None: ...
 
 
 class TuneConfig(GroundConfig, Protocol):
-    """Keys that `tune` reads."""
-
     @property
     def strides(self) -> int: ...
     @property
@@ -180,8 +160,6 @@ class TuneConfig(GroundConfig, Protocol):
 
 
 class OwnCases(Protocol):
-    """The config's own cases."""
-
     @property
     def cases(self) -> tuple[Case, ...]: ...
 
@@ -205,8 +183,6 @@ class SceneCasesConfig(WalksConfig, Protocol):
 
 
 class MapCells(Protocol):
-    """How fine the maps of stability are."""
-
     @property
     def map_cells(self) -> int: ...
 
@@ -219,36 +195,26 @@ class MapsConfig(Protocol):
 
 
 class ContinuationConfig(FixedPointConfig, ContactConfig, Protocol):
-    """Keys that `continuation` reads."""
-
     @property
     def continuation(self) -> Continuation: ...
 
 
 class BasinConfig(FixedPointConfig, GroundConfig, Protocol):
-    """Keys that `basin` reads."""
-
     @property
     def basin(self) -> Basin: ...
 
 
 class RobustnessConfig(FixedPointConfig, ContactConfig, Protocol):
-    """Keys that `robustness` reads."""
-
     @property
     def robustness(self) -> Robustness: ...
 
 
 class DesignConfig(FixedPointConfig, ContactConfig, Protocol):
-    """Keys that `design` reads."""
-
     @property
     def design(self) -> Design | None: ...
 
 
 class IdentifyConfig(FixedPointConfig, ContactConfig, Protocol):
-    """Keys that `identify` reads."""
-
     @property
     def identify(self) -> Identify | None: ...
 

@@ -89,17 +89,14 @@ _MEASURED: Final = "the measured error against run time"
 
 
 def method(default: Method) -> Any:
-    """An integration method."""
     return key(default, "", "integration method", _MEASURED)
 
 
 def relative(default: float) -> Any:
-    """A relative tolerance."""
     return key(default, "1", "relative tolerance", _MEASURED, ge=1e-14, le=0.1)
 
 
 def absolute(default: float) -> Any:
-    """An absolute tolerance."""
     return key(default, "rad, rad/s, m, m/s", "absolute tolerance", _MEASURED, gt=0.0, le=1.0)
 
 
@@ -138,7 +135,6 @@ class Solvers(Block):
 
 
 def factors(least: float, most: float, velocity: str) -> Any:
-    """A range of factors on a velocity."""
     bounds = "two numbers from -10 to 10, the first below the second"
     return key((least, most), "1", f"smallest and largest factor on the {velocity}", bounds=bounds)
 

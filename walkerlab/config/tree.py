@@ -30,8 +30,6 @@ NOWHERE = Position("", 0, 0)
 
 @dataclass(frozen=True, slots=True)
 class Scalar:
-    """A single value, and its text as written."""
-
     position: Position
     value: str | int | float | bool | None
     text: str
@@ -56,7 +54,6 @@ class Mapping:
         self.keys[name] = position
 
     def without(self, *names: str) -> Mapping:
-        """Copy the block without some keys."""
         entries = {name: node for name, node in self.entries.items() if name not in names}
         return Mapping(self.position, entries, {name: self.keys[name] for name in entries})
 

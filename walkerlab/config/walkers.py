@@ -244,7 +244,6 @@ class Kneed(_Legged):
 
     @property
     def leg_mass_kg(self) -> float:
-        """Thigh and shank, kg."""
         return self.thigh.mass_kg + self.shank.mass_kg
 
 
@@ -327,7 +326,6 @@ class PartsWalker(_Legged):
 
     @property
     def total_mass_kg(self) -> float:
-        """Mass of the whole walker, kg."""
         masses = [body.mass_kg for body in self.bodies] + [particle.mass_kg for particle in self.particles]
         return sum(masses) + torso_mass(self.torso)
 
@@ -335,10 +333,7 @@ class PartsWalker(_Legged):
 def hip_to_sole(
     hinges: tuple[PartHinge, ...], feet: tuple[PartFoot, PartFoot], legs: tuple[LegBodies, LegBodies]
 ) -> float | None:
-    """Depth of the first leg's sole below the hip with all bodies upright, m.
-
-    None if no hinges lead from the other leg to the foot's body.
-    """
+    """Depth of the first leg's sole below the hip, upright, m; None if no hinges lead there from the other leg."""
     places = {(hinge.parent, hinge.child): (hinge.parent_point_m, hinge.child_point_m) for hinge in hinges}
     places |= {(hinge.child, hinge.parent): (hinge.child_point_m, hinge.parent_point_m) for hinge in hinges}
     chain = [legs[1][0], *legs[0]] if legs[0] and legs[1] else []
@@ -475,10 +470,7 @@ def why_rigid_alone(walker: Any) -> str:
 
 
 def contact_required_error(request: str, walker: Any, instead: str) -> ConfigError:
-    """Build the error for a request that needs contact, which the config lacks.
-
-    instead  advice if only the block is missing
-    """
+    """Build the error for a request that needs contact; `instead` is the advice if only the block is missing."""
     why = too_light_for_contact(walker)
     if why:
         return ConfigError(f"{request} needs contact, but {why}.", "Stay with the rigid model, or give the legs mass.")

@@ -20,7 +20,6 @@ ELSEWHERE: Final = "left out; `walkerlab schema {}` has its keys"
 
 
 def to_yaml(config: Config) -> str:
-    """Write every key of `config` as YAML, defaults included."""
     return "".join(f"{line}\n" for line in _lines(config.model_dump(mode="json"), ""))
 
 
@@ -54,10 +53,7 @@ def _different(base: dict[str, Any], changed: dict[str, Any]) -> dict[str, Any]:
 
 
 def to_commented_yaml(config: Config, left_alone: Collection[str] = ()) -> str:
-    """Write `config` as YAML with meaning, bounds and unit above each key.
-
-    left_alone  keys to leave out, which have their defaults
-    """
+    """Write a config as YAML with meaning, bounds and unit above each key; keys `left_alone` keep their defaults."""
     values = config.model_dump(mode="json", exclude=set(left_alone))
     lines = [*_commented(config, values, ""), *(f"# {name}: {ELSEWHERE.format(name)}" for name in left_alone)]
     return "".join(f"{line}\n" for line in lines)

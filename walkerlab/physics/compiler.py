@@ -60,11 +60,9 @@ Record = private_class("numba.core.types.npytypes.Record", "mangling_args")
 
 
 def layout_symbol(record: Any) -> tuple[str, tuple[str, ...]]:
-    """Return a record type's name in symbols of machine code, the same in every process.
-
-    Numba uses a counter instead: two processes can then give parts compiled for different records the same symbol, and
-    a third process that loads both runs one in place of the other.
-    """
+    """Return a record type's name in symbols of machine code, the same in every process."""
+    # Numba uses a counter instead: two processes can then give parts compiled for different records the same symbol,
+    # and a third process that loads both runs one in place of the other.
     return "Record", (hashlib.sha256(record.name.encode()).hexdigest()[:16],)
 
 
@@ -96,7 +94,6 @@ class KernelLocator(UserProvidedCacheLocator):  # type: ignore[misc, valid-type]
     """Locator of kernels in `cache_folder`: depends on a file's content, not on its age or on where it is installed."""
 
     def __init__(self, py_func: Any, py_file: str) -> None:
-        """Choose the cache folder of a function's file."""
         super().__init__(py_func, py_file)
         file = Path(py_file)
         own = file.is_relative_to(PACKAGE)
@@ -104,12 +101,10 @@ class KernelLocator(UserProvidedCacheLocator):  # type: ignore[misc, valid-type]
         self._cache_path = str(cache_folder() / below)
 
     def get_source_stamp(self) -> str:
-        """Digest of the file that the code is compiled from."""
         return hashlib.sha256(Path(self._py_file).read_bytes()).hexdigest()
 
     @classmethod
     def from_function(cls, py_func: Any, py_file: str) -> Any:
-        """Create a locator for a function in a file, with or without NUMBA_CACHE_DIR."""
         return super(UserProvidedCacheLocator, cls).from_function(py_func, py_file)
 
 
@@ -120,10 +115,9 @@ class KernelCacheImpl(CompileResultCacheImpl):  # type: ignore[misc, valid-type]
 
 
 class KernelIndex(IndexDataCacheFile):  # type: ignore[misc, valid-type]
-    """Index of a kernel's stored code; empty if it holds types that this process cannot import.
+    """Index of a kernel's stored code; empty if it holds types that this process cannot import."""
 
-    Numba reads the types of all stored versions of a kernel, including those for systems of other programs.
-    """
+    # Numba reads the types of all stored versions of a kernel, including those for systems of other programs.
 
     def _load_index(self) -> Any:
         try:
@@ -133,12 +127,9 @@ class KernelIndex(IndexDataCacheFile):  # type: ignore[misc, valid-type]
 
 
 class StoredKernel(FunctionCache):  # type: ignore[misc, valid-type]
-    """Machine code of a kernel on disk."""
-
     _impl_class = KernelCacheImpl
 
     def __init__(self, py_func: Any) -> None:
-        """Open the on-disk cache of a function, creating its folder."""
         super().__init__(py_func)
         locator = self._impl.locator
         self._cache_file = KernelIndex(self._cache_path, self._impl.filename_base, locator.get_source_stamp())
@@ -148,14 +139,12 @@ class KernelCache:
     """Cache of a kernel as numba uses it: of several processes that call the kernel at once, only one compiles it."""
 
     def __init__(self, py_func: Any) -> None:
-        """Prepare the cache of a function; the first call opens it."""
         self._function = py_func
         self.kernel = py_func.__name__
         self._locks: dict[str, Any] = {}
 
     @functools.cached_property
     def stored(self) -> StoredKernel:
-        """Code on disk."""
         return StoredKernel(self._function)
 
     def load_overload(self, signature: Any, context: Any) -> Any:
@@ -176,7 +165,6 @@ class KernelCache:
         return code
 
     def save_overload(self, signature: Any, data: Any) -> None:
-        """Store compiled code."""
         try:
             with lock_of(self.kernel):  # one index for all signatures
                 self.stored.save_overload(signature, data)
@@ -184,7 +172,6 @@ class KernelCache:
             self.finish(str(signature))
 
     def finish(self, signature: str) -> None:
-        """End the compilation of a signature, successful or not."""
         lock = self._locks.pop(signature, None)
         if lock is not None:
             compiling.remove((self, signature))
@@ -200,17 +187,14 @@ def _release(lock: Any) -> None:
 
 
 class QuickFlags(Flags):  # type: ignore[misc, valid-type]
-    """Compiler flags that compare only flags that are set.
+    """Compiler flags that compare only flags that are set."""
 
-    Numba looks operators up by flags and compares every flag that exists.
-    """
+    # Numba looks operators up by flags and compares every flag that exists.
 
     def __eq__(self, other: object) -> bool:
-        """Whether the same flags are set to the same values."""
         return isinstance(other, QuickFlags) and self._values == other._values
 
     def __hash__(self) -> int:
-        """Hash the names of the flags that are set."""
         return hash(frozenset(self._values))
 
 
@@ -218,12 +202,10 @@ class KernelCompiler(Compiler):  # type: ignore[misc, valid-type]
     """Numba's compiler without vectorised loops, which releases the kernel's lock if it fails."""
 
     def __init__(self, *arguments: Any) -> None:
-        """Take the arguments of numba's compiler."""
         super().__init__(*arguments)
         self.state.flags = QuickFlags(self.state.flags)
 
     def compile_extra(self, func: Any) -> Any:
-        """Compile a function."""
         vectorize = numba.config.LOOP_VECTORIZE
         numba.config.LOOP_VECTORIZE = 0
         try:
@@ -251,15 +233,13 @@ class _Refreshed:
 
 
 class _NumberTyping(_Refreshed):
-    """Typing context that resolves each operator and function of numbers only once.
+    """Typing context that resolves each operator and function of numbers only once."""
 
-    Numba tries all overloads for arrays, sets and strings at every call.
-    """
+    # Numba tries all overloads for arrays, sets and strings at every call.
 
     signatures: dict[Any, Any] = {}  # noqa: RUF012 - shared by all parts
 
     def resolve_function_type(self, function: Any, arguments: tuple[Any, ...], keywords: dict[str, Any]) -> Any:
-        """Return the signature of a call, or None if there is no overload."""
         if keywords or not all(isinstance(argument, types.Number) for argument in arguments):
             return self._context.resolve_function_type(function, arguments, keywords)
         if (function, arguments) not in self.signatures:
@@ -284,10 +264,9 @@ class _WithoutEnvironment:
 
 
 class _PartLibrary(JITCodeLibrary):  # type: ignore[misc, valid-type]
-    """Code of a part, linked into kernels, which are optimised as a whole; it has no machine code of its own.
+    """Code of a part, linked into kernels, which are optimised as a whole; it has no machine code of its own."""
 
-    Numba also optimises and emits every part on its own, which takes a third of the compile time.
-    """
+    # Numba also optimises and emits every part on its own, which takes a third of the compile time.
 
     @property
     def codegen(self) -> Any:
@@ -314,7 +293,6 @@ class PartCompiler(CompilerBase):  # type: ignore[misc, valid-type]
         self.state.typingctx, self.state.flags = _NumberTyping(typing), QuickFlags(self.state.flags)
 
     def define_pipelines(self) -> list[Any]:
-        """Return numba's pipeline."""
         state = self.state
         if state.library is None:
             state.library = _PartLibrary(state.targetctx.codegen(), state.func_id.func_qualname)

@@ -58,7 +58,6 @@ def sources_digest() -> str:
 
 
 def processor_name() -> str:
-    """Name of the processor that code is compiled for, with a digest of its features."""
     # imported here and below so that checking whether the folder is writable loads no compiler
     import numba
     from llvmlite import binding as llvm
@@ -71,10 +70,7 @@ def processor_name() -> str:
 
 
 def cache_root() -> Path:
-    """Folder of all compiled code: $WALKERLAB_CACHE, else the user's cache folder, else a temporary one.
-
-    Warns once per process if the first choice is not writable.
-    """
+    """Folder of all compiled code: $WALKERLAB_CACHE, or the user's cache, or a temporary folder with a warning."""
     chosen = os.environ.get("WALKERLAB_CACHE")
     usual = Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser() / "walkerlab"
     return _first_usable((Path(chosen), usual) if chosen else (usual,))
@@ -98,10 +94,8 @@ def _first_usable(candidates: tuple[Path, ...]) -> Path:
 
 @functools.cache
 def cache_folder() -> Path:
-    """Return this processor's folder for this state of the sources.
-
-    The first call of a process creates it if necessary and then deletes folders that were not used for long.
-    """
+    """Return this processor's folder for this state of the sources."""
+    # The first call of a process creates it if necessary and then deletes folders that were not used for long.
     import numba
 
     root, host = cache_root(), processor_name()
@@ -126,7 +120,6 @@ def _remove_unused(generations: list[Path]) -> None:
 
 
 def nothing_compiled_yet() -> bool:
-    """Whether this state of the sources has no compiled code: the first run on a machine, or after a change."""
     return next(cache_folder().rglob("*.nbc"), None) is None
 
 

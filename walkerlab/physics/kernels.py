@@ -73,10 +73,8 @@ def forced_inline(function: F) -> F:
 
 
 def compile_as(function: Any, body_for: Callable[..., tuple[Callable[..., Any], dict[str, Any]]]) -> None:
-    """Let compiled calls of `function` use a body chosen from the argument types; each body is compiled once.
-
-    body_for  returns the body and its compiler flags for numba's types of the arguments
-    """
+    """Let compiled calls of `function` use a body chosen from the argument types; each body is compiled once."""
+    # `body_for` returns the body and its compiler flags for numba's types of the arguments
     parts: dict[Any, Any] = {}
     compiled: dict[Any, Any] = {}
 
@@ -108,25 +106,19 @@ class ByType:
     __name__: str
 
     def __init__(self, declaration: Callable[..., Any]) -> None:
-        """Take name and documentation from `declaration`."""
         functools.update_wrapper(self, declaration)
         self._bodies: dict[type, Callable[..., Any]] = {}
         self._forced_inline: set[type] = set()
         self._default: Callable[..., Any] | None = None
 
     def __call__(self, chooser: Any, *rest: Any) -> Any:
-        """Run the body for the type of `chooser`."""
         return self._body_for(type(chooser), str(type(chooser)))(chooser, *rest)
 
     def __contains__(self, chosen: type) -> bool:
-        """Whether a body is registered for a type."""
         return chosen in self._bodies
 
     def case(self, chosen: type, forced_inline: bool = False) -> Callable[[F], F]:
-        """Register the decorated function as the body for first arguments of type `chosen`.
-
-        forced_inline  copy its code into every caller, however large
-        """
+        """Register a body for first arguments of type `chosen`; with `forced_inline` every caller gets a copy of it."""
 
         def register(body: F) -> F:
             self._bodies[chosen] = body
@@ -137,12 +129,10 @@ class ByType:
         return register
 
     def default(self, body: F) -> F:
-        """Register the decorated function as the body for first arguments of all other types."""
         self._default = body
         return body
 
     def compiled_body(self, kind: Any, *_: Any) -> tuple[Callable[..., Any], dict[str, Any]]:
-        """Return the body for numba's type of a first argument, and its compiler flags."""
         chosen = getattr(kind, "instance_class", type(None))
         return self._body_for(chosen, str(kind)), ALWAYS_INLINE_FLAGS if chosen in self._forced_inline else PART_FLAGS
 
@@ -156,10 +146,8 @@ class ByType:
 
 
 def by_type(declaration: Callable[..., Any]) -> ByType:
-    """Declare a function with one body per type of its first argument (a NamedTuple class).
-
-    The choice is made while compiling, so variants that a scene does not use cost nothing.
-    """
+    """Declare a function with one body per type of its first argument (a NamedTuple class)."""
+    # The choice is made while compiling, so variants that a scene does not use cost nothing.
     chosen = ByType(declaration)
 
     compile_as(chosen, chosen.compiled_body)
@@ -177,7 +165,6 @@ class ByAddress(types.Type):
     """Numba's type of a NamedTuple that is passed by its address: see `by_reference`."""
 
     def __init__(self, held: Any) -> None:
-        """Create the type of a reference to a NamedTuple of numba type `held`."""
         self.held, self.instance_class = held, held.instance_class
         super().__init__(f"reference to {held.name}")
 
@@ -188,11 +175,9 @@ class ByAddress(types.Type):
 
 
 def by_reference(chosen: C) -> C:
-    """Let kernels pass a NamedTuple class by address; Python creates its values, kernels only read their fields.
-
-    Otherwise numba turns a record of twenty arrays into a hundred arguments, and most of the compile time goes into
-    packing and unpacking them.
-    """
+    """Let kernels pass a NamedTuple class by address; Python creates its values, kernels only read their fields."""
+    # Otherwise numba turns a record of twenty arrays into a hundred arguments, and most of the compile time goes into
+    # packing and unpacking them.
 
     def reference(value: Any, purpose: Any) -> ByAddress:
         fields = [typeof_impl(field, purpose) for field in value]
@@ -228,12 +213,8 @@ def _unbox_reference(kind: ByAddress, value: Any, c: Any) -> Any:
 
 
 def vector(like: Any) -> Any:
-    """Allocate scratch (n,) that lives until the calling function returns; write it before reading.
-
-    like  value whose type fixes the length n: a tuple, or an array inside a structured scalar
-
-    In Python it holds NaN, so that reading unwritten scratch shows.
-    """
+    """Allocate scratch (n,) for the calling function, as long as the tuple or record array `like`."""
+    # in Python it holds NaN, so that reading unwritten scratch shows
     return np.full(len(like), np.nan)
 
 
@@ -253,10 +234,8 @@ def zeros(context: Any, like: Any) -> Any:
 
 
 def _on_the_stack(function: Callable[..., Any], dimensions: int) -> None:
-    """Make compiled calls of `function(like)` return memory of the caller's frame.
-
-    An intrinsic behind an overload would return memory of the overload's frame.
-    """
+    """Make compiled calls of `function(like)` return memory of the caller's frame."""
+    # An intrinsic behind an overload would return memory of the overload's frame.
 
     class Scratch(AbstractTemplate):  # type: ignore[misc]
         key = function

@@ -58,7 +58,6 @@ def model_differs(model: str, config: ContactConfig, parameter: Parameter, value
 
 
 def iterate_values(value: Any) -> Iterator[Any]:
-    """Yield the leaves of a record and its nested records."""
     if isinstance(value, tuple) or is_dataclass(value):
         for field in value if isinstance(value, tuple) else vars(value).values():
             yield from iterate_values(field)

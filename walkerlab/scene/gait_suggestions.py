@@ -85,10 +85,7 @@ def walkable_ranges(branches: tuple[GaitBranch, ...]) -> Iterator[SlopeRange]:
 
 
 def suggest_gaits(config: Config, typed: str = "") -> str:
-    """Describe where gaits exist near a config without one, with the commands that show them.
-
-    typed  command-line options that select the config, with a leading space
-    """
+    """Describe where gaits exist near a config without one, with commands that have the options `typed` by the user."""
     if config.slope_rad <= 0.0:
         return ""
     feet, suitable = find_gait_with_feet_ahead(config), find_slopes_with_gaits(config)

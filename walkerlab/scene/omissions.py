@@ -21,8 +21,6 @@ STILL_COMPUTED = "still being computed"
 
 @dataclass(frozen=True)
 class LeftOut:
-    """Something that was not computed, why, and what that saves besides the work itself."""
-
     what: str
     why: str
     saves: str = ""

@@ -23,8 +23,6 @@ MODEL_KEYS = tuple(keys_of(ContactConfig))
 
 @dataclass(frozen=True)
 class Parameter:
-    """A config key that varies."""
-
     key: str  # dotted, as requested
     unit: str  # of its values
     path: tuple[str, ...]
@@ -80,7 +78,6 @@ SLOPE = Parameter(SLOPE_RAD, "rad", (SLOPE_RAD,))
 
 
 def _keys_set(value: Any) -> Any:
-    """Return only the keys set in a block, so that defaults that depend on others are recomputed."""
     if not isinstance(value, Block):
         return value
     keys = value.model_dump(exclude_unset=True)
@@ -93,10 +90,8 @@ def dotted(key: Key) -> str:
 
 
 def parameter_of(key: str, config: ContactConfig, asker: Key = ()) -> Parameter:
-    """Return the parameter of a key of the config; raises ConfigError if it is not a number that a model uses.
-
-    asker  the config key that names it, if any
-    """
+    """Return the parameter of a key of the config; raises ConfigError if it is not a number that a model uses."""
+    # `asker` is the config key that names it, if any
     if key == SLOPE_DEG:
         return Parameter(key, "deg", (SLOPE_RAD,))
     own = {".".join(path): field for path, field in leaves(Config, held=config)}
@@ -111,10 +106,8 @@ _KEY_ADVICE = "Name a parameter of the walker, its slope or its ground; `walkerl
 
 
 def why_no_parameter(key: str, config: ContactConfig, own: Mapping[str, FieldInfo]) -> str:
-    """Return why a key is not a number that a model of the config uses; empty if it is.
-
-    own  the keys of the config, of its own walker's type
-    """
+    """Return why a key is not a number that a model of the config uses; empty if it is."""
+    # `own` are the keys of the config, of its own walker's type
     if key not in own:
         if any(name.startswith(f"{key}.") for name in own):
             return "is a block of keys, not a number"

@@ -29,10 +29,9 @@ from walkerlab.physics.solvers.system import Floats
 
 @dataclass(frozen=True)
 class KneeRules:
-    """Rules by which knees lock and are released on compliant ground.
+    """Rules by which knees lock and are released on compliant ground."""
 
-    A walker with compliant stops keeps all its bodies while its knees are locked: a latched stop keeps its angle.
-    """
+    # A walker with compliant stops keeps all its bodies while its knees are locked: a latched stop keeps its angle.
 
     stop: KneeStop | IdealLock = IdealLock()  # noqa: RUF009 (immutable)
     release_at_touch: bool = False  # else when the leading foot stops sinking in
@@ -58,9 +57,8 @@ def contact_walker(
 ) -> ContactWalker:
     """Assemble a walker on compliant ground; gravity in m/s^2, slope in rad. Foot k and knee k belong to leg k.
 
-    hinged_foot  the foot whose ball's centre is the hinge of the hinged forms, at along = 0
-
-    Raises ValueError, with a message for the user, for parts that cannot walk on compliant ground.
+    The centre of `hinged_foot`'s ball is the hinge of the hinged forms, at along = 0. Raises ValueError, with a message
+    for the user, for parts that cannot walk on compliant ground.
     """
     rules = knee_rules or KneeRules()
     check_walkable(assembly)
@@ -77,7 +75,6 @@ def contact_walker(
 
 
 def check_walkable(assembly: Assembly) -> None:
-    """Raise ValueError for too many bodies, a number of feet other than two, or a knee in one leg only."""
     if len(assembly.bodies) > MAX_BODIES:
         raise ValueError(
             f"a walker on compliant ground has at most {MAX_BODIES} bodies; this assembly has {len(assembly.bodies)}"
@@ -95,7 +92,6 @@ def about_centre(assembly: Assembly) -> Root:
 
 
 def about_foot(assembly: Assembly, foot: int) -> Root:
-    """Describe the walker about the hinged centre of a foot's ball, which just touches the ground as the leg turns."""
     ball = assembly.feet[foot]
     tree = tree_about(assembly, Anchor(ball.body, ball.centre_m))
     _, from_centre = tree_about_centre(assembly)
@@ -110,10 +106,8 @@ def levers_by_axis(feet: Any, hip: Floats) -> dict[str, Floats]:
 
 
 def hip_levers(assembly: Assembly, to_foot: Floats) -> Floats:
-    """Compute levers (bodies, 2) in m to the hip from the point from which `to_foot` leads to the first foot.
-
-    Without named legs, the first foot takes the place of the hip.
-    """
+    """Compute levers (bodies, 2) in m to the hip from the point from which `to_foot` leads to the first foot."""
+    # Without named legs, the first foot takes the place of the hip.
     if not all(assembly.legs):
         return to_foot
     upper, foot = assembly.legs[STANCE_FOOT][0], assembly.feet[0]
@@ -128,10 +122,7 @@ def hinge_point(assembly: Assembly, body: str, other: str) -> Position:
 
 
 def fill(form: Any, assembly: Assembly, root: Root, locked: list[int], merges: bool) -> None:
-    """Write the walker about a root, with these knees locked, into `form`.
-
-    merges  whether a locked knee's thigh and shank become one body; else the shank follows at its own angle
-    """
+    """Write the walker about a root into `form`; with `merges` a locked knee's thigh and shank become one body."""
     knees = [(assembly.index(knee.thigh), assembly.index(knee.shank)) for knee in assembly.knees]
     straight = {shank: thigh for thigh, shank in (knees[k] for k in locked)}
     one_with = straight if merges else {}
@@ -156,6 +147,5 @@ def fill(form: Any, assembly: Assembly, root: Root, locked: list[int], merges: b
 
 
 def leg_bodies(assembly: Assembly) -> NDArray[np.int64]:
-    """Return the bodies (2, bodies of a leg) of each leg; without named legs, those that carry the feet."""
     named = assembly.legs if all(assembly.legs) else tuple((foot.body,) for foot in assembly.feet)
     return np.array([[assembly.index(body) for body in leg] for leg in named])

@@ -23,7 +23,6 @@ from walkerlab.physics.mechanics.tree import add_inertia, projections
 
 @kernel_part
 def kinetic_energy(form: GroundModel, y: Any) -> float:
-    """Compute the kinetic energy (J)."""
     # r is scratch here; only M is used
     s, c, r, M = vector(OF_BODIES), vector(OF_BODIES), vector(OF_BODIES), matrix(OF_BODIES)
     half, total = half_size(form), 0.0
@@ -48,7 +47,6 @@ def potential_energy(form: GroundModel, y: Any) -> float:
 
 @kernel_part
 def foot_elastic_energy(system: OnGround, foot: int, y: Any) -> float:
-    """Compute the elastic energy (J) in the ground under a foot."""
     return elastic_energy(-over_ground(system, foot, one_foot_motion(system.form, foot, y)).height, system.normal)
 
 
@@ -64,7 +62,6 @@ def total_energy(system: OnGround, y: Any) -> float:
 
 @kernel_part
 def push_power(system: OnGround, t: float, y: Any) -> float:
-    """Compute the power (W) of the push-off."""
     if system.form.push_off == 0.0:
         return 0.0
     s, c, foot = vector(OF_BODIES), vector(OF_BODIES), 1 - system.progress.stance
@@ -75,10 +72,7 @@ def push_power(system: OnGround, t: float, y: Any) -> float:
 
 @kernel_part
 def dissipated_power(system: OnGround, foot: int, y: Any) -> tuple[float, float, float]:
-    """Compute the power (W) dissipated under a foot and the normal force (N).
-
-    The parts are those lost in the normal direction, (F_n - k d^e) d', and to friction.
-    """
+    """Compute the powers (W) lost under a foot along the normal, (F_n - k d^e) d', and to friction; and F_n (N)."""
     motion = over_ground(system, foot, one_foot_motion(system.form, foot, y))
     if motion.height >= 0.0:
         return 0.0, 0.0, 0.0

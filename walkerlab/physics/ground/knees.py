@@ -47,13 +47,11 @@ def extension(form: GroundModel, knee: int, y: Any) -> float:
 
 @kernel_part
 def extension_rate(form: GroundModel, knee: int, y: Any) -> float:
-    """Return the rate at which a knee straightens (rad/s)."""
     return ahead(form, FIRST_KNEE + knee, y, half_size(form) + form.places)
 
 
 @hinge_torque.case(KneeStop)
 def stop_torque(law: KneeStop, angle: float, rate: float) -> HingeTorque:
-    """Evaluate the IMPACT law beyond straight."""
     if angle <= 0.0:
         return HingeTorque(0.0, 0.0, 0.0, 0.0)
     torque = impact_normal_force(angle, rate, impact_law(law))
@@ -76,10 +74,7 @@ class Locked(NamedTuple):
 def lock_knee(whole: GroundModel, form: GroundModel, x: Any, columns: Floats | None = None) -> Locked:
     """Project the angular velocities on those that a form allows, by a plastic impact that does not move the root.
 
-    whole    the form of all bodies, about the root
-    form     the form in which they move afterwards
-    x        (size,) state of all bodies
-    columns  (size, columns) directions of that state; None for none
+    The state x (size,) and its directions `columns` (size, columns) are those of the form `whole` of all bodies.
     """
     x = np.array(x, float)
     n, p, rates = int(whole.bodies), int(whole.places), x.size - int(whole.bodies)

@@ -28,7 +28,6 @@ from walkerlab.physics.solvers.system import block, derivative, jacobian
 
 @block.case(OnGround)
 def coordinate_and_rate(system: OnGround) -> tuple[float, float]:
-    """Use blocks of two: there are as many velocities as coordinates."""
     return (0.0, 0.0)
 
 
@@ -54,10 +53,8 @@ def foot_wrench(system: OnGround, t: float, foot: int, s: Any, c: Any, y: Any, r
 
 @forced_inline
 def all_forces(system: OnGround, t: float, s: Any, c: Any, y: Any, M: Any, r: Any) -> tuple[float, float]:
-    """Compute the forces of ground and push-off along and normal to the slope (N); write M (n, n) and r (n,) in N m.
-
-    The torques r are those of the feet, the centrifugal terms, the knees' stops, the hip and, about a hinge, gravity.
-    """
+    """Compute the forces of ground and push-off along and normal to the slope (N); write M (n, n) and r (n,) in N m."""
+    # The torques r are those of the feet, the centrifugal terms, the knees' stops, the hip and, about a hinge, gravity.
     form = system.form
     n, half = form.bodies, half_size(form)
     for k in range(n):
@@ -98,10 +95,7 @@ def on_ground_derivative(system: OnGround, t: float, y: Any, f: Any) -> None:
 
 @kernel_part
 def motion_gradient(form: GroundModel, foot: int, F: Any, U: Any, y: Any, j: int) -> tuple[float, float, float]:
-    """Compute derivatives of a foot's penetration, penetration rate and slip with respect to component j of the state.
-
-    F, U  (n,) projections of the levers to the foot
-    """
+    """Differentiate a foot's penetration, its rate and slip by state component j; F, U (n,) project its levers."""
     p, half = form.places, half_size(form)
     moves = j >= half
     k = (j - half if moves else j) - p
@@ -155,7 +149,6 @@ def add_column(form: GroundModel, foot: int, j: int, along: float, normal: float
 
 @kernel_part
 def add_torque_gradients(system: OnGround, s: Any, c: Any, y: Any, alpha: Any, by_angle: Any, by_rate: Any) -> None:
-    """Add the derivatives (n, n) of the torques, except the ground's, minus M alpha at fixed alpha."""
     form = system.form
     n, p, half = form.bodies, form.places, half_size(form)
     if p == 0:

@@ -45,11 +45,9 @@ def impact_normal_force(penetration: float, penetration_rate: float, law: Normal
 
 @kernel_part
 def grip(penetration: float, penetration_rate: float, law: NormalLaw) -> float:
-    """Scale the force before it is cut off at zero: where it falls through zero, the ground releases the foot.
-
-    The result is the force divided by min(d, d_max)^min(e, 2), with a finite slope at the surface, and nowhere steeper
-    than the force.
-    """
+    """Scale the force before it is cut off at zero: where it falls through zero, the ground releases the foot."""
+    # The result is the force divided by min(d, d_max)^min(e, 2), with a finite slope at the surface, and nowhere
+    # steeper than the force.
     full = law.full_damping_penetration
     power = min(law.exponent, 2.0)
     d = max(penetration, 0.0)

@@ -13,8 +13,6 @@ from walkerlab.physics.solvers.system import block, derivative, jacobian
 
 
 class OnPads(NamedTuple):
-    """A walker and its pads."""
-
     walker: OnGround
     terrain: Any
 

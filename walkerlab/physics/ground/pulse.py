@@ -13,7 +13,6 @@ from walkerlab.physics.kernels import kernel_part
 
 @kernel_part
 def pulse_force(system: OnGround, t: float) -> float:
-    """Compute the force (N) of the pulse at a time; 0 outside a pulse."""
     if system.form.push_off == 0.0 or system.progress.steps == 0:
         return 0.0
     u = (t - system.progress.last_touch) / system.form.push_off_duration
@@ -31,8 +30,6 @@ def pulse_left(system: OnGround, t: float) -> float:
 
 
 class Push(NamedTuple):
-    """Instantaneous push on a foot."""
-
     along: float  # N
     upward: float  # N
     ahead: float  # m, from the foot's contact point to the hip

@@ -12,14 +12,7 @@ class RestingFoot(NamedTuple):
 
 
 def resting_foot(weight: float, mass: float, stiffness: float, exponent: float, damping: float) -> RestingFoot:
-    """Compute the state of a foot at rest on ground with the normal force F = k d^e + c d'.
-
-    weight     normal to the ground, N
-    mass       kg
-    stiffness  k, N/m^e
-    exponent   e
-    damping    c, N s/m
-    """
+    """Compute the state of a foot at rest under a weight (N, normal to the ground) where F = k d^e + c d', SI."""
     depth = (weight / stiffness) ** (1.0 / exponent)
     slope = stiffness * exponent * depth ** (exponent - 1.0)
     return RestingFoot(depth, damping / (2.0 * math.sqrt(slope * mass)))

@@ -44,7 +44,6 @@ def plane(stride_measure: float) -> Terrain:
 
 @kernel_part
 def is_uneven(terrain: Terrain) -> bool:
-    """Whether footholds differ in height."""
     return terrain.heights.size > 1
 
 
@@ -56,7 +55,6 @@ def foothold_height(terrain: Terrain, foothold: int) -> float:
 
 @kernel_part
 def height_of_pad(terrain: Terrain, foot: int, cell: int) -> float:
-    """Return the height (m) of the pad in a cell of a foot's lane."""
     apart = (terrain.lanes[foot] - terrain.lanes[STANCE_FOOT]) / terrain.stride_measure
     return foothold_height(terrain, cell + math.floor(apart + 0.5))
 
@@ -71,7 +69,6 @@ def cell_at(terrain: Terrain, foot: int, along: float) -> int:
 
 @kernel_part
 def cell_edges(terrain: Terrain, foot: int, cell: int) -> tuple[float, float]:
-    """Return the start and end of a cell (m)."""
     if not terrain.has_pads:
         return -REMOTE_EDGE, REMOTE_EDGE
     centre = terrain.lanes[foot] + cell * terrain.stride_measure
@@ -92,12 +89,7 @@ def starts_with_ground(terrain: Terrain, is_stance: bool) -> bool:
 
 @kernel_part
 def has_ground_in_air(terrain: Terrain, has_ground: bool, stands: bool, ahead: bool) -> bool:
-    """Whether ground would carry a foot that is above it.
-
-    has_ground  whether it would have so far
-    stands      whether it is the stance foot
-    ahead       whether it is ahead of the other foot
-    """
+    """Whether ground would carry a foot above it, from whether it would so far, `stands` on it, or is `ahead`."""
     if terrain.has_pads:
         return has_ground
     return stands or ahead or not terrain.order_matters

@@ -32,12 +32,11 @@ RELEASED, BENT, STOPPING, LOCKED = 0, 1, 2, 3
 
 @tree.fast_fields
 class GroundModel(tree.Mechanism):  # type: ignore[misc]  # as its base
-    """Form of the walker, SI: its bodies with the present knees locked, hinged or free; a structured scalar.
+    """Form of the walker, SI: its bodies with the present knees locked, hinged or free; a structured scalar."""
 
-    Its arrays have room for MAX_BODIES, so that one compiled walk serves all walkers; only n entries are used. Its
-    hinges are the hip, with the uppermost body of the first leg ahead of the second's, and each knee, with the shank
-    ahead of the thigh: thigh and shank are the same body while they move as one. E has one reduction.
-    """
+    # Its arrays have room for MAX_BODIES, so that one compiled walk serves all walkers; only n entries are used. Its
+    # hinges are the hip, with the uppermost body of the first leg ahead of the second's, and each knee, with the shank
+    # ahead of the thigh: thigh and shank are the same body while they move as one. E has one reduction.
 
     bodies: int  # [n]
     places: int  # number of root coordinates before the angles: 2, or 0 with a hinge
@@ -75,8 +74,6 @@ FORM = tree.record_type(GroundModel, FORM_SHAPES)
 
 
 class ContactWalker(NamedTuple):
-    """Constants of a walker on compliant ground."""
-
     forms: Any  # (2, 4) of Form: free or hinged; which knees are locked, as `locked_knees` numbers them
     normal: NormalLaw
     friction: Any  # a FrictionLaw
@@ -91,17 +88,14 @@ class ContactWalker(NamedTuple):
 
     @property
     def size(self) -> int:
-        """Length of the whole walker's state."""
         return int(4 + 2 * self.whole.bodies)
 
     @property
     def mass(self) -> float:
-        """Total mass, kg."""
         return float(self.whole.mass)
 
     @property
     def slope(self) -> float:
-        """Angle of the slope, rad."""
         return float(self.whole.slope)
 
     @property
@@ -116,12 +110,10 @@ class ContactWalker(NamedTuple):
 
     @property
     def driven(self) -> bool:
-        """Whether anything besides gravity supplies energy."""
         return self.whole.driven
 
     @property
     def gravity(self) -> float:
-        """Gravitational acceleration, m/s^2."""
         return math.hypot(self.gravity_along, self.gravity_down)
 
     @property
@@ -130,7 +122,6 @@ class ContactWalker(NamedTuple):
 
 
 def changed_forms(walker: ContactWalker, **fields: Any) -> ContactWalker:
-    """Return the walker with some fields changed in all its forms."""
     forms = walker.forms.copy()
     tree.write_fields(forms, fields)
     return walker._replace(forms=forms)
@@ -180,12 +171,9 @@ def on_ground(
     level: Any = (0.0, 0.0),
     progress: WalkProgress | None = None,
 ) -> OnGround:
-    """Return the walker in the form that its knees determine.
+    """Return the walker in the form that its knees determine; by default foot 1 carries the first step.
 
-    has_ground  (2,) whether there is ground under a foot
-    knee        (2,) state of each knee
-    level       (2,) m, height of the ground for each foot
-    progress    of the walk; by default foot 1 carries the first step
+    For each foot, `has_ground` says whether there is ground under it, and `level` how high (m).
     """
     memory = np.asarray(has_ground, np.int8), np.asarray(knee, np.int8), np.asarray(level, float)
     form = walker.forms[int(hinged), locked_knees(knee)]
@@ -200,8 +188,6 @@ def locked_knees(knee: Any) -> int:
 
 
 class FootMotion(NamedTuple):
-    """Position and velocity of a foot's lowest point."""
-
     along: float  # m
     height: float  # m over the slope, negative inside the ground
     slip: float  # m/s, velocity along the slope of the material point there
@@ -210,7 +196,6 @@ class FootMotion(NamedTuple):
 
 @kernel_part
 def half_size(form: GroundModel) -> int:
-    """Return the number of coordinates, which is the index of the first velocity."""
     return form.places + form.bodies
 
 
@@ -251,13 +236,10 @@ def feet_motion(form: GroundModel, y: Any) -> tuple[FootMotion, FootMotion]:
 
 @kernel_part
 def over_ground(system: OnGround, foot: int, motion: FootMotion) -> FootMotion:
-    """Return a foot's motion with its height over the ground below it."""
     return FootMotion(motion.along, motion.height - system.level[foot], motion.slip, motion.vertical_velocity)
 
 
 class FootForce(NamedTuple):
-    """Force of the ground on a foot."""
-
     along: float  # N, friction
     normal: NormalForce
     by_slip: float  # N s/m, derivative of the friction
@@ -273,10 +255,8 @@ def foot_force(laws: Any, motion: FootMotion) -> FootForce:
 
 
 def to_form(form: GroundModel, x: Any) -> Floats:
-    """Convert a state of all bodies, or a tangent column, to that of a form about the same root.
-
-    Merged bodies turn alike up to rounding; the first one's values are taken.
-    """
+    """Convert a state of all bodies, or a tangent column, to that of a form about the same root."""
+    # Merged bodies turn alike up to rounding; the first one's values are taken.
     return np.asarray(x)[places_in_whole(form, len(x))]
 
 

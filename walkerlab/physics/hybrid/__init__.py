@@ -22,7 +22,7 @@ Contact model (`contact_loop`)
     no function   PULSE_END: the push-off is over, and a trailing knee that waited for that is released
     other ends    no touch in time, no foot on the ground for too long, a touch with a bent knee, off a pad, stubbed
 
-| file | what is in it |
+| file | content |
 |---|---|
 | `endings` | codes with which kernels report the end of a walk, for both models |
 | `contact_events`, `contact_crossings` | the events; their functions along a step, and the first zero |
@@ -32,6 +32,6 @@ Contact model (`contact_loop`)
 | `contact_record`, `contact_tangent` | samples and energy balance; the derivative with respect to the start |
 | `contact_result` | a whole walk in all its forms, and its result |
 | `rigid_walk`, `rigid_record`, `recorded_walk` | loop and events; samples and extremes; a whole walk and its result |
-| `walk_record`, `hip_torque` | for both: fields of every result; work of the hip's torque |
+| `walk_record`, `hip_work` | for both: fields of every result; work of the hip's torque |
 | `rigid_measures`, `comparison` | energies and forces along a rigid walk; differences between two walks |
 """

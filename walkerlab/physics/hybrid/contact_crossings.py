@@ -63,7 +63,6 @@ def hip_height(form: GroundModel, s: Any, c: Any, y: Any) -> float:
 def sample_event_functions(
     system: OnGround, ground: JudgedGround, walk_state: WalkState, y: Any, node: int, finder: CrossingFinder
 ) -> None:
-    """Evaluate all event functions at one node of a step, where the state is y."""
     form, terrain, values = system.form, ground.terrain, finder.values
     s, c = vector(OF_BODIES), vector(OF_BODIES)
     sines_cosines(form, y, s, c)
@@ -86,7 +85,6 @@ def sample_event_functions(
 def sample_foot(
     system: OnGround, motion: FootMotion, edges: tuple[float, float], first: int, j: int, finder: CrossingFinder
 ) -> None:
-    """Evaluate one foot's event functions at node j."""
     values = finder.values
     values[first + HEIGHT, j] = motion.height
     values[first + VERTICAL_VELOCITY, j] = motion.vertical_velocity
@@ -99,12 +97,8 @@ def sample_foot(
 
 @kernel_part
 def knee_crossing(walk_state: WalkState, finder: CrossingFinder) -> tuple[float, int]:
-    """Find the first event of the knees.
-
-    A bent knee straightens, a knee in its stop turns back, or the stance foot stops sinking in, which releases a knee.
-
-    Returns the fraction of the step and the event.
-    """
+    """Find the first event of the knees; returns the fraction of the step and the event."""
+    # a bent knee straightens, a knee in its stop turns back, or the stance foot stops sinking in and releases a knee
     best, event = NO_CROSSING, -1
     for knee in range(2):
         fraction, index = NO_CROSSING, EXTENSION + knee
@@ -127,11 +121,9 @@ def knee_crossing(walk_state: WalkState, finder: CrossingFinder) -> tuple[float,
 def earliest_crossing(
     system: OnGround, ground: JudgedGround, walk_state: WalkState, watch_order: bool, finder: CrossingFinder
 ) -> tuple[float, int]:
-    """Find the first event in the sampled step.
+    """Find the first event in the sampled step; returns its fraction of the step, or NO_CROSSING, and the event.
 
-    watch_order  whether it matters that the feet pass each other
-
-    Returns the fraction of the step, NO_CROSSING without an event, and the event.
+    `watch_order` adds the event that the feet pass each other.
     """
     sides, at_zero, has_ground = walk_state.sides, walk_state.at_zero, walk_state.has_ground
     best, event = NO_CROSSING, -1
@@ -169,13 +161,11 @@ def earliest_crossing(
 
 @kernel_part
 def leaves_side(finder: CrossingFinder, event: int, side: int, zero_at_start: bool) -> float:
-    """Find the fraction of the step at which an event function leaves its stored side of zero.
-
-    It is 0 if the function is already on the other side, because the previous step, ended by another event, went past
-    this zero or ended on it. For a function that is zero at the start, the direction of its change decides, unless it
-    has moved by rounding alone: a foot just released from its hinge may still sink in. A function that its own event
-    left at zero has already changed sides, so it returns only if it is on the other side throughout.
-    """
+    """Find the fraction of the step at which an event function leaves its stored side of zero."""
+    # It is 0 if the function is already on the other side, because the previous step, ended by another event, went past
+    # this zero or ended on it. For a function that is zero at the start, the direction of its change decides, unless it
+    # has moved by rounding alone: a foot just released from its hinge may still sink in. A function that its own event
+    # left at zero has already changed sides, so it returns only if it is on the other side throughout.
     value = finder.values[event, 0]
     at_zero = zero_at_start or abs(value) < ZERO_ROUNDING
     if side != NO_SIDE:

@@ -45,7 +45,6 @@ class JudgedGround(NamedTuple):
 
 @kernel_part
 def farthest_slide(terrain: Terrain) -> float:
-    """Return the distance that a loaded stance foot may slip (m)."""
     return FARTHEST_SLIDE * terrain.stride_measure
 
 

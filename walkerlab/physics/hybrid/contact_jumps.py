@@ -34,13 +34,11 @@ def change_form(
 ) -> Floats:
     """Return the state in the form after an event that locked or released a knee, and record its energy loss.
 
-    A lock is a plastic impact; a latch loses the energy held in its spring; a release changes no velocity.
-
-    The tangent jumps. So it does at a step's touch if the hip torque changes legs. For a walker with a push-off, whose
-    pulse starts at the touch, the tangent is afterwards that of walks that touch at the same time.
-
-    method  holds the event's time and the state in the form before; its state is replaced
+    `method` holds the event's time and the state in the form before; its state is replaced.
     """
+    # A lock is a plastic impact; a latch loses the energy held in its spring; a release changes no velocity. The
+    # tangent jumps, also at a step's touch if the hip torque changes legs. For a walker with a push-off, whose pulse
+    # starts at the touch, the tangent is afterwards that of walks that touch at the same time.
     y, t = method.y, float(method.clock[T])
     whole = walker.forms[int(before.form.places == 0), 0]
     size = int(2 * (whole.places + whole.bodies))
@@ -79,14 +77,12 @@ def change_form(
 
 
 def state_rate(system: OnGround, y: Floats, size: int, t: float) -> Floats:
-    """Compute dy/dt of all bodies (size,) at a time (s)."""
     rate = np.zeros(y.size)
     right_hand_side(system, t, y, rate)
     return to_full(system.form, rate, size)
 
 
 def event_gradient(whole: GroundModel, event: int, x: Floats) -> Floats:
-    """Compute the gradient of an event function (knee extension, foot height, or their rates) in the full state."""
     gradient, p, half = np.zeros(x.size), int(whole.places), x.size // 2
     if event >= EXTENSION:
         first = half + p if event >= EXTENSION_RATE else p

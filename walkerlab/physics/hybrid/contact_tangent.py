@@ -31,10 +31,9 @@ RADAU_WEIGHTS = np.array(
 
 @by_reference
 class Tangent(NamedTuple):
-    """The derivative Phi, and workspace sized for the n values of the whole walker's state.
+    """The derivative Phi, and workspace sized for the n values of the whole walker's state."""
 
-    While the walker moves as one of fewer bodies, only the first rows are used.
-    """
+    # While the walker moves as one of fewer bodies, only the first rows are used.
 
     Phi: Any  # (n, directions); no directions unless the tangent is requested
     stages: Any  # (4, n, n) Jacobians at the three stages, and one more to extrapolate with
@@ -44,7 +43,6 @@ class Tangent(NamedTuple):
 
 
 def new_tangent(n: int, directions: int) -> Tangent:
-    """Create the tangent for `directions` directions of a system of n equations; empty for zero directions."""
     m = n if directions else 0
     return Tangent(
         np.zeros((n, directions)),
@@ -57,7 +55,6 @@ def new_tangent(n: int, directions: int) -> Tangent:
 
 @kernel_part
 def jacobian_at(method: Any, system: Any, fraction: float, J: Any) -> None:
-    """Write the Jacobian at a fraction of the last step into J."""
     y = vector(OF_STATES)[: method.y.size]
     interpolate(method, system, fraction, y)
     jacobian(system, method.clock[T_OLD] + fraction * (method.clock[T] - method.clock[T_OLD]), y, J)
@@ -85,10 +82,8 @@ def carry_tangent(tangent: Tangent, method: Any, system: Any) -> None:
 
 @kernel_part
 def jacobian_at_end(tangent: Tangent, method: Any, system: Any) -> None:
-    """Compute the Jacobian at the step's end from inside, extrapolated from two states shortly before.
-
-    A step that ends at a switching point of the force law may end on either side of it, and the Jacobian jumps there.
-    """
+    """Compute the Jacobian at the step's end from inside, extrapolated from two states shortly before."""
+    # A step that ends at a switching point of the force law may end on either side of it, and the Jacobian jumps there.
     near = min(0.25, THIS_SIDE / (method.clock[T] - method.clock[T_OLD]))
     for i in range(2):
         jacobian_at(method, system, 1.0 - (1 + i) * near, tangent.stages[2 + i])

@@ -123,10 +123,7 @@ def set_level(
     level: float,
     y: Any,
 ) -> None:
-    """Set the ground height (m) for a foot; the energy in its ground spring is lost.
-
-    motion  of the foot relative to its present ground
-    """
+    """Set the ground height (m) for a foot; the energy in its ground spring is lost."""
     if level == walk_state.level[foot]:
         return
     height = motion.height + walk_state.level[foot] - level
@@ -193,7 +190,6 @@ def lift(
 
 @kernel_part
 def note_slip(form: GroundModel, walk_state: WalkState, feet: tuple[FootMotion, FootMotion], foot: int, y: Any) -> None:
-    """Record slip and rolling of a foot since its touch."""
     slip = material_along(form, foot, feet[foot].along, y) - walk_state.touched[foot]
     walk_state.slipped[foot] = slip
     walk_state.rolled[foot] = feet[foot].along - walk_state.foothold[foot] - slip
@@ -209,11 +205,9 @@ def touch(
     t: float,
     y: Any,
 ) -> int:
-    """Handle a foot that comes down on ground; returns an outcome if the walk ends.
-
-    The step ends if it is the swing foot, on another pad than it left and far enough ahead. A swing foot that comes
-    down on the pad it left, away from where it stood, has tripped over it: it scuffs.
-    """
+    """Handle a foot that comes down on ground; returns an outcome if the walk ends."""
+    # The step ends if it is the swing foot, on another pad than it left and far enough ahead. A swing foot that comes
+    # down on the pad it left, away from where it stood, has tripped over it: it scuffs.
     stance = walk_state.progress.stance
     if walk_state.has_ground[foot] == 0:
         return GOES_ON
@@ -256,7 +250,6 @@ def catches(stop: Any) -> bool:
 
 @catches.case(IdealLock)
 def lock_catches(stop: IdealLock) -> bool:
-    """IdealLock always catches."""
     return True
 
 
@@ -273,7 +266,6 @@ def knee_stops(stop: Any, walk_state: WalkState, event: int, t: float) -> None:
 
 @kernel_part
 def release(walk_state: WalkState, knee: int) -> None:
-    """Free a knee, so that its shank turns independently."""
     walk_state.progress.release = NOT_DUE
     walk_state.knee[knee] = RELEASED
 

@@ -50,7 +50,6 @@ class SpringDamper(NamedTuple):
 
 @hinge_torque.case(SpringDamper, forced_inline=True)
 def spring_damper_torque(law: SpringDamper, angle: float, rate: float) -> HingeTorque:
-    """Evaluate linear spring and damper, minus the constant torque."""
     elastic = law.stiffness * angle
     return HingeTorque(elastic + law.damping * rate - law.torque, elastic, law.stiffness, law.damping)
 
@@ -73,7 +72,6 @@ def hinge_law(model: Any, row: int) -> SpringDamper:
 
 @forced_inline
 def is_sprung(model: Any, row: int) -> bool:
-    """Whether spring, damper or torque acts at a hinge."""
     return model.laws[row, 0] != 0.0 or model.laws[row, 1] != 0.0 or model.laws[row, 2] != 0.0
 
 

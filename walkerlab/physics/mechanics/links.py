@@ -12,10 +12,9 @@ from walkerlab.physics.kernels import forced_inline
 
 
 class CountedModel(NamedTuple):
-    """Interface of models here, for one whose number of bodies is known only at run time.
+    """Interface of models here, for one whose number of bodies is known only at run time."""
 
-    A model with tuples takes little more than half the time: the compiler unrolls its loops.
-    """
+    # A model with tuples takes little more than half the time: the compiler unrolls its loops.
 
     E: Any  # (phases, n, n)
     arm_x: Any  # (n,)
@@ -58,10 +57,8 @@ def factor_linked(model: Any, phase: int, M: Any) -> None:
 
 @forced_inline
 def solve_linked(model: Any, phase: int, factors: Any, b: Any) -> None:
-    """Replace the right-hand side b (n,) = r by E dz, with factors from `factor_linked`.
-
-    A torque on a follower acts on the bodies it follows.
-    """
+    """Replace the right-hand side b (n,) = r by E dz, with factors from `factor_linked`."""
+    # A torque on a follower acts on the bodies it follows.
     n = len(model.arm_x)
     for c in range(n):
         if model.E[phase, c, c] == 0.0:

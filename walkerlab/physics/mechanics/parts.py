@@ -86,7 +86,6 @@ class Assembly:
     legs: tuple[tuple[str, ...], tuple[str, ...]] = ((), ())
 
     def __post_init__(self) -> None:
-        """Check that the parts form a tree of known bodies."""
         names = [body.name for body in self.bodies]
         if len(set(names)) < len(names):
             raise ValueError(f"two bodies of one name among {', '.join(names)}")

@@ -96,18 +96,15 @@ def group_bodies(assembly: Assembly) -> BodyPlaces:
 
 
 def group_index(groups: list[tuple[str, ...]], name: str) -> int:
-    """Return the index of the group that holds a body."""
     return next(place for place, group in enumerate(groups) if name in group)
 
 
 def torso_rows(assembly: Assembly, places: BodyPlaces) -> dict[int, Floats]:
-    """Return the weights by which coupled places follow others."""
     members = places.members
     return {int(np.argmax(members[body])): row @ members for body, row in followers(assembly).items()}
 
 
 def knee_rows(places: BodyPlaces) -> dict[int, Floats]:
-    """Return the weights by which the parts of a straight swing leg follow its thigh."""
     return {shank: np.eye(len(places.names))[thigh] for shank, thigh in places.knees}
 
 
@@ -127,7 +124,6 @@ def knee_position(assembly: Assembly) -> tuple[float, float] | None:
 
 
 def check_equal_legs(assembly: Assembly) -> None:
-    """Raise ValueError unless both legs have the same parts in the same order, joined by knees, and a foot each."""
     first, second = assembly.legs
     if not first or len(first) != len(second):
         raise ValueError("both legs need the same bodies, from the hip down: legs: [[…], […]]")
@@ -153,7 +149,6 @@ def check_equal_legs(assembly: Assembly) -> None:
 
 
 def leg_measures(assembly: Assembly, k: int) -> Floats:
-    """Compute mass, inertia, centre of mass and foot of a leg, relative to its hip."""
     leg, foot = assembly.legs[k], assembly.feet[k]
     hip = find_hip(assembly)
     at_hip = Anchor(hip.parent, hip.parent_point_m) if k == 1 else Anchor(hip.child, hip.child_point_m)

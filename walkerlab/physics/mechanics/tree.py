@@ -29,10 +29,8 @@ R = TypeVar("R", bound=type)
 
 
 def fast_fields(kind: R) -> R:
-    """Give a class of records fast access to its annotated fields.
-
-    NumPy's field look-up takes several times as long, and walks are prepared and evaluated in Python.
-    """
+    """Give a class of records fast access to its annotated fields."""
+    # NumPy's field look-up takes several times as long, and walks are prepared and evaluated in Python.
     fields: dict[str, Any] = {name: property(itemgetter(name)) for name in kind.__annotations__}
     fields |= {"__getattribute__": object.__getattribute__, "__getitem__": np.void.__getitem__}
     for name, read in fields.items():
@@ -83,12 +81,10 @@ class Mechanism(np.record):  # type: ignore[misc]  # NumPy's stubs call one of i
 
     @property
     def sprung(self) -> bool:
-        """Whether a spring, a damper or a torque acts at any hinge."""
         return bool(self.laws.any())
 
     @property
     def driven(self) -> bool:
-        """Whether anything besides gravity supplies energy."""
         return bool(self.push_off != 0.0 or self.laws[:, -1].any())
 
 
@@ -184,7 +180,6 @@ def add_inertia_gradients(
 
 @forced_inline
 def kinetic_energy(n: int, M: Any, omega: Any) -> float:
-    """Compute the kinetic energy (J) of the bodies' rotation with a mass matrix M (n, n)."""
     total = 0.0
     for k in range(n):
         for l in range(n):

@@ -36,11 +36,9 @@ def sine_cosine(x: float) -> tuple[float, float]:
 
 
 def lanes_sine_cosine(x: Lanes) -> tuple[Lanes, Lanes]:
-    """Compute the same for lanes, within 3e-16 for angles of a few thousand turns.
-
-    If any lane is further than a quarter turn from 0, the nearest multiple k of pi is subtracted in all of them: k = 0
-    leaves the nearer ones unchanged, and the others change sign with k.
-    """
+    """Compute the same for lanes, within 3e-16 for angles of a few thousand turns."""
+    # If any lane is further than a quarter turn from 0, the nearest multiple k of pi is subtracted in all of them: k =
+    # 0 leaves the nearer ones unchanged, and the others change sign with k.
     if any_positive(abs(x) - HALF_PI):
         k = nearest(PER_PI * x)
         odd = k - 2.0 * nearest(0.5 * k)

@@ -38,12 +38,10 @@ class Arc:
     centre_ahead_m: float = 0.0
 
     def foot(self, body: str, length_m: float) -> BallFoot:
-        """Return the sole of a limb that is `length_m` long, sole included."""
         return BallFoot(f"foot of {body}", body, (self.centre_ahead_m, self.radius_m - length_m), self.radius_m)
 
 
 def straight_legs(leg: Limb, hip_mass_kg: float, foot: Arc) -> Assembly:
-    """Assemble two straight legs hinged at a point-mass hip."""
     return Assembly(
         bodies=tuple(leg.body(name) for name in LEG_NAMES),
         joints=(Revolute("hip", LEG_NAMES[1], UPPER_END, LEG_NAMES[0], UPPER_END),),
@@ -54,7 +52,6 @@ def straight_legs(leg: Limb, hip_mass_kg: float, foot: Arc) -> Assembly:
 
 
 def kneed_legs(thigh: Limb, shank: Limb, hip_mass_kg: float, foot: Arc) -> Assembly:
-    """Assemble two legs of thigh and shank, with knees that lock straight."""
     at_knee = (0.0, -thigh.length_m)
     knees = tuple(Revolute(f"knee {k + 1}", THIGHS[k], at_knee, SHANKS[k], UPPER_END) for k in range(2))
     return Assembly(

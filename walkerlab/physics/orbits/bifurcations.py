@@ -57,8 +57,6 @@ def critical_value(kind: Kind, DP: Floats) -> float:
 
 @dataclass(frozen=True)
 class Bifurcation:
-    """A point where a branch folds, or its gait gives rise to one of twice the period or to a torus."""
-
     kind: Kind
     value: float  # of the parameter
     multiplier: complex
@@ -70,7 +68,6 @@ class Bifurcation:
         return self.point.evaluated.data
 
     def lies_between(self, first: Cycle, second: Cycle) -> bool:
-        """Whether the bifurcation lies between these two neighbours on the branch."""
         ends = (self.segment.first, self.segment.second)
         return {id(end.evaluated.data.z) for end in ends} == {id(first.z), id(second.z)}
 
@@ -165,9 +162,7 @@ def _cubic(equations: GaitEquations, flip: Bifurcation, v: Floats, w: Floats, h:
 
 
 def predict_doubled(flip: Bifurcation, form: FlipForm, share: float = 1.0) -> tuple[Floats, Floats, float]:
-    """Predict the branch of twice the period near a flip, for `correct`.
-
-    share  of the normal form's amplitude
+    """Predict the branch of twice the period near a flip, at a share of the normal form's amplitude, for `correct`.
 
     Returns the guess x (d + 1,), the normal of the plane of constant amplitude, and the amplitude.
     """

@@ -41,10 +41,7 @@ class GaitAnswer:
 
 
 def find_gait_from(walker: ContactWalker, ground: JudgedGround, tolerances: Tolerances, start: State) -> GaitAnswer:
-    """Find the contact gait near a state of the free walker with both feet on the ground.
-
-    Never raises if there is no gait: the answer states the reason and advice.
-    """
+    """Find the contact gait near a free state with both feet on the ground; without one, say why and advise."""
     excluded = why_no_gait(walker)
     if excluded:
         return GaitAnswer(None, *excluded)
@@ -111,10 +108,8 @@ def solve_gait_on(pads: OwnPads, z: Floats, rigidity: float = 0.0) -> Cycle | st
 
 
 def with_scaled_laws(walker: ContactWalker, stiffness: float, damping: float, creep: float) -> ContactWalker:
-    """Return the walker with stiffness, damping and friction velocities of the ground scaled by these factors.
-
-    The penetration of full damping shrinks with the static penetration, so that the damping ratio is unchanged.
-    """
+    """Return the walker with stiffness, damping and friction velocities of the ground scaled by these factors."""
+    # The penetration of full damping shrinks with the static penetration, so that the damping ratio is unchanged.
     normal = walker.normal
     changed = normal._replace(
         stiffness=normal.stiffness * stiffness,

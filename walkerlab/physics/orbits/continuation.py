@@ -58,18 +58,15 @@ class Follower:
         strides: Strides,
         abscissa: Callable[[float], float] = float,
     ) -> None:
-        """Begin with the solution `first`.
+        """Begin with the solution `first`; `solve` returns the solution (m,) near a prediction, or None.
 
-        solve     return the solution (m,) at a value, given a prediction; None if it fails
-        abscissa  variable in which the solution is smooth, as a function of the parameter
+        The solution is smooth in `abscissa`, a function of the parameter.
         """
         self._solve, self._strides, self._abscissa, self._states = solve, strides, abscissa, [first]
 
     def to(self, target: float) -> FollowerState:
-        """Follow the solution to the parameter's value `target`, or to where it is lost.
-
-        Strides do not depend on the target until the last, so the cached ones serve every target.
-        """
+        """Follow the solution to the parameter's value `target`, or to where it is lost."""
+        # Strides do not depend on the target until the last, so the cached ones serve every target.
         state = self._states[0]
         for state in self._states:  # grows during the loop
             following = state.value + state.stride
@@ -131,8 +128,6 @@ def correct(
 
 @dataclass(frozen=True)
 class StepControl:
-    """Limits of one step."""
-
     first: float = 0.01  # arclength, also of the next two
     shortest: float = 1e-8
     longest: float = 0.05
@@ -150,8 +145,7 @@ def step_along(
 ) -> tuple[CurvePoint[Data], float] | NotConverged:
     """Return the next point of a curve after `last`, and the length of the step after it.
 
-    acceptable  additional condition of the caller on the new point
-    before      point before `last`, if any: it gives the curvature
+    The point `before` the last one, if any, gives the curvature; the new point must be `acceptable`.
     """
     lost = NotConverged(Outcome.WALKED)
     bend = np.zeros_like(last.x)  # curvature: change of the tangent per arclength
@@ -196,10 +190,7 @@ class _OffTheCurve(Exception):  # noqa: N818 (the end of one search, not an erro
 
 
 def root_along(segment: Segment[Data], measure: Callable[[CurvePoint[Data]], float]) -> CurvePoint[Data] | None:
-    """Return the point of a segment where `measure` changes sign; None if the curve is lost.
-
-    Brent's method on the corrected curve.
-    """
+    """Return the point of a segment where `measure` changes sign, by Brent's method; None if the curve is lost."""
     # Imported late: only curves need it.
     from scipy.optimize import brentq
 

@@ -142,10 +142,7 @@ class BranchFollower:
     def family(
         self, seeds: Iterable[Seed], periods: int, previous: tuple[GaitBranch, ...] = ()
     ) -> tuple[GaitBranch, ...]:
-        """Return `previous`, every other branch through the seeds, and the cascades beyond their flips.
-
-        periods  maximum number of steps of a gait
-        """
+        """Return `previous`, other branches through the seeds, and cascades of up to `periods` steps beyond flips."""
         branches = list(previous)
         for seed in seeds:
             start = self.solve_at(seed.z, seed.value, seed.steps)
@@ -184,7 +181,6 @@ class BranchFollower:
         return None if isinstance(solution, NotConverged) else solution
 
     def lies_on(self, branch: GaitBranch, gait: Cycle) -> bool:
-        """Whether a gait is on a branch already, starting at any of its steps."""
         value, effort = gait.value, Effort(self.control.tolerance, SEED_EVALUATIONS)
         starts = [gait.z, *(step.z for step in gait.steps)]
         for first, second in pairwise(branch.points):
@@ -213,10 +209,8 @@ class BranchFollower:
         return branches
 
     def enter_doubled(self, flip: Bifurcation, form: FlipForm, period: int) -> CurvePoint[Cycle] | None:
-        """Return the first gait of twice the period, at the normal form's amplitude; None if it is lost.
-
-        Its tangent points away from the flip: the halves of the cycle move apart along it.
-        """
+        """Return the first gait of twice the period, at the normal form's amplitude; None if it is lost."""
+        # its tangent points away from the flip: the halves of the cycle move apart along it
         for halving in range(AMPLITUDE_HALVINGS):
             guess, normal, xi = predict_doubled(flip, form, 0.5**halving)
             point = correct(self.equations(2 * period), guess, normal, self.control.tolerance)
@@ -279,11 +273,8 @@ class BranchFollower:
     def next_point(
         self, equations: GaitEquations, last: CurvePoint[Cycle], step: float, before: CurvePoint[Cycle] | None
     ) -> tuple[CurvePoint[Cycle], float, BranchEnd | None] | BranchEnd:
-        """Return the next point, the next step length, and the branch's end if it is reached.
-
-        A step that leaves the span is cut at its edge, since beyond it there may be no walker. Returns only the end if
-        there is no further point.
-        """
+        """Return the next point, step length and, if reached, the branch's end; only the end if no point follows."""
+        # A step that leaves the span is cut at its edge, since beyond it there may be no walker.
         ahead, acceptable = last.x + step * last.tangent, self.multiplier_check(last)
         edge = self.span.nearest(equations.value(ahead))
         if edge != equations.value(ahead):
@@ -322,10 +313,7 @@ class BranchFollower:
 
 
 def passes_through(segment: Segment[Cycle], gait: CurvePoint[Cycle], turn: float) -> bool:
-    """Whether a gait lies between two neighbours on a curve with the same direction.
-
-    turn  cosine of the largest angle between the tangents
-    """
+    """Whether a gait lies between two neighbours on a curve whose tangent turns by less than arccos `turn`."""
     first = segment.first
     along = float(first.tangent @ (gait.x - first.x))
     if not 0.0 < along <= segment.length or gait.tangent @ first.tangent < turn:

@@ -115,12 +115,8 @@ class RigidGait:
 
 
 def feet_meet(walker: RigidModel, swing: Floats) -> bool:
-    """Whether the swing foot comes down exactly at the stance foot, where the step map is discontinuous.
-
-    Any further ahead, it would strike.
-
-    swing  (samples, 2 n) states with both legs straight
-    """
+    """Whether the swing foot comes down exactly at the stance foot, in states (samples, 2 n) with straight legs."""
+    # The step map is discontinuous there: any further ahead, the foot would strike.
     over, ahead = feet_on_slope(walker, swing[:, SWING], swing[:, STANCE]), swing[:, SWING] - swing[:, STANCE]
     down = np.flatnonzero((over[:-1] > 0.0) & (over[1:] <= 0.0))
     where = ahead[down] + np.diff(ahead)[down] * over[down] / (over[down] - over[down + 1])
@@ -162,8 +158,6 @@ def measure_gait(walker: RigidModel, units: Units, gait: Cycle) -> RigidGait | N
 
 @dataclass(frozen=True)
 class SearchSettings:
-    """Effort of a search."""
-
     random_starts: int = 100  # starting values to draw
     further_starts: int = 1000  # more to draw if no gait is found
 
@@ -175,8 +169,6 @@ DRIVE_SOURCE = f"followed from passive gaits as a last resort (slopes of {', '.j
 
 @dataclass(frozen=True)
 class GaitSearch:
-    """Result of a search."""
-
     gaits: tuple[RigidGait, ...]  # every period-1 gait, by period
     chosen: int | None  # index of the gait to walk; None if no gait is physical
     reason: str  # for the choice, or why no gait was found
@@ -197,10 +189,7 @@ class GaitSearch:
 
 
 def find_gaits(walker: RigidModel, seed: int = 0, settings: SearchSettings = SearchSettings()) -> GaitSearch:
-    """Find the period-1 gaits of `walker`.
-
-    seed  of the random starting values
-    """
+    """Find the period-1 gaits of `walker`; the seed is that of the random starting values."""
     if walker.slope <= 0.0 and walker.unpaired == 0.0 and not walker.driven:
         return GaitSearch((), None, NO_DESCENT)
     search = Search(walker)
@@ -226,10 +215,9 @@ MAX_DRIVE_POINTS = 60
 
 
 class SlopeBranch:
-    """A gait as a function of the slope: y = (theta_2 + phi, dtheta_1, dtheta_2) / s and T over s^2, s = phi^(1/3).
+    """A gait as a function of the slope: y = (theta_2 + phi, dtheta_1, dtheta_2) / s and T over s^2, s = phi^(1/3)."""
 
-    Both gaits of the small-slope theory are smooth in s^2, so polynomials through the last points predict the next.
-    """
+    # Both gaits of the small-slope theory are smooth in s^2, so polynomials through the last points predict the next.
 
     def __init__(self, step_map: Stepper, seed: SmallSlopeSeed) -> None:
         self.step_map, self.seed = step_map, seed
@@ -294,10 +282,7 @@ def over_slope(walker: RigidModel, tolerances: Tolerances) -> RigidMap:
 
 
 def with_partial_drive(walker: RigidModel, slope: float, share: float) -> RigidModel:
-    """Return the walker with a share of its drive, on a slope (rad) interpolated to its own.
-
-    It is passive and on `slope` for a share of 0.
-    """
+    """Return the walker with a share of its drive, on a slope (rad) that tends to its own; passive for a share of 0."""
     parts = {name: share * walker[name] for name in ("laws", "push_off")}
     return on_slope(walker.changed(**parts), slope + share * (walker.slope - slope))
 
@@ -406,10 +391,8 @@ class Search:
 
 
 def preference(gait: RigidGait) -> tuple[bool, int, float]:
-    """Sort key, smallest for the gait to walk: stable, without back-and-forth swings, fastest decay.
-
-    A leg that swings back passes its foot through the ground, which the model ignores.
-    """
+    """Sort key, smallest for the gait to walk: stable, without back-and-forth swings, fastest decay."""
+    # A leg that swings back passes its foot through the ground, which the model ignores.
     return not gait.stable, gait.swings, gait.spectral_radius
 
 

@@ -59,10 +59,8 @@ class Gradient:
 
 
 def gait_quantities(gait: GaitOnMap, selection: Collection[str] = GAIT_QUANTITIES) -> dict[str, float] | None:
-    """Compute the quantities of a gait by name, without norms if it is unstable; None if its step fails.
-
-    selection  quantities to compute; those that a single step does not give cost more steps
-    """
+    """Compute the quantities of a gait by name, without norms if it is unstable; None if its step fails."""
+    # quantities that a single step does not give cost more steps, hence `selection`
     step = gait.step_map.step(gait.z, gait.p)
     if step.outcome is not Outcome.WALKED:
         return None
@@ -102,8 +100,7 @@ WALK_QUANTITIES: Final[Mapping[tuple[str, ...], Callable[[GaitOnMap], tuple[floa
 def gradients(gait: GaitOnMap, scale: float, selection: Collection[str] = GAIT_QUANTITIES) -> dict[str, Gradient]:
     """Differentiate a gait's quantities by the parameter of its step map; empty if neighbouring steps fail.
 
-    scale   magnitude of significant changes of the parameter
-    selection  the quantities, see `gait_quantities`
+    `scale` is the magnitude of significant changes of the parameter.
     """
     h, along = STEP_FACTOR * gait.step_map.tolerances.rtol**0.2 * scale, np.zeros(gait.z.size)
     for part in APPROACH_STEPS:
@@ -128,7 +125,6 @@ def gradients(gait: GaitOnMap, scale: float, selection: Collection[str] = GAIT_Q
 
 
 def combine_steps(A: Floats, fine: Derivatives, coarse: Derivatives) -> dict[str, Gradient]:
-    """Combine the derivatives at two step sizes: values of the finer one, errors from the difference."""
     combined = {
         name: make_gradient(value, abs(value - coarse.numbers[name]))
         for name, value in fine.numbers.items()
@@ -143,11 +139,9 @@ class Derivatives(NamedTuple):
 
 
 def family_direction(gait: GaitOnMap, h: float, guess: Floats) -> Floats | None:
-    """Return the derivative of the gait's z (d,) by the parameter, from steps near z along a guess of it.
-
-    On compliant ground a step from z itself would not do for a walker of other dimensions: its foot would be in the
-    air, or deep in the ground.
-    """
+    """Return the derivative of the gait's z (d,) by the parameter, from steps near z along a guess of it."""
+    # On compliant ground a step from z itself would not do for a walker of other dimensions: its foot would be in the
+    # air, or deep in the ground.
 
     def step_from(off: float) -> Floats | None:
         step = gait.step_map.step(gait.z + off * guess, gait.p + off, derived=False)
@@ -188,7 +182,6 @@ def differentiate(gait: GaitOnMap, h: float, guess: Floats, selection: Collectio
 
 
 def make_gradient(value: float, error: float) -> Gradient:
-    """Return a derivative, marked as lost if its error is comparable to its value."""
     lost = error > LOST_ERROR * abs(value) and value != 0.0
     return Gradient(float(value), float(error), "lost in rounding" if lost else "")
 

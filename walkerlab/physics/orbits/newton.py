@@ -16,8 +16,6 @@ ROUNDING_FACTOR = 100.0
 
 
 class Evaluated(NamedTuple, Generic[Data]):
-    """Value and derivative of the equations at a point."""
-
     outcome: Outcome | None  # WALKED if there is a value
     value: Floats  # (m,)
     jacobian: Floats  # (m, m), or (m, m + 1) for a curve
@@ -59,10 +57,7 @@ class Effort(NamedTuple):
 
 
 def newton(equations: Equations[Data], guess: Floats, effort: Effort) -> Solution[Data] | NotConverged:
-    """Solve m equations in m unknowns from a guess (m,).
-
-    Returns the solution, or the outcome with which the equations failed or did not converge.
-    """
+    """Solve m equations from a guess (m,); return the solution, or the outcome with which they failed."""
     tolerance, most, shortest, growth, rounding = effort
     x, current, corrections, evaluations = guess, equations(guess), 0, 1
     residual = current.residual

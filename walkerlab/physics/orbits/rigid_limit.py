@@ -42,8 +42,6 @@ PUSH_OFF_FACTOR = 0.1
 
 
 class ContactFactors(NamedTuple):
-    """Factors on the contact parameters of the config."""
-
     series: str
     rigidity: float  # 1 for the config's contact, growing towards the limit
     stiffness: float
@@ -74,10 +72,8 @@ def series_settings(name: str, every: int = 1) -> list[ContactFactors]:
 
 
 def apply_setting(walker: ContactWalker, setting: ContactFactors) -> ContactWalker:
-    """Return the walker on the ground of a setting, with a brief push-off in series towards the rigid limit.
-
-    A longer push-off lifts the leading foot again, however rigid the ground, and leads to another limit.
-    """
+    """Return the walker on the ground of a setting, with a brief push-off in series towards the rigid limit."""
+    # A longer push-off lifts the leading foot again, however rigid the ground, and leads to another limit.
     changed, law = with_scaled_laws(walker, *setting[2:]), walker.normal
     if setting.series not in (ALL_SERIES, ALL_POINT_SERIES) or setting.rigidity == 1.0:
         return changed
@@ -88,10 +84,9 @@ def apply_setting(walker: ContactWalker, setting: ContactFactors) -> ContactWalk
 
 @dataclass(frozen=True)
 class Distance:
-    """Differences of a setting's gait and walk from the rigid ones, with their numerical errors.
+    """Differences of a setting's gait and walk from the rigid ones, with their numerical errors."""
 
-    Quantities of the walk are None where no walk is compared.
-    """
+    # Quantities of the walk are None where no walk is compared.
 
     setting: ContactFactors
     period: float
@@ -124,10 +119,8 @@ class Limit:
     def series(
         self, name: str, walker: ContactWalker, gait: Cycle, start: Callable[[ContactWalker], State] | None = None
     ) -> list[Distance]:
-        """Return the distances along a series, until a gait is lost; each gait is solved for from the one before.
-
-        start  start of the walk for a walker, to compare whole walks as well
-        """
+        """Return the distances along a series, until a gait is lost, of whole walks as well if they have a `start`."""
+        # each gait is solved for from the one before
         distances: list[Distance] = []
         for setting in series_settings(name, self.every):
             changed = apply_setting(walker, setting)
@@ -216,10 +209,8 @@ class Extrapolation:
 
 
 def extrapolate(distances: list[Distance]) -> Extrapolation | None:
-    """Extrapolate the period by Aitken's method from the last resolved settings; None if they do not converge.
-
-    Settings from the first change of the period below its numerical error on are ignored.
-    """
+    """Extrapolate the period by Aitken's method from the last resolved settings; None if they do not converge."""
+    # Settings from the first change of the period below its numerical error on are ignored.
     periods = np.array([distance.period for distance in distances])
     errors = np.array([distance.numerical_period for distance in distances])
     unresolved = np.flatnonzero(np.abs(np.diff(periods)) <= errors[1:])

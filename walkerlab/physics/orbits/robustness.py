@@ -65,10 +65,7 @@ def derivative(function: Callable[[float], Floats | None], step: float) -> Float
 def sensitivity_norm(A: Floats, B: Floats, C: Floats, D: Floats) -> Floats | None:
     """Return norms (indicators,) of e' = C z + D d, z' = A z + B d; None for an unstable gait.
 
-    A  (d, d)
-    B  (d,)
-    C  (indicators, d)
-    D  (steps, indicators) changes of the steps before the section's derivative applies
+    A (d, d), B (d,), C (indicators, d); D (steps, indicators) of the steps before the section's derivative applies.
     """
     if np.abs(multipliers_of(A)).max() >= 1.0:
         return None
@@ -127,10 +124,7 @@ def response(gait: GaitOnMap, disturbance: Disturbance, times: float = 1.0) -> t
 
 
 def largest_survived(stands: Callable[[float], bool], unit: float) -> float:
-    """Return the largest disturbance up to which all smaller ones are survived.
-
-    unit  of the disturbance: the grid is a fraction of it, and the search stops at half of it
-    """
+    """Return the largest disturbance up to which all smaller ones are survived, to half of a disturbance's `unit`."""
     steps = round(MAX_DISTURBANCE / SEARCH_GRID)
     low = next((k - 1 for k in range(1, steps + 1) if not stands(k * SEARCH_GRID * unit)), steps)
     if low == steps:
@@ -156,8 +150,6 @@ def steps_on_rough_ground(gait: GaitOnMap, roughness_m: float, seed: tuple[int, 
 
 @dataclass(frozen=True)
 class RoughWalks:
-    """Mean length of walks on rough ground."""
-
     mean_steps: float  # as far as the sample allows
     standard_error: float | None  # as far as the sample allows
     walks: int

@@ -92,10 +92,7 @@ def scaled_starts(
     steps: int,
     gait: tuple[float, float] | None,
 ) -> ScaledStarts:
-    """Build the scaled starts of a scene.
-
-    start_of  the free walker's start for factors on the two angular velocities; linear in them
-    """
+    """Build the scaled starts of a scene; `start_of` is linear in the factors on the two angular velocities."""
     still, swing, stance = start_of(0.0, 0.0), start_of(1.0, 0.0), start_of(0.0, 1.0)
     half = len(still) // 2
     return ScaledStarts(walker, ground, still[:half], swing[half:], stance[half:], steps, gait)
@@ -126,8 +123,7 @@ def margins(
 ) -> list[Margin]:
     """Return how far the velocities of a start that walks may be scaled, alone and together, before it fails.
 
-    step     spacing of factors until one fails; then the last interval is halved
-    largest  maximum factor
+    Factors are `step` apart, up to `largest`, until one fails; then the last interval is halved.
     """
     results = []
     for name, *direction in SCALING_DIRECTIONS:
@@ -154,7 +150,6 @@ class Adjustment:
 
     @property
     def distance(self) -> float:
-        """Euclidean distance of the factors from (1, 1)."""
         return math.hypot(self.swing - 1.0, self.stance - 1.0)
 
 
@@ -163,10 +158,8 @@ def smallest_change(
 ) -> Adjustment | None:
     """Find the walking start nearest to (1, 1), on successively finer grids around the nearest in a map.
 
-    starts      at the config's tolerances, which the result satisfies
-    quick       at the map's tolerances
-    candidates  (n, 2) factors that walk according to the map
-    cell        spacing of the map
+    `starts` have the config's tolerances, which the result satisfies, and `quick` the map's. `candidates` (n, 2) are
+    factors that walk according to the map, whose spacing is `cell`.
     """
     order = np.argsort(np.hypot(*(candidates - 1.0).T), kind="stable")
     for swing, stance in candidates[order]:

@@ -85,10 +85,7 @@ def leg_columns(walker: RigidModel) -> Floats:
 
 
 def seeds(walker: RigidModel) -> tuple[SmallSlopeSeed, ...]:
-    """Return the small-slope gaits of `walker`, whatever its own slope.
-
-    Only walkers whose upright legs balance have them: their gaits shrink with the slope.
-    """
+    """Return the small-slope gaits of `walker`, whatever its own slope; only walkers that balance upright have them."""
     modes = None if walker.kneed or walker.lean != 0.0 or walker.arm_x.any() else linear_modes(walker)
     try:
         long = None if modes is None else long_period_seed(walker, modes)
@@ -118,8 +115,7 @@ def long_period_seed(walker: RigidModel, modes: Modes) -> SmallSlopeSeed | None:
 def cube_root_seed(name: str, walker: RigidModel, per_angle: Floats, period: float) -> SmallSlopeSeed:
     """Return the gait at LONG_AMPLITUDE that grows as the cube root of the slope.
 
-    per_angle  (3,) theta_2 + phi, dtheta_1, dtheta_2 after heel strike per unit angle between the legs
-    period     duration of a step, s
+    `per_angle` holds theta_2 + phi, dtheta_1 and dtheta_2 after heel strike per unit angle between the legs.
     """
     kappa = slope_for_loss(walker, per_angle)
     slope = kappa * LONG_AMPLITUDE**3
@@ -129,10 +125,8 @@ def cube_root_seed(name: str, walker: RigidModel, per_angle: Floats, period: flo
 
 @np.errstate(divide="raise", invalid="raise")
 def slope_for_loss(walker: RigidModel, per_angle: Floats) -> float:
-    """Return the slope that balances the heel strike's loss, divided by the cube of the angle between the legs.
-
-    In the limit the gait ends a step as it began, with both legs at the same rates.
-    """
+    """Return the slope that balances the heel strike's loss, divided by the cube of the angle between the legs."""
+    # In the limit the gait ends a step as it began, with both legs at the same rates.
     flat, angle = on_slope(walker, 0.0), LOSS_ANGLE
     omega = angle * float(per_angle[2])
     before = leg_state(flat, (0.5 * angle, -0.5 * angle), (omega, omega))
@@ -187,11 +181,9 @@ def short_period_seed(walker: RigidModel, modes: Modes, longest: float) -> Small
 
 
 def step_conditions(walker: RigidModel, modes: Modes) -> Callable[[Floats], Floats]:
-    """Linearise one step on a slope of one radian, for many durations at once.
-
-    Returns a function of durations t (s) that gives matrices (..., 4, 4) on (z, 1): three rows require that z repeats
-    after t, one that both feet are down. A solution exists where the determinant vanishes.
-    """
+    """Linearise one step on a slope of one radian as matrices (..., 4, 4) on (z, 1), a function of durations t (s)."""
+    # Three rows require that z repeats after t, one that both feet are down. A solution exists where the determinant
+    # vanishes.
     flat, n = on_slope(walker, 0.0), len(walker.arm_x)
     swing, fall, inverse = modes.swing, modes.fall, np.linalg.inv(modes.V)
     strike = np.zeros((3, 4))  # the heel strike at vanishing angles, including the exchange of roles

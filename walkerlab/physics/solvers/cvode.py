@@ -17,7 +17,6 @@ FAR_AHEAD = 1e3
 
 
 def is_installed() -> bool:
-    """Whether CVODE can be imported."""
     return importlib.util.find_spec(SUNDIALS_PACKAGE) is not None
 
 
@@ -34,11 +33,6 @@ class CvodeSolver:
         jac: Callable[[float, Any], Any],
         **tolerances: float,
     ) -> None:
-        """Start at time t from y.
-
-        family      "BDF" or "Adams"
-        tolerances  rtol and atol
-        """
         from sksundae.cvode import CVODE
 
         # copies, because CVODE's arrays must not be written to
@@ -55,7 +49,6 @@ class CvodeSolver:
         self.interpolated = False
 
     def step(self) -> None:
-        """Take one step of a size that CVODE chooses."""
         if self.interpolated:
             # after interpolation CVODE must first return to the end of its step
             self.solver.step(self.t, "normal", None)
@@ -75,7 +68,6 @@ class LastStep:
     """CVODE's interpolating polynomial of the last step."""
 
     def __init__(self, solver: CvodeSolver) -> None:
-        """Interpolate within the last step of `solver`."""
         self.solver = solver
 
     def __call__(self, times: Any) -> Any:
@@ -86,5 +78,4 @@ class LastStep:
         return np.column_stack([self.state_at(time) for time in times.tolist()])
 
     def state_at(self, time: float) -> Any:
-        """State (n,) at a time (s) of the step."""
         return self.solver.solver.step(time, "normal", None).y

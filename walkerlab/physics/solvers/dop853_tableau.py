@@ -118,5 +118,4 @@ D_7 = (
 
 
 def nonzero(row: tuple[float, ...]) -> tuple[float, ...]:
-    """Return the weights of a row that are not zero."""
     return tuple(weight for weight in row if weight != 0.0)

@@ -37,13 +37,11 @@ def hermite(h: float, start: Jet, end: Jet) -> Quintic:
 
 @kernel_part
 def evaluate_quintic(quintic: Quintic, x: float) -> float:
-    """Evaluate a quintic at fraction x of the step."""
     return value_and_slope(in_powers(quintic), x)[0]
 
 
 @kernel_part
 def in_powers(quintic: Quintic) -> Quintic:
-    """Convert to coefficients of powers of the fraction, lowest first."""
     b0, b1, b2, b3, b4, b5 = quintic
     return (
         b0,
@@ -57,7 +55,6 @@ def in_powers(quintic: Quintic) -> Quintic:
 
 @kernel_part
 def value_and_slope(powers: Quintic, x: float) -> tuple[float, float]:
-    """Evaluate a polynomial and its derivative at x from coefficients of powers."""
     c0, c1, c2, c3, c4, c5 = powers
     value = c0 + x * (c1 + x * (c2 + x * (c3 + x * (c4 + x * c5))))
     slope = c1 + x * (2.0 * c2 + x * (3.0 * c3 + x * (4.0 * c4 + x * (5.0 * c5))))
@@ -66,13 +63,9 @@ def value_and_slope(powers: Quintic, x: float) -> tuple[float, float]:
 
 @kernel_part
 def first_fall(finder: CrossingFinder, quintic: Quintic, zero_at_start: bool, after: float) -> float:
-    """Fraction of the step at which a quintic first falls through zero; NO_CROSSING if it does not.
-
-    after  ignore crossings before this fraction
-
-    Coefficients of one sign prove that there is no crossing, a single change from positive to negative that there is
-    one; `crossing_of_piece` treats the rest.
-    """
+    """Find the fraction of the step, `after` another, at which a quintic first falls through zero, or NO_CROSSING."""
+    # Coefficients of one sign prove that there is no crossing, a single change from positive to negative that there is
+    # one; `crossing_of_piece` treats the rest.
     changes = 0
     for i in range(1 if zero_at_start else 0, 5):
         changes += (quintic[i] < 0.0) != (quintic[i + 1] < 0.0)

@@ -55,8 +55,6 @@ def combine(context: Any, weights: Any, vectors: Any) -> Any:
 
 @intrinsic
 def stage_state(context: Any, y: Any, h: Any, weights: Any, vectors: Any) -> Any:
-    """Return y + h sum(weights[j] vectors[j]), the state of a Runge-Kutta stage."""
-
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         state, step, factors, columns = arguments
         sums = _sums(builder, factors, columns, y.count)

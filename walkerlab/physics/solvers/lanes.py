@@ -28,11 +28,9 @@ class LanesType(types.Type):  # type: ignore[misc]
     """Numba's type of lanes; floats convert to it."""
 
     def __init__(self) -> None:
-        """Create the type; there is only one width."""
         super().__init__(name="lanes")
 
     def can_convert_from(self, typingctx: Any, other: Any) -> Any:  # noqa: ARG002 - numba calls it so
-        """Allow conversion from floats and integers."""
         return Conversion.safe if isinstance(other, types.Float | types.Integer) else None
 
     def unify(self, typingctx: Any, other: Any) -> Any:  # noqa: ARG002 - numba calls it so
@@ -73,7 +71,6 @@ def _cast(context: Any, builder: Any, kind: Any, _to: Any, value: Any) -> Any:
 
 
 def holds_lanes(kind: Any) -> bool:
-    """Whether a numba type is lanes or a tuple of lanes."""
     return isinstance(kind, LanesType) or (isinstance(kind, types.UniTuple) and isinstance(kind.dtype, LanesType))
 
 
@@ -134,10 +131,8 @@ def multiply_add(builder: Any, a: Any, b: Any, c: Any) -> Any:
 
 @functools.cache
 def teach_arithmetic() -> None:
-    """Register arithmetic on lanes with numba; needed before the first kernel with lanes is compiled.
-
-    An import alone does not do this because it affects everything that the process compiles.
-    """
+    """Register arithmetic on lanes with numba; needed before the first kernel with lanes is compiled."""
+    # An import alone does not do this because it affects everything that the process compiles.
     unary, binary, variadic = (LANES,), (LANES, LANES), (types.VarArg(LANES),)
     for plain, in_place, instruction in (
         (operator.add, operator.iadd, "fadd"),
@@ -156,7 +151,6 @@ def teach_arithmetic() -> None:
 
 @intrinsic
 def nearest(context: Any, x: Any) -> Any:
-    """Round each lane to the nearest integer."""
     if not isinstance(x, LanesType):
         return None
 
@@ -182,8 +176,6 @@ def choose(context: Any, sign: Any, if_positive: Any, otherwise: Any) -> Any:
 
 @intrinsic
 def any_positive(context: Any, x: Any) -> Any:
-    """Whether any lane is positive."""
-
     def generate(context: Any, builder: Any, sig: Any, arguments: Any) -> Any:
         positive = builder.fcmp_ordered(">", arguments[0], ir.Constant(VECTOR, [0.0] * WIDTH))
         mask = builder.bitcast(positive, ir.IntType(WIDTH))

@@ -8,7 +8,6 @@ from walkerlab.physics.kernels import PART_FLAGS, compile_as, kernel_part
 
 
 def reciprocal(x: Any) -> Any:
-    """Reciprocal of a real or complex number."""
     return 1.0 / x
 
 
@@ -34,10 +33,8 @@ def size(x: Any) -> float:
 
 @kernel_part
 def factor(A: Any, pivots: Any, n: int) -> bool:
-    """Compute LU factors of A[:n, :n] in place, with row exchanges; returns False if it is singular.
-
-    Works for real and complex A. The diagonal holds the pivots' reciprocals.
-    """
+    """Compute LU factors of real or complex A[:n, :n] in place, with row exchanges; returns False if it is singular."""
+    # The diagonal holds the pivots' reciprocals.
     for k in range(n):
         best = k
         for i in range(k + 1, n):

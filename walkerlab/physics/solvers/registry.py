@@ -14,27 +14,19 @@ from walkerlab.physics.solvers.scipy_methods import DENSE_DEGREE, ScipyMethod
 
 @dataclass(frozen=True)
 class Method:
-    """An integration method.
+    """An integration method."""
 
-    name      as in configs
-    new       factory: (number of equations, rtol, atol, budget of right-hand sides)
-    stiff     whether it suits stiff problems
-    orders    minimum and maximum; equal unless the method varies its order
-    compiled  whether whole walks compile with it; walks with a library's method run in Python
-    """
-
-    name: str
+    name: str  # as in configs
+    # factory: (number of equations, rtol, atol, budget of right-hand sides)
     new: Callable[[int, float, float, int], Any]
-    stiff: bool
-    orders: tuple[int, int]
-    compiled: bool = False
+    stiff: bool  # whether it suits stiff problems
+    orders: tuple[int, int]  # minimum and maximum; equal unless the method varies its order
+    compiled: bool = False  # whether whole walks compile with it; walks with a library's method run in Python
 
 
 def scipy_factory(class_name: str, takes_jacobian: bool = True) -> Callable[[int, float, float, int], ScipyMethod]:
-    """Return a factory for methods with a class of scipy.integrate; scipy is imported on first use.
-
-    takes_jacobian  whether the class uses the Jacobian
-    """
+    """Return a factory for methods with a class of scipy.integrate, which may use the Jacobian."""
+    # scipy is imported on first use
 
     def new_solver(*problem: Any, **options: Any) -> Any:
         from scipy import integrate
@@ -86,25 +78,21 @@ ENDLESS = 2**62
 class Tolerances:
     """Method and tolerances of a walk's integration.
 
-    method        name of the method
     rtol, atol    tolerances on the error of a step
-    budget        right-hand sides per walk
-    track_energy  whether a contact walk is checked by its energy balance; comparisons of methods do without
     """
 
-    method: str
+    method: str  # name of the method
     rtol: float
     atol: float
-    budget: int
+    budget: int  # right-hand sides per walk
+    # whether a contact walk is checked by its energy balance; comparisons of methods do without
     track_energy: bool = True
 
     @property
     def compiled(self) -> bool:
-        """See `Method.compiled`."""
         return method_named(self.method).compiled
 
     def new(self, n: int) -> Any:
-        """Create the method with memory for n equations."""
         return method_named(self.method).new(n, self.rtol, self.atol, self.budget)
 
 
@@ -117,7 +105,6 @@ def sharing(method: Any, clock: Any, counts: Any) -> Any:
 
 
 def dense_degree(method: Any) -> int:
-    """Degree of a method's dense output."""
     return DENSE_DEGREE if isinstance(method, ScipyMethod) else len(method.dense)
 
 

@@ -41,13 +41,11 @@ class OutOfBudgetError(Exception):
 
 @kernel
 def right_hand_side(system: Any, t: float, y: Any, dy: Any) -> None:
-    """See `derivative`."""
     derivative(system, t, y, dy)
 
 
 @kernel
 def jacobian_matrix(system: Any, t: float, y: Any, J: Any) -> None:
-    """See `jacobian`."""
     jacobian(system, t, y, J)
 
 
@@ -63,11 +61,7 @@ class ScipyMethod:
     def __init__(
         self, new_solver: Callable[..., Any], takes_jacobian: bool, n: int, rtol: float, atol: float, budget: int
     ) -> None:
-        """Prepare for n equations; `begin` creates the solver.
-
-        new_solver      factory with the signature of the classes of scipy.integrate
-        takes_jacobian  whether the solver uses the Jacobian
-        """
+        """Prepare for n equations; `begin` calls `new_solver`, with the signature of scipy.integrate's classes."""
         self.new_solver, self.takes_jacobian = new_solver, takes_jacobian
         self.rtol, self.atol = rtol, atol
         self.clock = np.zeros(3)
@@ -95,7 +89,6 @@ def counting_rhs(counts: Integers, system: Any, n: int) -> Callable[[float, Any]
 
 
 def counting_jacobian(method: ScipyMethod, system: Any, n: int) -> Callable[[float, Any], Any]:
-    """Return the compiled Jacobian as libraries call it; it counts calls."""
     code = entry_point(jacobian_matrix, system, 0.0, np.zeros(n), np.zeros((n, n)))
 
     def jac(t: float, y: Any) -> Any:
@@ -171,14 +164,12 @@ def prepare_dense_scipy(method: ScipyMethod, system: Any) -> None:
 
 @interpolate.case(ScipyMethod)
 def interpolate_scipy(method: ScipyMethod, system: Any, fraction: float, y: Any) -> None:
-    """Evaluate the library's dense output."""
     t_old, t = method.clock[T_OLD], method.clock[T]
     y[:] = method.dense(t_old + fraction * (t - t_old))[: y.size]
 
 
 @sample.case(ScipyMethod)
 def sample_scipy(method: ScipyMethod, system: Any, fractions: Any, states: Any) -> None:
-    """Evaluate the library's dense output at all fractions in one call."""
     t_old, t = method.clock[T_OLD], method.clock[T]
     columns = method.dense(t_old + fractions * (t - t_old))[: states.shape[1]]
     states[: len(fractions), : len(columns)] = columns.T
