@@ -1,8 +1,9 @@
 """Identify walkers from synthetic walks and compare errors with the spread of the estimates.
 
-Usage: python scripts/identification_coverage.py [WALKS, 1000 by default] [steps | angles] [CONFIG ...]
+Usage: python scripts/identification_coverage.py [WALKS, 1000 by default] [steps | angles | contact] [CONFIG ...]
 
-Walks go over a rough floor from a disturbed start, and are measured with noise. Printed for each walker: the number of
+Walks go over a rough floor from a disturbed start, and are measured with noise; `contact` are steps of the contact
+model. Printed for each walker: the number of
 walks that took all steps and whose fit converged; the share of these whose 95 % region holds the truth, with the
 binomial error of that share; and for each parameter the mean standard error over the spread of the estimates.
 """
@@ -19,7 +20,7 @@ from scipy.stats import f as fisher
 from walkerlab.api import in_memory
 from walkerlab.config.loader import load
 from walkerlab.physics.estimation.measurements import MeasuredSteps, split_into_steps
-from walkerlab.physics.orbits.family_search import RIGID
+from walkerlab.physics.orbits.family_search import CONTACT, RIGID
 from walkerlab.scene.identification import ConfigFamily, Question, identify_walk, step_map_of
 from walkerlab.scene.subject import find_model_gait
 
@@ -40,9 +41,10 @@ class Truth:
     def __init__(self, name, keys, level="steps"):
         self.config, self.keys, self.level = load(Path(name)).config, keys, level
         self.gait = in_memory("fixedpoint", self.config).summary
-        subject = find_model_gait(RIGID, self.config, self.gait, lambda _: None)
+        self.model = CONTACT if level == "contact" else RIGID
+        subject = find_model_gait(self.model, self.config, self.gait, lambda _: None)
         self.family = ConfigFamily(self.config, keys)
-        self.walks = step_map_of(RIGID, self.family, subject.length_m)
+        self.walks = step_map_of(self.model, self.family, subject.length_m)
         self.z, self.leg = subject.z, self.config.walker.leg_length_m
         self.values = np.array(self.family.start)
 
@@ -50,14 +52,14 @@ class Truth:
         """Measure a walk; None if it ends early. Returns also a weighing of the last parameter."""
         draw = np.random.default_rng(seed)
         heights = draw.normal(0.0, ROUGHNESS * self.leg, STEPS + 1)
-        z = self.z * (1.0 + draw.normal(0.0, 0.01, self.z.size))
+        z = self.walks.settled(self.z * (1.0 + draw.normal(0.0, 0.01, self.z.size)), tuple(self.values))
         walk = self.walks.disturbed(z, tuple(self.values), heights)
         weighed = self.values[-1] * (1.0 + PRIOR * draw.normal())
         if walk.durations_s.size < STEPS:
             return None
         periods = walk.durations_s + draw.normal(0.0, NOISE[0], STEPS)
         lengths = walk.lengths_m + draw.normal(0.0, NOISE[1] * self.leg, STEPS)
-        if self.level == "steps":
+        if self.level != "angles":
             return MeasuredSteps(periods, lengths), weighed
         touches = np.append(0.0, np.cumsum(walk.durations_s))
         times = np.arange(0.0, touches[-1] * (1.0 - 1e-9), 2e-3)
@@ -66,7 +68,7 @@ class Truth:
 
     def identify(self, measured, weighed):
         question = Question(dict.fromkeys(self.keys), {self.keys[-1]: (weighed, PRIOR * self.values[-1])})
-        return identify_walk(self.config, measured, self.gait, question)
+        return identify_walk(self.config, measured, self.gait, question, (self.model,))
 
 
 def region_holds(result, truth):

@@ -14,13 +14,11 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from walkerlab.exchange.rate_jumps import AHEAD, WINDOW
+
 Array = NDArray[np.float64]
 Height = Callable[[Array], Array]
 
-AHEAD: Final = 0.4
-"""Smallest angle between the legs at a heel strike, over the largest of the walk."""
-WINDOW: Final = 0.1
-"""Time before and after a heel strike in which angles are fitted, over a step's period."""
 TOUCH_DEGREE: Final = 3
 FEWEST: Final = 6
 """Samples on each side of a heel strike that a fit needs."""

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from walkerlab.errors import ConfigError
 from walkerlab.exchange.columns import RecordedWalk
-from walkerlab.exchange.touches import AHEAD, Touch, find_touches
+from walkerlab.exchange.rate_jumps import AHEAD
+from walkerlab.exchange.touches import Touch, find_touches
 from walkerlab.physics.mechanics.rigid_model import (
     STANCE,
     STRAIGHT,
@@ -66,10 +67,11 @@ class RecordedSteps:
     origin_s: float
 
 
-def divide_into_steps(walk: RecordedWalk, model: RigidModel, source: str) -> RecordedSteps:
+def divide_into_steps(walk: RecordedWalk, model: RigidModel, source: str, touch_sum_rad: float = 0.0) -> RecordedSteps:
     """Find the steps of a recorded walk of a walker.
 
-    source  name of the recording, for messages
+    source         name of the recording, for messages
+    touch_sum_rad  sum of the legs' angles from the slope's normal at heel strikes; not 0 if slope or sensors are off
 
     Raises ConfigError if the recording has no complete step, or a gap within one.
     """
@@ -83,13 +85,16 @@ def divide_into_steps(walk: RecordedWalk, model: RigidModel, source: str) -> Rec
             "Say in which unit angles are, such as --units angle=deg, or remove outliers.",
         )
 
+    def total(angles: Array) -> Array:
+        return np.asarray(feet_on_slope(model, angles[:, 0], angles[:, 1]))
+
     def height(angles: Array) -> Array:
         """Height (m) of leg 0's foot over leg 1's, perpendicular to the slope, for straight legs of one length."""
-        total = feet_on_slope(model, angles[:, 0], angles[:, 1])
-        return np.asarray(2.0 * model.leg_length * np.sin(0.5 * total) * np.sin(0.5 * (angles[:, 0] - angles[:, 1])))
+        half = 0.5 * (total(angles) - touch_sum_rad)
+        return np.asarray(2.0 * model.leg_length * np.sin(half) * np.sin(0.5 * (angles[:, 0] - angles[:, 1])))
 
     touches = find_touches(walk.time_s, angle, height)
-    if touches and not starts_on_two_feet(angle, model):
+    if touches and not starts_on_two_feet(angle, float(total(angle[:1])[0]) - touch_sum_rad):
         origin, ends = touches[0].time_s, touches[1:]
     else:
         origin = float(walk.time_s[0])
@@ -140,9 +145,8 @@ def longest_gap(time: Array, begin: float, end: float) -> tuple[float, float]:
     return float(instants[place]), float(instants[place + 1])
 
 
-def starts_on_two_feet(angle: Array, model: RigidModel) -> bool:
+def starts_on_two_feet(angle: Array, total: float) -> bool:
     spread = np.abs(angle[:, 0] - angle[:, 1])
-    total = float(feet_on_slope(model, angle[0, 0], angle[0, 1]))
     return bool(abs(total) < TWO_FEET_TOLERANCE and spread[0] > AHEAD * spread.max())
 
 

@@ -17,15 +17,15 @@ from walkerlab.physics.estimation.information import information_on, open_combin
 from walkerlab.physics.estimation.judgement import judge
 from walkerlab.physics.estimation.measurements import MeasuredAngles, MeasuredSteps
 from walkerlab.physics.estimation.mixed_model import evaluate, products_of
-from walkerlab.physics.estimation.prediction import DELAY, Forecast, felt_directions
+from walkerlab.physics.estimation.prediction import DELAY, NUISANCES, Forecast, felt_directions
 from walkerlab.physics.estimation.result import Estimate, Identification, ModelFit, StepTable, Uncertain
 from walkerlab.physics.orbits.family_search import RIGID
 from walkerlab.physics.orbits.newton import Effort
 from walkerlab.physics.orbits.rigid_map import RigidMap
 from walkerlab.physics.orbits.robustness import derivative
 from walkerlab.physics.orbits.step_map import Cycle, StepMap, gait_near
+from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.physics.solvers.system import Floats
-from walkerlab.scene.families import CONTACT_STEP
 from walkerlab.scene.parameter import parameter_of
 from walkerlab.scene.rigid import rigid_walker
 from walkerlab.scene.subject import ModelUnderTest, find_model_gait
@@ -39,6 +39,7 @@ CONFIGS_AT_ONCE: Final = 512
 SCALE_OF_ZERO: Final = 0.01  # typical change of a parameter that is 0
 AT_BOUND: Final = 1e-6  # distance from a bound, in the scale of the parameter, that counts as at it
 SPREAD_OF_STARTS: Final = 0.1  # of a parameter, between starts of the fit
+CONTACT_WALKS: Final = Tolerances("radau5", 1e-8, 1e-10, 60_000)  # errors of a walk near 1e-10, far below noise
 GAIT_EFFORT: Final = Effort(1e-9, 40)
 GAIT_NAMES: Final = ("period_s", "step_length_m", "spectral_radius")
 GAIT_STEP: Final = 1e-3  # of a parameter's scale, in derivatives of the gait
@@ -112,7 +113,7 @@ def step_map_of(model: str, family: ConfigFamily, length_m: float) -> StepMap:
     def on_ground(changed: ContactConfig) -> Any:
         return contact_scene(changed, length_m, length_m)
 
-    return ContactMap(family.over(on_ground), 1.0, CONTACT_STEP, length_m, on_ground(config))
+    return ContactMap(family.over(on_ground), 1.0, CONTACT_WALKS, length_m, on_ground(config))
 
 
 def identify_walk(
@@ -190,10 +191,8 @@ def in_time(first: Fit) -> Fit | None:
 def problem_of(subject: ModelUnderTest, measured: Measured, question: Question) -> FitProblem:
     family = ConfigFamily(subject.config, question.keys)
     walks = step_map_of(subject.model, family, subject.length_m)
-    start = walks.step(subject.z, family.start)  # type: ignore[arg-type]  # values of several parameters
-    forecast = Forecast(
-        walks, family.admits, family.scales(), subject.z, felt_directions(start.DP), measured, question.nuisance
-    )
+    directions = felt_directions(walks, subject.z, family.start)
+    forecast = Forecast(walks, family.admits, family.scales(), subject.z, directions, measured, question.nuisance)
     free = (-math.inf, math.inf)
     bounds = [question.fit.get(key) or free for key in question.keys]
     priors = {place: question.prior[key] for place, key in enumerate(question.keys) if key in question.prior}
@@ -256,7 +255,17 @@ def describe(subject: ModelUnderTest, question: Question, steps: Fit, best: Fit)
         fitted,
         forecast.walks.disturbed(forecast.start(fitted.u), forecast.parameters(fitted.u), fitted.heights_m),
         forecast.sensors(fitted.u),
+        nuisances_with_errors(best, question.nuisance),
     )
+
+
+def nuisances_with_errors(fit: Fit, names: Sequence[str]) -> dict[str, Uncertain]:
+    """Return the estimated properties of clock and sensors."""
+    forecast, fitted = fit.problem.forecast, fit.fitted
+    variances = np.diag(np.linalg.pinv(fitted.evaluation.information, hermitian=True))
+    own = dict(zip(forecast.nuisances, variances[forecast.unknowns - len(forecast.nuisances) :], strict=True))
+    values = forecast.sensors(fitted.u)
+    return {name: Uncertain(values[name], NUISANCES[name][1] * math.sqrt(max(own[name], 0.0))) for name in names}
 
 
 def measurement_noise(fit: Fit) -> dict[str, float]:
@@ -313,7 +322,8 @@ def gait_with_errors(problem: FitProblem, fitted: Fitted, covariance: Floats) ->
         parameters = tuple(p.tolist())
         if not forecast.admits(parameters):
             return None
-        gait = gait_near(forecast.walks, fitted.z, parameters, GAIT_EFFORT)  # type: ignore[arg-type]
+        z = forecast.walks.settled(fitted.z, parameters)
+        gait = gait_near(forecast.walks, z, parameters, GAIT_EFFORT)  # type: ignore[arg-type]
         if not isinstance(gait, Cycle):
             return None
         return np.array((gait.period_s, gait.step.length_m, float(np.abs(gait.multipliers).max())))

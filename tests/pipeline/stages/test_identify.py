@@ -126,7 +126,8 @@ def test_two_masses_of_a_rigid_walk_are_reported_as_one_combination(table, gait)
     text = " ".join(" ".join(answer("identify", summary)).split())
     assert "Leg mass and hip mass cannot be separated by this walk (" in text
     combination = text.partition("by this walk (")[2].partition(";")[0]
-    assert all(row["key"] in combination for row in summary["estimates"])
+    assert "leg mass (" in combination
+    assert "hip mass (" in combination
     assert "No walk would separate them; a value known beforehand (--prior) does." in text
 
 
@@ -303,6 +304,44 @@ def from_angles(transient, gait, tmp_path_factory):
     path.write_text("time (s),angle 1 (rad),angle 2 (rad)\n" + "\n".join(lines))
     changes = ask(path, "identify.level=angles", "identify.fit={slope_deg: null}")
     return identify.run(taken(*changes), gait, Silent())
+
+
+def written_angles(path, transient, offset):
+    """Write angles of the transient's first 4 s at 100 Hz, off by an offset and with noise."""
+    samples, time = transient.groups["trajectory"], np.arange(0.0, 4.0, 0.01)
+    noise = 1e-3 * np.random.default_rng(8).standard_normal((time.size, 2))
+    angle = np.column_stack([np.interp(time, samples["time"], leg) for leg in samples["angle"].T]) + noise + offset
+    lines = (f"{t!r},{a!r},{b!r}" for t, (a, b) in zip(time.tolist(), angle.tolist(), strict=True))
+    path.write_text("time (s),angle 1 (rad),angle 2 (rad)\n" + "\n".join(lines))
+    return path
+
+
+def test_an_offset_of_the_sensors_is_estimated_with_the_walker(transient, gait, tmp_path):
+    path = written_angles(tmp_path / "off.csv", transient, 0.02)
+    changes = ask(path, "identify.level=angles", "identify.fit={slope_deg: null}", "slope_deg=1.2")
+    summary = identify.run(taken(*changes, "identify.nuisance=[angle_offset_rad]"), gait, Silent()).summary
+    (slope,), offset = summary["estimates"], summary["nuisance"]["angle_offset_rad"]
+    assert summary["models"][0]["fit"] == "fits"
+    assert abs(slope["value"] - 0.9969465635) < 4.0 * slope["standard_error"] < 0.05
+    assert abs(offset["value"] - 0.02) < 4.0 * offset["standard_error"] < 2e-3
+    text = " ".join(" ".join(answer("identify", summary)).split())
+    assert "The angle offset is 0.0" in text
+
+
+def test_an_offset_that_is_not_estimated_is_mentioned(transient, gait, tmp_path):
+    path = written_angles(tmp_path / "off.csv", transient, 0.02)
+    changes = ask(path, "identify.level=angles", "identify.fit={walker.hip_mass_kg: null}")
+    summary = identify.run(taken(*changes), gait, Silent()).summary
+    assert summary["models"][0]["fit"] == "misfit"
+    assert "--nuisance angle_offset_rad" in " ".join(" ".join(answer("identify", summary)).split())
+
+
+def test_a_prior_that_the_walk_contradicts_is_named(table, gait):
+    fit, prior = "identify.fit={slope_deg: null}", "identify.prior={walker.leg_length_m: [1.1, 0.01]}"
+    summary = identify.run(taken(*ask(table, fit, prior)), gait, Silent()).summary
+    assert summary["prior"][0]["distance"] > 3.0
+    text = " ".join(" ".join(answer("identify", summary)).split())
+    assert "The walk contradicts the prior of the leg length, 1.100 ± 0.010 m, by " in text
 
 
 def test_both_motions_are_where_the_walk_was(from_angles, transient):

@@ -28,11 +28,9 @@ def information_on(fitted: Fitted, keys: tuple[str, ...], scales: Floats, quanti
     values_count = fitted.data.residuals.size + len(fitted.data.prior)
     plain = information_from(fitted.evaluation.information, keys, scales, values_count)
     basis = plain.directions[~is_open(plain.singular_values)]
-    covariance = basis.T @ averaged_covariance(fitted, basis) @ basis
     return replace(
         plain,
-        correlations=correlations(covariance),
-        covariance=covariance * np.outer(scales, scales),
+        freedom=effective_freedom(fitted, plain, basis),
         contributions=contributions(fitted, quantities, len(keys), basis),
     )
 
@@ -48,7 +46,7 @@ def information_from(whole: Floats, keys: tuple[str, ...], scales: Floats, value
     singular, directions = np.sqrt(np.maximum(sizes[order], 0.0)), vectors[:, order].T
     basis = directions[~is_open(singular)]
     covariance = basis.T @ np.linalg.pinv(basis @ reduced @ basis.T, hermitian=True) @ basis
-    freedom, scaled = max(1, values - len(whole)), covariance * np.outer(scales, scales)
+    freedom, scaled = float(max(1, values - len(whole))), covariance * np.outer(scales, scales)
     return Information(keys, correlations(covariance), singular, directions, scaled, scales, freedom, {})
 
 
@@ -57,11 +55,25 @@ def correlations(covariance: Floats) -> Floats:
     return np.asarray(covariance / np.outer(errors, errors))
 
 
+def effective_freedom(fitted: Fitted, information: Information, basis: Floats) -> float:
+    """Return the degrees of freedom of Student's t for the errors, as of Satterthwaite.
+
+    A short walk determines the standard deviations of floor and measurement poorly. Averaged over plausible ones the
+    covariance is larger than at the likeliest ones, by nu / (nu - 2) for Student's t of nu degrees of freedom.
+
+    basis  (directions, parameters) that the walk determines
+    """
+    if not len(basis):
+        return information.freedom
+    likeliest = basis @ (information.covariance / np.outer(information.scales, information.scales)) @ basis.T
+    ratio = float(np.trace(np.linalg.solve(likeliest, averaged_covariance(fitted, basis)))) / len(basis)
+    return min(information.freedom, 2.0 * ratio / (ratio - 1.0)) if ratio > 1.0 else information.freedom
+
+
 def averaged_covariance(fitted: Fitted, basis: Floats) -> Floats:
     """Average the covariance on directions `basis` (directions, parameters) over plausible standard deviations.
 
-    A short walk determines the standard deviations of floor and measurement poorly; errors at the likeliest ones alone
-    would be too small. Weights are the restricted likelihood with a flat prior on each standard deviation.
+    Weights are the restricted likelihood with a flat prior on the logarithm of each standard deviation.
     """
     products, noise = products_of(fitted.data), fitted.noise
     count = basis.shape[1]
@@ -76,8 +88,8 @@ def averaged_covariance(fitted: Fitted, basis: Floats) -> Floats:
     drawn = evaluate_at(logs)
     inverses = np.linalg.pinv(basis @ free_the_rest(drawn.information, count) @ basis.T, hermitian=True)
     moved = drawn.move[:, :count] @ basis.T
-    likelihoods, covariances = drawn.restricted + logs.sum(axis=1), inverses + moved[:, :, None] * moved[:, None, :]
-    weights = np.exp(likelihoods - likelihoods.max())
+    covariances = inverses + moved[:, :, None] * moved[:, None, :]
+    weights = np.exp(drawn.restricted - drawn.restricted.max())
     return np.asarray(np.tensordot(weights / weights.sum(), covariances, 1))
 
 

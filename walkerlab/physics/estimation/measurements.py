@@ -40,6 +40,7 @@ class MeasuredAngles:
     phase: Floats  # (samples,) share of the step's period that has passed, 0 to 1
     angles_rad: Floats  # (samples, 2) from the vertical; the leg that swings first comes first
     lengths_m: Floats | None = None  # (steps,)
+    touch_sum_rad: float = 0.0  # sum of the angles from the slope's normal at heel strikes, if slope or sensors are off
 
     @property
     def count(self) -> int:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from walkerlab.outcome import Outcome
 from walkerlab.physics.estimation.measurements import LEG_ANGLE, STEP_LENGTH, STEP_PERIOD, MeasuredAngles, MeasuredSteps
 from walkerlab.physics.orbits.robustness import CENTRAL_4TH
-from walkerlab.physics.orbits.step_map import NO_TIMES, DisturbedWalk, VariedWalk
+from walkerlab.physics.orbits.step_map import NO_TIMES, DisturbedWalk, MappedStep, VariedWalk
 from walkerlab.physics.solvers.system import Floats
 
 CLOCK, OFFSET, GAIN, DELAY = "clock_rate", "angle_offset_rad", "angle_gain", "time_offset_s"
@@ -27,6 +27,7 @@ NUISANCES: Final[Mapping[str, tuple[float, float]]] = {
 FELT: Final = 1e-3  # change of the next step by a change of the start, below which a direction of the start is lost
 LAST_INSTANT: Final = 1e-9  # share of a walk before its last heel strike that counts as after it
 START_SCALE: Final = 0.02  # typical change of the start, in coordinates of the section
+SETTLING_STEP: Final = 1e-4  # of section coordinates, in difference quotients of settled starts
 QUICK_STEP: Final = 1e-6  # of an unknown's scale, in difference quotients while searching
 FORWARD: Final = ((0, -1.0), (1, 1.0))
 EXACT_STEP: Final = 1e-4  # in those of the result
@@ -35,8 +36,14 @@ EXACT_STEP: Final = 1e-4  # in those of the result
 class WalkMap(Protocol):
     """Walks of a family of walkers from the section; `step_map.StepMap` with values of several parameters."""
 
+    def step(self, z: Floats, p: Any) -> MappedStep:
+        """Take a step from z (d,), with its derivative."""
+
     def disturbed(self, z: Floats, p: Any, heights_m: Floats) -> DisturbedWalk:
         """Walk from z (d,) over footholds (steps + 1,)."""
+
+    def settled(self, z: Floats, p: Any) -> Floats:
+        """Return z (d,) with the stance foot at rest on the ground."""
 
     def sampled(self, z: Floats, p: Any, heights_m: Floats, times_s: Floats) -> Floats:
         """Return the legs' angles (times, 2) at times from the first heel strike, the first swing leg's first."""
@@ -107,6 +114,9 @@ class Forecast:
         return {name: value + own.get(name, 0.0) * change for name, (value, change) in NUISANCES.items()}
 
     def start(self, u: Floats) -> Floats:
+        return self.walks.settled(self._unsettled(u), self.parameters(u))
+
+    def _unsettled(self, u: Floats) -> Floats:
         first = self.scales.size
         return np.asarray(self.z + START_SCALE * self.directions @ u[first : first + self.directions.shape[1]])
 
@@ -177,7 +187,8 @@ class Forecast:
             return None
         z, starts = self.start(u), self.directions.shape[1]
         along = np.zeros((z.size + heights_m.size, starts + lifts.shape[1]))
-        along[: z.size, :starts], along[z.size :, starts:] = START_SCALE * self.directions, lifts
+        settling = settling_along(self.walks, self._unsettled(u), self.parameters(u), self.directions)
+        along[: z.size, :starts], along[z.size :, starts:] = START_SCALE * settling, lifts
         sampled = isinstance(self.measured, MeasuredAngles)
         times, inside = self._times(walk, sensors) if sampled else (NO_TIMES, NO_TIMES)
         varied = self.walks.varied(z, self.parameters(u), heights_m, along, times)
@@ -227,7 +238,15 @@ class Forecast:
         return np.column_stack((*own, columns[:, :starts], columns[:, columns.shape[1] - len(self.nuisances) :]))
 
 
-def felt_directions(DP: Floats) -> Floats:
-    """Return the directions (d, starts) of the section that the next step feels."""
-    _, sizes, rows = np.linalg.svd(DP)
+def settling_along(walks: WalkMap, z: Floats, p: Any, directions: Floats) -> Floats:
+    """Return changes (d, starts) of the settled start with z (d,) along directions (d, starts)."""
+    h = SETTLING_STEP
+    ends = [walks.settled(z + h * column, p) - walks.settled(z - h * column, p) for column in directions.T]
+    return np.array(ends).reshape(-1, z.size).T / (2.0 * h)
+
+
+def felt_directions(walks: WalkMap, z: Floats, p: Any) -> Floats:
+    """Return the directions (d, starts) of the start near z (d,) that the next step feels."""
+    DP = walks.step(walks.settled(z, p), p).DP
+    _, sizes, rows = np.linalg.svd(DP @ settling_along(walks, z, p, np.eye(z.size)))
     return np.asarray(rows[sizes > FELT * max(1.0, sizes[0])].T)

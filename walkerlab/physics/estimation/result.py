@@ -48,7 +48,7 @@ class Information:
     directions       (parameters, parameters) one row per singular value: shares of the parameters
     covariance       (parameters, parameters) in the parameters' units, on determined directions
     scales           (parameters,) typical changes, in the parameters' units
-    freedom          degrees of freedom left, for Student's t
+    freedom          degrees of freedom of Student's t for the errors
     contributions    share of each measured quantity in the information, averaged over determined directions
     """
 
@@ -58,7 +58,7 @@ class Information:
     directions: Floats
     covariance: Floats
     scales: Floats
-    freedom: int
+    freedom: float
     contributions: dict[str, float]
 
 
@@ -101,3 +101,4 @@ class Identification:
     fitted: Fitted = field(repr=False)
     walk: DisturbedWalk = field(repr=False)  # over the most probable floor
     sensors: dict[str, float]  # properties of clock and sensors, as `prediction.NUISANCES`
+    nuisances: dict[str, Uncertain]  # those of them that were estimated

@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from walkerlab.outcome import Outcome
 from walkerlab.physics.energy_channels import LOSS_ENTRIES
 from walkerlab.physics.ground.knees import IdealLock
+from walkerlab.physics.ground.resting import resting_foot
 from walkerlab.physics.ground.terrain import STANCE_FOOT, Terrain, after_mid_swing, checkerboard, has_ground_in_air
 from walkerlab.physics.ground.walker import (
     ContactWalker,
@@ -124,6 +125,18 @@ def state_on_section(walker: ContactWalker, z: Floats, stance: int) -> State:
             break
     state[ANGLES : ANGLES + n] = fill_followers(walker, stance, angles, (upper, *angled))
     return tuple(float(x) for x in state)
+
+
+def stand(walker: ContactWalker, z: Floats, stance: int) -> Floats:
+    """Return section coordinates with the stance foot at rest, as deep in the ground as the weight presses it."""
+    foot = feet_motion(walker.whole, state_on_section(walker, z, stance))[stance]
+    law, weight = walker.normal, walker.mass * walker.gravity_down
+    depth = resting_foot(weight, walker.mass, law.stiffness, law.exponent, law.damping).depth
+    along_rate = 1 + len(angled_bodies(walker, stance))
+    moved = z.copy()
+    moved[0] -= foot.height + depth
+    moved[along_rate : along_rate + 2] -= foot.slip, foot.vertical_velocity
+    return moved
 
 
 def coordinates_of(walker: ContactWalker, state: Floats, stance: int) -> Floats:
@@ -389,6 +402,10 @@ class ContactMap(StepMap):
         endless = replace(self.tolerances, budget=self.tolerances.budget * heights_m.size)
         walk = walk_from_section(site.walker, ground, endless, z * self._units, heights_m, push_N_s)
         return replace(walk, z=walk.z / self._units)
+
+    def settled(self, z: Floats, p: float) -> Floats:
+        site = self._at(p)
+        return z if site is None else stand(site.walker, z * self._units, STANCE_FOOT) / self._units
 
     def sampled(self, z: Floats, p: float, heights_m: Floats, times_s: Floats) -> Floats:
         site, touch = self._at(p), self.step(z, p, derived=False)

@@ -111,6 +111,13 @@ class StepMap(Stepper, Protocol):
         heights_m  (steps + 1,) of the footholds, beginning with the current one
         """
 
+    def settled(self, z: Floats, p: float) -> Floats:  # noqa: ARG002
+        """Return z (d,) with the stance foot at rest on the ground.
+
+        How deep a foot stands in compliant ground depends on the parameters; from another depth it would bounce.
+        """
+        return z
+
     def sampled(self, z: Floats, p: float, heights_m: Floats, times_s: Floats) -> Floats:
         """Sample the legs' angles (times, 2) from the vertical on the walk of `disturbed`, the first swing leg's first.
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Final, cast
+from typing import TYPE_CHECKING, Any, Final, cast
 
 import numpy as np
 
@@ -16,13 +17,13 @@ from walkerlab.labels import Label, unit_by_name
 from walkerlab.physics.estimation.information import is_open
 from walkerlab.physics.estimation.measurements import MeasuredAngles, MeasuredSteps
 from walkerlab.physics.estimation.prediction import GAIN, OFFSET
-from walkerlab.physics.estimation.result import Identification, Information
+from walkerlab.physics.estimation.result import Estimate, Identification, Information, ModelFit
 from walkerlab.physics.hybrid.rigid_measures import Footholds, places
 from walkerlab.physics.mechanics.rigid_model import STRAIGHT, apply_couplings
 from walkerlab.physics.solvers.system import Floats
 from walkerlab.pipeline.progress import Progress
 from walkerlab.pipeline.stages.estimated import models_of, question_of, refuse_keys, refuse_model
-from walkerlab.pipeline.stages.measured_walk import read_measured
+from walkerlab.pipeline.stages.measured_walk import SAME_TOUCHES, Measured, divide_at, read_divisions, read_measured
 from walkerlab.pipeline.stages.rigid_groups import place_variables, reorder_by_leg
 from walkerlab.pipeline.stages.walk import legs, over_time
 from walkerlab.pipeline.store.columns import numbered, rows_group
@@ -40,6 +41,7 @@ LABELS: Final = {
     "standard_error": Label("SI", "standard error; absent where the walk leaves the parameter open"),
     "start": Label("SI", "value in the config"),
 }
+UNTOUCHED: Final = 1e-3  # relative reduction of a prior's variance, below which the walk says nothing on it
 SHOWN_STEPS, SHOWN_SAMPLES = 10, 800
 """Number of steps, and about that of samples, whose motion the player shows."""
 FEWER: Final = "Fit fewer parameters, add what was weighed (--prior), or start nearer to the walk (--set)."
@@ -50,12 +52,14 @@ def run(config: IdentifyConfig, inputs: Mapping[str, Content], progress: Progres
     refuse(config)
     block = config.identify
     assert block is not None, "refuse rejects a config without the block"
-    measured = read_measured(block, config)
     progress.start("identify")
     gait, models = inputs["fixedpoint"].summary, models_of(block)
-    result = identify_walk(cast("Config", config), measured, gait, question_of(block), models, progress.note)
-    content = content_of(config, result, measured)
-    verdict = next(model for model in result.models if model.model == result.model)
+
+    def ask(measured: Measured) -> Identification:
+        return identify_walk(cast("Config", config), measured, gait, question_of(block), models, progress.note)
+
+    result, measured = identify_divided(config, block, ask)
+    content, verdict = content_of(config, result, measured), verdict_of(result)
     if verdict.fit == "not-converged":
         raise NoAnswer(f"the fit of the {verdict.model} model did not converge: {verdict.reason}", FEWER, content)
     return content
@@ -87,22 +91,77 @@ def refuse(config: IdentifyConfig) -> None:
         )
 
 
+def identify_divided(
+    config: IdentifyConfig, block: Identify, ask: Callable[[Measured], Identification]
+) -> tuple[Identification, Measured]:
+    """Identify from the first division into steps that fits, or else from the first that a walk can be fitted to."""
+    first: tuple[Identification, Measured] | None = None
+    problem: NoAnswer | None = None
+    for measured in read_divisions(block, config):
+        try:
+            answer = divide_again(config, block, ask, (ask(measured), measured))
+        except NoAnswer as error:
+            problem = problem or error
+            continue
+        if verdict_of(answer[0]).fit == "fits":
+            return answer
+        first = first or answer
+    if first is None:
+        assert problem is not None, "a file without a walk raises"
+        raise problem
+    return first
+
+
+def divide_again(
+    config: IdentifyConfig,
+    block: Identify,
+    ask: Callable[[Measured], Identification],
+    before: tuple[Identification, Measured],
+) -> tuple[Identification, Measured]:
+    """Repeat a fit if identified slope and sensors put heel strikes elsewhere; `before` if the other does not fit."""
+    result, measured = before
+    if not isinstance(measured, MeasuredAngles):
+        return before
+    slope_change = identified_config(config, result).slope_rad - config.slope_rad
+    touch_sum = 2.0 * (result.sensors[OFFSET] - slope_change)
+    if abs(touch_sum - measured.touch_sum_rad) < SAME_TOUCHES:
+        return before
+    try:
+        divided = divide_at(block, config, touch_sum)
+        again = ask(divided)
+    except (ConfigError, NoAnswer):
+        return before
+    return (again, divided) if verdict_of(again).fit == "fits" else before
+
+
+def verdict_of(result: Identification) -> ModelFit:
+    return next(model for model in result.models if model.model == result.model)
+
+
 def content_of(config: IdentifyConfig, result: Identification, measured: MeasuredSteps | MeasuredAngles) -> Content:
     """Store estimates, steps and, of angles, residuals in phase."""
-    known = result.information
+    known, block = result.information, config.identify or Identify()
     estimates = [
         {**asdict(estimate), "value": float(f"{estimate.value:.12g}"), "start": float(f"{estimate.start:.12g}")}
         for estimate in result.estimates
     ]
     summary = {
         "model": result.model,
+        "level": block.level,
         "estimates": estimates,
         "not_identifiable": [asdict(entry) for entry in result.not_identifiable],
         "correlations": {"keys": list(known.keys), "matrix": known.correlations.tolist()},
+        "degrees_of_freedom": known.freedom,
         "singular_values": known.singular_values.tolist(),
         "directions": [dict(zip(known.keys, row, strict=True)) for row in known.directions.tolist()],
         "noise": {"process": dict(result.process), "measurement": dict(result.measurement)},
         "contributions": dict(known.contributions),
+        "prior": [
+            prior_row(estimate, *block.prior[estimate.key])
+            for estimate in result.estimates
+            if estimate.key in block.prior
+        ],
+        "nuisance": {name: asdict(value) for name, value in result.nuisances.items()},
         "steps": result.steps,
         "rms_residual": dict(result.rms_residual),
         "chi_square_per_dof": result.chi_square_per_dof,
@@ -122,6 +181,20 @@ def content_of(config: IdentifyConfig, result: Identification, measured: Measure
         groups["samples"] = sample_group(result, measured)
         groups |= motions(identified_config(config, result), result, measured)
     return Content(groups, summary)
+
+
+def prior_row(estimate: Estimate, value: float, sigma: float) -> dict[str, Any]:
+    """Return a prior, and its distance from the walk's own estimate in standard errors of the difference."""
+    error = estimate.standard_error
+    free = 0.0 if error is None else sigma**2 - error**2
+    distance = abs(estimate.value - value) / math.sqrt(free) if free > UNTOUCHED * sigma**2 else 0.0
+    return {
+        "key": estimate.key,
+        "value": value,
+        "standard_deviation": sigma,
+        "unit": estimate.unit,
+        "distance": distance,
+    }
 
 
 def worst_moves(known: Information) -> Floats | None:

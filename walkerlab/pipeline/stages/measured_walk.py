@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
@@ -12,11 +13,14 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from walkerlab.errors import ConfigError
-from walkerlab.exchange.columns import as_walk, plain, unit_value
+from walkerlab.exchange.columns import RecordedWalk, as_walk, plain, unit_value
+from walkerlab.exchange.rate_jumps import sums_at_jumps
 from walkerlab.exchange.recording import TIME, Recording, read_delimited, read_recording
 from walkerlab.exchange.walk_in_steps import PLAUSIBLE, divide_into_steps, is_plausible
 from walkerlab.labels import unit_by_name
 from walkerlab.physics.estimation.measurements import MeasuredAngles, MeasuredSteps, split_into_steps
+from walkerlab.physics.estimation.prediction import OFFSET
+from walkerlab.physics.mechanics.rigid_model import feet_on_slope
 from walkerlab.physics.solvers.system import Floats
 from walkerlab.scene.rigid import rigid_walker
 
@@ -29,7 +33,11 @@ STEP_KINDS: Final = {"period_s": "time", "length_m": "length", "touch_angle_rad"
 """Kind of unit of each quantity of a table of steps."""
 MIN_STEPS: Final = 2
 MOST_STEPS: Final = 500  # each has a floor height of its own: memory grows with their square, time with their cube
+SLOPE: Final = "slope_deg"
+SAME_TOUCHES: Final = 0.002  # rad, difference of the angles' sums that leaves heel strikes about where they are
 NO_DATA_FILE: Final = "there is no such file"
+
+Measured = MeasuredSteps | MeasuredAngles
 
 
 def digests(config: Config) -> Mapping[str, str]:
@@ -42,8 +50,17 @@ def digests(config: Config) -> Mapping[str, str]:
         return {"identify.data": NO_DATA_FILE}
 
 
-def read_measured(block: Identify, config: RigidConfig) -> MeasuredSteps | MeasuredAngles:
+def read_measured(block: Identify, config: RigidConfig) -> Measured:
     """Read the block's file at its level; raises ConfigError for a file without such a walk."""
+    return next(read_divisions(block, config))
+
+
+def read_divisions(block: Identify, config: RigidConfig) -> Iterator[Measured]:
+    """Read the block's file, and yield the walk, then other divisions of its angles into steps.
+
+    There are others if the slope or the sensors' offset is estimated: heel strikes depend on both. Raises ConfigError
+    for a file without a walk.
+    """
     path = Path(block.data)
     if not path.is_file():
         raise ConfigError(
@@ -52,9 +69,26 @@ def read_measured(block: Identify, config: RigidConfig) -> MeasuredSteps | Measu
             ("identify", "data"),
         )
     try:
-        measured = read_steps(path, block) if block.level == "steps" else read_angles(path, block, config)
+        if block.level == "steps":
+            yield refuse_count(path, read_steps(path, block))
+            return
+        walk = as_walk(read_recording(path), block.columns, block.units)
     except OSError as error:
         raise ConfigError(f"{path} cannot be read: {error.strerror or error}.", "Check the path.") from error
+    problem, divided = None, False
+    for touch_sum_rad in touch_sums(walk, block, config):
+        try:
+            measured = divide_angles(walk, config, str(path), touch_sum_rad)
+        except ConfigError as error:
+            problem = problem or error
+        else:
+            divided = True
+            yield refuse_count(path, measured)
+    if problem is not None and not divided:
+        raise problem
+
+
+def refuse_count(path: Path, measured: Measured) -> Measured:
     if measured.count > MOST_STEPS:
         raise ConfigError(
             f"{path} has {measured.count} steps; at most {MOST_STEPS} are fitted at once.", "Cut it into shorter walks."
@@ -62,17 +96,34 @@ def read_measured(block: Identify, config: RigidConfig) -> MeasuredSteps | Measu
     return measured
 
 
-def read_angles(path: Path, block: Identify, config: RigidConfig) -> MeasuredAngles:
-    """Read angles over time and divide them at the heel strikes of the config's walker."""
-    walk = as_walk(read_recording(path), block.columns, block.units)
-    steps = divide_into_steps(walk, rigid_walker(config), str(path))
+def touch_sums(walk: RecordedWalk, block: Identify, config: RigidConfig) -> Iterator[float]:
+    """Yield possible sums (rad) of the legs' angles from the slope's normal at heel strikes: 0, then others."""
+    yield 0.0
+    angles = walk.both_legs("angle")
+    if angles is None or not (SLOPE in block.fit or SLOPE in block.prior or OFFSET in block.nuisance):
+        return
+    model = rigid_walker(config)
+    sums = sums_at_jumps(walk.time_s, angles, lambda angles: np.asarray(feet_on_slope(model, *angles.T)))
+    yield from (each for each in sums if each)
+
+
+def divide_at(block: Identify, config: RigidConfig, touch_sum_rad: float) -> MeasuredAngles:
+    """Divide the angles of the block's file at heel strikes with another sum of the legs' angles."""
+    walk = as_walk(read_recording(Path(block.data)), block.columns, block.units)
+    return divide_angles(walk, config, block.data, touch_sum_rad)
+
+
+def divide_angles(walk: RecordedWalk, config: RigidConfig, source: str, touch_sum_rad: float) -> MeasuredAngles:
+    """Divide angles over time at the heel strikes of the config's walker."""
+    steps = divide_into_steps(walk, rigid_walker(config), source, touch_sum_rad)
     if steps.touch_time_s.size < MIN_STEPS:
-        raise ConfigError(f"{path} has 1 complete step; at least {MIN_STEPS} are needed.", "Record a longer walk.")
+        raise ConfigError(f"{source} has 1 complete step; at least {MIN_STEPS} are needed.", "Record a longer walk.")
     angles = walk.both_legs("angle")
     assert angles is not None, "a walk in steps has angles"
     # only what was measured: the steps' own samples at heel strikes are interpolated
     own = angles[:, ::-1] if steps.swapped else angles
-    return split_into_steps(walk.time_s - steps.origin_s, own, np.append(0.0, steps.touch_time_s))
+    measured = split_into_steps(walk.time_s - steps.origin_s, own, np.append(0.0, steps.touch_time_s))
+    return replace(measured, touch_sum_rad=touch_sum_rad)
 
 
 def read_steps(path: Path, block: Identify) -> MeasuredSteps:

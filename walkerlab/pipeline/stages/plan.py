@@ -29,6 +29,8 @@ def run(config: PlanConfig, inputs: Mapping[str, Content], progress: Progress) -
     refuse(config)
     block, plan = cast("Identify", config.identify), config.plan or Plan()
     progress.start("plan")
+    if block.data:
+        progress.note(f"a plan needs no measured walk: {block.data} is not read")
     gait = inputs["fixedpoint"].summary
     options = plan_measurements(cast("Config", config), gait, question_of(block), plan, block.model, progress.note)
     keys = tuple(options[0].errors)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from itertools import combinations
 from typing import Any, Final
@@ -20,7 +21,6 @@ from walkerlab.views.figures.style import BLACK, BLUE, GREY, ORANGE, PALE, VERMI
 IDENTIFY_STAGE: Final = "identify"
 NO_MEASURED_STEPS: Final = "it has no steps"
 TWO_SIGMA: Final = 2.0
-REGION_95: Final = 2.4477  # sqrt(-2 ln 0.05): semi-axis of the 95 % region of two parameters, in standard errors
 STEP_PANEL_HEIGHT: Final = 1.7
 MEASURED: Final = "measured_"
 LEGS: Final = (("swing leg", BLUE), ("stance leg", VERMILLION))
@@ -98,17 +98,18 @@ def draw_trade_off(results: Results) -> Drawn:
 
     The plane is that of the two parameters that show them best.
     """
-    rows = results[IDENTIFY_STAGE].summary["estimates"]
+    rows, freedom = (results[IDENTIFY_STAGE].summary[name] for name in ("estimates", "degrees_of_freedom"))
+    semi_axis = semi_axis_of_region(freedom)
     moves, values = results[IDENTIFY_STAGE].groups["worst"]["moves"], np.array([row["value"] for row in rows])
     relative = moves / np.where(values == 0.0, 1.0, np.abs(values))
     pair = max(combinations(range(len(rows)), 2), key=lambda pair: abs(float(np.linalg.det(relative[:, pair]))))
-    centre, reach = values[list(pair)], REGION_95 * moves[:, pair]
+    centre, reach = values[list(pair)], semi_axis * moves[:, pair]
     angle = np.linspace(0.0, 2.0 * np.pi, 181)
     outline = centre[:, None] + reach.T @ np.array([np.cos(angle), np.sin(angle)])
     figure, axes = panels(3.9)
     axes.fill(*outline, color=BLUE, alpha=0.15, linewidth=0.0)
     axes.plot(*outline, color=BLUE, linewidth=0.8)
-    worst, next_worst = (combination_in_words(rows, REGION_95 * move) for move in moves)
+    worst, next_worst = (combination_in_words(rows, semi_axis * move) for move in moves)
     key = []
     for move, name, style in zip(reach, (worst, next_worst), ("-", "--"), strict=True):
         axes.plot(*np.array([centre - move, centre + move]).T, color=BLACK, linewidth=1.2, linestyle=style)
@@ -118,6 +119,11 @@ def draw_trade_off(results: Results) -> Drawn:
     axes.set(**dict(zip(("xlabel", "ylabel"), labels, strict=True)))
     add_legend(figure, key)
     return figure, (worst, next_worst)
+
+
+def semi_axis_of_region(freedom: float) -> float:
+    """Return the semi-axis of the 95 % region of two parameters, in standard errors: sqrt(2 F) of 2 and `freedom`."""
+    return math.sqrt(freedom * math.expm1(-2.0 / freedom * math.log(0.05)))
 
 
 def combination_in_words(rows: Sequence[Mapping[str, Any]], move: Floats) -> str:

@@ -1,7 +1,7 @@
 """The parameters identified from a measured walk."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from walkerlab.labels import axis_label, join_words, unit_by_name
@@ -14,6 +14,7 @@ from walkerlab.views.report.words import words
 
 NO_EFFECT = 1e-6
 """Share of the largest singular value, below which no walk depends on a combination."""
+CONTRADICTION = 3.0  # standard errors between a prior and the walk, from which they contradict each other
 UNITS_IN_WORDS = {"deg": " degrees", "1": "", "": ""}
 GAIT_WORDS = {
     "step_length_m": "steps of {}",
@@ -58,7 +59,7 @@ def findings(summary: Mapping[str, Any]) -> list[str]:
     left_open = [
         (
             capitalised(join_words(axis_label(key) for key in keys if key in row["combination"])),
-            row["combination"],
+            with_labels(row["combination"], keys),
             row["reason"],
         )
         for row in summary["not_identifiable"]
@@ -67,9 +68,10 @@ def findings(summary: Mapping[str, Any]) -> list[str]:
     singular = summary["singular_values"]
     without_effect = separable and min(singular) < NO_EFFECT * max(singular)
     parameters = (determined, bool(masses and references), left_open, separable, without_effect)
+    beside = (priors_in_words(summary["prior"]), nuisances_in_words(summary["nuisance"]))
     quality = (other, gait_in_words(summary["gait"]), noise_in_words(summary))
     return [
-        *words.parts("identify.findings", summary, verdict, *parameters),
+        *words.parts("identify.findings", summary, verdict, *parameters, *beside),
         *words.parts("identify.quality", summary, verdict, *quality),
     ]
 
@@ -124,6 +126,30 @@ def estimate_in_words(row: Mapping[str, Any]) -> str:
     if row["key"].endswith("mass_kg"):
         return mass_in_words(row["key"], value.removesuffix(" kg")) + bound
     return f"the {axis_label(row['key'])} is {value}{bound}"
+
+
+def with_labels(combination: str, keys: Sequence[str]) -> str:
+    for key in sorted(keys, key=len, reverse=True):
+        combination = combination.replace(key, axis_label(key))
+    return combination
+
+
+def priors_in_words(priors: Sequence[Mapping[str, Any]]) -> list[tuple[str, str, float]]:
+    """Name and value of each prior that the walk contradicts, and by how many standard errors."""
+    return [
+        (axis_label(row["key"]), with_error(row["value"], row["standard_deviation"], row["unit"]), row["distance"])
+        for row in priors
+        if row["distance"] > CONTRADICTION
+    ]
+
+
+def nuisances_in_words(nuisances: Mapping[str, Mapping[str, float]]) -> str:
+    return capitalised(
+        join_words(
+            f"the {axis_label(name)} is {with_error(row['value'], row['standard_error'], unit_by_name(name))}"
+            for name, row in nuisances.items()
+        )
+    )
 
 
 def gait_in_words(gait: Mapping[str, Mapping[str, float]]) -> str:

@@ -1,0 +1,68 @@
+"""Recordings whose slope or sensors are off: the rates' jumps say where heel strikes are."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from walkerlab.config.loader import load
+from walkerlab.config.reads import only
+from walkerlab.exchange.columns import as_walk
+from walkerlab.exchange.rate_jumps import MOST_FOUND, sums_at_jumps
+from walkerlab.exchange.recording import TIME, Recording
+from walkerlab.exchange.walk_in_steps import divide_into_steps
+from walkerlab.physics.mechanics.rigid_model import feet_on_slope
+from walkerlab.pipeline.graph import PIPELINE
+from walkerlab.pipeline.progress import Silent
+from walkerlab.pipeline.stages import fixedpoint, simulate
+from walkerlab.scene.rigid import rigid_walker
+
+NOISE = 2e-3
+RATE_HZ = 100.0
+
+
+def found_gait(config):
+    return {"fixedpoint": fixedpoint.run(only(config, PIPELINE["fixedpoint"].takes), {}, Silent())}
+
+
+def recorded(name, strides=4):
+    """Return the config's walker, and times and noisy angles (samples, 2) of its gait."""
+    config = load(Path(name), (f"strides={strides}",)).config
+    trajectory = simulate.run(only(config, PIPELINE["simulate"].takes), found_gait(config), Silent()).groups[
+        "trajectory"
+    ]
+    rising = np.append(True, np.diff(trajectory["time"]) > 0.0)
+    time, angle = trajectory["time"][rising], trajectory["angle"][rising]
+    even = np.arange(0.0, time[-1], 1.0 / RATE_HZ)
+    noise = NOISE * np.random.default_rng(3).standard_normal((even.size, 2))
+    return rigid_walker(config), even, np.column_stack([np.interp(even, time, leg) for leg in angle.T]) + noise
+
+
+def total(walker):
+    return lambda angles: feet_on_slope(walker, *angles.T)
+
+
+@pytest.mark.parametrize("name", ["paper", "kneed", "torso"])
+@pytest.mark.parametrize("offset", [0.0, 0.02, -0.04])
+def test_rates_jump_where_the_feet_meet(name, offset):
+    walker, time, angle = recorded(name)
+    sums = sums_at_jumps(time, angle + offset, total(walker))
+    assert min(abs(each - 2.0 * offset) for each in sums) < 0.015
+
+
+def test_smooth_angles_have_few_jumps():
+    time = np.linspace(0.0, 6.0, 600)
+    swing = 0.2 * np.sin(2.0 * math.pi * time / 1.4)
+    sums = sums_at_jumps(time, np.column_stack((swing, -swing)), lambda angles: angles.sum(axis=1))
+    assert len(sums) <= MOST_FOUND
+
+
+def test_heel_strikes_are_found_at_another_sum_of_the_angles():
+    walker, time, angle = recorded("paper")
+    columns = {TIME: time, "angle 1": angle[:, 0] + 0.05, "angle 2": angle[:, 1] + 0.05}
+    units = {TIME: "s", "angle 1": "rad", "angle 2": "rad"}
+    walk = as_walk(Recording(Path("film.csv"), columns, units), {}, {})
+    steps = divide_into_steps(walk, walker, "film.csv", touch_sum_rad=0.1)
+    assert steps.touch_time_s.size >= 7
+    assert np.diff(steps.touch_time_s) == pytest.approx(0.7036, abs=0.01)

@@ -1,0 +1,92 @@
+"""Find the sums of the legs' angles at which their rates jump.
+
+At heel strike the legs' angles from the slope's normal are opposite, and rates jump. If the slope or the sensors'
+offset is known poorly, the angles sum to another value than 0 at that instant; the jumps show it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+AHEAD: Final = 0.4
+"""Smallest angle between the legs at a heel strike, over the largest of the walk."""
+WINDOW: Final = 0.1
+"""Time before and after a heel strike in which angles are fitted, over a step's period."""
+MOST_STEPS: Final = 20  # that are looked at
+MOST_SAMPLES: Final = 60  # of a window, that are fitted
+FEWEST: Final = 4  # on each side of an instant
+DEGREE: Final = 3
+ROUNDING: Final = 1e-12  # of squared angles
+SUMS: Final = np.round(np.arange(-0.12, 0.121, 0.01), 2)  # rad, that are tried
+MOST_FOUND: Final = 4
+
+
+def sums_at_jumps(time: Array, angle: Array, total: Callable[[Array], Array]) -> list[float]:
+    """Return sums (rad) of the legs' angles from the slope's normal at which rates jump, the clearest first.
+
+    time   (samples,) s
+    angle  (samples, 2) rad
+    total  (samples, 2) angles -> (samples,) that sum
+    """
+    spread, sums = angle[:, 0] - angle[:, 1], total(angle)
+    runs = apart_runs(np.abs(spread) > AHEAD * np.abs(spread).max(), spread > 0.0)
+    half = WINDOW * typical_distance(time, runs)
+    evidence = np.array([evidence_for(time, angle, sums - tried, runs[:MOST_STEPS], half) for tried in SUMS])
+    padded = np.concatenate(([0.0], evidence, [0.0]))
+    peaks = np.flatnonzero((evidence > padded[:-2]) & (evidence >= padded[2:]))
+    return [float(SUMS[peak]) for peak in peaks[np.argsort(-evidence[peaks])][:MOST_FOUND]]
+
+
+def evidence_for(time: Array, angle: Array, over: Array, runs: Sequence[tuple[int, int]], half: float) -> float:
+    """Return by how much jumps, where `over` (samples,) falls through zero within runs, reduce the angles' scatter.
+
+    In variances of what scatter they leave.
+    """
+    jumps = []
+    for first, last in runs:
+        falls = first + np.flatnonzero((over[first:last] > 0.0) & (over[first + 1 : last + 1] <= 0.0))
+        if not falls.size:
+            continue
+        row = int(falls[-1])
+        share = over[row] / (over[row] - over[row + 1])
+        jumps.append(jump_at(time, angle, float(time[row] + share * (time[row + 1] - time[row])), half))
+    fitted = [jump for jump in jumps if jump is not None]
+    if not fitted:
+        return 0.0
+    reductions, scatters, freedoms = (np.array(column) for column in zip(*fitted, strict=True))
+    return float(reductions.sum() * freedoms.sum() / scatters.sum())
+
+
+def apart_runs(apart: NDArray[np.bool_], first_ahead: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """Return first and last sample of each stretch in which the same leg is ahead, and far ahead."""
+    kind = np.where(apart, np.where(first_ahead, 1, -1), 0)
+    bounds = np.flatnonzero(np.diff(kind)) + 1
+    edges = zip((0, *bounds.tolist()), (*bounds.tolist(), kind.size), strict=True)
+    return [(begin, end - 1) for begin, end in edges if kind[begin]]
+
+
+def typical_distance(time: Array, runs: Iterable[tuple[int, int]]) -> float:
+    middles = np.array([0.5 * (time[first] + time[last]) for first, last in runs])
+    return float(np.median(np.diff(middles))) if middles.size > 1 else float(time[-1] - time[0])
+
+
+def jump_at(time: Array, angle: Array, instant: float, half: float) -> tuple[float, float, int] | None:
+    """Fit a jump of the rates at an instant: reduction of the squared scatter, the rest of it, its degrees of freedom.
+
+    None with too few samples on a side.
+    """
+    first, last = np.searchsorted(time, (instant - half, instant + half))
+    rows = slice(int(first), int(last), max(1, int(last - first) // MOST_SAMPLES))
+    t, y = (time[rows] - instant) / half, angle[rows]
+    if np.count_nonzero(t < 0.0) < FEWEST or np.count_nonzero(t > 0.0) < FEWEST:
+        return None
+    basis = np.linalg.qr(np.column_stack((t[:, None] ** np.arange(DEGREE + 1), np.maximum(t, 0.0))))[0]
+    shares = basis.T @ y
+    left = float((y**2).sum() - (shares**2).sum())
+    return float((shares[-1] ** 2).sum()), max(left, ROUNDING * float((y**2).sum())), y.size - shares.size
