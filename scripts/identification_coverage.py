@@ -34,6 +34,9 @@ WALKERS = {
 STEPS, ROUGHNESS, NOISE, ANGLE_NOISE, PRIOR = 20, 1e-4, (1e-3, 1e-3), 2e-3, 0.01
 """Steps of a walk; leg lengths; s and leg lengths; rad; shares of the last parameter's value."""
 
+START_CHANGE, START_CHANGES = 0.01, {"simplest": 0.002}
+"""Shares of the gait's coordinates; the simplest walker falls from farther starts."""
+
 
 class Truth:
     """A walker of a config, and synthetic walks of it."""
@@ -46,13 +49,14 @@ class Truth:
         self.family = ConfigFamily(self.config, keys)
         self.walks = step_map_of(self.model, self.family, subject.length_m)
         self.z, self.leg = subject.z, self.config.walker.leg_length_m
-        self.values = np.array(self.family.start)
+        self.values, self.start_change = np.array(self.family.start), START_CHANGES.get(name, START_CHANGE)
 
     def walk(self, seed):
         """Measure a walk; None if it ends early. Returns also a weighing of the last parameter."""
         draw = np.random.default_rng(seed)
         heights = draw.normal(0.0, ROUGHNESS * self.leg, STEPS + 1)
-        z = self.walks.settled(self.z * (1.0 + draw.normal(0.0, 0.01, self.z.size)), tuple(self.values))
+        z = self.z * (1.0 + self.start_change * draw.normal(0.0, 1.0, self.z.size))
+        z = self.walks.settled(z, tuple(self.values))
         walk = self.walks.disturbed(z, tuple(self.values), heights)
         weighed = self.values[-1] * (1.0 + PRIOR * draw.normal())
         if walk.durations_s.size < STEPS:
