@@ -26,24 +26,15 @@ CREEP_LOAD = 0.1  # tangential over normal force, about the mean of a walk
 
 @dataclass(frozen=True)
 class EngineScene:
-    """A walker on its ground, for an engine and for the walking rules.
+    """A walker on its ground, for an engine and for the walking rules."""
 
-    assembly  the parts
-    base      root of the engine's tree: the hip, on the first stance leg
-    ours      the walker as this project walks it
-    walker    the same with foot and hip levers taken from the base
-    ground    terrain, and the measures that a walk is judged by
-    start     state of the free walker on the gait
-    locked    locked knees, which have no hinge in the engine
-    """
-
-    assembly: Assembly
-    base: Anchor
-    ours: ContactWalker
-    walker: ContactWalker
-    ground: JudgedGround
-    start: State
-    locked: tuple[Knee, ...] = ()
+    assembly: Assembly  # the parts
+    base: Anchor  # root of the engine's tree: the hip, on the first stance leg
+    ours: ContactWalker  # the walker as this project walks it
+    walker: ContactWalker  # the same with foot and hip levers taken from the base
+    ground: JudgedGround  # terrain, and the measures that a walk is judged by
+    start: State  # state of the free walker on the gait
+    locked: tuple[Knee, ...] = ()  # locked knees, which have no hinge in the engine
 
     @cached_property
     def model(self) -> PlanarModel:
@@ -124,26 +115,16 @@ def scene_for_engines(scene: ContactScene, rigid_state: State) -> EngineScene:
 
 @dataclass(frozen=True)
 class EngineContact:
-    """Target to which an engine's own contact is tuned in closed form, SI.
+    """Target to which an engine's own contact is tuned in closed form, SI."""
 
-    mass             resting on one foot (kg)
-    gravity          towards the ground (m/s^2)
-    penetration      at rest under that weight (m)
-    exponent         of the penetration in the normal force
-    damping_ratio    c / (2 sqrt(k m)) at rest
-    friction         tangential over normal force of a sliding foot
-    creep_load       tangential over normal force of a standing foot
-    creep_velocity   creep under that load (m/s)
-    """
-
-    mass: float
-    gravity: float
-    penetration: float
-    exponent: float
-    damping_ratio: float
-    friction: float
-    creep_load: float
-    creep_velocity: float
+    mass: float  # resting on one foot (kg)
+    gravity: float  # towards the ground (m/s^2)
+    penetration: float  # at rest under that weight (m)
+    exponent: float  # of the penetration in the normal force
+    damping_ratio: float  # c / (2 sqrt(k m)) at rest
+    friction: float  # tangential over normal force of a sliding foot
+    creep_load: float  # tangential over normal force of a standing foot
+    creep_velocity: float  # creep under that load (m/s)
 
 
 def creep_velocity(friction: FrictionLaw, load: float) -> float:

@@ -51,21 +51,14 @@ class HingeCoupling:
 
 @dataclass(frozen=True)
 class Exported:
-    """A walker on its ground at the start of a walk.
-
-    scene    as other programs see it
-    steps    of the walk
-    walk     the contact model's own walk from that start
-    heights  (footholds,) of uneven ground (m), None on even ground
-    pinned   whether the stance foot is hinged until the first touch
-    """
+    """A walker on its ground at the start of a walk."""
 
     config: Config
-    scene: EngineScene
-    steps: int
-    walk: ContactWalkResult
-    heights: Floats | None
-    pinned: bool
+    scene: EngineScene  # as other programs see it
+    steps: int  # of the walk
+    walk: ContactWalkResult  # the contact model's own walk from that start
+    heights: Floats | None  # (footholds,) of uneven ground (m), None on even ground
+    pinned: bool  # whether the stance foot is hinged until the first touch
 
     @property
     def model(self) -> PlanarModel:

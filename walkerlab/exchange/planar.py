@@ -22,7 +22,6 @@ SMALLEST_BALL_M = 5e-4  # for point feet, which engines do not have; larger than
 class Link:
     """Rigid link, lumped from bodies that move together and the particles on them.
 
-    parent        index of its parent in `links`; -1 for the base
     parent_point  hinge in the parent's frame (m); for the base the point moved by the root's freedoms
     point         hinge in the link's own frame (m)
     """
@@ -31,7 +30,7 @@ class Link:
     mass_kg: float
     centre_m: Position
     inertia_kg_m2: float
-    parent: int
+    parent: int  # index of its parent in `links`; -1 for the base
     parent_point_m: Position
     point_m: Position
 
@@ -50,19 +49,15 @@ class Ball:
 class PlanarModel:
     """Tree of links.
 
-    links     base first, every link after its parent
-    freedoms  of the base relative to the world
-    balls     feet
     gravity   m/s^2, along the slope and towards it
-    chain     (bodies, links) maps relative angles, base first, to each body's absolute one (assembly's order)
     """
 
-    links: tuple[Link, ...]
-    freedoms: tuple[Freedom, ...]
-    balls: tuple[Ball, ...]
+    links: tuple[Link, ...]  # base first, every link after its parent
+    freedoms: tuple[Freedom, ...]  # of the base relative to the world
+    balls: tuple[Ball, ...]  # feet
     gravity_along: float
     gravity_down: float
-    chain: Floats
+    chain: Floats  # (bodies, links) maps relative angles, base first, to each body's absolute one (assembly's order)
 
     @property
     def size(self) -> int:

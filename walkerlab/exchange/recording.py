@@ -49,16 +49,12 @@ numpy.savez(sys.stdout.buffer, places=content["data"]["points"], rate=rate, labe
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """Hold columns over time as a file has them, before any conversion; a missing value is nan.
-
-    columns     arrays (samples,) by name; time is `time`
-    units       by column where the file states one, as it is written there
-    kind_units  by 'angle', 'length' and 'time' where the file states one for all columns of that kind
-    """
+    """Hold columns over time as a file has them, before any conversion; a missing value is nan."""
 
     path: Path
-    columns: dict[str, Array]
-    units: dict[str, str] = field(default_factory=dict)
+    columns: dict[str, Array]  # arrays (samples,) by name; time is `time`
+    units: dict[str, str] = field(default_factory=dict)  # by column where the file states one, as it is written there
+    # by 'angle', 'length' and 'time' where the file states one for all columns of that kind
     kind_units: dict[str, str] = field(default_factory=dict)
 
 

@@ -43,28 +43,17 @@ SIDE: Final = 1e-10  # share of the walk's duration before a heel strike, of the
 
 @dataclass(frozen=True, eq=False)
 class RecordedSteps:
-    """A recorded walk from its first heel strike on, the leg that swings first in column 0.
+    """A recorded walk from its first heel strike on, the leg that swings first in column 0."""
 
-    time_s         (samples,) from that heel strike, with both sides of every later one; dense recordings are thinned
-    step           (samples,) index of the step
-    angle_rad      (samples, 2)
-    velocity_rad_s (samples, 2)
-    touch_time_s   (steps,) ends of the steps
-    length_m       (steps,)
-    scatter_rad    of the angles around heel strikes
-    swapped        whether the recording's second leg swings first
-    origin_s       the recording's time at the first heel strike
-    """
-
-    time_s: Array
-    step: NDArray[np.int64]
-    angle_rad: Array
-    velocity_rad_s: Array
-    touch_time_s: Array
-    length_m: Array
-    scatter_rad: float
-    swapped: bool
-    origin_s: float
+    time_s: Array  # (samples,) from that heel strike, with both sides of every later one; dense recordings are thinned
+    step: NDArray[np.int64]  # (samples,) index of the step
+    angle_rad: Array  # (samples, 2)
+    velocity_rad_s: Array  # (samples, 2)
+    touch_time_s: Array  # (steps,) ends of the steps
+    length_m: Array  # (steps,)
+    scatter_rad: float  # of the angles around heel strikes
+    swapped: bool  # whether the recording's second leg swings first
+    origin_s: float  # the recording's time at the first heel strike
 
 
 def divide_into_steps(walk: RecordedWalk, model: RigidModel, source: str, touch_sum_rad: float = 0.0) -> RecordedSteps:

@@ -63,24 +63,17 @@ def known_problems_and_start(config: SceneConfig) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class Option:
-    """Option of a stage's command that sets a key of the config.
+    """Option of a stage's command that sets a key of the config."""
 
-    flag      as typed
-    key       dotted
-    metavar   "KEY" for the name of a key; with "=", pairs, which may be repeated: "...=A:B" two numbers by name,
-              "[=A:B]" where they may be missing, "...=...,..." names by name
-    type      of its value; list for names, which may be repeated
-    needs     flags without which it means nothing
-    runs      the stage that the command runs instead of its own; sets no key
-    """
-
-    flag: str
-    key: str
+    flag: str  # as typed
+    key: str  # dotted
+    # "KEY" for the name of a key; with "=", pairs, which may be repeated: "...=A:B" two numbers by name, "[=A:B]" where
+    # they may be missing, "...=...,..." names by name
     metavar: str
     help: str
-    type: type = str
-    needs: tuple[str, ...] = ()
-    runs: str = ""
+    type: type = str  # of its value; list for names, which may be repeated
+    needs: tuple[str, ...] = ()  # flags without which it means nothing
+    runs: str = ""  # the stage that the command runs instead of its own; sets no key
 
 
 STRIDES = Option("--strides", "strides", "N", "Strides to walk; one stride is two steps.", int)
@@ -88,44 +81,29 @@ STRIDES = Option("--strides", "strides", "N", "Strides to walk; one stride is tw
 
 @dataclass(frozen=True)
 class Stage:
-    """One stage of the pipeline.
+    """One stage of the pipeline."""
 
-    name           of its command and its artifact
-    module         of its `run`; imported only when the stage runs
-    purpose        one line for the user
-    takes          type of the config that `run` takes, whose keys its result depends on; None for the whole config
-    takes_of_scene the same for a walker of no study, where that is another type
-    takes_of_paper keys of the built-in paper config that its own cases are based on
-    programs       versions of other programs that its result depends on, by name
-    files          digests of files that its result depends on, by key of the config
-    inputs         stages whose results it needs under a config, earlier in the table
-    if_current     stages whose results it takes if they are current
-    options        of its command, besides those of all stages
-    requires       blocks without which it is left out
-    work           "times" runs alone; "draws" writes files besides its artifact, from whatever results
-                   there are
-    precompile     function of its module that compiles its kernels, where that pays while an earlier stage runs
-    only_by        the one command that runs it, its own or `STAGE --full`; nothing is stale without its result
-    early_with     the results with which it is worth drawing while others are still being computed
-    does_without   parts that its scene lacks under a config: name, reason and saving
-    """
-
-    name: str
-    module: str
-    purpose: str
+    name: str  # of its command and its artifact
+    module: str  # of its `run`; imported only when the stage runs
+    purpose: str  # one line for the user
+    # type of the config that `run` takes, whose keys its result depends on; None for the whole config
     takes: type | None
-    inputs: Inputs = nothing
-    if_current: tuple[str, ...] = ()
-    options: tuple[Option, ...] = ()
-    requires: tuple[str, ...] = ()
+    inputs: Inputs = nothing  # stages whose results it needs under a config, earlier in the table
+    if_current: tuple[str, ...] = ()  # stages whose results it takes if they are current
+    options: tuple[Option, ...] = ()  # of its command, besides those of all stages
+    requires: tuple[str, ...] = ()  # blocks without which it is left out
+    # "times" runs alone; "draws" writes files besides its artifact, from whatever results there are
     work: Literal["computes", "times", "draws"] = "computes"
+    # function of its module that compiles its kernels, where that pays while an earlier stage runs
     precompile: str = ""
-    only_by: str = ""
-    early_with: tuple[str, ...] = ()
-    does_without: Lacks = nothing
-    takes_of_scene: type | None = None
-    takes_of_paper: type | None = None
+    only_by: str = ""  # the one command that runs it, its own or `STAGE --full`; nothing is stale without its result
+    early_with: tuple[str, ...] = ()  # the results with which it is worth drawing while others are still being computed
+    does_without: Lacks = nothing  # parts that its scene lacks under a config: name, reason and saving
+    takes_of_scene: type | None = None  # the same for a walker of no study, where that is another type
+    takes_of_paper: type | None = None  # keys of the built-in paper config that its own cases are based on
+    # versions of other programs that its result depends on, by name
     programs: Callable[[], Mapping[str, str]] | None = None
+    # digests of files that its result depends on, by key of the config
     files: Callable[[Config], Mapping[str, str]] | None = None
 
     @property

@@ -28,22 +28,15 @@ REMEMBERED = 256
 
 @dataclass(frozen=True)
 class Step:
-    """Planned step for one stage.
-
-    reason    for the action
-    identity  of its result; None if the stage is left out
-    found     the stored result, if intact: the one to reuse, or an outdated one
-    damaged   its file, if that cannot be trusted
-    origin    its file, if that is in another run's folder
-    """
+    """Planned step for one stage."""
 
     stage: Stage
     action: Action
-    reason: str
-    identity: Identity | None = None
-    found: Content | None = None
-    damaged: Path | None = None
-    origin: Path | None = None
+    reason: str  # for the action
+    identity: Identity | None = None  # of its result; None if the stage is left out
+    found: Content | None = None  # the stored result, if intact: the one to reuse, or an outdated one
+    damaged: Path | None = None  # its file, if that cannot be trusted
+    origin: Path | None = None  # its file, if that is in another run's folder
 
 
 class FolderResults:

@@ -19,28 +19,19 @@ from walkerlab.scene.omissions import LeftOut
 
 @dataclass(frozen=True)
 class StageReport:
-    """Report on running a stage.
-
-    run_dir    the run's folder
-    artifact   file of the result; None if there is no result
-    reused     whether the result existed already
-    wall_s     total time, inputs included
-    left_out   results that were not computed, with the reasons
-    summary    of the result; empty without one
-    steps      outcome of each stage
-    no_answer  message and advice if the computation, or an input of the drawing, has no answer
-    results    summaries of all stages involved that have a result
-    """
+    """Report on running a stage."""
 
     stage: str
-    run_dir: Path
-    artifact: Path | None
-    reused: bool
-    wall_s: float
-    left_out: tuple[LeftOut, ...]
-    summary: dict[str, Any]
-    steps: tuple[StageDone, ...]
+    run_dir: Path  # the run's folder
+    artifact: Path | None  # file of the result; None if there is no result
+    reused: bool  # whether the result existed already
+    wall_s: float  # total time, inputs included
+    left_out: tuple[LeftOut, ...]  # results that were not computed, with the reasons
+    summary: dict[str, Any]  # of the result; empty without one
+    steps: tuple[StageDone, ...]  # outcome of each stage
+    # message and advice if the computation, or an input of the drawing, has no answer
     no_answer: NoAnswer | None = None
+    # summaries of all stages involved that have a result
     results: Mapping[str, dict[str, Any]] = field(default_factory=dict)
 
     def as_json(self) -> dict[str, Any]:
@@ -60,20 +51,13 @@ class StageReport:
 
 @dataclass(frozen=True)
 class Options:
-    """Options of running a stage.
+    """Options of running a stage."""
 
-    force  run the stage and all it needs even if current
-    wait   wait for another process that works in the folder, then reuse its results
-    jobs   processes for independent stages, and for independent cells of a stage
-    full   also run the stage's long campaigns
-    dry    only report the plan; changes no file
-    """
-
-    force: bool = False
-    wait: bool = True
-    jobs: int = 1
-    full: bool = False
-    dry: bool = False
+    force: bool = False  # run the stage and all it needs even if current
+    wait: bool = True  # wait for another process that works in the folder, then reuse its results
+    jobs: int = 1  # processes for independent stages, and for independent cells of a stage
+    full: bool = False  # also run the stage's long campaigns
+    dry: bool = False  # only report the plan; changes no file
 
 
 USUAL = Options()

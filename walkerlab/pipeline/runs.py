@@ -32,24 +32,16 @@ SHOWN_CHANGES = 3
 
 @dataclass(frozen=True)
 class RunSummary:
-    """One run folder.
-
-    changes   KEY=VALUE of each key in which its config differs from its file
-    stages    names of stages with a stored result
-    current   those that are up to date; None if the run's config is unknown
-    sweeps    sweep files
-    bytes     total size of its files
-    changed_utc  time of the last change, UTC, ISO 8601
-    """
+    """One run folder."""
 
     name: str
     run_dir: Path
-    changes: tuple[str, ...]
-    stages: tuple[str, ...]
-    current: tuple[str, ...] | None
-    sweeps: tuple[str, ...]
-    bytes: int
-    changed_utc: str
+    changes: tuple[str, ...]  # KEY=VALUE of each key in which its config differs from its file
+    stages: tuple[str, ...]  # names of stages with a stored result
+    current: tuple[str, ...] | None  # those that are up to date; None if the run's config is unknown
+    sweeps: tuple[str, ...]  # sweep files
+    bytes: int  # total size of its files
+    changed_utc: str  # time of the last change, UTC, ISO 8601
 
 
 def runs_in(runs_dir: Path, graph: Graph = PIPELINE) -> Iterator[RunSummary]:
@@ -258,17 +250,12 @@ class Pair:
 
 @dataclass(frozen=True)
 class RunDifference:
-    """Differences of two runs.
+    """Differences of two runs."""
 
-    config       keys with both values, as JSON
-    numbers      by stage of both, all values of the two summaries
-    headlines    by stage, the headline quantities
-    only_first, only_second  stages with a result in one run only
-    """
-
-    config: tuple[tuple[str, Any, Any], ...]
-    numbers: Mapping[str, tuple[Pair, ...]]
-    headlines: Mapping[str, tuple[Pair, ...]]
+    config: tuple[tuple[str, Any, Any], ...]  # keys with both values, as JSON
+    numbers: Mapping[str, tuple[Pair, ...]]  # by stage of both, all values of the two summaries
+    headlines: Mapping[str, tuple[Pair, ...]]  # by stage, the headline quantities
+    # only_first, only_second: stages with a result in one run only
     only_first: tuple[str, ...]
     only_second: tuple[str, ...]
 

@@ -23,22 +23,15 @@ from walkerlab.pipeline.workers import WorkerPool, tell
 
 @dataclass(frozen=True)
 class StageTask:
-    """A stage with its arguments.
-
-    config   the part of the config that it takes
-    inputs   results of other stages
-    offered  arguments that its `run` may have, by name:
-             jobs        processes for independent cells
-             checkpoint  units of the result that an interrupted run has computed
-             again       whether walks are repeated for their numerical error
-             folder      of its run, which it draws into
-             left_out    results that are missing in a drawing
-    """
+    """A stage with its arguments."""
 
     name: str
     module: str
-    config: Any
-    inputs: Mapping[str, Content]
+    config: Any  # the part of the config that it takes
+    inputs: Mapping[str, Content]  # results of other stages
+    # arguments that its `run` may have, by name: jobs processes for independent cells checkpoint units of the result
+    # that an interrupted run has computed again whether walks are repeated for their numerical error folder of its run,
+    # which it draws into left_out results that are missing in a drawing
     offered: Mapping[str, Any]
 
     def run(self, progress: Progress) -> Content:

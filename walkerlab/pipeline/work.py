@@ -27,15 +27,11 @@ MAX_DEATHS: Final = 12
 
 
 class WorkUnit(NamedTuple):
-    """Piece of work that is computed at once and stored under its name.
-
-    size  in units of the progress count
-    run   computes the result in any process
-    """
+    """Piece of work that is computed at once and stored under its name."""
 
     name: str
-    size: int
-    run: Callable[[], Any]
+    size: int  # in units of the progress count
+    run: Callable[[], Any]  # computes the result in any process
 
 
 Batch = tuple[WorkUnit, ...]
@@ -65,21 +61,14 @@ def compute(units: Batch) -> list[Timed]:
 
 @dataclass
 class Spread:
-    """Spreads units over an executor; the work of a worker that dies is tried again.
+    """Spreads units over an executor; the work of a worker that dies is tried again."""
 
-    todo     units, of which `left` are not handed out yet
-    keep     called with units and their results as they arrive
-    give_up  called with a unit whose attempts failed, and the last error
-    batch_s  target duration of a batch, s; 0: one unit at a time
-    unit_s   run time of a unit, s; None before the first batch is back, which then runs alone
-    """
-
-    todo: Iterator[WorkUnit]
+    todo: Iterator[WorkUnit]  # units, of which `left` are not handed out yet
     left: int
-    keep: Callable[[Batch, Sequence[Timed]], None]
-    give_up: Callable[[WorkUnit, BaseException], None]
-    batch_s: float
-    unit_s: float | None = None
+    keep: Callable[[Batch, Sequence[Timed]], None]  # called with units and their results as they arrive
+    give_up: Callable[[WorkUnit, BaseException], None]  # called with a unit whose attempts failed, and the last error
+    batch_s: float  # target duration of a batch, s; 0: one unit at a time
+    unit_s: float | None = None  # run time of a unit, s; None before the first batch is back, which then runs alone
     _again: deque[tuple[Batch, int]] = field(default_factory=deque)
     _running: dict[Future[Any], tuple[Batch, int]] = field(default_factory=dict)
     _deaths: int = 0

@@ -47,19 +47,13 @@ GAIT_STEP: Final = 1e-3  # of a parameter's scale, in derivatives of the gait
 
 @dataclass(frozen=True)
 class Question:
-    """Question to a measured walk.
+    """Question to a measured walk."""
 
-    fit        bounds of each fitted key, in its unit; None for the schema's
-    prior      value and standard deviation of keys, known beforehand
-    nuisance   properties of sensors that are estimated too
-    starts     number of starts of the fit
-    """
-
-    fit: Mapping[str, tuple[float, float] | None]
-    prior: Mapping[str, tuple[float, float]]
-    nuisance: tuple[str, ...] = ()
+    fit: Mapping[str, tuple[float, float] | None]  # bounds of each fitted key, in its unit; None for the schema's
+    prior: Mapping[str, tuple[float, float]]  # value and standard deviation of keys, known beforehand
+    nuisance: tuple[str, ...] = ()  # properties of sensors that are estimated too
     loss: Loss = "linear"
-    starts: int = 1
+    starts: int = 1  # number of starts of the fit
 
     @property
     def keys(self) -> tuple[str, ...]:

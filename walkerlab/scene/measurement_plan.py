@@ -41,19 +41,15 @@ CURVE: Final = (2, 3, 5, 7, 10, 14, 20, 30, 50, 70, 100, 150, 200, 300, 500)
 
 @dataclass(frozen=True)
 class Option:
-    """A way to measure a walk, and the errors that it would leave.
-
-    errors        standard error of each key, in its unit; None where the walk leaves it open
-    steps_needed  number of steps for each key with a wanted error; None where the longest walk does not suffice
-    curve         errors by number of steps
-    """
+    """A way to measure a walk, and the errors that it would leave."""
 
     measurement: str
     start: str
-    errors: dict[str, float | None]
+    errors: dict[str, float | None]  # standard error of each key, in its unit; None where the walk leaves it open
     not_identifiable: tuple[Unidentifiable, ...]
+    # number of steps for each key with a wanted error; None where the longest walk does not suffice
     steps_needed: dict[str, int | None]
-    curve: dict[int, dict[str, float | None]]
+    curve: dict[int, dict[str, float | None]]  # errors by number of steps
 
 
 def plan_measurements(

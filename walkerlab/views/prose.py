@@ -34,15 +34,11 @@ def percent(share: float, digits: int = 3) -> str:
 
 @dataclass(frozen=True)
 class Prose:
-    """The paragraphs in a folder of templates, as plain text.
-
-    filters  functions that templates may call by name; an unknown name is an error
-    known    global values of the templates
-    """
+    """The paragraphs in a folder of templates, as plain text."""
 
     folder: Path
-    filters: Sequence[Callable[..., Any]]
-    known: Mapping[str, Any]
+    filters: Sequence[Callable[..., Any]]  # functions that templates may call by name; an unknown name is an error
+    known: Mapping[str, Any]  # global values of the templates
 
     @cached_property
     def templates(self) -> Environment:

@@ -26,17 +26,12 @@ DASHED, DOTTED = (0.0, (3.2, 1.4)), (0.0, (1.0, 1.2))
 
 @dataclass(frozen=True)
 class Series:
-    """Runs of a method, or of an integrator or contact model of an engine, from coarse to fine.
-
-    runs    stored columns; gaps are NaN
-    filled  whether the markers are filled
-    engine  empty for methods
-    """
+    """Runs of a method, or of an integrator or contact model of an engine, from coarse to fine."""
 
     look: Look
-    runs: Mapping[str, Array]
-    filled: bool
-    engine: str = ""
+    runs: Mapping[str, Array]  # stored columns; gaps are NaN
+    filled: bool  # whether the markers are filled
+    engine: str = ""  # empty for methods
 
     @property
     def line(self) -> dict[str, Any]:

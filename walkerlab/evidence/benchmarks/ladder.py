@@ -36,16 +36,13 @@ class MethodRun:
 
 @dataclass(frozen=True)
 class Ascent:
-    """Runs of one method up its ladder of tolerances.
-
-    unfinished  whether the next tolerance takes long and is postponed
-    """
+    """Runs of one method up its ladder of tolerances."""
 
     trial: Trial
     method: str
     ladder: tuple[float, ...]
     runs: tuple[MethodRun, ...]
-    unfinished: bool
+    unfinished: bool  # whether the next tolerance takes long and is postponed
 
 
 @dataclass(frozen=True)

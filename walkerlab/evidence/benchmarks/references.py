@@ -20,16 +20,12 @@ TIGHTEST_RIGID = {"dop853": 1e-14, "radau5": 1e-12}
 
 @dataclass(frozen=True)
 class End:
-    """End state of a walk by one method.
-
-    tolerance        relative; 0 for Taylor series at machine precision
-    rhs_evaluations  0 where they are not counted
-    """
+    """End state of a walk by one method."""
 
     method: str
     state: Floats
-    tolerance: float = 0.0
-    rhs_evaluations: int = 0
+    tolerance: float = 0.0  # relative; 0 for Taylor series at machine precision
+    rhs_evaluations: int = 0  # 0 where they are not counted
 
 
 @dataclass(frozen=True)

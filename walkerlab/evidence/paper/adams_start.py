@@ -24,49 +24,31 @@ FALLING = 4  # samples through which a falling hip's height is fitted as a cubic
 
 @dataclass(frozen=True)
 class AdamsStart:
-    """The ADAMS start in the rigid model.
+    """The ADAMS start in the rigid model."""
 
-    state         rad and rad/s
-    slope         rad
-    energy        J, kinetic and potential, from the stance foot
-    weight        N
-    normal_force  N, of the ground at the start
-    pull_from     s, time from which the ground would have to pull; None if never
-    heel_strikes  number
-    end           outcome of the walk
-    end_time      s
-    """
-
-    state: State
-    slope: float
-    energy: float
-    weight: float
-    normal_force: float
-    pull_from: float | None
-    heel_strikes: int
-    end: str
-    end_time: float
+    state: State  # rad and rad/s
+    slope: float  # rad
+    energy: float  # J, kinetic and potential, from the stance foot
+    weight: float  # N
+    normal_force: float  # N, of the ground at the start
+    pull_from: float | None  # s, time from which the ground would have to pull; None if never
+    heel_strikes: int  # number
+    end: str  # outcome of the walk
+    end_time: float  # s
 
 
 @dataclass(frozen=True)
 class AdamsWalk:
-    """The ADAMS start in the contact model.
+    """The ADAMS start in the contact model."""
 
-    terrain             of the contact model's ground
-    rigid               the same start in the rigid model, both feet on the config's slope
-    airborne_from       s, time from which no foot of the contact model touches; None if never
-    later_normal_force  N, largest one of the contact model once the rigid model's ground would have to pull
-    normal              (samples, leg) N, normal forces of the contact model
-    mechanical          (samples,) J, kinetic and potential energy of the contact model
-    """
-
-    terrain: str
-    rigid: AdamsStart
+    terrain: str  # of the contact model's ground
+    rigid: AdamsStart  # the same start in the rigid model, both feet on the config's slope
     walk: ContactWalkResult
-    airborne_from: float | None
+    airborne_from: float | None  # s, time from which no foot of the contact model touches; None if never
+    # N, largest one of the contact model once the rigid model's ground would have to pull
     later_normal_force: float | None
-    normal: NDArray[np.float64]
-    mechanical: NDArray[np.float64]
+    normal: NDArray[np.float64]  # (samples, leg) N, normal forces of the contact model
+    mechanical: NDArray[np.float64]  # (samples,) J, kinetic and potential energy of the contact model
 
     @property
     def reason(self) -> str:

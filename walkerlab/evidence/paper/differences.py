@@ -44,17 +44,12 @@ def motion_of(walk: Content) -> comparison.Motion | None:
 
 @dataclass(frozen=True)
 class Comparison:
-    """Difference between the walks of both models.
+    """Difference between the walks of both models."""
 
-    errors    by alignment, where there is something to compare
-    orbit     distance between each leg's orbits, or None
-    left_out  comparisons left out, and why
-    """
-
-    errors: Errors
-    orbit: list[float] | None = None
+    errors: Errors  # by alignment, where there is something to compare
+    orbit: list[float] | None = None  # distance between each leg's orbits, or None
     groups: Mapping[str, Group] = field(default_factory=dict)
-    left_out: tuple[dict[str, str], ...] = ()
+    left_out: tuple[dict[str, str], ...] = ()  # comparisons left out, and why
 
     @property
     def summary(self) -> dict[str, Any]:

@@ -22,19 +22,13 @@ ENERGY_STEPS = 5  # over which the paper averages the energy
 
 @dataclass(frozen=True)
 class Characteristics:
-    """Quantities of Table 3, SI units; None where the walk or its record is too short.
+    """Quantities of Table 3, SI units; None where the walk or its record is too short."""
 
-    t_left   period of the first step of the last completed stride
-    t_right  period of its second step
-    t_cycle  their sum
-    v_com    length of the stride along the slope over t_cycle
-    E_avg    time mean of kinetic and potential energy, from the current stance foot, over at least five steps
-    """
-
-    t_left: float | None
-    t_right: float | None
-    t_cycle: float | None
-    v_com: float | None
+    t_left: float | None  # period of the first step of the last completed stride
+    t_right: float | None  # period of its second step
+    t_cycle: float | None  # their sum
+    v_com: float | None  # length of the stride along the slope over t_cycle
+    # time mean of kinetic and potential energy, from the current stance foot, over at least five steps
     E_avg: float | None
 
 
@@ -74,22 +68,15 @@ def over_last_steps(time: Array, energy: Array, step_ends: Array) -> EnergyRecor
 
 @dataclass(frozen=True)
 class RigidMeasurements:
-    """Gait of one set of equations, and a walk from it.
+    """Gait of one set of equations, and a walk from it."""
 
-    state          fixed point, rad and rad/s
-    steps          completed, of ten
-    step_length    m, between the feet at that state
-    energy_least   J, minimum and maximum energy during the walk
-    energy_drift   J, largest spread within a swing
-    """
-
-    state: State
-    steps: int
-    step_length: float
+    state: State  # fixed point, rad and rad/s
+    steps: int  # completed, of ten
+    step_length: float  # m, between the feet at that state
     table_3: Characteristics
-    energy_least: float
+    energy_least: float  # J, minimum and maximum energy during the walk
     energy_most: float
-    energy_drift: float
+    energy_drift: float  # J, largest spread within a swing
 
 
 def measure_rigid_model(walker: RigidWalker, state: State) -> RigidMeasurements:
@@ -111,25 +98,16 @@ def measure_rigid_model(walker: RigidWalker, state: State) -> RigidMeasurements:
 
 @dataclass(frozen=True)
 class ContactMeasurements:
-    """Walk of the contact model, to compare with the paper's ADAMS model.
+    """Walk of the contact model, to compare with the paper's ADAMS model."""
 
-    law          the contact block of its config
-    foot_radius  m
-    summary      stored summary of the walk
-    start        initial rigid state, rad and rad/s; None if states were not stored
-    step_length  m, mean over the last completed stride; None without one
-    energy       over the last five steps; None if energies were not stored
-    from_x_p     steps from x_p with its printed digits, of ten, and the outcome of that walk
-    """
-
-    law: Contact
-    foot_radius: float
-    summary: Mapping[str, Any]
-    start: State | None
+    law: Contact  # the contact block of its config
+    foot_radius: float  # m
+    summary: Mapping[str, Any]  # stored summary of the walk
+    start: State | None  # initial rigid state, rad and rad/s; None if states were not stored
     table_3: Characteristics
-    step_length: float | None
-    energy: EnergyRecord | None
-    from_x_p: tuple[int, str]
+    step_length: float | None  # m, mean over the last completed stride; None without one
+    energy: EnergyRecord | None  # over the last five steps; None if energies were not stored
+    from_x_p: tuple[int, str]  # steps from x_p with its printed digits, of ten, and the outcome of that walk
 
     @property
     def steps(self) -> int:

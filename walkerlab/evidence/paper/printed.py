@@ -14,16 +14,12 @@ COORDINATE_UNITS: Final = ("rad", "rad", "rad/s", "rad/s")
 
 @dataclass(frozen=True)
 class Printed:
-    """A number of the paper.
+    """A number of the paper."""
 
-    where    equation, table, figure or section
-    text     as printed, which shows its last digit
-    """
-
-    where: str
+    where: str  # equation, table, figure or section
     quantity: str
     unit: str
-    text: str
+    text: str  # as printed, which shows its last digit
 
     @property
     def value(self) -> float:

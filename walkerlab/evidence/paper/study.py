@@ -25,30 +25,22 @@ FOOT_VELOCITY = (0.3, -0.2)  # m/s, of the foot in the check of (A.9) to (A.24)
 
 @dataclass(frozen=True)
 class PaperStudy:
-    """Measurements, in SI units.
-
-    as_printed, corrected  gaits to which walks from x_p converge
-    from_x_p               Table 3 of five gait cycles from x_p with its printed digits, equations as printed
-    five_steps_energy      J, time mean over the first five of these ten steps
-    fastest                rad/s, largest angular velocity of the gait as printed
-    largest_jump           rad/s, largest change of an angular velocity at its heel strike
-    swing_foot_height      m, over the slope, where (A.55) as printed places the swing foot of x_p
-    foothold_speed         m/s, of the new stance foot after the impact of (A.55) as printed, on the gait as printed
-    both_misprints         fixed point near x_p with the misprints of (A.5) and (A.55), or None
-    kinetic_energy         J, of one state: from the masses' velocities, and from D_e with either order of coordinates
-    """
+    """Measurements, in SI units."""
 
     slope: float
     slope_rounding: float
+    # as_printed, corrected: gaits to which walks from x_p converge
     as_printed: measured.RigidMeasurements
     corrected: measured.RigidMeasurements
+    # Table 3 of five gait cycles from x_p with its printed digits, equations as printed
     from_x_p: measured.Characteristics
-    five_steps_energy: float
-    fastest: float
-    largest_jump: float
-    swing_foot_height: float
-    foothold_speed: float
-    both_misprints: State | None
+    five_steps_energy: float  # J, time mean over the first five of these ten steps
+    fastest: float  # rad/s, largest angular velocity of the gait as printed
+    largest_jump: float  # rad/s, largest change of an angular velocity at its heel strike
+    swing_foot_height: float  # m, over the slope, where (A.55) as printed places the swing foot of x_p
+    foothold_speed: float  # m/s, of the new stance foot after the impact of (A.55) as printed, on the gait as printed
+    both_misprints: State | None  # fixed point near x_p with the misprints of (A.5) and (A.55), or None
+    # J, of one state: from the masses' velocities, and from D_e with either order of coordinates
     kinetic_energy: Mapping[str, float]
     adams: AdamsStart
 

@@ -70,12 +70,9 @@ WALK_LABELS = {
 
 @dataclass(frozen=True)
 class LimitFindings:
-    """Distances by series, and the limit without creep.
+    """Distances by series, and the limit without creep."""
 
-    walk_series  series in which complete walks are compared as well
-    """
-
-    walk_series: tuple[str, ...]
+    walk_series: tuple[str, ...]  # series in which complete walks are compared as well
     rigid_period: float
     contact_period: float
     series: dict[str, list[Distance]]

@@ -27,26 +27,19 @@ LIBRARY_BUDGET: Final = 30_000  # right-hand sides; a library's walks run in Pyt
 
 @dataclass(frozen=True)
 class Second:
-    """A case walked by a second method.
+    """A case walked by a second method."""
 
-    method  empty if none reached an answer
-    tried   methods that failed before, with their outcomes
-    """
-
-    method: str
+    method: str  # empty if none reached an answer
     walk: JudgedWalk | None
-    tried: str
+    tried: str  # methods that failed before, with their outcomes
 
 
 @dataclass(frozen=True)
 class CaseCell:
-    """A case to judge and to try with ordinary methods, in any process.
-
-    config  of a scene's case; None for a case of the paper's compass
-    """
+    """A case to judge and to try with ordinary methods, in any process."""
 
     case: Case
-    config: Config | None = None
+    config: Config | None = None  # of a scene's case; None for a case of the paper's compass
 
     def run(self) -> tuple[CaseResult | Choice, ...]:
         """Return the verdict, then the ordinary methods' results."""

@@ -101,17 +101,14 @@ def run_until(
 
 @dataclass(frozen=True)
 class Known:
-    """Computed quantity and its reference.
-
-    limit  largest relative error, justified by `why_limit`
-    """
+    """Computed quantity and its reference."""
 
     name: Annotated[str, Label("", "name of the problem")]
     quantity: Annotated[str, Label("", "compared quantity, with its unit")]
     value: Annotated[float, Label("1", "by the contact code, in the quantity's unit")]
     reference: Annotated[float, Label("1", "by another route, in the quantity's unit")]
     source: str
-    limit: float
+    limit: float  # largest relative error, justified by `why_limit`
     why_limit: str
     wall_s: float
 

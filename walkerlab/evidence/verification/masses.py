@@ -44,24 +44,15 @@ def rotate(d: Floats, psi: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class Moving:
-    """Masses and bodies of a walker at an instant; the origin is on the ground under the stance foot.
+    """Masses and bodies of a walker at an instant; the origin is on the ground under the stance foot."""
 
-    mass      (masses,) kg
-    place     (masses, 2) m
-    velocity  (masses, 2) m/s
-    inertia   (bodies,) kg m^2, about the bodies' own centres of mass
-    rate      (bodies,) rad/s
-    hip       (2,) m
-    contact   (2,) m, point of the swing foot that would touch
-    """
-
-    mass: Floats
-    place: Floats
-    velocity: Floats
-    inertia: Floats
-    rate: Floats
-    hip: Floats
-    contact: Floats
+    mass: Floats  # (masses,) kg
+    place: Floats  # (masses, 2) m
+    velocity: Floats  # (masses, 2) m/s
+    inertia: Floats  # (bodies,) kg m^2, about the bodies' own centres of mass
+    rate: Floats  # (bodies,) rad/s
+    hip: Floats  # (2,) m
+    contact: Floats  # (2,) m, point of the swing foot that would touch
 
     @property
     def kinetic(self) -> float:

@@ -37,18 +37,12 @@ MAX_UNKNOWN: Final = 1e-3  # of the walker's momentum, beyond which a balance sa
 
 @dataclass(frozen=True)
 class Balance:
-    """Momentum against impulse, each as a share of the walker's momentum.
+    """Momentum against impulse, each as a share of the walker's momentum."""
 
-    residual    largest over time, both directions and the angular part
-    unsure      error bound of the impulses' sums
-    unresolved  friction's impulse that depends on slips below the tolerance
-    steps       of the solver
-    """
-
-    residual: float
-    unsure: float
-    unresolved: float
-    steps: int
+    residual: float  # largest over time, both directions and the angular part
+    unsure: float  # error bound of the impulses' sums
+    unresolved: float  # friction's impulse that depends on slips below the tolerance
+    steps: int  # of the solver
 
 
 def momentum_finding(config: WalksConfig, scene: ContactScene, start: State, case: Case) -> Measure | NotMeasured:

@@ -47,16 +47,12 @@ RIGID_REFERENCE_SETTINGS: Final = ("dop853", 1e-12, 1e-14)
 
 @dataclass(frozen=True)
 class Choice:
-    """One method on one case.
-
-    verdict  fine, wrong silently, gives up, diverges
-    error    of the final state; None if it was not reached
-    """
+    """One method on one case."""
 
     case: str
     method: str
-    verdict: str
-    error: float | None
+    verdict: str  # fine, wrong silently, gives up, diverges
+    error: float | None  # of the final state; None if it was not reached
     rhs_evaluations: int
     wall_s: float
 
@@ -93,15 +89,12 @@ def choices(case: Case, config: WalksConfig) -> tuple[Choice, ...]:
 
 @dataclass(frozen=True)
 class Arrival:
-    """End of a case's walk, to judge methods by.
-
-    units  of each component of the state
-    """
+    """End of a case's walk, to judge methods by."""
 
     case: str
     time_s: float
     state: Floats
-    units: Floats
+    units: Floats  # of each component of the state
 
     def judged(self, method: str, y: Floats | None, count: int, wall_s: float) -> Choice:
         """Judge the end state of a method; None if it was not reached."""

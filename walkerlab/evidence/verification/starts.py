@@ -51,16 +51,12 @@ class JudgedWalk:
 
 @dataclass(frozen=True)
 class CaseStart:
-    """A walker in the initial state of a case.
+    """A walker in the initial state of a case."""
 
-    energy         m g L and the initial energy (J), the scale of residuals
-    residual_name  name of the residual
-    """
-
-    residual_name: ClassVar[str]
+    residual_name: ClassVar[str]  # name of the residual
     config: WalksConfig
     start: State
-    energy: float
+    energy: float  # m g L and the initial energy (J), the scale of residuals
 
 
 @dataclass(frozen=True)

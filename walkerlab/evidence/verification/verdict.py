@@ -40,14 +40,7 @@ class NotMeasured:
 
 @dataclass(frozen=True)
 class CaseResult:
-    """Outcome of a case and its judgement.
-
-    findings       measures taken
-    remarks        further faults
-    not_measured   measures that could not be taken
-    second_method  method compared with; empty if none could walk the case
-    second_tried   methods that failed, or why none was tried
-    """
+    """Outcome of a case and its judgement."""
 
     name: Annotated[str, Label("", "name of the case")]
     family: Annotated[str, Label("", "family of the case")]
@@ -59,11 +52,11 @@ class CaseResult:
     energy_balance_residual_J: Annotated[float, Label("J", "largest residual of the energy balance")]  # noqa: N815
     rhs_evaluations: Annotated[int, Label("1", "right-hand sides evaluated")]
     wall_s: float
-    findings: tuple[Measure, ...]
-    remarks: tuple[str, ...] = ()
-    second_method: str = ""
-    second_tried: str = ""
-    not_measured: tuple[NotMeasured, ...] = ()
+    findings: tuple[Measure, ...]  # measures taken
+    remarks: tuple[str, ...] = ()  # further faults
+    second_method: str = ""  # method compared with; empty if none could walk the case
+    second_tried: str = ""  # methods that failed, or why none was tried
+    not_measured: tuple[NotMeasured, ...] = ()  # measures that could not be taken
 
     @property
     def failures(self) -> tuple[str, ...]:

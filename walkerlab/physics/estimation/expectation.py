@@ -19,15 +19,11 @@ from walkerlab.physics.solvers.system import Floats
 
 @dataclass(frozen=True, eq=False)
 class PlannedWalk:
-    """A walk that is predicted and not measured, with its derivatives.
-
-    quantities  those that the walk could be measured by
-    step        (values,) index of the step of each value
-    """
+    """A walk that is predicted and not measured, with its derivatives."""
 
     data: Linearised
-    quantities: tuple[str, ...]
-    step: NDArray[np.int64]
+    quantities: tuple[str, ...]  # those that the walk could be measured by
+    step: NDArray[np.int64]  # (values,) index of the step of each value
     keys: tuple[str, ...]
     scales: Floats
 

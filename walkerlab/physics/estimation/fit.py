@@ -38,17 +38,13 @@ WEAK_PRIOR: Final = 1.0  # standard deviation of every unknown about its start, 
 
 @dataclass(frozen=True, eq=False)
 class FitProblem:
-    """A measured walk, unknowns, and what is known of them.
-
-    start   values of the parameters, in their units
-    priors  (value, standard deviation) of parameters by index, in their units
-    bounds  (low, high) of each parameter, infinite where there are none
-    """
+    """A measured walk, unknowns, and what is known of them."""
 
     forecast: Forecast
     leg_length_m: float
-    start: tuple[float, ...]
-    bounds: Sequence[tuple[float, float]]
+    start: tuple[float, ...]  # values of the parameters, in their units
+    bounds: Sequence[tuple[float, float]]  # (low, high) of each parameter, infinite where there are none
+    # (value, standard deviation) of parameters by index, in their units
     priors: dict[int, tuple[float, float]] = field(default_factory=dict)
     loss: Loss = "linear"
 
@@ -70,10 +66,7 @@ class FitProblem:
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
-    """Result of a fit.
-
-    why  reason why it did not converge; empty if it did
-    """
+    """Result of a fit."""
 
     u: Floats  # (unknowns,) scaled
     heights_m: Floats  # most probable
@@ -83,7 +76,7 @@ class Fitted:
     predicted: Floats  # (values,) over even ground, with the most probable start
     z: Floats  # (d,) end of that walk, on the section
     rounds: int
-    why: str = ""
+    why: str = ""  # reason why it did not converge; empty if it did
 
 
 def fit(problem: FitProblem, start: Floats) -> Fitted | str:

@@ -40,25 +40,18 @@ class Unidentifiable:
 
 @dataclass(frozen=True, eq=False)
 class Information:
-    """How well a walk determines the fitted parameters.
-
-    correlations     (parameters, parameters) of the estimates
-    singular_values  (parameters,) of the sensitivity to parameters over their scale, in standard deviations of the
-                     data; the start and the nuisances are free
-    directions       (parameters, parameters) one row per singular value: shares of the parameters
-    covariance       (parameters, parameters) in the parameters' units, on determined directions
-    scales           (parameters,) typical changes, in the parameters' units
-    freedom          degrees of freedom of Student's t for the errors
-    contributions    share of each measured quantity in the information, averaged over determined directions
-    """
+    """How well a walk determines the fitted parameters."""
 
     keys: tuple[str, ...]
-    correlations: Floats
+    correlations: Floats  # (parameters, parameters) of the estimates
+    # (parameters,) of the sensitivity to parameters over their scale, in standard deviations of the data; the start and
+    # the nuisances are free
     singular_values: Floats
-    directions: Floats
-    covariance: Floats
-    scales: Floats
-    freedom: float
+    directions: Floats  # (parameters, parameters) one row per singular value: shares of the parameters
+    covariance: Floats  # (parameters, parameters) in the parameters' units, on determined directions
+    scales: Floats  # (parameters,) typical changes, in the parameters' units
+    freedom: float  # degrees of freedom of Student's t for the errors
+    # share of each measured quantity in the information, averaged over determined directions
     contributions: dict[str, float]
 
 

@@ -28,19 +28,14 @@ BLOCK_POINTS = 256  # points per block, which bounds the memory
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """Motion of the legs in time, SI units.
+    """Motion of the legs in time, SI units."""
 
-    time          (samples,) strictly rising
-    angle         (samples, leg)
-    velocity      (samples, leg)
-    step_ends     (steps,) times of the heel strikes or touches that end the steps; the first step begins at time[0]
-    knee_strikes  (strikes,) times at which a knee locks and velocities jump; empty without knees
-    """
-
-    time: Array
-    angle: Array
-    velocity: Array
+    time: Array  # (samples,) strictly rising
+    angle: Array  # (samples, leg)
+    velocity: Array  # (samples, leg)
+    # (steps,) times of the heel strikes or touches that end the steps; the first step begins at time[0]
     step_ends: Array
+    # (strikes,) times at which a knee locks and velocities jump; empty without knees
     knee_strikes: Array = field(default_factory=lambda: np.zeros(0))
 
     @property

@@ -71,9 +71,6 @@ class Coupling:
 class Assembly:
     """Bodies connected by hinges, without closed loops.
 
-    legs  the bodies of each leg from the hip down, in the same order; they change roles at heel strike. The first
-          foot is the first leg's. Bodies of neither leg belong to both.
-
     Raises KeyError for a part on an unknown body, ValueError for two bodies of one name and for closed loops.
     """
 
@@ -83,6 +80,8 @@ class Assembly:
     feet: tuple[BallFoot, ...] = ()
     knees: tuple[Knee, ...] = ()
     couplings: tuple[Coupling, ...] = ()
+    # the bodies of each leg from the hip down, in the same order; they change roles at heel strike. The first foot is
+    # the first leg's. Bodies of neither leg belong to both
     legs: tuple[tuple[str, ...], tuple[str, ...]] = ((), ())
 
     def __post_init__(self) -> None:

@@ -76,12 +76,10 @@ ENDLESS = 2**62
 
 @dataclass(frozen=True)
 class Tolerances:
-    """Method and tolerances of a walk's integration.
-
-    rtol, atol    tolerances on the error of a step
-    """
+    """Method and tolerances of a walk's integration."""
 
     method: str  # name of the method
+    # rtol, atol: tolerances on the error of a step
     rtol: float
     atol: float
     budget: int  # right-hand sides per walk

@@ -251,14 +251,10 @@ def margin_of(config: RigidConfig, window: Window, ends: WalkEnds, gait: Mapping
 
 @dataclass(frozen=True, eq=False)
 class RigidQuestion:
-    """Starts of the rigid model.
+    """Starts of the rigid model."""
 
-    walker  the unit walker
-    scale   (3) factors from SI to the unit walker's section coordinates
-    """
-
-    walker: Walker
-    scale: tuple[float, float, float]
+    walker: Walker  # the unit walker
+    scale: tuple[float, float, float]  # (3) factors from SI to the unit walker's section coordinates
     attractors: Attractors
     steps: int
     cells_at_once: int = 10_000

@@ -45,29 +45,21 @@ class OtherLayout(Damaged):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Stored(Content):
-    """Content of an artifact with its identity and provenance.
-
-    seal  sha256 of the file, provenance and timings included
-    """
+    """Content of an artifact with its identity and provenance."""
 
     identity: Identity
     provenance: Provenance
-    seal: str
+    seal: str  # sha256 of the file, provenance and timings included
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """Whether a file is the artifact of a key.
-
-    reason    for rejecting it; empty if accepted
-    artifact  as read, also if it has another key; None if missing or damaged
-    damaged   whether the file exists but cannot be trusted
-    """
+    """Whether a file is the artifact of a key."""
 
     accepted: bool
-    reason: str
-    artifact: Stored | None = None
-    damaged: bool = False
+    reason: str  # for rejecting it; empty if accepted
+    artifact: Stored | None = None  # as read, also if it has another key; None if missing or damaged
+    damaged: bool = False  # whether the file exists but cannot be trusted
 
 
 def write(path: Path, content: Content, identity: Identity, provenance: Provenance) -> Stored:
@@ -88,18 +80,13 @@ def write(path: Path, content: Content, identity: Identity, provenance: Provenan
 
 @dataclass(frozen=True)
 class InTurn:
-    """A content with one group whose variables are made one by one, to save memory.
-
-    coordinates  variables that are coordinates of dimensions
-    variables    all of them, ordered by name
-    size         approximate total, bytes
-    """
+    """A content with one group whose variables are made one by one, to save memory."""
 
     summary: Mapping[str, Any]
     attrs: Mapping[str, Attribute]
-    coordinates: Mapping[str, Variable]
-    variables: Iterable[tuple[str, Variable]]
-    size: int
+    coordinates: Mapping[str, Variable]  # variables that are coordinates of dimensions
+    variables: Iterable[tuple[str, Variable]]  # all of them, ordered by name
+    size: int  # approximate total, bytes
 
 
 def write_in_turn(

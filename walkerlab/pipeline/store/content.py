@@ -29,22 +29,16 @@ TIMING = re.compile(r"(.*_)?wall_s", re.DOTALL)
 class Variable:
     """A labelled array.
 
-    values     float, integer, bool or text; copied, widened to 64 bits and frozen; refused if not finite
-    dims       one name for each axis; a variable named like its only dimension is that dimension's coordinate
-    units      'rad', 'N', ...; '1' for a pure number, '' for text
-    long_name  meaning, for axes and tables
-    timing     measured run times, or what shows them: stored, but no part of the content's digest
-    missing    NaN is allowed, and marks a gap
-
     Raises ValueError or TypeError for what cannot be stored faithfully.
     """
 
-    values: NDArray[Any]
+    values: NDArray[Any]  # float, integer, bool or text; copied, widened to 64 bits and frozen; refused if not finite
+    # one name for each axis; a variable named like its only dimension is that dimension's coordinate
     dims: tuple[str, ...]
-    units: str
-    long_name: str
-    timing: bool = False
-    missing: bool = False
+    units: str  # 'rad', 'N', ...; '1' for a pure number, '' for text
+    long_name: str  # meaning, for axes and tables
+    timing: bool = False  # measured run times, or what shows them: stored, but no part of the content's digest
+    missing: bool = False  # NaN is allowed, and marks a gap
 
     def __post_init__(self) -> None:
         """Convert the values to one of the four stored types and check the labels."""
@@ -101,17 +95,15 @@ class Group:
 class Content:
     """Result of a stage.
 
-    groups   by path, such as 'corrected/gaits', '' for the file's root; missing parent groups are added
-    summary  what `--json` prints of it: JSON, SI units; 'wall_s' and keys that end in '_wall_s' count as timings
-    timed    further top-level keys of the summary that follow from timings, such as 'best'
-    complete False for the partial results of a stage that found no answer; `no_answer` of the summary says why
-
     Raises ValueError or TypeError for a summary that is not JSON or not finite, and for clashing names.
     """
 
+    # by path, such as 'corrected/gaits', '' for the file's root; missing parent groups are added
     groups: Mapping[str, Group] = field(default_factory=dict)
+    # what `--json` prints of it: JSON, SI units; 'wall_s' and keys that end in '_wall_s' count as timings
     summary: Mapping[str, Any] = field(default_factory=dict)
-    timed: tuple[str, ...] = ()
+    timed: tuple[str, ...] = ()  # further top-level keys of the summary that follow from timings, such as 'best'
+    # False for the partial results of a stage that found no answer; `no_answer` of the summary says why
     complete: bool = field(default=True, kw_only=True)
 
     def __post_init__(self) -> None:

@@ -13,20 +13,13 @@ SCHEMA_VERSION = 2
 
 @dataclass(frozen=True)
 class Identity:
-    """Everything that determines a stage's result.
+    """Everything that determines a stage's result."""
 
-    stage           name
-    config_slice    keys of the config that the stage reads, with their values
-    input_keys      stage keys of its inputs, by stage
-    code_digest     see `sources`
-    schema_version  of the artifact's layout
-    """
-
-    stage: str
-    config_slice: Mapping[str, Any]
-    input_keys: Mapping[str, str]
-    code_digest: str
-    schema_version: int = SCHEMA_VERSION
+    stage: str  # name
+    config_slice: Mapping[str, Any]  # keys of the config that the stage reads, with their values
+    input_keys: Mapping[str, str]  # stage keys of its inputs, by stage
+    code_digest: str  # see `sources`
+    schema_version: int = SCHEMA_VERSION  # of the artifact's layout
 
     @property
     def key(self) -> str:

@@ -25,26 +25,21 @@ LIBRARIES = ("numpy", "scipy", "numba", "llvmlite", "h5py", "pydantic", "ruamel.
 class Provenance:
     """Origin of a result.
 
-    config         the resolved config, as YAML text
-    command_line   as typed
-    seed           of everything random
-    started_utc, ended_utc   ISO 8601
-    platform       operating system, processor, Python
     package_version, library_versions
-    git_commit     of the source tree that the package runs from or was built from, '-dirty' if it was changed, if known
-    input_digests  digest of each input's content, by stage
     """
 
-    config: str
-    command_line: str
-    seed: int
+    config: str  # the resolved config, as YAML text
+    command_line: str  # as typed
+    seed: int  # of everything random
+    # started_utc, ended_utc: ISO 8601
     started_utc: str
     ended_utc: str
-    platform: str
+    platform: str  # operating system, processor, Python
     package_version: str
     library_versions: Mapping[str, str]
+    # of the source tree that the package runs from or was built from, '-dirty' if it was changed, if known
     git_commit: str | None = None
-    input_digests: Mapping[str, str] = field(default_factory=dict)
+    input_digests: Mapping[str, str] = field(default_factory=dict)  # digest of each input's content, by stage
 
     @property
     def took_s(self) -> float:

@@ -20,34 +20,22 @@ RECORD_BYTES = 1 << 20
 
 @dataclass(frozen=True)
 class Record:
-    """Record of the config of a run folder's results; results reused from another run name that run.
+    """Record of the config of a run folder's results; results reused from another run name that run."""
 
-    run      the folder's name when it was written
-    source   origin of the config, as in `RunFolder`
-    config   resolved config of the results, as YAML text
-    changes  as in `RunFolder`
-    """
-
-    run: str
-    source: str
-    config: str
-    changes: tuple[str, ...] = ()
+    run: str  # the folder's name when it was written
+    source: str  # origin of the config, as in `RunFolder`
+    config: str  # resolved config of the results, as YAML text
+    changes: tuple[str, ...] = ()  # as in `RunFolder`
 
 
 @dataclass(frozen=True)
 class RunFolder:
-    """runs/<name>/ of one run.
+    """runs/<name>/ of one run."""
 
-    runs_dir  the folder of all runs
-    name      of the run; path-safe
-    source    of its config: a path relative to `runs_dir`, or a built-in config; empty if unknown
-    changes   KEY=VALUE of each key in which the config differs from its source
-    """
-
-    runs_dir: Path
-    name: str
-    source: str = ""
-    changes: tuple[str, ...] = ()
+    runs_dir: Path  # the folder of all runs
+    name: str  # of the run; path-safe
+    source: str = ""  # of its config: a path relative to `runs_dir`, or a built-in config; empty if unknown
+    changes: tuple[str, ...] = ()  # KEY=VALUE of each key in which the config differs from its source
 
     @classmethod
     def at(cls, path: Path) -> RunFolder:

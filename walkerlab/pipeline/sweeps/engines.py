@@ -23,43 +23,29 @@ ONE_THREAD = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "M
 
 @dataclass(frozen=True)
 class Order:
-    """Options of an engine.
+    """Options of an engine."""
 
-    workers  processes; 0 for the engine's default
-    address  of a running scheduler; empty to start one
-    modules  that workers will need
-    folder   for the engine's files
-    options  specific to the engine, by name
-    """
-
-    workers: int = 0
-    address: str = ""
-    modules: tuple[str, ...] = ()
-    folder: Path = Path()
-    options: Mapping[str, str] = field(default_factory=dict)
+    workers: int = 0  # processes; 0 for the engine's default
+    address: str = ""  # of a running scheduler; empty to start one
+    modules: tuple[str, ...] = ()  # that workers will need
+    folder: Path = Path()  # for the engine's files
+    options: Mapping[str, str] = field(default_factory=dict)  # specific to the engine, by name
 
 
 @dataclass(frozen=True)
 class Pool:
-    """A running executor.
-
-    workers  number of chunks that it computes at once
-    """
+    """A running executor."""
 
     executor: Executor
-    workers: int
+    workers: int  # number of chunks that it computes at once
 
 
 @dataclass(frozen=True)
 class SweepEngine:
-    """An engine.
+    """An engine."""
 
-    opened   context that gives a pool and closes it
-    chunk_s  target duration of a chunk, s: long compared with the engine's overhead
-    """
-
-    opened: Callable[[Order], contextlib.AbstractContextManager[Pool]]
-    chunk_s: float
+    opened: Callable[[Order], contextlib.AbstractContextManager[Pool]]  # context that gives a pool and closes it
+    chunk_s: float  # target duration of a chunk, s: long compared with the engine's overhead
 
     @contextlib.contextmanager
     def start_early(self, order: Order) -> Iterator[SweepEngine]:

@@ -33,18 +33,12 @@ SAMPLERS: Final = ("latin-hypercube", "sobol", "random")
 
 @dataclass(frozen=True)
 class Axis:
-    """One parameter.
+    """One parameter."""
 
-    key     dotted, as in a config
-    values  in order; for a list of points one for each point
-    source  origin of the values, for messages
-    ends    bounds of an interval to sample; None if the values are given
-    """
-
-    key: str
-    values: tuple[Value, ...]
-    source: str
-    ends: tuple[float, float] | None = None
+    key: str  # dotted, as in a config
+    values: tuple[Value, ...]  # in order; for a list of points one for each point
+    source: str  # origin of the values, for messages
+    ends: tuple[float, float] | None = None  # bounds of an interval to sample; None if the values are given
 
     def setting(self, index: int) -> ConfigSetting:
         """Return one value as a `--set` option."""
@@ -58,12 +52,11 @@ class SweptStage:
     """A stage over values of parameters.
 
     names   of the parameters in results: the last part of the key, or more parts where two would be equal
-    layout  grid: all combinations; list: the n-th values form the n-th point
     """
 
     stage: str
     axes: tuple[Axis, ...]
-    layout: Layout = "grid"
+    layout: Layout = "grid"  # grid: all combinations; list: the n-th values form the n-th point
 
     @property
     def names(self) -> tuple[str, ...]:

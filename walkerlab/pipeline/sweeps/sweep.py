@@ -39,43 +39,28 @@ PIPELINE_AT = "walkerlab.pipeline.graph:PIPELINE"
 
 @dataclass(frozen=True)
 class SweepWork:
-    """Options of computing a sweep.
+    """Options of computing a sweep."""
 
-    engine   that computes the points
-    order    options of the engine
-    chunk_s  target duration of a chunk, s; None for the engine's default
-    wait     wait for another process that works in the folder
-    force    compute every point, stored or not
-    graph    import path of the pipeline, module:NAME
-    check    called with the names of quantities once a point has an answer; may raise
-    """
-
-    engine: SweepEngine = ENGINES["local"]
-    order: Order = field(default_factory=Order)
-    chunk_s: float | None = None
-    wait: bool = True
-    force: bool = False
-    graph: str = PIPELINE_AT
+    engine: SweepEngine = ENGINES["local"]  # that computes the points
+    order: Order = field(default_factory=Order)  # options of the engine
+    chunk_s: float | None = None  # target duration of a chunk, s; None for the engine's default
+    wait: bool = True  # wait for another process that works in the folder
+    force: bool = False  # compute every point, stored or not
+    graph: str = PIPELINE_AT  # import path of the pipeline, module:NAME
+    # called with the names of quantities once a point has an answer; may raise
     check: Callable[[Collection[str]], None] = lambda _names: None
 
 
 @dataclass(frozen=True)
 class Swept:
-    """Result of a sweep.
-
-    path     its file
-    summary  of the file
-    reused   number of points whose result existed
-    wall_s   total time
-    bugs     tracebacks of bugs that stopped points
-    """
+    """Result of a sweep."""
 
     question: SweptStage
-    path: Path
-    summary: Mapping[str, Any]
-    reused: int
-    wall_s: float
-    bugs: tuple[str, ...] = ()
+    path: Path  # its file
+    summary: Mapping[str, Any]  # of the file
+    reused: int  # number of points whose result existed
+    wall_s: float  # total time
+    bugs: tuple[str, ...] = ()  # tracebacks of bugs that stopped points
 
     @property
     def content(self) -> Content:
@@ -113,19 +98,13 @@ class Swept:
 
 @dataclass(frozen=True)
 class Foreseen:
-    """Plan of a sweep.
-
-    points     descriptions of the first points
-    count      number of points
-    there      number of points with a stored result
-    estimate_s time for the rest, s; None if no such point was timed
-    """
+    """Plan of a sweep."""
 
     path: Path
-    points: tuple[str, ...]
-    count: int
-    there: int
-    estimate_s: float | None
+    points: tuple[str, ...]  # descriptions of the first points
+    count: int  # number of points
+    there: int  # number of points with a stored result
+    estimate_s: float | None  # time for the rest, s; None if no such point was timed
 
 
 class SweepRun:

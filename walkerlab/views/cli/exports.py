@@ -267,18 +267,12 @@ def trajectory(folder: RunFolder, model: str, kind: str, console: Console) -> by
 
 @dataclass(frozen=True)
 class Film:
-    """Options of an animation.
+    """Options of an animation."""
 
-    model   stage whose walk is shown
-    steps   number of steps from the first; None lets `film_times` choose
-    rate    pictures per second
-    slower  slow-motion factor
-    """
-
-    model: str
-    steps: int | None
-    rate: int
-    slower: float
+    model: str  # stage whose walk is shown
+    steps: int | None  # number of steps from the first; None lets `film_times` choose
+    rate: int  # pictures per second
+    slower: float  # slow-motion factor
 
 
 def walk_in(folder: RunFolder, model: str | None = None) -> str:

@@ -147,16 +147,11 @@ def own_parameter(name: str, option: "Option") -> inspect.Parameter:
 
 @dataclass(frozen=True)
 class Request:
-    """Options of a command; those that it does not have keep their defaults.
+    """Options of a command; those that it does not have keep their defaults."""
 
-    command  as it is typed
-    own      settings of the config from options of its own
-    instead  stage that an option runs instead of the command's own; empty if there is no such option
-    """
-
-    command: str
-    own: tuple[SetByOption, ...] = ()
-    instead: str = ""
+    command: str  # as it is typed
+    own: tuple[SetByOption, ...] = ()  # settings of the config from options of its own
+    instead: str = ""  # stage that an option runs instead of the command's own; empty if there is no such option
     full: bool = option(
         "--full", default=False, help="Run the long campaign too; if interrupted, it resumes the next time."
     )

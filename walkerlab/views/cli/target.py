@@ -16,16 +16,11 @@ from walkerlab.views.cli.console import Console
 
 @dataclass(frozen=True)
 class Target:
-    """Destination of an export.
+    """Destination of an export."""
 
-    to      a format, or a file name with that ending if `output` is None
-    output  the file; None derives its name from the run
-    inputs  files that the command reads, which must not be overwritten
-    """
-
-    to: str | None
-    output: Path | None
-    inputs: tuple[Path, ...] = ()
+    to: str | None  # a format, or a file name with that ending if `output` is None
+    output: Path | None  # the file; None derives its name from the run
+    inputs: tuple[Path, ...] = ()  # files that the command reads, which must not be overwritten
 
     def of(self, what: str, stem: str, kinds: Sequence[str]) -> tuple[Path, str]:
         """Return file and format; the first of `kinds` by default.

@@ -61,22 +61,14 @@ class GivingWay(Silent):
 
 @dataclass(frozen=True)
 class ExploredConfig:
-    """A config with changes.
+    """A config with changes."""
 
-    config   as `--config` has it
-    sets     as `--set` has them
-    runs     the folder of all runs
-    changes  values by key, over the sets
-    models   those that walk
-    called   as the page calls it; None is the config's name
-    """
-
-    config: str | None
-    sets: tuple[str, ...]
-    runs: Path
-    changes: Mapping[str, Any]
-    models: Sequence[str] = ()
-    called: str | None = None
+    config: str | None  # as `--config` has it
+    sets: tuple[str, ...]  # as `--set` has them
+    runs: Path  # the folder of all runs
+    changes: Mapping[str, Any]  # values by key, over the sets
+    models: Sequence[str] = ()  # those that walk
+    called: str | None = None  # as the page calls it; None is the config's name
 
     @property
     def options(self) -> list[str]:

@@ -71,18 +71,12 @@ def parameter_of(results: Results) -> str:
 
 @dataclass(frozen=True)
 class Curve:
-    """A quantity of every step along a branch, including its bifurcations.
+    """A quantity of every step along a branch, including its bifurcations."""
 
-    value     (points,) of the parameter
-    quantity  (points, steps)
-    stable    (points - 1,) whether the gaits between neighbours are
-    marks     where the bifurcations are, and of which kind
-    """
-
-    value: NDArray[np.float64]
-    quantity: NDArray[np.float64]
-    stable: NDArray[np.bool_]
-    marks: tuple[tuple[int, str], ...]
+    value: NDArray[np.float64]  # (points,) of the parameter
+    quantity: NDArray[np.float64]  # (points, steps)
+    stable: NDArray[np.bool_]  # (points - 1,) whether the gaits between neighbours are
+    marks: tuple[tuple[int, str], ...]  # where the bifurcations are, and of which kind
 
 
 def curve_of(group: Group, name: str) -> Curve:

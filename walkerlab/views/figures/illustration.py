@@ -23,15 +23,12 @@ Draw = Callable[[Results], Drawn]
 
 @dataclass(frozen=True)
 class Need:
-    """Variables required of a stage's result, and of a scene's reference in its summary if one is named.
-
-    or_else  why a result may be without them, in words
-    """
+    """Variables required of a stage's result, and of a scene's reference in its summary if one is named."""
 
     stage: str
     group: str
     variables: tuple[str, ...]
-    or_else: str
+    or_else: str  # why a result may be without them, in words
     scene: str = ""
 
     def missing_in(self, results: Results, absent: Mapping[str, str]) -> str | None:
@@ -51,22 +48,14 @@ class Need:
 
 @dataclass(frozen=True)
 class Illustration:
-    """An illustration drawn from stored results.
+    """An illustration drawn from stored results."""
 
-    name    of its files, without suffix
-    needs   what it cannot be drawn without; what else is there is drawn too
-    draw    the figure, and what the caption's template takes of the results; called within the common style
-    number  the paper's; None if the paper has no such figure
-    words   file in `words/` with its title, its caption and what one sees; the figure's name if empty
-    scene   what those words are about, if a file serves several figures
-    """
-
-    name: str
-    needs: tuple[Need, ...]
-    draw: Draw
-    number: int | None = None
-    words: str = ""
-    scene: str = ""
+    name: str  # of its files, without suffix
+    needs: tuple[Need, ...]  # what it cannot be drawn without; what else is there is drawn too
+    draw: Draw  # the figure, and what the caption's template takes of the results; called within the common style
+    number: int | None = None  # the paper's; None if the paper has no such figure
+    words: str = ""  # file in `words/` with its title, its caption and what one sees; the figure's name if empty
+    scene: str = ""  # what those words are about, if a file serves several figures
 
     def say(self, what: str, *values: Any) -> str:
         return WORDS(f"{self.words or self.name}.{what}", *([self.scene] if self.scene else []), *values)

@@ -48,20 +48,14 @@ class Length:
 
 @dataclass(frozen=True)
 class UprightLeg:
-    """Geometry of one leg, upright with its sole at the origin; lengths in m.
+    """Geometry of one leg, upright with its sole at the origin; lengths in m."""
 
-    joints  the leg's line from the hip down, without the sole
-    centre  of the sole's arc
-    masses  what the config says of each, and where it is
-    top     height of the torso's end, or of the hip
-    """
-
-    joints: tuple[Point, ...]
-    centre: Point
+    joints: tuple[Point, ...]  # the leg's line from the hip down, without the sole
+    centre: Point  # of the sole's arc
     radius: float
     lengths: tuple[Length, ...]
-    masses: tuple[tuple[tuple[str, ...], Point], ...]
-    top: float
+    masses: tuple[tuple[tuple[str, ...], Point], ...]  # what the config says of each, and where it is
+    top: float  # height of the torso's end, or of the hip
 
 
 def entry(key: str, value: float) -> str:

@@ -61,34 +61,20 @@ NO_STEPS = Group(
 
 @dataclass(frozen=True, eq=False)
 class Sticks:
-    """Joint positions of a walker; lengths in m along the slope (downhill) and normal to it.
+    """Joint positions of a walker; lengths in m along the slope (downhill) and normal to it."""
 
-    time     (samples,) s
-    hip      (samples, 2)
-    feet     (samples, leg, 2)
-    strikes  (steps,) s
-    landings (1 + steps, 2) where the first stance foot stands and each step's foot comes down
-    slope    rad
-    knees    (samples, leg, 2); None for straight legs
-    radius   of the soles' arcs, m; the feet are their lowest points
-    head     (samples, 2), the torso's centre of mass; None without a torso
-    ground   as `ground_levels` says
-    pushes   whether the trailing foot pushes off as the other one lands
-    ending   how the walk ended before its last step, such as fell; empty where it did not
-    """
-
-    time: Array
-    hip: Array
-    feet: Array
-    strikes: Array
-    landings: Array
-    slope: float
-    knees: Array | None = None
-    radius: float = 0.0
-    head: Array | None = None
-    ground: tuple[Array, Array] | None = None
-    pushes: bool = False
-    ending: str = ""
+    time: Array  # (samples,) s
+    hip: Array  # (samples, 2)
+    feet: Array  # (samples, leg, 2)
+    strikes: Array  # (steps,) s
+    landings: Array  # (1 + steps, 2) where the first stance foot stands and each step's foot comes down
+    slope: float  # rad
+    knees: Array | None = None  # (samples, leg, 2); None for straight legs
+    radius: float = 0.0  # of the soles' arcs, m; the feet are their lowest points
+    head: Array | None = None  # (samples, 2), the torso's centre of mass; None without a torso
+    ground: tuple[Array, Array] | None = None  # as `ground_levels` says
+    pushes: bool = False  # whether the trailing foot pushes off as the other one lands
+    ending: str = ""  # how the walk ended before its last step, such as fell; empty where it did not
 
     def pushing(self, time: float) -> int | None:
         """Return the leg whose push-off is visible at a time (s), or None."""

@@ -54,23 +54,16 @@ def claims_in(results: Results) -> Sequence[Mapping[str, Any]]:
 class DrawnWalk:
     """A walk over time.
 
-    look      of its model
-    outcome   how it ended
-    steps     how many steps it has in all
-    strikes   (shown steps,) s, times of the heel strikes
     time      (samples,) s
-    samples   what was stored over time
-    end       number of the samples that are shown; None for all
-    recorded  whether it was recorded elsewhere, and has a name of its own
     """
 
-    look: Look
-    outcome: str
-    steps: int
-    strikes: Array
-    samples: Group
-    end: int | None = None
-    recorded: bool = False
+    look: Look  # of its model
+    outcome: str  # how it ended
+    steps: int  # how many steps it has in all
+    strikes: Array  # (shown steps,) s, times of the heel strikes
+    samples: Group  # what was stored over time
+    end: int | None = None  # number of the samples that are shown; None for all
+    recorded: bool = False  # whether it was recorded elsewhere, and has a name of its own
 
     def __getitem__(self, name: str) -> NDArray[Any]:
         return self.samples[name][: self.end]

@@ -45,15 +45,11 @@ class Statements:
 
 @dataclass(frozen=True)
 class Statement:
-    """One statement.
+    """One statement."""
 
-    about  subject, set bold
-    badge  verdict in a word; empty for none
-    """
-
-    about: str
+    about: str  # subject, set bold
     text: str
-    badge: str = ""
+    badge: str = ""  # verdict in a word; empty for none
     tone: Tone = "plain"
 
 
@@ -68,26 +64,18 @@ class Shares:
 
 @dataclass(frozen=True)
 class Picture:
-    """An embedded figure in a gallery.
-
-    alt      description for readers who cannot see it
-    svg      sanitised drawing; None if too large
-    uri      data URI of the image, for a drawing that is too large
-    name     file name without suffix
-    links    label and file of the drawing and its data
-    page     file of the page that shows it
-    """
+    """An embedded figure in a gallery."""
 
     title: str
     caption: str
-    alt: str
-    svg: Markup | None = None
-    uri: str = ""
+    alt: str  # description for readers who cannot see it
+    svg: Markup | None = None  # sanitised drawing; None if too large
+    uri: str = ""  # data URI of the image, for a drawing that is too large
     width: int = 0
     height: int = 0
-    name: str = ""
-    links: tuple[tuple[str, str], ...] = ()
-    page: str = MAIN
+    name: str = ""  # file name without suffix
+    links: tuple[tuple[str, str], ...] = ()  # label and file of the drawing and its data
+    page: str = MAIN  # file of the page that shows it
 
 
 @dataclass(frozen=True)
@@ -132,21 +120,16 @@ Pad = tuple[float, float, int]
 
 @dataclass(frozen=True)
 class Walker:
-    """Motion and style of one walker in a player.
-
-    track     thinned motion
-    strikes   times of the heel strikes (s)
-    stills    postures, each a line through the joints (mm along and below the slope)
-    pushes    whether the trailing foot pushes off as the other foot lands
-    """
+    """Motion and style of one walker in a player."""
 
     name: str
     style: str
-    track: Track
-    strikes: tuple[float, ...]
+    track: Track  # thinned motion
+    strikes: tuple[float, ...]  # times of the heel strikes (s)
+    # postures, each a line through the joints (mm along and below the slope)
     stills: tuple[tuple[tuple[int, int], ...], ...]
     ends: str = ""
-    pushes: bool = False
+    pushes: bool = False  # whether the trailing foot pushes off as the other foot lands
 
     @property
     def meta(self) -> dict[str, object]:
@@ -160,12 +143,7 @@ class Walker:
 
 @dataclass(frozen=True)
 class Player:
-    """The animated walk; shown as stills in print and without scripts.
-
-    ordinary_force  force (N) whose arrow has the usual length
-    closeup_m       height of the close-up of a foot
-    view            left, top, width and height of the stills (mm, y down), after the slope is tilted
-    """
+    """The animated walk; shown as stills in print and without scripts."""
 
     template: ClassVar[str] = "player"
     title: str
@@ -175,10 +153,10 @@ class Player:
     slope_rad: float
     leg_m: float
     foot_radius_m: float
-    closeup_m: float
-    view: tuple[int, int, int, int]
+    closeup_m: float  # height of the close-up of a foot
+    view: tuple[int, int, int, int]  # left, top, width and height of the stills (mm, y down), after the slope is tilted
     torso_m: float = 0.0
-    ordinary_force: float = 1.0
+    ordinary_force: float = 1.0  # force (N) whose arrow has the usual length
     pads: tuple[Pad, ...] = ()
     ground: tuple[tuple[float, float], ...] = ()  # start along the slope and height of each ground level (m)
 
@@ -200,26 +178,19 @@ class Player:
 
 @dataclass(frozen=True)
 class GaitMark:
-    """A point of a diagram whose gait the player can show.
+    """A point of a diagram whose gait the player can show."""
 
-    x, y    position in diagram units
-    walker  motion; its name describes the gait
-    """
-
+    # x, y: position in diagram units
     x: float
     y: float
     stable: bool
-    walker: Walker
+    walker: Walker  # motion; its name describes the gait
     slope_rad: float
 
 
 @dataclass(frozen=True)
 class Diagram:
-    """Branches of gaits over a parameter; a mark is a gait that is loaded into the page's player.
-
-    curves  points of each line, and whether its gaits are stable
-    ticks   position and text of the ticks of both axes
-    """
+    """Branches of gaits over a parameter; a mark is a gait that is loaded into the page's player."""
 
     template: ClassVar[str] = "diagram"
     WIDTH: ClassVar[int] = 720
@@ -231,25 +202,22 @@ class Diagram:
     title: str
     caption: str
     titles: tuple[str, str]
+    # points of each line, and whether its gaits are stable
     curves: tuple[tuple[tuple[tuple[float, float], ...], bool], ...]
+    # position and text of the ticks of both axes
     ticks: tuple[tuple[tuple[float, str], ...], tuple[tuple[float, str], ...]]
     gaits: tuple[GaitMark, ...]
 
 
 @dataclass(frozen=True)
 class Section:
-    """A part of a page under a heading.
+    """A part of a page under a heading."""
 
-    anchor   id, unique on the page
-    finding  one-sentence result; a section with one is folded to it
-    page     file of the page
-    """
-
-    anchor: str
+    anchor: str  # id, unique on the page
     title: str
     blocks: tuple[PageBlock, ...] = ()
-    finding: str = ""
-    page: str = MAIN
+    finding: str = ""  # one-sentence result; a section with one is folded to it
+    page: str = MAIN  # file of the page
 
     @classmethod
     def of(

@@ -23,23 +23,16 @@ CODE_SPAN = re.compile(r"`([^`]*)`")
 
 @dataclass(frozen=True)
 class Page:
-    """One file of the report; texts are plain.
-
-    lead      paragraphs under the title
-    study     the study reproduced, or None
-    relation  how closely the scene matches it, in a word or two
-    pending   results still being computed
-    run       name of the run for advised commands; empty for the default run
-    """
+    """One file of the report; texts are plain."""
 
     title: str
     sections: tuple[Section, ...]
-    lead: tuple[str, ...] = ()
+    lead: tuple[str, ...] = ()  # paragraphs under the title
     file: str = MAIN
-    study: Source | None = None
-    relation: str = "Redoes"
-    pending: tuple[str, ...] = ()
-    run: str = ""
+    study: Source | None = None  # the study reproduced, or None
+    relation: str = "Redoes"  # how closely the scene matches it, in a word or two
+    pending: tuple[str, ...] = ()  # results still being computed
+    run: str = ""  # name of the run for advised commands; empty for the default run
 
 
 def render(page: Page) -> str:

@@ -14,21 +14,14 @@ from walkerlab.views.report.blocks import Picture, Section
 
 @dataclass(frozen=True, eq=False)
 class Results:
-    """A run as the report sees it.
-
-    stored    up-to-date results by stage
-    pictures  embedded figures of `plot`
-    absent    missing results, with reasons
-    failed    stages that were run and failed
-    pending   stages that are still running
-    """
+    """A run as the report sees it."""
 
     config: Config
-    stored: Mapping[str, Content] = field(default_factory=dict)
-    pictures: tuple[Picture, ...] = ()
-    absent: tuple[LeftOut, ...] = ()
-    pending: tuple[str, ...] = ()
-    failed: frozenset[str] = frozenset()
+    stored: Mapping[str, Content] = field(default_factory=dict)  # up-to-date results by stage
+    pictures: tuple[Picture, ...] = ()  # embedded figures of `plot`
+    absent: tuple[LeftOut, ...] = ()  # missing results, with reasons
+    pending: tuple[str, ...] = ()  # stages that are still running
+    failed: frozenset[str] = frozenset()  # stages that were run and failed
 
     @property
     def departures(self) -> Sequence[str] | None:

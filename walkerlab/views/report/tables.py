@@ -24,15 +24,11 @@ BARE = re.compile(r"[-−+\d.e ×⁰¹²³⁴⁵⁶⁷⁸⁹⁻\xa0\u2009\u202f]
 
 @dataclass(frozen=True)
 class Cell:
-    """A cell of a table.
-
-    tone   sets the text as a badge
-    value  value behind the text, or None
-    """
+    """A cell of a table."""
 
     text: str
-    tone: Tone | None = None
-    value: Any = None
+    tone: Tone | None = None  # sets the text as a badge
+    value: Any = None  # value behind the text, or None
 
     @property
     def datum(self) -> Any:
@@ -51,21 +47,15 @@ def format_plain(value: Any) -> str:
 
 @dataclass(frozen=True)
 class Column:
-    """Describes how to show one value of each record: a column or, in `side_by_side`, a row.
+    """Describes how to show one value of each record: a column or, in `side_by_side`, a row."""
 
-    title    head, with the unit
-    of       key of a record's value (`a/b` for nested records), or a function of the record; None if records are rows
-             of cells
-    written  formats a value as text or as a cell with a tone; values that are cells already are kept
-    numeric  whether to align as numbers
-    wide     whether cells hold sentences, which a terminal omits
-    """
-
-    title: str
+    title: str  # head, with the unit
+    # key of a record's value (`a/b` for nested records), or a function of the record; None if records are rows of cells
     of: str | Callable[[Any], Any] | None = None
+    # formats a value as text or as a cell with a tone; values that are cells already are kept
     written: Callable[[Any], str | Cell] = format_plain
-    numeric: bool = False
-    wide: bool = False
+    numeric: bool = False  # whether to align as numbers
+    wide: bool = False  # whether cells hold sentences, which a terminal omits
 
     def value(self, record: Any, place: int = 0) -> Any:
         if self.of is None:
@@ -99,21 +89,15 @@ def measured(
 
 @dataclass(frozen=True)
 class Table:
-    """A table; the first cell of a row is its head.
-
-    groups rows by group title, which may be empty
-    wordy  whether cells hold sentences; on a narrow screen each row then becomes a card
-    note   text below the table
-    by     head of the column of group titles
-    """
+    """A table; the first cell of a row is its head."""
 
     template: ClassVar[str] = "table"
     caption: str
     columns: tuple[Column, ...]
-    groups: Mapping[str, Sequence[Sequence[Cell]]]
-    wordy: bool = False
-    note: str = ""
-    by: str = ""
+    groups: Mapping[str, Sequence[Sequence[Cell]]]  # rows by group title, which may be empty
+    wordy: bool = False  # whether cells hold sentences; on a narrow screen each row then becomes a card
+    note: str = ""  # text below the table
+    by: str = ""  # head of the column of group titles
 
     def __bool__(self) -> bool:
         return any(self.groups.values())

@@ -31,14 +31,12 @@ Channels = dict[str, Array]
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """The motion of one walker, an array for each channel.
+    """The motion of one walker, an array for each channel."""
 
-    channels  by name, all equally long; 't' is time (s), 'h' the hip, 'f' the feet's lowest points, 'k' the knees, each
-              with x along and y above the slope (m); 'a', 'v' angle and velocity of the legs or thighs (rad, rad/s),
-              'b' of the shanks; 'n', 'd' normal force and friction (N), 'p' penetration and 'q' slip since the touch
-              (m); 'ke', 'pe', 'me' energies (J); a last digit is the leg
-    """
-
+    # by name, all equally long; 't' is time (s), 'h' the hip, 'f' the feet's lowest points, 'k' the knees, each with x
+    # along and y above the slope (m); 'a', 'v' angle and velocity of the legs or thighs (rad, rad/s), 'b' of the
+    # shanks; 'n', 'd' normal force and friction (N), 'p' penetration and 'q' slip since the touch (m); 'ke', 'pe', 'me'
+    # energies (J); a last digit is the leg
     channels: Channels
 
     def __getitem__(self, name: str) -> Array:

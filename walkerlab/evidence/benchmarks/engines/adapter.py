@@ -15,18 +15,12 @@ Forces = Callable[[float, Floats, Floats], Floats]
 
 @dataclass(frozen=True)
 class Integrator:
-    """An engine's integrator.
+    """An engine's integrator."""
 
-    order             nominal
-    most_steps        budget of a run
-    adapts            whether steps follow a tolerance
-    for_contact_only  whether it equals another integrator in the absence of contact
-    """
-
-    order: int
-    most_steps: int
-    adapts: bool = False
-    for_contact_only: bool = False
+    order: int  # nominal
+    most_steps: int  # budget of a run
+    adapts: bool = False  # whether steps follow a tolerance
+    for_contact_only: bool = False  # whether it equals another integrator in the absence of contact
 
 
 @dataclass(frozen=True)
@@ -43,15 +37,11 @@ OnStep = Callable[[float, Floats, Floats], bool]
 
 @dataclass(frozen=True)
 class Stepping:
-    """Integrator and step control of an engine's run.
-
-    step_s     step size, or the largest one where steps are adaptive
-    tolerance  None for fixed steps
-    """
+    """Integrator and step control of an engine's run."""
 
     integrator: str
-    step_s: float
-    tolerance: float | None = None
+    step_s: float  # step size, or the largest one where steps are adaptive
+    tolerance: float | None = None  # None for fixed steps
 
 
 class Simulation(ABC):
@@ -88,16 +78,11 @@ class Simulation(ABC):
 
 
 class Adapter(Protocol):
-    """A module that drives one engine, and imports it only when a model is built.
+    """A module that drives one engine, and imports it only when a model is built."""
 
-    INTEGRATORS     by name
-    CONTACTS        integrator of each contact model
-    CANNOT_EXPRESS  limitations, for the report
-    """
-
-    INTEGRATORS: Mapping[str, Integrator]
-    CONTACTS: Mapping[str, str]
-    CANNOT_EXPRESS: tuple[str, ...]
+    INTEGRATORS: Mapping[str, Integrator]  # by name
+    CONTACTS: Mapping[str, str]  # integrator of each contact model
+    CANNOT_EXPRESS: tuple[str, ...]  # limitations, for the report
 
     def tuned(self, model: str, target: EngineContact) -> OwnContact:
         """Settings with which a contact model comes closest to the target."""

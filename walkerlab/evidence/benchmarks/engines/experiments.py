@@ -49,18 +49,13 @@ OUR_REPEATS = 3
 
 @dataclass(frozen=True)
 class Truth:
-    """Our walk of a scene at tight tolerance, by two methods.
-
-    end        state at `until_s`
-    agreement  largest difference between the two methods
-    walk       ten steps, for periods
-    """
+    """Our walk of a scene at tight tolerance, by two methods."""
 
     until_s: float
-    end: Floats
+    end: Floats  # state at `until_s`
     touches_s: Floats
-    agreement: float
-    walk: ContactWalkResult
+    agreement: float  # largest difference between the two methods
+    walk: ContactWalkResult  # ten steps, for periods
 
 
 def simulate(

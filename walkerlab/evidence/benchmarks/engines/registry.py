@@ -16,16 +16,11 @@ EXTRA = "pip install 'walkerlab[engines]'"
 
 @dataclass(frozen=True)
 class Engine:
-    """An engine.
+    """An engine."""
 
-    name     in output, and of its adapter module
-    module   import name of its package
-    package  distribution name
-    """
-
-    name: str
-    module: str
-    package: str
+    name: str  # in output, and of its adapter module
+    module: str  # import name of its package
+    package: str  # distribution name
 
     @property
     def is_installed(self) -> bool:

@@ -14,13 +14,7 @@ FROM_REFERENCE = "difference of the end state (SI), or of the last period (s) on
 
 @dataclass(frozen=True)
 class EngineRow:
-    """A run of one engine, or of this project for comparison.
-
-    step_s  largest step, for an adaptive run that did not finish
-    error   on own contact, of the period relative to ADAMS's law
-    wall_s  processor time of the loop; None if the process was lost
-    why     error message of a run without an outcome
-    """
+    """A run of one engine, or of this project for comparison."""
 
     scene: Annotated[str, Label("1", "scene")]
     engine: Annotated[str, Label("1", "engine")]
@@ -28,17 +22,18 @@ class EngineRow:
     experiment: Annotated[str, Label("1", "experiment")]
     integrator: Annotated[str, Label("1", "integrator, or contact model on its own law")]
     start: Annotated[float, Label("1", "velocities of the start over those of the gait")]
+    # largest step, for an adaptive run that did not finish
     step_s: Annotated[float, Label("s", "step size, the mean one where steps are adapted")]
     tolerance: Annotated[float | None, TOLERANCE]
-    error: Annotated[float | None, Label("1", FROM_REFERENCE)]
+    error: Annotated[float | None, Label("1", FROM_REFERENCE)]  # on own contact, of the period relative to ADAMS's law
     touch_error_s: Annotated[float | None, Label("s", "largest difference of a touch time from the reference")]
-    wall_s: Annotated[float | None, RUN_TIME]
+    wall_s: Annotated[float | None, RUN_TIME]  # processor time of the loop; None if the process was lost
     period_s: Annotated[float | None, Label("s", "period of the last step")]
     step_length_m: Annotated[float | None, Label("m", "length of the last step")]
     slip_m: Annotated[float | None, Label("m", "net slip of the last step")]
     steps: Annotated[int, Label("1", "steps walked")]
     outcome: Annotated[str, Label("1", "outcome")]
-    why: str = ""
+    why: str = ""  # error message of a run without an outcome
 
 
 @dataclass(frozen=True)

@@ -27,40 +27,30 @@ STEADY_STEP_FACTOR = 5  # of the step size, where only a steady end state is nee
 class WalkAnswer:
     """A walk in an engine.
 
-    end      final state of the free walker; None unless the walk was completed
     touches  (steps,) s; along: (steps,) m; slips: (steps,) m, without the last step if its foot did not lift
-    steps    of the engine
-    time_s   simulated
-    wall_s   processor time of the loop, in a process of its own
     """
 
     outcome: str
-    end: Floats | None
+    end: Floats | None  # final state of the free walker; None unless the walk was completed
     touches_s: Floats
     along_m: Floats
     slips_m: Floats
-    steps: int
-    time_s: float
-    wall_s: float
+    steps: int  # of the engine
+    time_s: float  # simulated
+    wall_s: float  # processor time of the loop, in a process of its own
 
 
 @dataclass(frozen=True)
 class WalkTask:
-    """A walk with an engine's integrator, on our contact law or the engine's.
-
-    touches  after which the walk ends
-    until_s  latest end, s
-    own      the engine's tuned contact; None for our law
-    most     step budget of the engine
-    """
+    """A walk with an engine's integrator, on our contact law or the engine's."""
 
     engine: str
     stepping: Stepping
     scene: EngineScene
-    touches: int
-    until_s: float
-    own: OwnContact | None
-    most: int
+    touches: int  # after which the walk ends
+    until_s: float  # latest end, s
+    own: OwnContact | None  # the engine's tuned contact; None for our law
+    most: int  # step budget of the engine
 
     def run(self) -> WalkAnswer:
         walk = EngineWalk(self)
@@ -209,15 +199,12 @@ class TuningAnswer:
 
 @dataclass(frozen=True)
 class TuningTask:
-    """Tune an engine's own contact and measure it with a dropped ball and a sliding block.
-
-    step_s  of recorded motions
-    """
+    """Tune an engine's own contact and measure it with a dropped ball and a sliding block."""
 
     engine: str
     contact: str
     target: EngineContact
-    step_s: float
+    step_s: float  # of recorded motions
     sliding_velocity: float  # m/s
 
     def run(self) -> TuningAnswer:
