@@ -97,7 +97,6 @@ class Module:
 
     @cached_property
     def text(self) -> bytes:
-        """Source text."""
         return self.path.read_bytes()
 
     @cached_property

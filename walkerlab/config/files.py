@@ -151,7 +151,6 @@ def _what_there_is() -> str:
 
 
 def _text_of(file: ConfigFile, reference: Position | None, purpose: str = "") -> str:
-    """Return the text of a file."""
     # position of its name and expected content, if not a config, are for the message if it cannot be read
     if file.text is not None:
         return file.text

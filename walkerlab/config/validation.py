@@ -135,7 +135,6 @@ def check_bodies(config: Config, tree: Mapping) -> None:
 
 
 def body_references(walker: PartsWalker) -> Iterator[tuple[Location, str]]:
-    """Yield position and name of each reference to a body."""
     for key, names in NAMES_OF_BODIES.items():
         for k, part in enumerate(getattr(walker, key)):
             yield from (((key, k, name), getattr(part, name)) for name in names)
@@ -290,6 +289,5 @@ def node_at(tree: Mapping, location: Location) -> tuple[Node | None, Position]:
 
 
 def key_at(tree: Mapping, location: Location) -> Position:
-    """Return the position of a key, or of its block if the key is missing."""
     block, position = node_at(tree, location[:-1])
     return block.keys.get(str(location[-1]), position) if isinstance(block, Mapping) else position

@@ -14,7 +14,6 @@ Ids = dict[str, int]
 
 
 def dataset_text(model: AdamsModel, head: Iterable[str]) -> str:
-    """Write the dataset of a model, with comment lines at its head."""
     return "\n".join([f"walkerlab model of {model.name}", *(f"! {line}" for line in head), *statements(model), ""])
 
 
@@ -125,7 +124,6 @@ def statement(head: str, *arguments: str) -> Iterator[str]:
 
 
 def contact_arguments(contact: AdamsContact, shapes: Mapping[str, int]) -> Iterator[str]:
-    """Yield the arguments of a CONTACT statement."""
     pads = [str(shapes[pad]) for pad in contact.pads]
     yield "TYPE = SOLID_TO_SOLID"
     yield f"IGEOM = {shapes[contact.foot]}"

@@ -243,7 +243,6 @@ class FootTerms:
 
     @property
     def height(self) -> str:
-        """Height of its lowest point."""
         return f"DY({self.place})-{finite(self.radius)}" if self.radius else f"DY({self.place})"
 
     def where_carried(self, expression: str) -> str:

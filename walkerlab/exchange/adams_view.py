@@ -42,7 +42,6 @@ def listed(*numbers: float) -> str:
 
 
 def building(model: AdamsModel) -> Iterator[list[str]]:
-    """Yield the commands that build a model."""
     root = f".{model.name}"
 
     def full(name: str) -> str:
@@ -149,7 +148,6 @@ def turned(angle: float) -> str:
 
 
 def contacts(model: AdamsModel, full: Naming) -> Iterator[list[str]]:
-    """Yield the contacts of feet and pads."""
     for name, contact in model.contacts.items():
         shapes = [full(model.shape_name(shape)) for shape in (contact.foot, *contact.pads)]
         normal, friction = contact.normal, contact.friction

@@ -102,7 +102,6 @@ def engine_scene(config: ContactConfig, rigid_step_length_m: float, rigid_state:
 
 
 def scene_for_engines(scene: ContactScene, rigid_state: State) -> EngineScene:
-    """Convert a contact scene for engines, started from a rigid state."""
     assembly, start = scene.assembly, start_state(scene, rigid_state)
     upper = assembly.legs[STANCE_FOOT][0]
     base = Anchor(upper, hinge_point(assembly, upper, assembly.legs[1 - STANCE_FOOT][0]))

@@ -347,7 +347,6 @@ def short_reason(why: str) -> str:
 
 
 def outcome_line(done: StageDone) -> str:
-    """Describe an outcome in one line."""
     why = short_reason(done.reason)
     match done.action:
         case "run":

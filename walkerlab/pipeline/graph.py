@@ -157,7 +157,6 @@ class Stage:
 
     @property
     def command(self) -> str:
-        """The command that computes its result."""
         return self.only_by or self.name
 
     @property
@@ -177,7 +176,6 @@ class Graph:
             raise ValueError("two stages have one name")
 
     def __getitem__(self, name: str) -> Stage:
-        """Return a stage by its name."""
         return self._by_name[name]
 
     def needed_for(self, target: str, config: Config) -> tuple[Stage, ...]:

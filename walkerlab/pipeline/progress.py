@@ -64,7 +64,6 @@ class Silent:
     """A reporter that shows nothing."""
 
     def begin(self, stage: str, place: str, expected_s: float | None = None) -> Silent:  # noqa: ARG002
-        """Return itself."""
         return self
 
     def note(self, *_arguments: Any, **_keywords: Any) -> None:

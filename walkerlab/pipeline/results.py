@@ -123,7 +123,6 @@ class LoadedCodeKeys(Keys):
     """Identities within this process, whose code does not change; no digest is needed."""
 
     def code_digest(self, target: str) -> str:  # noqa: ARG002
-        """Return an empty digest."""
         return ""
 
 
@@ -133,7 +132,6 @@ class MemoryResults:
     folder = None
 
     def __init__(self, graph: Graph = PIPELINE, size: int = REMEMBERED) -> None:
-        """Start empty."""
         self.keys, self.size = LoadedCodeKeys(graph), size
         self._kept: OrderedDict[str, Content] = OrderedDict()
 

@@ -116,7 +116,6 @@ def refuse_incomplete_law(config: Config, steps: Sequence[Step]) -> None:
 
 
 def report_of(run: Executor, folder: RunFolder, target: Stage, wall_s: float) -> StageReport:
-    """Build the report of an executor that has finished."""
     result = run.answers.get(target.name)
     summary = dict(result.summary) if result is not None else {}
     for campaign in run.graph.campaigns_of(target.name):

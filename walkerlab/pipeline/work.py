@@ -51,7 +51,6 @@ class InPlace(Executor):
 
 
 def compute(units: Batch) -> list[Timed]:
-    """Compute units in this process."""
     results = []
     for unit in units:
         started = time.perf_counter()

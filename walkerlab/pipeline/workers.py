@@ -60,7 +60,6 @@ class WorkerDiedError(WalkerlabError):
         self.exit_code_of_worker = exit_code
 
     def __reduce__(self) -> tuple[type, tuple[int]]:
-        """Support pickling."""
         return type(self), (self.exit_code_of_worker,)
 
 
@@ -146,7 +145,6 @@ class Worker:
 
     @property
     def alive(self) -> bool:
-        """Whether the process runs."""
         return self.process.poll() is None
 
     def leave(self) -> None:
@@ -162,7 +160,6 @@ class Worker:
             return self.process.wait()
 
     def close(self) -> None:
-        """End it."""
         self.leave()
         self.ended()
         self._line.close()
@@ -223,7 +220,6 @@ class WorkerPool(Executor):
             worker.close()
 
     def __exit__(self, *_: object) -> None:
-        """End the workers at once."""
         self.shutdown(wait=False, cancel_futures=True)
 
 

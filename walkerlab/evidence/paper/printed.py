@@ -23,12 +23,10 @@ class Printed:
 
     @property
     def value(self) -> float:
-        """Value in the printed unit."""
         return float(number(self.text))
 
     @property
     def last_digit(self) -> float:
-        """One unit in the last printed digit."""
         exponent = number(self.text).as_tuple().exponent
         return 10.0 ** int(exponent)
 

@@ -148,7 +148,6 @@ def limit_summary(findings: LimitFindings) -> dict[str, Any]:
 
 
 def setting(distance: Distance) -> dict[str, Any]:
-    """A setting and its distance from the rigid walk."""
     differences = ("period_error", "angle", "velocity", "raw_angle", "numerical_time")
     labels = {name: (DISTANCE_LABELS | WALK_LABELS)[name] for name in differences}
     return {

@@ -114,7 +114,6 @@ class Known:
 
     @property
     def error(self) -> Annotated[float, Label("1", "difference over reference")]:
-        """Relative to the reference."""
         return abs(self.value - self.reference) / abs(self.reference)
 
     @property

@@ -82,7 +82,6 @@ CASE_COLUMNS = (
 
 
 def by_reason(cases: Rows) -> str:
-    """List each reason with the cases that share it."""
     return "; ".join(f"{why} ({', '.join(row['name'] for row in rows)})" for why, rows in grouped(cases, "why").items())
 
 

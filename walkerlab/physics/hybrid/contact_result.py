@@ -336,7 +336,6 @@ def gather(
     terrain: Terrain,
     tolerances: Tolerances,
 ) -> ContactWalkResult:
-    """Build the result of a walk from its records."""
     done, lifted, seen = int(walk_state.progress.steps), steps_with_lift(walk_state), int(observer.tally.recorded)
     samples = ContactSamples(*(each[:seen] for each in observer.samples)) if observer.samples.time_s.size else None
     strikes = walk_state.knee_strike[:done]

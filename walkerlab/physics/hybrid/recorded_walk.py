@@ -243,7 +243,6 @@ class Recorder:
         return Samples(time[order], state[order], step[order], bent[order])
 
     def finished(self, outcome: Outcome) -> RigidWalkResult:
-        """Build the result."""
         if self.tally.duration == 0.0:  # a swing that begins observes its own start
             observe_start(self.seen, Mode(self.walker, BENT), self.start)
         end_time = self.time if outcome == Outcome.WALKED else float(self.tally.duration)
@@ -298,5 +297,4 @@ def far_from(times: Array, events: Array, distance: float) -> NDArray[np.bool_]:
 
 
 def join(pieces: list[Samples]) -> Samples:
-    """Concatenate consecutive records."""
     return Samples(*map(np.concatenate, zip(*pieces, strict=True)))

@@ -223,7 +223,6 @@ def begin_swing(walker: TwoLegs, memory: LaneMemory, lane: int, t: float, y: Sta
 
 @kernel_part
 def load_state(rows: Any, row: int) -> tuple[Lanes, Lanes, Lanes, Lanes]:
-    """Load four rows as a state in lanes."""
     return (
         load_lanes(rows, row),
         load_lanes(rows, row + 1),
@@ -305,7 +304,6 @@ def handle_step(walker: TwoLegs, memory: LaneMemory, observer: Any, lane: int) -
 
 @kernel_part
 def move_on(memory: LaneMemory, lane: int) -> None:
-    """Accept the step of a lane."""
     rows = memory.rows
     for i in range(4):
         rows[START_STATE + i, lane], rows[START_RATE + i, lane] = rows[END_STATE + i, lane], rows[END_RATE + i, lane]

@@ -66,7 +66,6 @@ def new_observer(times: Any, state_size: int) -> Observer:
 
 
 def unwatched() -> Observer:
-    """Create an observer that records nothing."""
     return new_observer(np.zeros(0), 0)._replace(watching=False)
 
 

@@ -124,7 +124,6 @@ def tree_about_centre(assembly: Assembly) -> tuple[Tree, tuple[Floats, ...]]:
 
 
 def sum_masses(assembly: Assembly, mass_levers: list[tuple[float, Floats]]) -> Tree:
-    """Sum the levers of all masses into the constants."""
     A = np.diag([body.inertia_kg_m2 for body in assembly.bodies])
     B = np.zeros_like(A)
     c = np.zeros((len(assembly.bodies), 2))

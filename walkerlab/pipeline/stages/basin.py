@@ -167,7 +167,6 @@ def contact_question(config: BasinConfig, inputs: Mapping[str, Content], rigid: 
 
 
 def group_of(settings: Basin, window: Window, ends: WalkEnds, walking: Floats) -> Group:
-    """Build the group of the grid."""
     dims: tuple[str, ...] = tuple(settings.plane)
     variables: dict[str, Variable] = {
         name: Variable(window.along(place), (name,), UNITS[axis], TEXTS[axis])
@@ -204,7 +203,6 @@ def attractors_of(question: Question, rigid: RigidModel) -> list[dict[str, Any]]
 def summary(
     settings: Basin, window: Window, ends: WalkEnds, walking: Floats, attractors: list[dict[str, Any]], aperiodic: bool
 ) -> dict[str, Any]:
-    """Summarise the grid and the attractors that are reached."""
     walks = ends.outcome == Outcome.WALKED
     for number, row in enumerate(attractors):
         reaches = walks & (ends.attractor == number)

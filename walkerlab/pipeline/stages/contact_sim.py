@@ -95,7 +95,6 @@ def tell_unresolved_slip(atol: float, scene: ContactScene, progress: Progress) -
 
 
 def summary(config: ContactSimConfig, scene: ContactScene, walk: ContactWalkResult) -> dict[str, Any]:
-    """Summarise the walk."""
     scuffed = require_contact(config).terrain == "plane" and walk.outcome.stumbled and not scene.walker.kneed
     strikes = walk.knee_strike_time_s
     return {
@@ -126,7 +125,6 @@ def mean_of(values: Floats) -> float | None:
 
 
 def groups(config: ContactSimConfig, scene: ContactScene, walk: ContactWalkResult) -> dict[str, Group]:
-    """Build the groups of the artifact."""
     stored: dict[str, Group] = {}
     if walk.steps:
         stored["steps"] = Group(steps_of(walk, slip_m=walk.slip_m, rolling_m=walk.rolling_m))

@@ -55,7 +55,6 @@ class FamilyQuestion:
 
     @property
     def models(self) -> tuple[str, ...]:
-        """Requested models."""
         model = self.config.continuation.model
         return (RIGID, CONTACT) if model == "both" else (model,)
 
@@ -84,7 +83,6 @@ class FamilyQuestion:
 
 
 def question_over(block: Span, config: ContinuationConfig, *path: str) -> FamilyQuestion:
-    """Build the question of a config block at a path of keys."""
     parameter = parameter_of(block.over, config, (*path, "over"))
     return FamilyQuestion(config, parameter, ValueSpan(block.least, block.most))
 

@@ -175,7 +175,6 @@ class Gaits:
         gait: Mapping[str, Any],
         progress: Progress,
     ) -> None:
-        """Start at the config's gait."""
         self.config, self.model, self.parameters, self.progress = config, design.model, parameters, progress
         self.wanted = {*filter(None, (design.minimise, design.maximise)), *design.keep}
         self.counts = np.zeros(2, int)  # evaluations, and those without a gait

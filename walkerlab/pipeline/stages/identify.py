@@ -240,7 +240,6 @@ def sample_group(result: Identification, measured: MeasuredAngles) -> Group:
 
 
 def identified_config(config: IdentifyConfig, result: Identification) -> IdentifyConfig:
-    """Return the config with the estimates as its values."""
     for estimate in result.estimates:
         changed = parameter_of(estimate.key, config).config_at(config, estimate.value)
         assert changed is not None, "an estimate makes a walker"

@@ -172,7 +172,6 @@ def refuse(config: RobustnessConfig) -> None:
 
 
 def subjects(config: RobustnessConfig, inputs: Mapping[str, Content], progress: Progress) -> Iterator[ModelUnderTest]:
-    """Return the requested models with their gaits."""
     progress.start("robustness: gaits")
     gait = inputs["fixedpoint"].summary
     for model in models_of(config):
@@ -180,7 +179,6 @@ def subjects(config: RobustnessConfig, inputs: Mapping[str, Content], progress: 
 
 
 def models_of(config: RobustnessConfig) -> tuple[str, ...]:
-    """Return the requested models."""
     model = config.robustness.model or (RIGID if config.contact is None else "both")
     return (RIGID, CONTACT) if model == "both" else (model,)
 
@@ -243,7 +241,6 @@ def rough_of(subject: ModelUnderTest, roughness: float, seed: int, walks: range,
 
 
 def rough_steps(config: RobustnessConfig, steps: Mapping[str, Floats]) -> Group:
-    """Build the group of the steps of every walk."""
     roughness, caps = np.array(config.robustness.roughness_m), np.array([cap(model, config) for model in steps])
     about = "steps that a walk took; one that went on to the last step that was looked at has as many"
     return Group(

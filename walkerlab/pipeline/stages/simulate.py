@@ -34,7 +34,6 @@ def run(config: SimulateConfig, inputs: Mapping[str, Content], progress: Progres
 
 
 def summary(config: SimulateConfig, walk: RigidWalkResult) -> dict[str, Any]:
-    """Summarise the walk."""
     return {
         **numbers_of(walk),
         **pace_of(config, walk),

@@ -145,7 +145,6 @@ def thinned(samples: Any, ends: NDArray[np.float64], progress: Progress) -> Any:
 
 
 def only_at(samples: Any, mask: NDArray[Any]) -> Any:
-    """Select samples of a walk."""
     return type(samples)(*(each[mask] for each in samples))
 
 

@@ -164,7 +164,6 @@ def check(path: Path, key: str | None = None, stage: str | None = None) -> Verdi
 def root_attributes(
     content: Content, identity: Identity, provenance: Provenance, complete: bool, digest: str
 ) -> dict[str, Attribute]:
-    """Return the attributes at the root of the file."""
     facts = {name: value for name, value in {**vars(identity), **vars(provenance)}.items() if value is not None}
     return {
         "title": f"walkerlab {identity.stage}",

@@ -47,5 +47,4 @@ def real_and_imaginary(name: str, values: Any, dims: tuple[str, ...], text: str)
 
 
 def rows_group(rows: Sequence[Any], labels: Mapping[str, Label], dim: str = "row", text: str = "row") -> Group:
-    """Build a group of numbered rows."""
     return Group({**numbered(len(rows), dim, text), **columns(rows, labels, dim)})

@@ -87,7 +87,6 @@ class Group:
         return sizes
 
     def __getitem__(self, name: str) -> NDArray[Any]:
-        """The values of a variable."""
         return self.variables[name].values
 
 
@@ -123,7 +122,6 @@ class Content:
                 raise ValueError(f"{path!r} is a group, and {name!r} a variable or dimension next to it")
 
     def __getitem__(self, path: str) -> Group:
-        """The group at a path."""
         return self.groups[path]
 
     @property
@@ -151,12 +149,10 @@ class Digest:
     """Digest of a content that is added group by group and variable by variable, ordered by name."""
 
     def __init__(self, summary: Mapping[str, Any], timed: tuple[str, ...]) -> None:
-        """Start with the summary."""
         self._sha256 = hashlib.sha256()
         self._take(canonical_json([untimed(summary, timed), timed]).encode())
 
     def enter(self, path: str, attrs: Mapping[str, Attribute]) -> None:
-        """Start a group."""
         self._take(canonical_json([path, dict(attrs)]).encode())
 
     def add(self, name: str, variable: Variable) -> None:
@@ -172,7 +168,6 @@ class Digest:
             self._take(values.astype(values.dtype.newbyteorder("<"), copy=False).tobytes())
 
     def hex(self) -> str:
-        """Return the digest."""
         return self._sha256.hexdigest()
 
     def _take(self, part: bytes) -> None:

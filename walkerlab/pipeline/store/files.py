@@ -51,7 +51,6 @@ def drawing_into(folder: Path) -> Iterator[None]:
 
 
 def refused(path: Path, error: OSError) -> StorageError:
-    """Build the error for a refusal of the system, with advice."""
     advice = ADVICE.get(error.errno or 0, "Choose another folder with --runs.")
     return StorageError(f"{path} could not be stored: {error.strerror or error}.", advice)
 

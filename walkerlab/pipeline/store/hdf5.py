@@ -54,7 +54,6 @@ class GroupOnDisk(Group):
     """Variables at the root of an intact file, each read on access."""
 
     def __init__(self, file: Path) -> None:
-        """Read the names."""
         object.__setattr__(self, "variables", VariablesOnDisk(file))
         object.__setattr__(self, "attrs", {})
 
@@ -76,15 +75,12 @@ class VariablesOnDisk(Mapping[str, Variable]):
         self._read = lru_cache(maxsize=8)(self._read_anew)
 
     def __getitem__(self, name: str) -> Variable:
-        """Read a variable."""
         return self._read(name)
 
     def __iter__(self) -> Iterator[str]:
-        """Iterate over the names."""
         return iter(self._names)
 
     def __len__(self) -> int:
-        """Return the number of variables."""
         return len(self._names)
 
     def _read_anew(self, name: str) -> Variable:
@@ -165,7 +161,6 @@ def walk_groups(parent: Any, path: str, budget: Budget) -> Iterator[tuple[str, G
 
 
 def is_bare_dimension(dataset: Any) -> bool:
-    """Whether a dataset is a bare dimension."""
     return "NAME" in dataset.attrs and read_text(dataset, "NAME").startswith(BARE_DIMENSION)
 
 

@@ -52,7 +52,6 @@ def differences(where: str, old: Any, new: Any) -> Iterator[str]:
 
 
 def brief(value: Any) -> str:
-    """Format a config value briefly."""
     if value is None:
         return "none"
     return "{...}" if isinstance(value, Mapping) else str(value)

@@ -48,7 +48,6 @@ class Provenance:
         return (ended - start).total_seconds()
 
     def until_now(self) -> Provenance:
-        """Return the same, ended now."""
         return replace(self, ended_utc=utc_now())
 
 

@@ -48,7 +48,6 @@ class RunFolder:
 
     @property
     def path(self) -> Path:
-        """The folder."""
         return self.runs_dir / self.name
 
     @property
@@ -59,12 +58,10 @@ class RunFolder:
 
     @property
     def quoted_path(self) -> str:
-        """The folder, quoted for a shell."""
         return shlex.quote(self.explicit_path)
 
     @property
     def figures(self) -> Path:
-        """The folder of its figures."""
         return self.path / "figures"
 
     def artifact(self, stage: str) -> Path:

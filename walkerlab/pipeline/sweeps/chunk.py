@@ -130,7 +130,6 @@ def by_name(summary: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def is_regular(value: list[Any]) -> bool:
-    """Whether a list is a regular array of numbers."""
     if all(isinstance(item, bool | int | float) for item in value):
         return True
     lists = [item for item in value if isinstance(item, list) and item]

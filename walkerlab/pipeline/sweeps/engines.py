@@ -147,7 +147,6 @@ class JobExecutor(Executor):
         self.jobs: set[Any] = set()
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
-        """Submit one job."""
         future: Future[Any] = Future()
         job = self._start(fn, *args, **kwargs)
         self.jobs.add(job)

@@ -60,23 +60,19 @@ class SweptStage:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the parameters."""
         return distinct_ends([axis.key for axis in self.axes])
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Lengths of the dimensions."""
         if self.layout == "list":
             return (len(self.axes[0].values),)
         return tuple(len(axis.values) for axis in self.axes)
 
     @property
     def dims(self) -> tuple[str, ...]:
-        """Names of the dimensions."""
         return (POINT,) if self.layout == "list" else self.names
 
     def __len__(self) -> int:
-        """Return the number of points."""
         return math.prod(self.shape)
 
     def places(self, index: int) -> tuple[int, ...]:
@@ -92,7 +88,6 @@ class SweptStage:
         return [axis.setting(place) for axis, place in zip(self.axes, self.places(index), strict=True)]
 
     def describe_point(self, index: int) -> str:
-        """Describe one point."""
         settings = self.settings(index)
         return ", ".join(
             f"{axis.key}={plain(setting.value)}" for axis, setting in zip(self.axes, settings, strict=True)

@@ -213,12 +213,10 @@ def last_of_each(rows: NDArray[Any]) -> NDArray[Any]:
 
 
 def ends_of(values: NDArray[Any]) -> tuple[float, float]:
-    """Return minimum and maximum."""
     return float(values.min()), float(values.max())
 
 
 def coordinates(question: SweptStage, config: Any) -> Iterable[tuple[str, Variable]]:
-    """Build the parameters' variables."""
     for name, axis in zip(question.names, question.axes, strict=True):
         unit, text = described(config, axis.key)
         values = axis.values
@@ -229,7 +227,6 @@ def coordinates(question: SweptStage, config: Any) -> Iterable[tuple[str, Variab
 
 
 def count_texts(texts: NDArray[Any]) -> dict[str, int]:
-    """Count equal texts."""
     names, counts = np.unique(texts.astype(str), return_counts=True)
     return {str(name): int(count) for name, count in zip(names, counts, strict=True)}
 

@@ -64,7 +64,6 @@ class Swept:
 
     @property
     def content(self) -> Content:
-        """Content of the file."""
         return artifact.read(self.path)
 
     @property
@@ -221,7 +220,6 @@ class SweepRun:
 
     @property
     def code_digest(self) -> str:
-        """Digest of the stage's code."""
         return self.keys.code_digest(self.question.stage)
 
     def _stored(self, warn: Callable[[str], None]) -> Iterator[Chunk]:

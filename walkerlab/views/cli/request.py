@@ -183,7 +183,6 @@ class Request:
 
     @cached_property
     def console(self) -> Console:
-        """Console that messages go to."""
         return Console(self.quiet, self.verbose, self.open_page)
 
     @property
@@ -232,17 +231,14 @@ class Request:
 
     @property
     def loaded(self) -> "LoadedConfig":
-        """The config, ready to be varied."""
         return self.resolved_run.loaded
 
     @property
     def resolved(self) -> "Config":
-        """The config itself."""
         return self.loaded.config
 
     @property
     def folder(self) -> "RunFolder":
-        """The run's folder."""
         return self.resolved_run.folder
 
 

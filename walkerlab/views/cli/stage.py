@@ -68,7 +68,6 @@ def with_nearby_gaits(report: StageReport, request: Request) -> StageReport:
 
 
 def values_of(summary: Mapping[str, Any]) -> dict[str, float]:
-    """Return the values of parameters that a stage ends in."""
     if "best" in summary:
         return dict(summary["best"])
     return {estimate["key"]: estimate["value"] for estimate in summary["estimates"]}

@@ -21,7 +21,6 @@ LONGEST_NAME = 60
 
 
 def start_name(base: ExploredConfig) -> str:
-    """Name the config from which the page was started."""
     name = base.called or base.config or DEFAULT
     changed = f"{name} with {', '.join(base.sets)}"
     return name if base.called or not base.sets else changed if len(changed) <= LONGEST_NAME else f"{name}, changed"

@@ -81,7 +81,6 @@ class Desk:
         self.compiled += bool(kernel)
 
     def close(self) -> None:
-        """Kill the worker."""
         self.worker.process.kill()
         self.worker.ended()
 

@@ -68,7 +68,6 @@ def panels(height: float, rows: int = 1, columns: int = 1, **how: Any) -> tuple[
 
 
 def label_of(words: str, unit: str) -> str:
-    """Return an axis label with its unit."""
     return with_unit(words, re.sub(r"\^([\d.]+|e\b)", lambda power: power[1].translate(RAISED), unit))
 
 
@@ -82,7 +81,6 @@ def label_ticks(axis: Axis) -> None:
 
 
 def error_axis(axes: Axes) -> None:
-    """Make the vertical axis logarithmic."""
     if np.isfinite(axes.dataLim.intervaly).all():
         axes.set_yscale("log")
         label_ticks(axes.yaxis)

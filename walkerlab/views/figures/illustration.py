@@ -111,5 +111,4 @@ class Illustration:
 
 
 def paper_figure(number: int, needs: tuple[Need, ...], draw: Draw) -> Illustration:
-    """A figure of the paper, redrawn."""
     return Illustration(f"figure-{number:02d}", needs, draw, number)

@@ -87,7 +87,6 @@ class Look:
 
     @property
     def line(self) -> dict[str, Any]:
-        """Line properties for matplotlib."""
         return {"color": self.colour, "linestyle": self.style, "linewidth": self.width}
 
 

@@ -114,7 +114,6 @@ def one_over_another(group: Group, dims: tuple[str, ...], names: Sequence[str], 
 
 
 def name_in_text(group: Group, name: str) -> str:
-    """Name a variable in a sentence."""
     return group.variables[name].long_name.replace("_", " ")
 
 

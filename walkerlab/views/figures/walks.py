@@ -77,7 +77,6 @@ class DrawnWalk:
         return label_of(words, self.samples.variables[name].units)
 
     def first(self, strides: int) -> DrawnWalk:
-        """Return the first strides, or the whole walk if it is shorter."""
         strikes = self.strikes[: 2 * strides]
         if strikes.size == self.strikes.size:
             return self

@@ -171,7 +171,6 @@ class Player:
 
     @property
     def scene(self) -> dict[str, object]:
-        """The scene as the script needs it."""
         names = ("slope_rad", "leg_m", "foot_radius_m", "torso_m", "ordinary_force", "closeup_m", "pads", "ground")
         return {name: getattr(self, name) for name in names}
 

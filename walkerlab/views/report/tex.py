@@ -60,7 +60,6 @@ def in_column(head: str, data: Sequence[Any]) -> tuple[str, list[str]]:
 
 
 def is_number(value: Any) -> bool:
-    """Whether a value is a number; booleans are not."""
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 

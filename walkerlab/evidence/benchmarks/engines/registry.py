@@ -29,7 +29,6 @@ class Engine:
 
     @property
     def install_line(self) -> str:
-        """Shell command that installs it."""
         return f"pip install {self.package}"
 
     @property

@@ -84,7 +84,6 @@ def measure_all(pairs: Sequence[EngineOnScene], jobs: int) -> Iterator[EngineFin
 
 
 def missing_engines() -> list[dict[str, str]]:
-    """List missing engines, with the command that installs each."""
     return [
         {"what": f"engine {engine.name}", "why": f"not installed: {engine.install_line}"}
         for engine in PHYSICS_ENGINES.values()
