@@ -186,7 +186,7 @@ def run(
     name     of the run's folder; None names it after the config and its changes
     strides  to walk, for stages that walk
 
-    Raises ConfigError for a config that is not usable. A question without an answer is told in `Result.no_answer`.
+    Raises ConfigError for an unusable config. For a question without an answer, `Result.no_answer` has the reason.
 
     >>> gait = run("fixedpoint", set={"slope_deg": 3}, runs=folder)
     >>> round(gait.summary["period_s"], 4)
@@ -205,7 +205,7 @@ def run(
 def open_run(name: str | Path, runs: str | Path = RUNS) -> Run:
     """Open a stored run by its name in the folder of all runs, or by its own folder.
 
-    Raises ConfigError if there is none.
+    Raises ConfigError for an unknown run.
 
     >>> _ = run("fixedpoint", runs=folder)
     >>> open_run("paper", folder).result("fixedpoint").summary["stable"]
@@ -462,7 +462,7 @@ def identify(
     prior   value and standard deviation of keys known beforehand
     keys    others of the block `identify`, such as level, model, nuisance
 
-    Raises ConfigError for an invalid question or file. A fit that does not converge is told in `Result.no_answer`.
+    Raises ConfigError for an invalid question or file. If the fit does not converge, `Result.no_answer` has the reason.
     """
     if isinstance(walk, Mapping):
         with tempfile.TemporaryDirectory() as folder:
@@ -489,7 +489,7 @@ def plan_measurements(
     model   rigid or contact
     keys    others of the block `plan`, such as steps, max_steps, errors, period_noise_s
 
-    Raises ConfigError for an invalid question. A walk that ends too early is told in `Result.no_answer`.
+    Raises ConfigError for an invalid question. If the walk ends too early, `Result.no_answer` has the reason.
     """
     question = {"fit": dict.fromkeys(fit), "prior": dict(prior or {}), "model": model}
     return in_memory("plan", with_blocks(config, identify=question, plan=keys))

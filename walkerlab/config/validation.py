@@ -59,10 +59,7 @@ _FOLLOWS_FROM_ANOTHER: Final = "default_factory_not_called"
 
 
 def validate_tree(tree: Mapping) -> Config:
-    """Convert a tree to a typed config.
-
-    Raises ConfigError with every problem found.
-    """
+    """Convert a tree to a typed config. Raises ConfigError with every problem found."""
     problems: list[Problem] = []
     data: dict[str, Any] = {name: plain(node) for name, node in tree.entries.items()}
     if "slope_deg" in data:

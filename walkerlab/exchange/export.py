@@ -52,7 +52,7 @@ def export_model(
     stem                 of the files' names; by default the config's name
 
     Raises ConfigError for what the format cannot express and would change the walk, NoAnswer if pads are to follow a
-    contact gait and there is none.
+    contact gait that does not exist.
     """
     export = prepare_export(config, rigid_step_length_m, rigid_state)
     stem = stem or export.model_name

@@ -47,10 +47,7 @@ class Ball:
 
 @dataclass(frozen=True)
 class PlanarModel:
-    """Tree of links.
-
-    gravity   m/s^2, along the slope and towards it
-    """
+    """Tree of links; `gravity`: m/s^2, along the slope and towards it."""
 
     links: tuple[Link, ...]  # base first, every link after its parent
     freedoms: tuple[Freedom, ...]  # of the base relative to the world

@@ -48,10 +48,7 @@ class WorkerDiedError(WalkerlabError):
     exit_code = 4
 
     def __init__(self, exit_code: int) -> None:
-        """Describe the end of a worker.
-
-        exit_code  of the process, negative for a signal
-        """
+        """Describe the end of a worker; `exit_code`: of the process, negative for a signal."""
         how = signal.Signals(-exit_code).name if exit_code < 0 else f"exit code {exit_code}"
         super().__init__(
             f"a worker process ended before it had answered ({how}).",
@@ -261,10 +258,7 @@ _lines: list[Connection] = []
 
 
 def serve(number: int, modules: Sequence[str]) -> None:
-    """Run calls until a signal ends this process.
-
-    number  descriptor of the connection to the parent
-    """
+    """Run calls until a signal ends this process; `number`: descriptor of the connection to the parent."""
     os.set_inheritable(number, False)
     line = Connection(number)
     _lines.append(line)

@@ -148,7 +148,7 @@ def identify_with(
     question: Question,
     note: Callable[[str], None],
 ) -> Identification | str:
-    """Fit one model; the reason in words if none of its walks can be fitted."""
+    """Fit one model; the reason as text if no walk of it can be fitted."""
     subject = find_model_gait(model, config, gait, note)
     problem = problem_of(subject, measured, question)
     fits = [fit(problem, start) for start in starts_of(problem, question.starts)]

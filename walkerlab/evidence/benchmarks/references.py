@@ -72,10 +72,7 @@ def first_end(trial: Trial) -> End:
 
 
 def second_end(trial: Trial) -> End:
-    """Compute the end by a second, quick method.
-
-    Raises WalkEndsError if the walk does not reach its end.
-    """
+    """Compute the end by a second, quick method. Raises WalkEndsError if the walk does not reach its end."""
     return tightest_end(trial, "radau5" if compass_of(trial) is None else "dop853")
 
 

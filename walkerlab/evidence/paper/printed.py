@@ -167,10 +167,7 @@ def slope_of(theta_1: Printed, theta_2: Printed) -> tuple[float, float]:
 
 
 def walker_of_the_paper(c21_sign: float) -> RigidWalker:
-    """Walker of Table 1 on the slope of x_p, with the masses at mid-leg.
-
-    c21_sign  CORRECTED or AS_PRINTED
-    """
+    """Walker of Table 1 on the slope of x_p, with the masses at mid-leg; `c21_sign`: CORRECTED or AS_PRINTED."""
     length, mass, hip, gravity = (entry.value for entry in TABLE_1)
     return RigidWalker(length, 0.5 * length, mass, hip, LEG_INERTIA.value, gravity, slope_of(*X_P[:2])[0], c21_sign)
 

@@ -15,7 +15,7 @@ MODELS = {"rigid": "simulate", "contact": "contact-sim"}
 
 
 def compare_recorded(inputs: Mapping[str, Content]) -> tuple[dict[str, Group], dict[str, Any]]:
-    """Return groups and summary of the recorded walk's differences from each model; empty if there is none."""
+    """Return groups and summary of the recorded walk's differences from each model; empty without one."""
     recorded = inputs.get("recorded-walk")
     if recorded is None:
         return {}, {}

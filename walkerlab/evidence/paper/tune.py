@@ -274,7 +274,7 @@ def gait_summary(tune: TuneRun) -> dict[str, Any]:
         "height_lost_J": step.driven.gravity,
         "work_per_step_J": step.driven.per_step(1),
         "cost_of_transport": step.driven.cost_of_transport(step.length_m),
-        "balance_J": float(step.dissipated_J.sum() - step.driven.given),
+        "balance_J": float(step.dissipated_J.sum() - step.driven.net_work),
     }
 
 

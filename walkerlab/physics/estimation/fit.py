@@ -38,12 +38,12 @@ WEAK_PRIOR: Final = 1.0  # standard deviation of every unknown about its start, 
 
 @dataclass(frozen=True, eq=False)
 class FitProblem:
-    """A measured walk, unknowns, and what is known of them."""
+    """A measured walk, unknowns, and prior knowledge of them."""
 
     forecast: Forecast
     leg_length_m: float
     start: tuple[float, ...]  # values of the parameters, in their units
-    bounds: Sequence[tuple[float, float]]  # (low, high) of each parameter, infinite where there are none
+    bounds: Sequence[tuple[float, float]]  # (low, high) of each parameter, infinite without bounds
     # (value, standard deviation) of parameters by index, in their units
     priors: dict[int, tuple[float, float]] = field(default_factory=dict)
     loss: Loss = "linear"
@@ -80,7 +80,7 @@ class Fitted:
 
 
 def fit(problem: FitProblem, start: Floats) -> Fitted | str:
-    """Fit from a start (unknowns,); the reason in words if no walk near the start can be predicted.
+    """Fit from a start (unknowns,); the reason as text if no walk near the start can be predicted.
 
     Rounds alternate between the unknowns, by least squares on whitened residuals, and the standard deviations.
     """

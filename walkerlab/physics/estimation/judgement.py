@@ -23,7 +23,7 @@ PHASE_BINS: Final = 20
 
 
 def judge(forecast: Forecast, fitted: Fitted, sizes: Floats, leg_length_m: float) -> tuple[Fit, str]:
-    """Return whether a model fits, and the reason in words if it does not.
+    """Return whether a model fits, and the reason as text if it does not.
 
     sizes  (quantities,) typical size of each quantity
     """

@@ -43,7 +43,7 @@ class Linearised:
     J: Floats  # (values, unknowns) by the unknowns, scaled
     G: Floats  # (values, heights) by the heights, 1/m
     quantity: NDArray[np.int64]  # (values,) index of the quantity of each value
-    prior: Floats  # (priors, 1 + unknowns) whitened residuals and derivatives of what is known beforehand
+    prior: Floats  # (priors, 1 + unknowns) whitened residuals and derivatives of priors
     sizes: Floats  # (quantities,) typical size of each quantity
 
 

@@ -31,7 +31,7 @@ class DrivenWork(NamedTuple):
     hip_torque_positive: float  # J, its positive work alone
 
     @property
-    def given(self) -> float:
+    def net_work(self) -> float:
         """Net work of gravity, push-off and hip (J)."""
         return self.gravity + self.push_off + self.hip
 

@@ -122,10 +122,7 @@ class FamilySearch:
         return Family(self.model, self.step_map, self.follower.family(self.seeds, self.periods))
 
     def family(self, generator: np.random.Generator) -> Family:
-        """Run the whole search.
-
-        generator  of scattered starts
-        """
+        """Run the whole search; `generator`: of scattered starts."""
         results = self.branches()
         if self.periods > 1:
             results = self.add_attractors(results)

@@ -62,7 +62,7 @@ METHODS = {
 
 
 def method_named(name: str) -> Method:
-    """Return a method by name; raise KeyError with all names if there is none."""
+    """Return a method by name; raise KeyError with all names for an unknown one."""
     if name in METHODS:
         return METHODS[name]
     if any(method.name == name for method in CVODE_METHODS):

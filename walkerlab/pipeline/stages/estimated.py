@@ -1,4 +1,4 @@
-"""The question of the block `identify`: parameters to estimate, what is known beforehand, and the models."""
+"""The question of the block `identify`: parameters to estimate, their priors, and the models."""
 
 from __future__ import annotations
 

@@ -27,10 +27,7 @@ TIMING = re.compile(r"(.*_)?wall_s", re.DOTALL)
 
 @dataclass(frozen=True, eq=False)
 class Variable:
-    """A labelled array.
-
-    Raises ValueError or TypeError for what cannot be stored faithfully.
-    """
+    """A labelled array. Raises ValueError or TypeError for what cannot be stored faithfully."""
 
     values: NDArray[Any]  # float, integer, bool or text; copied, widened to 64 bits and frozen; refused if not finite
     # one name for each axis; a variable named like its only dimension is that dimension's coordinate

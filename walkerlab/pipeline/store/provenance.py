@@ -23,10 +23,7 @@ LIBRARIES = ("numpy", "scipy", "numba", "llvmlite", "h5py", "pydantic", "ruamel.
 
 @dataclass(frozen=True)
 class Provenance:
-    """Origin of a result.
-
-    package_version, library_versions
-    """
+    """Origin of a result: who computed it, from what, when, and with which versions."""
 
     config: str  # the resolved config, as YAML text
     command_line: str  # as typed

@@ -133,7 +133,7 @@ def page_tables(folder: RunFolder) -> dict[str, Table]:
 
 
 def find_item(folder: RunFolder, name: str) -> Illustration | Table:
-    """Return the figure or table of a name; ConfigError that lists the run's items if there is none."""
+    """Return the figure or table of a name; ConfigError, with the run's items, for an unknown name."""
     # Imported here: a table needs no drawing.
     from walkerlab.views.figures.registry import FIGURES
 
@@ -296,7 +296,7 @@ def write_film(folder: RunFolder, target: Target, film: Film, console: Console) 
     ffmpeg = shutil.which("ffmpeg")
     if kind == "mp4" and ffmpeg is None:
         raise ConfigError("an MP4 needs ffmpeg, which is not installed.", "Install it, or write a .gif.")
-    # Imported here: what cannot be written is told before anything is loaded that draws.
+    # Imported here: a file that cannot be written is refused before drawing code is loaded.
     from walkerlab.views.figures.stick_diagram import FILM_NEEDS, film_times, pictures, sticks_of
 
     with results_to_show(folder, [film.model], console.warn) as results:

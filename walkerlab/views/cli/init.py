@@ -41,7 +41,7 @@ def write_config(file: Path, walker: str) -> str:
 
 
 def template(walker: str) -> str:
-    """Return the built-in config of that name or walker type, the paper's first; ConfigError if there is none."""
+    """Return the built-in config of that name or walker type, the paper's first; ConfigError for an unknown name."""
     types: dict[str, str] = {}
     for name in (DEFAULT, *builtin_names()):
         types.setdefault(load(Path(name)).config.walker.type, name)

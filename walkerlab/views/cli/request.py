@@ -68,7 +68,7 @@ class SetByOption(str):
 
 
 def option(*flags: str, default: Any = None, **about: Any) -> Any:
-    """A field of a request that commands may have as an option: its flags, and what typer is told of it."""
+    """A field of a request that commands may have as an option: its flags, and its description for typer."""
     return field(default=default, metadata={"option": typer.Option(*flags, **about)})
 
 
@@ -252,7 +252,7 @@ class KeysAreNoOptions(TyperCommand):
     """A command that says how a key of the config is changed where somebody types it as an option."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Read the options; an option that there is not is told with the `--set` of the key that it names, if any."""
+        """Read the options; for an unknown option that names a key, the error shows its `--set`."""
         try:
             return super().parse_args(ctx, args)
         except Exception as error:  # click's NoSuchOption, which each version of typer has in another place

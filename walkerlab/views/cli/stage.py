@@ -24,7 +24,7 @@ from walkerlab.views.report.answers import answer, verdict
 from walkerlab.views.report.tables import aligned
 
 SEARCHING = ("fixedpoint", "report")
-"""Stages that look for gaits nearby where there is none."""
+"""Stages that look for gaits nearby if the config has no gait."""
 WRITES_CONFIG = {"design": "optimum", "identify": "identified"}
 """Stages that end in a config, with its name."""
 DRAWN_AT_ONCE = {stage.name for stage in PIPELINE.stages if stage.on_demand}
@@ -98,7 +98,7 @@ def report_lines(request: Request, report: StageReport) -> list[str]:
     """The result for people: what was found, where it is, and what to do next."""
     if report.artifact is None:
         return [f"{report.stage}: no result", *omission_lines(request, report)]
-    # why there is no answer, and what to try, is told once: as the error
+    # the reason for no answer, and the advice, appear once: as the error
     separate = ("no_answer",) if report.no_answer is None else ("no_answer", "advice")
     own = {key: value for key, value in report.summary.items() if key not in separate}
     if "html" in own:

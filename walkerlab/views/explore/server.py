@@ -34,10 +34,7 @@ class Desk:
     """A worker process that answers only the newest waiting request."""
 
     def __init__(self, drops: bool = False) -> None:
-        """Start the worker.
-
-        drops  whether a newer question ends the work on an older one
-        """
+        """Start the worker; `drops`: whether a newer question ends the work on an older one."""
         self.drops, self.compiling, self.compiled = drops, "", 0
         self.worker = self._hire()
         self._turn, self._count, self._newest = threading.Lock(), threading.Lock(), 0

@@ -196,7 +196,7 @@ def draw_branches(results: Results) -> Drawn:
 def births_in(branches: Sequence[DrawnBranch], shown: tuple[float, float]) -> list[tuple[float, int]]:
     """Find the fold-born gaits of several steps in a part of the axis: position and number of steps.
 
-    Of births too close to be told apart that of the fewest steps.
+    Of births too close to distinguish, that of the fewest steps.
     """
     folds = [
         (branch.period, float(curve.value[place]))

@@ -34,7 +34,7 @@ def quantities(steps: Group) -> list[str]:
     return sorted((name.removeprefix(MEASURED) for name in steps.variables if name.startswith(MEASURED)), reverse=True)
 
 
-def named(quantity: str) -> str:
+def axis_name(quantity: str) -> str:
     return label_of(quantity.rpartition("_")[0].replace("_", " "), unit_by_name(quantity))
 
 
@@ -50,7 +50,7 @@ def draw_steps(results: Results) -> Drawn:
         panel.fill_between(number, predicted - reach, predicted + reach, color=BLUE, alpha=0.2, linewidth=0.0)
         panel.plot(number, predicted, color=BLUE, linewidth=1.0)
         panel.plot(number, measured, linestyle="none", marker="o", markersize=3.0, color=BLACK)
-        panel.set_ylabel(named(name))
+        panel.set_ylabel(axis_name(name))
         inside.append(np.abs(measured - predicted) <= reach)
     axes[-1, 0].set_xlabel("step")
     axes[-1, 0].xaxis.set_major_locator(MaxNLocator(integer=True))

@@ -277,7 +277,7 @@ def draw_pads(axes: Axes, sticks: Sticks, pads: Group) -> list[Artist]:
 
 
 def draw_ground(axes: Axes, sticks: Sticks, pads: Group | None) -> list[Artist]:
-    """Draw the pads, or the plane if there are none; return the legend entries."""
+    """Draw the pads, or the plane without pads; return the legend entries."""
     if pads is not None:
         return draw_pads(axes, sticks, pads)
     draw_slope(axes, sticks)

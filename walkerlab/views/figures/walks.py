@@ -52,10 +52,7 @@ def claims_in(results: Results) -> Sequence[Mapping[str, Any]]:
 
 @dataclass(frozen=True, eq=False)
 class DrawnWalk:
-    """A walk over time.
-
-    time      (samples,) s
-    """
+    """A walk over time; `time`: (samples,) s."""
 
     look: Look  # of its model
     outcome: str  # how it ended

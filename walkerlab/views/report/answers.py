@@ -77,7 +77,7 @@ def walk_row(title: str, key: str, digits: int = 4) -> Column:
 
 
 def energy_lost(dissipated: Mapping[str, float]) -> str:
-    """List the energy losses of a walk by cause; empty if there are none."""
+    """List the energy losses of a walk by cause; empty without losses."""
     return join_words(
         f"{quantity(lost, 'J', 3)} {CHANNELS.get(name, name)}" for name, lost in dissipated.items() if lost
     )

@@ -222,6 +222,6 @@ class Section:
     def of(
         cls, anchor: str, title: str, blocks: Iterable[PageBlock | None], finding: str = "", page: str = MAIN
     ) -> Section | None:
-        """Create a section of the non-empty blocks; None if there are none."""
+        """Create a section of the non-empty blocks; None if all are empty."""
         filled = tuple(block for block in blocks if block)
         return cls(anchor, title, filled, finding, page) if filled else None

@@ -36,10 +36,7 @@ class Page:
 
 
 def render(page: Page) -> str:
-    """Render a page to HTML.
-
-    Raises ValueError if two sections have one anchor.
-    """
+    """Render a page to HTML. Raises ValueError if two sections have one anchor."""
     anchors = [section.anchor for section in page.sections]
     if len(set(anchors)) != len(anchors):
         raise ValueError(f"two sections of the report have one anchor: {anchors}")

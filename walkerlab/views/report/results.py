@@ -25,7 +25,7 @@ class Results:
 
     @property
     def departures(self) -> Sequence[str] | None:
-        """Differences between this scene and the paper's; empty if there are none, None if not compared."""
+        """Differences between this scene and the paper's; empty without differences, None if not compared."""
         departures: Sequence[str] | None = self.summary("compare").get("departures")
         return departures
 
@@ -35,7 +35,7 @@ class Results:
         return claims(self.summary("compare"))
 
     def summary(self, stage: str) -> Mapping[str, Any]:
-        """Return the summary of a stage's result; empty if there is none."""
+        """Return the summary of a stage's result; empty without a result."""
         return self.stored[stage].summary if stage in self.stored else {}
 
     def group(self, stage: str, path: str) -> Group | None:

@@ -113,10 +113,7 @@ def measure(pair: EngineOnScene) -> EngineFindings:
 
 
 def make_content(findings: EngineFindings, rigid: Mapping[str, Any] | None) -> Content:
-    """Build groups and summary.
-
-    rigid  summary of `fixedpoint`, if the start or the pads depend on it
-    """
+    """Build groups and summary; `rigid`: summary of `fixedpoint`, if the start or the pads depend on it."""
     rows, truths = findings.rows, findings.truths
     stored = (("rows", EngineRow, rows), ("swings", SwingRow, findings.swings), ("tuning", TuningRow, findings.tuning))
     groups = {name: rows_group(table, labels_of(kind)) for name, kind, table in stored if table}
