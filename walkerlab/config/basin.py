@@ -11,7 +11,7 @@ Coordinate = Literal["theta_2", "dtheta_1", "dtheta_2"]
 COORDINATES: Final[tuple[Coordinate, ...]] = get_args(Coordinate)
 MAX_BOUND: Final = 1e6  # of a window's bounds
 
-_UNIT: Final = "rad, rad/s"
+_COORDINATE_UNITS: Final = "rad, rad/s"
 _WIDTH: Final = "the gait by 0.15 rad and 0.25 sqrt(g/L)"
 _Bound = Annotated[float, Field(ge=-MAX_BOUND, le=MAX_BOUND)]
 _Bounds = tuple[_Bound, ...]  # empty: the usual window
@@ -32,11 +32,15 @@ class Basin(Block):
         (400, 400), "1", "cells along each coordinate", bounds="a number from 2 to 4000 for each coordinate"
     )
     lower: _Bounds = key(
-        (), _UNIT, "lower bounds of the window", bounds="a number for each", default_in_words=f"below {_WIDTH}"
+        (),
+        _COORDINATE_UNITS,
+        "lower bounds of the window",
+        bounds="a number for each",
+        default_in_words=f"below {_WIDTH}",
     )
     upper: _Bounds = key(
         (),
-        _UNIT,
+        _COORDINATE_UNITS,
         "upper bounds of the window",
         bounds="a number for each, above `lower`",
         default_in_words=f"above {_WIDTH}",

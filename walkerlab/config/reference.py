@@ -20,7 +20,7 @@ from walkerlab.errors import ConfigError
 COLUMNS: Final = 79
 OF_A_KIND: Final = re.compile(r"\([a-z-]+\)")
 """Kind of a block in the name of a key; configs do not contain it."""
-REFERENCE: Final = re.compile(r'"#/\$defs/([^"]+)"')
+SCHEMA_REFERENCE: Final = re.compile(r'"#/\$defs/([^"]+)"')
 EXTENDS_MEANING: Final = "config this one inherits from: a file, from this file's folder, or the name of a built-in one"
 
 
@@ -134,7 +134,7 @@ def part_of(schema: dict[str, Any], selection: str) -> dict[str, Any]:
     unlike = list({json.dumps(part): part for part in parts}.values())
     result = unlike[0] if len(unlike) == 1 else {"anyOf": unlike}
     needed: set[str] = set()
-    while more := set(REFERENCE.findall(json.dumps([result, *(definitions[name] for name in needed)]))) - needed:
+    while more := set(SCHEMA_REFERENCE.findall(json.dumps([result, *(definitions[name] for name in needed)]))) - needed:
         needed |= more
     return {**result, "$defs": {name: definitions[name] for name in sorted(needed)}} if needed else result
 

@@ -15,7 +15,7 @@ from walkerlab.config.schema import Config, Source
 
 PUNCTUATION = re.compile(r"""^[^\w./]|[:#,\[\]{}"'\n]|^$""")
 """Characters that need quotes in a YAML value."""
-WIDTH: Final = 110
+LINE_WIDTH: Final = 110
 ELSEWHERE: Final = "left out; `walkerlab schema {}` has its keys"
 
 
@@ -90,7 +90,7 @@ def _meaning(field: FieldInfo) -> str:
 def _comment(text: str, indent: str) -> Iterator[str]:
     return iter(
         textwrap.wrap(
-            text, WIDTH, initial_indent=f"{indent}# ", subsequent_indent=f"{indent}#   ", break_on_hyphens=False
+            text, LINE_WIDTH, initial_indent=f"{indent}# ", subsequent_indent=f"{indent}#   ", break_on_hyphens=False
         )
     )
 

@@ -18,11 +18,11 @@ AHEAD: Final = 0.4
 """Smallest angle between the legs at a heel strike, over the largest of the walk."""
 WINDOW: Final = 0.1
 """Time before and after a heel strike in which angles are fitted, over a step's period."""
-MOST_STEPS: Final = 20  # that are looked at
-MOST_SAMPLES: Final = 60  # of a window, that are fitted
-FEWEST: Final = 4  # on each side of an instant
+MOST_RUNS: Final = 20  # that are looked at
+WINDOW_SAMPLES: Final = 60  # of a window, that are fitted
+SAMPLES_ON_A_SIDE: Final = 4  # on each side of an instant
 DEGREE: Final = 3
-ROUNDING: Final = 1e-12  # of squared angles
+SMALLEST_SCATTER: Final = 1e-12  # of squared angles
 SUMS: Final = np.round(np.arange(-0.12, 0.121, 0.01), 2)  # rad, that are tried
 MOST_FOUND: Final = 4
 
@@ -37,7 +37,7 @@ def sums_at_jumps(time: Array, angle: Array, total: Callable[[Array], Array]) ->
     spread, sums = angle[:, 0] - angle[:, 1], total(angle)
     runs = apart_runs(np.abs(spread) > AHEAD * np.abs(spread).max(), spread > 0.0)
     half = WINDOW * typical_distance(time, runs)
-    evidence = np.array([evidence_for(time, angle, sums - tried, runs[:MOST_STEPS], half) for tried in SUMS])
+    evidence = np.array([evidence_for(time, angle, sums - tried, runs[:MOST_RUNS], half) for tried in SUMS])
     padded = np.concatenate(([0.0], evidence, [0.0]))
     peaks = np.flatnonzero((evidence > padded[:-2]) & (evidence >= padded[2:]))
     return [float(SUMS[peak]) for peak in peaks[np.argsort(-evidence[peaks])][:MOST_FOUND]]
@@ -82,11 +82,11 @@ def jump_at(time: Array, angle: Array, instant: float, half: float) -> tuple[flo
     None with too few samples on a side.
     """
     first, last = np.searchsorted(time, (instant - half, instant + half))
-    rows = slice(int(first), int(last), max(1, int(last - first) // MOST_SAMPLES))
+    rows = slice(int(first), int(last), max(1, int(last - first) // WINDOW_SAMPLES))
     t, y = (time[rows] - instant) / half, angle[rows]
-    if np.count_nonzero(t < 0.0) < FEWEST or np.count_nonzero(t > 0.0) < FEWEST:
+    if np.count_nonzero(t < 0.0) < SAMPLES_ON_A_SIDE or np.count_nonzero(t > 0.0) < SAMPLES_ON_A_SIDE:
         return None
     basis = np.linalg.qr(np.column_stack((t[:, None] ** np.arange(DEGREE + 1), np.maximum(t, 0.0))))[0]
     shares = basis.T @ y
     left = float((y**2).sum() - (shares**2).sum())
-    return float((shares[-1] ** 2).sum()), max(left, ROUNDING * float((y**2).sum())), y.size - shares.size
+    return float((shares[-1] ** 2).sum()), max(left, SMALLEST_SCATTER * float((y**2).sum())), y.size - shares.size

@@ -44,7 +44,7 @@ def run(folder, *sets, progress=None, jobs=1, **gait):
     checkpoint = Checkpoint(folder / "basin.parts", "key")
     inputs = {"fixedpoint": Content({}, GAIT | gait)}
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(basin, "DRAWN", 300)  # one attractor is found soon
+        patch.setattr(basin, "SEARCHED_STARTS", 300)  # one attractor is found soon
         return basin.run(config, inputs, progress or Silent(), checkpoint=checkpoint, jobs=jobs)
 
 

@@ -19,7 +19,7 @@ from synthetic_walks import both_models, contact, rigid, rigid_alone
 
 from walkerlab.evidence.paper.figures import PAPER_ERROR, PHASE_LOOK, TIME_LOOK
 from walkerlab.outcome import OUTCOME_TEXTS, Outcome
-from walkerlab.views.cli.exports import COLUMNS
+from walkerlab.views.cli.exports import COLUMN_WIDTHS
 from walkerlab.views.figures.canvas import settle, styled
 from walkerlab.views.figures.maps import ATTRACTORS
 from walkerlab.views.figures.registry import FIGURES
@@ -45,7 +45,7 @@ CASES = [
     for name, results in RESULTS.items()
     for figure in (*FIGURES, OF_THE_DOCS)
     if figure.why_left_out(results, {}) is None
-    for width in COLUMNS.values()
+    for width in COLUMN_WIDTHS.values()
 ]
 WITH_UNIT = re.compile(r".+ \((deg|m|mm|s|m/s|rad|rad/s|kg|J|N|N/m²·²|SI)\)")
 PURE = re.compile("error|steps?|right-hand sides|(real|imaginary) part|magnitude|factor on .*")
@@ -130,7 +130,7 @@ def test_exponents_are_large_enough_to_be_read(drawn):
 
 @for_all
 def test_all_figures_have_the_width_asked_for_and_one_font(drawn):
-    assert drawn.get_figwidth() in {POINT * width for width in COLUMNS.values()}
+    assert drawn.get_figwidth() in {POINT * width for width in COLUMN_WIDTHS.values()}
     assert {text.get_fontname() for text in drawn.findobj(Text)} == {"DejaVu Sans"}
 
 

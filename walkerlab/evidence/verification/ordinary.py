@@ -38,7 +38,7 @@ FINE_ERROR: Final = 1e-2  # of a leg, of a radian, of their rates in pendulum ti
 SCIPY_DEFAULT: Final = (1e-3, 1e-6)  # tolerances of solve_ivp
 DIVERGED_ERROR: Final = 10.0  # the same
 COMPARED_STEPS: Final = 2
-SCIPY_METHODS: Final = ("RK45", "LSODA", "Radau")
+SCIPY_CHOICES: Final = ("RK45", "LSODA", "Radau")
 FIXED_STEPS_S: Final = (1e-3, 1e-4)
 REFERENCE_SETTINGS: Final = ("radau5", 1e-8, 1e-10)  # method, rtol, atol
 MIN_REFERENCE_BUDGET: Final = 1_000_000  # at least
@@ -76,14 +76,14 @@ def choices(case: Case, config: WalksConfig) -> tuple[Choice, ...]:
             return ()
         units = np.array([1.0, 1.0, *[1.0 / pendulum_time(config)] * 2])
         arrival = Arrival(case.name, float(walk.touch_time_s[-1]), np.array(walk.final_state), units)
-        return tuple(scipy_script(arrival, compass, walk, name) for name in SCIPY_METHODS)
+        return tuple(scipy_script(arrival, compass, walk, name) for name in SCIPY_CHOICES)
     if not isinstance(start, ContactStart) or start.scene.pinned or start.scene.ground.terrain.order_matters:
         return ()
     walk = start.walk(short, Tolerances(*REFERENCE_SETTINGS, short.budget)).record
     arrival = arrival_of(case.name, walk, natural_units(config))
     if arrival.time_s == 0.0:
         return ()
-    by_library = [scipy_walk(arrival, start, name) for name in SCIPY_METHODS]
+    by_library = [scipy_walk(arrival, start, name) for name in SCIPY_CHOICES]
     return (*by_library, *(euler(arrival, start, h) for h in FIXED_STEPS_S))
 
 

@@ -18,7 +18,7 @@ OPEN: Final = 1.0
 """Singular value below which a combination is open: a change by its whole scale stays within the data's noise."""
 LOST_SHARE: Final = 1e-7  # share of the largest singular value, below which a combination has no effect at all
 NOISE_DRAWS: Final = 200
-LOG_STEP: Final = 0.05
+NOISE_LOG_STEP: Final = 0.05
 FARTHEST_NOISE: Final = (3.0, 1.5)  # below and above the likeliest, of logarithms of standard deviations
 LOADED: Final = 0.1  # share of a parameter in an open direction, from which it is named
 
@@ -95,10 +95,10 @@ def averaged_covariance(fitted: Fitted, basis: Floats) -> Floats:
 
 def noise_reach(evaluate_at: Callable[[Floats], Evaluation], centre: Floats) -> tuple[Floats, Floats]:
     """Return how far below and above `centre` (deviations,) logarithms of standard deviations are plausible."""
-    moves = LOG_STEP * np.vstack((np.zeros(centre.size), np.eye(centre.size), -np.eye(centre.size)))
+    moves = NOISE_LOG_STEP * np.vstack((np.zeros(centre.size), np.eye(centre.size), -np.eye(centre.size)))
     likelihoods = evaluate_at(centre + moves).restricted
     above, below = likelihoods[1 : 1 + centre.size], likelihoods[1 + centre.size :]
-    curvatures = (2.0 * likelihoods[0] - above - below) / LOG_STEP**2
+    curvatures = (2.0 * likelihoods[0] - above - below) / NOISE_LOG_STEP**2
     spread = 3.0 / np.sqrt(np.maximum(curvatures, 1e-6))
     return np.minimum(spread, FARTHEST_NOISE[0]), np.minimum(spread, FARTHEST_NOISE[1])
 

@@ -54,8 +54,8 @@ from walkerlab.scene.rigid import rigid_walker
 from walkerlab.scene.walk_outcomes import Pads, describe_endings
 
 HALF_WIDTH = (0.15, 0.25, 0.25)  # of the default window, rad and sqrt(g/L)
-SAMPLE = 100  # cells whose walks are repeated
-DRAWN = 4_000  # starts of the search for attractors
+REPEATED_CELLS = 100  # cells whose walks are repeated
+SEARCHED_STARTS = 4_000  # starts of the search for attractors
 SIGMAS = 3.0  # of the Gaussian window, from its middle to the box's sides
 FAILED = UNREACHED - 1  # class of a cell that does not walk
 UNITS = ("rad", "rad/s", "rad/s")
@@ -116,7 +116,7 @@ def run(
 
 def sample_again(question: Question, window: Window, ends: WalkEnds) -> dict[str, int]:
     """Count cells of an even sample whose walk ends differently at tighter tolerances."""
-    cells = np.array(evenly_spread(window.size, SAMPLE))
+    cells = np.array(evenly_spread(window.size, REPEATED_CELLS))
     again = question.tightened().walk_to_ends(window.starts(cells))
     otherwise = (again.outcome != ends.outcome[cells]) | (again.attractor != ends.attractor[cells])
     return {"walked_again": int(cells.size), "of": window.size, "ended_otherwise": int(np.count_nonzero(otherwise))}
@@ -144,7 +144,7 @@ def question_of(config: BasinConfig, inputs: Mapping[str, Content], window: Wind
     walker = unit if legs is None else legs
     scale = (1.0, units.time, units.time)
     generator = np.random.default_rng(config.seed)
-    starts = np.concatenate([np.array([window.rest]), window.draw(DRAWN, generator)])
+    starts = np.concatenate([np.array([window.rest]), window.draw(SEARCHED_STARTS, generator)])
     attractors = find_attractors(walker, starts * np.array(scale), config.seed)
     question = RigidQuestion(walker, scale, attractors, config.basin.steps)
     one_by_one = replace(question, cells_at_once=500, edges_at_once=50, shared_from=10_000)

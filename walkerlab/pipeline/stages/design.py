@@ -45,7 +45,7 @@ LABELS: Final = {
     "start": Label("SI", "start of the search"),
     "best": Label("SI", "optimum, in the unit of the key"),
 }
-ADVICE: Final = "Widen the bounds (--over), or the constraints (--keep)."
+WIDEN_ADVICE: Final = "Widen the bounds (--over), or the constraints (--keep)."
 
 
 def run(config: DesignConfig, inputs: Mapping[str, Content], progress: Progress, *, checkpoint: Checkpoint) -> Content:
@@ -85,7 +85,7 @@ def run(config: DesignConfig, inputs: Mapping[str, Content], progress: Progress,
 
     searches = search_from_starts(question, own, design.starts, config.seed, search)
     if not searches or searches[0].point is None:
-        raise NoAnswer(f"no gait of the {design.model} model within the bounds", ADVICE)
+        raise NoAnswer(f"no gait of the {design.model} model within the bounds", WIDEN_ADVICE)
     best = searches[0]
     assert best.point is not None
     ends = count_optima(question, searches)
@@ -119,7 +119,7 @@ def run(config: DesignConfig, inputs: Mapping[str, Content], progress: Progress,
     ]
     content = Content({"optimum": rows_group(rows, LABELS, "row", "row")}, answer)
     if not ends:
-        raise NoAnswer("no walker within the bounds satisfies the constraints on its gait", ADVICE, content)
+        raise NoAnswer("no walker within the bounds satisfies the constraints on its gait", WIDEN_ADVICE, content)
     return content
 
 

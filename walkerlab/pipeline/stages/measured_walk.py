@@ -33,7 +33,7 @@ STEP_KINDS: Final = {"period_s": "time", "length_m": "length", "touch_angle_rad"
 """Kind of unit of each quantity of a table of steps."""
 MIN_STEPS: Final = 2
 MOST_STEPS: Final = 500  # each has a floor height of its own: memory grows with their square, time with their cube
-SLOPE: Final = "slope_deg"
+SLOPE_KEY: Final = "slope_deg"
 SAME_TOUCHES: Final = 0.002  # rad, difference of the angles' sums that leaves heel strikes about where they are
 NO_DATA_FILE: Final = "there is no such file"
 
@@ -100,7 +100,7 @@ def touch_sums(walk: RecordedWalk, block: Identify, config: RigidConfig) -> Iter
     """Yield possible sums (rad) of the legs' angles from the slope's normal at heel strikes: 0, then others."""
     yield 0.0
     angles = walk.both_legs("angle")
-    if angles is None or not (SLOPE in block.fit or SLOPE in block.prior or OFFSET in block.nuisance):
+    if angles is None or not (SLOPE_KEY in block.fit or SLOPE_KEY in block.prior or OFFSET in block.nuisance):
         return
     model = rigid_walker(config)
     sums = sums_at_jumps(walk.time_s, angles, lambda angles: np.asarray(feet_on_slope(model, *angles.T)))

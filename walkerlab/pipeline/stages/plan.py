@@ -21,7 +21,7 @@ from walkerlab.scene.parameter import parameter_of
 if TYPE_CHECKING:
     from walkerlab.config.schema import Config
 
-AXES: Final = ("measurement", "steps", "parameter")
+ERROR_DIMENSIONS: Final = ("measurement", "steps", "parameter")
 
 
 def run(config: PlanConfig, inputs: Mapping[str, Content], progress: Progress) -> Content:
@@ -95,7 +95,7 @@ def curves_of(options: Sequence[Option], keys: Sequence[str]) -> Group:
             "steps": Variable(np.array(counts), ("steps",), "1", "number of measured steps"),
             "standard_error": Variable(
                 np.array(errors, float),
-                AXES,
+                ERROR_DIMENSIONS,
                 "SI",
                 "standard error in the key's unit; a gap where it is open",
                 missing=True,

@@ -52,13 +52,13 @@ FILM_KINDS = ("gif", "mp4")
 TABLES = {"table": "paper_numbers", "table-1": "table1", "table-2": "table2", "table-3": "table3"}
 NOT_IN_NAMES = re.compile(r"[^a-z0-9]+")
 TRAJECTORY, STEPS = "trajectory", "steps"
-COLUMNS = {1: 252.0, 2: 516.0}
+COLUMN_WIDTHS = {1: 252.0, 2: 516.0}
 """Width of one or two columns of a journal, pt."""
 DPI = 300
 """Resolution that journals ask of pictures."""
 STORED_WITH = "Run it with outputs: [states, energies, forces]."
 """Advice for a walk that was stored without a trajectory."""
-NUMBERED = re.compile(r"(?:fig(?:ure)?[- .]*)?0*(\d+)")
+FIGURE_NUMBER = re.compile(r"(?:fig(?:ure)?[- .]*)?0*(\d+)")
 
 
 def export_from(
@@ -71,7 +71,7 @@ def export_from(
 
     Raises ConfigError for an unknown item or format, StaleError for a missing result.
     """
-    if numbered := NUMBERED.fullmatch(what):
+    if numbered := FIGURE_NUMBER.fullmatch(what):
         what = f"figure-{int(numbered[1]):02d}"
     make: Callable[[str], bytes]
     kinds: Sequence[str]

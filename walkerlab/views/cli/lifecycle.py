@@ -14,7 +14,9 @@ from walkerlab.views.cli.request import OF_TALK, Request, command
 RunArgument = Annotated[
     str, typer.Argument(metavar="RUN", help="A run's folder, or its name in the folder of all runs.")
 ]
-FIGURES = "figure-07 or 7, steps, trajectory, model, or a table by its caption; any other word lists the run's items"
+ITEM_EXAMPLES = (
+    "figure-07 or 7, steps, trajectory, model, or a table by its caption; any other word lists the run's items"
+)
 Output = Annotated[
     Path | None,
     typer.Option(
@@ -74,7 +76,7 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
     def export(
         request: Request,
         run: RunArgument,
-        what: Annotated[str, typer.Argument(metavar="WHAT", help=FIGURES)],
+        what: Annotated[str, typer.Argument(metavar="WHAT", help=ITEM_EXAMPLES)],
         to: Annotated[
             str | None,
             typer.Option(
@@ -105,9 +107,9 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
                 print(path)
             return
         from walkerlab.pipeline.runs import run_named
-        from walkerlab.views.cli.exports import COLUMNS, export_from, walk_in
+        from walkerlab.views.cli.exports import COLUMN_WIDTHS, export_from, walk_in
 
-        folder, points = run_named(run, request.runs), width or COLUMNS[columns]
+        folder, points = run_named(run, request.runs), width or COLUMN_WIDTHS[columns]
         whose = walk_in(folder, model)
         print(export_from(folder, what, Target(to, output), points, whose, request.console, dpi))
 

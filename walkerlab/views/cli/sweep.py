@@ -61,11 +61,11 @@ class SweepRequest(Request):
     )
 
 
-OWN = [one.name for one in fields(SweepRequest) if one not in fields(Request)]
+SWEEP_FIELDS = [one.name for one in fields(SweepRequest) if one not in fields(Request)]
 
 
 def add_to(app: typer.Typer, graph: Graph) -> None:
-    @command(app, *OWN, *OF_A_RUN, "force", "dry_run", "no_wait", "every", *OF_TALK, asks=SweepRequest)
+    @command(app, *SWEEP_FIELDS, *OF_A_RUN, "force", "dry_run", "no_wait", "every", *OF_TALK, asks=SweepRequest)
     def sweep(request: SweepRequest) -> None:
         """Run a stage over a range of parameters, reusing results that exist."""
         from walkerlab.config.sweep import Sweep

@@ -19,7 +19,7 @@ from walkerlab.views.explore.walks import Answered, ExploredConfig
 KINDS = ("report", "gif")
 EARLY = re.compile(r"page: (.+) \(partial")
 """Progress line with which a command announces its first page."""
-START = (
+JOB_PROGRAM = (
     "from walkerlab.pipeline.interrupts import end_with_parent; end_with_parent(); "
     "from walkerlab.views.cli.main import main; main()"
 )
@@ -80,7 +80,7 @@ class Job:
 
     def _command(self, *words: str) -> dict[str, Any]:
         """Run a command and return its JSON output; RuntimeError with its last message if it fails."""
-        command = [sys.executable, "-c", START, *words]
+        command = [sys.executable, "-c", JOB_PROGRAM, *words]
         lines = []
         # Into a file: a pipe that nobody reads meanwhile would fill.
         with tempfile.TemporaryFile("w+") as output:

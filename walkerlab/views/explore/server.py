@@ -129,8 +129,9 @@ class Server(ThreadingHTTPServer):
 
     def question(self, body: Mapping[str, Any]) -> ExploredConfig:
         """Parse a request body; TypeError if it is malformed."""
-        changes, models = body.get("set", {}), body.get("models", list(walks.STAGES))
-        if not isinstance(changes, Mapping) or not isinstance(models, list) or not {*models} <= walks.STAGES.keys():
+        known = walks.WALK_STAGES.keys()
+        changes, models = body.get("set", {}), body.get("models", list(known))
+        if not isinstance(changes, Mapping) or not isinstance(models, list) or not {*models} <= known:
             raise TypeError
         question = replace(self.base, changes=changes, models=models)
         config_name = body.get("config")

@@ -25,11 +25,11 @@ from walkerlab.views.explore.numbers import adjustable
 from walkerlab.views.report.results import Results
 from walkerlab.views.report.sections import motion
 
-STAGES = {"rigid": "simulate", "contact": "contact-sim"}
+WALK_STAGES = {"rigid": "simulate", "contact": "contact-sim"}
 Answered = tuple[int, dict[str, Any]]
 """HTTP status and JSON object."""
 SUPERSEDED: Final[Answered] = 409, {"error": {"message": "superseded by a newer request", "advice": ""}}
-MAX_STEPS = 100
+MOST_STEPS_SHOWN = 100
 """Maximum number of steps shown, enough to see one gait change into another."""
 GIVE_WAY = signal.SIGUSR1
 """Signal that makes a worker abandon its request."""
@@ -112,7 +112,7 @@ def walk(question: ExploredConfig) -> Answered:
     try:
         loaded = question.loaded
         config = loaded.config
-        wanted = [STAGES[model] for model in question.models if model == "rigid" or config.contact is not None]
+        wanted = [WALK_STAGES[model] for model in question.models if model == "rigid" or config.contact is not None]
         # The walks first: they leave the gait behind, and it is then there without being sought again.
         with kernel_cache.watch_compilation(tell):
             answers = {
@@ -132,10 +132,10 @@ def walk(question: ExploredConfig) -> Answered:
                 break
         elif stage != "fixedpoint":
             walks[stage] = answers[stage]
-    if (player := motion.player(Results(config, walks), MAX_STEPS)) is not None:
+    if (player := motion.player(Results(config, walks), MOST_STEPS_SHOWN)) is not None:
         found["scene"] = player.scene
         tracks = [{"meta": walker.meta, "floats": walker.track.packed()} for walker in player.walkers]
-        found["tracks"] = dict(zip((stage for stage in STAGES.values() if stage in walks), tracks, strict=True))
+        found["tracks"] = dict(zip((stage for stage in WALK_STAGES.values() if stage in walks), tracks, strict=True))
     return 200, found
 
 

@@ -142,7 +142,7 @@ LEAST: Final = 0.05
 """Minimum width of the bifurcation panel relative to the span, and minimum span of an axis relative to its values."""
 TOLD_APART: Final = 0.04
 """Minimum distance between birth labels, relative to the axis."""
-BETWEEN: Final = 16
+POINTS_BETWEEN: Final = 16
 """Points between two branch points, to find extremes of a quantity and to draw multipliers."""
 
 
@@ -240,7 +240,7 @@ def bounds(results: Results, name: str, close: tuple[float, float] | None) -> tu
     for branch in branches_of(results):
         curve = curve_of(branch.group, name)
         value, quantity = (finely(values) for values in (curve.value, curve.quantity))
-        wanted = np.append(np.repeat(curve.stable, BETWEEN), curve.stable[-1:])
+        wanted = np.append(np.repeat(curve.stable, POINTS_BETWEEN), curve.stable[-1:])
         if close is not None:
             wanted &= (value >= close[0]) & (value <= close[1])
         shown.append(quantity[wanted | (close is None and branch.period == 1)].ravel())
@@ -260,7 +260,7 @@ def finely(along: NDArray[Any]) -> NDArray[np.float64]:
     count = len(along)
     if count == 1:
         return np.asarray(along)
-    fine = np.linspace(0.0, count - 1.0, BETWEEN * (count - 1) + 1)
+    fine = np.linspace(0.0, count - 1.0, POINTS_BETWEEN * (count - 1) + 1)
     return np.asarray(PchipInterpolator(np.arange(count), along)(fine))
 
 

@@ -26,7 +26,7 @@ NORMAL, FRICTION = "normal_force_N", "friction_force_N"
 FORCES = Need(CONTACT_STAGE, TRAJECTORY, (NORMAL, FRICTION), "'forces' is not among the config's outputs")
 TOTAL: Final = "total_energy_J"
 LOST: Final = {loss.variable: (loss.cause, loss.colour) for loss in SAMPLED.values()}
-GIVEN: Final = ("push_off_J", "hip_J")
+DRIVE_LOSSES: Final = ("push_off_J", "hip_J")
 KNEES: Final = (LOSSES[KNEE_STRIKES].cause, LOSSES[KNEE_STRIKES].colour)
 ENERGY = Need(CONTACT_STAGE, TRAJECTORY, (*LOST, TOTAL), NO_ENERGIES)
 STRIDES, STEPS = 2, 40
@@ -90,7 +90,7 @@ def losses(walk: DrawnWalk) -> dict[tuple[str, str], Array]:
     # the last samples before touches: an impact falls between two samples, and is not to be divided among two steps
     rows = np.concatenate(([0], np.maximum(np.searchsorted(walk.time, walk.strikes) - 1, 0)))
     by_cause = {cause: np.diff(walk[name][rows]) for name, cause in LOST.items()}
-    given = np.sum([walk[name] for name in GIVEN if name in walk.samples.variables], axis=0)
+    given = np.sum([walk[name] for name in DRIVE_LOSSES if name in walk.samples.variables], axis=0)
     total = np.diff((given - walk[TOTAL])[rows])
     by_cause[KNEES] = total - np.sum(list(by_cause.values()), axis=0)
     return {cause: lost for cause, lost in by_cause.items() if np.abs(lost).max() >= NOTHING * np.abs(total).max()}

@@ -23,9 +23,9 @@ NO_MEASURED_STEPS: Final = "it has no steps"
 TWO_SIGMA: Final = 2.0
 STEP_PANEL_HEIGHT: Final = 1.7
 MEASURED: Final = "measured_"
-LEGS: Final = (("swing leg", BLUE), ("stance leg", VERMILLION))
+LEG_LOOKS: Final = (("swing leg", BLUE), ("stance leg", VERMILLION))
 MAX_RESIDUALS: Final = 4000  # residuals drawn of each leg
-PHASES: Final = 25  # intervals of the step's phase, each with the mean residual
+PHASE_INTERVALS: Final = 25  # intervals of the step's phase, each with the mean residual
 LEADING: Final = 0.1  # share of a combination's largest change, from which a parameter is named
 
 
@@ -81,13 +81,16 @@ def draw_residuals(results: Results) -> Drawn:
 def draw_residuals_in_phase(panel: Axes, samples: Group) -> None:
     """Plot the residuals of the angles over the phase of the step, with the mean of each interval."""
     phase, residual = samples["phase"], 1e3 * samples["residual_rad"]
-    every, bins = max(1, phase.size // MAX_RESIDUALS), np.minimum((PHASES * phase).astype(int), PHASES - 1)
+    every, bins = (
+        max(1, phase.size // MAX_RESIDUALS),
+        np.minimum((PHASE_INTERVALS * phase).astype(int), PHASE_INTERVALS - 1),
+    )
     filled = np.unique(bins)
-    for leg, (name, colour) in enumerate(LEGS):
+    for leg, (name, colour) in enumerate(LEG_LOOKS):
         look: dict[str, Any] = {"linestyle": "none", "marker": ".", "markersize": 1.5, "alpha": 0.35}
         panel.plot(phase[::every], residual[::every, leg], color=colour, **look)
         mean = [residual[bins == place, leg].mean() for place in filled]
-        panel.plot((filled + 0.5) / PHASES, mean, color=colour, linewidth=2.0, label=f"{name}, mean")
+        panel.plot((filled + 0.5) / PHASE_INTERVALS, mean, color=colour, linewidth=2.0, label=f"{name}, mean")
     panel.axhline(0.0, color=GREY, linewidth=0.7)
     panel.set(xlabel="phase of the step", ylabel="angle (mrad)", xlim=(0.0, 1.0))
     panel.legend(loc="upper right", ncols=2)

@@ -10,7 +10,7 @@ from walkerlab.views.figures.illustration import Drawn, Illustration, Need, Resu
 from walkerlab.views.figures.style import BLUE, GREEN, ORANGE, VERMILLION
 
 PANEL_INCHES: Final = 2.1
-COLOURS: Final = (BLUE, ORANGE, GREEN, VERMILLION)
+MEASUREMENT_COLOURS: Final = (BLUE, ORANGE, GREEN, VERMILLION)
 
 
 def draw_errors(results: Results) -> Drawn:
@@ -24,13 +24,13 @@ def draw_errors(results: Results) -> Drawn:
     for place, (panel, parameter) in enumerate(zip(axes[:, 0], entries, strict=True)):
         for row, errors in zip(rows, group["standard_error"], strict=True):
             style = "-" if row["start"] == first_start else "--"
-            colour = COLOURS[names.index(row["measurement"])]
+            colour = MEASUREMENT_COLOURS[names.index(row["measurement"])]
             panel.loglog(group["steps"], errors[:, place], style, color=colour, marker=".", markersize=3.0)
         if "wanted" in parameter:
             panel.axhline(parameter["wanted"], color="black", linewidth=0.7, linestyle=":")
         panel.set_ylabel(label_of(f"± {axis_label(parameter['key'])}", parameter["unit"]))
     axes[-1, 0].set_xlabel("measured steps")
-    key = [entry(name, color=colour) for name, colour in zip(names, COLOURS, strict=True)]
+    key = [entry(name, color=colour) for name, colour in zip(names, MEASUREMENT_COLOURS, strict=True)]
     starts = [
         entry(start, color="black", linestyle=style)
         for start, style in zip((first_start, rows[-1]["start"]), ("-", "--"), strict=True)

@@ -23,7 +23,7 @@ SMALL_ARC = 0.02
 """Foot radius (leg lengths) below which the sole's centre has no label of its own."""
 FAINT = "#C8C8C8"
 """Colour of the second leg."""
-ARC = np.linspace(-0.6, 0.6, 41)
+SOLE_ANGLES = np.linspace(-0.6, 0.6, 41)
 BEHIND, BENT = -0.3, -0.75
 """Angles (rad) of the second leg and of its shank."""
 BESIDE, FIRST_LANE = 0.62, 0.24
@@ -210,7 +210,7 @@ def draw_leg(axes: Axes, line: Sequence[Point], centre: Point, radius: float, co
     axes.plot(*np.transpose(line), color=colour, linewidth=2.0, zorder=2)
     axes.plot(*np.transpose(line[:-1]), linestyle="none", marker="o", markersize=6, color=colour, mfc="white", zorder=4)
     across, up = np.subtract(line[-1], line[-2])
-    around = np.arctan2(across, -up) + ARC
+    around = np.arctan2(across, -up) + SOLE_ANGLES
     axes.plot(centre[0] + radius * np.sin(around), centre[1] - radius * np.cos(around), color=colour, linewidth=2.0)
     if radius == 0.0:  # a point, perhaps ahead of the leg's line
         axes.plot(*np.transpose([line[-1], centre]), color=colour, linewidth=2.0, zorder=2)
@@ -246,7 +246,12 @@ def draw_parts(walker: PartsWalker) -> Figure:
             if foot.body == body.name:
                 x, y = foot.centre_m
                 bones.append((x, y - foot.radius_m))
-                axes.plot(x + foot.radius_m * np.sin(ARC), y - foot.radius_m * np.cos(ARC), color=BLACK, linewidth=2.0)
+                axes.plot(
+                    x + foot.radius_m * np.sin(SOLE_ANGLES),
+                    y - foot.radius_m * np.cos(SOLE_ANGLES),
+                    color=BLACK,
+                    linewidth=2.0,
+                )
         axes.plot(*np.transpose(bones), color=BLACK, linewidth=2.0, zorder=1)
         points = np.array([*bones, *(spot for *_, spot in marks)])
         (left, low), (_, high) = points.min(axis=0), points.max(axis=0)

@@ -19,7 +19,7 @@ from walkerlab.views.figures.illustration import Drawn, Illustration, Results
 from walkerlab.views.figures.maps import WHITE, edges, is_logarithmic
 from walkerlab.views.figures.style import BLUE, GREY, VERMILLION
 
-PANEL_HEIGHT: Final = 1.9
+SWEEP_PANEL_HEIGHT: Final = 1.9
 MAP_HEIGHT: Final = 2.9
 MAX_PANELS: Final = 4
 MAX_LINES: Final = 5
@@ -100,7 +100,7 @@ def one_over_another(group: Group, dims: tuple[str, ...], names: Sequence[str], 
     """Plot each quantity in a row over another quantity, joining the points of a single parameter in order."""
     x = spread(group, against, dims)
     few = np.unique(np.linspace(0, x.size - 1, min(x.size, MAX_SCATTERED)).astype(int))
-    figure, axes = panels(0.8 + PANEL_HEIGHT * len(names), len(names), sharex=True, squeeze=False)
+    figure, axes = panels(0.8 + SWEEP_PANEL_HEIGHT * len(names), len(names), sharex=True, squeeze=False)
     for panel, name in zip(axes[:, 0], names, strict=True):
         line = "-" if len(dims) == 1 else "none"
         y = group[name].astype(float).ravel()
@@ -126,7 +126,7 @@ def scattered(group: Group, parameters: Sequence[str], dims: tuple[str, ...], na
     """Plot a row per quantity and a column per parameter, with lines where the parameter orders the points."""
     shown = list(parameters)[:MAX_PANELS]
     rows, columns = len(names), len(shown)
-    figure, axes = panels(0.5 + PANEL_HEIGHT * rows, rows, columns, sharex="col", sharey="row", squeeze=False)
+    figure, axes = panels(0.5 + SWEEP_PANEL_HEIGHT * rows, rows, columns, sharex="col", sharey="row", squeeze=False)
     for column, parameter in enumerate(shown):
         x = spread(group, parameter, dims)
         few = np.unique(np.linspace(0, x.size - 1, min(x.size, MAX_SCATTERED)).astype(int))
@@ -186,7 +186,7 @@ def lines(group: Group, parameters: Sequence[str], names: Sequence[str]) -> Figu
     x, values = numbers(group, across), group[few].tolist()
     looks = [{"color": matplotlib.colormaps["viridis"](0.85 * shade), "linestyle": DASHES[place % len(DASHES)]}
              for place, shade in enumerate(np.linspace(0.0, 1.0, len(values)))]  # fmt: skip
-    figure, axes = panels(0.8 + PANEL_HEIGHT * len(names), len(names), sharex=True, squeeze=False)
+    figure, axes = panels(0.8 + SWEEP_PANEL_HEIGHT * len(names), len(names), sharex=True, squeeze=False)
     for panel, name in zip(axes[:, 0], names, strict=True):
         found = group[name].astype(float)
         rows = found if parameters[0] == few else found.T

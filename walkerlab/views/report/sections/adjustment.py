@@ -66,7 +66,7 @@ def starts_table(results: Results, summary: Summary) -> Table:
     return table(caption, (first, *value_columns), rows, note=note)
 
 
-LOSSES = {
+LOSS_HEADS = {
     "damping": ("to damping", "all in the impact"),
     "friction": ("to friction", "none"),
     "knee_strikes": ("in the knee's strike", "in the strike"),
@@ -97,7 +97,7 @@ GAIT_LINES = (
     Column("slip a step", "slip_m", length),
     *(
         Column(f"energy lost {label}", partial(lost_energy, channel), partial(quantity, unit="J"))
-        for channel, (label, _) in LOSSES.items()
+        for channel, (label, _) in LOSS_HEADS.items()
     ),
     *works(number),
 )
@@ -106,7 +106,9 @@ GAIT_LINES = (
 def gait_table(summary: Summary, rigid: Summary) -> Table:
     gait = summary["gait"]
     note = f"Section of the contact gait: {gait['section']}."
-    losses = {channel: Cell(label) for channel, (_, label) in LOSSES.items() if lost_energy(channel, gait) is not None}
+    losses = {
+        channel: Cell(label) for channel, (_, label) in LOSS_HEADS.items() if lost_energy(channel, gait) is not None
+    }
     rigid_column = {**rigid, "slip_m": Cell("none"), "lost_J": losses}
     gaits = {"contact model": gait, "rigid model": rigid_column}
     return side_by_side("The contact model's own gait", GAIT_LINES, gaits, note=note)

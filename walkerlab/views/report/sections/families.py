@@ -53,7 +53,7 @@ def parameter(summary: Mapping[str, Any]) -> str:
 DIAGRAM_MODEL = "rigid"
 MIN_MARK_DISTANCE = 16.0
 """Minimum distance between two marks in diagram units: 1.5 times their width, for touch screens."""
-SAMPLING_FACTOR = 3.0
+SAMPLING_MARGIN = 3.0
 """Sampling interval relative to that of the walk: these gaits are only looked at."""
 
 
@@ -96,7 +96,7 @@ def gait_diagram(results: Results) -> Diagram | None:
     across = DiagramAxis(value, Diagram.LEFT, Diagram.WIDTH - Diagram.RIGHT)
     up = DiagramAxis(period, Diagram.HEIGHT - Diagram.BOTTOM, Diagram.TOP)
     pushes = results.config.push_off.impulse_N_s != 0.0
-    gap, unit = SAMPLING_FACTOR * sampling_gap(results.config), summary["unit"]
+    gap, unit = SAMPLING_MARGIN * sampling_gap(results.config), summary["unit"]
     marks = []
     for branch, place, motion in moving:
         x, y = float(branch["value"][place]), float(branch["step_period"][place][0])
