@@ -78,6 +78,13 @@ def test_the_same_walk_is_read_from_every_format(name, tmp_path):
     assert walk.both_legs("angle") == pytest.approx(ANGLES, abs=1e-11)
 
 
+@pytest.mark.parametrize("delimiter", [",", ";", "\t"])
+def test_a_delimiter_at_the_end_of_every_row_is_ignored(delimiter, tmp_path):
+    rows = "".join(f"{line.replace(',', delimiter)}{delimiter}\n" for line in OWN.splitlines())
+    walk = as_walk(read_recording(written(tmp_path, "own.csv", f"Walk of today\n{rows}\n")), {}, {})
+    assert walk.both_legs("angle") == pytest.approx(ANGLES, abs=1e-11)
+
+
 def test_a_table_in_degrees_says_so_in_its_header(tmp_path):
     walk = as_walk(read_recording(written(tmp_path, "walk.mot", MOT)), {}, {})
     assert walk.both_legs("angle") == pytest.approx(np.radians(ANGLES), abs=1e-12)

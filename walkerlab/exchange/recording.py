@@ -108,7 +108,7 @@ def checked_time(recording: Recording) -> Recording:
 
 def read_delimited(path: Path) -> Recording:
     """Read CSV and tables of ADAMS: titles, a header, rows of numbers."""
-    lines = text_of(path).splitlines()
+    lines = without_last_delimiters(text_of(path).splitlines())
     header, delimiter = header_of(path, lines)
     names, units = names_and_units(split_row(lines[header], delimiter))
     names = unique(path, names)
@@ -131,6 +131,16 @@ def text_of(path: Path) -> str:
             break
         return text
     raise ConfigError(f"{path} is not a text, although its ending says so.", f"Export it as one of: {WANTED}.")
+
+
+def without_last_delimiters(lines: list[str]) -> list[str]:
+    """Remove the delimiter at the end of every row, from the first on that has one, as some spreadsheets write it."""
+    first = next((number for number, line in enumerate(lines) if line.endswith(tuple(DELIMITERS))), len(lines))
+    last = lines[first][-1] if first < len(lines) else ""
+    header_is_before = first > 0 and last in lines[first - 1]
+    if header_is_before or not all(line.endswith(last) for line in lines[first:] if line.strip()):
+        return lines
+    return [*lines[:first], *(line[:-1] for line in lines[first:])]
 
 
 def header_of(path: Path, lines: Sequence[str]) -> tuple[int, str]:
