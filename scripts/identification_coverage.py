@@ -3,11 +3,12 @@
 Usage: python scripts/identification_coverage.py [WALKS, 1000 by default] [steps | angles | contact] [CONFIG ...]
 
 Walks go over a rough floor from a disturbed start, and are measured with noise; `contact` are steps of the contact
-model. Printed for each walker: the number of
-walks that took all steps and whose fit converged; the share of these whose 95 % region holds the truth, with the
-binomial error of that share; and for each parameter the mean standard error over the spread of the estimates.
+model. Printed for each walker: the number of walks that took all steps and that the model fits; the share of these
+whose 95 % region holds the truth, with the binomial error of that share; and for each parameter the mean standard
+error over the spread of the estimates.
 """
 
+import math
 import os
 import sys
 import time
@@ -31,11 +32,12 @@ WALKERS = {
     "round-feet": ("slope_deg", "walker.leg_length_m", "walker.foot_radius_m"),
     "kneed": ("slope_deg", "walker.shank.length_m"),
 }
-STEPS, ROUGHNESS, NOISE, ANGLE_NOISE, PRIOR = 20, 1e-4, (1e-3, 1e-3), 2e-3, 0.01
-"""Steps of a walk; leg lengths; s and leg lengths; rad; shares of the last parameter's value."""
+STEPS, NOISE, ANGLE_NOISE, PRIOR = 20, (1e-3, 1e-3), 2e-3, 0.01
+"""Steps of a walk; s for a leg of 1 m on Earth, and leg lengths; rad; shares of the last parameter's value."""
 
-START_CHANGE, START_CHANGES = 0.01, {"simplest": 0.002}
-"""Shares of the gait's coordinates; the simplest walker falls from farther starts."""
+DISTURBANCE, DISTURBANCES = (0.01, 1e-4), {"simplest": (0.002, 5e-5)}
+"""Of the start, in shares of the gait's coordinates, and of the floor, in leg lengths; the simplest walker survives
+less."""
 
 
 class Truth:
@@ -49,24 +51,25 @@ class Truth:
         self.family = ConfigFamily(self.config, keys)
         self.walks = step_map_of(self.model, self.family, subject.length_m)
         self.z, self.leg = subject.z, self.config.walker.leg_length_m
-        self.values, self.start_change = np.array(self.family.start), START_CHANGES.get(name, START_CHANGE)
+        self.values, self.clock = np.array(self.family.start), math.sqrt(self.leg / (self.config.gravity_m_s2 / 9.81))
+        self.start_change, self.roughness = DISTURBANCES.get(name, DISTURBANCE)
 
     def walk(self, seed):
         """Measure a walk; None if it ends early. Returns also a weighing of the last parameter."""
         draw = np.random.default_rng(seed)
-        heights = draw.normal(0.0, ROUGHNESS * self.leg, STEPS + 1)
+        heights = draw.normal(0.0, self.roughness * self.leg, STEPS + 1)
         z = self.z * (1.0 + self.start_change * draw.normal(0.0, 1.0, self.z.size))
         z = self.walks.settled(z, tuple(self.values))
         walk = self.walks.disturbed(z, tuple(self.values), heights)
         weighed = self.values[-1] * (1.0 + PRIOR * draw.normal())
         if walk.durations_s.size < STEPS:
             return None
-        periods = walk.durations_s + draw.normal(0.0, NOISE[0], STEPS)
+        periods = walk.durations_s + draw.normal(0.0, NOISE[0] * self.clock, STEPS)
         lengths = walk.lengths_m + draw.normal(0.0, NOISE[1] * self.leg, STEPS)
         if self.level != "angles":
             return MeasuredSteps(periods, lengths), weighed
         touches = np.append(0.0, np.cumsum(walk.durations_s))
-        times = np.arange(0.0, touches[-1] * (1.0 - 1e-9), 2e-3)
+        times = np.arange(0.0, touches[-1] * (1.0 - 1e-9), 2e-3 * self.clock)
         angles = self.walks.sampled(z, tuple(self.values), heights, times)
         return split_into_steps(times, angles + draw.normal(0.0, ANGLE_NOISE, angles.shape), touches), weighed
 
@@ -84,14 +87,14 @@ def region_holds(result, truth):
 
 
 def coverage(truth, seeds):
-    """Return whether regions cover, estimates and standard errors of the walks of these seeds whose fit converges."""
+    """Return whether regions cover, estimates and standard errors of the walks of these seeds that the model fits."""
     inside, estimates, errors = [], [], []
     for seed in seeds:
         walk = truth.walk(seed)
         if walk is None:
             continue
         result = truth.identify(*walk)
-        if result.models[0].fit == "not-converged":
+        if result.models[0].fit != "fits":
             continue
         inside.append(region_holds(result, truth.values))
         estimates.append([estimate.value for estimate in result.estimates])
