@@ -23,6 +23,7 @@ def test_the_rigid_model_fits_the_film_with_a_hip_too_light():
     assert summary["models"][0]["fit"] == "fits"
     assert f"{slope['value']:.3f} ± {slope['standard_error']:.3f}" in PAGE
     assert f"{hip['value']:.2f} ± {hip['standard_error']:.2f}" in PAGE
+    assert summary["prior"][0]["distance"] > 3.0
 
 
 @pytest.mark.parametrize(
