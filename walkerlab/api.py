@@ -348,7 +348,7 @@ def continue_gait(
     slope_deg: float | None = None,
     **keys: Any,
 ) -> Result:
-    """Families of gaits over a number of the config, in memory: branches and bifurcations in `summary`.
+    """Follow families of gaits over a parameter of the config, in memory: branches and bifurcations in `summary`.
 
     walker     from `compass`, `kneed` or `walker`
     over       the key that changes, and `span` from where to where, in its unit

@@ -55,7 +55,7 @@ def problem_error(
 
 
 def beyond_scope(word: str) -> str:
-    """Explain why walkerlab has nothing of a name, as a sentence; empty if the name is within its scope."""
+    """Explain in a sentence why walkerlab does not offer something; empty if it is within the scope."""
     return next((why for pattern, why in BEYOND_SCOPE.items() if re.search(pattern, word.lower())), "")
 
 

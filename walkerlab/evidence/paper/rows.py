@@ -99,9 +99,9 @@ class Judge:
         scene: Scene,
         evidence: str,
     ) -> JudgedNumber:
-        """Build a row from a printed value and those of the rigid model, by set of equations, and of the contact model.
+        """Build the row of a printed value, with the rigid model's values by set of equations, and the contact model's.
 
-        verdict  on the paper's own scene, unless another value of the paper contradicts this one
+        verdict  on the paper's own scene; replaced if another value of the paper contradicts the printed one
         """
         departures = self.measured.departures
         differs = "; ".join(departures.rigid if scene == "rigid" else departures.contact)

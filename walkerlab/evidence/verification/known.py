@@ -130,10 +130,9 @@ def solve_problem(
     limit: float,
     why: str,
 ) -> Known:
-    """Solve a problem by both routes; a run that fails gets an error that fails.
+    """Solve a problem with the contact code (`run`) and by its reference; a run that fails does not meet the limit.
 
-    run    through the contact code
-    other  reference; for the other arguments see `Known`
+    The other arguments are fields of `Known`.
     """
     started = time.perf_counter()
     reference = reference_by()

@@ -169,7 +169,7 @@ def begin_dop853(method: Dop853, system: Any, t: float, y: Any, h: float) -> Non
 
 @advance.case(Dop853)
 def advance_dop853(method: Dop853, system: Any, t_end: float) -> int:
-    """Use Hairer's step control with a smaller safety factor."""
+    """Advance by one step, with Hairer's step control and a smaller safety factor."""
     clock, counts, y_old, y, K = method.clock, method.counts, method.y_old, method.y, method.stages
     t, h = clock[T], clock[H_NEXT]
     for i in range(y.size):

@@ -241,7 +241,7 @@ def error_size(method: Radau5, error: Any) -> float:
 
 @advance.case(Radau5)
 def advance_radau5(method: Radau5, system: Any, t_end: float) -> int:
-    """Use Hairer's predictive step control."""
+    """Advance by one step, with Hairer's predictive step control."""
     clock, control = method.clock, method.control
     t, h = clock[T], clock[H_NEXT]
     rejected = False

@@ -68,7 +68,7 @@ OVER_TIME: Final = {
     **{loss.variable: Label("J", loss.meaning) for loss in SAMPLED.values()},
     "push_off_J": Label("J", "given by the push-off so far"),
     "hip_J": Label("J", "given by torque and damper of the hip so far"),
-    "residual_J": Label("J", "change of total energy plus energy lost minus energy given"),
+    "residual_J": Label("J", "change of total energy plus energy lost minus energy supplied"),
 }
 OUTCOMES: Final = ", ".join(f"{outcome.value} {outcome.label}" for outcome in Outcome)
 """Meanings of the outcome codes on a map."""

@@ -23,12 +23,12 @@ Draw = Callable[[Results], Drawn]
 
 @dataclass(frozen=True)
 class Need:
-    """Variables required of a stage's result, and of a scene's reference in its summary if one is named."""
+    """Variables that a drawing requires of a stage's result, and the scene whose reference it requires."""
 
     stage: str
     group: str
     variables: tuple[str, ...]
-    or_else: str  # why a result may be without them, in words
+    or_else: str  # reason, as text, for which a result may lack them
     scene: str = ""
 
     def missing_in(self, results: Results, absent: Mapping[str, str]) -> str | None:

@@ -170,8 +170,8 @@ def redoes_the_procedure(results: Results) -> bool:
 def draw_adjusted(results: Results) -> Drawn:
     """Plot the rigid model from its start and the contact model from the adjusted start, a row per link.
 
-    It is called as in the paper if the walker is its compass, else by what it does first. Caption: what the start was,
-    how much is shown, and whether there are links.
+    The title is the paper's for its compass, and describes the start otherwise. The caption names the start, the
+    strides shown, and the links.
     """
     result, named = results[TUNE_STAGE], redoes_the_procedure(results)
     outcome = str(result.summary["procedure"]["adjusted"]["outcome"])

@@ -48,7 +48,7 @@ def left_out(results: Results) -> Section | None:
 def rows_by_reason(missing: Sequence[LeftOut]) -> Iterator[tuple[str, str, str]]:
     """Yield one row per reason: what is missing, then what depends on it."""
     reasons = {absent.why for absent in missing}
-    # the reason at the bottom of one such as 'it needs simulate: it needs fixedpoint: no gait'
+    # the innermost reason: of 'it needs simulate: it needs fixedpoint: no gait' the last part
     causes = {absent.why: min(filter(absent.why.endswith, reasons), key=len) for absent in missing}
     for why in dict.fromkeys(causes.values()):
         alike = [absent for absent in missing if absent.why == why]
