@@ -7,7 +7,7 @@ from typing import Final, get_args, get_type_hints
 
 UNITS: Final = {
     "rad": "rad", "deg": "deg", "m": "m", "s": "s", "N": "N", "J": "J", "kg": "kg", "m_s": "m/s", "m_s2": "m/s^2",
-    "rad_s": "rad/s", "N_s_m": "N s/m", "N_s": "N s", "Hz": "Hz", "W": "W", "mm": "mm", "kg_m2": "kg m^2",
+    "rad_s": "rad/s", "N_s_m": "N s/m", "s_m": "s/m", "N_s": "N s", "Hz": "Hz", "W": "W", "mm": "mm", "kg_m2": "kg m^2",
     "N_m": "N m", "N_m_per_rad": "N m/rad", "N_m_s_per_rad": "N m s/rad",
 }  # fmt: skip
 """Units by name suffix."""

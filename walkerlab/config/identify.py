@@ -36,6 +36,9 @@ class Identify(Block):
     )
     model: Literal["rigid", "contact", "both"] = key("rigid", "", "model to fit")
     starts: int = key(1, "1", "starts of the fit: the config's values, the rest up to 10 % beside them", ge=1, le=100)
+    robustness: bool = key(
+        False, "", "whether to report the identified gait's sensitivity norm, of the period for a drop of the floor"
+    )
     loss: Literal["linear", "soft_l1"] = key(
         "linear", "", "linear: least squares; soft_l1: outliers count by their size, not its square"
     )

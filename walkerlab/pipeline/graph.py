@@ -320,6 +320,7 @@ PIPELINE = Graph(
             *ESTIMATED,
             Option("--level", "identify.level", "steps|angles", "What was measured."),
             Option("--loss", "identify.loss", "linear|soft_l1", "soft_l1 for data with outliers."),
+            Option("--robustness", "identify.robustness", "", "Report the gait's sensitivity too.", bool),
             Option("--columns", "identify.columns", "QUANTITY=COLUMN,...", "Columns of the file."),
             Option("--units", "identify.units", "KIND=UNIT,...", "Units that it does not state."),
             Option("--plan", "", "", "Without data: errors that each way of measuring would leave.", bool, runs="plan"),

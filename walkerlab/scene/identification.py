@@ -22,7 +22,8 @@ from walkerlab.physics.estimation.result import Estimate, Identification, ModelF
 from walkerlab.physics.orbits.family_search import RIGID
 from walkerlab.physics.orbits.newton import Effort
 from walkerlab.physics.orbits.rigid_map import RigidMap
-from walkerlab.physics.orbits.robustness import derivative
+from walkerlab.physics.orbits.robustness import GaitOnMap, derivative, response
+from walkerlab.physics.orbits.similarity import Units, unit_walker
 from walkerlab.physics.orbits.step_map import Cycle, StepMap, gait_near
 from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.physics.solvers.system import Floats
@@ -41,7 +42,7 @@ AT_BOUND: Final = 1e-6  # distance from a bound, in the scale of the parameter, 
 SPREAD_OF_STARTS: Final = 0.1  # of a parameter, between starts of the fit
 CONTACT_WALKS: Final = Tolerances("radau5", 1e-8, 1e-10, 60_000)  # errors of a walk near 1e-10, far below noise
 GAIT_EFFORT: Final = Effort(1e-9, 40)
-GAIT_NAMES: Final = ("period_s", "step_length_m", "spectral_radius")
+GAIT_NAMES: Final = ("period_s", "step_length_m", "spectral_radius", "drop_sensitivity_s_m")
 GAIT_STEP: Final = 1e-3  # of a parameter's scale, in derivatives of the gait
 
 
@@ -54,6 +55,7 @@ class Question:
     nuisance: tuple[str, ...] = ()  # properties of sensors that are estimated too
     loss: Loss = "linear"
     starts: int = 1  # number of starts of the fit
+    robustness: bool = False  # whether the gait's sensitivity to a drop of the floor is wanted
 
     @property
     def keys(self) -> tuple[str, ...]:
@@ -243,7 +245,7 @@ def describe(subject: ModelUnderTest, question: Question, steps: Fit, best: Fit)
         forecast.steps.count,
         rms_residuals(steps) | rms_residuals(best),
         fitted.evaluation.squares / dof,
-        gait_with_errors(problem, fitted, information.covariance),
+        gait_with_errors(problem, fitted, information.covariance, units_of(subject) if question.robustness else None),
         (ModelFit(subject.model, fitted.evaluation.likelihood, fit_word, reason),),
         step_tables(steps),
         fitted,
@@ -304,10 +306,18 @@ def step_tables(fit: Fit) -> tuple[StepTable, ...]:
     )
 
 
-def gait_with_errors(problem: FitProblem, fitted: Fitted, covariance: Floats) -> dict[str, Uncertain]:
+def units_of(subject: ModelUnderTest) -> Units:
+    return unit_walker(rigid_walker(subject.config))[1]
+
+
+def gait_with_errors(
+    problem: FitProblem, fitted: Fitted, covariance: Floats, units: Units | None
+) -> dict[str, Uncertain]:
     """Return period, length and spectral radius of the identified gait, with errors that follow from the estimates'.
 
     Empty if the identified walker has no gait of one step near the start's.
+
+    units  of the walker, if the gait's sensitivity to a drop of the floor is wanted too
     """
     forecast = problem.forecast
     values = np.array(forecast.parameters(fitted.u))
@@ -320,17 +330,21 @@ def gait_with_errors(problem: FitProblem, fitted: Fitted, covariance: Floats) ->
         gait = gait_near(forecast.walks, z, parameters, GAIT_EFFORT)  # type: ignore[arg-type]
         if not isinstance(gait, Cycle):
             return None
-        return np.array((gait.period_s, gait.step.length_m, float(np.abs(gait.multipliers).max())))
+        values = (gait.period_s, gait.step.length_m, float(np.abs(gait.multipliers).max()))
+        if units is None:
+            return np.array(values)
+        responses = response(GaitOnMap(forecast.walks, parameters, gait.z, gait.DP, units), "floor-drop")  # type: ignore[arg-type]
+        return None if responses is None else np.array((*values, responses[0][0]))
 
     centre = quantities(values)
     if centre is None:
         return {}
-    slopes = np.zeros((values.size, len(GAIT_NAMES)))
+    slopes, names = np.zeros((values.size, centre.size)), GAIT_NAMES[: centre.size]
     for place, scale in enumerate(forecast.scales):
         along = scale * np.eye(values.size)[place]
         slope = derivative(lambda share, along=along: quantities(values + share * along), GAIT_STEP)  # type: ignore[misc]
         if slope is None:
-            return {name: Uncertain(float(v), None) for name, v in zip(GAIT_NAMES, centre, strict=True)}
+            return {name: Uncertain(float(v), None) for name, v in zip(names, centre, strict=True)}
         slopes[place] = slope / scale
     errors = np.sqrt(np.maximum(np.einsum("iq,ij,jq->q", slopes, covariance, slopes), 0.0))
-    return {name: Uncertain(float(v), float(e)) for name, v, e in zip(GAIT_NAMES, centre, errors, strict=True)}
+    return {name: Uncertain(float(v), float(e)) for name, v, e in zip(names, centre, errors, strict=True)}

@@ -84,7 +84,7 @@ def find_model_gait(
     if answer.gait is None:
         raise NoAnswer(f"no gait of the contact model: {answer.reason}", answer.advice)
     if require_contact(config).terrain == "checkerboard":
-        note("robustness: the contact model is disturbed on after-mid-swing: pads would end its walks")
+        note("the contact model walks on after-mid-swing ground: pads would end disturbed walks")
     length = answer.gait.step.length_m
     z = contact_map(config, SLOPE, 1.0, length).scale_section(answer.gait.z)
     return ModelUnderTest(CONTACT, config, z, length)

@@ -336,6 +336,15 @@ def test_an_offset_that_is_not_estimated_is_mentioned(transient, gait, tmp_path)
     assert "--nuisance angle_offset_rad" in " ".join(" ".join(answer("identify", summary)).split())
 
 
+def test_the_identified_gaits_sensitivity_has_an_error(table, gait):
+    fit = "identify.fit={slope_deg: null}"
+    summary = identify.run(taken(*ask(table, fit, "identify.robustness=true")), gait, Silent()).summary
+    norm = summary["gait"]["drop_sensitivity_s_m"]
+    # the norm of the config's own gait, from `walkerlab robustness`
+    assert abs(norm["value"] - 25.271) < 4.0 * norm["standard_error"] < 5.0
+    assert "a sensitivity norm (period for a drop of the floor) of 25" in " ".join(answer("identify", summary))
+
+
 def test_a_prior_that_the_walk_contradicts_is_named(table, gait):
     fit, prior = "identify.fit={slope_deg: null}", "identify.prior={walker.leg_length_m: [1.1, 0.01]}"
     summary = identify.run(taken(*ask(table, fit, prior)), gait, Silent()).summary

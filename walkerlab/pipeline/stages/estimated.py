@@ -23,6 +23,7 @@ def question_of(block: Identify) -> Question:
         block.nuisance,
         block.loss,
         block.starts,
+        block.robustness,
     )
 
 

@@ -20,6 +20,7 @@ GAIT_WORDS = {
     "step_length_m": "steps of {}",
     "period_s": "a period of {}",
     "spectral_radius": "a largest multiplier of {}",
+    "drop_sensitivity_s_m": "a sensitivity norm (period for a drop of the floor) of {}",
 }
 ESTIMATE_COLUMNS = (
     Column("parameter", "key"),
