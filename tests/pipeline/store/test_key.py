@@ -1,6 +1,6 @@
 import pytest
 
-from walkerlab.pipeline.store.key import Identity, changed_parts
+from walkerlab.pipeline.store.key import Identity, changed_parts, differences
 
 SLICE = {"slope_rad": 0.0174, "contact": None, "walker": {"leg_mass_kg": 5.0, "hip_mass_kg": 10.0}}
 INPUTS = {"fixedpoint": "a", "simulate": "b"}
@@ -44,3 +44,8 @@ def test_equal_identities_have_no_changes():
 def test_the_name_is_no_part_of_the_key():
     assert Identity("simulate", SLICE, INPUTS, "code", 1).key == OLD.key
     assert len(OLD.key) == 64
+
+
+def test_digests_of_files_are_shortened():
+    old, new = ({"files": {"recording.file": letter * 64}} for letter in "ab")
+    assert list(differences("", old, new)) == ["files.recording.file aaaaaaaa... -> bbbbbbbb..."]

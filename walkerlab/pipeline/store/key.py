@@ -1,14 +1,16 @@
 """Identity and key of a result: config slice, inputs and code."""
 
 import hashlib
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
 from walkerlab.config.canonical import canonical_json
 
 SCHEMA_VERSION = 2
 """Version of the artifacts' layout; raise it when older files must not be read any more."""
+DIGEST: Final = re.compile("[0-9a-f]{64}")
 
 
 @dataclass(frozen=True)
@@ -54,4 +56,5 @@ def differences(where: str, old: Any, new: Any) -> Iterator[str]:
 def brief(value: Any) -> str:
     if value is None:
         return "none"
-    return "{...}" if isinstance(value, Mapping) else str(value)
+    text = "{...}" if isinstance(value, Mapping) else str(value)
+    return f"{text[:8]}..." if DIGEST.fullmatch(text) else text
