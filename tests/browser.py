@@ -34,6 +34,13 @@ def executable():
     return named or next((found for name in NAMES if (found := shutil.which(name))), None)
 
 
+LEFT = "Inspected target navigated"
+
+
+class PageLeft(Exception):
+    """The page was left while it was asked."""
+
+
 class Browser:
     """One browser with one tab."""
 
@@ -66,6 +73,8 @@ class Browser:
         while True:
             answer = self.message()
             if answer.get("id") == number:
+                if LEFT in answer.get("error", {}).get("message", ""):
+                    raise PageLeft
                 assert "error" not in answer, answer
                 return answer["result"]
             self.events.append(answer)
@@ -99,9 +108,16 @@ class Browser:
     def until(self, expression):
         """Wait until an expression holds."""
         deadline = time.monotonic() + PATIENCE
-        while not self.evaluate(expression):
+        while not self.holds(expression):
             assert time.monotonic() < deadline, expression
             time.sleep(0.02)
+
+    def holds(self, expression):
+        """Whether an expression holds; not while another page is being loaded."""
+        try:
+            return self.evaluate(expression)
+        except PageLeft:
+            return False
 
     def press(self, key, code=0):
         """Press a key and let it go."""
