@@ -37,7 +37,7 @@ def executable():
 LEFT = "Inspected target navigated"
 
 
-class PageLeft(Exception):
+class PageLeftError(Exception):
     """The page was left while it was asked."""
 
 
@@ -74,7 +74,7 @@ class Browser:
             answer = self.message()
             if answer.get("id") == number:
                 if LEFT in answer.get("error", {}).get("message", ""):
-                    raise PageLeft
+                    raise PageLeftError
                 assert "error" not in answer, answer
                 return answer["result"]
             self.events.append(answer)
@@ -116,7 +116,7 @@ class Browser:
         """Whether an expression holds; not while another page is being loaded."""
         try:
             return self.evaluate(expression)
-        except PageLeft:
+        except PageLeftError:
             return False
 
     def press(self, key, code=0):
