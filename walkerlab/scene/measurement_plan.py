@@ -40,7 +40,7 @@ CURVE: Final = (2, 3, 5, 7, 10, 14, 20, 30, 50, 70, 100, 150, 200, 300, 500)
 
 
 @dataclass(frozen=True)
-class Option:
+class WayToMeasure:
     """A way to measure a walk, and the errors that it would leave."""
 
     measurement: str
@@ -59,7 +59,7 @@ def plan_measurements(
     plan: Plan,
     model: str,
     note: Callable[[str], None] = lambda _: None,
-) -> tuple[Option, ...]:
+) -> tuple[WayToMeasure, ...]:
     """Return the errors that each way of measuring a walk would leave, simple ones first.
 
     gait  summary of `fixedpoint` for the config
@@ -87,7 +87,7 @@ def plan_measurements(
             counts = {*(count for count in CURVE if count <= plan.max_steps), plan.max_steps}
             needed = {key: steps_for(key, error, errors_after, plan.max_steps) for key, error in plan.errors.items()}
             curve = {count: errors_after(count)[0] for count in sorted(counts)}
-            options.append(Option(measurement, start, *errors_after(plan.steps), needed, curve))
+            options.append(WayToMeasure(measurement, start, *errors_after(plan.steps), needed, curve))
     return tuple(options)
 
 

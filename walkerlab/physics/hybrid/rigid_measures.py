@@ -55,7 +55,7 @@ class Places:
     knees: Array | None  # (samples, 2, 2) of swing and stance leg; None without knees
 
 
-class Footholds(NamedTuple):
+class FootholdsOfWalk(NamedTuple):
     """Footholds of a walk, that of the start first."""
 
     along_m: Array  # (steps + 1,) along the slope
@@ -63,13 +63,17 @@ class Footholds(NamedTuple):
     set_down_rad: Array  # (steps + 1,) angle of the leg from the vertical as its foot is set down
 
 
-def footholds_of(walk: RigidWalkResult) -> Footholds:
+def footholds_of(walk: RigidWalkResult) -> FootholdsOfWalk:
     set_down = np.append(walk.start[STANCE], walk.after[:, STANCE])
-    return Footholds(np.append(0.0, walk.touch_along_m), walk.ground_m, set_down)
+    return FootholdsOfWalk(np.append(0.0, walk.touch_along_m), walk.ground_m, set_down)
 
 
 def places(
-    walker: RigidModel, knee_m: tuple[float, float] | None, footholds: Footholds, angle: Array, step: NDArray[np.int64]
+    walker: RigidModel,
+    knee_m: tuple[float, float] | None,
+    footholds: FootholdsOfWalk,
+    angle: Array,
+    step: NDArray[np.int64],
 ) -> Places:
     """Compute the points of the walker.
 

@@ -18,7 +18,7 @@ from walkerlab.physics.estimation.information import is_open
 from walkerlab.physics.estimation.measurements import MeasuredAngles, MeasuredSteps
 from walkerlab.physics.estimation.prediction import GAIN, OFFSET
 from walkerlab.physics.estimation.result import Estimate, Identification, Information, ModelFit
-from walkerlab.physics.hybrid.rigid_measures import Footholds, places
+from walkerlab.physics.hybrid.rigid_measures import FootholdsOfWalk, places
 from walkerlab.physics.mechanics.rigid_model import STRAIGHT, apply_couplings
 from walkerlab.physics.solvers.system import Floats
 from walkerlab.pipeline.progress import Progress
@@ -267,7 +267,7 @@ def motions(config: IdentifyConfig, result: Identification, measured: MeasuredAn
     along, touches = (np.append(0.0, np.cumsum(each)) for each in (walk.lengths_m, walk.durations_s))
     time = touches[step] + measured.phase[rows] * walk.durations_s[step]
     set_down = np.append((seen - residuals)[0, 1], walk.angles_rad)
-    footholds = Footholds(along, result.fitted.heights_m[: along.size], set_down)
+    footholds = FootholdsOfWalk(along, result.fitted.heights_m[: along.size], set_down)
     about = {"slope_rad": config.slope_rad, "leg_m": config.walker.leg_length_m}
     about["foot_radius_m"] = config.walker.foot_radius_m
     groups = {}

@@ -15,7 +15,7 @@ from walkerlab.errors import ConfigError
 from walkerlab.pipeline.progress import Progress
 from walkerlab.pipeline.stages.estimated import question_of, refuse_keys, refuse_model
 from walkerlab.pipeline.store.content import Content, Group, Variable
-from walkerlab.scene.measurement_plan import Option, plan_measurements
+from walkerlab.scene.measurement_plan import WayToMeasure, plan_measurements
 from walkerlab.scene.parameter import parameter_of
 
 if TYPE_CHECKING:
@@ -72,7 +72,7 @@ def refuse(config: PlanConfig) -> None:
         )  # fmt: skip
 
 
-def row_of(option: Option, units: Mapping[str, str], wanted: Mapping[str, float]) -> dict[str, Any]:
+def row_of(option: WayToMeasure, units: Mapping[str, str], wanted: Mapping[str, float]) -> dict[str, Any]:
     errors = [
         {"key": key, "standard_error": error, "unit": units[key]}
         | ({"wanted": wanted[key], "steps_needed": option.steps_needed[key]} if key in wanted else {})
@@ -86,7 +86,7 @@ def row_of(option: Option, units: Mapping[str, str], wanted: Mapping[str, float]
     }
 
 
-def curves_of(options: Sequence[Option], keys: Sequence[str]) -> Group:
+def curves_of(options: Sequence[WayToMeasure], keys: Sequence[str]) -> Group:
     """Store the errors by number of steps; gaps where the walk leaves a parameter open."""
     counts = list(options[0].curve)
     errors = [[[option.curve[count][key] for key in keys] for count in counts] for option in options]
