@@ -88,3 +88,13 @@ def test_an_even_floor_is_found_even():
     )
     found = estimate_noise(products, np.array([1e-6]), 1.0, Noise(np.ones(1), 0.0))
     assert found.roughness_m < 0.03
+
+
+def test_heights_that_act_alike_on_a_very_rough_floor_leave_a_finite_likelihood():
+    rng = np.random.default_rng(5)
+    G = np.outer(rng.normal(size=400), np.ones(6))
+    values = rng.normal(0.0, 1e-9, 400)
+    data = Linearised(values, np.ones((400, 1)), G, np.zeros(400, int), np.zeros((0, 2)), np.ones(1))
+    answer = evaluate(products_of(data), Noise(np.array([1e-9]), 10.0))
+    assert np.isfinite(answer.restricted)
+    assert np.isfinite(answer.heights_m).all()

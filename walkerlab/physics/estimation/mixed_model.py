@@ -24,6 +24,7 @@ NOISE_RATIO: Final = 1.0
 Without it a floor can explain one quantity of a short walk exactly, and its noise goes to zero.
 """
 NOISE_RANGE: Final = 1e6  # ratio of the largest standard deviation of a measurement to the smallest
+ROUNDING: Final = 1e-14  # of sums of products
 LOG_STEP: Final = 1e-4  # in derivatives of the restricted likelihood by logarithms
 LOST_INFORMATION: Final = 1e-13  # share of the largest eigenvalue of scaled information, below which it is rounding
 
@@ -84,7 +85,9 @@ def evaluate(products: Products, noise: Noise) -> Evaluation:
     fixed = 1 + products.unknowns
     rho2 = (rough**2)[..., None, None]
     cross, random = total[..., :fixed, fixed:], total[..., fixed:, fixed:]
-    K = np.eye(random.shape[-1]) + rho2 * random
+    # On a very rough floor rounding of the products would make K singular.
+    rounding = ROUNDING * np.trace(random, axis1=-2, axis2=-1)[..., None, None]
+    K = (1.0 + rho2 * rounding) * np.eye(random.shape[-1]) + rho2 * random
     solved = rho2 * np.linalg.solve(K, cross.swapaxes(-1, -2))
     reduced = total[..., :fixed, :fixed] - cross @ solved + products.prior
     information, score = reduced[..., 1:, 1:], reduced[..., 1:, 0]
