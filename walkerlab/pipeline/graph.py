@@ -229,7 +229,7 @@ PIPELINE = Graph(
     ),
     Stage(
         "contact-sim", "walkerlab.pipeline.stages.contact_sim",
-        "Walk the contact model, its contact forces as in ADAMS.",
+        "Walk the contact model, with contact forces as in ADAMS.",
         reads.ContactSimConfig, gait_for_start_or_pads, options=(STRIDES,), requires=("contact",),
         precompile="compile_kernels", does_without=contact_walk_omissions,
     ),
@@ -241,12 +241,12 @@ PIPELINE = Graph(
     ),
     Stage(
         "compare", "walkerlab.evidence.paper.compare",
-        "Compare both models with each other and with every number of the paper.", reads.CompareConfig,
+        "Compare both models with each other and with every value of the paper.", reads.CompareConfig,
         walks_and(), requires=("contact",),
         options=(
             Option("--with", "recording.file", "FILE", "Also compare a walk from a file, such as CSV."),
             Option("--columns", "recording.columns", "QUANTITY=COLUMN,...", "Its columns.", needs=("--with",)),
-            Option("--units", "recording.units", "KIND=UNIT,...", "Units that it does not state.", needs=("--with",)),
+            Option("--units", "recording.units", "KIND=UNIT,...", "Units that the file does not state.", needs=("--with",)),
         ),
     ),
     Stage(
@@ -318,11 +318,11 @@ PIPELINE = Graph(
         options=(
             Option("--data", "identify.data", "FILE", "Measured walk: a table of steps, or angles over time."),
             *ESTIMATED,
-            Option("--level", "identify.level", "steps|angles", "What was measured."),
+            Option("--level", "identify.level", "steps|angles", "Kind of data."),
             Option("--loss", "identify.loss", "linear|soft_l1", "soft_l1 for data with outliers."),
             Option("--robustness", "identify.robustness", "", "Report the gait's sensitivity too.", bool),
             Option("--columns", "identify.columns", "QUANTITY=COLUMN,...", "Columns of the file."),
-            Option("--units", "identify.units", "KIND=UNIT,...", "Units that it does not state."),
+            Option("--units", "identify.units", "KIND=UNIT,...", "Units that the file does not state."),
             Option("--plan", "", "", "Without data: errors that each way of measuring would leave.", bool, runs="plan"),
             replace(ERRORS_TO_REACH, needs=("--plan",)),
         ),

@@ -164,22 +164,22 @@ class Request:
     )
     strides: int | None = option("--strides", metavar="N", help="Strides to walk; one stride is two steps.")
     name: str | None = option(
-        "--name", metavar="NAME", help="Name of the run's folder; default: after config and changes."
+        "--name", metavar="NAME", help="Name of the run's folder; default: derived from the config and its changes."
     )
     runs: Path = option("--runs", default=RUNS, metavar="DIR", help="Folder of all runs.")
     jobs: int | None = option(
         "--jobs", metavar="N", min=1, help="Processes for independent stages and cells; default: all cores."
     )
     force: bool = option("--force", default=False, help="Run the stage and all it needs, up to date or not.")
-    dry_run: bool = option("--dry-run", default=False, help="Say what would be done and why; change nothing.")
+    dry_run: bool = option("--dry-run", default=False, help="Show what would be done and why; change nothing.")
     no_wait: bool = option(
         "--no-wait", default=False, help="Give up (exit 6) if another process works in the run folder."
     )
     open_page: bool = option("--open", default=False, help="Show the page in the browser as soon as it is there.")
-    every: bool = option("--all", default=False, help="Every number, not the headline numbers alone.")
+    every: bool = option("--all", default=False, help="Show all values, not only the headline values.")
     as_json: bool = option("--json", default=False, help="Print one JSON object on stdout.")
-    quiet: bool = option("--quiet", "-q", default=False, help="No messages but warnings and errors.")
-    verbose: bool = option("--verbose", "-v", default=False, help="More messages.")
+    quiet: bool = option("--quiet", "-q", default=False, help="Show only warnings and errors.")
+    verbose: bool = option("--verbose", "-v", default=False, help="Show more messages.")
 
     @cached_property
     def console(self) -> Console:
