@@ -246,7 +246,7 @@ PIPELINE = Graph(
         options=(
             Option("--with", "recording.file", "FILE", "Also compare a walk from a file, such as CSV."),
             Option("--columns", "recording.columns", "QUANTITY=COLUMN,...", "Its columns.", needs=("--with",)),
-            Option("--units", "recording.units", "KIND=UNIT,...", "Units that the file does not state.", needs=("--with",)),
+            Option("--units", "recording.units", "KIND=UNIT,...", "Units that the file lacks.", needs=("--with",)),
         ),
     ),
     Stage(
@@ -322,7 +322,7 @@ PIPELINE = Graph(
             Option("--loss", "identify.loss", "linear|soft_l1", "soft_l1 for data with outliers."),
             Option("--robustness", "identify.robustness", "", "Report the gait's sensitivity too.", bool),
             Option("--columns", "identify.columns", "QUANTITY=COLUMN,...", "Columns of the file."),
-            Option("--units", "identify.units", "KIND=UNIT,...", "Units that the file does not state."),
+            Option("--units", "identify.units", "KIND=UNIT,...", "Units that the file lacks."),
             Option("--plan", "", "", "Without data: errors that each way of measuring would leave.", bool, runs="plan"),
             replace(ERRORS_TO_REACH, needs=("--plan",)),
         ),
