@@ -250,6 +250,44 @@ def test_a_missing_file_is_refused(path, tmp_path, monkeypatch):
     refused(tmp_path, monkeypatch, "--data", path, *FIT)
 
 
+def damaged(text, rng):
+    """Return a file with bytes changed, rows lost, repeated or cut, or cells replaced."""
+    rows = text.splitlines()
+    for _ in range(rng.integers(1, 4)):
+        place = int(rng.integers(len(rows)))
+        cells = rows[place].split(",")
+        cells[int(rng.integers(len(cells)))] = str(
+            rng.choice(["", "nan", "-1", "1e400", "x", "0,7", '"', "1 2", "7e9"])
+        )
+        rows[place] = [",".join(cells), rows[place][: len(rows[place]) // 2], f"{rows[place]},1", ""][rng.integers(4)]
+        if rng.random() < 0.2:
+            rows.insert(place, rows[int(rng.integers(len(rows)))])
+    data = bytearray("\n".join(rows).encode())
+    if data and rng.random() < 0.3:
+        data[int(rng.integers(len(data)))] = int(rng.integers(256))
+    return bytes(data)
+
+
+@pytest.mark.parametrize("level", ["steps", "angles"])
+def test_a_randomly_damaged_file_is_read_or_refused(level, tmp_path):
+    rng, path = np.random.default_rng(11), tmp_path / "walk.csv"
+    times = np.arange(0.0, 3.0, 0.02)
+    swing = 0.2 * np.sin(2.0 * np.pi * times / 1.4)
+    angles = "".join(f"{t:.3f},{a:.6f},{-a:.6f}\n" for t, a in zip(times.tolist(), swing.tolist(), strict=True))
+    text = GOOD if level == "steps" else f"time (s),angle 1 (rad),angle 2 (rad)\n{angles}"
+    config = taken(*ask(path, f"identify.level={level}", "identify.fit={slope_deg: null}"))
+    counts, problems = [], []
+    for _ in range(100):
+        path.write_bytes(damaged(text, rng))
+        try:
+            counts.append(read_measured(config.identify, config).count)
+        except ConfigError as error:
+            problems.append(error)
+    assert min(counts) >= 2
+    assert len(problems) > 20
+    assert all(str(path) in str(problem) and problem.advice for problem in problems)
+
+
 def test_a_misfit_is_an_answer_that_proposes_no_next_step(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("steps.csv").write_text(GOOD)
