@@ -18,6 +18,7 @@ from walkerlab.physics.solvers.system import Floats
 LARGEST_SHARE: Final = 0.05  # of a quantity's size, as noise or as systematic difference
 ROUGHEST: Final = 0.02  # of the leg length
 OUTLIER: Final = 6.0  # standard deviations
+SMALLEST_OUTLIER: Final = 0.01  # of a quantity's size: a missed heel strike is off by far more
 ALTERNATION: Final = 5.0  # standard deviations by which odd and even steps differ
 PHASE_BINS: Final = 20
 
@@ -45,7 +46,8 @@ def judge(forecast: Forecast, fitted: Fitted, sizes: Floats, leg_length_m: float
         own, name = white[place * steps : (place + 1) * steps], name_and_unit(quantity)[0]
         worst = int(np.argmax(np.abs(own)))
         spread = float(np.median(np.abs(own))) * 1.4826 or 1.0
-        if abs(own[worst]) > OUTLIER * max(spread, 0.3) and steps > 4:
+        large = abs(own[worst]) * fitted.noise.measurement[place] > SMALLEST_OUTLIER * sizes[place]
+        if large and abs(own[worst]) > OUTLIER * max(spread, 0.3) and steps > 4:
             times = abs(own[worst]) / spread
             return "misfit", f"the {name} of step {worst + 1} is off by {times:.2g} times the others' scatter"
         if (alternation := alternation_of(own)) > ALTERNATION:
