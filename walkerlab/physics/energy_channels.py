@@ -9,8 +9,6 @@ LOSS_ENTRIES, SUPPLY_ENTRIES = slice(DAMPING_LOSS, PUSH_OFF), slice(PUSH_OFF, TO
 
 
 class Loss(NamedTuple):
-    """Channel of energy loss."""
-
     key: str  # of the loss in results
     where: str  # completes 'energy is lost'
     variable: str  # over time; empty if the loss has no variable of its own

@@ -30,11 +30,7 @@ class PlannedWalk:
     def expect(
         self, steps: int, measured: Collection[str], noise: Mapping[str, float], roughness_m: float
     ) -> Information:
-        """Return the information on the parameters from the first steps, measured by some quantities.
-
-        noise        standard deviation by quantity
-        roughness_m  standard deviation of the floor's heights
-        """
+        """Return the information on the parameters from the first `steps`, measured by some quantities."""
         deviations = np.array([noise[name] for name in self.quantities])
         used = np.isin(self.data.quantity, [self.quantities.index(name) for name in measured])
         rows = used & (self.step < steps)
@@ -47,7 +43,7 @@ class PlannedWalk:
 
 
 def planned_walk(problem: FitProblem, keys: tuple[str, ...]) -> PlannedWalk | None:
-    """Predict the walk of the problem's start with its derivatives; None if it, or one beside it, ends early."""
+    """Predict the walk of the problem's start with its derivatives; None if it or a neighbouring walk ends early."""
     forecast = problem.forecast
     u = np.zeros(forecast.unknowns)
     u[: forecast.scales.size] = np.array(problem.start) / forecast.scales

@@ -38,8 +38,6 @@ WEAK_PRIOR: Final = 1.0  # standard deviation of every unknown about its start, 
 
 @dataclass(frozen=True, eq=False)
 class FitProblem:
-    """A measured walk, unknowns, and prior knowledge of them."""
-
     forecast: Forecast
     leg_length_m: float
     start: tuple[float, ...]  # values of the parameters, in their units
@@ -66,8 +64,6 @@ class FitProblem:
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
-    """Result of a fit."""
-
     u: Floats  # (unknowns,) scaled
     heights_m: Floats  # most probable
     noise: Noise
@@ -163,10 +159,7 @@ def linearise(problem: FitProblem, u: Floats, heights: Floats, exact: bool = Fal
 def least_squares_fit(
     problem: FitProblem, u: Floats, start: Floats, heights: Floats, data: Linearised, noise: Noise
 ) -> Floats:
-    """Minimise the whitened residuals over the unknowns, for given standard deviations.
-
-    data  derivatives at u; they serve for all unknowns near it
-    """
+    """Minimise the whitened residuals over the unknowns, with the derivatives of `data` near u."""
     from scipy.optimize import least_squares  # takes a third of a second, only needed here
 
     forecast, low_high = problem.forecast, problem.limits()

@@ -36,10 +36,7 @@ def information_on(fitted: Fitted, keys: tuple[str, ...], scales: Floats, quanti
 
 
 def information_from(whole: Floats, keys: tuple[str, ...], scales: Floats, values: int) -> Information:
-    """Reduce the information (unknowns, unknowns) at known standard deviations to the parameters, the first unknowns.
-
-    values  number of measured values
-    """
+    """Reduce information (unknowns, unknowns) at known standard deviations to the parameters, the first unknowns."""
     reduced = free_the_rest(whole, len(keys))
     sizes, vectors = np.linalg.eigh(reduced)
     order = np.argsort(sizes)[::-1]
@@ -56,12 +53,10 @@ def correlations(covariance: Floats) -> Floats:
 
 
 def effective_freedom(fitted: Fitted, information: Information, basis: Floats) -> float:
-    """Return the degrees of freedom of Student's t for the errors, as of Satterthwaite.
+    """Return the degrees of freedom of Student's t for the errors on the directions `basis`, as of Satterthwaite.
 
     A short walk determines the standard deviations of floor and measurement poorly. Averaged over plausible ones the
     covariance is larger than at the likeliest ones, by nu / (nu - 2) for Student's t of nu degrees of freedom.
-
-    basis  (directions, parameters) that the walk determines
     """
     if not len(basis):
         return information.freedom
@@ -71,10 +66,8 @@ def effective_freedom(fitted: Fitted, information: Information, basis: Floats) -
 
 
 def averaged_covariance(fitted: Fitted, basis: Floats) -> Floats:
-    """Average the covariance on directions `basis` (directions, parameters) over plausible standard deviations.
-
-    Weights are the restricted likelihood with a flat prior on the logarithm of each standard deviation.
-    """
+    """Average the covariance on directions `basis` (directions, parameters) over plausible standard deviations."""
+    # Weights are the restricted likelihood with a flat prior on the logarithm of each standard deviation.
     products, noise = products_of(fitted.data), fitted.noise
     count = basis.shape[1]
     centre = np.log(np.append(noise.measurement, noise.roughness_m or 1.0))
@@ -151,10 +144,7 @@ def reason_in_words(value: float, largest: float) -> str:
 
 
 def contributions(fitted: Fitted, quantities: tuple[str, ...], count: int, basis: Floats) -> dict[str, float]:
-    """Return the share of each quantity in the information on the determined directions `basis` (directions, count).
-
-    A quantity's share is the information that would be lost without it.
-    """
+    """Return the share of information on directions `basis` (directions, count) that is lost without each quantity."""
     if not len(basis):
         return dict.fromkeys(quantities, 0.0)
     whole = np.diag(basis @ free_the_rest(fitted.evaluation.information, count) @ basis.T)

@@ -24,10 +24,7 @@ PHASE_BINS: Final = 20
 
 
 def judge(forecast: Forecast, fitted: Fitted, sizes: Floats, leg_length_m: float) -> tuple[Fit, str]:
-    """Return whether a model fits, and the reason as text if it does not.
-
-    sizes  (quantities,) typical size of each quantity
-    """
+    """Return whether a model fits, and the reason as text if it does not; `sizes` are typical of the quantities."""
     for quantity, noise, size in zip(forecast.quantities, fitted.noise.measurement, sizes, strict=True):
         if noise > LARGEST_SHARE * size:
             name, unit = name_and_unit(quantity)

@@ -113,11 +113,7 @@ def noise_at(logs: Floats, rough: bool) -> Noise:
 
 
 def estimate_noise(products: Products, floors: Floats, leg_length_m: float, start: Noise, anew: bool = True) -> Noise:
-    """Maximise the restricted likelihood over the standard deviations; a roughness of 0 is one of the candidates.
-
-    floors  (quantities,) smallest standard deviations of the measurement
-    anew    whether to search from several roughnesses rather than from the start's
-    """
+    """Maximise the restricted likelihood over standard deviations above `floors`; `anew` tries several roughnesses."""
     from scipy.optimize import minimize
 
     def costs(logs: Floats, rough: bool) -> tuple[float, Floats]:

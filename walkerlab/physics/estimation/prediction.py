@@ -57,8 +57,8 @@ class Forecast:
     """Function from unknowns to predicted values.
 
     The unknowns are parameters, coordinates of the start along `directions`, and nuisances, each over its scale. Angles
-    at shares of each step are easy to fit from afar. Angles at their times have no errors of measured heel strikes in
-    them: periods are then not measured values of their own.
+    at shares of each step are easy to fit from afar. Angles at their times do not depend on measured heel strikes;
+    periods then do not count as measured values.
     """
 
     walks: WalkMap
@@ -109,7 +109,6 @@ class Forecast:
         return tuple((u[: self.scales.size] * self.scales).tolist())
 
     def sensors(self, u: Floats) -> dict[str, float]:
-        """Return the values of all nuisances."""
         own = dict(zip(self.nuisances, u[self.unknowns - len(self.nuisances) :], strict=True))
         return {name: value + own.get(name, 0.0) * change for name, (value, change) in NUISANCES.items()}
 
@@ -138,11 +137,8 @@ class Forecast:
         return np.concatenate(parts)
 
     def differentiate(self, u: Floats, heights_m: Floats, exact: bool) -> Floats | None:
-        """Return the derivatives (values, unknowns) by the unknowns; `exact` for those of the result.
-
-        Those by parameters are difference quotients of exact walks; those by the start and by the heights follow from
-        the walk's tangent columns.
-        """
+        """Return the derivatives (values, unknowns) by the unknowns; `exact` if they enter the result."""
+        # Those by parameters are difference quotients of exact walks; the others follow from tangent columns.
         none = np.zeros((heights_m.size, 0))
         columns = self._columns_along(u, heights_m, none)
         return None if columns is None else self._with_parameters(u, heights_m, columns, exact)
@@ -216,7 +212,7 @@ class Forecast:
         return np.column_stack((np.concatenate(parts), *last))
 
     def _drift(self, durations: Floats) -> Floats:
-        """Return changes (samples, columns) of the samples' times with those of the steps' durations."""
+        """Return how the samples' times change with the steps' durations, (samples, columns)."""
         assert isinstance(self.measured, MeasuredAngles), "only angles are sampled"
         if not self.in_phase:
             return np.zeros((self.measured.step.size, durations.shape[1]))

@@ -57,8 +57,6 @@ class Information:
 
 @dataclass(frozen=True)
 class ModelFit:
-    """Verdict on a model: how likely it makes the data, and whether it fits."""
-
     model: str
     log_likelihood: float | None
     fit: Fit
@@ -77,8 +75,6 @@ class StepTable:
 
 @dataclass(frozen=True, eq=False)
 class Identification:
-    """A walker identified from a walk."""
-
     model: str
     estimates: tuple[Estimate, ...]
     not_identifiable: tuple[Unidentifiable, ...]
@@ -94,4 +90,4 @@ class Identification:
     fitted: Fitted = field(repr=False)
     walk: DisturbedWalk = field(repr=False)  # over the most probable floor
     sensors: dict[str, float]  # properties of clock and sensors, as `prediction.NUISANCES`
-    nuisances: dict[str, Uncertain]  # those of them that were estimated
+    nuisances: dict[str, Uncertain]  # the estimated ones among them

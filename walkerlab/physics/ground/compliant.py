@@ -39,8 +39,6 @@ class KneeRules:
 
 @dataclass(frozen=True)
 class Root:
-    """A point of the tree, or its centre of mass, with the constants about it."""
-
     tree: Tree
     numbers: dict[str, Any]  # fields that all forms share
     rows: dict[str, Floats]  # (..., n) fields that are summed over bodies that turn together

@@ -27,16 +27,14 @@ def absolute_state(slope: float, chain: Any, q: Any, v: Any, y: Any) -> None:
 
 @kernel
 def feet_and_forces(system: OnGround, chain: Any, t: float, q: Any, v: Any, feet: Any, forces: Any) -> None:
-    """Write the motion of both feet into feet (2, 4) and, unless it is empty, the forces into forces (2 + links).
-
-    They are the forces of the ground, of the hinges and of a push-off.
+    """Write the motion of both feet into feet (2, 4), forces of ground, hinges and push-off into forces (2 + links).
 
     system  with all bodies, its levers of feet and hip from the base's point
     chain   (n, links) whether a joint lies between the base and a body; bodies that move as one share a row
-    t       s
     q, v    (2 + links) coordinates and velocities of the other program
     feet    along (m), height (m), slip (m/s), velocity of the height (m/s)
     """
+    # Empty forces are not computed.
     form = system.form
     y, s, c, torques = vector(OF_STATES), vector(OF_BODIES), vector(OF_BODIES), vector(OF_BODIES)
     absolute_state(form.slope, chain, q, v, y)

@@ -99,12 +99,8 @@ class Coulomb(NamedTuple):
 
 @friction_coefficient.case(Coulomb)
 def coulomb_coefficient(law: Coulomb, slip: float) -> tuple[float, float]:
-    """Evaluate a cubic through zero up to v_s, a second one down to mu_d at v_d, and mu_d beyond.
-
-    A loaded foot therefore creeps, at about v_s (T/N) / (1.5 mu_s).
-
-    Source: Adams/Solver, CONTACT statement, COULOMB_FRICTION = ON.
-    """
+    """Evaluate a cubic up to v_s, a second one down to mu_d at v_d, then mu_d (Adams/Solver, COULOMB_FRICTION = ON)."""
+    # The cubic passes through zero, so a loaded foot creeps, at about v_s (T/N) / (1.5 mu_s).
     v, v_s = abs(slip), law.stiction_velocity
     if v < v_s:
         mu, slope = smooth_step(slip, -v_s, law.static, v_s, -law.static)
@@ -121,7 +117,6 @@ def coulomb_switching_count(law: Coulomb) -> int:
 
 @sample_switching.case(Coulomb)
 def sample_coulomb_switching(law: Coulomb, slip: float, values: Any, first: int, j: int) -> None:
-    """Write the distances of the slip velocity from those at which the formula changes."""
     values[first, j] = slip - law.stiction_velocity
     values[first + 1, j] = slip + law.stiction_velocity
     values[first + 2, j] = slip - law.friction_velocity
@@ -164,10 +159,7 @@ FRICTION_LAWS: Final[dict[str, type[FrictionLaw]]] = {"coulomb": Coulomb, "none"
 
 
 def create_law(word: str, contact: Any) -> FrictionLaw:
-    """Create the law of that name from the parameters of a contact block in SI.
-
-    Raises TypeError with the missing members if the law's class is incomplete.
-    """
+    """Create the law of that name from a contact block in SI; TypeError lists the members that its class lacks."""
     law = FRICTION_LAWS[word]
     missing = missing_members(law)
     if missing:

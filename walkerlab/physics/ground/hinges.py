@@ -26,10 +26,8 @@ def hip_sign(system: OnGround, row: int) -> float:
 
 @kernel_part
 def angle_at(system: OnGround, row: int, y: Any) -> tuple[float, float]:
-    """Return the angle of a hinge's first body ahead of its second (rad), and its rate (rad/s).
-
-    At the hip it is the angle of the swing leg ahead: at a touch the legs change roles.
-    """
+    """Return the angle of a hinge's first body ahead of its second (rad), and its rate (rad/s)."""
+    # At the hip it is the angle of the swing leg ahead: at a touch the legs change roles.
     form, sign = system.form, hip_sign(system, row)
     return sign * ahead(form, row, y, form.places), sign * ahead(form, row, y, half_size(form) + form.places)
 

@@ -26,12 +26,10 @@ class NormalForce(NamedTuple):
 
 @kernel_part
 def impact_normal_force(penetration: float, penetration_rate: float, law: NormalLaw) -> NormalForce:
-    """Compute the normal force of ADAMS's IMPACT law, never adhesive.
+    """Compute the normal force of ADAMS's IMPACT law, F = max(0, k d^e + c(d) d'), never adhesive.
 
-    F = max(0, k d^e + c(d) d'), where c rises from 0 at first touch to `law.damping` at `full_damping_penetration`.
-
-    penetration       d, m, positive inside the ground; the caller leaves out feet with d <= 0
-    penetration_rate  d', m/s, positive while going deeper
+    The damping c rises from 0 at first touch to `law.damping` at `full_damping_penetration`. Penetration d (m) and its
+    rate d' (m/s) are positive into the ground; the caller leaves out feet with d <= 0.
 
     Source: Adams function reference, IMPACT.
     """

@@ -89,7 +89,7 @@ def starts_with_ground(terrain: Terrain, is_stance: bool) -> bool:
 
 @kernel_part
 def has_ground_in_air(terrain: Terrain, has_ground: bool, stands: bool, ahead: bool) -> bool:
-    """Whether ground would carry a foot above it, from whether it would so far, `stands` on it, or is `ahead`."""
+    """Whether there is ground under a foot in the air: on pads as before, on a plane if it `stands` or is `ahead`."""
     if terrain.has_pads:
         return has_ground
     return stands or ahead or not terrain.order_matters

@@ -129,8 +129,6 @@ def changed_forms(walker: ContactWalker, **fields: Any) -> ContactWalker:
 
 @tree.fast_fields
 class WalkProgress(np.record):  # type: ignore[misc]  # NumPy's stubs call one of its bases final
-    """Progress of a walk: a structured scalar that the rules of a walk write to."""
-
     stance: int  # foot that carries the present step
     steps: int  # number of completed steps
     last_touch: float  # s, time of the last touch
@@ -171,10 +169,7 @@ def on_ground(
     level: Any = (0.0, 0.0),
     progress: WalkProgress | None = None,
 ) -> OnGround:
-    """Return the walker in the form that its knees determine; by default foot 1 carries the first step.
-
-    For each foot, `has_ground` says whether there is ground under it, and `level` how high (m).
-    """
+    """Return the walker in the form that its knees determine, by default on foot 1; the ground is at `level` (m)."""
     memory = np.asarray(has_ground, np.int8), np.asarray(knee, np.int8), np.asarray(level, float)
     form = walker.forms[int(hinged), locked_knees(knee)]
     progress = new_progress() if progress is None else progress
@@ -207,7 +202,7 @@ def sines_cosines(form: GroundModel, y: Any, s: Any, c: Any) -> None:
 
 @kernel_part
 def foot_motion(form: GroundModel, foot: int, s: Any, c: Any, y: Any) -> FootMotion:
-    """Compute the motion of the lowest point of a ball foot; the slip is that of the ball's material."""
+    """Compute the motion of the lowest point of a ball foot; its slip is the slip of the ball's material."""
     n, half = form.bodies, half_size(form)
     along, height, slip, vertical_velocity = form.root_along, form.root_height, 0.0, 0.0
     if form.places > 0:
@@ -255,7 +250,7 @@ def foot_force(laws: Any, motion: FootMotion) -> FootForce:
 
 
 def to_form(form: GroundModel, x: Any) -> Floats:
-    """Convert a state of all bodies, or a tangent column, to that of a form about the same root."""
+    """Convert a state of all bodies, or a tangent column, to a state of a form about the same root."""
     # Merged bodies turn alike up to rounding; the first one's values are taken.
     return np.asarray(x)[places_in_whole(form, len(x))]
 
@@ -275,7 +270,7 @@ def places_in_whole(form: GroundModel, size: int) -> list[int]:
 
 @kernel_part
 def store_whole(form: GroundModel, y: Any, whole: Any) -> None:
-    """Write the state y of a form into `whole` as that of the free walker with all bodies."""
+    """Write the state y of a form into `whole`, as a state of the free walker with all bodies."""
     n, p, half = form.bodies, form.places, half_size(form)
     middle = whole.size // 2
     for i in range(2, middle):

@@ -1,8 +1,7 @@
 """Differences between two walks: at equal times, at equal phases of each step, and as orbits in the phase plane.
 
-A frequency error of one percent makes the difference at equal times grow without bound, however similar the gaits.
-Equal phases, with each step's time scaled to [0, 1], leave the difference of the motions. The distance between orbits
-does not depend on time.
+A frequency error of one percent makes the difference at equal times grow without bound, however similar the gaits. The
+other two do not depend on the frequency.
 """
 
 from __future__ import annotations
@@ -50,10 +49,8 @@ class Motion:
 
     @cached_property
     def _pieces(self) -> list[tuple[CubicHermiteSpline, PchipInterpolator]]:
-        """Interpolants of each smooth piece.
-
-        Hermite splines for the angles; monotone splines for the velocities, which do not overshoot at an impact.
-        """
+        """Interpolants of each smooth piece: Hermite splines of angles, monotone ones of velocities."""
+        # Monotone splines do not overshoot at an impact.
         ends = (*self._first_samples[1:], self.time.size)
         pieces = []
         for first, end in zip(self._first_samples, ends, strict=True):
@@ -80,10 +77,7 @@ class Motion:
         return end
 
     def during(self, step: int, phases: Array) -> tuple[Array, Array]:
-        """Compute angles and velocities at phases of a step.
-
-        Phase 0 is just after the impact that began it, phase 1 just before the next.
-        """
+        """Compute angles and velocities at phases of a step: 0 just after its first impact, 1 just before the next."""
         start, end = self.span(step)
         return self.at(np.minimum(start + phases * (end - start), self.last_before(end)))
 
@@ -110,12 +104,9 @@ class Motion:
 
 
 def add_strike_samples(motion: Motion) -> Motion:
-    """Add samples at the end of every step and on both sides of every knee strike.
-
-    Where one is missing, it is extrapolated from the three samples before it, or after it behind a knee strike, unless
-    another strike lies among them. A compliant impact or an ideal lock takes less than the time between samples, so
-    interpolating across it would smear the jump.
-    """
+    """Extrapolate missing samples at the end of every step and on both sides of every knee strike."""
+    # A compliant impact or an ideal lock takes less than the time between samples: interpolating across it would smear
+    # the jump.
     side = 0.5 * JUMP * (motion.time[-1] - motion.time[0])
     added = [
         (end, slice(place - 3, place))
@@ -165,10 +156,7 @@ class WalkDifference:
 
 
 def difference_in_time(walk: Motion, reference: Motion) -> tuple[Array, WalkDifference]:
-    """Compute `walk` minus `reference` at every sample time of either while both walk.
-
-    Returns the times (s) and the difference.
-    """
+    """Return the times (s) of all samples of either while both walk, and `walk` minus `reference` there."""
     time = np.union1d(walk.time, reference.time)
     time = time[(time >= max(walk.time[0], reference.time[0])) & (time <= min(walk.time[-1], reference.time[-1]))]
     angle, velocity = walk.at(time)
@@ -177,10 +165,7 @@ def difference_in_time(walk: Motion, reference: Motion) -> tuple[Array, WalkDiff
 
 
 def difference_in_phase(walk: Motion, reference: Motion, phases: Array) -> WalkDifference:
-    """Compute `walk` minus `reference` at phases (phases,) of the steps that both completed: (step, phase, leg).
-
-    Raises ValueError if one of them completed none.
-    """
+    """Compute `walk` minus `reference` (step, phase, leg) in the steps of both; ValueError if one completed none."""
     steps = min(walk.steps, reference.steps)
     if steps == 0:
         raise ValueError("no step was completed by both")
@@ -191,11 +176,8 @@ def difference_in_phase(walk: Motion, reference: Motion, phases: Array) -> WalkD
 
 
 def between_impacts(walk: Motion, reference: Motion, phases: Array) -> NDArray[np.bool_]:
-    """Mark where both walks move smoothly (step, phase): after the impact at a step's start and outside knee strikes.
-
-    Between the phases at which the two walks' knees lock, the velocities differ by the whole jump, however similar the
-    motions are.
-    """
+    """Mark where both walks move smoothly (step, phase): not at impacts, nor between the knee strikes of both."""
+    # Between them the velocities differ by the whole jump, however similar the motions are.
     clear = np.tile(phases >= IMPACT_PHASE, (min(walk.steps, reference.steps), 1))
     for step, row in enumerate(clear):
         strikes, others = walk.knee_phases(step), reference.knee_phases(step)
@@ -206,12 +188,10 @@ def between_impacts(walk: Motion, reference: Motion, phases: Array) -> NDArray[n
 
 
 def orbit_distances(walk: Motion, reference: Motion) -> Array:
-    """Compute the distances (leg,) between the orbits of the last strides in the plane of angle and angular velocity.
+    """Compute the symmetric Hausdorff distance (leg,) between the orbits of the last strides in the phase plane.
 
-    Symmetric Hausdorff distance: the largest distance of a point of either orbit from the other. Each axis is scaled by
-    the reference orbit's range, so that 0.01 is one percent of the orbit's size.
-
-    Raises ValueError if one of them completed no stride.
+    Each axis is scaled by the reference orbit's range: 0.01 is one percent of the orbit's size. Raises ValueError
+    if one of them completed no stride.
     """
     stride, reference_stride = walk.last_stride(), reference.last_stride()
     distances = np.empty(LEG_COUNT)
@@ -223,7 +203,6 @@ def orbit_distances(walk: Motion, reference: Motion) -> Array:
 
 
 def phase_plane(motion: Motion, leg: int) -> Array:
-    """Return angle and velocity (samples, 2) of a leg."""
     return np.column_stack((motion.angle[:, leg], motion.velocity[:, leg]))
 
 

@@ -121,10 +121,7 @@ def knee_crossing(walk_state: WalkState, finder: CrossingFinder) -> tuple[float,
 def earliest_crossing(
     system: OnGround, ground: JudgedGround, walk_state: WalkState, watch_order: bool, finder: CrossingFinder
 ) -> tuple[float, int]:
-    """Find the first event in the sampled step; returns its fraction of the step, or NO_CROSSING, and the event.
-
-    `watch_order` adds the event that the feet pass each other.
-    """
+    """Find the first event and its fraction of the step, or NO_CROSSING; `watch_order` includes PASSING."""
     sides, at_zero, has_ground = walk_state.sides, walk_state.at_zero, walk_state.has_ground
     best, event = NO_CROSSING, -1
     for foot in range(2):

@@ -32,10 +32,7 @@ from walkerlab.physics.solvers.system import Floats
 def change_form(
     walker: ContactWalker, before: OnGround, after: OnGround, event: int, observer: ContactObserver, method: Any
 ) -> Floats:
-    """Return the state in the form after an event that locked or released a knee, and record its energy loss.
-
-    `method` holds the event's time and the state in the form before; its state is replaced.
-    """
+    """Return the state in the form after a knee's event and record the energy lost; replaces the state of `method`."""
     # A lock is a plastic impact; a latch loses the energy held in its spring; a release changes no velocity. The
     # tangent jumps, also at a step's touch if the hip torque changes legs. For a walker with a push-off, whose pulse
     # starts at the touch, the tangent is afterwards that of walks that touch at the same time.

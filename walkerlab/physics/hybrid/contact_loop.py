@@ -1,7 +1,4 @@
-"""Walking on compliant ground: integrate to the next event, apply it, continue.
-
-Compiled as a whole for the project's own methods; the same source runs in Python with a library's integrator.
-"""
+"""Walking on compliant ground: integrate to the next event, apply it, continue."""
 
 from typing import Any, NamedTuple
 
@@ -44,7 +41,7 @@ LONGEST_STEP = 10.0  # pendulum times within which a step must end
 LONGEST_FLIGHT = 0.25  # pendulum times without any foot on the ground
 EVENT_TIME = 1e-12  # s, accuracy of event times
 EVENT_REFINEMENTS = 4
-REWINDS = 24  # of one step, until its end is accepted as the event, which rounding moves with each attempt
+REWINDS = 24  # of one step; then its end is accepted as the event, which rounding moves at each attempt
 DOUBTS = 12  # rewinds of one step after which an event that its end does not confirm is dropped
 
 
@@ -52,11 +49,7 @@ DOUBTS = 12  # rewinds of one step after which an event that its end does not co
 def scan(
     system: OnGround, ground: JudgedGround, walk_state: WalkState, watch_order: bool, finder: CrossingFinder
 ) -> tuple[float, int]:
-    """Sample a step at the nodes and find its first event.
-
-    Returns its fraction of the step, NO_CROSSING without an event, and the event. `finder.values` keeps the event
-    functions.
-    """
+    """Sample a step into `finder.values` and find its first event, as `earliest_crossing` does."""
     for node in range(finder.nodes.size):
         sample_event_functions(system, ground, walk_state, finder.states[node], node, finder)
     return earliest_crossing(system, ground, walk_state, watch_order, finder)
@@ -87,11 +80,8 @@ def walk_in_form(
 ) -> tuple[int, int]:
     """Walk until the walk state is full, the walk changes its form, the hinge is released, or the walk ends.
 
-    Each iteration takes a step, searches it for an event, and repeats it if it must end elsewhere. A valid step is
-    observed and judged; then the event at its end changes the walk state.
-
     method  holds the start, and the end on return
-    until   number of steps after which it also stops when the feet pass each other, or NEVER; or AT_LIFT: a walk whose
+    until   number of steps after which it also stops when the feet pass each other; NO_LIMIT; or AT_LIFT: a walk whose
             walk state is full continues until the foot that carried its last step has lifted
 
     Returns the outcome's number, or CHANGES_FORM, and the last event.
@@ -129,7 +119,6 @@ def walk_in_form(
 
 @kernel_part
 def steps_are_left(walk_state: WalkState, until: int) -> bool:
-    """Whether the walk state has room for a step, or the last step still waits for its lift."""
     return walk_state.progress.steps < walk_state.touch_time.size or (until == AT_LIFT and is_to_lift(walk_state))
 
 
@@ -143,10 +132,7 @@ def seek(target: float, event: int) -> EventSearch:
 def aim(
     search: EventSearch, walk_state: WalkState, method: Any, finder: CrossingFinder, fraction: float, event: int
 ) -> EventSearch:
-    """Decide whether the last step is valid and its event happens, or else where it is to end.
-
-    fraction  of the step, at which the event lies; above 1 without an event
-    """
+    """Decide whether the last step is valid and where the next must end; `fraction` is above 1 without an event."""
     start, end = method.clock[T_OLD], method.clock[T]
     if fraction <= 1.0:
         return approach(search, walk_state, start, end, fraction, event)
@@ -159,10 +145,7 @@ def aim(
 def approach(
     search: EventSearch, walk_state: WalkState, start: float, end: float, fraction: float, event: int
 ) -> EventSearch:
-    """Shorten the step from start to end (s) to the event in it, or accept it if the event is at its end.
-
-    It is also accepted where rounding moves the event with each attempt.
-    """
+    """Shorten the step from start to end (s) to its event, or accept it if the event, up to rounding, is at its end."""
     latest = search.latest if search.arriving else end
     refinements = search.refinements if search.arriving and event == search.event else 0
     wait = max(fraction * (end - start), EVENT_TIME)
@@ -228,7 +211,6 @@ def react(
 
 @kernel_part
 def is_hinged(system: OnGround) -> bool:
-    """Whether a hinge carries the walker, until its first step releases it."""
     return system.form.places == 0
 
 
@@ -262,10 +244,8 @@ def time_to_zero(method: Any, finder: CrossingFinder, event: int) -> float:
 
 @kernel_part
 def judge(system: OnGround, frame: Frame, t: float, walk_state: WalkState) -> int:
-    """End the walk if its flight or step is too long at time t (s); record the last time a foot was on the ground.
-
-    The event at the step's end has not changed the walk state yet: a foot that leaves there was on the ground before.
-    """
+    """End the walk if its flight or step is too long at time t (s); record the last time a foot was on the ground."""
+    # A foot that leaves at t still has ground here: the event at the step's end is applied later.
     grounded = is_hinged(system)
     for foot in range(2):
         grounded = grounded or (walk_state.has_ground[foot] != 0 and not is_above(walk_state, foot))

@@ -45,8 +45,6 @@ OF_ORDER_9: Quadrature = (
 
 @by_reference
 class ContactSamples(NamedTuple):
-    """Samples of a walk at rising times."""
-
     time_s: Any  # (samples,)
     states: Any  # (samples, 4 + 2 n) of the whole walker
     has_ground: Any  # (samples, 2)
@@ -57,7 +55,7 @@ class ContactSamples(NamedTuple):
 
     @property
     def dissipated_J(self) -> Any:
-        """Energy dissipated, (samples, 5), in the order of account.LOSSES."""
+        """Energy dissipated, (samples, 5), in the order of `energy_channels.LOSSES`."""
         return self.account[:, LOSS_ENTRIES]
 
     @property
@@ -111,7 +109,6 @@ def observe(
 
 @kernel_part
 def record_samples(observer: ContactObserver, method: Any, system: OnGround, walk_state: WalkState) -> None:
-    """Record the samples within the last step."""
     t, h = method.clock[T_OLD], method.clock[T] - method.clock[T_OLD]
     samples, index = observer.samples, observer.tally.recorded
     y = vector(OF_STATES)[: method.y.size]
@@ -145,7 +142,6 @@ def balance(observer: ContactObserver, method: Any, system: OnGround) -> None:
 
 @kernel_part
 def note_torque(observer: ContactObserver, method: Any, system: OnGround, finder: CrossingFinder) -> None:
-    """Record the work of the hip's constant torque in the last step."""
     torque = hinge_law(system.form, HIP_ROW).torque
     if torque != 0.0:
         given = torque_work(torque, method, system, finder, LEGS_TURN, 1.0)
@@ -176,14 +172,12 @@ def note_depth(observer: ContactObserver, method: Any, system: OnGround, finder:
 
 @kernel_part
 def observe_edge(observer: ContactObserver, system: OnGround, foot: int, y: Any) -> None:
-    """Record the energy lost as a foot leaves its pad: that of the spring under it."""
     if system.has_ground[foot] != 0 and observer.track_energy:
         observer.account[EDGES] += foot_elastic_energy(system, foot, y)
 
 
 @callable_kernel
 def end_energy(system: OnGround, y: Any) -> float:
-    """Compute the mechanical energy (J) at the end of the last step."""
     return total_energy(system, y)
 
 
@@ -237,11 +231,9 @@ def add_work(
 
 @kernel_part
 def foot_work(system: OnGround, states: Any, weights: tuple[float, ...], foot: int, span: float) -> tuple[float, float]:
-    """Compute the work (J) lost under a foot with ground.
-
-    Where the force law has released the foot, the loss is the spring's energy: its powers of the penetration are badly
-    integrated by quadrature, and steps end at the release.
-    """
+    """Compute the energies (J) lost to damping and friction under a foot with ground."""
+    # Where the force law has released the foot, the loss is the spring's energy: quadrature integrates its powers of
+    # the penetration badly, and steps end at the release.
     damping, friction, let_go, last = 0.0, 0.0, True, len(weights) - 1
     for i in range(1, len(weights)):
         power = dissipated_power(system, foot, states[i])

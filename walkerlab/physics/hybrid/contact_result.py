@@ -50,8 +50,6 @@ FINEST_RTOL = 1e-10  # rtol below which rounding, not the tolerance, determines 
 
 @dataclass(frozen=True)
 class Stopped:
-    """Outcome, time, state and cost at the end of a walk."""
-
     outcome: Outcome
     time_s: float
     state: State  # of the free walker with all bodies
@@ -66,10 +64,7 @@ def sample_energies(walker: ContactWalker, samples: ContactSamples) -> Floats:
 
 
 def sample_feet(walker: ContactWalker, samples: ContactSamples) -> Floats:
-    """Compute position along the slope and height over the ground (m), normal force and friction (N), slip (m/s).
-
-    Returns (samples, foot, 5).
-    """
+    """Compute (samples, foot, 5): position along the slope, height (m), normal force, friction (N) and slip (m/s)."""
     feet = np.zeros((samples.time_s.size, 2, 5))
     fill_feet(walker, samples, feet)
     return feet
@@ -77,10 +72,7 @@ def sample_feet(walker: ContactWalker, samples: ContactSamples) -> Floats:
 
 @kernel
 def fill_energies(system: OnGround, samples: ContactSamples, energies: Any) -> None:
-    """Write `sample_energies` into `energies`.
-
-    system  free, with all bodies; its ground and knees are set to those of each sample
-    """
+    """Write `sample_energies`; `system` is free with all bodies, and its ground and knees are set to each sample's."""
     for i in range(samples.states.shape[0]):
         for k in range(2):
             system.has_ground[k], system.knee[k] = samples.has_ground[i, k], samples.knees[i, k]
@@ -92,7 +84,6 @@ def fill_energies(system: OnGround, samples: ContactSamples, energies: Any) -> N
 
 @kernel
 def fill_feet(walker: ContactWalker, samples: ContactSamples, feet: Any) -> None:
-    """Write `sample_feet` into an array of zeros."""
     for i in range(samples.states.shape[0]):
         motions = feet_motion(walker.forms[0, 0], samples.states[i])
         for foot in range(2):
@@ -145,12 +136,7 @@ def new_observer(
     track_energy: bool = True,
     directions: int = 0,
 ) -> ContactObserver:
-    """Create an observer of a walk from state y.
-
-    times         (samples,) rising, in s; no samples without them
-    track_energy  whether to compute the energy balance
-    directions    number of directions of the start to carry along as the tangent
-    """
+    """Create an observer of a walk from y, with samples at rising `times` (s) and a tangent along some `directions`."""
     times = np.zeros(0) if times is None else times
     samples = times.size
     tally = new_record(CONTACT_TALLY)
@@ -187,13 +173,10 @@ def walk_on(
     until: int = NO_LIMIT,
     hinged: bool = False,
 ) -> Stopped:
-    """Continue a walk from a walk state, changing the form as knees lock and are released.
+    """Continue a walk from a state of the free walker, changing the form as knees lock and are released.
 
-    start   state of the free walker
-    until   as in `walk_in_form`
-    hinged  whether the stance foot is hinged until the first step is taken, which then ends the walk
-
-    Returns the end of the walk, with `SOLVER_FAILED` also where the energy balance does not close.
+    A `hinged` walk ends with its first step; `until` as in `walk_in_form`. The outcome is `SOLVER_FAILED` if the energy
+    balance does not close.
     """
     walk = walk_in_form if tolerances.compiled else uncompiled(walk_in_form)
     system = in_walk(walker, walk_state, hinged)
@@ -232,15 +215,12 @@ def walk_contact(
     steps: int,
     sampling: float | Floats | None,
 ) -> ContactWalkResult:
-    """Walk up to `steps` steps.
+    """Walk up to `steps` steps, the first carried by foot `stance`, which is hinged if `hinged`.
 
-    hinged      whether the stance foot of the first step is hinged
-    stance      the foot that carries the first step
-    start       state of the free walker (4 + 2 n); its angles and angular velocities start a hinged one
-    tolerances  settings of the integration
-    sampling    time between samples, their times (samples,), rising, in s, or None for no samples
+    start     state of the free walker (4 + 2 n); its angles and angular velocities start a hinged one
+    sampling  time between samples, their times (samples,), rising, in s, or None for no samples
 
-    The room for samples doubles until the whole walk fits. A start with the hip already too low is rejected.
+    A start with the hip already too low is rejected.
     """
     frame, s, c = ground.frame, vector(OF_BODIES), vector(OF_BODIES)
     sines_cosines(walker.whole, start, s, c)
@@ -268,10 +248,8 @@ def run_parts(
     observer: ContactObserver,
     walk_state: WalkState,
 ) -> Stopped:
-    """Take the hinged step, if there is one, then the free walk.
-
-    A walk that completed all its steps continues, unobserved, until the foot that carried the last one has lifted.
-    """
+    """Take the hinged step, if there is one, then the free walk."""
+    # A walk that completed all steps continues, unobserved, until the foot that carried the last one has lifted.
     y, spent = start, np.zeros(4, np.int64)
     if hinged:
         first = walk_on(walker, ground, tolerances, walk_state, observer, start, hinged=True)
@@ -304,20 +282,14 @@ def release_hinge(walker: ContactWalker, walk_state: WalkState, y: State) -> Non
 
 
 def explained_residual(observer: ContactObserver, tolerances: Tolerances) -> float:
-    """Compute the largest residual of the energy balance (J) that the tolerance explains; a larger one is a fault.
-
-    It is UNEXPLAINED times rtol times energy and work exchanged: the energy at the start, kinetic, elastic, and
-    potential over the slope below, plus all energy dissipated since.
-    """
+    """Compute the largest residual of the energy balance (J) that the tolerance explains; a larger one is a fault."""
     exchanged = observer.tally.energy_below + np.abs(observer.account[:TORQUE]).sum()
     return float(UNEXPLAINED * max(tolerances.rtol, FINEST_RTOL) * exchanged)
 
 
 def check_balance(ended: int, observer: ContactObserver, tolerances: Tolerances) -> Outcome:
-    """Return the outcome of a walk, or `SOLVER_FAILED` if its energy balance does not close.
-
-    This detects faults and estimates no error: a walk may be off by far more than its balance.
-    """
+    """Return the outcome of a walk, or `SOLVER_FAILED` if its energy balance does not close."""
+    # This detects faults and estimates no error: a walk may be off by far more than its balance.
     closes = observer.tally.residual <= explained_residual(observer, tolerances)
     return Outcome(ended) if closes else Outcome.SOLVER_FAILED
 

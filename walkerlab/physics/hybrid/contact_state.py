@@ -62,7 +62,6 @@ class WalkState(NamedTuple):
 
 
 def new_walk_state(walker: ContactWalker, terrain: Terrain, stance: int, steps: int, y: State) -> WalkState:
-    """Create the walk state for `steps` steps from y with both feet on the ground."""
     feet = feet_motion(walker.whole, y)
     cells = np.array([cell_at(terrain, foot, feet[foot].along) for foot in range(2)], np.int64)
     has_ground = np.zeros(2, np.int8)
@@ -107,7 +106,7 @@ def initial_sides(
     walker: ContactWalker, feet: tuple[FootMotion, FootMotion], stance: int, y: State
 ) -> tuple[NDArray[np.int8], NDArray[np.int8]]:
     """Return the side of zero of every event function at the start, and which are zero to rounding."""
-    # A function that is zero takes the side towards which its velocity points. If that is zero, too, a foot on the
+    # A function that is zero takes the side towards which its velocity points. If that is also zero, a foot on the
     # ground counts as below it, and of feet side by side the stance foot as the one ahead.
     sides, at_zero = np.zeros(EVENT_FUNCTIONS, np.int8), np.zeros(EVENT_FUNCTIONS, np.int8)
     sides[[FALL, SLIDE]] = 1
@@ -136,7 +135,7 @@ def zero_side(value_and_rate: tuple[float, float], scales: tuple[float, float], 
 @kernel_part
 def material_along(form: GroundModel, foot: int, along: float, y: Any) -> float:
     """Compute where a foot at `along` (m) would be without rolling; its change is slip."""
-    # The velocity of the material point at the bottom of the ball is that of the contact point plus radius times
+    # The velocity of the material point at the bottom of the ball is the contact point's plus radius times
     # angular velocity, so its displacement is the contact point's plus radius times the change of the angle.
     for k in range(form.bodies):
         along += form.rolling[foot, k] * y[form.places + k]

@@ -51,7 +51,7 @@ from walkerlab.physics.kernels import by_type_or_default, kernel_part
 
 STEP_AHEAD = 0.25  # of the stride measure: least distance ahead at which a step lands
 AT_SURFACE = 1e-11  # m: distance from the surface within the error of an event's time
-TRIP = 0.25  # of the stride measure: distance from its stance beyond which a touch is a trip
+TRIP = 0.25  # share of the stride measure; a touch further than this from the last stance is a trip
 
 
 @kernel_part
@@ -161,7 +161,7 @@ def set_foothold(
 
 @kernel_part
 def find_ground(terrain: Terrain, walk_state: WalkState, foot: int, above: bool) -> None:
-    """Update whether there is ground under a foot above the surface, as the feet change places or roles."""
+    """Update whether there is ground below a foot in the air, after the feet change places or roles."""
     if above:
         stands = foot == walk_state.progress.stance
         has_ground = has_ground_in_air(terrain, walk_state.has_ground[foot] != 0, stands, is_ahead(walk_state, foot))

@@ -23,11 +23,7 @@ class TorqueWork(NamedTuple):
 
 @kernel_part
 def torque_work(torque: float, method: Any, system: Any, finder: CrossingFinder, row: int, until: float) -> TorqueWork:
-    """Compute the work of the torque (N m) in the last step up to a fraction of it.
-
-    finder  holds the states of the step; overwritten
-    row     unused row of the finder's values, for the rate between the legs
-    """
+    """Compute the work of the torque (N m) in the last step up to a fraction of it; the finder is overwritten."""
     sample_rates(system, finder, row)
     y = finder.states[0, : method.y.size]
     first, _ = legs_apart(system, y)

@@ -1,7 +1,4 @@
-"""Walks of the rigid model with their records: heel strikes, samples, and violations of the model's assumptions.
-
-Long walks are taken in blocks of a few dozen steps, so that memory is needed for results only.
-"""
+"""Walks of the rigid model with their records, taken in blocks of a few dozen steps to save memory."""
 
 import math
 from collections.abc import Callable
@@ -111,10 +108,8 @@ def take_walk(
     heights: Array | None = None,
     step_length: float | None = None,
 ) -> RigidWalkResult:
-    """Walk `steps` steps from `start`, or until the walk ends.
+    """Walk `steps` steps from `start`, or until the walk ends, with a limited budget of evaluations per step.
 
-    tolerances   settings of the integration; the evaluation budget per step is limited as well
-    sampled      whether to record states in time
     advance      called with the number of further steps taken
     heights      (steps + 1,) m, of the footholds over the slope, the start's first; None for even ground
     step_length  m, of the gait; by default the start's foot distance. On uneven ground a foot that lands less than a
@@ -204,11 +199,9 @@ class Recorder:
         return float((self.tally.energy_integral - zeros @ durations) / float(self.tally.duration))
 
     def _driven_work(self, before: Array, after: Array, gravity: float) -> tuple[DrivenWork, float]:
-        """Compute the works over the completed steps, given that of gravity, and the energy residual (J).
-
-        A push-off does its work before the strike, which loses part of it. With damping, the balance determines the
-        damper's work, which the states before and after strikes do not give, so the residual is zero.
-        """
+        """Compute the works over the completed steps, given that of gravity, and the energy residual (J)."""
+        # A push-off does its work before the strike, which loses part of it. With damping, the balance determines the
+        # damper's work, which the states before and after strikes do not give, so the residual is zero.
         walker, rows = self.walker, range(len(self.walker.hinges))
         laws = [hinge_law(walker, row) for row in rows]
         starts = np.vstack((self.start, after[:-1])) if self.steps else before
@@ -288,7 +281,6 @@ def with_scaled_rates(walker: RigidModel, state: State, swing: float, stance: fl
 
 
 def far_from(times: Array, events: Array, distance: float) -> NDArray[np.bool_]:
-    """Whether each of `times` is further than `distance` from all of the rising `events`."""
     if events.size == 0:
         return np.ones(times.size, np.bool_)
     behind = np.searchsorted(events, times).clip(max=events.size - 1)

@@ -140,7 +140,6 @@ class LaneMemory(NamedTuple):
 
 
 def new_lane_memory(rtol: float, atol: float) -> LaneMemory:
-    """Create the workspace for batches at these tolerances."""
     teach_arithmetic()
     return LaneMemory(
         rtol, atol, np.zeros((LANE_ROWS, WIDTH)), np.full((2, WIDTH), NOBODY, np.int64), new_crossing_finder(5)
@@ -148,8 +147,6 @@ def new_lane_memory(rtol: float, atol: float) -> LaneMemory:
 
 
 class Fates(NamedTuple):
-    """Outcomes of the walks of a batch; written."""
-
     outcome: Any  # (n,)
     steps: Any  # (n,) taken
 
@@ -160,19 +157,12 @@ def new_fates(n: int) -> Fates:
 
 @by_type
 def record_strike(observer: Any, walk: int, step: int, t: float, y: Any) -> int:
-    """Record a heel strike at time t (s) with state y after it; returns GOES_ON or the outcome's number.
-
-    walk  index of the start
-    step  from 0
-    """
+    """Record a heel strike at time t (s) with state y after it; return GOES_ON or the outcome's number."""
 
 
 @kernel
 def walk_lanes(walker: TwoLegs, memory: LaneMemory, observer: Any, starts: Any, fates: Fates) -> None:
-    """Walk from every start, until the observer ends the walk or it ends by itself.
-
-    starts  (n, 4) states, both feet on the slope
-    """
+    """Walk from starts (n, 4) with both feet on the slope, until the observer ends each walk or it ends by itself."""
     slots = memory.slots
     waiting = 0
     for lane in range(WIDTH):
@@ -211,7 +201,6 @@ def refill(walker: TwoLegs, memory: LaneMemory, starts: Any, fates: Fates, lane:
 
 @kernel_part
 def begin_swing(walker: TwoLegs, memory: LaneMemory, lane: int, t: float, y: State, h: float) -> None:
-    """Start a swing of a lane from state y at time t (s), with a step h."""
     rows = memory.rows
     rate = derivative(walker, t, y)
     for i in range(4):
@@ -233,10 +222,9 @@ def load_state(rows: Any, row: int) -> tuple[Lanes, Lanes, Lanes, Lanes]:
 
 @kernel_part
 def try_steps(walker: TwoLegs, memory: LaneMemory) -> bool:
-    """Try a step in every lane; returns whether some lane needs attention. Where no event is possible, accept the step.
+    """Try a step in every lane and accept it where no event is possible; return whether some lane needs attention.
 
-    A lane needs attention if its step may hold an event or arrives at one, if its time is over, or if its steps are too
-    many or too small.
+    It does if its step may hold or has reached an event, if its time is over, or if steps are too many or too small.
     """
     rows = memory.rows
     y, k1 = load_state(rows, START_STATE), load_state(rows, START_RATE)

@@ -21,10 +21,7 @@ def energies(walker: RigidModel, states: Array) -> Array:
 
 
 def reactions(walker: RigidModel, states: Array, bent: NDArray[np.bool_] | None = None) -> Array:
-    """Compute the ground force on the stance foot (samples, 2) in N: along the slope, and normal to it.
-
-    bent  (samples,) whether the swing leg's knee is free; None if it never is
-    """
+    """Compute the ground force on the stance foot (samples, 2) in N: along the slope, and normal to it."""
     out = np.zeros((len(states), 2))
     free = np.zeros(len(states), np.bool_) if bent is None else bent
     fill_reactions(walker, np.ascontiguousarray(states), free, out)
@@ -33,14 +30,12 @@ def reactions(walker: RigidModel, states: Array, bent: NDArray[np.bool_] | None 
 
 @kernel
 def fill_energies(walker: RigidModel, states: Any, out: Any) -> None:
-    """Write the energies of `states` (samples, 2 n) into `out` (samples, 2)."""
     for i in range(states.shape[0]):
         out[i, 0], out[i, 1] = rigid_model.energies(walker, states[i])
 
 
 @kernel
 def fill_reactions(walker: RigidModel, states: Any, bent: Any, out: Any) -> None:
-    """Write the ground's forces at `states` (samples, 2 n), where the swing knee is `bent` or not, into `out`."""
     for i in range(states.shape[0]):
         out[i, 0], out[i, 1] = ground_reaction(Mode(walker, BENT if bent[i] else STRAIGHT), states[i])
 
@@ -56,7 +51,7 @@ class Places:
 
 
 class FootholdsOfWalk(NamedTuple):
-    """Footholds of a walk, that of the start first."""
+    """Footholds of a walk, beginning with the start's."""
 
     along_m: Array  # (steps + 1,) along the slope
     height_m: Array  # (steps + 1,) over it
@@ -75,12 +70,7 @@ def places(
     angle: Array,
     step: NDArray[np.int64],
 ) -> Places:
-    """Compute the points of the walker.
-
-    knee_m  the knee in its thigh's frame; None without knees
-    angle   (samples, n) rad from the vertical, swing leg first
-    step    (samples,) index of the step, and of the stance foot's foothold
-    """
+    """Compute the walker's points at angles (samples, n) in rad, swing leg first; `knee_m` is in the thigh's frame."""
     psi = angle + walker.slope
     rolled = -walker.radius * (angle[:, STANCE] - footholds.set_down_rad[step])
     contact = np.column_stack((footholds.along_m[step] + rolled, footholds.height_m[step]))

@@ -83,10 +83,7 @@ def observe_start(observer: Observer, mode: Mode, y: Any) -> None:
 
 @kernel_part
 def observe_strike(observer: Observer, mode: Mode, heel: bool, before: Any, after: Any) -> None:
-    """Record the energy lost in a knee or heel strike and the impulse on the new stance foot.
-
-    The impulse is the change of momentum without the push-off's part. A heel strike ends the current step.
-    """
+    """Record a strike's energy loss and its impulse on the new stance foot, without the push-off's impulse."""
     if observer.watching:
         model, tally = mode.model, observer.tally[()]
         along, normal = momentum(model, before)
@@ -109,10 +106,7 @@ def observe_strike(observer: Observer, mode: Mode, heel: bool, before: Any, afte
 
 @kernel_part
 def assumptions(mode: Mode, y: Any) -> tuple[float, float, float]:
-    """Measures of the model's assumptions (section 3.1 of the paper); each is worst where it is largest.
-
-    Pull of the ground (N), friction ratio where the ground pushes, depth of the swing foot (m).
-    """
+    """Return pull of the ground (N), friction ratio and depth of the swing foot (m): see section 3.1 of the paper."""
     along, normal = ground_reaction(mode, y)
     ratio = abs(along) / normal if normal > 0.0 else 0.0
     return -normal, ratio, -swing_foot(mode.model, y)[0]
@@ -120,7 +114,6 @@ def assumptions(mode: Mode, y: Any) -> tuple[float, float, float]:
 
 @kernel_part
 def assumptions_at(method: Any, mode: Mode, fraction: float) -> tuple[float, float, float]:
-    """`assumptions` at a fraction of the last step."""
     y = vector(mode.model.zero_state)
     interpolate(method, mode, fraction, y)
     return assumptions(mode, y)
@@ -128,7 +121,6 @@ def assumptions_at(method: Any, mode: Mode, fraction: float) -> tuple[float, flo
 
 @kernel_part
 def keep_worst(tally: Any, measures: tuple[float, float, float]) -> None:
-    """Update the extremes with the measures of `assumptions`."""
     tally.min_normal_force = min(tally.min_normal_force, -measures[0])
     tally.max_friction_ratio = max(tally.max_friction_ratio, measures[1])
     tally.max_scuff_depth = max(tally.max_scuff_depth, measures[2])
@@ -136,7 +128,6 @@ def keep_worst(tally: Any, measures: tuple[float, float, float]) -> None:
 
 @kernel_part
 def record_extremes(tally: Any, mode: Mode, y: Any) -> tuple[float, float, float]:
-    """Update the extremes and the energies with state y; returns its `assumptions`."""
     measures = assumptions(mode, y)
     keep_worst(tally, measures)
     kinetic, potential = energies(mode.model, y)
@@ -158,10 +149,7 @@ def vertex(before: float, middle: float, after: float) -> float:
 def ascend_to_worst(
     tally: Any, method: Any, mode: Mode, measure: int, middle: float, spacing: float, last: float
 ) -> None:
-    """Follow a measure of `assumptions` to its maximum near fraction `middle` of the step, by ever narrower parabolas.
-
-    last  the fractions stay below it
-    """
+    """Follow a measure to its maximum near fraction `middle` of the step, below `last`, by ever narrower parabolas."""
     for _ in range(PEAK_REFINEMENTS):
         before = assumptions_at(method, mode, middle - spacing)
         centre = assumptions_at(method, mode, middle)
@@ -179,12 +167,7 @@ def ascend_to_worst(
 def observe(
     observer: Observer, method: Any, mode: Mode, finder: CrossingFinder, row: int, fraction: float, step: int
 ) -> None:
-    """Record the last integration step up to `fraction` of it; its dense output is ready.
-
-    Keeps the samples in it; takes the extremes and the energy's integral from its eighths.
-
-    row  a free row of the finder's values
-    """
+    """Record the last step up to `fraction`: its samples, extremes and energy; `row` of the finder is overwritten."""
     tally = observer.tally[()]
     torque = hinge_law(mode.model, HIP_ROW).torque
     if torque != 0.0:

@@ -1,8 +1,6 @@
 """Walking with the rigid model: swing phases that end in heel strikes, with or without an observer.
 
-A leg with a knee swings bent until the knee strikes, then straight. Tangent columns may follow the state: they obey the
-variational equations and jump at the events (saltation). Compiled as a whole for the project's own methods; the same
-source runs in Python with a library's integrator.
+Tangent columns may follow the state: they obey the variational equations and jump at the events (saltation).
 """
 
 import math
@@ -90,11 +88,7 @@ def hip_above_fall(model: RigidModel, y: Any) -> float:
 
 @kernel_part
 def may_end(system: Mode, method: Any, at_start: bool) -> bool:
-    """Whether the last step may hold an event: false through most of a swing.
-
-    A heel strike needs the swing leg ahead of the stance leg and its foot to come down onto the slope; a knee strike
-    needs the knee to stretch. The test uses the event functions' values and rates at the step's ends.
-    """
+    """Whether the last step may hold an event, from values and rates at its ends: false through most of a swing."""
     model, old, y, h = system.model, method.y_old, method.y, method.clock[T] - method.clock[T_OLD]
     if hip_above_fall(model, y) < 0.0:
         return True
@@ -111,12 +105,10 @@ def may_end(system: Mode, method: Any, at_start: bool) -> bool:
 
 @kernel_part
 def foot_function(system: Mode, y: Any, turn: Any) -> tuple[float, float, float, float]:
-    """Compute the heel strike's event function, a function that is positive with the swing foot ahead, and both rates.
+    """Compute the heel strike's event function, one that is positive with the swing foot ahead, and the rates of both.
 
     For a straight leg over even ground both are linear in the angles, so that scuffing near mid-swing is no zero.
-    Otherwise they are the foot's height over its next foothold, and its distance ahead.
-
-    turn  (n,) or longer: angular velocities, or a column
+    Otherwise they are the foot's height over its next foothold and its distance ahead. `turn` (n,): rates or a column.
     """
     model, swing, stance = system.model, turn[SWING], turn[STANCE]
     if is_bent(system) or system.rise != 0.0:
@@ -141,7 +133,6 @@ def hull(start: float, start_rate: float, end: float, end_rate: float, zero_at_s
 
 @kernel_part
 def sample_events(system: Mode, y: Any, node: int, finder: CrossingFinder) -> None:
-    """Evaluate the event functions at one node of a step, where the state is y."""
     foot = foot_function(system, y, y[len(system.model.arm_x) :])
     finder.values[HEEL_STRIKE, node], finder.values[AHEAD, node] = foot[0], foot[1]
     finder.values[HIP_FALL, node] = hip_above_fall(system.model, y)
@@ -168,14 +159,10 @@ def events_in_step(system: Mode, finder: CrossingFinder, at_start: bool) -> tupl
 def take_step(
     model: RigidModel, method: Any, finder: CrossingFinder, observer: Any, t: float, y: Any, step: int, strikes: Any
 ) -> tuple[int, float]:
-    """Take one step from time t (s): a swing and its heel strike.
-
-    y        state at the start, with tangent columns if the method has room for them; overwritten with that after the
-             strike
-    strikes  HeelStrikes of the walk, with the footholds; the time of this step's knee strike is written
+    """Take one step from time t (s): a swing and its heel strike, after which y holds the state and tangent columns.
 
     Returns WALKED and the time of the heel strike, with the state before it in the method; or another outcome and its
-    time.
+    time. The time of the knee strike is written into `strikes`.
     """
     latest = t + LONGEST_SWING * math.sqrt(model.leg_length / model.gravity)
     phase = BENT if model.shank != NO_SHANK else STRAIGHT
@@ -199,10 +186,8 @@ def take_step(
 def swing_phase(
     method: Any, system: Mode, finder: CrossingFinder, observer: Any, t: float, y: Any, latest: float, step: int
 ) -> int:
-    """Integrate up to the strike that ends a phase, of a bent knee or else of the heel, or to the time `latest` (s).
-
-    A phase starts on the strike that ended the previous one; that zero is ignored.
-    """
+    """Integrate up to the strike of knee or heel that ends a phase, or to the time `latest` (s)."""
+    # A phase starts on the strike that ended the previous one; that zero is ignored.
     limit, coming = latest, False
     at_start = is_bent(system) or system.model.shank == NO_SHANK
     begin(method, system, t, y, method.clock[H_NEXT])
@@ -247,14 +232,11 @@ def event_value(system: Mode, y: Any, turn: Any) -> tuple[float, float]:
 
 @kernel_part
 def pass_event(method: Any, system: Mode, new: Any, strikes: Any, step: int) -> float:
-    """Apply the strike at the end of a phase; returns its time (s).
+    """Apply the strike at the end of a phase, after a last Newton correction of its time; return that time (s).
 
-    A last Newton correction of the time comes first; the method then holds the state just before the strike. A column
-    Phi also changes by the strike's shift in time (saltation): J (Phi + f wait), minus f+ wait after a knee strike;
-    after a heel strike it stays on the section.
-
-    new      state after the strike, and columns; written
-    strikes  HeelStrikes; the columns' waits are written
+    The method then holds the state before the strike, `new` the state after it, and `strikes` the columns' waits. A
+    column Phi also moves with the strike's time (saltation): J (Phi + f wait), minus f+ wait after a knee strike. After
+    a heel strike it stays on the section.
     """
     model, y, waits = system.model, method.y, strikes.waits
     n, knee = len(model.arm_x), is_bent(system)
@@ -306,11 +288,7 @@ class HeelStrikes(NamedTuple):
 def new_heel_strikes(
     steps: int, m: int, kneed: bool = True, rise: Any = None, nearest: float = 0.0, columns: int = 0
 ) -> HeelStrikes:
-    """Create room for heel strikes with states of m values, and for knee strikes of a walker with knees.
-
-    rise, nearest  as in `HeelStrikes`; even ground by default
-    columns        number of tangent columns among the m values; they leave the ground as it is
-    """
+    """Create room for heel strikes with states of m values, tangent columns included; fields as in `HeelStrikes`."""
     before, after = np.zeros((2, steps, m))
     even, knee_time = np.zeros(steps + 1) if rise is None else rise, np.zeros(steps if kneed else 0)
     lift, waits = np.zeros((steps + 1, columns)), np.zeros((steps, columns))
@@ -321,13 +299,10 @@ def new_heel_strikes(
 def walk(
     walker: Any, method: Any, finder: CrossingFinder, observer: Observer, y: Any, strikes: HeelStrikes
 ) -> tuple[int, int]:
-    """Walk until `strikes` is full or the walk ends.
+    """Walk until `strikes` is full or the walk ends; return the outcome's number and the number of steps taken.
 
     walker  (), a RigidModel in an array, which compiled code receives ten times faster than a tuple
-    y       (m,) state (2 n) at time 0, with tangent columns if the method has room for them; overwritten with that
-            after the last heel strike
-
-    Returns the outcome's number and the number of steps taken.
+    y       (m,) state at time 0, with tangent columns if the method has room for them; overwritten with the last one
     """
     model = walker[()]
     t = 0.0

@@ -40,18 +40,14 @@ class DrivenWork(NamedTuple):
         return {name: getattr(self, name) / steps for name in self._fields if name != "weight"}
 
     def cost_of_transport(self, distance: float) -> float:
-        """Compute the work spent divided by weight times distance (m) along the slope.
-
-        A spring returns the energy it stores, and work against gravity is already counted in that of the drives.
-        """
+        """Compute the work spent divided by weight times distance (m) along the slope."""
+        # A spring returns the energy it stores; work against gravity is already counted in that of the drives.
         return (max(0.0, self.gravity) + self.push_off + self.hip_torque_positive) / (self.weight * distance)
 
 
 def rough_heights(roughness_m: float, seed: int | tuple[int, ...], steps: int) -> Array:
-    """Draw heights (steps + 1,) in m of the footholds of rough ground, independent and normal; the start's is zero.
-
-    The first heights do not depend on the number drawn.
-    """
+    """Draw heights (steps + 1,) in m of the footholds of rough ground, independent and normal; the start's is zero."""
+    # The first heights do not depend on the number drawn.
     return np.append(0.0, np.random.default_rng(seed).normal(0.0, roughness_m, steps))
 
 
@@ -80,7 +76,6 @@ class WalkRecord:
 
     @property
     def periods_s(self) -> Array:
-        """Duration of each step from touch to touch, (steps,)."""
         return np.diff(self.touch_time_s, prepend=0.0)
 
     @property
@@ -90,7 +85,7 @@ class WalkRecord:
 
     @property
     def ground_m(self) -> Array:
-        """Heights over the slope of the footholds, that of the start first, (steps + 1,)."""
+        """Heights over the slope of the footholds, the start's first, (steps + 1,)."""
         heights = np.zeros(self.steps) if self.foothold_height_m is None else self.foothold_height_m
         return np.append(0.0, heights)
 

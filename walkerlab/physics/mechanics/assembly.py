@@ -32,10 +32,7 @@ class Tree(NamedTuple):
     arm_y: Floats
 
     def merged(self, members: Floats) -> dict[str, Any]:
-        """Return fields of a mechanism whose bodies (n) are groups of those of the tree that turn as one.
-
-        members  (bodies, n) 1 where a body belongs to a group
-        """
+        """Return fields of a mechanism of grouped bodies; members (bodies, n) is 1 where a body belongs to a group."""
         A, B = (members.T @ pairs @ members for pairs in (self.A, self.B))
         return {"A": A, "B": B, "arm_x": self.arm_x @ members, "arm_y": self.arm_y @ members, "mass": self.mass}
 

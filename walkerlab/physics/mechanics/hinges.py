@@ -77,7 +77,6 @@ def is_sprung(model: Any, row: int) -> bool:
 
 @forced_inline
 def add_hinge_torque(now: HingeTorque, body: int, other: int, r: Any) -> None:
-    """Add a hinge's torques (N m) on both bodies to r (n,)."""
     r[body] -= now.torque
     r[other] += now.torque
 

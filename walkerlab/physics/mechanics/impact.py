@@ -33,10 +33,8 @@ from walkerlab.physics.solvers.system import Floats
 
 @kernel_part
 def heel_strike(model: RigidModel, y: Any, new: Any) -> None:
-    """Write the state after the heel strike that ends in y, with the legs' roles exchanged, into `new`.
-
-    y  the state, followed by any number of columns: directions, whose images are written into `new`
-    """
+    """Write the state after the heel strike that ends in y, with the legs' roles exchanged, into `new`."""
+    # Any number of columns may follow the state: directions, whose images are written into `new`.
     strike(model, AT_STRIKE, True, y, new)
 
 
@@ -48,10 +46,7 @@ def knee_strike(model: RigidModel, y: Any, new: Any) -> None:
 
 @kernel_part
 def strike(model: RigidModel, phase: int, other_foot: bool, y: Any, new: Any) -> None:
-    """Apply a plastic impact on the constraints of E[phase].
-
-    other_foot  whether the swing foot stands afterwards; otherwise the stance foot does
-    """
+    """Apply a plastic impact on the constraints of E[phase]; with `other_foot` the swing foot stands afterwards."""
     like = model.arm_x
     n, R = len(like), model.radius
     s, c, F, U, p, M, factors = (
@@ -127,8 +122,7 @@ class Lock(NamedTuple):
 def lock(tree: RootedTree, angles: Floats, omega: Floats, turns: Floats, rates: Floats) -> Lock:
     """Project angular velocities (n,) on those E[0] allows, by the impact of `strike` without the root.
 
-    angles        (n,) rad, from the vertical
-    turns, rates  (n, columns) directions of the state before: changes of the angles and of their velocities
+    turns, rates  (n, columns) changes of the angles and of their velocities before, column by column
     """
     n = len(omega)
     s, c, F, U, p = np.zeros((5, n))
@@ -173,16 +167,12 @@ def push_off(model: RigidModel, new: Any) -> PushOffImpulse:
 
 
 def push_off_work(model: RigidModel, before: Floats) -> Floats:
-    """Compute the work (strikes,) in J of the push-offs at heel strikes, each done just before its strike.
+    """Compute the work (strikes,) in J of the push-offs from states (strikes, 2 n) just before their heel strikes.
 
     The walker is free of the ground then, its knees locked and its torso coupled: an impulse P along e does the work
     P^2 / 2 J M^-1 J', with J the velocity along e of the trailing contact point, or of the hip on the same line.
     Eliminating angular velocities from M leaves the apparent mass at the hip, m - C' I^-1 C, with moments C and inertia
-    I about it.
-
-    before  (strikes, 2 n) states just before the strikes
-
-    Source: Kuo (2002); with massless legs it is P^2 / (2 m).
+    I about it. Source: Kuo (2002); with massless legs it is P^2 / (2 m).
     """
     n, E = len(model.arm_x), model.E[STRAIGHT]
     Z = E[:, np.diag(E) != 0.0]
@@ -205,10 +195,8 @@ def push_off_work(model: RigidModel, before: Floats) -> Floats:
 
 
 def pushed_at_hip(model: RigidModel, y: Any, impulse: float) -> NDArray[np.float64]:
-    """Return the state (2 n) just after a heel strike y, changed by an impulse (N s) at the hip along the slope.
-
-    The new stance foot stays at rest. The impulse follows the release of the trailing knee, which is free.
-    """
+    """Return the state (2 n) just after a heel strike y, changed by an impulse (N s) at the hip along the slope."""
+    # The new stance foot stays at rest. The impulse follows the release of the trailing knee, which is free.
     n, new, phase = len(model.arm_x), np.array(y, float), BENT if model.kneed else STRAIGHT
     s, c, F, U, p = np.zeros((5, n))
     M = np.zeros((n, n))
@@ -235,12 +223,7 @@ class Constraints(NamedTuple):
 def project(
     model: Any, constraints: Constraints, omega: Any, along: float, upward: float, twist: float, p: Any
 ) -> None:
-    """Write the velocities after a plastic impact on constraints into p (n,).
-
-    model                 a tree of either model
-    omega, along, upward  (n,) rad/s and m/s, velocities before of the bodies and of the root
-    twist                 N m s, an impulse on the stance leg
-    """
+    """Write into p (n,) the velocities after a plastic impact, with an impulse `twist` (N m s) on the stance leg."""
     momenta(model, constraints.M, constraints.F, constraints.U, omega, along, upward, p)
     p[STANCE] += twist
     solve_linked(model, constraints.phase, constraints.factors, p)
@@ -260,10 +243,8 @@ def project_change(
 
 @forced_inline
 def momenta(model: Any, M: Any, F: Any, U: Any, omega: Any, along: float, upward: float, p: Any) -> None:
-    """Write Z' M u into p (n,), with the angular velocities omega (n,).
-
-    M is M' of rigid_model.py, so the rolling part of the angular velocities is subtracted again.
-    """
+    """Write Z' M u into p (n,), with the angular velocities omega (n,)."""
+    # M is M' of rigid_model.py, so the rolling part of the angular velocities is subtracted again.
     n, R = len(model.arm_x), model.radius
     sliding = along + R * omega[STANCE]
     for k in range(n):
@@ -276,10 +257,7 @@ def momenta(model: Any, M: Any, F: Any, U: Any, omega: Any, along: float, upward
 
 @forced_inline
 def mass_change(model: Any, s: Any, c: Any, turn: Any, jump: Any, along: float, upward: float, p: Any) -> None:
-    """Write Z' dM w into p (n,): the change of the mass matrix with the angles, times a jump w of the velocities.
-
-    turn  (n,) changes of the angles
-    """
+    """Write Z' dM w into p (n,): dM changes the mass matrix as the angles change by `turn`; w is a velocity jump."""
     n = len(model.arm_x)
     F, U = vector(model.arm_x), vector(model.arm_x)
     projections(model.arm_x, model.arm_y, n, s, c, F, U)

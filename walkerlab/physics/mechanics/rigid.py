@@ -16,7 +16,7 @@ ALIKE = 1e-12  # relative difference up to which two legs count as equal
 
 @dataclass(frozen=True)
 class BodyPlaces:
-    """Assignment of an assembly's bodies to those of the rigid model, whose stance leg stays straight."""
+    """Places of an assembly's bodies in the rigid model, whose stance leg stays straight."""
 
     names: tuple[str, ...]  # of the angles, without the prefix 'theta_'
     members: Floats  # (bodies, n) 1 where a body belongs to a place
@@ -32,9 +32,8 @@ def standing(assembly: Assembly, gravity: float, slope: float, knee_locked_at_st
 def on_level_ground(assembly: Assembly, gravity: float, knee_locked_at_strike: bool) -> RigidModel:
     """Build the rigid model of an assembly; gravity in m/s^2.
 
-    knee_locked_at_strike  whether the trailing knee is rigid during the heel strike and released just after it
-
-    Raises ValueError, with a message for the user, for parts that are not a walker with two equal legs.
+    A trailing knee that is locked at the heel strike is released just after it. Raises ValueError, with a message for
+    the user, for parts that are not a walker with two equal legs.
     """
     check_equal_legs(assembly)
     hip = find_hip(assembly)

@@ -6,11 +6,8 @@ is a hinge. With M, r, F and U of tree.py and s the stance leg:
     M'_kl = M_kl + R (U_k d_ls + U_l d_ks) + m R^2 d_ks d_ls
     r'_k = r_k - d_ks R (sum over l of omega_l^2 F_l + m g_along)
 
-Bodies that follow others (a locked shank its thigh, a torso the bisector of the legs) are a reduction theta = E z with
-a constant E, which turns M' alpha = r' into E' M' E dz' = E' r'.
-
 Body 0 is the swing leg (its thigh), body 1 the stance leg, which stays straight; then the swing leg's shank, then
-bodies of both legs.
+bodies of both legs. Bodies that follow others are reduced as in links.py.
 """
 
 import math
@@ -51,10 +48,9 @@ NO_SHANK = -1
 
 @tree.fast_fields
 class RigidModel(tree.Mechanism):  # type: ignore[misc]  # as its base
-    """Constants of the rigid model, SI: a structured scalar, for n bodies by its type.
+    """Constants of the rigid model, SI: a structured scalar, for n bodies by its type."""
 
-    E has three reductions: BENT, STRAIGHT, AT_STRIKE.
-    """
+    # E has three reductions: BENT, STRAIGHT, AT_STRIKE.
 
     foot_x: Floats  # (n,) m, levers from the stance foot's centre to the swing foot's, body by body
     foot_y: Floats
@@ -120,17 +116,12 @@ def new_rigid_model(n: int, **fields: Any) -> RigidModel:
 
 
 def on_slope(model: RigidModel, slope: float) -> RigidModel:
-    """Return the same walker on another slope (rad)."""
     along, down = model.gravity * math.sin(slope), model.gravity * math.cos(slope)
     return model.changed(slope=slope, gravity_along=along, gravity_down=down)
 
 
 class Mode(NamedTuple):
-    """The walker between events, alone or with variational columns.
-
-    Its state (2 n,) consists of the bodies' angles and angular velocities. Columns (2 n,) of the variational equations
-    follow it, as many as the method's state has room for.
-    """
+    """The walker between events: its state (2 n,), then as many variational columns as the method has room for."""
 
     model: RigidModel
     phase: int  # BENT or STRAIGHT
@@ -186,11 +177,8 @@ def legs_apart_standing(system: Mode, y: Any) -> tuple[float, float]:
 
 @forced_inline
 def add_unpaired_torque(model: RigidModel, s: Any, c: Any, omega: Any, r: Any) -> None:
-    """Add a torque (N m) on the stance leg, proportional to the swing leg's squared rate, without a counterpart.
-
-    The centrifugal torque unpaired sin(theta_1 - theta_2) omega_1^2 does not act on the swing leg, so it does not
-    conserve energy. Walkers with Lagrange's equations do not have it.
-    """
+    """Add the torque (N m) unpaired sin(theta_1 - theta_2) omega_1^2 on the stance leg."""
+    # Without a reaction on the swing leg it does not conserve energy. Walkers with Lagrange's equations lack it.
     if model.unpaired != 0.0:
         r[STANCE] += model.unpaired * omega[SWING] * omega[SWING] * (s[SWING] * c[STANCE] - c[SWING] * s[STANCE])
 
@@ -313,10 +301,8 @@ def momentum(model: RigidModel, y: Any) -> tuple[float, float]:
 
 @kernel_part
 def energies(model: RigidModel, y: Any) -> tuple[float, float]:
-    """Compute kinetic and potential energy (J), the latter from the contact point with the leg normal to the slope.
-
-    The potential energy includes gravity and the springs at the hinges.
-    """
+    """Compute kinetic and potential energy (J), the latter of gravity and of the springs at the hinges."""
+    # Heights are measured from the contact point with the leg normal to the slope.
     n = len(model.arm_x)
     s, c, F, U, r, M = (
         vector(model.arm_x), vector(model.arm_x), vector(model.arm_x), vector(model.arm_x), vector(model.arm_x),
@@ -331,10 +317,7 @@ def energies(model: RigidModel, y: Any) -> tuple[float, float]:
 
 
 def energy_at_touch(model: RigidModel, touched: Any) -> Any:
-    """Compute the potential energy (J), with the zero of `energies`, of the mass at the contact point of a touch.
-
-    touched  rad, angle of the stance leg at the touch; or (...,) of several
-    """
+    """Compute the potential energy (J) of the mass at the contact point of a touch, with the zero of `energies`."""
     return model.mass * model.gravity_along * model.radius * (touched + model.slope)
 
 
@@ -366,9 +349,8 @@ def hip_height(model: RigidModel, y: Any) -> float:
 def feet_on_slope(model: Any, swing: Any, stance: Any) -> Any:
     """Compute the sum (rad) of the straight legs' angles from the slope's normal: zero with both feet on even ground.
 
-    It falls through zero at heel strike. (9-2) prints theta_1 = -theta_2, which holds only for angles from the normal.
-
-    swing, stance  rad, angles from the vertical: scalars, arrays or lanes
+    It falls through zero at heel strike. (9-2) prints theta_1 = -theta_2, which holds only for angles from the normal;
+    `swing` and `stance` are angles from the vertical, as scalars, arrays or lanes.
     """
     return swing + stance + 2.0 * (model.slope + model.lean)
 
@@ -395,7 +377,7 @@ def kinetic_energy(model: RigidModel, y: Any) -> float:
 
 
 def apply_couplings(model: RigidModel, phase: int, values: Any) -> Floats:
-    """Return values (n,) of all bodies, with the followers' computed from those of the bodies they follow."""
+    """Return values (n,) of all bodies, computing each follower's from the bodies that it follows."""
     every = np.array(values, float)
     expand(model, phase, every)
     return every

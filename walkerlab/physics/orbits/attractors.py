@@ -1,8 +1,7 @@
 """Attractors of a step map over a parameter, and their largest Lyapunov exponents.
 
-The largest Lyapunov exponent is the mean logarithmic growth per step of a tangent vector under the step map's exact
-derivative. Its uncertainty is the standard error of block means, each block several correlation times long; a walk with
-too few blocks is repeated at twice the length. The uncertainty is at least 1/steps: slower growth cannot be resolved.
+The largest Lyapunov exponent is the mean logarithmic growth per step of a tangent vector. Its uncertainty, at least
+1/steps, is the standard error of means over blocks of several correlation times; a walk with too few is repeated.
 
 Source: Benettin, Galgani, Giorgilli, Strelcyn, Meccanica 15 (1980).
 """
@@ -35,8 +34,6 @@ MAX_CLOSE_RETURNS = 4  # per period
 
 @dataclass(frozen=True, eq=False)
 class Attractor:
-    """The attractor of a walk at a value of the parameter."""
-
     value: float
     period: int  # steps after which it repeats; 0 if aperiodic
     periods_s: Floats  # (steps,) durations of steps on it
@@ -95,11 +92,8 @@ def sweep_attractor(
     steps: int,
     advance: Callable[[], None] = lambda: None,
 ) -> AttractorBranch:
-    """Follow the attractor that contains z at the first value from value to value.
-
-    If a walk from one attractor does not settle at the next value, smaller steps are tried. The value at which the
-    attractor is lost is narrowed by halving, so that it does not depend on the grid of values.
-    """
+    """Follow the attractor that contains z at the first value from value to value, until it is lost."""
+    # Halving narrows the value at which it is lost, so that it does not depend on the grid of values.
     attractors: list[Attractor] = []
     for value in values:
         settled = settle(step_map, z, float(value), transient, steps)
@@ -132,14 +126,9 @@ def leave_by_flip(step_map: StepMap, gait: Cycle, transient: int, steps: int) ->
 
 
 def largest_exponent(step_map: StepMap, z: Floats, value: float, transient: int, steps: int) -> Lyapunov | None:
-    """Return the largest Lyapunov exponent of the attractor of a walk from z; None if the walk fails.
-
-    transient  steps that turn the tangent into the direction of fastest growth
-    steps      to average over
-
-    Just beyond a flip a walk leaves the unstable gait as slowly as its tangent grows. A walk that repeats while its
-    tangent grows is therefore pushed off the gait, and one whose halves differ is continued.
-    """
+    """Return the largest Lyapunov exponent of the attractor of a walk from z; None if the walk fails."""
+    # Just beyond a flip a walk leaves the unstable gait as slowly as its tangent grows. A walk that repeats while its
+    # tangent grows is therefore pushed off the gait, and one whose halves differ is continued.
     for _ in range(MAX_WALKS):
         walk = step_map.iterate(z, value, transient + steps, np.full(z.size, 1.0 / math.sqrt(z.size)))
         if walk.outcome is not Outcome.WALKED:
@@ -160,10 +149,8 @@ def largest_exponent(step_map: StepMap, z: Floats, value: float, transient: int,
 
 
 def independent_blocks(series: Floats) -> int:
-    """Return how many blocks of several correlation times a series (n,) holds.
-
-    The correlation time sums the autocorrelation over all lags before the first that is not positive.
-    """
+    """Count the blocks of several correlation times in a series (n,)."""
+    # The correlation time sums the autocorrelation over all lags before the first that is not positive.
     off = series - series.mean()
     spectrum = np.abs(np.fft.rfft(off, 2 * off.size)) ** 2
     correlation = np.fft.irfft(spectrum)[: off.size]
@@ -184,10 +171,7 @@ def feigenbaum_ratios(flips: list[float]) -> list[float]:
 
 
 def close_returns(step_map: StepMap, attractor: Attractor, periods: Iterable[int], steps: int) -> list[Seed]:
-    """Return points of an attractor that nearly repeat after given periods, as seeds of unstable gaits.
-
-    steps  length of the walk to search
-    """
+    """Find points that nearly repeat after given periods in a walk of `steps` steps, as seeds of unstable gaits."""
     walk = step_map.iterate(attractor.last, attractor.value, steps, None)
     points, seeds = walk.points, []
     for period in periods:
@@ -204,9 +188,8 @@ def close_returns(step_map: StepMap, attractor: Attractor, periods: Iterable[int
 def settle_elsewhere(
     step_map: StepMap, attractor: Attractor, starts: int, spread: float, transient: int, generator: np.random.Generator
 ) -> list[Seed]:
-    """Return other periodic gaits that walks from scattered starts near an attractor settle on.
+    """Find other periodic gaits that walks from scattered starts near an attractor settle on.
 
-    starts  number of walks
     spread  standard deviation of the starts' coordinates, as a share of the largest coordinate
     """
     seeds: list[Seed] = []

@@ -1,8 +1,7 @@
 """Basins of attraction of the rigid walker: the attractor that each start reaches, in how many steps, or how it fails.
 
-All walks are of the similar walker of unit size, on the section just after heel strike, z = (theta_2, dtheta_1,
-dtheta_2). Attractors are found by long walks from many starts. A walk has reached an attractor once it is within a
-distance from which, as tested, every walk returns to it.
+All walks are of the unit walker, on the section just after heel strike, z = (theta_2, dtheta_1, dtheta_2). A walk has
+reached an attractor once it is within a distance from which, as tested, every walk returns to it.
 """
 
 from collections.abc import Sequence
@@ -67,8 +66,6 @@ def check_capture(observer: Capture, walk: int, step: int, t: float, y: Any) -> 
 
 @dataclass(frozen=True, eq=False)
 class PeriodicAttractor:
-    """A periodic attractor."""
-
     points: Floats  # (period, 3) on the section in the order of a walk, beginning with the smallest angle
     reach: float  # distance from which all walks return to it; zero if none was found
 
@@ -149,13 +146,8 @@ def walk_one_by_one(
 
 
 def find_attractors(walker: Walker, starts: Floats, seed: int) -> Attractors:
-    """Find the attractors of walks from section coordinates `starts` (n, 3).
-
-    The first starts walk the full length; later ones only if they do not reach an attractor known by then.
-
-    walker  the unit walker
-    seed    of the random starts around attractors
-    """
+    """Find the attractors of the unit walker's walks from section coordinates `starts` (n, 3)."""
+    # The first starts walk the full length; later ones only if they do not reach an attractor known by then.
 
     def with_reaches(cycles: Sequence[Floats]) -> tuple[PeriodicAttractor, ...]:
         generator = np.random.default_rng(seed)
@@ -213,10 +205,8 @@ def same_cycle(first: Floats, second: Floats) -> bool:
 
 
 def find_reach(walker: Walker, points: Floats, cycles: Sequence[Floats], generator: np.random.Generator) -> float:
-    """Return a distance from a cycle within which walks from all directions returned to it, or zero.
-
-    It is well below the distance to other cycles.
-    """
+    """Return a distance from a cycle within which walks from all directions returned to it, or zero."""
+    # It is well below the distance to other cycles.
     foreign = [cycle for cycle in cycles if cycle is not points]
     gap = min((float(np.linalg.norm(p - cycle, axis=1).min()) for cycle in foreign for p in points), default=np.inf)
     reach = min(CAPTURE, 0.25 * gap)
@@ -240,7 +230,7 @@ class Window:
     lower: tuple[float, ...]  # lower bound along each axis
     upper: tuple[float, ...]  # upper bound along each axis
     cells: tuple[int, ...]  # number along each axis
-    rest: tuple[float, ...]  # (3,) the section's coordinates; those of the axes are replaced
+    rest: tuple[float, ...]  # (3,) the section's coordinates, replaced along the axes
 
     @property
     def size(self) -> int:

@@ -162,10 +162,7 @@ def _cubic(equations: GaitEquations, flip: Bifurcation, v: Floats, w: Floats, h:
 
 
 def predict_doubled(flip: Bifurcation, form: FlipForm, share: float = 1.0) -> tuple[Floats, Floats, float]:
-    """Predict the branch of twice the period near a flip, at a share of the normal form's amplitude, for `correct`.
-
-    Returns the guess x (d + 1,), the normal of the plane of constant amplitude, and the amplitude.
-    """
+    """Predict the doubled branch near a flip: a point x (d + 1,), the normal of a plane for `correct`, an amplitude."""
     xi = share * form.amplitude
     s = form.cubic * xi * xi / form.rate
     guess = flip.point.x + s * flip.point.tangent

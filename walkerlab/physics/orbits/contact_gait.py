@@ -1,7 +1,6 @@
 """Search for the contact model's own gait: walk from a rigid start to the section, then Newton's method.
 
-If that fails, the gait is followed from nearly rigid ground, where the rigid gait is a good guess, to the actual force
-laws, in steps as large as Newton's method allows.
+If that fails, the gait is followed from nearly rigid ground, where the rigid gait is a good guess, to the actual one.
 """
 
 import math

@@ -1,11 +1,9 @@
 """Step map of the contact model, on a section where no foot is touching down or lifting off.
 
-On the section the swing foot passes the stance foot: one foot stands, the transients of its touch-down have decayed,
-and the other swings freely. Just after touch-down the state still moves on the fast time scale of the contact, which
-makes a poor section. Coordinates, ordered by the legs' roles: height of the centre of mass, angles of the legs' bodies
-except the uppermost of the swing leg, which the section determines, velocity along and normal to the slope, and the
-rates of all bodies that turn independently; six for two straight legs. The stance knee is locked, the swing knee free.
-The position along the slope is not a coordinate.
+On the section the swing foot passes the stance foot, after the fast transients of touch-down have decayed. Coordinates,
+ordered by the legs' roles: height of the centre of mass, angles of the legs' bodies except the uppermost of the swing
+leg, which the section determines, velocity along and normal to the slope, and the rates of all bodies that turn
+independently; six for two straight legs. The stance knee is locked, the swing knee free.
 
 One step maps the section to itself with the legs' roles exchanged.
 """
@@ -167,12 +165,7 @@ def section_tangents(walker: ContactWalker, state: State, stance: int) -> Floats
 def step_from_section(
     walker: ContactWalker, ground: JudgedGround, tolerances: Tolerances, z: Floats, pitch_m: float, derived: bool = True
 ) -> SectionStep:
-    """Walk from section to section; REJECTED if a push-off lasts beyond the section.
-
-    z        section coordinates, the height measured from the current foothold
-    pitch_m  pad pitch
-    derived  whether to compute the derivative
-    """
+    """Walk from section to section on pads of pitch `pitch_m`; REJECTED if a push-off lasts beyond the section."""
     stance, laid = STANCE_FOOT, ground
     start = state_on_section(walker, z, stance)
     if ground.terrain.has_pads:  # with the standing foot in the middle of a pad
@@ -220,11 +213,7 @@ def step_from_section(
 def walk_from_section(
     walker: ContactWalker, ground: JudgedGround, tolerances: Tolerances, z: Floats, heights: Floats, push: float
 ) -> DisturbedWalk:
-    """Walk from the section over footholds of given heights, with a push at the hip at the first touch-down.
-
-    heights  (steps + 1,) m, beginning with the current foothold
-    push     N s, along the slope
-    """
+    """Walk from the section over heights (steps + 1,) in m; at the first touch a push (N s) acts on the hip."""
     start, steps = state_on_section(walker, z, STANCE_FOOT), heights.size - 1
     laid = over_footholds(ground, heights)
     walk_state = walk_state_on_section(walker, laid, start, steps + 1)
@@ -259,10 +248,7 @@ def touch_angles(walker: ContactWalker, leg_length: float, along: Floats, up: Fl
 def legs_sampled_from_section(
     walker: ContactWalker, ground: JudgedGround, tolerances: Tolerances, z: Floats, heights: Floats, times: Floats
 ) -> Floats:
-    """Sample the legs' angles (times, 2) of the walk of `walk_from_section`, the leg that swings second first.
-
-    times  (times,) s, from the section
-    """
+    """Sample angles (times, 2) on `walk_from_section`, the leg that swings second first; times are from the section."""
     start = state_on_section(walker, z, STANCE_FOOT)
     laid = over_footholds(ground, heights)
     walk_state = walk_state_on_section(walker, laid, start, heights.size)
@@ -325,8 +311,8 @@ class WalkerOnGround:
 class ContactMap(StepMap):
     """Step map of a walker on compliant ground, scaled by leg length and pendulum time.
 
-    Pads let the swing foot of straight legs through; families are therefore followed on ground that the swing foot
-    touches only ahead of the stance foot. `watch` reports where pads of the gait's own step length would trip it.
+    Families are followed on ground that a foot can touch only ahead of the stance foot, so that straight legs may scuff
+    as between pads. `watch` reports where pads of the gait's own step length would trip the foot.
     """
 
     monitors = (
@@ -343,14 +329,7 @@ class ContactMap(StepMap):
         step_length_m: float,
         like: WalkerOnGround,
     ) -> None:
-        """Prepare the step map of a family of walkers.
-
-        walker_at      walker and ground at a value of the parameter; None where the value makes no walker
-        scale          magnitude of significant changes of the parameter
-        tolerances     solver settings of a step
-        step_length_m  reference step length of the terrain
-        like           any one of the walkers; its leg length and pendulum time are the units
-        """
+        """Prepare a family's map; `walker_at` returns None where a value makes no walker, `like` sets the units."""
         self._at = lru_cache(CACHE_SIZE)(walker_at)
         self.scale, self.tolerances, self._measure = scale, tolerances, step_length_m
         self._on_pads = like.ground.terrain.has_pads

@@ -58,10 +58,7 @@ class Follower:
         strides: Strides,
         abscissa: Callable[[float], float] = float,
     ) -> None:
-        """Begin with the solution `first`; `solve` returns the solution (m,) near a prediction, or None.
-
-        The solution is smooth in `abscissa`, a function of the parameter.
-        """
+        """Begin with `first`; `solve` returns the solution (m,) near a prediction, smooth in `abscissa`, or None."""
         self._solve, self._strides, self._abscissa, self._states = solve, strides, abscissa, [first]
 
     def to(self, target: float) -> FollowerState:
@@ -143,10 +140,7 @@ def step_along(
     acceptable: Callable[[CurvePoint[Data]], bool] = lambda _: True,
     before: CurvePoint[Data] | None = None,
 ) -> tuple[CurvePoint[Data], float] | NotConverged:
-    """Return the next point of a curve after `last`, and the length of the step after it.
-
-    The point `before` the last one, if any, gives the curvature; the new point must be `acceptable`.
-    """
+    """Find the next `acceptable` point of a curve and the length of the step after it; `before` gives the curvature."""
     lost = NotConverged(Outcome.WALKED)
     bend = np.zeros_like(last.x)  # curvature: change of the tangent per arclength
     if before is not None:

@@ -107,7 +107,7 @@ def is_feasible(problem: DesignProblem, point: Point) -> bool:
 def search_from_starts(
     problem: DesignProblem, own: Floats, starts: int, seed: int, search: Searcher | None = None
 ) -> list[DesignSearch]:
-    """Search from the walker's own parameters and from random ones; return the best first, feasible before others."""
+    """Search from the walker's own parameters and from random ones; the best feasible search comes first."""
     search = search or (lambda _, start: minimise(problem, start))
     random_starts = np.random.default_rng(seed).uniform(problem.lower, problem.upper, (starts - 1, own.size))
     all_starts = (np.clip(own, problem.lower, problem.upper), *random_starts)

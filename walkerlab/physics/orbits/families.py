@@ -131,8 +131,6 @@ class Seed(NamedTuple):
 
 @dataclass(frozen=True)
 class BranchFollower:
-    """Follows the branches of one model over one span."""
-
     step_map: StepMap
     span: ValueSpan
     control: StepControl = BRANCH_CONTROL

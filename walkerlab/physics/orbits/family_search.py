@@ -1,7 +1,4 @@
-"""Search for all families of one model over a span: branches with cascades, attractors, chaos, and a plane's curves.
-
-The search works on seeds and a step map of either model; only its thoroughness depends on the model.
-"""
+"""Search for all families of one model over a span: branches with cascades, attractors, chaos, and a plane's curves."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -43,8 +40,6 @@ RIGID, CONTACT = "rigid", "contact"
 
 
 class Listener(Protocol):
-    """Receives the progress of a search."""
-
     def start(self, label: str, total: int | None = None) -> None: ...
 
     def advance(self, n: int = 1) -> None: ...
@@ -52,8 +47,6 @@ class Listener(Protocol):
 
 @dataclass(frozen=True)
 class Thoroughness:
-    """Effort and limits of a search."""
-
     values: int  # of the parameter at which to look for attractors
     transient: int  # steps before reaching an attractor
     samples: int  # steps on the attractor
@@ -131,10 +124,8 @@ class FamilySearch:
         return results if self.plane is None else self.add_plane(results, self.plane)
 
     def add_attractors(self, family: Family) -> Family:
-        """Add the attractors beyond the first flip of a stable branch, and their exponents.
-
-        They are followed from just before that flip or, if it lies outside the span, from an end of the span.
-        """
+        """Add the attractors beyond the first flip of a stable branch, and their exponents."""
+        # They are followed from just before that flip or, if it lies outside the span, from an end of the span.
         span, how = self.span, self.thoroughness
         flipping = first_flip(family.branches)
         if flipping is not None:
@@ -165,11 +156,8 @@ class FamilySearch:
         return replace(family, attractors=attractors, exponents=measured)
 
     def doubled_outside(self, family: Family) -> tuple[Family, Attractor | None]:
-        """Add gaits of 2, 4, 8, ... steps of branches beyond a flip outside the span, and find their attractor.
-
-        Both are searched for at the branch's ends: a walk leaves the gait there for the attractor, whose close returns
-        are the seeds. The second result is the attractor at the smallest of these values, or None.
-        """
+        """Add gaits of 2, 4, 8, ... steps beyond flips outside the span; return the attractor of the smallest value."""
+        # At an end of the branch a walk leaves the gait for the attractor, whose close returns are the seeds.
         how = self.thoroughness
         self.announce("gaits of {model} beyond flips outside the span")
         ends = [

@@ -1,9 +1,8 @@
 """Search for the periodic gaits of a rigid walker; each gait is solved to rounding and measured.
 
-Three searches, all on the similar walker of unit size. The two gaits of the small-slope theory are followed to the
-walker's slope. The step map is solved from random starting values, as in the paper (section 3.3), and from more of them
-if that finds nothing: for some walkers few starts reach a heel strike. If a driven walker still has no gait, gaits of
-the passive walker are followed as the drive grows.
+The two gaits of small-slope theory are followed to the walker's slope, and the step map is solved from random starts,
+as in the paper (section 3.3). If a driven walker still has no gait, gaits of the passive walker are followed as the
+drive grows. All searches use the similar walker of unit size.
 """
 
 import math
@@ -189,7 +188,7 @@ class GaitSearch:
 
 
 def find_gaits(walker: RigidModel, seed: int = 0, settings: SearchSettings = SearchSettings()) -> GaitSearch:
-    """Find the period-1 gaits of `walker`; the seed is that of the random starting values."""
+    """Find the period-1 gaits of `walker`; `seed` determines the random starting values."""
     if walker.slope <= 0.0 and walker.unpaired == 0.0 and not walker.driven:
         return GaitSearch((), None, NO_DESCENT)
     search = Search(walker)

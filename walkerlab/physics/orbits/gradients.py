@@ -98,10 +98,7 @@ WALK_QUANTITIES: Final[Mapping[tuple[str, ...], Callable[[GaitOnMap], tuple[floa
 
 
 def gradients(gait: GaitOnMap, scale: float, selection: Collection[str] = GAIT_QUANTITIES) -> dict[str, Gradient]:
-    """Differentiate a gait's quantities by the parameter of its step map; empty if neighbouring steps fail.
-
-    `scale` is the magnitude of significant changes of the parameter.
-    """
+    """Differentiate a gait's quantities by the parameter of its step map; empty if neighbouring steps fail."""
     h, along = STEP_FACTOR * gait.step_map.tolerances.rtol**0.2 * scale, np.zeros(gait.z.size)
     for part in APPROACH_STEPS:
         closer = family_direction(gait, part * h, along)

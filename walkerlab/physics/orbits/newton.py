@@ -40,8 +40,6 @@ class Solution(Generic[Data]):
 
 @dataclass(frozen=True)
 class NotConverged:
-    """Why Newton's method failed."""
-
     outcome: Outcome | None  # WALKED if the equations could be evaluated; None where the parameter makes no walker
     singular: bool = False  # whether the Jacobian was singular, i.e. a multiplier is 1
 

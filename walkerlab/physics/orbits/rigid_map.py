@@ -162,9 +162,8 @@ class RigidStepper(local):
     ) -> Steps:
         """Walk from z (d,), with the derivative unless `derived` is false, which saves a third of the work.
 
-        floor     rises and nearest landing, see HeelStrikes, in units of the walker; even ground by default
-        start     (2 n,) state off the section to walk from instead, without a derivative
-        observer  records samples
+        floor  rises and nearest landing, see HeelStrikes, in units of the walker; even ground by default
+        start  (2 n,) state off the section to walk from instead, without a derivative
         """
         memory = self.memory
         method = memory.varied if derived else self.plain
@@ -193,10 +192,7 @@ class RigidStepper(local):
         floor: tuple[Floats, float],
         observer: Observer,
     ) -> tuple[Outcome, HeelStrikes, int]:
-        """Walk from a state (2 n,) with tangent columns (columns, 2 n), along which rises change by `lift`.
-
-        Returns the outcome, the heel strikes, and the number of completed steps.
-        """
+        """Walk from a state (2 n,) with tangent columns (columns, 2 n), along which rises change by `lift`."""
         method, (rises, nearest) = self.with_columns(len(columns)), floor
         y = np.concatenate((start, columns.ravel()))
         self._reset(method, rises.size - 1)
@@ -303,13 +299,7 @@ class RigidMap(StepMap):
     probe = 2e-5
 
     def __init__(self, walker_at: WalkerAt, scale: float, like: RigidModel, exact: Tolerances = EXACT_STEPS) -> None:
-        """Prepare the step map of a family of walkers.
-
-        walker_at  the walker at a value of the parameter; None where the value makes no walker
-        scale      magnitude of significant changes of the parameter
-        like       any one of the walkers
-        exact      solver settings of a step
-        """
+        """Prepare a family's map; `walker_at` returns None where a value makes no walker, `like` is any one of them."""
 
         @lru_cache(CACHE_SIZE)
         def unit_at(p: float) -> SimilarWalker | None:
@@ -420,11 +410,8 @@ class RigidMap(StepMap):
         return float(walk.driven.cost_of_transport(walk.lengths_m[0])) if walk.steps else None
 
     def ground_after_push(self, z: Floats, p: float, push_N_s: float, steps: int) -> tuple[float, float]:
-        """Return the ground's response to a push at the hip; negative values mean that it would have to pull.
-
-        The first is its normal impulse (N s) in the push, the second its minimum normal force (N) in the steps after
-        it.
-        """
+        """Return the ground's normal impulse (N s) in a push at the hip and its minimum normal force (N) afterwards."""
+        # Negative values mean that the ground would have to pull.
         unit = self._unit_at(p)
         assert unit is not None, "what is pushed has a gait"
         walker, units, start = unit.walker, unit.units, state_on_section(unit.walker, z)

@@ -121,10 +121,8 @@ def margins(
     step: float = MARGIN_STEP,
     largest: float = LARGEST_FACTOR,
 ) -> list[Margin]:
-    """Return how far the velocities of a start that walks may be scaled, alone and together, before it fails.
-
-    Factors are `step` apart, up to `largest`, until one fails; then the last interval is halved.
-    """
+    """Find how far the velocities of a start that walks may be scaled, alone and together, up to `largest`."""
+    # Factors are `step` apart until one fails; then the last interval is halved.
     results = []
     for name, *direction in SCALING_DIRECTIONS:
         sign = 1.0 if max(direction) > 0.0 else -1.0
@@ -156,10 +154,10 @@ class Adjustment:
 def smallest_change(
     starts: ScaledStarts, quick: ScaledStarts, candidates: np.ndarray, cell: tuple[float, float]
 ) -> Adjustment | None:
-    """Find the walking start nearest to (1, 1), on successively finer grids around the nearest in a map.
+    """Find the walking start nearest to (1, 1), on successively finer grids around the nearest of a map's.
 
-    `starts` have the config's tolerances, which the result satisfies, and `quick` the map's. `candidates` (n, 2) are
-    factors that walk according to the map, whose spacing is `cell`.
+    `candidates` (n, 2) are factors that walk on the map, `cell` apart. The `quick` starts have the map's tolerances,
+    and `starts` the config's, which the result satisfies.
     """
     order = np.argsort(np.hypot(*(candidates - 1.0).T), kind="stable")
     for swing, stance in candidates[order]:

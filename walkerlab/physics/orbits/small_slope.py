@@ -113,10 +113,7 @@ def long_period_seed(walker: RigidModel, modes: Modes) -> SmallSlopeSeed | None:
 
 
 def cube_root_seed(name: str, walker: RigidModel, per_angle: Floats, period: float) -> SmallSlopeSeed:
-    """Return the gait at LONG_AMPLITUDE that grows as the cube root of the slope.
-
-    `per_angle` holds theta_2 + phi, dtheta_1 and dtheta_2 after heel strike per unit angle between the legs.
-    """
+    """Return the gait at LONG_AMPLITUDE from theta_2 + phi, dtheta_1 and dtheta_2 per unit angle between the legs."""
     kappa = slope_for_loss(walker, per_angle)
     slope = kappa * LONG_AMPLITUDE**3
     z = LONG_AMPLITUDE * per_angle - np.array([slope, 0.0, 0.0])

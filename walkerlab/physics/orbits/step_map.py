@@ -44,8 +44,6 @@ class Monitor:
 
 @dataclass(frozen=True)
 class MappedStep:
-    """One step from section to section."""
-
     outcome: Outcome | None
     z: Floats  # (d,) section coordinates at the end
     DP: Floats  # (d, d) derivative with respect to the start, if requested
@@ -57,8 +55,6 @@ class MappedStep:
 
 @dataclass(frozen=True)
 class Iterates:
-    """A walk on the section with a tangent vector."""
-
     outcome: Outcome
     points: Floats  # (steps, d) section coordinates after each step
     lengths: Floats  # (steps,) factor by which each step stretches the tangent; empty without a tangent
@@ -106,16 +102,11 @@ class StepMap(Stepper, Protocol):
         """Return the worst value of each monitor (monitors,) over some steps."""
 
     def disturbed(self, z: Floats, p: float, heights_m: Floats, push_N_s: float = 0.0) -> DisturbedWalk:
-        """Walk from z (d,) over footholds, after an impulse at the hip along the slope.
-
-        heights_m  (steps + 1,) of the footholds, beginning with the current one
-        """
+        """Walk from z (d,) over heights (steps + 1,), the present first, after a push at the hip along the slope."""
 
     def settled(self, z: Floats, p: float) -> Floats:  # noqa: ARG002
-        """Return z (d,) with the stance foot at rest on the ground.
-
-        How deep a foot stands in compliant ground depends on the parameters; from another depth it would bounce.
-        """
+        """Return z (d,) with the stance foot at rest on the ground."""
+        # How deep a foot stands in compliant ground depends on the parameters; from another depth it would bounce.
         return z
 
     def sampled(self, z: Floats, p: float, heights_m: Floats, times_s: Floats) -> Floats:
@@ -127,11 +118,9 @@ class StepMap(Stepper, Protocol):
     def varied(
         self, z: Floats, p: float, heights_m: Floats, along: Floats, times_s: Floats = NO_TIMES
     ) -> VariedWalk | None:
-        """Differentiate the walk of `disturbed`, and its samples, along directions of start and heights.
+        """Differentiate `disturbed` and its samples along columns (d + steps + 1, columns) of z and heights (m).
 
-        along  (d + steps + 1, columns) changes of z and of the footholds' heights (m) along each column
-
-        None if the walk, or one beside it, ends early. Models without tangent columns take difference quotients.
+        Models without tangent columns take difference quotients. None if the walk or a neighbouring one ends early.
         """
         columns = [differentiate_along(self, z, p, heights_m, column, times_s) for column in along.T]
         if not columns or any(column is None for column in columns):
@@ -176,11 +165,8 @@ class StepMap(Stepper, Protocol):
 
 
 def differentiate_by_parameter(step_map: StepMap, z: Floats, p: float) -> tuple[Outcome | None, Floats]:
-    """Return the outcome of steps from z (d,) near p, and the derivative (d,) of the step with respect to p.
-
-    A second-order difference of exact steps, one-sided at the parameter's limits. It only steers predictors and
-    Newton's method and enters no result.
-    """
+    """Return the outcome of steps from z (d,) near p, and the derivative (d,) of the step with respect to p."""
+    # This second-order difference only steers predictors and Newton's method and enters no result.
     h = PARAMETER_STEP * (min(step_map.scale, abs(p)) if p != 0.0 else step_map.scale)
     for formula in (CENTRAL_2ND, FORWARD_2ND, tuple((-offset, -weight) for offset, weight in FORWARD_2ND)):
         steps = [step_map.step(z, p + offset * h, derived=False) for offset, _ in formula]

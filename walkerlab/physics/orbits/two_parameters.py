@@ -76,8 +76,6 @@ def critical_gaits(map_at: MapAt, kind: Kind, period: int, scales: tuple[float, 
 
 @dataclass(frozen=True, eq=False)
 class BifurcationCurve:
-    """A curve of bifurcations over two parameters."""
-
     kind: Kind
     period: int
     first: Floats  # (points,) values of the first parameter
@@ -89,11 +87,7 @@ def follow_curve(
     bifurcation: Bifurcation, period: int, first: ValueSpan, plane: Plane, points: int,
     advance: Callable[[], None], control: StepControl,
 ) -> BifurcationCurve | None:  # fmt: skip
-    """Follow the curve through a bifurcation located at the family's own second parameter; None if it is lost there.
-
-    first   span of the first parameter; the curve is followed within it and the plane's
-    points  maximum number in each direction
-    """
+    """Follow the curve through a bifurcation within both spans, up to `points` points each way, or return None."""
     spans = (first, plane.span)
     scales = (spans[0].size, spans[1].size)
     equations = critical_gaits(plane.map_at, bifurcation.kind, period, scales)
@@ -145,8 +139,6 @@ def clip_to_plane(inside: Floats, outside: Floats, spans: tuple[ValueSpan, Value
 
 @dataclass(frozen=True, eq=False)
 class Regions:
-    """Attractors over the plane, cell by cell."""
-
     first: Floats  # (n,) centres of the cells
     second: Floats  # (m,) centres of the cells
     period: Integers  # (n, m) steps after which the attractor repeats; 0 if never, ALL_FAILED if every walk fails

@@ -70,7 +70,6 @@ class Dop853(NamedTuple):
 
 
 def new_dop853(n: int, rtol: float, atol: float, budget: int) -> Dop853:
-    """Create a DOP853 for n equations and at most `budget` right-hand sides."""
     counts = np.zeros(COUNTS, np.int64)
     counts[BUDGET] = budget
     y_old, y, at = np.zeros((3, n))
@@ -203,7 +202,6 @@ def advance_dop853(method: Dop853, system: Any, t_end: float) -> int:
 
 @rewind.case(Dop853)
 def rewind_dop853(method: Dop853, system: Any) -> None:
-    """Restore state and derivative of the step's start."""
     for i in range(method.y.size):
         method.y[i], method.stages[LAST_STAGE, i] = method.y_old[i], method.stages[0, i]
     method.clock[T] = method.clock[T_OLD]

@@ -64,12 +64,9 @@ def sampling(degree: int) -> tuple[Any, Any]:
 
 @kernel_part
 def first_crossing(finder: CrossingFinder, event: int, direction: int, after: float, zero_at_start: bool) -> float:
-    """Find the fraction of the step at which an event function first changes sign; NO_CROSSING if it does not.
+    """Find the fraction of the step, above `after`, at which an event function first changes sign, or NO_CROSSING.
 
-    event          row of `finder.values`
-    direction      FALLING, RISING, or 0 for both
-    after          ignore crossings before this fraction
-    zero_at_start  the event function is zero at the step's start: divide that zero out
+    `direction` is FALLING, RISING, or 0 for both; `zero_at_start` divides out a zero at the step's start.
     """
     if not spans_zero(finder, event):
         return NO_CROSSING
@@ -143,12 +140,8 @@ def without_zero_at_start(stack: Any, size: int) -> int:
 
 @kernel_part
 def way_from_zero(finder: CrossingFinder, event: int, clearly: float) -> float:
-    """Direction of an event function that is zero at the step's start, as a number of its sign; 0 if it stays there.
-
-    The error of the last event's time leaves a small value at the start, which is subtracted.
-
-    clearly  minimum slope (per step) of a coefficient that decides
-    """
+    """Return the first clear slope of an event function after its zero at the step's start; 0 if it stays there."""
+    # The error of the last event's time leaves a small value at the start, which is subtracted.
     size = set_root_piece(finder, event, False)
     for i in range(1, size):
         slope = (finder.stack[0, i] - finder.stack[0, 0]) * (size - 1) / i
@@ -219,11 +212,7 @@ def evaluate(stack: Any, piece: int, size: int, x: float) -> float:
 
 @kernel_part
 def shift_column(columns: Any, at: int, rate: Any, wait: float) -> None:
-    """Move a variational column from fixed time to the event's time, or back: Phi + f wait (saltation).
-
-    columns  array that holds the column from index `at` on; written
-    rate     (n,) f, time derivative of the state
-    wait     derivative of the event's time with respect to the column's parameter; negative after a jump, to go back
-    """
+    """Move a variational column, from index `at` on, from fixed time to the event's time: Phi + f wait (saltation)."""
+    # After a jump a negative wait moves it back.
     for i in range(len(rate)):
         columns[at + i] += rate[i] * wait

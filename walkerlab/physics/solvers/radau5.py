@@ -87,7 +87,6 @@ class Radau5(NamedTuple):
 
 
 def new_radau5(n: int, rtol: float, atol: float, budget: int) -> Radau5:
-    """Create a Radau IIA method for n equations and at most `budget` right-hand sides."""
     counts = np.zeros(COUNTS, np.int64)
     counts[BUDGET] = budget
     three, square = (3, n), (n, n)
@@ -339,7 +338,6 @@ def prepare_dense_radau5(method: Radau5, system: Any) -> None:
 
 @interpolate.case(Radau5)
 def interpolate_radau5(method: Radau5, system: Any, fraction: float, y: Any) -> None:
-    """Evaluate the collocation polynomial."""
     s, dense = fraction, method.dense
     for i in range(y.size):
         y[i] = fused(s * s * s, dense[2, i], fused(s * s, dense[1, i], fused(s, dense[0, i], method.y_old[i])))

@@ -14,8 +14,6 @@ from walkerlab.physics.solvers.scipy_methods import DENSE_DEGREE, ScipyMethod
 
 @dataclass(frozen=True)
 class Method:
-    """An integration method."""
-
     name: str  # as in configs
     # factory: (number of equations, rtol, atol, budget of right-hand sides)
     new: Callable[[int, float, float, int], Any]
@@ -107,5 +105,4 @@ def dense_degree(method: Any) -> int:
 
 
 def finder_for(method: Any, event_functions: int, state_size: int) -> CrossingFinder:
-    """Create a crossing finder for a method's dense output and event functions of states (state_size,)."""
     return new_crossing_finder(dense_degree(method), event_functions, state_size)

@@ -102,7 +102,6 @@ def counting_jacobian(method: ScipyMethod, system: Any, n: int) -> Callable[[flo
 
 @begin.case(ScipyMethod)
 def begin_scipy(method: ScipyMethod, system: Any, t: float, y: Any, h: float) -> None:
-    """Create a new solver, which chooses its first step."""
     n = method.y.size
     method.y[:] = y
     method.clock[T_OLD] = method.clock[T] = t
