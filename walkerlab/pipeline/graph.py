@@ -187,10 +187,7 @@ class Graph:
         return tuple(stage for stage in self.stages if stage.name in needed)
 
     def needed_in_memory(self, target: str, config: Config) -> tuple[Stage, ...]:
-        """Return the same for a result without files.
-
-        Raises ConfigError if the config lacks a block that a stage requires, and for stages that draw files.
-        """
+        """Return the stages needed without files; ConfigError without a required block or for drawing stages."""
         stages = self.needed_for(target, config)
         for stage in stages:
             if stage.draws:

@@ -40,11 +40,8 @@ START_RATE_FACTOR = 0.98  # of the gait's angular velocities, so that no step re
 
 
 def run(config: SceneConfig, inputs: Mapping[str, Content], progress: Progress, jobs: int = 1) -> Content:
-    """Measure every method on every scene.
-
-    jobs  processes for reference solutions and for postponed library runs; all other runs are timed one after the
-          other, with nothing else running
-    """
+    """Measure every method on every scene; `jobs` processes for reference solutions and postponed library runs."""
+    # all other runs are timed one after the other, with nothing else running
     trials: list[Trial] = []
     second_ends: list[End] = []
     ascents: list[Ascent] = []

@@ -81,10 +81,7 @@ def method_series(scene: str, results: Results) -> Iterator[Series]:
 
 
 def draw_methods(scene: str, results: Results) -> Drawn:
-    """Plot error over run time (left) and over right-hand sides (right), with crosses for failed runs.
-
-    The caption gets the conclusion, the reference, whether its method is measured too, and the failed runs.
-    """
+    """Plot error over run time (left) and over right-hand sides (right), with crosses for failed runs."""
     all_series, summary = list(method_series(scene, results)), results["accuracy"].summary
     reference = summary["reference"][scene]
     # how far the reference is from a second one: errors below mean nothing
@@ -151,10 +148,7 @@ def engine_series(scene: str, experiment: str, results: Results) -> Iterator[Ser
 
 
 def draw_errors(scene: str, results: Results) -> Drawn:
-    """Plot the same law (left) and each engine's own contact (right), with a legend each, since looks are reused.
-
-    The caption gets the reference and the conclusion on the same law.
-    """
+    """Plot the same law (left) and each engine's own contact (right), with a legend each, since looks are reused."""
     figure, panes = panels(4.6, 1, 2)
     experiments = (
         (SAME_LAW, "upper", "(a) ADAMS's law in each integrator", "error of the end state (SI)"),
@@ -180,10 +174,7 @@ def draw_engine(axes: Axes, series: Series, cost: str, values: Array) -> None:
 
 
 def draw_periods(scene: str, results: Results) -> Drawn:
-    """Plot the last step's period over step size on own contact, with ADAMS's law and the rigid gait as levels.
-
-    The caption gets the conclusion and the step sizes of runs that failed.
-    """
+    """Plot the last step's period over step size on own contact, with ADAMS's law and the rigid gait as levels."""
     figure, axes = panels(4.2)
     all_series, summary = list(engine_series(scene, OWN_LAW, results)), results[ENGINES_STAGE].summary
     engines, reference = [series for series in all_series if series.engine != OURS], summary["reference"][scene]

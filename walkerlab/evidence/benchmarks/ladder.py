@@ -91,12 +91,7 @@ def ascend(trial: Trial, method: str) -> Ascent:
 def complete_ascents(
     trials: Sequence[Trial], ascents: Sequence[Ascent], jobs: int, long_runs: bool = True
 ) -> tuple[list[End | WalkEndsError], list[Ascent]]:
-    """Compute the references' first ends and the postponed runs, in `jobs` processes.
-
-    long_runs  whether to make the postponed runs
-
-    Returns an end, or the reason for its absence, for each trial; and the completed ascents.
-    """
+    """Compute the references' first ends (or why one is missing) and, with `long_runs`, the postponed runs."""
     # longest first: near the rigid limit ground is the stiffest for the explicit method that references are made with
     ends = [partial(try_first_end, trial) for trial in reversed(trials)]
     postponed = [ascent for ascent in ascents if ascent.unfinished and long_runs]

@@ -20,10 +20,7 @@ UNITLESS_KEYS: Final = tuple(name for name in Contact.model_fields if name not i
 
 
 def departures(config: CompareConfig, start_moved: bool) -> Departures:
-    """Describe the differences from the paper's scene; the slope is compared to the digits of x_p.
-
-    start_moved  whether the walk started away from the rigid model's fixed point
-    """
+    """Describe the differences from the paper's scene; the slope is compared to the digits of x_p."""
     walker, contact, paper = config.walker, config.contact, CompassWalker()
     rigid: list[str] = []
     of_contact: list[str] = []

@@ -48,10 +48,7 @@ ALIGNED_ERRORS = Need(
 
 
 def draw_differences(results: Results) -> Drawn:
-    """Plot the errors of each leg's angle and angular velocity over the rigid walk's steps, on logarithmic scales.
-
-    The caption gets the largest errors in time and in phase, the paper's, and a recorded walk's.
-    """
+    """Plot the errors of each leg's angle and angular velocity over the rigid walk's steps, on logarithmic scales."""
     (rigid,), _ = first_strides([walk_of(results[RIGID_STAGE], RIGID)])
     raw, aligned = (results[COMPARE_STAGE][need.group] for need in (RAW_ERRORS, ALIGNED_ERRORS))
     claimed, early = bool(claims_in(results)), raw["time"] <= rigid.time[-1]
@@ -124,10 +121,7 @@ MIN_ERROR = 1e-14
 
 
 def draw_limit(results: Results) -> Drawn:
-    """Plot errors over run time, one point per setting, from the config's contact to the most rigid one.
-
-    The caption gets the totals, also with point feet, the paper's claim, and whether the walker pushes off.
-    """
+    """Plot errors over run time, one point per setting, from the config's contact to the most rigid one."""
     figure, claimed = blank(3.6), bool(claims_in(results))
     # the series with point feet is absent for walkers whose feet roll in both models
     stored = results[TUNE_STAGE].groups

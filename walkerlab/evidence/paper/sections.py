@@ -94,10 +94,7 @@ def table_of(key: str, rows: Any) -> Table:
 
 
 def paper_table(caption: str, rows: Mapping[str, Row], note: str) -> Table:
-    """Build a table with symbols and units as row names; columns without values are omitted.
-
-    Printed numbers are shown as the paper's text, to its digits.
-    """
+    """Build a table with symbols and units as row names and the paper's own digits, without empty columns."""
     has_quantities = any("quantity" in row for row in rows.values())
     columns, heads = [Column("symbol" if has_quantities else "quantity", "row")], words.terms("paper.heads")
     for key in dict.fromkeys(key for row in rows.values() for key, value in row.items() if value is not None):

@@ -46,10 +46,7 @@ def read_catalogue(path: Path) -> Any:
 
 
 def all_cases(own: Sequence[Case], catalogue: Sequence[Case] | None = None) -> tuple[Case, ...]:
-    """Cases of a catalogue, by default the package's, followed by those of a config.
-
-    Raises ConfigError if two cases share a name.
-    """
+    """Join a catalogue's cases (by default the package's) and a config's; ConfigError if two share a name."""
     catalogue = package_cases() if catalogue is None else catalogue
     shared = {case.name for case in catalogue} & {case.name for case in own}
     if shared:

@@ -127,11 +127,7 @@ def other_methods(case_tolerances: str) -> tuple[Method, ...]:
 
 
 def second_walk(case_tolerances: str, budget: int, walk: Callable[[Method, int], JudgedWalk]) -> Second:
-    """Walk with other methods until one reaches an answer.
-
-    budget  right-hand sides of our own methods
-    walk    walks the case with a method and a budget
-    """
+    """Walk with other methods until one reaches an answer; `budget`: right-hand sides of our own methods."""
     tried: list[str] = []
     for method in other_methods(case_tolerances):
         result = walk(method, budget if method.compiled else min(budget, LIBRARY_BUDGET))

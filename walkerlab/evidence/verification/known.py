@@ -130,10 +130,7 @@ def solve_problem(
     limit: float,
     why: str,
 ) -> Known:
-    """Solve a problem with the contact code (`run`) and by its reference; a run that fails does not meet the limit.
-
-    The other arguments are fields of `Known`.
-    """
+    """Solve a problem with the contact code (`run`) and by its reference; a run that fails does not meet the limit."""
     started = time.perf_counter()
     reference = reference_by()
     try:

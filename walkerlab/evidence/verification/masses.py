@@ -115,10 +115,7 @@ class RigidMasses:
         return float(moving.contact[1] * along - moving.contact[0] * up)
 
     def momentum_change(self, before: Floats, after: Floats, push_off: float = 0.0) -> float:
-        """Largest relative change of these momenta in heel strikes; states (strikes, 2 n).
-
-        The angular impulse of a push-off (N s) is accounted for.
-        """
+        """Return the largest relative change of these momenta in heel strikes (strikes, 2 n); push-off in N s."""
         change, size = 0.0, 1e-300
         for old, new in zip(before, after, strict=True):
             momenta_before, momenta_after = (

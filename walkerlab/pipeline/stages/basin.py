@@ -152,7 +152,7 @@ def question_of(config: BasinConfig, inputs: Mapping[str, Content], window: Wind
 
 
 def contact_question(config: BasinConfig, inputs: Mapping[str, Content], rigid: RigidModel) -> ContactQuestion:
-    """Build the same for the contact model, at the tolerances of `tune`'s map."""
+    """Build the question for the contact model, at the tolerances of `tune`'s map."""
     if config.contact is None:
         raise contact_required_error("basin.model: contact", config.walker, "Add one.")
     # Imported here: it loads interpolation code, which the rigid model does not need.
@@ -235,10 +235,8 @@ def gaussian(window: Window) -> Floats:
 
 
 def margin_of(config: RigidConfig, window: Window, ends: WalkEnds, gait: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the distance from a stable gait to the nearest cell that does not walk, in rad and sqrt(g/L).
-
-    Accurate to the size of a cell; empty if the gait is unstable or the window holds no such cell.
-    """
+    """Return the distance (rad, sqrt(g/L)) from a stable gait to the nearest cell that fails; empty without one."""
+    # accurate to the size of a cell
     failing = np.flatnonzero(ends.outcome != Outcome.WALKED)
     if not gait["stable"] or not failing.size:
         return {}

@@ -262,10 +262,7 @@ def bifurcation_rows(family: Family) -> Iterator[dict[str, Any]]:
 
 
 def first_doubling(branches: Sequence[GaitBranch]) -> float | None:
-    """Return the first flip where a one-step gait loses stability; None without one.
-
-    branches  of one model; one that is unstable on both sides of a flip does not count
-    """
+    """Return the first flip where a one-step gait loses stability; None without one."""
     flips = [
         flip.value
         for branch in branches
@@ -286,10 +283,8 @@ def limit_rows(family: Family) -> Iterator[dict[str, Any]]:
 
 
 def sample_again(family: Family) -> dict[str, Any] | None:
-    """Return the change of some gaits at tighter tolerances, spread evenly over all branches; None without gaits.
-
-    They are solved for again, so that the residual of Newton's method counts as well.
-    """
+    """Return the change of some gaits at tighter tolerances, spread evenly over all branches; None without gaits."""
+    # they are solved for again, so that the residual of Newton's method counts as well
     step_map, every = family.step_map, [(branch, point) for branch in family.branches for point in branch.points]
     if step_map is None or not every:
         return None

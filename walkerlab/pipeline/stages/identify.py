@@ -282,10 +282,8 @@ def motions(config: IdentifyConfig, result: Identification, measured: MeasuredAn
 
 
 def reference_masses(config: IdentifyConfig, keys: Sequence[str], model: str) -> dict[str, float]:
-    """Return the masses that estimated masses refer to: those of the config that were not fitted.
-
-    Empty if no mass was estimated, or for the contact model, whose stiffness sets the scale of mass.
-    """
+    """Return the masses that estimated masses refer to: those of the config that were not fitted."""
+    # empty for the contact model, whose stiffness sets the scale of mass
     if model != "rigid" or not any(key.endswith("mass_kg") for key in keys):
         return {}
     fields = (".".join(("walker", *path)) for path, _ in leaves(type(config.walker), held=config.walker))

@@ -35,10 +35,7 @@ def numerical_error(first: Summary, tolerances: Tolerances, walk: Callable[[Tole
 
 
 def tightened(tolerances: Tolerances) -> tuple[Tolerances, str]:
-    """Return tighter tolerances with a larger budget, and a description of the change.
-
-    At the tightest tolerances the method changes instead.
-    """
+    """Return tighter tolerances (at the tightest ones another method) with a larger budget, and a description."""
     tolerances = replace(tolerances, budget=min(MORE_WORK * tolerances.budget, ENDLESS))
     for factor, by in TIGHTER.items():
         rtol = tolerances.rtol / factor

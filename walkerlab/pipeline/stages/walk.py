@@ -169,10 +169,7 @@ def legs() -> dict[str, Variable]:
 
 
 def step_columns(touch_time_s: ArrayLike, **values: ArrayLike | None) -> dict[str, Variable]:
-    """Build variables over steps, named as in `OF_STEPS`; empty for a walk without a step.
-
-    Values that are None are left out; NaN and missing values of the last steps are gaps.
-    """
+    """Build variables over steps, named as in `OF_STEPS`; None, NaN and missing values of the last steps are gaps."""
     count = np.size(touch_time_s)
     if count == 0:
         return {}
@@ -198,10 +195,7 @@ def steps_of(walk: WalkRecord, **values: ArrayLike | None) -> dict[str, Variable
 
 
 def pace_of(config: SceneConfig | SimulateConfig, walk: WalkRecord) -> dict[str, float]:
-    """Return mean speed (m/s) from the first foothold to the last touch, and its Froude number; empty without a step.
-
-    config  gives leg length L and gravity g
-    """
+    """Return mean speed (m/s) from first foothold to last touch, and its Froude number; empty without a step."""
     if not walk.steps:
         return {}
     speed = float(walk.touch_along_m[-1] / walk.touch_time_s[-1])
@@ -240,10 +234,7 @@ def numbers_of(walk: WalkRecord) -> dict[str, Any]:
 
 
 def last_step(walk: Mapping[str, Any]) -> dict[str, Any]:
-    """Return period (s), length (m) and knee strike time (s) of a walk's last step; None without a step.
-
-    walk  its numbers, as `numbers_of`
-    """
+    """Return period (s), length (m) and knee strike time (s) of a walk's last step; None without a step."""
     periods, lengths, strikes = walk["step_periods_s"], walk["step_lengths_m"], walk.get("knee_strike_times_s")
     step = {"period_s": periods[-1] if periods else None, "length_m": lengths[-1] if lengths else None}
     if not strikes:

@@ -23,10 +23,7 @@ LEAST_BYTES = 32
 
 
 def image(content: Mapping[str, Group], root: Mapping[str, Attribute]) -> bytes:
-    """The bytes of an HDF5 file with these groups, by path, and these root attributes.
-
-    Made in memory, so that a full disk is met by an ordinary write and not inside the HDF5 library.
-    """
+    """Build an HDF5 file in memory, so that a full disk fails an ordinary write and not the HDF5 library."""
     # No file of that name is touched: the memory driver has no backing store.
     with h5py.File("image", "w", driver="core", backing_store=False) as file:
         file.attrs.update(root)
@@ -114,10 +111,10 @@ def write_variable(target: Any, name: str, variable: Variable) -> Any:
 
 
 def parse(data: bytes) -> tuple[dict[str, Group], dict[str, Attribute]]:
-    """The groups, by path, and the root attributes in the bytes of a file; for bytes that nobody vouches for.
+    """Parse the groups, by path, and the root attributes of an untrusted HDF5 file.
 
-    Nothing is read that declares more than the file can hold. Raises ValueError for what `image` does not write,
-    and whatever the HDF5 library raises for what is no HDF5.
+    Nothing is read that declares more than the file can hold. Raises ValueError for content that `image` cannot write,
+    and the HDF5 library's own errors.
     """
     with h5py.File(h5py.h5f.open_file_image(data)) as file:
         return dict(walk_groups(file, "", Budget(len(data)))), read_attributes(file)

@@ -103,10 +103,7 @@ def chunk_of(key: str, answer: Content) -> Chunk:
 
 
 def by_name(summary: Mapping[str, Any]) -> dict[str, Any]:
-    """Flatten a summary to numbers, texts and regular lists of numbers.
-
-    Nested values get dotted names: `dissipated_J.friction`, `gaits.0.period_s`.
-    """
+    """Flatten a summary to numbers, texts and lists of numbers with dotted names, as `dissipated_J.friction`."""
     flat: dict[str, Any] = {}
 
     def take(name: str, value: Any) -> None:
@@ -137,10 +134,7 @@ def is_regular(value: list[Any]) -> bool:
 
 
 def without_outputs(config: Config, target: str, graph: Graph) -> Config:
-    """Return the config without time series of the target's walk; its summary does not depend on them.
-
-    They stay if another stage needs them.
-    """
+    """Return the config without time series of the target's walk, unless another stage needs them."""
     asking = [stage.name for stage in graph.needed_for(target, config) if "outputs" in stage.reads]
     return config.model_copy(update={"outputs": ()}) if asking == [target] else config
 

@@ -167,10 +167,7 @@ class Merge:
         return describe_endings(count_texts(outcomes), config, question.stage == CONTACT, pads)
 
     def numerical_error(self) -> dict[str, Any]:
-        """Return the largest errors of the repeated walks, and counts; empty for a stage that does not walk.
-
-        `ended_otherwise` counts walks that ended differently, whose error is unknown.
-        """
+        """Return the largest errors of the repeated walks; `ended_otherwise` counts walks whose error is unknown."""
         errors = {key: self.of(f"numerical_error.{key}") for key in ("end_time_s", *ERROR_OF_EACH_STEP.values())}
         reasons, ends = self.of("numerical_error.reason"), errors["end_time_s"]
         otherwise = 0 if reasons is None else int(np.sum(reasons != ""))
@@ -232,10 +229,7 @@ def count_texts(texts: NDArray[Any]) -> dict[str, int]:
 
 
 def as_csv(content: Content, question: SweptStage, every: bool = False) -> str:
-    """Format a CSV table of the points: parameters, outcome and headline quantities.
-
-    every  all numbers and texts instead; lists take columns
-    """
+    """Format a CSV table of the points: parameters, outcome and headline quantities, or with `every` all values."""
     group, dimensions = content[""], len(question.shape)
     columns: dict[str, list[Any]] = {}
     for place, (name, axis) in enumerate(zip(question.names, question.axes, strict=True)):

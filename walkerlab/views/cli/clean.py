@@ -13,9 +13,7 @@ from walkerlab.views.cli.request import Request
 
 
 def clean_folders(request: Request, every: bool, stages: Sequence[str], yes: bool) -> None:
-    """Delete the files of these stages from run folders, once confirmed, and folders left empty.
-
-    every  clean all runs instead of the request's
+    """Delete the files of these stages from the run's folder, or from all, once confirmed; also folders left empty.
 
     Raises typer.BadParameter without a terminal to confirm on, LockedError (with `--no-wait`) and StorageError.
     """

@@ -199,10 +199,7 @@ class StageLine:
         return now - self.work_began - compiled
 
     def seconds_left(self) -> float | None:
-        """Predict the remaining time from the rate of the later half of the work, or from the stage's last duration.
-
-        None until enough is known, and once the prediction has passed.
-        """
+        """Predict the remaining time (s) from the rate so far, or from the stage's last duration; None if unknown."""
         computed = self.computed_s()
         if self.total and self.done >= ENOUGH_DONE * self.total and computed >= ENOUGH_S:
             half = bisect.bisect_left(self.progress, (self.done // 2,))

@@ -64,10 +64,7 @@ FIGURE_NUMBER = re.compile(r"(?:fig(?:ure)?[- .]*)?0*(\d+)")
 def export_from(
     folder: RunFolder, what: str, target: Target, width: float, model: str, console: Console, dpi: int = DPI
 ) -> Path:
-    """Write one item of a run to a file, and return its path.
-
-    width  of a figure, pt; `dpi` pixels per inch for pixel formats
-    model  stage whose trajectory is exported
+    """Write one item of a run to a file (`width` pt, `dpi`), and return its path.
 
     Raises ConfigError for an unknown item or format, StaleError for a missing result.
     """
@@ -168,12 +165,7 @@ def plan_run(folder: RunFolder) -> Executor:
 def figure(
     folder: RunFolder, illustration: Illustration, kind: str, size: tuple[float, int], console: Console
 ) -> bytes:
-    """Draw a figure as on the page; StaleError if the run lacks a result that it needs.
-
-    size  width in pt, and pixels per inch
-
-    If its results are outdated it is drawn from them, with a warning.
-    """
+    """Draw a figure as on the page, in this size (width in pt, pixels per inch); StaleError without its results."""
     stored = results_in(folder, illustration.stages)
     run, plot = plan_run(folder), PIPELINE["plot"]
     inputs = {name: result for name, result in run.inputs(plot).items() if isinstance(result, Stored)}
@@ -200,10 +192,7 @@ def figure(
 
 
 def table(folder: RunFolder, name: str, kind: str, console: Console) -> Table:
-    """Return a table of the paper's values; ConfigError if the walker is not the paper's.
-
-    kind  csv: records by key; tex: as on the page
-    """
+    """Return a table of the paper's values, as records (csv) or as on the page (tex); ConfigError for other walkers."""
     with results_to_show(folder, ["compare"], console.warn) as results:
         summary = the_result(results, folder, "compare").summary
     if TABLES[name] not in summary:
@@ -276,10 +265,7 @@ class Film:
 
 
 def walk_in(folder: RunFolder, model: str | None = None) -> str:
-    """Return the stage to show: by default the contact model's walk, if there is one.
-
-    Raises ConfigError if `model` is not a walk.
-    """
+    """Return the stage to show, by default the contact model's walk; ConfigError if `model` is not a walk."""
     if model is not None and model not in MODEL_NAMES:
         raise ConfigError(f"--model {model}: not a walk.", f"There are {', '.join(MODEL_NAMES)}.")
     rigid, contact = MODEL_NAMES

@@ -24,10 +24,7 @@ FULL_DISK_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 
 @contextlib.contextmanager
 def exit_on_failure(request: Request) -> Iterator[None]:
-    """Turn expected failures into a message on stderr and an exit code, and with `--json` into an object.
-
-    request  the command's request, whose run options complete the advised commands
-    """
+    """Turn expected failures into a message on stderr and an exit code, and with `--json` into an object."""
     raise_on(signal.SIGTERM, KeyboardInterrupt)
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # a script's background job is to ignore it
         raise_on(signal.SIGINT, KeyboardInterrupt)
@@ -74,11 +71,7 @@ def discard_output() -> None:
 def print_result(
     request: Request, value: dict[str, Any], lines: Iterable[str], error: WalkerlabError | None = None
 ) -> None:
-    """Print a result as text or JSON; exit non-zero if it holds an error.
-
-    value  object for `--json`
-    lines  text for people
-    """
+    """Print a result as text lines or as the JSON object `value`; exit non-zero if it holds an error."""
     if request.as_json:
         print_json(value if error is None else value | {"error": error.as_json()})
     else:

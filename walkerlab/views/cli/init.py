@@ -17,10 +17,7 @@ SCHEMA = ".walkerlab-schema.json"
 
 
 def write_config(file: Path, walker: str) -> str:
-    """Write the built-in config of a walker type as a user's config with comments, and its schema.
-
-    Raises ConfigError if there is no such type, StorageError if the file exists or cannot be written.
-    """
+    """Write a walker's commented config, and its schema; ConfigError for an unknown type, StorageError."""
     config = load(Path(template(walker))).config
     if file.exists():
         raise StorageError(f"{file} already exists.", "Choose another name; nothing was overwritten.")
@@ -41,7 +38,6 @@ def write_config(file: Path, walker: str) -> str:
 
 
 def template(walker: str) -> str:
-    """Return the built-in config of that name or walker type, the paper's first; ConfigError for an unknown name."""
     types: dict[str, str] = {}
     for name in (DEFAULT, *builtin_names()):
         types.setdefault(load(Path(name)).config.walker.type, name)

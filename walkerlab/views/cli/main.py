@@ -39,7 +39,7 @@ def main() -> None:
 
 
 def print_whatever_there_is_to_print() -> None:
-    """Have output go nowhere where it is closed, and escape what its encoding lacks, such as names that are no text."""
+    """Discard output if stdout is closed, and escape characters that its encoding lacks, such as undecodable names."""
     for name in ("stdout", "stderr"):
         if getattr(sys, name) is None:
             setattr(sys, name, os.fdopen(os.open(os.devnull, os.O_WRONLY), "w", encoding="utf-8"))
@@ -47,10 +47,9 @@ def print_whatever_there_is_to_print() -> None:
 
 
 class Commands(TyperGroup):
-    """The commands, with their whole purpose in the list."""
+    """Commands listed with their whole purpose, which click would cut."""
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
-        """Wrapped to the width, where click would cut."""
         commands = {name: self.get_command(ctx, name) for name in self.list_commands(ctx)}
         with formatter.section("Commands"):
             formatter.write_dl(
@@ -59,7 +58,7 @@ class Commands(TyperGroup):
 
 
 def program(graph: Graph = PIPELINE) -> typer.Typer:
-    """The command line for a pipeline."""
+    """Build the command line of a pipeline."""
     app = typer.Typer(
         name="walkerlab",
         cls=Commands,
@@ -80,7 +79,7 @@ def program(graph: Graph = PIPELINE) -> typer.Typer:
 
 
 def print_version(requested: bool) -> None:
-    """Print the version with the commit that the code is from, if that is known, and exit, if asked."""
+    """Print the version, with the code's commit if it is known, and exit."""
     if requested:
         # Imported here: nothing else that is answered on sight asks git.
         from walkerlab.pipeline.store.commit import commit_of_package
@@ -95,11 +94,11 @@ def options_of_the_program(
         bool, typer.Option("--version", is_eager=True, callback=print_version, help="Print the version and the commit.")
     ] = False,
 ) -> None:
-    """Answer `--version` at once."""
+    """Handle `--version`."""
 
 
 def add_stage(app: typer.Typer, stage: Stage, graph: Graph) -> None:
-    """Add the command of one stage to a program, with the options that mean something to it."""
+    """Add the command of a stage to a program, with the options that apply to it."""
     shared = [*OF_A_RUN, "jobs", "force", "dry_run", "no_wait", *OF_TALK]
     if STRIDES not in stage.options:
         shared.remove("strides")

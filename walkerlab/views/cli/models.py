@@ -17,8 +17,7 @@ from walkerlab.views.cli.target import Target, write_file
 def write_model(run: str, runs: Path, target: Target, law: str | None, console: Console) -> list[Path]:
     """Write the walker of a run or config, after computing its gait if necessary.
 
-    Raises ConfigError for an unknown run or format and for a walker that the format cannot express, NoAnswer if the
-    walker has no gait to start from.
+    Raises ConfigError for an unknown run or format or a walker that the format cannot express, NoAnswer without a gait.
     """
     resolved = resolve(run, runs=runs)
     config, folder = resolved.loaded.config, resolved.folder

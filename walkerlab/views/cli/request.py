@@ -33,7 +33,7 @@ OF_KIND = re.compile(r"\([^)]*\)")
 
 
 def keys_to_set(incomplete: str) -> list[str]:
-    """The keys of a config that begin with what was typed, each with the `=` that `--set` wants."""
+    """Complete config keys, each with the `=` that `--set` needs."""
     # Imported here and below: only a shell that completes asks.
     from walkerlab.config.reference import keys
 
@@ -42,12 +42,12 @@ def keys_to_set(incomplete: str) -> list[str]:
 
 
 def keys_to_vary(incomplete: str) -> list[str]:
-    """The same without the `=`."""
+    """Complete config keys, without the `=`."""
     return [key.removesuffix("=") for key in keys_to_set(incomplete)]
 
 
 def configs_and_files(incomplete: str) -> list[str]:
-    """The built-in configs and the YAML files whose names begin with what was typed."""
+    """Complete names of built-in configs and of YAML files."""
     from walkerlab.config.files import builtin_names
 
     folder, slash, stem = incomplete.rpartition("/")
@@ -56,34 +56,31 @@ def configs_and_files(incomplete: str) -> list[str]:
 
 
 class SetByOption(str):
-    """A setting KEY=VALUE from an option of its own; messages show that option as typed."""
+    """A setting KEY=VALUE made from a stage's own option; messages show the option as the user typed it."""
 
     source: str
 
     def __new__(cls, text: str, source: str) -> "SetByOption":
-        """Make the setting, typed as `source`."""
         setting = super().__new__(cls, text)
         setting.source = source
         return setting
 
 
 def option(*flags: str, default: Any = None, **about: Any) -> Any:
-    """A field of a request that commands may have as an option: its flags, and its description for typer."""
+    """Declare a field of a request that commands may offer as an option, with its flags and its help."""
     return field(default=default, metadata={"option": typer.Option(*flags, **about)})
 
 
 def as_parameter(entry: Field[Any]) -> inspect.Parameter:
-    """Turn such a field into a parameter of a function whose signature typer reads."""
+    """Convert such a field to a parameter of a function whose signature typer reads."""
     kind, declared = inspect.Parameter.KEYWORD_ONLY, entry.metadata["option"]
     return inspect.Parameter(entry.name, kind, default=entry.default, annotation=Annotated[entry.type, declared])
 
 
 def settings_from(options: Sequence["Option"], values: Mapping[str, Any]) -> tuple[SetByOption, ...]:
-    """Return the settings that a stage's own options stand for.
+    """Convert a stage's own options (values by flag; None if not given) to settings.
 
-    values  by flag; None where an option was not given
-
-    Raises typer.BadParameter for an option without those it needs, and for bounds of another form.
+    Raises typer.BadParameter for an option without the options it needs, and for malformed bounds.
     """
     settings = []
     for option in options:
@@ -106,10 +103,7 @@ def settings_from(options: Sequence["Option"], values: Mapping[str, Any]) -> tup
 
 
 def bounds(flag: str, values: Sequence[str], form: str) -> str:
-    """Return pairs of numbers by name as a YAML block; typer.BadParameter for another form than NAME=A:B.
-
-    form  as documented; with brackets, a name alone stands for null
-    """
+    """Convert pairs of numbers by name to a YAML block; typer.BadParameter unless NAME=A:B, or [NAME] for null."""
     either = r"([^=]+)(?:=([^:]+):([^:]+))" + ("?" if "[" in form else "")
     parts = [re.fullmatch(either, value) for value in values]
     if None in parts:
@@ -119,10 +113,7 @@ def bounds(flag: str, values: Sequence[str], form: str) -> str:
 
 
 def pairs(flag: str, values: Sequence[str], kind: type) -> str:
-    """Return pairs NAME=VALUE,... as a YAML block; a unit alone stands for that of its kind.
-
-    kind  float for numbers, which stay unquoted
-    """
+    """Convert pairs NAME=VALUE,... to a YAML block; a lone unit is the unit of its kind. Floats stay unquoted."""
     # Imported here: few commands read files of other programs.
     from walkerlab.errors import ConfigError
     from walkerlab.exchange.columns import parse_pairs, parse_units
@@ -147,7 +138,7 @@ def own_parameter(name: str, option: "Option") -> inspect.Parameter:
 
 @dataclass(frozen=True)
 class Request:
-    """Options of a command; those that it does not have keep their defaults."""
+    """Options shared by commands; options that a command does not offer keep their defaults."""
 
     command: str  # as it is typed
     own: tuple[SetByOption, ...] = ()  # settings of the config from options of its own
@@ -187,12 +178,12 @@ class Request:
 
     @property
     def settings(self) -> tuple[str, ...]:
-        """Every change of the config, as `--set` has it."""
+        """All changes of the config, as settings for `--set`."""
         return (*(self.sets or ()), *self.own)
 
     @property
     def typed(self) -> str:
-        """The options that say which run is meant, each with a blank before it; none for the paper config's own."""
+        """The options that select the run, each after a space; empty for the default config."""
         words = [] if self.config is None else ["-c", self.config]
         for setting in self.settings:
             words += ["--set", setting]
@@ -203,14 +194,14 @@ class Request:
 
     @property
     def processes(self) -> int:
-        """How many processes may work at once."""
+        """Number of processes that may work at once."""
         if self.jobs is not None:
             return self.jobs
         return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
     @cached_property
     def resolved_run(self) -> "ResolvedRun":
-        """The config and its run folder, its warnings said; ConfigError if it is not usable."""
+        """The config and its run folder; shows the config's warnings. ConfigError if the config is invalid."""
         from walkerlab.pipeline.resolve import resolve
 
         run = resolve(self.config, self.settings, self.strides, self.runs, self.name)
@@ -226,7 +217,7 @@ class Request:
 
     @property
     def run_dir(self) -> Path | None:
-        """The run's folder; None as long as nothing has asked for it."""
+        """The run's folder; None until something has asked for it."""
         return self.folder.path if "resolved_run" in vars(self) else None
 
     @property
@@ -249,7 +240,7 @@ OF_TALK = ("as_json", "quiet", "verbose")
 
 
 class KeysAreNoOptions(TyperCommand):
-    """A command that says how a key of the config is changed where somebody types it as an option."""
+    """A command that advises `--set KEY=VALUE` when a user types a config key as an option."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Read the options; for an unknown option that names a key, the error shows its `--set`."""
@@ -275,15 +266,14 @@ def command(
     asks: type[Request] = Request,
     sets: Sequence["Option"] = (),
 ) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Add the decorated function to a program: it takes a request, then the options that are its own.
+    """Add the decorated function to a program as a command: it takes a request, then its own options.
 
-    shared   fields of the request that are options of the command; the others keep their defaults
-    name     as it is typed; default: the function's
-    purpose  what help says; default: the function's docstring
-    asks     the request's type, whose own fields help has before those of `Request`
-    sets     options that set keys of the config, which help has first
-
-    What the function raises ends the command as `exit_on_failure` says.
+    shared   fields of the request that the command offers as options
+    name     name of the command; default: the function's
+    purpose  help text; default: the function's docstring
+    asks     type of the request, whose own fields come first in the help
+    sets     options that set keys of the config, first in the help
+    Errors of the function end the command as `exit_on_failure` describes.
     """
 
     def register(function: Callable[..., None]) -> Callable[..., None]:

@@ -17,10 +17,7 @@ SHORT = 12
 
 
 def rerun_artifact(path: Path, graph: Graph, request: Request) -> None:
-    """Run an artifact's stage and its inputs in an empty folder, and compare the content.
-
-    Raises ConfigError if there is no such artifact, StaleError if it cannot be read or differs.
-    """
+    """Recompute an artifact in an empty folder and compare; ConfigError without one, StaleError if it differs."""
     try:
         stored = read(path)
     except (FileNotFoundError, NotADirectoryError):

@@ -89,10 +89,7 @@ def as_object(folders: tuple[RunFolder, RunFolder], found: RunDifference, figure
 def lines(
     folders: tuple[RunFolder, RunFolder], comparison: RunDifference, figures: list[Path], every: bool
 ) -> list[str]:
-    """Describe a difference: keys of the config, and headline values of each stage.
-
-    every  show all differing values instead
-    """
+    """Describe changed keys of the config and changed headline values; with `every` all differing values."""
     from walkerlab.views.report.numbers import number
     from walkerlab.views.report.tables import aligned
     from walkerlab.views.report.text import in_words

@@ -31,7 +31,7 @@ DRAWN_AT_ONCE = {stage.name for stage in PIPELINE.stages if stage.on_demand}
 
 
 def run_stage(request: Request, stage: Stage, graph: Graph) -> None:
-    """Do what the command asks and print it; typer.Exit(4) if there is no answer, else as `execute` raises."""
+    """Run a stage as requested and print its answer; typer.Exit(4) without an answer, else as `execute` raises."""
     try:
         report_on(request, stage, graph)
     except ConfigError as error:
@@ -39,7 +39,7 @@ def run_stage(request: Request, stage: Stage, graph: Graph) -> None:
 
 
 def report_on(request: Request, stage: Stage, graph: Graph) -> None:
-    """The same; ConfigError without the place of what is wrong."""
+    """Run a stage as requested and print its answer; its ConfigError names no place in a file."""
     options = Options(request.force, not request.no_wait, request.processes, request.full, request.dry_run)
     config, folder = request.resolved, request.folder
     if options.dry:
@@ -56,7 +56,7 @@ def report_on(request: Request, stage: Stage, graph: Graph) -> None:
 
 
 def with_nearby_gaits(report: StageReport, request: Request) -> StageReport:
-    """The report of a slope without a gait, its advice led by where gaits are met."""
+    """Lead the advice of a missing gait by the nearest slopes that have one."""
     error = report.no_answer
     if error is None or report.stage not in SEARCHING or "no gait" not in error.message:
         return report
@@ -74,10 +74,7 @@ def values_of(summary: Mapping[str, Any]) -> dict[str, float]:
 
 
 def write_config(request: Request, report: StageReport, name: str) -> Path:
-    """Write a stage's parameters as a config that extends that of the request, into its run folder, over no file.
-
-    Raises StorageError if the system refuses.
-    """
+    """Write a stage's parameters to a new config that extends the request's; StorageError if that fails."""
     start = config_to_extend(request.config)
     base = load(Path(start)).config
     typed = start if start in builtin_names() else os.path.relpath(start, report.run_dir)
@@ -95,7 +92,7 @@ def write_config(request: Request, report: StageReport, name: str) -> Path:
 
 
 def report_lines(request: Request, report: StageReport) -> list[str]:
-    """The result for people: what was found, where it is, and what to do next."""
+    """Describe the result: what was computed, where it is, and what to do next."""
     if report.artifact is None:
         return [f"{report.stage}: no result", *omission_lines(request, report)]
     # the reason for no answer, and the advice, appear once: as the error
@@ -122,13 +119,12 @@ def report_lines(request: Request, report: StageReport) -> list[str]:
 
 
 def plan_lines(report: StageReport) -> list[str]:
-    """Describe what would happen."""
+    """Describe what would be computed."""
     rows = [[done.stage, done.action, done.reason] for done in report.steps]
     return [f"in {report.run_dir}:", *aligned(rows), *describe_omissions(report)]
 
 
 def omission_lines(request: Request, report: StageReport) -> list[str]:
-    """Lines about what was left out, if they are requested or there is nothing else to report."""
     return describe_omissions(report) if request.verbose or report.artifact is None else []
 
 

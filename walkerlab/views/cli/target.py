@@ -23,10 +23,7 @@ class Target:
     inputs: tuple[Path, ...] = ()  # files that the command reads, which must not be overwritten
 
     def of(self, what: str, stem: str, kinds: Sequence[str]) -> tuple[Path, str]:
-        """Return file and format; the first of `kinds` by default.
-
-        Raises ConfigError for an unknown format, for two at once, and for a file that must not be overwritten.
-        """
+        """Return file and format, by default the first of `kinds`; ConfigError if unknown, given twice or protected."""
         a_file = self.to is not None and self.output is None and "." in self.to
         output = Path(str(self.to)) if a_file else self.output
         ending = "" if output is None else output.suffix.removeprefix(".")

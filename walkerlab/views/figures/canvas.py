@@ -39,17 +39,13 @@ LONGEST: Final = 1e4
 
 @contextlib.contextmanager
 def styled(width: float = WIDTH) -> Iterator[None]:
-    """Apply matplotlib's defaults and the project's style, whatever the user's settings.
-
-    width  of the figures, in; in narrow ones, letters are smaller and lines thinner
-    """
+    """Apply the project's style whatever the user's settings; figures are `width` inches wide."""
     size = {"figure.figsize": (width, width)}
     with matplotlib.style.context(["default", RC, *([NARROW] if width < NARROW_BELOW else []), size]):
         yield
 
 
 def is_narrow() -> bool:
-    """Whether figures are one column wide."""
     return bool(matplotlib.rcParams["figure.figsize"][0] < NARROW_BELOW)
 
 
@@ -62,7 +58,6 @@ def blank(height: float) -> Figure:
 
 
 def panels(height: float, rows: int = 1, columns: int = 1, **how: Any) -> tuple[Figure, Any]:
-    """Create a blank figure with a grid of axes, as matplotlib's `subplots` does."""
     figure = blank(height)
     return figure, figure.subplots(rows, columns, **how)
 
@@ -96,10 +91,7 @@ def cost_axis(axes: Axes) -> None:
 
 
 def power_of_ten(value: float, _place: float | None = None) -> str:
-    """Format a power of ten as an axis label.
-
-    Its exponent has signs of its own, since the small letters of a formula would be too small on a page.
-    """
+    """Format a power of ten as an axis label, with signs large enough to read on a page."""
     return "10" + str(round(math.log10(value))).translate(RAISED)
 
 
@@ -108,11 +100,7 @@ def entry(label: str, **look: Any) -> Line2D:
 
 
 def add_legend(figure: Figure, handles: Sequence[Artist], title: str | None = None, edge: str = "upper") -> None:
-    """Draw a legend in a band above all axes, in as few rows as fit.
-
-    title  of what it is the legend
-    edge   "lower" puts it below all axes
-    """
+    """Draw a legend above all axes (`edge` "lower": below), in as few rows as fit."""
     where: dict[str, Any] = {"title": title, "alignment": "left", "loc": f"outside {edge} center"}
     for rows in range(1, len(handles) + 1):
         legend = figure.legend(handles=list(handles), ncols=-(-len(handles) // rows), **where)

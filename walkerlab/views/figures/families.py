@@ -116,10 +116,8 @@ def draw_branch(axes: Axes, branch: DrawnBranch, name: str) -> set[str]:
 
 
 def stretch_of(curve: Curve, begin: int, end: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the parameter values and quantities to plot between two points of a branch.
-
-    From the flip that a branch is born in to its first gait, quantities part as the root of the distance from the flip.
-    """
+    """Return the parameter values and quantities to plot between two points of a branch."""
+    # near the flip in which a branch begins, quantities separate as the root of the distance from the flip
     value, quantity = curve.value[begin : end + 1], curve.quantity[begin : end + 1]
     if begin or (0, "flip") not in curve.marks:
         return value, quantity
@@ -130,7 +128,6 @@ def stretch_of(curve: Curve, begin: int, end: int) -> tuple[NDArray[np.float64],
 
 
 def clouds(results: Results) -> Iterator[tuple[str, Group]]:
-    """Return the attractors stored for each model."""
     found = ((model, results[STAGE].groups.get(f"{model}/attractor")) for model in MODELS)
     return ((model, group) for model, group in found if group is not None)
 
@@ -147,13 +144,7 @@ POINTS_BETWEEN: Final = 16
 
 
 def draw_branches(results: Results) -> Drawn:
-    """Plot both quantities over the full range (left) and, if there are bifurcations, around them (right).
-
-    In a figure of one column the two parts stand under one another.
-
-    Caption: where the models' gaits of one step change, where cascades accumulate, where gaits of several steps are
-    born in folds, and the unit of all.
-    """
+    """Plot both quantities over the full range (left) and, if there are bifurcations, around them (right)."""
     summary = results[STAGE].summary
     branches, settled, close = list(branches_of(results)), list(clouds(results)), close_of(results)
     parts = {"(a) full range": None} | ({"(b) bifurcations": close} if close else {})
@@ -194,10 +185,7 @@ def draw_branches(results: Results) -> Drawn:
 
 
 def births_in(branches: Sequence[DrawnBranch], shown: tuple[float, float]) -> list[tuple[float, int]]:
-    """Find the fold-born gaits of several steps in a part of the axis: position and number of steps.
-
-    Of births too close to distinguish, that of the fewest steps.
-    """
+    """Find position and number of steps of fold-born gaits; of several too close to distinguish, the shortest."""
     folds = [
         (branch.period, float(curve.value[place]))
         for branch in branches
@@ -265,10 +253,8 @@ def finely(along: NDArray[Any]) -> NDArray[np.float64]:
 
 
 def multipliers_of(branch: DrawnBranch) -> NDArray[np.complex128]:
-    """Sample the multipliers along a branch finely, (points, multipliers), largest first.
-
-    Between its points their polynomial is interpolated: where two of them meet they turn as roots do.
-    """
+    """Sample the multipliers along a branch finely, (points, multipliers), largest first."""
+    # between points their polynomial is interpolated: where two multipliers meet, they turn as roots do
     known = branch.group["multiplier_real"] + 1j * branch.group["multiplier_imag"]
     found = np.array([np.roots(row) for row in finely(np.array([np.poly(row).real for row in known]))])
     return np.take_along_axis(found, np.argsort(-np.abs(found), axis=1), axis=1)
@@ -290,10 +276,7 @@ FARTHEST: Final = 1.6
 
 
 def draw_multipliers(results: Results) -> Drawn:
-    """Plot multipliers in the complex plane (left) and their magnitudes over the parameter (right), a colour per gait.
-
-    Caption: where gaits of one step bifurcate, by model and kind, and the largest magnitude if it is beyond the axes.
-    """
+    """Plot multipliers in the complex plane (left) and their magnitudes over the parameter (right)."""
     (figure, (left, right)), largest = panels(3.6, 1, 2), 0.0
     drawn = [branch for branch in branches_of(results) if branch.period == 1]
     looks = {model: cycle(looks) for model, looks in GAITS.items()}
@@ -334,10 +317,7 @@ OTHER_PERIOD, APERIODIC, NOTHING = "#B5DDC0", "#F2C7A0", "#F4F4F4"
 
 
 def draw_plane(results: Results) -> Drawn:
-    """Plot regions by attractor, and every bifurcation curve over them, by model, kind and period.
-
-    Caption: what the curves divide, and how much of the plane settles on what.
-    """
+    """Plot regions by attractor, and every bifurcation curve over them, by model, kind and period."""
     figure, axes = panels(4.4)
     regions = results[STAGE].groups.get("rigid/regions")
     key: list[Artist] = []

@@ -38,10 +38,7 @@ NOTHING: Final = 1e-3
 
 
 def draw_forces(results: Results) -> Drawn:
-    """Plot both forces over time (left) and against each other (right).
-
-    Caption: how many strides are shown if not all, how steep the force gets, and how large an impact's is.
-    """
+    """Plot both forces over time (left) and against each other (right)."""
     result = results[CONTACT_STAGE]
     whole = walk_of(result, CONTACT)
     walk, every = whole.first(STRIDES), whole[NORMAL]

@@ -97,10 +97,7 @@ def draw_residuals_in_phase(panel: Axes, samples: Group) -> None:
 
 
 def draw_trade_off(results: Results) -> Drawn:
-    """Plot the 95 % region of the two worst-determined combinations; caption: both, in words.
-
-    The plane is that of the two parameters that show them best.
-    """
+    """Plot the 95 % region of the two worst-determined combinations over the two parameters that show it best."""
     rows, freedom = (results[IDENTIFY_STAGE].summary[name] for name in ("estimates", "degrees_of_freedom"))
     semi_axis = semi_axis_of_region(freedom)
     moves, values = results[IDENTIFY_STAGE].groups["worst"]["moves"], np.array([row["value"] for row in rows])

@@ -67,18 +67,15 @@ class Illustration:
         return self.say("seen")
 
     def caption(self, results: Results) -> str:
-        """One or two sentences with numbers from the results."""
         with styled():
             return self.say("caption", *self.draw(results)[1])
 
     @property
     def stages(self) -> tuple[str, ...]:
-        """Stages whose results are required."""
         return tuple(dict.fromkeys(need.stage for need in self.needs))
 
     @property
     def called(self) -> str:
-        """Name for use in a sentence."""
         return f"figure {self.name if self.number is None else self.number}"
 
     def why_left_out(self, results: Results, absent: Mapping[str, str]) -> str | None:

@@ -88,10 +88,7 @@ STEP_LEVELS: Final = (0.5, 1.5, 2.5, 4.5)
 
 
 def draw_starts(results: Results) -> Drawn:
-    """Plot both models' maps on equal axes, coloured by outcome, with contours of more steps.
-
-    Caption: how many starts walk, and the factors at which the paper's own would lie; none of these for another scene.
-    """
+    """Plot both models' maps on equal axes, coloured by outcome, with contours of more steps."""
     cells, summary = results[TUNE_STAGE]["map"], results[TUNE_STAGE].summary
     across, up = cells[SWING], cells[STANCE]
     marks: list[tuple[str, str, int, str, tuple[Any, Any]]] = [("rigid start", "o", 6, WHITE, (1.0, 1.0))]
@@ -129,10 +126,7 @@ NO_ATTRACTOR: Final = -1
 
 
 def draw_basins(results: Results) -> Drawn:
-    """Plot attractors and failures by colour (left) and steps to settle by brightness (right).
-
-    Caption: what is walked, how much of the window walks, and to which attractors.
-    """
+    """Plot attractors and failures by colour (left) and steps to settle by brightness (right)."""
     summary, cells = results[BASIN].summary, results[BASIN]["basin"]
     plane = [str(name) for name in summary["plane"][:2]]
     xlim, ylim = (sides_of(cells[name]) for name in plane)
@@ -218,7 +212,6 @@ class OverStiffness:
     """Two panels over stiffness and another coordinate: outcomes, and errors."""
 
     def __init__(self, cells: Group, up: str, titles: tuple[str, str]) -> None:
-        """Create both panels, still empty."""
         self.cells, self.edges = cells, (edges(cells[STIFFNESS]), edges(cells[up]))
         self.figure, (self.left, self.right) = panels(3.9, 1, 2, sharex=True, sharey=True)
         xlim, ylim = (ends[[0, -1]] for ends in self.edges)

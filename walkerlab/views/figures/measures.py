@@ -217,7 +217,7 @@ def draw_leg(axes: Axes, line: Sequence[Point], centre: Point, radius: float, co
 
 
 def rotate(angle: float, origin: Point, point: Point, moved_to: Point) -> Point:
-    """Rotate a point (rad), then shift it to a new origin."""
+    """Rotate a point (rad) about the origin, then shift the origin to another point."""
     (across, up), s, c = np.subtract(point, origin), np.sin(angle), np.cos(angle)
     return float(moved_to[0] + c * across - s * up), float(moved_to[1] + s * across + c * up)
 

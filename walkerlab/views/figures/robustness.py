@@ -94,10 +94,7 @@ def actuations(group: Group, parameters: Sequence[str]) -> dict[str, NDArray[np.
 
 
 def push_off_or_hip(group: Group, driven: Mapping[str, NDArray[np.bool_]], _results: Results) -> Drawn:
-    """Plot what each drive costs, and the disturbances it survives, over speed.
-
-    Caption: of each way speed (m/s), norm (s/m) and cost of transport of the least disturbed gait.
-    """
+    """Plot what each drive costs, and the disturbances it survives, over speed."""
     speed = group[SPEED].astype(float)
     figure, axes = panels(0.6 + PANEL_HEIGHT * len(ACTUATION_PANELS), len(ACTUATION_PANELS), sharex=True)
     looks = {name: {"color": colour, "marker": marker} for name, (_, colour, marker) in ACTUATIONS.items()}

@@ -24,13 +24,7 @@ def run(
     folder: Path,
     left_out: Sequence[LeftOut] = (),
 ) -> Content:
-    """Draw the figures into the run's folder.
-
-    inputs    results by stage: those that there are
-    left_out  the stages without a result, and why
-
-    Raises StorageError if a figure cannot be stored.
-    """
+    """Draw all figures that have their results into the run's folder; StorageError if one cannot be stored."""
     make_folder(folder / FOLDER)
     absent = {entry.what: entry.why for entry in left_out}
     reasons = [figure.why_left_out(inputs, absent) for figure in FIGURES]
@@ -66,12 +60,7 @@ def draw(figure: Illustration, results: Mapping[str, Stored], folder: Path) -> d
 
 
 def draw_at_once(stage: str, folder: Path, anew: bool) -> list[Path]:
-    """Draw the figures that need only one stage's result; return their paths.
-
-    anew  also those that are there
-
-    Raises StorageError if a figure cannot be stored.
-    """
+    """Draw the figures that need only one stage's result; with `anew` also those that exist. Return their paths."""
     results = {stage: artifact.read(folder / f"{stage}.h5")}
     figures = [figure for figure in FIGURES if figure.stages == (stage,) and figure.why_left_out(results, {}) is None]
     make_folder(folder / FOLDER)

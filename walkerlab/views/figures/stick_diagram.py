@@ -94,7 +94,6 @@ class Sticks:
 
     @property
     def has_soles(self) -> bool:
-        """Whether the soles are large enough to be drawn as arcs."""
         return self.radius > SMALL_FOOT * self.leg_length
 
     def leg(self, leg: int) -> Array:
@@ -121,10 +120,7 @@ class Sticks:
         return np.stack((c * along + s * normal, c * normal - s * along), axis=-1)
 
     def postures(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Select the samples at the start and heel strikes of the first cycle, and evenly spaced ones between.
-
-        A cycle that was not completed is shown to the end of the walk.
-        """
+        """Select the samples at the start and heel strikes of the first cycle, and some between."""
         strikes = np.concatenate(([self.time[0]], self.strikes[:CYCLE]))
         between = [np.linspace(a, b, BETWEEN + 2)[1:-1] for a, b in pairwise(strikes)]
         if strikes.size <= CYCLE:
@@ -212,10 +208,7 @@ def draw_postures(axes: Axes, sticks: Sticks, rows: NDArray[np.int64], width: fl
 
 
 def annotate(axes: Axes, sticks: Sticks, path: Array) -> None:
-    """Label landings below the ground, and the walking direction and slope above the walker.
-
-    path  (samples, 2) of the walker's highest point
-    """
+    """Label landings below the ground, and direction and slope above the walker's highest point (`path`)."""
     length = sticks.leg_length
     times = np.concatenate(([0.0], sticks.strikes[:CYCLE]))
     for landing, time in zip(sticks.landings[: CYCLE + 1], times, strict=True):
@@ -285,11 +278,7 @@ def draw_ground(axes: Axes, sticks: Sticks, pads: Group | None) -> list[Artist]:
 
 
 def draw_cycle(stage: str, results: Results) -> Drawn:
-    """Draw a model's walker on its pads or plane.
-
-    Caption: how long the steps of the cycle take and how far they go, whether it was completed, and what is drawn; of
-    the contact model also the feet's radius (m), what the ground is, and the pitch of its pads (m) if it has some.
-    """
+    """Draw a model's walker on its pads or plane."""
     result = results[stage]
     sticks, pads = sticks_of(result), result.groups.get("terrain")
     figure, axes = stick_diagram(sticks)
@@ -321,10 +310,8 @@ RELIEF, RELIEF_UNDER = 0.04, 0.075
 
 
 def film_times(sticks: Sticks, steps: int | None, rate: int, slower: float) -> Array:
-    """Return the frame times (s), `rate` a second, slowed down; a fall is held for a second.
-
-    steps  the first ones; None for the first four, or for the last four and the fall if the walk ended in one
-    """
+    """Return the times (s) of `rate` frames a second; `steps` None: four, or the last four and the fall."""
+    # a fall is held for a second
     begin, shown = 0, STEPS_SHOWN if steps is None else steps
     if steps is None and sticks.ending:
         begin, shown = max(0, sticks.strikes.size - STEPS_SHOWN), sticks.strikes.size + 1

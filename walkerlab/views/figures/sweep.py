@@ -62,13 +62,7 @@ def illustration(
     names: Sequence[str],
     against: str = "",
 ) -> Illustration:
-    """Plot quantities over the parameters, or over one of the quantities.
-
-    parameters  names of the coordinates
-    dims        of the points
-    names       what to draw, at least one
-    against     the number, or parameter, on the other axis; without one the parameters
-    """
+    """Return the illustration of a sweep's quantities `names` over its parameters, or over the quantity `against`."""
     drawing = partial(draw, group, parameters, dims, names, against)
     return Illustration(f"sweep-{stage}", (), drawing, words="sweep", scene=f"{stage} over {', '.join(parameters)}")
 

@@ -67,7 +67,6 @@ class DrawnWalk:
 
     @property
     def time(self) -> Array:
-        """Sample times (s)."""
         return self["time"]
 
     def label(self, words: str, name: str) -> str:
@@ -130,10 +129,7 @@ def time_axes(rows: int, row_height: float, walks: list[DrawnWalk]) -> tuple[Fig
 def in_time(
     walks: list[DrawnWalk], row_height: float, rows: Sequence[tuple[str, str, int | None, str]]
 ) -> tuple[Figure, list[Axes]]:
-    """Plot variables of walks over time, one row each.
-
-    rows  for each the variable, what its axis says, its leg (None: it has none), and the title
-    """
+    """Plot variables of walks over time, a row for each (variable, axis label, leg or None, title)."""
     figure, axes = time_axes(len(rows), row_height, walks)
     for panel, (name, words, leg, title) in zip(axes, rows, strict=True):
         for walk in walks:
@@ -168,11 +164,7 @@ def redoes_the_procedure(results: Results) -> bool:
 
 
 def draw_adjusted(results: Results) -> Drawn:
-    """Plot the rigid model from its start and the contact model from the adjusted start, a row per link.
-
-    The title is the paper's for its compass, and describes the start otherwise. The caption names the start, the
-    strides shown, and the links.
-    """
+    """Plot the rigid model from its start and the contact model from the adjusted start, a row per link."""
     result, named = results[TUNE_STAGE], redoes_the_procedure(results)
     outcome = str(result.summary["procedure"]["adjusted"]["outcome"])
     whole = []
@@ -196,10 +188,7 @@ STATES_IN_TIME = (
 
 
 def draw_states(results: Results) -> Drawn:
-    """Plot each leg's angle and angular velocity, a row each, shaded while the leg is in stance.
-
-    Caption: how much is shown, and how the walks went.
-    """
+    """Plot each leg's angle and angular velocity, a row each, shaded while the leg is in stance."""
     walks, extent = first_strides(walks_with(results, STATES))
     first = walks[0]
     figure, axes = in_time(walks, 1.55, STATES_IN_TIME)
@@ -243,10 +232,8 @@ def draw_cycles(results: Results) -> Drawn:
 
 
 def draw_cycles_of(axes: Axes, walk: DrawnWalk, leg: int) -> None:
-    """Plot the last stride in the model's style, with earlier strides as thin lines below.
-
-    Marked is the state just before each heel strike of the last stride: filled if the leg's own, open if not.
-    """
+    """Plot the last stride in the model's style, with earlier strides as thin lines below."""
+    # marked is the state just before each heel strike of the last stride: filled if the leg's own, open if not
     angle, velocity, look = walk["angle"][:, leg], walk["velocity"][:, leg], walk.look
     axes.plot(angle, velocity, color=look.colour, linewidth=EARLIER_WIDTH, zorder=look.order - 2)
     last = walk.time >= (walk.strikes[-1 - LAST_STRIDE] if walk.strikes.size > LAST_STRIDE else 0.0)
@@ -287,11 +274,7 @@ FEW = 0.005
 
 
 def draw_energies(results: Results) -> Drawn:
-    """Plot each energy in a row.
-
-    Caption: how much is shown, the means of the mechanical energy, whether Table 3 has it too, whether there are
-    impacts, whether anything drives the walker, and how the walks went.
-    """
+    """Plot each energy in a row."""
     walks, extent = first_strides(walks_with(results, ENERGIES))
     figure, axes = in_time(walks, 1.75, ENERGIES_IN_TIME)
     ends = np.array([np.quantile(walk["mechanical_J"], (FEW, 1.0 - FEW)) for walk in walks])
@@ -325,10 +308,7 @@ RUN_LOOKS: Final[tuple[dict[str, Any], ...]] = (
 def draw_runs(
     first: Mapping[str, Content], second: Mapping[str, Content], names: tuple[str, str]
 ) -> list[bytes] | None:
-    """Draw two runs' walks overlaid, as SVG and PNG; None if they share no sampled walk.
-
-    names  of the runs
-    """
+    """Draw two runs' walks overlaid, as SVG and PNG; None if they share no sampled walk."""
     both = [
         (stage, [run[stage].groups["trajectory"] for run in (first, second)])
         for stage in (RIGID_STAGE, CONTACT_STAGE)

@@ -36,7 +36,6 @@ def answer(stage: str, summary: Summary) -> list[str]:
 
 
 def lay_out(blocks: Iterable[str | Table]) -> list[str]:
-    """Wrap paragraphs, and set tables off by empty lines."""
     lines: list[str] = []
     after_table = False
     for block in blocks:
@@ -163,10 +162,7 @@ LAST_STEP = (
 
 
 def last_steps(summary: Summary, errors: Mapping[str, Summary]) -> Table:
-    """Compare both models' last steps with the gait's and, with knees, with those for each release instant.
-
-    errors  numerical errors of the walks by model; they limit the digits shown
-    """
+    """Compare both models' last steps with the gait's and, with knees, with the steps for each release instant."""
     steps = []
     for name, step in summary["steps"].items():
         known_errors = {key: errors[name].get(f"step_{key}") for key in ("period_s", "length_m") if name in errors}

@@ -17,10 +17,7 @@ SETS = {"as-printed": "as printed", "corrected": "corrected"}
 
 
 def gait_table(sets: Mapping[str, Mapping[str, Any]], names: Sequence[str], note: str = "") -> Table:
-    """Tabulate fixed points and multipliers, the sets of equations side by side.
-
-    names  names of the state's coordinates
-    """
+    """Tabulate fixed points (coordinates `names`) and multipliers, the sets of equations side by side."""
     six = partial(fixed, decimals=6)
     multipliers = range(max(len(gait["multipliers"]) for gait in sets.values()))
     lines = [

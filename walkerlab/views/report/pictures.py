@@ -19,27 +19,14 @@ VIEW_BOX = re.compile(rb'\bviewBox="0 0 ([\d.]+) ([\d.]+)"')
 
 
 def pictures(stored: Mapping[str, Content], folder: Path, *, numbered: bool = True) -> tuple[Picture, ...]:
-    """Embed every figure listed by `plot`, in its order.
-
-    folder    run folder, to which the figures' paths are relative
-    numbered  whether to show the paper's figure numbers
-
-    Raises FileNotFoundError if a listed file is not there.
-    """
+    """Embed every figure listed by `plot`, in its order; FileNotFoundError if a listed file does not exist."""
     figures = stored["plot"].summary.get("figures", []) if "plot" in stored else []
     files = fitting([(folder / figure["svg"], folder / figure["png"]) for figure in figures])
     return tuple(picture(figure, folder, file.suffix, numbered) for figure, file in zip(figures, files, strict=True))
 
 
 def picture(figure: Mapping[str, Any], folder: Path, kind: str = ".svg", numbered: bool = False) -> Picture:
-    """Embed one figure.
-
-    figure    texts and file paths relative to the folder
-    kind      suffix of the embedded file; SVG is inlined, PNG is embedded as an image
-    numbered  whether to show the paper's figure number
-
-    Raises FileNotFoundError if a file is not there.
-    """
+    """Embed a figure's file of this kind: SVG inline, PNG as an image; FileNotFoundError if it does not exist."""
     svg = folder / figure["svg"]
     with svg.open("rb") as file:
         box = VIEW_BOX.search(file.read(2000))
@@ -71,10 +58,7 @@ MAX_BYTES = 1_400_000
 
 
 def fitting(drawings: Sequence[tuple[Path, Path]], most: int = MAX_BYTES) -> list[Path]:
-    """Choose the file to embed for each (SVG, PNG): the SVG, unless all together exceed `most` bytes.
-
-    Raises FileNotFoundError if one is not there.
-    """
+    """Choose SVG files, or PNG files if the SVG files exceed `most` bytes; FileNotFoundError if one is missing."""
     chosen = [svg for svg, _ in drawings]
     sizes = [svg.stat().st_size for svg in chosen]
     for index in sorted(range(len(drawings)), key=lambda index: -sizes[index]):
@@ -115,10 +99,7 @@ EXTERNAL_REFERENCE = re.compile(r"url\((?!#)|@import|expression|javascript:", re
 
 
 def inline(file: Path, alt: str) -> Markup:
-    """Return the drawing of an SVG file as markup, described by `alt`.
-
-    Raises FileNotFoundError if it is not there, ParseError if it is no XML.
-    """
+    """Inline an SVG file, described by `alt`; FileNotFoundError without it, ParseError for malformed XML."""
     root = ET.fromstring(file.read_bytes())
     values = [value for element in root.iter() for value in element.attrib.values()]
     references = [reference for value in values for reference in re.findall(r"url\(#[^)]*\)|^#.*$", value)]
@@ -129,10 +110,7 @@ def inline(file: Path, alt: str) -> Markup:
 
 
 def markup(element: ET.Element, used: set[str]) -> Markup:
-    """Copy an element and its children; nothing for elements that the page does not allow.
-
-    used  ids that are referred to; others are omitted
-    """
+    """Copy an allowed element, with its children and the ids in `used`; return nothing for other elements."""
     name = element.tag.removeprefix(SVG)
     if name not in SVG_ELEMENTS:
         return Markup("")

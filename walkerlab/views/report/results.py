@@ -48,10 +48,7 @@ SectionMaker = Callable[[Results], Section | None]
 
 
 def stage_section(stage: str, needed: str = "") -> Callable[[Callable[..., Section | None]], SectionMaker]:
-    """Make a section from a stage's summary, passed as a second argument; None without a result.
-
-    needed  summary key without which there is no section
-    """
+    """Turn a function of results and a stage's summary into a section; None without the summary's key `needed`."""
 
     def section_of(make: Callable[..., Section | None]) -> SectionMaker:
         @wraps(make)

@@ -28,13 +28,7 @@ def run(
     folder: Path,
     left_out: Sequence[LeftOut] = (),
 ) -> Content:
-    """Write the report's pages into the run's folder.
-
-    inputs    available results by stage
-    left_out  stages without a result, with reasons
-
-    Raises StorageError if a page cannot be stored.
-    """
+    """Write the report's pages into the run's folder; StorageError if one cannot be stored."""
     progress.start("report", 1)
     pending = [entry.what for entry in left_out if entry.why == STILL_COMPUTED]
     written, results = write_pages(config, inputs, folder, left_out, pending)
@@ -58,14 +52,8 @@ def write_pages(
     left_out: Sequence[LeftOut] = (),
     pending: Sequence[str] = (),
 ) -> tuple[tuple[Page, ...], Results]:
-    """Write pages of the available results; also called while other results are being computed.
-
-    inputs    available results by stage
-    left_out  stages without a result, with reasons
-    pending   stages that are still running, shown as such
-
-    Removes pages of an earlier run that have no content now. Raises StorageError if one cannot be stored.
-    """
+    """Write pages of the available results, and remove pages without content; StorageError if that fails."""
+    # also called while other results are being computed, with the names of those in `pending`
     waited = [entry for entry in left_out if entry.what not in pending]
     names = {entry.what for entry in waited}
     failed = frozenset(name for name in names if has_failed(config, name, names))

@@ -35,10 +35,7 @@ class Files:
 
 
 def draw(swept: Swept, folder: RunFolder, names: Sequence[str] = (), against: str = "") -> Files:
-    """Draw a sweep and write its page.
-
-    names    quantities to draw; by default the headline quantities
-    against  quantity on the horizontal axis; by default the parameters
+    """Draw a sweep's quantities over its parameters, or over `against`, and write its page.
 
     Raises ConfigError for an unknown quantity, StorageError if the system refuses.
     """
@@ -75,10 +72,7 @@ def check_quantities(group: Group, dims: tuple[str, ...], names: Sequence[str], 
 
 
 def check_options(stage: str, names: Mapping[str, str], variables: Collection[str]) -> None:
-    """Raise ConfigError for a quantity missing in the first results; later results may add nested ones only.
-
-    names  by option, as typed
-    """
+    """Raise ConfigError for an unknown quantity, given by option; first results may lack nested quantities."""
     available = sorted({*variables, *HEADLINES.get(stage, ())} - {"outcome"})
     for option, name in names.items():
         if name not in available and "." not in name:

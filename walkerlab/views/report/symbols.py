@@ -44,10 +44,7 @@ RULES = (
 
 
 def in_signs(text: str) -> str:
-    """Replace plain spellings by Greek letters, subscripts, exponents and minus signs.
-
-    'dtheta_1 = -0.60 rad/s^2' becomes 'θ̇₁ = −0.60 rad/s²'; hyphens and ranges stay what they are.
-    """
+    """Convert plain letters to signs: 'dtheta_1 = -0.60 rad/s^2' becomes 'θ̇₁ = −0.60 rad/s²'."""
     for pattern, sign in RULES:
         text = pattern.sub(sign, text)
     return text

@@ -112,12 +112,7 @@ def table(
     note: str = "",
     by: str = "",
 ) -> Table:
-    """Build a table with a row for each record.
-
-    records  records, or records by group title
-
-    Raises ValueError for a row of cells whose length differs from the number of columns.
-    """
+    """Build a table with a row for each record; a mapping gives groups. ValueError for rows of unequal length."""
     groups = records if isinstance(records, Mapping) else {"": records}
     for record in chain.from_iterable(groups.values()):
         if isinstance(record, list | tuple) and len(record) != len(columns):
@@ -170,10 +165,7 @@ def record_table(rows: Sequence[Mapping[str, Any]], written: Callable[[Any], str
 
 
 def flat(content: Table, wide: bool = False) -> tuple[list[str], list[list[Cell]]]:
-    """Return heads and rows of a table, with group titles as a column of their own.
-
-    wide  include columns of sentences
-    """
+    """Return heads and rows, with group titles as a column of their own; `wide` includes columns of sentences."""
     places = [place for place, column in enumerate(content.columns) if wide or not column.wide]
     titled = any(content.groups)
     heads = [*([content.by] if titled else []), *(content.columns[place].title for place in places)]

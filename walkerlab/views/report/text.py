@@ -14,10 +14,7 @@ LONGEST_ROW, ENDS = 12, 4
 
 
 def describe_summary(summary: Mapping[str, Any], indent: str = INDENT, short: bool = False) -> Iterator[str]:
-    """Yield one line per key, nested values below it, and rows of objects as a table.
-
-    short  omit the middle of long rows and tables
-    """
+    """Yield a line per key, nested values below it, and objects as a table; `short` shortens long rows."""
     widest = max((len(key) for key in summary), default=0)
     for key, value in summary.items():
         if isinstance(value, Mapping) and value:

@@ -101,14 +101,9 @@ class EngineExperiment:
     def row(
         self, integrator: str, stepping: Stepping, answer: runs.WalkAnswer | TaskLost, start: float = 1.0
     ) -> EngineRow:
-        """Evaluate a run, or record why it was lost.
-
-        On the same law the errors are those of the end state and of touch times. On own contact the error is that of
-        the last period, of completed walks from the gait itself.
-
-        integrator  or contact model on an engine's own law
-        start       velocities of the start over those of the gait
-        """
+        """Evaluate a run, or record why it was lost (`start`: velocities over those of the gait)."""
+        # on the same law: errors of the end state and of touch times; on own contact: error of the last period of
+        # completed walks from the gait
         head = (self.scene.name, self.engine, self.version, self.experiment, integrator, start)
         step_s, tolerance = stepping.step_s, stepping.tolerance
         if isinstance(answer, TaskLost):
@@ -181,12 +176,7 @@ class EngineOnScene:
     def walk(
         self, called: str, stepping: Stepping, most: int, own: OwnContact | None = None, start: float = 1.0
     ) -> tuple[EngineRow, runs.WalkAnswer | TaskLost]:
-        """Walk on our law, or on the engine's own contact.
-
-        called  integrator or contact model, as the row names it
-        most    step budget
-        start   velocities over those of the gait
-        """
+        """Walk on our law, or on the engine's own contact, for at most `most` engine steps."""
         law, until_s = (SAME_LAW, self.truth.until_s) if own is None else (OWN_LAW, UNLIMITED_S)
         scene = self.scene.started(start)
         task = runs.WalkTask(self.engine.name, stepping, scene, OWN_TOUCHES, until_s, own, most)
@@ -224,10 +214,8 @@ class EngineOnScene:
         return answer.own, [TuningRow(*about, *numbers) for numbers in measured]
 
     def own_law(self, contact: str, own: OwnContact) -> Iterator[EngineRow]:
-        """Yield runs on own contact over step sizes from the gait, then from other starts at the second finest step.
-
-        Adaptive walks from the gait share one step budget; no walk is begun that would exceed it.
-        """
+        """Yield runs on own contact over step sizes from the gait, then from other starts at the second finest step."""
+        # adaptive walks from the gait share one step budget; no walk is begun that would exceed it
         name = self.engine.adapter().CONTACTS[contact]
         integrator = self.engine.adapter().INTEGRATORS[name]
         most = integrator.most_steps if integrator.adapts else STEP_ALLOWANCE * integrator.most_steps

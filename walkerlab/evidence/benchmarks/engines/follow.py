@@ -186,10 +186,7 @@ class RuleFollower:
         return int(np.count_nonzero(self.walk_state.knee == LOCKED)) != len(self.scene.locked)
 
     def go_on(self, q: Floats, v: Floats) -> tuple[Floats, Floats]:
-        """Apply the pending lock or release of a knee to this state.
-
-        Returns coordinates and velocities for a model with the present locks.
-        """
+        """Apply the pending lock or release of a knee; return coordinates and velocities for the present locks."""
         walker, walk_state, y = self.scene.ours, self.walk_state, self.scene.about_centre(q, v)
         if self.turn is not None and contact_events.EXTENSION <= self.turn.event < contact_events.PULSE_END:
             contact_transitions.knee_stops(walker.stop, walk_state, self.turn.event, self.time_s)

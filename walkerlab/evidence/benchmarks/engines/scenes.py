@@ -12,10 +12,7 @@ from walkerlab.scene.parts import assembly_of
 
 
 def scenes(config: ContactConfig, rigid_step_length_m: float, rigid_state: State) -> tuple[EngineScene, ...]:
-    """Walks of a config: its walker on its own ground, not hinged at the start.
-
-    Raises ConfigError for a walker that other engines do not support.
-    """
+    """Return a config's walks on its own ground; ConfigError for a walker that other engines do not support."""
     assembly = assembly_of(config.walker)
     if assembly.couplings:
         raise ConfigError(

@@ -189,10 +189,8 @@ def closest(rows: Sequence[EngineRow], scene: str) -> dict[str, Any] | None:
 
 
 def three_digits(rows: Sequence[EngineRow], scene: str, truth: experiments.Truth) -> dict[str, dict[str, float]]:
-    """Largest step (s) with three correct digits of the last period, by experiment and name.
-
-    Digits are relative to the reference on the same law, and to the finest run on an engine's own.
-    """
+    """Return the largest step (s) with three correct digits of the last period, by experiment and name."""
+    # relative to the reference on the same law, and to the finest run on an engine's own
     steps: dict[str, dict[str, float]] = {SAME_LAW: {}, OWN_LAW: {}}
     exact = float(np.diff(truth.touches_s)[-1])
     for experiment in steps:
@@ -218,10 +216,7 @@ def largest_good_step(runs: Sequence[EngineRow], experiment: str, target: float 
 
 
 def convergence(rows: Sequence[EngineRow], scene: str) -> dict[str, dict[str, float]]:
-    """Effect of the last refinement, by experiment and name.
-
-    On the same law the factor by which the error shrinks, on own contact the change of the period (s).
-    """
+    """Return the last refinement's effect: on the same law the error's factor, otherwise the period's change (s)."""
     effects: dict[str, dict[str, float]] = {SAME_LAW: {}, OWN_LAW: {}}
     for experiment, by_name in effects.items():
         for name, runs in series_by_name(rows, scene, experiment).items():

@@ -48,10 +48,7 @@ def section(results: Results) -> Section | None:
 
 
 def departure(results: Results) -> str:
-    """Describe where the contact model departs from the rigid one, and the role of the knees.
-
-    Empty without a comparison of this walker's models, or if the contact model took no step.
-    """
+    """Describe where the contact model departs from the rigid one; empty without a comparison."""
     summary = results.summary("compare")
     if "steps" not in summary or summary["steps"]["contact"]["period_s"] is None:
         return ""
