@@ -88,7 +88,7 @@ def swing(walker, t, y, rise):
             return t, y, Outcome.FELL
         if len(met) > 2 and met[2]:
             new = np.zeros(len(y))
-            impact.knee_strike(walker, y, new)
+            impact.strike(walker, STRAIGHT, False, y, new)
             phase, y, left_s = STRAIGHT, new, 0.0
         elif not met[0]:
             return t, y, Outcome.NO_HEEL_STRIKE

@@ -30,7 +30,10 @@ def heel_strike(model, y, columns=()):
 
 
 def knee_strike(model, y, columns=()):
-    return struck(impact.knee_strike, model, y, columns)
+    def lock(model, before, after):
+        impact.strike(model, STRAIGHT, False, before, after)
+
+    return struck(lock, model, y, columns)
 
 
 def struck(strike, model, y, columns):

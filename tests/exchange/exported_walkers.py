@@ -97,7 +97,7 @@ def touches_of(dataset, export, count):
     for foot, events in enumerate(zip(solution.t_events, solution.y_events, strict=True)):
         for time, y in zip(*events, strict=True):
             ahead = dataset.place(y[: y.size // 2], feet[foot])[0] - dataset.place(y[: y.size // 2], feet[1 - foot])[0]
-            if ahead[0] > 0.25 * 1000.0 * export.scene.ground.terrain.stride_measure and time > 0.1:
+            if ahead[0] > 0.25 * 1000.0 * export.scene.ground.terrain.pitch and time > 0.1:
                 times.append((time, foot))
     times.sort()
     # a leading foot that bounces touches again before the other one's turn

@@ -11,10 +11,11 @@ import pytest
 from walkerlab.code_digest import Sources
 from walkerlab.config import files
 from walkerlab.config.canonical import slice_of
+from walkerlab.config.fields import block_of
 from walkerlab.config.files import BUILTIN_FOLDER, builtin_names
 from walkerlab.config.loader import load
-from walkerlab.config.reads import CompassCasesConfig, SceneCasesConfig, dotted_keys, only
-from walkerlab.config.schema import Config
+from walkerlab.config.reads import CompassCasesConfig, ContactConfig, SceneCasesConfig, dotted_keys, keys_of, only
+from walkerlab.config.schema import QUESTIONS, Config
 from walkerlab.pipeline.graph import PIPELINE, STAGES, Graph, Stage, results_of
 from walkerlab.pipeline.identity import Keys
 from walkerlab.pipeline.store.key import differences
@@ -96,6 +97,15 @@ def test_a_walk_that_was_not_taken_again_is_not_taken_for_one_with_a_numerical_e
 def test_the_fixed_stages_are_there_in_order():
     fixed = ["fixedpoint", "simulate", "contact-sim", "compare", "plot", "report"]
     assert [name for name in NAMES if name in fixed] == fixed
+
+
+def test_the_report_is_the_last_stage_which_the_command_line_opens_and_checks():
+    assert PIPELINE.stages[-1].name == "report"
+
+
+def test_every_block_that_no_model_reads_is_a_question():
+    blocks = {name for name, field in Config.model_fields.items() if block_of(field) is not None}
+    assert blocks - set(keys_of(ContactConfig)) - {"ground", "solver", "source"} == set(QUESTIONS)
 
 
 def test_a_stage_needs_its_inputs_and_theirs():

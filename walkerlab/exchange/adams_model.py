@@ -250,7 +250,7 @@ class FootTerms:
         terrain = self.export.scene.ground.terrain
         if not terrain.has_pads:
             return expression
-        pitch, lane = MM * terrain.stride_measure, round(terrain.lanes[self.foot] / terrain.stride_measure)
+        pitch, lane = MM * terrain.pitch, round(terrain.lanes[self.foot] / terrain.pitch)
         return f"IF({'-' if lane % 2 else ''}COS(PI*DX({self.place})/{finite(pitch)}):0,0,{expression})"
 
 

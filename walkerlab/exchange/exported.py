@@ -107,7 +107,7 @@ class Exported:
     def pads(self) -> tuple[Pad, ...]:
         """Ground: one floor for each foot, or pads from behind the start to beyond the end."""
         terrain = self.scene.ground.terrain
-        pitch, last = terrain.stride_measure, self.steps + PADS_AHEAD
+        pitch, last = terrain.pitch, self.steps + PADS_AHEAD
         if not terrain.has_pads:
             span = (PADS_BEHIND + last) * pitch
             return tuple(Pad(foot, 0.5 * span - PADS_BEHIND * pitch, span, 0.0) for foot in range(2))

@@ -27,7 +27,7 @@ from walkerlab.physics.orbits.similarity import Units, unit_walker
 from walkerlab.physics.orbits.step_map import Cycle, StepMap, gait_near
 from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.physics.solvers.system import Floats
-from walkerlab.scene.parameter import parameter_of
+from walkerlab.scene.parameter import config_with, parameter_of
 from walkerlab.scene.rigid import rigid_walker
 from walkerlab.scene.subject import ModelUnderTest, find_model_gait
 
@@ -73,13 +73,7 @@ class ConfigFamily:
         self.admits = lru_cache(CONFIGS_AT_ONCE)(self._admits)
 
     def _at(self, values: Values) -> ContactConfig | None:
-        config: ContactConfig = self.config
-        for parameter, value in zip(self.parameters, values, strict=True):
-            changed = parameter.config_at(config, value)
-            if changed is None:
-                return None
-            config = changed
-        return config
+        return config_with(self.config, self.parameters, values)
 
     def _admits(self, values: Values) -> bool:
         try:

@@ -1,7 +1,7 @@
 """A config key as the parameter of a family of walkers: its unit, its value, and the config at other values."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
@@ -33,16 +33,13 @@ class Parameter:
 
     def config_at(self, config: ContactConfig, value: float) -> Config | None:
         """Return the config at another value, with everything that follows from it; None if the schema refuses it."""
-        try:
-            return self._changed(config, value)
-        except ValidationError:
-            return None
+        return config_with(config, (self,), (value,))
 
     def refusal(self, config: ContactConfig, value: float, key: Key) -> ConfigError:
         """Return the error for a value that the schema refuses, requested by the config key `key`, with the reason."""
         why = ""
         try:
-            self._changed(config, value)
+            _changed(config, (self,), (value,))
         except ValidationError as error:
             first = error.errors()[0]
             (*_, name), reason = first["loc"], first["msg"]
@@ -56,14 +53,6 @@ class Parameter:
             key,
         )
 
-    def _changed(self, config: ContactConfig, value: float) -> Config:
-        data = {name: _keys_set(getattr(config, name)) for name in MODEL_KEYS}
-        block = data
-        for name in self.path[:-1]:
-            block = block.setdefault(name, {})
-        block[self.path[-1]] = math.radians(value) if self.key == SLOPE_DEG else value
-        return Config.model_validate(data)
-
     def over(self, config: ContactConfig, make: Callable[[Config], R]) -> Callable[[float], R | None]:
         """Return `make(config)` as a function of the parameter's value; None where the schema refuses the value."""
 
@@ -72,6 +61,24 @@ class Parameter:
             return None if changed is None else make(changed)
 
         return at_value
+
+
+def config_with(config: ContactConfig, parameters: Sequence[Parameter], values: Sequence[float]) -> Config | None:
+    """Return the config at values of several parameters (parameters,); None if the schema refuses them."""
+    try:
+        return _changed(config, parameters, values)
+    except ValidationError:
+        return None
+
+
+def _changed(config: ContactConfig, parameters: Sequence[Parameter], values: Sequence[float]) -> Config:
+    data = {name: _keys_set(getattr(config, name)) for name in MODEL_KEYS}
+    for parameter, value in zip(parameters, values, strict=True):
+        block = data
+        for name in parameter.path[:-1]:
+            block = block.setdefault(name, {})
+        block[parameter.path[-1]] = math.radians(value) if parameter.key == SLOPE_DEG else value
+    return Config.model_validate(data)
 
 
 SLOPE = Parameter(SLOPE_RAD, "rad", (SLOPE_RAD,))

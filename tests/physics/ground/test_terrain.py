@@ -63,7 +63,7 @@ def test_a_pad_stays_where_it_is(has_ground, ahead):
     assert starts_with_ground(terrain, False)
     assert starts_with_ground(terrain, True)
     assert not terrain.order_matters
-    assert terrain.stride_measure == 0.4
+    assert terrain.pitch == 0.4
 
 
 @given(along=places, foot=feet)

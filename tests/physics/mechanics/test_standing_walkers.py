@@ -296,7 +296,7 @@ def compiled(system, y, f, reaction):
 @kernel
 def compiled_strikes(model, y, heel, knee):
     impact.heel_strike(model, y, heel)
-    impact.knee_strike(model, y, knee)
+    impact.strike(model, STRAIGHT, False, y, knee)
 
 
 @pytest.mark.parametrize("phase", [BENT, STRAIGHT])

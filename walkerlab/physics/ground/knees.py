@@ -28,7 +28,7 @@ class KneeStop(NamedTuple):
 
 
 @kernel_part
-def impact_law(stop: KneeStop) -> NormalLaw:
+def stop_law(stop: KneeStop) -> NormalLaw:
     """Return the IMPACT law with a stop's parameters, in rad and N m instead of m and N."""
     return NormalLaw(stop.stiffness, stop.exponent, stop.damping, stop.full_damping_angle)
 
@@ -54,13 +54,13 @@ def extension_rate(form: GroundModel, knee: int, y: Any) -> float:
 def stop_torque(law: KneeStop, angle: float, rate: float) -> HingeTorque:
     if angle <= 0.0:
         return HingeTorque(0.0, 0.0, 0.0, 0.0)
-    torque = impact_normal_force(angle, rate, impact_law(law))
+    torque = impact_normal_force(angle, rate, stop_law(law))
     return HingeTorque(torque.force, torque.spring, torque.by_penetration, torque.by_rate)
 
 
 @hinge_energy.case(KneeStop)
 def stop_energy(law: KneeStop, angle: float) -> float:
-    return elastic_energy(angle, impact_law(law))
+    return elastic_energy(angle, stop_law(law))
 
 
 class Locked(NamedTuple):

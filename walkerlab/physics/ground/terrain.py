@@ -20,7 +20,7 @@ EVEN = np.zeros(1)  # not read-only: pickled, it would come back as another type
 class Terrain(NamedTuple):
     """Ground, as created by `checkerboard`, `after_mid_swing` or `plane`."""
 
-    stride_measure: float  # [S] m, scale for judging steps and slides; the length of pads
+    pitch: float  # [S] m, length of pads; scale for judging steps and slides
     lanes: tuple[float, float]  # m, centre of each foot's pad number 0
     has_pads: bool  # whose edges a foot can trip over; else it is a plane
     order_matters: bool  # a foot can touch only once it has been above the ground ahead of the other foot
@@ -32,14 +32,14 @@ def checkerboard(pitch: float, lanes: tuple[float, float]) -> Terrain:
     return Terrain(pitch, lanes, True, False, EVEN)
 
 
-def after_mid_swing(stride_measure: float) -> Terrain:
+def after_mid_swing(pitch: float) -> Terrain:
     """Create a plane that a foot can touch only once it has been above the ground ahead of the other foot."""
-    return Terrain(stride_measure, (0.0, 0.0), False, True, EVEN)
+    return Terrain(pitch, (0.0, 0.0), False, True, EVEN)
 
 
-def plane(stride_measure: float) -> Terrain:
+def plane(pitch: float) -> Terrain:
     """Create ordinary ground, which carries any foot that touches it."""
-    return Terrain(stride_measure, (0.0, 0.0), False, False, EVEN)
+    return Terrain(pitch, (0.0, 0.0), False, False, EVEN)
 
 
 @kernel_part
@@ -55,7 +55,7 @@ def foothold_height(terrain: Terrain, foothold: int) -> float:
 
 @kernel_part
 def height_of_pad(terrain: Terrain, foot: int, cell: int) -> float:
-    apart = (terrain.lanes[foot] - terrain.lanes[STANCE_FOOT]) / terrain.stride_measure
+    apart = (terrain.lanes[foot] - terrain.lanes[STANCE_FOOT]) / terrain.pitch
     return foothold_height(terrain, cell + math.floor(apart + 0.5))
 
 
@@ -64,15 +64,15 @@ def cell_at(terrain: Terrain, foot: int, along: float) -> int:
     """Return the number of the cell of a foot's lane at `along` (m); pad 2 j is centred 2 j S from the lane's first."""
     if not terrain.has_pads:
         return 0
-    return math.floor((along - terrain.lanes[foot]) / terrain.stride_measure + 0.5)
+    return math.floor((along - terrain.lanes[foot]) / terrain.pitch + 0.5)
 
 
 @kernel_part
 def cell_edges(terrain: Terrain, foot: int, cell: int) -> tuple[float, float]:
     if not terrain.has_pads:
         return -REMOTE_EDGE, REMOTE_EDGE
-    centre = terrain.lanes[foot] + cell * terrain.stride_measure
-    return centre - 0.5 * terrain.stride_measure, centre + 0.5 * terrain.stride_measure
+    centre = terrain.lanes[foot] + cell * terrain.pitch
+    return centre - 0.5 * terrain.pitch, centre + 0.5 * terrain.pitch
 
 
 @kernel_part

@@ -32,6 +32,6 @@ Contact model (`contact_loop`)
 | `contact_record`, `contact_tangent` | samples and energy balance; the derivative with respect to the start |
 | `contact_result` | a whole walk in all its forms, and its result |
 | `rigid_walk`, `rigid_record`, `recorded_walk` | loop and events; samples and extremes; a whole walk and its result |
-| `walk_record`, `hip_torque` | for both: fields of every result; work of the hip's torque |
+| `walk_record`, `hip_work` | for both: fields of every result; work of the hip's torque |
 | `rigid_measures`, `comparison` | energies and forces along a rigid walk; differences between two walks |
 """

@@ -24,7 +24,7 @@ PULSE_END = EVENT_FUNCTIONS  # has no event function: it is due at a fixed time
 NO_EVENT = -1
 LEGS_TURN = EVENT_FUNCTIONS  # row of the rate between the legs, which is no event
 EVENT_ROWS = EVENT_FUNCTIONS + 1
-FARTHEST_SLIDE = 0.25  # of the stride measure, of a stance foot's material from where it touched
+FARTHEST_SLIDE = 0.25  # of the pitch, of a stance foot's material from where it touched
 
 
 class Frame(NamedTuple):
@@ -45,7 +45,7 @@ class JudgedGround(NamedTuple):
 
 @kernel_part
 def farthest_slide(terrain: Terrain) -> float:
-    return FARTHEST_SLIDE * terrain.stride_measure
+    return FARTHEST_SLIDE * terrain.pitch
 
 
 @kernel_part

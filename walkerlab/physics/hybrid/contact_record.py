@@ -23,7 +23,7 @@ from walkerlab.physics.ground.walker import OF_STATES, STOPPING, OnGround, one_f
 from walkerlab.physics.hybrid.contact_events import HEIGHT, LEGS_TURN, PER_FOOT, VERTICAL_VELOCITY
 from walkerlab.physics.hybrid.contact_state import WalkState
 from walkerlab.physics.hybrid.contact_tangent import Tangent, carry_tangent
-from walkerlab.physics.hybrid.hip_torque import torque_work
+from walkerlab.physics.hybrid.hip_work import torque_work
 from walkerlab.physics.kernels import by_reference, by_type_or_default, callable_kernel, kernel_part, matrix, vector
 from walkerlab.physics.mechanics.hinges import HIP_ROW, hinge_law
 from walkerlab.physics.mechanics.tree import fast_fields, record_type

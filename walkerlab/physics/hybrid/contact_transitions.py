@@ -49,9 +49,9 @@ from walkerlab.physics.hybrid.contact_state import (
 from walkerlab.physics.hybrid.endings import BENT_KNEE, FELL, GOES_ON, OFF_PAD, SLID, STUBBED
 from walkerlab.physics.kernels import by_type_or_default, kernel_part
 
-STEP_AHEAD = 0.25  # of the stride measure: least distance ahead at which a step lands
+STEP_AHEAD = 0.25  # of the pitch: least distance ahead at which a step lands
 AT_SURFACE = 1e-11  # m: distance from the surface within the error of an event's time
-TRIP = 0.25  # share of the stride measure; a touch further than this from the last stance is a trip
+TRIP = 0.25  # share of the pitch; a touch further than this from the last stance is a trip
 
 
 @kernel_part
@@ -214,11 +214,11 @@ def touch(
     material = material_along(form, foot, feet[foot].along, y)
     if foot == stance:
         return SLID if abs(material - walk_state.touched[foot]) > farthest_slide(terrain) else GOES_ON
-    measure = terrain.stride_measure
+    pitch = terrain.pitch
     if terrain.has_pads and walk_state.cells[foot] == walk_state.left_cells[foot]:
         away = abs(feet[foot].along - walk_state.foothold[foot] - walk_state.rolled[foot])
-        return OFF_PAD if away > TRIP * measure else GOES_ON
-    if feet[foot].along - feet[stance].along < STEP_AHEAD * measure:
+        return OFF_PAD if away > TRIP * pitch else GOES_ON
+    if feet[foot].along - feet[stance].along < STEP_AHEAD * pitch:
         return GOES_ON
     if not is_straight(form, walk_state, foot):
         return BENT_KNEE

@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from walkerlab.physics.hybrid.hip_torque import torque_work
+from walkerlab.physics.hybrid.hip_work import torque_work
 from walkerlab.physics.kernels import by_reference, kernel_part, vector
 from walkerlab.physics.mechanics.hinges import HIP_ROW, hinge_law
 from walkerlab.physics.mechanics.impact import push_off

@@ -59,7 +59,7 @@ def spring_energy(law: SpringDamper, angle: float) -> float:
     return 0.5 * law.stiffness * angle * angle
 
 
-LAW_NUMBERS = len(SpringDamper._fields)
+LAW_NUMBERS, TORQUE = len(SpringDamper._fields), SpringDamper._fields.index("torque")
 HIP_ROW = 0  # row of the hinge between the legs
 HINGE_ROWS = {"hip": slice(HIP_ROW, HIP_ROW + 1), "knees": slice(HIP_ROW + 1, None)}
 
@@ -72,7 +72,10 @@ def hinge_law(model: Any, row: int) -> SpringDamper:
 
 @forced_inline
 def is_sprung(model: Any, row: int) -> bool:
-    return model.laws[row, 0] != 0.0 or model.laws[row, 1] != 0.0 or model.laws[row, 2] != 0.0
+    sprung = False
+    for column in range(LAW_NUMBERS):
+        sprung |= model.laws[row, column] != 0.0
+    return sprung
 
 
 @forced_inline

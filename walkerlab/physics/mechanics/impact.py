@@ -39,12 +39,6 @@ def heel_strike(model: RigidModel, y: Any, new: Any) -> None:
 
 
 @kernel_part
-def knee_strike(model: RigidModel, y: Any, new: Any) -> None:
-    """Write the state after the swing leg's knee has locked straight into `new`; y as in `heel_strike`."""
-    strike(model, STRAIGHT, False, y, new)
-
-
-@kernel_part
 def strike(model: RigidModel, phase: int, other_foot: bool, y: Any, new: Any) -> None:
     """Apply a plastic impact on the constraints of E[phase]; with `other_foot` the swing foot stands afterwards."""
     like = model.arm_x

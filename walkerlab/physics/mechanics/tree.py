@@ -21,7 +21,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from walkerlab.physics.kernels import forced_inline
-from walkerlab.physics.mechanics.hinges import HINGE_ROWS, HIP_ROW, LAW_NUMBERS
+from walkerlab.physics.mechanics.hinges import HINGE_ROWS, HIP_ROW, LAW_NUMBERS, TORQUE
 from walkerlab.physics.mechanics.trigonometry import sine_cosine
 from walkerlab.physics.solvers.system import Floats, Integers
 
@@ -66,7 +66,7 @@ class Mechanism(np.record):  # type: ignore[misc]  # NumPy's stubs call one of i
     arm_y: Floats
     E: Floats  # (phases, n, n) the reductions of links.py; a body that follows others has zero on the diagonal
     hinges: Integers  # (rows, 2) the body that a hinge's torque turns back, and the second body
-    laws: Floats  # (rows, 3) parameters of the SpringDamper at each hinge
+    laws: Floats  # (rows, LAW_NUMBERS) parameters of the SpringDamper at each hinge
     push_off: float  # N s, along the trailing leg: at once or from a step's touch on
     mass: float  # kg
     gravity_along: float  # m/s^2
@@ -85,7 +85,7 @@ class Mechanism(np.record):  # type: ignore[misc]  # NumPy's stubs call one of i
 
     @property
     def driven(self) -> bool:
-        return bool(self.push_off != 0.0 or self.laws[:, -1].any())
+        return bool(self.push_off != 0.0 or self.laws[:, TORQUE].any())
 
 
 def mechanism_shapes(n: int, phases: int, rows: int) -> dict[str, tuple[int, ...]]:

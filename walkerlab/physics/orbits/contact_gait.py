@@ -47,7 +47,7 @@ def find_gait_from(walker: ContactWalker, ground: JudgedGround, tolerances: Tole
     tolerances = replace(tolerances, budget=SEARCH_STEP_BUDGET)
     failure = "the start does not even let the feet pass each other"
     for steps, z in section_points(walker, ground, tolerances, start):
-        gait = solve_gait_on(OwnPads(lambda _: walker, ground, tolerances, ground.terrain.stride_measure), z)
+        gait = solve_gait_on(OwnPads(lambda _: walker, ground, tolerances, ground.terrain.pitch), z)
         if isinstance(gait, Cycle):
             return GaitAnswer(gait, f"Newton's method after {steps} steps from the start")
         failure = f"Newton's method found none after {steps} steps from the start: {gait}"
@@ -130,7 +130,7 @@ def follow_from_rigid(walker: ContactWalker, ground: JudgedGround, tolerances: T
 
     points = section_points(with_rigidity(walker, 1.0), ground, tolerances, start)
     hint = "" if walker.whole.push_off == 0.0 else "Shorten the push-off (push_off.duration_s). "
-    tried = (gait_at(1.0, z, ground.terrain.stride_measure) for _, z in points)
+    tried = (gait_at(1.0, z, ground.terrain.pitch) for _, z in points)
     last = next((gait for gait in tried if isinstance(gait, Cycle)), None)
     if last is None:
         return GaitAnswer(

@@ -349,7 +349,7 @@ class ContactMap(StepMap):
     def _walk(self, site: WalkerOnGround, z: Floats, derived: bool, terrain: Terrain | None = None) -> SectionStep:
         terrain = terrain or self._terrain(site)
         ground = site.ground._replace(terrain=terrain)
-        return step_from_section(site.walker, ground, self.tolerances, z * self._units, terrain.stride_measure, derived)
+        return step_from_section(site.walker, ground, self.tolerances, z * self._units, terrain.pitch, derived)
 
     def step(self, z: Floats, p: float, derived: bool = True) -> MappedStep:
         site = self._at(p)

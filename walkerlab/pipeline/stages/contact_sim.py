@@ -129,7 +129,7 @@ def groups(config: ContactSimConfig, scene: ContactScene, walk: ContactWalkResul
     if walk.steps:
         stored["steps"] = Group(steps_of(walk, slip_m=walk.slip_m, rolling_m=walk.rolling_m))
     if scene.ground.terrain.has_pads:
-        stored["terrain"] = pads_group(scene.ground.terrain.stride_measure, walk.end_state[0])
+        stored["terrain"] = pads_group(scene.ground.terrain.pitch, walk.end_state[0])
     if walk.samples is not None:
         stored["trajectory"] = trajectory_group(config, scene, walk, walk.samples)
     return stored

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, Final
 
@@ -34,7 +34,7 @@ from walkerlab.pipeline.store.checkpoint import Checkpoint
 from walkerlab.pipeline.store.columns import rows_group
 from walkerlab.pipeline.store.content import Content
 from walkerlab.scene.families import model_reads, unused_key_error
-from walkerlab.scene.parameter import Parameter, parameter_of
+from walkerlab.scene.parameter import Parameter, config_with, parameter_of
 from walkerlab.scene.rigid import rigid_walker
 from walkerlab.scene.subject import ModelUnderTest, find_model_gait, section_coordinates
 
@@ -142,18 +142,8 @@ def refuse(config: DesignConfig) -> None:
     for place, parameter in enumerate(parameters):
         for bound in bounds[place]:
             neighbours = (np.where(np.arange(len(parameters)) == place, bound, corner) for corner in corners)
-            if all(config_with(config, parameters, x) is None for x in neighbours):
+            if all(config_with(config, parameters, x.tolist()) is None for x in neighbours):
                 raise parameter.refusal(config, bound, ("design", "over"))
-
-
-def config_with(config: DesignConfig, parameters: Sequence[Parameter], x: Floats) -> Config | None:
-    """Return the config with other parameter values (parameters,); None if it rejects them."""
-    changed: Config | None = None
-    for parameter, value in zip(parameters, x.tolist(), strict=True):
-        changed = parameter.config_at(config if changed is None else changed, value)
-        if changed is None:
-            break
-    return changed
 
 
 def on_bound(design: Design, x: Floats) -> list[str]:
@@ -186,7 +176,7 @@ class Gaits:
         """Return the gait; None without one, or if the config rejects the values."""
         self.counts[0] += 1
         self.progress.advance()
-        changed = config_with(self.config, self.parameters, x)
+        changed = config_with(self.config, self.parameters, x.tolist())
         gait = None if changed is None else self.gait_of(changed)
         if gait is None:
             self.counts[1] += 1

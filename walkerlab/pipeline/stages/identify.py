@@ -29,7 +29,7 @@ from walkerlab.pipeline.stages.walk import legs, over_time
 from walkerlab.pipeline.store.columns import numbered, rows_group
 from walkerlab.pipeline.store.content import Content, Group, Variable
 from walkerlab.scene.identification import identify_walk
-from walkerlab.scene.parameter import parameter_of
+from walkerlab.scene.parameter import config_with, parameter_of
 from walkerlab.scene.rigid import rigid_walker
 
 if TYPE_CHECKING:
@@ -240,11 +240,10 @@ def sample_group(result: Identification, measured: MeasuredAngles) -> Group:
 
 
 def identified_config(config: IdentifyConfig, result: Identification) -> IdentifyConfig:
-    for estimate in result.estimates:
-        changed = parameter_of(estimate.key, config).config_at(config, estimate.value)
-        assert changed is not None, "an estimate makes a walker"
-        config = changed
-    return config
+    parameters = [parameter_of(estimate.key, config) for estimate in result.estimates]
+    changed = config_with(config, parameters, [estimate.value for estimate in result.estimates])
+    assert changed is not None, "estimates make a walker"
+    return changed
 
 
 def motions(config: IdentifyConfig, result: Identification, measured: MeasuredAngles) -> dict[str, Group]:

@@ -26,9 +26,8 @@ def print_status(request: Request, graph: Graph, check: bool, run: str | None) -
     """Print the state of each stage, and of all runs unless one was selected.
 
     run  name or folder of a run, judged by the config of its results; None for the request's run
-
-    With `check`, typer.Exit(5) if a result is stale, missing or damaged. Raises ConfigError if there is no such run,
-    StaleError if its config is unknown.
+    Raises ConfigError for an unknown run, StaleError for an unknown config; with `check`, typer.Exit(5) for a stale,
+    missing or damaged result.
     """
     folder = request.folder if run is None else run_named(run, request.runs)
     config = request.resolved if run is None else config_of(folder)
@@ -115,7 +114,7 @@ def print_stored(request: Request, graph: Graph, stage: str) -> None:
     if not request.folder.path.is_dir():
         raise ConfigError(f"there is no run at {request.folder.path}.", f"`walkerlab {stage}` creates it.")
     if not isinstance(step.found, Stored):
-        why = "there is none yet" if step.reason == NOT_THERE else step.reason
+        why = "it does not exist yet" if step.reason == NOT_THERE else step.reason
         raise StaleError(f"{path} cannot be shown: {why}.", f"`walkerlab {stage}` computes it.")
     if step.action != "reuse":
         request.console.warn(f"{path} is out of date: {step.reason}")
@@ -148,7 +147,6 @@ def as_json(stored: Stored) -> dict[str, Any]:
 
 
 def lines(stored: Stored) -> list[str]:
-    """Format summary, arrays and provenance."""
     result = ["summary", *describe_summary(stored.summary)]
     for path, group in stored.groups.items():
         result.append(path)
