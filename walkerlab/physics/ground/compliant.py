@@ -31,10 +31,10 @@ from walkerlab.physics.solvers.system import Floats
 class KneeRules:
     """Rules for locking and releasing knees on compliant ground."""
 
-    # With compliant stops a locked knee does not merge its bodies: it keeps the angle at which its stop latched.
+    # With compliant stops, thigh and shank of a locked knee stay separate, at the angle at which the stop latched.
 
     stop: KneeStop | IdealLock = IdealLock()  # noqa: RUF009 (immutable)
-    release_at_touch: bool = False  # whether at the touch, or when the leading foot stops sinking in
+    release_at_touch: bool = False  # whether knees are released at the touch, or when the leading foot stops sinking in
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ def contact_walker(
 ) -> ContactWalker:
     """Assemble a walker on compliant ground; gravity in m/s^2, slope in rad. Foot k and knee k belong to leg k.
 
-    In the hinged forms the hinge is at the centre of the ball of `hinged_foot`, at along = 0. Raises ValueError, with a
+    In the hinged forms, the hinge is the centre of the ball of `hinged_foot`, at along = 0. Raises ValueError, with a
     message for the user, for parts that cannot walk on compliant ground.
     """
     rules = knee_rules or KneeRules()

@@ -33,7 +33,7 @@ def feet_and_forces(system: OnGround, chain: Any, t: float, q: Any, v: Any, feet
     chain   (n, links) map from relative to absolute angles; bodies that move as one have equal rows
     q, v    (2 + links) coordinates and velocities of the other program
     feet    (2, 4) along (m), height (m), slip (m/s), rate of the height (m/s)
-    forces  (2 + links) N and N m; not computed if empty
+    forces  (2 + links) generalised forces, N and N m; not computed if the array is empty
     """
     form = system.form
     y, s, c, torques = vector(OF_STATES), vector(OF_BODIES), vector(OF_BODIES), vector(OF_BODIES)

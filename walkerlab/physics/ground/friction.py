@@ -160,7 +160,7 @@ FRICTION_LAWS: Final[dict[str, type[FrictionLaw]]] = {"coulomb": Coulomb, "none"
 
 
 def create_law(word: str, contact: Any) -> FrictionLaw:
-    """Create the law named `word` from a contact block in SI; raises a TypeError that lists members its class lacks."""
+    """Create the law named `word` from a contact block in SI; raises TypeError if its class is incomplete."""
     law = FRICTION_LAWS[word]
     missing = missing_members(law)
     if missing:
@@ -169,7 +169,7 @@ def create_law(word: str, contact: Any) -> FrictionLaw:
 
 
 def missing_members(law: type) -> list[str]:
-    """List the members of `FrictionLaw` that a law's class lacks, and the function cases that it lacks."""
+    """List the members of `FrictionLaw` and the function cases that a law's class lacks."""
     asked = [name for name in vars(FrictionLaw) if not name.startswith("_")]
     missing = [name for name in asked if not hasattr(law, name)]
     switching = (switching_count, sample_switching)
@@ -179,5 +179,5 @@ def missing_members(law: type) -> list[str]:
 
 
 def steepest_change(law: FrictionLaw, slip: float) -> float:
-    """Return a bound on the change of the coefficient over a slip velocity (m/s), from its slope at rest."""
+    """Return an upper bound on the coefficient's change over a slip velocity range (m/s), from its slope at rest."""
     return min(law.largest, -slip * float(friction_coefficient(law, 0.0)[1]))

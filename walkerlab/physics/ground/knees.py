@@ -35,7 +35,7 @@ def impact_law(stop: KneeStop) -> NormalLaw:
 
 @kernel_part
 def ahead(form: GroundModel, row: int, y: Any, first: int) -> float:
-    """Return the angle (rad) of a hinge's first body ahead of its second, or its rate if y[first] starts the rates."""
+    """Return the angle (rad) of a hinge's first body ahead of its second, or its rate if y[first] is the first rate."""
     return y[first + form.hinges[row, 0]] - y[first + form.hinges[row, 1]]
 
 

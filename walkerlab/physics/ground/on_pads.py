@@ -19,7 +19,7 @@ class OnPads(NamedTuple):
 
 @kernel_part
 def find_pads(system: OnPads, y: Any) -> None:
-    """Set `has_ground` of each foot to whether it is over a pad, at any height."""
+    """Record in `has_ground` whether each foot is over a pad, at any height."""
     feet = feet_motion(system.walker.form, y)
     for foot in range(2):
         system.walker.has_ground[foot] = has_ground_in_cell(cell_at(system.terrain, foot, feet[foot].along))

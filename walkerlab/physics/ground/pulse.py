@@ -33,7 +33,7 @@ class Push(NamedTuple):
     along: float  # N
     upward: float  # N
     ahead: float  # m, from the foot's contact point to the hip, along the slope
-    above: float  # m, the same normal to the slope
+    above: float  # m, normal to the slope
 
 
 @kernel_part

@@ -1,8 +1,8 @@
 """Ground under each foot: lanes of pads, a plane that scuffing feet pass through, or an ordinary plane.
 
 Straight legs scuff, so the paper's walker needs a checkerboard: in a planar model, a lane of raised pads for each leg.
-A lane is divided into cells: pads (even numbers) and gaps (odd). A plane is one endless cell, and enough for feet that
-clear the ground.
+A lane is divided into cells: pads (even numbers) and gaps (odd). A plane is one endless cell; it suffices for feet
+that clear the ground.
 """
 
 import math
@@ -14,7 +14,7 @@ from walkerlab.physics.kernels import kernel_part
 
 REMOTE_EDGE = 1e9  # m, further than any walk gets
 STANCE_FOOT = 1  # foot that carries the first step
-EVEN = np.zeros(1)  # writable, as unpickled arrays are: kernels would be compiled again for another type
+EVEN = np.zeros(1)  # writable like unpickled arrays: kernels would be compiled again for a read-only one
 
 
 class Terrain(NamedTuple):
@@ -24,7 +24,7 @@ class Terrain(NamedTuple):
     lanes: tuple[float, float]  # m, position along the slope of the centre of each foot's pad 0
     has_pads: bool  # whether there are pads, over whose edges a foot can trip, or a plane
     order_matters: bool  # whether a foot can touch only after it was above the ground ahead of the other foot
-    heights: Any  # (footholds,) m above the slope, from the start's foothold on; the last value holds beyond
+    heights: Any  # (footholds,) m above the slope, from the start's foothold on; the last one applies to all later ones
 
 
 def checkerboard(pitch: float, lanes: tuple[float, float]) -> Terrain:
@@ -49,7 +49,7 @@ def is_uneven(terrain: Terrain) -> bool:
 
 @kernel_part
 def foothold_height(terrain: Terrain, foothold: int) -> float:
-    """Return the height (m) of a foothold above the slope; number 0 is the start's, and earlier ones are as high."""
+    """Return the height (m) of a foothold above the slope; number 0 is the start's; earlier ones have its height."""
     return float(terrain.heights[min(max(foothold, 0), terrain.heights.size - 1)])
 
 
@@ -89,7 +89,7 @@ def starts_with_ground(terrain: Terrain, is_stance: bool) -> bool:
 
 @kernel_part
 def has_ground_in_air(terrain: Terrain, has_ground: bool, stands: bool, ahead: bool) -> bool:
-    """Whether a foot in the air has ground below: as before on pads; if order matters, if it `stands` or is `ahead`."""
+    """Whether a foot in the air has ground below it: unchanged on pads, according to `order_matters` on a plane."""
     if terrain.has_pads:
         return has_ground
     return stands or ahead or not terrain.order_matters

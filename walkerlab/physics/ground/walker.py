@@ -30,7 +30,7 @@ RELEASED, BENT, STOPPING, LOCKED = 0, 1, 2, 3
 
 
 @tree.fast_fields
-class GroundModel(tree.Mechanism):  # type: ignore[misc]  # as its base
+class GroundModel(tree.Mechanism):  # type: ignore[misc]  # as for Mechanism
     """One form of the walker, SI: hinged or free, with certain knees locked; a structured scalar."""
 
     # The arrays have room for MAX_BODIES, so that one compiled walk serves all walkers; only n entries are used. The
@@ -71,10 +71,10 @@ FORM = tree.record_type(GroundModel, FORM_SHAPES)
 
 
 class ContactWalker(NamedTuple):
-    forms: Any  # (2, 4) records of FORM: free or hinged, by the index from `locked_knees`
+    forms: Any  # (2, 4) records of FORM: rows for free and hinged, columns by `locked_knees`
     normal: NormalLaw
     friction: Any  # a FrictionLaw
-    stop: Any  # IdealLock or KneeStop of the knees
+    stop: Any  # stop of both knees: IdealLock or a KneeStop
     legs: Integers  # (2, bodies of a leg) indices of each leg's bodies from the hip down
 
     @property

@@ -106,13 +106,13 @@ def total_mass(assembly: Assembly) -> float:
 
 
 def tree_about(assembly: Assembly, root: Anchor) -> Tree:
-    """Compute the constants of the equations of motion with a body's point as root."""
+    """Compute the constants of the equations of motion about a point of a body."""
     mass_levers = [(mass, levers(assembly, root, at)) for mass, at in masses(assembly)]
     return sum_masses(assembly, mass_levers)
 
 
 def tree_about_centre(assembly: Assembly) -> tuple[Tree, tuple[Floats, ...]]:
-    """Compute the constants with the centre of mass as root, and the levers (bodies, 2) in m to each foot's centre."""
+    """Compute the constants about the centre of mass, and the levers (bodies, 2) in m from it to each foot's centre."""
     root = Anchor(assembly.bodies[0].name, assembly.bodies[0].centre_m)
     mass_levers = [(mass, levers(assembly, root, at)) for mass, at in masses(assembly)]
     centre = sum(mass * d for mass, d in mass_levers) / total_mass(assembly)

@@ -20,7 +20,7 @@ def legs_apart(system: Any, y: Any) -> tuple[float, float]:
 
 
 class HingeTorque(NamedTuple):
-    """Torque that opposes the angle by which a first body is ahead of a second, and its derivatives."""
+    """Torque that opposes the angle by which one body is ahead of another, and its derivatives."""
 
     torque: float  # N m
     elastic: float  # N m, the part that stores energy

@@ -223,7 +223,7 @@ class Constraints(NamedTuple):
 def project(
     model: Any, constraints: Constraints, omega: Any, along: float, upward: float, twist: float, p: Any
 ) -> None:
-    """Write the rates after a plastic impact into p (n,), rad/s; `twist` (N m s) is an impulse on the stance leg."""
+    """Write angular velocities (rad/s) after an impact into p (n,); `twist` (N m s) is an impulse on the stance leg."""
     momenta(model, constraints.M, constraints.F, constraints.U, omega, along, upward, p)
     p[STANCE] += twist
     solve_linked(model, constraints.phase, constraints.factors, p)
@@ -257,7 +257,7 @@ def momenta(model: Any, M: Any, F: Any, U: Any, omega: Any, along: float, upward
 
 @forced_inline
 def mass_change(model: Any, s: Any, c: Any, turn: Any, jump: Any, along: float, upward: float, p: Any) -> None:
-    """Write Z' dM w into p (n,); dM is the change of M due to `turn` (n,), w the jump (along, upward, `jump`)."""
+    """Write Z' dM w into p (n,); dM is the change of M due to `turn` (n,), and w the jump of all velocities."""
     n = len(model.arm_x)
     F, U = vector(model.arm_x), vector(model.arm_x)
     projections(model.arm_x, model.arm_y, n, s, c, F, U)

@@ -57,7 +57,7 @@ def factor_linked(model: Any, phase: int, M: Any) -> None:
 
 @forced_inline
 def solve_linked(model: Any, phase: int, factors: Any, b: Any) -> None:
-    """Replace the right-hand side r in b (n,) by the solution E dz; the factors are from `factor_linked`."""
+    """Replace the right-hand side r in b (n,) by the solution E dz, using the factors from `factor_linked`."""
     # A torque on a follower acts on the bodies it follows.
     n = len(model.arm_x)
     for c in range(n):

@@ -19,7 +19,7 @@ class BodyPlaces:
     """Mapping of an assembly's bodies to those of the rigid model, where the straight stance leg is one body."""
 
     names: tuple[str, ...]  # names of the angles, without the prefix 'theta_'
-    members: Floats  # (bodies, n) 1 where a body of the assembly is part of one of the model, otherwise 0
+    members: Floats  # (bodies, n) 1 where an assembly's body is part of a model's body, otherwise 0
     roles: tuple[int, ...]  # body k after a heel strike is body roles[k] before it
     knees: tuple[tuple[int, int], ...]  # indices (shank, thigh) of the swing knee; empty for straight legs
 

@@ -41,27 +41,27 @@ from walkerlab.physics.mechanics.trigonometry import sine_cosine
 from walkerlab.physics.solvers.system import Floats, Integers, block, derivative, jacobian
 
 SWING, STANCE, SHANK = 0, 1, 2
-# indices of the matrices E: swing knee bent, swing leg straight, and heel strike
+# index of E: swing knee bent, swing leg straight, heel strike
 BENT, STRAIGHT, AT_STRIKE = 0, 1, 2
 NO_SHANK = -1
 
 
 @tree.fast_fields
-class RigidModel(tree.Mechanism):  # type: ignore[misc]  # as its base
+class RigidModel(tree.Mechanism):  # type: ignore[misc]  # as for Mechanism
     """Constants of the rigid model, SI; a structured scalar whose type fixes the number n of bodies."""
 
     # E holds three reductions: BENT, STRAIGHT and AT_STRIKE.
 
-    foot_x: Floats  # (n,) m, one lever per body, from the stance foot's centre to the swing foot's
+    foot_x: Floats  # (n,) m, levers of the bodies from the stance foot's centre to the swing foot's
     foot_y: Floats
     roles: Integers  # (n,) body k after a heel strike is body roles[k] before it
-    section: Integers  # (n + 1,) state indices of the section's d coordinates, first the stance leg's angle; then zeros
+    section: Integers  # (n + 1,) state indices of the section's d coordinates, the stance leg's angle first; then zeros
     coordinates: int  # [d] number of coordinates on the section
     thigh: int  # index of the swing leg's thigh; NO_SHANK without knees
     shank: int  # index of the swing leg's shank; NO_SHANK without knees
     unpaired: float  # kg m^2, coefficient of a torque on the stance leg that has no reaction: see `add_unpaired_torque`
     radius: float  # [R] m, radius of both feet; 0 for point feet
-    hip_x: float  # m, lever of the stance leg from its foot's centre to the hip
+    hip_x: float  # m, lever from the stance foot's centre to the hip, in the stance leg's frame
     hip_y: float
     lean: float  # rad, angle from a straight leg's axis to the line from hip to foot centre
     leg_length: float  # [L] m, from hip to sole
@@ -331,7 +331,7 @@ def swing_foot(model: RigidModel, y: Any) -> tuple[float, float]:
 
 @kernel_part
 def swing_foot_motion(model: RigidModel, y: Any, turn: Any) -> tuple[float, float, float, float]:
-    """Compute height and distance of `swing_foot` and their changes under `turn` (n,): m for rad, m/s for rad/s."""
+    """Compute the results of `swing_foot` and their changes due to `turn` (n,): m if in rad, m/s if in rad/s."""
     n = len(model.arm_x)
     s, c = vector(model.arm_x), vector(model.arm_x)
     sines_cosines(model, n, y, s, c)
@@ -357,7 +357,7 @@ def feet_on_slope(model: Any, swing: Any, stance: Any) -> Any:
 
 
 def step_lengths(model: RigidModel, starts: Any, ends: Any) -> Floats:
-    """Compute step lengths (steps,) in m along the slope from the first and last states (steps, 2 n) of the steps."""
+    """Compute step lengths (steps,) in m along the slope from each step's first and last state (steps, 2 n)."""
     psi = ends[:, : len(model.arm_x)] + model.slope
     ahead = np.cos(psi) @ model.foot_x - np.sin(psi) @ model.foot_y
     return np.asarray(ahead - model.radius * (ends[:, STANCE] - starts[:, STANCE]))

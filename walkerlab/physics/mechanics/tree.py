@@ -1,16 +1,16 @@
 """Equations of motion of a tree of bodies about its root, for both models: matrices, torques, energies, gradients.
 
-Let F_k = (R(psi_k) c_k)_x and U_k = (R(psi_k) c_k)_y be the first moments projected on the slope and its normal, with
-psi the angles from the normal, and let Delta = theta_l - theta_k. Then
+Let F_k = (R(psi_k) c_k)_x and U_k = (R(psi_k) c_k)_y be the first moments c_k projected on the slope and its normal,
+with psi the angles from the normal, and let Delta = theta_l - theta_k. Then
 
     M_kl = A_kl cos Delta + B_kl sin Delta
     r_k = sum over l of omega_l^2 (A_kl sin Delta - B_kl cos Delta) - g_along U_k - g_down F_k
 
-where the two terms of gravity hold for a root at rest. Terms due to the root's motion are in the models: those of a
+where the two terms of gravity hold for a root at rest. Each model adds the terms due to its root's motion: those of a
 rolling foot in rigid_model.py, Newton's law for the centre of mass in ground/motion.py.
 
-The argument `tree` of functions is a Mechanism: a `RigidModel`, or a `GroundModel` on compliant ground. It has n
-bodies; the compiler knows n if the tree's type fixes it.
+In the functions, `tree` is a Mechanism with n bodies: a `RigidModel`, or a `GroundModel` on compliant ground. The
+compiler knows n if the tree's type fixes it.
 """
 
 from collections.abc import Mapping
@@ -30,7 +30,7 @@ R = TypeVar("R", bound=type)
 
 def fast_fields(kind: R) -> R:
     """Give a class of records fast access to its annotated fields."""
-    # NumPy's own field access is several times slower, and Python prepares and evaluates the walks.
+    # NumPy's own field access is several times slower, and the Python code around a walk reads many fields.
     fields: dict[str, Any] = {name: property(itemgetter(name)) for name in kind.__annotations__}
     fields |= {"__getattribute__": object.__getattribute__, "__getitem__": np.void.__getitem__}
     for name, read in fields.items():
@@ -120,7 +120,7 @@ def projections(lever_x: Any, lever_y: Any, n: int, s: Any, c: Any, F: Any, U: A
 
 @forced_inline
 def lever_motion(lever_x: Any, lever_y: Any, n: int, s: Any, c: Any, omega: Any) -> tuple[float, float, float, float]:
-    """Compute a point's position (m) and velocity (m/s) from the root, along and normal to the slope, by its levers."""
+    """Compute position (m) and velocity (m/s) of a point relative to the root, along and normal to the slope."""
     along, height, along_rate, height_rate = 0.0, 0.0, 0.0, 0.0
     for k in range(n):
         forward, upward = c[k] * lever_x[k] - s[k] * lever_y[k], s[k] * lever_x[k] + c[k] * lever_y[k]

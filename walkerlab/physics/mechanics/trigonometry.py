@@ -16,7 +16,7 @@ PI_1, PI_2 = 3.1415926534682512, 1.2154201012607932e-10
 def sine_cosine(x: float) -> tuple[float, float]:
     """Compute (sin x, cos x) within one unit in the last place.
 
-    Up to pi/4, the range of a walking leg, they are the minimax polynomials of fdlibm (k_sin.c, k_cos.c; Sun
+    Up to pi/4, the range of a walking leg, both are the minimax polynomials of fdlibm (k_sin.c, k_cos.c; Sun
     Microsystems 1993), evaluated in independent pairs of terms; beyond it, the library's functions.
     """
     if abs(x) > QUARTER_PI:
@@ -37,8 +37,8 @@ def sine_cosine(x: float) -> tuple[float, float]:
 
 def lanes_sine_cosine(x: Lanes) -> tuple[Lanes, Lanes]:
     """Compute (sin x, cos x) of lanes, within 3e-16 for angles up to a few thousand turns."""
-    # If any lane is further than a quarter turn from 0, every lane loses its nearest multiple k pi; odd k flips the
-    # sign, and k = 0 leaves a lane unchanged.
+    # If any lane is further than a quarter turn from 0, the nearest multiple k pi is subtracted in every lane; odd k
+    # flips the sign, and k = 0 leaves a lane unchanged.
     if any_positive(abs(x) - HALF_PI):
         k = nearest(PER_PI * x)
         odd = k - 2.0 * nearest(0.5 * k)
