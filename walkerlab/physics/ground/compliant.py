@@ -29,19 +29,19 @@ from walkerlab.physics.solvers.system import Floats
 
 @dataclass(frozen=True)
 class KneeRules:
-    """Rules by which knees lock and are released on compliant ground."""
+    """Rules for locking and releasing knees on compliant ground."""
 
-    # A walker with compliant stops keeps all its bodies while its knees are locked: a latched stop keeps its angle.
+    # With compliant stops, thigh and shank of a locked knee stay separate, at the angle at which the stop latched.
 
     stop: KneeStop | IdealLock = IdealLock()  # noqa: RUF009 (immutable)
-    release_at_touch: bool = False  # else when the leading foot stops sinking in
+    release_at_touch: bool = False  # whether knees are released at the touch, or when the leading foot stops sinking in
 
 
 @dataclass(frozen=True)
 class Root:
     tree: Tree
-    numbers: dict[str, Any]  # fields that all forms share
-    rows: dict[str, Floats]  # (..., n) fields that are summed over bodies that turn together
+    numbers: dict[str, Any]  # fields that are equal in all forms about this root
+    rows: dict[str, Floats]  # (..., n) fields to be summed over bodies that turn together
 
 
 def contact_walker(
@@ -55,8 +55,8 @@ def contact_walker(
 ) -> ContactWalker:
     """Assemble a walker on compliant ground; gravity in m/s^2, slope in rad. Foot k and knee k belong to leg k.
 
-    The centre of `hinged_foot`'s ball is the hinge of the hinged forms, at along = 0. Raises ValueError, with a message
-    for the user, for parts that cannot walk on compliant ground.
+    In the hinged forms, the hinge is the centre of the ball of `hinged_foot`, at along = 0. Raises ValueError, with a
+    message for the user, for parts that cannot walk on compliant ground.
     """
     rules = knee_rules or KneeRules()
     check_walkable(assembly)
@@ -98,13 +98,13 @@ def about_foot(assembly: Assembly, foot: int) -> Root:
 
 
 def levers_by_axis(feet: Any, hip: Floats) -> dict[str, Floats]:
-    """Return the levers (bodies, 2) of feet and hip as fields of a form."""
+    """Return the levers (bodies, 2) to feet and hip as the x and y fields of a form."""
     x, y = np.moveaxis(np.array(feet), 2, 0)
     return {"foot_x": x, "foot_y": y, "hip_x": hip[:, 0], "hip_y": hip[:, 1]}
 
 
 def hip_levers(assembly: Assembly, to_foot: Floats) -> Floats:
-    """Compute levers (bodies, 2) in m to the hip from the point from which `to_foot` leads to the first foot."""
+    """Compute levers (bodies, 2) in m to the hip, from the same point as `to_foot`, the levers to the first foot."""
     # Without named legs, the first foot takes the place of the hip.
     if not all(assembly.legs):
         return to_foot
@@ -114,13 +114,13 @@ def hip_levers(assembly: Assembly, to_foot: Floats) -> Floats:
 
 
 def hinge_point(assembly: Assembly, body: str, other: str) -> Position:
-    """Return the point in a body's frame where it is hinged to another; its origin if they are not hinged directly."""
+    """Return the point in a body's frame where it is hinged to another; the origin if they are not hinged directly."""
     hinge = assembly.hinge(body, other)
     return (0.0, 0.0) if hinge is None else hinge.parent_point_m
 
 
 def fill(form: Any, assembly: Assembly, root: Root, locked: list[int], merges: bool) -> None:
-    """Write the walker about a root into `form`; with `merges` a locked knee's thigh and shank become one body."""
+    """Write the walker about a root into `form`; if `merges`, thigh and shank of each `locked` knee become one body."""
     knees = [(assembly.index(knee.thigh), assembly.index(knee.shank)) for knee in assembly.knees]
     straight = {shank: thigh for thigh, shank in (knees[k] for k in locked)}
     one_with = straight if merges else {}

@@ -36,7 +36,7 @@ def kinetic_energy(form: GroundModel, y: Any) -> float:
 
 @kernel_part
 def potential_energy(form: GroundModel, y: Any) -> float:
-    """Compute the potential energy of gravity (J) from the slope frame's origin."""
+    """Compute the potential energy of gravity (J), which is zero at the origin of the slope's frame."""
     s, c, F, U = vector(OF_BODIES), vector(OF_BODIES), vector(OF_BODIES), vector(OF_BODIES)
     sines_cosines(form, y, s, c)
     projections(form.arm_x, form.arm_y, form.bodies, s, c, F, U)
@@ -52,7 +52,7 @@ def foot_elastic_energy(system: OnGround, foot: int, y: Any) -> float:
 
 @kernel_part
 def total_energy(system: OnGround, y: Any) -> float:
-    """Compute the mechanical energy (J) of the energy balance: kinetic, potential from a fixed origin, elastic."""
+    """Compute the mechanical energy (J): kinetic, elastic, and potential relative to a fixed origin."""
     total = kinetic_energy(system.form, y) + potential_energy(system.form, y)
     for foot in range(2):
         if system.has_ground[foot] != 0:
@@ -72,7 +72,7 @@ def push_power(system: OnGround, t: float, y: Any) -> float:
 
 @kernel_part
 def dissipated_power(system: OnGround, foot: int, y: Any) -> tuple[float, float, float]:
-    """Compute the powers (W) lost under a foot along the normal, (F_n - k d^e) d', and to friction; and F_n (N)."""
+    """Compute the powers (W) dissipated under a foot by damping, (F_n - k d^e) d', and by friction, and F_n (N)."""
     motion = over_ground(system, foot, one_foot_motion(system.form, foot, y))
     if motion.height >= 0.0:
         return 0.0, 0.0, 0.0

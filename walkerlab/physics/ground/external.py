@@ -1,7 +1,7 @@
 """Forces of ground and drives for another program that integrates the walker in its own coordinates.
 
-Coordinates: position of a point of the base body along the slope and over it (m), then one angle per link, measured
-from the link that it is hinged to (rad), the base's from the slope's normal. Forces are generalised in the same order.
+Coordinates: position (m) of a point of the base body along and normal to the slope, then one angle (rad) per link: the
+base's from the slope's normal, any other from the link it is hinged to. Generalised forces have the same order.
 """
 
 from typing import Any
@@ -14,7 +14,7 @@ from walkerlab.physics.kernels import kernel, kernel_part, vector
 
 @kernel_part
 def absolute_state(slope: float, chain: Any, q: Any, v: Any, y: Any) -> None:
-    """Write the state in absolute angles into y; `chain` (n, links) is one where an angle is a sum over a joint."""
+    """Write the state with absolute angles into y; `chain` (n, links) maps the links' relative angles to them."""
     n = chain.shape[0]
     for i in range(2):
         y[i], y[2 + n + i] = q[i], v[i]
@@ -27,14 +27,14 @@ def absolute_state(slope: float, chain: Any, q: Any, v: Any, y: Any) -> None:
 
 @kernel
 def feet_and_forces(system: OnGround, chain: Any, t: float, q: Any, v: Any, feet: Any, forces: Any) -> None:
-    """Write the motion of both feet into feet (2, 4), forces of ground, hinges and push-off into forces (2 + links).
+    """Write the motion of both feet into `feet`, and the forces of ground, hinges and push-off into `forces`.
 
-    system  with all bodies, its levers of feet and hip from the base's point
-    chain   (n, links) whether a joint lies between the base and a body; bodies that move as one share a row
+    system  walker in the form with all bodies, with levers from the base's point to feet and hip
+    chain   (n, links) map from relative to absolute angles; bodies that move as one have equal rows
     q, v    (2 + links) coordinates and velocities of the other program
-    feet    along (m), height (m), slip (m/s), velocity of the height (m/s)
+    feet    (2, 4) along (m), height (m), slip (m/s), rate of the height (m/s)
+    forces  (2 + links) generalised forces, N and N m; not computed if the array is empty
     """
-    # Empty forces are not computed.
     form = system.form
     y, s, c, torques = vector(OF_STATES), vector(OF_BODIES), vector(OF_BODIES), vector(OF_BODIES)
     absolute_state(form.slope, chain, q, v, y)

@@ -1,8 +1,8 @@
 """Friction laws of the ground: ADAMS's Coulomb friction without true stick, or none.
 
-A law is a class of its parameters with the members of `FrictionLaw`, a case of `friction_coefficient`, cases of the two
-functions after it if its coefficient has several formulas, and a name in `FRICTION_LAWS`. No other file depends on the
-choice of law.
+A law is a class that holds the law's parameters and has the members of `FrictionLaw`. It needs a case of
+`friction_coefficient`, a name in `FRICTION_LAWS` and, if its coefficient has several formulas, cases of
+`switching_count` and `sample_switching`. No other file depends on the choice of law.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from walkerlab.physics.kernels import by_type, by_type_or_default
 
 
 class FrictionLaw(Protocol):
-    """Members of a law besides its force."""
+    """Members that a friction law needs in addition to its coefficient."""
 
     @classmethod
     def of(cls, contact: Any) -> Self:
@@ -23,7 +23,7 @@ class FrictionLaw(Protocol):
 
     @property
     def largest(self) -> float:
-        """Largest coefficient."""
+        """Maximum of the coefficient."""
 
     @property
     def rising_until(self) -> float:
@@ -31,36 +31,36 @@ class FrictionLaw(Protocol):
 
     @property
     def sliding_from(self) -> float:
-        """Slip velocity (m/s) from which on the coefficient is that of a sliding foot."""
+        """Slip velocity (m/s) above which the coefficient is that of a sliding foot."""
 
     def with_creep(self, factor: float) -> Self:
         """Return the law with its slip velocities multiplied by a factor."""
 
     def in_words(self) -> str:
-        """Describe the law with its parameters, as the end of 'there is'."""
+        """Describe the law and its parameters as a phrase that can follow 'there is'."""
 
 
 @by_type
 def friction_coefficient(law: Any, slip: float) -> tuple[float, float]:
-    """Compute tangential over normal force against a slip velocity (m/s), and its derivative (s/m)."""
+    """Compute the signed ratio of friction to normal force at a slip velocity (m/s), and its derivative (s/m)."""
 
 
 @by_type_or_default
 def switching_count(law: Any) -> int:
-    """Count the event functions at changes of the formula: at most four; none by default."""
+    """Return the number of event functions that mark changes of the law's formula: at most four, none by default."""
     return 0
 
 
 @by_type_or_default
 def sample_switching(law: Any, slip: float, values: Any, first: int, j: int) -> None:
-    """Write these event functions at a slip velocity (m/s) into values[first:, j]."""
+    """Write the event functions that `switching_count` counts, at a slip velocity (m/s), into values[first:, j]."""
 
 
 class Coulomb(NamedTuple):
     """ADAMS contact friction with 'Coulomb: on', SI."""
 
-    static: float  # [mu_s] at the stiction velocity
-    dynamic: float  # [mu_d] from the friction velocity on
+    static: float  # [mu_s] coefficient at the stiction velocity
+    dynamic: float  # [mu_d] coefficient from the friction velocity on
     stiction_velocity: float  # [v_s] m/s
     friction_velocity: float  # [v_d] m/s
 
@@ -99,8 +99,9 @@ class Coulomb(NamedTuple):
 
 @friction_coefficient.case(Coulomb)
 def coulomb_coefficient(law: Coulomb, slip: float) -> tuple[float, float]:
-    """Evaluate a cubic up to v_s, a second one down to mu_d at v_d, then mu_d (Adams/Solver, COULOMB_FRICTION = ON)."""
-    # The cubic passes through zero, so a loaded foot creeps, at about v_s (T/N) / (1.5 mu_s).
+    """Evaluate COULOMB_FRICTION = ON of Adams/Solver: a cubic up to v_s, another down to mu_d at v_d, then mu_d."""
+    # The cubic passes through zero, so under a tangential load T and a normal load N a foot creeps, at about
+    # v_s (T/N) / (1.5 mu_s).
     v, v_s = abs(slip), law.stiction_velocity
     if v < v_s:
         mu, slope = smooth_step(slip, -v_s, law.static, v_s, -law.static)
@@ -111,7 +112,7 @@ def coulomb_coefficient(law: Coulomb, slip: float) -> tuple[float, float]:
 
 @switching_count.case(Coulomb)
 def coulomb_switching_count(law: Coulomb) -> int:
-    """Return 4: two velocities, in both directions."""
+    """Return 4: two switching velocities in both directions."""
     return 4
 
 
@@ -155,11 +156,11 @@ def no_coefficient(law: Frictionless, slip: float) -> tuple[float, float]:
 
 
 FRICTION_LAWS: Final[dict[str, type[FrictionLaw]]] = {"coulomb": Coulomb, "none": Frictionless}
-"""Laws by their names in the config's contact.friction."""
+"""Friction laws by their names in `contact.friction` of a config."""
 
 
 def create_law(word: str, contact: Any) -> FrictionLaw:
-    """Create the law of that name from a contact block in SI; TypeError lists the members that its class lacks."""
+    """Create the law named `word` from a contact block in SI; raises TypeError if its class is incomplete."""
     law = FRICTION_LAWS[word]
     missing = missing_members(law)
     if missing:
@@ -168,7 +169,7 @@ def create_law(word: str, contact: Any) -> FrictionLaw:
 
 
 def missing_members(law: type) -> list[str]:
-    """List the members of `FrictionLaw` that a law's class lacks, and the cases that are not registered for it."""
+    """List the members of `FrictionLaw` and the function cases that a law's class lacks."""
     asked = [name for name in vars(FrictionLaw) if not name.startswith("_")]
     missing = [name for name in asked if not hasattr(law, name)]
     switching = (switching_count, sample_switching)
@@ -178,5 +179,5 @@ def missing_members(law: type) -> list[str]:
 
 
 def steepest_change(law: FrictionLaw, slip: float) -> float:
-    """Bound the change of the coefficient within a slip velocity (m/s), by its slope at rest."""
+    """Return an upper bound on the coefficient's change over a slip velocity range (m/s), from its slope at rest."""
     return min(law.largest, -slip * float(friction_coefficient(law, 0.0)[1]))

@@ -1,4 +1,4 @@
-"""Torques at hinges on compliant ground: each has a spring, damper and drive, and each knee also a stop."""
+"""Torques at hinges on compliant ground: spring, damper and drive at each hinge, and a stop at each knee."""
 
 from typing import Any
 
@@ -20,14 +20,14 @@ from walkerlab.physics.mechanics.hinges import (
 
 @kernel_part
 def hip_sign(system: OnGround, row: int) -> float:
-    """Return -1 for the hip while the first leg, first in its row, is the stance leg; otherwise 1."""
+    """Return -1 for the hip while the first leg is the stance leg; otherwise 1."""
     return -1.0 if row == HIP_ROW and system.progress.stance == 0 else 1.0
 
 
 @kernel_part
 def angle_at(system: OnGround, row: int, y: Any) -> tuple[float, float]:
-    """Return the angle of a hinge's first body ahead of its second (rad), and its rate (rad/s)."""
-    # At the hip it is the angle of the swing leg ahead: at a touch the legs change roles.
+    """Return the angle (rad) by which a hinge's first body is ahead of its second, and its rate (rad/s)."""
+    # At the hip the first body is that of the swing leg, so it changes when the legs exchange roles at a touch.
     form, sign = system.form, hip_sign(system, row)
     return sign * ahead(form, row, y, form.places), sign * ahead(form, row, y, half_size(form) + form.places)
 
@@ -39,7 +39,7 @@ def is_stopping(system: OnGround, row: int) -> bool:
 
 @kernel_part
 def torque_at(system: OnGround, row: int, y: Any) -> HingeTorque:
-    """Compute the torque at a hinge: of its spring, damper and drive, and of its stop."""
+    """Compute the torque of spring, damper and drive at a hinge, and of the stop while a knee is in it."""
     angle, rate = angle_at(system, row, y)
     own = hinge_torque(hinge_law(system.form, row), angle, rate)
     if not is_stopping(system, row):
@@ -52,7 +52,7 @@ def torque_at(system: OnGround, row: int, y: Any) -> HingeTorque:
 
 @kernel_part
 def bodies_at(system: OnGround, row: int) -> tuple[int, int]:
-    """Return the body that a hinge's torque turns back, and the other body."""
+    """Return the body that a hinge's torque turns back, and the one that it turns forward."""
     body, other = system.form.hinges[row, 0], system.form.hinges[row, 1]
     return (other, body) if hip_sign(system, row) < 0.0 else (body, other)
 
@@ -68,7 +68,7 @@ def add_torques(system: OnGround, y: Any, r: Any) -> None:
 
 @kernel_part
 def add_gradients(system: OnGround, y: Any, by_angle: Any, by_rate: Any) -> None:
-    """Add the derivatives of those torques with respect to angles and rates to by_angle and by_rate (n, n)."""
+    """Add the derivatives of all hinge torques with respect to angles and rates to by_angle and by_rate (n, n)."""
     for row in range(len(system.form.hinges)):
         if is_sprung(system.form, row) or is_stopping(system, row):
             body, other = bodies_at(system, row)
@@ -109,7 +109,7 @@ def spring_energy(system: OnGround, y: Any) -> float:
 
 @kernel_part
 def spring_power(system: OnGround, y: Any) -> float:
-    """Compute the power (W) that springs, dampers and drives supply and do not store."""
+    """Compute the power (W) that dampers (negative) and drives supply at all hinges; springs only store energy."""
     total = 0.0
     for row in range(len(system.form.hinges)):
         if is_sprung(system.form, row):
@@ -121,5 +121,5 @@ def spring_power(system: OnGround, y: Any) -> float:
 
 @legs_apart.case(OnGround)
 def legs_apart_on_ground(system: OnGround, y: Any) -> tuple[float, float]:
-    """Use the uppermost bodies of both legs."""
+    """Return the angle between the legs' uppermost bodies (rad), and its rate (rad/s)."""
     return angle_at(system, HIP_ROW, y)

@@ -11,15 +11,15 @@ from walkerlab.physics.mechanics.hinges import HingeTorque, hinge_energy, hinge_
 from walkerlab.physics.mechanics.impact import RootedTree, lock
 from walkerlab.physics.solvers.system import Floats
 
-FLEXED = 0.01  # rad of flexion beyond which a knee locks when it straightens
+FLEXED = 0.01  # rad, minimum flexion after which a knee locks again as it straightens
 
 
 class IdealLock(NamedTuple):
-    """Lock that acts as soon as the knee is straight: a plastic impact."""
+    """Lock that stops a knee by a plastic impact as soon as it is straight."""
 
 
 class KneeStop(NamedTuple):
-    """Stop by the IMPACT law that turns a knee back beyond straight."""
+    """Stop by the IMPACT law that pushes a knee back when it extends beyond straight."""
 
     stiffness: float  # [k] N m/rad^e
     exponent: float  # [e]
@@ -35,13 +35,13 @@ def stop_law(stop: KneeStop) -> NormalLaw:
 
 @kernel_part
 def ahead(form: GroundModel, row: int, y: Any, first: int) -> float:
-    """Return the angle of a hinge's body ahead of the other (rad), from angles starting at y[first]; or its rate."""
+    """Return the angle (rad) of a hinge's first body ahead of its second, or its rate if y[first] is the first rate."""
     return y[first + form.hinges[row, 0]] - y[first + form.hinges[row, 1]]
 
 
 @kernel_part
 def extension(form: GroundModel, knee: int, y: Any) -> float:
-    """Return the angle of a knee beyond straight (rad): negative while it is bent, zero without a knee."""
+    """Return the angle (rad) of a knee beyond straight: negative while it is bent, zero for a leg without a knee."""
     return ahead(form, FIRST_KNEE + knee, y, form.places)
 
 
@@ -66,15 +66,15 @@ def stop_energy(law: KneeStop, angle: float) -> float:
 class Locked(NamedTuple):
     """State of all bodies about their root after a knee has locked."""
 
-    state: Floats
-    lost: float  # J
-    columns: Floats  # (size, columns) images of directions of the state before
+    state: Floats  # (size,)
+    lost: float  # J, kinetic energy lost
+    columns: Floats  # (size, columns) variational columns just after the lock
 
 
 def lock_knee(whole: GroundModel, form: GroundModel, x: Any, columns: Floats | None = None) -> Locked:
-    """Project the angular velocities on those that a form allows, by a plastic impact that does not move the root.
+    """Project the angular velocities onto those that `form` allows; the root's motion does not change.
 
-    The state x (size,) and its directions `columns` (size, columns) are those of the form `whole` of all bodies.
+    The state x (size,) and the variational columns (size, columns) are those of `whole`, the form with all bodies.
     """
     x = np.array(x, float)
     n, p, rates = int(whole.bodies), int(whole.places), x.size - int(whole.bodies)

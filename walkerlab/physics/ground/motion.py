@@ -54,7 +54,7 @@ def foot_wrench(system: OnGround, t: float, foot: int, s: Any, c: Any, y: Any, r
 @forced_inline
 def all_forces(system: OnGround, t: float, s: Any, c: Any, y: Any, M: Any, r: Any) -> tuple[float, float]:
     """Compute the forces of ground and push-off along and normal to the slope (N); write M (n, n) and r (n,) in N m."""
-    # The torques r are those of the feet, the centrifugal terms, the knees' stops, the hip and, about a hinge, gravity.
+    # r sums the torques of feet, hinges and knee stops, the centrifugal torques and, about a hinged foot, gravity.
     form = system.form
     n, half = form.bodies, half_size(form)
     for k in range(n):
@@ -75,7 +75,7 @@ def all_forces(system: OnGround, t: float, s: Any, c: Any, y: Any, M: Any, r: An
 
 @derivative.case(OnGround)
 def on_ground_derivative(system: OnGround, t: float, y: Any, f: Any) -> None:
-    """Evaluate Newton's law for the centre of mass, unless hinged, and the tree's equations for the angles."""
+    """Evaluate Newton's law for the centre of mass (unless a foot is hinged) and the tree's equations of motion."""
     form = system.form
     n, half, first = form.bodies, half_size(form), form.places
     s, c, r, M = vector(OF_BODIES), vector(OF_BODIES), vector(OF_BODIES), matrix(OF_BODIES)
@@ -95,7 +95,7 @@ def on_ground_derivative(system: OnGround, t: float, y: Any, f: Any) -> None:
 
 @kernel_part
 def motion_gradient(form: GroundModel, foot: int, F: Any, U: Any, y: Any, j: int) -> tuple[float, float, float]:
-    """Differentiate a foot's penetration, its rate and slip by state component j; F, U (n,) project its levers."""
+    """Differentiate a foot's penetration, its rate and slip by state component j; F, U (n,) are projected levers."""
     p, half = form.places, half_size(form)
     moves = j >= half
     k = (j - half if moves else j) - p
@@ -111,7 +111,7 @@ def motion_gradient(form: GroundModel, foot: int, F: Any, U: Any, y: Any, j: int
 
 @kernel_part
 def add_foot_gradients(system: OnGround, t: float, foot: int, s: Any, c: Any, y: Any, J: Any) -> None:
-    """Add the derivatives of a foot's force and torques to the rows of J, before the division by masses."""
+    """Add the derivatives of a foot's force and torques to the rows of J, not yet divided by mass or inertia."""
     form, push = system.form, push_on(system, t, foot, s, c)
     motion = over_ground(system, foot, foot_motion(form, foot, s, c, y))
     inside, pushed = system.has_ground[foot] != 0 and motion.height < 0.0, push.above != 0.0
@@ -125,7 +125,7 @@ def add_foot_gradients(system: OnGround, t: float, foot: int, s: Any, c: Any, y:
         along += force.along
         normal += force.normal.force
         for j in range(2 * half):
-            # derivatives of penetration, its rate and the slip along coordinate or velocity j
+            # derivatives of penetration, its rate and the slip with respect to coordinate or velocity j
             deeper, deeper_rate, faster = motion_gradient(form, foot, F, U, y, j)
             by_j = force.normal.by_penetration * deeper + force.normal.by_rate * deeper_rate
             add_column(form, foot, j, force.coefficient * by_j + force.by_slip * faster, by_j, F, U, J)
@@ -161,7 +161,7 @@ def add_torque_gradients(system: OnGround, s: Any, c: Any, y: Any, alpha: Any, b
 
 @jacobian.case(OnGround)
 def on_ground_jacobian(system: OnGround, t: float, y: Any, J: Any) -> None:
-    """Compute the derivatives of the equations of motion, exact up to the switching points of the force law."""
+    """Compute the Jacobian of the equations of motion, exact except at switching points of the force law."""
     form = system.form
     n, p, half = form.bodies, form.places, half_size(form)
     s, c, alpha, M, by_torque = (
@@ -175,7 +175,7 @@ def on_ground_jacobian(system: OnGround, t: float, y: Any, J: Any) -> None:
     links = CountedModel(form.E, form.arm_x[:n])
     factor_linked(links, 0, M)
     solve_linked(links, 0, M, alpha)
-    for k in range(n):  # row k: angular accelerations due to a torque on body k
+    for k in range(n):  # row k: angular accelerations due to a unit torque on body k
         for l in range(n):
             by_torque[k, l] = 1.0 if k == l else 0.0
         solve_linked(links, 0, M, by_torque[k])

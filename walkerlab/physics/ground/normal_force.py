@@ -29,7 +29,7 @@ def impact_normal_force(penetration: float, penetration_rate: float, law: Normal
     """Compute the normal force of ADAMS's IMPACT law, F = max(0, k d^e + c(d) d'), never adhesive.
 
     The damping c rises from 0 at first touch to `law.damping` at `full_damping_penetration`. Penetration d (m) and its
-    rate d' (m/s) are positive into the ground; the caller leaves out feet with d <= 0.
+    rate d' (m/s) are positive into the ground; the caller skips feet with d <= 0.
 
     Source: Adams function reference, IMPACT.
     """
@@ -43,9 +43,9 @@ def impact_normal_force(penetration: float, penetration_rate: float, law: Normal
 
 @kernel_part
 def grip(penetration: float, penetration_rate: float, law: NormalLaw) -> float:
-    """Scale the force before it is cut off at zero: where it falls through zero, the ground releases the foot."""
-    # The result is the force divided by min(d, d_max)^min(e, 2), with a finite slope at the surface, and nowhere
-    # steeper than the force.
+    """Return the unclamped force divided by a power of the penetration; the foot is released as it falls to zero."""
+    # The divisor is min(d, d_max)^min(e, 2): the result has a finite slope at the surface and is nowhere steeper than
+    # the force.
     full = law.full_damping_penetration
     power = min(law.exponent, 2.0)
     d = max(penetration, 0.0)
@@ -58,7 +58,7 @@ def grip(penetration: float, penetration_rate: float, law: NormalLaw) -> float:
 
 @kernel_part
 def elastic_energy(penetration: float, law: NormalLaw) -> float:
-    """Compute the energy stored in the contact's spring (J): k d^(e+1) / (e+1)."""
+    """Compute the energy (J) stored in the contact's spring, k d^(e+1) / (e+1)."""
     if penetration <= 0.0:
         return 0.0
     return law.stiffness * penetration ** (law.exponent + 1.0) / (law.exponent + 1.0)

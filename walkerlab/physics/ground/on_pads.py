@@ -1,7 +1,7 @@
-"""The walker on its pads as an ordinary differential equation: ground carries a foot wherever it is over a pad.
+"""Walker on pads as an ordinary differential equation: the ground carries a foot wherever it is over a pad.
 
-This is the contact model as written for a general solver: one right-hand side, no events. It does not require that a
-foot comes from above, and no walk ends. The walks of this project do not use it.
+This is the contact model as written for a general solver: one right-hand side without events. A foot need not come
+from above, and a walk never ends. Only the comparison with general solvers uses it.
 """
 
 from typing import Any, NamedTuple
@@ -19,7 +19,7 @@ class OnPads(NamedTuple):
 
 @kernel_part
 def find_pads(system: OnPads, y: Any) -> None:
-    """Mark ground under the feet that are over a pad, at any height."""
+    """Record in `has_ground` whether each foot is over a pad, at any height."""
     feet = feet_motion(system.walker.form, y)
     for foot in range(2):
         system.walker.has_ground[foot] = has_ground_in_cell(cell_at(system.terrain, foot, feet[foot].along))
@@ -38,6 +38,6 @@ def on_pads_derivative(system: OnPads, t: float, y: Any, f: Any) -> None:
 
 @jacobian.case(OnPads)
 def on_pads_jacobian(system: OnPads, t: float, y: Any, J: Any) -> None:
-    """Compute the derivatives of the equations of motion, without the edges of the pads."""
+    """Compute the Jacobian of the equations of motion, ignoring the jumps at the pads' edges."""
     find_pads(system, y)
     jacobian(system.walker, t, y, J)

@@ -1,7 +1,7 @@
-"""Push-off on compliant ground: a pulse of force at the trailing foot, along the line from there to the hip.
+"""Push-off on compliant ground: a pulse of force at the trailing foot, directed from its contact point to the hip.
 
-It begins at the touch of the other foot and has the push-off's impulse P. With the elapsed fraction u of its duration D
-its force is 30 u^2 (1 - u)^2 P / D, smooth at both ends.
+The pulse begins when the other foot touches and delivers the push-off's impulse P over a duration D. At the elapsed
+fraction u of D, its force is 30 u^2 (1 - u)^2 P / D, smooth at both ends.
 """
 
 import math
@@ -23,7 +23,7 @@ def pulse_force(system: OnGround, t: float) -> float:
 
 @kernel_part
 def pulse_left(system: OnGround, t: float) -> float:
-    """Return the remaining duration (s) of a pulse; 0 outside a pulse."""
+    """Return the remaining duration (s) of the current pulse; 0 if there is none."""
     if system.form.push_off == 0.0 or system.progress.steps == 0:
         return 0.0
     return max(0.0, system.progress.last_touch + system.form.push_off_duration - t)
@@ -32,13 +32,13 @@ def pulse_left(system: OnGround, t: float) -> float:
 class Push(NamedTuple):
     along: float  # N
     upward: float  # N
-    ahead: float  # m, from the foot's contact point to the hip
-    above: float  # m
+    ahead: float  # m, from the foot's contact point to the hip, along the slope
+    above: float  # m, normal to the slope
 
 
 @kernel_part
 def push_on(system: OnGround, t: float, foot: int, s: Any, c: Any) -> Push:
-    """Compute the push on a foot at a time; zero force outside a pulse."""
+    """Compute the push-off on a foot at time t (s); it is zero outside a pulse and on the stance foot."""
     form, force = system.form, pulse_force(system, t) if foot != system.progress.stance else 0.0
     if force == 0.0:
         return Push(0.0, 0.0, 0.0, 0.0)
@@ -53,14 +53,14 @@ def push_on(system: OnGround, t: float, foot: int, s: Any, c: Any) -> Push:
 
 @kernel_part
 def lever_to_hip(form: GroundModel, foot: int, s: Any, c: Any, k: int) -> tuple[float, float]:
-    """Return a body's part (m) of the vector from a foot's centre to the hip, along the slope and over it."""
+    """Return a body's contribution (m) to the vector from a foot's centre to the hip, along and normal to the slope."""
     x, y = form.hip_x[k] - form.foot_x[foot, k], form.hip_y[k] - form.foot_y[foot, k]
     return c[k] * x - s[k] * y, s[k] * x + c[k] * y
 
 
 @kernel_part
 def push_gradient(form: GroundModel, push: Push, foot: int, s: Any, c: Any, k: int) -> tuple[float, float]:
-    """Compute derivatives (N/rad) of a push with respect to a body's angle, which turns the push at constant force."""
+    """Compute derivatives (N/rad) of a push with respect to a body's angle, which turns it at constant magnitude."""
     forward, upward = lever_to_hip(form, foot, s, c, k)
     turned = (push.along * forward + push.upward * upward) / (push.ahead * push.ahead + push.above * push.above)
     return -turned * push.above, turned * push.ahead

@@ -8,11 +8,11 @@ class RestingFoot(NamedTuple):
     """Foot that carries a walker's whole weight."""
 
     depth: float  # m, the static penetration
-    damping_ratio: float  # c / (2 sqrt(dF/dd m)) there, with damping fully developed and the total mass m
+    damping_ratio: float  # c / (2 sqrt(m dF/dd)) at that depth, with full damping c and the total mass m
 
 
 def resting_foot(weight: float, mass: float, stiffness: float, exponent: float, damping: float) -> RestingFoot:
-    """Compute the state of a foot at rest under a weight (N, normal to the ground) where F = k d^e + c d', SI."""
+    """Compute the state of a resting foot under a weight (N, normal to the ground), for F = k d^e + c d', SI."""
     depth = (weight / stiffness) ** (1.0 / exponent)
     slope = stiffness * exponent * depth ** (exponent - 1.0)
     return RestingFoot(depth, damping / (2.0 * math.sqrt(slope * mass)))

@@ -1,11 +1,10 @@
 """Walker on compliant ground: an assembled tree with ball feet, in the forms that it takes while walking.
 
-Coordinates in the slope's frame: along the slope (positive downhill) and height over it, m; the bodies' absolute
-angles from the vertical, rad. State: (along, height, theta_1 .. theta_n, and the velocities of all these), of the
-centre of mass. While an ideal lock holds a knee, thigh and shank are one body, theta = S z with a column of S for
-the bodies that turn together: the constants of the tree become S'AS, S'BS and S'c, every lever and radius S'd, and the
-form is an ordinary walker of fewer bodies. While the first stance foot is hinged, the root is the hinge and the state
-consists of the angles alone.
+The state is (along, height, theta_1 .. theta_n) and the velocities of all these: the position (m) of the centre of mass
+along the slope (positive downhill) and above it, and the bodies' absolute angles (rad) from the vertical. While an
+ideal lock holds a knee, thigh and shank are one body: theta = S z with a column of S for the bodies that turn together.
+The constants of the tree become S'AS, S'BS and S'c, every lever and radius S'd, and the form is an ordinary walker of
+fewer bodies. While the first stance foot is hinged, the root is the hinge and the state is the angles and their rates.
 """
 
 import math
@@ -22,44 +21,42 @@ from walkerlab.physics.mechanics.tree import lever_motion
 from walkerlab.physics.solvers.system import Floats, Integers, State
 
 MAX_BODIES = 8
-OF_BODIES = (0.0,) * MAX_BODIES  # templates of scratch arrays
+OF_BODIES = (0.0,) * MAX_BODIES  # templates for scratch arrays of that length
 OF_STATES = (0.0,) * (4 + 2 * MAX_BODIES)
 NO_FOOT = -1
-FIRST_KNEE = HIP_ROW + 1  # row of its hinge
+FIRST_KNEE = HIP_ROW + 1  # row of its hinge in `hinges` and `laws`
 # states of a knee
 RELEASED, BENT, STOPPING, LOCKED = 0, 1, 2, 3
 
 
 @tree.fast_fields
-class GroundModel(tree.Mechanism):  # type: ignore[misc]  # as its base
-    """Form of the walker, SI: its bodies with the present knees locked, hinged or free; a structured scalar."""
+class GroundModel(tree.Mechanism):  # type: ignore[misc]  # as for Mechanism
+    """One form of the walker, SI: hinged or free, with certain knees locked; a structured scalar."""
 
-    # Its arrays have room for MAX_BODIES, so that one compiled walk serves all walkers; only n entries are used. Its
-    # hinges are the hip, with the uppermost body of the first leg ahead of the second's, and each knee, with the shank
-    # ahead of the thigh: thigh and shank are the same body while they move as one. E has one reduction.
+    # The arrays have room for MAX_BODIES, so that one compiled walk serves all walkers; only n entries are used. The
+    # rows of `hinges` are the hip (uppermost body of the first leg, then of the second) and each knee (shank, then
+    # thigh, with equal indices while they are merged into one body). E holds a single reduction.
 
     bodies: int  # [n]
-    places: int  # number of root coordinates before the angles: 2, or 0 with a hinge
-    hinged: int  # hinged foot; NO_FOOT
+    places: int  # number of root coordinates before the angles: 2, or 0 for a hinged form
+    hinged: int  # index of the hinged foot; NO_FOOT in a free form
     kneed: bool
-    release_at_touch: (
-        bool  # whether the trailing knee is released at the touch, not when the leading foot stops sinking in
-    )
+    release_at_touch: bool  # release the trailing knee at the touch, not when the leading foot stops sinking in
     foot_x: Floats  # (2, n) m, levers from the root to the centres of the ball feet, in the bodies' frames
     foot_y: Floats
-    rolling: Floats  # (2, n) m, the ball's radius for its own body, else zero
-    radius: Floats  # (2,) m
+    rolling: Floats  # (2, n) m, radius of each ball in the column of its body; otherwise zero
+    radius: Floats  # (2,) m, radii of the balls
     hip_x: Floats  # (n,) m, levers from the root to the hip
     hip_y: Floats
     push_off_duration: float  # s
-    onto: Integers  # (all bodies,) the form's body for each
-    first: Integers  # (n,) the first body merged into each
-    root_along: float  # m, position of the hinge
-    root_height: float
+    onto: Integers  # (all bodies,) index in this form of each of the walker's bodies
+    first: Integers  # (n,) for each body of this form, the first of the walker's bodies merged into it
+    root_along: float  # m, position of the hinge along the slope
+    root_height: float  # m, height of the hinge above the slope
 
     @property
     def knees(self) -> Integers:
-        """Shank and thigh of either leg (2, 2)."""
+        """Indices (2, 2) of the shank and thigh of each leg."""
         bodies: Integers = self.hinges[FIRST_KNEE:]
         return bodies
 
@@ -74,11 +71,11 @@ FORM = tree.record_type(GroundModel, FORM_SHAPES)
 
 
 class ContactWalker(NamedTuple):
-    forms: Any  # (2, 4) of Form: free or hinged; which knees are locked, as `locked_knees` numbers them
+    forms: Any  # (2, 4) records of FORM: rows for free and hinged, columns by `locked_knees`
     normal: NormalLaw
     friction: Any  # a FrictionLaw
-    stop: Any  # of the knees: IdealLock or a KneeStop
-    legs: Integers  # (2, bodies of a leg) from the hip down
+    stop: Any  # stop of both knees: IdealLock or a KneeStop
+    legs: Integers  # (2, bodies of a leg) indices of each leg's bodies from the hip down
 
     @property
     def whole(self) -> GroundModel:
@@ -100,12 +97,12 @@ class ContactWalker(NamedTuple):
 
     @property
     def gravity_along(self) -> float:
-        """Component along the slope, m/s^2."""
+        """Gravity along the slope, m/s^2."""
         return float(self.whole.gravity_along)
 
     @property
     def gravity_down(self) -> float:
-        """Component towards the slope, m/s^2."""
+        """Gravity towards the slope, m/s^2."""
         return float(self.whole.gravity_down)
 
     @property
@@ -131,33 +128,33 @@ def changed_forms(walker: ContactWalker, **fields: Any) -> ContactWalker:
 class WalkProgress(np.record):  # type: ignore[misc]  # NumPy's stubs call one of its bases final
     stance: int  # foot that carries the present step
     steps: int  # number of completed steps
-    last_touch: float  # s, time of the last touch
-    airborne_since: float  # s, last time with a foot on the ground
-    stopped_at: float  # s, end of the integration so far
-    release: int  # when the trailing knee is due for release: see hybrid/contact_state.py
-    passes_switching: bool  # whether the present integration step may pass switching points
+    last_touch: float  # s, time of the touch that began the present step
+    airborne_since: float  # s, last time at which a foot was on the ground
+    stopped_at: float  # s, time that the integration has reached
+    release: int  # event that will release the trailing knee, as numbered in hybrid/contact_state.py
+    passes_switching: bool  # whether the present solver step may pass switching points
 
 
 PROGRESS = tree.record_type(WalkProgress, {})
 
 
 def new_progress(stance: int = 1, steps: int = 0, last_touch: float = 0.0) -> WalkProgress:
-    """Create the progress of a walk, carried by one foot, after some steps, the last of them at a time (s)."""
+    """Create the progress of a walk on foot `stance` after some steps, the last of which ended at `last_touch` (s)."""
     progress: WalkProgress = tree.new_record(PROGRESS, stance=stance, steps=steps, last_touch=last_touch)
     return progress
 
 
 @by_reference
 class OnGround(NamedTuple):
-    """The walker in one of its forms, with variables, owned by the walk, that may change while it keeps the form."""
+    """Walker in one form on the ground, with variables that the walk owns and may change within that form."""
 
     form: GroundModel
     normal: NormalLaw
     friction: Any
     stop: Any
-    has_ground: Any  # (2,) whether there is ground under a foot
+    has_ground: Any  # (2,) whether there is ground under each foot
     knee: Any  # (2,) state of each knee
-    level: Any  # (2,) m, height over the slope of the ground for each foot
+    level: Any  # (2,) m, height above the slope of the ground for each foot
     progress: WalkProgress
 
 
@@ -169,7 +166,7 @@ def on_ground(
     level: Any = (0.0, 0.0),
     progress: WalkProgress | None = None,
 ) -> OnGround:
-    """Return the walker in the form that its knees determine, by default on foot 1; the ground is at `level` (m)."""
+    """Return the walker in the form for its knees, by default standing on foot 1; `level` is the ground height (m)."""
     memory = np.asarray(has_ground, np.int8), np.asarray(knee, np.int8), np.asarray(level, float)
     form = walker.forms[int(hinged), locked_knees(knee)]
     progress = new_progress() if progress is None else progress
@@ -178,15 +175,15 @@ def on_ground(
 
 @kernel_part
 def locked_knees(knee: Any) -> int:
-    """Return the index of the form with these knees (2,) locked: 0 none, 1 or 2 one knee, 3 both."""
+    """Return the index of a form by its locked knees: 0 for none, 1 for the first, 2 for the second, 3 for both."""
     return (1 if knee[0] == LOCKED else 0) + (2 if knee[1] == LOCKED else 0)
 
 
 class FootMotion(NamedTuple):
-    along: float  # m
-    height: float  # m over the slope, negative inside the ground
-    slip: float  # m/s, velocity along the slope of the material point there
-    vertical_velocity: float  # m/s, velocity of the height
+    along: float  # m, position along the slope
+    height: float  # m, above the slope (after `over_ground`: above the foot's ground, negative inside it)
+    slip: float  # m/s, velocity along the slope of the ball's material at its lowest point
+    vertical_velocity: float  # m/s, rate of the height
 
 
 @kernel_part
@@ -202,7 +199,7 @@ def sines_cosines(form: GroundModel, y: Any, s: Any, c: Any) -> None:
 
 @kernel_part
 def foot_motion(form: GroundModel, foot: int, s: Any, c: Any, y: Any) -> FootMotion:
-    """Compute the motion of the lowest point of a ball foot; its slip is the slip of the ball's material."""
+    """Compute the motion of a ball foot's lowest point, with the slip of the ball's material at that point."""
     n, half = form.bodies, half_size(form)
     along, height, slip, vertical_velocity = form.root_along, form.root_height, 0.0, 0.0
     if form.places > 0:
@@ -237,21 +234,21 @@ def over_ground(system: OnGround, foot: int, motion: FootMotion) -> FootMotion:
 class FootForce(NamedTuple):
     along: float  # N, friction
     normal: NormalForce
-    by_slip: float  # N s/m, derivative of the friction
-    coefficient: float  # friction over normal force, with its sign
+    by_slip: float  # N s/m, derivative of the friction with respect to slip
+    coefficient: float  # signed ratio of friction to normal force
 
 
 @kernel_part
 def foot_force(laws: Any, motion: FootMotion) -> FootForce:
-    """Compute the force of the ground on a foot inside it, by the laws of a walker or of its system."""
+    """Compute the force of the ground on a penetrating foot; `laws` is a ContactWalker or an OnGround."""
     normal = impact_normal_force(-motion.height, -motion.vertical_velocity, laws.normal)
     mu, mu_slope = friction_coefficient(laws.friction, motion.slip)
     return FootForce(mu * normal.force, normal, mu_slope * normal.force, mu)
 
 
 def to_form(form: GroundModel, x: Any) -> Floats:
-    """Convert a state of all bodies, or a tangent column, to a state of a form about the same root."""
-    # Merged bodies turn alike up to rounding; the first one's values are taken.
+    """Convert a state of all bodies, or a variational column, to that of a form about the same root."""
+    # Merged bodies have equal angles and rates up to rounding; those of the first are used.
     return np.asarray(x)[places_in_whole(form, len(x))]
 
 
@@ -263,7 +260,7 @@ def to_full(form: GroundModel, y: Any, size: int) -> Floats:
 
 
 def places_in_whole(form: GroundModel, size: int) -> list[int]:
-    """Return the indices of a form's state within that of all bodies about the same root."""
+    """Return the indices of a form's state in the state (size,) of all bodies about the same root."""
     p, half, first = int(form.places), size // 2, form.first[: form.bodies]
     return [*range(p), *(p + first), *range(half, half + p), *(half + p + first)]
 

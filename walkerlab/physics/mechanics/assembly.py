@@ -1,12 +1,12 @@
 """Constants of the equations of motion, from the parts of a walker.
 
 Choose a point of the tree, the root. Every other point lies at root + sum over bodies k of R(theta_k) d_k, where the
-levers d_k are constants of the assembly and theta_k the bodies' absolute angles. The kinetic energy then needs only
+levers d_k are constants of the assembly and theta_k the bodies' absolute angles. The kinetic energy depends only on
 
     A_kl = sum m d_k . d_l (+ inertia on the diagonal),   B_kl = sum m d_k . (rotated d_l),   c_k = sum m d_k
 
-over all masses m. With the centre of mass as root c vanishes, and translation and rotation part. With Delta =
-theta_l - theta_k the equations of motion about a root at rest are
+with sums over all masses m. With the centre of mass as the root, c vanishes and translation decouples from rotation.
+With Delta = theta_l - theta_k, the equations of motion about a root at rest are
 
     M_kl = A_kl cos Delta + B_kl sin Delta
     M alpha = torques + sum over l of omega_l^2 (A_kl sin Delta - B_kl cos Delta)
@@ -28,17 +28,17 @@ class Tree(NamedTuple):
     mass: float  # kg
     A: Floats  # (n, n) kg m^2
     B: Floats
-    arm_x: Floats  # (n,) c, kg m: first moments about the root, zero if that is the centre of mass
+    arm_x: Floats  # (n,) c, kg m: first moments about the root; zero if the root is the centre of mass
     arm_y: Floats
 
     def merged(self, members: Floats) -> dict[str, Any]:
-        """Return fields of a mechanism of grouped bodies; members (bodies, n) is 1 where a body belongs to a group."""
+        """Return a Mechanism's fields for grouped bodies; members (bodies, n) is 1 where a body belongs to a group."""
         A, B = (members.T @ pairs @ members for pairs in (self.A, self.B))
         return {"A": A, "B": B, "arm_x": self.arm_x @ members, "arm_y": self.arm_y @ members, "mass": self.mass}
 
 
 def reduction(rows: Mapping[int, Floats], n: int) -> Floats:
-    """Build E (n, n) from the followers' weights."""
+    """Build the matrix E (n, n) of links.py from each follower's weights (n,)."""
     E = np.eye(n)
     for follower, row in rows.items():
         E[follower] = row
@@ -54,9 +54,9 @@ class Anchor:
 
 
 def levers(assembly: Assembly, root: Anchor, point: Anchor) -> Floats:
-    """Compute levers d (bodies, 2) in m: `point` lies at root + sum over k of R(theta_k) d[k].
+    """Compute the levers d (bodies, 2) in m such that `point` lies at root + sum over k of R(theta_k) d[k].
 
-    Raises KeyError for an unknown body, ValueError if hinges do not lead from the root's body to the point's.
+    Raises KeyError for an unknown body, ValueError if no hinges connect the bodies of root and point.
     """
     for end in (root, point):
         assembly.index(end.body)
@@ -70,7 +70,7 @@ def levers(assembly: Assembly, root: Anchor, point: Anchor) -> Floats:
 
 
 def path(assembly: Assembly, start: str, goal: str) -> list[tuple[str, Position, Position]]:
-    """List the hinges from body `start` to `goal`: (body left, point left from, point entered in the next body)."""
+    """List the hinges from body `start` to body `goal` as (body, hinge point on it, hinge point on the next body)."""
     reached: dict[str, list[tuple[str, Position, Position]]] = {start: []}
     frontier = [start]
     while frontier:
@@ -85,7 +85,7 @@ def path(assembly: Assembly, start: str, goal: str) -> list[tuple[str, Position,
 
 
 def neighbours(assembly: Assembly, body: str) -> Iterator[tuple[str, Position, Position]]:
-    """Yield bodies hinged to `body`, with the hinge's point in each."""
+    """Yield each body that is hinged to `body`, with the hinge's point on `body` and on the neighbour."""
     for joint in assembly.joints:
         if joint.parent == body:
             yield joint.child, joint.parent_point_m, joint.child_point_m
@@ -106,13 +106,13 @@ def total_mass(assembly: Assembly) -> float:
 
 
 def tree_about(assembly: Assembly, root: Anchor) -> Tree:
-    """Compute the constants of the equations of motion with a material point as root."""
+    """Compute the constants of the equations of motion about a point of a body."""
     mass_levers = [(mass, levers(assembly, root, at)) for mass, at in masses(assembly)]
     return sum_masses(assembly, mass_levers)
 
 
 def tree_about_centre(assembly: Assembly) -> tuple[Tree, tuple[Floats, ...]]:
-    """Compute the constants with the centre of mass as root, and the levers (bodies, 2) to each foot's centre."""
+    """Compute the constants about the centre of mass, and the levers (bodies, 2) in m from it to each foot's centre."""
     root = Anchor(assembly.bodies[0].name, assembly.bodies[0].centre_m)
     mass_levers = [(mass, levers(assembly, root, at)) for mass, at in masses(assembly)]
     centre = sum(mass * d for mass, d in mass_levers) / total_mass(assembly)
@@ -133,7 +133,7 @@ def sum_masses(assembly: Assembly, mass_levers: list[tuple[float, Floats]]) -> T
 
 
 def followers(assembly: Assembly) -> dict[int, Floats]:
-    """Return the weights (bodies,) by which coupled bodies follow others."""
+    """Return, by index of each coupled body, the weights (bodies,) with which it follows the others."""
     rows = {}
     for coupling in assembly.couplings:
         row = np.zeros(len(assembly.bodies))

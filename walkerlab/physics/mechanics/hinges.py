@@ -1,11 +1,11 @@
 """Torques at hinges, for both models, from the angle between two bodies and its rate.
 
-A law is a type with a body in `hinge_torque` and in `hinge_energy`. Its torque turns the first body back and the second
-one forward; its power loss is (torque - elastic part) times the rate.
+A law is a type registered with `hinge_torque` and `hinge_energy`. Its torque turns the first body back and the second
+one forward; it dissipates the power (torque - elastic part) times the rate.
 
-Hinges are rows of two arrays in both models: `hinges` has the two bodies, `laws` the parameters of a SpringDamper. The
-first row is the hip, the others are the knees that can bend: the swing leg's in the rigid model, both on compliant
-ground, where each also has a stop.
+Each hinge is a row of two arrays in both models: `hinges` holds its two bodies, `laws` the parameters of a
+SpringDamper. The first row is the hip; the others are the knees that can bend: the swing knee in the rigid model, both
+knees on compliant ground, where each also has a stop.
 """
 
 from typing import Any, NamedTuple
@@ -15,22 +15,22 @@ from walkerlab.physics.kernels import by_type_or_default, forced_inline, kernel_
 
 @by_type_or_default
 def legs_apart(system: Any, y: Any) -> tuple[float, float]:
-    """Return the angle of the swing leg ahead of the stance leg (rad), and its rate (rad/s)."""
+    """Return the angle (rad) by which the swing leg is ahead of the stance leg, and its rate (rad/s)."""
     return 0.0, 0.0
 
 
 class HingeTorque(NamedTuple):
-    """Torque against the angle by which a body is ahead of another, and its derivatives."""
+    """Torque that opposes the angle by which one body is ahead of another, and its derivatives."""
 
     torque: float  # N m
     elastic: float  # N m, the part that stores energy
-    by_angle: float  # N m
-    by_rate: float  # N m s
+    by_angle: float  # N m/rad
+    by_rate: float  # N m s/rad
 
 
 @by_type_or_default
 def hinge_torque(law: Any, angle: float, rate: float) -> HingeTorque:
-    """Compute the torque of a law at an angle (rad) and its rate; zero for an instantaneous law such as IdealLock."""
+    """Compute the torque of a law at an angle (rad) and rate (rad/s); zero for instantaneous laws such as IdealLock."""
     return HingeTorque(0.0, 0.0, 0.0, 0.0)
 
 
@@ -41,7 +41,7 @@ def hinge_energy(law: Any, angle: float) -> float:
 
 
 class SpringDamper(NamedTuple):
-    """Spring relaxed at zero angle, damper, and constant torque that turns the first body forward."""
+    """Spring that is relaxed at zero angle, damper, and constant torque that turns the first body forward."""
 
     stiffness: float  # N m/rad
     damping: float  # N m s/rad
@@ -66,7 +66,7 @@ HINGE_ROWS = {"hip": slice(HIP_ROW, HIP_ROW + 1), "knees": slice(HIP_ROW + 1, No
 
 @forced_inline
 def hinge_law(model: Any, row: int) -> SpringDamper:
-    """Return the spring, damper and torque at a hinge, with fields in the config's order."""
+    """Return the spring, damper and constant torque at a hinge."""
     return SpringDamper(model.laws[row, 0], model.laws[row, 1], model.laws[row, 2])
 
 
@@ -86,7 +86,7 @@ def add_hinge_torque(now: HingeTorque, body: int, other: int, r: Any) -> None:
 
 @kernel_part
 def add_hinge_gradients(now: HingeTorque, body: int, other: int, by_angle: Any, by_rate: Any) -> None:
-    """Add the derivatives of those torques with respect to angles and rates to by_angle and by_rate (n, n)."""
+    """Add the derivatives of a hinge's torques on its two bodies to by_angle and by_rate (n, n)."""
     for row, sign in ((other, 1.0), (body, -1.0)):
         by_angle[row, body] += sign * now.by_angle
         by_angle[row, other] -= sign * now.by_angle

@@ -1,10 +1,10 @@
-"""Plastic impacts: the velocities before, projected in the metric of the masses on those the new constraints allow.
+"""Plastic impacts: project the velocities before impact onto those that the new constraints allow, in the mass metric.
 
-With velocities u of all masses before and u+ = Z z+ after, Z of the new constraints, Z' M (u+ - u) = 0. Coordinates
-are those of the tree about the foot that stands afterwards: velocity (v_x, v_y) of its centre, along the slope and
-normal to it, and the bodies' angular velocities.
+All masses have velocities u before and u+ = Z z+ after the impact, where Z follows from the new constraints and
+Z' M (u+ - u) = 0. The coordinates are those of the tree about the new stance foot: the velocity (v_x, v_y) of its
+centre, along the slope and normal to it, and the bodies' angular velocities.
 
-Source: (A.57) of the paper with the impulse projected away.
+Source: (A.57) of the paper, with the impulse eliminated by the projection.
 """
 
 import math
@@ -33,14 +33,14 @@ from walkerlab.physics.solvers.system import Floats
 
 @kernel_part
 def heel_strike(model: RigidModel, y: Any, new: Any) -> None:
-    """Write the state after the heel strike that ends in y, with the legs' roles exchanged, into `new`."""
-    # Any number of columns may follow the state: directions, whose images are written into `new`.
+    """Write the state just after heel strike, with the legs' roles exchanged, into `new`; y is the state before it."""
+    # Any number of variational columns may follow the state; their images are written into `new`.
     strike(model, AT_STRIKE, True, y, new)
 
 
 @kernel_part
 def strike(model: RigidModel, phase: int, other_foot: bool, y: Any, new: Any) -> None:
-    """Apply a plastic impact on the constraints of E[phase]; with `other_foot` the swing foot stands afterwards."""
+    """Apply a plastic impact with the constraints E[phase]; if `other_foot`, the swing foot becomes the stance foot."""
     like = model.arm_x
     n, R = len(like), model.radius
     s, c, F, U, p, M, factors = (
@@ -49,7 +49,7 @@ def strike(model: RigidModel, phase: int, other_foot: bool, y: Any, new: Any) ->
     foot_F, foot_U = vector(like), vector(like)
     sines_cosines(model, n, y, s, c)
     projections(model.foot_x, model.foot_y, n, s, c, foot_F, foot_U)
-    # velocity of the centre of the foot that stands afterwards, along the slope and normal to it
+    # velocity of the new stance foot's centre, along the slope and normal to it
     along, upward = -R * y[n + STANCE], 0.0
     if other_foot:
         for l in range(n):
@@ -93,7 +93,7 @@ def strike(model: RigidModel, phase: int, other_foot: bool, y: Any, new: Any) ->
 
 
 class RootedTree(NamedTuple):
-    """Tree of n bodies about its root: the fields of a mechanism of either model that `project` needs."""
+    """Tree of n bodies about its root: the fields of a model's Mechanism that `project` needs."""
 
     E: Floats  # (phases, n, n)
     A: Floats  # (n, n) kg m^2
@@ -101,22 +101,22 @@ class RootedTree(NamedTuple):
     arm_x: Floats  # (n,) kg m
     arm_y: Floats
     mass: float  # kg
-    radius: float  # m, of the foot that rolls; 0 where the root is at rest or the centre of mass
+    radius: float  # m, radius of the rolling foot; 0 if the root is at rest or is the centre of mass
     slope: float  # rad
 
 
 class Lock(NamedTuple):
-    """Result of a joint's lock: a plastic impact that leaves the root's motion unchanged."""
+    """Result of locking a joint by a plastic impact that leaves the root's motion unchanged."""
 
-    velocities: Floats  # (n,) rad/s, after it
-    lost: float  # J
-    changes: Floats  # (n, columns) rad/s, images of the columns
+    velocities: Floats  # (n,) rad/s, after the impact
+    lost: float  # J, kinetic energy lost
+    changes: Floats  # (n, columns) rad/s, changes of `velocities`, one column per column of `rates`
 
 
 def lock(tree: RootedTree, angles: Floats, omega: Floats, turns: Floats, rates: Floats) -> Lock:
-    """Project angular velocities (n,) on those E[0] allows, by the impact of `strike` without the root.
+    """Project the angular velocities omega (n,) onto those that E[0] allows; the root's motion does not change.
 
-    turns, rates  (n, columns) changes of the angles and of their velocities before, column by column
+    turns, rates  (n, columns) changes of the angles (rad) and of omega (rad/s) just before the lock
     """
     n = len(omega)
     s, c, F, U, p = np.zeros((5, n))
@@ -134,22 +134,22 @@ def lock(tree: RootedTree, angles: Floats, omega: Floats, turns: Floats, rates: 
 
 
 class PushOffImpulse(NamedTuple):
-    """Impulse at the trailing foot, along the line from there to the hip."""
+    """Push-off impulse at the trailing foot, along the line from its contact point to the hip."""
 
     along: float  # N s, along the slope
-    upward: float  # N s, normal to it
-    angular: float  # N m s, on the leading leg about its foot; an impulse through the hip turns no other body
-    by_trailing: float  # N m s, its derivatives with respect to the angles of both legs
-    by_leading: float
+    upward: float  # N s, normal to the slope
+    angular: float  # N m s, on the leading leg about its contact point; an impulse through the hip turns no other body
+    by_trailing: float  # N m s, derivative of `angular` with respect to the trailing leg's angle
+    by_leading: float  # N m s, derivative with respect to the leading leg's angle
 
 
 @kernel_part
 def push_off(model: RigidModel, new: Any) -> PushOffImpulse:
-    """Compute the push-off of a heel strike from the state after it."""
+    """Compute the push-off at a heel strike from the state `new` just after it."""
     s_t, c_t = sine_cosine(new[SWING] + model.slope)
     s_l, c_l = sine_cosine(new[STANCE] + model.slope)
     R = model.radius
-    # from each foot's contact point to the hip, along the slope and normal to it
+    # vector from each foot's contact point to the hip, along the slope and normal to it
     x_t, y_t = c_t * model.hip_x - s_t * model.hip_y, s_t * model.hip_x + c_t * model.hip_y + R
     x_l, y_l = c_l * model.hip_x - s_l * model.hip_y, s_l * model.hip_x + c_l * model.hip_y + R
     length = math.hypot(x_t, y_t)
@@ -163,15 +163,15 @@ def push_off(model: RigidModel, new: Any) -> PushOffImpulse:
 def push_off_work(model: RigidModel, before: Floats) -> Floats:
     """Compute the work (strikes,) in J of the push-offs from states (strikes, 2 n) just before their heel strikes.
 
-    The walker is free of the ground then, its knees locked and its torso coupled: an impulse P along e does the work
-    P^2 / 2 J M^-1 J', with J the velocity along e of the trailing contact point, or of the hip on the same line.
-    Eliminating angular velocities from M leaves the apparent mass at the hip, m - C' I^-1 C, with moments C and inertia
-    I about it. Source: Kuo (2002); with massless legs it is P^2 / (2 m).
+    At push-off the walker is free of the ground, its knees locked and its torso coupled. An impulse P along e does the
+    work (P^2 / 2) J M^-1 J', where J gives the velocity along e of the trailing contact point or, equally, of the hip.
+    Eliminating the angular velocities from M leaves the apparent mass at the hip, m - C' I^-1 C, with first moments C
+    and inertia I about the hip. Source: Kuo (2002); with massless legs the work is P^2 / (2 m).
     """
     n, E = len(model.arm_x), model.E[STRAIGHT]
     Z = E[:, np.diag(E) != 0.0]
     A, B, arm_x, arm_y = (each.copy() for each in (model.A, model.B, model.arm_x, model.arm_y))
-    # about the hip, the trailing leg is a leg like the leading one, and carries no other body
+    # seen from the hip, the trailing leg has the constants of the leading one and carries no other body
     leg = [SWING] if model.shank == NO_SHANK else [SWING, int(model.shank)]
     own = A[np.ix_(leg, leg)].sum()
     for pairs in (A, B):
@@ -189,8 +189,8 @@ def push_off_work(model: RigidModel, before: Floats) -> Floats:
 
 
 def pushed_at_hip(model: RigidModel, y: Any, impulse: float) -> NDArray[np.float64]:
-    """Return the state (2 n) just after a heel strike y, changed by an impulse (N s) at the hip along the slope."""
-    # The new stance foot stays at rest. The impulse follows the release of the trailing knee, which is free.
+    """Return the state y (2 n,) after an impulse (N s) at the hip along the slope, applied just after a heel strike."""
+    # The new stance foot stays at rest. The trailing knee is already released and moves freely.
     n, new, phase = len(model.arm_x), np.array(y, float), BENT if model.kneed else STRAIGHT
     s, c, F, U, p = np.zeros((5, n))
     M = np.zeros((n, n))
@@ -204,20 +204,20 @@ def pushed_at_hip(model: RigidModel, y: Any, impulse: float) -> NDArray[np.float
 
 
 class Constraints(NamedTuple):
-    """Constraints E[phase] of an impact, with the masses of a tree about the root that they leave."""
+    """Constraints E[phase] of an impact, with the mass matrix and moments of the tree about its new root."""
 
     phase: int
     M: Any  # (n, n) kg m^2
-    factors: Any  # (n, n) of `factor_linked`
-    F: Any  # (n,) kg m, projections of the first moments
-    U: Any
+    factors: Any  # (n, n) factors from `factor_linked`
+    F: Any  # (n,) kg m, first moments projected on the slope
+    U: Any  # (n,) kg m, first moments projected on the slope's normal
 
 
 @forced_inline
 def project(
     model: Any, constraints: Constraints, omega: Any, along: float, upward: float, twist: float, p: Any
 ) -> None:
-    """Write into p (n,) the velocities after a plastic impact, with an impulse `twist` (N m s) on the stance leg."""
+    """Write angular velocities (rad/s) after an impact into p (n,); `twist` (N m s) is an impulse on the stance leg."""
     momenta(model, constraints.M, constraints.F, constraints.U, omega, along, upward, p)
     p[STANCE] += twist
     solve_linked(model, constraints.phase, constraints.factors, p)
@@ -227,7 +227,7 @@ def project(
 def project_change(
     model: Any, constraints: Constraints, rate: Any, along: float, upward: float, twist: float, turned: Any, p: Any
 ) -> None:
-    """Project a change of the velocities like `project`; `turned` (n,) is the change of momenta due to the angles."""
+    """Project a change of velocities as in `project`; `turned` (n,) is the momentum change due to the angles."""
     momenta(model, constraints.M, constraints.F, constraints.U, rate, along, upward, p)
     for k in range(len(model.arm_x)):
         p[k] -= turned[k]
@@ -237,8 +237,8 @@ def project_change(
 
 @forced_inline
 def momenta(model: Any, M: Any, F: Any, U: Any, omega: Any, along: float, upward: float, p: Any) -> None:
-    """Write Z' M u into p (n,), with the angular velocities omega (n,)."""
-    # M is M' of rigid_model.py, so the rolling part of the angular velocities is subtracted again.
+    """Write the generalised momenta Z' M u into p (n,); u is (along, upward) in m/s and omega (n,) in rad/s."""
+    # M is M' of rigid_model.py and includes the rolling velocity -R omega of the root; `sliding` is the remainder.
     n, R = len(model.arm_x), model.radius
     sliding = along + R * omega[STANCE]
     for k in range(n):
@@ -251,7 +251,7 @@ def momenta(model: Any, M: Any, F: Any, U: Any, omega: Any, along: float, upward
 
 @forced_inline
 def mass_change(model: Any, s: Any, c: Any, turn: Any, jump: Any, along: float, upward: float, p: Any) -> None:
-    """Write Z' dM w into p (n,): dM changes the mass matrix as the angles change by `turn`; w is a velocity jump."""
+    """Write Z' dM w into p (n,); dM is the change of M due to `turn` (n,), and w the jump of all velocities."""
     n = len(model.arm_x)
     F, U = vector(model.arm_x), vector(model.arm_x)
     projections(model.arm_x, model.arm_y, n, s, c, F, U)

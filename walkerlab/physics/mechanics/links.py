@@ -1,9 +1,9 @@
-"""Bodies that follow others: a locked shank its thigh, a torso the bisector of the legs.
+"""Bodies that follow others: a locked shank follows its thigh, a torso the bisector of the legs.
 
-Angles theta = E z with a constant E turn M alpha = r into E' M E dz = E' r. The system keeps its size: a follower's
-row and column are added to those of the bodies that it follows, and its own equation becomes trivial. The row of E of a
-follower has its weights and zero on the diagonal, any other row is that of the unit matrix. A model has an E for each
-phase.
+If the angles are theta = E z with a constant E, then M alpha = r becomes E' M E dz = E' r with the accelerations dz of
+z. The system keeps its size: a follower's row and column are added to those of the bodies that it follows, and its own
+equation becomes trivial. A follower's row of E holds its weights, with zero on the diagonal; all other rows are those
+of the unit matrix. A model has an E for each phase.
 """
 
 from typing import Any, NamedTuple
@@ -12,9 +12,9 @@ from walkerlab.physics.kernels import forced_inline
 
 
 class CountedModel(NamedTuple):
-    """Interface of models here, for one whose number of bodies is known only at run time."""
+    """Model whose number of bodies is known only at run time, with the fields that the functions below read."""
 
-    # A model with tuples takes little more than half the time: the compiler unrolls its loops.
+    # A model whose type fixes that number takes little more than half the time: the compiler unrolls its loops.
 
     E: Any  # (phases, n, n)
     arm_x: Any  # (n,)
@@ -22,7 +22,7 @@ class CountedModel(NamedTuple):
 
 @forced_inline
 def expand(model: Any, phase: int, z: Any) -> None:
-    """Replace z (n,) by E z: a follower moves with the bodies it follows."""
+    """Replace z (n,) by E z: compute each follower's value from those of the bodies it follows."""
     n = len(model.arm_x)
     for c in range(n):
         if model.E[phase, c, c] == 0.0:
@@ -34,7 +34,7 @@ def expand(model: Any, phase: int, z: Any) -> None:
 
 @forced_inline
 def factor_linked(model: Any, phase: int, M: Any) -> None:
-    """Replace M (n, n) by the factors L D L' = E' M E: 1/D on the diagonal, L' above it."""
+    """Replace M (n, n) by the factors of E' M E = L D L': 1/D on the diagonal, L' above it."""
     n = len(model.arm_x)
     for c in range(n):
         if model.E[phase, c, c] == 0.0:
@@ -57,7 +57,7 @@ def factor_linked(model: Any, phase: int, M: Any) -> None:
 
 @forced_inline
 def solve_linked(model: Any, phase: int, factors: Any, b: Any) -> None:
-    """Replace the right-hand side b (n,) = r by E dz, with factors from `factor_linked`."""
+    """Replace the right-hand side r in b (n,) by the solution E dz, using the factors from `factor_linked`."""
     # A torque on a follower acts on the bodies it follows.
     n = len(model.arm_x)
     for c in range(n):

@@ -1,6 +1,6 @@
-"""Parts of which a planar walker is assembled, as in a multibody program.
+"""Parts from which a planar walker is assembled, as in a multibody program.
 
-Every body has a frame of its own; at angle zero its axes are those of the world. Positions are given in that frame.
+Each body has its own frame, whose axes are parallel to the world's at angle zero. Positions refer to this frame.
 """
 
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ Position = tuple[float, float]
 
 @dataclass(frozen=True)
 class Body:
-    """Rigid body: mass, centre of mass in its own frame, and inertia about that centre."""
+    """Rigid body with its mass, its centre of mass in the body's frame, and its inertia about that centre."""
 
     name: str
     mass_kg: float
@@ -41,7 +41,7 @@ class Revolute:
 
 @dataclass(frozen=True)
 class BallFoot:
-    """Ball fixed to a body: the ground touches it below its centre; radius zero is a point."""
+    """Ball fixed to a body, which touches the ground directly below its centre; a zero radius makes a point foot."""
 
     name: str
     body: str
@@ -51,7 +51,7 @@ class BallFoot:
 
 @dataclass(frozen=True)
 class Knee:
-    """Hinge that locks when the shank comes into line with its thigh from behind: both at one angle."""
+    """Hinge that locks when the shank, swinging forward, reaches the thigh's angle."""
 
     name: str
     thigh: str
@@ -71,7 +71,7 @@ class Coupling:
 class Assembly:
     """Bodies connected by hinges, without closed loops.
 
-    Raises KeyError for a part on an unknown body, ValueError for two bodies of one name and for closed loops.
+    Raises KeyError for a part on an unknown body, ValueError for duplicate body names and for closed loops.
     """
 
     bodies: tuple[Body, ...]
@@ -80,8 +80,8 @@ class Assembly:
     feet: tuple[BallFoot, ...] = ()
     knees: tuple[Knee, ...] = ()
     couplings: tuple[Coupling, ...] = ()
-    # the bodies of each leg from the hip down, in the same order; they change roles at heel strike. The first foot is
-    # the first leg's. Bodies of neither leg belong to both
+    # bodies of each leg from the hip down, in the same order for both legs, which exchange roles at heel strike. The
+    # first foot belongs to the first leg. Bodies listed for neither leg are shared by both
     legs: tuple[tuple[str, ...], tuple[str, ...]] = ((), ())
 
     def __post_init__(self) -> None:
@@ -101,14 +101,14 @@ class Assembly:
             group = [one if of == other else of for of in group]
 
     def index(self, body: str) -> int:
-        """Return the index of a body in `bodies`; KeyError lists the known bodies."""
+        """Return the index of a body in `bodies`; for an unknown body, raise a KeyError that lists the known ones."""
         names = [b.name for b in self.bodies]
         if body not in names:
             raise KeyError(f"no body named {body!r}; bodies: {', '.join(names)}")
         return names.index(body)
 
     def hinge(self, body: str, other: str) -> Revolute | None:
-        """Return the hinge between two bodies, the first one as its parent; None if they are not hinged directly."""
+        """Return the hinge between two bodies, with the first as the parent; None if they are not hinged directly."""
         for joint in self.joints:
             if (joint.parent, joint.child) == (body, other):
                 return joint

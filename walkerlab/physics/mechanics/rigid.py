@@ -1,4 +1,4 @@
-"""Construction of the rigid model from parts: stance and swing bodies, followers, and roles at heel strike."""
+"""Construction of the rigid model from parts: groups of bodies, followers, and exchange of roles at heel strike."""
 
 import math
 from dataclasses import dataclass
@@ -16,12 +16,12 @@ ALIKE = 1e-12  # relative difference up to which two legs count as equal
 
 @dataclass(frozen=True)
 class BodyPlaces:
-    """Places of an assembly's bodies in the rigid model, whose stance leg stays straight."""
+    """Mapping of an assembly's bodies to those of the rigid model, where the straight stance leg is one body."""
 
-    names: tuple[str, ...]  # of the angles, without the prefix 'theta_'
-    members: Floats  # (bodies, n) 1 where a body belongs to a place
-    roles: tuple[int, ...]  # previous place of each after a heel strike
-    knees: tuple[tuple[int, int], ...]  # (shank, thigh) of the swing leg
+    names: tuple[str, ...]  # names of the angles, without the prefix 'theta_'
+    members: Floats  # (bodies, n) 1 where an assembly's body is part of a model's body, otherwise 0
+    roles: tuple[int, ...]  # body k after a heel strike is body roles[k] before it
+    knees: tuple[tuple[int, int], ...]  # indices (shank, thigh) of the swing knee; empty for straight legs
 
 
 def standing(assembly: Assembly, gravity: float, slope: float, knee_locked_at_strike: bool = True) -> RigidModel:
@@ -32,8 +32,8 @@ def standing(assembly: Assembly, gravity: float, slope: float, knee_locked_at_st
 def on_level_ground(assembly: Assembly, gravity: float, knee_locked_at_strike: bool) -> RigidModel:
     """Build the rigid model of an assembly; gravity in m/s^2.
 
-    A trailing knee that is locked at the heel strike is released just after it. Raises ValueError, with a message for
-    the user, for parts that are not a walker with two equal legs.
+    The trailing knee is released just after the heel strike if `knee_locked_at_strike`, otherwise just before it.
+    Raises ValueError, with a message for the user, if the parts are not a walker with two equal legs.
     """
     check_equal_legs(assembly)
     hip = find_hip(assembly)
@@ -76,7 +76,7 @@ def on_level_ground(assembly: Assembly, gravity: float, knee_locked_at_strike: b
 
 
 def group_bodies(assembly: Assembly) -> BodyPlaces:
-    """Group the bodies: swing leg (thigh), straight stance leg, other swinging bodies, and bodies of both legs."""
+    """Group the bodies in order: swing leg (or thigh), straight stance leg, swing shank, bodies shared by both legs."""
     swinging, stance = assembly.legs
     shared = tuple(body.name for body in assembly.bodies if body.name not in (*swinging, *stance))
     groups = [(swinging[0],), stance, *((name,) for name in swinging[1:]), *((name,) for name in shared)]
@@ -117,7 +117,7 @@ def find_hip(assembly: Assembly) -> Revolute:
 
 
 def knee_position(assembly: Assembly) -> tuple[float, float] | None:
-    """Return the position of the knee in a thigh's frame (m); None without knees."""
+    """Return the knee's position (m) in the frame of a thigh; None for a walker without knees."""
     hinges = (assembly.hinge(knee.thigh, knee.shank) for knee in assembly.knees)
     return next((hinge.parent_point_m for hinge in hinges if hinge is not None), None)
 

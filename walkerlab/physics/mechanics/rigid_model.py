@@ -1,13 +1,13 @@
-"""Walker on one foot that is pinned to the ground or rolls on it without slip.
+"""Rigid model: a walker on one foot, which is pinned to the ground or rolls on it without slip.
 
-The centre of the foot's arc is the tree's root; it moves along the slope by -R times the stance leg's angle, and R = 0
-is a hinge. With M, r, F and U of tree.py and s the stance leg:
+The root of the tree is the centre of the foot's arc. It moves along the slope by -R times the stance leg's angle; R = 0
+is a hinge. With M, r, F and U of tree.py, Kronecker's delta d and the index s of the stance leg:
 
     M'_kl = M_kl + R (U_k d_ls + U_l d_ks) + m R^2 d_ks d_ls
     r'_k = r_k - d_ks R (sum over l of omega_l^2 F_l + m g_along)
 
-Body 0 is the swing leg (its thigh), body 1 the stance leg, which stays straight; then the swing leg's shank, then
-bodies of both legs. Bodies that follow others are reduced as in links.py.
+Body 0 is the swing leg (or its thigh), body 1 the straight stance leg; then come the swing leg's shank and the bodies
+that both legs share. Bodies that follow others are eliminated as in links.py.
 """
 
 import math
@@ -41,36 +41,36 @@ from walkerlab.physics.mechanics.trigonometry import sine_cosine
 from walkerlab.physics.solvers.system import Floats, Integers, block, derivative, jacobian
 
 SWING, STANCE, SHANK = 0, 1, 2
-# rows of E: while the swing knee is free, with the swing leg straight, and in the heel strike
+# index of E: swing knee bent, swing leg straight, heel strike
 BENT, STRAIGHT, AT_STRIKE = 0, 1, 2
 NO_SHANK = -1
 
 
 @tree.fast_fields
-class RigidModel(tree.Mechanism):  # type: ignore[misc]  # as its base
-    """Constants of the rigid model, SI: a structured scalar, for n bodies by its type."""
+class RigidModel(tree.Mechanism):  # type: ignore[misc]  # as for Mechanism
+    """Constants of the rigid model, SI; a structured scalar whose type fixes the number n of bodies."""
 
-    # E has three reductions: BENT, STRAIGHT, AT_STRIKE.
+    # E holds three reductions: BENT, STRAIGHT and AT_STRIKE.
 
-    foot_x: Floats  # (n,) m, levers from the stance foot's centre to the swing foot's, body by body
+    foot_x: Floats  # (n,) m, levers of the bodies from the stance foot's centre to the swing foot's
     foot_y: Floats
-    roles: Integers  # (n,) body that takes each place after the heel strike
-    section: Integers  # (n + 1,) places in the state of the section's coordinates, the stance leg's angle first
-    coordinates: int  # [d] of the section
-    thigh: int  # places of the swing knee's bodies among them; NO_SHANK for legs without knees
-    shank: int
-    unpaired: float  # kg m^2, coefficient of a torque on the stance leg without counterpart: see `add_unpaired_torque`
-    radius: float  # [R] m, of either foot; 0 is a point
-    hip_x: float  # m, to the hip, which belongs to the stance leg
+    roles: Integers  # (n,) body k after a heel strike is body roles[k] before it
+    section: Integers  # (n + 1,) state indices of the section's d coordinates, the stance leg's angle first; then zeros
+    coordinates: int  # [d] number of coordinates on the section
+    thigh: int  # index of the swing leg's thigh; NO_SHANK without knees
+    shank: int  # index of the swing leg's shank; NO_SHANK without knees
+    unpaired: float  # kg m^2, coefficient of a torque on the stance leg that has no reaction: see `add_unpaired_torque`
+    radius: float  # [R] m, radius of both feet; 0 for point feet
+    hip_x: float  # m, lever from the stance foot's centre to the hip, in the stance leg's frame
     hip_y: float
-    lean: float  # rad, angle of the line from hip to foot centre in a straight leg
-    leg_length: float  # [L] m, hip to sole
+    lean: float  # rad, angle from a straight leg's axis to the line from hip to foot centre
+    leg_length: float  # [L] m, from hip to sole
     gravity: float  # [g] m/s^2
-    zero_state: Floats  # (2 n,) zeros: the bodies' angles from the vertical and their velocities
+    zero_state: Floats  # (2 n,) zeros for the state: the bodies' angles from the vertical and their velocities
 
     @property
     def section_indices(self) -> tuple[int, ...]:
-        """Indices (d) in the state of the section's coordinates."""
+        """Indices (d,) of the section's coordinates in the state."""
         return tuple(self.section[: self.coordinates].tolist())
 
     @property
@@ -79,7 +79,7 @@ class RigidModel(tree.Mechanism):  # type: ignore[misc]  # as its base
 
     @property
     def passive(self) -> bool:
-        """Whether only gravity acts on it, without even a spring or a damper."""
+        """Whether the walker has no drive, spring or damper."""
         return not self.sprung and not self.driven
 
     def __eq__(self, other: object) -> bool:
@@ -89,7 +89,7 @@ class RigidModel(tree.Mechanism):  # type: ignore[misc]  # as its base
         return hash(self.tobytes())
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickle as read-only, since kernels are compiled anew for writable arrays."""
+        """Pickle as read-only: kernels would be compiled again for a writable record."""
         return RigidModel.changed, (np.asarray(self),)
 
     def changed(self, **fields: Any) -> "RigidModel":
@@ -103,7 +103,7 @@ class RigidModel(tree.Mechanism):  # type: ignore[misc]  # as its base
 
 
 def new_rigid_model(n: int, **fields: Any) -> RigidModel:
-    """Create the rigid model of n bodies with these fields; the others are zero."""
+    """Create a rigid model of n bodies with the given fields; all others are zero."""
     shapes = {
         **tree.mechanism_shapes(n, 3, len(fields["hinges"])),
         **dict.fromkeys(("foot_x", "foot_y", "roles"), (n,)),
@@ -121,24 +121,24 @@ def on_slope(model: RigidModel, slope: float) -> RigidModel:
 
 
 class Mode(NamedTuple):
-    """The walker between events: its state (2 n,), then as many variational columns as the method has room for."""
+    """System to integrate between events: a state (2 n,), followed by any number of variational columns (2 n,)."""
 
     model: RigidModel
     phase: int  # BENT or STRAIGHT
-    # m, heights over the present foothold: of the foothold that the swing foot leaves, and of the next one
+    # m, heights of the foothold that the swing foot leaves and of its next one, relative to the stance foothold
     behind: float = 0.0
     rise: float = 0.0
 
 
 @block.case(Mode)
 def state_or_column(system: Mode) -> Any:
-    """Use blocks of 2 n: a state or a column."""
+    """Return zeros (2 n,), as long as the state and each variational column."""
     return zeros(system.model.zero_state)
 
 
 @forced_inline
 def equations(model: RigidModel, y: Any, s: Any, c: Any, F: Any, U: Any, M: Any, r: Any) -> None:
-    """Compute M' (n, n) in kg m^2 and r' (n,) in N m at the state y, and the terms they consist of."""
+    """Write M' (n, n) in kg m^2 into M, r' (n,) in N m into r, and their terms into s, c, F and U."""
     n, R = len(model.arm_x), model.radius
     omega = y[n : 2 * n]
     sines_cosines(model, n, y, s, c)
@@ -170,22 +170,22 @@ def torque_at(model: RigidModel, row: int, y: Any) -> HingeTorque:
 
 @legs_apart.case(Mode)
 def legs_apart_standing(system: Mode, y: Any) -> tuple[float, float]:
-    """Use the uppermost bodies of both legs."""
+    """Return the angle between the legs' uppermost bodies (rad), and its rate (rad/s)."""
     n = len(system.model.arm_x)
     return y[SWING] - y[STANCE], y[n + SWING] - y[n + STANCE]
 
 
 @forced_inline
 def add_unpaired_torque(model: RigidModel, s: Any, c: Any, omega: Any, r: Any) -> None:
-    """Add the torque (N m) unpaired sin(theta_1 - theta_2) omega_1^2 on the stance leg."""
-    # Without a reaction on the swing leg it does not conserve energy. Walkers with Lagrange's equations lack it.
+    """Add the torque `unpaired` sin(theta_1 - theta_2) omega_1^2 (N m) on the stance leg to r (n,)."""
+    # It has no reaction on the swing leg and does not conserve energy. In Lagrange's equations it is zero.
     if model.unpaired != 0.0:
         r[STANCE] += model.unpaired * omega[SWING] * omega[SWING] * (s[SWING] * c[STANCE] - c[SWING] * s[STANCE])
 
 
 @forced_inline
 def add_unpaired_gradients(model: RigidModel, s: Any, c: Any, omega: Any, by_angle: Any, by_rate: Any) -> None:
-    """Add the derivatives of that torque with respect to angles and rates."""
+    """Add the derivatives of the unpaired torque with respect to angles and rates to by_angle and by_rate (n, n)."""
     if model.unpaired != 0.0:
         cos_d, sin_d = c[SWING] * c[STANCE] + s[SWING] * s[STANCE], s[SWING] * c[STANCE] - c[SWING] * s[STANCE]
         turning = model.unpaired * omega[SWING] * omega[SWING] * cos_d
@@ -196,7 +196,7 @@ def add_unpaired_gradients(model: RigidModel, s: Any, c: Any, omega: Any, by_ang
 
 @derivative.case(Mode)
 def mode_derivative(system: Mode, t: float, y: Any, f: Any) -> None:
-    """Evaluate the equations of motion as a first-order system, and the variational equations of the columns."""
+    """Evaluate the equations of motion as a first-order system, and the variational equations for the columns."""
     model = system.model
     like, phase = model.arm_x, system.phase
     n = len(like)
@@ -210,7 +210,7 @@ def mode_derivative(system: Mode, t: float, y: Any, f: Any) -> None:
         by_angle, by_rate = matrix(like), matrix(like)
         torque_gradients(model, y, s, c, alpha, by_angle, by_rate)
         for at in range(2 * n, len(y), 2 * n):
-            # alpha serves as the column's right-hand side: d alpha of E' M' E d alpha = E' (dr - dM' alpha)
+            # from here on alpha holds d alpha, the solution of E' M' E d alpha = E' (dr' - dM' alpha)
             for k in range(n):
                 total = 0.0
                 for l in range(n):
@@ -223,7 +223,7 @@ def mode_derivative(system: Mode, t: float, y: Any, f: Any) -> None:
 
 @forced_inline
 def torque_gradients(model: RigidModel, y: Any, s: Any, c: Any, alpha: Any, by_angle: Any, by_rate: Any) -> None:
-    """Compute derivatives (n, n) of r' - M' alpha at fixed alpha with respect to angles and rates."""
+    """Write the derivatives of r' - M' alpha at fixed alpha into by_angle and by_rate (n, n)."""
     n, R = len(model.arm_x), model.radius
     omega, F, U = y[n : 2 * n], vector(model.arm_x), vector(model.arm_x)
     projections(model.arm_x, model.arm_y, n, s, c, F, U)
@@ -246,7 +246,7 @@ def torque_gradients(model: RigidModel, y: Any, s: Any, c: Any, alpha: Any, by_a
 
 @jacobian.case(Mode)
 def mode_jacobian(system: Mode, t: float, y: Any, J: Any) -> None:
-    """Compute the derivatives of the equations of motion, as rates of unit columns."""
+    """Compute the Jacobian (2 n, 2 n) of the equations of motion, column by column."""
     model = system.model
     like, phase = model.arm_x, system.phase
     n = len(like)
@@ -267,7 +267,7 @@ def mode_jacobian(system: Mode, t: float, y: Any, J: Any) -> None:
 
 @kernel_part
 def ground_reaction(system: Mode, y: Any) -> tuple[float, float]:
-    """Compute the ground force on the stance foot (N): along the slope (in walking direction) and normal to it."""
+    """Compute the ground force (N) on the stance foot, along the slope (in walking direction) and normal to it."""
     model = system.model
     n = len(model.arm_x)
     s, c, F, U, f = (
@@ -291,7 +291,7 @@ def ground_reaction(system: Mode, y: Any) -> tuple[float, float]:
 
 @kernel_part
 def momentum(model: RigidModel, y: Any) -> tuple[float, float]:
-    """Compute the linear momentum (kg m/s): along the slope and normal to it."""
+    """Compute the walker's linear momentum (kg m/s), along the slope and normal to it."""
     n = len(model.arm_x)
     s, c = vector(model.arm_x), vector(model.arm_x)
     sines_cosines(model, n, y, s, c)
@@ -301,8 +301,8 @@ def momentum(model: RigidModel, y: Any) -> tuple[float, float]:
 
 @kernel_part
 def energies(model: RigidModel, y: Any) -> tuple[float, float]:
-    """Compute kinetic and potential energy (J), the latter of gravity and of the springs at the hinges."""
-    # Heights are measured from the contact point with the leg normal to the slope.
+    """Compute the kinetic energy, and the potential energy of gravity and of the springs at the hinges (J)."""
+    # Heights are measured from the contact point of a stance leg that is normal to the slope.
     n = len(model.arm_x)
     s, c, F, U, r, M = (
         vector(model.arm_x), vector(model.arm_x), vector(model.arm_x), vector(model.arm_x), vector(model.arm_x),
@@ -317,20 +317,21 @@ def energies(model: RigidModel, y: Any) -> tuple[float, float]:
 
 
 def energy_at_touch(model: RigidModel, touched: Any) -> Any:
-    """Compute the potential energy (J) of the mass at the contact point of a touch, with the zero of `energies`."""
+    """Compute the potential energy (J) of the whole mass at the contact point of a leg at the angle `touched` (rad)."""
+    # zero is at the same height as in `energies`
     return model.mass * model.gravity_along * model.radius * (touched + model.slope)
 
 
 @kernel_part
 def swing_foot(model: RigidModel, y: Any) -> tuple[float, float]:
-    """Compute the height of the swing foot's lowest point, and its distance ahead of the stance foot (m)."""
+    """Compute the swing foot's height above the stance foot and its distance ahead of it (m)."""
     height, ahead, _, _ = swing_foot_motion(model, y, y)
     return height, ahead
 
 
 @kernel_part
 def swing_foot_motion(model: RigidModel, y: Any, turn: Any) -> tuple[float, float, float, float]:
-    """Compute `swing_foot` and the changes of both as the bodies turn: rates (m/s) if `turn` are angular velocities."""
+    """Compute the results of `swing_foot` and their changes due to `turn` (n,): m if in rad, m/s if in rad/s."""
     n = len(model.arm_x)
     s, c = vector(model.arm_x), vector(model.arm_x)
     sines_cosines(model, n, y, s, c)
@@ -340,30 +341,30 @@ def swing_foot_motion(model: RigidModel, y: Any, turn: Any) -> tuple[float, floa
 
 @kernel_part
 def hip_height(model: RigidModel, y: Any) -> float:
-    """Compute the height of the hip over the slope (m)."""
+    """Compute the height (m) of the hip above the slope."""
     s, c = sine_cosine(y[STANCE] + model.slope)
     return model.radius + s * model.hip_x + c * model.hip_y
 
 
 @kernel_part
 def feet_on_slope(model: Any, swing: Any, stance: Any) -> Any:
-    """Compute the sum (rad) of the straight legs' angles from the slope's normal: zero with both feet on even ground.
+    """Compute the sum (rad) of the straight legs' angles from the slope's normal, zero if both feet are on even ground.
 
-    It falls through zero at heel strike. (9-2) prints theta_1 = -theta_2, which holds only for angles from the normal;
-    `swing` and `stance` are angles from the vertical, as scalars, arrays or lanes.
+    The sum falls through zero at heel strike. `swing` and `stance` (rad) are scalars, arrays or lanes, measured from
+    the vertical; (9-2) of the paper prints theta_1 = -theta_2, which holds only for angles from the normal.
     """
     return swing + stance + 2.0 * (model.slope + model.lean)
 
 
 def step_lengths(model: RigidModel, starts: Any, ends: Any) -> Floats:
-    """Compute distances (steps,) in m along the slope from touch to touch, from first and last states (steps, 2 n)."""
+    """Compute step lengths (steps,) in m along the slope from each step's first and last state (steps, 2 n)."""
     psi = ends[:, : len(model.arm_x)] + model.slope
     ahead = np.cos(psi) @ model.foot_x - np.sin(psi) @ model.foot_y
     return np.asarray(ahead - model.radius * (ends[:, STANCE] - starts[:, STANCE]))
 
 
 def step_length_changes(model: RigidModel, ends: Any, starts_turn: Any, ends_turn: Any) -> Floats:
-    """Differentiate `step_lengths` (steps, columns) by changes of first and last states (steps, columns, 2 n)."""
+    """Compute changes of `step_lengths` (steps, columns) in m due to changes of the states (steps, columns, 2 n)."""
     n = len(model.arm_x)
     psi = ends[:, :n] + model.slope
     by_angle = -np.sin(psi) * model.foot_x - np.cos(psi) * model.foot_y
@@ -377,7 +378,7 @@ def kinetic_energy(model: RigidModel, y: Any) -> float:
 
 
 def apply_couplings(model: RigidModel, phase: int, values: Any) -> Floats:
-    """Return values (n,) of all bodies, computing each follower's from the bodies that it follows."""
+    """Return a copy of `values` (n,) in which each follower's value is computed from those of the bodies it follows."""
     every = np.array(values, float)
     expand(model, phase, every)
     return every

@@ -1,16 +1,16 @@
 """Equations of motion of a tree of bodies about its root, for both models: matrices, torques, energies, gradients.
 
-With the projections of the first moments c_k on the slope and its normal, F_k = (R(psi_k) c_k)_x and
-U_k = (R(psi_k) c_k)_y, psi the angles from the slope's normal, and Delta = theta_l - theta_k,
+Let F_k = (R(psi_k) c_k)_x and U_k = (R(psi_k) c_k)_y be the first moments c_k projected on the slope and its normal,
+with psi the angles from the normal, and let Delta = theta_l - theta_k. Then
 
     M_kl = A_kl cos Delta + B_kl sin Delta
     r_k = sum over l of omega_l^2 (A_kl sin Delta - B_kl cos Delta) - g_along U_k - g_down F_k
 
-the latter two terms about a root at rest. The terms of the root's own motion belong to each model: a rolling foot's in
-rigid_model.py, Newton's law for the centre of mass in ground/motion.py.
+where the two terms of gravity hold for a root at rest. Each model adds the terms due to its root's motion: those of a
+rolling foot in rigid_model.py, Newton's law for the centre of mass in ground/motion.py.
 
-`tree` is a Mechanism: the `RigidModel` or a `GroundModel` on compliant ground. n is the number of bodies, known
-at compile time if the tree's type fixes it.
+In the functions, `tree` is a Mechanism with n bodies: a `RigidModel`, or a `GroundModel` on compliant ground. The
+compiler knows n if the tree's type fixes it.
 """
 
 from collections.abc import Mapping
@@ -30,7 +30,7 @@ R = TypeVar("R", bound=type)
 
 def fast_fields(kind: R) -> R:
     """Give a class of records fast access to its annotated fields."""
-    # NumPy's field look-up takes several times as long, and walks are prepared and evaluated in Python.
+    # NumPy's own field access is several times slower, and the Python code around a walk reads many fields.
     fields: dict[str, Any] = {name: property(itemgetter(name)) for name in kind.__annotations__}
     fields |= {"__getattribute__": object.__getattribute__, "__getitem__": np.void.__getitem__}
     for name, read in fields.items():
@@ -39,7 +39,7 @@ def fast_fields(kind: R) -> R:
 
 
 def record_type(kind: type, shapes: Mapping[str, tuple[int, ...]]) -> Any:
-    """Create the NumPy type of a structured scalar with the fields of a class; numbers have eight bytes each."""
+    """Create the NumPy type of a structured scalar with the fields of a class and its bases, eight bytes per number."""
     fields = [
         (name, np.int64 if of in (Integers, int, bool) else np.float64, shapes.get(name, ()))
         for each in (*kind.__bases__, kind)
@@ -49,7 +49,7 @@ def record_type(kind: type, shapes: Mapping[str, tuple[int, ...]]) -> Any:
 
 
 def new_record(kind: Any, **fields: Any) -> Any:
-    """Create a structured scalar of a type from `record_type`, writable by kernels; fields not named are zero."""
+    """Create a structured scalar of a type from `record_type` that kernels can write; fields not named are zero."""
     record = np.zeros((), kind)[()]
     for name, value in fields.items():
         record[name] = value
@@ -58,24 +58,24 @@ def new_record(kind: Any, **fields: Any) -> Any:
 
 @fast_fields
 class Mechanism(np.record):  # type: ignore[misc]  # NumPy's stubs call one of its bases final
-    """Constants of a tree of n bodies about its root, its hinges and the forces on it, for both models, SI."""
+    """Constants (SI) of a tree of n bodies about its root, of its hinges and of the forces on it, for both models."""
 
-    A: Floats  # (n, n) kg m^2, of mechanics/assembly.py
-    B: Floats
-    arm_x: Floats  # (n,) c, kg m: first moments about the root, zero if that is the centre of mass
+    A: Floats  # (n, n) kg m^2, as defined in mechanics/assembly.py
+    B: Floats  # (n, n) kg m^2
+    arm_x: Floats  # (n,) c, kg m: first moments about the root; zero if the root is the centre of mass
     arm_y: Floats
-    E: Floats  # (phases, n, n) the reductions of links.py; a body that follows others has zero on the diagonal
-    hinges: Integers  # (rows, 2) the body that a hinge's torque turns back, and the second body
+    E: Floats  # (phases, n, n) reductions of links.py; a body that follows others has zero on the diagonal
+    hinges: Integers  # (rows, 2) bodies at each hinge: its torque turns the first back and the second forward
     laws: Floats  # (rows, LAW_NUMBERS) parameters of the SpringDamper at each hinge
-    push_off: float  # N s, along the trailing leg: at once or from a step's touch on
+    push_off: float  # N s, impulse along the trailing leg: instantaneous, or a pulse that starts at the touch
     mass: float  # kg
-    gravity_along: float  # m/s^2
+    gravity_along: float  # m/s^2, downhill
     gravity_down: float  # m/s^2, towards the slope
-    slope: float  # [phi] rad, positive downhill in walking direction
+    slope: float  # [phi] rad, positive if the walker walks downhill
 
     @property
     def hip(self) -> Floats:
-        """Parameters of the SpringDamper between the legs."""
+        """Parameters (3,) of the SpringDamper between the legs."""
         numbers: Floats = self.laws[HIP_ROW]
         return numbers
 
@@ -89,13 +89,13 @@ class Mechanism(np.record):  # type: ignore[misc]  # NumPy's stubs call one of i
 
 
 def mechanism_shapes(n: int, phases: int, rows: int) -> dict[str, tuple[int, ...]]:
-    """Return the shapes of a Mechanism's arrays for n bodies and some phases and rows of hinges."""
+    """Return the shapes of a Mechanism's arrays for given numbers of bodies, phases and hinges (`rows`)."""
     pairs, arms = dict.fromkeys(("A", "B"), (n, n)), dict.fromkeys(("arm_x", "arm_y"), (n,))
     return {**pairs, **arms, "E": (phases, n, n), "hinges": (rows, 2), "laws": (rows, LAW_NUMBERS)}
 
 
 def write_fields(mechanisms: Any, fields: Mapping[str, Any]) -> None:
-    """Write fields into one or more mechanisms; names of HINGE_ROWS stand for the laws at those hinges."""
+    """Set fields of one or more mechanisms; a name in HINGE_ROWS, such as "hip", sets the laws of those hinges."""
     for name, value in fields.items():
         if name in HINGE_ROWS:
             mechanisms["laws"][..., HINGE_ROWS[name], :] = value
@@ -105,7 +105,7 @@ def write_fields(mechanisms: Any, fields: Mapping[str, Any]) -> None:
 
 @forced_inline
 def sines_cosines(tree: Any, n: int, theta: Any, s: Any, c: Any) -> None:
-    """Write sines and cosines (n,) of angles from the slope's normal into s and c; theta from the vertical."""
+    """Write sines and cosines (n,) of angles from the slope's normal into s and c; theta (n,) is from the vertical."""
     for k in range(n):
         s[k], c[k] = sine_cosine(theta[k] + tree.slope)
 
@@ -120,7 +120,7 @@ def projections(lever_x: Any, lever_y: Any, n: int, s: Any, c: Any, F: Any, U: A
 
 @forced_inline
 def lever_motion(lever_x: Any, lever_y: Any, n: int, s: Any, c: Any, omega: Any) -> tuple[float, float, float, float]:
-    """Compute position (m) and velocity (m/s) of a point from the root along the slope and over it, by its levers."""
+    """Compute position (m) and velocity (m/s) of a point relative to the root, along and normal to the slope."""
     along, height, along_rate, height_rate = 0.0, 0.0, 0.0, 0.0
     for k in range(n):
         forward, upward = c[k] * lever_x[k] - s[k] * lever_y[k], s[k] * lever_x[k] + c[k] * lever_y[k]
@@ -133,14 +133,14 @@ def lever_motion(lever_x: Any, lever_y: Any, n: int, s: Any, c: Any, omega: Any)
 
 @forced_inline
 def add_gravity(tree: Any, n: int, F: Any, U: Any, r: Any) -> None:
-    """Add the torques of gravity (N m) about a root at rest to r (n,); F and U of the first moments."""
+    """Add the torques of gravity (N m) about a root at rest to r (n,); F and U (n,) are the projected first moments."""
     for k in range(n):
         r[k] -= tree.gravity_along * U[k] + tree.gravity_down * F[k]
 
 
 @forced_inline
 def add_inertia(tree: Any, n: int, s: Any, c: Any, omega: Any, M: Any, r: Any) -> None:
-    """Write M (n, n) in kg m^2 into M, and add the centrifugal terms (N m) to r (n,)."""
+    """Write the mass matrix (kg m^2) into M (n, n), and add the centrifugal torques (N m) to r (n,)."""
     for k in range(n):
         M[k, k] = tree.A[k, k]
         for l in range(k):
@@ -155,7 +155,7 @@ def add_inertia(tree: Any, n: int, s: Any, c: Any, omega: Any, M: Any, r: Any) -
 
 @forced_inline
 def add_gravity_gradient(tree: Any, n: int, F: Any, U: Any, by_angle: Any) -> None:
-    """Add the derivatives of the torques of gravity with respect to the angles to by_angle (n, n)."""
+    """Add the derivatives of the gravity torques with respect to the angles to by_angle (n, n)."""
     for k in range(n):
         by_angle[k, k] += tree.gravity_down * U[k] - tree.gravity_along * F[k]
 
@@ -164,7 +164,7 @@ def add_gravity_gradient(tree: Any, n: int, F: Any, U: Any, by_angle: Any) -> No
 def add_inertia_gradients(
     tree: Any, n: int, s: Any, c: Any, omega: Any, alpha: Any, by_angle: Any, by_rate: Any
 ) -> None:
-    """Add derivatives (n, n) of (centrifugal terms - M alpha) at fixed alpha with respect to angles and rates."""
+    """Add the derivatives of (centrifugal torques - M alpha) at fixed alpha to by_angle and by_rate (n, n)."""
     for k in range(n):
         own = 0.0
         for l in range(n):

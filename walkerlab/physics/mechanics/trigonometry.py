@@ -1,4 +1,4 @@
-"""Sine and cosine together, for the small angles of legs."""
+"""Sine and cosine computed together, fastest for the small angles of walking legs."""
 
 import math
 
@@ -9,7 +9,7 @@ from walkerlab.physics.solvers.lanes import Lanes, any_positive, holds_lanes, ne
 QUARTER_PI = 0.7853981633974483
 PER_PI = 0.3183098861837907
 HALF_PI = 1.5707963267948966
-# pi in two parts, of which the first has 33 bits: its multiples by whole numbers are exact
+# pi as a sum of two parts; the first has 33 bits, so its products with integers of up to 20 bits are exact
 PI_1, PI_2 = 3.1415926534682512, 1.2154201012607932e-10
 
 
@@ -17,7 +17,7 @@ def sine_cosine(x: float) -> tuple[float, float]:
     """Compute (sin x, cos x) within one unit in the last place.
 
     Up to pi/4, the range of a walking leg, both are the minimax polynomials of fdlibm (k_sin.c, k_cos.c; Sun
-    Microsystems 1993), evaluated in parallel, each in independent pairs of terms; beyond, the library's functions.
+    Microsystems 1993), evaluated in independent pairs of terms; beyond it, the library's functions.
     """
     if abs(x) > QUARTER_PI:
         return math.sin(x), math.cos(x)
@@ -36,9 +36,9 @@ def sine_cosine(x: float) -> tuple[float, float]:
 
 
 def lanes_sine_cosine(x: Lanes) -> tuple[Lanes, Lanes]:
-    """Compute the same for lanes, within 3e-16 for angles of a few thousand turns."""
-    # If any lane is further than a quarter turn from 0, the nearest multiple k of pi is subtracted in all of them: k =
-    # 0 leaves the nearer ones unchanged, and the others change sign with k.
+    """Compute (sin x, cos x) of lanes, within 3e-16 for angles up to a few thousand turns."""
+    # If any lane is further than a quarter turn from 0, the nearest multiple k pi is subtracted in every lane; odd k
+    # flips the sign, and k = 0 leaves a lane unchanged.
     if any_positive(abs(x) - HALF_PI):
         k = nearest(PER_PI * x)
         odd = k - 2.0 * nearest(0.5 * k)
@@ -50,7 +50,7 @@ def lanes_sine_cosine(x: Lanes) -> tuple[Lanes, Lanes]:
 
 @kernel_part
 def half_turn(x: Lanes) -> tuple[Lanes, Lanes]:
-    """Compute (sin x, cos x) up to pi/2: polynomials from Chebyshev interpolation in x^2, truncated below 1e-16."""
+    """Compute (sin x, cos x) up to pi/2 by Chebyshev interpolation in x^2, with truncation errors below 1e-16."""
     z = x * x
     w = z * z
     v = w * w

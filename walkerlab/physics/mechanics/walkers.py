@@ -1,8 +1,8 @@
-"""Catalogue of walkers: assemblies of parts from the dimensions of each type.
+"""Catalogue of walkers: assemblies of parts, built from the dimensions of each type of walker.
 
-Every body's frame has its origin at its upper joint (hip or knee) and points up the body; `ahead` is the walking
-direction with the leg upright. Leg 1 swings first, leg 2 stands first. A positive angle puts a leg's foot forward, so
-that a flexed knee has its shank at a smaller angle than its thigh.
+A body's frame has its origin at a hinge (the knee for a shank, otherwise the hip) and its y axis points up the body;
+"ahead" is the walking direction while the leg is upright. Leg 1 swings first, leg 2 stands first. A positive angle puts
+a leg's foot forward, so in a flexed knee the shank's angle is smaller than the thigh's.
 """
 
 from dataclasses import dataclass, replace
@@ -18,13 +18,13 @@ UPPER_END = (0.0, 0.0)
 
 @dataclass(frozen=True)
 class Limb:
-    """Rigid limb that hangs from its upper end, SI."""
+    """Rigid limb hanging from its upper end, SI."""
 
     length_m: float
     mass_kg: float
-    mass_below_m: float  # centre of mass below the upper end
+    mass_below_m: float  # distance of the centre of mass below the upper end
     mass_ahead_m: float = 0.0
-    inertia_kg_m2: float = 0.0  # about its own centre of mass
+    inertia_kg_m2: float = 0.0  # about the limb's centre of mass
 
     def body(self, name: str) -> Body:
         return Body(name, self.mass_kg, (self.mass_ahead_m, -self.mass_below_m), self.inertia_kg_m2)
@@ -32,7 +32,7 @@ class Limb:
 
 @dataclass(frozen=True)
 class Arc:
-    """Sole: an arc of `radius_m` that reaches the leg's length; radius zero is a point."""
+    """Circular sole, whose lowest point is level with the leg's lower end; a zero radius makes a point foot."""
 
     radius_m: float = 0.0
     centre_ahead_m: float = 0.0
@@ -65,7 +65,7 @@ def kneed_legs(thigh: Limb, shank: Limb, hip_mass_kg: float, foot: Arc) -> Assem
 
 
 def with_torso(walker: Assembly, mass_kg: float, above_hip_m: float, inertia_kg_m2: float) -> Assembly:
-    """Add a torso at the walker's hip, kept on the bisector of the legs.
+    """Add a torso that is hinged at the hip and kept on the bisector of the legs.
 
     Source: Wisse, Schwab, van der Helm, Passive dynamic walking model with upper body, Robotica 22 (2004).
     """
