@@ -105,7 +105,7 @@ def matches(recording: Recording, named: set[str]) -> dict[str, str]:
 
 
 def leg_names(name: str) -> list[str]:
-    """Return the name of a leg's quantity in exported models, as leg_1.angle for 'angle 1'; empty for the others."""
+    """Return a leg quantity's name in exported models, such as leg_1.angle for 'angle 1'; empty for the others."""
     quantity, blank, leg = name.rpartition(" ")
     return [f"leg_{leg}.{UNIT_AT_END.sub('', plain(quantity))}"] if blank else []
 
@@ -191,7 +191,7 @@ def unit_value(recording: Recording, name: str, source: str, kind: str, units: M
 
 
 def unit_in_name(column: str, kind: str) -> str:
-    """Return the unit at the end of a column's name, as mm in hip_mm; empty if the name has none."""
+    """Return the unit at the end of a column's name, such as mm in hip_mm; empty if the name has none."""
     endings = [unit for unit in UNIT_VALUES[kind] if plain(column).endswith(f"_{unit.replace('/', '_')}")]
     return max(endings, key=len, default="")
 
@@ -224,7 +224,7 @@ def line_angle(top: Array, bottom: Array) -> Array:
 
 
 def parse_pairs(option: str, texts: Sequence[str]) -> dict[str, str]:
-    """Parse pairs such as `a=b,c=d` into a dictionary; raises ConfigError for another form."""
+    """Parse pairs such as `a=b,c=d` into a dictionary; raises ConfigError for any other form."""
     pairs = [pair for text in texts for pair in text.split(",") if pair.strip()]
     for pair in pairs:
         if "=" not in pair or not all(side.strip() for side in pair.split("=", 1)):
@@ -233,7 +233,7 @@ def parse_pairs(option: str, texts: Sequence[str]) -> dict[str, str]:
 
 
 def parse_units(texts: Sequence[str]) -> dict[str, str]:
-    """Return units by kind, quantity or column; a unit alone, as `deg`, applies to its kind (angles)."""
+    """Return units by kind, quantity or column; a unit alone, such as `deg`, applies to its kind (angles)."""
     pairs, alone = [], {}
     for part in (part.strip() for text in texts for part in text.split(",") if part.strip()):
         kinds = [kind for kind, units in UNIT_VALUES.items() if part.lower() in units]

@@ -123,7 +123,7 @@ class Exported:
         return self.scene.ground.terrain._replace(heights=self.heights)
 
     def lane_across_m(self, foot: int) -> float:
-        """Distance (m) of a foot's lane from the plane of the walk; no ball reaches the pads of the other foot."""
+        """Signed distance (m) of a foot's lane from the plane of the walk; no ball reaches the other foot's pads."""
         distance = self.half_lane_m + 0.01 * self.config.walker.leg_length_m
         return -distance if foot == STANCE_FOOT else distance
 

@@ -21,7 +21,7 @@ Height = Callable[[Array], Array]
 
 TOUCH_DEGREE: Final = 3
 FEWEST: Final = 6
-"""Fewest samples before a heel strike for a fit."""
+"""Fewest samples before a heel strike that a fit needs."""
 ITERATIONS: Final = 8
 
 
