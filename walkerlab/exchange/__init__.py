@@ -1,1 +1,1 @@
-"""Exchange with other programs: models out (ADAMS, MuJoCo), recorded walks in."""
+"""Exchange with other programs: export of models (ADAMS, MuJoCo), import of recorded walks."""

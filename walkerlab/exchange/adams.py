@@ -1,4 +1,4 @@
-"""ADAMS/Solver: the dataset (.adm) of a walker and the commands (.acf) that run it."""
+"""ADAMS/Solver export: the dataset (.adm) of a walker, and the commands (.acf) that run it."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def dataset_text(model: AdamsModel, head: Iterable[str]) -> str:
 
 
 def statements(model: AdamsModel) -> Iterator[str]:
-    """Yield the lines of all statements; an id is the place in its kind's list, and part 1 is the ground."""
+    """Yield the lines of all statements; objects of each kind are numbered from 1, and part 1 is the ground."""
     parts = {name: number for number, name in enumerate((GROUND, *model.parts), start=1)}
     markers, shapes, joints, primitives, contacts, variables = (
         numbered(names)
@@ -113,12 +113,12 @@ def values(*numbers: float) -> str:
 
 
 def view_name(name: str) -> str:
-    """Write the comment that names the next statement's object in Adams View."""
+    """Return the comment that names the next statement's object in Adams View."""
     return f"!                adams_view_name='{name}'"
 
 
 def statement(head: str, *arguments: str) -> Iterator[str]:
-    """Write a statement with one argument per line."""
+    """Yield the lines of a statement, one argument per line."""
     yield head
     yield from (f", {argument}" for argument in arguments)
 
@@ -143,7 +143,7 @@ def contact_arguments(contact: AdamsContact, shapes: Mapping[str, int]) -> Itera
 
 
 def command_text(export: Exported, dataset: str) -> str:
-    """Write the commands that run a dataset as long as walkerlab's walk, the pinned first step included."""
+    """Write the commands that simulate a dataset as long as walkerlab's walk takes, including a pinned first step."""
     lines = [dataset, dataset.removesuffix(".adm")]
     lines.append(f"integrator/hht, error = {finite(ERROR)}, hmax = {finite(MAX_STEP_S)}")
     if export.pinned and export.touches_s:

@@ -1,7 +1,7 @@
-"""A walker in the objects of ADAMS: parts, markers, joints, forces, requests; in N, mm, kg, s.
+"""Walker as ADAMS objects (parts, markers, joints, forces, requests), in N, mm, kg and s.
 
-The plane of the walk is the x-y plane of the ground, x along the slope and y normal to it; gravity is tilted.
-Expressions name markers and variables in braces, as DX({leg_1.foot}), and each file format puts its own names there.
+The walk takes place in the x-y plane, x along the slope and y normal to it; gravity is tilted.
+Expressions name markers and variables in braces, as in DX({leg_1.foot}); each file format inserts its own names.
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ from walkerlab.physics.mechanics.walkers import TORSO
 MM = 1000.0
 GROUND, ORIGIN, BELOW = "ground", "ground.origin", "ground.below"
 FREE_LENGTH_MM = 100.0
-"""Free length of IMPACT for a point foot, whose height is measured from a marker this far below the ground."""
+"""Free length in IMPACT for a point foot: the foot's height is measured from a marker this far below the ground."""
 PAD_MM = 50.0
-"""Thickness of pads."""
+"""Thickness of the pads."""
 LEGS = ("leg_1", "leg_2")
 Place = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
 class Marker:
-    """A point of a part, in the part's frame (mm); a floating one moves with the reaction of a force."""
+    """Point of a part, in the part's frame (mm); a floating marker follows the point at which a reaction acts."""
 
     part: str
     place: Place = (0.0, 0.0, 0.0)
@@ -37,20 +37,20 @@ class Marker:
 
 @dataclass(frozen=True)
 class Part:
-    """A rigid body: place (mm) and angle (rad) of its frame, velocity (mm/s, rad/s), mass (kg), inertia (kg mm^2)."""
+    """Rigid body: position (mm), angle (rad), velocity (mm/s), spin (rad/s), mass (kg) and inertia (kg mm^2)."""
 
     place: tuple[float, float]
     angle: float
-    velocity: tuple[float, float]  # of the centre of mass
+    velocity: tuple[float, float]  # velocity of the centre of mass
     spin: float
     mass: float
-    centre: str  # marker
+    centre: str  # marker at the centre of mass
     inertia: float
 
 
 @dataclass(frozen=True)
 class Joint:
-    """A constraint between two markers: PLANAR, REVOLUTE, or the primitive INLINE."""
+    """Constraint between two markers: PLANAR, REVOLUTE, or the primitive INLINE."""
 
     kind: str
     i: str
@@ -59,7 +59,7 @@ class Joint:
 
 @dataclass(frozen=True)
 class Shape:
-    """An ellipsoid of these diameters about a marker, or a box of these edges from it (mm)."""
+    """Ellipsoid centred on a marker, or box with a corner there; `size` holds its diameters or edge lengths (mm)."""
 
     kind: str
     marker: str
@@ -68,17 +68,17 @@ class Shape:
 
 @dataclass(frozen=True)
 class AdamsContact:
-    """ADAMS's contact of a foot with its pads."""
+    """ADAMS contact between a foot and its pads."""
 
     foot: str
     pads: tuple[str, ...]
-    normal: NormalLaw  # N/mm^e, N s/mm, mm
-    friction: Coulomb | None  # mm/s
+    normal: NormalLaw  # stiffness in N/mm^e, damping in N s/mm, penetration in mm
+    friction: Coulomb | None  # velocities in mm/s; None without friction
 
 
 @dataclass(frozen=True)
 class Force:
-    """A force on a marker in the plane (N) and a torque about it (N mm), with the reaction on the ground."""
+    """Force on a marker in the plane (N) and torque about it (N mm), as expressions; the ground takes the reaction."""
 
     i: str
     reaction: str
@@ -89,7 +89,7 @@ class Force:
 
 @dataclass(frozen=True)
 class Torque:
-    """A torque (N mm) on the part of a marker, with its reaction on that of another one."""
+    """Torque (N mm) on the part of marker `i`; its reaction acts on the part of marker `j`."""
 
     i: str
     j: str
@@ -98,7 +98,7 @@ class Torque:
 
 @dataclass
 class AdamsModel:
-    """All objects by name, in the order of writing."""
+    """All objects of a model by name, in the order in which they are written."""
 
     name: str
     gravity: tuple[float, float]  # mm/s^2
@@ -115,14 +115,14 @@ class AdamsModel:
     requests: dict[str, dict[str, str]] = field(default_factory=dict)
 
     def shape_name(self, shape: str) -> str:
-        """Prefix a shape's name with its part's."""
+        """Prefix a shape's name with the name of its part."""
         return f"{self.markers[self.shapes[shape].marker].part}.{shape}"
 
 
 def adams_model(export: Exported, law: str) -> AdamsModel:
-    """Build the walker of an export, with ADAMS contact (law `contact`) or walkerlab's law (`functions`).
+    """Build the ADAMS model of an export, with ADAMS contact (law `contact`) or walkerlab's law (`functions`).
 
-    Raises ConfigError for what the law cannot express.
+    Raises ConfigError for a ground or coupling that cannot be expressed.
     """
     planar = export.model
     gravity = MM * planar.gravity_along, -MM * planar.gravity_down
@@ -141,10 +141,10 @@ def adams_model(export: Exported, law: str) -> AdamsModel:
 
 
 def add_bodies(model: AdamsModel, export: Exported) -> None:
-    """Add parts, markers, hinges, feet and couplers; the base slides and turns in the plane of the ground."""
+    """Add parts, markers, hinges, feet and couplers; a planar joint keeps the base in the plane of the walk."""
     planar, names = export.model, export.names
     q, v = export.start
-    places: list[tuple[float, float]] = []  # of the hinges, and of the frames' origins
+    places: list[tuple[float, float]] = []  # origins of the links' frames (m)
     angles: list[float] = []
     spins: list[float] = []
     motions: list[tuple[float, float]] = []
@@ -179,7 +179,7 @@ def add_bodies(model: AdamsModel, export: Exported) -> None:
         weights = zip((f"hinge_of_{names[link]}" for link in coupling.links), coupling.weights, strict=True)
         model.couplers[f"coupler_{number + 1}"] = tuple(weights)
     for foot, ball in enumerate(planar.balls):
-        # a part's frame turns with it, so a lane's distance from the plane is the same at every angle
+        # a part's frame turns with the part, so a lane's distance from the plane is the same at every angle
         x, y = ball.centre_m
         name = names[ball.link]
         model.markers[f"{name}.foot"] = Marker(name, (MM * x, MM * y, 0.0))
@@ -199,7 +199,7 @@ def add_bodies(model: AdamsModel, export: Exported) -> None:
 def carried(
     place: tuple[float, float], angle: float, motion: tuple[float, float], spin: float, point: tuple[float, float]
 ) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Return position and velocity of a point of a body, from those of its origin."""
+    """Return the position and velocity of a point of a body, given those of its origin."""
     s, c = math.sin(angle), math.cos(angle)
     x, y = c * point[0] - s * point[1], s * point[0] + c * point[1]
     return (place[0] + x, place[1] + y), (motion[0] - spin * y, motion[1] + spin * x)
@@ -207,7 +207,7 @@ def carried(
 
 @dataclass(frozen=True)
 class FootTerms:
-    """Expressions of the motion of a foot over the ground."""
+    """ADAMS expressions for the motion of a foot relative to the ground."""
 
     export: Exported
     foot: int
@@ -218,26 +218,26 @@ class FootTerms:
 
     @property
     def radius(self) -> float:
-        """Radius (mm)."""
+        """Radius of the foot (mm)."""
         return MM * float(self.export.scene.ours.whole.radius[self.foot])
 
     def place_over(self, base: str) -> str:
-        """Arguments of functions that measure its position relative to a marker."""
+        """Arguments for functions that measure the foot's position relative to the marker `base`."""
         return f"{{{self.marker}}},{{{base}}},{{{ORIGIN}}}"
 
     @property
     def place(self) -> str:
-        """The same over the ground."""
+        """Arguments for functions that measure the foot's position relative to the ground's origin."""
         return self.place_over(ORIGIN)
 
     @property
     def motion(self) -> str:
-        """Arguments of functions that measure its velocity."""
+        """Arguments for functions that measure the foot's velocity relative to the ground."""
         return f"{self.place},{{{ORIGIN}}}"
 
     @property
     def slip(self) -> str:
-        """Velocity along the slope of the material at its lowest point."""
+        """Velocity (mm/s) along the slope of the material at the foot's lowest point."""
         rolling = f"+{finite(self.radius)}*WZ({{{self.marker}}},{{{ORIGIN}}})" if self.radius else ""
         return f"VX({self.motion}){rolling}"
 
@@ -246,7 +246,7 @@ class FootTerms:
         return f"DY({self.place})-{finite(self.radius)}" if self.radius else f"DY({self.place})"
 
     def where_carried(self, expression: str) -> str:
-        """Restrict an expression to the pads of its lane; it is zero over the gaps."""
+        """Restrict an expression to the pads of the foot's lane; it is zero over the gaps between them."""
         terrain = self.export.scene.ground.terrain
         if not terrain.has_pads:
             return expression
@@ -263,7 +263,7 @@ def foot_marker(export: Exported, foot: int) -> str:
 
 
 def add_ground(model: AdamsModel, export: Exported) -> None:
-    """Add pads or floors as boxes, in one lane for each foot."""
+    """Add the pads or floors as boxes, with one lane for each foot."""
     for number, pad in enumerate(export.pads):
         marker = f"{GROUND}.pad_{number + 1}"
         left, ball = pad.centre_m - 0.5 * pad.length_m, export.model.balls[pad.foot]
@@ -275,7 +275,7 @@ def add_ground(model: AdamsModel, export: Exported) -> None:
 
 
 def laws(export: Exported) -> tuple[NormalLaw, Coulomb | None]:
-    """Return normal force (N/mm^e, N s/mm, mm) and friction (mm/s) of the ground; ConfigError for other laws."""
+    """Return the normal-force and friction laws (None if frictionless) in N, mm, s; ConfigError for other friction."""
     normal, friction = export.scene.ours.normal, export.scene.ours.friction
     in_mm = NormalLaw(
         normal.stiffness / MM**normal.exponent,
@@ -293,7 +293,7 @@ def laws(export: Exported) -> tuple[NormalLaw, Coulomb | None]:
 
 
 def add_contacts(model: AdamsModel, export: Exported) -> None:
-    """Add the contact of ADAMS between each ball and its pads."""
+    """Add an ADAMS contact between each ball and its pads."""
     normal, friction = laws(export)
     instead = "Export with --law functions, or set {}."
     if normal.exponent <= 1.0:
@@ -328,7 +328,7 @@ def add_normal_and_friction(model: AdamsModel, export: Exported) -> None:
 
 
 def friction_function(leg: str, law: Coulomb) -> str:
-    """Write the friction of a leg's foot from its variables of slip and normal force."""
+    """Return the expression for the friction force on a leg's foot, a function of the foot's slip and normal force."""
     slip, normal = f"VARVAL({{{leg}_slip}})", f"VARVAL({{{leg}_normal}})"
     mu, less, v, w = (
         finite(value) for value in (law.static, law.dynamic, law.stiction_velocity, law.friction_velocity)
@@ -338,13 +338,13 @@ def friction_function(leg: str, law: Coulomb) -> str:
 
 
 def add_push_offs(model: AdamsModel, export: Exported) -> None:
-    """Write the push-off pulses of each trailing foot, which begin at the touches of walkerlab's walk."""
+    """Add the push-off pulses on each trailing foot, which begin at the touchdown times of walkerlab's walk."""
     impulse, duration = export.config.push_off.impulse_N_s, export.config.push_off.duration_s
     if impulse == 0.0:
         return
     hip = f"{part_of_base(export)}.hinge"
     for foot, leg in enumerate(LEGS):
-        # the first touch is that of the first leg, and the other one trails
+        # leg_1 touches down first, so leg_2 is the first to trail
         times = export.touches_s[1 - foot :: 2]
         pulses = []
         for number, time in enumerate(times):
@@ -365,12 +365,12 @@ def add_push_offs(model: AdamsModel, export: Exported) -> None:
 
 
 def part_of_base(export: Exported) -> str:
-    """Return the root of the tree: the first stance leg, hinged at the hip."""
+    """Return the part at the root of the tree: the first stance leg, whose hinge is at the hip."""
     return export.names[0]
 
 
 def add_forces(model: AdamsModel, export: Exported) -> None:
-    """Add the forces of ground and push-off on each foot."""
+    """Add the ground and push-off forces on each foot."""
     for foot, leg in enumerate(LEGS):
         x, y = (
             [f"VARVAL({{{leg}_{kind}}})" for kind in kinds if f"{leg}_{kind}" in model.variables]
@@ -387,7 +387,7 @@ def add_forces(model: AdamsModel, export: Exported) -> None:
 
 
 def add_hip(model: AdamsModel, export: Exported) -> None:
-    """Add spring, damper and torque between the legs; the torque changes legs at walkerlab's touches."""
+    """Add the hip's spring, damper and torque; the torque changes sign at the touchdowns of walkerlab's walk."""
     hip, name = export.hip, export.names[export.hip_link]
     i, j = f"{name}.hinge", model.joints[f"hinge_of_{name}"].j
     terms = []
@@ -407,7 +407,7 @@ def add_hip(model: AdamsModel, export: Exported) -> None:
 
 
 def add_requests(model: AdamsModel, export: Exported, law: str) -> None:
-    """Add requests named like the quantities of a walk: angles from the vertical, lengths in mm."""
+    """Add requests named after the quantities of a walk; angles are from the vertical, lengths in mm."""
     tilt = f"{-export.scene.ours.slope:+.17g}" if export.scene.ours.slope else ""
     uppers = export.names[export.hip_link], export.names[0]
     for foot, (leg, part) in enumerate(zip(LEGS, uppers, strict=True)):

@@ -1,7 +1,7 @@
-"""Adams View: the commands (.cmd) that build a walker, with the same objects as the dataset.
+"""Adams View export: the commands (.cmd) that build a walker from the same objects as the dataset.
 
-Objects come in the order in which View writes them: parts with their markers, joints, contacts, forces, and last the
-functions of all these, since a function may name any of them.
+Objects are in the order in which View writes them: parts with their markers, joints, contacts, forces, and finally
+all functions, because a function may refer to any object.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ Naming = Callable[[str], str]
 
 
 def view_text(model: AdamsModel, head: Iterable[str], end_s: float, pinned_until_s: float | None = None) -> str:
-    """Write the commands that build a model, with comments at their head and a script that runs it until a time.
+    """Write the commands that build a model, with a header comment and a script that simulates it up to an end time.
 
-    pinned_until_s  when the hinge of the first stance foot is to be removed, if there is one
+    pinned_until_s  time (s) at which to remove the hinge at the first stance foot; None without a hinge
     """
     lines = ["! CMD Version:2", *(f"! {line}" for line in head)]
     lines += [line for each in (*building(model), script(model, end_s, pinned_until_s)) for line in each]
@@ -104,7 +104,7 @@ def building(model: AdamsModel) -> Iterator[list[str]]:
 
 
 def bodies(model: AdamsModel, full: Naming) -> Iterator[list[str]]:
-    """Yield parts with markers, mass, velocity and geometry; angular velocities carry their unit."""
+    """Yield commands for parts, markers, masses, velocities and shapes; angular velocities include their unit."""
     for number, (name, part) in enumerate([(GROUND, None), *model.parts.items()], start=1):
         if part is not None:
             yield command(
@@ -143,7 +143,7 @@ def bodies(model: AdamsModel, full: Naming) -> Iterator[list[str]]:
 
 
 def turned(angle: float) -> str:
-    """Write an orientation about the normal of the plane, with its unit."""
+    """Write a rotation by `angle` (rad) about the normal of the plane, with its unit."""
     return f"({finite(angle)}(rad)), (0(rad)), (0(rad))"
 
 
@@ -168,7 +168,7 @@ def contacts(model: AdamsModel, full: Naming) -> Iterator[list[str]]:
 
 
 def script(model: AdamsModel, end_s: float, pinned_until_s: float | None) -> list[str]:
-    """Write a simulation script; a pinned stance foot stays hinged until the first touch."""
+    """Write a simulation script; a pinned stance foot is released at `pinned_until_s`."""
     run = f"simulate/dynamic, end = {{}}, dtout = {finite(OUTPUT_S)}"
     stages = [] if pinned_until_s is None else [run.format(finite(pinned_until_s)), "deactivate/jprim, id = 1"]
     commands = ", ".join(quoted(text) for text in (*stages, run.format(finite(end_s))))

@@ -1,4 +1,4 @@
-"""Convert columns of a recording, by name, by suffix or as the user says, to quantities of a walk in SI units."""
+"""Map the columns of a recording to quantities of a walk in SI units, by name, by suffix or as the user specifies."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ UNIT_VALUES: Final[Mapping[str, Mapping[str, float]]] = {
     "force": {"n": 1.0, "newton": 1.0, "kn": 1e3},
     "energy": {"j": 1.0, "joule": 1.0, "mj": 1e-3, "n mm": 1e-3},
 }  # fmt: skip
-"""SI values of the units of each kind, in lower case."""
+"""Value of each unit in SI, by kind of quantity; unit names are in lower case."""
 SI: Final = {kind: next(iter(units)) for kind, units in UNIT_VALUES.items()}
 OF_LEG: Final = {
     "angle": "angle", "velocity": "rate", "shank_angle": "angle", "shank_velocity": "rate", "foot_along_m": "length",
@@ -41,23 +41,23 @@ OF_WALKER: Final = {
     "kinetic_J": "energy", "potential_J": "energy", "mechanical_J": "energy", "total_energy_J": "energy",
 }  # fmt: skip
 QUANTITY_KINDS: Final = OF_WALKER | {f"{name} {leg}": kind for name, kind in OF_LEG.items() for leg in (1, 2)}
-"""Kind of unit of each quantity; those of a leg end in its number, 1 for the leg that swings first."""
+"""Kind of unit of each quantity; a leg's quantities end in its number, 1 for the leg that swings first."""
 NEEDED: Final = (TIME, "angle 1", "angle 2")
 UNIT_AT_END: Final = re.compile(r"_(?:m_s|m|n)$")
 LINE: Final = re.compile(r"(.+?)\s*>\s*(.+)")
-"""The angle of the line from a marker to another, as in `angle 1=HIP>HEEL`."""
+"""Angle of the line from one marker to another, as in `angle 1=HIP>HEEL`."""
 
 
 @dataclass(frozen=True, eq=False)
 class RecordedWalk:
-    """Hold a recorded walk in SI units: time and quantities (samples,) by name, and their columns' names."""
+    """Recorded walk in SI units: time (samples,), quantities (samples,) by name, and the columns they come from."""
 
     time_s: Array
     quantities: dict[str, Array]
     sources: dict[str, str] = field(default_factory=dict)
 
     def both_legs(self, name: str) -> Array | None:
-        """Return a quantity (samples, 2) of both legs; None unless both are recorded."""
+        """Return a quantity of both legs (samples, 2); None unless both are recorded."""
         both = [self.quantities.get(f"{name} {leg}") for leg in (1, 2)]
         return None if both[0] is None or both[1] is None else np.stack([both[0], both[1]], axis=1)
 
@@ -65,8 +65,8 @@ class RecordedWalk:
 def as_walk(recording: Recording, columns: Mapping[str, str], units: Mapping[str, str]) -> RecordedWalk:
     """Return the quantities of a recorded walk in SI units.
 
-    columns  columns by quantity, where their names do not say it; `HIP>FOOT` is the angle of a line of markers
-    units    units by kind ('angle', 'length', ...), by quantity or by column, where the file does not state them
+    columns  column of each quantity that its name does not identify; `HIP>FOOT`: angle of the line between markers
+    units    units that the file does not state, by kind ('angle', 'length', ...), by quantity or by column
 
     Raises ConfigError for a column or unit that is unknown or missing, and for gaps.
     """
@@ -80,14 +80,14 @@ def as_walk(recording: Recording, columns: Mapping[str, str], units: Mapping[str
 
 
 def plain(name: str) -> str:
-    """Return a name in lower case, with one kind of separator."""
+    """Return a name in lower case, with underscores as its only separators."""
     return re.sub(r"[\s_\-]+", "_", name.strip().lower())
 
 
 def matches(recording: Recording, named: set[str]) -> dict[str, str]:
-    """Return columns by quantity: of the same name, otherwise the only one whose name ends in it.
+    """Return the column of each quantity: the one with its name, otherwise the only one whose name ends in it.
 
-    named  quantities whose columns the user names
+    named  quantities to skip, because the user names their columns
     """
     sources = {}
     for name in QUANTITY_KINDS.keys() - named:
@@ -105,18 +105,18 @@ def matches(recording: Recording, named: set[str]) -> dict[str, str]:
 
 
 def leg_names(name: str) -> list[str]:
-    """Return the name of a leg's quantity in results of exported models: leg_1.angle for 'angle 1'."""
+    """Return a leg quantity's name in exported models, such as leg_1.angle for 'angle 1'; empty for the others."""
     quantity, blank, leg = name.rpartition(" ")
     return [f"leg_{leg}.{UNIT_AT_END.sub('', plain(quantity))}"] if blank else []
 
 
 def ends_in(name: str, ending: str) -> bool:
-    """Return whether a longer name ends in a name, behind a dot or a slash."""
+    """Return whether a name ends in `ending` after a dot or a slash."""
     return name.endswith((f".{ending}", f"/{ending}"))
 
 
 def named_columns(recording: Recording, columns: Mapping[str, str]) -> dict[str, str]:
-    """Return columns by quantity as the user names them; raises ConfigError for an unknown name."""
+    """Return the columns that the user names, by quantity; raises ConfigError for an unknown quantity or column."""
     known = {plain(name): name for name in QUANTITY_KINDS}
     sources = {}
     for quantity, column in columns.items():
@@ -139,7 +139,7 @@ def named_columns(recording: Recording, columns: Mapping[str, str]) -> dict[str,
 
 
 def missing(recording: Recording, name: str) -> ConfigError:
-    """Return the error for a quantity without a column, with the nearest column."""
+    """Return the error for a quantity without a column, which suggests the column with the most similar name."""
     near = get_close_matches(plain(name), [plain(column) for column in recording.columns], 1, 0.2)
     nearest = next((column for column in recording.columns if near and plain(column) == near[0]), "NAME")
     there = ", ".join(column for column in list(recording.columns)[:12])
@@ -149,7 +149,7 @@ def missing(recording: Recording, name: str) -> ConfigError:
 
 
 def in_si(recording: Recording, name: str, source: str, units: Mapping[str, str]) -> Array:
-    """Return a quantity in SI units; raises ConfigError for gaps, and for a unit that is missing or not of its kind."""
+    """Return a quantity in SI units; raises ConfigError for gaps, and for a missing or unsuitable unit."""
     kind = QUANTITY_KINDS[name]
     if ends := LINE.fullmatch(source):
         return line_angle(*(marker_place(recording, marker, units) for marker in (ends[1], ends[2])))
@@ -158,7 +158,7 @@ def in_si(recording: Recording, name: str, source: str, units: Mapping[str, str]
 
 
 def complete(recording: Recording, name: str, source: str, values: Array) -> Array:
-    """Return the values of a column; raises ConfigError for gaps."""
+    """Return the values of a column; raises ConfigError if it has gaps."""
     gaps = np.flatnonzero(~np.isfinite(values))
     if gaps.size:
         time = recording.columns[TIME][gaps[0]]
@@ -171,7 +171,7 @@ def complete(recording: Recording, name: str, source: str, values: Array) -> Arr
 
 
 def unit_value(recording: Recording, name: str, source: str, kind: str, units: Mapping[str, str]) -> float:
-    """Return the SI value of a column's unit, by the user, the file or the column's name."""
+    """Return the SI value of a column's unit, which the user, the file or the column's name states."""
     unit = (
         units.get(source) or units.get(name) or recording.units.get(source) or units.get(kind)
         or recording.kind_units.get(kind) or unit_in_name(source, kind) or rate_unit(recording, kind, units)
@@ -191,29 +191,29 @@ def unit_value(recording: Recording, name: str, source: str, kind: str, units: M
 
 
 def unit_in_name(column: str, kind: str) -> str:
-    """Return the unit that a column's name ends in, as mm of hip_mm; empty without one."""
+    """Return the unit at the end of a column's name, such as mm in hip_mm; empty if the name has none."""
     endings = [unit for unit in UNIT_VALUES[kind] if plain(column).endswith(f"_{unit.replace('/', '_')}")]
     return max(endings, key=len, default="")
 
 
 def rate_unit(recording: Recording, kind: str, units: Mapping[str, str]) -> str:
-    """Return the unit of velocities in a file that states only that of its angles or lengths."""
+    """Derive the unit of velocities from the unit of angles or lengths; empty if that is not stated either."""
     moved = {"rate": "angle", "speed": "length"}.get(kind, "")
     unit = units.get(moved) or recording.kind_units.get(moved)
     return f"{unit}/s" if unit else ""
 
 
 def marker_place(recording: Recording, marker: str, units: Mapping[str, str]) -> Array:
-    """Return the places (samples, 3) of a marker (m)."""
+    """Return the positions (samples, 3) of a marker (m)."""
     axes = [f"{marker}.{axis}" for axis in "xyz"]
     scale = unit_value(recording, marker, axes[0], "length", units)
     return np.stack([complete(recording, marker, axis, recording.columns[axis] * scale) for axis in axes], axis=1)
 
 
 def line_angle(top: Array, bottom: Array) -> Array:
-    """Return angles of lines from the vertical (rad), positive with the lower end ahead.
+    """Return the angles (samples,) of a line from the vertical (rad), positive if the lower end is ahead.
 
-    The horizontal axis along which the upper end moves most points ahead.
+    Ahead is the direction of the upper end's motion along the horizontal axis on which it moves most.
     """
     vertical = int(np.argmax(np.abs(np.mean(top - bottom, axis=0))))
     spans = np.ptp(top, axis=0)
@@ -224,7 +224,7 @@ def line_angle(top: Array, bottom: Array) -> Array:
 
 
 def parse_pairs(option: str, texts: Sequence[str]) -> dict[str, str]:
-    """Split pairs of an option such as `a=b,c=d`."""
+    """Parse pairs such as `a=b,c=d` into a dictionary; raises ConfigError for any other form."""
     pairs = [pair for text in texts for pair in text.split(",") if pair.strip()]
     for pair in pairs:
         if "=" not in pair or not all(side.strip() for side in pair.split("=", 1)):
@@ -233,7 +233,7 @@ def parse_pairs(option: str, texts: Sequence[str]) -> dict[str, str]:
 
 
 def parse_units(texts: Sequence[str]) -> dict[str, str]:
-    """Return units by kind, quantity or column; a unit alone is that of its kind, as `deg` of angles."""
+    """Return units by kind, quantity or column; a unit alone, such as `deg`, applies to its kind (angles)."""
     pairs, alone = [], {}
     for part in (part.strip() for text in texts for part in text.split(",") if part.strip()):
         kinds = [kind for kind, units in UNIT_VALUES.items() if part.lower() in units]

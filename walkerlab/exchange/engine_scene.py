@@ -1,4 +1,4 @@
-"""A walker on its ground for other programs: its parts, its start, and a linear approximation of its contact."""
+"""Scene for other programs: a walker's parts, its start, and a linear approximation of its contact."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ from walkerlab.physics.mechanics.parts import Assembly, Knee
 from walkerlab.physics.solvers.system import Floats, State
 from walkerlab.scene.contact import ContactScene, contact_scene, start_state
 
-CREEP_LOAD = 0.1  # tangential over normal force, about the mean of a walk
+CREEP_LOAD = 0.1  # ratio of tangential to normal force, about its mean over a walk
 
 
 @dataclass(frozen=True)
 class EngineScene:
-    """A walker on its ground, for an engine and for the walking rules."""
+    """Walker on its ground, in the forms that an engine and our walking rules need."""
 
-    assembly: Assembly  # the parts
-    base: Anchor  # root of the engine's tree: the hip, on the first stance leg
-    ours: ContactWalker  # the walker as this project walks it
-    walker: ContactWalker  # the same with foot and hip levers taken from the base
-    ground: JudgedGround  # terrain, and the measures that a walk is judged by
-    start: State  # state of the free walker on the gait
+    assembly: Assembly  # parts of the walker
+    base: Anchor  # root of the engine's tree: the hip point of the first stance leg
+    ours: ContactWalker  # the walker in our contact model
+    walker: ContactWalker  # the same walker, with the levers of feet and hip measured from the base
+    ground: JudgedGround  # terrain, and the frame in which the walking rules judge a walk
+    start: State  # start of the walk, a state of the free walker (not hinged to the ground)
     locked: tuple[Knee, ...] = ()  # locked knees, which have no hinge in the engine
 
     @cached_property
@@ -46,7 +46,7 @@ class EngineScene:
 
     @property
     def gravity(self) -> tuple[float, float]:
-        """Along the slope and towards it (m/s^2)."""
+        """Gravity along the slope and towards it (m/s^2)."""
         return self.ours.gravity_along, self.ours.gravity_down
 
     @cached_property
@@ -57,18 +57,18 @@ class EngineScene:
         return tuple(2 + int(np.argmax(bend)) if bend.any() else -1 for bend in bends)
 
     def with_knees_locked(self, doing: NDArray[np.int8]) -> EngineScene:
-        """Scene whose locked knees are those in state LOCKED."""
+        """Scene in which the knees in state LOCKED are locked."""
         locked = (knee for knee, state in zip(self.assembly.knees, doing, strict=False) if state == LOCKED)
         return replace(self, locked=tuple(locked))
 
     @cached_property
     def centre_levers(self) -> Floats:
-        """Levers (n, 2) in m from the base to the centre of mass."""
+        """Levers (bodies, 2) in m from the base to the centre of mass."""
         weighted = [mass * levers(self.assembly, self.base, anchor) for mass, anchor in masses(self.assembly)]
         return np.asarray(sum(weighted) / total_mass(self.assembly))
 
     def from_base(self, y: State) -> tuple[Floats, Floats]:
-        """Engine's coordinates and velocities from the state of the free walker."""
+        """Convert a state of the free walker to the engine's coordinates and velocities."""
         n = len(self.model.chain)
         angles, rates = np.array(y[2 : 2 + n]) + self.ours.slope, np.array(y[4 + n :])
         shift, drift = self._centre(angles, rates)
@@ -77,7 +77,7 @@ class EngineScene:
         return np.concatenate((position, relative)), np.concatenate((velocity, relative_rates))
 
     def about_centre(self, q: Floats, v: Floats) -> Floats:
-        """State of the free walker from an engine's coordinates and velocities."""
+        """Convert an engine's coordinates and velocities to a state of the free walker."""
         angles, rates = self.model.chain @ q[2:], self.model.chain @ v[2:]
         shift, drift = self._centre(angles, rates)
         return np.concatenate((q[:2] + shift, angles - self.ours.slope, v[:2] + drift, rates))
@@ -90,13 +90,13 @@ class EngineScene:
         return np.array((forward.sum(), upward.sum())), np.array((-rates @ upward, rates @ forward))
 
     def started(self, factor: float) -> EngineScene:
-        """Scene with the start's velocities scaled; the walk's rules still see the stance foot at rest."""
+        """Scene with the start's velocities multiplied by `factor`; the stance foot still does not slip."""
         n = len(self.model.chain)
         return replace(self, start=(*self.start[: 2 + n], *(factor * x for x in self.start[2 + n :])))
 
 
 def engine_scene(config: ContactConfig, rigid_step_length_m: float, rigid_state: State) -> EngineScene:
-    """Return the walker of a config on pads of the rigid step length, not hinged, with no knee locked."""
+    """Build the scene of a config: pads at the rigid step length, stance foot not hinged, no knee locked."""
     scene = contact_scene(config, rigid_step_length_m, rigid_step_length_m)
     return scene_for_engines(replace(scene, pinned=False), rigid_state)
 
@@ -114,21 +114,21 @@ def scene_for_engines(scene: ContactScene, rigid_state: State) -> EngineScene:
 
 @dataclass(frozen=True)
 class EngineContact:
-    """Target to which an engine's own contact is tuned in closed form, SI."""
+    """Properties that an engine's own contact model is tuned to reproduce, SI."""
 
-    mass: float  # resting on one foot (kg)
-    gravity: float  # towards the ground (m/s^2)
-    penetration: float  # at rest under that weight (m)
-    exponent: float  # of the penetration in the normal force
+    mass: float  # mass that rests on one foot (kg)
+    gravity: float  # gravity towards the ground (m/s^2)
+    penetration: float  # penetration at rest under the weight of that mass (m)
+    exponent: float  # exponent of the penetration in the normal force
     damping_ratio: float  # c / (2 sqrt(k m)) at rest
-    friction: float  # tangential over normal force of a sliding foot
-    creep_load: float  # tangential over normal force of a standing foot
-    creep_velocity: float  # creep under that load (m/s)
+    friction: float  # ratio of tangential to normal force of a sliding foot
+    creep_load: float  # ratio of tangential to normal force of a standing foot
+    creep_velocity: float  # creep velocity under that load (m/s)
 
 
 def creep_velocity(friction: FrictionLaw, load: float) -> float:
-    """Return the slip velocity (m/s) at which friction carries a load, tangential over normal force."""
-    # Bisection down to neighbouring numbers: loading a library's root finder takes longer than an export may.
+    """Return the slip velocity (m/s) at which friction carries `load`, a ratio of tangential to normal force."""
+    # Bisect down to neighbouring floats: importing a library's root finder would take too long for an export.
     low, high = 0.0, friction.rising_until
     while low < (middle := 0.5 * (low + high)) < high:
         low, high = (middle, high) if -friction_coefficient(friction, middle)[0] < load else (low, middle)

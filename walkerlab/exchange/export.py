@@ -1,4 +1,4 @@
-"""Export of a walker with the start of its gait to ADAMS and MuJoCo."""
+"""Export a walker with the start of its gait to ADAMS and MuJoCo."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ Law = Literal["contact", "functions"]
 FORMATS: Final[tuple[Kind, ...]] = get_args(Kind)
 CONTACT_LAWS: Final[tuple[Law, ...]] = get_args(Law)
 ENDINGS: Final[dict[str, Kind]] = {"adm": "adm", "cmd": "cmd", "xml": "mjcf", "mjcf": "mjcf"}
-"""Formats by the ending of their files."""
+"""Format by file extension."""
 
 
 @dataclass(frozen=True)
 class ExportedFiles:
-    """Texts by file name, the model first, and the parts of the walk that they leave out."""
+    """Exported texts by file name, the model first, and the parts of the walk that they leave out."""
 
     files: dict[str, str]
     left_out: tuple[str, ...]
@@ -42,16 +42,16 @@ def export_model(
     commit: str | None = None,
     stem: str | None = None,
 ) -> ExportedFiles:
-    """Write a walker for another program, started from a rigid state as `contact-sim` starts it.
+    """Export a walker to another program, with the start that `contact-sim` derives from a rigid state.
 
-    rigid_step_length_m  step length of the rigid gait, for which pads are laid
-    rigid_state          start: the gait's, or another one with both feet on the slope
-    kind                 adm: ADAMS/Solver's dataset and commands; cmd: Adams View's commands; mjcf: MuJoCo's model
-    law                  of ADAMS: its contact between shapes, or walkerlab's law as functions
-    commit               of walkerlab, for the head of the file
-    stem                 of the files' names; by default the config's name
+    rigid_step_length_m  step length of the rigid gait (m), the default distance between pads
+    rigid_state          start of the rigid model: its gait, or another state with both feet on the slope
+    kind                 adm: dataset and commands of ADAMS/Solver; cmd: commands of Adams View; mjcf: MuJoCo model
+    law                  contact law in ADAMS: its own contact between shapes, or walkerlab's law as functions
+    commit               commit of walkerlab, for the header of the file
+    stem                 stem of the file names; by default the config's name
 
-    Raises ConfigError for what the format cannot express and would change the walk, NoAnswer if pads are to follow a
+    Raises ConfigError if the format cannot express something that affects the walk, NoAnswer if pads are to follow a
     contact gait that does not exist.
     """
     export = prepare_export(config, rigid_step_length_m, rigid_state)
@@ -71,7 +71,7 @@ def export_model(
 
 
 def law_named(text: str) -> Law:
-    """Return the contact law of ADAMS models with this name; raises ConfigError for another name."""
+    """Return the ADAMS contact law of this name; raises ConfigError if there is none."""
     for law in CONTACT_LAWS:
         if text == law:
             return law

@@ -1,4 +1,4 @@
-"""A walker to export: on its pads, at the start of a walk, with the walk that walkerlab takes from there."""
+"""Walker to export: on its pads, at the start of a walk, with the walk that walkerlab takes from that start."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ if TYPE_CHECKING:
 
 PADS_BEHIND, PADS_AHEAD = 2, 4
 RESERVED = ("ground", "world", "walker")
-COUPLED = 1e-12  # smallest weight of a coupling
+COUPLED = 1e-12  # smaller weights of a coupling count as zero
 
 
 @dataclass(frozen=True)
 class Pad:
-    """Ground for one foot: the whole floor, or a pad of its lane."""
+    """Ground for one foot: the whole floor, or a pad of the foot's lane."""
 
     foot: int
     centre_m: float
@@ -43,7 +43,7 @@ class Pad:
 
 @dataclass(frozen=True)
 class HingeCoupling:
-    """Links whose hinge angles, times these weights, add up to zero."""
+    """Constraint: the hinge angles of the links, multiplied by the weights, add up to zero."""
 
     links: tuple[int, ...]
     weights: tuple[float, ...]
@@ -51,14 +51,14 @@ class HingeCoupling:
 
 @dataclass(frozen=True)
 class Exported:
-    """A walker on its ground at the start of a walk."""
+    """Walker on its ground at the start of a walk, with walkerlab's own walk."""
 
     config: Config
-    scene: EngineScene  # as other programs see it
-    steps: int  # of the walk
+    scene: EngineScene  # walker and ground as other programs see them
+    steps: int  # number of steps that the walk attempts
     walk: ContactWalkResult  # the contact model's own walk from that start
-    heights: Floats | None  # (footholds,) of uneven ground (m), None on even ground
-    pinned: bool  # whether the stance foot is hinged until the first touch
+    heights: Floats | None  # (footholds,) heights of uneven ground (m); None on even ground
+    pinned: bool  # whether the stance foot is hinged until the first touchdown
 
     @property
     def model(self) -> PlanarModel:
@@ -66,7 +66,7 @@ class Exported:
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """Unique names of the links that other programs accept."""
+        """Unique link names that other programs accept."""
         names: list[str] = []
         for link in self.model.links:
             name = identifier(link.name)
@@ -76,7 +76,7 @@ class Exported:
 
     @cached_property
     def start(self) -> tuple[Floats, Floats]:
-        """Coordinates (m, rad) and velocities of the model at the start."""
+        """Coordinates (m, rad) and velocities (m/s, rad/s) of the model at the start."""
         return self.scene.from_base(self.scene.start)
 
     @property
@@ -91,7 +91,7 @@ class Exported:
 
     @cached_property
     def couplings(self) -> tuple[HingeCoupling, ...]:
-        """Couplings of bodies whose angles follow others."""
+        """Couplings of the hinges of bodies whose angles follow those of others."""
         found = []
         for row in coupling_rows(self.scene.assembly, self.model):
             if abs(row[0]) > COUPLED:
@@ -105,7 +105,7 @@ class Exported:
 
     @cached_property
     def pads(self) -> tuple[Pad, ...]:
-        """Ground: one floor for each foot, or pads from behind the start to beyond the end."""
+        """Ground under the feet: one floor per foot, or pads from behind the start to beyond the end of the walk."""
         terrain = self.scene.ground.terrain
         pitch, last = terrain.pitch, self.steps + PADS_AHEAD
         if not terrain.has_pads:
@@ -123,7 +123,7 @@ class Exported:
         return self.scene.ground.terrain._replace(heights=self.heights)
 
     def lane_across_m(self, foot: int) -> float:
-        """Distance of a foot's lane from the plane of the walk, so that no ball reaches the other's pads (m)."""
+        """Signed distance (m) of a foot's lane from the plane of the walk; no ball reaches the other foot's pads."""
         distance = self.half_lane_m + 0.01 * self.config.walker.leg_length_m
         return -distance if foot == STANCE_FOOT else distance
 
@@ -134,7 +134,7 @@ class Exported:
 
     @property
     def touches_s(self) -> list[float]:
-        """Times at which the legs change roles in walkerlab's walk."""
+        """Times (s) at which the legs change roles in walkerlab's walk."""
         return [float(time) for time in self.walk.touch_time_s]
 
     @property
@@ -146,7 +146,7 @@ class Exported:
         return identifier(self.config.name)
 
     def describe(self, left_out: Iterable[str], commit: str | None) -> Iterator[str]:
-        """Yield the head of an exported file: its origin, the walk in walkerlab, and omissions."""
+        """Yield the header of an exported file: its origin, the walk in walkerlab, and omissions."""
         yield f"Written by walkerlab {walkerlab.__version__}" + (f", commit {commit}" if commit else "") + "."
         yield f"Config: {self.config.name}. Slope: {self.scene.ours.slope:.10g} rad, as tilted gravity."
         yield f"walkerlab's contact model from this start: {self.walk.outcome.label}, {self.walk.steps} steps."
@@ -164,9 +164,9 @@ def identifier(name: str) -> str:
 
 
 def prepare_export(config: Config, rigid_step_length_m: float, rigid_state: State) -> Exported:
-    """Place the walker of a config on its ground, started from a rigid state as `contact-sim` starts it.
+    """Place the walker of a config on its ground, with the start that `contact-sim` derives from a rigid state.
 
-    Raises ConfigError for a walker or a ground that no exported model has.
+    Raises ConfigError for a walker or a ground that cannot be exported.
     """
     refuse(config)
     contact_scene = scene_on_pads(config, rigid_step_length_m, rigid_state)
@@ -200,6 +200,6 @@ def refuse(config: Config) -> None:
 
 
 def finite(value: float) -> str:
-    """Write a number with all its digits."""
+    """Format a number with all its digits, without a trailing `.0`."""
     text = repr(float(value))
     return "0" if float(value) == 0.0 else text.removesuffix(".0") if math.isfinite(value) else text

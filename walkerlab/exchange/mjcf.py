@@ -1,8 +1,8 @@
-"""MJCF: a planar walker in MuJoCo's language, with MuJoCo's soft contact tuned to the ADAMS contact law.
+"""MJCF export: a planar walker in MuJoCo's language, with MuJoCo's soft contact tuned to the ADAMS contact law.
 
-Contact is normalised by mass. With constant impedance d and a reference of stiffness K and damping B (solref -K, -B),
-a loaded contact accelerates by a = (1 - d) a_0 - B v - K r, where a_0 is the acceleration without contact; so any ball
-rests at (1 - d) g / K, and a foot creeps at (1 - d) a_0 / (impratio B).
+MuJoCo normalises contact by mass. With constant impedance d, stiffness K and damping B (solref -K, -B), a loaded
+contact accelerates by a = (1 - d) a_0 - B v - K r, where a_0 is the acceleration without contact. A ball of any mass
+therefore rests at a penetration of (1 - d) g / K, and a foot creeps at (1 - d) a_0 / (impratio B).
 
 Source: MuJoCo documentation, Computation: constraint model, and Modeling: solver parameters.
 """
@@ -21,19 +21,19 @@ from walkerlab.exchange.exported import Exported, Pad
 from walkerlab.exchange.planar import Ball, PlanarModel
 from walkerlab.physics.mechanics.parts import Position
 
-MIN_INERTIA = 2e-15  # kg m^2, twice what MuJoCo asks for
-IMPEDANCE = 0.1  # small: close to a spring and damper that the load acts on in full
+MIN_INERTIA = 2e-15  # kg m^2, twice MuJoCo's minimum
+IMPEDANCE = 0.1  # small, so that MuJoCo's soft contact behaves like a plain spring and damper that carry the full load
 JOINT_AXES = {"along": ("slide", "1 0 0"), "height": ("slide", "0 0 1"), "turn": ("hinge", "0 -1 0")}
 STEP_S, PAD_M = 1e-4, 0.05
 HIP = "hip"
 COUPLING_SETTINGS = 'solref="0.0005 1" solimp="0.9999 0.9999 0.001 0.5 2"'
-"""Settings of couplings: as hard as MuJoCo's constraints become at such steps."""
+"""Settings that make couplings as stiff as MuJoCo's constraints can be with time steps of STEP_S."""
 CLOSE = 'iterations="100" tolerance="1e-12"'
 
 
 @dataclass(frozen=True)
 class Foot:
-    """A foot's ball: name, collision group, and position across the walk (m)."""
+    """Ball of a foot: name, collision group, and position across the walk (m)."""
 
     name: str
     group: int = 1
@@ -45,7 +45,7 @@ FEET = (Foot("foot 0"), Foot("foot 1"))
 
 @dataclass(frozen=True)
 class HipJoint:
-    """The hinge of a link that is the hip, with its spring and damper."""
+    """Hip hinge of a link, with its spring and damper."""
 
     link: int
     stiffness: float  # N m/rad
@@ -53,7 +53,7 @@ class HipJoint:
 
 
 def contact_settings(target: EngineContact) -> dict[str, float]:
-    """Tune MuJoCo's contact to the target by the closed forms above."""
+    """Compute MuJoCo's contact settings for the target, by the formulas at the top of this module."""
     stiffness = (1.0 - IMPEDANCE) * target.gravity / target.penetration
     damping = 2.0 * target.damping_ratio * math.sqrt(stiffness)
     creep = (1.0 - IMPEDANCE) * target.creep_load * target.gravity / damping
@@ -67,7 +67,7 @@ def contact_settings(target: EngineContact) -> dict[str, float]:
 
 
 def option_text(model: PlanarModel, contact: Mapping[str, float] | None, more: str = "") -> str:
-    """Write the element `option`: tilted gravity, and the friction cone where there is contact."""
+    """Write the element `option`: tilted gravity and, with contact, the friction cone."""
     cone = "" if contact is None else f'cone="elliptic" impratio="{contact["impratio"]!r}" '
     return f'<option {more}gravity="{model.gravity_along!r} 0 {-model.gravity_down!r}" {cone}{CLOSE}/>'
 
@@ -82,9 +82,9 @@ def body_text(
 ) -> str:
     """Write a link with its hinge, its feet and its child links.
 
-    contact  settings of the feet's contact; None for a walker without feet
-    feet     how each ball collides
-    drawing  geometry of a link that touches nothing
+    contact  settings of the foot contacts; None for a walker without feet
+    feet     name, collision group and lateral position of each ball
+    drawing  function that returns the visible shape of a link, which collides with nothing
     """
     link = model.links[link_number]
     (px, pz), (x, z), (cx, cz) = link.parent_point_m, link.point_m, link.centre_m
@@ -103,7 +103,7 @@ def body_text(
 
 
 def joint_texts(model: PlanarModel, link_number: int, hip: HipJoint | None) -> Iterator[str]:
-    """Yield the joints of a link, named after their coordinates: the root's freedoms, or its hinge."""
+    """Yield the joints of a link, named after their coordinates: the base's freedoms, or a hinge."""
     link = model.links[link_number]
     x, z = link.point_m
     for freedom in model.freedoms if link.parent < 0 else ("turn",):
@@ -124,11 +124,11 @@ def foot_text(ball: Ball, foot: Foot, contact: Mapping[str, float]) -> str:
 
 
 def walker_text(export: Exported, head: Iterable[str]) -> str:
-    """Write a model with pads and the keyframe `gait`; without drives, plain `mj_step` walks from it.
+    """Write a model with pads and the keyframe `gait`, from which plain `mj_step` walks if there are no drives.
 
-    head  lines of the comment at its beginning
+    head  lines of the header comment
 
-    Raises ConfigError for what MJCF cannot express.
+    Raises ConfigError for a walker or ground that MJCF cannot express.
     """
     target = contact_target(export.scene)
     if target is None:
@@ -170,7 +170,7 @@ def walker_text(export: Exported, head: Iterable[str]) -> str:
 
 
 def leg_text(hinge: Position, ball: Ball, foot: Foot) -> str:
-    """Draw a capsule from a hinge to a foot; it collides with nothing."""
+    """Draw a leg as a capsule from its hinge to its foot; it collides with nothing."""
     (x, z), (a, c), y = hinge, ball.centre_m, foot.across_m
     ends, width = f"{x!r} {y!r} {z!r} {a!r} {y!r} {c!r}", 0.015 * math.hypot(x - a, z - c)
     return f'<geom type="capsule" fromto="{ends}" size="{width!r}" contype="0" conaffinity="0" rgba=".4 .5 .7 1"/>'
@@ -186,14 +186,14 @@ def pad_text(export: Exported, number: int, pad: Pad) -> str:
 
 
 def custom_texts(export: Exported) -> Iterator[str]:
-    """Yield the values that the script reads for push-offs and hip torque."""
+    """Yield the drive parameters that the script reads for push-offs and hip torque."""
     push_off, hip = export.config.push_off, export.hip
     yield f'<numeric name="push_off" data="{push_off.impulse_N_s!r} {push_off.duration_s!r}"/>'
     yield f'<numeric name="hip_torque" data="{hip.torque_N_m!r}"/>'
 
 
 def coupling_texts(export: Exported) -> Iterator[str]:
-    """Yield constraints that hold bodies at weighted sums of others' angles."""
+    """Yield the constraints of coupled hinges; raises ConfigError if a coupling has more than two."""
     for coupling in export.couplings:
         if len(coupling.links) > 2:
             raise ConfigError(
@@ -209,7 +209,7 @@ def coupling_texts(export: Exported) -> Iterator[str]:
 
 
 def tuning_lines(export: Exported, target: EngineContact) -> Iterator[str]:
-    """Describe which properties of the law MuJoCo's contact has, and which it lacks."""
+    """Describe the properties of the contact law that MuJoCo's contact reproduces, and those that it lacks."""
     static = float(export.scene.ours.friction.largest)
     yield (
         f"Contact tuned to ADAMS's law under {target.mass:.6g} kg: penetration at rest {target.penetration:.4g} m, "

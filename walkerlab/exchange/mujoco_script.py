@@ -1,4 +1,4 @@
-"""Step a walker of walkerlab in MuJoCo with its push-offs and its hip torque, and print its touches.
+"""Simulate in MuJoCo a walker that walkerlab exported, with push-offs and hip torque, and print its touchdowns.
 
 Usage: python NAME.py NAME.xml [steps] [--view]; needs the package mujoco.
 """
@@ -12,7 +12,7 @@ import numpy as np
 
 
 class Walk:
-    """A walk from the keyframe `gait`."""
+    """Walk from the keyframe `gait`."""
 
     def __init__(self, model: Any) -> None:
         self.model, self.data = model, mujoco.MjData(model)
@@ -27,7 +27,7 @@ class Walk:
         self.touches_m: list[float] = []
 
     def step(self) -> None:
-        """Apply push-off and hip torque, step, and change feet if the swing foot touches ahead of the stance foot."""
+        """Apply push-off and hip torque, advance one time step, and swap feet if the swing foot touches down ahead."""
         data, swing = self.data, 1 - self.stance
         data.qfrc_applied[:] = 0.0
         data.qfrc_applied[self.hip.dofadr[0]] = self.torque if swing == 0 else -self.torque
@@ -41,7 +41,7 @@ class Walk:
             self.touches_m.append(float(along[swing]))
 
     def push(self, foot: int, share: float) -> None:
-        """Push a foot towards the hip, this far into the pulse."""
+        """Push a foot towards the hip; `share` is the elapsed fraction of the pulse."""
         if not 0.0 < share < 1.0:
             return
         point = self.data.geom_xpos[foot] - [0.0, 0.0, self.model.geom_size[foot, 0]]
@@ -53,7 +53,7 @@ class Walk:
 
 
 def main(path: str, steps: int, view: bool) -> None:
-    """Walk for a number of touches, or ten seconds."""
+    """Walk for a number of touchdowns, but at most ten seconds."""
     walk, viewer = Walk(mujoco.MjModel.from_xml_path(path)), None
     if view:
         from mujoco.viewer import launch_passive

@@ -14,47 +14,47 @@ Freedom = Literal["along", "height", "turn"]
 FLOATING: tuple[Freedom, ...] = ("along", "height", "turn")
 HINGED: tuple[Freedom, ...] = ("turn",)
 UPRIGHT: tuple[Freedom, ...] = ("along", "height")
-SMALLEST_INERTIA = 1e-13  # of mass times length squared: engines refuse a body without inertia
-SMALLEST_BALL_M = 5e-4  # for point feet, which engines do not have; larger than any penetration
+SMALLEST_INERTIA = 1e-13  # in units of mass x length^2; engines reject a body without inertia
+SMALLEST_BALL_M = 5e-4  # radius of the ball for a point foot, which engines lack; larger than any penetration
 
 
 @dataclass(frozen=True)
 class Link:
     """Rigid link, lumped from bodies that move together and the particles on them.
 
-    parent_point  hinge in the parent's frame (m); for the base the point moved by the root's freedoms
-    point         hinge in the link's own frame (m)
+    parent_point_m  hinge in the parent's frame (m); for the base, the world's origin
+    point_m         hinge in the link's own frame (m); for the base, the point that its freedoms move
     """
 
     name: str
     mass_kg: float
     centre_m: Position
     inertia_kg_m2: float
-    parent: int  # index of its parent in `links`; -1 for the base
+    parent: int  # index of the parent link; -1 for the base
     parent_point_m: Position
     point_m: Position
 
 
 @dataclass(frozen=True)
 class Ball:
-    """A foot: a ball on a link, and the height of its ground."""
+    """Foot: a ball on a link, and the height of the ground under it."""
 
     link: int
     centre_m: Position
     radius_m: float
-    ground_m: float  # a point foot gets a tiny ball, and ground that much lower
+    ground_m: float  # height of the ground; a point foot gets a tiny ball, and ground lower by the ball's radius
 
 
 @dataclass(frozen=True)
 class PlanarModel:
-    """Tree of links; `gravity`: m/s^2, along the slope and towards it."""
+    """Tree of links under gravity (m/s^2), along the slope and towards it."""
 
     links: tuple[Link, ...]  # base first, every link after its parent
-    freedoms: tuple[Freedom, ...]  # of the base relative to the world
+    freedoms: tuple[Freedom, ...]  # freedoms of the base relative to the world
     balls: tuple[Ball, ...]  # feet
     gravity_along: float
     gravity_down: float
-    chain: Floats  # (bodies, links) maps relative angles, base first, to each body's absolute one (assembly's order)
+    chain: Floats  # (bodies, links) maps relative angles (base first) to the absolute angles of the assembly's bodies
 
     @property
     def size(self) -> int:
@@ -72,14 +72,14 @@ def planar_model(
     gravity: tuple[float, float],
     welds: Collection[Knee] = (),
 ) -> PlanarModel:
-    """Build the tree of an assembly from a point of its base outwards, depth first.
+    """Build the tree of an assembly's links, depth first, from a point of its base.
 
     gravity  along the slope and towards it, m/s^2
     welds    locked knees, whose shank and thigh form one link
     """
     root = base.body
     welded = [{knee.thigh, knee.shank} for knee in welds]
-    # of each link: its bodies, and where their frames' origins are in its own; and how it hangs from its parent
+    # for each link: its bodies, with their origins in its frame (m); and its parent, with the hinge in both frames
     members: list[list[tuple[str, Position]]] = [[(root, (0.0, 0.0))]]
     hinges: list[tuple[int, Position, Position]] = [(-1, (0.0, 0.0), base.at_m)]
     frames: dict[str, tuple[int, Position]] = {root: (0, (0.0, 0.0))}
@@ -112,7 +112,7 @@ def planar_model(
 
 
 def ball_and_ground(radius_m: float) -> tuple[float, float]:
-    """Radius of a foot's ball and height of the ground under it (m)."""
+    """Return the radius of a foot's ball and the height of the ground under it (m)."""
     ball = max(radius_m, SMALLEST_BALL_M)
     return ball, radius_m - ball
 
@@ -139,5 +139,5 @@ def lump_bodies(
 
 
 def coupling_rows(assembly: Assembly, model: PlanarModel) -> list[Floats]:
-    """Return weights (links,) of relative angles, base first, whose sum is zero for each body that follows others."""
+    """Return weights (links,) for each body that follows others: the relative angles, so weighted, add up to zero."""
     return [model.chain[body] - row @ model.chain for body, row in followers(assembly).items()]

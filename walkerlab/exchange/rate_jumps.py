@@ -1,7 +1,7 @@
-"""Find the sums of the legs' angles at which their rates jump.
+"""Find the sum of the leg angles at heel strike from the jumps in their rates.
 
-At heel strike the legs' angles from the slope's normal are opposite, and rates jump. If the slope or the sensors'
-offset is known poorly, the angles sum to another value than 0 at that instant; the jumps show it.
+Measured from the slope's normal, the leg angles are opposite at heel strike, where their rates jump. An error in slope
+or sensor offset makes the measured sum at these jumps non-zero.
 """
 
 from __future__ import annotations
@@ -15,24 +15,24 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 AHEAD: Final = 0.4
-"""Smallest angle between the legs at a heel strike, over the largest of the walk."""
+"""Smallest angle between the legs at a heel strike, as a fraction of the walk's largest."""
 WINDOW: Final = 0.1
-"""Time before and after a heel strike in which angles are fitted, over a step's period."""
-MOST_RUNS: Final = 20  # that are looked at
-WINDOW_SAMPLES: Final = 60  # of a window, that are fitted
-SAMPLES_ON_A_SIDE: Final = 4  # on each side of an instant
+"""Time before and after a heel strike in which angles are fitted, as a fraction of the step period."""
+MOST_RUNS: Final = 20  # stretches with one leg far ahead that are searched for jumps
+WINDOW_SAMPLES: Final = 60  # windows with more samples are thinned towards this number
+SAMPLES_ON_A_SIDE: Final = 4  # fewest samples before and after an instant for a fit
 DEGREE: Final = 3
-SMALLEST_SCATTER: Final = 1e-12  # of squared angles
-SUMS: Final = np.round(np.arange(-0.12, 0.121, 0.01), 2)  # rad, that are tried
+SMALLEST_SCATTER: Final = 1e-12  # lower limit, as a fraction of the sum of squared angles
+SUMS: Final = np.round(np.arange(-0.12, 0.121, 0.01), 2)  # rad, trial values of the sum
 MOST_FOUND: Final = 4
 
 
 def sums_at_jumps(time: Array, angle: Array, total: Callable[[Array], Array]) -> list[float]:
-    """Return sums (rad) of the legs' angles from the slope's normal at which rates jump, the clearest first.
+    """Return sums (rad) of the leg angles from the slope's normal at which their rates jump, the clearest first.
 
     time   (samples,) s
-    angle  (samples, 2) rad
-    total  (samples, 2) angles -> (samples,) that sum
+    angle  (samples, 2) rad, from the vertical
+    total  function from angles (samples, 2) to their sums (samples,) from the normal
     """
     spread, sums = angle[:, 0] - angle[:, 1], total(angle)
     runs = apart_runs(np.abs(spread) > AHEAD * np.abs(spread).max(), spread > 0.0)
@@ -44,9 +44,9 @@ def sums_at_jumps(time: Array, angle: Array, total: Callable[[Array], Array]) ->
 
 
 def evidence_for(time: Array, angle: Array, over: Array, runs: Sequence[tuple[int, int]], half: float) -> float:
-    """Return by how much jumps, where `over` (samples,) falls through zero within runs, reduce the angles' scatter.
+    """Return the reduction of the angles' scatter by rate jumps where `over` (samples,) falls through zero within runs.
 
-    In variances of what scatter they leave.
+    The reduction is in units of the variance that remains.
     """
     jumps = []
     for first, last in runs:
@@ -64,7 +64,7 @@ def evidence_for(time: Array, angle: Array, over: Array, runs: Sequence[tuple[in
 
 
 def apart_runs(apart: NDArray[np.bool_], first_ahead: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """Return first and last sample of each stretch in which the same leg is ahead, and far ahead."""
+    """Return the first and last sample of each stretch in which the same leg is far ahead."""
     kind = np.where(apart, np.where(first_ahead, 1, -1), 0)
     bounds = np.flatnonzero(np.diff(kind)) + 1
     edges = zip((0, *bounds.tolist()), (*bounds.tolist(), kind.size), strict=True)
@@ -77,9 +77,9 @@ def typical_distance(time: Array, runs: Iterable[tuple[int, int]]) -> float:
 
 
 def jump_at(time: Array, angle: Array, instant: float, half: float) -> tuple[float, float, int] | None:
-    """Fit a jump of the rates at an instant: reduction of the squared scatter, the rest of it, its degrees of freedom.
+    """Fit a jump of the rates at an instant: reduction of the squared scatter, remaining scatter, degrees of freedom.
 
-    None with too few samples on a side.
+    Returns None if there are too few samples before or after the instant.
     """
     first, last = np.searchsorted(time, (instant - half, instant + half))
     rows = slice(int(first), int(last), max(1, int(last - first) // WINDOW_SAMPLES))

@@ -1,7 +1,7 @@
-"""Read columns over time from files that other programs and people write.
+"""Read time series from files that other programs or people wrote.
 
-`read_recording` chooses the format by the ending: delimited text (CSV, tables of ADAMS), results of ADAMS (.res),
-tables of OpenSim (.sto, .mot), markers (.trc, .c3d). `columns` gives them their meanings for a walker.
+`read_recording` chooses the format by the file extension: delimited text (CSV, ADAMS tables), ADAMS results (.res),
+OpenSim tables (.sto, .mot), markers (.trc, .c3d). The module `columns` maps them to a walk.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ TIME: Final = "time"
 UNIT_IN_NAME: Final = re.compile(r"\s*[\[(]\s*([^\[\]()]*?)\s*[\])]\s*$")
 DELIMITERS: Final = "\t;,"
 EMPTY: Final = frozenset({"", "nan", "na", "n/a", "null", "none", "-", "#n/a"})
-"""Cells without a value."""
+"""Texts of cells without a value, in lower case."""
 HEADER_LINES: Final = 60
-"""Lines at the top of a text that are searched for its header."""
+"""Number of lines at the top of a file that are searched for the header."""
 WANTED: Final = "CSV (.csv, .txt, .tab, .tsv), ADAMS results (.res), OpenSim (.sto, .mot), markers (.trc, .c3d)"
 
 
@@ -49,19 +49,19 @@ numpy.savez(sys.stdout.buffer, places=content["data"]["points"], rate=rate, labe
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """Hold columns over time as a file has them, before any conversion; a missing value is nan."""
+    """Time series of a recording as stored in the file, before any unit conversion; missing values are nan."""
 
     path: Path
-    columns: dict[str, Array]  # arrays (samples,) by name; time is `time`
-    units: dict[str, str] = field(default_factory=dict)  # by column where the file states one, as it is written there
-    # by 'angle', 'length' and 'time' where the file states one for all columns of that kind
+    columns: dict[str, Array]  # (samples,) arrays by name; the time column is named `time`
+    units: dict[str, str] = field(default_factory=dict)  # unit by column, where the file states one, as written there
+    # unit by kind ('angle', 'length', 'time', 'force'), where the file states one for all columns of that kind
     kind_units: dict[str, str] = field(default_factory=dict)
 
 
 def read_recording(path: Path) -> Recording:
-    """Read the columns of a file, by the format that its ending names.
+    """Read the columns of a file, in the format of its extension.
 
-    Raises ConfigError for a file that cannot be read, whose format is not known, or that is damaged.
+    Raises ConfigError if the file cannot be read, is damaged, or has an unknown format.
     """
     reader = READERS.get(path.suffix.lower())
     if reader is None:
@@ -79,7 +79,7 @@ def read_recording(path: Path) -> Recording:
 
 
 def checked_time(recording: Recording) -> Recording:
-    """Return the recording; raises ConfigError unless its time is complete and strictly rising."""
+    """Return the recording unchanged; raises ConfigError unless its time is complete and strictly rising."""
     time, path = recording.columns.get(TIME), recording.path
     if time is None:
         names = ", ".join(list(recording.columns)[:8])
@@ -107,7 +107,7 @@ def checked_time(recording: Recording) -> Recording:
 
 
 def read_delimited(path: Path) -> Recording:
-    """Read CSV and tables of ADAMS: titles, a header, rows of numbers."""
+    """Read CSV files and ADAMS tables: titles, a header, rows of numbers."""
     lines = without_last_delimiters(text_of(path).splitlines())
     header, delimiter = header_of(path, lines)
     names, units = names_and_units(split_row(lines[header], delimiter))
@@ -120,7 +120,7 @@ def read_delimited(path: Path) -> Recording:
 
 
 def text_of(path: Path) -> str:
-    """Read a file in UTF-8, UTF-16 or Latin-1."""
+    """Read a text file in UTF-8, UTF-16 or Latin-1; raises ConfigError for binary data."""
     data = path.read_bytes()
     for encoding in ("utf-16",) if data[:2] in (b"\xff\xfe", b"\xfe\xff") else ("utf-8-sig", "latin-1"):
         try:
@@ -134,7 +134,7 @@ def text_of(path: Path) -> str:
 
 
 def without_last_delimiters(lines: list[str]) -> list[str]:
-    """Remove the delimiter at the end of every row, from the first on that has one, as some spreadsheets write it."""
+    """Remove the delimiter that some spreadsheets append to every row."""
     first = next((number for number, line in enumerate(lines) if line.endswith(tuple(DELIMITERS))), len(lines))
     last = lines[first][-1] if first < len(lines) else ""
     header_is_before = first > 0 and last in lines[first - 1]
@@ -144,9 +144,9 @@ def without_last_delimiters(lines: list[str]) -> list[str]:
 
 
 def header_of(path: Path, lines: Sequence[str]) -> tuple[int, str]:
-    """Find the header's line and the delimiter: the first row of names with a row of as many numbers behind it.
+    """Find the line number of the header and the delimiter: the first row of names followed by as many numbers.
 
-    A table of one column is recognised only where no row has several.
+    A table of one column is recognised only if there is none of several columns.
     """
     several = [(number, delimiter) for number in range(len(lines[:HEADER_LINES])) for delimiter in DELIMITERS]
     for fewest in (2, 1):
@@ -163,12 +163,12 @@ def header_of(path: Path, lines: Sequence[str]) -> tuple[int, str]:
 
 
 def split_row(line: str, delimiter: str) -> list[str]:
-    """Split a row into cells, without blanks around them."""
+    """Split a row into cells, stripped of blanks."""
     return [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter), [])]
 
 
 def is_number(cell: str) -> bool:
-    """Return whether a cell holds a number, with a point or a comma."""
+    """Return whether a cell holds a number, with a decimal point or comma."""
     try:
         float(cell.replace(",", "."))
     except ValueError:
@@ -177,7 +177,7 @@ def is_number(cell: str) -> bool:
 
 
 def names_and_units(header: Iterable[str]) -> tuple[list[str], list[str]]:
-    """Split headers into names and the units in brackets behind them, empty without one."""
+    """Split column headers into names and the units in brackets, which are empty if absent."""
     units = [match[1] if (match := UNIT_IN_NAME.search(name)) else "" for name in header]
     return [UNIT_IN_NAME.sub("", name).strip() for name in header], units
 
@@ -191,7 +191,7 @@ def unique(path: Path, names: Sequence[str]) -> list[str]:
 
 
 def numbers_in(path: Path, lines: Sequence[str], first: int, delimiter: str, count: int) -> Array:
-    """Return the numbers (rows, count) of the lines from `first`; empty cells are nan."""
+    """Parse the lines from index `first` on into an array (rows, count); empty cells become nan."""
     rows = [line for line in lines[first:] if line.strip()]
     text = "\n".join(rows)
     if delimiter == ";":
@@ -201,19 +201,19 @@ def numbers_in(path: Path, lines: Sequence[str], first: int, delimiter: str, cou
         if values.shape[1] == count:
             return values
     except ValueError:
-        pass  # a cell is empty or no number: read cell by cell
+        pass  # a cell is empty or not a number, so read cell by cell
     return np.array(
         [cells_as_numbers(path, number, line, delimiter, count) for number, line in numbered_rows(lines, first)]
     )
 
 
 def numbered_rows(lines: Sequence[str], first: int) -> Iterator[tuple[int, str]]:
-    """Return lines that are not blank, with their numbers as an editor shows them."""
+    """Return the non-blank lines from index `first` on, with line numbers as an editor shows them."""
     return ((number + 1, line) for number, line in enumerate(lines) if number >= first and line.strip())
 
 
 def cells_as_numbers(path: Path, number: int, line: str, delimiter: str, count: int) -> list[float]:
-    """Return a row's numbers, nan for empty cells."""
+    """Parse a row into numbers, nan for empty cells; raises ConfigError if the count is wrong or a cell holds text."""
     cells = split_row(line.replace(",", ".") if delimiter == ";" else line, delimiter)
     if len(cells) != count:
         raise ConfigError(
@@ -230,7 +230,7 @@ def cells_as_numbers(path: Path, number: int, line: str, delimiter: str, count: 
 
 
 def as_time_column(recording: Recording) -> Recording:
-    """Rename the column of time, which is named time or t, or a longer name that ends in .TIME."""
+    """Rename the time column, named time or t or ending in the word time, to `time`."""
     columns = recording.columns
     name = next((name for name in columns if name.lower() in ("time", "t")), None)
     name = name or next((name for name in columns if re.search(r"(^|[.\s_])time$", name, re.IGNORECASE)), None)
@@ -246,7 +246,7 @@ def as_time_column(recording: Recording) -> Recording:
 
 
 def read_adams_results(path: Path) -> Recording:
-    """Read XML results of ADAMS (.res): components by id, and blocks of steps with a number for each component."""
+    """Read XML results of ADAMS (.res): components with ids, and steps with a number for each component."""
     try:
         root = ElementTree.parse(path).getroot()
     except ElementTree.ParseError as error:
@@ -277,7 +277,7 @@ def read_adams_results(path: Path) -> Recording:
 
 
 def elements(node: ElementTree.Element, tag: str) -> Iterator[ElementTree.Element]:
-    """Return the elements of a tag below a node, in any namespace."""
+    """Return all elements below a node that have this tag, in any namespace."""
     return (element for element in node.iter() if element.tag.rpartition("}")[2] == tag)
 
 
@@ -318,7 +318,7 @@ def numbers_of_step(path: Path, place: int, step: ElementTree.Element, count: in
 
 
 def xml_units(root: ElementTree.Element) -> dict[str, str]:
-    """Return the model's units by kind."""
+    """Return the model's unit for each kind of quantity."""
     units: Mapping[str, str] = next((node.attrib for node in elements(root, "Units")), {})
     return {kind: units[kind] for kind in ("angle", "length", "time", "force") if units.get(kind)}
 
@@ -334,7 +334,7 @@ def without_repeated_times(recording: Recording) -> Recording:
 
 
 def read_opensim(path: Path) -> Recording:
-    """Read tables of OpenSim (.sto, .mot), also in SIMM's form: lines up to `endheader`, names, rows."""
+    """Read OpenSim tables (.sto, .mot), and SIMM's variant of them: lines up to `endheader`, names, rows."""
     lines = text_of(path).splitlines()
     end = next((number for number, line in enumerate(lines) if line.strip().lower() == "endheader"), None)
     if end is None or end + 1 >= len(lines):
@@ -352,8 +352,8 @@ def read_opensim(path: Path) -> Recording:
 
 
 def blank_separated(path: Path, lines: Sequence[str], first: int, count: int) -> Array:
-    """Return numbers (rows, count) separated by blanks or tabs; the header's count of rows is often wrong."""
-    rows = []
+    """Parse the lines from index `first` on, separated by blanks or tabs, into an array (rows, count)."""
+    rows = []  # the header's count of rows is often wrong
     for number, line in numbered_rows(lines, first):
         rows.append(cells_as_numbers(path, number, "\t".join(line.split()), "\t", count))
     return np.array(rows).reshape(len(rows), count)
@@ -363,7 +363,7 @@ def blank_separated(path: Path, lines: Sequence[str], first: int, count: int) ->
 
 
 def read_markers(path: Path) -> Recording:
-    """Read markers of a .trc file as columns 'name.x', 'name.y', 'name.z'; cells between two tabs may be empty."""
+    """Read the markers of a .trc file as columns 'name.x', 'name.y', 'name.z'; empty cells become nan."""
     lines = text_of(path).splitlines()
     if len(lines) < 5 or not lines[0].startswith("PathFileType"):
         raise ConfigError(
@@ -389,7 +389,7 @@ def read_markers(path: Path) -> Recording:
 
 
 def read_c3d(path: Path) -> Recording:
-    """Read the markers of a C3D file, as columns 'name.x', 'name.y', 'name.z'; needs the extra `data`."""
+    """Read the markers of a C3D file as columns 'name.x', 'name.y', 'name.z'; needs the package extra `data`."""
     if find_spec("ezc3d") is None:
         raise ConfigError(f"{path}: reading C3D needs ezc3d.", 'Install it: pip install "walkerlab[data]"')
     arrays = c3d_arrays(path)
@@ -405,12 +405,10 @@ def read_c3d(path: Path) -> Recording:
 
 
 def c3d_arrays(path: Path) -> dict[str, NDArray[Any]]:
-    """Read labels, rate, units and places (3 or 4, markers, frames) with ezc3d.
-
-    A child process does, because damaged files end ezc3d in segmentation faults.
-    """
+    """Read labels, rate, units and marker positions (3 or 4, markers, frames) with ezc3d."""
     with path.open("rb"):  # raises OSError, which ezc3d does not
         pass
+    # Damaged files end ezc3d in segmentation faults, so a child process runs it.
     try:
         command = [sys.executable, "-P", "-c", C3D_PROGRAM, str(path)]
         done = subprocess.run(command, capture_output=True, check=True, timeout=C3D_PATIENCE_S)

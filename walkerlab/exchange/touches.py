@@ -1,8 +1,8 @@
 """Find the heel strikes in recorded angles.
 
-A foot comes down where its height over the other foot falls to zero while it is ahead; between two heel strikes that
-happens once, however noisy the angles are. The instant is the zero of that height in a smooth fit: polynomials before
-and after, which meet at the heel strike because angles are continuous there while their rates jump.
+A foot strikes where it is ahead and its height over the other foot falls to zero. Noise repeats such crossings, so all
+those of one leg before the other leg's next one count as one strike. The instant is the zero of the height in a smooth
+fit: polynomials before and after, which meet there because angles are continuous while their rates jump.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ Height = Callable[[Array], Array]
 
 TOUCH_DEGREE: Final = 3
 FEWEST: Final = 6
-"""Samples on each side of a heel strike that a fit needs."""
+"""Fewest samples before a heel strike that a fit needs."""
 ITERATIONS: Final = 8
 
 
 @dataclass(frozen=True)
 class Touch:
-    """Describe a heel strike: time (s), leg (0 or 1) that comes down, and scatter of the angles around it (rad)."""
+    """Heel strike: time (s), leg that strikes (0 or 1), and scatter of the angles around it (rad)."""
 
     time_s: float
     leg: int
@@ -39,7 +39,7 @@ def find_touches(time: Array, angle: Array, height: Height) -> list[Touch]:
 
     time    (samples,) s, rising
     angle   (samples, 2) rad, from the vertical, positive with the foot ahead
-    height  (samples, 2) angles -> (samples,) m, height of leg 0's foot over leg 1's, perpendicular to the slope
+    height  function from angles (samples, 2) to the height (samples,) of leg 0's foot over leg 1's (m, normal to slope)
     """
     crossings = merge_repeats(candidates(time, angle, height))
     times = [crossing for crossing, _ in crossings]
@@ -48,10 +48,8 @@ def find_touches(time: Array, angle: Array, height: Height) -> list[Touch]:
 
 
 def candidates(time: Array, angle: Array, height: Height) -> list[tuple[float, int]]:
-    """Return times at which a foot that is ahead comes down to the other's level, and its leg; noise repeats some.
-
-    A recording may end with a heel strike: the last two samples are continued by half an interval.
-    """
+    """Return times at which a foot that is ahead falls to the other's level, and the leg; noise may repeat them."""
+    # A recording may end with a heel strike, so its last two samples are continued by half an interval.
     time = np.append(time, 1.5 * time[-1] - 0.5 * time[-2])
     angle = np.append(angle, 1.5 * angle[-1:] - 0.5 * angle[-2:-1], axis=0)
     spread, over = angle[:, 0] - angle[:, 1], height(angle)
@@ -66,7 +64,7 @@ def candidates(time: Array, angle: Array, height: Height) -> list[tuple[float, i
 
 
 def merge_repeats(crossings: list[tuple[float, int]]) -> list[tuple[float, int]]:
-    """Merge the crossings of each heel strike: those of one leg without the other leg's between them."""
+    """Average the consecutive crossings of a leg, which belong to one heel strike."""
     groups: list[list[float]] = []
     legs: list[int] = []
     for crossing, leg in crossings:
@@ -79,7 +77,7 @@ def merge_repeats(crossings: list[tuple[float, int]]) -> list[tuple[float, int]]
 
 
 def locate_touch(time: Array, angle: Array, height: Height, near: float, leg: int, period: float) -> Touch:
-    """Locate the heel strike near a crossing by a fit of the angles; too few samples leave it at the crossing."""
+    """Locate the heel strike near a crossing by a fit of the angles; with too few samples, return the crossing."""
     half = WINDOW * period
     inside = np.abs(time - near) <= half
     t, y, touch, scatter = (time[inside] - near) / half, angle[inside], 0.0, 0.0
@@ -97,7 +95,7 @@ def locate_touch(time: Array, angle: Array, height: Height, near: float, leg: in
 
 
 def fit_around(t: Array, y: Array, touch: float) -> tuple[Array, Array, float]:
-    """Fit polynomials that meet at a heel strike; returns the angles there, their rates just before it, the scatter."""
+    """Fit polynomials that meet at a heel strike; return the angles and the rates just before it, and the scatter."""
     before, after = np.minimum(t - touch, 0.0), np.maximum(t - touch, 0.0)
     sides = [
         side[:, None] ** np.arange(1, TOUCH_DEGREE + 1)

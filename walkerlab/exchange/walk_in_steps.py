@@ -29,38 +29,38 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 TWO_FEET_TOLERANCE: Final = (
-    0.03  # rad, sum of the legs' angles from the normal, up to which a recording starts on two feet
+    0.03  # rad, largest sum of the leg angles from the normal at the start of a recording on two feet
 )
-SHORTEST: Final = 0.25  # of the mean step, before which the first heel strike is the start itself
+SHORTEST: Final = 0.25  # fraction of the mean step; an earlier first heel strike is the start itself
 SPLINE_DEGREE: Final = 5
-INTERVALS: Final = 24  # of the spline through a step
-MOST_SAMPLES: Final = 250  # of a step, that are kept
-LONGEST_GAP: Final = 1 / 8  # of a step's duration, between two samples
+INTERVALS: Final = 24  # largest number of knot intervals of the spline through a step
+MOST_SAMPLES: Final = 250  # largest number of samples kept within a step
+LONGEST_GAP: Final = 1 / 8  # longest gap between two samples, as a fraction of the step's duration
 PLAUSIBLE: Final = (1e-6, 1e6)
-"""Shortest and longest step, in s or m; values beyond are damaged, or in another unit."""
-SIDE: Final = 1e-10  # share of the walk's duration before a heel strike, of the sample that ends a step
+"""Shortest and longest plausible step, in s or m; values outside are damaged or in another unit."""
+SIDE: Final = 1e-10  # time from the last sample of a step to the heel strike, as a fraction of the walk's duration
 
 
 @dataclass(frozen=True, eq=False)
 class RecordedSteps:
-    """A recorded walk from its first heel strike on, the leg that swings first in column 0."""
+    """Recorded walk from its first heel strike on; column 0 is the leg that swings first."""
 
-    time_s: Array  # (samples,) from that heel strike, with both sides of every later one; dense recordings are thinned
+    time_s: Array  # (samples,) since that heel strike; every later one has a sample on each side
     step: NDArray[np.int64]  # (samples,) index of the step
     angle_rad: Array  # (samples, 2)
     velocity_rad_s: Array  # (samples, 2)
     touch_time_s: Array  # (steps,) ends of the steps
     length_m: Array  # (steps,)
-    scatter_rad: float  # of the angles around heel strikes
+    scatter_rad: float  # scatter of the angles around heel strikes
     swapped: bool  # whether the recording's second leg swings first
     origin_s: float  # the recording's time at the first heel strike
 
 
 def divide_into_steps(walk: RecordedWalk, model: RigidModel, source: str, touch_sum_rad: float = 0.0) -> RecordedSteps:
-    """Find the steps of a recorded walk of a walker.
+    """Find the steps of a recorded walk.
 
     source         name of the recording, for messages
-    touch_sum_rad  sum of the legs' angles from the slope's normal at heel strikes; not 0 if slope or sensors are off
+    touch_sum_rad  sum of the leg angles from the slope's normal at heel strikes; not 0 if slope or sensors are off
 
     Raises ConfigError if the recording has no complete step, or a gap within one.
     """
@@ -78,7 +78,7 @@ def divide_into_steps(walk: RecordedWalk, model: RigidModel, source: str, touch_
         return np.asarray(feet_on_slope(model, angles[:, 0], angles[:, 1]))
 
     def height(angles: Array) -> Array:
-        """Height (m) of leg 0's foot over leg 1's, perpendicular to the slope, for straight legs of one length."""
+        """Height (m) of leg 0's foot over leg 1's, normal to the slope, for straight legs of equal length."""
         half = 0.5 * (total(angles) - touch_sum_rad)
         return np.asarray(2.0 * model.leg_length * np.sin(half) * np.sin(0.5 * (angles[:, 0] - angles[:, 1])))
 
@@ -102,7 +102,7 @@ def divide_into_steps(walk: RecordedWalk, model: RigidModel, source: str, touch_
 
 
 def is_plausible(size: float) -> bool:
-    """Return whether a step can take so many seconds, or be so many metres long."""
+    """Return whether a step can have this duration (s) or length (m)."""
     return PLAUSIBLE[0] <= size <= PLAUSIBLE[1]
 
 
@@ -115,7 +115,7 @@ def refuse_duration(step_s: float, source: str) -> None:
 
 
 def refuse_gaps(time: Array, touches: list[float], source: str) -> None:
-    """Raise ConfigError for a step in which samples are too far apart: its heel strikes and velocities are unknown."""
+    """Raise ConfigError for a step whose samples are too far apart to determine its heel strikes and velocities."""
     for number, (begin, end) in enumerate(pairwise(touches), 1):
         first, last = longest_gap(time, begin, end)
         if last - first > LONGEST_GAP * (end - begin):
@@ -127,7 +127,7 @@ def refuse_gaps(time: Array, touches: list[float], source: str) -> None:
 
 
 def longest_gap(time: Array, begin: float, end: float) -> tuple[float, float]:
-    """Return the neighbouring samples that lie farthest apart, of those around and between two instants."""
+    """Return the two neighbouring sample times (s) farthest apart, from just before `begin` to just after `end`."""
     first, last = np.searchsorted(time, begin, "right") - 1, np.searchsorted(time, end)
     instants = time[first : last + 1]
     place = int(np.argmax(np.diff(instants)))
@@ -160,7 +160,7 @@ def divided(
 
 
 def is_recorded_beyond(time: Array, touches: Array) -> bool:
-    """Return whether enough is recorded of the step after the last heel strike."""
+    """Return whether enough of the step after the last heel strike is recorded."""
     if np.count_nonzero(time >= touches[-1]) <= SPLINE_DEGREE:
         return False
     first, last = longest_gap(time, float(touches[-1]), float(time[-1]))
@@ -168,9 +168,9 @@ def is_recorded_beyond(time: Array, touches: Array) -> bool:
 
 
 def samples_within(time: Array, columns: Array, begin: float, end: float) -> tuple[Array, Array, Array]:
-    """Return times, angles and velocities of a step, with samples at its ends.
+    """Return times (s), angles (rad) and velocities (rad/s) of a step, with samples at its ends.
 
-    columns  (samples, 2) angles, or (samples, 4) with velocities; otherwise those are a spline's
+    columns  (samples, 4) angles and velocities, or (samples, 2) angles, from which a spline gives the velocities
     """
     near = (time >= begin) & (time <= end)
     spline = spline_through(time[near], columns[near])
@@ -184,8 +184,8 @@ def samples_within(time: Array, columns: Array, begin: float, end: float) -> tup
 
 
 def spline_through(time: Array, columns: Array) -> BSpline:
-    """Fit a spline with evenly spaced knots, fewer where samples are few."""
-    # Imported here: to see whether a result is current, nothing is fitted.
+    """Fit a spline with evenly spaced knots, with fewer knots if there are few samples."""
+    # Imported here, because checking whether a result is up to date needs no fit.
     from scipy.interpolate import make_lsq_spline
 
     degree = min(SPLINE_DEGREE, time.size - 1)
@@ -196,7 +196,7 @@ def spline_through(time: Array, columns: Array) -> BSpline:
 
 
 def lengths_of(model: RigidModel, angle: Array, step: NDArray[np.int64], count: int) -> Array:
-    """Return the lengths (m) of the steps, from the legs' angles as they begin and end."""
+    """Return the step lengths (m) from the leg angles at the beginning and end of each step."""
     n = len(model.arm_x)
     states = np.zeros((2, count, 2 * n))
     for number in range(count):

@@ -1,4 +1,4 @@
-"""The paper's ADAMS start (Table 2) in both models, and why that walk ends."""
+"""Walks of both models from the paper's ADAMS start (Table 2), and the reason why they end."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -19,33 +19,33 @@ from walkerlab.physics.hybrid.rigid_measures import energies, reactions
 from walkerlab.physics.mechanics.rigid_model import RigidModel
 from walkerlab.physics.solvers.system import State
 
-FALLING = 4  # samples through which a falling hip's height is fitted as a cubic
+FALLING = 4  # number of last samples in the cubic fit of a falling hip's height
 
 
 @dataclass(frozen=True)
 class AdamsStart:
-    """The ADAMS start in the rigid model."""
+    """Walk of the rigid model from the ADAMS start."""
 
     state: State  # rad and rad/s
     slope: float  # rad
-    energy: float  # J, kinetic and potential, from the stance foot
+    energy: float  # J, kinetic plus potential energy, with heights measured from the stance foot
     weight: float  # N
-    normal_force: float  # N, of the ground at the start
+    normal_force: float  # N, normal force of the ground at the start
     pull_from: float | None  # s, time from which the ground would have to pull; None if never
-    heel_strikes: int  # number
+    heel_strikes: int  # number of heel strikes in the walk
     end: str  # outcome of the walk
     end_time: float  # s
 
 
 @dataclass(frozen=True)
 class AdamsWalk:
-    """The ADAMS start in the contact model."""
+    """Walk of the contact model from the ADAMS start."""
 
-    terrain: str  # of the contact model's ground
-    rigid: AdamsStart  # the same start in the rigid model, both feet on the config's slope
+    terrain: str  # terrain of the contact model
+    rigid: AdamsStart  # walk of the rigid model from the same start, both feet on the config's slope
     walk: ContactWalkResult
-    airborne_from: float | None  # s, time from which no foot of the contact model touches; None if never
-    # N, largest one of the contact model once the rigid model's ground would have to pull
+    airborne_from: float | None  # s, first time at which no foot of the contact model touches the ground; None if never
+    # N, largest normal force of the contact model after the rigid model's ground would have to pull
     later_normal_force: float | None
     normal: NDArray[np.float64]  # (samples, leg) N, normal forces of the contact model
     mechanical: NDArray[np.float64]  # (samples,) J, kinetic and potential energy of the contact model
@@ -56,7 +56,7 @@ class AdamsWalk:
 
 
 def adams_start(walker: RigidModel, state: State) -> AdamsStart:
-    """Walk a step of the rigid model from Table 2's ADAMS start."""
+    """Walk one step of the rigid model from `state`, the ADAMS start of Table 2."""
     walk = take_walk(walker, TIGHT, state, 1, sampled=True)
     assert walk.samples is not None
     time, states, start = walk.samples.time_s, walk.samples.state, np.array([state])
@@ -82,8 +82,8 @@ def adams_walk(
 ) -> AdamsWalk:
     """Walk the contact model from Table 2's ADAMS start: the printed stance angle and velocities on the walker's slope.
 
-    walk     walks the contact model from a rigid start state, with samples
-    terrain  config name of its ground
+    walk     function that walks the contact model from a rigid start state, with samples
+    terrain  terrain of the contact model, as named in the config
     """
     _, theta_2, omega_1, omega_2 = adams_start_as_printed()
     rigid = adams_start(walker, (-2.0 * walker.slope - theta_2, theta_2, omega_1, omega_2))
@@ -105,7 +105,7 @@ def adams_walk(
 
 
 def first_below_zero(time: Array, values: Array) -> float | None:
-    """Time at which sampled values first cross zero downwards, interpolated; None if they do not."""
+    """Return the interpolated time (s) at which sampled values first cross zero downwards; None if they do not."""
     below = np.flatnonzero(values < 0.0)
     if below.size == 0:
         return None

@@ -1,7 +1,7 @@
 """Appendix A of the paper: the compass walker's equations as printed, and with C_21 corrected.
 
-The rigid model, assembled from parts (mechanics/), is checked against these equations (energies, forces and the foot's
-height are in the tests); `as-printed` uses their sign.
+Tests check the rigid model, assembled from parts (physics/mechanics), against these equations, and against those for
+energies, forces and the foot's height, which only the tests contain. The set `as-printed` uses the printed sign.
 
 State (theta_1 swing, theta_2 stance, dtheta_1, dtheta_2): absolute angles from the vertical, counter-clockwise
 positive, rad and rad/s. The walker walks in +x, downhill for a positive slope.
@@ -22,7 +22,7 @@ AS_PRINTED = 1.0
 
 
 class RigidWalker(NamedTuple):
-    """A compass walker on a slope, SI units; textbook letters in brackets."""
+    """Compass walker on a slope, SI units; the paper's letters are in brackets."""
 
     leg_length: float  # [L] m
     foot_to_mass: float  # [a] m
@@ -70,16 +70,16 @@ def accelerations(
 
 
 def step_length(walker: RigidWalker, theta_1: float, theta_2: float) -> float:
-    """Distance between the feet along the slope (m) with both on it: 2 L sin((theta_2 - theta_1)/2)."""
+    """Distance (m) along the slope between the feet when both are on it: 2 L sin((theta_2 - theta_1)/2)."""
     return 2.0 * walker.leg_length * math.sin(0.5 * (theta_2 - theta_1))
 
 
 def impact_matrices(walker: RigidWalker, cos_d: float) -> tuple[float, float, float, float, float, float]:
-    """(A_11, A_12, A_22, B_11, B_12, B_22) of A w+ = B w-, angular velocities (w_1, w_2) before the change of roles.
+    """Entries A_11, A_12, A_22, B_11, B_12, B_22 of A w+ = B w-, with w = (w_1, w_2) as before the change of roles.
 
-    (A.57) with the constraint E dq+ = 0 solved first: dq+ = Z w+, so that Z' D_e Z w+ = Z' D_e dq- and the impulse
-    drops out. With the right sign in (A.55) everything depends on cos(theta_2 - theta_1) alone, and B_21 = 0: the
-    trailing leg keeps its angular momentum about the hip.
+    They follow from (A.57): the constraint E dq+ = 0 gives dq+ = Z w+, so Z' D_e Z w+ = Z' D_e dq- without the impulse.
+    With the right sign in (A.55) they depend on cos(theta_2 - theta_1) alone, and B_21 = 0 because the trailing leg
+    keeps its angular momentum about the hip.
     """
     c = swing_constants(walker)
     L = walker.leg_length
@@ -96,7 +96,7 @@ def impact_matrices(walker: RigidWalker, cos_d: float) -> tuple[float, float, fl
 def impact(
     walker: RigidWalker, theta_1: float, theta_2: float, omega_1: float, omega_2: float
 ) -> tuple[float, float, float, float]:
-    """State after the heel strike, with roles changed: the former swing leg is theta_2."""
+    """State after the heel strike, with the roles exchanged: theta_2 is the former swing leg."""
     s1, c1 = sine_cosine(theta_1)
     s2, c2 = sine_cosine(theta_2)
     A_11, A_12, A_22, B_11, B_12, B_22 = impact_matrices(walker, c1 * c2 + s1 * s2)

@@ -1,4 +1,4 @@
-"""Stage `compare`: both models compared with each other and, for the paper's walker, with every number it prints."""
+"""Stage `compare`: compare both models with each other and, for the paper's walker, with every number in the paper."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ from walkerlab.pipeline.store.columns import numbered, rows_group
 from walkerlab.pipeline.store.content import Content, Group, Variable
 from walkerlab.scene.contact import GAIT_TOLERANCES, contact_scene, require_contact, start_state
 
-START_TOLERANCE = 1e-6  # rad and rad/s: a start this far from the fixed point is another one
+START_TOLERANCE = 1e-6  # rad and rad/s; a start farther than this from the fixed point counts as moved
 EQUATION_SETS: tuple[Equations, ...] = ("as-printed", "corrected")
 PAPER_OMISSION = {
     "what": "the paper's numbers, tables and errata",
@@ -123,7 +123,7 @@ def against_the_paper(
 
 
 def models_compared(config: CompareConfig, inputs: Mapping[str, Content]) -> dict[str, Any]:
-    """Summarise the walks of both models, and for knees the walks with either release."""
+    """Summarise the walks of both models and, for kneed walkers, the walks with each knee release."""
     gait, rigid, contact = (inputs[name].summary for name in ("fixedpoint", "simulate", "contact-sim"))
     releases = compare_releases(config, as_state(gait["state"]), float(contact["pitch_m"]))
     return {
@@ -145,7 +145,7 @@ def models_compared(config: CompareConfig, inputs: Mapping[str, Content]) -> dic
 
 
 def measure(config: CompareConfig, inputs: Mapping[str, Content], motion: Comparison) -> Measured:
-    """Measure everything that the paper's numbers are compared with."""
+    """Make the measurements that are compared with the paper's numbers."""
     sets = inputs["fixedpoint"].summary["equation_sets"]
     gaits = {name: sets[name] for name in EQUATION_SETS if "state" in sets.get(name, {})}
     models: dict[str, RigidMeasurements] = {
@@ -174,7 +174,7 @@ def measure_contact_model(config: CompareConfig, walk: Content) -> ContactMeasur
     angle, joules = (stored_variable(walk, "trajectory", name) for name in ("angle", "mechanical_J"))
     touches = times_of_steps(walk, "touch_time_s")
     energy = None if joules is None else over_last_steps(walk["trajectory"]["time"], joules, touches)
-    # from x_p with its printed digits, both feet on the config's slope
+    # walk from the printed x_p, with the swing angle that puts both feet on the config's slope
     _, theta_2, omega_1, omega_2 = fixed_point_as_printed()
     scene = contact_scene(config, pitch, pitch)
     start = start_state(scene, (-2.0 * config.slope_rad - theta_2, theta_2, omega_1, omega_2))
@@ -211,9 +211,9 @@ def left_out(inputs: Mapping[str, Content], measured: Measured) -> list[dict[str
 
 
 def numbers_group(rows: Sequence[Mapping[str, Any]], names: Sequence[str] | Mapping[str, Any] = ()) -> Group:
-    """Build a group with the paper's numbers and those of the models.
+    """Build a group with the numbers of the paper and of the models.
 
-    A model's column holds only the rows with a value; its own coordinate lists these rows. Texts cover all rows.
+    A model's column holds only rows with a value; its own coordinate lists these rows. Text columns hold all rows.
 
     names  symbols of the rows, if they have any
     """

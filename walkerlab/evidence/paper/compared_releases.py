@@ -1,7 +1,7 @@
-"""Contact walks from one gait that differ only in when the trailing knee is released.
+"""Contact walks from one gait that differ only in the moment at which the trailing knee is released.
 
-Each is compared with the corresponding rigid model: released during compression the trailing knee is rigid in the
-impact, released at first touch it is free.
+Each is compared with the corresponding rigid model, in which a knee released during compression is rigid in the impact,
+and a knee released at first touch is free.
 """
 
 from dataclasses import replace
@@ -36,7 +36,7 @@ LOCK_OMISSION = (
 
 
 def compare_releases(config: ContactConfig, state: State, pitch_m: float) -> dict[str, Any] | None:
-    """Walk up to 20 steps from a gait with each release; None without knees, or if they wait for a push-off."""
+    """Walk up to 20 steps from a gait with each release; None for walkers without knees or with a push-off."""
     scene = contact_scene(config, pitch_m, pitch_m)
     if not scene.walker.kneed or config.push_off.impulse_N_s != 0.0:
         return None

@@ -21,18 +21,18 @@ from walkerlab.evidence.paper.printed import (
 )
 
 APPROXIMATE_FACTOR: Final = 2.0
-"""'Around 1e-4' is up to twice that."""
+"""Largest ratio of a value to 1e-4 that still counts as 'around 1e-4'."""
 Interval = tuple[float, float]
 
 
 @cache
 def contradictions() -> MappingProxyType[Printed, str]:
-    """Printed values that other values of the paper contradict, each with the computation."""
+    """Return the printed values that other values of the paper contradict, each with the computation."""
     return MappingProxyType(dict([*percentages(), *steps_of_a_cycle(), *lengths_and_speeds(), start_error()]))
 
 
 def interval(function: Callable[..., float], *entries: Printed) -> Interval:
-    """Range of a function, monotonic in each argument, over all values that round to the printed ones."""
+    """Return the range of a function, monotonic in each argument, over all values that round to the printed ones."""
     values = [function(*corner) for corner in product(*(entry.rounding for entry in entries))]
     return min(values), max(values)
 
@@ -42,10 +42,10 @@ def are_disjoint(first: Interval, second: Interval) -> bool:
 
 
 def percentages() -> Iterator[tuple[Printed, str]]:
-    """Percentages of Table 2 that are not relative to the MATLAB column."""
+    """Yield the percentages of Table 2 that are not relative to the MATLAB column, each with the computation."""
     for row in TABLE_2:
         low, high = percent_left_open(row)
-        # the signs of the column follow no rule, so sizes are compared
+        # the signs of the column follow no rule, so magnitudes are compared
         smallest = 0.0 if low <= 0.0 <= high else min(abs(low), abs(high))
         if are_disjoint((smallest, max(abs(low), abs(high))), row.percent.rounding):
             change = f"{row.matlab.text} to {row.adams.text} {row.matlab.unit} is {row.percent_of_matlab:+.3g}%"
@@ -53,12 +53,12 @@ def percentages() -> Iterator[tuple[Printed, str]]:
 
 
 def percent_left_open(row: StartRow) -> Interval:
-    """Range of the change in magnitude from MATLAB's to ADAMS's value (%), given the rounding of both."""
+    """Return the range of the change in magnitude from MATLAB's to ADAMS's value (%), given the rounding of both."""
     return interval(lambda adams, matlab: 100.0 * (abs(adams) / abs(matlab) - 1.0), row.adams, row.matlab)
 
 
 def steps_of_a_cycle() -> Iterator[tuple[Printed, str]]:
-    """Unequal steps of a period-one gait, and a cycle that is not the sum of its steps."""
+    """Yield unequal steps of a period-one gait, and cycles that are not the sum of their steps."""
     left, right = T_LEFT.matlab, T_RIGHT.matlab
     if are_disjoint(left.rounding, right.rounding):
         equal = "x_p is a fixed point of one step (eq. 10 and 11), so its steps are equal"
@@ -74,7 +74,7 @@ def steps_of_a_cycle() -> Iterator[tuple[Printed, str]]:
 
 
 def lengths_and_speeds() -> Iterator[tuple[Printed, str]]:
-    """A step length, and speeds, that do not follow from the legs' length and angles."""
+    """Yield a step length and speeds that do not follow from the length and angles of the legs."""
     leg = TABLE_1[0]
     for column, source in (("matlab", "x_p and Table 1"), ("adams", "Tables 1 and 2")):
         angles = [getattr(row, column) for row in TABLE_2[:2]]
@@ -84,7 +84,7 @@ def lengths_and_speeds() -> Iterator[tuple[Printed, str]]:
         if column == "matlab" and are_disjoint(steps, STEP_LENGTH.rounding):
             yield STEP_LENGTH, f"{feet}, {length / STEP_LENGTH.value:.1f} times {STEP_LENGTH.text} m"
         speed, cycle = getattr(V_COM, column), getattr(T_CYCLE, column)
-        # one step over a cycle, as section 5 has it, or both steps of the cycle
+        # one step per cycle, as in section 5, or both steps of the cycle
         low, high = steps[0] / cycle.rounding[1], 2.0 * steps[1] / cycle.rounding[0]
         if are_disjoint((low, high), speed.rounding):
             one_step, two_steps = length / cycle.value, 2.0 * length / cycle.value
@@ -93,7 +93,7 @@ def lengths_and_speeds() -> Iterator[tuple[Printed, str]]:
 
 
 def start_error() -> tuple[Printed, str]:
-    """The largest error, which cannot be below the difference between the two starts."""
+    """Return the largest error, which cannot be smaller than the difference between the two starts."""
     angle, rate = (max(abs(row.adams.value - row.matlab.value) for row in rows) for rows in (TABLE_2[:2], TABLE_2[2:]))
     return LARGEST_ERROR, (
         f"the two starts of Table 2 alone differ by {angle:.4f} rad and {rate:.2f} rad/s, "

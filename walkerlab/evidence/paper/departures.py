@@ -1,4 +1,4 @@
-"""Differences from the paper's scene; with any, a config's numbers neither confirm nor refute the paper's."""
+"""Differences from the paper's scene; if there are any, a config's numbers neither confirm nor refute the paper's."""
 
 from collections.abc import Iterable, Iterator
 from typing import Any, Final
@@ -14,13 +14,13 @@ from walkerlab.evidence.paper.printed import X_P, slope_of
 
 CONTACT_MODEL_KEYS: Final = ("foot_radius_m",)
 SI_KEYS: Final = ("stiffness", "damping", *BOUNDS_SI)
-"""Keys of the contact block whose values depend on its units."""
+"""Keys of the contact block whose values depend on the block's units."""
 UNITLESS_KEYS: Final = tuple(name for name in Contact.model_fields if name not in (*SI_KEYS, "units", "stance"))
-"""Remaining keys of the contact block, except `stance`: the paper also has a pinned first stance (section 4)."""
+"""Remaining keys of the contact block, except `stance`: the paper also pins the first stance foot (section 4)."""
 
 
 def departures(config: CompareConfig, start_moved: bool) -> Departures:
-    """Describe the differences from the paper's scene; the slope is compared to the digits of x_p."""
+    """Describe the differences from the paper's scene; slopes that agree within the rounding of x_p count as equal."""
     walker, contact, paper = config.walker, config.contact, CompassWalker()
     rigid: list[str] = []
     of_contact: list[str] = []

@@ -14,7 +14,7 @@ from walkerlab.pipeline.stages.walk import LEG, STEP, TIME, legs, over_time
 from walkerlab.pipeline.store.columns import numbered
 from walkerlab.pipeline.store.content import Content, Group, Variable
 
-STEPS_PER_STRIDE = 2  # steps
+STEPS_PER_STRIDE = 2
 ALIGNMENTS = ("raw", "aligned", "between_impacts", "settled")
 QUANTITY_KEYS: dict[str, comparison.Quantity] = {"max_angle_error_rad": "angle", "max_velocity_error_rad_s": "velocity"}
 PHASE = "phase"
@@ -26,13 +26,13 @@ def stored_variable(walk: Content, group: str, name: str) -> comparison.Array | 
 
 
 def times_of_steps(walk: Content, name: str) -> comparison.Array:
-    """Return the times (s) of a walk's steps, empty unless stored."""
+    """Return the times (s) of a walk's steps; empty if they were not stored."""
     times = stored_variable(walk, "steps", name)
     return np.zeros(0) if times is None else times
 
 
 def motion_of(walk: Content) -> comparison.Motion | None:
-    """Motion of the legs in a stored walk; None if states were not stored or the walk ended at once."""
+    """Return the motion of the legs in a stored walk; None if states were not stored or the walk ended at once."""
     angle = stored_variable(walk, "trajectory", "angle")
     if angle is None or len(angle) < 2:
         return None
@@ -46,10 +46,10 @@ def motion_of(walk: Content) -> comparison.Motion | None:
 class Comparison:
     """Difference between the walks of both models."""
 
-    errors: Errors  # by alignment, where there is something to compare
-    orbit: list[float] | None = None  # distance between each leg's orbits, or None
+    errors: Errors  # differences by alignment, where there is something to compare
+    orbit: list[float] | None = None  # distance between the orbits of each leg; None without a complete stride
     groups: Mapping[str, Group] = field(default_factory=dict)
-    left_out: tuple[dict[str, str], ...] = ()  # comparisons left out, and why
+    left_out: tuple[dict[str, str], ...] = ()  # omitted comparisons, with reasons
 
     @property
     def summary(self) -> dict[str, Any]:
@@ -65,7 +65,7 @@ class Comparison:
 def compare_motion(
     rigid: comparison.Motion | None, contact: comparison.Motion | None, meaning: str = "contact less rigid model"
 ) -> Comparison:
-    """Subtract the first walk from the second: in time, in phase, and as orbits; `meaning` describes the difference."""
+    """Compare two walks in time, in phase and as orbits, second minus first; `meaning` describes the difference."""
     if rigid is None or contact is None:
         why = "there are no states of both walks: outputs omits them, or a walk ended at once"
         return Comparison({}, left_out=({"what": "differences of the walks", "why": why},))
@@ -110,7 +110,7 @@ def select(difference: comparison.WalkDifference, where: Any) -> comparison.Walk
 def differences(
     way: str, difference: comparison.WalkDifference, dims: tuple[str, ...], meaning: str
 ) -> dict[str, Variable]:
-    """Store differences of angles and velocities as variables."""
+    """Return differences of angles and velocities as variables to store; `way` is their alignment."""
     return {
         f"{way}_angle_error_rad": Variable(difference.angle, dims, "rad", f"angle, {meaning}"),
         f"{way}_velocity_error_rad_s": Variable(difference.velocity, dims, "rad/s", f"velocity, {meaning}"),

@@ -11,7 +11,7 @@ from walkerlab.labels import Label
 
 @dataclass(frozen=True)
 class Erratum:
-    """An error of the paper."""
+    """Error in the paper."""
 
     where: Annotated[str, Label("", "where the paper errs")]
     printed: Annotated[str, Label("", "as printed")]
@@ -26,5 +26,5 @@ ERRATUM_PATTERN = re.compile(" ".join(rf"{name}: (?P<{name}>.*?)" for name in ER
 
 
 def errata(study: PaperStudy) -> tuple[Erratum, ...]:
-    """All errata, by theme and then in the order of the paper's sections."""
+    """Return all errata, by theme and then in the order of the paper's sections."""
     return tuple(Erratum(**match.groupdict()) for match in ERRATUM_PATTERN.finditer(prose("errata.errata", study)))

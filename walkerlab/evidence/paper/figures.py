@@ -1,4 +1,4 @@
-"""Figures on the paper's claim: 8, the difference between both models' walks, and 12, the rigid limit."""
+"""Figures on the paper's claim: the difference between the walks of both models (8), and the rigid limit (12)."""
 
 from __future__ import annotations
 
@@ -32,12 +32,12 @@ PAPER_ERROR: Final = Look("largest error in the paper", GREY, ":", 1.6, "", orde
 AXIS_MARGIN = 3.0
 """Factor between the extreme errors and the ends of the axis."""
 ZERO_CROSSING = 1e-3
-"""Smallest error shown, as a share of the largest: errors vanish where the difference changes sign."""
+"""Smallest error shown, as a fraction of the largest; errors vanish where the difference changes sign."""
 LEG_QUANTITIES = (
     ("a", "angle", "angle_error_rad"),
     ("b", "angular velocity", "velocity_error_rad_s"),
 )
-"""Compared quantities: letter, name, variable of the errors (stored raw and aligned)."""
+"""Compared quantities: letter of the panel, name, variable of the errors (stored raw and aligned)."""
 RAW_ERRORS = Need(COMPARE_STAGE, "errors", ("time", *(f"raw_{name}" for _, _, name in LEG_QUANTITIES)), NO_STATES)
 ALIGNED_ERRORS = Need(
     COMPARE_STAGE,
@@ -89,7 +89,7 @@ def draw_differences(results: Results) -> Drawn:
 
 
 def largest_of_recorded(summary: Mapping[str, Any]) -> tuple[str, list[tuple[str, float, str]]] | None:
-    """Return the recorded walk's name and largest differences from the rigid model in phase; None without one."""
+    """Return the recorded walk's name and largest differences in phase from the rigid model; None if not recorded."""
     if not summary:
         return None
     differences = summary["differences"]["rigid"]
@@ -117,7 +117,7 @@ CONFIG_MARKER: Final[dict[str, Any]] = {
     "fillstyle": "none",
 }
 MIN_ERROR = 1e-14
-"""Shown for a numerical error of zero, which a logarithmic axis cannot show."""
+"""Error shown in place of zero, which a logarithmic axis cannot show."""
 
 
 def draw_limit(results: Results) -> Drawn:

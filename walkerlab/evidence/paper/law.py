@@ -1,6 +1,6 @@
 """The study's contribution to scenes (see scene/studies.py): its walker, and Appendix A's sign error as a torque.
 
-Every result of the rigid model depends on this file, so the rest of the study is kept in others.
+Every result of the rigid model depends on this file, so the rest of the study is in other files.
 """
 
 from collections.abc import Callable, Mapping
@@ -25,4 +25,4 @@ def as_printed(model: RigidModel) -> RigidModel:
 
 
 LAWS: Mapping[str, Callable[[RigidModel], RigidModel]] = {"as-printed": as_printed}
-"""Changes of a walker's model, by the config's name for a set of equations."""
+"""Function that changes the rigid model, by the config's name for the set of equations."""

@@ -15,9 +15,9 @@ from walkerlab.physics.solvers.registry import ENDLESS, Tolerances
 from walkerlab.physics.solvers.system import State
 
 TIGHT = Tolerances("dop853", 1e-12, 1e-14, ENDLESS)
-"""Errors are far below any printed digit."""
-PAPER_CYCLES = 5  # walked in the paper
-ENERGY_STEPS = 5  # over which the paper averages the energy
+"""Tolerances at which errors are far below any printed digit."""
+PAPER_CYCLES = 5  # gait cycles walked in the paper
+ENERGY_STEPS = 5  # steps over which the paper averages the energy
 
 
 @dataclass(frozen=True)
@@ -25,15 +25,15 @@ class Characteristics:
     """Quantities of Table 3, SI units; None where the walk or its record is too short."""
 
     t_left: float | None  # period of the first step of the last completed stride
-    t_right: float | None  # period of its second step
-    t_cycle: float | None  # their sum
-    v_com: float | None  # length of the stride along the slope over t_cycle
-    # time mean of kinetic and potential energy, from the current stance foot, over at least five steps
+    t_right: float | None  # period of the second step of that stride
+    t_cycle: float | None  # sum of both periods
+    v_com: float | None  # length of that stride along the slope, divided by t_cycle
+    # time mean of kinetic plus potential energy over several steps, with heights from the current stance foot
     E_avg: float | None
 
 
 def characteristics(periods: Array, lengths: Array, mean_energy: float | None) -> Characteristics:
-    """Compute Table 3 from the periods (s) and lengths (m) of a walk's steps."""
+    """Compute Table 3 from the periods (s) and lengths (m) of a walk's steps and its mean energy (J)."""
     strides = len(periods) // 2
     if strides == 0:
         first = float(periods[0]) if len(periods) else None
@@ -54,7 +54,7 @@ class EnergyRecord:
 
 
 def over_last_steps(time: Array, energy: Array, step_ends: Array) -> EnergyRecord | None:
-    """Average a sampled energy over the last five completed steps, or fewer; None without a step."""
+    """Average a sampled energy (J) over the last five completed steps (all if fewer); None if no step was completed."""
     if step_ends.size == 0:
         return None
     start = step_ends[-1 - ENERGY_STEPS] if step_ends.size > ENERGY_STEPS else time[0]
@@ -71,16 +71,16 @@ class RigidMeasurements:
     """Gait of one set of equations, and a walk from it."""
 
     state: State  # fixed point, rad and rad/s
-    steps: int  # completed, of ten
-    step_length: float  # m, between the feet at that state
+    steps: int  # completed steps, out of ten
+    step_length: float  # m, distance between the feet at the fixed point
     table_3: Characteristics
-    energy_least: float  # J, minimum and maximum energy during the walk
-    energy_most: float
-    energy_drift: float  # J, largest spread within a swing
+    energy_least: float  # J, minimum energy during the walk
+    energy_most: float  # J, maximum energy during the walk
+    energy_drift: float  # J, largest change of the energy within a swing
 
 
 def measure_rigid_model(walker: RigidWalker, state: State) -> RigidMeasurements:
-    """Walk five cycles from a gait's fixed point; energy is measured from the current stance foot."""
+    """Walk five cycles from a gait's fixed point; energies are measured from the current stance foot."""
     model = assembled(walker)
     walk = take_walk(model, TIGHT, state, 2 * PAPER_CYCLES, sampled=True)
     assert walk.samples is not None
@@ -98,16 +98,16 @@ def measure_rigid_model(walker: RigidWalker, state: State) -> RigidMeasurements:
 
 @dataclass(frozen=True)
 class ContactMeasurements:
-    """Walk of the contact model, to compare with the paper's ADAMS model."""
+    """Walk of the contact model, for comparison with the paper's ADAMS model."""
 
-    law: Contact  # the contact block of its config
+    law: Contact  # contact block of the config
     foot_radius: float  # m
     summary: Mapping[str, Any]  # stored summary of the walk
     start: State | None  # initial rigid state, rad and rad/s; None if states were not stored
     table_3: Characteristics
-    step_length: float | None  # m, mean over the last completed stride; None without one
-    energy: EnergyRecord | None  # over the last five steps; None if energies were not stored
-    from_x_p: tuple[int, str]  # steps from x_p with its printed digits, of ten, and the outcome of that walk
+    step_length: float | None  # m, mean over the last completed stride; None if no stride was completed
+    energy: EnergyRecord | None  # energy over the last five steps; None if energies were not stored
+    from_x_p: tuple[int, str]  # completed steps, out of ten, of a walk from the printed x_p, and its outcome
 
     @property
     def steps(self) -> int:
@@ -123,17 +123,17 @@ Errors = Mapping[str, WalkDifference]
 
 raw              at the same time
 aligned          at the same phase of each step
-between_impacts  the same without the start of each step, while a compliant impact is still in progress
-settled          the same for the last completed stride only
+between_impacts  aligned, without the start of each step, when a compliant impact is still in progress
+settled          between_impacts, for the last completed stride only
 """
 
 
 @dataclass(frozen=True)
 class Departures:
-    """Descriptions of a scene's differences from the paper's."""
+    """Descriptions of the differences between a scene and the paper's scene."""
 
-    rigid: tuple[str, ...]  # of the rigid model
-    contact: tuple[str, ...]  # of the contact model, those of the rigid model included
+    rigid: tuple[str, ...]  # differences of the rigid model
+    contact: tuple[str, ...]  # differences of the contact model, including those of the rigid model
 
 
 @dataclass(frozen=True)
@@ -142,8 +142,8 @@ class Measured:
 
     walker: RigidWalker
     equations: str
-    models: Mapping[str, RigidMeasurements]  # by set of equations, if it has a gait
-    spectral_radii: Mapping[str, float]  # of the same gaits
+    models: Mapping[str, RigidMeasurements]  # measurements by set of equations, for sets that have a gait
+    spectral_radii: Mapping[str, float]  # spectral radii of these gaits, by set of equations
     contact: ContactMeasurements
     errors: Errors
     departures: Departures

@@ -16,7 +16,7 @@ ROOT_TOLERANCE = 1e-9
 
 
 def inertia_at_impact(walker: RigidWalker, theta_1: float, theta_2: float) -> Array:
-    """D_e of (A.9) to (A.24), for velocities of (theta_1, theta_2, x, y)."""
+    """Mass matrix D_e of (A.9) to (A.24), for velocities of (theta_1, theta_2, x, y)."""
     L, a, m, M_H = walker.leg_length, walker.foot_to_mass, walker.leg_mass, walker.hip_mass
     b = L - a
     K = L * m + a * m + L * M_H
@@ -34,20 +34,20 @@ def inertia_at_impact(walker: RigidWalker, theta_1: float, theta_2: float) -> Ar
 
 
 def swing_foot(walker: RigidWalker, theta_1: float, theta_2: float, row_2: float) -> Array:
-    """P (m) of (A.55) with the stance foot at the origin; `row_2` is RIGHT or MISPRINTED."""
+    """Position P (m) of the swing foot, (A.55), with the stance foot at the origin; `row_2` is RIGHT or MISPRINTED."""
     L = walker.leg_length
     rise = L * (math.cos(theta_2) - math.cos(theta_1))
     return np.array([L * (math.sin(theta_1) - math.sin(theta_2)), row_2 * rise])
 
 
 def height_over_slope(walker: RigidWalker, theta_1: float, theta_2: float, row_2: float) -> float:
-    """Height (m) over the slope at which P places the swing foot."""
+    """Height (m) above the slope at which P places the swing foot."""
     along, up = swing_foot(walker, theta_1, theta_2, row_2)
     return float(along * math.sin(walker.slope) + up * math.cos(walker.slope))
 
 
 def swing_foot_gradient(walker: RigidWalker, theta_1: float, theta_2: float, row_2: float) -> Array:
-    """E of (A.56), the derivative of `swing_foot` with respect to (theta_1, theta_2, x, y)."""
+    """Matrix E of (A.56), the derivative of `swing_foot` with respect to (theta_1, theta_2, x, y)."""
     L = walker.leg_length
     return np.array(
         [
@@ -73,7 +73,7 @@ def foothold_speed_after_impact(walker: RigidWalker, before: State, row_2: float
 
 
 def step(walker: RigidWalker, start: State, row_2: float) -> State | None:
-    """State after one step with the impact of (A.57); None without a heel strike."""
+    """Return the state after one step with the impact of (A.57); None if no heel strike occurs."""
     walk = take_walk(assembled(walker), TIGHT, start, 1)
     if walk.steps == 0:
         return None
@@ -83,7 +83,7 @@ def step(walker: RigidWalker, start: State, row_2: float) -> State | None:
 
 
 def fixed_point(walker: RigidWalker, guess: State, row_2: float) -> State | None:
-    """Fixed point, near `guess`, of the step map with the impact of (A.57); None if the search fails."""
+    """Find the fixed point, near `guess`, of the step map with the impact of (A.57); None if the search fails."""
 
     def state(z: Array) -> State:
         return -2.0 * walker.slope - float(z[0]), float(z[0]), float(z[1]), float(z[2])

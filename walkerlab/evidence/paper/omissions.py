@@ -1,4 +1,4 @@
-"""Parts of the paper's adjustment that a config leaves out, known before anything is loaded or run."""
+"""Parts of the paper's adjustment that do not apply to a config, known before anything is loaded or run."""
 
 from __future__ import annotations
 

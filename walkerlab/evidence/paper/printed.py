@@ -1,4 +1,4 @@
-"""Numbers that the paper prints, with their sources, and the walker they describe."""
+"""Numbers printed in the paper, with their sources, and the walker that they describe."""
 
 from dataclasses import dataclass
 from decimal import ROUND_DOWN, ROUND_HALF_UP, Decimal
@@ -14,12 +14,12 @@ COORDINATE_UNITS: Final = ("rad", "rad", "rad/s", "rad/s")
 
 @dataclass(frozen=True)
 class Printed:
-    """A number of the paper."""
+    """Number printed in the paper."""
 
     where: str  # equation, table, figure or section
     quantity: str
     unit: str
-    text: str  # as printed, which shows its last digit
+    text: str  # text as printed, which shows the last significant digit
 
     @property
     def value(self) -> float:
@@ -32,12 +32,12 @@ class Printed:
 
     @property
     def rounding(self) -> tuple[float, float]:
-        """Smallest and largest value that rounds to it."""
+        """Smallest and largest value that round to the printed one."""
         half = 0.5 * self.last_digit
         return self.value - half, self.value + half
 
     def agreement(self, value: float | None) -> str:
-        """How a value agrees to the printed digits: 'rounded', 'cut off', or '' if it does not."""
+        """Agreement of a value with the printed digits: 'rounded', 'cut off', or '' if it disagrees."""
         if value is None:
             return ""
         expected, decimal = number(self.text), Decimal(repr(float(value)))
@@ -91,7 +91,7 @@ class StartRow(PrintedRow):
 
     @property
     def percent_of_adams(self) -> float:
-        """The same, relative to the ADAMS value, in percent."""
+        """Increase in magnitude from MATLAB to ADAMS, relative to the ADAMS value, in percent."""
         return self._percent_of(self.adams)
 
     def _percent_of(self, base: Printed) -> float:
@@ -141,7 +141,7 @@ DYNAMIC_FRICTION: Final = Printed("section 4, Fig. 4b", "dynamic friction", "1",
 LOST_BALANCE: Final = Printed("section 4", "steps until balance was lost, from MATLAB's initial conditions", "1", "one")
 CYCLES_WALKED: Final = Printed("section 5, Fig. 7", "gait cycles walked", "1", "five")
 LARGEST_ERROR: Final = Printed("section 5, Fig. 8", "largest error, angles and velocities", "rad, rad/s", "10^-4")
-"""One value for angles and velocities."""
+"""Single value for both angles and velocities."""
 STEP_LENGTH: Final = Printed("section 5", "length of one complete step", "m", "0.0342")
 VELOCITY_DIFFERENCE: Final = Printed("section 5", "difference of the average velocities", "%", "less than 1%")
 
@@ -150,13 +150,13 @@ EQUATION_NUMBERS: Final = (*range(1, 42), *range(55, 59))
 
 
 def fixed_point_as_printed() -> tuple[float, float, float, float]:
-    """x_p of eq. 11."""
+    """Fixed point x_p of eq. 11 (rad, rad/s)."""
     theta_1, theta_2, omega_1, omega_2 = (entry.value for entry in X_P)
     return theta_1, theta_2, omega_1, omega_2
 
 
 def adams_start_as_printed() -> tuple[float, float, float, float]:
-    """The start of the ADAMS model, Table 2."""
+    """Start of the ADAMS model in Table 2 (rad, rad/s)."""
     theta_1, theta_2, omega_1, omega_2 = (row.adams.value for row in TABLE_2)
     return theta_1, theta_2, omega_1, omega_2
 
@@ -173,26 +173,26 @@ def walker_of_the_paper(c21_sign: float) -> RigidWalker:
 
 
 def printed_speed(cycle: float) -> float:
-    """Printed step length over the time (s) of a cycle, as in section 5 (m/s)."""
+    """Speed (m/s) as section 5 computes it: the printed step length divided by the time (s) of a cycle."""
     return STEP_LENGTH.value / cycle
 
 
 def speed_difference(matlab_cycle: float, adams_cycle: float) -> float:
-    """Relative difference (%) of the speeds that follow from cycles of these times (s)."""
+    """Relative difference (%) of the speeds implied by two cycle times (s)."""
     matlab, adams = printed_speed(matlab_cycle), printed_speed(adams_cycle)
     return 100.0 * abs(adams - matlab) / matlab
 
 
 def softening_in_metres() -> float:
-    """Return how much lower a default stiffness of ADAMS is in a model in metres than in one in millimetres."""
+    """Return the factor by which a default stiffness of ADAMS is lower in a model in metres than in millimetres."""
     return float(MM_PER_M ** (Contact().exponent - 1.0))
 
 
 def readings_of_fig_4b() -> tuple[RestingFoot, RestingFoot, RestingFoot]:
-    """Rest of the paper's walker on its contact parameters: in N, mm and s; in SI; as defaults of a model in metres.
+    """Walker of the paper at rest on its contact, with parameters in N, mm, s; in SI; as defaults of a model in metres.
 
-    Adams View converts a default stiffness as force over length whatever the exponent, so the same dialog in a model in
-    metres has 1000^(exponent - 1) times less of it than 10^5 N/mm^exponent.
+    Adams View converts a default stiffness as force over length, whatever the exponent. The same dialog in a model in
+    metres therefore means a stiffness 1000^(exponent - 1) times lower than 10^5 N/mm^exponent.
     """
     _, leg, hip, gravity = (entry.value for entry in TABLE_1)
     mass, adams = hip + 2.0 * leg, Contact(stiffness=STIFFNESS.value, damping=DAMPING.value).in_si()

@@ -1,4 +1,4 @@
-"""A recorded walk compared with the walks of both models."""
+"""Comparison of a recorded walk with the walks of both models."""
 
 from collections.abc import Mapping
 from dataclasses import asdict
@@ -15,7 +15,7 @@ MODELS = {"rigid": "simulate", "contact": "contact-sim"}
 
 
 def compare_recorded(inputs: Mapping[str, Content]) -> tuple[dict[str, Group], dict[str, Any]]:
-    """Return groups and summary of the recorded walk's differences from each model; empty without one."""
+    """Return groups and summary of the recorded walk's differences from each model; empty if no walk was recorded."""
     recorded = inputs.get("recorded-walk")
     if recorded is None:
         return {}, {}
@@ -39,7 +39,7 @@ def compare_recorded(inputs: Mapping[str, Content]) -> tuple[dict[str, Group], d
 
 
 def characteristics_of(walk: Content) -> Characteristics:
-    """Return the quantities of Table 3 of a stored walk; its energy only where it was stored."""
+    """Return the quantities of Table 3 for a stored walk; the mean energy is None if energies were not stored."""
     periods, lengths = (np.array(walk.summary[key]) for key in ("step_periods_s", "step_lengths_m"))
     joules, touches = stored_variable(walk, "trajectory", "mechanical_J"), times_of_steps(walk, "touch_time_s")
     energy = None if joules is None else over_last_steps(walk["trajectory"]["time"], joules, touches)

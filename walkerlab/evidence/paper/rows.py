@@ -1,4 +1,4 @@
-"""The paper's numbers with verdicts, in order, and its three tables next to our measurements."""
+"""The paper's numbers in order, with verdicts, and its three tables next to our measurements."""
 
 import math
 from collections import Counter
@@ -21,18 +21,18 @@ WALKER_PARAMETERS = ("leg_length", "leg_mass", "hip_mass", "gravity")
 
 
 class NumberVerdict(StrEnum):
-    """Verdict on a printed value; each value has one."""
+    """Verdict on a printed value."""
 
     INPUT = "input"  # used as given
     REPRODUCED = "reproduced"  # agrees to the printed digits
-    EXPLAINED = "explained"  # does not agree, or not alone, for a measured reason
-    CONTRADICTED = "contradicted"  # by other values of the paper; overrides all other verdicts
+    EXPLAINED = "explained"  # does not agree, for a measured reason or because the scene is another
+    CONTRADICTED = "contradicted"  # contradicted by other values of the paper; overrides all other verdicts
     NOT_REPRODUCED = "not-reproduced"  # does not agree; includes values of ADAMS, which was not run
 
 
 @dataclass(frozen=True)
 class JudgedNumber:
-    """A printed number and the measured ones, in the printed unit; None where a model has no such value."""
+    """Printed number and the measured ones, in the printed unit; None where a model has no such value."""
 
     where: str
     quantity: str
@@ -51,7 +51,7 @@ Scene = Literal["rigid", "contact", "any"]
 
 
 def count_verdicts(rows: Iterable[JudgedNumber]) -> dict[str, int]:
-    """Values by verdict, and `refuted`, which repeats the last two until 0.3 is released."""
+    """Count values by verdict; `refuted` repeats the sum of the last two verdicts until 0.3 is released."""
     verdicts = Counter(row.verdict for row in rows)
     by_class = {verdict.value: verdicts[verdict] for verdict in NumberVerdict}
     return {**by_class, "refuted": verdicts[CONTRADICTED] + verdicts[NOT_REPRODUCED]}
@@ -85,7 +85,7 @@ def paper_rows(measured: Measured, study: PaperStudy) -> Iterator[JudgedNumber]:
 
 @dataclass(frozen=True)
 class Judge:
-    """Judges the paper's numbers by measurements on a config's scene and on the paper's own."""
+    """Judge of the paper's numbers, by measurements on a config's scene and on the paper's own."""
 
     measured: Measured
     study: PaperStudy
@@ -99,9 +99,9 @@ class Judge:
         scene: Scene,
         evidence: str,
     ) -> JudgedNumber:
-        """Build the row of a printed value, with the rigid model's values by set of equations, and the contact model's.
+        """Build the row of a printed value; `rigid` holds the rigid model's values by set of equations.
 
-        verdict  on the paper's own scene; replaced if another value of the paper contradicts the printed one
+        verdict  verdict on the paper's own scene; replaced if another value of the paper contradicts the printed one
         """
         departures = self.measured.departures
         differs = "; ".join(departures.rigid if scene == "rigid" else departures.contact)
@@ -153,7 +153,7 @@ class Judge:
         return self.row(printed.LOST_BALANCE, {}, float(steps), verdict_if(agrees), "contact", text)
 
     def percent(self, row: printed.StartRow, coordinate: int) -> JudgedNumber:
-        """Judge a percentage of Table 2, which is arithmetic, whatever the config."""
+        """Judge a percentage of Table 2, which is arithmetic and so independent of the config."""
         entry = row.percent
         verdict = REPRODUCED if entry.agreement(row.percent_of_matlab) else EXPLAINED
         left_open = None if entry in contradictions() else percent_left_open(row)
@@ -161,7 +161,7 @@ class Judge:
         return self.row(entry, {}, self.raised[coordinate], verdict, "any", text)
 
     def adams_start(self, entry: Printed, coordinate: int) -> JudgedNumber:
-        """Judge a coordinate of the ADAMS start: an input where the contact model starts from it."""
+        """Judge a coordinate of the ADAMS start, which is an input if the contact model starts from it."""
         contact = self.measured.contact
         value = None if contact.start is None else contact.start[coordinate]
         verdict = INPUT if entry.agreement(value) else NOT_REPRODUCED
@@ -169,7 +169,7 @@ class Judge:
         return self.row(entry, {}, value, verdict, "contact", text)
 
     def strides(self) -> JudgedNumber:
-        """Judge the five gait cycles, which the rigid models walk as well."""
+        """Judge the five gait cycles, which the rigid model walks as well."""
         entry, contact = printed.CYCLES_WALKED, self.measured.contact
         rigid = {name: float(model.steps // 2) for name, model in self.measured.models.items()}
         completed = contact.steps // 2
@@ -202,7 +202,7 @@ class Judge:
         return self.row(entry, lengths, contact, verdict_if(agrees), "rigid", text)
 
     def velocity_difference(self) -> JudgedNumber:
-        """Judge the difference of the average velocities; the paper's own arithmetic is in the evidence."""
+        """Judge the difference of the average velocities; the evidence includes the paper's own arithmetic."""
         entry, contact = printed.VELOCITY_DIFFERENCE, self.measured.contact.table_3.v_com
         speeds = {name: model.table_3.v_com for name, model in self.measured.models.items()}
         percentages = {
@@ -218,16 +218,16 @@ class Judge:
         return self.row(entry, percentages, None, verdict_if(agrees), "contact", text)
 
     def table_3(self, row: printed.PrintedRow) -> Iterator[JudgedNumber]:
-        """Judge a row of Table 3: MATLAB by the rigid model, ADAMS by the contact model."""
+        """Judge a row of Table 3: MATLAB's value by the rigid model, ADAMS's value by the contact model."""
         measured, study = self.measured, self.study
         values = {name: getattr(model.table_3, row.name) for name, model in measured.models.items()}
         rigid = {name: value for name, value in values.items() if value is not None}
         contact: float | None = getattr(measured.contact.table_3, row.name)
-        # both step periods share one cause, so the evidence has both
+        # both step periods share one cause, so the evidence shows both
         names = ("t_left", "t_right") if row in (printed.T_LEFT, printed.T_RIGHT) else (row.name,)
         means = {"five": study.five_steps_energy, "ten": study.from_x_p.E_avg} if row is printed.E_AVG else {}
         matching_means = [steps for steps, mean in means.items() if row.matlab.agreement(mean)]
-        # an energy that is a mean over another number of steps follows from the misprint, which does not conserve it
+        # with the misprint, energy is not conserved, so a mean over five or ten steps may explain the printed value
         verdict = EXPLAINED if matching_means else NOT_REPRODUCED
         text = prose("evidence.matlab", row, measured, names, study, matching_means)
         agrees = any(row.matlab.agreement(value) for value in rigid.values())
@@ -241,13 +241,13 @@ def verdict_if(agrees: bool) -> NumberVerdict:
 
 
 Table = dict[str, dict[str, Any]]
-"""Rows by name, as columns; None where a model has no such value."""
+"""Rows by name, each with its values by column; None where a model has no such value."""
 
 MIDDLE = "section 2: 'in the middle of the legs'"
 
 
 def table_1(measured: Measured, study: PaperStudy) -> Table:
-    """Parameters as printed, with their source, and as used."""
+    """Return the parameters as printed, with their source, and as used here."""
     walker, inertia, radius = measured.walker, printed.LEG_INERTIA, printed.FOOT_RADIUS
     length, mass, hip, gravity = printed.TABLE_1
     rows = (
@@ -267,7 +267,7 @@ def table_1(measured: Measured, study: PaperStudy) -> Table:
 
 
 def table_2(measured: Measured) -> Table:
-    """Initial values, and the percentages relative to either column."""
+    """Return the initial values, with their differences in percent of either column."""
     table, start = {}, measured.contact.start
     for place, (coordinate, row) in enumerate(zip(printed.STATE_NAMES, printed.TABLE_2, strict=True)):
         states = {name: model.state[place] for name, model in measured.models.items()}
@@ -290,7 +290,7 @@ def table_3(measured: Measured) -> Table:
 
 
 def number_columns(row: printed.PrintedRow, rigid: Mapping[str, float | None], contact: float | None) -> dict[str, Any]:
-    """Columns of both printed numbers, of the rigid model by set of equations, and of the contact model."""
+    """Return the columns of both printed numbers, of the rigid model by set of equations, and of the contact model."""
     return {
         "unit": row.matlab.unit,
         "paper_matlab": row.matlab.value,

@@ -1,4 +1,4 @@
-"""Report sections on the paper: each printed value and our own, its tables and its errata."""
+"""Report sections on the paper: its values next to ours, its tables and its errata."""
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -24,12 +24,12 @@ TONES: dict[str, Tone] = {
     "contradicted": "bad",
     "not-reproduced": "plain",
 }
-"""Verdicts on printed values, and their appearance."""
+"""Appearance of each verdict on a printed value."""
 
 TEXT_SUFFIX = "_text"
-"""Suffix of the key of a printed number's text."""
+"""Suffix of keys whose values are numbers in their printed form."""
 MODEL_COLUMNS = {"as_printed": "as printed", "corrected": "corrected", "contact": "contact model"}
-"""Columns compared with the paper's numbers."""
+"""Headers of the columns that are compared with the paper's numbers, by key."""
 
 
 def numbers(results: Results) -> Section | None:
@@ -47,7 +47,7 @@ def numbers(results: Results) -> Section | None:
 
 
 def numbers_table(rows: Sequence[Row]) -> Table:
-    """Table of the paper's numbers by location, with columns for the models that have values."""
+    """Build the table of the paper's numbers by location, with columns for the models that have values."""
     models = [key for key in MODEL_COLUMNS if any(row.get(key) is not None for row in rows)]
     columns = (
         Column("quantity", lambda row: name_with_unit(row["quantity"], row.get("unit"))),
@@ -74,7 +74,7 @@ def name_with_unit(name: str, unit: str | None) -> str:
 
 
 def paper_numbers(results: Results) -> Sequence[Row]:
-    """Rows from `compare`; empty if it did not run."""
+    """Return the rows from `compare`; empty if it did not run."""
     rows: Sequence[Row] = results.summary("compare").get("paper_numbers", ())
     return rows
 
@@ -86,7 +86,7 @@ def tables(results: Results) -> Section | None:
 
 
 def table_of(key: str, rows: Any) -> Table:
-    """Table of the paper's numbers, or one of its tables, by its key in the summary of `compare`."""
+    """Build the table of the paper's numbers, or one of its tables, by its key in the summary of `compare`."""
     captions = words.terms("paper.tables")
     if key not in captions:
         return numbers_table(rows)
@@ -94,7 +94,7 @@ def table_of(key: str, rows: Any) -> Table:
 
 
 def paper_table(caption: str, rows: Mapping[str, Row], note: str) -> Table:
-    """Build a table with symbols and units as row names and the paper's own digits, without empty columns."""
+    """Build a table in the paper's own digits, with symbols and units as row names and without empty columns."""
     has_quantities = any("quantity" in row for row in rows.values())
     columns, heads = [Column("symbol" if has_quantities else "quantity", "row")], words.terms("paper.heads")
     for key in dict.fromkeys(key for row in rows.values() for key, value in row.items() if value is not None):
@@ -121,7 +121,7 @@ ERRATUM_HEADS = {
     "evidence": "evidence",
     "measured": "measured here",
 }
-"""Column heads of the stored errata."""
+"""Headers of the errata table, by stored column."""
 ERRATUM_COLUMNS = [Column(head, name, in_signs, wide=name != "where") for name, head in ERRATUM_HEADS.items()]
 
 
@@ -133,7 +133,7 @@ def errors(results: Results) -> Section | None:
 
 
 def errata(results: Results) -> Sequence[Row]:
-    """Errata from `compare`; empty if it did not run."""
+    """Return the errata from `compare`; empty if it did not run."""
     rows: Sequence[Row] = results.summary("compare").get("errata", ())
     return rows
 
@@ -185,7 +185,7 @@ RECORDED_COLUMNS = (
 
 
 def recorded(results: Results) -> Section | None:
-    """Compare the recorded walk with both models; None without one."""
+    """Compare the recorded walk with both models; None if no walk was recorded."""
     stored = results.summary("compare").get("recorded")
     if stored is None:
         return None
@@ -227,7 +227,7 @@ def recorded_tables(stored: Row) -> Iterator[Table]:
 
 
 def answer(summary: Row) -> list[str | Table]:
-    """Report the verdicts on the paper's values or, for another walker, how the models differ."""
+    """Report the verdicts on the paper's values or, for another walker, the differences between the models."""
     errors = summary.get("numerical_error", {})
     error_lines: list[str | Table] = [
         f"numerical error of the {model} walk: {describe_error(error)}." for model, error in errors.items()

@@ -19,8 +19,8 @@ from walkerlab.evidence.paper.misprints import (
 from walkerlab.physics.hybrid.recorded_walk import as_state, take_walk
 from walkerlab.physics.solvers.system import State
 
-X_P_SETTLING_STEPS = 150  # from x_p to its fixed point: disturbances shrink by 0.6 a step
-FOOT_VELOCITY = (0.3, -0.2)  # m/s, of the foot in the check of (A.9) to (A.24)
+X_P_SETTLING_STEPS = 150  # steps from x_p to the fixed point; disturbances shrink by a factor of 0.6 per step
+FOOT_VELOCITY = (0.3, -0.2)  # m/s, velocity of the foot in the check of (A.9) to (A.24)
 
 
 @dataclass(frozen=True)
@@ -29,24 +29,24 @@ class PaperStudy:
 
     slope: float
     slope_rounding: float
-    # as_printed, corrected: gaits to which walks from x_p converge
+    # gaits to which walks from x_p converge, with the equations as printed and corrected
     as_printed: measured.RigidMeasurements
     corrected: measured.RigidMeasurements
-    # Table 3 of five gait cycles from x_p with its printed digits, equations as printed
+    # Table 3 for five gait cycles from the printed x_p, with the equations as printed
     from_x_p: measured.Characteristics
-    five_steps_energy: float  # J, time mean over the first five of these ten steps
+    five_steps_energy: float  # J, time mean of the energy over the first five of these ten steps
     fastest: float  # rad/s, largest angular velocity of the gait as printed
     largest_jump: float  # rad/s, largest change of an angular velocity at its heel strike
-    swing_foot_height: float  # m, over the slope, where (A.55) as printed places the swing foot of x_p
-    foothold_speed: float  # m/s, of the new stance foot after the impact of (A.55) as printed, on the gait as printed
+    swing_foot_height: float  # m, height above the slope at which (A.55) as printed places the swing foot of x_p
+    foothold_speed: float  # m/s, speed of the new stance foot if the printed gait's impact uses (A.55) as printed
     both_misprints: State | None  # fixed point near x_p with the misprints of (A.5) and (A.55), or None
-    # J, of one state: from the masses' velocities, and from D_e with either order of coordinates
+    # J, kinetic energy of one state: from the velocities of the masses, and from D_e with either order of coordinates
     kinetic_energy: Mapping[str, float]
     adams: AdamsStart
 
 
 def study_the_paper() -> PaperStudy:
-    """Walk the paper's walker from its printed states; takes milliseconds once compiled."""
+    """Make all measurements on the paper's own walker and slope; takes milliseconds once compiled."""
     wrong, right = printed.walker_of_the_paper(AS_PRINTED), printed.walker_of_the_paper(CORRECTED)
     x_p = printed.fixed_point_as_printed()
     as_printed, corrected = settle(wrong), settle(right)
@@ -74,7 +74,7 @@ def study_the_paper() -> PaperStudy:
 
 
 def settle(walker: RigidWalker) -> State:
-    """Stable gait to which walks from x_p converge."""
+    """Return the stable gait to which walks from x_p converge."""
     walk = take_walk(assembled(walker), measured.TIGHT, printed.fixed_point_as_printed(), X_P_SETTLING_STEPS)
     if walk.steps < X_P_SETTLING_STEPS:
         raise ArithmeticError(f"x_p does not walk: {walk.outcome.label} after {walk.steps} steps")
@@ -82,7 +82,7 @@ def settle(walker: RigidWalker) -> State:
 
 
 def kinetic_energy_by_order(walker: RigidWalker) -> dict[str, float]:
-    """Kinetic energies (J) at x_p with a moving foot: of the masses, and of D_e with angles or foot first."""
+    """Return kinetic energies (J) at x_p with a moving foot: of the masses, and by D_e with angles or foot first."""
     theta_1, theta_2, omega_1, omega_2 = printed.fixed_point_as_printed()
     D = inertia_at_impact(walker, theta_1, theta_2)
     angles_first = np.array([omega_1, omega_2, *FOOT_VELOCITY])

@@ -1,4 +1,4 @@
-"""Stage `tune`: the paper's parameter adjustment for any walker; whether it is needed, how large it is, and why."""
+"""Stage `tune`: the paper's parameter adjustment for any walker, with its necessity, size and causes."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -58,18 +58,18 @@ from walkerlab.scene.scaled import for_a_map, starts_of
 from walkerlab.scene.walk_outcomes import Pads, describe_endings
 
 RIGID_SETTINGS = Tolerances("dop853", 1e-10, 1e-12, ENDLESS)
-AS_IT_STANDS = (1.0, 1.0)
-# knees or rolling feet make walks several times slower than the compass's, so their map and margins are coarser
+AS_IT_STANDS = (1.0, 1.0)  # factors that leave the velocities of the rigid start unchanged
+# walks with knees or rolling feet take several times longer to compute, so their map and margins are coarser
 COMPASS_CELLS, OTHER_CELLS, COARSE_MARGINS = 61, 21, {"step": 0.05, "largest": 2.0}
 SEARCH_ADVICE = "Widen the search (tune.swing_factors, tune.stance_factors, tune.cells) or choose another contact."
 WALK_SUMMARY_KEYS = ("outcome", "advice", "steps", "step_periods_s", "step_lengths_m", "end_time_s")
-"""Quantities reported of each walk of the procedure."""
+"""Quantities reported for each walk of the procedure."""
 
 
 def run(config: TuneConfig, inputs: Mapping[str, Content], progress: Progress, jobs: int = 1) -> Content:
-    """Adjust the start; that none walks is a result. Raises NoAnswer if the pads need a gait that does not exist."""
+    """Adjust the start; the result may be that none walks. Raises NoAnswer if the pads need a gait that is missing."""
     rigid_step, rigid_state = rigid_start(config, inputs)
-    rigid_gait = inputs["fixedpoint"].summary  # the start may be far from any gait
+    rigid_gait = inputs["fixedpoint"].summary  # gait of the rigid model; the start may be far from it
     gait = contact_gait(config, rigid_step, as_state(rigid_gait["state"]))
     scene = replace(scene_on_pads(config, rigid_step, rigid_state, gait), pinned=False)
     tune = TuneRun(config, scene, rigid_state, gait)
@@ -86,13 +86,13 @@ def run(config: TuneConfig, inputs: Mapping[str, Content], progress: Progress, j
 class TuneRun:
     """State and results of the stage.
 
-    names       of the rigid start's coordinates
-    steps       per walk
-    hinge       whether the paper's procedure hinges the first step, as for its compass
-    walks       of the procedure: `hinged`, with a revolute joint at the first stance foot; `released`, without it;
-                and `adjusted`, from the adjusted start, if any
+    names       names of the rigid start's coordinates
+    steps       number of steps per walk
+    hinge       whether the first stance foot is hinged in one walk, as in the paper's procedure for its compass
+    walks       walks of the procedure: `hinged`, with a revolute joint at the first stance foot; `released`, without
+                it; and `adjusted`, from the adjusted start, if there is one
     printed     summaries of these walks
-    adjustment  smallest change of the velocities that walks, or None
+    adjustment  smallest change of the velocities with which the contact model walks, or None
     """
 
     def __init__(self, config: TuneConfig, scene: ContactScene, rigid_state: State, gait: GaitAnswer) -> None:
@@ -106,10 +106,10 @@ class TuneRun:
         self.printed: dict[str, dict[str, Any]] = {}
         self.margins: list[scaled_starts.Margin] = []
         self.adjusted_state: State | None = None
-        self.paper: AdamsWalk | None = None  # only for the paper's compass
+        self.paper: AdamsWalk | None = None  # walk from the paper's ADAMS start, only for the paper's compass
 
     def find(self, progress: Progress, jobs: int) -> None:
-        """Walk the procedure, compute map, adjustment and margins, and walk from the paper's start."""
+        """Run the procedure: its walks, the map, the adjusted start, its margins, and a walk from the paper's start."""
         settings = self.config.tune
         cells = settings.cells or (COMPASS_CELLS if self.hinge else OTHER_CELLS)
         swing, stance = (np.linspace(*ends, cells) for ends in (settings.swing_factors, settings.stance_factors))
@@ -136,7 +136,7 @@ class TuneRun:
             self.paper = adams_walk(self.rigid, self.walk, self.scene.walker, terrain)
 
     def adjusted(self, quick: scaled_starts.ScaledStarts) -> scaled_starts.Adjustment | None:
-        """Smallest change of the velocities that walks; None if no change does."""
+        """Return the smallest change of the velocities with which the contact model walks; None if there is none."""
         cells = self.contact_map
         if self.as_it_stands.walks:
             return scaled_starts.Adjustment(*AS_IT_STANDS, self.as_it_stands)
@@ -149,7 +149,7 @@ class TuneRun:
     def gait_factors(self) -> tuple[float, float] | None:
         """Position of the gait on the map, from the end of the adjusted walk; None if it cannot be determined.
 
-        Velocities of the last step, once the rear foot has lifted, over those of the rigid start.
+        The factors are velocities of the last step, once the rear foot has lifted, divided by those of the rigid start.
         """
         walk, n = self.walks.get("adjusted"), len(self.rigid_state) // 2
         first = self.rigid_state[n + SWING], self.rigid_state[n + STANCE]
@@ -171,7 +171,7 @@ class TuneRun:
         return scene.walk(start_state(scene, state), self.steps, tolerances or self.tolerances, interval)
 
     def take(self, name: str, state: State) -> None:
-        """Record a walk of the procedure, and its numerical error if it has an answer."""
+        """Take and record a walk of the procedure, with its numerical error unless the solver failed."""
         walk = self.walks[name] = self.walk(state, name == "hinged")
         report = self.printed[name] = walk_summary(walk)
         if walk.outcome.answered:
@@ -207,7 +207,7 @@ def summary(tune: TuneRun) -> dict[str, Any]:
 
 
 def papers_start(paper: AdamsWalk) -> dict[str, Any]:
-    """Summarise the walk from the paper's start, and that start in the rigid model."""
+    """Summarise the walks of both models from the paper's start."""
     return {
         "outcome": paper.walk.outcome.label,
         "reason": paper.reason,
@@ -223,7 +223,7 @@ def papers_start(paper: AdamsWalk) -> dict[str, Any]:
 
 
 def table_2(tune: TuneRun) -> dict[str, dict[str, Any]]:
-    """The start before and after adjustment with percentages and, for the paper's compass, the printed values."""
+    """Tabulate the start before and after adjustment, percentages and, for the paper's compass, the printed values."""
     rows, adjusted = {}, tune.adjusted_state
     for k, (name, value) in enumerate(zip(tune.names, tune.rigid_state, strict=True)):
         row: dict[str, Any] = {"unit": "rad" if k < len(tune.names) // 2 else "rad/s"}
@@ -247,12 +247,12 @@ def table_2(tune: TuneRun) -> dict[str, dict[str, Any]]:
 
 
 def percent(value: float, reference: float, base: float) -> float | None:
-    """Increase in magnitude over `reference`, in percent of `base`; None for a base of zero."""
+    """Return the increase in magnitude over `reference`, in percent of `base`; None for a base of zero."""
     return 100.0 * (abs(value) - abs(reference)) / abs(base) if base else None
 
 
 def gait_summary(tune: TuneRun) -> dict[str, Any]:
-    """Summarise the contact model's gait, or why the search found no gait."""
+    """Summarise the contact model's gait, or give the reason why the search found none."""
     gait = tune.gait.gait
     report = {"found": gait is not None, "reason": tune.gait.reason, "advice": tune.gait.advice}
     if gait is None:
@@ -279,7 +279,7 @@ def gait_summary(tune: TuneRun) -> dict[str, Any]:
 
 
 def section_coordinates(scene: ContactScene) -> list[tuple[str, str]]:
-    """Descriptions and units of a gait's coordinates on its section."""
+    """Return descriptions and units of a gait's coordinates on its section."""
     walker, names = scene.walker, [body.name for body in scene.assembly.bodies]
 
     def of(quantity: str, unit: str, bodies: tuple[int, ...]) -> list[tuple[str, str]]:
@@ -297,7 +297,7 @@ def section_coordinates(scene: ContactScene) -> list[tuple[str, str]]:
 
 
 def adjustment_summary(tune: TuneRun) -> dict[str, Any]:
-    """Smallest change that walks, whether any is needed, and the margins around it."""
+    """Summarise the adjustment: whether it is needed, the smallest change that works, and the margins around it."""
     change = tune.adjustment
     report: dict[str, Any] = {"needed": not tune.as_it_stands.walks, "found": change is not None}
     if change is None:
@@ -346,7 +346,7 @@ def groups(tune: TuneRun) -> dict[str, Group]:
 
 
 def legs_in_time(walk: ContactWalkResult, walker: ContactWalker) -> dict[str, Variable]:
-    """Angles and velocities of the legs; empty without samples."""
+    """Return angles and velocities of the legs; empty if the walk has no samples."""
     if walk.samples is None:
         return {}
     angle, velocity = leg_motion(walk.samples.states, walker)
@@ -354,7 +354,7 @@ def legs_in_time(walk: ContactWalkResult, walker: ContactWalker) -> dict[str, Va
 
 
 def map_group(tune: TuneRun) -> Group:
-    """Outcome and steps of both models over the two factors."""
+    """Return the outcome and steps of both models over the two velocity factors."""
     cells, rigid, swing, stance = tune.contact_map, tune.rigid_map, "swing_factor", "stance_factor"
     over = {
         "outcome": (cells.outcome, "outcome of the contact model's walk, see attribute outcomes"),

@@ -1,4 +1,4 @@
-"""Part of `tune`: the approach to the rigid limit, and the share of each contact property in the difference."""
+"""Part of `tune`: the approach to the rigid limit, and the contribution of each contact property to the difference."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -34,10 +34,10 @@ from walkerlab.pipeline.store.content import Group
 from walkerlab.scene.contact import SAMPLES_PER_PENDULUM_TIME, ContactScene, apply_drives, knee_rules, start_state
 from walkerlab.scene.parts import assembly_of
 
-SAMPLING_FACTOR = 4  # times the sampling of contact-sim, so that interpolation errors stay far below the model error
+SAMPLING_FACTOR = 4  # times as many samples as contact-sim, so that interpolation errors stay far below the model error
 COMPASS_SERIES = STICTION_SERIES, STIFFNESS_SERIES, DAMPING_SERIES, NORMAL_SERIES
 GAIT_SERIES = STICTION_SERIES, NORMAL_SERIES
-COARSE_STRIDE = 3  # stride through the settings for slower walkers than the compass
+COARSE_STRIDE = 3  # use every third setting for walkers that are slower to simulate than the compass
 SETTING = "setting"
 FACTOR_LABELS = {
     "stiffness": Label("1", "factor on the stiffness", name="stiffness_factor"),
@@ -70,11 +70,11 @@ WALK_LABELS = {
 
 @dataclass(frozen=True)
 class LimitFindings:
-    """Distances by series, and the limit without creep."""
+    """Distances from the rigid limit by series, and the limit without creep."""
 
-    walk_series: tuple[str, ...]  # series in which complete walks are compared as well
-    rigid_period: float
-    contact_period: float
+    walk_series: tuple[str, ...]  # series in which whole walks are compared, too
+    rigid_period: float  # s, period of the rigid gait
+    contact_period: float  # s, period of the contact gait
     series: dict[str, list[Distance]]
     without_creep: Extrapolation | None
 
@@ -90,7 +90,7 @@ def limit_findings(
     """Take the contact to the rigid limit; None if the rigid walk has no samples or no step.
 
     rigid_gait  summary of `fixedpoint`
-    walk        of the rigid model from the start
+    walk        walk of the rigid model from the start
     """
     if walk.samples is None or walk.steps == 0:
         return None
@@ -108,7 +108,7 @@ def limit_findings(
         scene.ground.frame.pendulum_time / (SAMPLING_FACTOR * SAMPLES_PER_PENDULUM_TIME),
         1 if compass else COARSE_STRIDE,
     )
-    # feet other than points roll in both models
+    # only the compass has point feet in one model and round feet in the other
     compared = (ALL_SERIES, ALL_POINT_SERIES) if isinstance(config.walker, CompassWalker) else (ALL_SERIES,)
     gaits = COMPASS_SERIES if compass else GAIT_SERIES
     progress.start("tune: rigid limit", len(compared) + len(gaits))
@@ -133,7 +133,7 @@ def limit_findings(
 
 
 def limit_summary(findings: LimitFindings) -> dict[str, Any]:
-    """Orders of convergence, the settings that reach the paper's 1e-4 rad, and the share of each cause."""
+    """Summarise orders of convergence, settings that reach the paper's 1e-4 rad, and contributions of the causes."""
     reaches = {}
     for name in findings.walk_series:
         distances = [distance for distance in findings.series[name] if distance.angle is not None]
@@ -158,9 +158,9 @@ def setting(distance: Distance) -> dict[str, Any]:
 
 
 def causes(findings: LimitFindings) -> dict[str, Any]:
-    """Difference in period by cause, each found by switching off one property while the others stay.
+    """Return the difference in period (s) by cause, found by switching off one property at a time.
 
-    The rest is their joint effect, and also that of creep where its limit was not reached.
+    The rest is the joint effect of these properties; it includes creep if the limit without creep was not reached.
     """
     total = findings.contact_period - findings.rigid_period
     farthest = findings.series[findings.walk_series[-1]]
@@ -181,7 +181,7 @@ def causes(findings: LimitFindings) -> dict[str, Any]:
 
 
 def limit_groups(findings: LimitFindings) -> dict[str, Group]:
-    """One group per series: its settings and distances, and those of whole walks where compared."""
+    """Build one group per series: its settings and distances, including whole walks where they are compared."""
     groups = {}
     for name, rows in findings.series.items():
         complete = [distance for distance in rows if distance.angle is not None and name in findings.walk_series]

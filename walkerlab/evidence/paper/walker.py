@@ -1,4 +1,4 @@
-"""A config's walker in the form of Appendix A."""
+"""Conversion of a config's walker to the form of Appendix A."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""Templates for texts about the paper, with its printed values and their direct consequences at hand.
+"""Templates for texts about the paper, which can use its printed values and quantities derived from them.
 
-A package of its own: only results of modules that import it depend on its words.
+This is a package of its own so that only results of modules that import it depend on its words.
 """
 
 import math
