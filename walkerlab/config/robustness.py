@@ -1,4 +1,4 @@
-"""The robustness block: disturbances of a gait, and parameters it is differentiated by."""
+"""The robustness block: disturbances of a gait, and the parameters for its derivatives."""
 
 from typing import Annotated, Final, Literal
 
