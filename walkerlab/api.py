@@ -397,7 +397,7 @@ def explore(
     runs: str | Path = RUNS,
     **keys: Any,
 ) -> Any:
-    """Show the page of `walkerlab explore` in a notebook; a browser opens its `url`, and `close()` stops it.
+    """Return the page of `walkerlab explore` for a notebook; its `url` opens in a browser, and `close()` stops it.
 
     walker     built by `compass`, `kneed` or `walker`
     slope_deg  slope in deg, positive downhill

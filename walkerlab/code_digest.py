@@ -45,7 +45,7 @@ class Sources:
         return digest_of(texts + [(label, path.read_bytes()) for label, path in sorted(files.items())])
 
     def closure(self, *names: str) -> list[Module]:
-        """Return modules and everything they import, even indirectly, from their own packages and this one, by name.
+        """Return modules and all direct and indirect imports from their own packages and this one, sorted by name.
 
         Raises ModuleNotFoundError if there is no such module.
         """
@@ -100,7 +100,7 @@ class Module:
 
     @cached_property
     def imports(self) -> list[str]:
-        """Full names of modules that it may import; see `find_imports`."""
+        """Full names of modules that this module may import; see `find_imports`."""
         return find_imports(self.name, self.is_package, self.text)
 
     @cached_property

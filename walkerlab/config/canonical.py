@@ -1,4 +1,4 @@
-"""Selected parts of a config, and canonical JSON, from which the keys of results are made."""
+"""Selected parts of a config, and canonical JSON, for making the keys of results."""
 
 import json
 from collections.abc import Iterator, Mapping

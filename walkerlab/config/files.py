@@ -169,7 +169,7 @@ def _text_of(file: ConfigFile, reference: Position | None, purpose: str = "") ->
         beyond = "" if purpose or file.path.suffix else beyond_scope(file.path.name)
         text = f"there is no {kind} {file.label}{f'; {beyond}' if beyond else ''}"
         raise problem_error(reference, text, there_is, "" if beyond else _near(file), advice) from None
-    except (OSError, ValueError, RuntimeError) as error:  # ValueError: null byte in the name; RuntimeError: loop of links
+    except (OSError, ValueError, RuntimeError) as error:  # ValueError: null byte in the name; RuntimeError: link loop
         reason = (error.strerror if isinstance(error, OSError) else None) or str(error)
         raise problem_error(reference, f"{kind} {file.label} cannot be read: {reason.lower()}") from None
     if len(data) > 4 * MAX_CHARACTERS:

@@ -159,7 +159,7 @@ UNSAFE: Final = re.compile(r"[^A-Za-z0-9._,@=+-]")
 
 
 def changes_of(base: Config, changed: Config, slope_deg: float | None = None) -> tuple[str, ...]:
-    """List the keys in which `changed` differs from `base`, as KEY=VALUE; `slope_deg` if the slope is in degrees."""
+    """List the keys in which `changed` differs from `base`, as KEY=VALUE; `slope_deg` is passed if it was typed."""
     before, after = base.model_dump(mode="json", exclude={"name"}), changed.model_dump(mode="json", exclude={"name"})
     added = []
     for name in before:

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 @cache
 def keys_of(takes: type) -> dict[str, type | None]:
-    """Map the keys of a type (base classes first) to the type of the part that is read; None for keys read whole."""
+    """Map each key of a type (base classes first) to the type of the part that is read, or to None if read whole."""
     members = (item for base in reversed(takes.__mro__) for item in vars(base).items())
     return {name: _part(member) for name, member in members if isinstance(member, property)}
 

@@ -26,7 +26,7 @@ EXTENDS_MEANING: Final = "config this one inherits from: a file, from this file'
 
 @dataclass(frozen=True, slots=True)
 class KeyReference:
-    """Description of one key, in texts."""
+    """Description of one config key; every fact is a text."""
 
     key: str
     type: str

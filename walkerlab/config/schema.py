@@ -140,7 +140,7 @@ def factors(least: float, most: float, velocity: str) -> Any:
 
 
 class Tune(Block):
-    """Ranges in which the two initial angular velocities are adjusted until the contact model walks."""
+    """Settings for adjusting the two initial angular velocities until the contact model walks."""
 
     cells: int | None = key(
         None,
@@ -188,7 +188,7 @@ class Source(Block):
 
 
 class Config(Block):
-    """Scene, and the computations to do with it."""
+    """A scene, and settings of the computations on it."""
 
     name: str = key(
         "paper",

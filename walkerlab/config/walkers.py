@@ -58,7 +58,7 @@ def parts(of: type[Block], meaning: str, default: Any = ..., number: str = "") -
 
 
 def check_arc(name: str, of: str, limit: Callable[[Any], float] = float) -> Any:
-    """Validate that the foot radius is below `limit(value of key `of`)`; messages describe the limit as `name`."""
+    """Validate that the foot radius is below a limit computed from the value of key `of`; errors call it `name`."""
     return check_against(
         "foot_radius_m", of, lambda arc, owner: "" if arc < limit(owner) else f"must be below {name}, {limit(owner):g}"
     )
@@ -333,7 +333,7 @@ class PartsWalker(_Legged):
 def hip_to_sole(
     hinges: tuple[PartHinge, ...], feet: tuple[PartFoot, PartFoot], legs: tuple[LegBodies, LegBodies]
 ) -> float | None:
-    """Return the depth (m) of the first leg's sole below the hip, upright; None if hinges do not connect the legs."""
+    """Return the depth (m) of the first leg's sole below the hip, legs upright; None if hinges do not connect them."""
     places = {(hinge.parent, hinge.child): (hinge.parent_point_m, hinge.child_point_m) for hinge in hinges}
     places |= {(hinge.child, hinge.parent): (hinge.child_point_m, hinge.parent_point_m) for hinge in hinges}
     chain = [legs[1][0], *legs[0]] if legs[0] and legs[1] else []
