@@ -85,7 +85,7 @@ class Result:
 
     @property
     def groups(self) -> tuple[str, ...]:
-        """Names of the groups for `dataset`."""
+        """Names of the groups of arrays, as arguments of `dataset`."""
         return tuple(path for path, group in self.content.groups.items() if group.variables)
 
     def dataset(self, group: str) -> Any:

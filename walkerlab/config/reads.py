@@ -38,7 +38,7 @@ def keys_of(takes: type) -> dict[str, type | None]:
 def _part(member: property) -> type | None:
     getter: Any = member.fget
     result_type = getter.__globals__.get(getter.__annotations__.get("return"))
-    # a block itself, which is not a Protocol, is read whole
+    # config blocks, which are not Protocols, are read whole
     return result_type if Protocol in getattr(result_type, "__mro__", ()) else None
 
 
@@ -122,7 +122,7 @@ class ContactSolvers(Protocol):
 
 
 class GroundConfig(SceneConfig, Protocol):
-    """Scene and the solver settings of the contact model."""
+    """Scene, and solver settings of the contact model."""
 
     @property
     def solver(self) -> ContactSolvers: ...

@@ -27,7 +27,7 @@ COMMON_SLOPES = (0.03, 0.12)  # rad; most walkers that have gaits have them on t
 # rad; the steepest slope to which gaits are followed lies between these
 MIN_FOLLOWED_TO, MAX_FOLLOWED_TO = 0.2, 0.35
 SUGGESTION_SEARCH = SearchSettings(random_starts=50, further_starts=100)
-SUGGESTION_POINTS = 60  # maximum per branch
+SUGGESTION_POINTS = 60  # maximum number of points of a branch
 INSET = 0.1  # distance kept from the end of a range, as a fraction of the range
 FOOT_KEY = "foot_centre_ahead_m"
 FOOT_SHARES = (0.02, 0.03, 0.04, 0.05)  # distances of the feet ahead of the shanks, in leg lengths
